@@ -1,0 +1,9 @@
+"""Planar ANCF beams of any order as scikit-fem elements."""
+
+from . import forms
+from .beam import Beam, reference_coordinates
+from .elements import ElementBeamANCF, ElementBeamPatelShabana
+from .errors import (AncfError, ConvergenceError, InputError, MeshError, MissingExtra, NameUnknown,
+                     SupportError)
+from .materials import NeoHookean, StVenantKirchhoff
+from .mesh import MeshBeam

@@ -1,0 +1,336 @@
+"""A beam: a mesh, an element, a material and a formulation."""
+
+from functools import cached_property
+
+import numpy as np
+from skfem.assembly import Basis, FacetBasis, asm
+from skfem.element import ElementVector
+
+from . import forms
+from .elements import ElementBeam
+from .errors import InputError, MeshError, NameUnknown, require_positive
+from .formulations import COMPONENTS, get_formulation
+from .kernel import Kernel
+from .materials import Material
+from .mesh import MeshBeam
+from .quadrature import gauss, tensor
+
+
+def reference_coordinates(basis):
+    """Coordinates of the stress-free state of a basis of the position field.
+
+    Parameters
+    ----------
+    basis
+        A ``Basis`` of ``ElementVector(element)`` on a MeshBeam.
+
+    Returns
+    -------
+    ndarray
+        Shape (basis.N,).
+
+    Examples
+    --------
+    >>> from skfem import Basis, ElementVector
+    >>> from skfem_ancf import ElementBeamANCF, MeshBeam, reference_coordinates
+    >>> basis = Basis(MeshBeam.init_line([0, 2], height=0.1), ElementVector(ElementBeamANCF(1)))
+    >>> reference_coordinates(basis).tolist()  # r, r_X, r_Y of both nodes
+    [0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 2.0, 0.0, 1.0, 0.0, 0.0, 1.0]
+    """
+    return _coordinates(basis.mesh, basis.elem.elem, basis.mesh.p)
+
+
+def _coordinates(mesh, element, p):
+    q = element.rigid(mesh.p_X, mesh.p_Y)
+    q[0] = p
+    return np.ascontiguousarray(q.transpose(2, 0, 1)).ravel()
+
+
+class Beam:
+    """A planar beam.
+
+    Parameters
+    ----------
+    mesh
+        A :class:`~skfem_ancf.MeshBeam`.
+    element
+        A beam element, for example ``ElementBeamANCF(3)``.
+    material
+        A material, for example :class:`~skfem_ancf.StVenantKirchhoff`.
+    width
+        Width of the section, positive.
+    formulation
+        How the strain is sampled and integrated: a name from
+        :data:`skfem_ancf.formulations.FORMULATIONS`, or a formulation.
+    name
+        What messages and multi-beam scenes call the beam.
+
+    Raises
+    ------
+    InputError
+        If an argument is of the wrong kind or out of range.
+    NameUnknown
+        If the formulation is not known.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, StVenantKirchhoff
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 17), height=0.01), ElementBeamANCF(3),
+    ...             StVenantKirchhoff(E=2e8, nu=0.3, density=7800), width=0.01)
+    >>> beam.N, round(beam.total_mass, 6)
+    (170, 0.78)
+    """
+
+    def __init__(self, mesh, element, material, width, formulation="continuum", name=None):
+        for argument, kind, value in (("mesh", MeshBeam, mesh), ("element", ElementBeam, element),
+                                      ("material", Material, material)):
+            if not isinstance(value, kind):
+                raise InputError(f"{argument} must be a {kind.__name__}, got {value!r}")
+        self.mesh, self.element, self.material = mesh, element, material
+        self.width = require_positive("width", width)
+        self.formulation = get_formulation(formulation)
+        self.name = name
+        self.nd = 2 * element.nodal_dofs
+        self.N = self.nd * mesh.p.shape[1]
+
+    def __repr__(self):
+        return (f"<Beam {self.name or ''}: {self.mesh.nelements} elements of order "
+                f"{self.element.order}, {self.N} coordinates, {self.formulation.name}>")
+
+    # the scikit-fem side
+
+    @cached_property
+    def vector_element(self):
+        """The element of the position field: ``ElementVector(element)``."""
+        return ElementVector(self.element)
+
+    @cached_property
+    def basis(self):
+        """A scikit-fem ``Basis`` of the position field with the formulation's quadrature."""
+        return Basis(self.mesh, self.vector_element,
+                     quadrature=self.formulation.terms(self.element, self.material)[0].quadrature)
+
+    def exact_basis(self):
+        """A ``Basis`` whose quadrature is exact for products of two coordinates, as in the mass."""
+        n = self.element.axis_degree + 1 + (0 if self.mesh.is_straight else 1)
+        return Basis(self.mesh, self.vector_element,
+                     quadrature=tensor(gauss(n), gauss(self.element.order + 1)))
+
+    def facet_basis(self, facets, intorder=None):
+        """A scikit-fem ``FacetBasis`` of the position field."""
+        order = 2 * max(self.element.axis_degree, self.element.order) + 2
+        return FacetBasis(self.mesh, self.vector_element, facets=facets,
+                          intorder=order if intorder is None else intorder)
+
+    @cached_property
+    def kernel(self):
+        """The fused evaluation of the strain energy; see :mod:`skfem_ancf.kernel`."""
+        return Kernel(self.mesh, self.element, self.material, self.width, self.formulation)
+
+    # coordinates
+
+    @cached_property
+    def q0(self):
+        """Coordinates of the stress-free state, shape (N,)."""
+        return _coordinates(self.mesh, self.element, self.mesh.p)
+
+    @cached_property
+    def origin(self):
+        """A point near the beam, from which positions are measured inside the package."""
+        return self.mesh.p.mean(axis=1)
+
+    @cached_property
+    def q0_local(self):
+        """Coordinates of the stress-free state with positions measured from :attr:`origin`."""
+        return _coordinates(self.mesh, self.element, self.mesh.p - self.origin[:, None])
+
+    @property
+    def dofnames(self):
+        """Names of the coordinates of a node, as scikit-fem gives them: r^1, r^2, r_X^1, ..."""
+        return self.vector_element.dofnames
+
+    def nodes(self, boundary):
+        """Nodes of a named boundary, or of anything else scikit-fem takes for facets."""
+        return self.mesh._expand_facets(self.mesh.normalize_facets(boundary))[0]
+
+    def dofs(self, boundary, names=None):
+        """Coordinate numbers at a boundary.
+
+        Parameters
+        ----------
+        boundary
+            A boundary name, or anything else scikit-fem takes for facets.
+        names
+            Coordinate names, as ``"r^1"``, or without component, as ``"r"``; None for all.
+
+        Raises
+        ------
+        NameUnknown
+            If a name is not known; the message lists the known ones.
+        """
+        known = self.dofnames
+        if names is None:
+            rows = np.arange(len(known))
+        else:
+            names = [names] if isinstance(names, str) else list(names)
+            for name in names:
+                if name not in known and name not in self.element.dofnames:
+                    raise NameUnknown("coordinate", name, known)
+            rows = np.array([k for k, full in enumerate(known)
+                             if full in names or full.rsplit("^", 1)[0] in names])
+        return np.sort((self.nodes(boundary)[:, None] * self.nd + rows).ravel())
+
+    def locate(self, point):
+        """Element and reference point of a material point.
+
+        Parameters
+        ----------
+        point
+            Position in the stress-free body, shape (2,).
+
+        Returns
+        -------
+        int, ndarray
+            The element and (xi, eta).
+
+        Raises
+        ------
+        MeshError
+            If the point is outside the body.
+        """
+        x = np.asarray(point, dtype=np.float64)
+        if x.shape != (2,):
+            raise MeshError(f"a material point has two coordinates, got {point!r}")
+        e = self._finder(*x[:, None])
+        X = self.mesh.mapping().invF(x[:, None, None], tind=e)[:, 0, 0]
+        return int(e[0]), np.clip(X, 0.0, 1.0)
+
+    @cached_property
+    def _finder(self):
+        return self.mesh.element_finder()
+
+    def probe(self, point):
+        """Coordinate numbers and weights of the position of a material point.
+
+        Returns
+        -------
+        dofs, weights
+            Shapes (2, n) and (n,): ``q[dofs] @ weights`` is the position.
+        """
+        e, X = self.locate(point)
+        return self.probe_reference(e, X)
+
+    def probe_reference(self, e, X):
+        """As :meth:`probe`, for the point X = (xi, eta) of the reference cell of element ``e``."""
+        mapping, tind = self.mesh.mapping(), np.array([e])
+        weights = np.array([self.element.gbasis(mapping, X[:, None], i, tind)[0][0, 0]
+                            for i in range(2 * self.element.nodal_dofs)])
+        first = self.mesh.t[0, e] * self.nd
+        return first + np.arange(2 * self.nd).reshape(-1, 2).T, weights
+
+    def section_node(self, boundary):
+        """The one node of a boundary that is an end section."""
+        facets = np.asarray(self.mesh.normalize_facets(boundary))
+        if len(facets) != 1 or facets[0] >= self.mesh.p.shape[1]:
+            raise MeshError(f"boundary {boundary!r} is not one section of the beam; sections are "
+                            "'left' and 'right'")
+        return int(facets[0])
+
+    def section_direction(self, node):
+        """Coordinates (2, n) and weights (n,) of the direction 12 / h^3 int Y r dY of a section."""
+        eta, w = gauss(self.element.order + 1)
+        h, f = self.mesh.height, self.element.functionals[2:]
+        c = np.array([12.0 * h ** (f[k][2] - 1) * np.sum(
+            w * (eta - 0.5) * self.element.section(eta - 0.5, k)[0]) for k in range(len(f))])
+        return node * self.nd + 4 + np.arange(2 * len(f)).reshape(-1, 2).T, c
+
+    def rigid_motions(self):
+        """Two translations and the rotation about :attr:`origin`: shape (N, 3)."""
+        q = self.q0_local.reshape(-1, self.nd // 2, 2)
+        out = np.zeros(q.shape + (3,))
+        out[:, 0, 0, 0] = out[:, 0, 1, 1] = 1.0
+        out[..., 0, 2], out[..., 1, 2] = -q[..., 1], q[..., 0]
+        return out.reshape(self.N, 3)
+
+    # fields
+
+    def gradients(self, u, X, tind=None):
+        """Displacement gradient in the beam's frame and the frame.
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (N,).
+        X
+            Reference points, (2, npoints) or (2, nelements, npoints).
+        tind
+            Elements, or None for all.
+
+        Returns
+        -------
+        H, frame
+            Shape (2, 2, nelements, npoints) both: H[i, J] = d u_i / d X_J, J along the frame.
+        """
+        mapping = self.mesh.mapping()
+        u_e = self.kernel.gather(u, slice(None) if tind is None else tind)
+        grad = sum(np.einsum("ei,jep->ijep", u_e[:, k], self.element.gbasis(mapping, X, k, tind)[0].grad)
+                   for k in range(u_e.shape[1]))
+        frame = mapping.frame(X, tind)
+        return np.einsum("ijep,jJep->iJep", grad, frame), frame
+
+    def displacements(self, u, X, tind=None):
+        """Displacement at reference points, shape (2, nelements, npoints)."""
+        mapping = self.mesh.mapping()
+        u_e = self.kernel.gather(u, slice(None) if tind is None else tind)
+        return sum(np.einsum("ei,ep->iep", u_e[:, k],
+                             np.asarray(self.element.gbasis(mapping, X, k, tind)[0]))
+                   for k in range(u_e.shape[1]))
+
+    def strain(self, u, X, tind=None):
+        """Green-Lagrange strain of the formulation: (eps_xx, eps_yy, 2 eps_xy).
+
+        Arguments as in :meth:`gradients`; shape (3, nelements, npoints).
+        """
+        term = self.formulation.terms(self.element, self.material)[0]
+
+        def component(k, X):
+            H, e = self.gradients(u, X, tind)
+            F = e + H
+            if k < 2:
+                return 0.5 * np.sum((F[:, k] + e[:, k]) * H[:, k], axis=0)
+            return np.sum(F[:, 0] * H[:, 1] + H[:, 0] * e[:, 1], axis=0)
+
+        out = []
+        for k, name in enumerate(COMPONENTS):
+            weights = term.interpolation(name, np.ravel(X[0]))
+            if weights is None:
+                out.append(component(k, X))
+                continue
+            weights = weights.reshape(X[0].shape + (-1,))
+            out.append(sum(weights[..., j] * component(k, np.array([0.0 * X[0] + xi, X[1]]))
+                           for j, xi in enumerate(term.nodes(name))))
+        return np.array(out)
+
+    def stress(self, strain):
+        """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) of a strain of :meth:`strain`."""
+        return self.formulation.stress(self.element, self.material, strain)
+
+    # mass
+
+    @property
+    def total_mass(self):
+        """Mass of the beam."""
+        return self.density * self.width * float(np.sum(
+            self.exact_basis().dx))
+
+    @property
+    def density(self):
+        """Density of the material; raises InputError if the material has none."""
+        if self.material.density is None:
+            raise InputError(f"{self.material!r} has no density: give one to use mass or gravity")
+        return self.material.density
+
+    def mass(self):
+        """The mass matrix, constant, sparse, shape (N, N)."""
+        return asm(forms.mass(self.density, self.width), self.exact_basis())

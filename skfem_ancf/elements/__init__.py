@@ -1,0 +1,13 @@
+"""Beam elements: what is interpolated. A new element is one file and one line here."""
+
+from .ancf import ElementBeamANCF
+from .base import ElementBeam
+from .patel_shabana import ElementBeamPatelShabana
+
+#: The elements that the tests run over, by name.
+ELEMENTS = {
+    **{f"ancf-{n}": (lambda n=n: ElementBeamANCF(n)) for n in range(1, 11)},
+    "patel-shabana": ElementBeamPatelShabana,
+}
+
+__all__ = ["ELEMENTS", "ElementBeam", "ElementBeamANCF", "ElementBeamPatelShabana"]

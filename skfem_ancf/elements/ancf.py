@@ -1,0 +1,78 @@
+"""The ANCF beam element of order N."""
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from ..errors import InputError, NameUnknown
+from .base import ElementBeam, SectionFunctions
+
+
+def _chebyshev(n):
+    """Both faces, and the zeros of the Chebyshev polynomial T_{n-2} between them."""
+    m = n - 2  # sines, not cosines: antisymmetric to the last digit, and 0 in the middle
+    return np.concatenate([[-1.0], np.sin(np.arange(1 - m, m, 2) * np.pi / (2 * m)), [1.0]])
+
+
+def _gauss_lobatto(n):
+    inner = legendre.legroots(legendre.legder(np.eye(n)[n - 1]))
+    return np.concatenate([[-1.0], inner, [1.0]])
+
+
+POINT_FAMILIES = {
+    "chebyshev": _chebyshev,
+    "gauss-lobatto": _gauss_lobatto,
+    "equispaced": lambda n: np.linspace(-1.0, 1.0, n),
+}
+
+
+class ElementBeamANCF(ElementBeam):
+    """Beam element with position, axis slope and N section slopes at each node.
+
+    The position is cubic along the axis; the section is a polynomial of degree N in Y whose
+    derivative ``r_Y`` is interpolated at N points of the section, from the bottom to the top.
+    Order 1 is the element of Omar and Shabana, order 2 that of Zheng.
+
+    Parameters
+    ----------
+    order
+        Degree N >= 1 of the section.
+    points
+        Where the section slopes sit: "chebyshev" (both faces and the zeros of T_{N-2}),
+        "gauss-lobatto" or "equispaced". The space is the same, only the coordinates differ.
+
+    Raises
+    ------
+    InputError
+        If the order is not an integer >= 1.
+    NameUnknown
+        If the family of points is not known.
+
+    References
+    ----------
+    "A series of locking-free beam element models in absolute nodal coordinate formulation",
+    Archive of Applied Mechanics (2024), section 2.
+
+    Examples
+    --------
+    >>> from skfem import Basis, ElementVector
+    >>> from skfem_ancf import ElementBeamANCF, MeshBeam
+    >>> element = ElementBeamANCF(3)
+    >>> element.dofnames
+    ['r', 'r_X', 'r_Y0', 'r_Y1', 'r_Y2']
+    >>> int(Basis(MeshBeam.init_line([0, 0.5, 1], height=0.1), ElementVector(element)).N)
+    30
+    """
+
+    def __init__(self, order, points="chebyshev"):
+        if isinstance(order, bool) or not isinstance(order, (int, np.integer)) or order < 1:
+            raise InputError(f"the order of an ANCF beam element is an integer >= 1, got {order!r}")
+        if not isinstance(points, str) or points not in POINT_FAMILIES:
+            raise NameUnknown("family of section points", points, POINT_FAMILIES)
+        n = int(order)
+        x = np.zeros(1) if n == 1 else (
+            np.array([-1.0, 1.0]) if n == 2 else POINT_FAMILIES[points](n))
+        self.section_points = 0.5 * x
+        names = [f"r_Y{k}" for k in range(n)]
+        super().__init__(
+            SectionFunctions(np.linalg.inv(legendre.legvander(x, n - 1))), names,
+            [(y, 0, 1) for y in self.section_points], names)

@@ -1,0 +1,139 @@
+"""What every beam element shares: products of axis and section functions."""
+
+import numpy as np
+from numpy.polynomial import legendre
+from skfem.element import DiscreteField, Element
+
+from ..reference import RefBeam, hermite, linear
+
+
+class ElementBeam(Element):
+    """A scalar beam element; wrap it in scikit-fem's ``ElementVector`` for the position field.
+
+    The local functions are, for each of the two nodes, a cubic Hermite function in xi for the
+    position ``r`` and its slope ``r_X`` on the axis, then ``(1 - xi) P_k(Y)`` or ``xi P_k(Y)``
+    for each section coordinate. A subclass sets :attr:`section` and :attr:`dofnames`.
+
+    Attributes
+    ----------
+    section : SectionFunctions
+        The functions P_k of the section.
+    welded : list of str
+        Names of the coordinates that a welded face fixes: the position of every point of it.
+    functionals : list of (float, int, int)
+        For each coordinate of a node: eta - 1/2 of the point, and the number of derivatives
+        along X and Y that the coordinate is.
+    axis_degree : int
+        Polynomial degree along the axis.
+    carries_shear_parabola : bool
+        True if the section functions hold Y^3, so that no shear correction is wanted.
+    """
+
+    refdom = RefBeam
+    axis_degree = 3
+
+    def __init__(self, section, names, functionals, welded):
+        self.section = section
+        self.dofnames = ["r", "r_X", *names]
+        self.nodal_dofs = len(self.dofnames)
+        self.functionals = [(0.0, 0, 0), (0.0, 1, 0), *functionals]
+        self.welded = ["r", *welded]
+        self.doflocs = np.array([[xi, 0.5 + f[0]] for xi in (0.0, 1.0) for f in self.functionals])
+        # stock quadrature takes 2 maxdeg in each direction: exact for the energy, which is of
+        # degree 8 along the axis and 4 N across the section
+        self.maxdeg = max(4, 2 * self.section.degree)
+
+    @property
+    def order(self):
+        """Degree N of the section functions."""
+        return self.section.degree
+
+    @property
+    def carries_shear_parabola(self):
+        return self.section.degree >= 3
+
+    def local(self, X, h, i):
+        """Local function i on the reference cell, its derivatives, and its power of the length.
+
+        Parameters
+        ----------
+        X
+            Reference points, shape (2, npoints) or (2, nelements, npoints).
+        h
+            Height of the section.
+        i
+            Number of the local function, 0 to 2 nodal_dofs - 1.
+
+        Returns
+        -------
+        value, d_xi, d_eta
+            Arrays of shape X.shape[1:].
+        slope
+            1 if the coordinate is a derivative along X, so that the function takes a factor L.
+        """
+        node, k = divmod(i, self.nodal_dofs)
+        if not 0 <= i < 2 * self.nodal_dofs:
+            self._index_error()
+        if k < 2:
+            values, slopes = (hermite(X[0], d)[2 * node + k] for d in (0, 1))
+            return values, slopes, 0.0 * X[1], k
+        P, dP = self.section(X[1] - 0.5, k - 2)
+        a, da = (linear(X[0], d)[node] for d in (0, 1))
+        size = h ** self.functionals[k][2]
+        return size * a * P, size * da * P, size * a * dP, 0
+
+    def gbasis(self, mapping, X, i, tind=None):
+        mesh = mapping.mesh
+        value, d_xi, d_eta, slope = self.local(X, mesh.height, i)
+        lengths = mesh.lengths if tind is None else mesh.lengths[tind]
+        scale = lengths[:, None] if slope else np.ones((len(lengths), 1))
+        invDF = mapping.invDF(X, tind)
+        grad = scale * (invDF[0] * d_xi + invDF[1] * d_eta)
+        return (DiscreteField(value=scale * value, grad=grad),)
+
+    def rigid(self, p_X, p_Y):
+        """The coordinates of a node in the stress-free state, less its position.
+
+        Parameters
+        ----------
+        p_X, p_Y
+            Gradients of the stress-free position at the nodes, shape (2, n).
+
+        Returns
+        -------
+        ndarray
+            Shape (nodal_dofs, 2, n); the first row, for ``r``, is zero.
+        """
+        gradient = {(0, 0): 0.0 * p_X, (1, 0): p_X, (0, 1): p_Y}
+        return np.array([gradient.get(f[1:], 0.0 * p_X) for f in self.functionals])
+
+    def __repr__(self):
+        return f"<{type(self).__name__} of order {self.order}, coordinates {self.dofnames}>"
+
+
+class SectionFunctions:
+    """Polynomials P_k(eta), P_k(0) = 0, given by their derivatives in the Legendre basis.
+
+    The beam's section function is ``h^m P_k(Y / h)`` for a coordinate that is an m-th derivative.
+
+    Parameters
+    ----------
+    derivatives
+        Legendre coefficients of P_k' on [-1/2, 1/2], shape (degree, n).
+    """
+
+    def __init__(self, derivatives):
+        self._dP = np.asarray(derivatives)
+        self._P = legendre.legint(self._dP, lbnd=0.0, axis=0) / 2
+
+    @property
+    def degree(self):
+        return self._dP.shape[0]
+
+    @property
+    def number(self):
+        return self._dP.shape[1]
+
+    def __call__(self, eta, k):
+        """P_k and its derivative at eta in [-1/2, 1/2]."""
+        return legendre.legval(2 * eta, self._P[:, k]), legendre.legval(2 * eta, self._dP[:, k])

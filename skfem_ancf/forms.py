@@ -1,0 +1,246 @@
+"""The weak forms of a planar body: energy, internal force, tangent, mass, loads.
+
+Each factory returns a scikit-fem form for stock ``asm`` on any ``Basis`` of the position field,
+with the coordinates passed as ``r``:
+
+>>> import numpy as np
+>>> from skfem import Basis, ElementVector, asm
+>>> from skfem_ancf import ElementBeamANCF, MeshBeam, StVenantKirchhoff, forms, reference_coordinates
+>>> basis = Basis(MeshBeam.init_line(np.linspace(0, 1, 3), height=0.1),
+...               ElementVector(ElementBeamANCF(2)))
+>>> steel = StVenantKirchhoff(E=2.1e11, nu=0.3)
+>>> q = reference_coordinates(basis)
+>>> K = asm(forms.tangent(steel, width=0.1), basis, r=q)
+>>> K.shape, bool(abs(asm(forms.internal_force(steel, width=0.1), basis, r=q)).max() < 1e-3)
+((24, 24), True)
+
+The forms of :data:`textbook` are the same integrals, written for scikit-fem's pairwise assembly;
+they are the reference that everything faster is tested against.
+"""
+
+from types import SimpleNamespace
+
+import numpy as np
+from skfem.assembly import BilinearForm, Form, Functional, LinearForm
+from skfem.assembly.form.form import FormExtraParams
+from skfem.helpers import dot
+
+
+class _BeamFrame:
+    """A form whose ``w`` also holds the beam's frame, shape (2, 2, nelements, npoints)."""
+
+    @staticmethod
+    def _normalize_asm_kwargs(w, basis):
+        if hasattr(basis, "find"):
+            tind, points = basis.mapping.facet_points(basis.X, basis.find)
+        else:
+            tind, points = basis.tind, basis.X
+        frame = basis.mapping.frame(points, tind)
+        return {**Form._normalize_asm_kwargs(w, basis), "frame": frame}
+
+    def _parameters(self, basis, kwargs):
+        return FormExtraParams({**basis.default_parameters(),
+                                **self._normalize_asm_kwargs(kwargs, basis)})
+
+
+class EnergyForm(_BeamFrame, Functional):
+    """A functional, with the beam's frame as ``w.frame``."""
+
+
+class BeamLinearForm(_BeamFrame, LinearForm):
+    """A linear form, with the beam's frame as ``w.frame``."""
+
+
+class BeamBilinearForm(_BeamFrame, BilinearForm):
+    """A bilinear form, with the beam's frame as ``w.frame``."""
+
+
+class StressForm(BeamLinearForm):
+    """A linear form ``int P : grad v`` given by the first Piola-Kirchhoff stress P.
+
+    The decorated function takes ``w`` and returns P of shape (2, 2, nelements, npoints); the
+    fields in ``w`` are as for scikit-fem's ``LinearForm``, and ``w.frame`` is the beam's frame.
+    All local functions are contracted at once by a matrix product.
+    """
+
+    def _assemble(self, ubasis, vbasis=None, **kwargs):
+        P = self.form(self._parameters(ubasis, kwargs)) * ubasis.dx
+        nq, ne = ubasis.Nbfun, ubasis.nelems
+        B = _gradient_table(ubasis).reshape(ne, nq, -1)
+        P = np.moveaxis(P, (2, 3), (0, 1)).reshape(ne, -1, 1)
+        data = (B @ P)[..., 0].T
+        return np.array([ubasis.element_dofs.ravel()]), data.ravel(), (ubasis.N,), (nq,)
+
+
+class ModuliForm(BeamBilinearForm):
+    """A bilinear form ``int grad v : A : grad u`` given by the moduli A = dP / dF.
+
+    The decorated function takes ``w`` and returns A of shape (2, 2, 2, 2, nelements, npoints).
+    All pairs of local functions are contracted at once by matrix products.
+    """
+
+    def _assemble(self, ubasis, vbasis=None, **kwargs):
+        A = self.form(self._parameters(ubasis, kwargs)) * ubasis.dx
+        nq, ne = ubasis.Nbfun, ubasis.nelems
+        B = _gradient_table(ubasis).reshape(ne, nq, -1, 4)
+        A = np.moveaxis(A.reshape(4, 4, ne, -1), (2, 3), (0, 1))
+        AB = A @ B.transpose(0, 2, 3, 1)  # (ne, np, 4, nq)
+        K = B.reshape(ne, nq, -1) @ AB.reshape(ne, -1, nq)  # rows v, columns u
+        dofs = ubasis.element_dofs
+        rows, cols = np.tile(dofs, (nq, 1)), np.repeat(dofs, nq, axis=0)
+        return (np.array([rows.ravel(), cols.ravel()]), K.transpose(2, 1, 0).ravel(),
+                (ubasis.N, ubasis.N), (nq, nq))
+
+
+def _gradient_table(basis):
+    """Gradients of all local functions, shape (ne, nq, np, 2, 2)."""
+    return np.ascontiguousarray(np.moveaxis(np.array([b[0].grad for b in basis.basis]),
+                                            (0, 3, 4, 1, 2), (1, 0, 2, 3, 4)))
+
+
+# kinematics: grad[i, j] = d r_i / d X_j
+
+def deformation_gradient(r, frame):
+    """F in the beam's frame: F[i, J] = d r_i / d X_j frame[j, J]."""
+    return np.einsum("ij...,jJ...->iJ...", r.grad, frame)
+
+
+def green_lagrange(F):
+    """(eps_xx, eps_yy, 2 eps_xy), shape (3, ...), of a deformation gradient (2, 2, ...)."""
+    return np.array([0.5 * (dot(F[:, 0], F[:, 0]) - 1.0), 0.5 * (dot(F[:, 1], F[:, 1]) - 1.0),
+                     dot(F[:, 0], F[:, 1])])
+
+
+def strain_variation(F, dF):
+    """The variation of :func:`green_lagrange` at F in the direction dF; linear in both."""
+    return np.array([dot(F[:, 0], dF[:, 0]), dot(F[:, 1], dF[:, 1]),
+                     dot(F[:, 0], dF[:, 1]) + dot(F[:, 1], dF[:, 0])])
+
+
+def _tensor(S):
+    return np.array([[S[0], S[2]], [S[2], S[1]]])
+
+
+def _voigt_to_tensor(D):
+    k = np.array([[0, 2], [2, 1]])
+    return D[k][:, :, k]
+
+
+# the forms
+
+def energy(material, width=1.0, k_s=1.0):
+    """Strain energy ``int W(eps) dV``, a ``Functional``."""
+    law = material.law(k_s)
+
+    @EnergyForm
+    def strain_energy(w):
+        return width * law.energy(green_lagrange(deformation_gradient(w.r, w.frame)))
+
+    return strain_energy
+
+
+def internal_force(material, width=1.0, k_s=1.0):
+    """Internal force ``int P : grad v dV``, P = F S; a batched ``LinearForm``."""
+    law = material.law(k_s)
+
+    @StressForm
+    def force(w):
+        F = deformation_gradient(w.r, w.frame)
+        S = _tensor(law.stress(green_lagrange(F)))
+        return width * np.einsum("iJ...,JK...,jK...->ij...", F, S, w.frame)
+
+    return force
+
+
+def tangent(material, width=1.0, k_s=1.0):
+    """Tangent ``int grad v : dP/dF : grad u dV``; a batched ``BilinearForm``."""
+    law = material.law(k_s)
+
+    @ModuliForm
+    def stiffness(w):
+        F = deformation_gradient(w.r, w.frame)
+        eps = green_lagrange(F)
+        D, S = _voigt_to_tensor(law.moduli(eps)), _tensor(law.stress(eps))
+        A = np.einsum("iI...,IJKL...,kK...->iJkL...", F, D, F, optimize=True)
+        A = A + np.einsum("ik,JL...->iJkL...", np.eye(2), S)
+        return width * np.einsum("jJ...,iJkL...,lL...->ijkl...", w.frame, A, w.frame, optimize=True)
+
+    return stiffness
+
+
+def mass(density, width=1.0):
+    """Mass ``int rho v . u dV``, a ``BilinearForm``: constant, whatever the motion."""
+
+    @BilinearForm
+    def inertia(u, v, _):
+        return width * density * dot(u, v)
+
+    return inertia
+
+
+def gravity(density, g, width=1.0):
+    """Dead load ``int rho g . v dV``, a ``LinearForm``; ``g`` is the acceleration (2,)."""
+
+    @LinearForm
+    def weight(v, _):
+        return width * density * (g[0] * v[0] + g[1] * v[1])
+
+    return weight
+
+
+def traction(t, width=1.0):
+    """Dead traction ``int t . v dA`` for a ``FacetBasis``; ``t`` constant (2,) or t(x) -> (2, ...)."""
+
+    @LinearForm
+    def surface_load(v, w):
+        value = t(w.x) if callable(t) else t
+        return width * (value[0] * v[0] + value[1] * v[1])
+
+    return surface_load
+
+
+def pressure(width=1.0):
+    """Follower pressure of 1 as ``int -n . v da``, linear in the position: a ``BilinearForm``.
+
+    On the deformed facet ``n da`` is the derivative of the position along the facet, turned by
+    -90 degrees. The matrix times the coordinates is the force.
+    """
+
+    @BilinearForm
+    def follower(u, v, w):
+        # the facet's direction with the body on its left: n turned by +90 degrees
+        along = -w.n[1] * u.grad[:, 0] + w.n[0] * u.grad[:, 1]
+        return -width * (along[1] * v[0] - along[0] * v[1])
+
+    return follower
+
+
+def _textbook_internal_force(material, width=1.0, k_s=1.0):
+    """``int S : delta eps dV``, for scikit-fem's stock assembly."""
+    law = material.law(k_s)
+
+    @BeamLinearForm
+    def force(v, w):
+        F, dF = (deformation_gradient(f, w.frame) for f in (w.r, v))
+        return width * dot(law.stress(green_lagrange(F)), strain_variation(F, dF))
+
+    return force
+
+
+def _textbook_tangent(material, width=1.0, k_s=1.0):
+    """``int delta eps : D : d eps + S : d delta eps dV``, for scikit-fem's stock assembly."""
+    law = material.law(k_s)
+
+    @BeamBilinearForm
+    def stiffness(u, v, w):
+        F, DF, dF = (deformation_gradient(f, w.frame) for f in (w.r, u, v))
+        eps = green_lagrange(F)
+        d, D = strain_variation(F, dF), strain_variation(F, DF)
+        return width * (np.einsum("a...,ab...,b...->...", d, law.moduli(eps), D)
+                        + dot(law.stress(eps), strain_variation(dF, DF)))
+
+    return stiffness
+
+
+#: The pairwise forms: ``textbook.internal_force`` and ``textbook.tangent``.
+textbook = SimpleNamespace(internal_force=_textbook_internal_force, tangent=_textbook_tangent)

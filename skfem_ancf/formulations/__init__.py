@@ -1,0 +1,28 @@
+"""Formulations of the strain energy. A new one is one file and one line here."""
+
+from ..errors import NameUnknown
+from .base import COMPONENTS, Formulation, Term
+from .continuum import Continuum
+
+#: The formulations by name.
+FORMULATIONS = {cls.name: cls for cls in (Continuum,)}
+
+
+def get_formulation(formulation):
+    """A :class:`Formulation` from its name, its class or itself.
+
+    Raises
+    ------
+    NameUnknown
+        If the name is not known; the message lists the known ones.
+    """
+    if isinstance(formulation, Formulation):
+        return formulation
+    if isinstance(formulation, type) and issubclass(formulation, Formulation):
+        return formulation()
+    if formulation not in FORMULATIONS:
+        raise NameUnknown("formulation", formulation, FORMULATIONS)
+    return FORMULATIONS[formulation]()
+
+
+__all__ = ["COMPONENTS", "FORMULATIONS", "Continuum", "Formulation", "Term", "get_formulation"]

@@ -1,0 +1,85 @@
+"""A formulation says where each strain component is sampled and how it is integrated."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..quadrature import gauss, lagrange, tensor
+
+COMPONENTS = ("xx", "yy", "xy")
+
+
+@dataclass(frozen=True)
+class Term:
+    """One integral of the strain energy: ``int law(strain) dV`` over a product rule.
+
+    Attributes
+    ----------
+    law
+        Energy, stress and moduli as functions of the strain (3, ...).
+    axis, section
+        Points and weights on [0, 1] along the axis and across the section.
+    samples
+        For a strain component ("xx", "yy" or "xy") the points xi at which it is evaluated; it is
+        interpolated between them by Lagrange polynomials. Components not named are evaluated at
+        the integration points.
+    """
+
+    law: object
+    axis: tuple
+    section: tuple
+    samples: dict = field(default_factory=dict)
+
+    @property
+    def quadrature(self):
+        """Points (2, n) and weights (n,) for scikit-fem's Basis."""
+        return tensor(self.axis, self.section)
+
+    def nodes(self, component):
+        """Where along the axis a component is sampled, shape (m,)."""
+        return np.asarray(self.samples.get(component, self.axis[0]), dtype=float)
+
+    def interpolation(self, component, xi):
+        """Matrix from the samples of a component to the points xi, shape (len(xi), m), or None."""
+        if component not in self.samples:
+            return None
+        return lagrange(self.samples[component], xi)
+
+
+class Formulation:
+    """Base class of the formulations; a subclass gives its name and its terms."""
+
+    name = ""
+
+    def terms(self, element, material):
+        """The integrals that make up the strain energy.
+
+        Parameters
+        ----------
+        element
+            A beam element.
+        material
+            A material.
+
+        Returns
+        -------
+        list of Term
+        """
+        raise NotImplementedError
+
+    def stress(self, element, material, strain):
+        """Second Piola-Kirchhoff stress of a strain (3, ...), for output."""
+        return material.law(material.shear_factor(element)).stress(strain)
+
+    @staticmethod
+    def full_rules(element):
+        """Rules along the axis and across the section that integrate the energy exactly.
+
+        The strain is of degree 4 along the axis of a straight element and 2 N across the
+        section, the energy of St. Venant-Kirchhoff of twice those.
+        """
+        strain_degree = 2 * (element.axis_degree - 1)
+        return gauss(strain_degree + 1), gauss(2 * element.order + 1)
+
+    def __repr__(self):
+        return f"<formulation {self.name!r}>"

@@ -1,0 +1,18 @@
+"""The formulation of the paper: every strain component at every integration point."""
+
+from .base import Formulation, Term
+
+
+class Continuum(Formulation):
+    """U = int W(eps) dV with the Green-Lagrange strain of the interpolated position.
+
+    References
+    ----------
+    "A series of locking-free beam element models in absolute nodal coordinate formulation",
+    Archive of Applied Mechanics (2024).
+    """
+
+    name = "continuum"
+
+    def terms(self, element, material):
+        return [Term(material.law(material.shear_factor(element)), *self.full_rules(element))]

@@ -1,0 +1,321 @@
+"""The fused evaluation of strain energy, internal force and tangent.
+
+The weak forms of :mod:`skfem_ancf.forms` say what is computed; this module computes the same for
+all elements of a beam at once, from tables of the derivatives of the local functions in the
+beam's own frame. Straight elements of one length share one table.
+
+Everything is a function of the displacement ``u = q - q0`` of the coordinates: the gradient is
+``r_X = e_1 + G u``, and ``eps_xx = (e_1 + G u / 2) . G u`` has no cancellation where displacements
+are small, nor far from the origin.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .quadrature import tensor
+
+#: Elements evaluated together; keeps the work arrays in cache and the memory bounded.
+CHUNK = 1024
+
+
+def beam_gradients(mesh, element, X, tind=None):
+    """Derivatives of the local functions along the axis and across the section.
+
+    Parameters
+    ----------
+    mesh, element
+        A MeshBeam and a scalar beam element.
+    X
+        Reference points, shape (2, npoints).
+    tind
+        Elements, or None for all.
+
+    Returns
+    -------
+    G : ndarray
+        Shape (2, nelements, npoints, 2 nodal_dofs).
+    frame : ndarray
+        The beam's frame, transposed to (2, nelements, npoints, 2): e_1 and e_2.
+    """
+    mapping = mesh.mapping()
+    frame = mapping.frame(X, tind)
+    grad = np.array([element.gbasis(mapping, X, i, tind)[0].grad
+                     for i in range(2 * element.nodal_dofs)])
+    G = np.einsum("jkep,ijep->kepi", frame, grad, optimize=True)
+    return np.ascontiguousarray(G), np.ascontiguousarray(np.moveaxis(frame, 0, -1))
+
+
+class Evaluation:
+    """What one evaluation found: element forces and tangents, and what :meth:`step` needs."""
+
+    __slots__ = ("force", "tangent", "energy", "strains", "stresses", "_gradients", "_tables")
+
+    def step(self, du):
+        """Strain increments, linear in the element displacement increments du (ne, nb, 2)."""
+        return [t.strain_increment(r, du) for t, r in zip(self._tables, self._gradients)]
+
+
+@dataclass
+class _Rows:
+    """Where one strain component is sampled, and how it gets to the integration points."""
+
+    x: object  # rows of the table of d/dX, None if not needed
+    y: object
+    matrix: object  # (integration points, samples), None for the identity
+
+
+class TermTables:
+    """The tables of one :class:`~skfem_ancf.formulations.Term` on a mesh and element."""
+
+    def __init__(self, mesh, element, term, width):
+        self.law = term.law
+        self.nb = 2 * element.nodal_dofs
+        xi_x = np.unique(np.concatenate([term.nodes("xx"), term.nodes("xy")]))
+        xi_y = np.unique(np.concatenate([term.nodes("yy"), term.nodes("xy")]))
+        eta, w_eta = term.section
+        ns = len(eta)
+        same = mesh.is_straight and np.ptp(mesh.lengths) <= 1e-13 * np.max(mesh.lengths)
+        tind = np.array([0]) if same else None
+        self.shared = same
+
+        def table(xi, k):
+            X, _ = tensor((xi, np.ones(len(xi))), (eta, np.ones(ns)))
+            G, frame = beam_gradients(mesh, element, X, tind)
+            return np.ascontiguousarray(G[k]), np.ascontiguousarray(frame[k])
+
+        self.Gx, self.e1 = table(xi_x, 0)
+        self.Gy, self.e2 = table(xi_y, 1)
+
+        def rows(of, xi):
+            if len(of) == len(xi):
+                return slice(None)
+            return (np.searchsorted(xi, of)[:, None] * ns + np.arange(ns)).ravel()
+
+        def component(name):
+            matrix = term.interpolation(name, term.axis[0])
+            return _Rows(rows(term.nodes(name), xi_x) if name != "yy" else None,
+                         rows(term.nodes(name), xi_y) if name != "xx" else None,
+                         None if matrix is None else np.kron(matrix, np.eye(ns)))
+
+        self.xx, self.yy, self.xy = map(component, ("xx", "yy", "xy"))
+        X, W = term.quadrature
+        self.points = X
+        self.w = width * W * mesh.mapping().detDF(X, tind)
+        if same:
+            self._pairs = self._pair_tables()
+
+    def _pair_tables(self):
+        """G_a G_b of each sample, for the geometric part of the tangent, (samples, nb^2)."""
+        def pairs(A, B):
+            return (A[0][:, :, None] * B[0][:, None, :]).reshape(A.shape[1], -1)
+
+        shear = pairs(self.Gx[:, self.xy.x], self.Gy[:, self.xy.y])
+        nb = self.nb
+        shear = shear.reshape(-1, nb, nb)
+        shear = (shear + shear.transpose(0, 2, 1)).reshape(len(shear), -1)
+        return np.concatenate([pairs(self.Gx[:, self.xx.x], self.Gx[:, self.xx.x]),
+                               pairs(self.Gy[:, self.yy.y], self.Gy[:, self.yy.y]), shear])
+
+    def part(self, elements):
+        """The same tables for a slice of the elements."""
+        if self.shared:
+            return self
+        other = object.__new__(TermTables)
+        other.__dict__.update(self.__dict__)
+        other.Gx, other.Gy, other.w = self.Gx[elements], self.Gy[elements], self.w[elements]
+        other.e1, other.e2 = self.e1[elements], self.e2[elements]
+        return other
+
+    # strain
+
+    def gradients(self, u):
+        """Displacement gradients and position gradients of element displacements (ne, nb, 2)."""
+        ux, uy = self.Gx @ u, self.Gy @ u
+        return ux, uy, self.e1 + ux, self.e2 + uy
+
+    @staticmethod
+    def _to_points(rows, values):
+        return values if rows.matrix is None else values @ rows.matrix.T
+
+    @staticmethod
+    def _to_samples(rows, values):
+        return values if rows.matrix is None else values @ rows.matrix
+
+    def strain(self, gradients):
+        """(eps_xx, eps_yy, 2 eps_xy) at the integration points, shape (3, ne, np)."""
+        ux, uy, rx, ry = gradients
+        xx = 0.5 * np.einsum("epi,epi->ep", rx[:, self.xx.x] + self.e1[:, self.xx.x],
+                             ux[:, self.xx.x])
+        yy = 0.5 * np.einsum("epi,epi->ep", ry[:, self.yy.y] + self.e2[:, self.yy.y],
+                             uy[:, self.yy.y])
+        xy = (np.einsum("epi,epi->ep", rx[:, self.xy.x], uy[:, self.xy.y])
+              + np.einsum("epi,epi->ep", ux[:, self.xy.x],
+                          np.broadcast_to(self.e2[:, self.xy.y], ux[:, self.xy.x].shape)))
+        return np.array([self._to_points(self.xx, xx), self._to_points(self.yy, yy),
+                         self._to_points(self.xy, xy)])
+
+    def strain_increment(self, gradients, du):
+        """The strain's derivative in the direction du, at given gradients; (3, ne, np)."""
+        _, _, rx, ry = gradients
+        dx, dy = self.Gx @ du, self.Gy @ du
+        xx = np.einsum("epi,epi->ep", rx[:, self.xx.x], dx[:, self.xx.x])
+        yy = np.einsum("epi,epi->ep", ry[:, self.yy.y], dy[:, self.yy.y])
+        xy = (np.einsum("epi,epi->ep", rx[:, self.xy.x], dy[:, self.xy.y])
+              + np.einsum("epi,epi->ep", ry[:, self.xy.y], dx[:, self.xy.x]))
+        return np.array([self._to_points(self.xx, xx), self._to_points(self.yy, yy),
+                         self._to_points(self.xy, xy)])
+
+    # force and tangent
+
+    def force(self, gradients, stress):
+        """Element forces B^T (w S), shape (ne, nb, 2)."""
+        _, _, rx, ry = gradients
+        sxx, syy, sxy = (self._to_samples(rows, self.w * s)[..., None]
+                         for rows, s in zip((self.xx, self.yy, self.xy), stress))
+        Tx, Ty = np.zeros_like(rx), np.zeros_like(ry)
+        Tx[:, self.xx.x] = sxx * rx[:, self.xx.x]
+        Ty[:, self.yy.y] = syy * ry[:, self.yy.y]
+        Tx[:, self.xy.x] += sxy * ry[:, self.xy.y]
+        Ty[:, self.xy.y] += sxy * rx[:, self.xy.x]
+        return (self.Gx.transpose(0, 2, 1) @ Tx) + (self.Gy.transpose(0, 2, 1) @ Ty)
+
+    def strain_matrix(self, gradients):
+        """B: the derivative of the strain by the coordinates, shape (ne, 3, np, 2 nb)."""
+        _, _, rx, ry = gradients
+        ne, nb = len(rx), self.nb
+        B = np.empty((ne, 3, self.w.shape[1], 2 * nb))
+
+        def fill(k, rows, value):
+            value = value.reshape(ne, -1, 2 * nb)
+            B[:, k] = value if rows.matrix is None else rows.matrix @ value
+
+        fill(0, self.xx, self.Gx[:, self.xx.x, :, None] * rx[:, self.xx.x, None, :])
+        fill(1, self.yy, self.Gy[:, self.yy.y, :, None] * ry[:, self.yy.y, None, :])
+        shear = self.Gx[:, self.xy.x, :, None] * ry[:, self.xy.y, None, :]
+        shear += self.Gy[:, self.xy.y, :, None] * rx[:, self.xy.x, None, :]
+        fill(2, self.xy, shear)
+        return B
+
+    def material_tangent(self, gradients, strain):
+        """int B^T D B, shape (ne, 2 nb, 2 nb)."""
+        B = self.strain_matrix(gradients)
+        ne, _, n, m = B.shape
+        D = getattr(self.law, "D", None)
+        if D is not None:
+            DB = (D @ B.reshape(ne, 3, n * m)).reshape(B.shape)
+        else:
+            DB = np.einsum("abep,ebpk->eapk", self.law.moduli(strain), B, optimize=True)
+        DB *= self.w[:, None, :, None]
+        return B.reshape(ne, 3 * n, m).transpose(0, 2, 1) @ DB.reshape(ne, 3 * n, m)
+
+    def geometric_tangent(self, stress):
+        """The part of the tangent that is linear in the stress, for one component: (ne, nb, nb)."""
+        xx, yy, xy = (self._to_samples(rows, self.w * s)
+                      for rows, s in zip((self.xx, self.yy, self.xy), stress))
+        nb = self.nb
+        if self.shared:
+            return (np.concatenate([xx, yy, xy], axis=1) @ self._pairs).reshape(-1, nb, nb)
+        Gx, Gy = self.Gx[:, self.xx.x], self.Gy[:, self.yy.y]
+        K = Gx.transpose(0, 2, 1) @ (xx[..., None] * Gx)
+        K += Gy.transpose(0, 2, 1) @ (yy[..., None] * Gy)
+        shear = self.Gx[:, self.xy.x].transpose(0, 2, 1) @ (xy[..., None] * self.Gy[:, self.xy.y])
+        return K + shear + shear.transpose(0, 2, 1)
+
+
+class Kernel:
+    """Energy, force and tangent of the strain energy of one beam.
+
+    Parameters
+    ----------
+    mesh, element, material
+        The body, a scalar beam element and a material.
+    width
+        Width of the section.
+    formulation
+        A :class:`~skfem_ancf.formulations.Formulation`.
+    """
+
+    def __init__(self, mesh, element, material, width, formulation):
+        self.nd = 2 * element.nodal_dofs
+        self.t = mesh.t
+        self.N = self.nd * mesh.p.shape[1]
+        self.tables = [TermTables(mesh, element, term, width)
+                       for term in formulation.terms(element, material)]
+
+    def gather(self, u, elements=slice(None)):
+        """Element values (ne, nb, 2) of a coordinate vector (N,)."""
+        nodes = u.reshape(-1, self.nd)
+        t = self.t[:, elements]
+        return np.concatenate([nodes[t[0]], nodes[t[1]]], axis=1).reshape(t.shape[1], self.nd, 2)
+
+    def scatter(self, force, elements=slice(None), out=None):
+        """Add element vectors (ne, nb, 2) into a coordinate vector (N,)."""
+        out = np.zeros(self.N, dtype=force.dtype) if out is None else out
+        nodes, t = out.reshape(-1, self.nd), self.t[:, elements]
+        parts = force.reshape(t.shape[1], 2, self.nd)
+        nodes[t[0]] += parts[:, 0]  # a node is the left end of one element at most
+        nodes[t[1]] += parts[:, 1]
+        return out
+
+    def chunks(self):
+        """Slices of the elements that are evaluated together."""
+        return [slice(k, k + CHUNK) for k in range(0, self.t.shape[1], CHUNK)]
+
+    def evaluate(self, u_e, elements=slice(None), tangent=True, carried=None, geometric=True):
+        """Element forces and, if asked for, tangents.
+
+        Parameters
+        ----------
+        u_e
+            Element displacements, shape (ne, nb, 2).
+        elements
+            The slice of elements these are.
+        tangent
+            Compute the tangent.
+        carried
+            Stresses (3, ne, np), one array a term, to use in the geometric part in place of the
+            stress of the strain: the mixed integration point iteration.
+        geometric
+            Include the geometric part.
+        """
+        out = Evaluation()
+        out._tables = [t.part(elements) for t in self.tables]
+        out._gradients = [t.gradients(u_e) for t in out._tables]
+        out.strains = [t.strain(g) for t, g in zip(out._tables, out._gradients)]
+        out.stresses = [t.law.stress(e) for t, e in zip(out._tables, out.strains)]
+        out.force = sum(t.force(g, s) for t, g, s in zip(out._tables, out._gradients, out.stresses))
+        out.tangent = None
+        if tangent:
+            K = sum(t.material_tangent(g, e)
+                    for t, g, e in zip(out._tables, out._gradients, out.strains))
+            if geometric:
+                Kg = sum(t.geometric_tangent(s)
+                         for t, s in zip(out._tables, carried or out.stresses))
+                ne, nb = Kg.shape[:2]
+                blocks = K.reshape(ne, nb, 2, nb, 2)
+                blocks[:, :, 0, :, 0] += Kg
+                blocks[:, :, 1, :, 1] += Kg
+            out.tangent = K
+        return out
+
+    def energy(self, u):
+        """Strain energy of a coordinate displacement (N,)."""
+        total = 0.0
+        for part in self.chunks():
+            u_e = self.gather(u, part)
+            for t in (t.part(part) for t in self.tables):
+                total += np.sum(t.w * t.law.energy(t.strain(t.gradients(u_e))))
+        return total
+
+    def force(self, u):
+        """Internal force of a coordinate displacement (N,), shape (N,)."""
+        out = np.zeros(self.N, dtype=u.dtype)
+        for part in self.chunks():
+            self.scatter(self.evaluate(self.gather(u, part), part, tangent=False).force, part, out)
+        return out
+
+    def tangents(self, u, **options):
+        """Element tangents (ne, 2 nb, 2 nb) of a coordinate displacement (N,)."""
+        return np.concatenate([self.evaluate(self.gather(u, part), part, **options).tangent
+                               for part in self.chunks()])

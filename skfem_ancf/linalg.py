@@ -1,0 +1,152 @@
+"""Banded matrices of chains of elements, over LAPACK."""
+
+import numpy as np
+from scipy.linalg import lapack
+from scipy.sparse import coo_matrix
+
+
+class BandMatrix:
+    """A square band matrix that is filled element by element and factorised by LAPACK.
+
+    Parameters
+    ----------
+    n
+        Number of rows.
+    bandwidth
+        Number of subdiagonals, and of superdiagonals.
+    symmetric
+        Store and factorise the lower half only: Cholesky, or LU where it is not positive
+        definite.
+    """
+
+    def __init__(self, n, bandwidth, symmetric=True):
+        self.n, self.bandwidth, self.symmetric = n, bandwidth, symmetric
+        self._ld = (1 if symmetric else 3) * bandwidth + 1  # gbtrf wants room for the pivots
+        self._diagonal = 0 if symmetric else 2 * bandwidth
+        self._flat = np.zeros(n * self._ld)
+        self._factor = None
+        self.positive_definite = None
+
+    @property
+    def ab(self):
+        """LAPACK's band storage, a view of shape (rows, n)."""
+        return self._flat.reshape(self.n, self._ld).T
+
+    def clear(self):
+        """Set every entry to zero."""
+        self._flat.fill(0.0)
+        self._factor = None
+
+    def _blocks(self, start, step, m, count):
+        """Diagonal blocks of size m at rows start, start + step, ...: a view (count, m, m)."""
+        item, ld = self._flat.itemsize, self._ld
+        return np.lib.stride_tricks.as_strided(
+            self._flat[start * ld + self._diagonal:], (count, m, m),
+            (step * ld * item, item, (ld - 1) * item), writeable=True)
+
+    def add_elements(self, K, start, nd, left):
+        """Add element matrices that couple node k and k + 1 of a chain.
+
+        Parameters
+        ----------
+        K
+            Element matrices, shape (ne, 2 nd, 2 nd). Overwritten if the matrix is symmetric.
+        start
+            Row of the first coordinate of node 0.
+        nd
+            Coordinates of a node.
+        left
+            Left node of each element, increasing, shape (ne,).
+        """
+        m = 2 * nd
+        if self.symmetric:  # the upper half would land on other entries
+            K *= np.tri(m)
+        view = self._blocks(start, nd, m, int(left[-1]) + 1)
+        if left[-1] - left[0] == len(left) - 1:
+            first = int(left[0])
+            view[first::2] += K[0::2]
+            view[first + 1::2] += K[1::2]
+        else:
+            view[left[0::2]] += K[0::2]
+            view[left[1::2]] += K[1::2]
+
+    def _position(self, i, j):
+        return np.asarray(j) * self._ld + self._diagonal + np.asarray(i) - np.asarray(j)
+
+    def add(self, i, j, values):
+        """Add entries; of a symmetric matrix those above the diagonal are ignored."""
+        i, j, values = map(np.atleast_1d, (i, j, values))
+        if self.symmetric:
+            keep = i >= j
+            i, j, values = i[keep], j[keep], values[keep]
+        np.add.at(self._flat, self._position(i, j), values)
+
+    def fixed_positions(self, dofs):
+        """Where rows and columns ``dofs`` are stored, and where their diagonal is."""
+        dofs = np.asarray(dofs, dtype=np.int64)
+        k = np.arange(-self.bandwidth, self.bandwidth + 1)
+        other = dofs[:, None] + k
+        inside = (other >= 0) & (other < self.n)
+        this = np.broadcast_to(dofs[:, None], other.shape)[inside]
+        other = other[inside]
+        i, j = np.concatenate([this, other]), np.concatenate([other, this])
+        if self.symmetric:
+            i, j = i[i >= j], j[i >= j]
+        return np.unique(self._position(i, j)), self._position(dofs, dofs)
+
+    def fix(self, positions):
+        """Make the rows and columns of :meth:`fixed_positions` those of the identity."""
+        everywhere, diagonal = positions
+        self._flat[everywhere] = 0.0
+        self._flat[diagonal] = 1.0
+
+    def diagonal(self):
+        """A copy of the diagonal."""
+        return self._flat[self._diagonal::self._ld].copy()
+
+    def factorize(self):
+        """Factorise; raises ``numpy.linalg.LinAlgError`` if the matrix is singular."""
+        if self.symmetric:
+            c, info = lapack.dpbtrf(self.ab, lower=1)
+            self.positive_definite = info == 0
+            if info == 0:
+                self._factor = ("pb", c)
+                return self
+            general = BandMatrix(self.n, self.bandwidth, symmetric=False)
+            ab, lower, top = general.ab, self.ab, 2 * self.bandwidth
+            ab[top:] = lower
+            for k in range(1, self.bandwidth + 1):
+                ab[top - k, k:] = lower[k, :self.n - k]
+        else:
+            general = self
+        lu, pivots, info = lapack.dgbtrf(general.ab, self.bandwidth, self.bandwidth)
+        if info != 0 or not np.all(np.isfinite(lu[2 * self.bandwidth])):
+            raise np.linalg.LinAlgError("the matrix is singular")
+        self._factor = ("gb", lu, pivots)
+        return self
+
+    def solve(self, b):
+        """Solve with the factors; ``b`` of shape (n,) or (n, k)."""
+        if self._factor is None:
+            self.factorize()
+        if self._factor[0] == "pb":
+            return lapack.dpbtrs(self._factor[1], b, lower=1)[0]
+        return lapack.dgbtrs(self._factor[1], self.bandwidth, self.bandwidth, b,
+                             self._factor[2])[0]
+
+    def tocsc(self):
+        """The matrix as a scipy.sparse array in CSC format."""
+        k = np.arange(-self.bandwidth, self.bandwidth + 1)
+        if self.symmetric:
+            k = k[k >= 0]
+        j = np.arange(self.n)
+        i = j + k[:, None]
+        j = np.broadcast_to(j, i.shape)
+        inside = (i >= 0) & (i < self.n)
+        i, j = i[inside], j[inside]
+        v = self._flat[self._position(i, j)]
+        if self.symmetric:
+            off = i > j
+            i, j, v = (np.concatenate([i, j[off]]), np.concatenate([j, i[off]]),
+                       np.concatenate([v, v[off]]))
+        return coo_matrix((v, (i, j)), shape=(self.n, self.n)).tocsc()

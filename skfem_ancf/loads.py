@@ -1,0 +1,113 @@
+"""Loads: their force on the coordinates of a beam, its derivative, and its potential."""
+
+import numpy as np
+from skfem.assembly import asm
+
+from . import forms
+from .errors import require_finite
+
+
+class Load:
+    """Base class: a force on the coordinates of one beam as a function of their displacement.
+
+    Attributes
+    ----------
+    beam
+        The beam it acts on.
+    constant : bool
+        The force does not depend on the displacement.
+    symmetric : bool
+        The derivative of the force is symmetric: the load has a potential.
+    """
+
+    constant = True
+    symmetric = True
+
+    def __init__(self, beam):
+        self.beam = beam
+
+    def force(self, u):
+        """Force at the displacement ``u`` of the beam's coordinates, shape (beam.N,)."""
+        raise NotImplementedError
+
+    def stiffness(self, u):
+        """Derivative of the force: rows, columns and values."""
+        raise NotImplementedError
+
+    def potential(self, u):
+        """The potential, minus the work done from the stress-free state; None if there is none."""
+        return None
+
+
+class DeadLoad(Load):
+    """A force that keeps its direction and size."""
+
+    def __init__(self, beam, vector):
+        super().__init__(beam)
+        self.vector = require_finite("the load", vector, (beam.N,))
+
+    def force(self, u):
+        return self.vector
+
+    def potential(self, u):
+        return -float(self.vector @ u)
+
+
+class Pressure(Load):
+    """A pressure that stays normal to the deformed surface: linear in the position in the plane."""
+
+    constant = False
+    symmetric = False
+
+    def __init__(self, beam, facets, p):
+        super().__init__(beam)
+        basis = beam.facet_basis(facets)
+        self.matrix = (p * asm(forms.pressure(beam.width), basis)).tocoo()
+        self._rows = self.matrix.tocsr()
+
+    def force(self, u):
+        return self._rows @ (self.beam.q0_local + u)
+
+    def stiffness(self, u):
+        return self.matrix.row, self.matrix.col, self.matrix.data
+
+
+class EndMoment(Load):
+    """A moment M on a section: M times the angle of the section is its potential, negated.
+
+    The section's direction is ``d = 12 / h^3 int Y r dY``, the best fit of a straight line to the
+    deformed face, and its angle that of ``d``. The force is a traction linear in Y and normal
+    to ``d``; it turns with the section.
+    """
+
+    constant = False
+
+    def __init__(self, beam, node, M):
+        super().__init__(beam)
+        self.M = M
+        self.dofs, self.c = beam.section_direction(node)
+        d = self.direction(np.zeros(beam.N))
+        self._angle0 = np.arctan2(d[1], d[0])
+
+    def direction(self, u):
+        """The section's direction d, shape (2,)."""
+        return (self.beam.q0_local[self.dofs] + u[self.dofs]) @ self.c
+
+    def force(self, u):
+        d = self.direction(u)
+        out = np.zeros(self.beam.N)
+        out[self.dofs] = np.outer(np.array([-d[1], d[0]]) * self.M / (d @ d), self.c)
+        return out
+
+    def stiffness(self, u):
+        a, b = self.direction(u)
+        H = np.array([[2 * a * b, b * b - a * a], [b * b - a * a, -2 * a * b]])
+        H *= self.M / (a * a + b * b) ** 2
+        values = np.einsum("ij,k,l->ikjl", H, self.c, self.c)
+        rows = np.broadcast_to(self.dofs[:, :, None, None], values.shape)
+        cols = np.broadcast_to(self.dofs[None, None, :, :], values.shape)
+        return rows.ravel(), cols.ravel(), values.ravel()
+
+    def potential(self, u):
+        d = self.direction(u)
+        return -self.M * float(np.arctan2(d[1], d[0]) - self._angle0)

@@ -1,0 +1,135 @@
+"""The map from the reference cell to the stress-free body of a beam."""
+
+import numpy as np
+from skfem.mapping import Mapping
+
+from .errors import MeshError
+from .reference import hermite, linear
+
+_FACET_POINTS = (  # the point of the reference cell at X on facet bottom, right, top, left
+    lambda s: (s, 0.0 * s), lambda s: (1.0 + 0.0 * s, s),
+    lambda s: (s, 1.0 + 0.0 * s), lambda s: (0.0 * s, s),
+)
+
+
+class MappingBeam(Mapping):
+    """Reference cell to body: a cubic axis and sections that turn linearly between the nodes.
+
+    ``X(xi, eta) = sum_i H_i(xi) x_i + h (eta - 1/2) ((1 - xi) n_1 + xi n_2)`` with the cubic
+    Hermite functions H_i, nodal positions and tangents x_i and section directors n_1, n_2.
+    Every ANCF element of order 1 or more contains this map, so the stress-free state, and
+    any rigid motion of it, is represented exactly.
+
+    Parameters
+    ----------
+    mesh
+        A :class:`~skfem_ancf.MeshBeam`.
+    """
+
+    def __init__(self, mesh):
+        self.mesh = mesh
+        self.dim = 2
+
+    def _coefficients(self, tind):
+        """Axis (2, 4, ne) and director (2, 2, ne) coefficients of the elements ``tind``."""
+        m = self.mesh
+        t = m.t if tind is None else m.t[:, tind]
+        L = m.lengths if tind is None else m.lengths[tind]
+        axis = np.stack([m.p[:, t[0]], L * m.p_X[:, t[0]], m.p[:, t[1]], L * m.p_X[:, t[1]]], 1)
+        return axis, m.height * np.stack([m.p_Y[:, t[0]], m.p_Y[:, t[1]]], 1)
+
+    @staticmethod
+    def _sum(coefficients, functions):
+        """Combine (2, n, ne) coefficients with functions (n, np) or (n, ne, np)."""
+        if functions.ndim == 2:
+            return np.einsum("ine,np->iep", coefficients, functions)
+        return np.einsum("ine,nep->iep", coefficients, functions)
+
+    def F(self, X, tind=None):
+        axis, director = self._coefficients(tind)
+        xi, eta = X
+        return self._sum(axis, hermite(xi)) + self._sum(director, (eta - 0.5) * linear(xi))
+
+    def DF(self, X, tind=None):
+        axis, director = self._coefficients(tind)
+        xi, eta = X
+        dxi = self._sum(axis, hermite(xi, 1)) + self._sum(director, (eta - 0.5) * linear(xi, 1))
+        return np.stack([dxi, self._sum(director, linear(xi))], 1)
+
+    def detDF(self, X, tind=None):
+        J = self.DF(X, tind)
+        return J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
+
+    def invDF(self, X, tind=None):
+        J = self.DF(X, tind)
+        det = J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
+        return np.array([[J[1, 1], -J[0, 1]], [-J[1, 0], J[0, 0]]]) / det
+
+    def frame(self, X, tind=None):
+        """The beam's own frame: ``frame[:, 0]`` the axis tangent, ``frame[:, 1]`` its normal.
+
+        Returns
+        -------
+        ndarray
+            Shape (2, 2, nelements, npoints), orthonormal, the same across a section.
+        """
+        axis, _ = self._coefficients(tind)
+        e1 = self._sum(axis, hermite(X[0], 1))
+        e1 = e1 / np.sqrt(e1[0] ** 2 + e1[1] ** 2)
+        return np.stack([e1, np.array([-e1[1], e1[0]])], 1)
+
+    def invF(self, x, tind=None, max_iterations=30):
+        """Newton's method for the reference point of ``x``, which may lie outside the cell."""
+        X = np.full(x.shape, 0.5)
+        for _ in range(max_iterations):
+            dX = np.einsum("ijep,jep->iep", self.invDF(X, tind), x - self.F(X, tind))
+            X = X + np.clip(dX, -1.0, 1.0)
+            if not np.any(np.abs(dX) > 1e-14 * (1.0 + np.abs(X))):
+                break
+        return X
+
+    def _facet_elements(self, find):
+        """One element of each facet, and the local number of the facet in it."""
+        m = self.mesh
+        find = np.arange(m.nfacets, dtype=np.int32) if find is None else np.asarray(find)
+        tind = m.f2t[0, find]
+        return tind, np.argmax(m.t2f[:, tind] == find, axis=0)
+
+    def facet_points(self, X, find=None):
+        """Elements (nf,) and reference points (2, nf, np) of the points X of the facets."""
+        tind, local = self._facet_elements(find)
+        s = np.broadcast_to(X[0], (len(tind), X.shape[-1]))
+        points = np.empty((2,) + s.shape)
+        for k, place in enumerate(_FACET_POINTS):
+            points[:, local == k] = place(s[local == k])
+        return tind, points
+
+    def G(self, X, find=None):
+        tind, points = self.facet_points(X, find)
+        return self.F(points, tind)
+
+    def detDG(self, X, find=None):
+        tind, points = self.facet_points(X, find)
+        _, local = self._facet_elements(find)
+        J = self.DF(points, tind)
+        along = np.where((local % 2 == 0)[:, None], J[:, 0], J[:, 1])
+        return np.sqrt(along[0] ** 2 + along[1] ** 2)
+
+    def normals(self, X, tind, find, t2f):
+        local = np.argmax(t2f[:, tind] == find, axis=0)
+        reference = self.mesh.elem.refdom.normals[local].T
+        n = np.einsum("ijkl,ik->jkl", self.invDF(X, tind), reference)
+        return n / np.sqrt(n[0] ** 2 + n[1] ** 2)
+
+    def check(self):
+        """Raise :class:`MeshError` where the body folds: the map is not one to one."""
+        xi, eta = np.meshgrid(np.linspace(0, 1, 9), [0.0, 1.0])
+        det = self.detDF(np.array([xi.ravel(), eta.ravel()]))
+        bad = np.nonzero(~(det.min(axis=1) > 0))[0]
+        if len(bad):
+            at = self.mesh.p[:, self.mesh.t[0, bad[0]]]
+            raise MeshError(
+                f"the body folds in element {bad[0]}, which starts at ({at[0]:.6g}, {at[1]:.6g}): "
+                f"the radius of curvature is below half the height {self.mesh.height:.6g}, or the "
+                "elements are too long for the curve; use a smaller height, a gentler curve or "
+                "more elements")

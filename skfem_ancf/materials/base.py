@@ -1,0 +1,141 @@
+"""The interface of a material law: energy, stress and moduli from the Green-Lagrange strain."""
+
+import numpy as np
+
+from ..errors import InputError, NameUnknown, require_finite_scalar, require_positive
+
+PLANES = ("stress", "strain")
+
+
+class Material:
+    """An isotropic hyperelastic material in plane stress or plane strain.
+
+    A law of your own is a subclass that defines :meth:`energy` and :meth:`stress`, and
+    :meth:`moduli` if the complex step of ``stress`` is not good enough. Strains and stresses are
+    in the beam's frame (first index along the axis, second across the section):
+
+    * strain: Green-Lagrange, ``(eps_xx, eps_yy, 2 eps_xy)``, shape (3, ...),
+    * stress: second Piola-Kirchhoff, ``(S_xx, S_yy, S_xy)``, shape (3, ...).
+
+    Parameters
+    ----------
+    E
+        Young's modulus (force per area), positive.
+    nu
+        Poisson ratio, in (-1, 1/2), or 1/2 itself in plane stress.
+    density
+        Mass per volume in the stress-free state, positive; None if neither mass nor gravity is
+        asked for.
+    plane
+        "stress" or "strain".
+    shear_correction
+        "auto": ``10 (1 + nu) / (12 + 11 nu)`` where the section cannot carry the shear parabola
+        (order 1, 2 and Patel-Shabana), else 1. "paper": that number at every order. Or a
+        positive number.
+
+    Raises
+    ------
+    InputError
+        If a value is out of its range.
+    NameUnknown
+        If ``plane`` or ``shear_correction`` is a name that is not known.
+    """
+
+    def __init__(self, E, nu, density=None, plane="stress", shear_correction="auto"):
+        self.E = require_positive("E", E)
+        self.nu = require_finite_scalar("nu", nu)
+        self.density = None if density is None else require_positive("density", density)
+        if plane not in PLANES:
+            raise NameUnknown("plane", plane, PLANES)
+        self.plane = plane
+        if not (-1.0 < self.nu < 0.5 or (self.nu == 0.5 and plane == "stress")):
+            raise InputError(
+                f"the Poisson ratio nu must lie in (-1, 0.5), or be 0.5 in plane stress, got "
+                f"{self.nu!r} in plane {plane}")
+        if isinstance(shear_correction, str):
+            if shear_correction not in ("auto", "paper"):
+                raise NameUnknown("shear correction", shear_correction, ("auto", "paper"))
+            self.shear_correction = shear_correction
+        else:
+            self.shear_correction = require_positive("shear_correction", shear_correction)
+
+    @property
+    def G(self):
+        """Shear modulus E / (2 (1 + nu))."""
+        return self.E / (2.0 * (1.0 + self.nu))
+
+    def shear_factor(self, element):
+        """The factor k_s on the shear modulus for sections of an element."""
+        if isinstance(self.shear_correction, float):
+            return self.shear_correction
+        if self.shear_correction == "auto" and element.carries_shear_parabola:
+            return 1.0
+        return 10.0 * (1.0 + self.nu) / (12.0 + 11.0 * self.nu)
+
+    def law(self, k_s=1.0):
+        """The law with its shear corrected: a function of (eps_xx, eps_yy, sqrt(k_s) 2 eps_xy)."""
+        return self if k_s == 1.0 else ShearCorrected(self, k_s)
+
+    def energy(self, strain):
+        """Energy per volume of the stress-free body, shape (...)."""
+        raise NotImplementedError
+
+    def stress(self, strain):
+        """Second Piola-Kirchhoff stress, shape (3, ...)."""
+        raise NotImplementedError
+
+    def moduli(self, strain):
+        """Derivative of the stress with respect to ``strain``, shape (3, 3, ...)."""
+        strain = np.asarray(strain)
+        out = []
+        for j in range(3):
+            step = np.zeros((3,) + (1,) * (strain.ndim - 1), dtype=complex)
+            step[j] = 1e-30j
+            out.append(np.imag(self.stress(strain + step)) / 1e-30)
+        return np.stack(out, 1)
+
+    def thickness_stretch(self, strain):
+        """Stretch out of the plane, shape (...): 1 in plane strain."""
+        raise NotImplementedError
+
+    def __repr__(self):
+        return (f"{type(self).__name__}(E={self.E:g}, nu={self.nu:g}, density={self.density}, "
+                f"plane={self.plane!r}, shear_correction={self.shear_correction!r})")
+
+
+class ShearCorrected:
+    """A law whose shear strain enters multiplied by sqrt(k_s), so that k_s G is its modulus."""
+
+    def __init__(self, law, k_s):
+        self.base = law
+        self.scale = np.array([1.0, 1.0, np.sqrt(k_s)])
+
+    def _scaled(self, strain):
+        return strain * self.scale.reshape((3,) + (1,) * (np.ndim(strain) - 1))
+
+    def energy(self, strain):
+        return self.base.energy(self._scaled(strain))
+
+    def stress(self, strain):
+        return self._scaled(self.base.stress(self._scaled(strain)))
+
+    def moduli(self, strain):
+        D = self.base.moduli(self._scaled(strain))
+        return D * np.outer(self.scale, self.scale).reshape((3, 3) + (1,) * (D.ndim - 2))
+
+
+class LinearLaw:
+    """Stress linear in the Green-Lagrange strain: S = D eps with a constant D of shape (3, 3)."""
+
+    def __init__(self, D):
+        self.D = np.asarray(D)
+
+    def energy(self, strain):
+        return 0.5 * np.sum(strain * self.stress(strain), axis=0)
+
+    def stress(self, strain):
+        return np.tensordot(self.D, strain, 1)
+
+    def moduli(self, strain):
+        shape = np.shape(strain)[1:]
+        return np.broadcast_to(self.D.reshape((3, 3) + (1,) * len(shape)), (3, 3) + shape)

@@ -1,0 +1,51 @@
+"""St. Venant-Kirchhoff: stress linear in the Green-Lagrange strain."""
+
+import numpy as np
+
+from .base import LinearLaw, Material
+
+
+class StVenantKirchhoff(Material):
+    """S = D eps: the law of the paper. Energy per volume 1/2 eps : D : eps.
+
+    Parameters and errors are those of :class:`~skfem_ancf.materials.base.Material`.
+
+    References
+    ----------
+    "A series of locking-free beam element models in absolute nodal coordinate formulation",
+    Archive of Applied Mechanics (2024).
+
+    Examples
+    --------
+    >>> from skfem_ancf import StVenantKirchhoff
+    >>> StVenantKirchhoff(E=2e8, nu=0.3, plane="stress").D.round(-3).tolist()
+    [[219780000.0, 65934000.0, 0.0], [65934000.0, 219780000.0, 0.0], [0.0, 0.0, 76923000.0]]
+    """
+
+    @property
+    def D(self):
+        """Moduli without shear correction, shape (3, 3)."""
+        E, nu = self.E, self.nu
+        if self.plane == "stress":
+            a, b = E / (1.0 - nu**2), E * nu / (1.0 - nu**2)
+        else:
+            a = E * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu))
+            b = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+        return np.array([[a, b, 0.0], [b, a, 0.0], [0.0, 0.0, self.G]])
+
+    def law(self, k_s=1.0):
+        return LinearLaw(self.D * np.diag([1.0, 1.0, k_s]) + self.D * (1 - np.eye(3)))
+
+    def energy(self, strain):
+        return self.law().energy(strain)
+
+    def stress(self, strain):
+        return self.law().stress(strain)
+
+    def moduli(self, strain):
+        return self.law().moduli(strain)
+
+    def thickness_stretch(self, strain):
+        if self.plane == "strain":
+            return np.ones(np.shape(strain)[1:])
+        return np.sqrt(1.0 - 2.0 * self.nu / (1.0 - self.nu) * (strain[0] + strain[1]))

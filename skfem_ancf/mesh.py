@@ -1,0 +1,703 @@
+"""Meshes of planar beams: a chain of nodes on the axis, and the height of the section."""
+
+import json
+import logging
+import warnings
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Optional, Type
+
+import numpy as np
+from numpy import ndarray
+from scipy.spatial import cKDTree
+from skfem.element import Element
+from skfem.generic_utils import OrientedBoundary
+from skfem.mesh import Mesh, MeshQuad
+
+from .errors import MeshError, NameUnknown, require_finite, require_finite_scalar, require_positive
+from .mapping import MappingBeam
+from .reference import ElementBeamP1
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(repr=False, eq=False)
+class MeshBeam(Mesh):
+    """A planar beam in its stress-free state, divided into elements along its axis.
+
+    Use :meth:`init_line` or :meth:`init_curve`. The nodes are numbered along the axis, which
+    keeps matrices banded; the boundaries ``left`` and ``right`` are the end sections, ``top``
+    and ``bottom`` the surfaces at Y = +h/2 and -h/2.
+
+    Attributes
+    ----------
+    doflocs, p
+        Positions of the nodes, shape (2, nvertices).
+    t
+        Left and right node of each element, shape (2, nelements).
+    height
+        Height h of the section.
+    p_X, p_Y
+        Derivative of the position along the axis and across the section at the nodes, shape
+        (2, nvertices): the unit tangent and the unit normal on a given curve.
+    lengths
+        Length of each element along the axis, shape (nelements,).
+    s
+        Parameter of each node on the curve, or None.
+    curve
+        The function r(s) -> (2, n) that :meth:`refined` puts new nodes on, or None.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem_ancf import MeshBeam
+    >>> mesh = MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1)
+    >>> mesh.nelements, sorted(mesh.boundaries)
+    (4, ['bottom', 'left', 'right', 'top'])
+    >>> mesh.refined([3]).p[0].tolist()
+    [0.0, 0.25, 0.5, 0.75, 0.875, 1.0]
+    """
+
+    elem: Type[Element] = ElementBeamP1
+    height: Optional[float] = None
+    p_X: Optional[ndarray] = None
+    p_Y: Optional[ndarray] = None
+    lengths: Optional[ndarray] = None
+    s: Optional[ndarray] = None
+    curve: Optional["Curve"] = None
+
+    # construction
+
+    @classmethod
+    def init_line(cls, x, height, origin=(0.0, 0.0), angle=0.0):
+        """A straight beam.
+
+        Parameters
+        ----------
+        x
+            Increasing positions of the nodes along the axis, shape (n,), n >= 2.
+        height
+            Height of the section.
+        origin
+            The point from which ``x`` is measured.
+        angle
+            Direction of the axis, in radians from the first coordinate axis.
+
+        Raises
+        ------
+        MeshError
+            If an element has no length or the nodes are not increasing.
+        InputError
+            If ``height`` is not positive or a value is not finite.
+
+        Examples
+        --------
+        >>> mesh = MeshBeam.init_line([0, 1, 3], height=0.2)
+        >>> mesh.lengths.tolist()
+        [1.0, 2.0]
+        """
+        x = require_finite("x", x, (None,))
+        height = require_positive("height", height)
+        origin = require_finite("origin", origin, (2,))
+        angle = require_finite_scalar("angle", angle)
+        if len(x) < 2:
+            raise MeshError(f"a beam needs at least two nodes, got {len(x)}")
+        if not np.all(np.diff(x) > 0):
+            k = int(np.argmin(np.diff(x)))
+            raise MeshError(
+                f"element {k} from x = {x[k]:.9g} to {x[k + 1]:.9g} has no positive length; the nodes "
+                "must increase along the axis")
+        e1 = np.array([np.cos(angle), np.sin(angle)])
+        return cls._from_nodes(origin[:, None] + e1[:, None] * x, np.outer(e1, np.ones(len(x))),
+                               np.diff(x), height, s=x)
+
+    @classmethod
+    def init_curve(cls, r, s, height, dr=None):
+        """A beam that is curved in its stress-free state.
+
+        Parameters
+        ----------
+        r
+            The axis: a function of parameters, shape (n,), that returns positions (2, n).
+        s
+            Increasing parameters of the nodes, shape (n,), n >= 2. They need not be arc lengths.
+        height
+            Height of the section.
+        dr
+            Optional derivative of ``r``. If None it is found by the complex step where ``r``
+            allows it, else by differences.
+
+        Raises
+        ------
+        MeshError
+            If the curve folds (radius of curvature below h/2), stands still, jumps, or an element
+            has no length.
+
+        Notes
+        -----
+        The axis of an element is the cubic through the end points with the unit tangents and
+        the arc length of the curve. :meth:`refined` puts new nodes on the curve.
+
+        Examples
+        --------
+        >>> arc = MeshBeam.init_curve(lambda s: np.array([np.cos(s), np.sin(s)]),
+        ...                           np.linspace(0, np.pi, 9), height=0.1)
+        >>> bool(abs(arc.lengths.sum() - np.pi) < 1e-12)
+        True
+        """
+        s = require_finite("s", s, (None,))
+        height = require_positive("height", height)
+        if len(s) < 2:
+            raise MeshError(f"a beam needs at least two nodes, got {len(s)}")
+        if not np.all(np.diff(s) > 0):
+            k = int(np.argmin(np.diff(s)))
+            raise MeshError(f"the parameters of the nodes must increase: s[{k}] = {s[k]:.9g}, "
+                            f"s[{k + 1}] = {s[k + 1]:.9g}")
+        curve = Curve(r, dr if dr is not None else _curve_derivative(r, s[0], s[-1]))
+        p, tangent = curve.nodes(s)
+        curve.check(s)
+        _check_curvature(curve, s, height)
+        return cls._from_nodes(p, tangent, curve.lengths(s[:-1], s[1:]), height, s=s, curve=curve)
+
+    @classmethod
+    def _from_nodes(cls, p, tangent, lengths, height, s=None, curve=None):
+        n = p.shape[1]
+        mesh = cls(p, np.array([np.arange(n - 1), np.arange(1, n)]), height=height, p_X=tangent,
+                   p_Y=np.array([-tangent[1], tangent[0]]), lengths=lengths, s=s, curve=curve)
+        mesh._boundaries = mesh._build_default_tags()
+        return mesh
+
+    @classmethod
+    def init_refdom(cls):
+        return cls.init_line([0.0, 1.0], height=1.0, origin=(0.0, 0.5))
+
+    def __post_init__(self):
+        p, shape = require_finite("the nodes", self.doflocs, (2, None)), np.shape(self.t)
+        if len(shape) != 2 or shape[0] != 2 or shape[1] == 0:
+            raise MeshError(
+                f"a MeshBeam has two nodes per element and at least one element, t has shape "
+                f"{shape}; for quads of its body use mesh.to_meshquad()")
+        super().__post_init__()
+        self.height = require_positive("height", self.height)
+        t = self.t
+        if not (np.array_equal(t[1], t[0] + 1) and np.all(np.diff(t[0]) > 0)):
+            raise MeshError("the nodes of a MeshBeam are numbered along its axis: element k joins "
+                            "t[0, k] and t[0, k] + 1, and t[0] increases")
+        odd = np.setxor1d(t, np.arange(p.shape[1]))
+        if len(odd):
+            raise MeshError(f"every node of a MeshBeam is part of an element: there are "
+                            f"{p.shape[1]} nodes, and node {odd[0]} is only in "
+                            f"{'t' if odd[0] in t else 'the nodes'}")
+        chord = np.hypot(*(p[:, t[1]] - p[:, t[0]]))
+        self._require_length(chord > 4 * np.finfo(float).eps * np.max(np.abs(p)))
+        if self.p_X is None:
+            self._straight()
+        self.p_X = require_finite("p_X", self.p_X, p.shape)
+        self.p_Y = require_finite("p_Y", self.p_Y, p.shape)
+        self.lengths = require_finite("lengths", self.lengths, (t.shape[1],))
+        self._require_length(self.lengths > 0)
+        self._mapping().check()
+
+    def _require_length(self, has_length):
+        if not np.all(has_length):
+            k = int(np.argmin(has_length))
+            a, b = self.p[:, self.t[:, k]].T.tolist()
+            raise MeshError(f"element {k} has no length: its nodes are at {a} and {b}")
+
+    def _straight(self):
+        """Tangents, normals and lengths of nodes that lie on straight lines."""
+        p, t = self.doflocs, self.t
+        d = p[:, t[1]] - p[:, t[0]]
+        self.lengths = np.hypot(*d)
+        d = d / self.lengths
+        self.p_X = np.zeros(p.shape)
+        self.p_X[:, t[1]] = d
+        shared = np.intersect1d(t[0], t[1])
+        if np.any(np.abs(self.p_X[:, shared] - d[:, np.searchsorted(t[0], shared)]) > 1e-8):
+            raise MeshError("the nodes do not lie on a straight line: use MeshBeam.init_curve, or "
+                            "one beam for each straight part and a rigid joint between them")
+        self.p_X[:, t[0]] = d
+        self.p_Y = np.array([-self.p_X[1], self.p_X[0]])
+
+    # topology
+
+    def _mapping(self):
+        if not hasattr(self, "_cached_mapping"):
+            self._cached_mapping = MappingBeam(self)
+        return self._cached_mapping
+
+    def _init_facets(self):
+        """Sections first, one for each node, then the bottom and the top of each element."""
+        n, ne, t = self.doflocs.shape[1], self.t.shape[1], self.t
+        nodes = np.arange(n, dtype=np.int32)
+        bottom, top = n + np.arange(ne, dtype=np.int32), n + ne + np.arange(ne, dtype=np.int32)
+        self._facets = np.hstack([np.array([nodes, nodes]), t, t])
+        self._t2f = np.array([bottom, t[1], top, t[0]], dtype=np.int32)
+        f2t = np.full((2, n + 2 * ne), -1, dtype=np.int32)
+        elements = np.arange(ne, dtype=np.int32)
+        f2t[0, bottom] = f2t[0, top] = elements
+        f2t[1, t[0]] = elements
+        f2t[0, t[1]] = elements
+        starts = f2t[0] < 0
+        f2t[0, starts], f2t[1, starts] = f2t[1, starts], -1
+        self._f2t = f2t
+
+    @property
+    def f2t(self):
+        if not hasattr(self, "_f2t"):
+            self._init_facets()
+        return self._f2t
+
+    def _build_default_tags(self):
+        n, ne = self.p.shape[1], self.nelements
+        elements = np.arange(ne, dtype=np.int32)
+        ends = np.setdiff1d(self.t[0], self.t[1]), np.setdiff1d(self.t[1], self.t[0])
+        return {"left": ends[0][:1].astype(np.int32), "right": ends[1][-1:].astype(np.int32),
+                "bottom": n + elements, "top": n + ne + elements}
+
+    def normalize_facets(self, facets):
+        if isinstance(facets, str) and facets not in (self.boundaries or {}):
+            raise NameUnknown("boundary", facets, self.boundaries or {})
+        return super().normalize_facets(facets)
+
+    def normalize_elements(self, elements):
+        if isinstance(elements, str) and elements not in (self.subdomains or {}):
+            raise NameUnknown("subdomain", elements, self.subdomains or {})
+        if isinstance(elements, np.integer):
+            elements = int(elements)
+        elif isinstance(elements, (tuple, list, set)) and len(elements) == 0:
+            elements = np.zeros(0, dtype=np.int32)
+        elements = super().normalize_elements(elements)
+        if elements.dtype == bool:
+            elements = np.nonzero(elements)[0]
+        if len(elements) and not 0 <= np.min(elements) <= np.max(elements) < self.nelements:
+            raise MeshError(f"the elements are numbered 0 to {self.nelements - 1}, got "
+                            f"{np.min(elements)} to {np.max(elements)}")
+        return elements
+
+    def facets_satisfying(self, test, boundaries_only=False, normal=None):
+        middle = np.array([[0.5]])
+        mapping = self._mapping()
+        facets = np.nonzero(test(mapping.G(middle)[:, :, 0]))[0].astype(np.int32)
+        if boundaries_only:
+            facets = np.intersect1d(facets, self.boundary_facets())
+        if normal is None:
+            return facets
+        tind, points = mapping.facet_points(middle, facets)
+        normals = mapping.normals(points, tind, facets, self.t2f)[:, :, 0]
+        return OrientedBoundary(facets, 1 * (np.asarray(normal) @ normals < 0))
+
+    def elements_satisfying(self, test):
+        middle = self._mapping().F(np.array([[0.5], [0.5]]))[:, :, 0]
+        return np.nonzero(test(middle))[0].astype(np.int32)
+
+    def params(self):
+        """Length of each element."""
+        return self.lengths
+
+    def param(self):
+        """Length of the longest element."""
+        return float(np.max(self.lengths))
+
+    @property
+    def is_straight(self):
+        """True if every element is straight with sections normal to it."""
+        if not hasattr(self, "_is_straight"):
+            d = (self.p[:, self.t[1]] - self.p[:, self.t[0]]) / self.lengths
+            tol = 1e-12 + 8 * np.finfo(float).eps * np.max(np.abs(self.p)) / np.min(self.lengths)
+            self._is_straight = bool(
+                all(np.all(np.abs(self.p_X[:, t] - d) <= tol) for t in self.t)
+                and np.all(np.abs(self.p_Y - np.array([-self.p_X[1], self.p_X[0]])) <= tol))
+        return self._is_straight
+
+    def element_finder(self, mapping=None):
+        """A function from points x, y to the elements that hold them.
+
+        The function raises :class:`MeshError` for points outside the body.
+        """
+        mapping = self._mapping() if mapping is None else mapping
+        samples = np.array([(np.arange(4) + 0.5) / 4, np.full(4, 0.5)])
+        tree = cKDTree(mapping.F(samples).reshape(2, -1).T)
+        k = min(6, 4 * self.nelements)
+        # points of an exact curve may lie a little outside its cubic elements
+        allowed = 1e-6 if self.is_straight else 1e-3
+
+        def best(x, candidates):
+            """The best of the candidates (n, k) for each point, and how far outside it is."""
+            n, k = candidates.shape
+            X = mapping.invF(np.repeat(x, k, axis=1)[:, :, None], tind=candidates.ravel())
+            outside = np.max(np.abs(X[:, :, 0] - 0.5) - 0.5, axis=0).reshape(n, k)
+            size = np.max(np.abs(x), initial=0.0) + np.max(np.abs(self.p))
+            outside[outside < 1e-9 + 8 * np.finfo(float).eps * size / self.height] = 0.0
+            rows, which = np.arange(n), np.argmin(outside, axis=1)
+            return candidates[rows, which].astype(np.int32), outside[rows, which]
+
+        def finder(*x):
+            x = require_finite("the points", np.array(x), (2, None))
+            near = tree.query(x.T, k=k)[1].reshape(x.shape[1], k) // 4
+            found, outside = best(x, np.sort(near, axis=1))
+            for i in np.nonzero(outside > allowed)[0]:  # rare: neighbouring coils are nearer
+                found[i:i + 1], outside[i:i + 1] = best(
+                    x[:, i:i + 1], np.arange(self.nelements)[None])
+                if outside[i] <= allowed:
+                    continue
+                bad = x[:, i]
+                raise MeshError(
+                    f"the point ({bad[0]:.9g}, {bad[1]:.9g}) is outside the body: points are named "
+                    f"by their place in the stress-free beam of height {self.height:.6g}, whose "
+                    f"axis runs from {self.p[:, 0].tolist()} to {self.p[:, -1].tolist()}")
+            return found
+
+        return finder
+
+    # refinement
+
+    def _uniform(self):
+        return self._adaptive(np.arange(self.nelements))
+
+    def refined(self, times_or_ix=1):
+        """A finer mesh: new nodes on the curve, numbered along the axis; names are kept.
+
+        Parameters
+        ----------
+        times_or_ix
+            The number of uniform refinements, or the elements to halve.
+        """
+        if isinstance(times_or_ix, (int, np.integer)) and not isinstance(times_or_ix, bool):
+            if times_or_ix < 0:
+                raise MeshError(f"the number of refinements must be >= 0, got {times_or_ix}")
+            return super().refined(int(times_or_ix))
+        return self._adaptive(times_or_ix)
+
+    def _adaptive(self, ix):
+        ix = np.unique(self.normalize_elements(ix))
+        marked = np.zeros(self.nelements, dtype=bool)
+        marked[ix] = True
+        new = self._midpoints(ix)
+        where = self.t[1, ix]
+        fields = {name: np.insert(getattr(self, name), where, new[name], axis=-1)
+                  for name in ("doflocs", "p_X", "p_Y")}
+        if self.s is not None:
+            fields["s"] = np.insert(self.s, where, new["s"])
+        # children of element e: first[e], and first[e] + 1 if it was marked
+        first = np.arange(self.nelements) + np.concatenate([[0], np.cumsum(marked)[:-1]])
+        parent = np.repeat(np.arange(self.nelements), 1 + marked)
+        node = np.arange(self.p.shape[1]) + np.searchsorted(where, np.arange(self.p.shape[1]),
+                                                            side="right")
+        left = node[self.t[0, parent]]
+        left[first[ix] + 1] += 1
+        lengths = self.lengths[parent]
+        if self.curve is None:
+            lengths = np.where(marked[parent], lengths / 2, lengths)
+        else:
+            lengths[first[ix]], lengths[first[ix] + 1] = new["lengths"]
+        m = replace(self, t=np.array([left, left + 1]), lengths=lengths, _boundaries=None,
+                    _subdomains=None, **fields)
+        m._boundaries = self._refine_tags(self._boundaries, m, first, marked, node)
+        if self._subdomains is not None:
+            m._subdomains = {name: np.nonzero(np.isin(parent, e))[0].astype(np.int32)
+                             for name, e in self._subdomains.items()}
+        return m
+
+    def _midpoints(self, ix):
+        """Position, gradients, parameter and, on a curve, lengths for the middle of elements."""
+        out = {}
+        if self.s is not None:
+            out["s"] = 0.5 * (self.s[self.t[0, ix]] + self.s[self.t[1, ix]])
+        if self.curve is None:
+            middle = np.array([[0.5], [0.5]])
+            mapping = self._mapping()
+            J = mapping.DF(middle, ix)[..., 0]
+            return {**out, "doflocs": mapping.F(middle, ix)[..., 0],
+                    "p_X": J[:, 0] / self.lengths[ix], "p_Y": J[:, 1] / self.height}
+        a, b = self.s[self.t[:, ix]]
+        p, tangent = self.curve.nodes(out["s"])
+        return {**out, "doflocs": p, "p_X": tangent, "p_Y": np.array([-tangent[1], tangent[0]]),
+                "lengths": (self.curve.lengths(a, out["s"]), self.curve.lengths(out["s"], b))}
+
+    def _refine_tags(self, tags, m, first, marked, node):
+        """Boundaries of the refined mesh ``m``: sections move, surfaces pass to the children."""
+        if tags is None:
+            return None
+        n, ne = self.p.shape[1], self.nelements
+        out = {}
+        for name, facets in tags.items():
+            ori = getattr(facets, "ori", None)
+            f = np.asarray(facets)
+            new, source = [], []
+            for k, facet in enumerate(f):
+                if facet < n:
+                    children = [node[facet]]
+                else:
+                    side, e = divmod(facet - n, ne)
+                    start = m.p.shape[1] + side * m.nelements + first[e]
+                    children = [start, start + 1] if marked[e] else [start]
+                new += children
+                source += [k] * len(children)
+            new = np.array(new, dtype=np.int32)
+            order = np.argsort(new, kind="stable")
+            out[name] = (new[order] if ori is None else
+                         OrientedBoundary(new[order], np.asarray(ori)[source][order]))
+        return out
+
+    def restrict(self, elements, return_mapping=False, skip_boundaries=False,
+                 skip_subdomains=False):
+        """The mesh of some elements; a part cut off keeps the numbering along the axis."""
+        elements = np.unique(self.normalize_elements(elements))
+        if len(elements) == 0:
+            raise MeshError("a mesh needs at least one element: the given set is empty")
+        nodes = np.unique(self.t[:, elements])
+        renumber = np.full(self.p.shape[1], -1, dtype=np.int32)
+        renumber[nodes] = np.arange(len(nodes))
+        m = type(self)(self.p[:, nodes], renumber[self.t[:, elements]], height=self.height,
+                     p_X=self.p_X[:, nodes], p_Y=self.p_Y[:, nodes],
+                     lengths=self.lengths[elements], curve=self.curve,
+                     s=None if self.s is None else self.s[nodes])
+        if self._subdomains is not None and not skip_subdomains:
+            m._subdomains = {name: np.nonzero(np.isin(elements, e))[0].astype(np.int32)
+                             for name, e in self._subdomains.items()}
+        if self._boundaries is not None and not skip_boundaries:
+            facets = np.full(self.nfacets, -1, dtype=np.int32)
+            facets[self.t2f[:, elements].ravel()] = m.t2f.ravel()
+            m._boundaries = {}
+            for name, f in self._boundaries.items():
+                keep = facets[np.asarray(f)] >= 0
+                new = facets[np.asarray(f)[keep]]
+                m._boundaries[name] = (new if getattr(f, "ori", None) is None
+                                       else OrientedBoundary(new, f.ori[keep]))
+        return (m, nodes) if return_mapping else m
+
+    # rigid motion and scale
+
+    def _moved(self, rotation, shift, scale=1.0):
+        curve = None if self.curve is None else self.curve.moved(scale * rotation, shift)
+        return replace(self, doflocs=scale * rotation @ self.p + shift[:, None],
+                       p_X=rotation @ self.p_X, p_Y=rotation @ self.p_Y, curve=curve,
+                       lengths=scale * self.lengths, height=scale * self.height)
+
+    def translated(self, diffs):
+        """The mesh moved by a vector of shape (2,)."""
+        return self._moved(np.eye(2), require_finite("the shift", diffs, (2,)))
+
+    def rotated(self, angle, about=(0.0, 0.0)):
+        """The mesh turned by an angle in radians about a point."""
+        angle, about = require_finite_scalar("angle", angle), require_finite("about", about, (2,))
+        c, s = np.cos(angle), np.sin(angle)
+        Q = np.array([[c, -s], [s, c]])
+        return self._moved(Q, about - Q @ about)
+
+    def scaled(self, factors):
+        """The mesh, with its height, scaled by one positive factor."""
+        f = np.unique(require_finite("factors", np.atleast_1d(factors)))
+        if len(f) != 1 or f[0] <= 0:
+            raise MeshError(f"a beam is scaled by one positive factor in all directions, got "
+                            f"{factors!r}; sections would not stay normal otherwise")
+        return self._moved(np.eye(2), np.zeros(2), f[0])
+
+    def _refuse(self, what):
+        raise MeshError(
+            f"a MeshBeam cannot be {what}: it is one chain of nodes with sections. Put several "
+            "beams into one Scene and join them, or build the mesh with init_line or init_curve")
+
+    def mirrored(self, normal, point=None):
+        self._refuse("mirrored")
+
+    def morphed(self, *args):
+        self._refuse("morphed")
+
+    def smoothed(self, fixed_nodes=None):
+        self._refuse("smoothed")
+
+    def __add__(self, other):
+        self._refuse("joined with +")
+
+    def __matmul__(self, other):
+        self._refuse("joined with @")
+
+    # pictures and files
+
+    def to_meshquad(self, nx=8, ny=4):
+        """Quads of the stress-free body, ``nx`` by ``ny`` an element, as a scikit-fem MeshQuad."""
+        quad = MeshQuad.init_tensor(np.linspace(0, 1, nx + 1), np.linspace(0, 1, ny + 1))
+        number = np.arange(quad.p.shape[1] * self.nelements).reshape(self.nelements, -1)
+        left, right = (np.nonzero(quad.p[0] == end)[0] for end in (0.0, 1.0))
+        joined = 1 + np.nonzero(self.t[1, :-1] == self.t[0, 1:])[0]
+        number[joined[:, None], left] = number[joined[:, None] - 1, right]
+        kept, number = np.unique(number, return_inverse=True)
+        t = number.reshape(self.nelements, -1)[:, quad.t].transpose(1, 0, 2)
+        return MeshQuad(self._mapping().F(quad.p).reshape(2, -1)[:, kept], t.reshape(4, -1))
+
+    def draw(self, visuals="matplotlib", **kwargs):
+        """Draw the outline of the elements; see :meth:`skfem.Mesh.draw`."""
+        return self.to_meshquad(1 if self.is_straight else 8, 1).draw(visuals, **kwargs)
+
+    def _repr_svg_(self):
+        return self.to_meshquad(1 if self.is_straight else 8, 1)._repr_svg_()
+
+    def __repr__(self):
+        kind = "straight" if self.is_straight else "curved"
+        return (super().__repr__() + f"\n  Height, length: {self.height:.6g}, "
+                f"{self.lengths.sum():.6g} ({kind})")
+
+    def to_dict(self):
+        """Everything but the function ``curve``, as lists."""
+        out = super().to_dict()
+        out["orientations"] = {k: v.ori.tolist() for k, v in (self.boundaries or {}).items()
+                               if getattr(v, "ori", None) is not None}
+        for name in ("p_X", "p_Y"):
+            out[name] = getattr(self, name).T.tolist()
+        for name in ("lengths", "s"):
+            value = getattr(self, name)
+            out[name] = None if value is None else value.tolist()
+        return {**out, "height": self.height}
+
+    @classmethod
+    def from_dict(cls, data):
+        data = {"boundaries": None, "subdomains": None, **data}
+        for name in ("p_X", "p_Y"):
+            if data.get(name) is not None:
+                data[name] = np.ascontiguousarray(np.array(data[name]).T)
+        for name in ("lengths", "s"):
+            if data.get(name) is not None:
+                data[name] = np.array(data[name])
+        orientations = data.pop("orientations", {})
+        mesh = super().from_dict(data)
+        for name, ori in orientations.items():
+            mesh._boundaries[name] = OrientedBoundary(mesh._boundaries[name], ori)
+        return mesh
+
+    def save_npz(self, filename):
+        """Save everything but the function ``curve``; read it with :meth:`load_npz`."""
+        tags = {f"b_{k}": v for k, v in (self.boundaries or {}).items()}
+        tags |= {f"o_{k}": v.ori for k, v in (self.boundaries or {}).items()
+                 if getattr(v, "ori", None) is not None}
+        tags |= {f"s_{k}": v for k, v in (self.subdomains or {}).items()}
+        s = {} if self.s is None else {"s": self.s}
+        np.savez(filename, doflocs=self.doflocs, t=self.t, height=self.height, p_X=self.p_X,
+                 p_Y=self.p_Y, lengths=self.lengths, **s, **tags)
+
+    @classmethod
+    def load_npz(cls, filename):
+        with np.load(filename) as data:
+            tags = {k[2:]: data[k] for k in data.files if k.startswith("b_")}
+            tags = {k: OrientedBoundary(v, data[f"o_{k}"]) if f"o_{k}" in data.files else v
+                    for k, v in tags.items()}
+            parts = {k[2:]: data[k] for k in data.files if k.startswith("s_")}
+            return cls(data["doflocs"], data["t"], tags or None, parts or None,
+                       height=float(data["height"]), p_X=data["p_X"], p_Y=data["p_Y"],
+                       lengths=data["lengths"], s=data["s"] if "s" in data.files else None)
+
+    def save(self, filename, point_data=None, cell_data=None, **kwargs):
+        """Save the mesh: ``.npz`` or ``.json`` to load it again, else the body for a viewer.
+
+        Any other suffix that meshio knows writes the quads of :meth:`to_meshquad`.
+        """
+        path = Path(filename)
+        if path.suffix == ".npz":
+            self.save_npz(path)
+        elif path.suffix == ".json":
+            path.write_text(json.dumps(self.to_dict()))
+        else:
+            self.to_meshquad().save(filename, point_data, cell_data, **kwargs)
+
+    @classmethod
+    def load(cls, filename, out=None, **kwargs):
+        """Load a mesh saved as ``.npz`` or ``.json``."""
+        path = Path(filename)
+        if path.suffix == ".npz":
+            return cls.load_npz(path)
+        if path.suffix == ".json":
+            return cls.from_dict(json.loads(path.read_text()))
+        raise MeshError(f"cannot read a beam from {path.name!r}: only .npz and .json files keep "
+                        "the axis, the tangents and the height; save the mesh in one of them")
+
+
+class Curve:
+    """A plane curve r(s) with its derivative."""
+
+    def __init__(self, r, derivative):
+        self.r, self.derivative = r, derivative
+
+    def __call__(self, s):
+        return require_finite("r(s)", self.r(s), (2, len(s)))
+
+    def nodes(self, s):
+        """Positions and unit tangents at parameters ``s``, both of shape (2, n)."""
+        p, d = self(s), require_finite("the derivative of r", self.derivative(s), (2, len(s)))
+        size = np.hypot(*d)
+        if len(s) and np.min(size) <= 1e-12 * np.max(size):
+            raise MeshError(f"the curve stands still at s = {s[np.argmin(size)]:.9g}: it has no "
+                            "tangent there")
+        return p, d / size
+
+    def lengths(self, a, b):
+        """Arc lengths from parameters ``a`` to ``b``, both of shape (n,)."""
+        d, w = self._at_gauss_points(a, b)
+        return np.hypot(*d) @ w * (b - a)
+
+    def check(self, s):
+        """Raise :class:`MeshError` if the derivative is not that of r between nodes ``s``."""
+        d, w = self._at_gauss_points(s[:-1], s[1:])
+        gap = np.hypot(*(d @ w * np.diff(s) - np.diff(self(s))))
+        length = np.hypot(*d) @ w * np.diff(s)
+        k = int(np.argmax(gap / length))
+        if not gap[k] <= 0.02 * length[k]:
+            raise MeshError(
+                f"r jumps, or its derivative does not fit, between s = {s[k]:.9g} and "
+                f"{s[k + 1]:.9g}: the derivative adds up to a point {gap[k]:.6g} from r")
+
+    def _at_gauss_points(self, a, b):
+        x, w = np.polynomial.legendre.leggauss(12)
+        at = a[:, None] + (b - a)[:, None] * (0.5 + 0.5 * x)
+        return np.reshape(self.derivative(at.ravel()), (2,) + at.shape), 0.5 * w
+
+    def moved(self, A, shift):
+        """The curve ``A r(s) + shift``."""
+        return Curve(lambda s: A @ self(s) + shift[:, None], lambda s: A @ self.derivative(s))
+
+
+def _curve_derivative(r, s0, s1):
+    """The derivative of ``r`` on [s0, s1]: complex step if exact, else sixth-order differences."""
+    d = 1e-3 * (s1 - s0)
+    k = np.arange(-3, 4)
+
+    def differences(s):
+        c = np.clip(s, s0 + 3 * d, s1 - 3 * d)  # the stencil stays on the curve
+        values = np.array([np.asarray(r(c + i * d), dtype=np.float64) for i in k])
+        weights = np.array([_lagrange_derivative(k, i, (s - c) / d) for i in range(7)])
+        return np.einsum("is,ijs->js", weights, values) / d
+
+    def complex_step(s):
+        return np.imag(np.asarray(r(s + 1e-30j))) / 1e-30
+
+    try:
+        probe = s0 + (s1 - s0) * np.linspace(0.0137, 0.991, 24)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # among them: the imaginary part is discarded
+            exact, near = complex_step(probe), differences(probe)
+        if exact.shape == near.shape and np.allclose(exact, near, rtol=1e-6,
+                                                     atol=1e-6 * np.max(np.abs(near))):
+            return complex_step
+    except Exception:  # r is the user's: whatever it raises, it has no complex step
+        logger.debug("the curve has no complex step; differences are used", exc_info=True)
+    return differences
+
+
+def _lagrange_derivative(nodes, i, x):
+    """Derivative at x of the Lagrange polynomial of ``nodes`` that is 1 at nodes[i]."""
+    others = [n for j, n in enumerate(nodes) if j != i]
+    polynomial = np.poly(others) / np.prod([nodes[i] - n for n in others])
+    return np.polyval(np.polyder(polynomial), x)
+
+
+def _check_curvature(curve, s, height):
+    """Raise MeshError where the radius of curvature of the curve is below h/2."""
+    at = np.unique(np.concatenate([np.linspace(a, b, 17) for a, b in zip(s[:-1], s[1:])]))
+    _, tangent = curve.nodes(at)
+    angle = np.unwrap(np.arctan2(tangent[1], tangent[0]))
+    kappa = np.abs(np.diff(angle)) / curve.lengths(at[:-1], at[1:])
+    k = int(np.argmax(kappa))
+    if kappa[k] * height / 2 >= 1.0:
+        raise MeshError(
+            f"the curve folds near s = {at[k]:.6g}: its radius of curvature {1 / kappa[k]:.6g} is "
+            f"below half the height {height / 2:.6g}; use a smaller height or a gentler curve")

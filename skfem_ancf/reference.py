@@ -1,0 +1,68 @@
+"""The reference cell of a beam and the two interpolations along its axis."""
+
+import numpy as np
+from skfem.element import ElementH1
+from skfem.refdom import RefLine, RefQuad, Refdom
+
+
+class RefBeam(Refdom):
+    """Unit square (xi, eta) with two vertices, at the middle of its left and right side.
+
+    ``xi`` runs along the axis, ``eta`` across the section; the axis is ``eta = 1/2``.
+    The facets are bottom, right, top, left, as for scikit-fem's ``RefQuad``, whose
+    quadrature is used through the attribute ``refdom``. Bottom and top share their
+    two vertices, left and right have one vertex, written twice.
+    """
+
+    p = np.array([[0.0, 1.0], [0.5, 0.5]])
+    t = np.array([[0], [1]], dtype=np.int32)
+    normals = RefQuad.normals
+    facets = [[0, 1], [1, 1], [0, 1], [0, 0]]
+    refdom = RefQuad
+    brefdom = RefLine
+    nnodes = 2
+    nfacets = 4
+    name = "Beam"
+
+    @classmethod
+    def on_facet(cls, i, X):
+        return (np.abs(X[1]) < 1e-4, np.abs(X[0] - 1) < 1e-4,
+                np.abs(X[1] - 1) < 1e-4, np.abs(X[0]) < 1e-4)[i]
+
+
+class ElementBeamP1(ElementH1):
+    """Linear along the axis, constant across the section: for fields such as a temperature."""
+
+    nodal_dofs = 1
+    maxdeg = 1
+    dofnames = ["u"]
+    doflocs = np.array([[0.0, 0.5], [1.0, 0.5]])
+    refdom = RefBeam
+
+    def lbasis(self, X, i):
+        if i not in (0, 1):
+            self._index_error()
+        slope = 2.0 * i - 1.0
+        return 1.0 - i + slope * X[0], np.array([slope + 0.0 * X[0], 0.0 * X[0]])
+
+
+def linear(xi, derivative=0):
+    """The two linear functions of ``xi`` that are 1 at 0 and at 1; shape (2,) + xi.shape."""
+    one = np.ones_like(xi)
+    if derivative == 0:
+        return np.array([1.0 - xi, xi])
+    return np.array([-one, one]) if derivative == 1 else np.array([0.0 * one, 0.0 * one])
+
+
+def hermite(xi, derivative=0):
+    """The cubic Hermite functions dual to f(0), f'(0), f(1), f'(1); shape (4,) + xi.shape."""
+    x = np.asarray(xi)
+    if derivative == 0:
+        return np.array([1.0 - x * x * (3.0 - 2.0 * x), x * (1.0 - x) ** 2,
+                         x * x * (3.0 - 2.0 * x), x * x * (x - 1.0)])
+    if derivative == 1:
+        return np.array([-6.0 * x * (1.0 - x), (1.0 - x) * (1.0 - 3.0 * x),
+                         6.0 * x * (1.0 - x), x * (3.0 * x - 2.0)])
+    if derivative == 2:
+        return np.array([12.0 * x - 6.0, 6.0 * x - 4.0, 6.0 - 12.0 * x, 6.0 * x - 2.0])
+    raise ValueError(f"derivative must be 0, 1 or 2, got {derivative!r}")

@@ -1,0 +1,52 @@
+"""Fixtures: every element of the registry, and meshes of every kind."""
+
+import numpy as np
+import pytest
+
+from skfem_ancf import MeshBeam
+from skfem_ancf.elements import ELEMENTS
+
+
+def quarter_arc(n=3, height=0.3, radius=1.0):
+    """A quarter of a circle about the origin, n elements, parameter = angle."""
+    return MeshBeam.init_curve(lambda s: radius * np.array([np.cos(s), np.sin(s)]),
+                               np.linspace(0.0, np.pi / 2, n + 1), height)
+
+
+def s_curve(height=0.2):
+    """A curve that bends both ways, with unequal elements and a parameter that is no length."""
+    return MeshBeam.init_curve(lambda s: np.array([2 * s + 0.2 * s ** 2, 0.4 * np.sin(2.5 * s)]),
+                               [-1.0, -0.2, 0.1, 0.8, 1.3], height)
+
+
+MESHES = {
+    "straight": lambda: MeshBeam.init_line([0.0, 0.5, 1.0, 1.5], 0.2),
+    "unequal": lambda: MeshBeam.init_line([-1.0, -0.9, 0.3, 1.7], 0.37),
+    "inclined": lambda: MeshBeam.init_line([0.0, 0.4, 1.1], 0.25, origin=(3.0, -2.0), angle=2.3),
+    "one element": lambda: MeshBeam.init_line([0.0, 1.3], 0.8, angle=-0.4),
+    "arc": quarter_arc,
+    "s-curve": s_curve,
+}
+STRAIGHT = ("straight", "unequal", "inclined", "one element")
+
+
+@pytest.fixture(params=ELEMENTS)
+def element(request):
+    """Each element of the registry, a new one for each test."""
+    return ELEMENTS[request.param]()
+
+
+@pytest.fixture(params=MESHES)
+def mesh(request):
+    """Straight, unequal, inclined, single-element and curved meshes."""
+    return MESHES[request.param]()
+
+
+@pytest.fixture(params=STRAIGHT)
+def straight_mesh(request):
+    return MESHES[request.param]()
+
+
+@pytest.fixture
+def arc():
+    return quarter_arc()

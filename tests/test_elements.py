@@ -1,0 +1,372 @@
+"""The beam elements: their space, their coordinates, and what they represent exactly."""
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial, chebyshev
+from numpy.testing import assert_allclose, assert_array_equal
+from skfem import Basis, ElementTriP1, ElementVector, FacetBasis, MeshTri
+from skfem.models.poisson import mass
+
+from conftest import MESHES
+from skfem_ancf import ElementBeamANCF, ElementBeamPatelShabana, InputError, MeshBeam, NameUnknown
+from skfem_ancf.elements.ancf import POINT_FAMILIES
+from skfem_ancf.reference import ElementBeamP1, RefBeam, hermite, linear
+
+ORDERS = range(1, 11)
+SIZES = [(1.0, 1.0), (0.01, 3.0), (250.0, 1e-3)]
+STEP = 1e-30  # of the complex step: exact to round-off
+POINTS = np.random.default_rng(0).random((2, 40))
+
+
+def one_element(L=1.0, h=1.0):
+    return MeshBeam.init_line([0.0, L], h)
+
+
+def tabulate(element, mesh, X=POINTS, tind=None):
+    """Values (n, ne, np) and gradients (n, 2, ne, np) of all local functions."""
+    fields = [element.gbasis(mesh.mapping(), X, i, tind)[0] for i in range(len(element.doflocs))]
+    return np.array([np.asarray(f) for f in fields]), np.array([f.grad for f in fields])
+
+
+def functionals(element, mesh, e, L, h):
+    """Each coordinate of element ``e``, applied to each local function: (coordinate, function).
+
+    Derivatives are taken of the values with the complex step along the reference axes, on an
+    element of length L and height h; the second derivative of the section is that of the gradient.
+    """
+    scale = L, h
+    rows = []
+    for xi, (y, mx, my) in zip(element.doflocs[:, 0], 2 * element.functionals):
+        X = np.array([[xi], [0.5 + y]], dtype=complex)
+        if mx + my == 0:
+            row = tabulate(element, mesh, X, np.array([e]))[0].real
+        else:
+            axis = 0 if mx else 1
+            X[axis] += 1j * STEP
+            values, gradients = tabulate(element, mesh, X, np.array([e]))
+            if mx + my == 1:
+                row = values.imag / STEP / scale[axis]
+            else:
+                director = mesh.mapping().DF(X, np.array([e]))[:, 1] / h
+                row = np.einsum("niep,iep->nep", gradients, director).imag / STEP / scale[axis]
+        rows.append(row[:, 0, 0])
+    return np.array(rows)
+
+
+def reference_state(element, mesh, rotation=np.eye(2), shift=np.zeros(2)):
+    """Vector basis and the coordinates of the stress-free state after a rigid motion."""
+    basis = Basis(mesh, ElementVector(element), intorder=6)
+    q = element.rigid(mesh.p_X, mesh.p_Y)
+    q[0] += mesh.p
+    q = np.einsum("ij,kjn->kin", rotation, q)
+    q[0] += shift[:, None]
+    x = basis.zeros()
+    x[basis.nodal_dofs] = q.reshape(basis.nodal_dofs.shape)
+    return basis, x
+
+
+# the section
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_section_points(order):
+    points = ElementBeamANCF(order).section_points
+    if order == 1:
+        expected = [0.0]
+    elif order == 2:
+        expected = [-0.5, 0.5]
+    else:
+        zeros = chebyshev.chebroots(np.eye(order - 1)[order - 2])
+        expected = np.concatenate([[-0.5], 0.5 * zeros, [0.5]])
+    assert_allclose(points, expected, atol=1e-14)
+    assert_array_equal(points, -points[::-1])
+
+
+@pytest.mark.parametrize("family", POINT_FAMILIES)
+@pytest.mark.parametrize("order", ORDERS)
+def test_section_functions_integrate_the_lagrange_polynomials(order, family):
+    element = ElementBeamANCF(order, points=family)
+    points, eta = element.section_points, np.linspace(-0.5, 0.5, 23)
+    assert len(np.unique(points)) == order and np.max(np.abs(points)) <= 0.5
+    if order > 1:
+        assert points[0] == -0.5 and points[-1] == 0.5
+    for k in range(order):
+        at_points = element.section(points, k)[1]
+        assert_allclose(at_points, np.eye(order)[k], atol=1e-12)
+        assert element.section(0.0, k)[0] == 0.0
+        others = np.delete(points, k)
+        lagrange = Polynomial.fromroots(others) if order > 1 else Polynomial([1.0])
+        lagrange = lagrange / np.prod(points[k] - others)
+        P, dP = element.section(eta, k)
+        assert_allclose(dP, lagrange(eta), atol=1e-11)
+        assert_allclose(P, lagrange.integ(lbnd=0.0)(eta), atol=1e-12)
+
+
+def test_fourth_order_function_in_full():
+    """P_1 = h eta (-1/2 + eta/2 + 4 eta^2/3 - 2 eta^3): the printed appendix has it wrong."""
+    eta = np.linspace(-0.5, 0.5, 9)
+    P, _ = ElementBeamANCF(4).section(eta, 0)
+    assert_allclose(P, eta * (-1 / 2 + eta / 2 + 4 * eta ** 2 / 3 - 2 * eta ** 3), atol=1e-15)
+
+
+def test_gauss_lobatto_points():
+    assert_allclose(ElementBeamANCF(4, "gauss-lobatto").section_points * 2,
+                    [-1, -1 / np.sqrt(5), 1 / np.sqrt(5), 1], atol=1e-15)
+
+
+# the space and its coordinates
+
+@pytest.mark.parametrize("L, h", SIZES)
+def test_space_is_reproduced_exactly(element, L, h):
+    """{1, X, X^2, X^3} and {Y^k, X Y^k : k = 1..N}, from coordinates taken analytically."""
+    mesh = one_element(L, h)
+    values, gradients = tabulate(element, mesh)
+    powers = [(a, 0) for a in range(4)]
+    powers += [(a, k) for a in range(2) for k in range(1, element.order + 1)]
+    assert len(powers) == len(element.doflocs) == 2 * element.order + 4
+    xi, eta = POINTS[0], POINTS[1] - 0.5
+    for a, b in powers:  # the function (X/L)^a (2Y/h)^b
+        f, g = Polynomial.basis(a), Polynomial.basis(b)(Polynomial([0.0, 2.0]))
+        q = [f.deriv(mx)(x) / L ** mx * g.deriv(my)(y) / h ** my
+             for x, (y, mx, my) in zip(element.doflocs[:, 0], 2 * element.functionals)]
+        assert_allclose(np.tensordot(q, values, 1)[0], f(xi) * g(eta), atol=2e-12)
+        grad = np.tensordot(q, gradients, 1)[:, 0] * [[L], [h]]
+        assert_allclose(grad, [f.deriv()(xi) * g(eta), f(xi) * g.deriv()(eta)], atol=2e-11)
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_functions_are_dual_to_the_coordinates(element, name):
+    mesh = MESHES[name]()
+    L = np.hypot(*np.diff(mesh.p)) if mesh.is_straight else mesh.lengths
+    for e in range(mesh.nelements):
+        matrix = functionals(element, mesh, e, L[e], mesh.height)
+        assert_allclose(matrix, np.eye(len(matrix)), atol=1e-10)
+
+
+@pytest.mark.parametrize("L, h", SIZES)
+def test_duality_does_not_depend_on_units(element, L, h):
+    matrix = functionals(element, one_element(L, h), 0, L, h)
+    size = np.array([L ** -mx * h ** -my for _, mx, my in 2 * element.functionals])
+    assert_allclose(matrix * size / size[:, None], np.eye(len(size)), atol=1e-11)
+
+
+@pytest.mark.parametrize("spoil", ["point", "length", "height"])
+def test_the_duality_test_can_fail(spoil):
+    element, mesh = ElementBeamANCF(3), one_element(0.7, 0.3)
+    if spoil == "point":
+        element.functionals[2] = (element.functionals[2][0] + 0.01, 0, 1)
+    elif spoil == "length":
+        mesh.lengths = mesh.lengths * 1.01
+    else:
+        mesh.height *= 1.01
+    assert np.max(np.abs(functionals(element, mesh, 0, 0.7, 0.3) - np.eye(10))) > 1e-3
+
+
+def test_gradients_are_those_of_the_values(element, mesh):
+    X = POINTS[:, :7]
+    for axis in (0, 1):
+        step = np.zeros((2, 1), dtype=complex)
+        step[axis] = 1j * STEP
+        along = mesh.mapping().DF(X)[:, axis]
+        expected = tabulate(element, mesh, X + step)[0].imag / STEP
+        gradients = tabulate(element, mesh, X)[1]
+        assert_allclose(np.einsum("niep,iep->nep", gradients, along), expected, atol=1e-12)
+
+
+def test_partition_of_unity(element, mesh):
+    values, gradients = tabulate(element, mesh)
+    position = [0, element.nodal_dofs]
+    assert_allclose(values[position].sum(0), 1.0, atol=1e-14)
+    assert_allclose(gradients[position].sum(0), 0.0, atol=1e-12)
+
+
+def test_functions_scale_with_length_and_height(element):
+    value, grad = tabulate(element, one_element(1.0, 1.0))
+    L, h = 0.37, 2.9
+    scaled, scaled_grad = tabulate(element, one_element(L, h))
+    for i, (_, mx, my) in enumerate(2 * element.functionals):
+        assert_allclose(scaled[i], L ** mx * h ** my * value[i], rtol=1e-12, atol=1e-14)
+        for axis, size in enumerate((L, h)):
+            assert_allclose(scaled_grad[i, axis], L ** mx * h ** my / size * grad[i, axis],
+                            rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", ["same points", "other points", "points per element"])
+def test_one_element_on_several_meshes(element, shape):
+    """Nothing may be remembered from the last mesh or points."""
+    fresh = type(element)() if isinstance(element, ElementBeamPatelShabana) else (
+        ElementBeamANCF(element.order))
+    first, second = MESHES["unequal"](), MESHES["arc"](height=0.11)
+    X = {"same points": POINTS, "other points": POINTS[::-1].copy(),
+         "points per element": np.random.default_rng(1).random((2, second.nelements, 5))}[shape]
+    tabulate(element, first)
+    tabulate(element, first, X)
+    for got, expected in zip(tabulate(element, second, X), tabulate(fresh, second, X)):
+        assert_array_equal(got, expected)
+    assert np.max(np.abs(tabulate(element, second)[0] - tabulate(element, first)[0])) > 1e-3
+
+
+def test_points_per_element_and_subsets(element, arc):
+    value, grad = tabulate(element, arc)
+    each = np.repeat(POINTS[:, None], 2, axis=1)
+    subset = np.array([2, 0])
+    got, got_grad = tabulate(element, arc, each, subset)
+    assert_allclose(got, value[:, subset], atol=1e-15)
+    assert_allclose(got_grad, grad[:, :, subset], atol=1e-13)
+
+
+# elements against each other
+
+def test_patel_shabana_is_order_two_in_other_coordinates():
+    """r_Y at -+h/2 is r_Y -+ (h/2) r_YY: the same fields, and so the same mass matrix."""
+    mesh = MESHES["s-curve"]()
+    h = mesh.height
+    node = np.eye(4)
+    node[2:, 2:] = [[1.0, -h / 2], [1.0, h / 2]]
+    T = np.kron(np.eye(2), node)
+    ps, zheng = (tabulate(e, mesh) for e in (ElementBeamPatelShabana(), ElementBeamANCF(2)))
+    for a, b in zip(ps, zheng):
+        assert_allclose(a, np.tensordot(T.T, b, 1), atol=1e-14)
+    M_ps, M = (mass.assemble(Basis(mesh, e)).toarray()
+               for e in (ElementBeamPatelShabana(), ElementBeamANCF(2)))
+    T = np.kron(np.eye(mesh.nvertices), node)
+    assert_allclose(M_ps, T.T @ M @ T, atol=1e-15)
+
+
+@pytest.mark.parametrize("family", POINT_FAMILIES)
+def test_families_span_the_same_space(family):
+    ours, other = ElementBeamANCF(6), ElementBeamANCF(6, points=family)
+    T = np.array([ours.section(other.section_points, k)[1] for k in range(6)])
+    for k in range(6):
+        eta = np.linspace(-0.5, 0.5, 11)
+        combined = sum(T[k, j] * other.section(eta, j)[0] for j in range(6))
+        assert_allclose(ours.section(eta, k)[0], combined, atol=1e-14)
+
+
+@pytest.mark.parametrize("order", range(1, 10))
+def test_spaces_are_nested(order):
+    low, high = (tabulate(ElementBeamANCF(n), one_element())[0][:, 0] for n in (order, order + 1))
+    _, residual, rank, _ = np.linalg.lstsq(high.T, low.T, rcond=None)
+    assert rank == len(high) and np.max(residual) < 1e-24
+    assert np.max(np.linalg.lstsq(low.T, high.T, rcond=None)[1]) > 1e-9
+
+
+# the stress-free state
+
+@pytest.mark.parametrize("angle, shift", [(0.0, (0.0, 0.0)), (0.3, (1.0, -2.0)), (3.9, (-7.0, 0.1))])
+def test_stress_free_state_and_rigid_motion_are_exact(element, mesh, angle, shift):
+    Q = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    basis, q = reference_state(element, mesh, Q, np.array(shift))
+    field, x = basis.interpolate(q), basis.global_coordinates()
+    expected = np.einsum("ij,jep->iep", Q, x) + np.array(shift)[:, None, None]
+    assert_allclose(field, expected, atol=1e-13)
+    assert_allclose(field.grad, Q[:, :, None, None] + 0 * field.grad, atol=2e-11)
+
+
+def test_stress_free_state_on_the_surface(element, mesh):
+    _, q = reference_state(element, mesh)
+    surface = FacetBasis(mesh, ElementVector(element), facets=["top", "bottom", "left", "right"])
+    field = surface.interpolate(q)
+    assert_allclose(field, surface.global_coordinates(), atol=1e-13)
+    assert_allclose(field.grad, np.eye(2)[:, :, None, None] + 0 * field.grad, atol=5e-11)
+
+
+# attributes
+
+def test_attributes(element):
+    n = element.order
+    assert element.nodal_dofs == len(element.dofnames) == n + 2
+    assert element.dofnames[:2] == ["r", "r_X"]
+    assert element.welded == ["r"] + element.dofnames[2:]
+    assert element.carries_shear_parabola == (n >= 3)
+    assert element.doflocs.shape == (2 * n + 4, 2)
+    assert_array_equal(element.doflocs[:, 0], np.repeat([0.0, 1.0], n + 2))
+    assert element.refdom is RefBeam and element.axis_degree == 3
+    assert f"order {n}" in repr(element)
+    with pytest.raises(ValueError, match="basis functions"):
+        element.gbasis(one_element().mapping(), POINTS, 2 * n + 4)
+    with pytest.raises(ValueError, match="basis functions"):
+        element.gbasis(one_element().mapping(), POINTS, -1)
+
+
+def test_default_quadrature_is_exact(element):
+    mesh = one_element(0.7, 0.3)
+    M, exact = (mass.assemble(Basis(mesh, element, **kw)).toarray()
+                for kw in ({}, {"intorder": 4 * element.order + 20}))
+    assert_allclose(M, exact, atol=1e-15)
+
+
+def test_composite_is_vector(element, arc):
+    """ElementComposite and ElementVector have the same functions, in another order."""
+    n = range(2 * len(element.doflocs))
+    composite = [element_pair(element * element, arc, i) for i in n]
+    vector = [element_pair(ElementVector(element), arc, i) for i in n]
+    assert_array_equal(np.unique(composite, axis=0), np.unique(vector, axis=0))
+    assert len(np.unique(vector, axis=0)) == len(n)
+
+
+def element_pair(element, mesh, i):
+    """Values and gradients of both components of function i, in one row."""
+    fields = element.gbasis(mesh.mapping(), POINTS, i)
+    if len(fields) == 2:
+        both = [np.array([*fields]), np.array([f.grad for f in fields])]
+    else:
+        both = [np.asarray(fields[0]), fields[0].grad]
+    return np.concatenate([b.ravel() for b in both])
+
+
+def test_foreign_meshes_and_elements_are_refused(element):
+    with pytest.raises(ValueError, match="Incompatible"):
+        Basis(MeshTri(), element)
+    with pytest.raises(ValueError, match="Incompatible"):
+        Basis(one_element(), ElementTriP1())
+
+
+@pytest.mark.parametrize("order", [0, -1, 2.0, 1.5, True, "3", None, np.nan])
+def test_bad_order(order):
+    with pytest.raises(InputError, match="integer >= 1, got"):
+        ElementBeamANCF(order)
+
+
+def test_numpy_order():
+    assert ElementBeamANCF(np.int64(3)).order == 3
+
+
+@pytest.mark.parametrize("points", ["gauss", "Chebyshev", None, [0.0]])
+def test_bad_points(points):
+    with pytest.raises(NameUnknown, match="'chebyshev', 'gauss-lobatto', 'equispaced'") as info:
+        ElementBeamANCF(3, points=points)
+    assert info.value.name == points
+
+
+# the functions of the axis, and the scalar element
+
+def test_axis_functions():
+    for x, node in ((0.0, 0), (1.0, 1)):
+        assert_array_equal(hermite(x), np.eye(4)[2 * node])
+        assert_array_equal(hermite(x, 1), np.eye(4)[2 * node + 1])
+        assert_array_equal(linear(x), np.eye(2)[node])
+    x = np.linspace(0, 1, 7)
+    for f, degree in ((hermite, 2), (linear, 1)):
+        for d in range(degree):
+            assert_allclose(f(x + 1j * STEP, d).imag / STEP, f(x, d + 1), atol=1e-14)
+    assert_array_equal(linear(x, 2), 0)
+    with pytest.raises(ValueError, match="derivative"):
+        hermite(x, 3)
+
+
+def test_scalar_element_is_nodal():
+    element = ElementBeamP1()
+    values = np.array([element.lbasis(element.doflocs.T, i)[0] for i in range(2)])
+    assert_array_equal(values, np.eye(2))
+    for i in range(2):
+        d = element.lbasis(POINTS + np.array([[1j * STEP], [0]]), i)[0].imag / STEP
+        assert_allclose(element.lbasis(POINTS, i)[1], [d, 0 * d], atol=1e-15)
+    with pytest.raises(ValueError, match="basis functions"):
+        element.lbasis(POINTS, 2)
+
+
+def test_reference_cell():
+    X = np.array([[0.3, 1.0, 0.6, 0.0], [0.0, 0.2, 1.0, 0.7]])
+    for i in range(4):
+        assert_array_equal(RefBeam.on_facet(i, X), np.arange(4) == i)
+    assert_array_equal(RefBeam.normals, [[0, -1], [1, 0], [0, 1], [-1, 0]])
