@@ -7,3 +7,4 @@ from .errors import (AncfError, ConvergenceError, InputError, MeshError, Missing
                      SupportError)
 from .materials import NeoHookean, StVenantKirchhoff
 from .mesh import MeshBeam
+from .scene import Scene

@@ -312,9 +312,9 @@ class Beam:
                            for j, xi in enumerate(term.nodes(name))))
         return np.array(out)
 
-    def stress(self, strain):
-        """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) of a strain of :meth:`strain`."""
-        return self.formulation.stress(self.element, self.material, strain)
+    def stress(self, u, X, tind=None):
+        """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy); arguments as in :meth:`gradients`."""
+        return self.formulation.stress(self, self.strain(u, X, tind), u, X, tind)
 
     # mass
 

@@ -18,6 +18,8 @@ this module lengths are divided by L and forces by EI/L^2, so EI = 1 and the axi
 is s = I/(A L^2).
 """
 
+# ruff: noqa: E741 - I is the second moment of area, as everywhere in mechanics
+
 import itertools
 
 import numpy as np
@@ -34,9 +36,9 @@ def _choose(kind, name, table):
     return table[name]
 
 
-def _count(n):
-    if int(n) != n or n < 1:
-        raise InputError(f"n must be a whole number from 1 up, got {n!r}")
+def _count(n, least=1):
+    if int(n) != n or n < least:
+        raise InputError(f"n must be a whole number from {least} up, got {n!r}")
     return int(n)
 
 
@@ -84,7 +86,7 @@ def shear_factor(nu):
     return 10 * (1 + nu) / (12 + 11 * nu)
 
 
-def euler_bernoulli_tip(P, E, I, L):  # noqa: E741
+def euler_bernoulli_tip(P, E, I, L):
     """Tip displacement of a cantilever under a small tip force P downwards, P L^3/(3 E I).
 
     Parameters
@@ -167,8 +169,6 @@ def _svk(s):
                 break
             dl, dk = (d * f - c * g) / det, (a * g - c * f) / det
             lam, k = lam - dl, k - dk
-            if abs(dl) + s**0.5 * abs(dk) < 1e-15:
-                return lam, 0 * Q, k
             if abs(dl) + s**0.5 * abs(dk) < 1e-9:  # quadratic: the next error is below 1e-16
                 return lam, 0 * Q, k
         raise InputError("a St. Venant-Kirchhoff section collapses under this load; reduce it")
@@ -188,22 +188,28 @@ def _march(y, span, force, law):
         dx, dy = lam * c - gam * s, lam * s + gam * c
         return np.array([dx, dy, kap, dy * nx - dx * ny]).ravel()
 
-    run = solve_ivp(rate, span, y.ravel(), method="DOP853", rtol=1e-13, atol=1e-14)
+    run = solve_ivp(rate, span, y.ravel(), method="DOP853", rtol=1e-12, atol=1e-14)
     return run.y[:, -1].reshape(y.shape)
 
 
 def _cantilever(law, P, q):
     """Tip displacement over L of a clamped rod under a tip force P and a line load q, both down.
 
-    Shoots from the tip (m = 0, angle unknown) to the root (angle 0): the well-posed direction,
-    and the angle of the tip of a hanging rod lies between -pi/2 and 0.
+    Shoots from the tip (m = 0, angle unknown) to the root (angle 0), the well-posed direction.
+    The tip hangs at an angle between -pi/2 and 0; the first root from -pi/2 up is the rod that
+    hangs without a loop.
     """
 
-    def root(angle):
-        return _march([0.0, 0.0, angle, 0.0], (1.0, 0.0), lambda X: (0.0, -P - q * (1 - X)), law)
+    def root(rise):
+        tip = [0.0, 0.0, rise - np.pi / 2, 0.0]
+        return _march(tip, (1.0, 0.0), lambda X: (0.0, -P - q * (1 - X)), law)
 
-    angle = brentq(lambda a: root(a)[2], -np.pi / 2, 0.0, xtol=1e-15, rtol=1e-15)
-    x, y, _, _ = root(angle)
+    low, high = 0.0, 1e-8
+    while high < np.pi / 2 and root(high)[2] < 0:
+        low, high = high, min(8 * high, np.pi / 2)
+    if low == 0.0:
+        raise InputError("the load is too heavy for shooting: the tip hangs straight down")
+    x, y, _, _ = root(brentq(lambda rise: root(rise)[2], low, high, xtol=1e-16, rtol=1e-15))
     return np.array([-x - 1.0, -y])
 
 
@@ -251,7 +257,8 @@ def elastica_tip_load(alpha):
     phi = brentq(excess, 0.0, top, xtol=1e-300, rtol=1e-15)
     modulus, first, rest = parts(phi)
     second = ellipeinc(rest, modulus) - modulus * np.sin(first) * np.sin(rest)
-    return 1 - np.sqrt(2 * np.sin(phi) / alpha), 1 - 2 * second / np.sqrt(alpha)
+    u, w = 1 - np.sqrt(2 * np.sin(phi) / alpha), 1 - 2 * second / np.sqrt(alpha)
+    return float(u), float(w)
 
 
 def elastica_extensible_tip(P, EA, EI, L):
@@ -319,7 +326,7 @@ def gravity_cantilever(E, nu, rho, L, b, h, g=9.81, model="reissner", plane="str
     [-0.724507359, -0.897687847]
     """
     E, rho, L, g = map(require_positive, ("E", "rho", "L", "g"), (E, rho, L, g))
-    area, I = b * h, inertia(b, h)  # noqa: E741
+    area, I = b * h, inertia(b, h)
     shear_modulus = E / (2 * (1 + nu))
     E = E / _choose("plane", plane, {"stress": 1.0, "strain": 1 - nu**2})
     s, shear = I / (area * L**2), E * I / (shear_factor(nu) * shear_modulus * area * L**2)
@@ -423,64 +430,72 @@ def rollup_tip(M, E, b, h, L):
 # Frames and arches: a rod from support to support, four unknowns, three end conditions
 
 
-def _newton(f, z, tol=1e-11):
-    """Solve f(z) = 0; return z, the Jacobian (complex steps) and the extra output of f."""
-    z = np.asarray(z, dtype=float)
-    best = np.inf
+# of the unknowns in the length of a path: one of order 1 (angle or moment), three forces
+_WEIGHT = np.array([1.0, 0.1, 0.1, 0.1])
+
+
+def _newton(f, z):
+    """Solve f(z)[0] = 0; return z, the Jacobian (complex steps) and the second output of f."""
     for _ in range(20):
         res, out = f(z[:, None] + 1e-30j * np.eye(len(z)))
         value, J = res[:, 0].real, res.imag / 1e-30
-        if np.abs(value).max() < tol:
+        if np.abs(value).max() < 1e-11:
             return z, J, out[:, 0].real
+        if not np.abs(value).max() < 2.0:  # lost; integrating further could take minutes
+            break
         z = z - np.linalg.solve(J, value)
-        best = min(best, np.abs(value).max())
-    raise InputError(f"no equilibrium found (residual {best:.1e}); take smaller steps")
+    raise InputError("no equilibrium found from the previous one; take smaller steps")
 
 
 def _step(frame, z, t):
-    """The point of the path in the plane through z normal to t; its tangent and output."""
-    weight = np.array([1.0, 0.1, 0.1, 0.1])  # of the unknowns: one of order 1, three forces
+    """The point of the path in the plane through z with the normal t, its tangent and output."""
 
-    def plane(w):
+    def in_plane(w):
         res, out = frame(w)
-        return np.vstack([res, (t * weight) @ (w - z[:, None])]), out
+        return np.vstack([res, (t * _WEIGHT) @ (w - z[:, None])]), out
 
-    z, J, out = _newton(plane, z)
-    new = np.linalg.svd(J[:3] / weight)[2][-1]
-    return z, new * np.sign(new @ t), out, new / weight * np.sign(new @ t)
+    z, J, out = _newton(in_plane, z)
+    new = np.linalg.svd(J[:3] / _WEIGHT)[2][-1]
+    return z, new * np.sign(new @ t), out
 
 
 def _path(frame, step):
-    """Equilibria (z, t, out, dz/ds) from rest, z = 0, by pseudo-arc-length; z[3] is the load."""
-    point = _step(frame, np.zeros(4), np.array([0.0, 0.0, 0.0, 1.0]))
+    """Equilibria (z, tangent, output) from rest, z = 0, by pseudo-arc-length; z[3] is the load."""
+    z, t, out = _step(frame, np.zeros(4), np.array([0.0, 0.0, 0.0, 1.0]))
+    before = t
     while True:
-        yield point
-        point = _step(frame, point[0] + step * point[3], point[1])
+        yield z, t, out
+        ahead = step * (1.5 * t - 0.5 * before)  # of second order
+        before = t
+        z, t, out = _step(frame, z + ahead / _WEIGHT, t)
 
 
 def _limit_loads(frame, count, step):
     """The first limit loads of a path: where the load component of the tangent vanishes."""
-    found, path = [], _path(frame, step)
-    for a, b in itertools.pairwise(itertools.islice(path, 1000)):
-        if a[1][3] * b[1][3] < 0:
-            at = brentq(
-                lambda ds, a=a: _step(frame, a[0] + ds * a[3], a[1])[1][3], 0.0, step, xtol=1e-7
-            )
-            found.append(_step(frame, a[0] + at * a[3], a[1])[0][3])
+    found = []
+    for (z, t, _), (y, after, _) in itertools.pairwise(itertools.islice(_path(frame, step), 200)):
+        if t[3] * after[3] < 0:
+
+            def between(part, z=z, y=y, t=t):
+                return _step(frame, z + part * (y - z), t)
+
+            part = brentq(lambda part: between(part)[1][3], 0.0, 1.0, xtol=1e-7)
+            found.append(float(between(part)[0][3]))
             if len(found) == count:
                 return found
     raise InputError("the path has fewer limit points than asked for")
 
 
-def _sample(frame, n, reach, finest):
-    """n points along a path of the given scaled length: rows of the output and the load."""
-    parts = -(-round(reach / finest) // max(n - 1, 1))
-    path = _path(frame, reach / (parts * max(n - 1, 1)))
+def _sample(frame, n, reach, step):
+    """n points of a path of the length reach, in steps of at most step: output and load."""
+    n = _count(n, 2)
+    parts = int(np.ceil(require_positive("reach", reach) / (step * (n - 1))))
+    path = _path(frame, reach / (parts * (n - 1)))
     points = itertools.islice(path, 0, parts * (n - 1) + 1, parts)
-    return np.array([np.append(out, z[3]) for z, _, out, _ in points]).T
+    return np.array([np.append(out, z[3]) for z, _, out in points]).T
 
 
-def _lee(A, I, L):  # noqa: E741
+def _lee(A, I, L):
     s = 0.0 if A is None else require_positive("I", I) / (require_positive("A", A) * L**2)
     law = _line(s)
 
@@ -496,7 +511,7 @@ def _lee(A, I, L):  # noqa: E741
     return frame
 
 
-def lee_frame(n=41, A=None, I=1.0, L=1.0, reach=8.0):  # noqa: E741
+def lee_frame(n=41, A=None, I=1.0, L=1.0, reach=8.0):
     """Load path of Lee's frame, through snap-through and snap-back.
 
     A column of length L, pinned at its foot, carries a beam of length L, rigidly joined to it and
@@ -525,10 +540,10 @@ def lee_frame(n=41, A=None, I=1.0, L=1.0, reach=8.0):  # noqa: E741
     >>> ux.shape, bool(load.max() > 18.0), bool(load.min() < -8.0)
     ((17,), True, True)
     """
-    return _sample(_lee(A, I, L), _count(n), require_positive("reach", reach), 0.2)
+    return _sample(_lee(A, I, L), n, reach, 0.2)
 
 
-def lee_frame_limits(A=None, I=1.0, L=1.0):  # noqa: E741
+def lee_frame_limits(A=None, I=1.0, L=1.0):
     """The limit load and the following minimum of Lee's frame, see :func:`lee_frame`.
 
     Parameters
@@ -589,7 +604,7 @@ def clamped_hinged_arch(n=33, angle=215.0, reach=3.6):
     >>> uy.shape, bool(load.max() > 8.8), bool(uy[-1] < -1.1)
     ((10,), True, True)
     """
-    return _sample(_arch(angle), _count(n), require_positive("reach", reach), 0.15)
+    return _sample(_arch(angle), n, reach, 0.2)
 
 
 def clamped_hinged_arch_limit(angle=215.0):
@@ -610,7 +625,7 @@ def clamped_hinged_arch_limit(angle=215.0):
     >>> round(clamped_hinged_arch_limit(), 6)
     8.97309
     """
-    return _limit_loads(_arch(angle), 1, 0.15)[0]
+    return _limit_loads(_arch(angle), 1, 0.2)[0]
 
 
 def williams_toggle(v, EA=1.885e6, EI=9.27e3, half_span=12.943, rise=0.386):
@@ -656,13 +671,13 @@ def williams_toggle(v, EA=1.885e6, EI=9.27e3, half_span=12.943, rise=0.386):
             state = _newton(lambda z, down=down: member(z, down), state)[0]
         at = target
         loads.append(-2 * state[1] * EI / L**2)
-    return np.array(loads) if np.ndim(v) else loads[0]
+    return np.array(loads) if np.ndim(v) else float(loads[0])
 
 
 # Buckling
 
 
-def euler_buckling_load(E, I, L, ends="fixed-free"):  # noqa: E741
+def euler_buckling_load(E, I, L, ends="fixed-free"):
     """Euler buckling load of a column under an end force of fixed direction.
 
     Parameters
@@ -692,7 +707,7 @@ def euler_buckling_load(E, I, L, ends="fixed-free"):  # noqa: E741
     return float(_choose("ends", ends, roots) ** 2 * E * I / require_positive("L", L) ** 2)
 
 
-def greenhill_load(E, I, L):  # noqa: E741
+def greenhill_load(E, I, L):
     """Weight per length at which a clamped-free column buckles under itself (Greenhill 1881).
 
     q L^3/(E I) = (3 j/2)^2 with j the first zero of the Bessel function J of order -1/3.
@@ -719,7 +734,7 @@ def greenhill_load(E, I, L):  # noqa: E741
 # Vibration
 
 
-def euler_bernoulli_frequencies(E, I, A, rho, L, n=3, ends="fixed-free"):  # noqa: E741
+def euler_bernoulli_frequencies(E, I, A, rho, L, n=3, ends="fixed-free"):
     """Lowest bending frequencies of an Euler-Bernoulli beam.
 
     omega = x^2 sqrt(E I/(rho A))/L^2 with the roots of cos x cosh x = -1 (fixed-free),
@@ -758,7 +773,7 @@ def euler_bernoulli_frequencies(E, I, A, rho, L, n=3, ends="fixed-free"):  # noq
     return roots**2 * np.sqrt(E * I / (rho * A)) / require_positive("L", L) ** 2
 
 
-def timoshenko_frequencies(E, I, A, rho, L, kGA, n=3, ends="fixed-free"):  # noqa: E741
+def timoshenko_frequencies(E, I, A, rho, L, kGA, n=3, ends="fixed-free"):
     """Lowest bending frequencies of a Timoshenko beam.
 
     E I theta'' + kGA (w' - theta) + rho I omega^2 theta = 0 and
@@ -802,7 +817,7 @@ def timoshenko_frequencies(E, I, A, rho, L, kGA, n=3, ends="fixed-free"):  # noq
         w2 = squared(beta)
         s = rho * A * w2 / kGA
         other = beta**2 - (rho / E * w2 + s)  # the two p^2 of exp(p X) add to -(rho/E w2 + s)
-        rows = []
+        columns = []
         for p2 in (-(beta**2), other):
             # two solutions f'' = p2 f: f and f' at both ends; theta = f, w = f'/(p2 + s),
             # theta' = f', w' - theta = -s f/(p2 + s)
@@ -817,8 +832,9 @@ def timoshenko_frequencies(E, I, A, rho, L, kGA, n=3, ends="fixed-free"):  # noq
                 f, d = [[1, 0], [0, 1]], [[-tall, low], [-low, tall]]
             (f0, f1), (d0, d1) = np.array(f, float), np.array(d, float)
             c = 1 / ((p2 + s) * L**2)
-            rows.append([d0 * c, f0, d1, f1 * c] if ends == "fixed-free" else [d0, f0 * c, d1, f1 * c])
-        return np.linalg.det(np.concatenate(rows, axis=1))
+            start = [d0 * c, f0] if ends == "fixed-free" else [d0, f0 * c]
+            columns.append(np.array([*start, d1, f1 * c]))
+        return np.linalg.det(np.hstack(columns))
 
     if ends == "pinned-pinned":
         return np.sqrt(squared(np.pi * np.arange(1, n + 1) / L))
@@ -887,11 +903,17 @@ def rigid_pendulum_period(L, theta0=np.pi / 2, g=9.81):
     >>> round(rigid_pendulum_period(1.0), 9)
     0.0
     """
-    return 4 * ellipk(np.sin(theta0 / 2) ** 2) / np.sqrt(1.5 * g / require_positive("L", L))
+    return float(4 * ellipk(np.sin(theta0 / 2) ** 2) / np.sqrt(1.5 * g / require_positive("L", L)))
 
 
-def double_pendulum(t, lengths=(1.0, 1.0), masses=(1.0, 1.0), angles=(np.pi / 2, np.pi / 2),
-                    rates=(0.0, 0.0), g=9.81):
+def double_pendulum(
+    t,
+    lengths=(1.0, 1.0),
+    masses=(1.0, 1.0),
+    angles=(np.pi / 2, np.pi / 2),
+    rates=(0.0, 0.0),
+    g=9.81,
+):
     """Angles of two uniform rigid rods, the first hung at one end, the second hinged to it.
 
     Integrates the exact equations of motion by DOP853 to a relative tolerance of 1e-13.

@@ -21,7 +21,9 @@ class BandMatrix:
 
     def __init__(self, n, bandwidth, symmetric=True):
         self.n, self.bandwidth, self.symmetric = n, bandwidth, symmetric
-        self._ld = (1 if symmetric else 3) * bandwidth + 1  # gbtrf wants room for the pivots
+        # gbtrf wants room for the pivots; the lower half wants one spare row, so that the upper
+        # half of an element matrix falls on places that no other entry of it has
+        self._ld = bandwidth + 2 if symmetric else 3 * bandwidth + 1
         self._diagonal = 0 if symmetric else 2 * bandwidth
         self._flat = np.zeros(n * self._ld)
         self._factor = None
@@ -30,7 +32,8 @@ class BandMatrix:
     @property
     def ab(self):
         """LAPACK's band storage, a view of shape (rows, n)."""
-        return self._flat.reshape(self.n, self._ld).T
+        ab = self._flat.reshape(self.n, self._ld).T
+        return ab[:-1] if self.symmetric else ab
 
     def clear(self):
         """Set every entry to zero."""
@@ -59,7 +62,7 @@ class BandMatrix:
             Left node of each element, increasing, shape (ne,).
         """
         m = 2 * nd
-        if self.symmetric:  # the upper half would land on other entries
+        if self.symmetric:  # the upper half falls on entries of other elements
             K *= np.tri(m)
         view = self._blocks(start, nd, m, int(left[-1]) + 1)
         if left[-1] - left[0] == len(left) - 1:

@@ -67,9 +67,14 @@ class Formulation:
         """
         raise NotImplementedError
 
-    def stress(self, element, material, strain):
-        """Second Piola-Kirchhoff stress of a strain (3, ...), for output."""
-        return material.law(material.shear_factor(element)).stress(strain)
+    def stress(self, beam, strain, u, X, tind):
+        """Second Piola-Kirchhoff stress (3, nelements, npoints) of a beam's strain, for output.
+
+        ``strain`` is that of ``beam.strain(u, X, tind)``; the rest is for formulations whose
+        stress depends on more than the strain at the point.
+        """
+        material = beam.material
+        return material.law(material.shear_factor(beam.element)).stress(strain)
 
     @staticmethod
     def full_rules(element):

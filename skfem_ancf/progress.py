@@ -1,0 +1,39 @@
+"""A progress bar for long work, if tqdm is installed."""
+
+import sys
+from contextlib import contextmanager
+
+from .errors import MissingExtra
+
+
+class _NoBar:
+    def update(self, amount):
+        """Nothing to show."""
+
+
+@contextmanager
+def progress_bar(show, total, desc):
+    """A bar with ``update(amount)``.
+
+    Parameters
+    ----------
+    show
+        True, False, or None: on a terminal, after a second, if tqdm is installed.
+    total
+        The amount at the end.
+    desc
+        What is counted.
+    """
+    if show is False or (show is None and not sys.stderr.isatty()):
+        yield _NoBar()
+        return
+    try:
+        from tqdm import tqdm
+    except ImportError:
+        if show:
+            raise MissingExtra("tqdm", "progress") from None
+        yield _NoBar()
+        return
+    with tqdm(total=total, desc=desc, delay=0.0 if show else 1.0,
+              bar_format="{l_bar}{bar}| {n:.3g}/{total:.3g} [{elapsed}]") as bar:
+        yield bar

@@ -1,0 +1,162 @@
+"""What a solution knows: positions, strains, stresses, energies, reactions."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .errors import MeshError
+
+
+class Reaction(NamedTuple):
+    """What a support does to the beam.
+
+    Attributes
+    ----------
+    force
+        Resultant, shape (2,).
+    moment
+        Moment about the deformed position of the support's axis point, counterclockwise.
+    coordinates
+        The force on each fixed coordinate by name, summed over the nodes.
+    """
+
+    force: np.ndarray
+    moment: float
+    coordinates: dict
+
+
+class State:
+    """A configuration of a scene.
+
+    Attributes
+    ----------
+    u
+        Displacement of the coordinates from the stress-free state, shape (N,).
+    load
+        Load factor.
+    converged, iterations, message, steps
+        How the solver got here; ``steps`` holds the residuals of every iteration.
+    """
+
+    def __init__(self, system, u, load=1.0, force=None, converged=True, iterations=0, message="",
+                 steps=()):
+        self.system, self.u, self.load = system, u, load
+        self.converged, self.iterations, self.message = converged, iterations, message
+        self.steps = list(steps)
+        self._force = force
+
+    def __repr__(self):
+        return (f"<State of {len(self.system.beams)} beam(s), {self.system.N} coordinates, load "
+                f"{self.load:g}: {self.message}>")
+
+    @property
+    def beams(self):
+        """The beams of the scene."""
+        return self.system.beams
+
+    @property
+    def q(self):
+        """Absolute coordinates, beam after beam, shape (N,)."""
+        return np.concatenate([b.q0 for b in self.beams]) + self.u
+
+    def u_of(self, beam):
+        """Coordinate displacements of one beam."""
+        return self.u[self.system.of(beam)]
+
+    # at a material point
+
+    def _find(self, point, beam):
+        from .scene import select_beam
+
+        if beam is not None or len(self.beams) == 1:
+            beam = select_beam(self.beams, beam)
+            return beam, *beam.locate(point)
+        for candidate in self.beams:
+            try:
+                return candidate, *candidate.locate(point)
+            except MeshError:
+                continue
+        raise MeshError(f"the point {tuple(point)} is in none of the {len(self.beams)} beams")
+
+    def displacement(self, point, beam=None):
+        """Displacement of a material point, named by its place in the stress-free body; (2,)."""
+        beam, e, X = self._find(point, beam)
+        dofs, weights = beam.probe_reference(e, X)
+        return self.u_of(beam)[dofs] @ weights
+
+    def position(self, point, beam=None):
+        """Position of a material point, shape (2,)."""
+        beam, e, X = self._find(point, beam)
+        dofs, weights = beam.probe_reference(e, X)
+        start = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
+        return start + self.u_of(beam)[dofs] @ weights
+
+    def strain(self, point, beam=None):
+        """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, shape (3,)."""
+        beam, e, X = self._find(point, beam)
+        strain = beam.strain(self.u_of(beam), X[:, None], np.array([e]))[:, 0, 0]
+        return strain * np.array([1.0, 1.0, 0.5])
+
+    def stress(self, point, beam=None):
+        """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, shape (3,)."""
+        beam, e, X = self._find(point, beam)
+        return beam.stress(self.u_of(beam), X[:, None], np.array([e]))[:, 0, 0]
+
+    # of the whole
+
+    @property
+    def strain_energy(self):
+        """Strain energy of the scene."""
+        return self.system.strain_energy(self.u)
+
+    @property
+    def internal_force(self):
+        """Internal force on all coordinates, shape (N,)."""
+        if self._force is None:
+            self._force = self.system.internal_force(self.u)
+        return self._force
+
+    def reactions(self, boundary, beam=None):
+        """What the supports at a boundary do to the beam: force, moment, and by coordinate.
+
+        Parameters
+        ----------
+        boundary
+            A boundary name, or anything else scikit-fem takes for facets.
+        beam
+            The beam, its name or its number, in a scene of several.
+
+        Returns
+        -------
+        Reaction
+        """
+        from .scene import select_beam
+
+        beam = select_beam(self.beams, beam)
+        s = self.system.of(beam)
+        total = self.internal_force - self.load * self.system.external_force(self.u)
+        total[self.system.free] = 0.0
+        nodes = beam.nodes(boundary)
+        forces = total[s].reshape(-1, beam.nd // 2, 2)[nodes]
+        q = (beam.q0_local + self.u[s]).reshape(-1, beam.nd // 2, 2)[nodes]
+        arm = q.copy()
+        arm[:, 0] -= q[0, 0]
+        moment = np.sum(arm[..., 0] * forces[..., 1] - arm[..., 1] * forces[..., 0])
+        by_name = dict(zip(beam.dofnames, forces.sum(axis=0).ravel()))
+        held = set(np.nonzero(~self.system.free[s].reshape(-1, beam.nd)[nodes].all(axis=0))[0])
+        names = {n: float(v) for k, (n, v) in enumerate(by_name.items()) if k in held}
+        return Reaction(forces[:, 0].sum(axis=0), float(moment), names)
+
+    # files and pictures
+
+    def save(self, filename, **options):
+        """Write the deformed body for ParaView; see :func:`skfem_ancf.io.vtu.save_vtu`."""
+        from .io.vtu import save_vtu
+
+        return save_vtu(self, filename, **options)
+
+    def plot(self, field="eps_yy", **options):
+        """Draw the deformed body; see :func:`skfem_ancf.visuals.matplotlib.plot_state`."""
+        from .visuals.matplotlib import plot_state
+
+        return plot_state(self, field, **options)

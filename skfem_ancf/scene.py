@@ -1,0 +1,240 @@
+"""A scene: beams, supports and loads, and what can be asked of them."""
+
+import numpy as np
+from skfem.assembly import LinearForm, asm
+
+from . import forms
+from .beam import Beam
+from .errors import (ConvergenceError, InputError, NameUnknown, SupportError, require_finite,
+                     require_finite_scalar)
+from .loads import DeadLoad, EndMoment, Pressure
+from .results import State
+from .statics import newton
+from .system import System
+
+
+def select_beam(beams, beam):
+    """The beam meant by a Beam, a name, a number, or None where there is only one.
+
+    Raises
+    ------
+    NameUnknown
+        If there is no such beam, or None is given and there are several.
+    """
+    known = [b.name if b.name is not None else k for k, b in enumerate(beams)]
+    if beam is None:
+        if len(beams) == 1:
+            return beams[0]
+        raise InputError(f"the scene has {len(beams)} beams: say which with beam=, one of {known}")
+    for k, b in enumerate(beams):
+        if b is beam or (isinstance(beam, str) and b.name == beam) or (
+                isinstance(beam, int) and not isinstance(beam, bool) and beam == k):
+            return b
+    raise NameUnknown("beam", beam, known)
+
+
+class Scene:
+    """Beams with supports and loads.
+
+    Methods that add something return the scene, so that they can be chained. In a scene of
+    several beams they take ``beam=``: a Beam, its name or its number.
+
+    Parameters
+    ----------
+    *beams
+        One or more :class:`~skfem_ancf.Beam`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+    >>> mesh = MeshBeam.init_line(np.linspace(0, 1, 17), height=0.01)
+    >>> material = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)
+    >>> scene = Scene(Beam(mesh, ElementBeamANCF(3), material, width=0.01))
+    >>> state = scene.clamp("left").gravity((0, -9.81)).solve_static()
+    >>> state.converged, bool(-0.91 < state.displacement((1, 0))[1] < -0.88)
+    (True, True)
+    """
+
+    def __init__(self, *beams):
+        if len(beams) == 1 and isinstance(beams[0], (list, tuple)):
+            beams = tuple(beams[0])
+        if not beams:
+            raise InputError("a scene needs at least one beam")
+        for b in beams:
+            if not isinstance(b, Beam):
+                raise InputError(f"a scene is made of Beams, got {b!r}")
+        names = [b.name for b in beams if b.name is not None]
+        if len(set(names)) < len(names) or len(set(map(id, beams))) < len(beams):
+            raise InputError(f"the beams of a scene must be different, and so must their names: "
+                             f"{names}")
+        self.beams = beams
+        self.loads = []
+        self._fixed = {}  # (number of the beam, coordinate) -> displacement
+        self._system = None
+
+    def __repr__(self):
+        return (f"<Scene of {len(self.beams)} beam(s), {len(self._fixed)} fixed coordinates, "
+                f"{len(self.loads)} load(s)>")
+
+    # supports
+
+    def _fix(self, beam, dofs, displacement=0.0):
+        k = self.beams.index(beam)
+        values = np.broadcast_to(displacement, np.shape(dofs))
+        for d, v in zip(dofs, values):
+            before = self._fixed.get((k, int(d)))
+            if before is not None and before != v:
+                raise SupportError(
+                    f"coordinate {beam.dofnames[int(d) % beam.nd]} of node {int(d) // beam.nd} is "
+                    f"fixed twice, with displacements {before!r} and {float(v)!r}")
+            self._fixed[k, int(d)] = float(v)
+        self._system = None
+        return self
+
+    def clamp(self, boundary, beam=None):
+        """Weld a face: the position of every material point of it is fixed.
+
+        Those are ``r`` and the section coordinates at the node; the slope ``r_X``, a strain
+        measure there, stays free.
+        """
+        beam = select_beam(self.beams, beam)
+        return self._fix(beam, beam.dofs(boundary, beam.element.welded))
+
+    def pin(self, boundary, beam=None):
+        """Fix the position of the axis; the section may turn."""
+        beam = select_beam(self.beams, beam)
+        return self._fix(beam, beam.dofs(boundary, "r"))
+
+    def fix(self, boundary, names=None, displacement=0.0, beam=None):
+        """Fix coordinates by their scikit-fem names.
+
+        Parameters
+        ----------
+        boundary
+            A boundary name, or anything else scikit-fem takes for facets.
+        names
+            As ``["r^1", "r_Y0^2"]``; ``"r"`` means both components; None means all.
+        displacement
+            Their displacement at full load; it grows with the load.
+
+        Raises
+        ------
+        NameUnknown
+            If a name is not known; the message lists the known ones.
+        SupportError
+            If a coordinate is given two displacements.
+        """
+        beam = select_beam(self.beams, beam)
+        return self._fix(beam, beam.dofs(boundary, names),
+                         require_finite_scalar("displacement", displacement))
+
+    # loads
+
+    def _load(self, load):
+        self.loads.append(load)
+        self._system = None
+        return self
+
+    def gravity(self, g, beam=None):
+        """Weight of every beam, or of one.
+
+        Parameters
+        ----------
+        g
+            Acceleration, shape (2,), as ``(0, -9.81)``.
+        """
+        g = require_finite("g", g, (2,))
+        for b in self.beams if beam is None else [select_beam(self.beams, beam)]:
+            self._load(DeadLoad(b, asm(forms.gravity(b.density, g, b.width), b.exact_basis())))
+        return self
+
+    def point_force(self, force, at, beam=None):
+        """A dead force (2,) on the material point ``at`` of the stress-free body."""
+        force = require_finite("force", force, (2,))
+        beam = select_beam(self.beams, beam)
+        dofs, weights = beam.probe(at)
+        vector = np.zeros(beam.N)
+        np.add.at(vector, dofs, np.outer(force, weights))
+        return self._load(DeadLoad(beam, vector))
+
+    def traction(self, boundary, t, beam=None):
+        """A dead traction on a surface, per area of the stress-free body.
+
+        Parameters
+        ----------
+        boundary
+            A boundary name, or anything else scikit-fem takes for facets.
+        t
+            Constant, shape (2,), or a function of the points x (2, ...) that returns (2, ...).
+        """
+        beam = select_beam(self.beams, beam)
+        if not callable(t):
+            t = require_finite("t", t, (2,))
+        basis = beam.facet_basis(boundary, intorder=12 if callable(t) else None)
+        return self._load(DeadLoad(beam, asm(forms.traction(t, beam.width), basis)))
+
+    def pressure(self, boundary, p, beam=None):
+        """A pressure on a surface that stays normal to it as it deforms; positive pushes."""
+        beam = select_beam(self.beams, beam)
+        return self._load(Pressure(beam, boundary, require_finite_scalar("p", p)))
+
+    def moment(self, boundary, M, beam=None):
+        """A moment on an end section, counterclockwise, that turns with it."""
+        beam = select_beam(self.beams, beam)
+        return self._load(EndMoment(beam, beam.section_node(boundary),
+                                    require_finite_scalar("M", M)))
+
+    def load(self, form, boundary=None, beam=None):
+        """Any scikit-fem ``LinearForm``, as a dead load on the body or on a boundary of it."""
+        beam = select_beam(self.beams, beam)
+        if not isinstance(form, LinearForm):
+            raise InputError(f"a load is a scikit-fem LinearForm, got {form!r}")
+        basis = beam.exact_basis() if boundary is None else beam.facet_basis(boundary)
+        return self._load(DeadLoad(beam, asm(form, basis)))
+
+    # solution
+
+    @property
+    def system(self):
+        """The discrete equations, built when first asked for."""
+        if self._system is None:
+            offsets = np.concatenate([[0], np.cumsum([b.N for b in self.beams])])
+            fixed = np.array([offsets[k] + d for k, d in self._fixed], dtype=int)
+            self._system = System(self.beams, self.loads, fixed,
+                                  np.array(list(self._fixed.values()), dtype=float))
+        return self._system
+
+    def solve_static(self, start=None, **options):
+        """The equilibrium under the full load.
+
+        Parameters
+        ----------
+        start
+            A State to start from; the stress-free state by default.
+        **options
+            Those of :func:`skfem_ancf.statics.newton.solve_static`: ``method``, ``tol``,
+            ``max_iterations``, ``first_step``, ``min_step``, ``progress``.
+
+        Returns
+        -------
+        State
+
+        Raises
+        ------
+        SupportError
+            If a rigid motion is free.
+        ConvergenceError
+            If there is no convergence; its ``state`` is the last converged State.
+        """
+        system = self.system
+        system.require_supports()
+        try:
+            result = newton.solve_static(system, None if start is None else start.u, **options)
+        except ConvergenceError as error:
+            raise ConvergenceError(str(error), self._state(error.state)) from None
+        return self._state(result)
+
+    def _state(self, result):
+        return State(self.system, result.u, result.load, result.force, result.converged,
+                     result.iterations, result.message, result.steps)

@@ -1,0 +1,188 @@
+"""Newton's method with automatic load steps, and the mixed integration point iteration."""
+
+import logging
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import ConvergenceError, NameUnknown
+from ..progress import progress_bar
+
+logger = logging.getLogger(__name__)
+
+METHODS = ("mixed", "newton")
+
+
+@dataclass
+class LoadStep:
+    """One converged load step.
+
+    Attributes
+    ----------
+    load
+        Load factor at its end, 1 is full load.
+    iterations
+        Linear systems solved.
+    force_residuals, energy_residuals
+        For each iteration the residual in the norm ``sum R_i^2 / K_ii`` and the work of the
+        correction ``R . du``, as square roots relative to those of the forces and of the work.
+    """
+
+    load: float
+    iterations: int
+    force_residuals: list = field(default_factory=list)
+    energy_residuals: list = field(default_factory=list)
+
+
+@dataclass
+class StaticResult:
+    """What the iteration found: the displacement, the load reached, and how."""
+
+    u: np.ndarray
+    load: float
+    force: np.ndarray
+    steps: list
+    converged: bool
+    message: str
+    rejected: int = 0
+
+    @property
+    def iterations(self):
+        """Linear systems solved in the converged steps."""
+        return sum(step.iterations for step in self.steps)
+
+
+def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, first_step=1.0,
+                 min_step=1e-4, progress=None):
+    """Find the equilibrium at full load.
+
+    The load is applied in steps: the first is ``first_step`` of it, a step that fails is cut to a
+    quarter, a step that goes well doubles the next. The iteration has converged when the
+    correction's work ``R . du`` is below ``tol^2`` times the work done, and the residual, in the
+    norm ``sqrt(sum R_i^2 / K_ii)`` in which no unit matters, is below ``tol`` times that of the
+    forces; both with the round-off of the strain as a floor.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    u
+        Displacement to start from, shape (N,); zero by default.
+    method
+        "mixed": the geometric part of the tangent uses a stress that is carried from one iterate
+        to the next by its linearisation. "newton": it uses the stress of the strain. The solution
+        is the same.
+    tol
+        Relative error of a correction in the energy norm.
+    max_iterations
+        Iterations before a step is given up and cut.
+    first_step, min_step
+        Parts of the load.
+    progress
+        Show a progress bar: True, False, or None for "if it takes long".
+
+    Returns
+    -------
+    StaticResult
+
+    Raises
+    ------
+    ConvergenceError
+        If the step falls below ``min_step``; the error has the last converged ``StaticResult`` as
+        ``state``.
+
+    References
+    ----------
+    Magisano, Leonetti, Garcea: "How to improve efficiency and robustness of the Newton method in
+    geometrically non-linear structural problem discretized via displacement-based finite
+    elements", Computer Methods in Applied Mechanics and Engineering 313 (2017).
+    """
+    if method not in METHODS:
+        raise NameUnknown("method", method, METHODS)
+    u = np.zeros(system.N) if u is None else u.copy()
+    result = StaticResult(u, 0.0, np.zeros(system.N), [], False, "no load step has converged")
+    step = float(first_step)
+    with progress_bar(progress, total=1.0, desc="load") as bar:
+        while result.load < 1.0:
+            load = min(1.0, result.load + step)
+            if load > 1.0 - 1e-12:
+                load = 1.0
+            record = LoadStep(load, 0)
+            try:
+                u, force = _iterate(system, result.u, load, method, tol, max_iterations, record)
+            except _Failed as failure:
+                result.rejected += 1
+                logger.info("load %.6g failed (%s), step cut", load, failure)
+                step = 0.25 * (load - result.load)
+                if step < min_step:
+                    result.message = (
+                        f"no equilibrium found beyond the load level {result.load:.6g}: {failure} "
+                        f"at {load:.6g}, and steps below {min_step:g} are not tried. Beyond a "
+                        "limit point there is none: use scene.continuation(); else more elements "
+                        "or a larger max_iterations may help")
+                    raise ConvergenceError(result.message, result) from None
+                continue
+            result.u, result.force = u, force
+            bar.update(load - result.load)
+            result.load = load
+            result.steps.append(record)
+            logger.info("load %.6g converged in %d iterations", load, record.iterations)
+            if record.iterations <= max(8, max_iterations // 3):
+                step *= 2.0
+    result.converged = True
+    result.message = f"converged in {len(result.steps)} load steps, {result.iterations} iterations"
+    return result
+
+
+class _Failed(Exception):
+    """A load step did not converge; the message says why."""
+
+
+def _iterate(system, u, load, method, tol, max_iterations, record):
+    """Iterate to equilibrium at one load; returns displacement and internal force."""
+    u, carried = u.copy(), None
+    floor = 8.0 * system.stiffness_scale()
+    prescribed = load * system.values - u[system.fixed]
+    # the residual sums the noise of all coordinates, the work that of the strains
+    force_floor = floor * np.sqrt(max(b.nd for b in system.beams))
+    for k in range(max_iterations + 1):
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            force, evaluations = system.assemble(u, load, carried)
+            external = load * system.external_force(u)
+        if not np.all(np.isfinite(force)):
+            raise _Failed("the strain is not finite")
+        residual = external - force
+        scale = 1.0 / np.abs(system.K.diagonal())
+        size = np.sqrt(max(np.sum(force**2 * scale), np.sum(external**2 * scale)))
+        free = residual * system.free
+        rho = np.sqrt(np.sum(free**2 * scale))
+        record.force_residuals.append(rho / size if size > 0 else 0.0)
+        moved = bool(np.any(prescribed))
+        if not moved and rho <= tol * size + force_floor and (
+                k == 0 and rho <= 1e-3 * tol * size + force_floor
+                or k > 0 and work <= tol * reference + floor):  # noqa: F821
+            return u, force
+        if k == max_iterations:
+            break
+        if moved:
+            du0 = np.zeros(system.N)
+            du0[system.fixed] = prescribed
+            free = (residual - system.multiply(du0)) * system.free
+        try:
+            system.factorize()
+        except np.linalg.LinAlgError:
+            raise _Failed("the tangent is singular") from None
+        du = system.solve(free)
+        if moved:
+            du += du0
+            prescribed = np.zeros_like(prescribed)
+        if not np.all(np.isfinite(du)):
+            raise _Failed("the tangent is singular")
+        work = np.sqrt(abs(free @ du))
+        if method == "mixed":
+            carried = system.stress_step(evaluations, du)
+        u += du
+        record.iterations += 1
+        reference = np.sqrt(max(abs(external @ u), abs(force @ u)))
+        record.energy_residuals.append(work / reference if reference > 0 else 0.0)
+    raise _Failed(f"no convergence in {max_iterations} iterations")

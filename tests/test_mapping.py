@@ -1,0 +1,191 @@
+"""The map from the reference cell to the body: inverse, derivatives, facets, normals."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from skfem import FacetBasis
+
+from conftest import MESHES, STRAIGHT, quarter_arc
+from skfem_ancf import MeshBeam, MeshError
+from skfem_ancf.mapping import MappingBeam
+from skfem_ancf.reference import ElementBeamP1
+
+STEP = 1e-30
+POINTS = np.random.default_rng(2).random((2, 30))
+ALONG = np.linspace(0.0, 1.0, 9)[None]
+GAUSS = 0.5 + 0.5 * np.polynomial.legendre.leggauss(8)[0], 0.5 * np.polynomial.legendre.leggauss(8)[1]
+
+
+def test_reference_cell_is_mapped_to_itself():
+    m = MeshBeam.init_refdom()
+    assert_array_equal(m.mapping().F(m.p)[:, 0], m.p)
+    assert_allclose(m.mapping().F(POINTS)[:, 0], POINTS, atol=1e-15)
+
+
+def test_mapping_is_that_of_the_mesh(mesh):
+    assert isinstance(mesh.mapping(), MappingBeam) and mesh.mapping() is mesh._mapping()
+    assert mesh.mapping().dim == 2
+
+
+@pytest.mark.parametrize("name", STRAIGHT)
+def test_straight_body_is_a_chain_of_rectangles(name):
+    mesh = MESHES[name]()
+    a, b = mesh.p[:, mesh.t]  # each (2, ne): x and y of both nodes
+    start, end = np.array([a[0], b[0]]), np.array([a[1], b[1]])
+    e1 = (end - start) / np.hypot(*(end - start))
+    e2 = np.array([-e1[1], e1[0]])
+    xi, eta = POINTS
+    expected = (start[..., None] + (end - start)[..., None] * xi
+                + mesh.height * e2[..., None] * (eta - 0.5))
+    assert_allclose(mesh.mapping().F(POINTS), expected, atol=1e-14)
+
+
+def test_axis_and_sections_of_an_arc(arc):
+    """On the nodes the sections are radial; the axis is within the error of a cubic."""
+    mapping, h = arc.mapping(), arc.height
+    for xi, node in ((0.0, 0), (1.0, 1)):
+        ends = mapping.F(np.array([[xi, xi], [0.0, 1.0]]))
+        radial = arc.p[:, arc.t[node]]
+        assert_allclose(ends[..., 0], (1 + h / 2) * radial, atol=1e-14)  # Y points inwards
+        assert_allclose(ends[..., 1], (1 - h / 2) * radial, atol=1e-14)
+    axis = mapping.F(np.array([ALONG[0], 0.5 + 0 * ALONG[0]]))
+    assert np.max(np.abs(np.hypot(*axis) - 1)) < 3e-4
+
+
+def test_inverse(mesh):
+    mapping = mesh.mapping()
+    X = 1.1 * POINTS - 0.05  # also just outside the cell
+    back = mapping.invF(mapping.F(X))
+    assert_allclose(back, np.broadcast_to(X[:, None], back.shape), atol=1e-13)
+    subset = np.array([mesh.nelements - 1, 0])
+    assert_allclose(mapping.invF(mapping.F(X, subset), subset), back[:, subset], atol=1e-13)
+
+
+def test_derivative(mesh):
+    mapping = mesh.mapping()
+    J, F = mapping.DF(POINTS), mapping.F(POINTS)
+    for axis in (0, 1):
+        step = np.zeros((2, 1), dtype=complex)
+        step[axis] = 1j * STEP
+        assert_allclose(J[:, axis], mapping.F(POINTS + step).imag / STEP, atol=1e-13)
+    identity = np.einsum("ijep,jkep->ikep", mapping.invDF(POINTS), J)
+    assert_allclose(identity, np.eye(2)[:, :, None, None] + 0 * J, atol=1e-13)
+    det = np.linalg.det(np.moveaxis(J, (0, 1), (-2, -1)))
+    assert_allclose(mapping.detDF(POINTS), det, rtol=1e-12)
+    assert np.all(det > 0)
+    # points of their own for each element, and a subset of the elements
+    each, subset = np.repeat(POINTS[:, None], 2, axis=1), np.array([mesh.nelements - 1, 0])
+    for f, whole in ((mapping.F, F), (mapping.DF, J), (mapping.detDF, mapping.detDF(POINTS)),
+                     (mapping.invDF, mapping.invDF(POINTS))):
+        assert_allclose(f(each, subset), whole[..., subset, :], atol=1e-13)
+
+
+def test_area_is_that_inside_the_boundary(mesh):
+    """The integral of detDF against half the integral of x . n over the boundary."""
+    mapping, (x, w) = mesh.mapping(), GAUSS
+    X = np.array([a.ravel() for a in np.meshgrid(x, x)])
+    area = np.sum(mapping.detDF(X) @ np.outer(w, w).ravel())
+    find = mesh.boundary_facets()
+    tind, points = mapping.facet_points(x[None], find)
+    n = mapping.normals(points, tind, find, mesh.t2f)
+    flux = np.sum(mapping.G(x[None], find) * n, 0) * mapping.detDG(x[None], find)
+    assert_allclose(np.sum(flux @ w) / 2, area, rtol=1e-9)
+    if mesh.is_straight:
+        assert_allclose(area, mesh.height * mesh.lengths.sum(), rtol=1e-14)
+
+
+def test_neighbours_meet_in_the_same_section(mesh):
+    """Both elements of a section see the same points of it, with the axis smooth."""
+    mapping = mesh.mapping()
+    inner = np.nonzero(mesh.f2t[1] >= 0)[0]
+    assert_array_equal(inner, np.arange(1, mesh.nelements))
+    before, after = mesh.f2t[:, inner]
+    left, right = (np.array([xi + 0 * ALONG[0], ALONG[0]]) for xi in (0.0, 1.0))
+    x = mapping.G(ALONG, inner)
+    assert_allclose(mapping.F(right, before), x, atol=1e-14)
+    assert_allclose(mapping.F(left, after), x, atol=1e-14)
+    assert_allclose(mapping.frame(right, before), mapping.frame(left, after), atol=1e-14)
+
+
+def test_facets(mesh):
+    """Each facet is its side of its element, with the length detDG and an outward unit normal."""
+    mapping = mesh.mapping()
+    sides = [lambda s: (s, 0 * s), lambda s: (1 + 0 * s, s), lambda s: (s, 1 + 0 * s),
+             lambda s: (0 * s, s)]
+    s = ALONG[0]
+    for local, side in enumerate(sides):
+        find = mesh.t2f[local]
+        assert_allclose(mapping.G(ALONG, find), mapping.F(np.array(side(s))), atol=1e-14)
+        d = mapping.G(ALONG + 1j * STEP, find).imag / STEP
+        assert_allclose(mapping.detDG(ALONG, find), np.hypot(*d), rtol=1e-12)
+        elements = np.arange(mesh.nelements)
+        points = np.repeat(np.array(side(s))[:, None], mesh.nelements, axis=1)
+        n = mapping.normals(points, elements, find, mesh.t2f)
+        assert_allclose(np.hypot(*n), 1.0, rtol=1e-14)
+        assert_allclose(np.sum(n * d, 0) / np.hypot(*d), 0.0, atol=1e-13)
+        outside = mapping.invF(mapping.F(points, elements) + 1e-4 * mesh.height * n, elements)
+        assert np.all(np.abs(outside[1 - local % 2] - 0.5) > 0.5)
+
+
+def test_all_facets_by_default(mesh):
+    everything = np.arange(mesh.nfacets)
+    assert_array_equal(mesh.mapping().G(ALONG), mesh.mapping().G(ALONG, everything))
+    assert_array_equal(mesh.mapping().detDG(ALONG), mesh.mapping().detDG(ALONG, everything))
+
+
+def test_normals_of_a_straight_beam():
+    m = MeshBeam.init_line([0.0, 0.4, 1.0], 0.2)
+    fb = FacetBasis(m, ElementBeamP1())
+    x, n = fb.global_coordinates(), fb.normals
+    for axis, low, high in ((0, 0.0, 1.0), (1, -0.1, 0.1)):
+        for value, sign in ((low, -1.0), (high, 1.0)):
+            on = np.all(np.abs(x[axis] - value) < 1e-12, axis=1)
+            assert np.any(on)
+            assert_allclose(n[axis][on], sign, atol=1e-14)
+            assert_allclose(n[1 - axis][on], 0.0, atol=1e-14)
+
+
+def test_boundary_points_are_in_the_cell(mesh):
+    find = mesh.boundary_facets()
+    x = mesh.mapping().G(ALONG, find)
+    X = mesh.mapping().invF(x, tind=mesh.f2t[0, find])
+    assert np.max(np.abs(X - 0.5)) < 0.5 + 1e-12
+
+
+def test_perimeter():
+    for name in STRAIGHT:
+        m = MESHES[name]()
+        fb = FacetBasis(m, ElementBeamP1())
+        assert_allclose(fb.dx.sum(), 2 * (m.lengths.sum() + m.height), rtol=1e-13)
+    h, errors = 0.3, []
+    for n in (4, 8, 16):
+        fb = FacetBasis(quarter_arc(n, h), ElementBeamP1(), intorder=10)
+        errors.append(fb.dx.sum() - (np.pi + 2 * h))  # (R + h/2) pi/2 + (R - h/2) pi/2
+    assert abs(errors[-1]) < 1e-6
+    assert np.all(np.log2(np.abs(np.divide(errors[:-1], errors[1:]))) > 3.8)
+
+
+def test_frame(mesh):
+    mapping = mesh.mapping()
+    frame = mapping.frame(POINTS)
+    gram = np.einsum("kiep,kjep->ijep", frame, frame)
+    assert_allclose(gram, np.eye(2)[:, :, None, None] + 0 * gram, atol=1e-14)
+    assert np.all(np.linalg.det(np.moveaxis(frame, (0, 1), (-2, -1))) > 0)
+    at_nodes = mapping.frame(np.array([[0.0, 1.0], [0.2, 0.9]]))  # the same across the section
+    for k in (0, 1):
+        assert_allclose(at_nodes[:, 0, :, k], mesh.p_X[:, mesh.t[k]], atol=1e-13)
+        assert_allclose(at_nodes[:, 1, :, k], mesh.p_Y[:, mesh.t[k]], atol=1e-13)
+    assert_allclose(mapping.frame(POINTS, np.array([0])), frame[:, :, :1], atol=1e-15)
+
+
+def test_folding_map_is_refused():
+    """A body that folds between good nodes: a tangent that points backwards, a left-handed one."""
+    p, t = np.array([[0.0, 1.0, 2.0], [0.0, 0.0, 0.0]]), np.array([[0, 1], [1, 2]])
+    e = np.array([[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    n = e[::-1]
+    good = dict(height=0.1, p_X=e, p_Y=n, lengths=np.ones(2))
+    MeshBeam(p, t, **good)
+    with pytest.raises(MeshError, match=r"folds in element 1, which starts at \(1, 0\)"):
+        MeshBeam(p, t, **{**good, "p_X": np.array([[1.0, 1.0, -1.0], [0.0, 0.0, 0.0]])})
+    with pytest.raises(MeshError, match="folds in element 0"):
+        MeshBeam(p, t, **{**good, "p_Y": -n})
