@@ -73,7 +73,7 @@ class TermTables:
         self.nb = 2 * element.nodal_dofs
         xi_x = np.unique(np.concatenate([term.nodes("xx"), term.nodes("xy")]))
         xi_y = np.unique(np.concatenate([term.nodes("yy"), term.nodes("xy")]))
-        eta, w_eta = term.section
+        eta = term.section_nodes
         ns = len(eta)
         same = mesh.is_straight and np.ptp(mesh.lengths) <= 1e-13 * np.max(mesh.lengths)
         tind = np.array([0]) if same else None
@@ -93,10 +93,9 @@ class TermTables:
             return (np.searchsorted(xi, of)[:, None] * ns + np.arange(ns)).ravel()
 
         def component(name):
-            matrix = term.interpolation(name, term.axis[0])
             return _Rows(rows(term.nodes(name), xi_x) if name != "yy" else None,
                          rows(term.nodes(name), xi_y) if name != "xx" else None,
-                         None if matrix is None else np.kron(matrix, np.eye(ns)))
+                         term.matrix(name))
 
         self.xx, self.yy, self.xy = map(component, ("xx", "yy", "xy"))
         X, W = term.quadrature
@@ -242,6 +241,7 @@ class Kernel:
         self.N = self.nd * mesh.p.shape[1]
         self.tables = [TermTables(mesh, element, term, width)
                        for term in formulation.terms(element, material)]
+        self.constant = formulation.stabilisation(mesh, element, material, width)
 
     def gather(self, u, elements=slice(None)):
         """Element values (ne, nb, 2) of a coordinate vector (N,)."""
@@ -285,6 +285,9 @@ class Kernel:
         out.strains = [t.strain(g) for t, g in zip(out._tables, out._gradients)]
         out.stresses = [t.law.stress(e) for t, e in zip(out._tables, out.strains)]
         out.force = sum(t.force(g, s) for t, g, s in zip(out._tables, out._gradients, out.stresses))
+        if self.constant is not None:
+            constant = self.constant[elements] if len(self.constant) > 1 else self.constant
+            out.force += (constant @ u_e.reshape(len(u_e), -1, 1)).reshape(u_e.shape)
         out.tangent = None
         if tangent:
             K = sum(t.material_tangent(g, e)
@@ -296,6 +299,8 @@ class Kernel:
                 blocks = K.reshape(ne, nb, 2, nb, 2)
                 blocks[:, :, 0, :, 0] += Kg
                 blocks[:, :, 1, :, 1] += Kg
+            if self.constant is not None:
+                K += constant
             out.tangent = K
         return out
 
@@ -306,6 +311,10 @@ class Kernel:
             u_e = self.gather(u, part)
             for t in (t.part(part) for t in self.tables):
                 total += np.sum(t.w * t.law.energy(t.strain(t.gradients(u_e))))
+            if self.constant is not None:
+                constant = self.constant[part] if len(self.constant) > 1 else self.constant
+                v = u_e.reshape(len(u_e), -1, 1)
+                total += 0.5 * np.sum(v * (constant @ v))
         return total
 
     def force(self, u):

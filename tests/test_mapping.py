@@ -116,7 +116,7 @@ def test_facets(mesh):
     for local, side in enumerate(sides):
         find = mesh.t2f[local]
         assert_allclose(mapping.G(ALONG, find), mapping.F(np.array(side(s))), atol=1e-14)
-        d = mapping.G(ALONG + 1j * STEP, find).imag / STEP
+        d = mapping.F(np.array(side(s + 1j * STEP))).imag / STEP
         assert_allclose(mapping.detDG(ALONG, find), np.hypot(*d), rtol=1e-12)
         elements = np.arange(mesh.nelements)
         points = np.repeat(np.array(side(s))[:, None], mesh.nelements, axis=1)
@@ -158,11 +158,11 @@ def test_perimeter():
         fb = FacetBasis(m, ElementBeamP1())
         assert_allclose(fb.dx.sum(), 2 * (m.lengths.sum() + m.height), rtol=1e-13)
     h, errors = 0.3, []
-    for n in (4, 8, 16):
+    for n in (8, 16, 32):
         fb = FacetBasis(quarter_arc(n, h), ElementBeamP1(), intorder=10)
         errors.append(fb.dx.sum() - (np.pi + 2 * h))  # (R + h/2) pi/2 + (R - h/2) pi/2
-    assert abs(errors[-1]) < 1e-6
-    assert np.all(np.log2(np.abs(np.divide(errors[:-1], errors[1:]))) > 3.8)
+    assert abs(errors[-1]) < 1e-5
+    assert np.all(np.log2(np.abs(np.divide(errors[:-1], errors[1:]))) > 1.9)
 
 
 def test_frame(mesh):

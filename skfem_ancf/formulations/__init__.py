@@ -1,11 +1,14 @@
 """Formulations of the strain energy. A new one is one file and one line here."""
 
 from ..errors import NameUnknown
+from .assumed import Assumed
 from .base import COMPONENTS, Formulation, Term
 from .continuum import Continuum
+from .ecm import EnhancedContinuum
+from .strain_split import StrainSplit
 
 #: The formulations by name.
-FORMULATIONS = {cls.name: cls for cls in (Continuum,)}
+FORMULATIONS = {cls.name: cls for cls in (Continuum, EnhancedContinuum, StrainSplit, Assumed)}
 
 
 def get_formulation(formulation):
@@ -25,4 +28,5 @@ def get_formulation(formulation):
     return FORMULATIONS[formulation]()
 
 
-__all__ = ["COMPONENTS", "FORMULATIONS", "Continuum", "Formulation", "Term", "get_formulation"]
+__all__ = ["COMPONENTS", "FORMULATIONS", "Assumed", "Continuum", "EnhancedContinuum",
+           "Formulation", "StrainSplit", "Term", "get_formulation"]

@@ -23,12 +23,16 @@ class Term:
         For a strain component ("xx", "yy" or "xy") the points xi at which it is evaluated; it is
         interpolated between them by Lagrange polynomials. Components not named are evaluated at
         the integration points.
+    section_samples
+        Points eta and a matrix (section points, points eta): the strain at a section point is
+        that combination of the strains at the points eta. None to evaluate it there.
     """
 
     law: object
     axis: tuple
     section: tuple
     samples: dict = field(default_factory=dict)
+    section_samples: tuple = None
 
     @property
     def quadrature(self):
@@ -44,6 +48,19 @@ class Term:
         if component not in self.samples:
             return None
         return lagrange(self.samples[component], xi)
+
+    @property
+    def section_nodes(self):
+        """Where across the section the strain is evaluated."""
+        return np.asarray(self.section_samples[0] if self.section_samples else self.section[0])
+
+    def matrix(self, component):
+        """From the samples of a component to the integration points; None for the identity."""
+        along = self.interpolation(component, self.axis[0])
+        if along is None and self.section_samples is None:
+            return None
+        across = self.section_samples[1] if self.section_samples else np.eye(len(self.section[0]))
+        return np.kron(np.eye(len(self.axis[0])) if along is None else along, across)
 
 
 class Formulation:
@@ -66,6 +83,13 @@ class Formulation:
         list of Term
         """
         raise NotImplementedError
+
+    def stabilisation(self, mesh, element, material, width):
+        """A constant element stiffness, (ne, 2 nb, 2 nb) or (1, ...), or None for none.
+
+        It must vanish for rigid motions of the stress-free state, large ones included.
+        """
+        return None
 
     def stress(self, beam, strain, u, X, tind):
         """Second Piola-Kirchhoff stress (3, nelements, npoints) of a beam's strain, for output.

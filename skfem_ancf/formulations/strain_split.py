@@ -1,0 +1,36 @@
+"""The strain split method: only the strain of the axis is Poisson-coupled with the section."""
+
+import numpy as np
+
+from ..materials import LinearLaw
+from .base import Term
+from .ecm import AXIS, EnhancedContinuum, split_moduli
+
+
+class StrainSplit(EnhancedContinuum):
+    """eps = a + s with a = eps(X, 0): stress D a + diag(E, E, k_s G) s.
+
+    The energy is 1/2 int (a : D : a + 2 a : D : s + s : D_0 : s) dV with
+    D_0 = diag(E, E, k_s G). Its derivative by s is the stress of the method; its derivative by a
+    is D (a + s), where the method puts that same stress: the difference is the Poisson coupling
+    of the section's mean of s, of second order, and makes the tangent symmetric and the energy
+    exist. Replacing D by D_0 in the middle term would give "ecm".
+
+    References
+    ----------
+    Patel, Shabana: "Locking alleviation in the large displacement analysis of beam elements:
+    the strain split method", Acta Mechanica 229 (2018).
+    """
+
+    name = "strain-split"
+
+    def terms(self, element, material):
+        axis, section = self.full_rules(element)
+        uncoupled, coupling = split_moduli(self.name, material, element)
+        eta, w = section
+        # a : C : s + 1/2 a : C : a = 1/2 m : C : m - 1/2 (m - a) : C : (m - a), m the mean
+        mean = (eta, w[None])
+        rest = (np.append(eta, 0.5), np.append(w, -1.0)[None])
+        return [Term(LinearLaw(uncoupled), axis, section),
+                Term(LinearLaw(coupling), axis, AXIS, section_samples=mean),
+                Term(LinearLaw(-coupling), axis, AXIS, section_samples=rest)]

@@ -1,0 +1,741 @@
+"""Meshes: construction, topology, names, refinement, parts, motion, files and bad input."""
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from skfem import Basis, FacetBasis, MeshLine, MeshQuad
+from skfem.generic_utils import OrientedBoundary
+
+from conftest import MESHES, quarter_arc, s_curve
+from skfem_ancf import AncfError, InputError, MeshBeam, MeshError, NameUnknown
+from skfem_ancf.reference import ElementBeamP1
+
+CENTRE = np.array([[0.5], [0.5]])
+CURVED = ["arc", "s-curve"]
+
+
+def area(mesh):
+    return Basis(mesh, ElementBeamP1(), intorder=8).dx.sum()
+
+
+def perimeter(mesh):
+    return FacetBasis(mesh, ElementBeamP1(), intorder=12).dx.sum()
+
+
+def tagged(mesh):
+    """The mesh with subdomains, an inner section, and an oriented and an empty boundary."""
+    last = np.array([mesh.nelements - 1], dtype=np.int32)
+    return mesh.with_subdomains({"first": np.array([0], dtype=np.int32), "last": last}) \
+        .with_boundaries({"around": mesh.facets_around(last),
+                          "inner": OrientedBoundary(np.array([1], dtype=np.int32), [0]),
+                          "none": np.zeros(0, dtype=np.int32)})
+
+
+def assert_same_tags(a, b):
+    for which in ("boundaries", "subdomains"):
+        x, y = getattr(a, which) or {}, getattr(b, which) or {}
+        assert list(x) == list(y)
+        for name in x:
+            assert_array_equal(x[name], y[name])
+            assert_array_equal(getattr(x[name], "ori", None), getattr(y[name], "ori", None))
+
+
+def assert_same(a, b, atol=0.0):
+    assert type(a) is type(b) is MeshBeam
+    assert_array_equal(a.t, b.t)
+    for name in ("p", "p_X", "p_Y", "lengths", "height", "s"):
+        if getattr(a, name) is None:
+            assert getattr(b, name) is None
+        else:
+            assert_allclose(getattr(b, name), getattr(a, name), rtol=0, atol=atol)
+    assert_same_tags(a, b)
+
+
+def where(mesh, facets):
+    """Midpoints of facets, one row each, sorted."""
+    x = mesh.mapping().G(np.array([[0.5]]), np.asarray(facets))[..., 0].T
+    return x[np.lexsort(np.round(x, 9).T)]
+
+
+# construction and topology
+
+def test_line():
+    m = MeshBeam.init_line([0, 1, 3], 0.2, origin=(1.0, 2.0), angle=np.pi / 2)
+    assert_allclose(m.p, [[1, 1, 1], [2, 3, 5]], atol=1e-15)
+    assert_array_equal(m.t, [[0, 1], [1, 2]])
+    assert_allclose(m.p_X, np.outer([0, 1], np.ones(3)), atol=1e-15)
+    assert_allclose(m.p_Y, np.outer([-1, 0], np.ones(3)), atol=1e-15)
+    assert_array_equal(m.lengths, [1, 2])
+    assert m.param() == 2.0 and m.height == 0.2 and m.is_straight
+    assert_array_equal(m.params(), m.lengths)
+
+
+def test_directly_from_nodes():
+    m = MESHES["inclined"]()
+    direct = MeshBeam(m.p, m.t, height=m.height).with_defaults()
+    assert direct.is_straight
+    for name in ("p_X", "p_Y", "lengths"):
+        assert_allclose(getattr(direct, name), getattr(m, name), atol=1e-14)
+    assert_same_tags(direct, m)
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_kind(name):
+    mesh = MESHES[name]()
+    assert mesh.is_straight == (name not in CURVED)
+    text = repr(mesh)
+    assert ("curved" if name in CURVED else "straight") in text
+    assert f"Number of elements: {mesh.nelements}" in text and f"{mesh.height:.6g}" in text
+    assert mesh.is_valid(raise_=True)
+    assert mesh.dim() == 2 and mesh.nnodes == 2
+    assert mesh.nvertices == mesh.nelements + 1 == mesh.p.shape[1]
+
+
+def test_facets_and_elements_name_each_other(mesh):
+    n, ne = mesh.nvertices, mesh.nelements
+    assert mesh.nfacets == n + 2 * ne and len(mesh.boundary_facets()) == 2 * ne + 2
+    for facet, (a, b) in enumerate(mesh.f2t.T):
+        assert facet in mesh.t2f[:, a]
+        assert b == -1 or facet in mesh.t2f[:, b]
+    assert_array_equal(np.bincount(mesh.t2f.ravel()), 1 + (mesh.f2t[1] >= 0))
+    for local, nodes in enumerate(mesh.elem.refdom.facets):
+        assert_array_equal(mesh.facets[:, mesh.t2f[local]], mesh.t[nodes])
+    assert mesh.f2t.dtype == mesh.t2f.dtype == mesh.t.dtype == np.int32
+
+
+def test_default_boundaries(mesh):
+    h = mesh.height
+    assert sorted(mesh.boundaries) == ["bottom", "left", "right", "top"]
+    ends = np.sort(np.concatenate(list(mesh.boundaries.values())))
+    assert_array_equal(ends, mesh.boundary_facets())
+    for name, node in (("left", 0), ("right", -1)):
+        assert_allclose(where(mesh, mesh.boundaries[name])[0], mesh.p[:, node], atol=1e-14)
+    mapping = mesh.mapping()
+    for name, sign in (("bottom", -1), ("top", 1)):
+        for xi, node in ((0.0, 0), (1.0, 1)):
+            corner = mapping.G(np.array([[xi]]), mesh.boundaries[name])[..., 0]
+            t = mesh.t[node]
+            assert_allclose(corner, mesh.p[:, t] + sign * h / 2 * mesh.p_Y[:, t], atol=1e-14)
+
+
+def test_own_boundaries_and_subdomains(arc):
+    m = arc.with_boundaries({"root": lambda x: x[1] < 1e-9, "outer": lambda x: np.hypot(*x) > 1.1})
+    assert_array_equal(m.boundaries["root"], m.boundaries["left"])
+    assert_array_equal(m.boundaries["outer"], m.boundaries["bottom"])
+    inner = arc.with_boundaries({"axis": lambda x: np.abs(np.hypot(*x) - 1) < 1e-9},
+                                boundaries_only=False)
+    assert_array_equal(inner.boundaries["axis"], [0, 1, 2, 3])
+    assert_array_equal(arc.with_subdomains({"low": lambda x: x[1] < 0.6}).subdomains["low"], [0, 1])
+    assert_array_equal(arc.facets_satisfying(lambda x: x[0] > 0.8), arc.normalize_facets(
+        lambda x: x[0] > 0.8))
+    assert_array_equal(arc.normalize_facets(["left", "right"]), [0, 3])
+
+
+def test_oriented_facets():
+    m = MESHES["straight"]()
+    for normal, ori in (([1, 0], 0), ([-1, 0], 1)):
+        f = m.facets_satisfying(lambda x: np.isclose(x[0], 0.5), normal=normal)
+        assert_array_equal(f, [1])
+        assert_array_equal(f.ori, [ori])
+    around = m.facets_around([1])
+    n = FacetBasis(m, ElementBeamP1(), facets=around).normals
+    x = FacetBasis(m, ElementBeamP1(), facets=around).global_coordinates()
+    out = np.sum(n * (x - np.array([0.75, 0.0])[:, None, None]), axis=0)
+    assert np.all(out > 0) and len(around) == 4
+
+
+def test_unit_square():
+    m = MeshBeam.init_refdom()
+    assert area(m) == pytest.approx(1.0, abs=1e-15)
+    assert perimeter(m) == pytest.approx(4.0, abs=1e-14)
+
+
+# curved geometry
+
+def ellipse(s):
+    return np.array([2.0 * np.cos(s), np.sin(s)])
+
+
+def ellipse_derivative(s):
+    return np.array([-2.0 * np.sin(s), np.cos(s)])
+
+
+ELLIPSE_QUARTER = 2.422112055136919  # 2 E(3/4)
+
+
+@pytest.mark.parametrize("dr", [None, ellipse_derivative])
+def test_arc_length(dr):
+    m = MeshBeam.init_curve(ellipse, np.linspace(0, np.pi / 2, 5), 0.1, dr=dr)
+    assert_allclose(m.lengths.sum(), ELLIPSE_QUARTER, rtol=1e-10)
+    d = ellipse_derivative(m.s)
+    assert_allclose(m.p_X, d / np.hypot(*d), atol=1e-14)
+    assert_allclose(m.p_Y, np.array([-d[1], d[0]]) / np.hypot(*d), atol=1e-14)
+    assert_allclose(m.p, ellipse(m.s), atol=1e-15)
+
+
+def test_length_of_the_meshed_axis_converges():
+    """The cubics have the length of the curve to fourth order."""
+    x = np.linspace(0, 1, 41)
+    errors = []
+    for n in (4, 8, 16):
+        m = MeshBeam.init_curve(ellipse, np.linspace(0, np.pi / 2, n + 1), 0.1)
+        J = m.mapping().DF(np.array([x, 0.5 + 0 * x]))[:, 0]
+        speed = np.hypot(*J)
+        simpson = np.r_[1, np.tile([4, 2], 19), 4, 1] / 120
+        errors.append(abs((speed @ simpson).sum() - ELLIPSE_QUARTER))
+    assert errors[-1] < 3e-5
+    assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 3.7)
+
+
+def test_area_converges_to_that_of_the_exact_body():
+    """Height times length, whatever the curvature; sections turn linearly, so second order."""
+    errors = []
+    for n in (8, 16, 32):
+        m = MeshBeam.init_curve(ellipse, np.linspace(0, np.pi / 2, n + 1), 0.3)
+        errors.append(abs(area(m) / (0.3 * ELLIPSE_QUARTER) - 1))
+    assert errors[-1] < 1e-3
+    rates = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert np.all(np.abs(rates - 2) < 0.1)
+
+
+@pytest.mark.parametrize("radius, h", [(1.0, 0.3), (0.2, 0.35)])
+def test_area_above_and_below_a_bent_axis(radius, h):
+    """The halves differ by the curvature: (pi/2) (R h/2 -+ h^2/8)."""
+    errors = []
+    for n in (8, 16, 32):
+        m = quarter_arc(n, h, radius)
+        x, w = np.polynomial.legendre.leggauss(6)
+        xi, eta = np.meshgrid(0.5 + 0.5 * x, 0.25 + 0.25 * x)
+        weights = np.outer(0.25 * w, 0.5 * w).ravel()
+        halves = [np.sum(m.mapping().detDF(np.array([xi.ravel(), e.ravel()])) @ weights)
+                  for e in (eta, eta + 0.5)]
+        exact = np.pi / 2 * (radius * h / 2 + np.array([1, -1]) * h ** 2 / 8)
+        errors.append(np.max(np.abs(halves - exact) / exact))
+    assert errors[-1] < 2e-3
+    assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 1.9)
+
+
+def test_sections_on_the_s_curve_are_normal():
+    m = s_curve()
+    assert_allclose(np.sum(m.p_X * m.p_Y, 0), 0, atol=1e-15)
+    assert_allclose(np.hypot(*m.p_X), 1, rtol=1e-14)
+    d = np.array([2 + 0.4 * m.s, np.cos(2.5 * m.s)])
+    assert_allclose(m.p_X, d / np.hypot(*d), atol=1e-13)
+
+
+def parabola_by_abs(s):
+    return np.array([s, np.abs(s) ** 2])  # np.abs has no complex step
+
+
+def parabola_by_casting(s):
+    out = np.empty((2, len(s)))
+    out[0], out[1] = s, s * s  # discards an imaginary part, with a warning
+    return out
+
+
+def parabola_by_interp(s):
+    x = np.linspace(-1.5, 1.5, 3001)
+    return np.array([s, np.interp(s, x, x * x)])  # raises on complex numbers
+
+
+@pytest.mark.parametrize("r, atol", [(lambda s: np.array([s, s ** 2]), 1e-14),
+                                     (parabola_by_abs, 1e-10), (parabola_by_casting, 1e-10),
+                                     (parabola_by_interp, 5e-3)])
+def test_curves_without_a_complex_step(r, atol, recwarn):
+    m = MeshBeam.init_curve(r, np.linspace(-1, 1, 9), 0.1)
+    d = np.array([np.ones(9), 2 * m.s])
+    assert_allclose(m.p_X, d / np.hypot(*d), atol=atol)
+    exact = np.sqrt(5) + np.arcsinh(2) / 2
+    assert_allclose(m.lengths.sum(), exact, rtol=max(1e-9, atol))
+    assert len(recwarn) == 0
+
+
+@pytest.mark.parametrize("r", [s_curve, quarter_arc])
+@pytest.mark.parametrize("how", [2, [0], [1, 2]])
+def test_refined_nodes_lie_on_the_curve(r, how):
+    m = r()
+    fine = m.refined(how)
+    assert_array_equal(fine.p, m.curve(fine.s))
+    p, tangent = m.curve.nodes(fine.s)
+    assert_array_equal(fine.p_X, tangent)
+    assert_allclose(fine.lengths.sum(), m.lengths.sum(), rtol=1e-10)
+    assert fine.nelements > m.nelements and np.all(np.diff(fine.s) > 0)
+
+
+def test_curve_moves_with_the_mesh():
+    m = s_curve()
+    a = m.rotated(0.7, about=(1.0, 2.0)).translated((0.3, -4.0)).scaled(2.5).refined()
+    b = m.refined().rotated(0.7, about=(1.0, 2.0)).translated((0.3, -4.0)).scaled(2.5)
+    assert_same(a, b, atol=1e-12)
+
+
+def test_full_circle():
+    m = MeshBeam.init_curve(lambda s: np.array([np.cos(s), np.sin(s)]),
+                            np.linspace(0, 2 * np.pi, 33), 0.2)
+    assert_allclose(m.lengths.sum(), 2 * np.pi, rtol=1e-12)
+    assert len(m.boundaries["left"]) == len(m.boundaries["right"]) == 1
+    assert m.boundaries["left"] != m.boundaries["right"]
+
+
+# refinement
+
+def test_uniform_refinement(mesh):
+    fine = mesh.refined(2)
+    assert fine.nelements == 4 * mesh.nelements
+    assert_allclose(fine.p[:, ::4], mesh.p, atol=0)
+    assert_allclose(fine.lengths.reshape(-1, 4).sum(1), mesh.lengths, rtol=1e-9)
+    assert_array_equal(fine.t, [np.arange(fine.nelements), np.arange(1, fine.nvertices)])
+    assert fine.height == mesh.height and fine.is_straight == mesh.is_straight
+    assert_same(mesh.refined(0), mesh)
+    assert_same(mesh.refined().refined(), fine)
+    assert_same(mesh.refined(np.int64(2)), fine)
+
+
+@pytest.mark.parametrize("curved", [False, True])
+@pytest.mark.parametrize("elements", [[0], [2], [0, 2], [0, 1, 2], np.array([1]), (2, 1), {1},
+                                      np.array([True, False, True]), []])
+def test_adaptive_refinement(curved, elements):
+    mesh = MESHES["arc" if curved else "unequal"]()
+    chosen = np.nonzero(elements)[0] if getattr(elements, "dtype", int) == bool else elements
+    fine = mesh.refined(elements)
+    assert fine.nelements == mesh.nelements + len(chosen)
+    assert_array_equal(fine.t, [np.arange(fine.nelements), np.arange(1, fine.nvertices)])
+    s = np.sort(np.concatenate([mesh.s, [0.5 * (mesh.s[e] + mesh.s[e + 1]) for e in chosen]]))
+    assert_allclose(fine.s, s, atol=1e-15)
+    assert_allclose(fine.lengths.sum(), mesh.lengths.sum(), rtol=1e-12)
+
+
+def test_repeated_refinement_of_the_last_element():
+    m = MeshBeam.init_line([0.0, 1.0], 0.1)
+    for k in range(10):
+        m = m.refined([m.nelements - 1])
+        assert m.nelements == k + 2 and m.nvertices == k + 3
+        assert_array_equal(m.t[1], m.t[0] + 1)
+    assert_allclose(m.p[0], np.r_[1 - 0.5 ** np.arange(11), 1.0], atol=1e-15)
+
+
+@pytest.mark.parametrize("how", [1, [1], [0, 2]])
+def test_refinement_keeps_names_where_they_are(how):
+    """Naming and refining commute."""
+    tests = {"root": lambda x: x[0] < 1e-9, "inner": lambda x: np.isclose(x[0], 0.5),
+             "upper": lambda x: (x[1] > 0.09) & (x[0] < 1.0)}
+    parts = {"front": lambda x: x[0] < 1.0, "back": lambda x: x[0] > 1.0}
+    m = MESHES["straight"]()
+    a = m.with_boundaries(tests, boundaries_only=False).with_subdomains(parts).refined(how)
+    b = m.refined(how).with_boundaries(tests, boundaries_only=False).with_subdomains(parts)
+    assert_same_tags(a, b)
+    assert len(a.subdomains["front"]) + len(a.subdomains["back"]) == a.nelements
+
+
+def test_refinement_keeps_orientation(mesh):
+    coarse = mesh.with_boundaries({"around": mesh.facets_around([0])})
+    fine, fb = coarse.refined(), {}
+    for m in (coarse, fine):
+        fb[m] = FacetBasis(m, ElementBeamP1(), facets="around", intorder=12)
+    assert len(fine.boundaries["around"]) == 6
+    assert_array_equal(fine.boundaries["around"].ori,
+                       fine.facets_around([0, 1]).ori)
+    assert_array_equal(fine.boundaries["around"], fine.facets_around([0, 1]))
+    if mesh.is_straight:
+        assert_allclose(fb[fine].dx.sum(), fb[coarse].dx.sum(), rtol=1e-12)
+
+
+def test_refinement_without_the_curve_keeps_the_body(tmp_path):
+    """A loaded mesh has lost r(s): its own cubics are halved, exactly."""
+    m = s_curve()
+    m.save_npz(tmp_path / "m.npz")
+    loaded = MeshBeam.load_npz(tmp_path / "m.npz")
+    fine = loaded.refined([1, 3]).refined(1)
+    assert loaded.curve is None
+    assert_allclose(area(fine), area(m), rtol=1e-12)
+    assert_allclose(perimeter(fine), perimeter(m), rtol=1e-7)
+    x = np.array([[0.1, 0.6, 0.9], [0.0, 0.7, 1.0]])
+    at = m.mapping().F(x).reshape(2, -1)
+    cells = fine.element_finder()(*at)
+    X = fine.mapping().invF(at[:, :, None], cells)
+    assert np.all(np.abs(X - 0.5) < 0.5 + 1e-9)
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(st.lists(st.floats(0.01, 10), min_size=1, max_size=6), st.floats(1e-3, 10),
+       st.floats(-7, 7), st.sets(st.integers(0, 5)))
+def test_any_refinement_of_any_line(lengths, h, angle, marked):
+    m = MeshBeam.init_line(np.cumsum([0.0, *lengths]), h, angle=angle)
+    fine = m.refined([e for e in marked if e < m.nelements])
+    assert fine.is_straight
+    assert_allclose(area(fine), h * sum(lengths), rtol=1e-12)
+    assert_allclose(np.hypot(*(fine.p[:, -1] - fine.p[:, 0])), sum(lengths), rtol=1e-12)
+
+
+# parts of a mesh
+
+@pytest.mark.parametrize("elements", [[0, 1], [2], [2, 0], np.array([1, 2]), "last", {0, 2},
+                                      np.array([True, False, True])])
+def test_restrict(elements):
+    mesh = tagged(MESHES["arc"]())
+    part, nodes = mesh.restrict(elements, return_mapping=True)
+    kept = np.unique(mesh.normalize_elements(elements))
+    assert_array_equal(part.p, mesh.p[:, nodes])
+    assert_array_equal(nodes[part.t], mesh.t[:, kept])
+    assert_array_equal(part.lengths, mesh.lengths[kept])
+    for name, facets in mesh.boundaries.items():
+        there = np.asarray(facets)[np.isin(facets, mesh.t2f[:, kept])]
+        assert_allclose(where(part, part.boundaries[name]), where(mesh, there), atol=1e-14)
+    for name, e in mesh.subdomains.items():
+        assert_array_equal(kept[part.subdomains[name]], np.intersect1d(e, kept))
+    assert_allclose(area(part), Basis(mesh, ElementBeamP1(), elements=kept,
+                                      intorder=8).dx.sum(), rtol=1e-13)
+    assert part.refined().nelements == 2 * len(kept)
+    bare = mesh.restrict(elements, skip_boundaries=True, skip_subdomains=True)
+    assert bare.boundaries is None and bare.subdomains is None
+
+
+def test_restricted_orientation():
+    """The facets around one element stay oriented outwards, or are dropped."""
+    m = MESHES["straight"]()
+    m = m.with_boundaries({"around": m.facets_around([1])})
+    part = m.restrict([1, 2])
+    assert_array_equal(part.boundaries["around"], part.facets_around([0]))
+    fb = FacetBasis(part, ElementBeamP1(), facets="around")
+    out = np.sum(fb.normals * (fb.global_coordinates() - np.array([0.75, 0])[:, None, None]), 0)
+    assert np.all(out > 0)
+
+
+def test_remove_elements():
+    m = tagged(MESHES["straight"]())
+    assert_same(m.remove_elements([0]), m.restrict([1, 2]))
+
+
+# motion
+
+def test_rigid_motion(mesh):
+    Q = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
+    about, shift = np.array([1.0, 2.0]), np.array([0.3, -4.0])
+    moved = tagged(mesh).rotated(0.7, about=about).translated(shift)
+    X = np.random.default_rng(3).random((2, 9))
+    x = mesh.mapping().F(X) - about[:, None, None]
+    expected = np.einsum("ij,jep->iep", Q, x) + (about + shift)[:, None, None]
+    assert_allclose(moved.mapping().F(X), expected, atol=1e-14)
+    assert moved.is_straight == mesh.is_straight and moved.height == mesh.height
+    assert_same_tags(moved, tagged(mesh))
+
+
+@pytest.mark.parametrize("factor", [2.5, 3, (0.1, 0.1), np.array([0.1, 0.1])])
+def test_scaled(mesh, factor):
+    f = np.max(factor)
+    big = mesh.scaled(factor)
+    assert_allclose(area(big), f ** 2 * area(mesh), rtol=1e-13)
+    assert_allclose(perimeter(big), f * perimeter(mesh), rtol=1e-13)
+    assert big.height == f * mesh.height
+    assert_allclose(np.hypot(*big.p_X), 1, rtol=1e-13)
+
+
+def test_copies_do_not_share_caches():
+    m = MESHES["straight"]()
+    m.mapping(), m.f2t, m.is_straight
+    moved = m.translated((1.0, 0.0))
+    assert moved.mapping() is not m.mapping() and moved.mapping().mesh is moved
+    assert m.copy().refined().nfacets == 7 + 12 and m.nfacets == 4 + 6
+
+
+# files
+
+@pytest.mark.parametrize("form", ["npz", "json", "dict", "json text"])
+def test_round_trip(mesh, form, tmp_path):
+    for original in (mesh, tagged(mesh) if mesh.nelements > 1 else mesh):
+        if form == "dict":
+            data = original.to_dict()
+            back = MeshBeam.from_dict(data)
+            assert data == original.to_dict()
+        elif form == "json text":
+            back = MeshBeam.from_dict(json.loads(json.dumps(original.to_dict())))
+        else:
+            original.save(tmp_path / f"m.{form}")
+            back = MeshBeam.load(tmp_path / f"m.{form}")
+            back.save(str(tmp_path / f"n.{form}"))
+            assert_same(MeshBeam.load(str(tmp_path / f"n.{form}")), back)
+        assert_same(original, back)
+
+
+def test_round_trip_without_names(tmp_path):
+    m = MESHES["straight"]()
+    bare = MeshBeam(m.p, m.t, height=m.height)
+    bare.save_npz(tmp_path / "m.npz")
+    for back in (MeshBeam.load_npz(tmp_path / "m.npz"), MeshBeam.from_dict(bare.to_dict())):
+        assert back.boundaries is None and back.subdomains is None
+        assert_same(bare, back)
+
+
+def test_pickle_of_a_straight_mesh():
+    m = tagged(MESHES["unequal"]())
+    assert_array_equal(pickle.loads(pickle.dumps(m)).p, m.p)
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".vtu"])
+def test_save_for_a_viewer(arc, suffix, tmp_path):
+    arc.save(tmp_path / f"m{suffix}")
+    quad = MeshQuad.load(tmp_path / f"m{suffix}")
+    assert quad.nelements == 3 * 8 * 4
+    assert_allclose(Basis(quad, quad.elem()).dx.sum(), area(arc), rtol=5e-3)
+
+
+def test_load_needs_a_beam_format(tmp_path):
+    with pytest.raises(MeshError, match=r"'m.vtk': only .npz and .json"):
+        MeshBeam.load(tmp_path / "m.vtk")
+
+
+@pytest.mark.parametrize("nx, ny", [(1, 1), (8, 4)])
+def test_to_meshquad(mesh, nx, ny):
+    quad = mesh.to_meshquad(nx, ny)
+    assert quad.is_valid(raise_=True)
+    assert quad.nelements == nx * ny * mesh.nelements
+    assert quad.nvertices == (nx * mesh.nelements + 1) * (ny + 1)
+    assert len(quad.boundary_facets()) == 2 * (nx * mesh.nelements + ny)
+    total = Basis(quad, quad.elem()).dx.sum()
+    assert_allclose(total, area(mesh), rtol=1e-13 if mesh.is_straight else 0.1 / nx ** 2)
+    assert np.all(quad.mapping().detDF(CENTRE) > 0)
+
+
+def test_meshquad_of_a_cut_beam():
+    """Elements that do not touch stay apart."""
+    quad = MESHES["straight"]().restrict([0, 2]).to_meshquad(2, 2)
+    assert quad.nvertices == 2 * 9 and len(quad.boundary_facets()) == 16
+
+
+def test_draw(mesh):
+    pytest.importorskip("matplotlib").use("Agg")
+    from matplotlib import pyplot
+    ax = mesh.draw()
+    x = mesh.mapping().F(np.array([[0, 0, 1, 1], [0, 1, 0, 1]]))
+    (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
+    assert x0 <= x[0].min() and x[0].max() <= x1 and y0 <= x[1].min() and x[1].max() <= y1
+    pyplot.close(ax.figure)
+    assert mesh._repr_svg_().startswith("<svg")
+
+
+# finding elements
+
+def test_element_finder(mesh):
+    X = 0.01 + 0.98 * np.random.default_rng(4).random((2, 50))
+    for m in (mesh, mesh.refined(2)):
+        x = m.mapping().F(X)
+        expected = np.repeat(np.arange(m.nelements), 50)
+        assert_array_equal(m.element_finder()(*x.reshape(2, -1)), expected)
+
+
+def test_element_finder_on_surfaces_sections_and_ends(mesh):
+    find, finder = np.arange(mesh.nfacets), mesh.element_finder()
+    x = mesh.mapping().G(np.array([[0.0, 0.3, 1.0]]), find)
+    cells = finder(*x.reshape(2, -1)).reshape(x.shape[1:])
+    touching = np.array([np.unique(np.r_[e - 1, e, e + 1]) for e in mesh.f2t[0]], dtype=object)
+    for k, near in enumerate(touching):
+        assert set(cells[k]) <= set(near)
+    X = mesh.mapping().invF(x.reshape(2, -1, 1), cells.ravel())
+    assert np.max(np.abs(X - 0.5)) < 0.5 + 1e-9
+    assert_array_equal(finder(*mesh.p)[1:-1], np.arange(mesh.nelements - 1))  # the left of two
+    assert len(finder(*np.zeros((2, 0)))) == 0
+
+
+@pytest.mark.parametrize("h", [1e-6, 1e-2, 1.9])
+def test_element_finder_of_thin_and_thick_arcs(h):
+    m = quarter_arc(24, h)
+    X = np.random.default_rng(5).random((2, 40))
+    cells = m.element_finder()(*m.mapping().F(X).reshape(2, -1))
+    assert_array_equal(cells, np.repeat(np.arange(24), 40))
+
+
+def test_element_finder_of_a_coil():
+    """Long elements of neighbouring coils are nearer than the right one."""
+    m = MeshBeam.init_curve(lambda s: (1 + 0.004 * s) * np.array([np.cos(s), np.sin(s)]),
+                            np.linspace(0, 20 * np.pi, 62), 0.02)
+    X = np.random.default_rng(6).random((2, 20))
+    cells = m.element_finder()(*m.mapping().F(X).reshape(2, -1))
+    assert_array_equal(cells, np.repeat(np.arange(61), 20))
+
+
+@pytest.mark.parametrize("X", [(-0.1, 0.5), (1.1, 0.5), (0.5, 1.05), (0.5, -0.05)])
+def test_points_outside_are_named(mesh, X):
+    e = np.array([0 if X[0] < 0 else mesh.nelements - 1])
+    x = mesh.mapping().F(np.array(X)[:, None], e)[:, 0, 0]
+    inside = mesh.mapping().F(CENTRE, e)[:, 0, 0]
+    with pytest.raises(MeshError, match="outside the body") as info:
+        mesh.element_finder()(*np.array([inside, x]).T)
+    assert f"({x[0]:.9g}, {x[1]:.9g})" in str(info.value)
+
+
+# bad input
+
+@pytest.mark.parametrize("height, message", [
+    (0.0, "height must be positive, got 0.0"), (-1, "height must be positive, got -1"),
+    (np.nan, "height must be finite, got nan"), (np.inf, "height must be finite"),
+    (None, "height must be a number, got None"), ("thick", "height must be a number, got 'thick'"),
+])
+@pytest.mark.parametrize("make", [
+    lambda h: MeshBeam.init_line([0, 1], h),
+    lambda h: MeshBeam.init_curve(ellipse, [0, 1], h),
+    lambda h: MeshBeam(np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0], [1]]), height=h)])
+def test_bad_height(make, height, message):
+    with pytest.raises(InputError, match=message):
+        make(height)
+
+
+@pytest.mark.parametrize("x, message", [
+    ([0, 1, 0.5], "element 1 from x = 1 to 0.5 has no positive length"),
+    ([0, 1, 1], "element 1 from x = 1 to 1 has no positive length"),
+    ([1, 0], "must increase along the axis"),
+    ([0.0], "at least two nodes, got 1"), ([], "at least two nodes, got 0"),
+    ([0, np.nan], "x has a value that is NaN or infinite: nan"),
+    ([0, np.inf], "x has a value that is NaN or infinite: inf"),
+    ([[0, 1]], r"x must have shape \(n\), got \(1, 2\)"), (3, r"x must have shape"),
+    ("abc", "x must be an array of numbers"), ([0, 1j], "x must be real"),
+])
+def test_bad_nodes(x, message):
+    with pytest.raises(InputError, match=message):
+        MeshBeam.init_line(x, 0.1)
+
+
+@pytest.mark.parametrize("s, message", [
+    ([0, 1, 0.5], r"parameters of the nodes must increase: s\[1\] = 1, s\[2\] = 0.5"),
+    ([0, 0], "must increase"), ([0.0], "at least two nodes, got 1"),
+    ([0, np.nan], "s has a value that is NaN"), (7, r"s must have shape \(n\), got \(\)"),
+])
+def test_bad_parameters(s, message):
+    with pytest.raises(InputError, match=message):
+        MeshBeam.init_curve(ellipse, s, 0.1)
+
+
+@pytest.mark.parametrize("kwargs, message", [
+    (dict(origin=(0, 0, 0)), r"origin must have shape \(2\), got \(3,\)"),
+    (dict(origin=(0, np.nan)), "origin has a value"), (dict(angle=np.inf), "angle must be finite"),
+    (dict(angle=None), "angle must be a number"),
+])
+def test_bad_placement(kwargs, message):
+    with pytest.raises(InputError, match=message):
+        MeshBeam.init_line([0, 1], 0.1, **kwargs)
+
+
+def circle(s):
+    return np.array([np.cos(s), np.sin(s)])
+
+
+@pytest.mark.parametrize("r, s, height, message", [
+    (circle, np.linspace(0, 1, 9), 2.01,
+     "radius of curvature 1 is below half the height 1.005; use a smaller height"),
+    (lambda s: np.array([s, 5 * s ** 2]), np.linspace(-1, 1, 5), 0.25, "folds near s = -?0.0"),
+    (lambda s: np.array([s ** 3, 0 * s]), [-1, 0, 1], 0.1, "stands still at s = 0"),
+    (lambda s: np.array([s ** 3, 0 * s]), [-1, 1], 0.1, "stands still at s = 0"),
+    (lambda s: 0 * np.array([s, s]), [0, 1], 0.1, "stands still"),
+    (lambda s: np.array([s ** 2, 0 * s]), [-1, -0.3, 1], 0.1, "stands still|folds"),
+    (lambda s: np.array([s, s > 0.5]) * 1.0, [0, 0.4, 1], 0.1,
+     "r jumps, or its derivative does not fit, between s = 0.4 and 1"),
+    (lambda s: s, [0, 1], 0.1, r"r\(s\) must have shape \(2, 2\), got \(2,\)"),
+    (lambda s: np.array([s, s, s]), [0, 1], 0.1, r"r\(s\) must have shape"),
+    (lambda s: circle(s).T, [0, 0.1, 0.2], 0.1, r"r\(s\) must have shape"),
+    (lambda s: np.array([s, np.nan * s]), [0, 1], 0.1, r"r\(s\) has a value that is NaN"),
+    (lambda s: np.array([s, 1j * s]), [0, 1], 0.1, r"r\(s\) must be real"),
+    (circle, [0, 2 * np.pi], 0.1, "element 0 has no length"),
+])
+def test_bad_curves(r, s, height, message):
+    with pytest.raises(InputError, match=message):
+        MeshBeam.init_curve(r, s, height)
+
+
+@pytest.mark.parametrize("dr, message", [
+    (circle, "its derivative does not fit"), (lambda s: 0 * circle(s), "stands still"),
+    (lambda s: s, "derivative of r must have shape"),
+])
+def test_bad_curve_derivative(dr, message):
+    with pytest.raises(InputError, match=message):
+        MeshBeam.init_curve(circle, np.linspace(0, 1, 4), 0.1, dr=dr)
+
+
+def test_elements_too_long_for_the_curve():
+    with pytest.raises(MeshError, match="folds|elements are too long"):
+        MeshBeam.init_curve(circle, [0, 5.5], 0.9)
+
+
+def test_errors_of_the_curve_itself_are_not_hidden():
+    with pytest.raises(ZeroDivisionError):
+        MeshBeam.init_curve(lambda s: np.array([s, s]) / int(0 / 1), [0, 1], 0.1) if False else (
+            MeshBeam.init_curve(lambda s: 1 // 0, [0, 1], 0.1))
+
+
+P = np.array([[0.0, 1.0, 2.0], [0.0, 0.0, 0.0]])
+CORNER = np.array([[0.0, 1.0, 1.0], [0.0, 0.0, 1.0]])
+
+
+@pytest.mark.parametrize("p, t, message", [
+    (P, [[1, 0], [2, 1]], "numbered along its axis"),
+    (P, [[0, 2], [1, 1]], "numbered along its axis"),
+    (P, [[0, 0], [1, 1]], "numbered along its axis"),
+    (P, [[0], [1]], "part of an element: there are 3 nodes, and node 2 is only in the nodes"),
+    (P, [[0, 1, 2], [1, 2, 3]], "there are 3 nodes, and node 3 is only in t"),
+    (P, np.zeros((2, 0), int), r"at least one element, t has shape \(2, 0\)"),
+    (P, [[0], [1], [2]], r"two nodes per element.*\(3, 1\)"),
+    (P, [[0], [1], [2], [1]], "to_meshquad"),
+    (P[:1], [[0, 1], [1, 2]], r"the nodes must have shape \(2, n\), got \(1, 3\)"),
+    (P.T, [[0, 1], [1, 2]], r"the nodes must have shape \(2, n\)"),
+    (P * np.nan, [[0, 1], [1, 2]], "the nodes has a value that is NaN"),
+    (P[:, [0, 1, 1]], [[0, 1], [1, 2]], r"element 1 has no length: .* \[1.0, 0.0\] and \[1.0"),
+    (CORNER, [[0, 1], [1, 2]], "do not lie on a straight line: use MeshBeam.init_curve"),
+])
+def test_bad_direct_construction(p, t, message):
+    with pytest.raises(InputError, match=message):
+        MeshBeam(p, np.array(t), height=0.1)
+
+
+@pytest.mark.parametrize("change, message", [
+    (dict(lengths=np.array([1.0, -1.0])), "element 1 has no length"),
+    (dict(lengths=np.ones(3)), r"lengths must have shape \(2\), got \(3,\)"),
+    (dict(p_X=np.ones((2, 2))), r"p_X must have shape \(2, 3\)"),
+    (dict(p_Y=np.full((2, 3), np.nan)), "p_Y has a value"),
+])
+def test_bad_fields(change, message):
+    m = MeshBeam.init_line([0, 1, 2], 0.1)
+    fields = dict(height=0.1, p_X=m.p_X, p_Y=m.p_Y, lengths=m.lengths)
+    with pytest.raises(InputError, match=message):
+        MeshBeam(m.p, m.t, **{**fields, **change})
+
+
+@pytest.mark.parametrize("action, message", [
+    (lambda m: m.refined([3]), "numbered 0 to 2, got 3 to 3"),
+    (lambda m: m.refined(np.array([-1])), "numbered 0 to 2, got -1"),
+    (lambda m: m.refined(-1), "refinements must be >= 0, got -1"),
+    (lambda m: m.restrict([0, 7]), "numbered 0 to 2, got 0 to 7"),
+    (lambda m: m.restrict([]), "at least one element"),
+    (lambda m: Basis(m, ElementBeamP1(), elements=[5]), "numbered 0 to 2, got 5"),
+    (lambda m: m.refined("tip"), "unknown subdomain 'tip'; known: 'first', 'last'"),
+    (lambda m: m.refined(["tip"]), "unknown subdomain 'tip'"),
+    (lambda m: m.normalize_facets("tip"),
+     "unknown boundary 'tip'; known: 'left', 'right', 'bottom', 'top', 'around'"),
+    (lambda m: m.normalize_facets(["left", "tip"]), "unknown boundary 'tip'"),
+    (lambda m: m + m, r"cannot be joined with \+: .*Scene"),
+    (lambda m: m @ m, "cannot be joined with @"),
+    (lambda m: m @ MeshLine(), "cannot be joined with @"),
+    (lambda m: m.mirrored((1, 0)), "cannot be mirrored"),
+    (lambda m: m.morphed(lambda p: p[0]), "cannot be morphed"),
+    (lambda m: m.smoothed(), "cannot be smoothed"),
+    (lambda m: m.scaled((1, 2)), r"one positive factor in all directions, got \(1, 2\)"),
+    (lambda m: m.scaled(0.0), "one positive factor"), (lambda m: m.scaled(-1), "one positive"),
+    (lambda m: m.scaled(np.nan), "factors has a value"),
+    (lambda m: m.translated((1, 2, 3)), r"the shift must have shape \(2\), got \(3,\)"),
+    (lambda m: m.rotated(np.nan), "angle must be finite"),
+    (lambda m: m.rotated(1.0, about=3), "about must have shape"),
+    (lambda m: m.element_finder()(np.array([np.nan]), np.array([0.0])), "the points has a value"),
+    (lambda m: MeshBeam.from_mesh(m), "height must be a number"),
+])
+def test_refused(action, message):
+    with pytest.raises(AncfError, match=message):
+        action(tagged(MESHES["straight"]()))
+
+
+def test_name_errors_tell_what_is_known():
+    with pytest.raises(NameUnknown) as info:
+        MESHES["straight"]().normalize_facets("tip")
+    assert (info.value.kind, info.value.name) == ("boundary", "tip")
+    assert info.value.known == ("left", "right", "bottom", "top")
+    assert isinstance(info.value, ValueError)
