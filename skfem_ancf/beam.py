@@ -331,6 +331,14 @@ class Beam:
             raise InputError(f"{self.material!r} has no density: give one to use mass or gravity")
         return self.material.density
 
+    def mass_elements(self):
+        """Element mass matrices, shape (nelements, 2 nd, 2 nd)."""
+        basis = Basis(self.mesh, self.element, quadrature=self.exact_basis().quadrature)
+        N = np.array([np.asarray(b[0]) for b in basis.basis])
+        scalar = self.density * self.width * np.einsum("iep,jep,ep->eij", N, N, basis.dx,
+                                                       optimize=True)
+        return np.einsum("eij,ab->eiajb", scalar, np.eye(2)).reshape(-1, 2 * self.nd, 2 * self.nd)
+
     def mass(self):
         """The mass matrix, constant, sparse, shape (N, N)."""
         return asm(forms.mass(self.density, self.width), self.exact_basis())

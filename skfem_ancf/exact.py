@@ -620,7 +620,7 @@ def clamped_hinged_arch(n=33, angle=215.0, reach=3.6):
 
 
 def clamped_hinged_arch_limit(angle=215.0):
-    """Limit load of the arch of :func:`clamped_hinged_arch`.
+    """First limit load along the path of :func:`clamped_hinged_arch`.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Banded matrices of chains of elements, over LAPACK."""
 
 import numpy as np
-from scipy.linalg import lapack
+from scipy.linalg import blas, lapack
 from scipy.sparse import coo_matrix
 
 
@@ -106,6 +106,20 @@ class BandMatrix:
     def diagonal(self):
         """A copy of the diagonal."""
         return self._flat[self._diagonal::self._ld].copy()
+
+    def multiply(self, v):
+        """The matrix times a vector (n,)."""
+        if self.symmetric:
+            return blas.dsbmv(self.bandwidth, 1.0, self.ab, v, lower=1)
+        k = self.bandwidth
+        return blas.dgbmv(self.n, self.n, k, k, 1.0, self.ab[k:], v)
+
+    def combine(self, a, A, b, B):
+        """Fill with a A + b B of two matrices of the same layout."""
+        np.multiply(A._flat, a, out=self._flat)
+        self._flat += b * B._flat
+        self._factor = None
+        return self
 
     def factorize(self):
         """Factorise; raises ``numpy.linalg.LinAlgError`` if the matrix is singular."""

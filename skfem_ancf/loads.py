@@ -18,13 +18,25 @@ class Load:
         The force does not depend on the displacement.
     symmetric : bool
         The derivative of the force is symmetric: the load has a potential.
+    amplitude
+        A function of time by which the force is multiplied in dynamics, or None.
     """
 
     constant = True
     symmetric = True
 
+    amplitude = None
+
     def __init__(self, beam):
         self.beam = beam
+
+    def factor(self, t):
+        """The amplitude at time ``t``; 1 without one, or in statics, where ``t`` is None."""
+        return 1.0 if self.amplitude is None or t is None else float(self.amplitude(t))
+
+    def mean_force(self, u0, u1):
+        """A mean of the force between two displacements whose work is exact if it can be."""
+        return self.force(0.5 * (u0 + u1))
 
     def force(self, u):
         """Force at the displacement ``u`` of the beam's coordinates, shape (beam.N,)."""
@@ -107,6 +119,17 @@ class EndMoment(Load):
         rows = np.broadcast_to(self.dofs[:, :, None, None], values.shape)
         cols = np.broadcast_to(self.dofs[None, None, :, :], values.shape)
         return rows.ravel(), cols.ravel(), values.ravel()
+
+    def mean_force(self, u0, u1):
+        # the discrete gradient of Gonzalez (1996): its work is the change of the angle
+        force = self.force(0.5 * (u0 + u1))
+        step = (u1 - u0)[self.dofs] @ self.c
+        if step @ step > 0:
+            d0, d1 = self.direction(u0), self.direction(u1)
+            angle = np.arctan2(d0[0] * d1[1] - d0[1] * d1[0], d0 @ d1)
+            missing = self.M * angle - force @ (u1 - u0)
+            force[self.dofs] += np.outer(step, self.c) * missing / (step @ step * (self.c @ self.c))
+        return force
 
     def potential(self, u):
         d = self.direction(u)

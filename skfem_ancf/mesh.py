@@ -270,9 +270,9 @@ class MeshBeam(Mesh):
         elements = super().normalize_elements(elements)
         if elements.dtype == bool:
             elements = np.nonzero(elements)[0]
-        if len(elements) and not 0 <= np.min(elements) <= np.max(elements) < self.nelements:
-            raise MeshError(f"the elements are numbered 0 to {self.nelements - 1}, got "
-                            f"{np.min(elements)} to {np.max(elements)}")
+        bad = elements[(elements < 0) | (elements >= self.nelements)]
+        if len(bad):
+            raise MeshError(f"the elements are numbered 0 to {self.nelements - 1}, got {bad[0]}")
         return elements
 
     def facets_satisfying(self, test, boundaries_only=False, normal=None):
@@ -463,8 +463,9 @@ class MeshBeam(Mesh):
             for name, f in self._boundaries.items():
                 keep = facets[np.asarray(f)] >= 0
                 new = facets[np.asarray(f)[keep]]
-                m._boundaries[name] = (new if getattr(f, "ori", None) is None
-                                       else OrientedBoundary(new, f.ori[keep]))
+                if getattr(f, "ori", None) is not None:  # a cut section has one side left
+                    new = OrientedBoundary(new, np.where(m.f2t[1, new] < 0, 0, f.ori[keep]))
+                m._boundaries[name] = new
         return (m, nodes) if return_mapping else m
 
     # rigid motion and scale
@@ -524,7 +525,7 @@ class MeshBeam(Mesh):
         joined = 1 + np.nonzero(self.t[1, :-1] == self.t[0, 1:])[0]
         number[joined[:, None], left] = number[joined[:, None] - 1, right]
         kept, number = np.unique(number, return_inverse=True)
-        t = number.reshape(self.nelements, -1)[:, quad.t].transpose(1, 0, 2)
+        t = number.reshape(self.nelements, -1)[:, quad.t[::-1]].transpose(1, 0, 2)
         return MeshQuad(self._mapping().F(quad.p).reshape(2, -1)[:, kept], t.reshape(4, -1))
 
     def draw(self, visuals="matplotlib", **kwargs):

@@ -39,11 +39,12 @@ class State:
     """
 
     def __init__(self, system, u, load=1.0, force=None, converged=True, iterations=0, message="",
-                 steps=()):
+                 steps=(), multipliers=None, t=None):
         self.system, self.u, self.load = system, u, load
         self.converged, self.iterations, self.message = converged, iterations, message
         self.steps = list(steps)
-        self._force = force
+        self._force, self.t = force, t
+        self.multipliers = np.zeros(system.m) if multipliers is None else multipliers
 
     def __repr__(self):
         return (f"<State of {len(self.system.beams)} beam(s), {self.system.N} coordinates, load "
@@ -134,8 +135,7 @@ class State:
 
         beam = select_beam(self.beams, beam)
         s = self.system.of(beam)
-        total = self.internal_force - self.load * self.system.external_force(self.u)
-        total[self.system.free] = 0.0
+        total = np.where(self.system.free, 0.0, self._support_force())
         nodes = beam.nodes(boundary)
         forces = total[s].reshape(-1, beam.nd // 2, 2)[nodes]
         q = (beam.q0_local + self.u[s]).reshape(-1, beam.nd // 2, 2)[nodes]
@@ -146,6 +146,18 @@ class State:
         held = set(np.nonzero(~self.system.free[s].reshape(-1, beam.nd)[nodes].all(axis=0))[0])
         names = {n: float(v) for k, (n, v) in enumerate(by_name.items()) if k in held}
         return Reaction(forces[:, 0].sum(axis=0), float(moment), names)
+
+    def _support_force(self):
+        """What supports do to the coordinates: internal force less loads and joints, (N,)."""
+        total = self.internal_force - self.load * self.system.external_force(self.u, self.t)
+        t = self.load if self.t is None else self.t
+        for joint, part in zip(self.system.joints, self.system.multipliers_of(self.multipliers)):
+            total = total + part @ joint.jacobian(self.u, t)
+        return total
+
+    def joint_force(self, joint):
+        """What a joint does to its first beam, in the order of ``joint.equations``; (m,)."""
+        return self.system.joint_force(joint, self.multipliers, self._support_force())
 
     # files and pictures
 

@@ -7,6 +7,7 @@ from . import forms
 from .beam import Beam
 from .errors import (ConvergenceError, InputError, NameUnknown, SupportError, require_finite,
                      require_finite_scalar)
+from .joints import get_joint
 from .loads import DeadLoad, EndMoment, Pressure
 from .results import State
 from .statics import newton
@@ -36,8 +37,9 @@ def select_beam(beams, beam):
 class Scene:
     """Beams with supports and loads.
 
-    Methods that add something return the scene, so that they can be chained. In a scene of
-    several beams they take ``beam=``: a Beam, its name or its number.
+    Methods that add a support or a load return the scene, so that they can be chained. In a
+    scene of several beams they take ``beam=``: a Beam, its name or its number. Loads take
+    ``amplitude=``: a function of time by which they are multiplied in :meth:`integrate`.
 
     Parameters
     ----------
@@ -70,12 +72,26 @@ class Scene:
                              f"{names}")
         self.beams = beams
         self.loads = []
+        self.joints = []
         self._fixed = {}  # (number of the beam, coordinate) -> displacement
         self._system = None
 
     def __repr__(self):
         return (f"<Scene of {len(self.beams)} beam(s), {len(self._fixed)} fixed coordinates, "
                 f"{len(self.loads)} load(s)>")
+
+    def beam(self, beam=None):
+        """The Beam meant by a Beam, a name, a number, or None where there is only one."""
+        return select_beam(self.beams, beam)
+
+    def offset(self, beam):
+        """Number of the first coordinate of a beam among those of the scene."""
+        return sum(b.N for b in self.beams[:self.beams.index(self.beam(beam))])
+
+    @property
+    def N(self):
+        """Number of coordinates of the scene."""
+        return sum(b.N for b in self.beams)
 
     # supports
 
@@ -129,14 +145,55 @@ class Scene:
         return self._fix(beam, beam.dofs(boundary, names),
                          require_finite_scalar("displacement", displacement))
 
+    def joint(self, joint, **options):
+        """Add a joint, held by Lagrange multipliers.
+
+        Parameters
+        ----------
+        joint
+            A name from :data:`skfem_ancf.joints.JOINTS` with its options, or a Joint:
+
+            * ``"hinge", beams=(a, b), at=point``: two beams share a point,
+            * ``"weld", beams=(a, b), at=("right", "left")``: two end sections keep their angle,
+            * ``"line", at=point, direction=(1, 0)``: a point slides on a line,
+            * ``"circle", at=point, center=(0, 0)``: a point slides on a circle,
+            * ``"position", at=point, r=function``: a point follows ``r(t)``,
+            * ``"angle", at="left", angle=function``: a section turns by ``angle(t)``.
+
+        Returns
+        -------
+        Joint
+            Ask a State or History for its force with ``joint_force(joint)``.
+
+        Raises
+        ------
+        NameUnknown
+            If the joint's name is not known.
+        SupportError
+            When solving, if joints repeat or contradict each other or the supports.
+
+        Notes
+        -----
+        In statics the time of a motion is the load factor. A joint that only fixes coordinates
+        is eliminated like a support.
+        """
+        joint = get_joint(joint, **options)
+        joint.bind(self)
+        self.joints.append(joint)
+        self._system = None
+        return joint
+
     # loads
 
-    def _load(self, load):
+    def _load(self, load, amplitude=None):
+        if amplitude is not None and not callable(amplitude):
+            raise InputError(f"an amplitude is a function of time, got {amplitude!r}")
+        load.amplitude = amplitude
         self.loads.append(load)
         self._system = None
         return self
 
-    def gravity(self, g, beam=None):
+    def gravity(self, g, beam=None, amplitude=None):
         """Weight of every beam, or of one.
 
         Parameters
@@ -146,19 +203,19 @@ class Scene:
         """
         g = require_finite("g", g, (2,))
         for b in self.beams if beam is None else [select_beam(self.beams, beam)]:
-            self._load(DeadLoad(b, asm(forms.gravity(b.density, g, b.width), b.exact_basis())))
+            self._load(DeadLoad(b, asm(forms.gravity(b.density, g, b.width), b.exact_basis())), amplitude)
         return self
 
-    def point_force(self, force, at, beam=None):
+    def point_force(self, force, at, beam=None, amplitude=None):
         """A dead force (2,) on the material point ``at`` of the stress-free body."""
         force = require_finite("force", force, (2,))
         beam = select_beam(self.beams, beam)
         dofs, weights = beam.probe(at)
         vector = np.zeros(beam.N)
         np.add.at(vector, dofs, np.outer(force, weights))
-        return self._load(DeadLoad(beam, vector))
+        return self._load(DeadLoad(beam, vector), amplitude)
 
-    def traction(self, boundary, t, beam=None):
+    def traction(self, boundary, t, beam=None, amplitude=None):
         """A dead traction on a surface, per area of the stress-free body.
 
         Parameters
@@ -172,26 +229,26 @@ class Scene:
         if not callable(t):
             t = require_finite("t", t, (2,))
         basis = beam.facet_basis(boundary, intorder=12 if callable(t) else None)
-        return self._load(DeadLoad(beam, asm(forms.traction(t, beam.width), basis)))
+        return self._load(DeadLoad(beam, asm(forms.traction(t, beam.width), basis)), amplitude)
 
-    def pressure(self, boundary, p, beam=None):
+    def pressure(self, boundary, p, beam=None, amplitude=None):
         """A pressure on a surface that stays normal to it as it deforms; positive pushes."""
         beam = select_beam(self.beams, beam)
-        return self._load(Pressure(beam, boundary, require_finite_scalar("p", p)))
+        return self._load(Pressure(beam, boundary, require_finite_scalar("p", p)), amplitude)
 
-    def moment(self, boundary, M, beam=None):
+    def moment(self, boundary, M, beam=None, amplitude=None):
         """A moment on an end section, counterclockwise, that turns with it."""
         beam = select_beam(self.beams, beam)
         return self._load(EndMoment(beam, beam.section_node(boundary),
-                                    require_finite_scalar("M", M)))
+                                    require_finite_scalar("M", M)), amplitude)
 
-    def load(self, form, boundary=None, beam=None):
+    def load(self, form, boundary=None, beam=None, amplitude=None):
         """Any scikit-fem ``LinearForm``, as a dead load on the body or on a boundary of it."""
         beam = select_beam(self.beams, beam)
         if not isinstance(form, LinearForm):
             raise InputError(f"a load is a scikit-fem LinearForm, got {form!r}")
         basis = beam.exact_basis() if boundary is None else beam.facet_basis(boundary)
-        return self._load(DeadLoad(beam, asm(form, basis)))
+        return self._load(DeadLoad(beam, asm(form, basis)), amplitude)
 
     # solution
 
@@ -202,7 +259,7 @@ class Scene:
             offsets = np.concatenate([[0], np.cumsum([b.N for b in self.beams])])
             fixed = np.array([offsets[k] + d for k, d in self._fixed], dtype=int)
             self._system = System(self.beams, self.loads, fixed,
-                                  np.array(list(self._fixed.values()), dtype=float))
+                                  np.array(list(self._fixed.values()), dtype=float), self.joints)
         return self._system
 
     def solve_static(self, start=None, **options):
@@ -237,4 +294,4 @@ class Scene:
 
     def _state(self, result):
         return State(self.system, result.u, result.load, result.force, result.converged,
-                     result.iterations, result.message, result.steps)
+                     result.iterations, result.message, result.steps, result.multipliers)

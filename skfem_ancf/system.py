@@ -1,9 +1,12 @@
-"""A scene in numbers: free coordinates, loads, residual, tangent and its solution."""
+"""A scene in numbers: free coordinates, loads, joints, residual, tangent and its solution."""
 
 import logging
+from functools import cached_property
 
 import numpy as np
+from scipy import sparse
 from scipy.linalg import blas
+from scipy.sparse.linalg import splu
 
 from .errors import SupportError
 from .linalg import BandMatrix
@@ -15,7 +18,8 @@ class System:
     """The discrete equations of a scene.
 
     The unknown is the displacement ``u`` of all coordinates from the stress-free state, beam
-    after beam.
+    after beam, and a multiplier for each equation of a joint:
+    ``M u'' + f(u) + J^T lambda = load Q(u)``, ``Phi(u, t) = 0``, ``J = dPhi / du``.
 
     Parameters
     ----------
@@ -25,41 +29,133 @@ class System:
         The loads of all beams.
     fixed, values
         Numbers of the fixed coordinates and their displacements at full load.
+    joints
+        Joints, already bound.
     """
 
-    def __init__(self, beams, loads, fixed, values):
+    def __init__(self, beams, loads, fixed, values, joints=()):
         self.beams, self.loads = list(beams), list(loads)
         self.offsets = np.concatenate([[0], np.cumsum([b.N for b in self.beams])])
         self.N = int(self.offsets[-1])
-        self.slices = [slice(a, b) for a, b in zip(self.offsets[:-1], self.offsets[1:])]
-        order = np.argsort(fixed, kind="stable")
-        self.fixed, self.values = np.asarray(fixed, dtype=int)[order], np.asarray(values)[order]
-        self.free = np.ones(self.N, dtype=bool)
-        self.free[self.fixed] = False
-        self.symmetric = all(load.symmetric for load in self.loads)
-        self.K = BandMatrix(self.N, max(2 * b.nd for b in self.beams) - 1, self.symmetric)
-        self._fixed_positions = self.K.fixed_positions(self.fixed)
+        self.slices = [slice(int(a), int(b)) for a, b in zip(self.offsets[:-1], self.offsets[1:])]
         self._index = {id(b): k for k, b in enumerate(self.beams)}
-        self._constant = np.zeros(self.N)
-        self._varying = []
+        self._eliminate(fixed, values, joints)
+        self.symmetric = all(load.symmetric for load in self.loads)
+        self.size = float(sum(b.mesh.lengths.sum() for b in self.beams))
+        self._constant, self._varying = np.zeros(self.N), []
         for load in self.loads:
-            if load.constant:
+            if load.constant and load.amplitude is None:
                 self._constant[self.of(load)] += load.force(None)
             else:
                 self._varying.append(load)
+
+    def _eliminate(self, fixed, values, joints):
+        """Sort joints that only fix coordinates to the supports, the others to the multipliers."""
+        fixed, values = np.asarray(fixed, dtype=int), np.asarray(values, dtype=float)
+        self.all_joints, self.joints, self._moving, zero = list(joints), [], [], np.zeros(self.N)
+        for joint in joints:
+            rows = joint.jacobian(zero, 0.0)
+            dofs = np.argmax(np.abs(rows), axis=1)
+            if joint.constant and np.all(np.sum(rows != 0, axis=1) == 1):
+                clash = np.intersect1d(dofs, fixed)
+                if len(clash):
+                    raise SupportError(
+                        f"{joint!r} prescribes {self.describe_dof(clash[0])}, which a support or "
+                        "another joint fixes already: remove one of them")
+                self._moving.append((joint, len(fixed), rows[np.arange(len(dofs)), dofs]))
+                fixed, values = np.append(fixed, dofs), np.append(values, np.zeros(len(dofs)))
+            else:
+                self.joints.append(joint)
+        self.fixed, self._values = fixed, values
+        self.free = np.ones(self.N, dtype=bool)
+        self.free[fixed] = False
+        self.m = sum(len(joint.equations) for joint in self.joints)
+
+    def describe_dof(self, k):
+        """What coordinate number k is, in words."""
+        b = int(np.searchsorted(self.offsets, k, side="right")) - 1
+        beam, node = self.beams[b], (k - self.offsets[b]) // self.beams[b].nd
+        who = "" if len(self.beams) == 1 else f" of beam {beam.name or b}"
+        return f"{beam.dofnames[(k - self.offsets[b]) % beam.nd]} of node {node}{who}"
 
     def of(self, load_or_beam):
         """The slice of the coordinates that a load or a beam has."""
         return self.slices[self._index[id(getattr(load_or_beam, "beam", load_or_beam))]]
 
-    def external_force(self, u):
-        """The force of all loads at full size, shape (N,)."""
+    # supports and joints
+
+    def values(self, load, t=None):
+        """Displacements of the fixed coordinates at a load factor and a time."""
+        values = load * self._values
+        for joint, first, factors in self._moving:
+            phi = joint.value(np.zeros(self.N), load if t is None else t)
+            values[first:first + len(factors)] = -phi / factors
+        return values
+
+    @property
+    def moves(self):
+        """True if a fixed coordinate has a displacement that is not zero, now or later."""
+        return bool(self._moving) or bool(np.any(self._values))
+
+    def constraint(self, u, t):
+        """Phi of the joints with multipliers, shape (m,)."""
+        if not self.joints:
+            return np.zeros(0)
+        return np.concatenate([joint.value(u, t) for joint in self.joints])
+
+    def jacobian(self, u, t):
+        """Derivative of :meth:`constraint`, shape (m, N), zero at fixed coordinates."""
+        if not self.joints:
+            return np.zeros((0, self.N))
+        J = np.vstack([joint.jacobian(u, t) for joint in self.joints])
+        J[:, self.fixed] = 0.0
+        return J
+
+    def multipliers_of(self, multipliers):
+        """The multipliers joint by joint: a list in the order of :attr:`joints`."""
+        ends = np.cumsum([len(joint.equations) for joint in self.joints])[:-1]
+        return np.split(multipliers, ends)
+
+    def joint_force(self, joint, multipliers, reaction):
+        """What a joint does to its first beam, in the order of ``joint.equations``."""
+        for known, part in zip(self.joints, self.multipliers_of(multipliers)):
+            if known is joint:
+                return -part
+        for known, first, factors in self._moving:
+            if known is joint:
+                return reaction[self.fixed[first:first + len(factors)]] / factors
+        raise SupportError(f"{joint!r} is not a joint of this scene")
+
+    def require_independent_joints(self):
+        """Raise SupportError if joints repeat or contradict each other or the supports."""
+        if not self.joints:
+            return
+        zero, basis = np.zeros(self.N), np.zeros((0, self.N))
+        for joint in self.joints:
+            rows = joint.jacobian(zero, 0.0)
+            rows[:, self.fixed] = 0.0
+            for k, row in enumerate(rows):
+                size = np.linalg.norm(joint.jacobian(zero, 0.0)[k])
+                rest = row - basis.T @ (basis @ row)
+                rest = rest - basis.T @ (basis @ rest)
+                if np.linalg.norm(rest) <= 1e-9 * size:
+                    phi = joint.value(zero, 0.0)[k]
+                    kind = ("repeats what" if abs(phi) <= 1e-9 * self.size else "contradicts what")
+                    raise SupportError(
+                        f"{joint!r}, equation {joint.equations[k]!r}, {kind} the supports and the "
+                        "joints before it hold already: remove one of them")
+                basis = np.vstack([basis, rest / np.linalg.norm(rest)])
+
+    # forces and energies
+
+    def external_force(self, u, t=None):
+        """The force of all loads at full size, shape (N,); at time ``t`` if it is given."""
         if not self._varying:
             return self._constant
         out = self._constant.copy()
         for load in self._varying:
             s = self.of(load)
-            out[s] += load.force(u[s])
+            out[s] += load.factor(t) * load.force(u[s])
         return out
 
     def internal_force(self, u):
@@ -70,12 +166,48 @@ class System:
         """Strain energy of all beams."""
         return float(sum(b.kernel.energy(u[s]) for b, s in zip(self.beams, self.slices)))
 
-    def load_potential(self, u):
-        """Potential of the loads at full size, or None if one has none."""
-        parts = [load.potential(u[self.of(load)]) for load in self.loads]
-        return None if any(p is None for p in parts) else float(sum(parts))
+    def load_potential(self, u, t=None):
+        """Potential of the loads; loads without one count as zero."""
+        return float(sum(load.factor(t) * (load.potential(u[self.of(load)]) or 0.0)
+                         for load in self.loads))
 
-    def assemble(self, u, load=1.0, carried=None, geometric=True):
+    @cached_property
+    def stiffness_scale(self):
+        """Round-off floor: eps times the square root of modulus times volume."""
+        total = 0.0
+        for beam in self.beams:
+            t = beam.kernel.tables[0]
+            n = beam.mesh.nelements if t.shared else 1
+            total += n * float(np.sum(t.w)) * beam.material.E
+        return np.finfo(float).eps * np.sqrt(total)
+
+    # mass
+
+    @cached_property
+    def mass(self):
+        """The mass matrix, a :class:`~skfem_ancf.linalg.BandMatrix`; assembled once."""
+        M = self.new_band()
+        for beam, offset in zip(self.beams, self.offsets):
+            M.add_elements(beam.mass_elements(), int(offset), beam.nd, beam.mesh.t[0])
+        return M
+
+    # tangent
+
+    def new_band(self):
+        """An empty band matrix of the scene."""
+        return BandMatrix(self.N, max(2 * b.nd for b in self.beams) - 1, self.symmetric)
+
+    @cached_property
+    def K(self):
+        """The tangent, filled by :meth:`assemble`."""
+        return self.new_band()
+
+    @cached_property
+    def fixed_positions(self):
+        """Where the fixed rows and columns are stored."""
+        return self.K.fixed_positions(self.fixed)
+
+    def assemble(self, u, load=1.0, carried=None, geometric=True, t=None):
         """Internal force, and the tangent of the residual into :attr:`K`.
 
         Parameters
@@ -88,6 +220,8 @@ class System:
             Stresses for the geometric part, as :meth:`stress_step` returns them.
         geometric
             Include the geometric part.
+        t
+            Time, for loads with an amplitude.
 
         Returns
         -------
@@ -107,9 +241,11 @@ class System:
                 self.K.add_elements(e.tangent, int(offset), beam.nd, beam.mesh.t[0, part])
                 evaluations.append((kernel, s, part, e))
         for item in self._varying:
+            if item.constant:
+                continue
             i, j, v = item.stiffness(u[self.of(item)])
             first = self.of(item).start
-            self.K.add(first + i, first + j, -load * v)
+            self.K.add(first + i, first + j, -load * item.factor(t) * v)
         return force, evaluations
 
     @staticmethod
@@ -125,74 +261,86 @@ class System:
 
     def multiply(self, v):
         """The assembled tangent times a vector, before :meth:`factorize`."""
-        K = self.K
-        if self.symmetric:
-            return blas.dsbmv(K.bandwidth, 1.0, K.ab, v, lower=1)
-        k = K.bandwidth
-        return blas.dgbmv(self.N, self.N, k, k, 1.0, K.ab[k:], v)
+        return self.K.multiply(v)
 
-    def factorize(self):
-        """Fix the supports in the tangent and factorise it."""
-        self.K.fix(self._fixed_positions)
-        self.K.factorize()
+    def factorize(self, u=None, t=0.0, multipliers=None):
+        """Fix the supports in the tangent and factorise it, with the joints where there are any."""
+        self.K.fix(self.fixed_positions)
+        if not self.joints:
+            self.K.factorize()
+            return
+        K = self.K.tocsc()
+        for joint, part in zip(self.joints, self.multipliers_of(multipliers)):
+            second = joint.curvature(u, t, part)
+            if second is not None:
+                i, j, v = second
+                v = v * (self.free[i] & self.free[j])
+                K = K + sparse.coo_matrix((v, (i, j)), shape=K.shape)
+        self._weight = float(np.mean(np.abs(K.diagonal()[self.free])))
+        J = sparse.csr_matrix(self.jacobian(u, t) * self._weight)
+        self._kkt = splu(sparse.bmat([[K, J.T], [J, None]], format="csc"))
 
-    def solve(self, residual):
-        """Solve with the factors; the fixed coordinates of ``residual`` are ignored."""
-        b = residual.copy()
-        b[self.fixed] = 0.0
-        return self.K.solve(b)
+    def solve(self, residual, phi=None):
+        """Solve with the factors.
 
-    def stiffness_scale(self):
-        """Round-off floor: eps times the square root of modulus times volume."""
-        total = 0.0
-        for beam in self.beams:
-            for t in beam.kernel.tables:
-                n = beam.mesh.nelements if t.shared else 1
-                total += n * float(np.sum(t.w)) * beam.material.E
-        return np.finfo(float).eps * np.sqrt(total)
+        Parameters
+        ----------
+        residual
+            Shape (N,); its fixed coordinates are ignored.
+        phi
+            What the constraints should change by, shape (m,), where there are joints.
 
-    # supports
+        Returns
+        -------
+        du, multipliers
+            The increments; the second is empty without joints.
+        """
+        b = residual * self.free
+        if not self.joints:
+            return self.K.solve(b), np.zeros(0)
+        x = self._kkt.solve(np.append(b, self._weight * phi))
+        return x[:self.N], self._weight * x[self.N:]
+
+    # rigid motions
 
     def free_rigid_motions(self):
         """Descriptions of the rigid motions that nothing holds, one string each."""
         n = 3 * len(self.beams)
-        motions = np.zeros((self.N, n))
-        sizes = []
+        motions, sizes = np.zeros((self.N, n)), []
         for k, (beam, s) in enumerate(zip(self.beams, self.slices)):
-            size = float(beam.mesh.lengths.sum())
-            sizes.append(size)
-            motions[s, 3 * k:3 * k + 3] = beam.rigid_motions() / np.array([1.0, 1.0, size])
+            sizes.append(float(beam.mesh.lengths.sum()))
+            motions[s, 3 * k:3 * k + 3] = beam.rigid_motions() / np.array([1.0, 1.0, sizes[-1]])
         held = motions[self.fixed]
+        if self.joints:
+            zero = np.zeros(self.N)
+            held = np.vstack([held] + [j.jacobian(zero, 0.0) @ motions for j in self.joints])
         # rows for slopes have another unit than rows for positions: scale each to its size
         norms = np.abs(held).max(axis=1, initial=0.0)
         held = held[norms > 0] / norms[norms > 0, None]
-        if len(held):
-            _, sigma, V = np.linalg.svd(held)
-            rank = int(np.sum(sigma > 1e-9 * sigma[0]))
-        else:
-            V, rank = np.eye(n), 0
-        return [self._describe(v, sizes) for v in V[rank:]] if rank else [
-            self._describe(v, sizes) for v in V]
+        if not len(held):
+            return [self._describe(v, sizes) for v in np.eye(n)]
+        _, sigma, V = np.linalg.svd(held)
+        return [self._describe(v, sizes) for v in V[int(np.sum(sigma > 1e-9 * sigma[0])):]]
 
     def _describe(self, v, sizes):
         parts = []
         for k, beam in enumerate(self.beams):
             a, b, c = v[3 * k:3 * k + 3]
-            c = c / sizes[k]
-            if max(abs(a), abs(b), abs(c) * sizes[k]) < 1e-8:
-                continue
             who = "" if len(self.beams) == 1 else f" of beam {beam.name or k}"
-            if abs(c) * sizes[k] < 1e-8:
+            if max(abs(a), abs(b), abs(c)) < 1e-8:
+                continue
+            if abs(c) < 1e-8:
                 d = np.array([a, b]) / np.hypot(a, b)
                 d = d if d[np.argmax(np.abs(d))] > 0 else -d
                 parts.append(f"translation along ({d[0]:.3g}, {d[1]:.3g}){who}")
             else:
-                x = beam.origin + np.array([-b, a]) / c
+                x = beam.origin + np.array([-b, a]) * sizes[k] / c
                 parts.append(f"rotation about ({x[0]:.4g}, {x[1]:.4g}){who}")
         return " with ".join(parts)
 
     def require_supports(self):
-        """Raise SupportError if a rigid motion is free."""
+        """Raise SupportError if a rigid motion is free, or joints are not independent."""
+        self.require_independent_joints()
         free = self.free_rigid_motions()
         if free:
             raise SupportError(

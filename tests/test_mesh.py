@@ -129,7 +129,7 @@ def test_own_boundaries_and_subdomains(arc):
     inner = arc.with_boundaries({"axis": lambda x: np.abs(np.hypot(*x) - 1) < 1e-9},
                                 boundaries_only=False)
     assert_array_equal(inner.boundaries["axis"], [0, 1, 2, 3])
-    assert_array_equal(arc.with_subdomains({"low": lambda x: x[1] < 0.6}).subdomains["low"], [0, 1])
+    assert_array_equal(arc.with_subdomains({"low": lambda x: x[1] < 0.8}).subdomains["low"], [0, 1])
     assert_array_equal(arc.facets_satisfying(lambda x: x[0] > 0.8), arc.normalize_facets(
         lambda x: x[0] > 0.8))
     assert_array_equal(arc.normalize_facets(["left", "right"]), [0, 3])
@@ -333,15 +333,14 @@ def test_refinement_keeps_names_where_they_are(how):
 
 def test_refinement_keeps_orientation(mesh):
     coarse = mesh.with_boundaries({"around": mesh.facets_around([0])})
-    fine, fb = coarse.refined(), {}
-    for m in (coarse, fine):
-        fb[m] = FacetBasis(m, ElementBeamP1(), facets="around", intorder=12)
+    fine = coarse.refined()
     assert len(fine.boundaries["around"]) == 6
     assert_array_equal(fine.boundaries["around"].ori,
                        fine.facets_around([0, 1]).ori)
     assert_array_equal(fine.boundaries["around"], fine.facets_around([0, 1]))
     if mesh.is_straight:
-        assert_allclose(fb[fine].dx.sum(), fb[coarse].dx.sum(), rtol=1e-12)
+        total = [FacetBasis(m, ElementBeamP1(), facets="around").dx.sum() for m in (coarse, fine)]
+        assert_allclose(total, 2 * (mesh.lengths[0] + mesh.height), rtol=1e-13)
 
 
 def test_refinement_without_the_curve_keeps_the_body(tmp_path):
@@ -660,8 +659,7 @@ def test_elements_too_long_for_the_curve():
 
 def test_errors_of_the_curve_itself_are_not_hidden():
     with pytest.raises(ZeroDivisionError):
-        MeshBeam.init_curve(lambda s: np.array([s, s]) / int(0 / 1), [0, 1], 0.1) if False else (
-            MeshBeam.init_curve(lambda s: 1 // 0, [0, 1], 0.1))
+        MeshBeam.init_curve(lambda s: 1 // 0, [0, 1], 0.1)
 
 
 P = np.array([[0.0, 1.0, 2.0], [0.0, 0.0, 0.0]])
@@ -702,10 +700,10 @@ def test_bad_fields(change, message):
 
 
 @pytest.mark.parametrize("action, message", [
-    (lambda m: m.refined([3]), "numbered 0 to 2, got 3 to 3"),
+    (lambda m: m.refined([3]), "numbered 0 to 2, got 3"),
     (lambda m: m.refined(np.array([-1])), "numbered 0 to 2, got -1"),
     (lambda m: m.refined(-1), "refinements must be >= 0, got -1"),
-    (lambda m: m.restrict([0, 7]), "numbered 0 to 2, got 0 to 7"),
+    (lambda m: m.restrict([0, 7]), "numbered 0 to 2, got 7"),
     (lambda m: m.restrict([]), "at least one element"),
     (lambda m: Basis(m, ElementBeamP1(), elements=[5]), "numbered 0 to 2, got 5"),
     (lambda m: m.refined("tip"), "unknown subdomain 'tip'; known: 'first', 'last'"),

@@ -36,9 +36,10 @@ class LoadStep:
 
 @dataclass
 class StaticResult:
-    """What the iteration found: the displacement, the load reached, and how."""
+    """What the iteration found: displacement and multipliers, the load reached, and how."""
 
     u: np.ndarray
+    multipliers: np.ndarray
     load: float
     force: np.ndarray
     steps: list
@@ -100,7 +101,8 @@ def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, fi
     if method not in METHODS:
         raise NameUnknown("method", method, METHODS)
     u = np.zeros(system.N) if u is None else u.copy()
-    result = StaticResult(u, 0.0, np.zeros(system.N), [], False, "no load step has converged")
+    result = StaticResult(u, np.zeros(system.m), 0.0, np.zeros(system.N), [], False,
+                          "no load step has converged")
     step = float(first_step)
     with progress_bar(progress, total=1.0, desc="load") as bar:
         while result.load < 1.0:
@@ -109,7 +111,7 @@ def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, fi
                 load = 1.0
             record = LoadStep(load, 0)
             try:
-                u, force = _iterate(system, result.u, load, method, tol, max_iterations, record)
+                found = _iterate(system, result, load, method, tol, max_iterations, record)
             except _Failed as failure:
                 result.rejected += 1
                 logger.info("load %.6g failed (%s), step cut", load, failure)
@@ -122,7 +124,7 @@ def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, fi
                         "or a larger max_iterations may help")
                     raise ConvergenceError(result.message, result) from None
                 continue
-            result.u, result.force = u, force
+            result.u, result.multipliers, result.force = found
             bar.update(load - result.load)
             result.load = load
             result.steps.append(record)
@@ -138,50 +140,55 @@ class _Failed(Exception):
     """A load step did not converge; the message says why."""
 
 
-def _iterate(system, u, load, method, tol, max_iterations, record):
-    """Iterate to equilibrium at one load; returns displacement and internal force."""
-    u, carried = u.copy(), None
-    floor = 8.0 * system.stiffness_scale()
-    prescribed = load * system.values - u[system.fixed]
+def _iterate(system, result, load, method, tol, max_iterations, record):
+    """Iterate to equilibrium at one load; returns displacement, multipliers, internal force."""
+    u, multipliers, carried = result.u.copy(), result.multipliers.copy(), None
+    floor = 8.0 * system.stiffness_scale
     # the residual sums the noise of all coordinates, the work that of the strains
     force_floor = floor * np.sqrt(max(b.nd for b in system.beams))
+    prescribed = system.values(load) - u[system.fixed]
+    work = reference = 0.0
     for k in range(max_iterations + 1):
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             force, evaluations = system.assemble(u, load, carried)
             external = load * system.external_force(u)
         if not np.all(np.isfinite(force)):
             raise _Failed("the strain is not finite")
-        residual = external - force
+        residual, phi = external - force, system.constraint(u, load)
+        if system.joints:
+            residual = residual - multipliers @ system.jacobian(u, load)
         scale = 1.0 / np.abs(system.K.diagonal())
         size = np.sqrt(max(np.sum(force**2 * scale), np.sum(external**2 * scale)))
         free = residual * system.free
         rho = np.sqrt(np.sum(free**2 * scale))
         record.force_residuals.append(rho / size if size > 0 else 0.0)
-        moved = bool(np.any(prescribed))
-        if not moved and rho <= tol * size + force_floor and (
-                k == 0 and rho <= 1e-3 * tol * size + force_floor
-                or k > 0 and work <= tol * reference + floor):  # noqa: F821
-            return u, force
+        still = not np.any(prescribed) and np.max(np.abs(phi), initial=0) <= 1e-12 * system.size
+        small = (rho <= 1e-3 * tol * size + force_floor if k == 0 else
+                 rho <= tol * size + force_floor and work <= tol * reference + floor)
+        if still and small:
+            return u, multipliers, force
         if k == max_iterations:
             break
-        if moved:
-            du0 = np.zeros(system.N)
+        du0 = np.zeros(system.N)
+        if np.any(prescribed):
             du0[system.fixed] = prescribed
             free = (residual - system.multiply(du0)) * system.free
-        try:
-            system.factorize()
-        except np.linalg.LinAlgError:
-            raise _Failed("the tangent is singular") from None
-        du = system.solve(free)
-        if moved:
-            du += du0
+            if system.joints:
+                phi = phi + np.concatenate([j.jacobian(u, load) @ du0 for j in system.joints])
             prescribed = np.zeros_like(prescribed)
+        try:
+            system.factorize(u, load, multipliers)
+        except (np.linalg.LinAlgError, RuntimeError):
+            raise _Failed("the tangent is singular") from None
+        du, dm = system.solve(free, -phi)
         if not np.all(np.isfinite(du)):
             raise _Failed("the tangent is singular")
-        work = np.sqrt(abs(free @ du))
+        work = np.sqrt(abs(free @ du) + abs(phi @ dm))
+        du += du0
         if method == "mixed":
             carried = system.stress_step(evaluations, du)
         u += du
+        multipliers += dm
         record.iterations += 1
         reference = np.sqrt(max(abs(external @ u), abs(force @ u)))
         record.energy_residuals.append(work / reference if reference > 0 else 0.0)

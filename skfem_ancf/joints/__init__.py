@@ -1,0 +1,37 @@
+"""Joints: constraints with Lagrange multipliers. A new joint is one file and one line here."""
+
+from ..errors import NameUnknown
+from .base import Joint
+from .guides import OnCircle, OnLine
+from .hinge import Hinge
+from .prescribed import PrescribedAngle, PrescribedPosition
+from .weld import Weld
+
+#: The joints by name.
+JOINTS = {
+    "hinge": Hinge,
+    "weld": Weld,
+    "line": OnLine,
+    "circle": OnCircle,
+    "position": PrescribedPosition,
+    "angle": PrescribedAngle,
+}
+
+
+def get_joint(joint, **options):
+    """A :class:`Joint` from its name and options, or itself.
+
+    Raises
+    ------
+    NameUnknown
+        If the name is not known; the message lists the known ones.
+    """
+    if isinstance(joint, Joint):
+        return joint
+    if joint not in JOINTS:
+        raise NameUnknown("joint", joint, JOINTS)
+    return JOINTS[joint](**options)
+
+
+__all__ = ["JOINTS", "Hinge", "Joint", "OnCircle", "OnLine", "PrescribedAngle",
+           "PrescribedPosition", "Weld", "get_joint"]

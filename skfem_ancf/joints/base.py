@@ -1,0 +1,108 @@
+"""What every joint shares: constraint equations on points and sections of beams."""
+
+import numpy as np
+
+from ..errors import InputError
+
+
+class Vector:
+    """A plane vector that depends affinely on the coordinates: ``start + u[dofs] @ weights``.
+
+    The position of a material point and the direction of a section are such vectors.
+    """
+
+    def __init__(self, start, dofs, weights):
+        keep = np.abs(weights) > 1e-14 * np.max(np.abs(weights))
+        self.start, self.dofs, self.weights = np.asarray(start), dofs[:, keep], weights[keep]
+
+    def __call__(self, u):
+        return self.start + u[self.dofs] @ self.weights
+
+    def row(self, direction, n):
+        """The derivative of ``direction . vector`` by the coordinates, as a dense row (n,)."""
+        out = np.zeros(n)
+        np.add.at(out, self.dofs, np.outer(direction, self.weights))
+        return out
+
+
+def rotation(angle):
+    """The matrix that turns by ``angle``."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]])
+
+
+class Joint:
+    """Constraint equations Phi(u, t) = 0 with Lagrange multipliers.
+
+    A joint is bound to a scene by :meth:`bind`, which finds its points; from then on ``u`` is
+    the displacement of all coordinates of the scene. The multipliers are the forces (or moment)
+    that the joint exerts, in the order of :attr:`equations`.
+
+    Attributes
+    ----------
+    equations : tuple of str
+        What each equation holds.
+    constant : bool
+        The derivative of Phi depends neither on u nor on t.
+    """
+
+    equations = ()
+    constant = True
+    name = None
+
+    def bind(self, scene):
+        """Find the points and sections in the scene's coordinates."""
+        raise NotImplementedError
+
+    def value(self, u, t):
+        """Phi, shape (m,)."""
+        raise NotImplementedError
+
+    def jacobian(self, u, t):
+        """Derivative of Phi by u, shape (m, N)."""
+        raise NotImplementedError
+
+    def curvature(self, u, t, multipliers):
+        """Rows, columns and values of sum_k multipliers[k] d^2 Phi_k / du^2, or None."""
+        return None
+
+    def __repr__(self):
+        return f"<{type(self).__name__} {self.name or ''}>"
+
+
+def point(scene, beam, at):
+    """The position of the material point ``at`` of a beam, as a :class:`Vector`."""
+    beam = scene.beam(beam)
+    e, X = beam.locate(at)
+    dofs, weights = beam.probe_reference(e, X)
+    start = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
+    return Vector(start, dofs + scene.offset(beam), weights)
+
+
+def section(scene, beam, boundary):
+    """Axis position and direction of an end section, as two :class:`Vector`."""
+    beam = scene.beam(beam)
+    node = beam.section_node(boundary)
+    dofs, weights = beam.section_direction(node)
+    direction = Vector(beam.q0_local[dofs] @ weights, dofs + scene.offset(beam), weights)
+    first = scene.offset(beam) + node * beam.nd
+    return (Vector(beam.mesh.p[:, node], np.array([[first], [first + 1]]), np.ones(1)), direction)
+
+
+def pair(value, what):
+    """A value as a pair: given once for both beams, or once for each."""
+    if isinstance(value, (tuple, list)) and len(value) == 2 and not np.isscalar(value[0]):
+        return tuple(value)
+    if value is None:
+        raise InputError(f"a joint needs {what}")
+    return value, value
+
+
+def cross_terms(a, b, Q):
+    """Second derivative of ``a x (Q b)`` for two Vectors: rows, columns, values (symmetric)."""
+    J = np.array([[0.0, 1.0], [-1.0, 0.0]]) @ Q  # a x c = a^T [[0, 1], [-1, 0]] c
+    values = np.einsum("ij,k,l->ikjl", J, a.weights, b.weights)
+    rows = np.broadcast_to(a.dofs[:, :, None, None], values.shape).ravel()
+    cols = np.broadcast_to(b.dofs[None, None], values.shape).ravel()
+    values = values.ravel()
+    return np.append(rows, cols), np.append(cols, rows), np.append(values, values)

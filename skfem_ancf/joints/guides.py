@@ -1,0 +1,84 @@
+"""A point of a beam slides on a line or on a circle."""
+
+import numpy as np
+
+from ..errors import InputError, require_finite, require_positive
+from .base import Joint, point
+
+
+class OnLine(Joint):
+    """n . (r - p) = 0: a material point slides on a straight line.
+
+    Parameters
+    ----------
+    beam
+        The beam, by Beam, name or number; None where there is only one.
+    at
+        The material point.
+    direction
+        Direction of the line, shape (2,).
+    through
+        A point of the line; the material point's stress-free place by default.
+    """
+
+    equations = ("force normal to the line",)
+
+    def __init__(self, at, direction, beam=None, through=None, name=None):
+        d = require_finite("direction", direction, (2,))
+        if not np.any(d):
+            raise InputError("the direction of the line must not be zero")
+        self.normal = np.array([-d[1], d[0]]) / np.hypot(*d)
+        self.beam, self.at, self.through, self.name = beam, at, through, name
+
+    def bind(self, scene):
+        self.r = point(scene, self.beam, self.at)
+        self.p = self.r.start if self.through is None else require_finite("through", self.through)
+        self.rows = self.r.row(self.normal, scene.N)[None]
+
+    def value(self, u, t):
+        return np.array([self.normal @ (self.r(u) - self.p)])
+
+    def jacobian(self, u, t):
+        return self.rows
+
+
+class OnCircle(Joint):
+    """(|r - c|^2 - R^2) / (2 R) = 0: a material point slides on a circle.
+
+    Parameters
+    ----------
+    beam
+        The beam, by Beam, name or number; None where there is only one.
+    at
+        The material point.
+    center
+        Centre of the circle, shape (2,).
+    radius
+        Its radius; the distance of the stress-free point by default.
+    """
+
+    equations = ("force away from the centre",)
+    constant = False
+
+    def __init__(self, at, center, beam=None, radius=None, name=None):
+        self.center = require_finite("center", center, (2,))
+        self.radius = None if radius is None else require_positive("radius", radius)
+        self.beam, self.at, self.name = beam, at, name
+
+    def bind(self, scene):
+        self.r, self.N = point(scene, self.beam, self.at), scene.N
+        self.R = self.radius or require_positive(
+            "the distance of the point from the centre", np.hypot(*(self.r.start - self.center)))
+
+    def value(self, u, t):
+        d = self.r(u) - self.center
+        return np.array([(d @ d - self.R**2) / (2 * self.R)])
+
+    def jacobian(self, u, t):
+        return self.r.row((self.r(u) - self.center) / self.R, self.N)[None]
+
+    def curvature(self, u, t, multipliers):
+        w = self.r.weights
+        values = np.broadcast_to(np.outer(w, w) * multipliers[0] / self.R, (2, len(w), len(w)))
+        rows = np.broadcast_to(self.r.dofs[:, :, None], values.shape)
+        return rows.ravel(), rows.transpose(0, 2, 1).ravel(), values.ravel()

@@ -1,0 +1,37 @@
+"""Two beams share a point and turn freely about it."""
+
+import numpy as np
+
+from .base import Joint, pair, point
+
+
+class Hinge(Joint):
+    """r_a = r_b for a material point of each of two beams.
+
+    Parameters
+    ----------
+    beams
+        Two beams, by Beam, name or number.
+    at
+        The point, in the stress-free bodies; or one point for each beam, if they are apart.
+
+    References
+    ----------
+    Eq. (26) of "A series of locking-free beam element models in absolute nodal coordinate
+    formulation", Archive of Applied Mechanics (2024).
+    """
+
+    equations = ("force along x", "force along y")
+
+    def __init__(self, beams, at, name=None):
+        self.beams, self.at, self.name = beams, pair(at, "the point at="), name
+
+    def bind(self, scene):
+        self.a, self.b = (point(scene, beam, at) for beam, at in zip(self.beams, self.at))
+        self.rows = np.array([self.a.row(e, scene.N) - self.b.row(e, scene.N) for e in np.eye(2)])
+
+    def value(self, u, t):
+        return self.a(u) - self.b(u)
+
+    def jacobian(self, u, t):
+        return self.rows

@@ -1,0 +1,468 @@
+"""scikit-fem's own machinery on beams: bases, coordinates by name, projection, forms, solvers."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.linalg import eigh
+from scipy.sparse import csr_matrix, identity
+from skfem import (Basis, BilinearForm, CellBasis, ElementVector, FacetBasis, Functional,
+                   InteriorFacetBasis, LinearForm, condense, enforce, mpc, penalize, solve)
+from skfem.helpers import ddot, div, dot, eye, grad, sym_grad, trace
+from skfem.models.poisson import laplace, mass, unit_load
+
+from conftest import MESHES, quarter_arc
+from skfem_ancf import ElementBeamANCF, ElementBeamPatelShabana, InputError, MeshBeam, MeshError
+from skfem_ancf.reference import ElementBeamP1
+
+
+@Functional
+def square(w):
+    return w["u"] ** 2
+
+
+@pytest.fixture
+def beam():
+    """A vector basis of order 3 on three straight elements with one named part."""
+    m = MESHES["straight"]().with_subdomains({"tip": np.array([2])})
+    return Basis(m, ElementVector(ElementBeamANCF(3)))
+
+
+# coordinates by name
+
+def test_number_and_places_of_the_coordinates(element, mesh):
+    basis = Basis(mesh, ElementVector(element))
+    assert basis.N == 2 * (element.order + 2) * mesh.nvertices
+    assert basis.element_dofs.shape == (4 * (element.order + 2), mesh.nelements)
+    for k, (y, _, _) in enumerate(element.functionals):
+        place = mesh.p + y * mesh.height * mesh.p_Y
+        for component in (0, 1):
+            dofs = basis.nodal_dofs[2 * k + component]
+            assert_allclose(basis.doflocs[:, dofs], place, atol=1e-14)
+
+
+def test_matrices_are_banded():
+    """Numbering along the axis: the half bandwidth is that of one element, after refining too."""
+    for m in (MESHES["straight"]().refined(2), MESHES["arc"]().refined([0]).refined([2])):
+        basis = Basis(m, ElementVector(ElementBeamANCF(3)), intorder=4)
+        assert np.max(np.ptp(basis.element_dofs, axis=0)) == 19
+
+
+@pytest.mark.parametrize("name, node", [("left", 0), ("right", 3)])
+def test_dofs_of_an_end(beam, name, node):
+    dofs = beam.get_dofs(name)
+    assert_array_equal(dofs.all(), beam.nodal_dofs[:, node])
+    assert_array_equal(dofs.flatten(), beam.nodal_dofs[:, node])
+    assert list(dofs.nodal) == [f"{n}^{i}" for n in ("r", "r_X", "r_Y0", "r_Y1", "r_Y2")
+                                for i in (1, 2)]
+    assert_array_equal(dofs.all(["r^1", "r_Y2^2"]), beam.nodal_dofs[[0, 9], node])
+    assert_array_equal(dofs.nodal["r_X^2"], beam.nodal_dofs[3, node])
+    assert_array_equal(dofs.keep(["r^1", "r^2"]).all(), beam.nodal_dofs[:2, node])
+    assert_array_equal(dofs.drop(["r_X^1", "r_X^2"]).all(),
+                       np.delete(beam.nodal_dofs[:, node], [2, 3]))
+    assert_array_equal(dofs.keep(["r^1", "r^2"]).keep("r^1"), dofs.keep("r^1"))
+    assert_array_equal(dofs.drop("no such"), dofs)
+    assert len(dofs.keep("no such")) == 0
+    assert_array_equal(beam.get_dofs(name, skip=["r^1"]).all(), beam.nodal_dofs[1:, node])
+
+
+def test_dofs_of_other_sets(beam):
+    assert_array_equal(beam.get_dofs(), np.arange(40))  # every node is on the boundary
+    assert_array_equal(beam.get_dofs("top"), np.arange(40))
+    assert_array_equal(beam.get_dofs({"left", "right"}),
+                       np.sort(np.r_[beam.get_dofs("left"), beam.get_dofs("right")]))
+    assert_array_equal(beam.get_dofs(("left", "right")), beam.get_dofs(["left", "right"]))
+    assert_array_equal(beam.get_dofs(1), np.arange(10, 20))  # facet 1 is the section of node 1
+    assert_array_equal(beam.get_dofs(np.array([1, 2])), np.arange(10, 30))
+    assert_array_equal(beam.get_dofs(lambda x: np.isclose(x[0], 1.0)), np.arange(20, 30))
+    assert_array_equal(beam.get_dofs(elements="tip"), np.arange(20, 40))
+    assert_array_equal(beam.get_dofs(elements=[0]), np.arange(20))
+    assert_array_equal(beam.get_dofs(elements=lambda x: x[0] > 1.0), np.arange(20, 40))
+    assert_array_equal(beam.get_dofs(nodes=np.array([2])), np.arange(20, 30))
+    assert_array_equal(beam.get_dofs(nodes=(1.5, 0.0)), np.arange(30, 40))
+    assert_array_equal(beam.get_dofs(nodes=lambda x: x[0] < 0.1).all("r^2"), [1])
+    assert_array_equal(beam.complement_dofs(beam.get_dofs("left"), np.array([39])),
+                       np.arange(10, 39))
+    x = beam.doflocs[0, beam.get_dofs("top").sort(lambda x: -x[0])]
+    assert np.all(np.diff(x) <= 0)
+
+
+@pytest.mark.parametrize("kwargs, message", [
+    (dict(facets="root"), "unknown boundary 'root'; known: 'left', 'right', 'bottom', 'top'"),
+    (dict(facets={"left", "root"}), "unknown boundary 'root'"),
+    (dict(elements="root"), "unknown subdomain 'root'; known: 'tip'"),
+    (dict(elements=[3]), "numbered 0 to 2, got 3")])
+def test_unknown_dofs(beam, kwargs, message):
+    with pytest.raises(InputError, match=message):
+        beam.get_dofs(**kwargs)
+
+
+def test_split(beam):
+    x = np.arange(40.0)
+    (u, bu), (v, bv) = beam.split(x)
+    assert_array_equal(u, x[::2])
+    assert_array_equal(v, x[1::2])
+    for part, basis, k in ((u, bu, 0), (v, bv, 1)):
+        assert_allclose(basis.interpolate(part), beam.interpolate(x)[k], atol=1e-12)
+
+
+# functions of the space
+
+def in_the_space(x):
+    """A linear function of the place: in every space, on every mesh."""
+    return 2.0 + 3.0 * x[0] - 1.5 * x[1]
+
+
+@pytest.mark.parametrize("name", ["unequal", "inclined", "arc"])
+def test_projection_is_exact_in_the_space(element, name):
+    mesh = MESHES[name]()
+    basis = Basis(mesh, element)
+    q = basis.project(in_the_space)
+    u = basis.interpolate(q)
+    assert_allclose(u, in_the_space(basis.global_coordinates()), atol=1e-11)
+    g = np.array([3.0, -1.5])
+    assert_allclose(u.grad, g[:, None, None] + 0 * u.grad, atol=2e-9)
+    exact = np.zeros(basis.nodal_dofs.shape)
+    exact[0] = in_the_space(mesh.p)
+    for k, f in enumerate(element.functionals):
+        if f[1:] in ((1, 0), (0, 1)):
+            exact[k] = g @ (mesh.p_X if f[1] else mesh.p_Y)
+    assert_allclose(q[basis.nodal_dofs], exact, atol=1e-7)
+
+
+def test_projection_of_a_vector_field(beam):
+    q = beam.project(lambda x: np.array([in_the_space(x), x[0] ** 3 - x[0] * x[1] ** 3]))
+    x = beam.global_coordinates()
+    expected = [in_the_space(x), x[0] ** 3 - x[0] * x[1] ** 3]
+    assert_allclose(beam.interpolate(q), expected, atol=1e-11)
+
+
+def test_projection_converges():
+    """Cubic along the axis: fourth order, for a function of X alone."""
+    errors = []
+    for n in (2, 4, 8):
+        basis = Basis(MeshBeam.init_line(np.linspace(0, 3, n + 1), 0.1), ElementBeamANCF(1),
+                      intorder=12)
+        u = basis.interpolate(basis.project(lambda x: np.sin(x[0])))
+        errors.append(np.sqrt(square.assemble(
+            basis, u=u - np.sin(basis.global_coordinates()[0])) / 0.1))
+    assert errors[-1] < 3e-5
+    assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 3.8)
+
+
+def test_projection_across_the_section_converges_with_the_order():
+    def error(n):
+        basis = Basis(MeshBeam.init_line([0, 1], 2.0), ElementBeamANCF(n), intorder=40)
+        u = basis.interpolate(basis.project(lambda x: np.exp(x[1])))
+        return np.max(np.abs(u - np.exp(basis.global_coordinates()[1])))
+    errors = [error(n) for n in range(1, 9)]
+    assert errors[-1] < 1e-6
+    assert np.all(np.divide(errors[:-1], errors[1:]) > 3)
+
+
+def test_probes(element, mesh):
+    """Values anywhere: inside, on surfaces, between elements, at the ends."""
+    basis = Basis(mesh, element, intorder=4)
+    q = basis.zeros()
+    q[basis.nodal_dofs[0]] = in_the_space(mesh.p)
+    g = np.array([3.0, -1.5])
+    for k, f in enumerate(element.functionals):
+        if f[1:] in ((1, 0), (0, 1)):
+            q[basis.nodal_dofs[k]] = g @ (mesh.p_X if f[1] else mesh.p_Y)
+    X = np.array([a.ravel() for a in np.meshgrid([0.0, 0.3, 1.0], [0.0, 0.5, 0.8, 1.0])])
+    x = mesh.mapping().F(X).reshape(2, -1)
+    assert basis.probes(x).shape == (x.shape[1], basis.N)
+    assert_allclose(basis.probes(x) @ q, in_the_space(x), atol=1e-12)
+    assert_allclose(basis.interpolator(q)(x), in_the_space(x), atol=1e-12)
+    three = x.reshape(2, mesh.nelements, -1)
+    assert_allclose(basis.interpolator(q)(three), in_the_space(three), atol=1e-12)
+    assert_allclose(basis.point_source(x[:, 5]) @ q, in_the_space(x[:, 5]), atol=1e-12)
+    vector = basis.with_element(ElementVector(element))
+    both = np.repeat(q, 2)
+    assert_allclose((vector.probes(x) @ both).reshape(2, -1), [in_the_space(x)] * 2, atol=1e-12)
+    assert_allclose(vector.interpolator(both)(x), [in_the_space(x)] * 2, atol=1e-12)
+
+
+def test_probes_outside(beam):
+    with pytest.raises(MeshError, match=r"point \(0.7, 0.11\) is outside the body"):
+        beam.probes(np.array([[0.2, 0.7], [0.0, 0.11]]))
+
+
+def test_interpolation_between_meshes():
+    """A finer mesh takes over a function exactly."""
+    coarse = Basis(MESHES["unequal"](), ElementBeamANCF(2))
+    q = np.random.default_rng(0).random(coarse.N)
+    fine = Basis(coarse.mesh.refined(), ElementBeamANCF(2))
+    taken = fine.project(coarse.interpolator(q))
+    x = fine.global_coordinates()
+    assert_allclose(fine.interpolate(taken), coarse.interpolator(q)(np.asarray(x)), atol=1e-11)
+
+
+# kinds of bases
+
+def test_parts_of_the_mesh(element, mesh):
+    whole = Basis(mesh, element)
+    M = mass.assemble(whole)
+    parts = sum(mass.assemble(Basis(mesh, element, elements=[e])) for e in range(mesh.nelements))
+    assert_allclose(parts.toarray(), M.toarray(), atol=1e-15)
+    last = whole.with_elements([mesh.nelements - 1])
+    assert last.nelems == 1 and last.N == whole.N
+    assert_allclose(last.dx, whole.dx[-1:])
+    q = np.random.default_rng(1).random(whole.N)
+    assert_allclose(last.interpolate(q), whole.interpolate(q)[-1:], atol=1e-14)
+
+
+def test_part_by_name_or_place(beam):
+    for elements in ("tip", lambda x: x[0] > 1, [2], np.array([2])):
+        assert_array_equal(Basis(beam.mesh, beam.elem, elements=elements).tind, [2])
+    q = beam.with_elements("tip").project(lambda x: np.array([x[0], x[1]]))
+    assert np.all(q[:20] == 0)
+    assert_allclose(beam.interpolate(q)[0][2], beam.global_coordinates()[0][2], atol=1e-12)
+
+
+def test_with_element(beam):
+    other = beam.with_element(ElementBeamPatelShabana())
+    assert type(other) is CellBasis and other.mesh is beam.mesh
+    assert_array_equal(other.X, beam.X)
+    assert_array_equal(other.dx, beam.dx)
+    assert other.N == 4 * 4
+    facet = beam.boundary("top").with_element(ElementBeamP1())
+    assert type(facet) is FacetBasis and facet.N == 4
+    assert_array_equal(facet.find, beam.mesh.boundaries["top"])
+
+
+def test_boundary(beam):
+    lengths = {name: beam.boundary(name).dx.sum() for name in beam.mesh.boundaries}
+    assert lengths == pytest.approx({"left": 0.2, "right": 0.2, "bottom": 1.5, "top": 1.5})
+    assert beam.boundary().dx.sum() == pytest.approx(3.4)
+    n = {name: beam.boundary(name).normals[:, 0, 0] for name in beam.mesh.boundaries}
+    for name, expected in (("left", [-1, 0]), ("right", [1, 0]), ("bottom", [0, -1]),
+                           ("top", [0, 1])):
+        assert_allclose(n[name], expected, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_divergence_theorem(element, name):
+    mesh = MESHES[name]()
+    basis = Basis(mesh, ElementVector(element), intorder=2 * element.maxdeg + 8)
+    q = np.random.default_rng(2).standard_normal(basis.N)
+    flux = Functional(lambda w: dot(w["u"], w.n))
+    total = Functional(lambda w: div(w["u"])).assemble(basis, u=q)
+    surface = basis.boundary(intorder=2 * element.maxdeg + 8)
+    assert_allclose(flux.assemble(surface, u=q), total, atol=1e-8)
+    # and on one element alone, whose boundary crosses the body
+    own = FacetBasis(mesh, ElementVector(element), facets=mesh.facets_around([0]),
+                     intorder=2 * element.maxdeg + 8)
+    part = Functional(lambda w: div(w["u"])).assemble(basis.with_elements([0]), u=q)
+    assert_allclose(flux.assemble(own, u=q), part, atol=1e-8)
+
+
+def test_fields_are_continuous_across_sections(element, mesh):
+    """Both sides of a section have the same values and the same derivative along it."""
+    if mesh.nelements == 1:
+        pytest.skip("no section between elements")
+    sides = [InteriorFacetBasis(mesh, element, side=k, intorder=8) for k in (0, 1)]
+    assert_array_equal(sides[0].find, np.arange(1, mesh.nelements))
+    assert_array_equal(sides[1].tind - sides[0].tind, 1)
+    assert_allclose(sides[0].normals, sides[1].normals, atol=1e-14)
+    assert_allclose(sides[0].dx.sum(1), mesh.height, rtol=1e-12)
+    q = np.random.default_rng(3).standard_normal(sides[0].N)
+    a, b = (s.interpolate(q) for s in sides)
+    assert_allclose(a, b, atol=1e-12)
+    along = np.einsum("iep,ie->ep", a.grad - b.grad, mesh.p_Y[:, 1:-1])
+    assert_allclose(along, 0, atol=1e-9)
+
+
+def test_oriented_basis():
+    """Orientation picks the side, and with it the sign of the normal."""
+    m = MESHES["straight"]()
+    for normal in ([1.0, 0.0], [-1.0, 0.0]):
+        f = m.facets_satisfying(lambda x: np.isclose(x[0], 0.5), normal=normal)
+        fb = FacetBasis(m, ElementBeamP1(), facets=f)
+        assert_allclose(fb.normals[:, 0, 0], normal, atol=1e-14)
+        assert_array_equal(fb.tind, [0 if normal[0] > 0 else 1])
+
+
+def test_surface_load_on_an_arc():
+    """Uniform pressure on the inner surface: its resultant is that on the chord."""
+    h, p, errors = 0.3, 5.0, []
+    for n in (4, 8, 16):
+        m = quarter_arc(n, h)
+        basis = Basis(m, ElementVector(ElementBeamANCF(2)), intorder=4)
+        f = LinearForm(lambda v, w: -p * dot(w.n, v)).assemble(basis.boundary("top", intorder=10))
+        total = [f[basis.nodal_dofs[i]].sum() for i in (0, 1)]
+        errors.append(np.max(np.abs(np.array(total) - p * (1 - h / 2))))
+    assert errors[-1] < 1e-12  # the end points lie on the circle, whatever runs between
+
+
+# forms and solvers
+
+def test_mass_of_the_body(element, mesh):
+    basis = Basis(mesh, element)
+    one = basis.zeros()
+    one[basis.nodal_dofs[0]] = 1.0
+    M = mass.assemble(basis)
+    area = basis.dx.sum()
+    assert_allclose(one @ M @ one, area, rtol=1e-12)
+    assert_allclose(unit_load.assemble(basis) @ one, area, rtol=1e-12)
+    assert_allclose((laplace.assemble(basis) @ one), 0, atol=1e-9)
+    d = np.sqrt(M.diagonal())
+    assert eigh(M.toarray() / np.outer(d, d), eigvals_only=True)[0] > 1e-12
+    assert_allclose((M - M.T).toarray(), 0, atol=1e-16)
+
+
+def poisson(mesh, element, load, exact, how="condense"):
+    """-Laplace u = load with u given at both ends and no flux elsewhere; the largest error."""
+    basis = Basis(mesh, element, intorder=12)
+    A, b = laplace.assemble(basis), LinearForm(lambda v, w: load(w.x) * v).assemble(basis)
+    x = basis.zeros()
+    # a welded face: the value at the node and the slopes of its section
+    ends = basis.get_dofs(["left", "right"])
+    D = ends.all(element.welded)
+    x[ends.all("r")] = exact(basis.doflocs[:, ends.all("r")])
+    if how == "condense":
+        y = solve(*condense(A, b, x=x, D=D))
+    elif how == "enforce":
+        y = solve(*enforce(A, b, x=x, D=D))
+    elif how == "penalize":
+        y = solve(*penalize(A, b, x=x, D=D))
+    else:  # constraints x_S = T x_M + g, with nothing to depend on
+        S = D
+        M = np.setdiff1d(np.arange(basis.N), S)
+        y = solve(*mpc(A, b, S=S, M=M, T=csr_matrix((len(S), len(M))), g=x[S]))
+    X = np.array([a.ravel() for a in np.meshgrid(np.linspace(0, 1, 9), [0.0, 0.5, 1.0])])
+    at = mesh.mapping().F(X).reshape(2, -1)
+    return np.max(np.abs(basis.probes(at) @ y - exact(at)))
+
+
+@pytest.mark.parametrize("how", ["condense", "enforce", "penalize", "mpc"])
+def test_poisson_in_the_space(element, how):
+    """u = X^3 - 2 X, which every space holds."""
+    error = poisson(MESHES["unequal"](), element, lambda x: -6 * x[0],
+                    lambda x: x[0] ** 3 - 2 * x[0], how)
+    assert error < (1e-11 if how != "penalize" else 1e-5)
+
+
+def test_poisson_converges():
+    errors = [poisson(MeshBeam.init_line(np.linspace(0, 3, n + 1), 0.1), ElementBeamANCF(2),
+                      lambda x: np.sin(x[0]), lambda x: np.sin(x[0])) for n in (4, 8, 16)]
+    assert errors[-1] < 2e-6
+    assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 3.7)
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_poisson_on_an_arc_converges(order):
+    """u = angle is harmonic, with no flux through the curved surfaces."""
+    errors = [poisson(quarter_arc(n, 0.2), ElementBeamANCF(order), lambda x: 0 * x[0],
+                      lambda x: np.arctan2(x[1], x[0])) for n in (2, 4, 8)]
+    assert errors[-1] < 1e-4
+    assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 1.9)
+
+
+def test_mpc_periodic():
+    """The right end tied to the left: the pure Fourier mode 1 of a ring, cut open."""
+    basis = Basis(MeshBeam.init_line(np.linspace(0, 2 * np.pi, 13), 0.1), ElementBeamANCF(1))
+    A = laplace.assemble(basis) + mass.assemble(basis)
+    b = LinearForm(lambda v, w: 2 * np.cos(w.x[0] - 0.3) * v).assemble(basis)
+    S, M = basis.get_dofs("right").all(), basis.get_dofs("left").all()
+    add = identity(basis.N, format="lil")
+    add[M, S] = 1.0  # stock mpc drops the equations of S: they belong to those of M
+    y = solve(*mpc(add.tocsr() @ A, add @ b, S=S, M=M))
+    assert_allclose(y[basis.nodal_dofs[0]], np.cos(basis.mesh.p[0] - 0.3), atol=2e-4)
+    assert_allclose(y[basis.get_dofs("left")], y[basis.get_dofs("right")], atol=1e-14)
+
+
+def elasticity(E, nu):
+    """Linear plane stress."""
+    lam, mu = E * nu / (1 - nu ** 2), E / (2 * (1 + nu))
+
+    @BilinearForm
+    def form(u, v, w):
+        e = sym_grad(u)
+        return ddot(lam * eye(trace(e), 2) + 2 * mu * e, sym_grad(v))
+
+    return form
+
+
+def test_linear_elasticity_has_three_rigid_motions(element):
+    mesh = MESHES["s-curve"]()
+    basis = Basis(mesh, ElementVector(element))
+    K = elasticity(1.0, 0.3).assemble(basis).toarray()
+    d = np.sqrt(np.diag(K))
+    values = eigh(K / np.outer(d, d), eigvals_only=True)
+    assert np.max(np.abs(values[:3])) < 1e-12 and values[3] > 1e-9
+
+
+@pytest.mark.parametrize("name", ["straight", "inclined"])
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_traction_is_exact(name, order):
+    """A bar pulled at its end: uniform stress, Poisson contraction, exact for every order."""
+    mesh, E, nu, sigma = MESHES[name](), 200.0, 0.3, 1.7
+    basis = Basis(mesh, ElementVector(ElementBeamANCF(order)))
+    e1, e2 = mesh.p_X[:, 0], mesh.p_Y[:, 0]
+    stress = sigma * np.outer(e1, e1)
+    f = LinearForm(lambda v, w: dot(np.einsum("ij,jep->iep", stress, w.n), v)).assemble(
+        basis.boundary())
+    K = elasticity(E, nu).assemble(basis)
+    y = solve(*condense(K, f, D=np.r_[basis.get_dofs("left").all(["r^1", "r^2"]),
+                                      basis.get_dofs("left").all("r_X^1" if abs(e1[0]) < abs(e1[1])
+                                                                 else "r_X^2")]))
+    g = basis.interpolate(y).grad
+    strain = sigma / E * (np.outer(e1, e1) - nu * np.outer(e2, e2))
+    symmetric = (g + np.swapaxes(g, 0, 1)) / 2
+    assert_allclose(symmetric, strain[:, :, None, None] + 0 * g, atol=1e-13)
+
+
+# the scalar element along the axis
+
+def test_scalar_element(mesh):
+    basis = Basis(mesh, ElementBeamP1(), intorder=6)
+    assert basis.N == mesh.nvertices
+    q = np.random.default_rng(4).random(basis.N)
+    xi = np.array([[0.0, 0.25, 1.0], [0.0, 0.9, 0.4]])
+    x = mesh.mapping().F(xi)
+    got = (basis.probes(x.reshape(2, -1)) @ q).reshape(x.shape[1:])
+    assert_allclose(got, q[mesh.t[0]][:, None] * (1 - xi[0]) + q[mesh.t[1]][:, None] * xi[0],
+                    atol=1e-11)
+    assert_array_equal(basis.get_dofs("right"), [mesh.nvertices - 1])
+
+
+def test_heat_along_a_beam():
+    """Temperatures 1 and 4 at the ends: linear between, and they load a beam form as a field."""
+    m = MESHES["unequal"]()
+    scalar = Basis(m, ElementBeamP1(), intorder=8)
+    x = scalar.zeros()
+    x[0], x[-1] = 1.0, 4.0
+    T = solve(*condense(laplace.assemble(scalar), x=x, D=scalar.get_dofs(["left", "right"])))
+    assert_allclose(T, 1 + 3 * (m.p[0] + 1) / 2.7, atol=1e-13)
+    basis = scalar.with_element(ElementBeamANCF(1))
+    load = LinearForm(lambda v, w: w["T"] * v).assemble(basis, T=scalar.interpolate(T))
+    one = basis.zeros()
+    one[basis.nodal_dofs[0]] = 1.0
+    assert_allclose(load @ one, 2.5 * 2.7 * m.height, rtol=1e-13)
+
+
+def test_composite_with_a_scalar_field():
+    """Position and a scalar field in one element."""
+    m = MESHES["arc"]()
+    e = ElementVector(ElementBeamANCF(2)) * ElementBeamP1()
+    basis = Basis(m, e)
+    assert basis.N == (8 + 1) * m.nvertices
+    q = np.arange(float(basis.N))
+    (u, ub), (T, Tb) = basis.split(q)
+    assert (len(u), len(T)) == (8 * m.nvertices, m.nvertices)
+    both = basis.interpolate(q)
+    assert_allclose(both[0], ub.interpolate(u), atol=1e-11)
+    assert_allclose(both[1], Tb.interpolate(T), atol=1e-12)
+
+
+def test_stock_gradient_of_a_projection():
+    """grad in the fixed frame, on a curved mesh, against the analytic gradient."""
+    errors = []
+    for n in (4, 8, 16):
+        basis = Basis(quarter_arc(n, 0.2), ElementBeamANCF(3), intorder=10)
+        q = basis.project(lambda x: np.sin(2 * x[0]) * x[1])
+        x, g = basis.global_coordinates(), grad(basis.interpolate(q))
+        exact = np.array([2 * np.cos(2 * x[0]) * x[1], np.sin(2 * x[0])])
+        errors.append(np.sqrt(np.sum(basis.dx * np.sum((g - exact) ** 2, 0))))
+    assert errors[-1] < 2e-3, errors
+    assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 1.8)
