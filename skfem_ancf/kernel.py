@@ -324,7 +324,45 @@ class Kernel:
             self.scatter(self.evaluate(self.gather(u, part), part, tangent=False).force, part, out)
         return out
 
+    def strains(self, u):
+        """Strains of every term, one list a chunk of elements."""
+        return [[t.strain(t.gradients(self.gather(u, part)))
+                 for t in (t.part(part) for t in self.tables)] for part in self.chunks()]
+
+    def mean_force(self, u0, u1, strains0):
+        """B(middle)^T S with S . (eps_1 - eps_0) the change of the energy, shape (N,).
+
+        ``strains0`` is :meth:`strains` of u0.
+        """
+        out = np.zeros(self.N)
+        for part, known in zip(self.chunks(), strains0):
+            a, b = self.gather(u0, part), self.gather(u1, part)
+            middle = 0.5 * (a + b)
+            total = 0.0
+            for t, eps0 in zip((t.part(part) for t in self.tables), known):
+                stress = mean_stress(t.law, eps0, t.strain(t.gradients(b)))
+                total = total + t.force(t.gradients(middle), stress)
+            if self.constant is not None:
+                constant = self.constant[part] if len(self.constant) > 1 else self.constant
+                total += (constant @ middle.reshape(len(middle), -1, 1)).reshape(middle.shape)
+            self.scatter(total, part, out)
+        return out
+
     def tangents(self, u, **options):
         """Element tangents (ne, 2 nb, 2 nb) of a coordinate displacement (N,)."""
         return np.concatenate([self.evaluate(self.gather(u, part), part, **options).tangent
                                for part in self.chunks()])
+
+
+def mean_stress(law, eps0, eps1):
+    """A stress whose product with ``eps1 - eps0`` is the change of the law's energy.
+
+    The mean of both stresses for a linear law, else the discrete gradient of Gonzalez (2000).
+    """
+    middle = law.stress(0.5 * (eps0 + eps1))
+    if hasattr(law, "D"):
+        return middle
+    d = eps1 - eps0
+    size = np.sum(d * d, axis=0)
+    missing = law.energy(eps1) - law.energy(eps0) - np.sum(middle * d, axis=0)
+    return middle + np.where(size > 1e-24, missing / np.maximum(size, 1e-24), 0.0) * d

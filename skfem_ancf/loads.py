@@ -97,17 +97,31 @@ class EndMoment(Load):
     def __init__(self, beam, node, M):
         super().__init__(beam)
         self.M = M
+        self.node = node
         self.dofs, self.c = beam.section_direction(node)
-        d = self.direction(np.zeros(beam.N))
-        self._angle0 = np.arctan2(d[1], d[0])
 
     def direction(self, u):
         """The section's direction d, shape (2,)."""
         return (self.beam.q0_local[self.dofs] + u[self.dofs]) @ self.c
 
+    def angle(self, u):
+        """The angle by which the section has turned, in radians.
+
+        Whole turns are counted along the beam, from the section at its other end, whose own angle
+        is taken in (-pi, pi].
+        """
+        nd = self.beam.nd
+        rows = self.dofs - self.node * nd + nd * np.arange(self.beam.N // nd)[:, None, None]
+        start = self.beam.q0_local[rows] @ self.c
+        now = start + u[rows] @ self.c
+        turn = (now @ [1.0, 1.0j]) / (start @ [1.0, 1.0j])
+        if self.node == 0:
+            turn = turn[::-1]
+        return float(np.angle(turn[0]) + np.sum(np.angle(turn[1:] / turn[:-1])))
+
     def force(self, u):
         d = self.direction(u)
-        out = np.zeros(self.beam.N)
+        out = np.zeros(self.beam.N, dtype=d.dtype)
         out[self.dofs] = np.outer(np.array([-d[1], d[0]]) * self.M / (d @ d), self.c)
         return out
 
@@ -132,5 +146,4 @@ class EndMoment(Load):
         return force
 
     def potential(self, u):
-        d = self.direction(u)
-        return -self.M * float(np.arctan2(d[1], d[0]) - self._angle0)
+        return -self.M * self.angle(u)

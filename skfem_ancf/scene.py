@@ -5,6 +5,8 @@ from skfem.assembly import LinearForm, asm
 
 from . import forms
 from .beam import Beam
+from .dynamics import get_scheme
+from .dynamics.integrate import integrate
 from .errors import (ConvergenceError, InputError, NameUnknown, SupportError, require_finite,
                      require_finite_scalar)
 from .joints import get_joint
@@ -73,6 +75,7 @@ class Scene:
         self.beams = beams
         self.loads = []
         self.joints = []
+        self._velocity = {}
         self._fixed = {}  # (number of the beam, coordinate) -> displacement
         self._system = None
 
@@ -291,6 +294,63 @@ class Scene:
         except ConvergenceError as error:
             raise ConvergenceError(str(error), self._state(error.state)) from None
         return self._state(result)
+
+    def initial_velocity(self, v, beam=None):
+        """The velocity at the start of :meth:`integrate`.
+
+        Parameters
+        ----------
+        v
+            Velocities of the coordinates, shape (beam.N,), or a function of the points x, shape
+            (2, ...), of the stress-free body that returns velocities (2, ...).
+        """
+        beam = select_beam(self.beams, beam)
+        if callable(v):
+            basis = beam.exact_basis()
+            rate = require_finite("v(x)", v(np.asarray(basis.global_coordinates())))
+            v = basis.project(np.broadcast_to(rate, (2, basis.nelems, len(basis.W))))
+        self._velocity[id(beam)] = require_finite("v", v, (beam.N,))
+        return self
+
+    def integrate(self, t_end, dt, scheme="energy-momentum", start=None, **options):
+        """The motion from the stress-free state, or from a given one.
+
+        Parameters
+        ----------
+        t_end
+            Time at the end.
+        dt
+            Step size, or "auto".
+        scheme
+            A scheme or a name from :data:`skfem_ancf.dynamics.SCHEMES`.
+        start
+            A State to start from, or None for the stress-free state.
+        **options
+            Those of :func:`skfem_ancf.dynamics.integrate.integrate`: ``t_eval``, ``tol``,
+            ``rtol``, ``t_start``, ``progress``.
+
+        Returns
+        -------
+        History
+
+        Raises
+        ------
+        ConvergenceError
+            If a step fails; its ``state`` is the History up to there.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.01),
+        ...                    ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.3, 7800), width=0.01))
+        >>> history = scene.pin("left").gravity((0, -9.81)).integrate(t_end=0.02, dt=1e-3)
+        >>> bool(np.ptp(history.total_energy) < 1e-12)
+        True
+        """
+        velocity = np.concatenate([self._velocity.get(id(b), np.zeros(b.N)) for b in self.beams])
+        return integrate(self.system, t_end, dt, get_scheme(scheme),
+                                   None if start is None else start.u, velocity, **options)
 
     def _state(self, result):
         return State(self.system, result.u, result.load, result.force, result.converged,

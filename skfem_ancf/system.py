@@ -162,6 +162,41 @@ class System:
         """The internal force, shape (N,)."""
         return np.concatenate([b.kernel.force(u[s]) for b, s in zip(self.beams, self.slices)])
 
+    def strains(self, u):
+        """Strains at the integration points, for :meth:`mean_internal_force`."""
+        return [b.kernel.strains(u[s]) for b, s in zip(self.beams, self.slices)]
+
+    def mean_internal_force(self, u0, u1, strains0):
+        """The internal force whose work from u0 to u1 is the change of the strain energy."""
+        return np.concatenate([b.kernel.mean_force(u0[s], u1[s], e)
+                               for b, s, e in zip(self.beams, self.slices, strains0)])
+
+    def mean_external_force(self, u0, u1, t0, t1):
+        """The loads' mean over a step from u0 to u1."""
+        if not self._varying:
+            return self._constant
+        out = self._constant.copy()
+        for load in self._varying:
+            s = self.of(load)
+            out[s] += load.factor(0.5 * (t0 + t1)) * load.mean_force(u0[s], u1[s])
+        return out
+
+    def momentum(self, v):
+        """Linear momentum of the coordinates' velocities, shape (2,)."""
+        p = self.mass.multiply(v)
+        total = np.zeros(2)
+        for beam, s in zip(self.beams, self.slices):  # a unit translation moves every r by one
+            total += p[s].reshape(-1, beam.nd)[:, :2].sum(axis=0)
+        return total
+
+    def angular_momentum(self, u, v):
+        """Angular momentum about the origin."""
+        p, total = self.mass.multiply(v), 0.0
+        for beam, s in zip(self.beams, self.slices):
+            q, pb = (beam.q0 + u[s]).reshape(-1, 2), p[s].reshape(-1, 2)
+            total += np.sum(q[:, 0] * pb[:, 1] - q[:, 1] * pb[:, 0])
+        return float(total)
+
     def strain_energy(self, u):
         """Strain energy of all beams."""
         return float(sum(b.kernel.energy(u[s]) for b, s in zip(self.beams, self.slices)))

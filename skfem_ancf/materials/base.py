@@ -11,7 +11,8 @@ class Material:
     """An isotropic hyperelastic material in plane stress or plane strain.
 
     A law of your own is a subclass that defines :meth:`energy` and :meth:`stress`, and
-    :meth:`moduli` if the complex step of ``stress`` is not good enough. Strains and stresses are
+    :meth:`moduli` if the complex step of ``stress`` is not good enough; in plane stress also
+    :meth:`thickness_stretch` if Cauchy stress is asked for. Strains and stresses are
     in the beam's frame (first index along the axis, second across the section):
 
     * strain: Green-Lagrange, ``(eps_xx, eps_yy, 2 eps_xy)``, shape (3, ...),
@@ -95,8 +96,12 @@ class Material:
         return np.stack(out, 1)
 
     def thickness_stretch(self, strain):
-        """Stretch out of the plane, shape (...): 1 in plane strain."""
-        raise NotImplementedError
+        """Stretch out of the plane, shape (...): 1 in plane strain. Needed for Cauchy stress."""
+        if self.plane == "strain":
+            return np.ones(np.shape(strain)[1:])
+        raise NotImplementedError(
+            f"{type(self).__name__} does not define thickness_stretch(strain), the stretch out of "
+            "the plane that makes S_33 zero in plane stress")
 
     def __repr__(self):
         return (f"{type(self).__name__}(E={self.E:g}, nu={self.nu:g}, density={self.density}, "

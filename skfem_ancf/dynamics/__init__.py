@@ -1,0 +1,30 @@
+"""Time integration. A new scheme is one file and one line here."""
+
+from ..errors import NameUnknown
+from .base import Motion, Scheme, Step
+from .energy_momentum import EnergyMomentum
+from .generalized_alpha import HHT, GeneralizedAlpha, Newmark
+
+#: The schemes by name.
+SCHEMES = {cls.name: cls for cls in (EnergyMomentum, GeneralizedAlpha, HHT, Newmark)}
+
+
+def get_scheme(scheme):
+    """A :class:`Scheme` from its name, its class or itself.
+
+    Raises
+    ------
+    NameUnknown
+        If the name is not known; the message lists the known ones.
+    """
+    if isinstance(scheme, Scheme):
+        return scheme
+    if isinstance(scheme, type) and issubclass(scheme, Scheme):
+        return scheme()
+    if scheme not in SCHEMES:
+        raise NameUnknown("scheme", scheme, SCHEMES)
+    return SCHEMES[scheme]()
+
+
+__all__ = ["HHT", "SCHEMES", "EnergyMomentum", "GeneralizedAlpha", "Motion", "Newmark", "Scheme",
+           "Step", "get_scheme"]

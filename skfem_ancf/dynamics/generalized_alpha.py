@@ -1,0 +1,125 @@
+"""The generalised-alpha family: Chung-Hulbert, HHT and Newmark."""
+
+import numpy as np
+
+from ..errors import InputError, require_finite_scalar
+from .base import Motion, Scheme, Step
+
+
+class GeneralizedAlpha(Scheme):
+    """Second order, with the damping of high frequencies chosen by one number.
+
+    The equation of motion holds at the end of each step,
+    ``M a_{n+1} + f(u_{n+1}) = Q_{n+1}``, and Newmark's formulas use an acceleration ``w`` with
+    ``(1 - alpha_m) w_{n+1} + alpha_m w_n = (1 - alpha_f) a_{n+1} + alpha_f a_n``.
+
+    Parameters
+    ----------
+    rho_inf
+        Spectral radius at infinite frequency, from 0 (annihilates it in one step) to 1 (no
+        damping).
+
+    References
+    ----------
+    Chung, Hulbert: "A time integration algorithm for structural dynamics with improved numerical
+    dissipation", Journal of Applied Mechanics 60 (1993), eq. (17), (25); in this form, which is of
+    second order with constraints too, Arnold, Bruls: "Convergence of the generalized-alpha scheme
+    for constrained mechanical systems", Multibody System Dynamics 18 (2007), eq. (7)-(9).
+    """
+
+    name = "generalized-alpha"
+
+    def __init__(self, rho_inf=0.9):
+        rho = require_finite_scalar("rho_inf", rho_inf)
+        if not 0.0 <= rho <= 1.0:
+            raise InputError(f"rho_inf must lie in [0, 1], got {rho!r}")
+        self._set((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0))
+
+    def _set(self, alpha_m, alpha_f):
+        self.alpha_m, self.alpha_f = alpha_m, alpha_f
+        self.gamma = 0.5 + alpha_f - alpha_m
+        self.beta = 0.25 * (self.gamma + 0.5) ** 2
+        self.error_constant = abs(self.beta - 1.0 / 6.0)
+
+    def begin(self, system, y, dt):
+        return _Step(self, system, y, dt)
+
+    def __repr__(self):
+        return (f"<{type(self).__name__} alpha_m={self.alpha_m:.4g} alpha_f={self.alpha_f:.4g} "
+                f"beta={self.beta:.4g} gamma={self.gamma:.4g}>")
+
+
+class HHT(GeneralizedAlpha):
+    """The scheme of Hilber, Hughes and Taylor.
+
+    Parameters
+    ----------
+    alpha
+        From 0 (no damping) to 1/3; the authors' alpha is its negative.
+
+    References
+    ----------
+    Hilber, Hughes, Taylor: "Improved numerical dissipation for time integration algorithms in
+    structural dynamics", Earthquake Engineering and Structural Dynamics 5 (1977).
+    """
+
+    name = "hht"
+
+    def __init__(self, alpha=0.05):
+        alpha = require_finite_scalar("alpha", alpha)
+        if not 0.0 <= alpha <= 1.0 / 3.0:
+            raise InputError(f"alpha must lie in [0, 1/3], got {alpha!r}")
+        self._set(0.0, alpha)
+
+
+class Newmark(GeneralizedAlpha):
+    """Newmark's scheme; by default the trapezoidal rule, beta = 1/4, gamma = 1/2.
+
+    Parameters
+    ----------
+    beta, gamma
+        Newmark's parameters; second order for gamma = 1/2 only.
+
+    References
+    ----------
+    Newmark: "A method of computation for structural dynamics", Journal of the Engineering
+    Mechanics Division ASCE 85 (1959).
+    """
+
+    name = "newmark"
+
+    def __init__(self, beta=0.25, gamma=0.5):
+        self._set(0.0, 0.0)
+        self.beta = require_finite_scalar("beta", beta)
+        self.gamma = require_finite_scalar("gamma", gamma)
+        if self.gamma < 0.5 or self.beta < 0.5 * self.gamma:
+            raise InputError(f"unconditional stability needs 2 beta >= gamma >= 1/2, got "
+                             f"beta = {beta!r}, gamma = {gamma!r}")
+        self.order = 2 if self.gamma == 0.5 else 1
+
+
+class _Step(Step):
+    def __init__(self, scheme, system, y, dt):
+        self.scheme, self.system, self.y, self.dt = scheme, system, y, dt
+        self.t = y.t + dt
+        b, g = scheme.beta, scheme.gamma
+        self._u = y.u + dt * y.v + dt * dt * (0.5 - b) * y.algorithmic
+        self._v = y.v + dt * (1.0 - g) * y.algorithmic
+        self.guess = self._u + dt * dt * b * y.algorithmic
+        self.mass_factor = (1.0 - scheme.alpha_m) / ((1.0 - scheme.alpha_f) * b * dt * dt)
+        self.stiffness_factor = 1.0
+
+    def _accelerations(self, u):
+        s, y = self.scheme, self.y
+        w = (u - self._u) / (s.beta * self.dt**2)
+        a = ((1.0 - s.alpha_m) * w + s.alpha_m * y.algorithmic - s.alpha_f * y.acceleration)
+        return w, a / (1.0 - s.alpha_f)
+
+    def residual(self, u):
+        s = self.system
+        return (s.external_force(u, self.t) - s.internal_force(u)
+                - s.mass.multiply(self._accelerations(u)[1]))
+
+    def finish(self, u, multipliers):
+        w, a = self._accelerations(u)
+        return Motion(self.t, u, self._v + self.dt * self.scheme.gamma * w, a, w, multipliers)

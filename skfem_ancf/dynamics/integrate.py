@@ -1,0 +1,315 @@
+"""The loop over time steps: iteration, reuse of factors, step size, storage."""
+
+import logging
+
+import numpy as np
+
+from ..errors import ConvergenceError, InputError, SupportError, require_finite, require_positive
+from ..progress import progress_bar
+from .base import Motion
+from .history import History
+
+logger = logging.getLogger(__name__)
+
+MAX_ITERATIONS = 25
+SLOW = 0.3  # contraction above which the factors are made anew
+
+
+class StepFailed(Exception):
+    """The iteration of a step did not converge."""
+
+
+class Integrator:
+    """Advances the motion of a system.
+
+    The mass matrix is assembled and factorised once. The factors of the iteration matrix are
+    kept from step to step as long as the iteration contracts.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    scheme
+        A :class:`~skfem_ancf.dynamics.Scheme`.
+    tol
+        Tolerance of the iteration in a step, relative, in the energy norm.
+    """
+
+    def __init__(self, system, scheme, tol=None):
+        self.system, self.scheme = system, scheme
+        self.tol = scheme.tol if tol is None else require_positive("tol", tol)
+        self.A = system.new_band()
+        self._coefficients = None
+        self._rate = 1.0
+        self._energy = 0.0
+        self.iterations = self.factorizations = 0
+
+    # the mass matrix
+
+    def _mass_factors(self):
+        if not hasattr(self, "_M"):
+            s = self.system
+            self._M = s.new_band().combine(1.0, s.mass, 0.0, s.mass)
+            self._M.fix(s.fixed_positions)
+            self._M.factorize()
+        return self._M
+
+    def solve_mass(self, b, u, t, rhs):
+        """x with M x + J^T l = b at free coordinates and J x = rhs; zero at fixed ones."""
+        M, J = self._mass_factors(), self.system.jacobian(u, t)
+        x = M.solve(b * self.system.free)
+        if not len(J):
+            return x, np.zeros(0)
+        Y = M.solve(np.ascontiguousarray(J.T))
+        multipliers = np.linalg.solve(J @ Y, J @ x - rhs)
+        return x - Y @ multipliers, multipliers
+
+    # the start
+
+    def _rates(self, function, t, dt):
+        """First and second derivative of a function of time, by fourth-order differences."""
+        k = np.arange(-2, 3) if t > 2 * dt else np.arange(0, 6)
+        f = np.array([function(t + i * dt) for i in k])
+        if len(k) == 5:
+            return ((f[0] - 8 * f[1] + 8 * f[3] - f[4]) / (12 * dt),
+                    (-f[0] + 16 * f[1] - 30 * f[2] + 16 * f[3] - f[4]) / (12 * dt**2))
+        return (np.array([-137, 300, -300, 200, -75, 12]) @ f / (60 * dt),
+                np.array([45, -154, 214, -156, 61, -10]) @ f / (12 * dt**2))
+
+    def _hold(self, y, dt):
+        """Set velocity and acceleration of the moving fixed coordinates."""
+        s = self.system
+        if len(s.fixed):
+            y.v[s.fixed] = y.acceleration[s.fixed] = 0.0
+            if s.moves:
+                v, a = self._rates(lambda t: s.values(1.0, t), y.t, dt)
+                y.v[s.fixed], y.acceleration[s.fixed] = v, a
+                if y.algorithmic is not None:
+                    y.algorithmic[s.fixed] = a
+
+    def _constraint_rate(self, y, dt):
+        """J v + dPhi/dt of the joints."""
+        s, h = self.system, 1e-3 * dt
+        rate = (s.constraint(y.u, y.t + h) - s.constraint(y.u, y.t - h)) / (2 * h)
+        return rate + np.concatenate([j.jacobian(y.u, y.t) @ y.v for j in s.joints])
+
+    def project_velocity(self, y, dt):
+        """Remove from the velocity what the joints do not allow."""
+        if self.system.joints:
+            dv, _ = self.solve_mass(np.zeros(self.system.N), y.u, y.t,
+                                    -self._constraint_rate(y, dt))
+            y.v = y.v + dv
+
+    def start(self, u, v, t, dt):
+        """The Motion at the start, with consistent velocity, acceleration and multipliers."""
+        s = self.system
+        y = Motion(t, u.copy(), v.copy(), np.zeros(s.N), None, np.zeros(s.m))
+        y.u[s.fixed] = s.values(1.0, t)
+        gap = np.max(np.abs(s.constraint(y.u, t)), initial=0.0)
+        if gap > 1e-8 * s.size:
+            raise SupportError(f"the joints are open by {gap:.3g} at the start: begin with beams "
+                               "that fit, or from a static solution (start=)")
+        self._hold(y, dt)
+        self.project_velocity(y, dt)
+        held = np.where(s.free, 0.0, y.acceleration)
+        force = s.external_force(y.u, t) - s.internal_force(y.u) - s.mass.multiply(held)
+        rhs = np.zeros(s.m)
+        if s.joints:
+            phi = [s.constraint(y.u + k * dt * y.v, t + k * dt) for k in (-1, 0, 1)]
+            rhs = -(phi[0] - 2 * phi[1] + phi[2]) / dt**2
+        y.acceleration, y.multipliers = self.solve_mass(force, y.u, t, rhs)
+        y.acceleration = y.acceleration + held
+        y.algorithmic = y.acceleration.copy()
+        self._energy = max(self._energy, 0.5 * y.v @ s.mass.multiply(y.v), s.strain_energy(y.u))
+        return y
+
+    # a step
+
+    def _factorize(self, step, u):
+        s = self.system
+        at = step.tangent_at(u)
+        s.assemble(at, t=step.t)
+        self.A.combine(step.mass_factor, s.mass, step.stiffness_factor, s.K)
+        self.A.fix(s.fixed_positions)
+        self.A.factorize()
+        self._coefficients = (step.mass_factor, step.stiffness_factor)
+        self.factorizations += 1
+
+    def advance(self, y, dt):
+        """The Motion one step later; raises StepFailed."""
+        s = self.system
+        step = self.scheme.begin(s, y, dt)
+        u, multipliers = step.guess.copy(), y.multipliers.copy()
+        u[s.fixed] = s.values(1.0, step.t)
+        fresh = False
+        if self._coefficients != (step.mass_factor, step.stiffness_factor):
+            self._factorize(step, u)
+            fresh, self._rate = True, 0.1
+        floor = (8.0 * s.stiffness_scale) * np.sqrt(step.stiffness_factor)
+        before = None
+        for _ in range(MAX_ITERATIONS):
+            R = step.residual(u) * s.free
+            if s.joints:
+                J0, phi = s.jacobian(step.tangent_at(u), step.t), s.constraint(u, step.t)
+                R = R - multipliers @ J0
+            du = self.A.solve(R)
+            if s.joints:
+                J1 = s.jacobian(u, step.t)
+                Y = self.A.solve(np.ascontiguousarray(J0.T))
+                dm = np.linalg.solve(J1 @ Y, J1 @ du + phi)
+                du, multipliers = du - Y @ dm, multipliers + dm
+            size = np.sqrt(abs(R @ du))
+            self.iterations += 1
+            if not np.isfinite(size):
+                raise StepFailed("the residual is not finite")
+            u += du
+            self._energy = max(self._energy, 0.25 * size**2)
+            wanted = self.tol * np.sqrt(self._energy) + floor
+            if before is not None:
+                rate = size / before
+                if rate > 1.0 and size <= 1e3 * floor:
+                    break  # round-off
+                self._rate = rate
+                if rate > SLOW and size > wanted:
+                    if fresh and rate > 2.0:
+                        raise StepFailed("the iteration diverges")
+                    self._factorize(step, u)
+                    fresh, before, self._rate = True, None, 0.1
+                    continue
+            if size * min(1.0, self._rate) <= wanted:
+                break
+            before = size
+        else:
+            raise StepFailed(f"no convergence in {MAX_ITERATIONS} iterations")
+        new = step.finish(u, multipliers)
+        self._hold(new, dt)
+        if self.scheme.projects_velocity:
+            self.project_velocity(new, dt)
+        self._energy = max(self._energy, 0.5 * new.v @ s.mass.multiply(new.v))
+        return new
+
+    def advance_safely(self, y, dt, depth=0):
+        """As :meth:`advance`, in two halves where one step does not converge."""
+        try:
+            return self.advance(y, dt)
+        except (StepFailed, np.linalg.LinAlgError) as failure:
+            self._coefficients = None
+            if depth == 6:
+                raise StepFailed(f"{failure}, nor with steps of {dt:.3g}") from None
+            logger.info("step of %.3g at t = %.6g halved: %s", dt, y.t, failure)
+            return self.advance_safely(self.advance_safely(y, 0.5 * dt, depth + 1), 0.5 * dt,
+                                       depth + 1)
+
+    def error(self, old, new, dt):
+        """Estimate of the local error of a step, relative to the size of the scene."""
+        de = self.scheme.error_constant * dt**2 * (new.algorithmic - old.algorithmic)
+        mass = sum(b.total_mass for b in self.system.beams)
+        return np.sqrt(max(de @ self.system.mass.multiply(de), 0.0) / mass) / self.system.size
+
+
+def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=None, tol=None,
+              rtol=1e-5, progress=None):
+    """Integrate the equation of motion.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    t_end
+        Time at the end.
+    dt
+        Step size, or "auto": chosen so that the local error stays below ``rtol`` of the size of
+        the scene.
+    scheme
+        A :class:`~skfem_ancf.dynamics.Scheme`.
+    u, v
+        Displacement and velocity at the start, shape (N,); zero by default.
+    t_start
+        Time at the start.
+    t_eval
+        Times to store, interpolated by cubic Hermite polynomials in time; every step by default.
+    tol
+        Tolerance of the iteration in a step; the scheme's own by default.
+    rtol
+        Tolerance of the automatic step size.
+    progress
+        Show a progress bar: True, False, or None for "if it takes long".
+
+    Returns
+    -------
+    History
+
+    Raises
+    ------
+    ConvergenceError
+        If a step fails even when cut to 1/64; its ``state`` is the History up to there.
+    SupportError
+        If joints repeat or contradict each other, or are open at the start.
+    """
+    t_end = require_positive("t_end - t_start", t_end - t_start) + t_start
+    auto = isinstance(dt, str)
+    if auto and dt != "auto":
+        raise InputError(f'dt must be a positive number or "auto", got {dt!r}')
+    span = t_end - t_start
+    step = 1e-4 * span if auto else min(require_positive("dt", dt), span)
+    if t_eval is not None:
+        t_eval = require_finite("t_eval", t_eval, (None,))
+        if np.any(np.diff(t_eval) <= 0) or t_eval[0] < t_start or t_eval[-1] > t_end * (1 + 1e-12):
+            raise InputError(f"t_eval must increase within [{t_start}, {t_end}], got {t_eval!r}")
+    system.require_independent_joints()
+    zero = np.zeros(system.N)
+    solver = Integrator(system, scheme, tol)
+    y = solver.start(zero if u is None else u, zero if v is None else v, t_start, step)
+    history = History(system, scheme, solver)
+    wanted = iter(() if t_eval is None else t_eval)
+    next_time = next(wanted, None)
+    if t_eval is None or next_time <= t_start:
+        history.append(y)
+        next_time = next(wanted, None)
+    n = 0
+    steps = None if auto else max(1, int(np.ceil(span / step * (1 - 1e-12))))
+    with progress_bar(progress, total=span, desc="time") as bar:
+        while (n < steps) if steps is not None else (y.t < t_end - 1e-12 * span):
+            if steps is not None:
+                # the last step may be shorter; the others are of one size, to keep the factors
+                h = step if n < steps - 1 else t_end - y.t
+                h = step if abs(h - step) < 1e-9 * step else h
+            else:
+                h = min(step, t_end - y.t)
+            try:
+                new = solver.advance_safely(y, h)
+            except StepFailed as failure:
+                raise ConvergenceError(f"the motion could not be continued beyond t = {y.t:.6g}: "
+                                       f"{failure}; try a smaller dt", history.close()) from None
+            if auto and n > 0:
+                error = solver.error(y, new, h)
+                factor = 0.9 * (rtol / max(error, 1e-300)) ** (1.0 / 3.0)
+                if error > rtol and step > 1e-9 * span:
+                    step = h * max(0.2, min(0.7, factor))
+                    continue
+                if factor > 1.5:  # small changes are not worth new factors
+                    step = h * min(2.0, factor)
+            if steps is not None:
+                new.t = t_start + (n + 1) * step if n < steps - 1 else t_end
+            n += 1
+            while next_time is not None and next_time <= new.t * (1 + 1e-14):
+                history.append(_between(y, new, next_time))
+                next_time = next(wanted, None)
+            if t_eval is None:
+                history.append(new)
+            bar.update(new.t - y.t)
+            y = new
+    return history.close()
+
+
+def _between(a, b, t):
+    """The motion at t between two instants, by Hermite interpolation."""
+    h, s = b.t - a.t, (t - a.t) / (b.t - a.t)
+    if abs(s - 1.0) < 1e-12:
+        return b
+    du = b.u - a.u
+    u = (a.u + s * s * (3 - 2 * s) * du + h * s * (1 - s) ** 2 * a.v + h * s * s * (s - 1) * b.v)
+    v = (6 * s * (1 - s) / h * du + (1 - s) * (1 - 3 * s) * a.v + s * (3 * s - 2) * b.v)
+    acceleration = (1 - s) * a.acceleration + s * b.acceleration
+    multipliers = (1 - s) * a.multipliers + s * b.multipliers
+    return Motion(float(t), u, v, acceleration, acceleration, multipliers)
