@@ -105,8 +105,8 @@ class MeshBeam(Mesh):
         if not np.all(np.diff(x) > 0):
             k = int(np.argmin(np.diff(x)))
             raise MeshError(
-                f"element {k} from x = {x[k]:.9g} to {x[k + 1]:.9g} has no positive length; the nodes "
-                "must increase along the axis")
+                f"element {k} from x = {x[k]:.9g} to {x[k + 1]:.9g} has no positive length; the "
+                "nodes must increase along the axis")
         e1 = np.array([np.cos(angle), np.sin(angle)])
         return cls._from_nodes(origin[:, None] + e1[:, None] * x, np.outer(e1, np.ones(len(x))),
                                np.diff(x), height, s=x)
@@ -580,6 +580,9 @@ class MeshBeam(Mesh):
     @classmethod
     def load_npz(cls, filename):
         with np.load(filename) as data:
+            missing = {"doflocs", "t", "height", "p_X", "p_Y", "lengths"} - set(data.files)
+            if missing:
+                raise MeshError(f"{str(filename)!r} holds no beam: {sorted(missing)} are missing")
             tags = {k[2:]: data[k] for k in data.files if k.startswith("b_")}
             tags = {k: OrientedBoundary(v, data[f"o_{k}"]) if f"o_{k}" in data.files else v
                     for k, v in tags.items()}

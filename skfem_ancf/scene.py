@@ -3,7 +3,7 @@
 import numpy as np
 from skfem.assembly import LinearForm, asm
 
-from . import forms
+from . import eigen, forms
 from .beam import Beam
 from .dynamics import get_scheme
 from .dynamics.integrate import integrate
@@ -351,6 +351,47 @@ class Scene:
         velocity = np.concatenate([self._velocity.get(id(b), np.zeros(b.N)) for b in self.beams])
         return integrate(self.system, t_end, dt, get_scheme(scheme),
                                    None if start is None else start.u, velocity, **options)
+
+    def modes(self, k, state=None):
+        """The k lowest natural frequencies and their shapes.
+
+        Parameters
+        ----------
+        k
+            How many.
+        state
+            The state about which the beams vibrate, prestress included; stress-free by default.
+
+        Returns
+        -------
+        Modes
+            With ``frequencies`` in rad/s, ``shapes`` and ``mode(i, amplitude)``.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.01),
+        ...                    ElementBeamANCF(3), StVenantKirchhoff(2e8, 0.3, 7800), width=0.01,
+        ...                    formulation="assumed"))
+        >>> EI, rhoA = 2e8 * 0.01**4 / 12, 7800 * 0.01**2
+        >>> ratio = scene.clamp("left").modes(1).frequencies[0] / (3.5160 * np.sqrt(EI / rhoA))
+        >>> bool(abs(ratio - 1) < 5e-3)
+        True
+        """
+        if state is None:
+            state = State(self.system, np.zeros(self.N), load=0.0)
+        return eigen.modes(self.system, state, k)
+
+    def buckling(self, k=1):
+        """The k lowest load factors at which the stress-free state buckles, and their shapes.
+
+        Returns
+        -------
+        Buckling
+            With ``factors`` on the loads of the scene and ``shapes``.
+        """
+        return eigen.buckling(self.system, k)
 
     def _state(self, result):
         return State(self.system, result.u, result.load, result.force, result.converged,

@@ -248,7 +248,8 @@ def test_spaces_are_nested(order):
 
 # the stress-free state
 
-@pytest.mark.parametrize("angle, shift", [(0.0, (0.0, 0.0)), (0.3, (1.0, -2.0)), (3.9, (-7.0, 0.1))])
+@pytest.mark.parametrize("angle, shift", [(0.0, (0.0, 0.0)), (0.3, (1.0, -2.0)),
+                                          (3.9, (-7.0, 0.1))])
 def test_stress_free_state_and_rigid_motion_are_exact(element, mesh, angle, shift):
     Q = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     basis, q = reference_state(element, mesh, Q, np.array(shift))

@@ -487,6 +487,12 @@ def test_load_needs_a_beam_format(tmp_path):
         MeshBeam.load(tmp_path / "m.vtk")
 
 
+def test_load_of_another_mesh(tmp_path):
+    MeshQuad().save_npz(tmp_path / "quad.npz")
+    with pytest.raises(MeshError, match=r"quad.npz' holds no beam: \['height', 'lengths'"):
+        MeshBeam.load(tmp_path / "quad.npz")
+
+
 @pytest.mark.parametrize("nx, ny", [(1, 1), (8, 4)])
 def test_to_meshquad(mesh, nx, ny):
     quad = mesh.to_meshquad(nx, ny)
