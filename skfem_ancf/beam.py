@@ -41,7 +41,7 @@ def reference_coordinates(basis):
 
 
 def _coordinates(mesh, element, p):
-    q = element.rigid(mesh.p_X, mesh.p_Y)
+    q = element.rigid(mesh)
     q[0] = p
     return np.ascontiguousarray(q.transpose(2, 0, 1)).ravel()
 
@@ -87,7 +87,8 @@ class Beam:
                                       ("material", Material, material)):
             if not isinstance(value, kind):
                 raise InputError(f"{argument} must be a {kind.__name__}, got {value!r}")
-        self.mesh, self.element, self.material = mesh, element, material
+        self.mesh = mesh if mesh.is_straight else mesh.with_sections(element.sections)
+        self.element, self.material = element, material
         self.width = require_positive("width", width)
         self.formulation = get_formulation(formulation)
         self.name = name

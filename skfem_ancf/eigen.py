@@ -64,11 +64,7 @@ def modes(system, state, k):
     """
     t = state.load if state.t is None else state.t
     system.assemble(state.u, state.load, t=state.t)
-    K, M = system.K.tocsc(), system.mass.tocsc()
-    for joint, part in zip(system.joints, system.multipliers_of(state.multipliers)):
-        second = joint.curvature(state.u, t, part)
-        if second is not None:
-            K = K + sparse.coo_matrix((second[2], second[:2]), shape=K.shape)
+    K, M = system.K.tocsc() + system.curvature(state.u, t, state.multipliers), system.mass.tocsc()
     J = system.jacobian(state.u, t)
     values, shapes = _lowest(K, M, J, system.free, k)
     return Modes(np.sign(values) * np.sqrt(np.abs(values)), shapes, state)
@@ -90,10 +86,10 @@ def buckling(system, k):
     _, evaluations = system.assemble(zero, 0.0)
     K0 = system.K.tocsc()
     system.factorize(zero, 0.0, none)
-    du, _ = system.solve(system.external_force(zero), -system.constraint(zero, 0.0))
+    du, multipliers = system.solve(system.external_force(zero), -system.constraint(zero, 0.0))
     carried = system.stress_step(evaluations, du)
     system.assemble(zero, 1.0, carried)
-    Ks = system.K.tocsc() - K0
+    Ks = system.K.tocsc() + system.curvature(zero, 0.0, multipliers) - K0
     J = system.jacobian(zero, 0.0)
     # K_s phi = -1/factor K_0 phi: the most negative ones
     free = np.nonzero(system.free)[0]

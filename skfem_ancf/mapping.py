@@ -18,7 +18,8 @@ class MappingBeam(Mapping):
     ``X(xi, eta) = sum_i H_i(xi) x_i + h (eta - 1/2) ((1 - xi) n_1 + xi n_2)`` with the cubic
     Hermite functions H_i, nodal positions and tangents x_i and section directors n_1, n_2.
     Every ANCF element of order 1 or more contains this map, so the stress-free state, and
-    any rigid motion of it, is represented exactly.
+    any rigid motion of it, is represented exactly. On a mesh with ``sections="cubic"``, for
+    elements whose sections are cubic too, the directors are interpolated by H_i as well.
 
     Parameters
     ----------
@@ -31,12 +32,19 @@ class MappingBeam(Mapping):
         self.dim = 2
 
     def _coefficients(self, tind):
-        """Axis (2, 4, ne) and director (2, 2, ne) coefficients of the elements ``tind``."""
+        """Axis (2, 4, ne) and director (2, 2 or 4, ne) coefficients of the elements ``tind``."""
         m = self.mesh
         t = m.t if tind is None else m.t[:, tind]
         L = m.lengths if tind is None else m.lengths[tind]
         axis = np.stack([m.p[:, t[0]], L * m.p_X[:, t[0]], m.p[:, t[1]], L * m.p_X[:, t[1]]], 1)
-        return axis, m.height * np.stack([m.p_Y[:, t[0]], m.p_Y[:, t[1]]], 1)
+        n = [m.p_Y[:, t[0]], m.p_Y[:, t[1]]]
+        if m.sections == "cubic":
+            n = [n[0], L * m.p_XY[:, t[0]], n[1], L * m.p_XY[:, t[1]]]
+        return axis, m.height * np.stack(n, 1)
+
+    def _director(self, xi, derivative=0):
+        """The functions of xi that interpolate the section director."""
+        return (hermite if self.mesh.sections == "cubic" else linear)(xi, derivative)
 
     @staticmethod
     def _sum(coefficients, functions):
@@ -48,13 +56,13 @@ class MappingBeam(Mapping):
     def F(self, X, tind=None):
         axis, director = self._coefficients(tind)
         xi, eta = X
-        return self._sum(axis, hermite(xi)) + self._sum(director, (eta - 0.5) * linear(xi))
+        return self._sum(axis, hermite(xi)) + self._sum(director, (eta - 0.5) * self._director(xi))
 
     def DF(self, X, tind=None):
         axis, director = self._coefficients(tind)
         xi, eta = X
-        dxi = self._sum(axis, hermite(xi, 1)) + self._sum(director, (eta - 0.5) * linear(xi, 1))
-        return np.stack([dxi, self._sum(director, linear(xi))], 1)
+        dxi = self._sum(axis, hermite(xi, 1)) + self._sum(director, (eta - 0.5) * self._director(xi, 1))
+        return np.stack([dxi, self._sum(director, self._director(xi))], 1)
 
     def detDF(self, X, tind=None):
         J = self.DF(X, tind)
@@ -64,6 +72,11 @@ class MappingBeam(Mapping):
         J = self.DF(X, tind)
         det = J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
         return np.array([[J[1, 1], -J[0, 1]], [-J[1, 0], J[0, 0]]]) / det
+
+    def turning(self, X, tind=None):
+        """Derivative by xi of the unit-height section director, shape (2, nelements, npoints)."""
+        _, director = self._coefficients(tind)
+        return self._sum(director, self._director(X[0], 1)) / self.mesh.height
 
     def frame(self, X, tind=None):
         """The beam's own frame: ``frame[:, 0]`` the axis tangent, ``frame[:, 1]`` its normal.

@@ -42,6 +42,11 @@ class MeshBeam(Mesh):
         (2, nvertices): the unit tangent and the unit normal on a given curve.
     lengths
         Length of each element along the axis, shape (nelements,).
+    p_XY
+        Derivative of ``p_Y`` along the axis, shape (2, nvertices), or None if it is not known.
+    sections
+        "linear" or "cubic": how ``p_Y`` is interpolated between the nodes, see
+        :meth:`with_sections`.
     s
         Parameter of each node on the curve, or None.
     curve
@@ -65,6 +70,8 @@ class MeshBeam(Mesh):
     lengths: Optional[ndarray] = None
     s: Optional[ndarray] = None
     curve: Optional["Curve"] = None
+    p_XY: Optional[ndarray] = None
+    sections: str = "linear"
 
     # construction
 
@@ -153,17 +160,20 @@ class MeshBeam(Mesh):
             k = int(np.argmin(np.diff(s)))
             raise MeshError(f"the parameters of the nodes must increase: s[{k}] = {s[k]:.9g}, "
                             f"s[{k + 1}] = {s[k + 1]:.9g}")
-        curve = Curve(r, dr if dr is not None else _curve_derivative(r, s[0], s[-1]))
+        curve = Curve(r, dr if dr is not None else _curve_derivative(r, s[0], s[-1]),
+                      (s[0], s[-1]))
         p, tangent = curve.nodes(s)
         curve.check(s)
         _check_curvature(curve, s, height)
-        return cls._from_nodes(p, tangent, curve.lengths(s[:-1], s[1:]), height, s=s, curve=curve)
+        return cls._from_nodes(p, tangent, curve.lengths(s[:-1], s[1:]), height, s=s, curve=curve,
+                               p_XY=curve.turning(s))
 
     @classmethod
-    def _from_nodes(cls, p, tangent, lengths, height, s=None, curve=None):
+    def _from_nodes(cls, p, tangent, lengths, height, s=None, curve=None, p_XY=None):
         n = p.shape[1]
         mesh = cls(p, np.array([np.arange(n - 1), np.arange(1, n)]), height=height, p_X=tangent,
-                   p_Y=np.array([-tangent[1], tangent[0]]), lengths=lengths, s=s, curve=curve)
+                   p_Y=np.array([-tangent[1], tangent[0]]), lengths=lengths, s=s, curve=curve,
+                   p_XY=np.zeros(p.shape) if p_XY is None else p_XY)
         mesh._boundaries = mesh._build_default_tags()
         return mesh
 
@@ -218,6 +228,23 @@ class MeshBeam(Mesh):
                             "one beam for each straight part and a rigid joint between them")
         self.p_X[:, t[0]] = d
         self.p_Y = np.array([-self.p_X[1], self.p_X[0]])
+        self.p_XY = np.zeros(p.shape)
+
+    def with_sections(self, sections):
+        """The mesh with section directors interpolated "linear" or "cubic" along the axis.
+
+        Elements with sections that vary linearly along X hold the stress-free state of a curved
+        beam exactly on a mesh with "linear", those with cubic sections on one with "cubic". A
+        ``Beam`` chooses for itself; it makes no difference for straight beams.
+        """
+        if sections not in ("linear", "cubic"):
+            raise NameUnknown("interpolation of the sections", sections, ("linear", "cubic"))
+        if sections == self.sections:
+            return self
+        if sections == "cubic" and self.p_XY is None:
+            raise MeshError("the mesh does not know how its sections turn (p_XY): build it with "
+                            "MeshBeam.init_line or MeshBeam.init_curve")
+        return replace(self, sections=sections)
 
     # topology
 
@@ -376,7 +403,8 @@ class MeshBeam(Mesh):
         new = self._midpoints(ix)
         where = self.t[1, ix]
         fields = {name: np.insert(getattr(self, name), where, new[name], axis=-1)
-                  for name in ("doflocs", "p_X", "p_Y")}
+                  for name in ("doflocs", "p_X", "p_Y", "p_XY")
+                  if getattr(self, name) is not None}
         if self.s is not None:
             fields["s"] = np.insert(self.s, where, new["s"])
         # children of element e: first[e], and first[e] + 1 if it was marked
@@ -409,11 +437,12 @@ class MeshBeam(Mesh):
             mapping = self._mapping()
             J = mapping.DF(middle, ix)[..., 0]
             return {**out, "doflocs": mapping.F(middle, ix)[..., 0],
-                    "p_X": J[:, 0] / self.lengths[ix], "p_Y": J[:, 1] / self.height}
+                    "p_X": J[:, 0] / self.lengths[ix], "p_Y": J[:, 1] / self.height,
+                    "p_XY": mapping.turning(middle, ix)[..., 0] / self.lengths[ix]}
         a, b = self.s[self.t[:, ix]]
         p, tangent = self.curve.nodes(out["s"])
         return {**out, "doflocs": p, "p_X": tangent, "p_Y": np.array([-tangent[1], tangent[0]]),
-                "lengths": (self.curve.lengths(a, out["s"]), self.curve.lengths(out["s"], b))}
+                "p_XY": self.curve.turning(out["s"]), "lengths": (self.curve.lengths(a, out["s"]), self.curve.lengths(out["s"], b))}
 
     def _refine_tags(self, tags, m, first, marked, node):
         """Boundaries of the refined mesh ``m``: sections move, surfaces pass to the children."""
@@ -451,7 +480,8 @@ class MeshBeam(Mesh):
         renumber[nodes] = np.arange(len(nodes))
         m = type(self)(self.p[:, nodes], renumber[self.t[:, elements]], height=self.height,
                      p_X=self.p_X[:, nodes], p_Y=self.p_Y[:, nodes],
-                     lengths=self.lengths[elements], curve=self.curve,
+                     lengths=self.lengths[elements], curve=self.curve, sections=self.sections,
+                     p_XY=None if self.p_XY is None else self.p_XY[:, nodes],
                      s=None if self.s is None else self.s[nodes])
         if self._subdomains is not None and not skip_subdomains:
             m._subdomains = {name: np.nonzero(np.isin(elements, e))[0].astype(np.int32)
@@ -474,6 +504,7 @@ class MeshBeam(Mesh):
         curve = None if self.curve is None else self.curve.moved(scale * rotation, shift)
         return replace(self, doflocs=scale * rotation @ self.p + shift[:, None],
                        p_X=rotation @ self.p_X, p_Y=rotation @ self.p_Y, curve=curve,
+                       p_XY=None if self.p_XY is None else rotation @ self.p_XY / scale,
                        lengths=scale * self.lengths, height=scale * self.height)
 
     def translated(self, diffs):
@@ -545,17 +576,15 @@ class MeshBeam(Mesh):
         out = super().to_dict()
         out["orientations"] = {k: v.ori.tolist() for k, v in (self.boundaries or {}).items()
                                if getattr(v, "ori", None) is not None}
-        for name in ("p_X", "p_Y"):
-            out[name] = getattr(self, name).T.tolist()
-        for name in ("lengths", "s"):
+        for name in ("p_X", "p_Y", "p_XY", "lengths", "s"):
             value = getattr(self, name)
-            out[name] = None if value is None else value.tolist()
-        return {**out, "height": self.height}
+            out[name] = None if value is None else value.T.tolist()
+        return {**out, "height": self.height, "sections": self.sections}
 
     @classmethod
     def from_dict(cls, data):
         data = {"boundaries": None, "subdomains": None, **data}
-        for name in ("p_X", "p_Y"):
+        for name in ("p_X", "p_Y", "p_XY"):
             if data.get(name) is not None:
                 data[name] = np.ascontiguousarray(np.array(data[name]).T)
         for name in ("lengths", "s"):
@@ -573,9 +602,9 @@ class MeshBeam(Mesh):
         tags |= {f"o_{k}": v.ori for k, v in (self.boundaries or {}).items()
                  if getattr(v, "ori", None) is not None}
         tags |= {f"s_{k}": v for k, v in (self.subdomains or {}).items()}
-        s = {} if self.s is None else {"s": self.s}
+        s = {name: getattr(self, name) for name in ("s", "p_XY") if getattr(self, name) is not None}
         np.savez(filename, doflocs=self.doflocs, t=self.t, height=self.height, p_X=self.p_X,
-                 p_Y=self.p_Y, lengths=self.lengths, **s, **tags)
+                 p_Y=self.p_Y, lengths=self.lengths, sections=self.sections, **s, **tags)
 
     @classmethod
     def load_npz(cls, filename):
@@ -589,7 +618,8 @@ class MeshBeam(Mesh):
             parts = {k[2:]: data[k] for k in data.files if k.startswith("s_")}
             return cls(data["doflocs"], data["t"], tags or None, parts or None,
                        height=float(data["height"]), p_X=data["p_X"], p_Y=data["p_Y"],
-                       lengths=data["lengths"], s=data["s"] if "s" in data.files else None)
+                       lengths=data["lengths"], sections=str(data["sections"]),
+                       **{name: data[name] for name in ("s", "p_XY") if name in data.files})
 
     def save(self, filename, point_data=None, cell_data=None, **kwargs):
         """Save the mesh: ``.npz`` or ``.json`` to load it again, else the body for a viewer.
@@ -617,10 +647,10 @@ class MeshBeam(Mesh):
 
 
 class Curve:
-    """A plane curve r(s) with its derivative."""
+    """A plane curve r(s) with its derivative, on the parameters between ``ends``."""
 
-    def __init__(self, r, derivative):
-        self.r, self.derivative = r, derivative
+    def __init__(self, r, derivative, ends):
+        self.r, self.derivative, self.ends = r, derivative, ends
 
     def __call__(self, s):
         return require_finite("r(s)", self.r(s), (2, len(s)))
@@ -633,6 +663,11 @@ class Curve:
             raise MeshError(f"the curve stands still at s = {s[np.argmin(size)]:.9g}: it has no "
                             "tangent there")
         return p, d / size
+
+    def turning(self, s):
+        """Derivative of the unit normal by the arc length at parameters ``s``, shape (2, n)."""
+        dt = _differences(lambda x: self.nodes(x)[1], s, *self.ends)
+        return np.array([-dt[1], dt[0]]) / np.hypot(*self.derivative(s))
 
     def lengths(self, a, b):
         """Arc lengths from parameters ``a`` to ``b``, both of shape (n,)."""
@@ -657,19 +692,14 @@ class Curve:
 
     def moved(self, A, shift):
         """The curve ``A r(s) + shift``."""
-        return Curve(lambda s: A @ self(s) + shift[:, None], lambda s: A @ self.derivative(s))
+        return Curve(lambda s: A @ self(s) + shift[:, None], lambda s: A @ self.derivative(s),
+                     self.ends)
 
 
 def _curve_derivative(r, s0, s1):
     """The derivative of ``r`` on [s0, s1]: complex step if exact, else sixth-order differences."""
-    d = 1e-3 * (s1 - s0)
-    k = np.arange(-3, 4)
-
     def differences(s):
-        c = np.clip(s, s0 + 3 * d, s1 - 3 * d)  # the stencil stays on the curve
-        values = np.array([np.asarray(r(c + i * d), dtype=np.float64) for i in k])
-        weights = np.array([_lagrange_derivative(k, i, (s - c) / d) for i in range(7)])
-        return np.einsum("is,ijs->js", weights, values) / d
+        return _differences(r, s, s0, s1)
 
     def complex_step(s):
         return np.imag(np.asarray(r(s + 1e-30j))) / 1e-30
@@ -685,6 +715,16 @@ def _curve_derivative(r, s0, s1):
     except Exception:  # r is the user's: whatever it raises, it has no complex step
         logger.debug("the curve has no complex step; differences are used", exc_info=True)
     return differences
+
+
+def _differences(r, s, s0, s1):
+    """Derivative of a function on [s0, s1] by seven-point differences, of sixth order."""
+    d = 1e-3 * (s1 - s0)
+    k = np.arange(-3, 4)
+    c = np.clip(s, s0 + 3 * d, s1 - 3 * d)  # the stencil stays inside
+    values = np.array([np.asarray(r(c + i * d), dtype=np.float64) for i in k])
+    weights = np.array([_lagrange_derivative(k, i, (s - c) / d) for i in range(7)])
+    return np.einsum("is,ijs->js", weights, values) / d
 
 
 def _lagrange_derivative(nodes, i, x):

@@ -103,16 +103,46 @@ class System:
             return np.zeros(0)
         return np.concatenate([joint.value(u, t) for joint in self.joints])
 
-    def jacobian(self, u, t):
-        """Derivative of :meth:`constraint`, shape (m, N), zero at fixed coordinates."""
+    @property
+    def drives(self):
+        """True if a joint with multipliers depends on time."""
+        return any(joint.moving for joint in self.joints)
+
+    def full_jacobian(self, u, t):
+        """Derivative of :meth:`constraint` by all coordinates, shape (m, N)."""
         if not self.joints:
             return np.zeros((0, self.N))
-        J = np.vstack([joint.jacobian(u, t) for joint in self.joints])
+        return np.vstack([joint.jacobian(u, t) for joint in self.joints])
+
+    def jacobian(self, u, t):
+        """Derivative of :meth:`constraint`, shape (m, N), zero at fixed coordinates."""
+        J = self.full_jacobian(u, t)
         J[:, self.fixed] = 0.0
         return J
 
+    def quadratic(self, u, t, v):
+        """The second derivative of :meth:`constraint` in the direction v, shape (m,)."""
+        out = []
+        for joint in self.joints:
+            for unit in np.eye(len(joint.equations)):
+                second = joint.curvature(u, t, unit)
+                out.append(0.0 if second is None else second[2] @ (v[second[0]] * v[second[1]]))
+        return np.array(out)
+
+    def curvature(self, u, t, multipliers):
+        """sum_k multipliers[k] d^2 Phi_k / du^2 at free coordinates, sparse, shape (N, N)."""
+        parts = [joint.curvature(u, t, part)
+                 for joint, part in zip(self.joints, self.multipliers_of(multipliers))]
+        parts = [part for part in parts if part is not None]
+        if not parts:
+            return sparse.csr_matrix((self.N, self.N))
+        i, j, v = (np.concatenate(column) for column in zip(*parts))
+        return sparse.csr_matrix((v * (self.free[i] & self.free[j]), (i, j)), shape=(self.N, self.N))
+
     def multipliers_of(self, multipliers):
         """The multipliers joint by joint: a list in the order of :attr:`joints`."""
+        if not self.joints:
+            return []
         ends = np.cumsum([len(joint.equations) for joint in self.joints])[:-1]
         return np.split(multipliers, ends)
 
@@ -226,6 +256,33 @@ class System:
             M.add_elements(beam.mass_elements(), int(offset), beam.nd, beam.mesh.t[0])
         return M
 
+    @cached_property
+    def mass_factors(self):
+        """The factors of the mass matrix with its supports fixed; made once."""
+        M = self.new_band().combine(1.0, self.mass, 0.0, self.mass)
+        M.fix(self.fixed_positions)
+        return M.factorize()
+
+    def solve_mass(self, b, u=None, t=0.0, rate=None):
+        """x and l with M x + J^T l = b at free coordinates and J x = rate; x is zero at fixed ones.
+
+        Parameters
+        ----------
+        b
+            Shape (N,); its fixed coordinates are ignored.
+        u, t
+            Where J is taken.
+        rate
+            Shape (m,).
+        """
+        x = self.mass_factors.solve(b * self.free)
+        if not self.joints:
+            return x, np.zeros(0)
+        J = self.jacobian(u, t)
+        Y = self.mass_factors.solve(np.ascontiguousarray(J.T))
+        multipliers = np.linalg.solve(J @ Y, J @ x - rate)
+        return x - Y @ multipliers, multipliers
+
     # tangent
 
     def new_band(self):
@@ -304,13 +361,7 @@ class System:
         if not self.joints:
             self.K.factorize()
             return
-        K = self.K.tocsc()
-        for joint, part in zip(self.joints, self.multipliers_of(multipliers)):
-            second = joint.curvature(u, t, part)
-            if second is not None:
-                i, j, v = second
-                v = v * (self.free[i] & self.free[j])
-                K = K + sparse.coo_matrix((v, (i, j)), shape=K.shape)
+        K = self.K.tocsc() + self.curvature(u, t, multipliers)
         self._weight = float(np.mean(np.abs(K.diagonal()[self.free])))
         J = sparse.csr_matrix(self.jacobian(u, t) * self._weight)
         self._kkt = splu(sparse.bmat([[K, J.T], [J, None]], format="csc"))

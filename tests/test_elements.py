@@ -1,10 +1,12 @@
 """The beam elements: their space, their coordinates, and what they represent exactly."""
 
+from copy import deepcopy
+
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial, chebyshev
 from numpy.testing import assert_allclose, assert_array_equal
-from skfem import Basis, ElementTriP1, ElementVector, FacetBasis, MeshTri
+from skfem import Basis, ElementTriP1, ElementVector, FacetBasis, Functional, MeshTri
 from skfem.models.poisson import mass
 
 from conftest import MESHES
@@ -32,28 +34,25 @@ def functionals(element, mesh, L, h):
     """Each coordinate applied to each local function: (element, coordinate, function).
 
     Derivatives are taken of the values with the complex step along the reference axes, on
-    elements of length L and height h; the second derivative is that of the gradient along Y.
+    elements of length L and height h; second derivatives are those of the gradient along Y.
     """
     L, coordinates = np.broadcast_to(L, mesh.nelements), 2 * element.functionals
     X = np.array([element.doflocs[:, 0], [0.5 + y for y, _, _ in coordinates]], dtype=complex)
-    X += 1j * STEP * np.array([[mx > 0, my > 0] for _, mx, my in coordinates]).T
+    X += 1j * STEP * np.array([[mx > 0, mx == 0 and my > 0] for _, mx, my in coordinates]).T
     values, gradients = tabulate(element, mesh, X)
     along_Y = np.einsum("niep,iep->nep", gradients, mesh.mapping().DF(X)[:, 1] / h)
     out = np.empty((mesh.nelements, len(coordinates), len(coordinates)))
     for k, (_, mx, my) in enumerate(coordinates):
-        if mx + my == 0:
-            out[:, k] = values[:, :, k].T.real
-        elif mx + my == 1:
-            out[:, k] = values[:, :, k].T.imag / STEP / (L[:, None] if mx else h)
-        else:
-            out[:, k] = along_Y[:, :, k].T.imag / STEP / h
+        assert (mx, my) in ((0, 0), (1, 0), (0, 1), (0, 2), (1, 1))
+        applied = (values if mx + my < 2 else along_Y)[:, :, k].T
+        out[:, k] = (applied.imag / STEP / (L[:, None] if mx else h) if mx + my else applied.real)
     return out
 
 
 def reference_state(element, mesh, rotation=np.eye(2), shift=np.zeros(2)):
     """Vector basis and the coordinates of the stress-free state after a rigid motion."""
     basis = Basis(mesh, ElementVector(element), intorder=6)
-    q = element.rigid(mesh.p_X, mesh.p_Y)
+    q = element.rigid(mesh)
     q[0] += mesh.p
     q = np.einsum("ij,kjn->kin", rotation, q)
     q[0] += shift[:, None]
@@ -114,12 +113,16 @@ def test_gauss_lobatto_points():
 
 @pytest.mark.parametrize("L, h", SIZES)
 def test_space_is_reproduced_exactly(element, L, h):
-    """{1, X, X^2, X^3} and {Y^k, X Y^k : k = 1..N}, from coordinates taken analytically."""
+    """{1, X, X^2, X^3} and {Y^k, X Y^k : k = 1..N}, from coordinates taken analytically.
+
+    Cubic sections have X^2 Y^k and X^3 Y^k too.
+    """
     mesh = one_element(L, h)
     values, gradients = tabulate(element, mesh)
     powers = [(a, 0) for a in range(4)]
-    powers += [(a, k) for a in range(2) for k in range(1, element.order + 1)]
-    assert len(powers) == len(element.doflocs) == 2 * element.order + 4
+    powers += [(a, k) for a in range(4 if element.sections == "cubic" else 2)
+               for k in range(1, element.order + 1)]
+    assert len(powers) == len(element.doflocs)
     xi, eta = POINTS[0], POINTS[1] - 0.5
     for a, b in powers:  # the function (X/L)^a (2Y/h)^b
         f, g = Polynomial.basis(a), Polynomial.basis(b)(Polynomial([0.0, 2.0]))
@@ -189,8 +192,7 @@ def test_functions_scale_with_length_and_height(element):
 @pytest.mark.parametrize("shape", ["same points", "other points", "points per element"])
 def test_one_element_on_several_meshes(element, shape):
     """Nothing may be remembered from the last mesh or points."""
-    fresh = type(element)() if isinstance(element, ElementBeamPatelShabana) else (
-        ElementBeamANCF(element.order))
+    fresh = deepcopy(element)
     first, second = MESHES["unequal"](), MESHES["arc"](height=0.11)
     X = {"same points": POINTS, "other points": POINTS[::-1].copy(),
          "points per element": np.random.default_rng(1).random((2, second.nelements, 5))}[shape]
@@ -250,7 +252,8 @@ def test_spaces_are_nested(order):
 
 @pytest.mark.parametrize("angle, shift", [(0.0, (0.0, 0.0)), (0.3, (1.0, -2.0)),
                                           (3.9, (-7.0, 0.1))])
-def test_stress_free_state_and_rigid_motion_are_exact(element, mesh, angle, shift):
+def test_stress_free_state_and_rigid_motion_are_exact(element, mesh, angle, shift, exact_geometry):
+    exact_geometry(mesh)
     Q = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     basis, q = reference_state(element, mesh, Q, np.array(shift))
     field, x = basis.interpolate(q), basis.global_coordinates()
@@ -259,7 +262,8 @@ def test_stress_free_state_and_rigid_motion_are_exact(element, mesh, angle, shif
     assert_allclose(field.grad, Q[:, :, None, None] + 0 * field.grad, atol=2e-11)
 
 
-def test_stress_free_state_on_the_surface(element, mesh):
+def test_stress_free_state_on_the_surface(element, mesh, exact_geometry):
+    exact_geometry(mesh)
     _, q = reference_state(element, mesh)
     surface = FacetBasis(mesh, ElementVector(element), facets=["top", "bottom", "left", "right"])
     field = surface.interpolate(q)
@@ -270,26 +274,33 @@ def test_stress_free_state_on_the_surface(element, mesh):
 # attributes
 
 def test_attributes(element):
-    n = element.order
-    assert element.nodal_dofs == len(element.dofnames) == n + 2
-    assert element.dofnames[:2] == ["r", "r_X"]
-    assert element.welded == ["r"] + element.dofnames[2:]
+    n, number = element.order, element.nodal_dofs
+    assert number == len(element.dofnames) == len(element.functionals)
+    assert number == {"linear": n + 2, "cubic": 2 * n + 2}[element.sections]
+    assert element.dofnames[:2] == ["r", "r_X"] and len(set(element.dofnames)) == number
+    welded = [name for name, f in zip(element.dofnames, element.functionals) if f[1] == 0]
+    assert element.welded == welded and len(welded) == n + 1
     assert element.carries_shear_parabola == (n >= 3)
-    assert element.doflocs.shape == (2 * n + 4, 2)
-    assert_array_equal(element.doflocs[:, 0], np.repeat([0.0, 1.0], n + 2))
+    assert element.doflocs.shape == (2 * number, 2)
+    assert_array_equal(element.doflocs[:, 0], np.repeat([0.0, 1.0], number))
     assert element.refdom is RefBeam and element.axis_degree == 3
     assert f"order {n}" in repr(element)
     with pytest.raises(ValueError, match="basis functions"):
-        element.gbasis(one_element().mapping(), POINTS, 2 * n + 4)
+        element.gbasis(one_element().mapping(), POINTS, 2 * number)
     with pytest.raises(ValueError, match="basis functions"):
         element.gbasis(one_element().mapping(), POINTS, -1)
 
 
 def test_default_quadrature_is_exact(element):
     mesh = one_element(0.7, 0.3)
-    M, exact = (mass.assemble(Basis(mesh, element, **kw)).toarray()
-                for kw in ({}, {"intorder": 4 * element.order + 20}))
-    assert_allclose(M, exact, atol=1e-15)
+    energy = Functional(lambda w: np.sum(w["r"].grad ** 2, (0, 1)) ** 2)  # degree of the strain's
+    bases = [Basis(mesh, ElementVector(element), **kw)
+             for kw in ({}, {"intorder": 4 * element.order + 20})]
+    q = np.random.default_rng(5).standard_normal(bases[0].N)
+    U, exact = (energy.assemble(basis, r=basis.interpolate(q)) for basis in bases)
+    assert_allclose(U, exact, rtol=1e-11)
+    M, exact = (mass.assemble(basis.with_element(element)).toarray() for basis in bases)
+    assert_allclose(M, exact, atol=1e-14)
 
 
 def test_composite_is_vector(element, arc):

@@ -254,6 +254,15 @@ def test_curves_without_a_complex_step(r, atol, recwarn):
     assert len(recwarn) == 0
 
 
+def test_curve_is_not_called_outside_its_range():
+    def r(s):
+        assert np.all(np.abs(s) <= 1)
+        return parabola_by_abs(s)
+
+    m = MeshBeam.init_curve(r, np.linspace(-1, 1, 9), 0.1).refined()
+    assert_allclose(m.p_X[1] / m.p_X[0], 2 * m.s, atol=1e-10)
+
+
 @pytest.mark.parametrize("r", [s_curve, quarter_arc])
 @pytest.mark.parametrize("how", [2, [0], [1, 2]])
 def test_refined_nodes_lie_on_the_curve(r, how):
@@ -262,6 +271,7 @@ def test_refined_nodes_lie_on_the_curve(r, how):
     assert_array_equal(fine.p, m.curve(fine.s))
     p, tangent = m.curve.nodes(fine.s)
     assert_array_equal(fine.p_X, tangent)
+    assert_allclose(fine.lengths, m.curve.lengths(fine.s[:-1], fine.s[1:]), rtol=1e-14)
     assert_allclose(fine.lengths.sum(), m.lengths.sum(), rtol=1e-10)
     assert fine.nelements > m.nelements and np.all(np.diff(fine.s) > 0)
 
@@ -332,15 +342,16 @@ def test_refinement_keeps_names_where_they_are(how):
 
 
 def test_refinement_keeps_orientation(mesh):
-    coarse = mesh.with_boundaries({"around": mesh.facets_around([0])})
+    last = mesh.nelements - 1
+    coarse = mesh.with_boundaries({"around": mesh.facets_around([last])})
     fine = coarse.refined()
-    assert len(fine.boundaries["around"]) == 6
-    assert_array_equal(fine.boundaries["around"].ori,
-                       fine.facets_around([0, 1]).ori)
-    assert_array_equal(fine.boundaries["around"], fine.facets_around([0, 1]))
+    expected = fine.facets_around([2 * last, 2 * last + 1])
+    assert_array_equal(fine.boundaries["around"], expected)
+    assert_array_equal(fine.boundaries["around"].ori, expected.ori)
+    assert np.any(expected.ori) == (last > 0) and len(expected) == 6
     if mesh.is_straight:
         total = [FacetBasis(m, ElementBeamP1(), facets="around").dx.sum() for m in (coarse, fine)]
-        assert_allclose(total, 2 * (mesh.lengths[0] + mesh.height), rtol=1e-13)
+        assert_allclose(total, 2 * (mesh.lengths[last] + mesh.height), rtol=1e-13)
 
 
 def test_refinement_without_the_curve_keeps_the_body(tmp_path):

@@ -1,6 +1,7 @@
 """What every time integrator shares."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,8 @@ class Motion:
         The scheme's own acceleration, where it has one.
     multipliers
         Of the joints, shape (m,).
+    memory
+        What else the scheme keeps for its next step.
     """
 
     t: float
@@ -29,31 +32,57 @@ class Motion:
     acceleration: np.ndarray
     algorithmic: np.ndarray
     multipliers: np.ndarray
+    memory: Any = None
 
 
 class Step:
     """One time step of a scheme from a :class:`Motion` y over dt.
 
+    The equation that a step solves is ``force(u) - M acceleration(u) - J^T multipliers = 0`` with
+    J at ``middle(u)``, ``joint_time``.
+
     Attributes
     ----------
     t
         Time at the end of the step.
+    joint_time
+        Time at which the joints act.
     guess
         Displacement to start the iteration from.
     mass_factor, stiffness_factor
         The iteration matrix is ``mass_factor M + stiffness_factor K``.
     """
 
-    def residual(self, u):
-        """Residual of the equation of motion without the joints, shape (N,)."""
+    def force(self, u):
+        """Loads less internal force, shape (N,)."""
         raise NotImplementedError
 
-    def tangent_at(self, u):
-        """The displacement at which K is taken."""
+    def acceleration(self, u):
+        """The acceleration in the equation, shape (N,)."""
+        raise NotImplementedError
+
+    def support_acceleration(self, v, a):
+        """As :meth:`acceleration`, at fixed coordinates, of their v and a at the end."""
+        return a
+
+    def velocity(self, u):
+        """Velocity at the end of the step before the joints' part in it, shape (N,)."""
+        raise NotImplementedError
+
+    def middle(self, u):
+        """The displacement at which the tangent and the joints' directions are taken."""
         return u
 
-    def finish(self, u, multipliers):
-        """The Motion at the end of the step."""
+    def finish(self, u, v, multipliers, impulse):
+        """The Motion at the end of the step.
+
+        Parameters
+        ----------
+        u, v, multipliers
+            Displacement, velocity and multipliers found.
+        impulse
+            The multipliers of the velocity, shape (m,): ``v = velocity(u) - M^-1 J^T impulse``.
+        """
         raise NotImplementedError
 
 
@@ -66,8 +95,8 @@ class Scheme:
         Order of convergence of displacements and velocities.
     tol : float
         Default tolerance of the iteration in a step, relative, in the energy norm.
-    projects_velocity : bool
-        Project the velocity onto the joints' after each step.
+    couples_velocity : bool
+        The joints' part in the velocity acts back on the equation of motion.
     error_constant : float
         The local error is about this number times dt^2 times the change of the acceleration.
     """
@@ -75,7 +104,7 @@ class Scheme:
     name = ""
     order = 2
     tol = 1e-9
-    projects_velocity = True
+    couples_velocity = False
     error_constant = 1.0 / 12.0
 
     def begin(self, system, y, dt):

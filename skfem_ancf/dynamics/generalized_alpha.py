@@ -101,7 +101,7 @@ class Newmark(GeneralizedAlpha):
 class _Step(Step):
     def __init__(self, scheme, system, y, dt):
         self.scheme, self.system, self.y, self.dt = scheme, system, y, dt
-        self.t = y.t + dt
+        self.t = self.joint_time = y.t + dt
         b, g = scheme.beta, scheme.gamma
         self._u = y.u + dt * y.v + dt * dt * (0.5 - b) * y.algorithmic
         self._v = y.v + dt * (1.0 - g) * y.algorithmic
@@ -109,17 +109,20 @@ class _Step(Step):
         self.mass_factor = (1.0 - scheme.alpha_m) / ((1.0 - scheme.alpha_f) * b * dt * dt)
         self.stiffness_factor = 1.0
 
-    def _accelerations(self, u):
+    def _algorithmic(self, u):
+        return (u - self._u) / (self.scheme.beta * self.dt**2)
+
+    def force(self, u):
+        return self.system.external_force(u, self.t) - self.system.internal_force(u)
+
+    def acceleration(self, u):
         s, y = self.scheme, self.y
-        w = (u - self._u) / (s.beta * self.dt**2)
-        a = ((1.0 - s.alpha_m) * w + s.alpha_m * y.algorithmic - s.alpha_f * y.acceleration)
-        return w, a / (1.0 - s.alpha_f)
+        a = ((1.0 - s.alpha_m) * self._algorithmic(u) + s.alpha_m * y.algorithmic
+             - s.alpha_f * y.acceleration)
+        return a / (1.0 - s.alpha_f)
 
-    def residual(self, u):
-        s = self.system
-        return (s.external_force(u, self.t) - s.internal_force(u)
-                - s.mass.multiply(self._accelerations(u)[1]))
+    def velocity(self, u):
+        return self._v + self.dt * self.scheme.gamma * self._algorithmic(u)
 
-    def finish(self, u, multipliers):
-        w, a = self._accelerations(u)
-        return Motion(self.t, u, self._v + self.dt * self.scheme.gamma * w, a, w, multipliers)
+    def finish(self, u, v, multipliers, impulse):
+        return Motion(self.t, u, v, self.acceleration(u), self._algorithmic(u), multipliers)

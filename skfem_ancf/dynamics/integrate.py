@@ -12,6 +12,7 @@ from .history import History
 logger = logging.getLogger(__name__)
 
 MAX_ITERATIONS = 25
+EPS = np.finfo(float).eps
 SLOW = 0.3  # contraction above which the factors are made anew
 
 
@@ -22,8 +23,8 @@ class StepFailed(Exception):
 class Integrator:
     """Advances the motion of a system.
 
-    The mass matrix is assembled and factorised once. The factors of the iteration matrix are
-    kept from step to step as long as the iteration contracts.
+    The factors of the iteration matrix are kept from step to step as long as the iteration
+    contracts.
 
     Parameters
     ----------
@@ -33,10 +34,12 @@ class Integrator:
         A :class:`~skfem_ancf.dynamics.Scheme`.
     tol
         Tolerance of the iteration in a step, relative, in the energy norm.
+    span
+        Times of start and end, outside of which no function of time is asked.
     """
 
-    def __init__(self, system, scheme, tol=None):
-        self.system, self.scheme = system, scheme
+    def __init__(self, system, scheme, tol=None, span=(-np.inf, np.inf)):
+        self.system, self.scheme, self.span = system, scheme, span
         self.tol = scheme.tol if tol is None else require_positive("tol", tol)
         self.A = system.new_band()
         self._coefficients = None
@@ -44,61 +47,47 @@ class Integrator:
         self._energy = 0.0
         self.iterations = self.factorizations = 0
 
-    # the mass matrix
-
-    def _mass_factors(self):
-        if not hasattr(self, "_M"):
-            s = self.system
-            self._M = s.new_band().combine(1.0, s.mass, 0.0, s.mass)
-            self._M.fix(s.fixed_positions)
-            self._M.factorize()
-        return self._M
-
-    def solve_mass(self, b, u, t, rhs):
-        """x with M x + J^T l = b at free coordinates and J x = rhs; zero at fixed ones."""
-        M, J = self._mass_factors(), self.system.jacobian(u, t)
-        x = M.solve(b * self.system.free)
-        if not len(J):
-            return x, np.zeros(0)
-        Y = M.solve(np.ascontiguousarray(J.T))
-        multipliers = np.linalg.solve(J @ Y, J @ x - rhs)
-        return x - Y @ multipliers, multipliers
-
-    # the start
+    # motions given as functions of time
 
     def _rates(self, function, t, dt):
-        """First and second derivative of a function of time, by fourth-order differences."""
-        k = np.arange(-2, 3) if t > 2 * dt else np.arange(0, 6)
-        f = np.array([function(t + i * dt) for i in k])
-        if len(k) == 5:
-            return ((f[0] - 8 * f[1] + 8 * f[3] - f[4]) / (12 * dt),
-                    (-f[0] + 16 * f[1] - 30 * f[2] + 16 * f[3] - f[4]) / (12 * dt**2))
-        return (np.array([-137, 300, -300, 200, -75, 12]) @ f / (60 * dt),
-                np.array([45, -154, 214, -156, 61, -10]) @ f / (12 * dt**2))
+        """First and second derivative of a function of time, by fourth-order differences.
 
-    def _hold(self, y, dt):
-        """Set velocity and acceleration of the moving fixed coordinates."""
+        The function is asked for times within the motion only.
+        """
+        start, end = self.span
+        h = min(0.25 * dt, 0.2 * (end - start))
+        if t - 2 * h >= start and t + 2 * h <= end:
+            f = np.array([function(t + i * h) for i in range(-2, 3)])
+            return ((f[0] - 8 * f[1] + 8 * f[3] - f[4]) / (12 * h),
+                    (-f[0] + 16 * f[1] - 30 * f[2] + 16 * f[3] - f[4]) / (12 * h**2))
+        h = h if t - 2 * h < start else -h
+        f = np.array([function(t + i * h) for i in range(6)])
+        return (np.tensordot([-137, 300, -300, 200, -75, 12], f, 1) / (60 * h),
+                np.tensordot([45, -154, 214, -156, 61, -10], f, 1) / (12 * h**2))
+
+    def _support_rates(self, t, dt):
+        """Velocity and acceleration of the fixed coordinates, shape (nfixed,)."""
         s = self.system
-        if len(s.fixed):
-            y.v[s.fixed] = y.acceleration[s.fixed] = 0.0
-            if s.moves:
-                v, a = self._rates(lambda t: s.values(1.0, t), y.t, dt)
-                y.v[s.fixed], y.acceleration[s.fixed] = v, a
-                if y.algorithmic is not None:
-                    y.algorithmic[s.fixed] = a
+        if not s.moves:
+            return np.zeros((2, len(s.fixed)))
+        return self._rates(lambda t: s.values(1.0, t), t, dt)
 
-    def _constraint_rate(self, y, dt):
-        """J v + dPhi/dt of the joints."""
-        s, h = self.system, 1e-3 * dt
-        rate = (s.constraint(y.u, y.t + h) - s.constraint(y.u, y.t - h)) / (2 * h)
-        return rate + np.concatenate([j.jacobian(y.u, y.t) @ y.v for j in s.joints])
+    def _constraint_rate(self, u, v, t, dt):
+        """The rate of the joints' Phi, shape (m,)."""
+        s = self.system
+        rate = s.full_jacobian(u, t) @ v
+        return rate + self._rates(lambda t: s.constraint(u, t), t, dt)[0] if s.drives else rate
 
-    def project_velocity(self, y, dt):
-        """Remove from the velocity what the joints do not allow."""
-        if self.system.joints:
-            dv, _ = self.solve_mass(np.zeros(self.system.N), y.u, y.t,
-                                    -self._constraint_rate(y, dt))
-            y.v = y.v + dv
+    def _constraint_acceleration(self, u, v, t, dt):
+        """The second rate of Phi without accelerations of the coordinates, shape (m,)."""
+        s = self.system
+        rate = s.quadratic(u, t, v)
+        if s.drives:
+            rate = (rate + self._rates(lambda t: s.constraint(u, t), t, dt)[1]
+                    + 2.0 * self._rates(lambda t: s.full_jacobian(u, t) @ v, t, dt)[0])
+        return rate
+
+    # the start
 
     def start(self, u, v, t, dt):
         """The Motion at the start, with consistent velocity, acceleration and multipliers."""
@@ -109,16 +98,16 @@ class Integrator:
         if gap > 1e-8 * s.size:
             raise SupportError(f"the joints are open by {gap:.3g} at the start: begin with beams "
                                "that fit, or from a static solution (start=)")
-        self._hold(y, dt)
-        self.project_velocity(y, dt)
-        held = np.where(s.free, 0.0, y.acceleration)
-        force = s.external_force(y.u, t) - s.internal_force(y.u) - s.mass.multiply(held)
-        rhs = np.zeros(s.m)
+        y.v[s.fixed], y.acceleration[s.fixed] = self._support_rates(t, dt)
+        rate = np.zeros(s.m)
         if s.joints:
-            phi = [s.constraint(y.u + k * dt * y.v, t + k * dt) for k in (-1, 0, 1)]
-            rhs = -(phi[0] - 2 * phi[1] + phi[2]) / dt**2
-        y.acceleration, y.multipliers = self.solve_mass(force, y.u, t, rhs)
-        y.acceleration = y.acceleration + held
+            y.v = y.v + s.solve_mass(np.zeros(s.N), y.u, t,
+                                     -self._constraint_rate(y.u, y.v, t, dt))[0]
+            rate = -(self._constraint_acceleration(y.u, y.v, t, dt)
+                     + s.full_jacobian(y.u, t) @ y.acceleration)
+        force = s.external_force(y.u, t) - s.internal_force(y.u) - s.mass.multiply(y.acceleration)
+        acceleration, y.multipliers = s.solve_mass(force, y.u, t, rate)
+        y.acceleration = y.acceleration + acceleration
         y.algorithmic = y.acceleration.copy()
         self._energy = max(self._energy, 0.5 * y.v @ s.mass.multiply(y.v), s.strain_energy(y.u))
         return y
@@ -127,13 +116,24 @@ class Integrator:
 
     def _factorize(self, step, u):
         s = self.system
-        at = step.tangent_at(u)
-        s.assemble(at, t=step.t)
+        s.assemble(step.middle(u), t=step.t)
         self.A.combine(step.mass_factor, s.mass, step.stiffness_factor, s.K)
         self.A.fix(s.fixed_positions)
         self.A.factorize()
         self._coefficients = (step.mass_factor, step.stiffness_factor)
         self.factorizations += 1
+
+    def _velocity(self, step, u, J, supports, dt):
+        """The velocity that supports and joints allow, and the joints' impulses in it."""
+        s = self.system
+        v = step.velocity(u)
+        v[s.fixed] = supports
+        if not s.joints:
+            return v, np.zeros(0)
+        Y = s.mass_factors.solve(np.ascontiguousarray(J.T))
+        impulse = np.linalg.solve(s.full_jacobian(u, step.t) @ Y,
+                                  self._constraint_rate(u, v, step.t, dt))
+        return v - Y @ impulse, impulse
 
     def advance(self, y, dt):
         """The Motion one step later; raises StepFailed."""
@@ -141,24 +141,37 @@ class Integrator:
         step = self.scheme.begin(s, y, dt)
         u, multipliers = step.guess.copy(), y.multipliers.copy()
         u[s.fixed] = s.values(1.0, step.t)
+        v_fixed, a_fixed = self._support_rates(step.t, dt)
+        held = step.support_acceleration(v_fixed, a_fixed)
+        couples = self.scheme.couples_velocity and not all(joint.constant for joint in s.joints)
         fresh = False
         if self._coefficients != (step.mass_factor, step.stiffness_factor):
             self._factorize(step, u)
             fresh, self._rate = True, 0.1
-        floor = (8.0 * s.stiffness_scale) * np.sqrt(step.stiffness_factor)
+        # round-off of the strains and of the inertia
+        floor = np.hypot(8.0 * s.stiffness_scale * np.sqrt(step.stiffness_factor),
+                         EPS * np.sqrt(step.mass_factor * abs(u @ s.mass.multiply(u))))
         before = None
         for _ in range(MAX_ITERATIONS):
-            R = step.residual(u) * s.free
+            acceleration = step.acceleration(u)
+            acceleration[s.fixed] = held
+            R = (step.force(u) - s.mass.multiply(acceleration)) * s.free
             if s.joints:
-                J0, phi = s.jacobian(step.tangent_at(u), step.t), s.constraint(u, step.t)
-                R = R - multipliers @ J0
+                at = step.middle(u)
+                J, phi = s.jacobian(at, step.joint_time), s.constraint(u, step.t)
+                R = R - multipliers @ J
+                if couples:
+                    v, impulse = self._velocity(step, u, J, v_fixed, dt)
+                    R -= s.curvature(at, step.joint_time, 0.25 * impulse) @ (y.v + v)
             du = self.A.solve(R)
+            work = abs(R @ du)
             if s.joints:
-                J1 = s.jacobian(u, step.t)
-                Y = self.A.solve(np.ascontiguousarray(J0.T))
-                dm = np.linalg.solve(J1 @ Y, J1 @ du + phi)
+                Y = self.A.solve(np.ascontiguousarray(J.T))
+                dm = np.linalg.solve(s.jacobian(u, step.t) @ Y,
+                                     s.full_jacobian(u, step.t) @ du + phi)
                 du, multipliers = du - Y @ dm, multipliers + dm
-            size = np.sqrt(abs(R @ du))
+                work = abs(R @ du) + abs(dm @ phi)
+            size = np.sqrt(work)
             self.iterations += 1
             if not np.isfinite(size):
                 raise StepFailed("the residual is not finite")
@@ -181,10 +194,11 @@ class Integrator:
             before = size
         else:
             raise StepFailed(f"no convergence in {MAX_ITERATIONS} iterations")
-        new = step.finish(u, multipliers)
-        self._hold(new, dt)
-        if self.scheme.projects_velocity:
-            self.project_velocity(new, dt)
+        v, impulse = self._velocity(step, u, s.jacobian(step.middle(u), step.joint_time), v_fixed,
+                                    dt)
+        new = step.finish(u, v, multipliers, impulse)
+        new.acceleration[s.fixed] = a_fixed
+        new.algorithmic[s.fixed] = a_fixed
         self._energy = max(self._energy, 0.5 * new.v @ s.mass.multiply(new.v))
         return new
 
@@ -254,11 +268,12 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=Non
     step = 1e-4 * span if auto else min(require_positive("dt", dt), span)
     if t_eval is not None:
         t_eval = require_finite("t_eval", t_eval, (None,))
-        if np.any(np.diff(t_eval) <= 0) or t_eval[0] < t_start or t_eval[-1] > t_end * (1 + 1e-12):
+        if not len(t_eval) or np.any(np.diff(t_eval) <= 0) or t_eval[0] < t_start or t_eval[-1] > t_end * (1 + 1e-12):
             raise InputError(f"t_eval must increase within [{t_start}, {t_end}], got {t_eval!r}")
+    rtol = require_positive("rtol", rtol)
     system.require_independent_joints()
     zero = np.zeros(system.N)
-    solver = Integrator(system, scheme, tol)
+    solver = Integrator(system, scheme, tol, (t_start, t_end))
     y = solver.start(zero if u is None else u, zero if v is None else v, t_start, step)
     history = History(system, scheme, solver)
     wanted = iter(() if t_eval is None else t_eval)

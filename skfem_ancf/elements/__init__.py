@@ -2,12 +2,15 @@
 
 from .ancf import ElementBeamANCF
 from .base import ElementBeam
+from .cubic import ElementBeamANCFCubic
 from .patel_shabana import ElementBeamPatelShabana
 
 #: The elements that the tests run over, by name.
 ELEMENTS = {
     **{f"ancf-{n}": (lambda n=n: ElementBeamANCF(n)) for n in range(1, 11)},
     "patel-shabana": ElementBeamPatelShabana,
+    **{f"cubic-{n}": (lambda n=n: ElementBeamANCFCubic(n)) for n in (1, 2, 3, 6)},
 }
 
-__all__ = ["ELEMENTS", "ElementBeam", "ElementBeamANCF", "ElementBeamPatelShabana"]
+__all__ = ["ELEMENTS", "ElementBeam", "ElementBeamANCF", "ElementBeamANCFCubic",
+           "ElementBeamPatelShabana"]

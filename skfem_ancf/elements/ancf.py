@@ -72,7 +72,11 @@ class ElementBeamANCF(ElementBeam):
         x = np.zeros(1) if n == 1 else (
             np.array([-1.0, 1.0]) if n == 2 else POINT_FAMILIES[points](n))
         self.section_points = 0.5 * x
-        names = [f"r_Y{k}" for k in range(n)]
-        super().__init__(
-            SectionFunctions(np.linalg.inv(legendre.legvander(x, n - 1))), names,
-            [(y, 0, 1) for y in self.section_points], names)
+        names, functionals = self._coordinates()
+        super().__init__(SectionFunctions(np.linalg.inv(legendre.legvander(x, n - 1))), names,
+                         functionals, names[:n])
+
+    def _coordinates(self):
+        """Names of the section coordinates of a node, and what they are."""
+        return ([f"r_Y{k}" for k in range(len(self.section_points))],
+                [(float(y), 0, 1) for y in self.section_points])

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from skfem.element import DiscreteField, Element
 
+from ..errors import MeshError
 from ..reference import RefBeam, hermite, linear
 
 
@@ -25,12 +26,18 @@ class ElementBeam(Element):
         along X and Y that the coordinate is.
     axis_degree : int
         Polynomial degree along the axis.
+    sections : str
+        How section coordinates vary between the nodes: "linear", or "cubic" (Hermite, with slopes
+        along X as further coordinates).
+    strain_degree : int
+        Polynomial degree of the Green-Lagrange strain along a straight element.
     carries_shear_parabola : bool
         True if the section functions hold Y^3, so that no shear correction is wanted.
     """
 
     refdom = RefBeam
     axis_degree = 3
+    sections = "linear"
 
     def __init__(self, section, names, functionals, welded):
         self.section = section
@@ -41,12 +48,16 @@ class ElementBeam(Element):
         self.doflocs = np.array([[xi, 0.5 + f[0]] for xi in (0.0, 1.0) for f in self.functionals])
         # stock quadrature takes 2 maxdeg in each direction: exact for the energy, which is of
         # degree 8 along the axis and 4 N across the section
-        self.maxdeg = max(4, 2 * self.section.degree)
+        self.maxdeg = max(self.strain_degree, 2 * self.section.degree)
 
     @property
     def order(self):
         """Degree N of the section functions."""
         return self.section.degree
+
+    @property
+    def strain_degree(self):
+        return 4 if self.sections == "linear" else 6
 
     @property
     def carries_shear_parabola(self):
@@ -77,10 +88,14 @@ class ElementBeam(Element):
         if k < 2:
             values, slopes = (hermite(X[0], d)[2 * node + k] for d in (0, 1))
             return values, slopes, 0.0 * X[1], k
-        P, dP = self.section(X[1] - 0.5, k - 2)
-        a, da = (linear(X[0], d)[node] for d in (0, 1))
-        size = h ** self.functionals[k][2]
-        return size * a * P, size * da * P, size * a * dP, 0
+        _, slope, m = self.functionals[k]
+        P, dP = self.section(X[1] - 0.5, (k - 2) % self.section.number)
+        if self.sections == "cubic":
+            a, da = (hermite(X[0], d)[2 * node + slope] for d in (0, 1))
+        else:
+            a, da = (linear(X[0], d)[node] for d in (0, 1))
+        size = h**m
+        return size * a * P, size * da * P, size * a * dP, slope
 
     def gbasis(self, mapping, X, i, tind=None):
         mesh = mapping.mesh
@@ -91,21 +106,30 @@ class ElementBeam(Element):
         grad = scale * (invDF[0] * d_xi + invDF[1] * d_eta)
         return (DiscreteField(value=scale * value, grad=grad),)
 
-    def rigid(self, p_X, p_Y):
-        """The coordinates of a node in the stress-free state, less its position.
+    def rigid(self, mesh):
+        """The coordinates of the nodes in the stress-free state, less their positions.
 
         Parameters
         ----------
-        p_X, p_Y
-            Gradients of the stress-free position at the nodes, shape (2, n).
+        mesh
+            A MeshBeam whose ``sections`` are those of the element, unless it is straight.
 
         Returns
         -------
         ndarray
-            Shape (nodal_dofs, 2, n); the first row, for ``r``, is zero.
+            Shape (nodal_dofs, 2, nvertices); the first row, for ``r``, is zero.
+
+        Raises
+        ------
+        MeshError
+            If the mesh is curved and interpolates its sections in another way.
         """
-        gradient = {(0, 0): 0.0 * p_X, (1, 0): p_X, (0, 1): p_Y}
-        return np.array([gradient.get(f[1:], 0.0 * p_X) for f in self.functionals])
+        if mesh.sections != self.sections and not mesh.is_straight:
+            raise MeshError(f"the sections of {self!r} are {self.sections}, those of the curved "
+                            f"mesh {mesh.sections}: use mesh.with_sections({self.sections!r})")
+        zero = np.zeros(mesh.p.shape)
+        known = {(1, 0): mesh.p_X, (0, 1): mesh.p_Y, (1, 1): mesh.p_XY}
+        return np.array([known.get(f[1:], zero) for f in self.functionals])
 
     def __repr__(self):
         return f"<{type(self).__name__} of order {self.order}, coordinates {self.dofnames}>"

@@ -1,25 +1,39 @@
-"""Assumed strain: free of membrane and curvature-thickness locking, two points along the axis."""
+"""Assumed strain: free of membrane and curvature-thickness locking."""
 
 import numpy as np
 
+from ..materials import LinearLaw
 from ..quadrature import gauss
 from .base import Formulation, Term
+from .ecm import AXIS, split_moduli
 
 
 class Assumed(Formulation):
-    """eps_xx and eps_xy at two Gauss points along the axis, eps_yy interpolated from the nodes.
+    """Strain components sampled along the axis where the interpolation can make them vanish.
 
     A cubic axis cannot keep |r_X| constant while it bends, and sections that turn linearly get
-    thinner between two nodes that have turned: sampled where they are exact, neither is seen. One
-    spurious mode is left, equal r_X at both nodes with r at rest, and is held by
-    ``1/2 alpha E I / L |c|^2``, ``c = (A_1 r_X1 + A_2 r_X2) / 2 - (r_2 - r_1) / L``, where A_i
-    turns and scales the stress-free tangent onto the chord (the identity for a straight element),
-    so that c vanishes there, turns with the beam, and the term is objective and quadratic.
+    thinner between two nodes that have turned. Sampled as follows neither is seen, and the error
+    of a mesh does not grow with the slenderness:
+
+    * linear sections: eps_xx and eps_xy at two Gauss points, eps_yy at the nodes,
+    * cubic sections: eps_xx at two Gauss points, eps_xy and eps_yy at xi = 0, 1/2, 1, integrated
+      with three Gauss points,
+
+    and interpolated between. What the samples miss, equal slopes at both nodes while the nodes
+    rest, is held by ``1/2 k L |c|^2`` with ``c = (r_X1 + r_X2) / 2 - beta (r_2 - r_1) / L``, and
+    likewise for each pair ``r_Yk``, ``r_XYk`` of cubic sections. The complex number beta, 1 for a
+    straight element, makes c vanish in the stress-free state; c turns with the beam, so the term
+    is objective, quadratic, and its matrix constant. For linear sections k = E I / L^2; for cubic
+    sections k = 10 E I / l^2 for the axis, l the length of the beam, and E I / N for each section
+    coordinate, which keeps the fourth order.
+
+    Sections of order 1 cannot change their thickness linearly in Y. For them, and a law with
+    constant moduli, the Poisson coupling acts on the mean of the strain over the section.
 
     Parameters
     ----------
     alpha
-        Size of the stabilisation.
+        Factor on the stabilisation.
     """
 
     name = "assumed"
@@ -29,23 +43,56 @@ class Assumed(Formulation):
 
     def terms(self, element, material):
         _, section = self.full_rules(element)
+        if element.sections == "linear":
+            axis, samples = gauss(2), {"yy": (0.0, 1.0)}
+        else:
+            nodes = (0.0, 0.5, 1.0)
+            axis, samples = gauss(3), {"xx": tuple(gauss(2)[0]), "yy": nodes, "xy": nodes}
         law = material.law(material.shear_factor(element))
-        return [Term(law, gauss(2), section, {"yy": (0.0, 1.0)})]
+        if element.order > 1 or not isinstance(law, LinearLaw):
+            return [Term(law, axis, section, samples)]
+        uncoupled, coupling = split_moduli(self.name, material, element)
+        mean = (section[0], section[1][None])
+        return [Term(LinearLaw(uncoupled), axis, section, samples),
+                Term(LinearLaw(coupling), axis, AXIS, samples, mean)]
+
+    def stress(self, beam, strain, u, X, tind):
+        terms = self.terms(beam.element, beam.material)
+        if len(terms) == 1:
+            return terms[0].law.stress(strain)
+        eta, w = terms[0].section
+        mean = sum(wi * beam.strain(u, np.array([X[0], 0.0 * X[1] + y]), tind)
+                   for y, wi in zip(eta, w))
+        return terms[0].law.stress(strain) + terms[1].law.stress(mean)
 
     def stabilisation(self, mesh, element, material, width):
         same = mesh.is_straight and np.ptp(mesh.lengths) <= 1e-13 * np.max(mesh.lengths)
         tind = np.arange(1 if same else mesh.nelements)
-        L, nd = mesh.lengths[tind], 2 * element.nodal_dofs
-        left, right = mesh.t[:, tind]
-        chord = (mesh.p[:, right] - mesh.p[:, left]) / L
-        C = np.zeros((len(tind), 2, 2 * nd))
-        for node, at, sign in ((0, left, -1.0), (1, right, 1.0)):
-            t = mesh.p_X[:, at]
-            # a + i b = chord / tangent in the complex plane
-            a = np.sum(chord * t, axis=0) / np.sum(t * t, axis=0)
-            b = (chord[1] * t[0] - chord[0] * t[1]) / np.sum(t * t, axis=0)
-            A = np.array([[a, -b], [b, a]])
-            C[:, :, node * nd:node * nd + 2] -= sign * np.eye(2) / L[:, None, None]
-            C[:, :, node * nd + 2:node * nd + 4] += 0.5 * np.moveaxis(A, -1, 0)
-        k = self.alpha * material.E * width * mesh.height**3 / 12.0 / L
-        return k[:, None, None] * (C.transpose(0, 2, 1) @ C)
+        L, EI = mesh.lengths[tind], material.E * width * mesh.height**3 / 12.0
+        q = element.rigid(mesh)
+        q[0] = mesh.p
+        q = np.concatenate([q[:, :, end] for end in mesh.t[:, tind]])  # (2 nb, 2, ne)
+
+        nb = element.nodal_dofs
+        chord = (q[nb] - q[0]) / L
+
+        def held(k, slope, value=None):
+            """1/2 k L |c|^2 for the mean of a slope, less the difference of a value."""
+            c = np.zeros((len(tind), 2 * nb))
+            c[:, [slope, nb + slope]] = 0.5
+            if value is not None:
+                c[:, value], c[:, nb + value] = 1.0 / L, -1.0 / L
+            start = np.einsum("ek,kie->ie", c, q)
+            beta = (start[0] + 1j * start[1]) / (chord[0] + 1j * chord[1])
+            beta = np.array([[beta.real, -beta.imag], [beta.imag, beta.real]]).transpose(2, 0, 1)
+            C = np.einsum("ek,ij->eikj", c, np.eye(2))
+            C[:, :, 0] += beta / L[:, None, None]
+            C[:, :, nb] -= beta / L[:, None, None]
+            C = C.reshape(len(tind), 2, -1)
+            return (self.alpha * k * L)[:, None, None] * (C.transpose(0, 2, 1) @ C)
+
+        if element.sections == "linear":
+            return held(EI / L**2, 1)
+        N = element.section.number
+        total = held(10.0 * EI / np.sum(mesh.lengths) ** 2, 1)
+        return total + sum(held(EI / N, 2 + N + k, 2 + k) for k in range(N))

@@ -104,11 +104,10 @@ class Formulation:
     def full_rules(element):
         """Rules along the axis and across the section that integrate the energy exactly.
 
-        The strain is of degree 4 along the axis of a straight element and 2 N across the
-        section, the energy of St. Venant-Kirchhoff of twice those.
+        That is of twice the degree of the strain: ``element.strain_degree`` along the axis of a
+        straight element, and 2 N across the section, for St. Venant-Kirchhoff.
         """
-        strain_degree = 2 * (element.axis_degree - 1)
-        return gauss(strain_degree + 1), gauss(2 * element.order + 1)
+        return gauss(element.strain_degree + 1), gauss(2 * element.order + 1)
 
     def __repr__(self):
         return f"<formulation {self.name!r}>"

@@ -43,11 +43,15 @@ class Joint:
     equations : tuple of str
         What each equation holds.
     constant : bool
-        The derivative of Phi depends neither on u nor on t.
+        The derivative of Phi depends neither on u nor on t. Where it does, Phi is at most
+        quadratic in u: what :class:`~skfem_ancf.dynamics.EnergyMomentum` needs to be exact.
+    moving : bool
+        Phi depends on t.
     """
 
     equations = ()
     constant = True
+    moving = False
     name = None
 
     def bind(self, scene):

@@ -19,6 +19,7 @@ class PrescribedPosition(Joint):
     """
 
     equations = ("force along x", "force along y")
+    moving = True
 
     def __init__(self, at, r, beam=None, name=None):
         self.at, self.motion, self.beam, self.name = at, r, beam, name
@@ -50,6 +51,7 @@ class PrescribedAngle(Joint):
 
     equations = ("moment",)
     constant = False
+    moving = True
 
     def __init__(self, at, angle, beam=None, name=None):
         self.at, self.angle, self.beam, self.name = at, angle, beam, name

@@ -1,0 +1,28 @@
+"""ANCF beam elements whose sections vary cubically along the axis: fourth order."""
+
+from .ancf import ElementBeamANCF
+
+
+class ElementBeamANCFCubic(ElementBeamANCF):
+    """As :class:`ElementBeamANCF`, with Hermite functions along X for the section slopes too.
+
+    The coordinates of a node are ``r``, ``r_X``, the section slopes ``r_Y0`` ... and their
+    derivatives along the axis ``r_XY0`` ...: the position is the full product of cubic
+    polynomials in X and polynomials of degree N in Y. With the formulation "assumed" the tip of a
+    bent beam converges at fourth order, at any slenderness.
+
+    Parameters and errors are those of :class:`ElementBeamANCF`.
+
+    Examples
+    --------
+    >>> from skfem_ancf import ElementBeamANCFCubic
+    >>> ElementBeamANCFCubic(2).dofnames
+    ['r', 'r_X', 'r_Y0', 'r_Y1', 'r_XY0', 'r_XY1']
+    """
+
+    sections = "cubic"
+
+    def _coordinates(self):
+        names, functionals = super()._coordinates()
+        return (names + [name.replace("r_Y", "r_XY") for name in names],
+                functionals + [(eta, 1, m) for eta, _, m in functionals])

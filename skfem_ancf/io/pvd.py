@@ -1,0 +1,91 @@
+"""A series of states in time for ParaView."""
+
+import logging
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+from ..errors import InputError, require_finite_scalar
+from .vtu import replacing, save_vtu
+
+logger = logging.getLogger(__name__)
+
+
+class PvdWriter:
+    """Writes one .vtu a frame, and a .pvd that lists them with their times.
+
+    Both files are complete after every :meth:`add`, so ParaView can follow a run, and what was
+    written before an interruption can be opened. Frames are called ``stem_00000.vtu``, and so on,
+    and lie beside the .pvd.
+
+    Parameters
+    ----------
+    filename
+        Path that ends with .pvd. Missing folders are made; an older file is replaced by the first
+        frame.
+    **options
+        Those of :func:`~skfem_ancf.io.vtu.save_vtu`.
+
+    Raises
+    ------
+    InputError
+        If the file name does not end with .pvd.
+
+    Examples
+    --------
+    >>> import numpy as np, tempfile
+    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+    >>> from skfem_ancf.io import PvdWriter
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamANCF(2),
+    ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     with PvdWriter(f"{folder}/load.pvd") as series:
+    ...         for t in (1.0, 2.0):
+    ...             scene = Scene(beam).clamp("left").point_force((0, -t), at=(1, 0))
+    ...             print(series.add(scene.solve_static(), t).name)
+    load_00000.vtu
+    load_00001.vtu
+    """
+
+    def __init__(self, filename, **options):
+        self.path = Path(filename)
+        if self.path.suffix.lower() != ".pvd":
+            raise InputError(f"the file name must end with .pvd, got {str(filename)!r}")
+        self.options = options
+        self.frames = []  # (time, name of the file)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.frames:
+            logger.info("wrote %s: %d frames", self.path, len(self.frames))
+
+    def add(self, state, t):
+        """Write a frame.
+
+        Parameters
+        ----------
+        state
+            A State, or anything with its ``beams`` and ``u_of``.
+        t
+            Its time, later than that of the frame before.
+
+        Returns
+        -------
+        pathlib.Path
+            The frame's file.
+        """
+        t = require_finite_scalar("t", t)
+        if self.frames and t <= self.frames[-1][0]:
+            raise InputError(f"the times of the frames must increase: {t!r} after "
+                             f"{self.frames[-1][0]!r}")
+        name = f"{self.path.stem}_{len(self.frames):05d}.vtu"
+        frame = save_vtu(state, self.path.with_name(name), **self.options)
+        self.frames.append((t, name))
+        rows = [f'<DataSet timestep="{time!r}" part="0" file={quoteattr(file)}/>'
+                for time, file in self.frames]
+        with replacing(self.path) as temporary:
+            temporary.write_text("\n".join(
+                ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">',
+                 "<Collection>", *rows, "</Collection>", "</VTKFile>", ""]), encoding="utf-8")
+        return frame

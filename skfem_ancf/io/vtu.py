@@ -1,0 +1,262 @@
+"""The deformed body with its strains and stresses, as points and cells, and as a .vtu file."""
+
+import logging
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..quadrature import tensor
+
+logger = logging.getLogger(__name__)
+
+#: What a file may end with: formats that meshio writes as one file with data on points.
+SUFFIXES = (".vtu", ".vtk")
+
+#: VTK evaluates Lagrange cells up to this degree.
+MAX_LAGRANGE_DEGREE = 10
+
+COMPONENTS = ("xx", "yy", "xy")
+
+
+class BodyFields(NamedTuple):
+    """The body of a state on points, in the form that meshio takes.
+
+    Attributes
+    ----------
+    points
+        Positions, shape (n, 3); elements do not share points.
+    cells
+        For each beam its cell type and its cells, as rows of point numbers.
+    point_data
+        Fields by name, shape (n,) or (n, 3).
+    cell_data
+        ``beam`` and ``element``: the numbers of both, one array for each beam.
+    """
+
+    points: np.ndarray
+    cells: list
+    point_data: dict
+    cell_data: dict
+
+
+def sample(state, beam, X):
+    """The fields of one beam at reference points.
+
+    Parameters
+    ----------
+    state
+        A :class:`~skfem_ancf.results.State`, or anything with its ``u_of``.
+    beam
+        One of its beams.
+    X
+        Reference points (xi, eta) in [0, 1], shape (2, npoints).
+
+    Returns
+    -------
+    dict
+        Arrays of shape (nelements, npoints); ``x`` (stress-free positions) and ``displacement``
+        have shape (2, nelements, npoints). See :func:`save_vtu` for the names.
+    """
+    u = state.u_of(beam)
+    out = {"x": beam.mesh.mapping().F(X), "displacement": beam.displacements(u, X)}
+    strain, S = beam.strain(u, X), beam.stress(u, X)
+    H, frame = beam.gradients(u, X)
+    F = frame + H
+    with np.errstate(invalid="ignore", divide="ignore"):  # NaN where no such state can exist
+        J = (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) * beam.material.thickness_stretch(strain)
+        sigma = np.einsum("iJ...,JK...,jK...->ij...", F, np.array([[S[0], S[2]], [S[2], S[1]]]),
+                          F, optimize=True) / J
+    for k, (i, j) in enumerate(((0, 0), (1, 1), (0, 1))):
+        out["eps_" + COMPONENTS[k]] = strain[k] if i == j else 0.5 * strain[k]
+        out["S_" + COMPONENTS[k]] = S[k]
+        out["sigma_" + COMPONENTS[k]] = sigma[i, j]
+    return out
+
+
+def body_fields(state, subdivide=(8, 4), lagrange=False, undeformed=False):
+    """The body of a state on points.
+
+    Parameters are those of :func:`save_vtu`.
+
+    Returns
+    -------
+    BodyFields
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+    >>> from skfem_ancf.io import body_fields
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamANCF(2),
+    ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
+    >>> state = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).solve_static()
+    >>> body = body_fields(state, subdivide=(8, 4))
+    >>> body.points.shape, body.cells[0][0], body.cells[0][1].shape  # 4 elements, 9 x 5 points
+    ((180, 3), 'quad', (128, 4))
+    >>> sorted(body.point_data)[:4]
+    ['S_xx', 'S_xy', 'S_yy', 'displacement']
+    """
+    m, n = _subdivision(subdivide)
+    first, points, cells, data = 0, [], [], {}
+    numbers = {"beam": [], "element": []}
+    for b, beam in enumerate(state.beams):
+        if lagrange:
+            X, local = lagrange_cell(beam)
+        else:
+            X, local = grid(m, n), quads(m, n)
+        fields = sample(state, beam, X)
+        x, u = fields.pop("x"), fields.pop("displacement")
+        points.append(_rows(x if undeformed else x + u))
+        data.setdefault("displacement", []).append(_rows(u))
+        for name, value in fields.items():
+            data.setdefault(name, []).append(value.ravel())
+        ne, npoints = beam.mesh.nelements, X.shape[1]
+        start = first + npoints * np.arange(ne)
+        cells.append(("VTK_LAGRANGE_QUADRILATERAL" if lagrange else "quad",
+                      (start[:, None, None] + local).reshape(-1, local.shape[1])))
+        numbers["beam"].append(np.full(ne * len(local), b))
+        numbers["element"].append(np.repeat(np.arange(ne), len(local)))
+        first += ne * npoints
+    return BodyFields(np.concatenate(points), cells,
+                      {name: np.concatenate(v) for name, v in data.items()}, numbers)
+
+
+def save_vtu(state, filename, subdivide=(8, 4), lagrange=False, undeformed=False):
+    """Write the deformed body of a state for ParaView.
+
+    All beams go into one file. Points belong to one element each, since strains and stresses
+    jump between elements. The file replaces an older one of the same name only once it is
+    complete.
+
+    =============================  ==========================================================
+    on points                      meaning
+    =============================  ==========================================================
+    displacement                   from the stress-free state, 3 components, the last zero
+    eps_xx, eps_yy, eps_xy         Green-Lagrange strain in the beam's own frame: x along the
+                                   axis, y across the section of the stress-free beam
+    S_xx, S_yy, S_xy               second Piola-Kirchhoff stress in the same frame
+    sigma_xx, sigma_yy, sigma_xy   Cauchy stress F S F^T / J along the global axes; J holds the
+                                   change of thickness in plane stress. NaN where the material
+                                   has no thickness left.
+    =============================  ==========================================================
+
+    ``beam`` and ``element``, on cells, are the numbers of both.
+
+    Parameters
+    ----------
+    state
+        A :class:`~skfem_ancf.results.State`, or anything with its ``beams`` and ``u_of``.
+    filename
+        Path that ends with .vtu (or .vtk). Missing folders are made.
+    subdivide
+        Number of straight quads along and across each element.
+    lagrange
+        Write each element as one VTK_LAGRANGE_QUADRILATERAL of degree max(3, N), the exact
+        deformed geometry, in place of straight quads.
+    undeformed
+        Put the points at their stress-free places. ParaView's filter "Warp By Vector" then moves
+        them by any multiple of ``displacement``.
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If the file name ends otherwise, ``subdivide`` is not two positive integers, or a Lagrange
+        cell would exceed degree 10, the largest that VTK evaluates.
+
+    Examples
+    --------
+    >>> import numpy as np, tempfile
+    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamANCF(2),
+    ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
+    >>> state = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).solve_static()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     print(state.save(f"{folder}/beam.vtu").name)
+    beam.vtu
+    """
+    import meshio
+
+    path = Path(filename)
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"the file name must end with one of {', '.join(SUFFIXES)}, got "
+                         f"{str(filename)!r}")
+    body = body_fields(state, subdivide, lagrange, undeformed)
+    mesh = meshio.Mesh(body.points, body.cells, body.point_data, body.cell_data)
+    with replacing(path) as temporary:
+        meshio.write(temporary, mesh)
+    logger.info("wrote %s: %d points", path, len(body.points))
+    return path
+
+
+class replacing:  # noqa: N801
+    """A context with a temporary path beside ``path``, which replaces ``path`` on success."""
+
+    def __init__(self, path):
+        self.path = Path(path)
+        self.temporary = self.path.with_name(f".{self.path.stem}.{os.getpid()}{self.path.suffix}")
+
+    def __enter__(self):
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        return self.temporary
+
+    def __exit__(self, error, *_):
+        if error is None:
+            os.replace(self.temporary, self.path)
+        else:
+            self.temporary.unlink(missing_ok=True)
+
+
+def _subdivision(subdivide):
+    try:
+        m, n = subdivide
+    except (TypeError, ValueError):
+        m = n = None
+    if not all(isinstance(k, (int, np.integer)) and not isinstance(k, bool) and k >= 1
+               for k in (m, n)):
+        raise InputError("subdivide must be two positive integers, along and across an element, "
+                         f"got {subdivide!r}")
+    return int(m), int(n)
+
+
+def _rows(x):
+    """Vectors (2, nelements, npoints) as rows with a third component of zero."""
+    x = x.reshape(2, -1).T
+    return np.hstack([x, np.zeros((len(x), 1))])
+
+
+def grid(m, n):
+    """A grid of (m + 1) (n + 1) points of the reference cell, eta fastest; shape (2, npoints)."""
+    xi, eta = np.linspace(0, 1, m + 1), np.linspace(0, 1, n + 1)
+    return tensor((xi, xi), (eta, eta))[0]
+
+
+def quads(m, n):
+    """The m n quads of :func:`grid` as rows of 4 points, counterclockwise."""
+    k = np.arange((m + 1) * (n + 1)).reshape(m + 1, n + 1)
+    return np.stack([k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]], -1).reshape(-1, 4)
+
+
+def lagrange_cell(beam):
+    """Points of the Lagrange cell that holds an element exactly, and their order in VTK.
+
+    VTK numbers the corners, then the inner points of the edges bottom, right, top, left (in the
+    directions of rising xi and eta), then the inside with xi fastest.
+    """
+    p = max(beam.element.axis_degree, beam.element.order)
+    if p > MAX_LAGRANGE_DEGREE:
+        raise InputError(f"VTK evaluates Lagrange cells up to degree {MAX_LAGRANGE_DEGREE}, this "
+                         f"element has {p}: use subdivide= instead of lagrange=True")
+    k = np.arange((p + 1) ** 2).reshape(p + 1, p + 1)  # [xi, eta]
+    inner = slice(1, -1)
+    order = np.concatenate([
+        [k[0, 0], k[-1, 0], k[-1, -1], k[0, -1]],
+        k[inner, 0], k[-1, inner], k[inner, -1], k[0, inner], k[inner, inner].T.ravel()])
+    return grid(p, p), order[None]

@@ -1,0 +1,488 @@
+"""Energy, force, tangent, mass and loads: three implementations, derivatives, rigid motion."""
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from skfem import Basis, BilinearForm, Functional, LinearForm, asm
+from skfem.helpers import ddot, dot
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamPatelShabana, MeshBeam, NeoHookean, Scene,
+                        StVenantKirchhoff, forms, reference_coordinates)
+from skfem_ancf.elements import ELEMENTS
+from skfem_ancf.formulations import FORMULATIONS
+from skfem_ancf.loads import DeadLoad, EndMoment, Pressure
+
+STEP = 1e-30
+BODIES = {
+    "straight": lambda: MeshBeam.init_line([0.0, 0.5, 1.0, 1.5], 0.2),
+    "unequal": lambda: MeshBeam.init_line([-1.0, -0.7, 0.3, 1.1], 0.3),
+    "inclined": lambda: MeshBeam.init_line([0.0, 0.4, 1.1], 0.25, origin=(3.0, -2.0), angle=2.3),
+    "arc": lambda: MeshBeam.init_curve(lambda s: np.array([np.cos(s), np.sin(s)]),
+                                       np.linspace(0.0, np.pi / 2, 4), 0.3),
+}
+SHAPES = {"1": ElementBeamANCF(1), "2": ElementBeamANCF(2), "3": ElementBeamANCF(3),
+          "5": ElementBeamANCF(5), "ps": ElementBeamPatelShabana()}
+LAWS = {"svk": StVenantKirchhoff(2.0, 0.3, density=1.7),
+        "neo": NeoHookean(2.0, 0.3, density=1.7, plane="strain")}
+WIDTH = 0.4
+
+
+@lru_cache(None)
+def make(body, element="3", law="svk", formulation="continuum"):
+    shape = SHAPES[element] if element in SHAPES else ELEMENTS[element]()
+    return Beam(BODIES[body](), shape, LAWS[law], WIDTH, formulation)
+
+
+def deformed(beam, size=0.05, seed=0):
+    """A displacement with gradients of about ``size``, the same field for every element."""
+    rng = np.random.default_rng(seed)
+    u = rng.uniform(-1, 1, (beam.N // beam.nd, beam.nd // 2, 2))
+    scale = np.array([beam.mesh.lengths.min()] + [
+        beam.mesh.height ** min(0, 1 - f[2]) for f in beam.element.functionals[1:]])
+    return (size * u * scale[:, None]).ravel()
+
+
+def rotation(angle):
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def turn(q, angle):
+    return (q.reshape(-1, 2) @ rotation(angle).T).ravel()
+
+
+def moved(beam, u, angle, shift):
+    """The displacement after the deformed state ``u`` is turned and shifted."""
+    q = turn(beam.q0 + u, angle).reshape(-1, beam.nd // 2, 2)
+    q[:, 0] += shift
+    return q.ravel() - beam.q0
+
+
+def dense(beam, tangents):
+    """Element tangents of the kernel as one dense matrix."""
+    K = np.zeros((beam.N, beam.N))
+    for k, Ke in enumerate(tangents):
+        i = beam.mesh.t[0, k] * beam.nd + np.arange(2 * beam.nd)
+        K[np.ix_(i, i)] += Ke
+    return K
+
+
+def relative(a, b):
+    return np.abs(a - b).max() / np.abs(b).max()
+
+
+# three implementations
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("element", SHAPES)
+@pytest.mark.parametrize("body", BODIES)
+def test_batched_textbook_and_fused_agree(body, element, law):
+    beam = make(body, element, law)
+    u = deformed(beam)
+    args = (beam.material, WIDTH, beam.material.shear_factor(beam.element))
+    q = dict(r=beam.q0 + u)
+    f = asm(forms.internal_force(*args), beam.basis, **q)
+    K = asm(forms.tangent(*args), beam.basis, **q).toarray()
+    assert relative(asm(forms.textbook.internal_force(*args), beam.basis, **q), f) < 2e-13
+    assert relative(asm(forms.textbook.tangent(*args), beam.basis, **q).toarray(), K) < 2e-13
+    assert relative(beam.kernel.force(u), f) < 2e-13
+    assert relative(dense(beam, beam.kernel.tangents(u)), K) < 2e-13
+    energy = asm(forms.energy(*args), beam.basis, **q)
+    assert abs(beam.kernel.energy(u) - energy) < 1e-13 * energy
+    assert_allclose(K, K.T, rtol=0, atol=1e-13 * np.abs(K).max())
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_quadrature_of_a_straight_beam_is_exact(law):
+    """The formulation's rule against a finer one; exact for St. Venant-Kirchhoff."""
+    beam = make("unequal", "3", law)
+    u = deformed(beam)
+    fine = Basis(beam.mesh, beam.vector_element, intorder=24)
+    f = asm(forms.internal_force(beam.material, WIDTH), fine, r=beam.q0 + u)
+    assert relative(beam.kernel.force(u), f) < (1e-13 if law == "svk" else 1e-4)
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_stock_basis_and_stock_assembly(body):
+    """The user's own forms beside the package's, on a Basis with scikit-fem's own quadrature."""
+    beam = make(body)
+    basis = Basis(beam.mesh, beam.vector_element)
+    q = reference_coordinates(basis) + deformed(beam)
+    assert_allclose(reference_coordinates(basis), beam.q0)
+
+    @BilinearForm
+    def bedding(u, v, w):
+        return 3.0 * dot(u, v)
+
+    @LinearForm
+    def bedding_force(v, w):
+        return 3.0 * dot(w.r, v)
+
+    @BilinearForm
+    def laplace(u, v, w):
+        return ddot(u.grad, v.grad)
+
+    K = asm(forms.tangent(beam.material, WIDTH), basis, r=q)
+    B = asm(bedding, basis)
+    assert B.shape == K.shape == (beam.N, beam.N)
+    assert np.linalg.eigvalsh((K + B).toarray())[0] > 0 > np.linalg.eigvalsh(K.toarray())[0]
+    assert_allclose(asm(bedding_force, basis, r=q), B @ q, atol=1e-13)
+    assert_allclose(B.toarray(), 3.0 / 1.7 / WIDTH * asm(forms.mass(1.7, WIDTH), basis).toarray(),
+                    atol=1e-15)
+    # int grad v : 1 : grad u is a ModuliForm with A = identity
+    identity = np.einsum("ik,jl->ijkl", np.eye(2), np.eye(2))[..., None, None]
+
+    @forms.ModuliForm
+    def moduli(w):
+        return identity * np.ones_like(w.x[0])
+
+    @forms.StressForm
+    def stress(w):
+        return w.r.grad
+
+    A = asm(laplace, basis)
+    assert abs(A - asm(moduli, basis)).max() < 1e-13 * abs(A).max()
+    assert_allclose(asm(stress, basis, r=q), A @ q, atol=1e-13 * abs(A).max())
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_forms_are_derivatives_of_each_other(law):
+    """Complex step through scikit-fem's own assembly of the forms."""
+    beam = make("arc", "2", law)
+    q, args = beam.q0 + deformed(beam), (beam.material, WIDTH, 0.85)
+    f = asm(forms.internal_force(*args), beam.basis, r=q)
+    K = asm(forms.tangent(*args), beam.basis, r=q).toarray()
+    d = np.random.default_rng(1).uniform(-1, 1, beam.N)
+    # stock interpolation of complex coordinates, real and imaginary part
+    field = beam.basis.interpolate(q)
+    change = beam.basis.interpolate(d)
+    F = field.grad + 1j * STEP * change.grad
+    frame = beam.mesh.mapping().frame(beam.basis.X)
+    eps = forms.green_lagrange(np.einsum("ij...,jJ...->iJ...", F, frame))
+    W = WIDTH * np.sum(beam.material.law(0.85).energy(eps) * beam.basis.dx)
+    assert abs(W.imag / STEP - f @ d) < 1e-12 * np.abs(f).max()
+    h = 1e-6
+    fp, fm = (asm(forms.internal_force(*args), beam.basis, r=q + s * h * d) for s in (1, -1))
+    assert relative((fp - fm) / (2 * h), K @ d) < 1e-8
+
+
+# derivatives, for every formulation
+
+CASES = [(f, e) for f in FORMULATIONS for e in SHAPES]
+
+
+@pytest.mark.parametrize("body", ["straight", "unequal", "arc"])
+@pytest.mark.parametrize("formulation, element", CASES)
+def test_force_and_tangent_are_derivatives(formulation, element, body):
+    beam = make(body, element, "svk", formulation)
+    u, n = deformed(beam), beam.N
+    f, K = beam.kernel.force(u), dense(beam, beam.kernel.tangents(u))
+    steps = u + 1j * STEP * np.eye(n)
+    df = np.imag([beam.kernel.energy(v) for v in steps]) / STEP
+    dK = np.imag([beam.kernel.force(v) for v in steps]).T / STEP
+    assert relative(df, f) < 1e-12
+    assert relative(dK, K) < 1e-12
+    assert relative(K.T, K) < 1e-14
+
+
+@pytest.mark.parametrize("formulation", ["continuum", "assumed"])
+def test_derivatives_of_a_nonlinear_law(formulation):
+    beam = make("arc", "2", "neo", formulation)
+    u = deformed(beam)
+    f, K = beam.kernel.force(u), dense(beam, beam.kernel.tangents(u))
+    steps = u + 1j * STEP * np.eye(beam.N)
+    assert relative(np.imag([beam.kernel.energy(v) for v in steps]) / STEP, f) < 1e-12
+    assert relative(np.imag([beam.kernel.force(v) for v in steps]).T / STEP, K) < 1e-12
+
+
+# rigid motion and objectivity
+
+MOTIONS = dict(angle=st.floats(-20.0, 20.0),
+               shift=st.tuples(st.floats(-10.0, 10.0), st.floats(-10.0, 10.0)))
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@settings(max_examples=5, deadline=None)
+@given(**MOTIONS)
+def test_rigid_motion_costs_nothing(formulation, element, angle, shift):
+    for body in ("unequal", "arc"):
+        beam = make(body, element, "svk", formulation)
+        u = moved(beam, 0.0, angle, np.array(shift))
+        f, scale = beam.kernel.force(u), np.abs(beam.kernel.tangents(0 * u)).max()
+        assert np.abs(f).max() < 1e-14 * scale * (1 + np.abs(u).max())
+        # a stabilisation u^T K u cancels less well than the square of a strain
+        floor = 1e-26 if beam.kernel.constant is None else 1e-16 * scale * (1 + np.abs(u).max()) ** 2
+        assert abs(beam.kernel.energy(u)) < floor
+        X = np.array([[0.0, 0.3, 1.0, 0.5], [0.0, 0.8, 1.0, 0.5]])
+        assert np.abs(beam.strain(u, X)).max() < 1e-12
+
+
+@pytest.mark.parametrize("element", SHAPES)
+@pytest.mark.parametrize("body", BODIES)
+def test_rigid_motion_in_the_forms(body, element):
+    beam = make(body, element)
+    q = beam.q0 + moved(beam, 0.0, 2.0, np.array([3.0, -1.0]))
+    assert np.abs(asm(forms.internal_force(beam.material, WIDTH), beam.basis, r=q)).max() < 1e-13
+    assert abs(asm(forms.energy(beam.material, WIDTH), beam.basis, r=q)) < 1e-26
+
+
+@pytest.mark.parametrize("element", SHAPES)
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@settings(max_examples=5, deadline=None)
+@given(**MOTIONS)
+def test_objectivity(formulation, element, angle, shift):
+    """Turning a deformed state turns its force and keeps its energy, strain and stiffness."""
+    X = np.array([[0.1, 0.9], [0.2, 1.0]])
+    for body in ("inclined", "arc"):
+        beam = make(body, element, "svk", formulation)
+        u = deformed(beam)
+        v = moved(beam, u, angle, np.array(shift))
+        f, W = beam.kernel.force(u), beam.kernel.energy(u)
+        assert relative(beam.kernel.force(v), turn(f, angle)) < 1e-11
+        assert abs(beam.kernel.energy(v) - W) < 1e-11 * W
+        assert_allclose(beam.strain(v, X), beam.strain(u, X), atol=1e-12)
+        K, Kv = (dense(beam, beam.kernel.tangents(w)) for w in (u, v))
+        T = np.kron(np.eye(beam.N // 2), rotation(angle))
+        assert relative(Kv, T @ K @ T.T) < 1e-11
+        # the force is in balance whatever the state
+        q = (beam.q0 + u).reshape(-1, 2)
+        g = f.reshape(-1, 2)
+        size = np.abs(g).sum() * np.abs(q).max()
+        assert np.abs(f.reshape(-1, beam.nd // 2, 2)[:, 0].sum(axis=0)).max() < 1e-13 * size
+        assert abs(np.sum(q[:, 0] * g[:, 1] - q[:, 1] * g[:, 0])) < 1e-13 * size
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("element", SHAPES)
+@pytest.mark.parametrize("body", ["straight", "arc"])
+def test_three_zero_modes(body, element, formulation):
+    """The stress-free tangent is positive but for the rigid motions."""
+    beam = make(body, element, "svk", formulation)
+    K = dense(beam, beam.kernel.tangents(np.zeros(beam.N)))
+    M = beam.mass().toarray()
+    C = np.linalg.inv(np.linalg.cholesky(M))
+    values = np.linalg.eigvalsh(C @ K @ C.T)
+    assert np.abs(values[:3]).max() < 1e-9 * values[3] + 1e-13 * values[-1]
+    assert values[3] > 1e-3  # omega^2 of the first bending mode, E = 2
+    assert np.abs(K @ beam.rigid_motions()).max() < 1e-13 * np.abs(K).max()
+
+
+# mass and dead loads
+
+@pytest.mark.parametrize("element", SHAPES)
+@pytest.mark.parametrize("body", BODIES)
+def test_mass(body, element):
+    beam = make(body, element)
+    M, mesh = beam.mass().toarray(), beam.mesh
+    T = beam.rigid_motions()
+    fine = Basis(mesh, beam.vector_element, intorder=20)
+    assert relative(M, asm(forms.mass(1.7, WIDTH), fine).toarray()) < 1e-13
+    assert relative(M.T, M) < 1e-15
+    assert np.linalg.eigvalsh(M)[0] > 0
+    # momentum and rotation about the origin of the beam
+    x = np.asarray(fine.global_coordinates()) - beam.origin[:, None, None]
+    m, J = (1.7 * WIDTH * np.sum(value * fine.dx) for value in (1.0, x[0] ** 2 + x[1] ** 2))
+    moments = 1.7 * WIDTH * np.sum(x * fine.dx, axis=(1, 2))
+    assert_allclose(T.T @ M @ T, [[m, 0, -moments[1]], [0, m, moments[0]],
+                                  [-moments[1], moments[0], J]], atol=1e-13 * m)
+    assert abs(beam.total_mass - m) < 1e-13 * m
+    if mesh.is_straight:
+        h, L = mesh.height, mesh.lengths.sum()
+        assert abs(m - 1.7 * WIDTH * h * L) < 1e-14
+        about_middle = J - (moments @ moments) / m
+        assert abs(about_middle - 1.7 * WIDTH * (h * L**3 + h**3 * L) / 12) < 1e-13
+
+
+def test_mass_of_an_arc_converges():
+    """Sections that turn linearly between the nodes are a little thinner there: second order."""
+    mesh = BODIES["arc"]()
+    m = [Beam(mesh.refined(k), SHAPES["1"], LAWS["svk"], WIDTH).total_mass for k in (2, 3, 4)]
+    error = 1 - np.array(m) / (1.7 * WIDTH * 0.3 * np.pi / 2)
+    assert 0 < error[2] < 1e-4 and np.all(error[:-1] / error[1:] > 3.9)
+
+
+@pytest.mark.parametrize("element", SHAPES)
+@pytest.mark.parametrize("body", BODIES)
+def test_gravity(body, element):
+    beam, g = make(body, element), np.array([1.3, -9.81])
+    f = asm(forms.gravity(1.7, g, WIDTH), beam.exact_basis())
+    assert_allclose(beam.rigid_motions()[:, :2].T @ f, beam.total_mass * g, rtol=1e-13)
+    uniform = np.zeros((beam.N // beam.nd, beam.nd // 2, 2))
+    uniform[:, 0] = g
+    assert_allclose(f, beam.mass() @ uniform.ravel(), atol=1e-13)
+    # by the scene, and as the user's own form
+    own = LinearForm(lambda v, w: 1.7 * WIDTH * (g[0] * v[0] + g[1] * v[1]))
+    for scene in (Scene(beam).gravity(g), Scene(beam).load(own)):
+        assert_allclose(scene.loads[0].force(None), f, atol=1e-14)
+    u = deformed(beam)
+    assert abs(scene.loads[0].potential(u) + f @ u) < 1e-14
+
+
+def test_traction():
+    beam = make("unequal", "3")  # x from -1 to 1.1, h = 0.3
+    T = beam.rigid_motions()
+    for name, length, arm in (("top", 2.1, (0, 0.15)), ("bottom", 2.1, (0, -0.15)),
+                              ("right", 0.3, (1.05, 0)), ("left", 0.3, (-1.05, 0))):
+        t = np.array([0.7, -0.2])
+        f = asm(forms.traction(t, WIDTH), beam.facet_basis(name))
+        middle = np.array([0.05, 0.0]) + arm - beam.origin
+        force = t * WIDTH * length
+        assert_allclose(T.T @ f, [*force, middle[0] * force[1] - middle[1] * force[0]], atol=1e-14)
+        assert_allclose(Scene(beam).traction(name, t).loads[0].vector, f, atol=1e-15)
+    # a traction that varies: resultant and first moment of sin over the top
+    f = Scene(beam).traction("top", lambda x: np.array([0 * x[0], np.sin(3 * x[0])])).loads[0].vector
+    assert abs(T[:, 1] @ f - WIDTH * (np.cos(-3.0) - np.cos(3.3)) / 3) < 1e-9
+
+
+def test_point_force():
+    beam = make("arc", "3")
+    r = np.array([np.cos(0.5), np.sin(0.5)]) * 1.1
+    force = np.array([0.3, -2.0])
+    f = Scene(beam).point_force(force, at=r).loads[0].vector
+    x = r - beam.origin
+    assert_allclose(beam.rigid_motions().T @ f, [*force, x[0] * force[1] - x[1] * force[0]],
+                    atol=1e-12)
+
+
+# follower loads
+
+ENDS = ["left", "right", "top", "bottom"]
+
+
+@pytest.mark.parametrize("element", SHAPES)
+@pytest.mark.parametrize("body", BODIES)
+def test_pressure_on_a_closed_surface(body, element):
+    """Its force is minus p times the derivative of the deformed area; it has no resultant."""
+    beam, p = make(body, element), 0.7
+    facets = np.concatenate([beam.mesh.boundaries[name] for name in ENDS])
+    load = Pressure(beam, facets, p)
+    u = deformed(beam, 0.1)
+    f = load.force(u)
+
+    X, W = beam.basis.X, beam.basis.dx
+
+    def area(u):
+        H, frame = beam.gradients(u, X)
+        F = H + frame
+        return WIDTH * np.sum((F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) * W)
+
+    h = 1e-6  # the area is quadratic in u: central differences are exact up to round-off
+    gradient = np.array([(area(u + h * e) - area(u - h * e)) / (2 * h) for e in np.eye(beam.N)])
+    assert np.abs(f + p * gradient).max() < 1e-9
+    assert np.abs(beam.rigid_motions()[:, :2].T @ f).max() < 1e-14
+    q, g = (beam.q0 + u).reshape(-1, 2), f.reshape(-1, 2)
+    assert abs(np.sum(q[:, 0] * g[:, 1] - q[:, 1] * g[:, 0])) < 1e-13
+
+
+@pytest.mark.parametrize("boundary", ENDS)
+@pytest.mark.parametrize("body", BODIES)
+def test_pressure_on_one_surface(body, boundary):
+    """The resultant is p b times the deformed chord, turned; the derivative is exact."""
+    beam, p = make(body, "3"), 0.7
+    load = Pressure(beam, boundary, p)
+    u = deformed(beam, 0.1)
+    # the surface from its start to its end with the body on its left
+    corners = {"bottom": (0, 0, 1, 0), "right": (1, 0, 1, 1), "top": (1, 1, 0, 1),
+               "left": (0, 1, 0, 0)}[boundary]
+    last = beam.mesh.nelements - 1
+    a, b = (beam.mesh.mapping().F(X, e) + beam.displacements(u, X, e) for X, e in (
+        (np.array([[c[0]], [c[1]]], dtype=float), np.array([last if c[0] else 0]))
+        for c in (corners[:2], corners[2:])))
+    along = (b - a)[:, 0, 0]
+    force = beam.rigid_motions()[:, :2].T @ load.force(u)
+    assert_allclose(force, -p * WIDTH * np.array([along[1], -along[0]]), atol=1e-14)
+    i, j, v = load.stiffness(u)
+    d = np.random.default_rng(3).uniform(-1, 1, beam.N)
+    change = np.zeros(beam.N)
+    np.add.at(change, i, v * d[j])
+    assert_allclose(load.force(u + d) - load.force(u), change, atol=1e-13)
+    # follows the body
+    w = moved(beam, u, 1.1, np.array([5.0, 4.0]))
+    assert_allclose(load.force(w), turn(load.force(u), 1.1), atol=1e-13)
+
+
+def test_positive_pressure_pushes():
+    for name, sign in (("top", (0, -1)), ("bottom", (0, 1)), ("left", (1, 0)), ("right", (-1, 0))):
+        beam = make("straight")
+        f = beam.rigid_motions()[:, :2].T @ Pressure(beam, name, 2.0).force(np.zeros(beam.N))
+        size = 2.0 * WIDTH * (1.5 if sign[0] == 0 else 0.2)
+        assert_allclose(f, size * np.array(sign), atol=1e-14)
+
+
+@pytest.mark.parametrize("end", ["left", "right"])
+@pytest.mark.parametrize("element", SHAPES)
+@pytest.mark.parametrize("body", BODIES)
+def test_end_moment(body, element, end):
+    beam, M = make(body, element), 1.3
+    load = EndMoment(beam, beam.section_node(end), M)
+    u = moved(beam, deformed(beam), 2.4, np.array([1.0, -2.0]))
+    f, h = load.force(u), 1e-6
+    gradient = np.array([(load.potential(u + h * e) - load.potential(u - h * e)) / (2 * h)
+                         for e in np.eye(beam.N)])
+    scale = np.abs(f).max()
+    assert np.abs(f + gradient).max() < 1e-8 * scale
+    # a pure couple: no resultant, and moment M whatever the state
+    assert np.abs(beam.rigid_motions()[:, :2].T @ f).max() == 0.0
+    q, g = (beam.q0 + u).reshape(-1, 2), f.reshape(-1, 2)
+    assert abs(np.sum(q[:, 0] * g[:, 1] - q[:, 1] * g[:, 0]) - M) < 1e-13 * max(1, scale)
+    K = np.zeros((beam.N, beam.N))
+    np.add.at(K, load.stiffness(u)[:2], load.stiffness(u)[2])
+    dK = np.imag([load.force(u + 1j * STEP * e) for e in np.eye(beam.N)]).T / STEP
+    assert np.abs(K - dK).max() < 1e-13 * np.abs(K).max()
+    assert np.abs(K - K.T).max() < 1e-15 * np.abs(K).max()
+
+
+@pytest.mark.parametrize("element", SHAPES)
+@pytest.mark.parametrize("body", ["unequal", "arc"])
+def test_end_moment_is_that_of_a_linear_traction(body, element):
+    """On the undeformed section: a traction 12 M Y / (b h^3) along the axis, against Y."""
+    beam = make(body, element)
+    h, node = beam.mesh.height, beam.section_node("right")
+    at, e1, e2 = beam.mesh.p[:, node], beam.mesh.p_X[:, node], beam.mesh.p_Y[:, node]
+
+    def traction(x):
+        Y = e2[0] * (x[0] - at[0]) + e2[1] * (x[1] - at[1])
+        return -12 * 1.3 * Y / (WIDTH * h**3) * e1[:, None, None]
+
+    f = asm(forms.traction(traction, WIDTH), beam.facet_basis("right"))
+    assert_allclose(EndMoment(beam, node, 1.3).force(np.zeros(beam.N)), f, atol=1e-12)
+
+
+def test_end_moment_counts_whole_turns():
+    """A beam rolled up k times: the potential is -M times the whole angle."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 33), 0.01), ElementBeamANCF(2), LAWS["svk"], 1.0)
+    x = beam.mesh.p[0]
+    for turns in (0.2, -0.9, 1.6, -3.3):
+        angle = 2 * np.pi * turns * x
+        q = beam.q0.reshape(-1, beam.nd // 2, 2).copy()
+        c, s = np.cos(angle), np.sin(angle)
+        q[:, 1] = np.array([c, s]).T
+        q[:, 2:] = np.array([-s, c]).T[:, None]
+        load = EndMoment(beam, beam.section_node("right"), 2.0)
+        assert abs(load.potential(q.ravel() - beam.q0) + 4 * np.pi * turns) < 1e-12
+
+
+def test_loads_without_potential_say_so():
+    beam = make("straight")
+    u = deformed(beam)
+    assert Pressure(beam, "top", 1.0).potential(u) is None
+    assert DeadLoad(beam, np.ones(beam.N)).potential(u) == -u.sum()
+    with pytest.raises(ValueError, match="NaN"):
+        DeadLoad(beam, np.full(beam.N, np.nan))
+
+
+def test_energy_is_a_functional_of_the_position():
+    """U of a uniform stretch in closed form, and beside a Functional of the user's own."""
+    beam = make("unequal", "2")
+    s = 1.2
+    q = (beam.q0.reshape(-1, 2) * [s, 1.0]).ravel()
+    e = (s**2 - 1) / 2
+    volume = WIDTH * 0.3 * 2.1
+    W = asm(forms.energy(beam.material, WIDTH), beam.basis, r=q)
+    assert abs(W - volume * e**2 * 2.0 / (1 - 0.09) / 2) < 1e-14
+    own = Functional(lambda w: w.r.grad[0, 0])
+    assert abs(asm(own, beam.basis, r=q) - s * 0.63) < 1e-14
