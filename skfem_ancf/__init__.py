@@ -3,7 +3,8 @@
 from . import forms
 from .beam import Beam, reference_coordinates
 from .dynamics import HHT, EnergyMomentum, GeneralizedAlpha, Newmark
-from .elements import ElementBeamANCF, ElementBeamANCFCubic, ElementBeamPatelShabana
+from .elements import (ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
+                       ElementBeamPatelShabana)
 from .errors import (AncfError, ConvergenceError, InputError, MeshError, MissingExtra, NameUnknown,
                      SupportError)
 from .materials import NeoHookean, StVenantKirchhoff

@@ -10,6 +10,8 @@ from . import forms
 from .elements import ElementBeam
 from .errors import InputError, MeshError, NameUnknown, require_positive
 from .formulations import COMPONENTS, get_formulation
+from .formulations.ecm import AXIS
+from .cable import CableKernel
 from .kernel import Kernel
 from .materials import Material
 from .mesh import MeshBeam
@@ -115,6 +117,8 @@ class Beam:
     def exact_basis(self):
         """A ``Basis`` whose quadrature is exact for products of two coordinates, as in the mass."""
         n = self.element.axis_degree + 1 + (0 if self.mesh.is_straight else 1)
+        if self.is_cable:  # its energy is a line integral, its mass that of the axis
+            return Basis(self.mesh, self.vector_element, quadrature=tensor(gauss(n), AXIS))
         return Basis(self.mesh, self.vector_element,
                      quadrature=tensor(gauss(n), gauss(self.element.order + 1)))
 
@@ -127,7 +131,13 @@ class Beam:
     @cached_property
     def kernel(self):
         """The fused evaluation of the strain energy; see :mod:`skfem_ancf.kernel`."""
-        return Kernel(self.mesh, self.element, self.material, self.width, self.formulation)
+        kernel = CableKernel if self.is_cable else Kernel
+        return kernel(self.mesh, self.element, self.material, self.width, self.formulation)
+
+    @property
+    def is_cable(self):
+        """True if the element has no section of its own."""
+        return self.element.order == 0
 
     # coordinates
 
@@ -240,6 +250,8 @@ class Beam:
 
     def section_direction(self, node):
         """Coordinates (2, n) and weights (n,) of the direction 12 / h^3 int Y r dY of a section."""
+        if self.is_cable:  # the tangent, which turns with the section
+            return node * self.nd + 2 + np.arange(2).reshape(2, 1), np.ones(1)
         eta, w = gauss(self.element.order + 1)
         h, f = self.mesh.height, self.element.functionals[2:]
         c = np.array([12.0 * h ** (f[k][2] - 1) * np.sum(
@@ -274,6 +286,15 @@ class Beam:
             Shape (2, 2, nelements, npoints) both: H[i, J] = d u_i / d X_J, J along the frame.
         """
         mapping = self.mesh.mapping()
+        if self.is_cable:
+            frame = mapping.frame(X, tind)
+            tangent, _, eps, kappa = self._cable_section(u, X, tind)
+            strain = self.strain(u, X, tind)
+            normal = np.array([-tangent[1], tangent[0]])
+            Y = self.mesh.height * (X[1] - 0.5)
+            F = np.stack([(1.0 + eps - Y * kappa) * tangent,
+                          np.sqrt(1.0 + 2.0 * strain[1]) * normal], axis=1)
+            return F - frame, frame
         u_e = self.kernel.gather(u, slice(None) if tind is None else tind)
         grad = sum(np.einsum("ei,jep->ijep", u_e[:, k], self.element.gbasis(mapping, X, k, tind)[0].grad)
                    for k in range(u_e.shape[1]))
@@ -284,15 +305,30 @@ class Beam:
         """Displacement at reference points, shape (2, nelements, npoints)."""
         mapping = self.mesh.mapping()
         u_e = self.kernel.gather(u, slice(None) if tind is None else tind)
-        return sum(np.einsum("ei,ep->iep", u_e[:, k],
-                             np.asarray(self.element.gbasis(mapping, X, k, tind)[0]))
-                   for k in range(u_e.shape[1]))
+        out = sum(np.einsum("ei,ep->iep", u_e[:, k],
+                            np.asarray(self.element.gbasis(mapping, X, k, tind)[0]))
+                  for k in range(u_e.shape[1]))
+        if self.is_cable:
+            tangent, tangent0, _, _ = self._cable_section(u, X, tind)
+            turn = tangent - tangent0
+            out = out + self.mesh.height * (X[1] - 0.5) * np.array([-turn[1], turn[0]])
+        return out
+
+    def _cable_section(self, u, X, tind):
+        return self.kernel.section(u, X[0], tind, self.mesh, self.element)
 
     def strain(self, u, X, tind=None):
         """Green-Lagrange strain of the formulation: (eps_xx, eps_yy, 2 eps_xy).
 
         Arguments as in :meth:`gradients`; shape (3, nelements, npoints).
         """
+        if self.is_cable:  # S_yy = 0
+            _, _, eps, kappa = self._cable_section(u, X, tind)
+            e = eps - self.mesh.height * (X[1] - 0.5) * kappa
+            nu = self.material.nu
+            ratio = nu if self.material.plane == "stress" else nu / (1.0 - nu)
+            xx = e + 0.5 * e * e
+            return np.array([xx, -ratio * xx, 0.0 * xx])
         term = self.formulation.terms(self.element, self.material)[0]
 
         def component(k, X):
@@ -315,7 +351,12 @@ class Beam:
 
     def stress(self, u, X, tind=None):
         """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy); arguments as in :meth:`gradients`."""
-        return self.formulation.stress(self, self.strain(u, X, tind), u, X, tind)
+        strain = self.strain(u, X, tind)
+        if self.is_cable:
+            E = self.material.E
+            E = E if self.material.plane == "stress" else E / (1.0 - self.material.nu**2)
+            return np.array([E * strain[0], 0.0 * strain[0], 0.0 * strain[0]])
+        return self.formulation.stress(self, strain, u, X, tind)
 
     # mass
 

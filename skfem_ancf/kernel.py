@@ -47,13 +47,19 @@ def beam_gradients(mesh, element, X, tind=None):
 
 
 class Evaluation:
-    """What one evaluation found: element forces and tangents, and what :meth:`step` needs."""
+    """What one evaluation found: element forces and tangents, and what :meth:`carry` needs."""
 
-    __slots__ = ("force", "tangent", "energy", "strains", "stresses", "_gradients", "_tables")
+    __slots__ = ("force", "tangent", "strains", "stresses", "_gradients", "_tables")
 
-    def step(self, du):
-        """Strain increments, linear in the element displacement increments du (ne, nb, 2)."""
-        return [t.strain_increment(r, du) for t, r in zip(self._tables, self._gradients)]
+    def carry(self, du):
+        """Stresses S + D B du for element displacement increments du (ne, nb, 2), by term."""
+        out = []
+        for t, g, eps, S in zip(self._tables, self._gradients, self.strains, self.stresses):
+            d = t.strain_increment(g, du)
+            D = getattr(t.law, "D", None)
+            out.append(S + (np.einsum("abep,bep->aep", t.law.moduli(eps), d) if D is None
+                            else np.tensordot(D, d, 1)))
+        return out
 
 
 @dataclass
@@ -222,26 +228,13 @@ class TermTables:
         return K + shear + shear.transpose(0, 2, 1)
 
 
-class Kernel:
-    """Energy, force and tangent of the strain energy of one beam.
+class Chain:
+    """Elements of a chain of nodes: gathering, scattering, and the loop over chunks."""
 
-    Parameters
-    ----------
-    mesh, element, material
-        The body, a scalar beam element and a material.
-    width
-        Width of the section.
-    formulation
-        A :class:`~skfem_ancf.formulations.Formulation`.
-    """
-
-    def __init__(self, mesh, element, material, width, formulation):
+    def __init__(self, mesh, element):
         self.nd = 2 * element.nodal_dofs
         self.t = mesh.t
         self.N = self.nd * mesh.p.shape[1]
-        self.tables = [TermTables(mesh, element, term, width)
-                       for term in formulation.terms(element, material)]
-        self.constant = formulation.stabilisation(mesh, element, material, width)
 
     def gather(self, u, elements=slice(None)):
         """Element values (ne, nb, 2) of a coordinate vector (N,)."""
@@ -261,6 +254,44 @@ class Kernel:
     def chunks(self):
         """Slices of the elements that are evaluated together."""
         return [slice(k, k + CHUNK) for k in range(0, self.t.shape[1], CHUNK)]
+
+    def force(self, u):
+        """Internal force of a coordinate displacement (N,), shape (N,)."""
+        out = np.zeros(self.N, dtype=u.dtype)
+        for part in self.chunks():
+            self.scatter(self.evaluate(self.gather(u, part), part, tangent=False).force, part, out)
+        return out
+
+    def tangents(self, u, **options):
+        """Element tangents (ne, 2 nb, 2 nb) of a coordinate displacement (N,)."""
+        return np.concatenate([self.evaluate(self.gather(u, part), part, **options).tangent
+                               for part in self.chunks()])
+
+
+class Kernel(Chain):
+    """Energy, force and tangent of the strain energy of one beam.
+
+    Parameters
+    ----------
+    mesh, element, material
+        The body, a scalar beam element and a material.
+    width
+        Width of the section.
+    formulation
+        A :class:`~skfem_ancf.formulations.Formulation`.
+    """
+
+    def __init__(self, mesh, element, material, width, formulation):
+        super().__init__(mesh, element)
+        self.tables = [TermTables(mesh, element, term, width)
+                       for term in formulation.terms(element, material)]
+        self.constant = formulation.stabilisation(mesh, element, material, width)
+
+    @property
+    def volume(self):
+        """Volume of the body, by the rule of the first term."""
+        t = self.tables[0]
+        return float(np.sum(t.w)) * (self.t.shape[1] if t.shared else 1)
 
     def evaluate(self, u_e, elements=slice(None), tangent=True, carried=None, geometric=True):
         """Element forces and, if asked for, tangents.
@@ -317,13 +348,6 @@ class Kernel:
                 total += 0.5 * np.sum(v * (constant @ v))
         return total
 
-    def force(self, u):
-        """Internal force of a coordinate displacement (N,), shape (N,)."""
-        out = np.zeros(self.N, dtype=u.dtype)
-        for part in self.chunks():
-            self.scatter(self.evaluate(self.gather(u, part), part, tangent=False).force, part, out)
-        return out
-
     def strains(self, u):
         """Strains of every term, one list a chunk of elements."""
         return [[t.strain(t.gradients(self.gather(u, part)))
@@ -347,11 +371,6 @@ class Kernel:
                 total += (constant @ middle.reshape(len(middle), -1, 1)).reshape(middle.shape)
             self.scatter(total, part, out)
         return out
-
-    def tangents(self, u, **options):
-        """Element tangents (ne, 2 nb, 2 nb) of a coordinate displacement (N,)."""
-        return np.concatenate([self.evaluate(self.gather(u, part), part, **options).tangent
-                               for part in self.chunks()])
 
 
 def mean_stress(law, eps0, eps1):

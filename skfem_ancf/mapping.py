@@ -61,8 +61,9 @@ class MappingBeam(Mapping):
     def DF(self, X, tind=None):
         axis, director = self._coefficients(tind)
         xi, eta = X
-        dxi = self._sum(axis, hermite(xi, 1)) + self._sum(director, (eta - 0.5) * self._director(xi, 1))
-        return np.stack([dxi, self._sum(director, self._director(xi))], 1)
+        turning = self._sum(director, (eta - 0.5) * self._director(xi, 1))
+        return np.stack([self._sum(axis, hermite(xi, 1)) + turning,
+                         self._sum(director, self._director(xi))], 1)
 
     def detDF(self, X, tind=None):
         J = self.DF(X, tind)

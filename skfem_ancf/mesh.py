@@ -204,6 +204,13 @@ class MeshBeam(Mesh):
             self._straight()
         self.p_X = require_finite("p_X", self.p_X, p.shape)
         self.p_Y = require_finite("p_Y", self.p_Y, p.shape)
+        if self.sections not in ("linear", "cubic"):
+            raise NameUnknown("interpolation of the sections", self.sections, ("linear", "cubic"))
+        if self.p_XY is not None:
+            self.p_XY = require_finite("p_XY", self.p_XY, p.shape)
+        elif self.sections == "cubic":
+            raise MeshError("the mesh does not know how its sections turn (p_XY): build it with "
+                            "MeshBeam.init_line or MeshBeam.init_curve")
         self.lengths = require_finite("lengths", self.lengths, (t.shape[1],))
         self._require_length(self.lengths > 0)
         self._mapping().check()
@@ -237,14 +244,7 @@ class MeshBeam(Mesh):
         beam exactly on a mesh with "linear", those with cubic sections on one with "cubic". A
         ``Beam`` chooses for itself; it makes no difference for straight beams.
         """
-        if sections not in ("linear", "cubic"):
-            raise NameUnknown("interpolation of the sections", sections, ("linear", "cubic"))
-        if sections == self.sections:
-            return self
-        if sections == "cubic" and self.p_XY is None:
-            raise MeshError("the mesh does not know how its sections turn (p_XY): build it with "
-                            "MeshBeam.init_line or MeshBeam.init_curve")
-        return replace(self, sections=sections)
+        return self if sections == self.sections else replace(self, sections=sections)
 
     # topology
 
@@ -442,7 +442,8 @@ class MeshBeam(Mesh):
         a, b = self.s[self.t[:, ix]]
         p, tangent = self.curve.nodes(out["s"])
         return {**out, "doflocs": p, "p_X": tangent, "p_Y": np.array([-tangent[1], tangent[0]]),
-                "p_XY": self.curve.turning(out["s"]), "lengths": (self.curve.lengths(a, out["s"]), self.curve.lengths(out["s"], b))}
+                "p_XY": self.curve.turning(out["s"]),
+                "lengths": (self.curve.lengths(a, out["s"]), self.curve.lengths(out["s"], b))}
 
     def _refine_tags(self, tags, m, first, marked, node):
         """Boundaries of the refined mesh ``m``: sections move, surfaces pass to the children."""
@@ -609,7 +610,8 @@ class MeshBeam(Mesh):
     @classmethod
     def load_npz(cls, filename):
         with np.load(filename) as data:
-            missing = {"doflocs", "t", "height", "p_X", "p_Y", "lengths"} - set(data.files)
+            missing = {"doflocs", "t", "height", "p_X", "p_Y", "lengths",
+                       "sections"} - set(data.files)
             if missing:
                 raise MeshError(f"{str(filename)!r} holds no beam: {sorted(missing)} are missing")
             tags = {k[2:]: data[k] for k in data.files if k.startswith("b_")}

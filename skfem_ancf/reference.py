@@ -1,6 +1,9 @@
 """The reference cell of a beam and the two interpolations along its axis."""
 
+from functools import lru_cache
+
 import numpy as np
+from numpy.polynomial import polynomial
 from skfem.element import ElementH1
 from skfem.refdom import RefLine, RefQuad, Refdom
 
@@ -66,3 +69,20 @@ def hermite(xi, derivative=0):
     if derivative == 2:
         return np.array([12.0 * x - 6.0, 6.0 * x - 4.0, 6.0 - 12.0 * x, 6.0 * x - 2.0])
     raise ValueError(f"derivative must be 0, 1 or 2, got {derivative!r}")
+
+
+@lru_cache
+def _hermite_coefficients(m):
+    """Powers of the Hermite polynomials of degree 2 m - 1 on [0, 1]: (2 m, 2 m), columns."""
+    conditions = [[polynomial.polyval(x, polynomial.polyder(row, d)) for row in np.eye(2 * m)]
+                  for x in (0.0, 1.0) for d in range(m)]
+    return np.linalg.inv(np.array(conditions))
+
+
+def hermite_basis(m, xi, derivative=0):
+    """Functions of degree 2 m - 1 dual to the derivatives 0 ... m-1 at 0, then at 1.
+
+    Shape (2 m,) + xi.shape; m = 2 is :func:`hermite`.
+    """
+    coefficients = polynomial.polyder(_hermite_coefficients(m), derivative)
+    return polynomial.polyval(np.asarray(xi, dtype=np.float64), coefficients)

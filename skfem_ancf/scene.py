@@ -111,14 +111,28 @@ class Scene:
         self._system = None
         return self
 
-    def clamp(self, boundary, beam=None):
-        """Weld a face: the position of every material point of it is fixed.
+    def clamp(self, boundary, beam=None, thickness="fixed"):
+        """Weld a face, or hold it as a plane.
 
-        Those are ``r`` and the section coordinates at the node; the slope ``r_X``, a strain
-        measure there, stays free.
+        Parameters
+        ----------
+        boundary
+            A boundary name, or anything else scikit-fem takes for facets.
+        thickness
+            "fixed": the position of every material point of the face is fixed, that is ``r`` and
+            the section coordinates at the node; the slope ``r_X``, a strain measure there, stays
+            free. "free": ``r`` is fixed and the section stays in its plane, but may get thinner
+            or thicker there. With nu not zero a welded face causes a boundary layer as long as
+            the beam is high, which long elements exaggerate; the plane does not.
         """
         beam = select_beam(self.beams, beam)
-        return self._fix(beam, beam.dofs(boundary, beam.element.welded))
+        if thickness not in ("fixed", "free"):
+            raise NameUnknown("thickness", thickness, ("fixed", "free"))
+        if thickness == "fixed" and not beam.is_cable:
+            return self._fix(beam, beam.dofs(boundary, beam.element.welded))
+        self._fix(beam, beam.dofs(boundary, "r"))
+        self.joint("plane", at=boundary, beam=beam)
+        return self
 
     def pin(self, boundary, beam=None):
         """Fix the position of the axis; the section may turn."""
@@ -161,7 +175,8 @@ class Scene:
             * ``"line", at=point, direction=(1, 0)``: a point slides on a line,
             * ``"circle", at=point, center=(0, 0)``: a point slides on a circle,
             * ``"position", at=point, r=function``: a point follows ``r(t)``,
-            * ``"angle", at="left", angle=function``: a section turns by ``angle(t)``.
+            * ``"angle", at="left", angle=function``: a section turns by ``angle(t)``,
+            * ``"plane", at="left"``: a section stays in its plane.
 
         Returns
         -------

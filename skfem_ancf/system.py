@@ -160,21 +160,22 @@ class System:
         """Raise SupportError if joints repeat or contradict each other or the supports."""
         if not self.joints:
             return
-        zero, basis = np.zeros(self.N), np.zeros((0, self.N))
+        zero, basis, gaps = np.zeros(self.N), np.zeros((0, self.N)), np.zeros(0)
         for joint in self.joints:
-            rows = joint.jacobian(zero, 0.0)
-            rows[:, self.fixed] = 0.0
-            for k, row in enumerate(rows):
-                size = np.linalg.norm(joint.jacobian(zero, 0.0)[k])
-                rest = row - basis.T @ (basis @ row)
-                rest = rest - basis.T @ (basis @ rest)
-                if np.linalg.norm(rest) <= 1e-9 * size:
-                    phi = joint.value(zero, 0.0)[k]
-                    kind = ("repeats what" if abs(phi) <= 1e-9 * self.size else "contradicts what")
+            full, phi = joint.jacobian(zero, 0.0), joint.value(zero, 0.0)
+            for k, row in enumerate(full):
+                size = np.linalg.norm(row)
+                rest, gap = np.where(self.free, row, 0.0), phi[k]
+                for _ in range(2):
+                    part = basis @ rest
+                    rest, gap = rest - part @ basis, gap - part @ gaps
+                length = np.linalg.norm(rest)
+                if length <= 1e-9 * size:
+                    kind = "repeats" if abs(gap) <= 1e-9 * self.size else "contradicts"
                     raise SupportError(
-                        f"{joint!r}, equation {joint.equations[k]!r}, {kind} the supports and the "
-                        "joints before it hold already: remove one of them")
-                basis = np.vstack([basis, rest / np.linalg.norm(rest)])
+                        f"{joint!r}, equation {joint.equations[k]!r}, {kind} what the supports and "
+                        "the joints before it hold already: remove one of them")
+                basis, gaps = np.vstack([basis, rest / length]), np.append(gaps, gap / length)
 
     # forces and energies
 
@@ -239,11 +240,7 @@ class System:
     @cached_property
     def stiffness_scale(self):
         """Round-off floor: eps times the square root of modulus times volume."""
-        total = 0.0
-        for beam in self.beams:
-            t = beam.kernel.tables[0]
-            n = beam.mesh.nelements if t.shared else 1
-            total += n * float(np.sum(t.w)) * beam.material.E
+        total = sum(b.kernel.volume * b.material.E for b in self.beams)
         return np.finfo(float).eps * np.sqrt(total)
 
     # mass
@@ -342,14 +339,8 @@ class System:
 
     @staticmethod
     def stress_step(evaluations, du):
-        """Stresses carried to ``u + du``: S(eps) + D B du, one list a chunk of elements."""
-        out = []
-        for kernel, s, part, e in evaluations:
-            increments = e.step(kernel.gather(du[s], part))
-            out.append([S + (np.tensordot(t.law.D, d, 1) if hasattr(t.law, "D")
-                             else np.einsum("abep,bep->aep", t.law.moduli(eps), d))
-                        for t, S, eps, d in zip(e._tables, e.stresses, e.strains, increments)])
-        return out
+        """Stresses carried to ``u + du`` by linearisation, one list a chunk of elements."""
+        return [e.carry(kernel.gather(du[s], part)) for kernel, s, part, e in evaluations]
 
     def multiply(self, v):
         """The assembled tangent times a vector, before :meth:`factorize`."""

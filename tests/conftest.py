@@ -26,6 +26,7 @@ MESHES = {
     "one element": lambda: MeshBeam.init_line([0.0, 1.3], 0.8, angle=-0.4),
     "arc": quarter_arc,
     "s-curve": s_curve,
+    "s-curve, cubic sections": lambda: s_curve().with_sections("cubic"),
 }
 STRAIGHT = ("straight", "unequal", "inclined", "one element")
 
@@ -50,14 +51,3 @@ def straight_mesh(request):
 @pytest.fixture
 def arc():
     return quarter_arc()
-
-
-@pytest.fixture
-def exact_geometry(request, element):
-    """A function of the mesh: expect failure where the element does not hold its shape."""
-    def expect(mesh):
-        if element.sections == "cubic" and not mesh.is_straight:
-            request.applymarker(pytest.mark.xfail(strict=True, reason=(
-                "sections of a curved mesh turn linearly: their slope along X jumps at the nodes, "
-                "where cubic sections have one r_XY")))
-    return expect

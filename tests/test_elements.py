@@ -10,7 +10,8 @@ from skfem import Basis, ElementTriP1, ElementVector, FacetBasis, Functional, Me
 from skfem.models.poisson import mass
 
 from conftest import MESHES
-from skfem_ancf import ElementBeamANCF, ElementBeamPatelShabana, InputError, MeshBeam, NameUnknown
+from skfem_ancf import (ElementBeamANCF, ElementBeamPatelShabana, InputError, MeshBeam, MeshError,
+                        NameUnknown)
 from skfem_ancf.elements.ancf import POINT_FAMILIES
 from skfem_ancf.reference import ElementBeamP1, RefBeam, hermite, linear
 
@@ -252,8 +253,8 @@ def test_spaces_are_nested(order):
 
 @pytest.mark.parametrize("angle, shift", [(0.0, (0.0, 0.0)), (0.3, (1.0, -2.0)),
                                           (3.9, (-7.0, 0.1))])
-def test_stress_free_state_and_rigid_motion_are_exact(element, mesh, angle, shift, exact_geometry):
-    exact_geometry(mesh)
+def test_stress_free_state_and_rigid_motion_are_exact(element, mesh, angle, shift):
+    mesh = mesh.with_sections(element.sections)
     Q = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     basis, q = reference_state(element, mesh, Q, np.array(shift))
     field, x = basis.interpolate(q), basis.global_coordinates()
@@ -262,13 +263,25 @@ def test_stress_free_state_and_rigid_motion_are_exact(element, mesh, angle, shif
     assert_allclose(field.grad, Q[:, :, None, None] + 0 * field.grad, atol=2e-11)
 
 
-def test_stress_free_state_on_the_surface(element, mesh, exact_geometry):
-    exact_geometry(mesh)
+def test_stress_free_state_on_the_surface(element, mesh):
+    mesh = mesh.with_sections(element.sections)
     _, q = reference_state(element, mesh)
     surface = FacetBasis(mesh, ElementVector(element), facets=["top", "bottom", "left", "right"])
     field = surface.interpolate(q)
     assert_allclose(field, surface.global_coordinates(), atol=1e-13)
     assert_allclose(field.grad, np.eye(2)[:, :, None, None] + 0 * field.grad, atol=5e-11)
+
+
+@pytest.mark.parametrize("sections", ["linear", "cubic"])
+def test_stress_free_state_needs_sections_of_its_own_kind(element, sections):
+    mesh = MESHES["arc"]().with_sections(sections)
+    if sections == element.sections:
+        assert element.rigid(mesh).shape == (element.nodal_dofs, 2, mesh.nvertices)
+    else:
+        with pytest.raises(MeshError, match=rf"use mesh.with_sections\('{element.sections}'\)"):
+            element.rigid(mesh)
+    assert_array_equal(element.rigid(MESHES["straight"]().with_sections(sections)),
+                       element.rigid(MESHES["straight"]()))
 
 
 # attributes

@@ -15,7 +15,7 @@ from skfem_ancf import AncfError, InputError, MeshBeam, MeshError, NameUnknown
 from skfem_ancf.reference import ElementBeamP1
 
 CENTRE = np.array([[0.5], [0.5]])
-CURVED = ["arc", "s-curve"]
+CURVED = ["arc", "s-curve", "s-curve, cubic sections"]
 
 
 def area(mesh):
@@ -47,7 +47,8 @@ def assert_same_tags(a, b):
 def assert_same(a, b, atol=0.0):
     assert type(a) is type(b) is MeshBeam
     assert_array_equal(a.t, b.t)
-    for name in ("p", "p_X", "p_Y", "lengths", "height", "s"):
+    assert a.sections == b.sections
+    for name in ("p", "p_X", "p_Y", "p_XY", "lengths", "height", "s"):
         if getattr(a, name) is None:
             assert getattr(b, name) is None
         else:
@@ -78,7 +79,7 @@ def test_directly_from_nodes():
     m = MESHES["inclined"]()
     direct = MeshBeam(m.p, m.t, height=m.height).with_defaults()
     assert direct.is_straight
-    for name in ("p_X", "p_Y", "lengths"):
+    for name in ("p_X", "p_Y", "p_XY", "lengths"):
         assert_allclose(getattr(direct, name), getattr(m, name), atol=1e-14)
     assert_same_tags(direct, m)
 
@@ -191,15 +192,36 @@ def test_length_of_the_meshed_axis_converges():
     assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 3.7)
 
 
-def test_area_converges_to_that_of_the_exact_body():
-    """Height times length, whatever the curvature; sections turn linearly, so second order."""
+@pytest.mark.parametrize("sections, bound, rate", [("linear", 1e-3, 2), ("cubic", 1e-6, 4)])
+def test_area_converges_to_that_of_the_exact_body(sections, bound, rate):
+    """Height times length, whatever the curvature."""
     errors = []
     for n in (8, 16, 32):
         m = MeshBeam.init_curve(ellipse, np.linspace(0, np.pi / 2, n + 1), 0.3)
-        errors.append(abs(area(m) / (0.3 * ELLIPSE_QUARTER) - 1))
-    assert errors[-1] < 1e-3
+        errors.append(abs(area(m.with_sections(sections)) / (0.3 * ELLIPSE_QUARTER) - 1))
+    assert errors[-1] < bound, errors
     rates = np.log2(np.divide(errors[:-1], errors[1:]))
-    assert np.all(np.abs(rates - 2) < 0.1)
+    assert np.all(np.abs(rates - rate) < 0.2), rates
+
+
+@pytest.mark.parametrize("dr", [None, ellipse_derivative])
+def test_turning_of_the_sections(dr):
+    """The normal turns by the curvature: n' = -kappa t, kappa = 2 / |r'|^3 on the ellipse."""
+    m = MeshBeam.init_curve(ellipse, np.linspace(0, np.pi / 2, 5), 0.1, dr=dr)
+    for mesh in (m, m.refined([1]), m.rotated(0.3), m.scaled(2.0)):
+        size = np.hypot(*ellipse_derivative(mesh.s))
+        kappa = 2 / size ** 3 * m.height / mesh.height
+        assert_allclose(mesh.p_XY, -kappa * mesh.p_X, atol=1e-9)
+    assert_array_equal(MESHES["inclined"]().p_XY, 0)
+
+
+def test_sections_of_a_straight_beam_are_the_same():
+    m = MESHES["unequal"]()
+    assert m.with_sections("linear") is m
+    cubic = m.with_sections("cubic")
+    assert cubic.is_straight and cubic.sections == "cubic"
+    X = np.random.default_rng(7).random((2, 9))
+    assert_allclose(cubic.mapping().F(X), m.mapping().F(X), atol=1e-15)
 
 
 @pytest.mark.parametrize("radius, h", [(1.0, 0.3), (0.2, 0.35)])
@@ -354,9 +376,10 @@ def test_refinement_keeps_orientation(mesh):
         assert_allclose(total, 2 * (mesh.lengths[last] + mesh.height), rtol=1e-13)
 
 
-def test_refinement_without_the_curve_keeps_the_body(tmp_path):
+@pytest.mark.parametrize("sections", ["linear", "cubic"])
+def test_refinement_without_the_curve_keeps_the_body(tmp_path, sections):
     """A loaded mesh has lost r(s): its own cubics are halved, exactly."""
-    m = s_curve()
+    m = s_curve().with_sections(sections)
     m.save_npz(tmp_path / "m.npz")
     loaded = MeshBeam.load_npz(tmp_path / "m.npz")
     fine = loaded.refined([1, 3]).refined(1)
@@ -368,6 +391,7 @@ def test_refinement_without_the_curve_keeps_the_body(tmp_path):
     cells = fine.element_finder()(*at)
     X = fine.mapping().invF(at[:, :, None], cells)
     assert np.all(np.abs(X - 0.5) < 0.5 + 1e-9)
+    assert_allclose(X[1, :, 0], np.tile(x[1], m.nelements), atol=1e-12)
 
 
 @settings(max_examples=25, deadline=None, derandomize=True)
@@ -392,6 +416,7 @@ def test_restrict(elements):
     assert_array_equal(part.p, mesh.p[:, nodes])
     assert_array_equal(nodes[part.t], mesh.t[:, kept])
     assert_array_equal(part.lengths, mesh.lengths[kept])
+    assert_array_equal(part.p_XY, mesh.p_XY[:, nodes])
     for name, facets in mesh.boundaries.items():
         there = np.asarray(facets)[np.isin(facets, mesh.t2f[:, kept])]
         assert_allclose(where(part, part.boundaries[name]), where(mesh, there), atol=1e-14)
@@ -708,6 +733,9 @@ def test_bad_direct_construction(p, t, message):
     (dict(lengths=np.ones(3)), r"lengths must have shape \(2\), got \(3,\)"),
     (dict(p_X=np.ones((2, 2))), r"p_X must have shape \(2, 3\)"),
     (dict(p_Y=np.full((2, 3), np.nan)), "p_Y has a value"),
+    (dict(p_XY=np.zeros((2, 2))), r"p_XY must have shape \(2, 3\)"),
+    (dict(sections="quintic"), "unknown interpolation of the sections 'quintic'; known: 'linear'"),
+    (dict(sections="cubic"), r"does not know how its sections turn \(p_XY\)"),
 ])
 def test_bad_fields(change, message):
     m = MeshBeam.init_line([0, 1, 2], 0.1)
@@ -741,6 +769,7 @@ def test_bad_fields(change, message):
     (lambda m: m.rotated(np.nan), "angle must be finite"),
     (lambda m: m.rotated(1.0, about=3), "about must have shape"),
     (lambda m: m.element_finder()(np.array([np.nan]), np.array([0.0])), "the points has a value"),
+    (lambda m: m.with_sections("quadratic"), "known: 'linear', 'cubic'"),
     (lambda m: MeshBeam.from_mesh(m), "height must be a number"),
 ])
 def test_refused(action, message):

@@ -51,7 +51,12 @@ class Step:
         Displacement to start the iteration from.
     mass_factor, stiffness_factor
         The iteration matrix is ``mass_factor M + stiffness_factor K``.
+    acceleration_share
+        Where the equation holds at the end of the step: the part of a change of the acceleration,
+        made so that the joints' second rate holds too, that the scheme's own acceleration takes.
     """
+
+    acceleration_share = 0.0
 
     def force(self, u):
         """Loads less internal force, shape (N,)."""

@@ -108,6 +108,7 @@ class _Step(Step):
         self.guess = self._u + dt * dt * b * y.algorithmic
         self.mass_factor = (1.0 - scheme.alpha_m) / ((1.0 - scheme.alpha_f) * b * dt * dt)
         self.stiffness_factor = 1.0
+        self.acceleration_share = (1.0 - scheme.alpha_f) / (1.0 - scheme.alpha_m)
 
     def _algorithmic(self, u):
         return (u - self._u) / (self.scheme.beta * self.dt**2)

@@ -197,8 +197,13 @@ class Integrator:
         v, impulse = self._velocity(step, u, s.jacobian(step.middle(u), step.joint_time), v_fixed,
                                     dt)
         new = step.finish(u, v, multipliers, impulse)
-        new.acceleration[s.fixed] = a_fixed
-        new.algorithmic[s.fixed] = a_fixed
+        new.acceleration[s.fixed] = new.algorithmic[s.fixed] = a_fixed
+        if s.joints and step.acceleration_share:
+            rate = (self._constraint_acceleration(u, v, step.t, dt)
+                    + s.full_jacobian(u, step.t) @ new.acceleration)
+            da, dm = s.solve_mass(np.zeros(s.N), u, step.t, -rate)
+            new.acceleration, new.multipliers = new.acceleration + da, new.multipliers + dm
+            new.algorithmic = new.algorithmic + step.acceleration_share * da
         self._energy = max(self._energy, 0.5 * new.v @ s.mass.multiply(new.v))
         return new
 

@@ -2,6 +2,7 @@
 
 from .ancf import ElementBeamANCF
 from .base import ElementBeam
+from .cable import ElementBeamCable
 from .cubic import ElementBeamANCFCubic
 from .patel_shabana import ElementBeamPatelShabana
 
@@ -12,5 +13,5 @@ ELEMENTS = {
     **{f"cubic-{n}": (lambda n=n: ElementBeamANCFCubic(n)) for n in (1, 2, 3, 6)},
 }
 
-__all__ = ["ELEMENTS", "ElementBeam", "ElementBeamANCF", "ElementBeamANCFCubic",
+__all__ = ["ELEMENTS", "ElementBeam", "ElementBeamANCF", "ElementBeamANCFCubic", "ElementBeamCable",
            "ElementBeamPatelShabana"]

@@ -80,7 +80,7 @@ class ElementBeam(Element):
         value, d_xi, d_eta
             Arrays of shape X.shape[1:].
         slope
-            1 if the coordinate is a derivative along X, so that the function takes a factor L.
+            The power of L that the function takes: how many derivatives along X its coordinate is.
         """
         node, k = divmod(i, self.nodal_dofs)
         if not 0 <= i < 2 * self.nodal_dofs:
@@ -101,7 +101,7 @@ class ElementBeam(Element):
         mesh = mapping.mesh
         value, d_xi, d_eta, slope = self.local(X, mesh.height, i)
         lengths = mesh.lengths if tind is None else mesh.lengths[tind]
-        scale = lengths[:, None] if slope else np.ones((len(lengths), 1))
+        scale = lengths[:, None] ** slope
         invDF = mapping.invDF(X, tind)
         grad = scale * (invDF[0] * d_xi + invDF[1] * d_eta)
         return (DiscreteField(value=scale * value, grad=grad),)

@@ -4,6 +4,7 @@ from ..errors import NameUnknown
 from .base import Joint
 from .guides import OnCircle, OnLine
 from .hinge import Hinge
+from .plane_section import PlaneSection
 from .prescribed import PrescribedAngle, PrescribedPosition
 from .weld import Weld
 
@@ -15,6 +16,7 @@ JOINTS = {
     "circle": OnCircle,
     "position": PrescribedPosition,
     "angle": PrescribedAngle,
+    "plane": PlaneSection,
 }
 
 
@@ -33,5 +35,5 @@ def get_joint(joint, **options):
     return JOINTS[joint](**options)
 
 
-__all__ = ["JOINTS", "Hinge", "Joint", "OnCircle", "OnLine", "PrescribedAngle",
+__all__ = ["JOINTS", "Hinge", "Joint", "OnCircle", "OnLine", "PlaneSection", "PrescribedAngle",
            "PrescribedPosition", "Weld", "get_joint"]

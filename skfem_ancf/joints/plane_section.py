@@ -1,0 +1,43 @@
+"""An end section keeps its direction as a plane, and may change its thickness."""
+
+import numpy as np
+
+from .base import Joint, Vector
+
+
+class PlaneSection(Joint):
+    """t . r_Y = 0 at every section point: no section slope leaves the stress-free plane.
+
+    For a cable, n . r_X = 0. On a beam along a coordinate axis it only fixes coordinates.
+
+    Parameters
+    ----------
+    at
+        The end section, "left" or "right".
+    beam
+        The beam, by Beam, name or number; None where there is only one.
+    """
+
+    def __init__(self, at, beam=None, name=None):
+        self.at, self.beam, self.name = at, beam, name
+
+    def bind(self, scene):
+        beam = scene.beam(self.beam)
+        node = beam.section_node(self.at)
+        t = beam.mesh.p_X[:, node]
+        direction = np.array([-t[1], t[0]]) if beam.is_cable else t
+        direction = np.where(np.abs(direction) < 1e-14, 0.0, direction)
+        held = [k for k, (_, along, across) in enumerate(beam.element.functionals)
+                if (along, across) == (1, 0) and beam.is_cable or along == 0 and across > 0]
+        first = scene.offset(beam) + node * beam.nd
+        self.vectors = [Vector(np.zeros(2), np.array([[first + 2 * k], [first + 2 * k + 1]]),
+                               np.ones(1)) for k in held]
+        self.direction = direction
+        self.equations = tuple(f"moment on {beam.element.dofnames[k]}" for k in held)
+        self.rows = np.array([v.row(direction, scene.N) for v in self.vectors])
+
+    def value(self, u, t):
+        return np.array([self.direction @ v(u) for v in self.vectors])
+
+    def jacobian(self, u, t):
+        return self.rows
