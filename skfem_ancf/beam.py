@@ -253,7 +253,7 @@ class Beam:
         if self.is_cable:  # the tangent, which turns with the section
             return node * self.nd + 2 + np.arange(2).reshape(2, 1), np.ones(1)
         eta, w = gauss(self.element.order + 1)
-        h, f = self.mesh.height, self.element.functionals[2:]
+        h, f = self.mesh.height, self.element.functionals[2:2 + self.element.section.number]
         c = np.array([12.0 * h ** (f[k][2] - 1) * np.sum(
             w * (eta - 0.5) * self.element.section(eta - 0.5, k)[0]) for k in range(len(f))])
         return node * self.nd + 4 + np.arange(2 * len(f)).reshape(-1, 2).T, c

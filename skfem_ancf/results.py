@@ -39,11 +39,11 @@ class State:
     """
 
     def __init__(self, system, u, load=1.0, force=None, converged=True, iterations=0, message="",
-                 steps=(), multipliers=None, t=None):
+                 steps=(), multipliers=None, t=None, inertia=0.0):
         self.system, self.u, self.load = system, u, load
         self.converged, self.iterations, self.message = converged, iterations, message
         self.steps = list(steps)
-        self._force, self.t = force, t
+        self._force, self.t, self._inertia = force, t, inertia
         self.multipliers = np.zeros(system.m) if multipliers is None else multipliers
 
     def __repr__(self):
@@ -148,8 +148,9 @@ class State:
         return Reaction(forces[:, 0].sum(axis=0), float(moment), names)
 
     def _support_force(self):
-        """What supports do to the coordinates: internal force less loads and joints, (N,)."""
-        total = self.internal_force - self.load * self.system.external_force(self.u, self.t)
+        """What supports do to the coordinates, (N,): all other forces and inertia, negated."""
+        total = (self.internal_force - self.load * self.system.external_force(self.u, self.t)
+                 + self._inertia)
         t = self.load if self.t is None else self.t
         for joint, part in zip(self.system.joints, self.system.multipliers_of(self.multipliers)):
             total = total + part @ joint.jacobian(self.u, t)

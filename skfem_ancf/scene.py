@@ -11,8 +11,9 @@ from .errors import (ConvergenceError, InputError, NameUnknown, SupportError, re
                      require_finite_scalar)
 from .joints import get_joint
 from .loads import DeadLoad, EndMoment, Pressure
+from .path import Path
 from .results import State
-from .statics import newton
+from .statics import continuation, newton
 from .system import System
 
 
@@ -309,6 +310,31 @@ class Scene:
         except ConvergenceError as error:
             raise ConvergenceError(str(error), self._state(error.state)) from None
         return self._state(result)
+
+    def continuation(self, **options):
+        """The equilibrium path through limit and snap-back points, by arc length.
+
+        Parameters
+        ----------
+        **options
+            Those of :func:`skfem_ancf.statics.continuation.continuation`: ``steps``, ``ds``,
+            ``ds_max``, ``max_load``, ``until``, ``tol``, ``max_iterations``, ``progress``.
+
+        Returns
+        -------
+        Path
+
+        Raises
+        ------
+        ConvergenceError
+            If the path cannot be followed further; its ``state`` is the Path so far.
+        """
+        system = self.system
+        system.require_supports()
+        try:
+            return Path(system, continuation(system, **options))
+        except ConvergenceError as error:
+            raise ConvergenceError(str(error), Path(system, error.state)) from None
 
     def initial_velocity(self, v, beam=None):
         """The velocity at the start of :meth:`integrate`.

@@ -407,8 +407,8 @@ class System:
             if max(abs(a), abs(b), abs(c)) < 1e-8:
                 continue
             if abs(c) < 1e-8:
-                d = np.array([a, b]) / np.hypot(a, b)
-                d = d if d[np.argmax(np.abs(d))] > 0 else -d
+                d = np.round(np.array([a, b]) / np.hypot(a, b), 8)
+                d = (d if d[np.argmax(np.abs(d))] > 0 else -d) + 0.0  # no -0
                 parts.append(f"translation along ({d[0]:.3g}, {d[1]:.3g}){who}")
             else:
                 x = beam.origin + np.array([-b, a]) * sizes[k] / c

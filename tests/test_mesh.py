@@ -127,8 +127,9 @@ def test_own_boundaries_and_subdomains(arc):
     m = arc.with_boundaries({"root": lambda x: x[1] < 1e-9, "outer": lambda x: np.hypot(*x) > 1.1})
     assert_array_equal(m.boundaries["root"], m.boundaries["left"])
     assert_array_equal(m.boundaries["outer"], m.boundaries["bottom"])
-    inner = arc.with_boundaries({"axis": lambda x: np.abs(np.hypot(*x) - 1) < 1e-9},
-                                boundaries_only=False)
+    axis = {"axis": lambda x: np.abs(np.hypot(*x) - 1) < 1e-9}
+    assert_array_equal(arc.with_boundaries(axis).boundaries["axis"], [0, 3])
+    inner = arc.with_boundaries(axis, boundaries_only=False)
     assert_array_equal(inner.boundaries["axis"], [0, 1, 2, 3])
     assert_array_equal(arc.with_subdomains({"low": lambda x: x[1] < 0.8}).subdomains["low"], [0, 1])
     assert_array_equal(arc.facets_satisfying(lambda x: x[0] > 0.8), arc.normalize_facets(
@@ -410,7 +411,7 @@ def test_any_refinement_of_any_line(lengths, h, angle, marked):
 @pytest.mark.parametrize("elements", [[0, 1], [2], [2, 0], np.array([1, 2]), "last", {0, 2},
                                       np.array([True, False, True])])
 def test_restrict(elements):
-    mesh = tagged(MESHES["arc"]())
+    mesh = tagged(MESHES["arc"]().with_sections("cubic"))
     part, nodes = mesh.restrict(elements, return_mapping=True)
     kept = np.unique(mesh.normalize_elements(elements))
     assert_array_equal(part.p, mesh.p[:, nodes])

@@ -144,9 +144,9 @@ class Settings:
     elements
         Elements of the shapes and of the dynamics.
     dt
-        Step of the pendulums and of the falling cantilever.
-    instants
-        Stored instants of a motion besides the first.
+        Time step.
+    every
+        Steps between two stored instants.
     scheme
         Time integrator.
     """
@@ -157,11 +157,11 @@ class Settings:
     meshes_2d: tuple = ((16, 2), (32, 4), (64, 8), (128, 16))
     elements: int = 16
     dt: float = 5e-4
-    instants: int = 200
+    every: int = 5
     scheme: str = "energy-momentum"
 
 
 FULL = Settings()
 QUICK = Settings(elements_small=(2, 4, 8, 16), elements_large=(2, 4, 8, 16),
-                 elements_thick=(2, 4, 8, 16), meshes_2d=((16, 2), (32, 4)), elements=8, dt=4e-3,
-                 instants=100)
+                 elements_thick=(2, 4, 8, 16), meshes_2d=((16, 2), (32, 4)), elements=8,
+                 dt=2.5e-3, every=4)

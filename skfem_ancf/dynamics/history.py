@@ -14,8 +14,8 @@ class History:
     ----------
     t
         Times, shape (nt,).
-    u, v
-        Displacement and velocity of the coordinates, shape (nt, N).
+    u, v, acceleration
+        Displacement of the coordinates and its rates, shape (nt, N).
     multipliers
         Of the joints, shape (nt, m).
     iterations, factorizations
@@ -49,9 +49,10 @@ class History:
                 "factorisations>")
 
     def state(self, k):
-        """The instant ``k`` as a State: strain, plots, files."""
+        """The instant ``k`` as a State: strain, reactions (inertia included), plots, files."""
         return State(self.system, self.u[k], load=1.0, converged=True, t=float(self.t[k]),
-                     message=f"t = {self.t[k]:g}", multipliers=self.multipliers[k])
+                     message=f"t = {self.t[k]:g}", multipliers=self.multipliers[k],
+                     inertia=self.system.mass.multiply(self.acceleration[k]))
 
     def __iter__(self):
         return (self.state(k) for k in range(len(self)))
@@ -78,16 +79,7 @@ class History:
 
     def joint_force(self, joint):
         """What a joint does to its first beam at all instants, shape (nt, m)."""
-        return np.array([self.system.joint_force(
-            joint, m, self._reaction(k)) for k, m in enumerate(self.multipliers)])
-
-    def _reaction(self, k):
-        s = self.system
-        total = (s.internal_force(self.u[k]) - s.external_force(self.u[k], self.t[k])
-                 + s.mass.multiply(self.acceleration[k]))
-        for joint, part in zip(s.joints, s.multipliers_of(self.multipliers[k])):
-            total = total + part @ joint.jacobian(self.u[k], self.t[k])
-        return total
+        return np.array([state.joint_force(joint) for state in self])
 
     # of the whole
 

@@ -151,6 +151,10 @@ class Integrator:
         # round-off of the strains and of the inertia
         floor = np.hypot(8.0 * s.stiffness_scale * np.sqrt(step.stiffness_factor),
                          EPS * np.sqrt(step.mass_factor * abs(u @ s.mass.multiply(u))))
+        v = step.velocity(u)
+        v[s.fixed] = v_fixed
+        energy = max(self._energy, 0.5 * v @ s.mass.multiply(v))
+        wanted = self.tol * np.sqrt(energy) + floor
         before = None
         for _ in range(MAX_ITERATIONS):
             acceleration = step.acceleration(u)
@@ -164,20 +168,18 @@ class Integrator:
                     v, impulse = self._velocity(step, u, J, v_fixed, dt)
                     R -= s.curvature(at, step.joint_time, 0.25 * impulse) @ (y.v + v)
             du = self.A.solve(R)
-            work = abs(R @ du)
+            work = np.sum(np.abs(R * du))
             if s.joints:
                 Y = self.A.solve(np.ascontiguousarray(J.T))
                 dm = np.linalg.solve(s.jacobian(u, step.t) @ Y,
                                      s.full_jacobian(u, step.t) @ du + phi)
                 du, multipliers = du - Y @ dm, multipliers + dm
-                work = abs(R @ du) + abs(dm @ phi)
+                work = np.sum(np.abs(R * du)) + abs(dm @ phi)
             size = np.sqrt(work)
             self.iterations += 1
             if not np.isfinite(size):
                 raise StepFailed("the residual is not finite")
             u += du
-            self._energy = max(self._energy, 0.25 * size**2)
-            wanted = self.tol * np.sqrt(self._energy) + floor
             if before is not None:
                 rate = size / before
                 if rate > 1.0 and size <= 1e3 * floor:
@@ -210,7 +212,8 @@ class Integrator:
     def advance_safely(self, y, dt, depth=0):
         """As :meth:`advance`, in two halves where one step does not converge."""
         try:
-            return self.advance(y, dt)
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                return self.advance(y, dt)
         except (StepFailed, np.linalg.LinAlgError) as failure:
             self._coefficients = None
             if depth == 6:

@@ -129,6 +129,8 @@ class ElementBeam(Element):
                             f"mesh {mesh.sections}: use mesh.with_sections({self.sections!r})")
         zero = np.zeros(mesh.p.shape)
         known = {(1, 0): mesh.p_X, (0, 1): mesh.p_Y, (1, 1): mesh.p_XY}
+        if mesh.p_XY is not None:  # the tangent turns as the normal does
+            known[2, 0] = np.array([mesh.p_XY[1], -mesh.p_XY[0]])
         return np.array([known.get(f[1:], zero) for f in self.functionals])
 
     def __repr__(self):

@@ -16,8 +16,8 @@ class ElementBeamCable(ElementBeam):
     Parameters
     ----------
     degree
-        Degree of the axis along X: 3 (coordinates ``r``, ``r_X``), or 5 or 7 with ``r_XX`` and
-        ``r_XXX`` too, on straight meshes.
+        Degree of the axis along X: 3 (coordinates ``r``, ``r_X``), 5 (``r_XX`` too; by far the
+        most accurate for its cost) or 7 (``r_XXX`` too, on straight meshes only).
 
     Raises
     ------

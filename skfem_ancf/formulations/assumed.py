@@ -24,7 +24,7 @@ class Assumed(Formulation):
     likewise for each pair ``r_Yk``, ``r_XYk`` of cubic sections. The complex number beta, 1 for a
     straight element, makes c vanish in the stress-free state; c turns with the beam, so the term
     is objective, quadratic, and its matrix constant. For linear sections k = E I / L^2; for cubic
-    sections, and the cable, k = 10 E I / l^2 for the axis, l the length of the beam, and E I / N for each section
+    sections k = 10 E I / l^2 (the cubic cable: 300 E I / l^2) for the axis, l the length of the beam, and E I / N for each section
     coordinate, which keeps the fourth order.
 
     Sections of order 1 cannot change their thickness linearly in Y. For them, and a law with
@@ -94,5 +94,6 @@ class Assumed(Formulation):
         if element.sections == "linear" and element.order > 0:
             return held(EI / L**2, 1)
         N = element.section.number
-        total = held(10.0 * EI / np.sum(mesh.lengths) ** 2, 1)
+        size = 300.0 if element.order == 0 else 10.0
+        total = held(size * EI / np.sum(mesh.lengths) ** 2, 1)
         return total + sum(held(EI / N, 2 + N + k, 2 + k) for k in range(N))

@@ -1,0 +1,1 @@
+"""Pictures. Each module imports its plotting package only when it is called."""

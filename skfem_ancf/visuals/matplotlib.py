@@ -1,0 +1,218 @@
+"""Pictures of the deformed body, coloured by a field."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import (InputError, MissingExtra, NameUnknown, require_finite_scalar,
+                      require_positive)
+from ..io.vtu import _subdivision, grid, quads, replacing, sample
+
+#: Titles of the fields: the names are those in the files of :func:`~skfem_ancf.io.vtu.save_vtu`.
+TITLES = {
+    "displacement": "displacement, magnitude",
+    "u_x": "displacement $u_x$",
+    "u_y": "displacement $u_y$",
+    **{f"eps_{k}": rf"Green–Lagrange strain $\varepsilon_{{{k}}}$, beam frame"
+       for k in ("xx", "yy", "xy")},
+    **{f"S_{k}": f"second Piola–Kirchhoff stress $S_{{{k}}}$, beam frame"
+       for k in ("xx", "yy", "xy")},
+    **{f"sigma_{k}": rf"Cauchy stress $\sigma_{{{k}}}$, global axes" for k in ("xx", "yy", "xy")},
+}
+
+#: ``thickness="auto"`` draws a section at least this part of the picture high.
+READABLE = 1 / 40
+
+_INK, _MUTED, _GHOST = "#222222", "#666666", "#d9d9d9"
+
+
+def plot_state(state, field="eps_yy", ax=None, *, thickness="auto", undeformed=True, colorbar=True,
+               cmap=None, limits=None, title=None, subdivide=(8, 8), filename=None, dpi=200):
+    """Draw the deformed body of a state, coloured by a field.
+
+    Parameters
+    ----------
+    state
+        A :class:`~skfem_ancf.results.State`, or anything with its ``beams`` and ``u_of``.
+    field
+        A component of strain or stress as named in :func:`~skfem_ancf.io.vtu.save_vtu`, "u_x",
+        "u_y", or "displacement" for its magnitude.
+    ax
+        matplotlib Axes to draw in; a new figure by default, which needs no display.
+    thickness
+        Factor by which the section is drawn thicker than it is, for slender beams; the picture
+        says so. Colours stay those of the material points. "auto": the whole number that makes
+        the section 1/40 of the picture, or 1 if it is.
+    undeformed
+        Draw the stress-free body in grey behind.
+    colorbar
+        Draw a colour bar.
+    cmap
+        matplotlib colour map; by default one for signed fields, symmetric about zero, and one
+        for the magnitude of the displacement.
+    limits
+        Lowest and highest value of the colours.
+    title
+        Title of the picture; the name of the field by default, "" for none.
+    subdivide
+        Patches along and across each element.
+    filename
+        Write the picture here too (.png, .pdf, .svg); missing folders are made.
+    dpi
+        Resolution of the file.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    MissingExtra
+        If matplotlib is not installed.
+    NameUnknown
+        If the field is not known; the message lists the known ones.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamANCF(2),
+    ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
+    >>> state = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).solve_static()
+    >>> ax = state.plot("S_xx")
+    >>> ax.get_title(loc="left")
+    'second Piola–Kirchhoff stress $S_{xx}$, beam frame'
+    """
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        raise MissingExtra("matplotlib", "plot") from None
+    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.figure import Figure
+    from matplotlib.tri import Triangulation
+
+    if field not in TITLES:
+        raise NameUnknown("field", field, TITLES)
+    m, n = _subdivision(subdivide)
+    bodies = [_Body(state, beam, field, m, n) for beam in state.beams]
+    factor = _thickness(thickness, bodies)
+    ghosts = [line for b in bodies for line in b.outline(b.reference, factor)] if undeformed else []
+    outlines = [line for b in bodies for line in b.outline(b.deformed, factor)]
+    points = np.concatenate([b.points(b.deformed, factor).reshape(2, -1) for b in bodies], axis=1)
+    values = np.concatenate([b.values.ravel() for b in bodies])
+    low, high = _limits(limits, values, signed=field != "displacement")
+
+    if ax is None:
+        ax = Figure(figsize=_figsize(np.concatenate(ghosts + outlines), colorbar),
+                    layout="constrained").add_subplot()
+    if ghosts:
+        ax.add_collection(PolyCollection(ghosts, facecolor=_GHOST, edgecolor=_GHOST, linewidth=0.5,
+                                         zorder=1), autolim=True)
+    patches = quads(m, n)
+    first = np.concatenate([[0], np.cumsum([b.values.size for b in bodies])])
+    cells = np.concatenate([
+        (f + np.arange(0, b.values.size, (m + 1) * (n + 1))[:, None, None] + patches).reshape(-1, 4)
+        for f, b in zip(first, bodies)])
+    triangles = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
+    image = ax.tripcolor(Triangulation(*points, triangles=triangles), values, shading="gouraud",
+                         cmap=cmap or ("viridis" if field == "displacement" else "RdYlBu_r"),
+                         vmin=low, vmax=high, zorder=2)
+    ax.add_collection(LineCollection([np.vstack([line, line[:1]]) for line in outlines],
+                                     colors=_INK, linewidths=0.5, zorder=3))
+    ax.set_aspect("equal")
+    ax.margins(0.04)
+    ax.autoscale_view()
+    _dress(ax, TITLES[field] if title is None else title, factor)
+    if colorbar:
+        bar = ax.figure.colorbar(image, ax=ax, shrink=0.85, aspect=28, pad=0.02)
+        bar.outline.set_visible(False)
+        bar.ax.tick_params(labelsize=8, color=_MUTED, labelcolor=_INK)
+        bar.formatter.set_powerlimits((-3, 4))
+        bar.formatter.set_useMathText(True)
+        bar.ax.yaxis.get_offset_text().set_size(8)
+    if filename is not None:
+        with replacing(Path(filename)) as temporary:
+            ax.figure.savefig(temporary, dpi=dpi)
+    return ax
+
+
+class _Body:
+    """One beam on a grid: the deformed and the stress-free place of each point, and the field."""
+
+    def __init__(self, state, beam, field, m, n):
+        fields = sample(state, beam, grid(m, n))
+        self.n, self.height = n, beam.mesh.height
+        self.shape = (2, beam.mesh.nelements, m + 1, n + 1)
+        # the axis is at eta = 1/2, which is on the grid only if n is even
+        ends = np.array([np.linspace(0, 1, m + 1), np.full(m + 1, 0.5)])
+        x, axis = fields["x"], beam.mesh.mapping().F(ends)
+        u, axis_u = fields["displacement"], beam.displacements(state.u_of(beam), ends)
+        self.reference, self.deformed = (x, axis), (x + u, axis + axis_u)
+        self.values = (np.hypot(*u) if field == "displacement" else
+                       u["xy".index(field[2])] if field[:2] == "u_" else fields[field])
+
+    def points(self, body, factor):
+        """Positions (2, nelements, m + 1, n + 1) with the section drawn ``factor`` thicker."""
+        x, axis = body
+        axis = axis[..., None]
+        return axis + factor * (x.reshape(self.shape) - axis)
+
+    def outline(self, body, factor):
+        """Closed lines around each unbroken run of elements, shape (points, 2)."""
+        x = self.points(body, factor)
+        cuts = np.nonzero(np.hypot(*(x[:, 1:, 0] - x[:, :-1, -1])).max(axis=-1)
+                          > 1e-6 * self.height)[0] + 1
+        out = []
+        for part in np.split(np.arange(x.shape[1]), cuts):
+            run = x[:, part].reshape(2, -1, self.n + 1)
+            out.append(np.hstack([run[:, :, 0], run[:, -1, 1:], run[:, -2::-1, -1],
+                                  run[:, 0, -2:0:-1]]).T)
+        return out
+
+
+def _thickness(thickness, bodies):
+    if thickness != "auto":
+        return require_positive("thickness", thickness)
+    x = np.concatenate([p[1].reshape(2, -1) for b in bodies for p in (b.reference, b.deformed)],
+                       axis=1)
+    wanted = READABLE * np.max(np.ptp(x, axis=1)) / max(b.height for b in bodies)
+    return float(max(1, round(wanted)))
+
+
+def _limits(limits, values, signed):
+    if limits is not None:
+        try:
+            low, high = limits
+        except (TypeError, ValueError):
+            raise InputError(f"limits must be two numbers, got {limits!r}") from None
+        low, high = require_finite_scalar("limits", low), require_finite_scalar("limits", high)
+        if not low < high:
+            raise InputError(f"limits must increase, got {limits!r}")
+        return low, high
+    size = np.max(np.abs(values[np.isfinite(values)]), initial=0.0) or 1.0
+    return (-size, size) if signed else (0.0, size)
+
+
+def _figsize(points, colorbar):
+    """A figure about as wide and high as what is in it."""
+    width, height = np.maximum(np.ptp(points, axis=0), 1e-300)
+    aspect = np.clip(height / width, 0.15, 1.6)
+    area = 5.2 * 5.2 if aspect > 0.5 else 36.0
+    w = min(8.0, np.sqrt(area / aspect))
+    return w + (1.2 if colorbar else 0.3), max(1.6, w * aspect) + 0.9
+
+
+def _dress(ax, title, factor):
+    if title:
+        ax.set_title(title, loc="left", fontsize=10, color=_INK)
+    for side in ("top", "right"):
+        ax.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        ax.spines[side].set_color(_MUTED)
+    ax.tick_params(color=_MUTED, labelcolor=_INK, labelsize=8)
+    ax.set_xlabel("x", fontsize=9, color=_INK)
+    ax.set_ylabel("y", fontsize=9, color=_INK)
+    if factor != 1.0:
+        ax.annotate(f"section drawn {factor:g} times as thick", (1, 1), (0, 3), va="bottom",
+                    ha="right", xycoords="axes fraction", textcoords="offset points", fontsize=8,
+                    color=_MUTED)
