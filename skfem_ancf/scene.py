@@ -390,8 +390,8 @@ class Scene:
         True
         """
         velocity = np.concatenate([self._velocity.get(id(b), np.zeros(b.N)) for b in self.beams])
-        return integrate(self.system, t_end, dt, get_scheme(scheme),
-                                   None if start is None else start.u, velocity, **options)
+        u = None if start is None else require_finite("start.u", start.u, (self.N,))
+        return integrate(self.system, t_end, dt, get_scheme(scheme), u, velocity, **options)
 
     def modes(self, k, state=None):
         """The k lowest natural frequencies and their shapes.

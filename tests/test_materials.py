@@ -228,7 +228,8 @@ class Stiffening(Material):
     def energy(self, strain):
         e = np.asarray(strain)
         D = StVenantKirchhoff(self.E, self.nu, plane=self.plane).D
-        return 0.5 * np.sum(e * np.tensordot(D, e, 1), axis=0) + self.c / 4 * np.sum(e * e, axis=0) ** 2
+        hooke = 0.5 * np.sum(e * np.tensordot(D, e, 1), axis=0)
+        return hooke + self.c / 4 * np.sum(e * e, axis=0) ** 2
 
     def stress(self, strain):
         e = np.asarray(strain)

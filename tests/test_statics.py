@@ -6,9 +6,9 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, root
 
-from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamPatelShabana, InputError,
-                        MeshBeam, MeshError, NameUnknown, Scene, StVenantKirchhoff, SupportError,
-                        exact)
+from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamPatelShabana,
+                        InputError, MeshBeam, MeshError, NameUnknown, Scene, StVenantKirchhoff,
+                        SupportError, exact)
 from skfem_ancf.formulations import FORMULATIONS
 from skfem_ancf.materials import LinearLaw, Material
 
@@ -20,9 +20,9 @@ def element(order):
     return ElementBeamPatelShabana() if order == "ps" else ElementBeamANCF(order)
 
 
-def cantilever(order=3, n=16, L=1.0, h=0.01, b=0.01, E=2e8, nu=0.3, k="auto", plane="stress", grade=0,
-               formulation="continuum", density=7800.0):
-    """The beam of the paper's example 5.2; ``grade``: how often the element at the root is halved."""
+def cantilever(order=3, n=16, L=1.0, h=0.01, b=0.01, E=2e8, nu=0.3, k="auto", plane="stress",
+               grade=0, formulation="continuum", density=7800.0):
+    """The beam of the paper's example 5.2; the element at the root is halved ``grade`` times."""
     x = np.linspace(0.0, L, n + 1)
     for _ in range(grade):
         x = np.insert(x, 1, x[1] / 2)
@@ -39,7 +39,8 @@ def solved(scene, **options):
 # the paper
 
 ROOTS = {1: None, 2: ["r", "r_X", "r_Y0^1", "r_Y1^1"], 3: ["r", "r_X", "r_Y1", "r_Y0^1", "r_Y2^1"],
-         4: ["r", "r_X", "r_Y0^1", "r_Y1^1", "r_Y2^1", "r_Y3^1"], "ps": ["r", "r_X", "r_Y", "r_YY^1"]}
+         4: ["r", "r_X", "r_Y0^1", "r_Y1^1", "r_Y2^1", "r_Y3^1"],
+         "ps": ["r", "r_X", "r_Y", "r_YY^1"]}
 TABLE_4 = {  # N = 4: ours, the paper's row cannot be right
     1: (-0.275739, -0.588096, -0.804809, -0.878510, -0.895754, -0.897565, -0.897727),
     2: (-0.329152, -0.636383, -0.826052, -0.888423, -0.901827, -0.903283, -0.903457),
@@ -53,8 +54,8 @@ TABLE_4 = {  # N = 4: ours, the paper's row cannot be right
 def test_table_4(order):
     tips = []
     for k in range(7):
-        scene = cantilever(order, 2 ** (k + 1), k="paper").fix("left", ROOTS[order]).gravity(GRAVITY)
-        state = solved(scene)
+        scene = cantilever(order, 2 ** (k + 1), k="paper").fix("left", ROOTS[order])
+        state = solved(scene.gravity(GRAVITY))
         assert len(state.steps) == 1 and state.iterations <= 10
         tips.append(state.displacement(TIP)[1])
     assert_allclose(tips, TABLE_4[order], rtol=0, atol=1.5e-6)
@@ -151,7 +152,7 @@ def roll_up(material, order, n, formulation, h=0.01, **options):
 
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_roll_up_of_rigid_sections(order):
-    """The closed form M / (EI kappa) = 1 - 0.3 (h kappa)^2: the end turns by 1.0011885806 x 2 pi."""
+    """Closed form M / (EI kappa) = 1 - 0.3 (h kappa)^2: the end turns by 1.0011885806 x 2 pi."""
     material = RigidNormals(12e6, 0.0)
     runs = [roll_up(material, order, n, "assumed", first_step=0.1) for n in (64, 128)]
     angle = exact.rollup_end_angle(2 * np.pi, 12e6, 1.0, 0.01, 1.0)
@@ -222,7 +223,8 @@ THICK = {  # nu, plane: tip of the continuum, and bounds on 128 elements of orde
 
 
 def thick(order, n, nu, plane, F=62.5e6, **options):
-    scene = cantilever(order, n, L=2.0, h=0.5, b=0.1, E=2.07e11, nu=nu, k=1.0, plane=plane, **options)
+    scene = cantilever(order, n, L=2.0, h=0.5, b=0.1, E=2.07e11, nu=nu, k=1.0, plane=plane,
+                       **options)
     return scene.clamp("left").traction("right", (0, -F / 0.05))
 
 
@@ -297,14 +299,16 @@ def test_reactions_of_two_supports(names):
 @pytest.mark.parametrize("method", ["mixed", "newton"])
 def test_prescribed_displacement(method):
     """A displacement and its reaction give the same state, however the displacement is reached."""
-    moved = solved(cantilever(3, 8).clamp("left").fix("right", "r^2", displacement=-0.5), method=method)
+    def scene():
+        return cantilever(3, 8).clamp("left").fix("right", "r^2", displacement=-0.5)
+
+    moved = solved(scene(), method=method)
     assert abs(moved.displacement(TIP)[1] + 0.5) < 1e-15
     force = moved.reactions("right").force
     assert force[0] == 0.0 and force[1] < 0
     pushed = solved(cantilever(3, 8).clamp("left").point_force(force, at=TIP), method=method)
     assert_allclose(pushed.u, moved.u, atol=2e-7)
-    steps = solved(cantilever(3, 8).clamp("left").fix("right", "r^2", displacement=-0.5),
-                   method=method, first_step=0.13)
+    steps = solved(scene(), method=method, first_step=0.13)
     assert len(steps.steps) > 1
     assert_allclose(steps.u, moved.u, atol=1e-7)
     # the work of the support is the strain energy; the force grows with the displacement
@@ -456,10 +460,10 @@ def test_compression_up_to_collapse(order, method):
     state = solved(column(0.19), method=method)
     stretch = brentq(lambda x: x * (x * x - 1) / 2 + 0.19, 3**-0.5, 1.0, xtol=1e-14)
     assert_allclose(state.displacement((2, 0.1)), [2 * (stretch - 1), 0.0], atol=1e-8)
-    with pytest.raises(ConvergenceError, match="no equilibrium found beyond the load level 0.76") as e:
+    with pytest.raises(ConvergenceError, match="beyond the load level 0.76") as error:
         column(0.25).solve_static(method=method)
     limit = COMPRESSION / 0.25
-    assert limit - 2e-4 < e.value.state.load <= limit
+    assert limit - 2e-4 < error.value.state.load <= limit
 
 
 @pytest.mark.parametrize("method", ["mixed", "newton"])
@@ -522,7 +526,7 @@ def _scene():
     (lambda s: s.fix("left", ["r", "r_Y2"]), NameUnknown, "coordinate 'r_Y2'; known"),
     (lambda s: s.gravity(GRAVITY, beam="arm"), NameUnknown, "beam 'arm'; known: 0"),
     (lambda s: s.solve_static(method="arc"), NameUnknown, "method 'arc'; known: 'mixed', 'newton'"),
-    (lambda s: s.fix("left", "r^1", displacement=1.0), SupportError, r"r\^1 of node 0 is fixed twice"),
+    (lambda s: s.fix("left", "r^1", displacement=1.0), SupportError, "node 0 is fixed twice"),
     (lambda s: s.fix("left", "r", displacement=np.nan), InputError, "displacement must be finite"),
     (lambda s: s.gravity((0, np.nan)), InputError, "g has a value that is NaN"),
     (lambda s: s.gravity(9.81), InputError, r"g must have shape"),

@@ -21,13 +21,15 @@ TITLES = {
 }
 
 #: ``thickness="auto"`` draws a section at least this part of the picture high.
-READABLE = 1 / 40
+READABLE = 1 / 25
 
+_EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max",
+           (True, True): "both"}
 _INK, _MUTED, _GHOST = "#222222", "#666666", "#d9d9d9"
 
 
 def plot_state(state, field="eps_yy", ax=None, *, thickness="auto", undeformed=True, colorbar=True,
-               cmap=None, limits=None, title=None, subdivide=(8, 8), filename=None, dpi=200):
+               cmap=None, limits=None, title=None, subdivide=(16, 8), filename=None, dpi=200):
     """Draw the deformed body of a state, coloured by a field.
 
     Parameters
@@ -42,7 +44,7 @@ def plot_state(state, field="eps_yy", ax=None, *, thickness="auto", undeformed=T
     thickness
         Factor by which the section is drawn thicker than it is, for slender beams; the picture
         says so. Colours stay those of the material points. "auto": the whole number that makes
-        the section 1/40 of the picture, or 1 if it is.
+        the section about 1/25 of the picture, less where bends would fold, at least 1.
     undeformed
         Draw the stress-free body in grey behind.
     colorbar
@@ -51,7 +53,8 @@ def plot_state(state, field="eps_yy", ax=None, *, thickness="auto", undeformed=T
         matplotlib colour map; by default one for signed fields, symmetric about zero, and one
         for the magnitude of the displacement.
     limits
-        Lowest and highest value of the colours.
+        Lowest and highest value of the colours; values beyond them take the last colour, and
+        the colour bar gets arrows.
     title
         Title of the picture; the name of the field by default, "" for none.
     subdivide
@@ -124,15 +127,10 @@ def plot_state(state, field="eps_yy", ax=None, *, thickness="auto", undeformed=T
     ax.autoscale_view()
     _dress(ax, TITLES[field] if title is None else title, factor)
     if colorbar:
-        bar = ax.figure.colorbar(image, ax=ax, shrink=0.85, aspect=28, pad=0.02)
-        bar.outline.set_visible(False)
-        bar.ax.tick_params(labelsize=8, color=_MUTED, labelcolor=_INK)
-        bar.formatter.set_powerlimits((-3, 4))
-        bar.formatter.set_useMathText(True)
-        bar.ax.yaxis.get_offset_text().set_size(8)
+        _add_colorbar(ax, image, low > np.nanmin(values), high < np.nanmax(values))
     if filename is not None:
         with replacing(Path(filename)) as temporary:
-            ax.figure.savefig(temporary, dpi=dpi)
+            ax.figure.savefig(temporary, dpi=dpi, bbox_inches="tight")
     return ax
 
 
@@ -173,10 +171,16 @@ class _Body:
 def _thickness(thickness, bodies):
     if thickness != "auto":
         return require_positive("thickness", thickness)
-    x = np.concatenate([p[1].reshape(2, -1) for b in bodies for p in (b.reference, b.deformed)],
-                       axis=1)
-    wanted = READABLE * np.max(np.ptp(x, axis=1)) / max(b.height for b in bodies)
-    return float(max(1, round(wanted)))
+    shapes = [(b, p) for b in bodies for p in (b.reference, b.deformed)]
+    x = np.concatenate([axis.reshape(2, -1) for _, (_, axis) in shapes], axis=1)
+    factor = READABLE * np.max(np.ptp(x, axis=1)) / max(b.height for b in bodies)
+    for body, (x, axis) in shapes:  # both faces keep a third of the advance of the axis
+        step = np.diff(axis, axis=-1)
+        for face in (0, -1):
+            offset = np.diff(x.reshape(body.shape)[..., face] - axis, axis=-1)
+            turn = -np.sum(offset * step, axis=0) / np.sum(step**2, axis=0)
+            factor = min(factor, (2 / 3) / max(np.max(turn), 1e-300))
+    return float(max(1, round(factor)))
 
 
 def _limits(limits, values, signed):
@@ -193,6 +197,23 @@ def _limits(limits, values, signed):
     return (-size, size) if signed else (0.0, size)
 
 
+def _add_colorbar(ax, image, below, above):
+    """A bar as high as the picture, or below a flat one."""
+    (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
+    flat = (y1 - y0) < 0.35 * (x1 - x0)
+    if flat:
+        bar = ax.figure.colorbar(image, ax=ax, location="bottom", shrink=0.6, aspect=45, pad=0.06,
+                                 extend=_EXTEND[below, above])
+    else:
+        bar = ax.figure.colorbar(image, cax=ax.inset_axes([1.03, 0.0, 0.03, 1.0]),
+                                 extend=_EXTEND[below, above])
+    bar.outline.set_visible(False)
+    bar.ax.tick_params(labelsize=8, color=_MUTED, labelcolor=_INK)
+    bar.formatter.set_powerlimits((-3, 4))
+    bar.formatter.set_useMathText(True)
+    (bar.ax.xaxis if flat else bar.ax.yaxis).get_offset_text().set_size(8)
+
+
 def _figsize(points, colorbar):
     """A figure about as wide and high as what is in it."""
     width, height = np.maximum(np.ptp(points, axis=0), 1e-300)
@@ -204,7 +225,7 @@ def _figsize(points, colorbar):
 
 def _dress(ax, title, factor):
     if title:
-        ax.set_title(title, loc="left", fontsize=10, color=_INK)
+        ax.set_title(title, loc="left", fontsize=10, color=_INK, pad=6 if factor == 1.0 else 18)
     for side in ("top", "right"):
         ax.spines[side].set_visible(False)
     for side in ("left", "bottom"):
@@ -213,6 +234,5 @@ def _dress(ax, title, factor):
     ax.set_xlabel("x", fontsize=9, color=_INK)
     ax.set_ylabel("y", fontsize=9, color=_INK)
     if factor != 1.0:
-        ax.annotate(f"section drawn {factor:g} times as thick", (1, 1), (0, 3), va="bottom",
-                    ha="right", xycoords="axes fraction", textcoords="offset points", fontsize=8,
-                    color=_MUTED)
+        ax.annotate(f"section drawn {factor:g} times as thick", (0, 1), (0, 5), va="bottom",
+                    xycoords="axes fraction", textcoords="offset points", fontsize=8, color=_MUTED)
