@@ -51,7 +51,7 @@ def main(arguments=None):
     parser.add_argument("--out", default="out/paper", help="folder to write to")
     parser.add_argument("--only", nargs="+", choices=EXAMPLES, default=list(EXAMPLES),
                         metavar="EXAMPLE", help=f"some of {', '.join(EXAMPLES)}")
-    parser.add_argument("--quick", action="store_true", help="coarse, a few seconds")
+    parser.add_argument("--quick", action="store_true", help="coarse, a quarter of a minute")
     options = parser.parse_args(arguments)
     numbers = [number for number in EXAMPLES if number in options.only]
     run(options.out, numbers, QUICK if options.quick else FULL)

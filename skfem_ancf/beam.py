@@ -66,6 +66,9 @@ class Beam:
         :data:`skfem_ancf.formulations.FORMULATIONS`, or a formulation.
     name
         What messages and multi-beam scenes call the beam.
+    compiled
+        Use the kernels compiled by Numba, if it is installed and they apply; the results agree to
+        round-off.
 
     Raises
     ------
@@ -84,7 +87,8 @@ class Beam:
     (170, 0.78)
     """
 
-    def __init__(self, mesh, element, material, width, formulation="continuum", name=None):
+    def __init__(self, mesh, element, material, width, formulation="continuum", name=None,
+                 compiled=True):
         for argument, kind, value in (("mesh", MeshBeam, mesh), ("element", ElementBeam, element),
                                       ("material", Material, material)):
             if not isinstance(value, kind):
@@ -93,7 +97,7 @@ class Beam:
         self.element, self.material = element, material
         self.width = require_positive("width", width)
         self.formulation = get_formulation(formulation)
-        self.name = name
+        self.name, self.compiled = name, bool(compiled)
         self.nd = 2 * element.nodal_dofs
         self.N = self.nd * mesh.p.shape[1]
 
@@ -131,8 +135,11 @@ class Beam:
     @cached_property
     def kernel(self):
         """The fused evaluation of the strain energy; see :mod:`skfem_ancf.kernel`."""
-        kernel = CableKernel if self.is_cable else Kernel
-        return kernel(self.mesh, self.element, self.material, self.width, self.formulation)
+        kernel = (CableKernel if self.is_cable else Kernel)(
+            self.mesh, self.element, self.material, self.width, self.formulation)
+        if self.compiled:
+            kernel.compile()
+        return kernel
 
     @property
     def is_cable(self):

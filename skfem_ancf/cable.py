@@ -82,11 +82,18 @@ class CableKernel(Chain):
         else:
             q_e = self.gather(q0)
             self.a0, self.b0 = self.G1 @ q_e, self.G2 @ q_e
+        self.a0, self.b0 = np.ascontiguousarray(self.a0), np.ascontiguousarray(self.b0)
+        self.G1, self.G2 = np.ascontiguousarray(self.G1), np.ascontiguousarray(self.G2)
         self.s0 = np.sum(self.a0**2, axis=-1)
         self.kappa0 = cross(self.a0, self.b0) / self.s0
         self.volume = float(np.sum(self.w)) * (mesh.nelements if same else 1) * area
         self.constant = (formulation.stabilisation(mesh, element, material, width)
                          if m == 2 and formulation.name == "assumed" else None)
+
+    def _pack(self):
+        constant = np.zeros((0, 1, 1)) if self.constant is None else self.constant
+        return (self.G1, self.G2, self.a0, self.b0, self.s0, self.kappa0, self.w, self.stiffness,
+                np.ascontiguousarray(constant), self.t[0].astype(np.int64), self.nd)
 
     def _part(self, table, elements):
         return table[elements] if len(table) > 1 else table
@@ -191,7 +198,9 @@ class CableKernel(Chain):
         return total
 
     def strains(self, u):
-        """What :meth:`mean_force` wants of the start of a step."""
+        """What :meth:`mean_force` wants of the start of a step; None if it is not needed."""
+        if self.compiled is not None:
+            return None
         out = []
         for part in self.chunks():
             state = self._state(self.gather(u, part), part)
@@ -205,6 +214,8 @@ class CableKernel(Chain):
         step: ``d eps = (a0 + a1) . da / (|a0| + |a1|)`` and, from ``s kappa = a x b``,
         ``mean(s) d kappa = d(a x b) - mean(kappa) ds``.
         """
+        if self.compiled is not None:
+            return self.compiled.mean_force(u0, u1)
         out = np.zeros(self.N)
         for part, (old, strain0, s0) in zip(self.chunks(), strains0):
             p = self._part
@@ -225,6 +236,10 @@ class CableKernel(Chain):
                           ).reshape(u_e.shape)
             self.scatter(force, part, out)
         return out
+
+    def inverted(self, u):
+        """False: a cable has no section to turn inside out."""
+        return False
 
     # fields
 

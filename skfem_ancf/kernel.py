@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .materials import LinearLaw
 from .quadrature import tensor
 
 #: Elements evaluated together; keeps the work arrays in cache and the memory bounded.
@@ -56,9 +57,8 @@ class Evaluation:
         out = []
         for t, g, eps, S in zip(self._tables, self._gradients, self.strains, self.stresses):
             d = t.strain_increment(g, du)
-            D = getattr(t.law, "D", None)
-            out.append(S + (np.einsum("abep,bep->aep", t.law.moduli(eps), d) if D is None
-                            else np.tensordot(D, d, 1)))
+            out.append(S + (np.tensordot(t.law.D, d, 1) if isinstance(t.law, LinearLaw) else
+                            np.einsum("abep,bep->aep", t.law.moduli(eps), d)))
         return out
 
 
@@ -104,6 +104,9 @@ class TermTables:
                          term.matrix(name))
 
         self.xx, self.yy, self.xy = map(component, ("xx", "yy", "xy"))
+        self.along = None if term.section_samples is not None else [
+            np.eye(len(term.axis[0])) if matrix is None else matrix
+            for matrix in (term.interpolation(c, term.axis[0]) for c in ("xx", "yy", "xy"))]
         X, W = term.quadrature
         self.points = X
         self.w = width * W * mesh.mapping().detDF(X, tind)
@@ -171,6 +174,12 @@ class TermTables:
         return np.array([self._to_points(self.xx, xx), self._to_points(self.yy, yy),
                          self._to_points(self.xy, xy)])
 
+    def inverted(self, gradients):
+        """True if the body is turned inside out at a sample: det F is not positive."""
+        _, _, rx, ry = gradients
+        rx, ry = rx[:, self.xy.x], ry[:, self.xy.y]
+        return not np.all(rx[..., 0] * ry[..., 1] > rx[..., 1] * ry[..., 0])
+
     # force and tangent
 
     def force(self, gradients, stress):
@@ -206,9 +215,8 @@ class TermTables:
         """int B^T D B, shape (ne, 2 nb, 2 nb)."""
         B = self.strain_matrix(gradients)
         ne, _, n, m = B.shape
-        D = getattr(self.law, "D", None)
-        if D is not None:
-            DB = (D @ B.reshape(ne, 3, n * m)).reshape(B.shape)
+        if isinstance(self.law, LinearLaw):
+            DB = (self.law.D @ B.reshape(ne, 3, n * m)).reshape(B.shape)
         else:
             DB = np.einsum("abep,ebpk->eapk", self.law.moduli(strain), B, optimize=True)
         DB *= self.w[:, None, :, None]
@@ -228,8 +236,27 @@ class TermTables:
         return K + shear + shear.transpose(0, 2, 1)
 
 
+class Assembly:
+    """What :meth:`Chain.assemble` found, chunk by chunk."""
+
+    def __init__(self, kernel, parts):
+        self._kernel, self._parts = kernel, parts
+
+    def carry(self, du):
+        """Stresses at ``u + du``, linearised, one list a chunk."""
+        return [e.carry(self._kernel.gather(du, part)) for part, e in self._parts]
+
+
 class Chain:
-    """Elements of a chain of nodes: gathering, scattering, and the loop over chunks."""
+    """Elements of a chain of nodes: gathering, scattering, and the loop over chunks.
+
+    Attributes
+    ----------
+    compiled
+        The same compiled by Numba, or None where it is not installed or does not apply.
+    """
+
+    compiled = None
 
     def __init__(self, mesh, element):
         self.nd = 2 * element.nodal_dofs
@@ -255,8 +282,58 @@ class Chain:
         """Slices of the elements that are evaluated together."""
         return [slice(k, k + CHUNK) for k in range(0, self.t.shape[1], CHUNK)]
 
+    def compile(self):
+        """Use Numba from now on, if it is installed and has what this kernel needs."""
+        pack = self._pack()
+        if pack is None:
+            return
+        try:
+            from .compiled import CompiledKernel
+        except ImportError:
+            return
+        self.compiled = CompiledKernel(self, pack, cable=len(pack) == 11)
+
+    def _pack(self):
+        """The tables for the compiled functions, or None."""
+        return None
+
+    def assemble(self, u, K, start, force, carried=None, geometric=True):
+        """Add the tangent to a band matrix and the internal force to a vector.
+
+        Parameters
+        ----------
+        u
+            Coordinate displacement, shape (N,).
+        K
+            A :class:`~skfem_ancf.linalg.BandMatrix`, and ``start`` the row of the first
+            coordinate in it.
+        force
+            Shape (N,); added to.
+        carried
+            What :meth:`Assembly.carry` returned, for the geometric part.
+        geometric
+            Include the geometric part.
+
+        Returns
+        -------
+        Assembly
+            With ``carry(du)``.
+        """
+        if self.compiled is not None and K.symmetric:
+            return self.compiled.assemble(u, K, start, force, carried, geometric)
+        parts = []
+        for k, part in enumerate(self.chunks()):
+            e = self.evaluate(self.gather(u, part), part, geometric=geometric,
+                              carried=None if carried is None else carried[k])
+            self.scatter(e.force, part, force)
+            K.add_elements(e.tangent, start, self.nd, self.t[0, part])
+            parts.append((part, e))
+        return Assembly(self, parts)
+
     def force(self, u):
         """Internal force of a coordinate displacement (N,), shape (N,)."""
+        if self.compiled is not None and u.dtype == np.float64:
+            return self.compiled.force(u)
         out = np.zeros(self.N, dtype=u.dtype)
         for part in self.chunks():
             self.scatter(self.evaluate(self.gather(u, part), part, tangent=False).force, part, out)
@@ -286,6 +363,22 @@ class Kernel(Chain):
         self.tables = [TermTables(mesh, element, term, width)
                        for term in formulation.terms(element, material)]
         self.constant = formulation.stabilisation(mesh, element, material, width)
+
+    def _pack(self):
+        t = self.tables[0]
+        if len(self.tables) > 1 or not isinstance(t.law, LinearLaw) or t.along is None:
+            return None
+        n = [t.Gx.shape[1], t.Gy.shape[1]]
+        where = [np.arange(size, dtype=np.int64)[rows] for rows, size in (
+            (t.xx.x, n[0]), (t.yy.y, n[1]), (t.xy.x, n[0]), (t.xy.y, n[1]))]
+        constant = np.zeros((0, 1, 1)) if self.constant is None else self.constant
+        return (t.Gx, t.Gy, t.e1, t.e2, t.w, np.ascontiguousarray(t.law.D), *where, *t.along,
+                np.ascontiguousarray(constant), self.t[0].astype(np.int64), self.nd)
+
+    def inverted(self, u):
+        """True if the body is turned inside out somewhere: no deformation of a real one."""
+        return any(t.inverted(t.gradients(self.gather(u, part))) for part in self.chunks()
+                   for t in (self.tables[0].part(part),))
 
     @property
     def volume(self):
@@ -349,7 +442,9 @@ class Kernel(Chain):
         return total
 
     def strains(self, u):
-        """Strains of every term, one list a chunk of elements."""
+        """Strains of every term, one list a chunk of elements; None if they are not needed."""
+        if self.compiled is not None:
+            return None
         return [[t.strain(t.gradients(self.gather(u, part)))
                  for t in (t.part(part) for t in self.tables)] for part in self.chunks()]
 
@@ -358,6 +453,8 @@ class Kernel(Chain):
 
         ``strains0`` is :meth:`strains` of u0.
         """
+        if self.compiled is not None:
+            return self.compiled.mean_force(u0, u1)
         out = np.zeros(self.N)
         for part, known in zip(self.chunks(), strains0):
             a, b = self.gather(u0, part), self.gather(u1, part)
@@ -379,7 +476,7 @@ def mean_stress(law, eps0, eps1):
     The mean of both stresses for a linear law, else the discrete gradient of Gonzalez (2000).
     """
     middle = law.stress(0.5 * (eps0 + eps1))
-    if hasattr(law, "D"):
+    if isinstance(law, LinearLaw):
         return middle
     d = eps1 - eps0
     size = np.sum(d * d, axis=0)

@@ -112,6 +112,8 @@ class BandMatrix:
         if self.symmetric:
             return blas.dsbmv(self.bandwidth, 1.0, self.ab, v, lower=1)
         k = self.bandwidth
+        if self.n <= 2 * k:  # scipy's wrapper refuses
+            return self.tocsc() @ v
         return blas.dgbmv(self.n, self.n, k, k, 1.0, self.ab[k:], v)
 
     def combine(self, a, A, b, B):

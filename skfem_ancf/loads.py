@@ -140,9 +140,9 @@ class EndMoment(Load):
         step = (u1 - u0)[self.dofs] @ self.c
         if step @ step > 0:
             d0, d1 = self.direction(u0), self.direction(u1)
-            angle = np.arctan2(d0[0] * d1[1] - d0[1] * d1[0], d0 @ d1)
+            angle = np.arctan2(d0[0] * step[1] - d0[1] * step[0], d0 @ d1)
             missing = self.M * angle - force @ (u1 - u0)
-            force[self.dofs] += np.outer(step, self.c) * missing / (step @ step * (self.c @ self.c))
+            force[self.dofs] += np.outer(step, self.c) * missing / (step @ step)
         return force
 
     def potential(self, u):

@@ -320,15 +320,10 @@ class System:
         self.K.clear()
         force = np.zeros(self.N)
         evaluations = []
-        carried = iter(carried) if carried is not None else None
-        for beam, s, offset in zip(self.beams, self.slices, self.offsets):
-            kernel, ub, fb = beam.kernel, u[s], force[s]
-            for part in kernel.chunks():
-                e = kernel.evaluate(kernel.gather(ub, part), part, geometric=geometric,
-                                    carried=None if carried is None else next(carried))
-                kernel.scatter(e.force, part, fb)
-                self.K.add_elements(e.tangent, int(offset), beam.nd, beam.mesh.t[0, part])
-                evaluations.append((kernel, s, part, e))
+        for k, (beam, s) in enumerate(zip(self.beams, self.slices)):
+            evaluations.append((s, beam.kernel.assemble(
+                u[s], self.K, s.start, force[s], None if carried is None else carried[k],
+                geometric)))
         for item in self._varying:
             if item.constant:
                 continue
@@ -339,8 +334,8 @@ class System:
 
     @staticmethod
     def stress_step(evaluations, du):
-        """Stresses carried to ``u + du`` by linearisation, one list a chunk of elements."""
-        return [e.carry(kernel.gather(du[s], part)) for kernel, s, part, e in evaluations]
+        """Stresses carried to ``u + du`` by linearisation, for each beam."""
+        return [assembly.carry(du[s]) for s, assembly in evaluations]
 
     def multiply(self, v):
         """The assembled tangent times a vector, before :meth:`factorize`."""

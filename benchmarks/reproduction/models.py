@@ -164,4 +164,4 @@ class Settings:
 FULL = Settings()
 QUICK = Settings(elements_small=(2, 4, 8, 16), elements_large=(2, 4, 8, 16),
                  elements_thick=(2, 4, 8, 16), meshes_2d=((16, 2), (32, 4)), elements=8,
-                 dt=2.5e-3, every=4)
+                 dt=5e-3, every=2)

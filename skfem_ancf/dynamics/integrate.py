@@ -184,7 +184,7 @@ class Integrator:
                 rate = size / before
                 if rate > 1.0 and size <= 1e3 * floor:
                     break  # round-off
-                self._rate = rate
+                self._rate = max(rate, 0.01)  # of one step, used in the next, where it may be larger
                 if rate > SLOW and size > wanted:
                     if fresh and rate > 2.0:
                         raise StepFailed("the iteration diverges")

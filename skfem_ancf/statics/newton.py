@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import ConvergenceError, NameUnknown
+from ..errors import ConvergenceError, InputError, NameUnknown, require_positive
 from ..progress import progress_bar
 
 logger = logging.getLogger(__name__)
@@ -100,6 +100,11 @@ def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, fi
     """
     if method not in METHODS:
         raise NameUnknown("method", method, METHODS)
+    tol, min_step = require_positive("tol", tol), require_positive("min_step", min_step)
+    if not 0.0 < require_positive("first_step", first_step) <= 1.0:
+        raise InputError(f"first_step must lie in (0, 1], got {first_step!r}")
+    if require_positive("max_iterations", max_iterations) < 1:
+        raise InputError(f"max_iterations must be at least 1, got {max_iterations!r}")
     u = np.zeros(system.N) if u is None else u.copy()
     result = StaticResult(u, np.zeros(system.m), 0.0, np.zeros(system.N), [], False,
                           "no load step has converged")
@@ -166,6 +171,8 @@ def _iterate(system, result, load, method, tol, max_iterations, record):
         small = (rho <= 1e-3 * tol * size + force_floor if k == 0 else
                  rho <= tol * size + force_floor and work <= tol * reference + floor)
         if still and small:
+            if any(b.kernel.inverted(u[s]) for b, s in zip(system.beams, system.slices)):
+                raise _Failed("the body is turned inside out")
             return u, multipliers, force
         if k == max_iterations:
             break

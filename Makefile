@@ -1,0 +1,50 @@
+# make demo    the cantilever of the paper: numbers, out/*.vtu, out/*.png
+# make test    the tests, on two processes
+# make paper   the paper's tables; bench: timings; stress: large and hard cases
+# make docs    reference pages from the docstrings, out/docs, and the pictures of docs/
+# make clean   removes .venv and out
+#
+# The first target called builds a virtual environment in .venv with $(PYTHON), 3.10 or newer.
+
+PYTHON ?= python3
+VENV := .venv
+PY := $(VENV)/bin/python
+PIP := $(PY) -m pip install --quiet --disable-pip-version-check
+# the systems are small and banded: more threads only cost time
+export OPENBLAS_NUM_THREADS ?= 1
+export OMP_NUM_THREADS ?= 1
+
+.PHONY: demo test paper bench stress docs clean
+
+demo: $(VENV)/test.stamp
+	$(PY) demos/cantilever.py
+
+test: $(VENV)/test.stamp
+	$(PY) -m pytest -n 2 $(ARGS)
+
+paper: $(VENV)/test.stamp
+	$(PY) benchmarks/paper.py
+
+bench: $(VENV)/bench.stamp
+	$(PY) benchmarks/bench.py
+
+stress: $(VENV)/test.stamp
+	$(PY) benchmarks/stress.py
+
+docs: $(VENV)/docs.stamp
+	$(PY) docs/pictures.py
+	$(PY) -m pdoc --docformat numpy --output-directory out/docs skfem_ancf
+	@echo "open out/docs/index.html; the guides are docs/*.md"
+
+clean:
+	rm -rf $(VENV) out
+
+$(PY):
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || \
+	  { echo "Python 3.10 or newer is needed: make PYTHON=/path/to/python3"; exit 1; }
+	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
+
+# one stamp per extra, so that nothing is installed twice
+$(VENV)/%.stamp: pyproject.toml | $(PY)
+	$(PIP) --editable '.[$*]'
+	@touch $@

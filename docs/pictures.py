@@ -1,0 +1,28 @@
+"""Makes the pictures of the guides: python docs/pictures.py."""
+
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parent
+sys.path.insert(0, str(DOCS.parent / "demos"))
+
+import cantilever  # noqa: E402
+import rollup  # noqa: E402
+import spring  # noqa: E402
+
+
+def main(folder=DOCS):
+    """Write cantilever.png (64 elements), cantilever_16.png, rollup.png and spring.png."""
+    for elements, name in ((64, "cantilever.png"), (16, "cantilever_16.png")):
+        state = cantilever.cantilever(2e8, elements).gravity((0, -9.81)).solve_static()
+        cantilever.picture(state, Path(folder) / name)
+    with tempfile.TemporaryDirectory() as out:
+        for demo in (rollup, spring):
+            demo.main(out, progress=False)
+            shutil.copy(Path(out) / f"{demo.__name__}.png", folder)
+
+
+if __name__ == "__main__":
+    main()

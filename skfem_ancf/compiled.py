@@ -1,0 +1,742 @@
+"""The kernels compiled by Numba, for scenes too small for batched NumPy.
+
+Found at run time: without the package numba nothing changes but the speed. The functions repeat
+what :mod:`skfem_ancf.kernel` and :mod:`skfem_ancf.cable` say, element by element and into the band
+matrix, and are tested against them; :func:`steps` does whole time steps.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+# no "nnan" and "ninf": a strain that is not finite must be seen
+_FAST = {"contract", "reassoc", "nsz", "arcp"}
+
+
+def jit(function):
+    return njit(cache=True, fastmath=_FAST)(function)
+
+
+# the band: lower half of a symmetric matrix, entry (i, j) at j * ld + i - j
+
+
+@jit
+def add_block(K, flat, ld, row):
+    for b in range(K.shape[0]):
+        at = (row + b) * ld - b
+        for a in range(b, K.shape[0]):
+            flat[at + a] += K[a, b]
+
+
+@jit
+def multiply(flat, ld, bw, x, y):
+    n = x.size
+    for i in range(n):
+        y[i] = 0.0
+    for j in range(n):
+        at = j * ld
+        y[j] += flat[at] * x[j]
+        for k in range(1, min(bw, n - 1 - j) + 1):
+            y[j + k] += flat[at + k] * x[j]
+            y[j] += flat[at + k] * x[j + k]
+
+
+@jit
+def cholesky(flat, ld, bw, n):
+    """Factorise in place; returns False if the matrix is not positive definite."""
+    for j in range(n):
+        at = j * ld
+        if not flat[at] > 0.0:
+            return False
+        d = math.sqrt(flat[at])
+        flat[at] = d
+        m = min(bw, n - 1 - j)
+        inverse = 1.0 / d
+        for k in range(1, m + 1):
+            flat[at + k] *= inverse
+        for k in range(1, m + 1):
+            c = flat[at + k]
+            if c != 0.0:
+                other = (j + k) * ld - k
+                for i in range(k, m + 1):
+                    flat[other + i] -= c * flat[at + i]
+    return True
+
+
+@jit
+def cholesky_solve(flat, ld, bw, x):
+    n = x.size
+    for j in range(n):
+        at = j * ld
+        x[j] /= flat[at]
+        for k in range(1, min(bw, n - 1 - j) + 1):
+            x[j + k] -= flat[at + k] * x[j]
+    for j in range(n - 1, -1, -1):
+        at = j * ld
+        s = x[j]
+        for k in range(1, min(bw, n - 1 - j) + 1):
+            s -= flat[at + k] * x[j + k]
+        x[j] = s / flat[at]
+
+
+@jit
+def fix(flat, ld, bw, fixed):
+    """Rows and columns of the fixed coordinates become those of the identity."""
+    n = fixed.size
+    for j in range(n):
+        for k in range(1, min(bw, n - 1 - j) + 1):
+            if fixed[j] or fixed[j + k]:
+                flat[j * ld + k] = 0.0
+        if fixed[j]:
+            flat[j * ld] = 1.0
+
+
+@jit
+def _constant(constant, e, u, first, m, f, K, tangent):
+    """The stabilisation: f += C u, K += C."""
+    if constant.shape[0] == 0:
+        return
+    c = constant[e if constant.shape[0] > 1 else 0]
+    for a in range(m):
+        s = 0.0
+        for b in range(m):
+            s += c[a, b] * u[first + b]
+            if tangent:
+                K[a, b] += c[a, b]
+        f[first + a] += s
+
+
+# the beam: one term, a law with constant moduli
+# pack = Gx, Gy, e1, e2, w, D, where (4 index arrays), along (3 matrices), constant, left, nd
+
+
+@jit
+def _gradients(G, e0, u, first, nb, r, du):
+    for p in range(G.shape[0]):
+        x, y = 0.0, 0.0
+        for k in range(nb):
+            x += G[p, k] * u[first + 2 * k]
+            y += G[p, k] * u[first + 2 * k + 1]
+        du[p, 0], du[p, 1] = x, y
+        q = p if e0.shape[0] > 1 else 0
+        r[p, 0], r[p, 1] = e0[q, 0] + x, e0[q, 1] + y
+
+
+@jit
+def _interpolate(L, ns, samples, points):
+    """points[i, j] = sum_k L[i, k] samples[k, j]."""
+    for i in range(L.shape[0]):
+        for j in range(ns):
+            s = 0.0
+            for k in range(L.shape[1]):
+                s += L[i, k] * samples[k * ns + j]
+            points[i * ns + j] = s
+
+
+@jit
+def _collect(L, ns, points, samples):
+    """The transpose of _interpolate."""
+    for k in range(L.shape[1]):
+        for j in range(ns):
+            s = 0.0
+            for i in range(L.shape[0]):
+                s += L[i, k] * points[i * ns + j]
+            samples[k * ns + j] = s
+
+
+@jit
+def _beam_strain(rx, ry, ux, uy, e1, e2, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, ns, s, out):
+    for p in range(x_xx.size):
+        q = x_xx[p]
+        g = q if e1.shape[0] > 1 else 0
+        s[p] = 0.5 * ((rx[q, 0] + e1[g, 0]) * ux[q, 0] + (rx[q, 1] + e1[g, 1]) * ux[q, 1])
+    _interpolate(Lxx, ns, s, out[0])
+    for p in range(y_yy.size):
+        q = y_yy[p]
+        g = q if e2.shape[0] > 1 else 0
+        s[p] = 0.5 * ((ry[q, 0] + e2[g, 0]) * uy[q, 0] + (ry[q, 1] + e2[g, 1]) * uy[q, 1])
+    _interpolate(Lyy, ns, s, out[1])
+    for p in range(x_xy.size):
+        q, h = x_xy[p], y_xy[p]
+        g = h if e2.shape[0] > 1 else 0
+        s[p] = (rx[q, 0] * uy[h, 0] + rx[q, 1] * uy[h, 1]
+                + ux[q, 0] * e2[g, 0] + ux[q, 1] * e2[g, 1])
+    _interpolate(Lxy, ns, s, out[2])
+
+
+@jit
+def _beam_force(Gx, Gy, rx, ry, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, ns, w, S, hat, Tx, Ty, f,
+                first, nb):
+    n = w.size
+    for c in range(3):
+        for p in range(n):
+            S[c, p] *= w[p]
+    _collect(Lxx, ns, S[0], hat[0])
+    _collect(Lyy, ns, S[1], hat[1])
+    _collect(Lxy, ns, S[2], hat[2])
+    Tx[:] = 0.0
+    Ty[:] = 0.0
+    for p in range(x_xx.size):
+        q = x_xx[p]
+        Tx[q, 0] += hat[0, p] * rx[q, 0]
+        Tx[q, 1] += hat[0, p] * rx[q, 1]
+    for p in range(y_yy.size):
+        q = y_yy[p]
+        Ty[q, 0] += hat[1, p] * ry[q, 0]
+        Ty[q, 1] += hat[1, p] * ry[q, 1]
+    for p in range(x_xy.size):
+        q, h = x_xy[p], y_xy[p]
+        for i in range(2):
+            Tx[q, i] += hat[2, p] * ry[h, i]
+            Ty[h, i] += hat[2, p] * rx[q, i]
+    for k in range(nb):
+        x, y = 0.0, 0.0
+        for p in range(Gx.shape[0]):
+            x += Gx[p, k] * Tx[p, 0]
+            y += Gx[p, k] * Tx[p, 1]
+        for p in range(Gy.shape[0]):
+            x += Gy[p, k] * Ty[p, 0]
+            y += Gy[p, k] * Ty[p, 1]
+        f[first + 2 * k] += x
+        f[first + 2 * k + 1] += y
+
+
+@jit
+def _normal_row(L, ns, i, j, rows, G, r, B, nb):
+    """B of a normal strain at the integration point (i, j): B[0] for x, B[1] for y."""
+    B[:, :] = 0.0
+    for k in range(L.shape[1]):
+        if L[i, k] != 0.0:
+            p = rows[k * ns + j]
+            x, y = L[i, k] * r[p, 0], L[i, k] * r[p, 1]
+            for a in range(nb):
+                B[0, a] += x * G[p, a]
+                B[1, a] += y * G[p, a]
+
+
+@jit
+def _shear_row(L, ns, i, j, x_rows, y_rows, Gx, Gy, rx, ry, B, nb):
+    """B of the shear strain at the integration point (i, j)."""
+    B[:, :] = 0.0
+    for k in range(L.shape[1]):
+        if L[i, k] != 0.0:
+            p, q = x_rows[k * ns + j], y_rows[k * ns + j]
+            for c in range(2):
+                x, y = L[i, k] * ry[q, c], L[i, k] * rx[p, c]
+                for a in range(nb):
+                    B[c, a] += x * Gx[p, a] + y * Gy[q, a]
+
+
+@jit
+def _add_material(B, D, weight, DB, K00, K10, K11, nb):
+    """K += weight B^T D B for B (3, 2, nb); the diagonal blocks' lower halves only."""
+    for c in range(3):
+        d0, d1, d2 = weight * D[c, 0], weight * D[c, 1], weight * D[c, 2]
+        for k in range(2):
+            for a in range(nb):
+                DB[c, k, a] = d0 * B[0, k, a] + d1 * B[1, k, a] + d2 * B[2, k, a]
+    for a in range(nb):
+        x0, x1, x2 = DB[0, 0, a], DB[1, 0, a], DB[2, 0, a]
+        y0, y1, y2 = DB[0, 1, a], DB[1, 1, a], DB[2, 1, a]
+        for b in range(a + 1):
+            K00[a, b] += x0 * B[0, 0, b] + x1 * B[1, 0, b] + x2 * B[2, 0, b]
+            K11[a, b] += y0 * B[0, 1, b] + y1 * B[1, 1, b] + y2 * B[2, 1, b]
+        for b in range(nb):
+            K10[a, b] += y0 * B[0, 0, b] + y1 * B[1, 0, b] + y2 * B[2, 0, b]
+
+
+@jit
+def _add_geometric(s, g, h, K00, K11, nb):
+    """K += s g h^T for both components, lower halves."""
+    for a in range(nb):
+        x = s * g[a]
+        for b in range(a + 1):
+            K00[a, b] += x * h[b]
+            K11[a, b] += x * h[b]
+
+
+@jit
+def beam_loop(pack, u, f, tangent, geometric, carried, use_carried, strains, stresses, flat, ld,
+              start):
+    """Force into f, tangent into the band; strains and stresses (3, ne, np) are filled."""
+    (Gx_, Gy_, e1_, e2_, w_, D, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, constant, left, nd) = pack
+    nb, m = nd, 2 * nd
+    n, ns = w_.shape[1], x_xx.size // Lxx.shape[1]
+    rx, ux = np.empty((Gx_.shape[1], 2)), np.empty((Gx_.shape[1], 2))
+    ry, uy = np.empty((Gy_.shape[1], 2)), np.empty((Gy_.shape[1], 2))
+    Tx, Ty = np.empty_like(rx), np.empty_like(ry)
+    size = max(x_xx.size, y_yy.size, x_xy.size)
+    s, hat = np.empty(size), np.empty((3, size))
+    strain, S = np.empty((3, n)), np.empty((3, n))
+    K, B, DB = np.empty((m, m)), np.empty((3, 2, nb)), np.empty((3, 2, nb))
+    K00, K10, K11 = np.empty((nb, nb)), np.empty((nb, nb)), np.empty((nb, nb))
+    for e in range(left.size):
+        t = e if Gx_.shape[0] > 1 else 0
+        Gx, Gy, w = Gx_[t], Gy_[t], w_[t]
+        e1, e2 = e1_[e if e1_.shape[0] > 1 else 0], e2_[e if e2_.shape[0] > 1 else 0]
+        first = left[e] * nd
+        _gradients(Gx, e1, u, first, nb, rx, ux)
+        _gradients(Gy, e2, u, first, nb, ry, uy)
+        _beam_strain(rx, ry, ux, uy, e1, e2, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, ns, s, strain)
+        for p in range(n):
+            for c in range(3):
+                v = D[c, 0] * strain[0, p] + D[c, 1] * strain[1, p] + D[c, 2] * strain[2, p]
+                S[c, p] = v
+                if tangent:
+                    strains[c, e, p], stresses[c, e, p] = strain[c, p], v
+        _beam_force(Gx, Gy, rx, ry, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, ns, w, S, hat, Tx, Ty,
+                    f, first, nb)
+        if tangent:
+            K00[:], K10[:], K11[:] = 0.0, 0.0, 0.0
+            for i in range(Lxx.shape[0]):
+                for j in range(ns):
+                    _normal_row(Lxx, ns, i, j, x_xx, Gx, rx, B[0], nb)
+                    _normal_row(Lyy, ns, i, j, y_yy, Gy, ry, B[1], nb)
+                    _shear_row(Lxy, ns, i, j, x_xy, y_xy, Gx, Gy, rx, ry, B[2], nb)
+                    _add_material(B, D, w[i * ns + j], DB, K00, K10, K11, nb)
+            if geometric:
+                if use_carried:
+                    for c in range(3):
+                        for p in range(n):
+                            S[c, p] = w[p] * carried[c, e, p]
+                    _collect(Lxx, ns, S[0], hat[0])
+                    _collect(Lyy, ns, S[1], hat[1])
+                    _collect(Lxy, ns, S[2], hat[2])
+                for p in range(x_xx.size):
+                    _add_geometric(hat[0, p], Gx[x_xx[p]], Gx[x_xx[p]], K00, K11, nb)
+                for p in range(y_yy.size):
+                    _add_geometric(hat[1, p], Gy[y_yy[p]], Gy[y_yy[p]], K00, K11, nb)
+                for p in range(x_xy.size):
+                    _add_geometric(hat[2, p], Gx[x_xy[p]], Gy[y_xy[p]], K00, K11, nb)
+                    _add_geometric(hat[2, p], Gy[y_xy[p]], Gx[x_xy[p]], K00, K11, nb)
+            for a in range(nb):
+                for b in range(nb):
+                    K[2 * a, 2 * b], K[2 * a + 1, 2 * b + 1] = K00[a, b], K11[a, b]
+                    K[2 * a + 1, 2 * b], K[2 * b, 2 * a + 1] = K10[a, b], K10[a, b]
+        _constant(constant, e, u, first, m, f, K, tangent)
+        if tangent:
+            add_block(K, flat, ld, start + first)
+
+
+@jit
+def beam_increment(pack, u, du, out):
+    """The strain's derivative at u in the direction du, (3, ne, np)."""
+    (Gx_, Gy_, e1_, e2_, w_, D, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, constant, left, nd) = pack
+    nb, n, ns = nd, w_.shape[1], x_xx.size // Lxx.shape[1]
+    rx, dx = np.empty((Gx_.shape[1], 2)), np.empty((Gx_.shape[1], 2))
+    ry, dy = np.empty((Gy_.shape[1], 2)), np.empty((Gy_.shape[1], 2))
+    none = np.zeros((1, 2))
+    s = np.empty(max(x_xx.size, y_yy.size, x_xy.size))
+    for e in range(left.size):
+        t = e if Gx_.shape[0] > 1 else 0
+        first = left[e] * nd
+        _gradients(Gx_[t], e1_[e if e1_.shape[0] > 1 else 0], u, first, nb, rx, dx)
+        _gradients(Gy_[t], e2_[e if e2_.shape[0] > 1 else 0], u, first, nb, ry, dy)
+        _gradients(Gx_[t], none, du, first, nb, dx, dx)
+        _gradients(Gy_[t], none, du, first, nb, dy, dy)
+        for p in range(x_xx.size):
+            q = x_xx[p]
+            s[p] = rx[q, 0] * dx[q, 0] + rx[q, 1] * dx[q, 1]
+        _interpolate(Lxx, ns, s, out[0, e])
+        for p in range(y_yy.size):
+            q = y_yy[p]
+            s[p] = ry[q, 0] * dy[q, 0] + ry[q, 1] * dy[q, 1]
+        _interpolate(Lyy, ns, s, out[1, e])
+        for p in range(x_xy.size):
+            q, h = x_xy[p], y_xy[p]
+            s[p] = (rx[q, 0] * dy[h, 0] + rx[q, 1] * dy[h, 1]
+                    + dx[q, 0] * ry[h, 0] + dx[q, 1] * ry[h, 1])
+        _interpolate(Lxy, ns, s, out[2, e])
+
+
+@jit
+def beam_mean(pack, u0, u1, f):
+    """B(middle)^T mean stress, added to f."""
+    (Gx_, Gy_, e1_, e2_, w_, D, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, constant, left, nd) = pack
+    nb, m, n, ns = nd, 2 * nd, w_.shape[1], x_xx.size // Lxx.shape[1]
+    rx, ux = np.empty((Gx_.shape[1], 2)), np.empty((Gx_.shape[1], 2))
+    ry, uy = np.empty((Gy_.shape[1], 2)), np.empty((Gy_.shape[1], 2))
+    mx, my = np.empty_like(rx), np.empty_like(ry)
+    Tx, Ty = np.empty_like(rx), np.empty_like(ry)
+    size = max(x_xx.size, y_yy.size, x_xy.size)
+    s, hat = np.empty(size), np.empty((3, size))
+    old, strain, S = np.empty((3, n)), np.empty((3, n)), np.empty((3, n))
+    K, middle = np.empty((1, 1)), 0.5 * (u0 + u1)
+    for e in range(left.size):
+        t = e if Gx_.shape[0] > 1 else 0
+        Gx, Gy = Gx_[t], Gy_[t]
+        e1, e2 = e1_[e if e1_.shape[0] > 1 else 0], e2_[e if e2_.shape[0] > 1 else 0]
+        first = left[e] * nd
+        _gradients(Gx, e1, u0, first, nb, rx, ux)
+        _gradients(Gy, e2, u0, first, nb, ry, uy)
+        mx[:], my[:] = rx, ry
+        _beam_strain(rx, ry, ux, uy, e1, e2, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, ns, s, old)
+        _gradients(Gx, e1, u1, first, nb, rx, ux)
+        _gradients(Gy, e2, u1, first, nb, ry, uy)
+        _beam_strain(rx, ry, ux, uy, e1, e2, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, ns, s, strain)
+        for p in range(mx.shape[0]):
+            mx[p, 0], mx[p, 1] = 0.5 * (mx[p, 0] + rx[p, 0]), 0.5 * (mx[p, 1] + rx[p, 1])
+        for p in range(my.shape[0]):
+            my[p, 0], my[p, 1] = 0.5 * (my[p, 0] + ry[p, 0]), 0.5 * (my[p, 1] + ry[p, 1])
+        for p in range(n):
+            for c in range(3):
+                S[c, p] = 0.5 * (D[c, 0] * (old[0, p] + strain[0, p])
+                                 + D[c, 1] * (old[1, p] + strain[1, p])
+                                 + D[c, 2] * (old[2, p] + strain[2, p]))
+        _beam_force(Gx, Gy, mx, my, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, ns, w_[t], S, hat, Tx,
+                    Ty, f, first, nb)
+        _constant(constant, e, middle, first, m, f, K, False)
+
+
+# the cable
+# pack = G1, G2, a0, b0, s0, kappa0, w, stiffness, constant, left, nd
+
+
+@jit
+def _cable_point(G1, G2, p, u, first, nb):
+    a0, a1, b0, b1 = 0.0, 0.0, 0.0, 0.0
+    for k in range(nb):
+        x, y = u[first + 2 * k], u[first + 2 * k + 1]
+        a0 += G1[p, k] * x
+        a1 += G1[p, k] * y
+        b0 += G2[p, k] * x
+        b1 += G2[p, k] * y
+    return a0, a1, b0, b1
+
+
+@jit
+def cable_loop(pack, u, f, tangent, geometric, carried, use_carried, strains, stresses, flat, ld,
+               start):
+    """Force into f, tangent into the band; strains and stresses (2, ne, np) are filled."""
+    G1_, G2_, A0_, B0_, s0_, kappa0_, w_, stiffness, constant, left, nd = pack
+    nb, m, n = nd, 2 * nd, w_.shape[1]
+    K, T = np.empty((m, m)), np.empty((4, 4))
+    e_a, k_a, k_b, c_a = np.empty(2), np.empty(2), np.empty(2), np.empty(2)
+    Be, Bk = np.empty(m), np.empty(m)
+    EA, EI = stiffness
+    for e in range(left.size):
+        t = e if G1_.shape[0] > 1 else 0
+        r = e if A0_.shape[0] > 1 else 0
+        G1, G2, w = G1_[t], G2_[t], w_[t]
+        first = left[e] * nd
+        if tangent:
+            K[:] = 0.0
+        for p in range(n):
+            d0, d1, d2, d3 = _cable_point(G1, G2, p, u, first, nb)
+            a0, a1 = A0_[r, p, 0] + d0, A0_[r, p, 1] + d1
+            b0, b1 = B0_[r, p, 0] + d2, B0_[r, p, 1] + d3
+            s = a0 * a0 + a1 * a1
+            root = math.sqrt(s)
+            eps = (((a0 + A0_[r, p, 0]) * d0 + (a1 + A0_[r, p, 1]) * d1)
+                   / (root + math.sqrt(s0_[r, p])))
+            kappa = (a0 * b1 - a1 * b0) / s
+            change = kappa - kappa0_[r, p]
+            N, M = EA * eps, EI * change
+            e_a[0], e_a[1] = a0 / root, a1 / root
+            k_a[0], k_a[1] = (b1 - 2 * kappa * a0) / s, (-b0 - 2 * kappa * a1) / s
+            k_b[0], k_b[1] = -a1 / s, a0 / s
+            n_, m_ = w[p] * N, w[p] * M
+            for k in range(nb):
+                for i in range(2):
+                    f[first + 2 * k + i] += (G1[p, k] * (n_ * e_a[i] + m_ * k_a[i])
+                                             + G2[p, k] * m_ * k_b[i])
+            if not tangent:
+                continue
+            strains[0, e, p], strains[1, e, p] = eps, change
+            stresses[0, e, p], stresses[1, e, p] = N, M
+            # the 4 x 4 second derivative by (a, b)
+            T[:] = 0.0
+            if geometric:
+                if use_carried:
+                    n_, m_ = w[p] * carried[0, e, p], w[p] * carried[1, e, p]
+                c_a[0], c_a[1] = b1, -b0
+                c = kappa * s
+                for i in range(2):
+                    for j in range(2):
+                        ai, aj = (a0, a1)[i], (a0, a1)[j]
+                        normal = (a1, -a0)[i] * (a1, -a0)[j] / s
+                        delta = 1.0 if i == j else 0.0
+                        T[i, j] = (n_ / root * normal + m_ * (
+                            -2.0 / (s * s) * (c_a[i] * aj + ai * c_a[j] + c * delta)
+                            + 8.0 * c / (s * s * s) * ai * aj))
+                        J = 0.0 if i == j else (1.0 if i == 0 else -1.0)
+                        T[i, 2 + j] = m_ * (J / s + 2.0 / (s * s) * ai * (a1, -a0)[j])
+                        T[2 + j, i] = T[i, 2 + j]
+            x, y = w[p] * EA, w[p] * EI
+            for i in range(2):
+                for j in range(2):
+                    T[i, j] += x * e_a[i] * e_a[j] + y * k_a[i] * k_a[j]
+                    T[i, 2 + j] += y * k_a[i] * k_b[j]
+                    T[2 + i, j] += y * k_b[i] * k_a[j]
+                    T[2 + i, 2 + j] += y * k_b[i] * k_b[j]
+            for k in range(nb):
+                g, h = G1[p, k], G2[p, k]
+                for i in range(2):
+                    t0, t1 = g * T[i, 0] + h * T[2 + i, 0], g * T[i, 1] + h * T[2 + i, 1]
+                    t2, t3 = g * T[i, 2] + h * T[2 + i, 2], g * T[i, 3] + h * T[2 + i, 3]
+                    for l in range(k + 1):
+                        K[2 * k + i, 2 * l] += t0 * G1[p, l] + t2 * G2[p, l]
+                        K[2 * k + i, 2 * l + 1] += t1 * G1[p, l] + t3 * G2[p, l]
+        _constant(constant, e, u, first, m, f, K, tangent)
+        if tangent:
+            add_block(K, flat, ld, start + first)
+
+
+@jit
+def cable_increment(pack, u, du, out):
+    """The strain's derivative at u in the direction du, (2, ne, np)."""
+    G1_, G2_, A0_, B0_, s0_, kappa0_, w_, stiffness, constant, left, nd = pack
+    for e in range(left.size):
+        t = e if G1_.shape[0] > 1 else 0
+        r = e if A0_.shape[0] > 1 else 0
+        first = left[e] * nd
+        for p in range(w_.shape[1]):
+            d0, d1, d2, d3 = _cable_point(G1_[t], G2_[t], p, u, first, nd)
+            x0, x1, x2, x3 = _cable_point(G1_[t], G2_[t], p, du, first, nd)
+            a0, a1 = A0_[r, p, 0] + d0, A0_[r, p, 1] + d1
+            b0, b1 = B0_[r, p, 0] + d2, B0_[r, p, 1] + d3
+            s = a0 * a0 + a1 * a1
+            ax = a0 * x0 + a1 * x1
+            kappa = (a0 * b1 - a1 * b0) / s
+            out[0, e, p] = ax / math.sqrt(s)
+            out[1, e, p] = (x0 * b1 - x1 * b0 + a0 * x3 - a1 * x2 - 2 * kappa * ax) / s
+
+
+@jit
+def cable_mean(pack, u0, u1, f):
+    """The force whose work from u0 to u1 is the change of the energy, added to f."""
+    G1_, G2_, A0_, B0_, s0_, kappa0_, w_, stiffness, constant, left, nd = pack
+    EA, EI = stiffness
+    K, middle = np.empty((1, 1)), 0.5 * (u0 + u1)
+    for e in range(left.size):
+        t = e if G1_.shape[0] > 1 else 0
+        r = e if A0_.shape[0] > 1 else 0
+        G1, G2, w = G1_[t], G2_[t], w_[t]
+        first = left[e] * nd
+        for p in range(w.size):
+            A0, A1, start = A0_[r, p, 0], A0_[r, p, 1], math.sqrt(s0_[r, p])
+            d0, d1, d2, d3 = _cable_point(G1, G2, p, u0, first, nd)
+            a0, a1, b0, b1 = A0 + d0, A1 + d1, B0_[r, p, 0] + d2, B0_[r, p, 1] + d3
+            x0, x1, x2, x3 = _cable_point(G1, G2, p, u1, first, nd)
+            c0, c1, g0, g1 = A0 + x0, A1 + x1, B0_[r, p, 0] + x2, B0_[r, p, 1] + x3
+            s, z = a0 * a0 + a1 * a1, c0 * c0 + c1 * c1
+            rs, rz = math.sqrt(s), math.sqrt(z)
+            k0, k1 = (a0 * b1 - a1 * b0) / s, (c0 * g1 - c1 * g0) / z
+            N = 0.5 * w[p] * EA * (((a0 + A0) * d0 + (a1 + A1) * d1) / (rs + start)
+                                   + ((c0 + A0) * x0 + (c1 + A1) * x1) / (rz + start))
+            kappa = 0.5 * (k0 + k1)
+            M = w[p] * EI * (kappa - kappa0_[r, p])
+            m0, m1, q0, q1 = 0.5 * (a0 + c0), 0.5 * (a1 + c1), 0.5 * (b0 + g0), 0.5 * (b1 + g1)
+            mean = 0.5 * (s + z)
+            x = 2.0 * N / (rs + rz)
+            p0 = x * m0 + M * (q1 - 2 * kappa * m0) / mean
+            p1 = x * m1 + M * (-q0 - 2 * kappa * m1) / mean
+            y0, y1 = -M * m1 / mean, M * m0 / mean
+            for k in range(nd):
+                f[first + 2 * k] += G1[p, k] * p0 + G2[p, k] * y0
+                f[first + 2 * k + 1] += G1[p, k] * p1 + G2[p, k] * y1
+        _constant(constant, e, middle, first, 2 * nd, f, K, False)
+
+
+# time steps of a scene of one beam without joints
+
+
+@jit
+def _force(cable, cpack, bpack, u, f, dummy, flat):
+    f[:] = 0.0
+    if cable:
+        cable_loop(cpack, u, f, False, False, dummy, False, dummy, dummy, flat, 1, 0)
+    else:
+        beam_loop(bpack, u, f, False, False, dummy, False, dummy, dummy, flat, 1, 0)
+
+
+@jit
+def _mean(cable, cpack, bpack, u0, u1, f):
+    f[:] = 0.0
+    if cable:
+        cable_mean(cpack, u0, u1, f)
+    else:
+        beam_mean(bpack, u0, u1, f)
+
+
+@jit
+def _tangent(cable, cpack, bpack, u, f, strains, flat, ld):
+    f[:] = 0.0
+    if cable:
+        cable_loop(cpack, u, f, True, True, strains, False, strains, strains, flat, ld, 0)
+    else:
+        beam_loop(bpack, u, f, True, True, strains, False, strains, strains, flat, ld, 0)
+
+
+@jit
+def steps(cable, cpack, bpack, strains, conserving, parameters, load, fixed, M, ld, bw, A, state, y,
+          t0, dt, tol, floor, energy, rows, times):
+    """Time steps; one row of ``rows`` (n, 3, N) for each: u, v and the acceleration.
+
+    ``y`` (5, N) is u, v, acceleration, the scheme's acceleration and the one before it, and is
+    advanced; ``state`` is [has factors, iterations, factorisations, rate]. Returns the number of
+    steps done, and the energy scale.
+    """
+    N = load.size
+    alpha_m, alpha_f, beta, gamma = parameters
+    u, f, R, du, inertia = (np.empty(N) for _ in range(5))
+    base, x = np.empty(N), np.empty(N)
+    if conserving:
+        c_m, c_k = 2.0 / dt**2, 0.5
+    else:
+        c_m, c_k = (1.0 - alpha_m) / ((1.0 - alpha_f) * beta * dt * dt), 1.0
+    rough = floor * math.sqrt(c_k)
+    for n in range(rows.shape[0]):
+        u0, v0, a0, w0 = y[0], y[1], y[2], y[3]
+        for i in range(N):
+            if conserving:
+                u[i] = u0[i] + dt * v0[i] + 0.5 * dt * dt * a0[i]
+                base[i] = u0[i] + dt * v0[i]
+            else:
+                base[i] = u0[i] + dt * v0[i] + dt * dt * (0.5 - beta) * w0[i]
+                u[i] = base[i] + dt * dt * beta * w0[i]
+            if fixed[i]:
+                u[i] = u0[i]
+        fresh, before, done = False, -1.0, False
+        for k in range(30):
+            if state[0] == 0.0:
+                A[:] = 0.0
+                for i in range(N):
+                    x[i] = 0.5 * (u[i] + u0[i]) if conserving else u[i]
+                _tangent(cable, cpack, bpack, x, f, strains, A, ld)
+                for i in range(A.size):
+                    A[i] = c_m * M[i] + c_k * A[i]
+                fix(A, ld, bw, fixed)
+                if not cholesky(A, ld, bw, N):
+                    return n, energy
+                state[0], state[3] = 1.0, 0.1
+                state[2] += 1.0
+                fresh, before = True, -1.0
+            if conserving:
+                _mean(cable, cpack, bpack, u0, u, f)
+                for i in range(N):
+                    x[i] = (u[i] - base[i]) * c_m
+            else:
+                _force(cable, cpack, bpack, u, f, strains, A)
+                for i in range(N):
+                    w = (u[i] - base[i]) / (beta * dt * dt)
+                    x[i] = ((1.0 - alpha_m) * w + alpha_m * w0[i] - alpha_f * a0[i]) / (1.0 - alpha_f)
+            multiply(M, ld, bw, x, inertia)
+            for i in range(N):
+                R[i] = 0.0 if fixed[i] else load[i] - f[i] - inertia[i]
+                du[i] = R[i]
+            cholesky_solve(A, ld, bw, du)
+            size = 0.0
+            for i in range(N):
+                size += R[i] * du[i]
+                u[i] += du[i]
+            size = math.sqrt(abs(size))
+            state[1] += 1.0
+            if not size < 1e300:
+                return n, energy
+            energy = max(energy, 0.25 * size * size)
+            wanted = tol * math.sqrt(energy) + rough
+            if before > 0.0:
+                rate = size / before
+                if rate > 1.0 and size <= 1e3 * rough:
+                    done = True
+                    break
+                state[3] = rate
+                if rate > 0.1 and size * min(1.0, rate) > wanted:
+                    if fresh and rate > 2.0:
+                        return n, energy
+                    state[0] = 0.0
+                    continue
+            if size * min(1.0, state[3]) <= wanted:
+                done = True
+                break
+            before = size
+        if not done:
+            return n, energy
+        for i in range(N):
+            if conserving:
+                v = (u[i] - u0[i]) * (2.0 / dt) - v0[i]
+                middle = (v - v0[i]) / dt
+                y[2, i] = 1.5 * middle - 0.5 * w0[i]
+                y[3, i] = middle
+            else:
+                w = (u[i] - base[i]) / (beta * dt * dt)
+                a = ((1.0 - alpha_m) * w + alpha_m * w0[i] - alpha_f * a0[i]) / (1.0 - alpha_f)
+                v = v0[i] + dt * ((1.0 - gamma) * w0[i] + gamma * w)
+                y[2, i], y[3, i] = a, w
+            y[0, i], y[1, i] = u[i], v
+            if fixed[i]:
+                y[1, i] = y[2, i] = y[3, i] = 0.0
+            rows[n, 0, i], rows[n, 1, i], rows[n, 2, i] = y[0, i], y[1, i], y[2, i]
+        multiply(M, ld, bw, y[1], inertia)
+        kinetic = 0.0
+        for i in range(N):
+            kinetic += 0.5 * y[1, i] * inertia[i]
+        energy = max(energy, kinetic)
+        times[n] = t0 + (n + 1) * dt
+    return rows.shape[0], energy
+
+
+class CompiledKernel:
+    """The compiled functions of one beam, with the tables of its NumPy kernel.
+
+    Parameters
+    ----------
+    kernel
+        A :class:`~skfem_ancf.kernel.Kernel` or :class:`~skfem_ancf.cable.CableKernel`.
+    pack
+        The tables, in the order that the functions take.
+    cable
+        Whether it is a cable.
+    """
+
+    def __init__(self, kernel, pack, cable):
+        self.kernel, self.pack, self.cable = kernel, pack, cable
+        self.stiffness = pack[7] if cable else pack[5]
+        self.shape = ((2, kernel.t.shape[1], pack[6].shape[1]) if cable else
+                      (3, kernel.t.shape[1], pack[4].shape[1]))
+        self._loop, self._increment, self._mean = (
+            (cable_loop, cable_increment, cable_mean) if cable else
+            (beam_loop, beam_increment, beam_mean))
+        self._none = np.zeros((1, 1, 1))
+
+    def assemble(self, u, K, start, force, carried, geometric):
+        """Add force and tangent; see :meth:`skfem_ancf.kernel.Chain.assemble`."""
+        strains, stresses = np.empty(self.shape), np.empty(self.shape)
+        self._loop(self.pack, u, force, True, geometric,
+                   self._none if carried is None else carried, carried is not None, strains,
+                   stresses, K._flat, K._ld, start)
+        return CompiledEvaluation(self, u, stresses)
+
+    def force(self, u):
+        """Internal force, shape (N,)."""
+        out = np.zeros(u.size)
+        self._loop(self.pack, u, out, False, False, self._none, False, self._none, self._none,
+                   self._none[0, 0], 1, 0)
+        return out
+
+    def mean_force(self, u0, u1):
+        """The force whose work from u0 to u1 is the change of the energy."""
+        out = np.zeros(u0.size)
+        self._mean(self.pack, u0, u1, out)
+        return out
+
+
+class CompiledEvaluation:
+    """What :meth:`CompiledKernel.assemble` found."""
+
+    def __init__(self, compiled, u, stresses):
+        self._compiled, self._u, self._stresses = compiled, u.copy(), stresses
+
+    def carry(self, du):
+        """The stress, linearised, at ``u + du``."""
+        c = self._compiled
+        out = np.empty(c.shape)
+        c._increment(c.pack, self._u, np.ascontiguousarray(du), out)
+        if c.cable:
+            out *= c.stiffness[:, None, None]
+        else:
+            out = np.tensordot(c.stiffness, out, 1)
+        out += self._stresses
+        return out
