@@ -12,6 +12,7 @@ from .errors import SupportError
 from .linalg import BandMatrix
 
 logger = logging.getLogger(__name__)
+_NONE = np.zeros(0)
 
 
 class System:
@@ -69,6 +70,7 @@ class System:
         self.fixed, self._values = fixed, values
         self.free = np.ones(self.N, dtype=bool)
         self.free[fixed] = False
+        self.mask = self.free.astype(float)
         self.m = sum(len(joint.equations) for joint in self.joints)
 
     def describe_dof(self, k):
@@ -243,6 +245,16 @@ class System:
         total = sum(b.kernel.volume * b.material.E for b in self.beams)
         return np.finfo(float).eps * np.sqrt(total)
 
+    @cached_property
+    def noise(self):
+        """How much larger the round-off of a residual is than that of the strains."""
+        return np.sqrt(max(b.nd for b in self.beams))
+
+    @property
+    def constant_loads(self):
+        """True if no load depends on displacement or time."""
+        return not self._varying
+
     # mass
 
     @cached_property
@@ -367,9 +379,9 @@ class System:
         du, multipliers
             The increments; the second is empty without joints.
         """
-        b = residual * self.free
+        b = residual * self.mask
         if not self.joints:
-            return self.K.solve(b), np.zeros(0)
+            return self.K.solve(b), _NONE
         x = self._kkt.solve(np.append(b, self._weight * phi))
         return x[:self.N], self._weight * x[self.N:]
 

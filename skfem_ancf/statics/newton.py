@@ -11,6 +11,7 @@ from ..progress import progress_bar
 logger = logging.getLogger(__name__)
 
 METHODS = ("mixed", "newton")
+_NONE = np.zeros(0)
 
 
 @dataclass
@@ -116,7 +117,8 @@ def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, fi
                 load = 1.0
             record = LoadStep(load, 0)
             try:
-                found = _iterate(system, result, load, method, tol, max_iterations, record)
+                with np.errstate(all="ignore"):  # what overflows is seen in the residual
+                    found = _iterate(system, result, load, method, tol, max_iterations, record)
             except _Failed as failure:
                 result.rejected += 1
                 logger.info("load %.6g failed (%s), step cut", load, failure)
@@ -150,53 +152,69 @@ def _iterate(system, result, load, method, tol, max_iterations, record):
     u, multipliers, carried = result.u.copy(), result.multipliers.copy(), None
     floor = 8.0 * system.stiffness_scale
     # the residual sums the noise of all coordinates, the work that of the strains
-    force_floor = floor * np.sqrt(max(b.nd for b in system.beams))
+    force_floor = floor * system.noise
     prescribed = system.values(load) - u[system.fixed]
-    work = reference = 0.0
+    moving = bool(np.any(prescribed))
+    external = load * system.external_force(u)
+    work = before = reference = np.inf
+    scale = None
     for k in range(max_iterations + 1):
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        # after the last correction only the residual is wanted, not the tangent
+        last = k > 1 and work * min(1.0, work / before) <= tol * reference + floor
+        if last:
+            force = system.internal_force(u)
+        else:
             force, evaluations = system.assemble(u, load, carried)
+        if not system.constant_loads:
             external = load * system.external_force(u)
-        if not np.all(np.isfinite(force)):
-            raise _Failed("the strain is not finite")
-        residual, phi = external - force, system.constraint(u, load)
+        residual = external - force
         if system.joints:
+            phi = system.constraint(u, load)
             residual = residual - multipliers @ system.jacobian(u, load)
-        scale = 1.0 / np.abs(system.K.diagonal())
-        size = np.sqrt(max(np.sum(force**2 * scale), np.sum(external**2 * scale)))
-        free = residual * system.free
-        rho = np.sqrt(np.sum(free**2 * scale))
-        record.force_residuals.append(rho / size if size > 0 else 0.0)
-        still = not np.any(prescribed) and np.max(np.abs(phi), initial=0) <= 1e-12 * system.size
-        small = (rho <= 1e-3 * tol * size + force_floor if k == 0 else
-                 rho <= tol * size + force_floor and work <= tol * reference + floor)
-        if still and small:
+            closed = np.max(np.abs(phi)) <= 1e-12 * system.size
+        else:
+            phi, closed = _NONE, True
+        if not last:
+            scale = 1.0 / np.abs(system.K.diagonal())
+        free = residual * system.mask
+        rho = np.sqrt(free @ (free * scale))
+        size = np.sqrt(max(force @ (force * scale), external @ (external * scale)))
+        if not np.isfinite(rho):
+            raise _Failed("the strain is not finite")
+        record.force_residuals.append(float(rho / size) if size > 0 else 0.0)
+        if closed and not moving and (
+                rho <= 1e-3 * tol * size + force_floor if k == 0 else
+                last and rho <= tol * size + force_floor):
             if any(b.kernel.inverted(u[s]) for b, s in zip(system.beams, system.slices)):
                 raise _Failed("the body is turned inside out")
             return u, multipliers, force
         if k == max_iterations:
             break
-        du0 = np.zeros(system.N)
-        if np.any(prescribed):
+        if last:
+            force, evaluations = system.assemble(u, load, carried)
+        du0 = None
+        if moving:
+            du0 = np.zeros(system.N)
             du0[system.fixed] = prescribed
             free = (residual - system.multiply(du0)) * system.free
             if system.joints:
                 phi = phi + np.concatenate([j.jacobian(u, load) @ du0 for j in system.joints])
-            prescribed = np.zeros_like(prescribed)
+            moving = False
         try:
             system.factorize(u, load, multipliers)
         except (np.linalg.LinAlgError, RuntimeError):
             raise _Failed("the tangent is singular") from None
         du, dm = system.solve(free, -phi)
-        if not np.all(np.isfinite(du)):
+        before, work = work, np.sqrt(abs(free @ du) + abs(phi @ dm))
+        if not np.isfinite(work):
             raise _Failed("the tangent is singular")
-        work = np.sqrt(abs(free @ du) + abs(phi @ dm))
-        du += du0
+        if du0 is not None:
+            du += du0
         if method == "mixed":
             carried = system.stress_step(evaluations, du)
         u += du
-        multipliers += dm
+        multipliers = multipliers + dm
         record.iterations += 1
         reference = np.sqrt(max(abs(external @ u), abs(force @ u)))
-        record.energy_residuals.append(work / reference if reference > 0 else 0.0)
+        record.energy_residuals.append(float(work / reference) if reference > 0 else 0.0)
     raise _Failed(f"no convergence in {max_iterations} iterations")
