@@ -7,7 +7,7 @@ from skfem.assembly import Basis, FacetBasis, asm
 from skfem.element import ElementVector
 
 from . import forms
-from .elements import ElementBeam
+from .elements import ElementBeam, choose_element
 from .errors import InputError, MeshError, NameUnknown, require_positive
 from .formulations import COMPONENTS, get_formulation
 from .formulations.ecm import AXIS
@@ -56,7 +56,9 @@ class Beam:
     mesh
         A :class:`~skfem_ancf.MeshBeam`.
     element
-        A beam element, for example ``ElementBeamANCF(3)``.
+        A beam element, for example ``ElementBeamANCF(3)``, or "auto": the one of lowest order that
+        carries ``fields`` within ``tolerance``, see
+        :func:`skfem_ancf.elements.choose.choose_element`.
     material
         A material, for example :class:`~skfem_ancf.StVenantKirchhoff`.
     width
@@ -69,6 +71,9 @@ class Beam:
     compiled
         Use the kernels compiled by Numba, if it is installed and they apply; the results agree to
         round-off.
+    fields, tolerance
+        For the element "auto": names of section fields that will be looked at, and the relative
+        error that the beam theory may have.
 
     Raises
     ------
@@ -88,7 +93,9 @@ class Beam:
     """
 
     def __init__(self, mesh, element, material, width, formulation="continuum", name=None,
-                 compiled=True):
+                 compiled=True, fields=(), tolerance=1e-3):
+        if isinstance(element, str) and element == "auto" and isinstance(mesh, MeshBeam):
+            element = choose_element(mesh, material, fields, tolerance)
         for argument, kind, value in (("mesh", MeshBeam, mesh), ("element", ElementBeam, element),
                                       ("material", Material, material)):
             if not isinstance(value, kind):
@@ -104,6 +111,11 @@ class Beam:
     def __repr__(self):
         return (f"<Beam {self.name or ''}: {self.mesh.nelements} elements of order "
                 f"{self.element.order}, {self.N} coordinates, {self.formulation.name}>")
+
+    def with_mesh(self, mesh):
+        """The same beam on another mesh."""
+        return Beam(mesh, self.element, self.material, self.width, self.formulation, self.name,
+                    self.compiled)
 
     # the scikit-fem side
 

@@ -2,8 +2,8 @@
 
 ``U = 1/2 int E A eps^2 + E I (kappa - kappa_0)^2 ds`` with ``eps = |r'| - 1`` and the material
 curvature ``kappa = r' x r'' / |r'|^2``, the rate at which the tangent turns along the stress-free
-axis. Both are sampled at m Gauss points of an axis of degree 2 m - 1, where they are
-superconvergent; for the cubic axis the mode of equal slopes that this leaves is stabilised.
+axis. Both are sampled at 2 m - 2 Gauss points of an axis of degree 2 m - 1; for the cubic axis
+the mode of equal slopes that this leaves is stabilised.
 """
 
 import numpy as np
@@ -46,7 +46,7 @@ class CableKernel(Chain):
     width
         Width of the section.
     formulation
-        "assumed" samples at m Gauss points, any other at as many as are exact for small strain.
+        "assumed" samples at 2 m - 2 Gauss points, any other at 2 m.
     """
 
     def __init__(self, mesh, element, material, width, formulation):
@@ -58,8 +58,9 @@ class CableKernel(Chain):
         E = material.E / (1.0 if material.plane == "stress" else 1.0 - material.nu**2)
         area = width * mesh.height
         self.stiffness = np.array([E * area, E * area * mesh.height**2 / 12.0])
-        # degree 3 has one mode that m points miss, which is stabilised; above, one point more
-        n = (m if m == 2 else m + 1) if formulation.name == "assumed" else 2 * m
+        # 2 m - 2 points miss one mode of an element: for degree 3 it is stabilised, above it is
+        # held where two elements meet
+        n = 2 * m - 2 + (m > 2 and mesh.nelements == 1) if formulation.name == "assumed" else 2 * m
         xi, w = gauss(n)
         powers = np.tile(np.arange(m), 2)
         scale = mesh.lengths[:, None] ** powers
@@ -71,7 +72,7 @@ class CableKernel(Chain):
         self.G1 = tables[0] * scale[:, None, :] / L[:, None, None]
         self.G2 = tables[1] * scale[:, None, :] / L[:, None, None] ** 2
         self.w = w * L[:, None]
-        self.points = xi
+        self.points_number, self.shared = n, same
         mapping, X = mesh.mapping(), np.array([xi, 0.5 + 0.0 * xi])
         q0 = element.rigid(mesh)
         q0[0] = mesh.p - mesh.p.mean(axis=1, keepdims=True)

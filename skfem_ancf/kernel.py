@@ -80,6 +80,7 @@ class TermTables:
         xi_x = np.unique(np.concatenate([term.nodes("xx"), term.nodes("xy")]))
         xi_y = np.unique(np.concatenate([term.nodes("yy"), term.nodes("xy")]))
         eta = term.section_nodes
+        self.section_points = len(term.section[0])
         ns = len(eta)
         same = mesh.is_straight and np.ptp(mesh.lengths) <= 1e-13 * np.max(mesh.lengths)
         tind = np.array([0]) if same else None
@@ -374,6 +375,21 @@ class Kernel(Chain):
         constant = np.zeros((0, 1, 1)) if self.constant is None else self.constant
         return (t.Gx, t.Gy, t.e1, t.e2, t.w, np.ascontiguousarray(t.law.D), *where, *t.along,
                 np.ascontiguousarray(constant), self.t[0].astype(np.int64), self.nd)
+
+    @property
+    def shared(self):
+        """One table serves all elements."""
+        return self.tables[0].shared
+
+    @property
+    def points_number(self):
+        """Integration points of an element."""
+        return sum(t.w.shape[1] for t in self.tables)
+
+    @property
+    def section_points(self):
+        """Integration points across the section, of the first term."""
+        return self.tables[0].section_points
 
     def inverted(self, u):
         """True if the body is turned inside out somewhere: no deformation of a real one."""

@@ -1,5 +1,8 @@
 """A scene: beams, supports and loads, and what can be asked of them."""
 
+from copy import copy
+from functools import wraps
+
 import numpy as np
 from skfem.assembly import LinearForm, asm
 
@@ -9,11 +12,13 @@ from .dynamics import get_scheme
 from .dynamics.integrate import integrate
 from .errors import (ConvergenceError, InputError, NameUnknown, SupportError, require_finite,
                      require_finite_scalar)
-from .joints import get_joint
+from .joints import Joint, get_joint
 from .loads import DeadLoad, EndMoment, Pressure
 from .path import Path
+from .plan import make_plan
 from .results import State
 from .statics import continuation, newton
+from .statics.adapt import solve_adaptive
 from .system import System
 
 
@@ -35,6 +40,25 @@ def select_beam(beams, beam):
                 isinstance(beam, int) and not isinstance(beam, bool) and beam == k):
             return b
     raise NameUnknown("beam", beam, known)
+
+
+def _recorded(method):
+    """Keep the call, so that the scene can be built again on other meshes."""
+
+    @wraps(method)
+    def wrapper(self, *args, **kwargs):
+        outermost = not self._inside
+        self._inside = True
+        try:
+            result = method(self, *args, **kwargs)
+        finally:
+            if outermost:
+                self._inside = False
+        if outermost:
+            self._calls.append((method.__name__, args, kwargs))
+        return result
+
+    return wrapper
 
 
 class Scene:
@@ -76,6 +100,7 @@ class Scene:
         self.beams = beams
         self.loads = []
         self.joints = []
+        self._calls, self._inside = [], False
         self._velocity = {}
         self._fixed = {}  # (number of the beam, coordinate) -> displacement
         self._system = None
@@ -112,6 +137,7 @@ class Scene:
         self._system = None
         return self
 
+    @_recorded
     def clamp(self, boundary, beam=None, thickness="fixed"):
         """Weld a face, or hold it as a plane.
 
@@ -135,11 +161,13 @@ class Scene:
         self.joint("plane", at=boundary, beam=beam)
         return self
 
+    @_recorded
     def pin(self, boundary, beam=None):
         """Fix the position of the axis; the section may turn."""
         beam = select_beam(self.beams, beam)
         return self._fix(beam, beam.dofs(boundary, "r"))
 
+    @_recorded
     def fix(self, boundary, names=None, displacement=0.0, beam=None):
         """Fix coordinates by their scikit-fem names.
 
@@ -163,6 +191,7 @@ class Scene:
         return self._fix(beam, beam.dofs(boundary, names),
                          require_finite_scalar("displacement", displacement))
 
+    @_recorded
     def joint(self, joint, **options):
         """Add a joint, held by Lagrange multipliers.
 
@@ -212,6 +241,7 @@ class Scene:
         self._system = None
         return self
 
+    @_recorded
     def gravity(self, g, beam=None, amplitude=None):
         """Weight of every beam, or of one.
 
@@ -225,6 +255,7 @@ class Scene:
             self._load(DeadLoad(b, asm(forms.gravity(b.density, g, b.width), b.exact_basis())), amplitude)
         return self
 
+    @_recorded
     def point_force(self, force, at, beam=None, amplitude=None):
         """A dead force (2,) on the material point ``at`` of the stress-free body."""
         force = require_finite("force", force, (2,))
@@ -234,6 +265,7 @@ class Scene:
         np.add.at(vector, dofs, np.outer(force, weights))
         return self._load(DeadLoad(beam, vector), amplitude)
 
+    @_recorded
     def traction(self, boundary, t, beam=None, amplitude=None):
         """A dead traction on a surface, per area of the stress-free body.
 
@@ -250,17 +282,20 @@ class Scene:
         basis = beam.facet_basis(boundary, intorder=12 if callable(t) else None)
         return self._load(DeadLoad(beam, asm(forms.traction(t, beam.width), basis)), amplitude)
 
+    @_recorded
     def pressure(self, boundary, p, beam=None, amplitude=None):
         """A pressure on a surface that stays normal to it as it deforms; positive pushes."""
         beam = select_beam(self.beams, beam)
         return self._load(Pressure(beam, boundary, require_finite_scalar("p", p)), amplitude)
 
+    @_recorded
     def moment(self, boundary, M, beam=None, amplitude=None):
         """A moment on an end section, counterclockwise, that turns with it."""
         beam = select_beam(self.beams, beam)
         return self._load(EndMoment(beam, beam.section_node(boundary),
                                     require_finite_scalar("M", M)), amplitude)
 
+    @_recorded
     def load(self, form, boundary=None, beam=None, amplitude=None):
         """Any scikit-fem ``LinearForm``, as a dead load on the body or on a boundary of it."""
         beam = select_beam(self.beams, beam)
@@ -281,13 +316,96 @@ class Scene:
                                   np.array(list(self._fixed.values()), dtype=float), self.joints)
         return self._system
 
-    def solve_static(self, start=None, **options):
+    def with_beams(self, beams):
+        """The same supports, loads and joints on other beams.
+
+        Parameters
+        ----------
+        beams
+            As many beams, in the same order; a boundary given by a name, a point or a function
+            is found again on them.
+
+        Raises
+        ------
+        InputError
+            If a boundary was given by facet numbers, or velocities by coordinates.
+        """
+        scene = Scene(*beams)
+        known = {id(a): b for a, b in zip(self.beams, beams)}
+
+        def moved(value):
+            if isinstance(value, Joint):
+                return copy(value)  # bound to the new scene below
+            if isinstance(value, tuple) and any(id(v) in known for v in value):
+                return tuple(map(moved, value))
+            return known.get(id(value), value)
+
+        for name, args, kwargs in self._calls:
+            first = args[0] if args else kwargs.get("boundary", kwargs.get("v"))
+            if name in ("clamp", "pin", "fix", "traction", "pressure", "moment",
+                        "initial_velocity") and not (isinstance(first, str) or callable(first)):
+                raise InputError(f"{name}({first!r}) cannot be put on another mesh: give names or "
+                                 "functions")
+            getattr(scene, name)(*map(moved, args), **{k: moved(v) for k, v in kwargs.items()})
+        return scene
+
+    def plan(self, kind="static"):
+        """What a solution computes, keeps constant or skips, and why; ``print`` it.
+
+        Parameters
+        ----------
+        kind
+            "static", "linear" or "dynamic".
+
+        Examples
+        --------
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line([0, 0.5, 1], height=0.01), ElementBeamANCF(2),
+        ...                    StVenantKirchhoff(2e8, 0.0, 7800), width=0.01))
+        >>> plan = scene.clamp("left").gravity((0, -9.81)).plan()
+        >>> plan["mass"].status, plan["Poisson coupling"].status, plan["dead loads"].status
+        ('skipped', 'skipped', 'constant')
+        """
+        return make_plan(self, kind)
+
+    def solve_linear(self):
+        """The small-displacement solution: one assembly, one factorisation, one solve.
+
+        Returns
+        -------
+        State
+
+        Raises
+        ------
+        SupportError
+            If a rigid motion is free.
+        """
+        system = self.system
+        system.require_supports()
+        zero, none = np.zeros(system.N), np.zeros(system.m)
+        system.assemble(zero, 1.0, geometric=False)
+        du0 = np.zeros(system.N)
+        du0[system.fixed] = system.values(1.0)
+        load, phi = system.external_force(zero), -system.constraint(zero, 1.0)
+        if np.any(du0):
+            load = load - system.multiply(du0)
+            phi = phi - system.full_jacobian(zero, 1.0) @ du0
+        system.factorize(zero, 1.0, none)
+        du, multipliers = system.solve(load, phi)
+        return State(system, du + du0, force=None, iterations=1, message="linear, one solve",
+                     multipliers=multipliers)
+
+    def solve_static(self, start=None, adapt=None, **options):
         """The equilibrium under the full load.
 
         Parameters
         ----------
         start
             A State to start from; the stress-free state by default.
+        adapt
+            Tolerance of the error: refine the meshes where it is, starting from those given. The
+            state's ``error_estimate`` says what was reached; its beams are the refined ones. See
+            :func:`skfem_ancf.statics.adapt.solve_adaptive`.
         **options
             Those of :func:`skfem_ancf.statics.newton.solve_static`: ``method``, ``tol``,
             ``max_iterations``, ``first_step``, ``min_step``, ``progress``.
@@ -303,10 +421,15 @@ class Scene:
         ConvergenceError
             If there is no convergence; its ``state`` is the last converged State.
         """
+        if adapt is not None:
+            return solve_adaptive(self, adapt, **options)
+        return self._solve(None if start is None else start.u, **options)
+
+    def _solve(self, u, **options):
         system = self.system
         system.require_supports()
         try:
-            result = newton.solve_static(system, None if start is None else start.u, **options)
+            result = newton.solve_static(system, u, **options)
         except ConvergenceError as error:
             raise ConvergenceError(str(error), self._state(error.state)) from None
         return self._state(result)
@@ -336,6 +459,7 @@ class Scene:
         except ConvergenceError as error:
             raise ConvergenceError(str(error), Path(system, error.state)) from None
 
+    @_recorded
     def initial_velocity(self, v, beam=None):
         """The velocity at the start of :meth:`integrate`.
 

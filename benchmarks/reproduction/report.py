@@ -110,9 +110,10 @@ def section_5_2(result):
         *convergence_table(result.sheets["table3"], 6),
         f"The limit of a shear-deformable rod (Reissner) is u_x = {facts['limit'][0]:.6f}, "
         f"u_y = {facts['limit'][1]:.6f}. With 16 elements every model is still "
-        f"{distance:.3f} m or more away from it in u_y: free of Poisson locking is not free of membrane and curvature-thickness "
-        "locking. On the finest mesh all but N=1 are within "
-        f"{last:.1e} m of the rod's limit, and do not tend to it exactly: the conditions at the root and the law of the section are not the rod's.", "",
+        f"{distance:.3f} m or more away from it in u_y: free of Poisson locking is not "
+        "free of membrane and curvature-thickness locking. On the finest mesh all but N=1 are within "
+        f"{last:.1e} m of the rod's limit, and do not tend to it exactly: the conditions at the "
+        "root and the law of the section are not the rod's.", "",
         *picture("table3", "table4", "fig09")]
 
 
@@ -207,8 +208,8 @@ def section_5_5(result, settings):
         f"{spread(sheet, UNLOCKED, 'tip_y'):.1e} m in y; N=1 leaves them by up to "
         f"{spread(sheet, sheet.models, 'tip_y'):.1e} m. They agree better with each other than "
         "with the limit: on this mesh membrane and curvature-thickness locking, which all share, "
-        f"cost {np.hypot(*(end - limit)):.1e} m at 1 s (N=4). The strain energy differs from that of N=4 by at most "
-        f"{gap[0]:.1e} J (N=1), {gap[1]:.1e} J (ECM) and {gap[2]:.1e} J (N=2).", "",
+        f"cost {np.hypot(*(end - limit)):.1e} m at 1 s (N=4). The strain energy "
+        f"differs from that of N=4 by at most {gap[0]:.1e} J (N=1), {gap[1]:.1e} J (ECM) and {gap[2]:.1e} J (N=2).", "",
         time_error(result.facts, settings), "", *picture(*result.sheets)]
 
 
@@ -261,7 +262,7 @@ def preamble():
         "## Models and root conditions", "",
         "Fixed at a clamped root; all other coordinates of that node are free. These are the "
         "conditions, recovered by matching the paper's own numbers, that reproduce its Table 4. "
-        "None of them is a welded face, which fixes r and every r_Y and leaves r_X, a strain "
+        "No row is a welded face, which fixes r and every r_Y and leaves r_X, a strain "
         "measure there, free (that is `scene.clamp`). `r_Y0` is the lowest section point; without "
         "^1 or ^2 a name means both components.", "",
         *table(["model", "element", "formulation", "fixed"],

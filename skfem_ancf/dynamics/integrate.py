@@ -14,6 +14,7 @@ logger = logging.getLogger(__name__)
 MAX_ITERATIONS = 25
 EPS = np.finfo(float).eps
 SLOW = 0.3  # contraction above which the factors are made anew
+MANY = 4  # iterations to go above which old factors are made anew
 
 
 class StepFailed(Exception):
@@ -114,9 +115,13 @@ class Integrator:
 
     # a step
 
-    def _factorize(self, step, u):
+    def _factorize(self, step, u, start):
+        """Factors at u, with the stress of the start of the step in the geometric part.
+
+        The stress of an iterate may be far off: turning by a straight predictor stretches.
+        """
         s = self.system
-        s.assemble(step.middle(u), t=step.t)
+        _, ev = s.assemble(start); s.assemble(step.middle(u), carried=s.stress_step(ev, 0 * u), t=step.t)
         self.A.combine(step.mass_factor, s.mass, step.stiffness_factor, s.K)
         self.A.fix(s.fixed_positions)
         self.A.factorize()
@@ -146,7 +151,7 @@ class Integrator:
         couples = self.scheme.couples_velocity and not all(joint.constant for joint in s.joints)
         fresh = False
         if self._coefficients != (step.mass_factor, step.stiffness_factor):
-            self._factorize(step, u)
+            self._factorize(step, u, y.u)
             fresh, self._rate = True, 0.1
         # round-off of the strains and of the inertia
         floor = np.hypot(8.0 * s.stiffness_scale * np.sqrt(step.stiffness_factor),
@@ -185,10 +190,11 @@ class Integrator:
                 if rate > 1.0 and size <= 1e3 * floor:
                     break  # round-off
                 self._rate = max(rate, 0.01)  # of one step, used in the next, where it may be larger
-                if rate > SLOW and size > wanted:
+                left = np.log(wanted / size) / np.log(min(rate, 0.99))  # iterations to go
+                if size > wanted and (rate > SLOW or (left > MANY and not fresh)):
                     if fresh and rate > 2.0:
                         raise StepFailed("the iteration diverges")
-                    self._factorize(step, u)
+                    self._factorize(step, u, y.u)
                     fresh, before, self._rate = True, None, 0.1
                     continue
             if size * min(1.0, self._rate) <= wanted:

@@ -3,6 +3,7 @@
 from .ancf import ElementBeamANCF
 from .base import ElementBeam
 from .cable import ElementBeamCable
+from .choose import ORDER_OF_FIELD, choose_element
 from .cubic import ElementBeamANCFCubic
 from .patel_shabana import ElementBeamPatelShabana
 
@@ -13,5 +14,5 @@ ELEMENTS = {
     **{f"cubic-{n}": (lambda n=n: ElementBeamANCFCubic(n)) for n in (1, 2, 3, 6)},
 }
 
-__all__ = ["ELEMENTS", "ElementBeam", "ElementBeamANCF", "ElementBeamANCFCubic", "ElementBeamCable",
-           "ElementBeamPatelShabana"]
+__all__ = ["ELEMENTS", "ORDER_OF_FIELD", "ElementBeam", "ElementBeamANCF", "ElementBeamANCFCubic", "ElementBeamCable",
+           "ElementBeamPatelShabana", "choose_element"]

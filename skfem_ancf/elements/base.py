@@ -1,5 +1,7 @@
 """What every beam element shares: products of axis and section functions."""
 
+from functools import cached_property
+
 import numpy as np
 from numpy.polynomial import legendre
 from skfem.element import DiscreteField, Element
@@ -105,6 +107,20 @@ class ElementBeam(Element):
         invDF = mapping.invDF(X, tind)
         grad = scale * (invDF[0] * d_xi + invDF[1] * d_eta)
         return (DiscreteField(value=scale * value, grad=grad),)
+
+    @cached_property
+    def halving(self):
+        """The coordinates of the left half of an element of length 1 and height 1 from its own.
+
+        Shape (2 nodal_dofs, 2 nodal_dofs), for coordinates multiplied by the length to the number
+        of their derivatives along X. The last nodal_dofs rows are those of the middle.
+        """
+        n = self.axis_degree + 1, max(self.order, 1) + 1
+        X = np.array(np.meshgrid(np.linspace(0, 1, n[0]), np.linspace(0, 1, n[1]))).reshape(2, -1)
+        half = np.array([0.5 * X[0], X[1]])
+        i = range(2 * self.nodal_dofs)
+        own, child = (np.array([self.local(P, 1.0, k)[0] for k in i]).T for P in (half, X))
+        return np.linalg.lstsq(child, own, rcond=None)[0]
 
     def rigid(self, mesh):
         """The coordinates of the nodes in the stress-free state, less their positions.

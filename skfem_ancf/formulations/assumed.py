@@ -52,6 +52,11 @@ class Assumed(Formulation):
         if element.order > 1 or not isinstance(law, LinearLaw):
             return [Term(law, axis, section, samples)]
         uncoupled, coupling = split_moduli(self.name, material, element)
+        if material.plane == "strain":  # a bent section is as stiff as E / (1 - nu^2)
+            more = np.diag([1.0, 1.0, 0.0]) * material.E * material.nu**2 / (1.0 - material.nu**2)
+            uncoupled, coupling = uncoupled + more, coupling - more
+        if not np.any(coupling):
+            return [Term(law, axis, section, samples)]
         mean = (section[0], section[1][None])
         return [Term(LinearLaw(uncoupled), axis, section, samples),
                 Term(LinearLaw(coupling), axis, AXIS, samples, mean)]

@@ -44,7 +44,10 @@ class EnhancedContinuum(Formulation):
     def terms(self, element, material):
         axis, section = self.full_rules(element)
         uncoupled, coupling = split_moduli(self.name, material, element)
-        return [Term(LinearLaw(uncoupled), axis, section), Term(LinearLaw(coupling), axis, AXIS)]
+        terms = [Term(LinearLaw(uncoupled), axis, section)]
+        if np.any(coupling):  # not at nu = 0 in plane stress
+            terms.append(Term(LinearLaw(coupling), axis, AXIS))
+        return terms
 
     def stress(self, beam, strain, u, X, tind):
         uncoupled, coupling = split_moduli(self.name, beam.material, beam.element)

@@ -27,6 +27,8 @@ class StrainSplit(EnhancedContinuum):
     def terms(self, element, material):
         axis, section = self.full_rules(element)
         uncoupled, coupling = split_moduli(self.name, material, element)
+        if not np.any(coupling):
+            return [Term(LinearLaw(uncoupled), axis, section)]
         eta, w = section
         # a : C : s + 1/2 a : C : a = 1/2 m : C : m - 1/2 (m - a) : C : (m - a), m the mean
         mean = (eta, w[None])

@@ -127,7 +127,7 @@ def plot_state(state, field="eps_yy", ax=None, *, thickness="auto", undeformed=T
     ax.autoscale_view()
     _dress(ax, TITLES[field] if title is None else title, factor)
     if colorbar:
-        _add_colorbar(ax, image, low > np.nanmin(values), high < np.nanmax(values))
+        _add_colorbar(ax, image, bool(np.any(values < low)), bool(np.any(values > high)))
     if filename is not None:
         with replacing(Path(filename)) as temporary:
             ax.figure.savefig(temporary, dpi=dpi, bbox_inches="tight")
@@ -173,14 +173,14 @@ def _thickness(thickness, bodies):
         return require_positive("thickness", thickness)
     shapes = [(b, p) for b in bodies for p in (b.reference, b.deformed)]
     x = np.concatenate([axis.reshape(2, -1) for _, (_, axis) in shapes], axis=1)
-    factor = READABLE * np.max(np.ptp(x, axis=1)) / max(b.height for b in bodies)
+    factor = round(READABLE * np.max(np.ptp(x, axis=1)) / max(b.height for b in bodies))
     for body, (x, axis) in shapes:  # both faces keep a third of the advance of the axis
         step = np.diff(axis, axis=-1)
         for face in (0, -1):
             offset = np.diff(x.reshape(body.shape)[..., face] - axis, axis=-1)
             turn = -np.sum(offset * step, axis=0) / np.sum(step**2, axis=0)
-            factor = min(factor, (2 / 3) / max(np.max(turn), 1e-300))
-    return float(max(1, round(factor)))
+            factor = min(factor, (2 / 3) // max(np.max(turn), 1e-300))
+    return float(max(1, factor))
 
 
 def _limits(limits, values, signed):

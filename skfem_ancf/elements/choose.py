@@ -1,0 +1,58 @@
+"""The element of lowest order that can show what is asked for."""
+
+from ..errors import InputError, NameUnknown, require_positive
+from .ancf import ElementBeamANCF
+from .cable import ElementBeamCable
+from .cubic import ElementBeamANCFCubic
+
+#: The order that a field of the section needs at least; 0 is the cable.
+ORDER_OF_FIELD = {"displacement": 0, "eps_xx": 0, "S_xx": 0, "eps_yy": 2, "eps_xy": 3, "S_yy": 5,
+                  "S_xy": 3}
+
+
+def choose_element(mesh, material, fields=(), tolerance=1e-3):
+    """The element of lowest order that carries the fields and is accurate enough.
+
+    The error of a beam theory is a power of h / L, with L the length of the beam: the cable leaves
+    out shear, ``3 E I / (k_s G A L^2)`` of the deflection of a cantilever; a section of order 1 or
+    2 carries the shear with a factor, and leaves out the shape of the section, about
+    ``(h / L)^2 / 10`` in the continuum's own measures; order 3 carries the shear parabola, and
+    leaves out what is of the order of ``(h / L)^3``.
+
+    Parameters
+    ----------
+    mesh, material
+        The body and its material.
+    fields
+        Fields of the section that will be looked at: names from :data:`ORDER_OF_FIELD`.
+    tolerance
+        Relative error of the deflection that the theory may have; what the mesh adds is not in it.
+
+    Returns
+    -------
+    ElementBeam
+        A quintic cable, or an element with cubic sections of order 2, 3 or 5, or linear sections
+        on a beam shorter than 20 heights.
+
+    Raises
+    ------
+    NameUnknown
+        If a field is not known.
+    """
+    fields = [fields] if isinstance(fields, str) else list(fields)
+    for name in fields:
+        if name not in ORDER_OF_FIELD:
+            raise NameUnknown("field", name, ORDER_OF_FIELD)
+    tolerance = require_positive("tolerance", tolerance)
+    if tolerance >= 1.0:
+        raise InputError(f"the tolerance is relative and below 1, got {tolerance!r}")
+    ratio = mesh.height / float(mesh.lengths.sum())
+    k_s = 10.0 * (1.0 + material.nu) / (12.0 + 11.0 * material.nu)
+    shear = 0.25 * material.E / (k_s * material.G) * ratio**2
+    wanted = max((ORDER_OF_FIELD[name] for name in fields), default=0)
+    enough = (0 if shear <= tolerance else 2 if 0.1 * ratio**2 <= tolerance else
+              3 if ratio**3 <= tolerance else 5)
+    order = max(wanted, enough)
+    if order == 0:
+        return ElementBeamCable(5)
+    return ElementBeamANCFCubic(order) if ratio < 0.05 else ElementBeamANCF(order)

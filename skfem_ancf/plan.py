@@ -1,0 +1,110 @@
+"""What a solution computes, keeps constant or skips, and why."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .errors import NameUnknown
+
+KINDS = ("static", "linear", "dynamic")
+
+
+class Item(NamedTuple):
+    """One term: its name, "computed", "constant" or "skipped", and the reason."""
+
+    term: str
+    status: str
+    reason: str
+
+
+class Plan(tuple):
+    """The items of a plan; ``plan["mass"]`` finds one by its term, ``print(plan)`` shows all."""
+
+    def __getitem__(self, key):
+        if not isinstance(key, str):
+            return super().__getitem__(key)
+        for item in self:
+            if item.term == key:
+                return item
+        raise NameUnknown("term", key, [item.term for item in self])
+
+    def __str__(self):
+        width = max(len(item.term) for item in self)
+        return "\n".join(f"{i.term:<{width}}  {i.status:<8}  {i.reason}" for i in self)
+
+
+def make_plan(scene, kind="static"):
+    """The plan of a scene.
+
+    Parameters
+    ----------
+    scene
+        A :class:`~skfem_ancf.Scene`.
+    kind
+        "static", "linear" (``scene.solve_linear``) or "dynamic".
+
+    Raises
+    ------
+    NameUnknown
+        If the kind is not known.
+    """
+    if kind not in KINDS:
+        raise NameUnknown("kind of solution", kind, KINDS)
+    s, beams = scene.system, scene.beams
+    dynamic, linear = kind == "dynamic", kind == "linear"
+    items = []
+
+    def add(term, status, reason):
+        items.append(Item(term, status, reason))
+
+    points = sum(b.mesh.nelements * b.kernel.points_number for b in beams)
+    add("strain energy", "computed", f"{points} integration points, "
+        + ", ".join(sorted({b.formulation.name for b in beams})))
+    shared = [b for b in beams if b.kernel.shared]
+    add("tables", "constant", "one for all elements of a straight beam with equal elements"
+        if len(shared) == len(beams) else "one for each element: curved or unequal elements")
+    poisson = [b for b in beams if b.material.nu != 0 and not b.is_cable]
+    if poisson:
+        add("Poisson coupling", "computed", "nu = " + ", ".join(
+            sorted({f"{b.material.nu:g}" for b in poisson})))
+    else:
+        add("Poisson coupling", "skipped", "nu = 0, or a section without thickness strain")
+    held = [b for b in beams if b.kernel.constant is not None]
+    add("stabilisation", "constant" if held else "skipped",
+        "quadratic: one matrix" if held else "the quadrature leaves no mode out")
+    add("geometric term", "skipped" if linear else "computed",
+        "no stress in a linear solve" if linear else "the stress is not zero")
+    add("tangent", "constant" if linear else "computed",
+        "one assembly, one factorisation" if linear else
+        "its factors are kept while the iteration contracts" if dynamic else
+        "each iteration; the last evaluates the force only")
+    add("mass", "constant" if dynamic else "skipped",
+        "assembled and factorised once" if dynamic else "no inertia in statics")
+    dead = [load for load in scene.loads if load.constant and load.amplitude is None]
+    rest = len(scene.loads) - len(dead)
+    add("dead loads", "constant" if dead else "skipped",
+        f"{len(dead)} assembled when given" if dead else "there are none")
+    add("varying loads", "computed" if rest else "skipped",
+        f"{rest} depend on displacement or time" if rest else "no follower load, no amplitude")
+    add("multipliers", "computed" if s.m else "skipped",
+        f"{s.m} equations of {len(s.joints)} joint(s)" if s.m else
+        "no joints" if not scene.joints else "the joints only fix coordinates")
+    bandwidth = s.K.bandwidth
+    if s.m and not dynamic:
+        solver = "sparse LU with the multipliers"
+    elif not s.symmetric:
+        solver = f"banded LU, half bandwidth {bandwidth}: a pressure has no potential"
+    else:
+        solver = f"banded Cholesky, half bandwidth {bandwidth}" + (
+            ", bordered by the multipliers" if s.m else "")
+    add("linear solver", "computed", solver)
+    rules = sorted({(b.element.order, b.kernel.section_points) for b in beams if not b.is_cable})
+    add("section quadrature", "constant" if rules else "skipped",
+        "; ".join(f"order {n}: {p} points, exact for degree {2 * p - 1} of {4 * n}"
+                  for n, p in rules) or "a cable has EA and EI")
+    compiled = [b for b in beams if b.kernel.compiled is not None]
+    add("compiled kernels", "computed" if compiled else "skipped",
+        f"{len(compiled)} of {len(beams)} beams by Numba" if compiled else
+        "Numba is not installed, not wanted, or does not apply")
+    add("fields", "skipped", "strain and stress are computed where a State is asked for them")
+    return Plan(items)

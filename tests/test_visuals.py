@@ -1,0 +1,154 @@
+"""Pictures: what is drawn, without a display."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from numpy.testing import assert_allclose
+
+from conftest import quarter_arc
+from test_io import affine, bent, turn
+from skfem_ancf import (Beam, ElementBeamANCF, InputError, MeshBeam, MissingExtra, NameUnknown,
+                        Scene, StVenantKirchhoff)
+from skfem_ancf.visuals.matplotlib import TITLES, plot_state
+
+STEEL = StVenantKirchhoff(E=1e6, nu=0.3)
+
+
+def drawn(ax):
+    """The coloured patches."""
+    return next(c for c in ax.collections if type(c).__name__ == "TriMesh")
+
+
+@pytest.fixture(scope="module")
+def state():
+    return bent()
+
+
+@pytest.mark.parametrize("field", TITLES)
+def test_every_field_is_drawn_and_named(state, field):
+    ax = state.plot(field)
+    assert ax.get_title(loc="left") == TITLES[field]
+    low, high = drawn(ax).get_clim()
+    values = drawn(ax).get_array()
+    assert high == pytest.approx(abs(values).max())
+    assert low == (0.0 if field == "displacement" else -high)
+    assert ax.get_aspect() == 1.0
+
+
+def test_values_are_those_of_the_file(state):
+    from skfem_ancf.io import body_fields
+
+    data = body_fields(state, subdivide=(4, 2)).point_data
+    for field in ("eps_yy", "sigma_xy"):
+        ax = state.plot(field, subdivide=(4, 2))
+        assert_allclose(np.sort(drawn(ax).get_array()), np.sort(data[field]), atol=1e-15)
+
+
+def test_picture_files(state, tmp_path):
+    for suffix in ("png", "pdf", "svg"):
+        path = tmp_path / "new" / f"beam.{suffix}"
+        state.plot(filename=path, dpi=60)
+        assert path.stat().st_size > 2000
+    assert len(list(path.parent.iterdir())) == 3
+
+
+def test_png_shows_both_signs(state, tmp_path):
+    from matplotlib.image import imread
+
+    state.plot("S_xx", colorbar=False, filename=tmp_path / "beam.png", dpi=80)
+    rgb = imread(tmp_path / "beam.png")[..., :3]
+    assert np.sum((rgb[..., 0] > 0.6) & (rgb[..., 2] < 0.3)) > 20   # red: tension
+    assert np.sum((rgb[..., 2] > 0.5) & (rgb[..., 0] < 0.4)) > 20   # blue: compression
+
+
+def test_own_axes_are_used_and_shared(state):
+    ax = Figure().add_subplot()
+    assert plot_state(state, ax=ax, colorbar=False, undeformed=False, title="one") is ax
+    assert plot_state(state, ax=ax, colorbar=False, title="") is ax
+    assert sum(type(c).__name__ == "TriMesh" for c in ax.collections) == 2
+    assert len(ax.figure.axes) == 1 and ax.get_title(loc="left") == "one"
+
+
+def test_slender_beams_are_drawn_thicker_and_say_so():
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.01), ElementBeamANCF(2), STEEL, 1)
+    state = affine(beam, turn(0.5))
+    ax = state.plot()
+    assert [t.get_text() for t in ax.texts] == ["section drawn 4 times as thick"]
+    thick = drawn(state.plot(thickness=8))._triangulation
+    # turned back, the section is 8 times 0.01 high
+    across = turn(-0.5) @ np.array([thick.x, thick.y])
+    assert_allclose([across[1].min(), across[1].max()], [-0.04, 0.04], atol=1e-14)
+    assert_allclose([across[0].min(), across[0].max()], [0, 1], atol=1e-14)
+    assert not state.plot(thickness=1).texts
+
+
+def test_automatic_thickness_does_not_fold_a_tight_bend():
+    curve = MeshBeam.init_curve(lambda s: 0.02 * np.array([np.cos(s), np.sin(s)]),
+                                np.linspace(0, 3, 9), height=0.01)
+    far = Beam(MeshBeam.init_line([10, 20], height=0.01), ElementBeamANCF(1), STEEL, 1)
+    near = Beam(curve, ElementBeamANCF(1), STEEL, 1)
+    scene = Scene(near, far)
+    for b in (0, 1):
+        scene.clamp("left", beam=b)
+    ax = scene.solve_static().plot()  # alone the straight one would be drawn 80 times as thick
+    assert [t.get_text() for t in ax.texts] == ["section drawn 2 times as thick"]
+
+
+def test_stress_free_body_behind(state):
+    behind = [c for c in state.plot().collections if type(c).__name__ == "PolyCollection"]
+    box = behind[0].get_paths()[0].get_extents()
+    assert_allclose([box.x0, box.y0, box.x1, box.y1], [0, -0.05, 1, 0.05], atol=1e-12)
+    assert not [c for c in state.plot(undeformed=False).collections
+                if type(c).__name__ == "PolyCollection"]
+
+
+def test_limits_clip_with_arrows(state):
+    ax = state.plot("S_xx", limits=(-1, 2))
+    image = drawn(ax)
+    assert image.get_clim() == (-1, 2) and image.colorbar.extend == "both"
+    assert drawn(state.plot("S_xx")).colorbar.extend == "neither"
+
+
+@pytest.mark.parametrize("A", [np.eye(2), turn(1.0), 3 * np.eye(2)])
+def test_fields_without_a_range_or_without_values(A, tmp_path):
+    """No strain at all; and a Cauchy stress that is NaN everywhere."""
+    beam = Beam(quarter_arc(), ElementBeamANCF(1), STEEL, 1.0)
+    affine(beam, A).plot("sigma_xx", filename=tmp_path / "none.png", dpi=50)
+
+
+@pytest.mark.parametrize("options, error, message", [
+    (dict(field="eps_zz"), NameUnknown, "known: 'displacement'"),
+    (dict(thickness=0), InputError, "thickness must be positive"),
+    (dict(thickness="thick"), InputError, "thickness must be a number"),
+    (dict(limits=(1, 1)), InputError, "must increase"),
+    (dict(limits=1), InputError, "two numbers"),
+    (dict(limits=(np.nan, 1)), InputError, "finite"),
+    (dict(subdivide=(0, 1)), InputError, "positive integers"),
+])
+def test_bad_options(state, options, error, message):
+    with pytest.raises(error, match=message):
+        state.plot(**options)
+
+
+def test_without_matplotlib(state, monkeypatch):
+    for name in [m for m in sys.modules if m.split(".")[0] == "matplotlib"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(MissingExtra, match=r'pip install "skfem-ancf\[plot\]"'):
+        state.plot()
+
+
+def test_neither_matplotlib_at_import_nor_pyplot_ever(tmp_path):
+    script = """
+import sys, skfem_ancf, skfem_ancf.io, skfem_ancf.visuals.matplotlib
+assert "matplotlib" not in sys.modules and "vtk" not in sys.modules
+from skfem_ancf import *
+beam = Beam(MeshBeam.init_line([0, 1], height=0.1), ElementBeamANCF(2),
+            StVenantKirchhoff(E=1, nu=0.3), 1)
+Scene(beam).clamp("left").solve_static().plot(filename=sys.argv[1])
+assert "matplotlib.pyplot" not in sys.modules
+"""
+    subprocess.run([sys.executable, "-c", script, str(tmp_path / "a.png")], check=True)
