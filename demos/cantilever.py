@@ -26,7 +26,8 @@ def cantilever(E, elements):
     mesh = MeshBeam.init_line(np.linspace(0, LENGTH, elements + 1), height=SIDE)
     material = StVenantKirchhoff(E=E, nu=NU, density=DENSITY, plane="stress",
                                  shear_correction="paper")
-    return Scene(Beam(mesh, ElementBeamANCF(3), material, width=SIDE)).fix("left", ROOT)
+    beam = Beam(mesh, ElementBeamANCF(3), material, width=SIDE, formulation="continuum")
+    return Scene(beam).fix("left", ROOT)
 
 
 def picture(state, filename):

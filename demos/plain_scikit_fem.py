@@ -45,7 +45,7 @@ def newton(mesh=MESH, steps=10, tol=1e-10):
 
 def scene(mesh=MESH):
     """The same by the short way."""
-    beam = Beam(mesh, ElementBeamANCF(3), MATERIAL, WIDTH)
+    beam = Beam(mesh, ElementBeamANCF(3), MATERIAL, WIDTH, formulation="continuum")
     return Scene(beam).clamp("left").gravity(G).solve_static()
 
 

@@ -92,7 +92,7 @@ class Beam:
     (170, 0.78)
     """
 
-    def __init__(self, mesh, element, material, width, formulation="continuum", name=None,
+    def __init__(self, mesh, element, material, width, formulation="assumed", name=None,
                  compiled=True, fields=(), tolerance=1e-3):
         if isinstance(element, str) and element == "auto" and isinstance(mesh, MeshBeam):
             element = choose_element(mesh, material, fields, tolerance)

@@ -172,7 +172,7 @@ class MeshBeam(Mesh):
     def _from_nodes(cls, p, tangent, lengths, height, s=None, curve=None, p_XY=None):
         n = p.shape[1]
         mesh = cls(p, np.array([np.arange(n - 1), np.arange(1, n)]), height=height, p_X=tangent,
-                   p_Y=np.array([-tangent[1], tangent[0]]), lengths=lengths, s=s, curve=curve,
+                   p_Y=np.array([0.0 - tangent[1], tangent[0]]), lengths=lengths, s=s, curve=curve,
                    p_XY=np.zeros(p.shape) if p_XY is None else p_XY)
         mesh._boundaries = mesh._build_default_tags()
         return mesh

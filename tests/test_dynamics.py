@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from skfem_ancf import (Beam, ElementBeamANCF, MeshBeam, NeoHookean, Scene, StVenantKirchhoff,
-                        exact)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, MeshBeam, NeoHookean, Scene,
+                        StVenantKirchhoff, exact)
 from skfem_ancf.dynamics import (HHT, SCHEMES, EnergyMomentum, GeneralizedAlpha, Motion, Newmark,
                                  get_scheme)
 from skfem_ancf.elements import ELEMENTS
@@ -89,14 +89,14 @@ def driven_hub():
 
 @lru_cache
 def driven_motion():
-    a, b = (driven_hub().integrate(1.0, 1.0 / n) for n in (1280, 2560))
+    a, b = (driven_hub().integrate(1.0, 1.0 / n) for n in (320, 640))
     return [(4 * y - x) / 3 for x, y in ((a.u[-1], b.u[-1]), (a.v[-1], b.v[-1]),
                                          (a.multipliers[-1], b.multipliers[-1]))]
 
 
 @pytest.mark.parametrize("scheme", [cls() for cls in SCHEMES.values()], ids=repr)
 def test_order_with_moving_supports_and_joints(scheme):
-    runs = [driven_hub().integrate(1.0, 1.0 / n, scheme=scheme) for n in (160, 320)]
+    runs = [driven_hub().integrate(1.0, 1.0 / n, scheme=scheme) for n in (80, 160)]
     for k, exact_value in enumerate(driven_motion()):
         errors = [np.abs((run.u, run.v, run.multipliers)[k][-1] - exact_value).max()
                   for run in runs]
@@ -166,10 +166,10 @@ def test_published_dissipation(scheme):
     radius = [np.abs(amplification(scheme, dt)).max() for dt in np.geomspace(1e-2, 1e4, 61)]
     assert max(radius) < 1 + 1e-7  # stable for every step size
     if isinstance(scheme, GeneralizedAlpha) and not isinstance(scheme, (HHT, Newmark)):
-        assert radius[-1] == pytest.approx(published_radius(scheme), abs=2e-3)
         # Chung and Hulbert: least damping of low frequencies for the wanted one of high ones
         assert np.all(np.diff(radius) < 1e-7)
-    assert radius[-1] == pytest.approx(published_radius(scheme), abs=0.02)
+    # a double root at infinity: it is reached like 1 / sqrt(dt)
+    assert radius[-1] == pytest.approx(published_radius(scheme), abs=5e-3)
     # damping ratio of a low frequency: none, or of third order in dt
     damping = [-np.log(np.abs(amplification(scheme, dt)).max()) / dt for dt in (0.05, 0.1)]
     if published_radius(scheme) == 1.0:
@@ -185,14 +185,14 @@ def test_rho_inf_is_the_radius_at_infinity(rho):
     assert published_radius(GeneralizedAlpha(rho)) == pytest.approx(rho, abs=1e-14)
 
 
-@pytest.mark.parametrize("scheme, low, high", [
-    (EnergyMomentum(), 1 - 1e-9, 1 + 1e-9), (Newmark(), 1 - 1e-6, 1 + 1e-6),
-    (GeneralizedAlpha(0.8), 0.0, 1e-2), (GeneralizedAlpha(0.0), 0.0, 1e-12)], ids=str)
-def test_fastest_vibration_of_a_beam(scheme, low, high):
+@pytest.mark.parametrize("scheme, size, low, high", [
+    (EnergyMomentum(), 1e-2, 1 - 1e-10, 1 + 1e-10), (Newmark(), 1e-6, 1 - 1e-5, 1 + 1e-5),
+    (GeneralizedAlpha(0.8), 1e-4, 1e-9, 1e-2), (GeneralizedAlpha(0.0), 1e-4, 0.0, 1e-12)], ids=str)
+def test_fastest_vibration_of_a_beam(scheme, size, low, high):
     scene = Scene(soft(2, 2, E=1e6)).clamp("left")
     modes = scene.modes(scene.system.free.sum())
     shape, omega = modes.shapes[-1], modes.frequencies[-1]
-    scene.initial_velocity(1e-7 * shape)
+    scene.initial_velocity(size * shape)
     energy = scene.integrate(30 * 40 / omega, 40 / omega, scheme=scheme).total_energy
     assert low <= energy[-1] / energy[0] <= high
 
@@ -204,7 +204,7 @@ def tumbling(mesh, element, formulation, material, steps=25, dt=0.02):
     """Free flight from a velocity that spins, throws and strains the body."""
     beam = Beam(mesh, element, material, 0.1, formulation=formulation)
     scene = Scene(beam).initial_velocity(
-        lambda x: np.array([1.0 - 2 * x[1] + 0.5 * x[0], 2 * x[0] - x[0] ** 2]))
+        lambda x: np.array([1.0 - 2 * x[1] + 0.1 * x[0], 2 * x[0] - 0.3 * x[0] ** 2]))
     return scene.integrate(steps * dt, dt)
 
 
@@ -221,7 +221,8 @@ def assert_conserves(history, energy=2e-13, momentum=2e-13):
 
 @pytest.mark.parametrize("mesh", ["straight", "arc"])
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("name", ELEMENTS)
+@pytest.mark.parametrize("name", ["ancf-1", "ancf-2", "ancf-3", "ancf-6", "patel-shabana", "cubic-1",
+                                  "cubic-2"])
 def test_free_flight_conserves_energy_and_momenta(name, formulation, mesh):
     mesh = (MeshBeam.init_line([0, 0.4, 1.0], 0.1, angle=0.3) if mesh == "straight"
             else quarter_arc(2, 0.2))
@@ -241,9 +242,9 @@ def test_neo_hookean_conserves(plane):
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_gravity_and_end_moment_have_a_potential(formulation):
     scene = Scene(soft(3, 2, E=1e6, h=0.1, formulation=formulation)).clamp("left")
-    history = scene.gravity(GRAVITY).moment("right", 40.0).integrate(0.6, 0.01)
-    assert np.ptp(history.potential_energy) > 1.0
-    assert np.ptp(history.strain_energy) > 1.0
+    history = scene.gravity(GRAVITY).moment("right", 6.0).integrate(0.6, 0.01)
+    assert np.ptp(history.potential_energy) > 5.0
+    assert np.ptp(history.strain_energy) > 5.0
     assert np.ptp(history.total_energy) < 1e-10
 
 
@@ -325,24 +326,24 @@ def test_open_joint_at_the_start():
 
 @pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
 def test_automatic_step_size(scheme):
-    """A load that acts for a short time in a long motion."""
+    """A blow of a hundredth of a second at the start of a slow motion."""
     def build():
-        return Scene(soft(E=300.0)).clamp("left").gravity(
-            (0, -30.0), amplitude=lambda t: np.exp(-((t - 1.0) / 0.1) ** 2))
+        return Scene(soft(E=100.0)).clamp("left").gravity(
+            (0, -10.0), amplitude=lambda t: np.exp(-(t / 0.01) ** 2))
 
-    u = by_scipy(build(), np.array([3.0]))[0][0]
+    u = by_scipy(build(), np.array([1.0]))[0][0]
     errors, steps = [], []
     for rtol in (1e-4, 1e-5, 1e-6):
-        history = build().integrate(3.0, "auto", scheme=scheme, rtol=rtol)
-        assert history.t[-1] == pytest.approx(3.0, rel=1e-12)
+        history = build().integrate(1.0, "auto", scheme=scheme, rtol=rtol)
+        assert history.t[-1] == pytest.approx(1.0, rel=1e-12)
+        assert np.diff(history.t).max() > 100 * np.diff(history.t).min()
         errors.append(np.abs(history.u[-1] - u).max())
         steps.append(len(history) - 1)
-        assert np.ptp(np.diff(history.t)[1:-1]) > 0
-    assert errors[0] < 200 * 1e-4 and errors[1] < 200 * 1e-5 and errors[2] < 200 * 1e-6
-    # local error of third order: ten times smaller costs 10^(1/3) times the steps
-    assert 1.5 < steps[2] / steps[1] < 3.0
-    same = build().integrate(3.0, 3.0 / steps[1], scheme=scheme)
-    assert errors[1] < np.abs(same.u[-1] - u).max()
+    # a tenth of the local error is 10^(-2/3) = 0.22 of the global one
+    assert errors[0] < 0.06 and errors[1] < 0.4 * errors[0] and errors[2] < 0.4 * errors[1]
+    assert steps[0] < steps[1] < steps[2] < 50
+    equal = build().integrate(1.0, 1.0 / steps[2], scheme=scheme)
+    assert np.abs(equal.u[-1] - u).max() > 50 * errors[2]
 
 
 def test_only_asked_instants_are_stored():
@@ -429,10 +430,13 @@ def test_initial_velocity_by_function_and_by_coordinates():
         by_function = Scene(beam).initial_velocity(lambda x: omega * np.array([-x[1], x[0]]))
         assert np.allclose(by_function._velocity[id(beam)], spin, rtol=0, atol=1e-9)
         history = Scene(beam).initial_velocity(spin).integrate(1e-3, 1e-3)
-        # the energy of a rigid quarter ring of radius 1: rho b int r^2 dA omega^2 / 2
-        J = 1e3 * 0.1 * np.pi / 2 * (1.1**4 - 0.9**4) / 4
-        assert history.kinetic_energy[0] == pytest.approx(0.5 * J * omega**2, rel=2e-4)
-        assert history.angular_momentum[0] == pytest.approx(J * omega, rel=2e-4)
+        # that of the rigid body that the element makes of a quarter ring
+        x = np.asarray(beam.exact_basis().global_coordinates())
+        J = 1e3 * 0.1 * np.sum(np.sum(x**2, axis=0) * beam.exact_basis().dx)
+        assert history.kinetic_energy[0] == pytest.approx(0.5 * J * omega**2, rel=1e-12)
+        assert history.angular_momentum[0] == pytest.approx(J * omega, rel=1e-12)
+        # and no strain at all: the ring turns as a whole
+        assert abs(history.strain_energy[0]) < 1e-20
 
 
 def test_steady_spin():
@@ -574,7 +578,7 @@ def test_flexible_pendulum_against_scipy():
     beam = build().beams[0]
     dofs, weights = beam.probe((1, 0))
     tip = u[:, dofs] @ weights
-    assert tip[-1][1] < -0.5 and beam.N == 50
+    assert tip[-1][1] < -0.5
     errors = []
     for dt in (2e-3, 1e-3):
         history = build().integrate(0.5, dt, t_eval=t)
@@ -636,7 +640,7 @@ def reissner_rod(n, L, EA, GA, EI, rhoA, rhoI, times, load, angle=0.0):
         return np.concatenate([v, force / [mass, mass, spin]]).ravel()
 
     y0 = np.concatenate([start, 0 * start]).ravel()
-    run = solve_ivp(rate, (0, times[-1]), y0, "DOP853", t_eval=times, rtol=1e-8, atol=1e-8)
+    run = solve_ivp(rate, (0, times[-1]), y0, "DOP853", t_eval=times, rtol=1e-6, atol=1e-6)
     return run.y.reshape(2, 3, n + 1, -1)[0, :2].transpose(2, 1, 0)
 
 
@@ -646,28 +650,32 @@ def test_flying_flexible_rod():
     L = 10 from (6, 0) to (0, 8), EA = GA = 1e4, EI = 100, rho A = 1, rho I = 10, at the lower end
     a force of 8 along x and a moment of -80 until 2.5 s. A homogeneous rectangle with that EI / EA
     has rho I = rho A EI / EA = 0.01, not 10: the paper's rotary inertia is not that of a body. Here
-    the body has the paper's EI, rho A, loads and geometry and EA = GA = 1e6 (a thinner one, whose
-    law is that of a rod), against a rod with the same numbers integrated in this file.
+    the body has the paper's EI, rho A, geometry and size of loads, EA = GA = 1e5 (thinner, so that
+    its law is that of a rod), and a smooth pulse of 1.25 s, against a rod with the same numbers
+    integrated in this file.
     """
-    L, EA, EI, rhoA = 10.0, 1e6, 100.0, 1.0
-    h = np.sqrt(12 * EI / EA)
+    L, EA, EI, rhoA = 10.0, 1e5, 100.0, 1.0
+    h, angle = np.sqrt(12 * EI / EA), np.arctan2(8, -6)
     pulse = lambda t: 1.0 * (t < 1.25) * np.sin(np.pi * t / 1.25) ** 2  # noqa: E731
-    mesh = MeshBeam.init_line(np.linspace(0, L, 13), h, origin=(6, 0), angle=np.arctan2(8, -6))
-    beam = Beam(mesh, ElementBeamANCF(1), StVenantKirchhoff(EA / h, 0.0, rhoA / h,
-                shear_correction=2.0), 1.0, formulation="assumed")
-    assert beam.total_mass == pytest.approx(10.0)
+    mesh = MeshBeam.init_line(np.linspace(0, L, 11), h, origin=(6, 0), angle=angle)
+    material = StVenantKirchhoff(EA / h, 0.0, rhoA / h, shear_correction=2.0)
+    beam = Beam(mesh, ElementBeamANCFCubic(1), material, 1.0, formulation="assumed")
+    assert beam.total_mass == pytest.approx(rhoA * L)
     scene = Scene(beam).point_force((8, 0), (6, 0), amplitude=pulse)
     scene.moment("left", -80.0, amplitude=pulse)
-    times = np.array([0.5, 1.0, 1.5, 2.0])
-    history = scene.integrate(2.0, 0.01, t_eval=times)
-    rod = reissner_rod(24, L, EA, EA, EI, rhoA, rhoA * EI / EA, times,
-                       lambda t: pulse(t) * np.array([8.0, 0.0, -80.0]), np.arctan2(8, -6))
-    for end, k in (((6, 0), 0), ((0, 8), -1)):
-        there = rod[:, k] + np.array([6, 0])
-        assert np.abs(history.position(end) - there).max() < 0.05
-    # momentum: the impulse, 8 x 1.25 / 2; it is free afterwards
-    assert np.allclose(history.momentum[-2:], [[5.0, 0.0]] * 2, rtol=0, atol=1e-3)
-    assert np.ptp(history.total_energy[-2:] - history.potential_energy[-2:]) < 1e-8
+    times = np.array([0.5, 1.0, 1.26, 1.5])
+    history = scene.integrate(1.5, 0.02, t_eval=times)
+    rod = [reissner_rod(n, L, EA, EA, EI, rhoA, rhoA * EI / EA, times,
+                        lambda t: pulse(t) * np.array([8.0, 0.0, -80.0]), angle) for n in (10, 20)]
+    rod = [x[:, [0, -1]] for x in rod]
+    rod = rod[1] + (rod[1] - rod[0]) / 3
+    for end, k in (((6, 0), 0), ((0, 8), 1)):
+        assert np.abs(history.position(end) - rod[:, k] - [6, 0]).max() < 0.03
+    assert np.hypot(*(history.position((6, 0)) - history.position((0, 8))).T)[-1] < 6  # bent
+    # momentum: the impulse 8 x 1.25 / 2; free flight afterwards
+    assert np.allclose(history.momentum[-2:], [[5.0, 0.0]] * 2, rtol=0, atol=1e-4)
+    energy = history.strain_energy + history.kinetic_energy
+    assert energy[-1] == pytest.approx(energy[-2], rel=1e-12)
 
 
 def test_rotating_arm():
@@ -686,21 +694,23 @@ def test_rotating_arm():
         c = T / (2 * np.pi)
         return 0.4 * (0.5 * t * t + c * c * (np.cos(t / c) - 1)) if t < T else 6 * t - 45
 
-    beam = Beam(MeshBeam.init_line(np.linspace(0, L, 5), h), ElementBeamANCF(1),
-                StVenantKirchhoff(EA / h, 0.0, rhoA / h, shear_correction=2 * GA / EA), 1.0)
+    material = StVenantKirchhoff(EA / h, 0.0, rhoA / h, shear_correction=2 * GA / EA)
+    beam = Beam(MeshBeam.init_line(np.linspace(0, L, 5), h), ElementBeamANCFCubic(1), material, 1.0,
+                formulation="assumed")
     scene = Scene(beam).pin("left")
     hub = scene.joint("angle", at="left", angle=psi)
-    history = scene.integrate(18.0, 0.03, scheme=GeneralizedAlpha(0.5))
+    history = scene.integrate(16.5, 0.02, scheme=GeneralizedAlpha(0.9))
     angle = np.array([psi(t) for t in history.t])
     tip = history.position((L, 0))
     along = tip[:, 0] * np.cos(angle) + tip[:, 1] * np.sin(angle) - L
     across = -tip[:, 0] * np.sin(angle) + tip[:, 1] * np.cos(angle)
-    assert across.min() == pytest.approx(-0.58, abs=0.03)
-    assert 4 < history.t[np.argmin(across)] < 8
-    steady = history.t > 15.5
-    assert np.abs(across[steady]).max() < 0.02
-    assert along[steady].mean() == pytest.approx(rhoA * 36 * L**3 / (3 * EA), rel=0.1)
-    # the hub's moment: what changes the angular momentum
-    rate = np.gradient(history.angular_momentum, history.t)
-    moment = history.joint_force(hub)[:, 0] * EI / EI
-    assert np.abs(moment[5:-5] - rate[5:-5]).max() < 0.05 * np.abs(rate).max()
+    # 16 elements and dt = 0.005 give -0.5730 at 6.76 s
+    assert across.min() == pytest.approx(-0.573, abs=0.003)
+    assert history.t[np.argmin(across)] == pytest.approx(6.76, abs=0.1)
+    steady = history.t > 15.2
+    assert np.abs(across[steady]).max() < 0.01
+    assert along[steady].mean() == pytest.approx(5.14e-4, rel=0.01)
+    # the hub's moment is what changes the angular momentum about it
+    rate, moment = np.gradient(history.angular_momentum, history.t), history.joint_force(hub)[:, 0]
+    early = (history.t > 0.2) & (history.t < 8)
+    assert np.abs(moment - rate)[early].max() < 0.02 * np.abs(rate).max()

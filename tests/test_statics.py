@@ -412,7 +412,7 @@ def test_scale_and_place_do_not_matter():
     c, s = np.cos(0.7), np.sin(0.7)
     R = np.array([[c, -s], [s, c]])
     mesh = MeshBeam.init_line(np.linspace(0, 1, 9), 0.01, origin=(1e4, -2e4), angle=0.7)
-    scene = Scene(Beam(mesh, ElementBeamANCF(2), reference.beams[0].material, 0.01))
+    scene = Scene(Beam(mesh, ElementBeamANCF(2), reference.beams[0].material, 0.01, "continuum"))
     state = solved(scene.clamp("left").gravity(R @ GRAVITY))
     assert state.iterations == reference.iterations
     tip = mesh.p[:, -1]

@@ -111,9 +111,9 @@ def section_5_2(result):
         f"The limit of a shear-deformable rod (Reissner) is u_x = {facts['limit'][0]:.6f}, "
         f"u_y = {facts['limit'][1]:.6f}. With 16 elements every model is still "
         f"{distance:.3f} m or more away from it in u_y: free of Poisson locking is not "
-        "free of membrane and curvature-thickness locking. On the finest mesh all but N=1 are within "
-        f"{last:.1e} m of the rod's limit, and do not tend to it exactly: the conditions at the "
-        "root and the law of the section are not the rod's.", "",
+        "free of membrane and curvature-thickness locking. On the finest mesh all but N=1 are "
+        f"within {last:.1e} m of the rod's limit, and do not tend to it exactly: the conditions "
+        "at the root and the law of the section are not the rod's.", "",
         *picture("table3", "table4", "fig09")]
 
 
@@ -209,7 +209,8 @@ def section_5_5(result, settings):
         f"{spread(sheet, sheet.models, 'tip_y'):.1e} m. They agree better with each other than "
         "with the limit: on this mesh membrane and curvature-thickness locking, which all share, "
         f"cost {np.hypot(*(end - limit)):.1e} m at 1 s (N=4). The strain energy "
-        f"differs from that of N=4 by at most {gap[0]:.1e} J (N=1), {gap[1]:.1e} J (ECM) and {gap[2]:.1e} J (N=2).", "",
+        f"differs from that of N=4 by at most {gap[0]:.1e} J (N=1), {gap[1]:.1e} J (ECM) "
+        f"and {gap[2]:.1e} J (N=2).", "",
         time_error(result.facts, settings), "", *picture(*result.sheets)]
 
 

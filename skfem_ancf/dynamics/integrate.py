@@ -121,7 +121,8 @@ class Integrator:
         The stress of an iterate may be far off: turning by a straight predictor stretches.
         """
         s = self.system
-        _, ev = s.assemble(start); s.assemble(step.middle(u), carried=s.stress_step(ev, 0 * u), t=step.t)
+        _, pieces = s.assemble(start, t=step.t, geometric=False)
+        s.assemble(step.middle(u), carried=s.stress_step(pieces, np.zeros(s.N)), t=step.t)
         self.A.combine(step.mass_factor, s.mass, step.stiffness_factor, s.K)
         self.A.fix(s.fixed_positions)
         self.A.factorize()

@@ -1,0 +1,342 @@
+"""The formulation "assumed": no locking at any slenderness, order, shape and plane."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import eigh
+from scipy.optimize import root
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
+                        InputError, NeoHookean, Scene, StVenantKirchhoff, exact)
+from skfem_ancf.formulations import Assumed, Formulation, Term
+from skfem_ancf.materials import Material
+from skfem_ancf.quadrature import gauss
+
+ORDERS = (1, 2, 3, 4, 5, 6)
+PLANES = ("stress", "strain")
+SLENDER = (1e2, 1e3, 1e4, 1e5, 1e6)
+NU, WIDTH = 0.3, 0.01
+
+ELEMENTS = {**{f"linear {n}": ElementBeamANCF(n) for n in ORDERS},
+            **{f"cubic {n}": ElementBeamANCFCubic(n) for n in ORDERS},
+            **{f"cable {d}": ElementBeamCable(d) for d in (3, 5, 7)}}
+
+
+def line(n, h):
+    return MeshBeam.init_line(np.linspace(0.0, 1.0, n + 1), h)
+
+
+def quarter(n, h):
+    return MeshBeam.init_curve(lambda s: np.array([np.cos(s), np.sin(s)]),
+                               np.linspace(0.0, np.pi / 2, n + 1), h)
+
+
+def soft(h, plane="stress", law=StVenantKirchhoff, **options):
+    """A material whose bending stiffness and mass per length do not depend on the height."""
+    return law(2e8 * (0.01 / h) ** 3, NU, 7800 * 0.01 / h, plane=plane, **options)
+
+
+def cantilever(element, n, slenderness, plane="stress", clamp="free", formulation="assumed",
+               law=StVenantKirchhoff):
+    """The tip of the gravity cantilever and the state."""
+    h = 1.0 / slenderness
+    beam = Beam(line(n, h), element, soft(h, plane, law), WIDTH, formulation=formulation)
+    state = Scene(beam).clamp("left", thickness=clamp).gravity((0, -9.81)).solve_static()
+    return state.displacement((1, 0))[1], state
+
+
+def thin(plane):
+    """The tip of the inextensible line."""
+    return exact.gravity_cantilever(2e8, NU, 7800, 1.0, WIDTH, 0.01, model="elastica",
+                                    plane=plane)[1]
+
+
+# the error of a mesh does not depend on the slenderness
+
+
+@pytest.mark.parametrize("plane", PLANES)
+@pytest.mark.parametrize("order", ORDERS)
+def test_straight_beam_of_any_slenderness(order, plane):
+    tips, iterations = [], []
+    for slenderness in SLENDER:
+        tip, state = cantilever(ElementBeamANCF(order), 16, slenderness, plane)
+        assert len(state.steps) == 1
+        tips.append(tip)
+        iterations.append(state.iterations)
+    error = np.array(tips) - thin(plane)
+    assert np.all(np.abs(error) < 2.6e-3)  # 16 elements of second order
+    assert np.ptp(error[1:]) < 2e-5
+    assert np.ptp(error) < 6e-4  # at L/h = 100 the beam itself is softer by 3.7e-4
+    assert max(iterations) <= 12
+
+
+@pytest.mark.parametrize("plane", PLANES)
+@pytest.mark.parametrize("order", ORDERS)
+def test_straight_beam_with_cubic_sections_of_any_slenderness(order, plane):
+    tips = [cantilever(ElementBeamANCFCubic(order), 16, s, plane)[0] for s in SLENDER]
+    error = np.array(tips) - thin(plane)
+    assert np.all(np.abs(error[1:]) < 1e-4)
+    assert np.ptp(error[1:]) < 3e-5
+
+
+def pulled_quarter():
+    """Tip displacement of an inextensible quarter circle, EI = R = 1, pulled by PULL."""
+    def end(m, part):
+        def rate(_, y):
+            c, s = np.cos(y[2]), np.sin(y[2])
+            return [c, s, 1.0 + y[3], part * (s * PULL[0] - c * PULL[1])]
+
+        return solve_ivp(rate, (0, np.pi / 2), [1, 0, np.pi / 2, m], rtol=1e-11, atol=1e-12).y[:, -1]
+
+    m = 0.0
+    for part in np.linspace(0.2, 1.0, 5):
+        m = root(lambda z, part=part: end(z[0], part)[3], [m], tol=1e-12).x[0]
+    return end(m, 1.0)[:2] - [0.0, 1.0]
+
+
+PULL = np.array([-1.0, 2.0])
+
+
+def pull(element, n, slenderness, plane):
+    h = 1.0 / slenderness
+    E = 12.0 / (WIDTH * h**3) * (1.0 if plane == "stress" else 1.0 - NU**2)
+    mesh = quarter(n, h)
+    beam = Beam(mesh, element, StVenantKirchhoff(E, NU, plane=plane), WIDTH, formulation="assumed")
+    scene = Scene(beam).clamp("left", thickness="free").point_force(PULL, at=mesh.p[:, -1])
+    state = scene.solve_static()
+    assert len(state.steps) == 1 and state.iterations <= 12
+    return state.displacement(mesh.p[:, -1])
+
+
+@pytest.mark.parametrize("plane", PLANES)
+def test_curved_beam_of_any_slenderness(plane):
+    reference = pulled_quarter()
+    np.testing.assert_allclose(reference, [0.27158193, 0.32447890], rtol=0, atol=2e-8)
+    for order in ORDERS:
+        for element, error, spread in ((ElementBeamANCF(order), 5e-4, 1e-6),
+                                       (ElementBeamANCFCubic(order), 2e-6, 1e-6)):
+            tips = np.array([pull(element, 16, s, plane) for s in SLENDER]) - reference
+            assert np.max(np.abs(tips[1:])) < error
+            assert np.max(np.ptp(tips[1:], axis=0)) < spread
+            assert np.max(np.abs(tips[0] - tips[1])) < 4e-5  # what the beam stretches
+    for degree, error in ((3, 2e-5), (5, 1e-9)):
+        tips = np.array([pull(ElementBeamCable(degree), 16, s, plane) for s in SLENDER]) - reference
+        assert np.max(np.abs(tips[3:])) < error
+
+
+@pytest.mark.parametrize("name", ["linear 1", "linear 2", "linear 6", "cubic 3", "cable 3"])
+def test_iterations_do_not_depend_on_slenderness(name):
+    # at L/h = 10 the load is close to what St. Venant-Kirchhoff carries at the root: only a
+    # coarse mesh of linear sections, whose root is spared, finds an equilibrium; and cables whose
+    # elements are about twice as long as high, as 16 at L/h = 30, take three load steps
+    start = {"cubic 3": [30.0], "cable 3": [10.0]}.get(name, [10.0, 30.0])
+    for slenderness in start + [*SLENDER]:
+        _, state = cantilever(ELEMENTS[name], 16, slenderness, clamp="fixed")
+        assert len(state.steps) == 1
+        assert state.iterations <= 12
+
+
+@pytest.mark.parametrize("degree", [5, 7])
+def test_iterations_of_cables_of_high_degree(degree):
+    # at 1e6 the normal force of these is as small as its round-off
+    for slenderness in (10.0, 1e2, 1e3, 1e4, 1e5):
+        _, state = cantilever(ElementBeamCable(degree), 16, slenderness)
+        assert len(state.steps) == 1
+        assert state.iterations <= 12
+
+
+# rates
+
+
+def rate(errors):
+    return np.log2(np.abs(errors[:-1] / errors[1:]))
+
+
+@pytest.mark.parametrize("slenderness", [1e2, 1e5])
+@pytest.mark.parametrize("order", ORDERS)
+def test_linear_sections_converge_at_second_order(order, slenderness):
+    element = ElementBeamANCF(order)
+    fine = (thin("stress") if slenderness > 1e4 else
+            cantilever(ElementBeamANCFCubic(order), 64, slenderness)[0])
+    errors = np.array([cantilever(element, n, slenderness)[0] for n in (16, 32, 64)]) - fine
+    assert np.all(rate(errors) > 1.95)
+    assert abs(errors[-1]) < 1.5e-4
+
+
+@pytest.mark.parametrize("plane", PLANES)
+@pytest.mark.parametrize("order", ORDERS)
+def test_cubic_sections_converge_at_fourth_order(order, plane):
+    element = ElementBeamANCFCubic(order)
+    fine = cantilever(element, 64, 1e2, plane)[0]
+    errors = np.array([cantilever(element, n, 1e2, plane)[0] for n in (8, 16, 32)]) - fine
+    assert np.all(rate(errors) > 3.8)
+    errors = np.array([cantilever(element, n, 1e5, plane)[0] for n in (16, 32, 64)]) - thin(plane)
+    assert np.all(rate(errors) > 3.8)
+    assert abs(errors[-1]) < 5e-7
+
+
+@pytest.mark.parametrize("degree, meshes, order, error", [
+    (3, (16, 32, 64), 3.8, 2e-6), (5, (8, 12, 16), 6.0, 1e-7), (7, (4, 6, 8), 8.5, 2e-8)])
+@pytest.mark.parametrize("slenderness", [1e2, 1e4])
+def test_cables_converge(degree, meshes, order, error, slenderness):
+    h = 1.0 / slenderness
+    reference = exact.gravity_cantilever(2e8 * (0.01 / h) ** 3, NU, 7800 * 0.01 / h, 1.0, WIDTH, h,
+                                         model="extensible")[1]
+    errors = np.abs([cantilever(ElementBeamCable(degree), n, slenderness)[0] - reference
+                     for n in meshes])
+    assert np.all(np.diff(np.log(errors)) / np.diff(np.log(meshes)) < -order)
+    assert errors[-1] < error
+
+
+# zero modes
+
+
+def scaled_eigenvalues(beam):
+    """Of the tangent at rest, with unit diagonal so that no unit or slenderness hides a mode."""
+    K, nd = np.zeros((beam.N, beam.N)), beam.nd
+    for e, k in enumerate(beam.kernel.tangents(np.zeros(beam.N))):
+        K[e * nd:(e + 2) * nd, e * nd:(e + 2) * nd] += k
+    scale = 1.0 / np.sqrt(np.diag(K))
+    return eigh(K * np.outer(scale, scale), eigvals_only=True)
+
+
+@pytest.mark.parametrize("shape", [line, quarter])
+@pytest.mark.parametrize("name", ELEMENTS)
+def test_a_free_beam_has_three_zero_modes(name, shape):
+    element = ELEMENTS[name]
+    if shape is quarter and name == "cable 7":  # that one is for straight meshes
+        with pytest.raises(InputError):
+            Beam(quarter(2, 0.1), element, soft(0.1), WIDTH, formulation="assumed").kernel
+        return
+    for plane in PLANES:
+        for n in (1, 2, 4):
+            for slenderness in (10.0, *SLENDER):
+                h = 1.0 / slenderness
+                w = scaled_eigenvalues(Beam(shape(n, h), element, soft(h, plane), WIDTH,
+                                            formulation="assumed"))
+                assert np.max(np.abs(w[:3])) < 1e-14
+                assert w[3] > 2e-2 / slenderness**2  # bending against stretching
+
+
+def test_without_stabilisation_there_are_more_zero_modes():
+    beam = Beam(line(2, 0.01), ElementBeamANCF(2), soft(0.01), WIDTH, formulation=Assumed(alpha=0.0))
+    assert np.sum(scaled_eigenvalues(beam) < 1e-12) > 3
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_free_frequencies_are_those_of_full_quadrature(order):
+    for element in (ElementBeamANCF(order), ElementBeamANCFCubic(order)):
+        found = []
+        for formulation in ("assumed", "continuum"):
+            beam = Beam(line(20, 0.1), element, soft(0.1), WIDTH, formulation=formulation)
+            found.append(Scene(beam).modes(5).frequencies[3:])
+        np.testing.assert_allclose(*found, rtol=1e-2 if order > 1 else 6e-2)
+
+
+# the stabilisation
+
+
+@pytest.mark.parametrize("shape", [line, quarter])
+@pytest.mark.parametrize("name", [name for name in ELEMENTS if name != "cable 7"])
+def test_no_force_under_rigid_motion(name, shape):
+    for h in (0.1, 1e-3, 1e-5):
+        beam = Beam(shape(5, h), ELEMENTS[name], soft(h), WIDTH, formulation="assumed")
+        K = np.abs(beam.kernel.tangents(np.zeros(beam.N))).max()
+        constant = beam.kernel.constant
+        q = beam.q0.reshape(-1, beam.nd // 2, 2)
+        for angle in (0.3, 2.0, np.pi, 5.0):
+            c, s = np.cos(angle), np.sin(angle)
+            turned = q @ np.array([[c, s], [-s, c]])
+            turned[:, 0] += [0.7, -1.3]
+            u = turned.ravel() - beam.q0
+            assert np.max(np.abs(beam.kernel.force(u))) < 5e-14 * K * np.max(np.abs(u))
+            assert abs(beam.kernel.energy(u)) < 1e-15 * K * np.max(np.abs(u)) ** 2
+            if constant is not None:
+                held = constant @ beam.kernel.gather(u).reshape(5, -1, 1)
+                assert np.max(np.abs(held)) < 5e-14 * np.max(np.abs(constant)) * np.max(np.abs(u))
+
+
+def test_the_stabilisation_costs_little():
+    # a tenth and ten times of it: the error of 16 elements moves by less than itself
+    tips = []
+    for alpha in (0.1, 1.0, 10.0):
+        tips.append(cantilever(ElementBeamANCF(2), 16, 1e3, formulation=Assumed(alpha=alpha))[0])
+    assert abs(tips[0] - tips[1]) < 2e-3
+    assert abs(tips[2] - thin("stress")) < 3e-2
+
+
+# other laws, and motion
+
+
+class Hencky(Material):
+    """A law of the reader's own, by its energy's derivative only: E ln(C) / 2, uncoupled."""
+
+    def stress(self, strain):
+        C = 1.0 + 2.0 * strain[:2]
+        return np.array([self.E * np.log(C[0]) / (2 * C[0]), self.E * np.log(C[1]) / (2 * C[1]),
+                         self.G * strain[2]])
+
+    def energy(self, strain):
+        C = 1.0 + 2.0 * strain[:2]
+        return (self.E / 8.0 * (np.log(C[0]) ** 2 + np.log(C[1]) ** 2)
+                + 0.5 * self.G * strain[2] ** 2)
+
+
+@pytest.mark.parametrize("order", ORDERS[1:])
+def test_any_law_in_the_thin_limit(order):
+    for element, error in ((ElementBeamANCF(order), 2.6e-3), (ElementBeamANCFCubic(order), 1.2e-4)):
+        linear = cantilever(element, 16, 1e4)[0]
+        for law in (NeoHookean, Hencky):
+            tip = cantilever(element, 16, 1e4, law=law)[0]
+            assert abs(tip - thin("stress")) < error
+            assert abs(tip - linear) < (1e-7 if law is NeoHookean else 2e-4)  # the other has no nu
+
+
+def test_order_one_with_another_law_is_stiffer_by_poisson():
+    # its sections cannot change their thickness linearly in Y, and no constant moduli are there
+    # to be split: the bending stiffness is E I / (1 - nu^2)
+    tip, _ = cantilever(ElementBeamANCFCubic(1), 16, 1e4, law=NeoHookean)
+    assert abs(tip - thin("strain")) < 1.5e-4
+
+
+@pytest.mark.parametrize("name", [*ELEMENTS])
+def test_energy_momentum_conserves_energy(name):
+    h = 0.02
+    for law in (StVenantKirchhoff,) if "cable" in name else (StVenantKirchhoff, NeoHookean):
+        beam = Beam(line(4, h), ELEMENTS[name], soft(h, law=law), WIDTH, formulation="assumed")
+        scene = Scene(beam).pin("left").gravity((0, -9.81))
+        history = scene.integrate(t_end=0.03, dt=1e-3)
+        assert np.ptp(history.total_energy) < 1e-10 * np.max(history.kinetic_energy)
+        free = Scene(beam).initial_velocity(lambda x: np.array([0 * x[0] + 1.0, 3 * x[0] ** 2]))
+        history = free.integrate(t_end=0.02, dt=1e-3)
+        assert np.ptp(history.total_energy) < 1e-10 * history.total_energy[0]
+        assert np.max(np.ptp(history.momentum, axis=0)) < 1e-10
+        assert np.ptp(history.angular_momentum) < 1e-10
+
+
+# the paper's element, two Gauss points, and the assumed strain
+
+
+class TwoGaussPoints(Formulation):
+    """As "continuum", with two Gauss points along the axis."""
+
+    name = "two Gauss points"
+
+    def terms(self, element, material):
+        _, section = self.full_rules(element)
+        return [Term(material.law(material.shear_factor(element)), gauss(2), section)]
+
+
+@pytest.mark.parametrize("formulation, tips", [
+    ("continuum", (-0.888, -0.736, -0.270, -0.061)),
+    (TwoGaussPoints(), (-0.899, -0.870, -0.764, -0.349)),
+    ("assumed", (-0.905, -0.904, -0.904, -0.904, -0.904))])
+def test_16_elements_of_order_2_from_slender_to_very_slender(formulation, tips):
+    found = []
+    for slenderness in SLENDER[:len(tips)]:
+        h = 1.0 / slenderness
+        beam = Beam(line(16, h), ElementBeamANCF(2), soft(h, shear_correction="paper"), WIDTH,
+                    formulation=formulation)
+        scene = Scene(beam).fix("left", ["r", "r_X", "r_Y0^1", "r_Y1^1"]).gravity((0, -9.81))
+        found.append(scene.solve_static().displacement((1, 0))[1])
+    assert np.round(found, 3).tolist() == list(tips)
