@@ -33,7 +33,7 @@ stress: $(VENV)/test.stamp
 
 docs: $(VENV)/docs.stamp
 	$(PY) docs/pictures.py
-	$(PY) -m pdoc --docformat numpy --output-directory out/docs skfem_ancf
+	$(PY) -m pdoc --docformat numpy --output-directory out/docs skfem_ancf '!skfem_ancf.compiled'
 	@echo "open out/docs/index.html; the guides are docs/*.md"
 
 clean:

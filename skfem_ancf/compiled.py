@@ -580,7 +580,7 @@ def steps(cable, cpack, bpack, strains, conserving, parameters, load, fixed, M, 
     """
     N = load.size
     alpha_m, alpha_f, beta, gamma = parameters
-    u, f, R, du, inertia = (np.empty(N) for _ in range(5))
+    u, f, R, du, inertia = np.empty(N), np.empty(N), np.empty(N), np.empty(N), np.empty(N)
     base, x = np.empty(N), np.empty(N)
     if conserving:
         c_m, c_k = 2.0 / dt**2, 0.5
@@ -642,7 +642,7 @@ def steps(cable, cpack, bpack, strains, conserving, parameters, load, fixed, M, 
                 if rate > 1.0 and size <= 1e3 * rough:
                     done = True
                     break
-                state[3] = rate
+                state[3] = max(rate, 0.01)  # of one step, used in the next, where it may be larger
                 if rate > 0.1 and size * min(1.0, rate) > wanted:
                     if fresh and rate > 2.0:
                         return n, energy

@@ -133,13 +133,22 @@ class System:
 
     def curvature(self, u, t, multipliers):
         """sum_k multipliers[k] d^2 Phi_k / du^2 at free coordinates, sparse, shape (N, N)."""
+        i, j, v = self._curvature(u, t, multipliers)
+        return sparse.csr_matrix((v * (self.free[i] & self.free[j]), (i, j)), shape=(self.N, self.N))
+
+    def _curvature(self, u, t, multipliers):
         parts = [joint.curvature(u, t, part)
                  for joint, part in zip(self.joints, self.multipliers_of(multipliers))]
         parts = [part for part in parts if part is not None]
         if not parts:
-            return sparse.csr_matrix((self.N, self.N))
-        i, j, v = (np.concatenate(column) for column in zip(*parts))
-        return sparse.csr_matrix((v * (self.free[i] & self.free[j]), (i, j)), shape=(self.N, self.N))
+            none = np.zeros(0, dtype=int)
+            return none, none, np.zeros(0)
+        return tuple(np.concatenate(column) for column in zip(*parts))
+
+    def curvature_times(self, u, t, multipliers, v):
+        """:meth:`curvature` times a vector (N,)."""
+        i, j, values = self._curvature(u, t, multipliers)
+        return np.bincount(i, values * v[j], self.N)
 
     def multipliers_of(self, multipliers):
         """The multipliers joint by joint: a list in the order of :attr:`joints`."""
@@ -419,6 +428,7 @@ class System:
                 parts.append(f"translation along ({d[0]:.3g}, {d[1]:.3g}){who}")
             else:
                 x = beam.origin + np.array([-b, a]) * sizes[k] / c
+                x = np.where(np.abs(x) < 1e-9 * sizes[k], 0.0, x)
                 parts.append(f"rotation about ({x[0]:.4g}, {x[1]:.4g}){who}")
         return " with ".join(parts)
 

@@ -8,7 +8,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from conftest import quarter_arc, s_curve
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamPatelShabana, InputError, MeshBeam,
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
+                        ElementBeamPatelShabana, InputError, MeshBeam,
                         NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.io import PvdWriter, body_fields, save_vtu
 from skfem_ancf.io.vtu import grid, lagrange_cell, quads
@@ -263,3 +264,22 @@ def test_series_takes_anything_with_beams_and_u_of(state, tmp_path):
         beams, u_of = state.beams, staticmethod(state.u_of)
 
     assert PvdWriter(tmp_path / "run.pvd").add(Frame(), 0.0).is_file()
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(), ElementBeamCable(5),
+                                     ElementBeamANCFCubic(2), ElementBeamANCFCubic(4)], ids=str)
+@pytest.mark.parametrize("mesh", [MeshBeam.init_line([0, 0.3, 1.0], height=0.1), quarter_arc()],
+                         ids=["straight", "arc"])
+def test_elements_of_other_kinds(element, mesh, tmp_path):
+    state = bent(element, mesh, StVenantKirchhoff(E=1e6, nu=0.3))
+    beam = state.beams[0]
+    m = meshio.read(state.save(tmp_path / "beam.vtu", subdivide=(2, 2)))
+    assert set(m.point_data) == FIELDS
+    assert all(np.all(np.isfinite(v)) for v in m.point_data.values())
+    end = beam.mesh.p[:, -1]  # on the axis: the point next to last but one of the last element
+    assert_allclose(m.points[-2, :2], state.position(end), atol=1e-12)
+    assert_allclose([m.point_data["eps_" + k][-2] for k in ("xx", "yy", "xy")],
+                    state.strain(end), atol=1e-10)
+    lagrange = meshio.read(state.save(tmp_path / "lagrange.vtu", lagrange=True))
+    degree = max(element.axis_degree, element.order)
+    assert lagrange.cells[0].data.shape == (beam.mesh.nelements, (degree + 1) ** 2)

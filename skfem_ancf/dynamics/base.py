@@ -98,6 +98,9 @@ class Scheme:
     ----------
     order : int
         Order of convergence of displacements and velocities.
+    compiled : tuple or None
+        For :mod:`skfem_ancf.dynamics.blocks`: whether the scheme conserves energy, and
+        (alpha_m, alpha_f, beta, gamma); None if there is no compiled step.
     tol : float
         Default tolerance of the iteration in a step, relative, in the energy norm.
     couples_velocity : bool
@@ -109,6 +112,7 @@ class Scheme:
     name = ""
     order = 2
     tol = 1e-9
+    compiled = None
     couples_velocity = False
     error_constant = 1.0 / 12.0
 

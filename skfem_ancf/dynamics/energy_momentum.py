@@ -33,6 +33,7 @@ class EnergyMomentum(Scheme):
     name = "energy-momentum"
     tol = 1e-14  # to round-off: what is left in the residual is lost energy
     couples_velocity = True
+    compiled = True, (0.0, 0.0, 0.25, 0.5)
 
     def begin(self, system, y, dt):
         return _Step(system, y, dt)

@@ -41,6 +41,10 @@ class GeneralizedAlpha(Scheme):
         self.beta = 0.25 * (self.gamma + 0.5) ** 2
         self.error_constant = abs(self.beta - 1.0 / 6.0)
 
+    @property
+    def compiled(self):
+        return False, (self.alpha_m, self.alpha_f, self.beta, self.gamma)
+
     def begin(self, system, y, dt):
         return _Step(self, system, y, dt)
 

@@ -7,6 +7,7 @@ import numpy as np
 from ..errors import ConvergenceError, InputError, SupportError, require_finite, require_positive
 from ..progress import progress_bar
 from .base import Motion
+from .blocks import CompiledSteps
 from .history import History
 
 logger = logging.getLogger(__name__)
@@ -172,7 +173,7 @@ class Integrator:
                 R = R - multipliers @ J
                 if couples:
                     v, impulse = self._velocity(step, u, J, v_fixed, dt)
-                    R -= s.curvature(at, step.joint_time, 0.25 * impulse) @ (y.v + v)
+                    R -= s.free * s.curvature_times(at, step.joint_time, 0.25 * impulse, y.v + v)
             du = self.A.solve(R)
             work = np.sum(np.abs(R * du))
             if s.joints:
@@ -298,8 +299,31 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=Non
         next_time = next(wanted, None)
     n = 0
     steps = None if auto else max(1, int(np.ceil(span / step * (1 - 1e-12))))
+    blocks = None
+    if steps is not None and CompiledSteps.applies(scheme, system):
+        blocks = CompiledSteps(solver, scheme, system)
+        whole = steps if abs(steps * step - span) < 1e-9 * step else steps - 1
+
+    def store(old, new):
+        """Keep what was asked for of the step from one Motion to the next."""
+        nonlocal next_time
+        while next_time is not None and next_time <= new.t * (1 + 1e-14):
+            history.append(_between(old, new, next_time))
+            next_time = next(wanted, None)
+        if t_eval is None:
+            history.append(new)
+        bar.update(new.t - old.t)
+
     with progress_bar(progress, total=span, desc="time") as bar:
         while (n < steps) if steps is not None else (y.t < t_end - 1e-12 * span):
+            if blocks is not None and n < whole:
+                for new in blocks.run(y, step, whole - n):
+                    n += 1
+                    new.t = t_start + n * step if n < steps else t_end
+                    store(y, new)
+                    y = new
+                if n == steps:
+                    break
             if steps is not None:
                 # the last step may be shorter; the others are of one size, to keep the factors
                 h = step if n < steps - 1 else t_end - y.t
@@ -322,12 +346,7 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=Non
             if steps is not None:
                 new.t = t_start + (n + 1) * step if n < steps - 1 else t_end
             n += 1
-            while next_time is not None and next_time <= new.t * (1 + 1e-14):
-                history.append(_between(y, new, next_time))
-                next_time = next(wanted, None)
-            if t_eval is None:
-                history.append(new)
-            bar.update(new.t - y.t)
+            store(y, new)
             y = new
     return history.close()
 

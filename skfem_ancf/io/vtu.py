@@ -154,8 +154,9 @@ def save_vtu(state, filename, subdivide=(8, 4), lagrange=False, undeformed=False
     subdivide
         Number of straight quads along and across each element.
     lagrange
-        Write each element as one VTK_LAGRANGE_QUADRILATERAL of degree max(3, N), the exact
-        deformed geometry, in place of straight quads.
+        Write each element as one VTK_LAGRANGE_QUADRILATERAL in place of straight quads. Its
+        degree is that of the element, 3 or N if that is larger, so the deformed geometry is
+        exact; for cables, whose sections follow the unit normal, it is interpolated.
     undeformed
         Put the points at their stress-free places. ParaView's filter "Warp By Vector" then moves
         them by any multiple of ``displacement``.
@@ -245,7 +246,7 @@ def quads(m, n):
 
 
 def lagrange_cell(beam):
-    """Points of the Lagrange cell that holds an element exactly, and their order in VTK.
+    """Points of the Lagrange cell that holds an element, and their order in VTK.
 
     VTK numbers the corners, then the inner points of the edges bottom, right, top, left (in the
     directions of rising xi and eta), then the inside with xi fastest.

@@ -1,0 +1,68 @@
+"""Many time steps of a simple scene in one compiled call."""
+
+import numpy as np
+
+from .base import Motion
+
+#: Steps of a call: between two calls the progress is shown.
+BLOCK = 256
+
+
+class CompiledSteps:
+    """Steps of one beam with compiled kernels, without joints, under dead loads.
+
+    They are those of the scheme's :class:`~skfem_ancf.dynamics.base.Step`, to the tolerance of the
+    iteration.
+    """
+
+    def __init__(self, solver, scheme, system):
+        from ..compiled import steps
+
+        self._steps, self._solver, self._system = steps, solver, system
+        self._conserving, self._parameters = scheme.compiled
+        kernel = system.beams[0].kernel.compiled
+        none = _empty_pack(not kernel.cable)
+        self._packs = (kernel.pack, none) if kernel.cable else (none, kernel.pack)
+        self._cable = kernel.cable
+        self._strains = np.empty(kernel.shape)
+        self._A = np.empty_like(system.mass._flat)
+        self._state = np.zeros(4)  # factors are there, iterations, factorisations, rate
+
+    @staticmethod
+    def applies(scheme, system):
+        """True if the scene is simple enough and the scheme has a compiled step."""
+        return (scheme.compiled is not None and len(system.beams) == 1 and not system.joints
+                and system.beams[0].kernel.compiled is not None and system.constant_loads
+                and not system.moves and system.symmetric)
+
+    def run(self, y, dt, n):
+        """Up to ``n`` steps from the Motion ``y``; fewer where one fails. A list of Motions."""
+        s, solver = self._system, self._solver
+        n = min(n, BLOCK)
+        rows, times = np.empty((n, 3, s.N)), np.empty(n)
+        now = np.array([y.u, y.v, y.acceleration, y.algorithmic, y.algorithmic])
+        before = self._state.copy()
+        done, solver._energy = self._steps(
+            self._cable, *self._packs, self._strains, self._conserving, self._parameters,
+            s.external_force(y.u), ~s.free, s.mass._flat, s.mass._ld, s.mass.bandwidth, self._A,
+            self._state, now, y.t, dt, solver.tol, 8.0 * s.stiffness_scale, solver._energy, rows,
+            times)
+        solver.iterations += int(self._state[1] - before[1])
+        solver.factorizations += int(self._state[2] - before[2])
+        none = y.multipliers
+        motions = [Motion(float(t), u, v, a, a, none)
+                   for t, (u, v, a) in zip(times[:done], rows[:done])]
+        if done:
+            motions[-1].algorithmic = now[3]
+        if done < n:
+            self._state[0] = 0.0
+        return motions
+
+
+def _empty_pack(cable):
+    """Tables of the right types and no size, for the kind of beam that the scene has not."""
+    one, two, three = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0, 0))
+    index = np.zeros(0, dtype=np.int64)
+    if cable:
+        return (three, three, three, three, two, two, two, one, three, index, 0)
+    return (three, three, three, three, two, two, *[index] * 4, *[two] * 3, three, index, 0)

@@ -1,0 +1,583 @@
+"""Joints: derivatives, statics, mechanisms, conservation over long runs, and what is refused."""
+
+import numpy as np
+import pytest
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamPatelShabana,
+                        EnergyMomentum, GeneralizedAlpha, MeshBeam, Scene, StVenantKirchhoff, exact)
+from skfem_ancf.errors import InputError, NameUnknown, SupportError
+from skfem_ancf.joints import JOINTS, get_joint
+
+E, NU, RHO = 1e6, 0.3, 1000.0
+GRAVITY = (0.0, -9.81)
+
+
+def between(a, b, ne=2, order=2, h=0.1, E=E, nu=NU, rho=RHO, width=0.1, name=None, element=None,
+            formulation="assumed"):
+    """A straight beam from a to b."""
+    a, b = np.array(a, dtype=float), np.array(b, dtype=float)
+    d = b - a
+    mesh = MeshBeam.init_line(np.linspace(0, np.hypot(*d), ne + 1), h, origin=a,
+                              angle=np.arctan2(d[1], d[0]))
+    return Beam(mesh, element or ElementBeamANCF(order), StVenantKirchhoff(E, nu, rho), width,
+                formulation=formulation, name=name)
+
+
+def elbow(**options):
+    """Two beams that meet at a corner, of different order, height and width."""
+    return (between((0, 0), (1, 0), 2, 1, name="arm", **options),
+            between((1, 0), (1.4, 0.9), 3, 3, h=0.15, width=0.07, name="forearm", **options))
+
+
+#: How to make each joint of the registry on the elbow.
+CASES = {
+    "hinge": dict(beams=("arm", "forearm"), at=(1, 0)),
+    "weld": dict(beams=("arm", "forearm"), at=("right", "left")),
+    "line": dict(beam="arm", at=(0.3, 0.02), direction=(1, 2)),
+    "circle": dict(beam="forearm", at=(1.2, 0.45), center=(0.4, 0.1)),
+    "position": dict(beam="arm", at=(0.4, -0.03), r=lambda t: (0.4 + np.sin(t), t * t - 0.03)),
+    "angle": dict(beam="forearm", at="right", angle=lambda t: np.sin(3 * t)),
+    "plane": dict(beam="forearm", at="left"),
+}
+
+
+def test_every_joint_has_a_case():
+    assert set(CASES) == set(JOINTS)
+
+
+@pytest.fixture(params=JOINTS)
+def joint(request):
+    scene = Scene(*elbow())
+    return scene.joint(request.param, **CASES[request.param]), scene
+
+
+def test_value_is_zero_at_the_start(joint):
+    joint, scene = joint
+    assert np.abs(joint.value(np.zeros(scene.N), 0.0)).max() < 1e-15
+    assert joint.value(np.zeros(scene.N), 0.0).shape == (len(joint.equations),)
+
+
+def test_jacobian_is_the_derivative(joint):
+    joint, scene = joint
+    rng = np.random.default_rng(0)
+    u, v, t = 0.3 * rng.standard_normal(scene.N), rng.standard_normal(scene.N), 0.7
+    # Phi is quadratic at most: central differences are exact
+    along = 0.5 * (joint.value(u + v, t) - joint.value(u - v, t))
+    assert np.allclose(joint.jacobian(u, t) @ v, along, rtol=0, atol=1e-12)
+    assert np.linalg.matrix_rank(joint.jacobian(u, t)) == len(joint.equations)
+
+
+def test_curvature_is_the_derivative_of_the_jacobian(joint):
+    joint, scene = joint
+    rng = np.random.default_rng(1)
+    u, v, t = 0.3 * rng.standard_normal(scene.N), rng.standard_normal(scene.N), 0.7
+    multipliers = rng.standard_normal(len(joint.equations))
+    along = 0.5 * multipliers @ (joint.jacobian(u + v, t) - joint.jacobian(u - v, t))
+    second = joint.curvature(u, t, multipliers)
+    C = np.zeros((scene.N, scene.N))
+    if second is not None:
+        np.add.at(C, (second[0], second[1]), second[2])
+    assert np.allclose(C, C.T, rtol=0, atol=1e-14)
+    assert np.allclose(C @ v, along, rtol=0, atol=1e-12)
+    assert joint.constant == (not np.any(joint.jacobian(u + v, t + 0.1) - joint.jacobian(u, t)))
+    assert joint.moving == bool(np.any(joint.value(u, t + 0.1) - joint.value(u, t)))
+
+
+# conservation and drift
+
+FORCED = ("position", "angle")
+
+
+@pytest.mark.parametrize("name", [n for n in JOINTS if n not in FORCED])
+def test_energy_momentum_with_every_joint(name):
+    """Energy to round-off, and the joint met in position and in velocity."""
+    scene = Scene(*elbow()).gravity(GRAVITY)
+    joint = scene.joint(name, **CASES[name])
+    for beam in scene.beams:
+        scene.initial_velocity(lambda x: np.array([1 - 2 * x[1], 2 * x[0]]), beam=beam)
+    history = scene.integrate(0.4, 0.01)
+    assert history.strain_energy.max() > 1e-2
+    assert np.ptp(history.total_energy) < 1e-10
+    for k in range(len(history)):
+        J = joint.jacobian(history.u[k], 0.0)
+        assert np.abs(joint.value(history.u[k], 0.0)).max() < 1e-13
+        assert np.abs(J @ history.v[k]).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", ["hinge", "weld"])
+def test_joints_between_beams_keep_the_momenta(name):
+    scene = Scene(*elbow())
+    scene.joint(name, **CASES[name])
+    for beam in scene.beams:
+        scene.initial_velocity(lambda x: np.array([1 - 2 * x[1], 2 * x[0]]), beam=beam)
+    history = scene.integrate(0.4, 0.01)
+    assert np.ptp(history.momentum, axis=0).max() < 1e-10
+    assert np.ptp(history.angular_momentum) < 1e-10
+    assert np.ptp(history.total_energy) < 1e-10
+
+
+def swing():
+    """A soft elbow whose far end slides on a circle."""
+    a = between((0, 0), (1, 0), 1, 1, E=1e6, h=0.2)
+    b = between((1, 0), (1, 0.8), 1, 1, E=1e6, h=0.2)
+    scene = Scene(a, b).pin("left", beam=a).gravity((0, -2.0))
+    scene.joint("weld", beams=(a, b), at=("right", "left"))
+    scene.joint("circle", beam=b, at=(1, 0.8), center=(0, 0.8))
+    return scene
+
+
+@pytest.mark.parametrize("scheme, steps", [(EnergyMomentum(), 2000), (GeneralizedAlpha(0.8), 2000)],
+                         ids=["energy-momentum", "generalized-alpha"])
+def test_drift_over_a_long_run(scheme, steps):
+    scene = swing()
+    dt = 4e-3
+    history = scene.integrate(steps * dt, dt, scheme=scheme,
+                              t_eval=np.arange(0, steps + 1, 10) * dt)
+    s = scene.system
+    phi = [np.abs(s.constraint(u, 0.0)).max() for u in history.u]
+    rate = [np.abs(s.full_jacobian(u, 0.0) @ v).max() for u, v in zip(history.u, history.v)]
+    assert np.abs(history.v).max() > 0.1
+    assert max(phi) < 1e-10 and max(rate) < 1e-11
+    if isinstance(scheme, EnergyMomentum):
+        assert max(phi) < 1e-13
+        assert np.ptp(history.total_energy) < 1e-9
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+def test_a_driven_joint_is_met_in_position_and_velocity(scheme):
+    beam = between((0, 0), (1, 0), 2, 2)
+    scene = Scene(beam).pin("left")
+    joint = scene.joint("angle", at="left", angle=lambda t: np.sin(2 * t))
+    history = scene.integrate(1.0, 5e-3, scheme=scheme)
+    for k in range(0, len(history), 20):
+        t, u, v = history.t[k], history.u[k], history.v[k]
+        assert abs(joint.value(u, t)[0]) < 1e-13
+        turned = joint.jacobian(u, t) @ v
+        # d/dt (e(t) x d) = J v - 2 cos(2 t) e . d
+        a = joint.start + np.sin(2 * t)
+        rate = turned[0] - 2 * np.cos(2 * t) * (np.array([np.cos(a), np.sin(a)]) @ joint.d(u))
+        assert abs(rate) < 1e-10  # the motion's rate is a difference of fourth order
+
+
+# statics
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7, 2.5])
+def test_two_welded_beams_are_one(angle):
+    """Cut in the middle and welded: the same deflection and the same frequencies."""
+    d = np.array([np.cos(angle), np.sin(angle)])
+    load = 0.3 * np.array([-d[1], d[0]])
+    whole = Scene(between((0, 0), 2 * d, 4)).clamp("left").point_force(load, 2 * d)
+    a, b = between((0, 0), d, 2), between(d, 2 * d, 2)
+    cut = Scene(a, b).clamp("left", beam=a).point_force(load, 2 * d, beam=b)
+    joint = cut.joint("weld", beams=(a, b), at=("right", "left"))
+    one, two = whole.solve_static(), cut.solve_static()
+    tip = one.displacement(2 * d)
+    assert np.hypot(*tip) > 0.05
+    # the weld leaves r_X free on both sides and the face free to warp
+    assert np.abs(two.displacement(2 * d, beam=b) - tip).max() < 2e-3 * np.hypot(*tip)
+    force = two.joint_force(joint)
+    # on the first beam acts the load, and the moment of it about the weld
+    arm = two.position(2 * d, beam=b) - two.position(d, beam=b)
+    assert np.allclose(force[:2], load, rtol=1e-8)
+    assert force[2] == pytest.approx(arm[0] * load[1] - arm[1] * load[0], rel=1e-2)
+    f1, f2 = whole.modes(4).frequencies, cut.modes(4).frequencies
+    assert np.allclose(f1[:2], f2[:2], rtol=1e-3)
+    assert np.allclose(f1, f2, rtol=0.02)
+
+
+def test_weld_moment_is_the_moment():
+    """The multiplier of the weld's third equation, in units of moment."""
+    a, b = between((0, 0), (1, 0)), between((1, 0), (2, 0))
+    scene = Scene(a, b).clamp("left", beam=a).moment("right", 1e-3, beam=b)
+    joint = scene.joint("weld", beams=(a, b), at=("right", "left"))
+    state = scene.solve_static()
+    assert np.allclose(state.joint_force(joint), [0, 0, 1e-3], rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [np.pi / 2, 2.0, -0.8])
+def test_frame_against_slope_deflection(angle):
+    """A column with a rigid corner and a beam off it, loaded across the beam's end.
+
+    Small deflections: the beam's tip moves across by P L^3 / (3 EI) + (corner rotation) L, the
+    corner turns by P L H / (EI) plus the column's own share.
+    """
+    H, L, h, P = 1.0, 0.8, 0.02, 1e-5
+    EI = E * h**3 * 0.1 / 12
+    # at the corner the column ends in the direction (0, 1); the beam leaves at `angle` to it
+    d = np.array([-np.sin(angle), np.cos(angle)])
+    n = np.array([-d[1], d[0]])
+    corner = np.array([0.0, H])
+    a = between((0, 0), corner, 4, h=h, nu=0.0)
+    b = between(corner, corner + L * d, 4, h=h, nu=0.0)
+    scene = Scene(a, b).clamp("left", beam=a).point_force(P * n, corner + L * d, beam=b)
+    scene.joint("weld", beams=(a, b), at=("right", "left"))
+    state = scene.solve_static()
+    # column under an end force across it, Q = P n . (-1, 0), and an end moment P L
+    Q, M = -P * n[0], P * L
+    turn = Q * H**2 / (2 * EI) + M * H / EI
+    sway = Q * H**3 / (3 * EI) + M * H**2 / (2 * EI)
+    tip = np.array([-sway, 0.0]) + n * (turn * L + P * L**3 / (3 * EI))
+    found = state.displacement(corner + L * d, beam=b)
+    assert np.abs(found - tip).max() < 0.01 * np.hypot(*tip)
+    assert np.hypot(*tip) < 0.01
+
+
+def test_hinge_reactions_of_a_three_hinged_arch():
+    """Two bars that meet at the top: the thrust of a load there is P / (2 tan a)."""
+    P, a = 0.1, 0.6
+    top = np.array([np.cos(a), np.sin(a)])
+    left = between((0, 0), top, 1, E=1e8, name="left")
+    right = between((2 * top[0], 0), top, 1, E=1e8, name="right")
+    scene = Scene(left, right).pin("left", beam="left").pin("left", beam="right")
+    hinge = scene.joint("hinge", beams=(left, right), at=top)
+    scene.point_force((0, -P), top, beam=left)
+    state = scene.solve_static()
+    thrust = P / (2 * np.tan(a))
+    assert np.allclose(state.joint_force(hinge), [-thrust, P / 2], rtol=1e-4)
+    assert np.allclose(state.reactions("left", beam="left").force, [thrust, P / 2], rtol=1e-4)
+    assert np.allclose(state.reactions("left", beam="right").force, [-thrust, P / 2], rtol=1e-4)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.4])
+def test_roller(tilt):
+    """A beam under its weight on a pin and a roller: half the weight each, if the roller is flat.
+
+    On a tilted guide the roller pushes along the normal, and the pin takes the rest.
+    """
+    beam = between((0, 0), (1, 0), 2, E=1e8)
+    scene = Scene(beam).pin("left").gravity(GRAVITY)
+    joint = scene.joint("line", at=(1, 0), direction=(np.cos(tilt), np.sin(tilt)))
+    assert scene.system.m == (0 if tilt == 0 else 1)  # along x it only fixes r^2
+    state = scene.solve_static()
+    W = beam.total_mass * 9.81
+    N = W / 2 / np.cos(tilt)
+    assert state.joint_force(joint)[0] == pytest.approx(N, rel=1e-3)
+    push = N * np.array([-np.sin(tilt), np.cos(tilt)])
+    assert np.allclose(state.reactions("left").force, [-push[0], W - push[1]], rtol=1e-3, atol=1e-6)
+
+
+def test_circle_carries_a_pendulum():
+    """The tip of a stiff bar that hangs on a circle of radius 1: its weight, away from the centre."""
+    bar = between((1, 0), (1.5, 0), 1, E=1e8)
+    scene = Scene(bar).gravity(GRAVITY)
+    left = scene.joint("circle", at=(1, 0), center=(1, 1))
+    right = scene.joint("circle", at=(1.5, 0), center=(1.5, 1))
+    scene.joint("line", at=(1.25, 0), direction=(0, 1))
+    state = scene.solve_static()
+    W = bar.total_mass * 9.81
+    for joint in (left, right):
+        # the guide's force on the beam points to the centre: away from it it is negative
+        assert state.joint_force(joint)[0] == pytest.approx(-W / 2, rel=1e-4)
+
+
+@pytest.mark.parametrize("at, m", [((1, 0), 0), ((0.6, 0.02), 2)])
+def test_prescribed_position_in_statics(at, m):
+    """Time is the load factor; where only coordinates are fixed no multiplier is spent."""
+    beam = between((0, 0), (1, 0), 2)
+    scene = Scene(beam).clamp("left")
+    end = np.array(at) + [-0.1, 0.3]
+    joint = scene.joint("position", at=at, r=lambda t: np.array(at) + t * np.array([-0.1, 0.3]))
+    assert scene.system.m == m
+    state = scene.solve_static()
+    assert np.allclose(state.position(at), end, rtol=0, atol=1e-12)
+    # the force is what would move the point there
+    other = Scene(beam).clamp("left").point_force(state.joint_force(joint), at).solve_static()
+    assert np.allclose(other.position(at), end, rtol=0, atol=1e-7)
+    root = state.reactions("left").force
+    assert np.allclose(root, -state.joint_force(joint), rtol=1e-7)
+
+
+def test_prescribed_angle_in_statics():
+    """Both ends pinned so that one may slide, one turned: M = 3 EI / L times the angle."""
+    h, turn = 0.02, 1e-3
+    beam = between((0, 0), (1, 0), 8, h=h, nu=0.0)
+    scene = Scene(beam).pin("left").fix("right", "r^2")
+    joint = scene.joint("angle", at="left", angle=lambda t: turn * t)
+    state = scene.solve_static()
+    EI = E * h**3 * 0.1 / 12
+    assert state.joint_force(joint)[0] == pytest.approx(3 * EI * turn, rel=5e-3)
+    # a large turn of a free end needs no force
+    free = Scene(beam).pin("left")
+    joint = free.joint("angle", at="left", angle=lambda t: 1.2 * t)
+    state = free.solve_static(first_step=0.25)
+    assert np.allclose(state.position((1, 0)), [np.cos(1.2), np.sin(1.2)], atol=1e-6)
+    assert abs(state.joint_force(joint)[0]) < 1e-6 * EI
+
+
+def test_elimination_does_not_change_the_motion():
+    """A pin as a support, as an eliminated joint, and through a multiplier: one motion."""
+    def motion(pin):
+        beam = between((0, 0), (1, 0), 2, E=1e5)
+        scene = Scene(beam).gravity(GRAVITY)
+        joint = pin(scene)
+        history = scene.integrate(0.3, 0.01)
+        return history, scene.system.m, joint
+
+    support, m0, _ = motion(lambda s: s.pin("left"))
+    eliminated, m1, joint = motion(lambda s: s.joint("position", at=(0, 0), r=lambda t: (0, 0)))
+    held, m2, other = motion(lambda s: (s.joint("line", at=(0, 0), direction=(1, 1)),
+                                        s.joint("line", at=(0, 0), direction=(1, -1))))
+    assert (m0, m1, m2) == (0, 0, 2)
+    assert np.abs(support.u[-1]).max() > 0.1
+    assert np.allclose(eliminated.u, support.u, rtol=0, atol=1e-12)
+    assert np.allclose(held.u, support.u, rtol=0, atol=1e-9)
+    # and the same reaction at every instant
+    a = eliminated.joint_force(joint)
+    assert a.shape == (len(eliminated), 2)
+    normals = np.array([other[0].normal, other[1].normal])
+    b = np.column_stack([held.joint_force(j)[:, 0] for j in other]) @ normals
+    assert np.abs(a[0] - b[0]).max() < 1e-8
+    scale = np.abs(a).max()
+    assert scale > 1.0
+    assert np.abs(a - [state.reactions("left").force for state in support]).max() < 1e-9 * scale
+
+
+def test_joint_force_over_time_is_the_rate_of_momentum():
+    """A free beam driven at a point: the force of the joint is all that acts on it."""
+    beam = between((0, 0), (1, 0), 2, E=1e5)
+    scene = Scene(beam)
+    joint = scene.joint("position", at=(0.3, 0), r=lambda t: (0.3 + 0.1 * np.sin(t) ** 3, 0))
+    history = scene.integrate(1.0, 5e-3)
+    rate = np.gradient(history.momentum, history.t, axis=0)[5:-5]
+    force = history.joint_force(joint)[5:-5]
+    assert force.shape[1] == 2 and np.abs(rate).max() > 0.5
+    assert np.abs(force - rate).max() < 0.02 * np.abs(rate).max()
+    impulse = np.trapezoid(history.joint_force(joint), history.t, axis=0)
+    assert np.allclose(impulse, history.momentum[-1], rtol=0, atol=2e-3)
+
+
+# mechanisms
+
+
+def test_double_pendulum_in_the_rigid_limit():
+    options = dict(ne=1, order=1, E=1e12, h=0.01, width=0.01, nu=0.0)
+    bars = between((0, 0), (1, 0), **options), between((1, 0), (2, 0), **options)
+    scene = Scene(*bars).pin("left", beam=bars[0]).gravity(GRAVITY)
+    scene.joint("hinge", beams=bars, at=(1, 0))
+    t = np.linspace(0.1, 1.0, 10)
+    p, q = exact.double_pendulum(np.append(0.0, t))[:2, 1:]
+    elbow = np.array([np.sin(p), -np.cos(p)]).T
+    hand = elbow + np.array([np.sin(q), -np.cos(q)]).T
+    errors = []
+    for dt in (4e-3, 2e-3):
+        history = scene.integrate(1.0, dt, t_eval=t)
+        errors.append(max(
+            np.abs(history.position((1, 0), beam=bars[0]) - elbow).max(),
+            np.abs(history.position((2, 0), beam=bars[1]) - hand).max()))
+    assert errors[1] < 1e-3
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2, abs=0.3)
+
+
+def test_rigid_pendulum():
+    beam = between((0, 0), (1, 0), 1, 1, E=1e12, h=0.01, width=0.01, nu=0.0)
+    scene = Scene(beam).gravity(GRAVITY)
+    scene.joint("position", at=(0, 0), r=lambda t: (0, 0))
+    t = np.linspace(0.1, 1.0, 10)
+    angle = exact.rigid_pendulum(t, 1.0)
+    tip = scene.integrate(1.0, 2e-3, t_eval=t).position((1, 0))
+    assert np.abs(tip - np.array([np.sin(angle), -np.cos(angle)]).T).max() < 1e-4
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+def test_four_bar_mechanism(scheme):
+    """A crank that turns steadily; the coupler's end follows the geometry of rigid bars."""
+    ground, crank, coupler, rocker, omega = 2.0, 0.5, 1.8, 1.2, 2.0
+
+    def joint_of(angle):
+        """Where the coupler meets the rocker: the intersection of two circles, the upper one."""
+        A, D = crank * np.array([np.cos(angle), np.sin(angle)]), np.array([ground, 0.0])
+        d = D - A
+        r = np.hypot(*d)
+        x = (coupler**2 - rocker**2 + r**2) / (2 * r)
+        y = np.sqrt(coupler**2 - x**2)
+        return A, A + (x * d + y * np.array([-d[1], d[0]])) / r
+
+    A, B = joint_of(0.0)
+    options = dict(E=1e11, h=0.04, width=0.04, ne=1, order=1, nu=0.0)
+    bars = [between((0, 0), A, name="crank", **options),
+            between(A, B, name="coupler", **{**options, "order": 2}),
+            between((ground, 0), B, name="rocker", **{**options, "h": 0.06})]
+    scene = Scene(bars).pin("left", beam="crank").pin("left", beam="rocker")
+    scene.joint("hinge", beams=("crank", "coupler"), at=A)
+    scene.joint("hinge", beams=("coupler", "rocker"), at=B)
+    turn = lambda t: omega * t**3 / (1 + t**2)  # noqa: E731
+    drive = scene.joint("angle", beam="crank", at="left", angle=turn)
+    history = scene.integrate(1.0, 5e-3, scheme=scheme)
+    for k in (50, 100, 150, 200):
+        A_t, B_t = joint_of(turn(history.t[k]))
+        assert np.abs(history.position(A, beam="crank")[k] - A_t).max() < 1e-4
+        assert np.abs(history.position(B, beam="coupler")[k] - B_t).max() < 1e-3
+        assert np.abs(history.position(B, beam="rocker")[k]
+                      - history.position(B, beam="coupler")[k]).max() < 1e-12
+    # the drive's power is the change of energy
+    rate = omega * (3 * history.t**2 + history.t**4) / (1 + history.t**2) ** 2
+    work = np.trapezoid(history.joint_force(drive)[:, 0] * rate, history.t)
+    assert work == pytest.approx(history.kinetic_energy[-1] + history.strain_energy[-1], rel=0.03)
+
+
+def test_scene_of_unlike_beams():
+    """Order 1, Patel-Shabana and order 4, three heights and materials, straight and curved."""
+    a = between((0, 0), (1, 0), 2, 1, h=0.1, name="a")
+    b = between((1, 0), (1, 1), 2, h=0.05, E=3e6, element=ElementBeamPatelShabana(), name="b",
+                formulation="continuum")
+    arc = MeshBeam.init_curve(lambda s: np.array([1 + np.sin(s), 2 - np.cos(s)]),
+                              np.linspace(0, 1.2, 3), 0.08)
+    c = Beam(arc, ElementBeamANCF(4), StVenantKirchhoff(2e6, 0.2, 500.0, plane="strain"), 0.2,
+             name="c")
+    scene = Scene(a, b, c).clamp("left", beam="a").gravity((0, -1.0))
+    scene.joint("weld", beams=("a", "b"), at=("right", "left"))
+    hinge = scene.joint("hinge", beams=(b, c), at=(1, 1))
+    scene.fix("right", "r^2", beam="c")
+    state = scene.solve_static()
+    assert state.converged
+    weight = sum(beam.total_mass for beam in (a, b, c))
+    held = (state.reactions("left", beam="a").force[1] + state.reactions("right", beam="c").force[1])
+    assert held == pytest.approx(weight, rel=1e-8)
+    assert np.allclose(state.position((1, 1), beam="b"), state.position((1, 1), beam="c"), atol=1e-13)
+    # the hinge carries c: its weight less what the roller holds
+    assert state.joint_force(hinge)[1] == pytest.approx(
+        state.reactions("right", beam="c").force[1] - c.total_mass, rel=1e-7)
+    history = scene.integrate(0.05, 0.01, start=state)
+    assert np.abs(history.u - state.u).max() < 1e-8
+
+
+# frames
+
+
+def test_lees_frame_below_the_limit_point():
+    """Load path of Lee's frame (1968) up to 15 EI / L^2; the limit load is 18.56."""
+    L, h = 1.0, 0.01
+    options = dict(h=h, E=12 / h**3, nu=0.0, width=1.0, order=1)  # E I = 1
+    ux, uy, load = exact.lee_frame(61, A=h, I=h**3 / 12, L=L)
+    rising = slice(0, int(np.argmax(load > 17)) + 1)
+    column = between((0, 0), (0, L), 10, **options)
+    beam = between((0, L), (L, L), 10, **options)
+    for P, bound in ((6.0, 4e-3), (14.0, 6e-3)):
+        scene = Scene(column, beam).pin("left", beam=column).pin("right", beam=beam)
+        scene.joint("weld", beams=(column, beam), at=("right", "left"))
+        scene.point_force((0, -P), (L / 5, L), beam=beam)
+        state = scene.solve_static(first_step=0.1)
+        found = state.displacement((L / 5, L), beam=beam)
+        known = [np.interp(P, load[rising], x[rising]) for x in (ux, uy)]
+        assert np.abs(found - known).max() < bound, (P, found, known)
+    assert known[1] < -0.1
+
+
+def test_williams_toggle_below_the_limit_point():
+    """Williams' toggle (1964) in inches and pounds, with his EA and EI."""
+    EA, EI, half, rise = 1.885e6, 9.27e3, 12.943, 0.386
+    h = np.sqrt(12 * EI / EA)
+    options = dict(h=h, E=EA / h, nu=0.0, width=1.0, ne=8, element=ElementBeamANCFCubic(1))
+    left = between((-half, 0), (0, rise), **options)
+    right = between((0, rise), (half, 0), **options)
+    # near the limit point small differences of the law are magnified
+    for v, bound in ((0.1, 2e-3), (0.2, 0.012)):
+        P = exact.williams_toggle(v)
+        scene = Scene(left, right).clamp("left", beam=left).clamp("right", beam=right)
+        scene.joint("weld", beams=(left, right), at=("right", "left"))
+        scene.point_force((0, -P), (0, rise), beam=left)
+        state = scene.solve_static()
+        assert state.displacement((0, rise), beam=left)[1] == pytest.approx(-v, rel=bound)
+        assert abs(state.displacement((0, rise), beam=left)[0]) < 1e-9
+
+
+# what is refused
+
+
+def test_redundant_and_contradictory_joints():
+    a, b = elbow()
+
+    def scene():
+        return Scene(a, b).clamp("left", beam=a)
+
+    s = scene()
+    s.joint("hinge", beams=(a, b), at=(1, 0), name="first")
+    s.joint("hinge", beams=(a, b), at=(1, 0), name="second")
+    with pytest.raises(SupportError, match="Hinge second.*'force along x'.*repeats"):
+        s.solve_static()
+    with pytest.raises(SupportError, match="repeats"):
+        s.integrate(0.1, 0.01)
+
+    s = scene()
+    s.joint("weld", beams=(a, b), at=("right", "left"), name="corner")
+    s.joint("hinge", beams=(a, b), at=(1, 0), name="pin")
+    with pytest.raises(SupportError, match="Hinge pin.*repeats"):
+        s.solve_static()
+
+    s = scene()
+    s.joint("line", beam=b, at=(1.4, 0.9), direction=(1, 1))
+    s.joint("line", beam=b, at=(1.4, 0.9), direction=(1, 1), through=(0, 0), name="guide")
+    with pytest.raises(SupportError, match="OnLine guide.*contradicts"):
+        s.solve_static()
+
+    # three lines through one point: the third repeats the other two, or contradicts them
+    for through, word in ((None, "repeats"), ((1.4, 1.0), "contradicts")):
+        s = scene()
+        s.joint("line", beam=b, at=(1.2, 0.45), direction=(1, 1))
+        s.joint("line", beam=b, at=(1.2, 0.45), direction=(1, -1))
+        s.joint("line", beam=b, at=(1.2, 0.45), direction=(1, 0.3), through=through, name="third")
+        with pytest.raises(SupportError, match=f"OnLine third.*{word}"):
+            s.solve_static()
+
+    s = scene()
+    s.joint("line", beam=a, at=(0, 0.02), direction=(1, 1), name="on the clamp")
+    with pytest.raises(SupportError, match="on the clamp.*the supports"):
+        s.solve_static()
+
+    s = scene()
+    s.joint("position", beam=a, at=(0, 0), r=lambda t: (0, t))
+    with pytest.raises(SupportError, match="prescribes r\\^1 of node 0 of beam arm.*support"):
+        s.solve_static()
+
+    s = scene()
+    s.joint("line", beam=b, at=(1.4, 0.9), direction=(1, 0))
+    s.joint("position", beam=b, at=(1.4, 0.9), r=lambda t: (1.4, 0.9))
+    with pytest.raises(SupportError, match="r\\^2 of node 3 of beam forearm"):
+        s.solve_static()
+
+
+def test_checking_joints_leaves_them_alone():
+    """Reactions where a support and a joint share coordinates: the joint's part is not lost."""
+    a, b = between((0, 0), (1, 0)), between((0, 0), (0, 1))
+    scene = Scene(a, b).fix("left", "r", beam=a).fix("left", ["r_Y0", "r_Y1"], beam=a)
+    hinge = scene.joint("hinge", beams=(a, b), at=(0, 0))
+    scene.fix("right", "r^1", beam=b)
+    scene.point_force((0, -0.2), (0, 1), beam=b)
+    state = scene.solve_static()
+    assert state.joint_force(hinge)[1] == pytest.approx(-0.2, rel=1e-8)
+    assert state.reactions("left", beam=a).force[1] == pytest.approx(0.2, rel=1e-8)
+
+
+def test_free_mechanism_is_named():
+    a, b = elbow()
+    scene = Scene(a, b).clamp("left", beam=a)
+    scene.joint("hinge", beams=(a, b), at=(1, 0))
+    with pytest.raises(SupportError, match=r"rotation about \(1, 0\) of beam forearm"):
+        scene.solve_static()
+
+
+@pytest.mark.parametrize("call, error, message", [
+    (lambda s: s.joint("glue"), NameUnknown, "'glue'; known: 'hinge', 'weld'"),
+    (lambda s: s.joint("hinge", beams=("arm", "leg"), at=(1, 0)), NameUnknown, "'leg'"),
+    (lambda s: s.joint("hinge", beams=("arm", "forearm"), at=(5, 5)), InputError, "5"),
+    (lambda s: s.joint("hinge", beams=("arm", "forearm"), at=None), InputError, "at="),
+    (lambda s: s.joint("weld", beams=("arm", "forearm"), at=("right", "top")), InputError, "top"),
+    (lambda s: s.joint("line", at=(1, 0), direction=(1, 0)), InputError, "say which"),
+    (lambda s: s.joint("line", beam="arm", at=(1, 0), direction=(0, 0)), InputError, "direction"),
+    (lambda s: s.joint("circle", beam="arm", at=(1, 0), center=(1, 0)), InputError, "positive"),
+    (lambda s: s.joint("circle", beam="arm", at=(1, 0), center=(0, 0), radius=-1.0), InputError,
+     "radius"),
+])
+def test_bad_inputs(call, error, message):
+    with pytest.raises(error, match=message):
+        call(Scene(*elbow()))
+
+
+def test_joint_of_another_scene():
+    scene, other = Scene(*elbow()), Scene(*elbow())
+    joint = other.joint("hinge", **CASES["hinge"])
+    state = scene.integrate(0.01, 0.01).state(0)
+    with pytest.raises(SupportError, match="not a joint of this scene"):
+        state.joint_force(joint)
+    assert get_joint(joint) is joint
