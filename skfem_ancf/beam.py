@@ -249,7 +249,24 @@ class Beam:
             Shapes (2, n) and (n,): ``q[dofs] @ weights`` is the position.
         """
         e, X = self.locate(point)
+        if self.is_cable and abs(X[1] - 0.5) > 1e-6:
+            raise InputError(
+                f"the point {tuple(map(float, np.ravel(point)))} is off the axis of a cable, whose "
+                "position there is no linear function of its coordinates: name a point of the "
+                "axis, and put a moment on an end section with scene.moment")
         return self.probe_reference(e, X)
+
+    def point_displacement(self, u, e, X):
+        """Displacement of the point X of the reference cell of element ``e``.
+
+        ``u`` of shape (N,) or (nt, N); the result is (2,) or (nt, 2).
+        """
+        if self.is_cable and X[1] != 0.5:
+            at, tind = np.asarray(X)[:, None], np.array([e])
+            return np.reshape([self.displacements(v, at, tind)[:, 0, 0] for v in np.atleast_2d(u)],
+                              u.shape[:-1] + (2,))
+        dofs, weights = self.probe_reference(e, X)
+        return u[..., dofs] @ weights
 
     def probe_reference(self, e, X):
         """As :meth:`probe`, for the point X = (xi, eta) of the reference cell of element ``e``."""

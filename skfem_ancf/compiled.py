@@ -574,9 +574,9 @@ def steps(cable, cpack, bpack, strains, conserving, parameters, load, fixed, M, 
           t0, dt, tol, floor, energy, rows, times):
     """Time steps; one row of ``rows`` (n, 3, N) for each: u, v and the acceleration.
 
-    ``y`` (5, N) is u, v, acceleration, the scheme's acceleration and the one before it, and is
-    advanced; ``state`` is [has factors, iterations, factorisations, rate]. Returns the number of
-    steps done, and the energy scale.
+    ``y`` (4, N) is u, v, acceleration and the scheme's acceleration, and is advanced; ``state`` is
+    [has factors, iterations, factorisations, rate, size of the step before]. Returns the number
+    of steps done, and the energy scale.
     """
     N = load.size
     alpha_m, alpha_f, beta, gamma = parameters
@@ -586,7 +586,6 @@ def steps(cable, cpack, bpack, strains, conserving, parameters, load, fixed, M, 
         c_m, c_k = 2.0 / dt**2, 0.5
     else:
         c_m, c_k = (1.0 - alpha_m) / ((1.0 - alpha_f) * beta * dt * dt), 1.0
-    rough = floor * math.sqrt(c_k)
     for n in range(rows.shape[0]):
         u0, v0, a0, w0 = y[0], y[1], y[2], y[3]
         for i in range(N):
@@ -598,6 +597,23 @@ def steps(cable, cpack, bpack, strains, conserving, parameters, load, fixed, M, 
                 u[i] = base[i] + dt * dt * beta * w0[i]
             if fixed[i]:
                 u[i] = u0[i]
+        for i in range(N):  # the velocity of the guess, for the scale of the energy
+            if conserving:
+                x[i] = (u[i] - u0[i]) * (2.0 / dt) - v0[i]
+            else:
+                x[i] = v0[i] + dt * ((1.0 - gamma) * w0[i]
+                                     + gamma * (u[i] - base[i]) / (beta * dt * dt))
+            if fixed[i]:
+                x[i] = 0.0
+        multiply(M, ld, bw, x, inertia)
+        kinetic, noise = 0.0, 0.0
+        for i in range(N):
+            kinetic += 0.5 * x[i] * inertia[i]
+        multiply(M, ld, bw, u, inertia)
+        for i in range(N):
+            noise += u[i] * inertia[i]
+        rough = math.sqrt(floor * floor * c_k + 4.9e-32 * c_m * abs(noise))
+        wanted = tol * math.sqrt(max(energy, kinetic)) + rough
         fresh, before, done = False, -1.0, False
         for k in range(30):
             if state[0] == 0.0:
@@ -635,8 +651,6 @@ def steps(cable, cpack, bpack, strains, conserving, parameters, load, fixed, M, 
             state[1] += 1.0
             if not size < 1e300:
                 return n, energy
-            energy = max(energy, 0.25 * size * size)
-            wanted = tol * math.sqrt(energy) + rough
             if before > 0.0:
                 rate = size / before
                 if rate > 1.0 and size <= 1e3 * rough:
@@ -654,11 +668,13 @@ def steps(cable, cpack, bpack, strains, conserving, parameters, load, fixed, M, 
             before = size
         if not done:
             return n, energy
+        ahead = dt / (dt + state[4])
+        state[4] = dt
         for i in range(N):
             if conserving:
                 v = (u[i] - u0[i]) * (2.0 / dt) - v0[i]
                 middle = (v - v0[i]) / dt
-                y[2, i] = 1.5 * middle - 0.5 * w0[i]
+                y[2, i] = middle + ahead * (middle - w0[i])
                 y[3, i] = middle
             else:
                 w = (u[i] - base[i]) / (beta * dt * dt)

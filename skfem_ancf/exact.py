@@ -340,11 +340,13 @@ def gravity_cantilever(E, nu, rho, L, b, h, g=9.81, model="reissner", plane="str
 
 
 def rollup_curvature(M, E, b, h):
-    """Curvature and axis stretch of a St. Venant-Kirchhoff body in pure bending, nu = 0.
+    """Curvature and axis stretch of a St. Venant-Kirchhoff beam in pure bending, nu = 0.
 
     With no section force, lambda^2 = 1 - (h kappa)^2/4 and
-    M = E I kappa (1 - 0.3 (h kappa)^2): the sections stay rigid and normal, so this is exact for
-    the two-dimensional body as well.
+    M = E I kappa (1 - 0.3 (h kappa)^2) for sections that stay rigid and normal. In a body whose
+    sections may strain, radial equilibrium presses them together by a strain of the order of
+    (h kappa)^2, and the factor becomes 1 - (h kappa)^2/2 for the two-dimensional body and
+    sections of order 3 or more, 1 - 7 (h kappa)^2/15 for order 1 and 2, to that order.
 
     Parameters
     ----------

@@ -45,8 +45,7 @@ class Path:
     def displacement(self, point, beam=None):
         """Displacement of a material point along the path, shape (n, 2)."""
         beam, e, X = self.state(0)._find(point, beam)
-        dofs, weights = beam.probe_reference(e, X)
-        return self.u[:, self.system.of(beam)][:, dofs] @ weights
+        return beam.point_displacement(self.u[:, self.system.of(beam)], e, X)
 
     def limit_points(self):
         """Load factors at the turning points of the load.

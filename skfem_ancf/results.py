@@ -82,15 +82,13 @@ class State:
     def displacement(self, point, beam=None):
         """Displacement of a material point, named by its place in the stress-free body; (2,)."""
         beam, e, X = self._find(point, beam)
-        dofs, weights = beam.probe_reference(e, X)
-        return self.u_of(beam)[dofs] @ weights
+        return beam.point_displacement(self.u_of(beam), e, X)
 
     def position(self, point, beam=None):
         """Position of a material point, shape (2,)."""
         beam, e, X = self._find(point, beam)
-        dofs, weights = beam.probe_reference(e, X)
         start = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
-        return start + self.u_of(beam)[dofs] @ weights
+        return start + beam.point_displacement(self.u_of(beam), e, X)
 
     def strain(self, point, beam=None):
         """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, shape (3,)."""

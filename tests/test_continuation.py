@@ -59,7 +59,7 @@ def test_limits_of_lee_frame_with_quintic_cables():
     fall = (path.load > -5) & (np.arange(len(path)) > np.argmax(path.load))
     assert np.any(np.diff(tip[fall]) < 0)
     # and the whole path lies on that of the rod
-    ux, uy, load = exact.lee_frame(81, A=6, I=2, L=120)
+    ux, uy, load = exact.lee_frame(21, A=6, I=2, L=120)
     point = np.array([tip, path.load / 10]).T
     rod = np.array([-uy, load / 10]).T
     rod = rod[: np.argmin(load) + 2]
@@ -68,7 +68,7 @@ def test_limits_of_lee_frame_with_quintic_cables():
         a, d = point[:-1], np.diff(point, axis=0)
         s = np.clip(np.sum((r - a) * d, axis=1) / np.sum(d * d, axis=1), 0, 1)
         gaps.append(np.min(np.linalg.norm(a + s[:, None] * d - r, axis=1)))
-    assert max(gaps) < 2e-4
+    assert max(gaps) < 1e-3  # of the chords between points
 
 
 @pytest.mark.parametrize("element, n, slenderness, tol", [
@@ -236,7 +236,7 @@ def test_steps_grow_up_to_ds_max():
 
 
 def test_failure_keeps_the_path():
-    # where the tangent of two members in line is singular for every load: a mechanism
+    # one iteration is a prediction and no more
     with pytest.raises(ConvergenceError, match="load") as failure:
         shallow(0.02).continuation(steps=20, ds=1e-3, max_iterations=1, tol=1e-14)
     path = failure.value.state

@@ -26,7 +26,8 @@ class CompiledSteps:
         self._cable = kernel.cable
         self._strains = np.empty(kernel.shape)
         self._A = np.empty_like(system.mass._flat)
-        self._state = np.zeros(4)  # factors are there, iterations, factorisations, rate
+        # factors are there, iterations, factorisations, rate, size of the step before
+        self._state = np.zeros(5)
 
     @staticmethod
     def applies(scheme, system):
@@ -40,7 +41,8 @@ class CompiledSteps:
         s, solver = self._system, self._solver
         n = min(n, BLOCK)
         rows, times = np.empty((n, 3, s.N)), np.empty(n)
-        now = np.array([y.u, y.v, y.acceleration, y.algorithmic, y.algorithmic])
+        now = np.array([y.u, y.v, y.acceleration, y.algorithmic])
+        self._state[4] = y.memory[0] if y.memory else 0.0
         before = self._state.copy()
         done, solver._energy = self._steps(
             self._cable, *self._packs, self._strains, self._conserving, self._parameters,
@@ -54,6 +56,8 @@ class CompiledSteps:
                    for t, (u, v, a) in zip(times[:done], rows[:done])]
         if done:
             motions[-1].algorithmic = now[3]
+            if self._conserving:
+                motions[-1].memory = dt, now[3], none
         if done < n:
             self._state[0] = 0.0
         return motions

@@ -62,8 +62,7 @@ class History:
     def displacement(self, point, beam=None):
         """Displacement of a material point at all instants, shape (nt, 2)."""
         beam, e, X = self.state(0)._find(point, beam)
-        dofs, weights = beam.probe_reference(e, X)
-        return self.u[:, self.system.of(beam)][:, dofs] @ weights
+        return beam.point_displacement(self.u[:, self.system.of(beam)], e, X)
 
     def position(self, point, beam=None):
         """Position of a material point at all instants, shape (nt, 2)."""

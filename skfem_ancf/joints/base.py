@@ -78,7 +78,7 @@ def point(scene, beam, at):
     """The position of the material point ``at`` of a beam, as a :class:`Vector`."""
     beam = scene.beam(beam)
     e, X = beam.locate(at)
-    dofs, weights = beam.probe_reference(e, X)
+    dofs, weights = beam.probe(at)
     start = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
     return Vector(start, dofs + scene.offset(beam), weights)
 

@@ -69,7 +69,8 @@ def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, fi
     system
         A :class:`~skfem_ancf.system.System`.
     u
-        Displacement to start from, shape (N,); zero by default.
+        Displacement to start from, shape (N,); the stress-free state by default. Load steps lead
+        from it to the equilibrium under the full load, whatever holds it in its place.
     method
         "mixed": the geometric part of the tangent uses a stress that is carried from one iterate
         to the next by its linearisation. "newton": it uses the stress of the strain. The solution
@@ -106,7 +107,11 @@ def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, fi
         raise InputError(f"first_step must lie in (0, 1], got {first_step!r}")
     if require_positive("max_iterations", max_iterations) < 1:
         raise InputError(f"max_iterations must be at least 1, got {max_iterations!r}")
-    u = np.zeros(system.N) if u is None else u.copy()
+    origin = np.zeros(system.N), None
+    if u is not None:
+        missing = system.external_force(u) - system.internal_force(u)
+        origin = u.copy(), missing * system.mask
+    u = origin[0].copy()
     result = StaticResult(u, np.zeros(system.m), 0.0, np.zeros(system.N), [], False,
                           "no load step has converged")
     step = float(first_step)
@@ -118,7 +123,7 @@ def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, fi
             record = LoadStep(load, 0)
             try:
                 with np.errstate(all="ignore"):  # what overflows is seen in the residual
-                    found = _iterate(system, result, load, method, tol, max_iterations, record)
+                    found = _iterate(system, result, load, origin, method, tol, max_iterations, record)
             except _Failed as failure:
                 result.rejected += 1
                 logger.info("load %.6g failed (%s), step cut", load, failure)
@@ -147,15 +152,25 @@ class _Failed(Exception):
     """A load step did not converge; the message says why."""
 
 
-def _iterate(system, result, load, method, tol, max_iterations, record):
-    """Iterate to equilibrium at one load; returns displacement, multipliers, internal force."""
+def _iterate(system, result, load, start, method, tol, max_iterations, record):
+    """Iterate to equilibrium at one load; returns displacement, multipliers, internal force.
+
+    ``start`` is the displacement at load 0 and what was missing there to equilibrium under the
+    full load, or None for the stress-free state; the missing part is reduced to nothing.
+    """
     u, multipliers, carried = result.u.copy(), result.multipliers.copy(), None
     floor = 8.0 * system.stiffness_scale
     # the residual sums the noise of all coordinates, the work that of the strains
     force_floor = floor * system.noise
-    prescribed = system.values(load) - u[system.fixed]
+    u0, gap = start
+    full, at = (load, load) if gap is None else (1.0, 1.0)
+    target = system.values(at)
+    if gap is not None:
+        target = u0[system.fixed] + load * (target - u0[system.fixed])
+        gap = (1.0 - load) * gap
+    prescribed = target - u[system.fixed]
     moving = bool(np.any(prescribed))
-    external = load * system.external_force(u)
+    external = full * system.external_force(u)
     work = before = reference = np.inf
     scale = None
     for k in range(max_iterations + 1):
@@ -164,13 +179,15 @@ def _iterate(system, result, load, method, tol, max_iterations, record):
         if last:
             force = system.internal_force(u)
         else:
-            force, evaluations = system.assemble(u, load, carried)
+            force, evaluations = system.assemble(u, full, carried)
         if not system.constant_loads:
-            external = load * system.external_force(u)
+            external = full * system.external_force(u)
         residual = external - force
+        if gap is not None:
+            residual = residual - gap
         if system.joints:
-            phi = system.constraint(u, load)
-            residual = residual - multipliers @ system.jacobian(u, load)
+            phi = system.constraint(u, at)
+            residual = residual - multipliers @ system.jacobian(u, at)
             closed = np.max(np.abs(phi)) <= 1e-12 * system.size
         else:
             phi, closed = _NONE, True
@@ -191,17 +208,17 @@ def _iterate(system, result, load, method, tol, max_iterations, record):
         if k == max_iterations:
             break
         if last:
-            force, evaluations = system.assemble(u, load, carried)
+            force, evaluations = system.assemble(u, full, carried)
         du0 = None
         if moving:
             du0 = np.zeros(system.N)
             du0[system.fixed] = prescribed
             free = (residual - system.multiply(du0)) * system.free
             if system.joints:
-                phi = phi + np.concatenate([j.jacobian(u, load) @ du0 for j in system.joints])
+                phi = phi + np.concatenate([j.jacobian(u, at) @ du0 for j in system.joints])
             moving = False
         try:
-            system.factorize(u, load, multipliers)
+            system.factorize(u, at, multipliers)
         except (np.linalg.LinAlgError, RuntimeError):
             raise _Failed("the tangent is singular") from None
         du, dm = system.solve(free, -phi)

@@ -1,0 +1,323 @@
+"""The shear-rigid cable: its kernel, exact rods, motion and fields."""
+
+import numpy as np
+import pytest
+
+from skfem_ancf import (Beam, ElementBeamANCFCubic, ElementBeamCable, InputError, MeshBeam, Scene,
+                        StVenantKirchhoff, exact)
+
+DEGREES = (3, 5, 7)
+E, NU, RHO, B = 2e8, 0.3, 7800.0, 0.01
+
+
+def line(n=4, h=0.01, **options):
+    return MeshBeam.init_line(np.linspace(0.0, 1.0, n + 1), h, **options)
+
+
+def uneven(h=0.05):
+    return MeshBeam.init_line([0.0, 0.3, 0.35, 1.0, 1.2], h, origin=(5.0, -1.0), angle=2.1)
+
+
+def wave(h=0.05, n=5):
+    return MeshBeam.init_curve(lambda s: np.array([2 * s + 0.2 * s**2, 0.4 * np.sin(2.5 * s)]),
+                               np.linspace(-1.0, 1.3, n + 1), h)
+
+
+MESHES = {"line": line, "uneven": uneven, "wave": wave}
+CASES = [(d, m) for d in DEGREES for m in MESHES if not (d == 7 and m == "wave")]
+FORMULATIONS = ("assumed", "continuum")
+
+
+def cable(degree, mesh, formulation="assumed", plane="stress", **options):
+    return Beam(mesh, ElementBeamCable(degree), StVenantKirchhoff(E, NU, RHO, plane=plane), B,
+                formulation=formulation, **options)
+
+
+def disturbed(beam, size=0.05, seed=0):
+    """A displacement of the coordinates of that size relative to an element, shape (N,)."""
+    L = np.min(beam.mesh.lengths)
+    u = np.random.default_rng(seed).normal(size=(beam.N // beam.nd, beam.nd // 2, 2))
+    return (size * u * L ** (1.0 - np.arange(beam.nd // 2)[:, None])).ravel()
+
+
+def scale(beam):
+    """The size of each coordinate, shape (N,)."""
+    L = np.min(beam.mesh.lengths)
+    size = np.repeat(L ** (1.0 - np.arange(beam.nd // 2)), 2)
+    return np.tile(size, beam.N // beam.nd)
+
+
+# the kernel
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("degree, name", CASES)
+def test_the_force_is_the_gradient_of_the_energy(degree, name, formulation):
+    beam = cable(degree, MESHES[name](), formulation)
+    u, kernel, size = disturbed(beam), beam.kernel, scale(beam)
+    f, rng = kernel.force(u) * size, np.random.default_rng(1)
+    for _ in range(4):
+        d = rng.normal(size=beam.N)
+        # fourth-order differences
+        w = {e: kernel.energy(u + e * 1e-3 * size * d) for e in (-2, -1, 1, 2)}
+        slope = (8 * (w[1] - w[-1]) - (w[2] - w[-2])) / 12e-3
+        assert abs(f @ d - slope) < 1e-5 * np.linalg.norm(f) * np.linalg.norm(d)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("degree, name", CASES)
+def test_the_tangent_is_the_derivative_of_the_force(degree, name, formulation):
+    beam = cable(degree, MESHES[name](), formulation)
+    u, kernel, size = disturbed(beam), beam.kernel, scale(beam)
+    K, nd = np.zeros((beam.N, beam.N)), beam.nd
+    for e, k in enumerate(kernel.tangents(u)):
+        K[e * nd:(e + 2) * nd, e * nd:(e + 2) * nd] += k
+    K *= np.outer(size, size)
+    assert np.max(np.abs(K - K.T)) < 1e-12 * np.max(np.abs(K))
+    rng = np.random.default_rng(2)
+    for _ in range(4):
+        d = rng.normal(size=beam.N)
+        f = {e: kernel.force(u + e * 1e-3 * size * d) * size for e in (-2, -1, 1, 2)}
+        slope = (8 * (f[1] - f[-1]) - (f[2] - f[-2])) / 12e-3
+        assert np.linalg.norm(K @ d - slope) < 1e-5 * np.linalg.norm(K) * np.linalg.norm(d)
+
+
+@pytest.mark.parametrize("degree, name", CASES)
+def test_the_stress_free_state_has_no_force(degree, name):
+    beam = cable(degree, MESHES[name]())
+    zero = np.zeros(beam.N)
+    size = np.max(np.abs(beam.kernel.force(disturbed(beam)) * scale(beam)))
+    assert np.max(np.abs(beam.kernel.force(zero) * scale(beam))) < 1e-14 * size
+    assert beam.kernel.energy(zero) < 1e-20 * beam.kernel.energy(disturbed(beam))
+    assert not np.any(beam.strain(zero, np.array([[0.2, 0.9], [0.0, 0.7]])))
+
+
+@pytest.mark.parametrize("degree, name", CASES)
+def test_objectivity(degree, name):
+    beam = cable(degree, MESHES[name]())
+    kernel, u = beam.kernel, disturbed(beam)
+    q0, q = (x.reshape(-1, beam.nd // 2, 2) for x in (beam.q0_local, beam.q0_local + u))
+    force = kernel.force(u).reshape(-1, 2)
+    for angle in (0.7, 3.0, -2.2):
+        c, s = np.cos(angle), np.sin(angle)
+        R = np.array([[c, -s], [s, c]])
+        moved, rigid = q @ R.T, q0 @ R.T
+        moved[:, 0] += [3.0, -2.0]
+        v, w = (x.ravel() - beam.q0_local for x in (moved, rigid))
+        assert kernel.energy(v) == pytest.approx(kernel.energy(u), rel=1e-11)
+        turned = kernel.force(v).reshape(-1, 2)
+        assert np.max(np.abs(turned - force @ R.T)) < 1e-10 * np.max(np.abs(force))
+        assert np.max(np.abs(kernel.force(w))) < 1e-11 * np.max(np.abs(force))
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("degree, name", CASES)
+@pytest.mark.parametrize("size", [1e-6, 1e-2, 0.1])
+def test_the_mean_force_does_the_work_of_the_energy(degree, name, formulation, size):
+    beam = cable(degree, MESHES[name](), formulation)
+    kernel, u0 = beam.kernel, disturbed(beam, 0.05)
+    u1 = u0 + disturbed(beam, size, seed=5)
+    force = kernel.mean_force(u0, u1, kernel.strains(u0))
+    work, change = force @ (u1 - u0), kernel.energy(u1) - kernel.energy(u0)
+    assert abs(work - change) < 1e-12 * (np.abs(force) @ np.abs(u1 - u0)) + 1e-14 * kernel.energy(u1)
+    # and it gives no momentum and no angular momentum about the middle of the step
+    f = force.reshape(-1, beam.nd // 2, 2)
+    q = (beam.q0_local + 0.5 * (u0 + u1)).reshape(f.shape)
+    total = np.sum(np.abs(f))
+    assert np.max(np.abs(f[:, 0].sum(axis=0))) < 1e-12 * total
+    moment = np.sum(q[..., 0] * f[..., 1] - q[..., 1] * f[..., 0])
+    assert abs(moment) < 1e-12 * np.sum(np.abs(q) * np.abs(f))
+
+
+@pytest.mark.parametrize("degree, name", CASES)
+def test_compiled_and_plain_kernels_agree(degree, name):
+    plain, fast = (cable(degree, MESHES[name](), compiled=c).kernel for c in (False, True))
+    beam = cable(degree, MESHES[name]())
+    u, size = disturbed(beam), scale(beam)
+    for a, b in ((plain.force(u) * size, fast.force(u) * size),
+                 (plain.tangents(u), fast.tangents(u)), (plain.energy(u), fast.energy(u))):
+        np.testing.assert_allclose(b, a, rtol=0, atol=1e-12 * np.max(np.abs(a)))
+
+
+def test_degree_7_needs_a_straight_mesh():
+    with pytest.raises(InputError, match="degree 5"):
+        cable(7, wave()).kernel
+    for degree in (2, 4, 9, True, "3"):
+        with pytest.raises(InputError):
+            ElementBeamCable(degree)
+
+
+# statics
+
+
+@pytest.mark.parametrize("degree, n, tol", [(3, 32, 6e-6), (5, 16, 2e-8), (7, 8, 1e-9)])
+def test_tip_load_of_a_thick_cantilever(degree, n, tol):
+    L, h, modulus = 2.0, 0.1, 2.07e11
+    beam = Beam(MeshBeam.init_line(np.linspace(0, L, n + 1), h), ElementBeamCable(degree),
+                StVenantKirchhoff(modulus, 0.3), h, formulation="assumed")
+    P = 3 * modulus * h**4 / 12 / L**2
+    state = Scene(beam).clamp("left").point_force((0, -P), at=(L, 0)).solve_static()
+    tip = state.displacement((L, 0))
+    np.testing.assert_allclose(tip, [-0.508537304326, -1.207239854550], rtol=0, atol=tol)
+    EI, EA = modulus * h**4 / 12, modulus * h**2
+    np.testing.assert_allclose(tip, exact.elastica_extensible_tip(P, EA, EI, L), rtol=0, atol=tol)
+    reaction = state.reactions("left")
+    np.testing.assert_allclose(reaction.force, [0, P], atol=1e-8 * P)
+    assert reaction.moment == pytest.approx(P * (L + tip[0]), rel=1e-6)
+
+
+@pytest.mark.parametrize("plane", ["stress", "strain"])
+@pytest.mark.parametrize("degree, n, tol", [(3, 32, 2.5e-5), (5, 16, 2e-8), (7, 8, 3e-9)])
+def test_gravity_cantilever(degree, n, tol, plane):
+    beam = cable(degree, line(n), plane=plane)
+    state = Scene(beam).clamp("left").gravity((0, -9.81)).solve_static()
+    assert state.iterations <= 10 and len(state.steps) == 1
+    reference = exact.gravity_cantilever(E, NU, RHO, 1.0, B, 0.01, model="extensible", plane=plane)
+    np.testing.assert_allclose(state.displacement((1, 0)), reference, rtol=0, atol=tol)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_a_cable_rolls_up_to_a_circle(formulation):
+    beam = cable(5, line(16), formulation)
+    EI = E * B * 0.01**3 / 12
+    state = Scene(beam).clamp("left").moment("right", 2 * np.pi * EI).solve_static(first_step=0.25)
+    # the law is linear in the curvature: it closes
+    np.testing.assert_allclose(state.position((1, 0)), 0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("degree", DEGREES)
+def test_one_element(degree):
+    scene = Scene(cable(degree, line(1))).clamp("left").point_force((0, -1e-4), at=(1, 0))
+    state = scene.solve_static()  # the stabilisation of the cubic one is felt on one element
+    tip = exact.euler_bernoulli_tip(1e-4, E, B * 0.01**3 / 12, 1.0)[1]
+    assert state.displacement((1, 0))[1] == pytest.approx(tip, rel=0.3 if degree == 3 else 1e-5)
+
+
+def test_full_quadrature_of_the_cubic_axis_is_less_accurate():
+    tips = {}
+    for formulation in FORMULATIONS:
+        h = 1e-4
+        beam = Beam(line(16, h), ElementBeamCable(3),
+                    StVenantKirchhoff(E * (0.01 / h) ** 3, NU, RHO * 0.01 / h), B,
+                    formulation=formulation)
+        state = Scene(beam).clamp("left").gravity((0, -9.81)).solve_static()
+        tips[formulation] = state.displacement((1, 0))[1]
+    assert abs(tips["assumed"] + 0.9031317) < 3.2e-4 and tips["continuum"] > -0.9014
+
+
+# vibration and motion
+
+
+@pytest.mark.parametrize("degree, n, tol", [(3, 32, 5e-5), (5, 8, 1e-6), (7, 5, 1e-6)])
+def test_frequencies(degree, n, tol):
+    beam = cable(degree, line(n))
+    A, I = B * 0.01, B * 0.01**3 / 12  # noqa: E741
+    for scene, ends, skip in ((Scene(beam).clamp("left"), "fixed-free", 0),
+                              (Scene(beam), "free-free", 3)):
+        found = scene.modes(skip + 2).frequencies[skip:]
+        reference = exact.euler_bernoulli_frequencies(E, I, A, RHO, 1.0, n=2, ends=ends)
+        np.testing.assert_allclose(found, reference, rtol=tol)
+
+
+@pytest.mark.parametrize("degree, name", CASES)
+def test_free_flight_conserves_energy_and_momenta(degree, name):
+    beam = cable(degree, MESHES[name]())
+    scene = Scene(beam).initial_velocity(
+        lambda x: np.array([1.0 - 2 * x[1] + np.sin(3 * x[0]), 2 * x[0] + 0.3 * x[0] ** 2]))
+    history = scene.integrate(t_end=0.05, dt=1e-3)
+    energy = history.kinetic_energy + history.strain_energy
+    assert np.ptp(history.strain_energy) > 1e-4 * energy[0]
+    assert np.ptp(energy) < 1e-11 * energy[0]
+    P, H = history.momentum, history.angular_momentum
+    assert np.max(np.ptp(P, axis=0)) < 1e-11 * np.max(np.abs(P))
+    assert np.ptp(H) < 1e-11 * np.max(np.abs(H))
+
+
+def test_pendulum_keeps_its_energy():
+    history = Scene(cable(3, line(8))).pin("left").gravity((0, -9.81)).integrate(t_end=0.5, dt=2e-3)
+    assert np.ptp(history.total_energy) < 1e-11 * np.max(history.kinetic_energy)
+
+
+def test_soft_pendulum_in_time():
+    history = Scene(cable(5, line(8))).pin("left").gravity((0, -9.81)).integrate(
+        t_end=0.5, dt=2.5e-4, t_eval=[0.25, 0.5])
+    tip = history.displacement((1, 0))
+    np.testing.assert_allclose(tip, [[-0.100646, -0.308569], [-1.189393, -0.956101]], atol=2e-5)
+
+
+# fields
+
+
+@pytest.mark.parametrize("plane, ratio", [("stress", NU), ("strain", NU / (1 - NU))])
+def test_strain_of_a_stretched_cable(plane, ratio):
+    beam = cable(5, line(2), plane=plane)
+    modulus = E if plane == "stress" else E / (1 - NU**2)
+    force = 1e-3 * modulus * B * 0.01
+    state = Scene(beam).clamp("left").point_force((force, 0), at=(1, 0)).solve_static()
+    e = 1e-3
+    for point in ((0.3, 0.0), (0.7, 0.004), (0.99, -0.005)):
+        strain, stress = state.strain(point), state.stress(point)
+        assert strain[0] == pytest.approx(e + e * e / 2, rel=1e-9)
+        assert strain[1] == -ratio * strain[0] and strain[2] == 0.0
+        assert stress[0] == pytest.approx(modulus * strain[0], rel=1e-12)
+        assert stress[1] == stress[2] == 0.0
+        np.testing.assert_allclose(state.displacement(point), [e * point[0], 0], atol=1e-14)
+
+
+@pytest.mark.parametrize("degree", DEGREES)
+def test_strain_of_a_bent_cable(degree):
+    beam = cable(degree, line(16))
+    P, I = 1e-3, B * 0.01**3 / 12  # noqa: E741
+    state = Scene(beam).clamp("left").point_force((0, -P), at=(1, 0)).solve_static()
+    # where the curvature of a cubic axis is best, at the Gauss points of an element
+    x = 0.25 + (0.5 - 0.5 / np.sqrt(3)) / 16
+    for Y in (-0.005, 0.0, 0.0025, 0.005):
+        strain = state.strain((x, Y))
+        assert strain[0] == pytest.approx(P * (1 - x) * Y / (E * I), rel=3e-3, abs=1e-9)
+        assert strain[1] == -NU * strain[0]
+        stress = state.stress((x, Y))
+        assert stress[0] == pytest.approx(E * strain[0]) and stress[1] == stress[2] == 0
+
+
+@pytest.mark.parametrize("degree, name", [case for case in CASES if case[1] != "wave"])
+def test_sections_stay_normal_and_keep_their_height(degree, name):
+    beam = cable(degree, MESHES[name]())
+    u = disturbed(beam, 0.02)
+    X = np.array([[0.1, 0.1, 0.1, 0.8, 0.8, 0.8], [0.0, 0.5, 1.0, 0.0, 0.5, 1.0]])
+    x0 = beam.mesh.mapping().F(X)
+    x = x0 + beam.displacements(u, X)
+    h = beam.mesh.height
+    across = (x[..., 2::3] - x[..., 0::3]) / h
+    np.testing.assert_allclose(np.hypot(*across), 1.0, atol=1e-12)
+    tangent, *_ = beam._cable_section(u, X[:, 1::3], None)
+    assert np.max(np.abs(np.sum(across * tangent, axis=0))) < 1e-12
+
+
+def test_the_body_of_a_cable_agrees_with_the_plane_body():
+    # a slender beam: strains, stresses and displacements of both models at points of the body
+    states = []
+    for element in (ElementBeamCable(5), ElementBeamANCFCubic(3)):
+        beam = Beam(line(64), element, StVenantKirchhoff(E, NU, RHO), B, formulation="assumed")
+        states.append(Scene(beam).clamp("left", thickness="free").gravity((0, -0.1)).solve_static())
+    thin, body = states
+    for point in ((0.4, 0.004), (0.8, -0.005)):
+        moved = [s.beams[0].displacements(s.u, X[:, None], np.array([e]))[:, 0, 0]
+                 for s in states for e, X in [s.beams[0].locate(point)]]
+        np.testing.assert_allclose(*moved, rtol=0, atol=1e-5)
+        a, b = thin.strain(point), body.strain(point)
+        np.testing.assert_allclose(a[:2], b[:2], rtol=0, atol=2e-2 * abs(b[0]))
+        assert thin.stress(point)[0] == pytest.approx(body.stress(point)[0], rel=2e-2)
+
+
+def test_curved_cable_springs_back_with_the_right_stiffness():
+    # quarter circle under a small force at its free end: Castigliano
+    R, h = 1.0, 1e-3
+    mesh = MeshBeam.init_curve(lambda s: R * np.array([np.cos(s), np.sin(s)]),
+                               np.linspace(0, np.pi / 2, 17), h)
+    beam = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(12 / (B * h**3), NU), B,
+                formulation="assumed")
+    P = 1e-5
+    state = Scene(beam).clamp("left").point_force((0, -P), at=(0, R)).solve_static()
+    tip = state.displacement((0, R))
+    # m(a) = -P R cos a for the angle a: u_y = -P R^3 pi / 4, u_x = -P R^3 / 2 by the unit loads
+    np.testing.assert_allclose(tip, [-P / 2, -P * np.pi / 4], rtol=2e-4)
