@@ -317,13 +317,14 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=Non
     with progress_bar(progress, total=span, desc="time") as bar:
         while (n < steps) if steps is not None else (y.t < t_end - 1e-12 * span):
             if blocks is not None and n < whole:
-                for new in blocks.run(y, step, whole - n):
+                motions = blocks.run(y, step, whole - n)
+                for new in motions:
                     n += 1
                     new.t = t_start + n * step if n < steps else t_end
                     store(y, new)
                     y = new
-                if n == steps:
-                    break
+                if motions:
+                    continue
             if steps is not None:
                 # the last step may be shorter; the others are of one size, to keep the factors
                 h = step if n < steps - 1 else t_end - y.t

@@ -1,0 +1,351 @@
+"""Natural frequencies and linear buckling against beam theory."""
+
+import numpy as np
+import pytest
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, MeshBeam, Scene,
+                        StVenantKirchhoff, eigen, exact)
+from skfem_ancf.elements import ELEMENTS
+from skfem_ancf.errors import InputError, SupportError
+from skfem_ancf.formulations import FORMULATIONS
+
+from conftest import quarter_arc
+
+E, RHO, B = 1e9, 1000.0, 0.1
+
+
+def straight(ne, h=0.02, element=None, nu=0.0, formulation="assumed", L=1.0, **options):
+    mesh = MeshBeam.init_line(np.linspace(0, L, ne + 1), h, **options)
+    return Beam(mesh, element or ElementBeamANCF(2), StVenantKirchhoff(E, nu, RHO), B,
+                formulation=formulation)
+
+
+def theory(h, ends, n=3, L=1.0, timoshenko=False, nu=0.0):
+    A, I = B * h, B * h**3 / 12
+    if timoshenko:
+        kGA = exact.shear_factor(nu) * E / (2 * (1 + nu)) * A
+        return exact.timoshenko_frequencies(E, I, A, RHO, L, kGA, n, ends)
+    return exact.euler_bernoulli_frequencies(E, I, A, RHO, L, n, ends)
+
+
+def held(beam, ends):
+    """A scene of the beam with the ends held, and how many modes are no bending."""
+    scene = Scene(beam)
+    if ends == "fixed-free":
+        scene.clamp("left")
+    elif ends == "pinned-pinned":
+        scene.pin("left").fix("right", "r^2")
+    return scene, 3 if ends == "free-free" else 0
+
+
+ENDS = ("fixed-free", "free-free", "pinned-pinned")
+
+
+@pytest.mark.parametrize("ends", ENDS)
+def test_slender_beam_against_euler_bernoulli(ends):
+    """h / L = 1 / 200: the theory's own error is 1e-4 in the third frequency."""
+    h = 0.005
+    known = theory(h, ends)
+    scene, skip = held(straight(8, h, ElementBeamANCFCubic(1)), ends)
+    found = scene.modes(3 + skip).frequencies[skip:]
+    assert np.abs(found / known - 1).max() < 1e-3
+
+
+@pytest.mark.parametrize("ends", ENDS)
+@pytest.mark.parametrize("order", [1, 2])
+def test_thick_beam_against_timoshenko(ends, order):
+    """h / L = 1 / 10: Euler-Bernoulli is off by up to a fifth in the third frequency."""
+    h = 0.1
+    known = theory(h, ends, timoshenko=True)
+    scene, skip = held(straight(16, h, ElementBeamANCFCubic(order)), ends)
+    modes = scene.modes(6 + skip)
+    # a bar's axial vibrations lie between: those move along x on the axis
+    across = [k for k in range(skip, 6 + skip)
+              if np.abs(modes.shapes[k].reshape(-1, scene.beams[0].nd)[:, 1]).max()
+              > 10 * np.abs(modes.shapes[k].reshape(-1, scene.beams[0].nd)[:, 0]).max()][:3]
+    found = modes.frequencies[across]
+    assert len(found) == 3
+    assert np.abs(found / known - 1).max() < 4e-3
+    assert np.abs(theory(h, ends) / known - 1).max() > 0.05
+
+
+@pytest.mark.parametrize("element, formulation, rate, bound", [
+    (lambda: ElementBeamANCF(2), "assumed", 2, 5e-3),
+    (lambda: ElementBeamANCF(2), "continuum", 2, 5e-3),
+    (lambda: ElementBeamANCFCubic(1), "assumed", 4, 1e-5),
+], ids=["assumed", "continuum", "cubic"])
+def test_rate_of_convergence(element, formulation, rate, bound):
+    """The first frequency of a cantilever, against a fine mesh."""
+    def first(ne, make):
+        return Scene(straight(ne, 0.05, make(), formulation=formulation)).clamp("left").modes(
+            1).frequencies[0]
+
+    fine = first(64, lambda: ElementBeamANCFCubic(2)) if rate == 2 else first(40, element)
+    errors = [abs(first(ne, element) / fine - 1) for ne in (4, 8, 16)]
+    assert errors[2] < bound
+    assert np.log2(errors[0] / errors[1]) > rate - 0.4
+    assert np.log2(errors[1] / errors[2]) > rate - 0.5
+
+
+@pytest.mark.parametrize("T", [-0.8, 0.0, 3.0, 20.0])
+def test_tension_stiffens(T):
+    """A pinned beam under an axial force: omega^2 = (n pi / L)^4 EI / rho A (1 + T / T_n).
+
+    T in units of the first buckling load pi^2 EI / L^2, T_n the n-th.
+    """
+    h, L = 0.01, 1.0
+    EI = E * B * h**3 / 12
+    force = T * np.pi**2 * EI / L**2
+    scene = Scene(straight(8, h, ElementBeamANCFCubic(1))).pin("left").fix("right", "r^2")
+    scene.point_force((force, 0), (L, 0))
+    state = scene.solve_static()
+    n = np.arange(1, 4)
+    known = (n * np.pi / L) ** 2 * np.sqrt(EI / (RHO * B * h)) * np.sqrt(1 + T / n**2)
+    assert np.abs(scene.modes(3, state).frequencies / known - 1).max() < 4e-3
+
+
+def test_unstable_state():
+    """Beyond the buckling load the straight state has a negative omega^2, shown as such."""
+    h = 0.01
+    EI = E * B * h**3 / 12
+    scene = Scene(straight(6, h)).pin("left").fix("right", "r^2")
+    scene.point_force((-1.5 * np.pi**2 * EI, 0), (1, 0))
+    frequencies = scene.modes(2, scene.solve_static()).frequencies
+    assert frequencies[0] < 0 < frequencies[1]
+    assert frequencies[0] == pytest.approx(
+        -np.pi**2 * np.sqrt(EI / (RHO * B * h)) * np.sqrt(0.5), rel=0.02)
+
+
+def elastic_scale(beam):
+    return np.sqrt(E / RHO) / beam.mesh.lengths.sum()
+
+
+@pytest.mark.parametrize("name", ELEMENTS)
+def test_free_beam_has_three_zero_modes(name):
+    for formulation in FORMULATIONS:
+        for mesh in (MeshBeam.init_line([0, 0.4, 1.0], 0.2, angle=0.5), quarter_arc(2, 0.2)):
+            beam = Beam(mesh, ELEMENTS[name](), StVenantKirchhoff(E, 0.3, RHO), B,
+                        formulation=formulation)
+            frequencies = Scene(beam).modes(5).frequencies / elastic_scale(beam)
+            assert np.abs(frequencies[:3]).max() < 1e-3, (formulation, frequencies)
+            assert frequencies[3] > 0.1, (formulation, frequencies)
+
+
+def test_shapes_and_modes():
+    beam = straight(6)
+    scene = Scene(beam).clamp("left")
+    modes = scene.modes(4)
+    M = scene.system.mass.tocsc()
+    assert np.allclose(modes.shapes @ (M @ modes.shapes.T), np.eye(4), atol=1e-9)
+    scene.system.assemble(np.zeros(scene.N))
+    K = scene.system.K.tocsc()
+    stiffness = modes.shapes @ (K @ modes.shapes.T)
+    assert np.allclose(stiffness, np.diag(modes.frequencies**2), atol=1e-9 * stiffness.max())
+    assert not np.any(modes.shapes[:, ~scene.system.free])
+    shown = modes.mode(1, 0.01)
+    assert np.array_equal(shown.u, 0.01 * modes.shapes[1])
+    # a mode is a motion: released in shape 0 the beam comes back after a period
+    period = 2 * np.pi / modes.frequencies[0]
+    history = scene.integrate(period, period / 200, start=modes.mode(0, 1e-5))
+    assert np.abs(history.u[-1] - history.u[0]).max() < 0.01 * np.abs(history.u[0]).max()
+
+
+def test_modes_with_joints():
+    """Two bars hinged in the middle of a propped span, by symmetry: sin and cosine parts.
+
+    A free-free beam cut by a weld keeps its frequencies; hinged at its middle, where the even
+    modes have no curvature, only these stay.
+    """
+    whole = Scene(straight(8))
+    a, b = straight(4, L=0.5), straight(4, L=0.5, origin=(0.5, 0))
+    one = whole.modes(7).frequencies
+    welded, hinged = Scene(a, b), Scene(a, b)
+    welded.joint("weld", beams=(a, b), at=("right", "left"))
+    hinged.joint("hinge", beams=(a, b), at=(0.5, 0))
+    two = welded.modes(7).frequencies
+    assert np.abs(two[:3]).max() < 1e-3 * two[3]
+    assert np.allclose(two[3:6], one[3:6], rtol=0.01)
+    four = hinged.modes(7).frequencies
+    assert np.abs(four[:4]).max() < 1e-3 * four[4]  # the bars turn freely
+    assert four[4] == pytest.approx(one[4], rel=0.02)  # the antisymmetric one stays
+
+
+def test_pendulum_on_a_hinge_and_on_a_circle():
+    """Small swings of a hanging rod: omega^2 = 3 g / (2 L), from the weight it carries.
+
+    The rod's own joint holds it either way; the point on a circle of radius R swings about its
+    centre too: then the joint's own curvature enters, and a rigid rod that may not turn swings as
+    a point mass, omega^2 = g / R.
+    """
+    L, R, g = 0.5, 0.8, 9.81
+    rod = straight(2, 0.01, L=L, angle=-np.pi / 2)
+    hung = Scene(rod).pin("left").gravity((0, -g))
+    omega = hung.modes(1, hung.solve_static()).frequencies[0]
+    assert omega == pytest.approx(np.sqrt(1.5 * g / L), rel=1e-3)
+    # a bar whose two ends hang on circles of one radius moves without turning
+    bar = straight(2, 0.02, L=L)
+    swing = Scene(bar).gravity((0, -g))
+    for x in (0, L):
+        swing.joint("circle", at=(x, 0), center=(x, R))
+    start = Scene(bar).gravity((0, -g))
+    for x in (0, L):
+        start.joint("circle", at=(x, 0), center=(x, R))
+    start.fix("left", "r^1")
+    state = start.solve_static()
+    from skfem_ancf.results import State
+
+    state = State(swing.system, state.u, multipliers=state.multipliers)
+    omega = swing.modes(1, state).frequencies[0]
+    assert omega == pytest.approx(np.sqrt(g / R), rel=2e-3)
+
+
+@pytest.mark.parametrize("joined", [False, True])
+def test_sparse_branch_equals_dense_branch(monkeypatch, joined):
+    def scene():
+        a, b = straight(6), straight(5, L=0.5, origin=(1, 0), angle=1.0)
+        s = Scene(a, b) if joined else Scene(a)
+        if joined:
+            s.joint("weld", beams=(a, b), at=("right", "left"))
+        return s
+
+    dense_free = scene().modes(6)
+    held_scene = scene()
+    held_scene.clamp("left", beam=held_scene.beams[0])
+    dense_held = held_scene.modes(6)
+    monkeypatch.setattr(eigen, "DENSE", 10)
+    sparse_free, sparse_held = scene().modes(6), held_scene.modes(6)
+    scale = dense_free.frequencies[3]
+    assert np.abs(sparse_free.frequencies[:3]).max() < 2e-3 * scale
+    assert np.allclose(sparse_free.frequencies[3:], dense_free.frequencies[3:], rtol=1e-8)
+    assert np.allclose(sparse_held.frequencies, dense_held.frequencies, rtol=1e-9)
+    for x, y in zip(sparse_held.shapes, dense_held.shapes):
+        x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
+        assert abs(x @ y) == pytest.approx(1, abs=1e-8)
+
+
+# buckling
+
+
+@pytest.mark.parametrize("ends", ["fixed-free", "pinned-pinned", "fixed-pinned", "fixed-fixed"])
+def test_euler_buckling(ends):
+    h, L = 0.01, 1.0
+    scene = Scene(straight(8, h, ElementBeamANCFCubic(1)))
+    left, right = ends.split("-")
+    scene.clamp("left") if left == "fixed" else scene.pin("left")
+    if right != "free":
+        scene.fix("right", "r^2")
+    if right == "fixed":
+        scene.fix("right", "r_Y0^1")
+    scene.point_force((-1, 0), (L, 0))
+    known = exact.euler_buckling_load(E, B * h**3 / 12, L, ends)
+    buckling = scene.buckling(2)
+    assert buckling.factors[0] == pytest.approx(known, rel=3e-3)
+    assert buckling.factors[1] > 2 * known
+    # the shape is across, and is still at the ends
+    shape = buckling.shapes[0].reshape(-1, scene.beams[0].nd)
+    assert np.abs(shape[:, 1]).max() > 100 * np.abs(shape[:, 0]).max()
+
+
+def test_buckling_load_is_where_the_frequency_vanishes():
+    h = 0.02
+    def loaded(P):
+        return Scene(straight(6, h)).clamp("left").point_force((-P, 0), (1, 0))
+
+    P = loaded(1.0).buckling(1).factors[0]
+    squares = []
+    for part in (0.9, 0.95):
+        scene = loaded(part * P)
+        squares.append(scene.modes(1, scene.solve_static()).frequencies[0] ** 2)
+    zero = 0.95 + 0.05 * squares[1] / (squares[0] - squares[1])
+    # linear buckling leaves out the shortening before it, of the size of the strain
+    assert zero == pytest.approx(1, abs=3e-3)
+
+
+def test_buckling_under_a_guided_end():
+    """A strut pushed by a rigid link: the circle's own curvature enters.
+
+    The load of a column clamped at its foot stays directed at a point below its head at the
+    distance R, or above it: with k^2 = P / EI, tan(kL) = -k(R - L) (above: R negative).
+    The link is a point on a circle, and the load its force.
+    """
+    from scipy.optimize import brentq
+
+    h, L = 0.01, 1.0
+    EI = E * B * h**3 / 12
+    for R in (3.0, -3.0):
+        # head on a circle about (L - R, 0) on the axis, its foot driven towards it: instead, the
+        # head is held and the foot's support is loaded through a force along the axis
+        column = straight(8, h, ElementBeamANCFCubic(1))
+        scene = Scene(column)
+        scene.fix("left", ["r^2", "r_Y0^1"])  # a clamp that slides along the axis
+        scene.joint("circle", at=(L, 0), center=(L - R, 0))
+        scene.point_force((1, 0), (0, 0))
+        factor = scene.buckling(1).factors[0]
+        # the circle pushes the head with P along the radius, at a deflection w with P w / R across
+        # EI y'' = P (w - y) - Q (L - x): y = A (1 - cos kx) + C (kx - sin kx), Q = -+ P w / R
+        c = 1.0 / R
+
+        def f(k):
+            # moment free head and shear: y''(L) = 0, EI y''' + P y' = P c y at L
+            M = np.array([[np.cos(k * L), np.sin(k * L)],
+                          [0.0, 0.0]])
+            A = [np.sin(k * L) * k**3 * -1 + k**2 * k * np.sin(k * L) - k**2 * c * (1 - np.cos(k * L)),
+                 np.cos(k * L) * k**3 + k**2 * k * (1 - np.cos(k * L))
+                 - k**2 * c * (k * L - np.sin(k * L))]
+            M[1] = A
+            return np.linalg.det(M)
+
+        grid = np.linspace(0.3, 8, 2000)
+        values = [f(k) for k in grid]
+        n = next(i for i in range(len(grid) - 1) if values[i] * values[i + 1] < 0)
+        k = brentq(f, grid[n], grid[n + 1])
+        assert factor == pytest.approx(k * k * EI, rel=0.01)
+
+
+def test_greenhill():
+    """A column under its own weight, clamped at its foot."""
+    h, L, g = 0.01, 1.0, 9.81
+    column = straight(8, h, ElementBeamANCFCubic(1), angle=np.pi / 2)
+    factor = Scene(column).clamp("left").gravity((0, -g)).buckling(1).factors[0]
+    known = exact.greenhill_load(E, B * h**3 / 12, L) / (RHO * B * h * g)
+    assert factor == pytest.approx(known, rel=3e-3)
+
+
+def test_buckling_of_a_welded_column_and_of_the_sparse_branch(monkeypatch):
+    h = 0.01
+    known = exact.euler_buckling_load(E, B * h**3 / 12, 1.0, "fixed-free")
+
+    def scene():
+        a, b = straight(4, h, L=0.5), straight(4, h, L=0.5, origin=(0.5, 0))
+        s = Scene(a, b).clamp("left", beam=a).point_force((-1, 0), (1, 0), beam=b)
+        s.joint("weld", beams=(a, b), at=("right", "left"))
+        return s
+
+    assert scene().buckling(1).factors[0] == pytest.approx(known, rel=0.02)
+    whole = Scene(straight(8, h)).clamp("left").point_force((-1, 0), (1, 0))
+    dense = whole.buckling(3)
+    monkeypatch.setattr(eigen, "DENSE", 10)
+    sparse = whole.buckling(3)
+    assert np.allclose(sparse.factors, dense.factors, rtol=1e-7)
+
+
+# what is refused
+
+
+@pytest.mark.parametrize("k", [0, -1, 1.5, True, 10**6])
+def test_number_of_modes(k):
+    with pytest.raises(InputError, match="number of modes"):
+        Scene(straight(2)).modes(k)
+
+
+def test_refused():
+    with pytest.raises(InputError, match="pull the beam straight"):
+        Scene(straight(4)).clamp("left").point_force((1, 0), (1, 0)).buckling()
+    with pytest.raises(SupportError, match="rigid motions"):
+        Scene(straight(4)).point_force((1, 0), (1, 0)).buckling()
+    a, b = straight(2), straight(2, origin=(1, 0))
+    scene = Scene(a, b)
+    scene.joint("hinge", beams=(a, b), at=(1, 0))
+    scene.joint("hinge", beams=(a, b), at=(1, 0))
+    with pytest.raises(SupportError):
+        scene.modes(3)

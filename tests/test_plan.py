@@ -1,0 +1,153 @@
+"""What a scene does not need is not computed: counted by calls, not read from the plan alone."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, NameUnknown,
+                        Scene, StVenantKirchhoff, SupportError)
+from skfem_ancf.beam import Beam as BeamClass
+from skfem_ancf.kernel import TermTables
+from skfem_ancf.linalg import BandMatrix
+
+
+def scene(element=None, nu=0.3, formulation="assumed", **options):
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.01), element or ElementBeamANCF(2),
+                StVenantKirchhoff(2e8, nu, 7800), 0.01, formulation, compiled=False, **options)
+    return Scene(beam).clamp("left").gravity((0, -9.81))
+
+
+@pytest.fixture
+def count(monkeypatch):
+    """Count the calls of methods: count(cls, name) returns a list that grows."""
+    def patch(cls, name):
+        calls, original = [], getattr(cls, name)
+
+        def wrapper(self, *args, **kwargs):
+            calls.append(args)
+            return original(self, *args, **kwargs)
+
+        monkeypatch.setattr(cls, name, wrapper)
+        return calls
+
+    return patch
+
+
+def test_statics_have_no_mass_and_one_factorisation_an_iteration(count):
+    s = scene()
+    mass, factors = count(BeamClass, "mass_elements"), count(BandMatrix, "factorize")
+    tangents, forces = count(TermTables, "material_tangent"), count(TermTables, "force")
+    state = s.solve_static()
+    assert len(mass) == 0 and s.plan()["mass"].status == "skipped"
+    assert len(factors) == len(tangents) == state.iterations  # none after the last correction
+    assert len(forces) == state.iterations + 1
+
+
+def test_dynamics_assemble_the_mass_once_and_keep_factors(count):
+    s = scene()
+    mass, factors = count(BeamClass, "mass_elements"), count(BandMatrix, "factorize")
+    history = s.integrate(0.05, 1e-3, "generalized-alpha")
+    assert len(mass) == 1 and s.plan("dynamic")["mass"].status == "constant"
+    # one more for the mass matrix; fewer than steps for the iteration
+    assert len(factors) == history.factorizations + 1 < 50 < history.iterations
+
+
+def test_linear_problem_is_one_solve_without_geometric_term(count):
+    s = scene(nu=0.0)
+    geometric = count(TermTables, "geometric_tangent")
+    tangents, factors = count(TermTables, "material_tangent"), count(BandMatrix, "factorize")
+    tip = s.solve_linear().displacement((1, 0))
+    assert (len(tangents), len(factors), len(geometric)) == (1, 1, 0)
+    assert s.plan("linear")["geometric term"].status == "skipped"
+    EI = 2e8 * 0.01**4 / 12
+    assert_allclose(tip, [0, -7800 * 9.81 * 1e-4 / (8 * EI)], rtol=6e-3, atol=1e-12)
+    s.solve_static()
+    assert len(geometric) > 1
+
+
+def test_linear_solve_meets_prescribed_displacements_and_joints():
+    s = scene(nu=0.0)
+    s.loads.clear()
+    s.fix("right", "r^2", displacement=0.01)
+    state = s.solve_linear()
+    assert_allclose(state.displacement((1, 0))[1], 0.01, rtol=1e-12)
+    assert_allclose(state.displacement((0.5, 0))[1], 0.01 * 5 / 16, rtol=1e-2)
+    with pytest.raises(SupportError, match="rotation about"):
+        Scene(s.beams[0]).pin("left").solve_linear()
+
+
+@pytest.mark.parametrize("formulation, terms", [("ecm", 2), ("strain-split", 3), ("assumed", 1)])
+def test_no_poisson_coupling_at_nu_zero(formulation, terms):
+    with_nu, without = (scene(nu=nu, formulation=formulation).beams[0].kernel for nu in (0.3, 0.0))
+    assert len(with_nu.tables) == terms and len(without.tables) == 1
+    assert scene(nu=0.0).plan()["Poisson coupling"].status == "skipped"
+    assert scene(nu=0.3).plan()["Poisson coupling"].status == "computed"
+
+
+def test_no_viewer_is_imported():
+    code = ("import sys, skfem_ancf; "
+            "print(sorted({'matplotlib', 'tqdm', 'pyvista', 'numba', 'h5py'} & set(sys.modules)))")
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.strip() == "[]"
+
+
+def test_no_field_that_nobody_asked_for(count):
+    strains = count(BeamClass, "strain")
+    state = scene().solve_static()
+    state.displacement((1, 0)), state.strain_energy, state.reactions("left")
+    assert len(strains) == 0
+    state.strain((0.5, 0))
+    assert len(strains) == 1
+
+
+def test_plan_of_every_kind():
+    s = scene()
+    assert s.plan()["multipliers"].status == "skipped"
+    assert s.plan()["varying loads"].status == "skipped"
+    assert "Cholesky" in s.plan()["linear solver"].reason
+    s.pressure("top", 1.0)
+    s.joint("line", at=(1, 0), direction=(1, 0.5))
+    plan = s.plan()
+    assert plan["multipliers"].status == plan["varying loads"].status == "computed"
+    assert "sparse" in plan["linear solver"].reason
+    assert "LU" in s.plan("dynamic")["linear solver"].reason
+    assert all(item.term in str(plan) and item.reason in str(plan) for item in plan)
+    with pytest.raises(NameUnknown, match="'static', 'linear', 'dynamic'"):
+        s.plan("modal")
+    with pytest.raises(NameUnknown, match="'mass'"):
+        plan["inertia"]
+
+
+# the element is chosen
+
+@pytest.mark.parametrize("fields, height, tolerance, order", [
+    ((), 0.01, 1e-3, 0), ((), 0.01, 5e-5, 2), ("eps_yy", 0.01, 1e-2, 2), ("eps_xy", 0.01, 1e-2, 3),
+    ((), 0.1, 2e-3, 2), ((), 0.2, 1e-3, 5), (("eps_xx", "S_yy"), 0.01, 1e-2, 5)])
+def test_lowest_order_that_will_do(fields, height, tolerance, order):
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 9), height)
+    beam = Beam(mesh, "auto", StVenantKirchhoff(1.0, 0.3), 0.1, fields=fields, tolerance=tolerance)
+    assert beam.element.order == order
+
+
+@pytest.mark.parametrize("height, tolerance", [(0.01, 1e-3), (0.05, 1e-3), (0.1, 1e-2), (0.1, 2e-3)])
+def test_chosen_element_keeps_the_tolerance(height, tolerance):
+    """Tip of a linear cantilever against sections of order 7; a fine mesh for both."""
+    def tip(element):
+        mesh = MeshBeam.init_line(np.linspace(0, 1, 65), height)
+        beam = Beam(mesh, element, StVenantKirchhoff(1.0, 0.3), 1.0, tolerance=tolerance)
+        s = Scene(beam).clamp("left", thickness="free").traction("right", (0, -1e-6))
+        return s.solve_linear().displacement((1, 0))[1]
+
+    assert abs(tip("auto") / tip(ElementBeamANCF(7)) - 1) < tolerance
+
+
+def test_choice_refuses_unknown_fields():
+    mesh = MeshBeam.init_line([0, 1], 0.1)
+    with pytest.raises(NameUnknown, match="'eps_yy'"):
+        Beam(mesh, "auto", StVenantKirchhoff(1.0, 0.3), 0.1, fields=["eps_zz"])
+    with pytest.raises(InputError, match="below 1"):
+        Beam(mesh, "auto", StVenantKirchhoff(1.0, 0.3), 0.1, tolerance=2.0)
+    assert Beam(mesh, ElementBeamCable(), StVenantKirchhoff(1.0, 0.3), 0.1).is_cable
