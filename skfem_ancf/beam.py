@@ -399,8 +399,8 @@ class Beam:
     @property
     def total_mass(self):
         """Mass of the beam."""
-        return self.density * self.width * float(np.sum(
-            self.exact_basis().dx))
+        volume = float(np.sum(self._shapes[1]))
+        return self.density * volume * (self.mesh.nelements if self.mesh.is_uniform else 1)
 
     @property
     def density(self):
@@ -409,13 +409,33 @@ class Beam:
             raise InputError(f"{self.material!r} has no density: give one to use mass or gravity")
         return self.material.density
 
-    def mass_elements(self):
-        """Element mass matrices, shape (nelements, 2 nd, 2 nd)."""
-        basis = Basis(self.mesh, self.element, quadrature=self.exact_basis().quadrature)
-        N = np.array([np.asarray(b[0]) for b in basis.basis])
-        scalar = self.density * self.width * np.einsum("iep,jep,ep->eij", N, N, basis.dx,
-                                                       optimize=True)
-        return np.einsum("eij,ab->eiajb", scalar, np.eye(2)).reshape(-1, 2 * self.nd, 2 * self.nd)
+    @cached_property
+    def _shapes(self):
+        """Local functions (nb, ne, np) and volume weights (ne, np); one element if all are equal."""
+        n = self.element.axis_degree + 1 + (0 if self.mesh.is_straight else 1)
+        X, W = tensor(gauss(n), AXIS if self.is_cable else gauss(self.element.order + 1))
+        tind = np.array([0]) if self.mesh.is_uniform else None
+        mapping = self.mesh.mapping()
+        N = np.array([np.asarray(self.element.gbasis(mapping, X, i, tind)[0])
+                      for i in range(2 * self.element.nodal_dofs)])
+        return N, self.width * W * mapping.detDF(X, tind)
+
+    def mass_elements(self, elements=slice(None)):
+        """Element mass matrices of a slice of the elements, shape (n, 2 nd, 2 nd)."""
+        N, dV = self._shapes
+        if not self.mesh.is_uniform:
+            N, dV = N[:, elements], dV[elements]
+        scalar = self.density * np.einsum("iep,jep,ep->eij", N, N, dV, optimize=True)
+        full = np.einsum("eij,ab->eiajb", scalar, np.eye(2)).reshape(-1, 2 * self.nd, 2 * self.nd)
+        n = len(range(*elements.indices(self.mesh.nelements)))
+        return np.repeat(full, n, axis=0) if self.mesh.is_uniform else full
+
+    def weight(self, g):
+        """The dead load of an acceleration ``g`` (2,), shape (N,)."""
+        N, dV = self._shapes
+        mean = self.density * np.einsum("iep,ep->ei", N, dV)
+        load = np.broadcast_to(mean[:, :, None] * g, (self.mesh.nelements,) + mean.shape[1:] + (2,))
+        return self.kernel.scatter(np.ascontiguousarray(load))
 
     def mass(self):
         """The mass matrix, constant, sparse, shape (N, N)."""

@@ -64,7 +64,7 @@ class CableKernel(Chain):
         xi, w = gauss(n)
         powers = np.tile(np.arange(m), 2)
         scale = mesh.lengths[:, None] ** powers
-        same = np.ptp(mesh.lengths) <= 1e-13 * np.max(mesh.lengths)
+        same = mesh.is_uniform or np.ptp(mesh.lengths) <= 1e-13 * np.max(mesh.lengths)
         if same:
             scale = scale[:1]
         L = scale[:, 1] if m > 1 else mesh.lengths

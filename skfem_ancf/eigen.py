@@ -73,8 +73,9 @@ def modes(system, state, k):
 def buckling(system, k):
     """The k lowest positive load factors of linear buckling.
 
-    ``(K_0 + factor K_s) phi = 0``, K_s the geometric part for the stress that the full load
-    causes in the stress-free geometry, less the stiffness of the loads.
+    ``(K_0 + factor K_s) phi = 0``, K_s the geometric part for the stress that the full load, moved
+    supports included, causes in the stress-free geometry, less the stiffness of the loads. Factors
+    at which the mean strain before buckling is not below one are left out.
 
     Raises
     ------
@@ -86,7 +87,11 @@ def buckling(system, k):
     _, evaluations = system.assemble(zero, 0.0)
     K0 = system.K.tocsc()
     system.factorize(zero, 0.0, none)
-    du, multipliers = system.solve(system.external_force(zero), -system.constraint(zero, 0.0))
+    du0 = np.zeros(system.N)
+    du0[system.fixed] = system.values(1.0)
+    du, multipliers = system.solve(system.external_force(zero) - K0 @ du0,
+                                   -system.constraint(du0, 1.0))
+    du += du0
     carried = system.stress_step(evaluations, du)
     system.assemble(zero, 1.0, carried)
     Ks = system.K.tocsc() + system.curvature(zero, 0.0, multipliers) - K0
@@ -103,7 +108,9 @@ def buckling(system, k):
         A, B = (_reduced(S, free, Z) for S in (Ks, K0))
         theta, X = scipy.linalg.eigh(A, B, subset_by_index=[0, _count(k, len(A)) - 1])
         X = X if Z is None else Z @ X
-    good = theta < -1e-12 * np.max(np.abs(theta))
+    # square roots of the energies of the strain before buckling and of a strain of one
+    smallest = np.sqrt(max(du @ (K0 @ du), 0.0)) * np.finfo(float).eps / system.stiffness_scale
+    good = theta < -smallest
     if not np.any(good):
         raise InputError("no positive load factor: these loads pull the beam straight")
     order = np.argsort(-1.0 / theta[good])

@@ -82,7 +82,7 @@ class TermTables:
         eta = term.section_nodes
         self.section_points = len(term.section[0])
         ns = len(eta)
-        same = mesh.is_straight and np.ptp(mesh.lengths) <= 1e-13 * np.max(mesh.lengths)
+        same = mesh.is_uniform
         tind = np.array([0]) if same else None
         self.shared = same
 

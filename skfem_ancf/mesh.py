@@ -337,6 +337,16 @@ class MeshBeam(Mesh):
                 and np.all(np.abs(self.p_Y - np.array([-self.p_X[1], self.p_X[0]])) <= tol))
         return self._is_straight
 
+    @property
+    def is_uniform(self):
+        """True if every element is straight and of the same length: one table serves them all."""
+        if not hasattr(self, "_is_uniform"):
+            # the round-off of the nodes' positions is no difference in length
+            noise = 8 * np.finfo(float).eps * np.max(np.abs(self.p))
+            self._is_uniform = self.is_straight and bool(
+                np.ptp(self.lengths) <= 1e-13 * np.max(self.lengths) + noise)
+        return self._is_uniform
+
     def element_finder(self, mapping=None):
         """A function from points x, y to the elements that hold them.
 

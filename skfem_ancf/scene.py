@@ -252,7 +252,7 @@ class Scene:
         """
         g = require_finite("g", g, (2,))
         for b in self.beams if beam is None else [select_beam(self.beams, beam)]:
-            self._load(DeadLoad(b, asm(forms.gravity(b.density, g, b.width), b.exact_basis())), amplitude)
+            self._load(DeadLoad(b, b.weight(g)), amplitude)
         return self
 
     @_recorded

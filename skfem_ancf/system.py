@@ -271,7 +271,8 @@ class System:
         """The mass matrix, a :class:`~skfem_ancf.linalg.BandMatrix`; assembled once."""
         M = self.new_band()
         for beam, offset in zip(self.beams, self.offsets):
-            M.add_elements(beam.mass_elements(), int(offset), beam.nd, beam.mesh.t[0])
+            for part in beam.kernel.chunks():
+                M.add_elements(beam.mass_elements(part), int(offset), beam.nd, beam.mesh.t[0, part])
         return M
 
     @cached_property

@@ -262,7 +262,8 @@ def test_other_schemes_do_not_conserve():
 def test_mass_is_assembled_and_factorised_once(monkeypatch):
     assembled, factorised = [], []
     assemble, factorize = Beam.mass_elements, BandMatrix.factorize
-    monkeypatch.setattr(Beam, "mass_elements", lambda b: assembled.append(b) or assemble(b))
+    monkeypatch.setattr(Beam, "mass_elements",
+                        lambda b, *part: assembled.append(b) or assemble(b, *part))
     monkeypatch.setattr(BandMatrix, "factorize", lambda A: factorised.append(A) or factorize(A))
     scene = Scene(soft(2, 2)).pin("left").gravity(GRAVITY)
     for scheme in SCHEMES:

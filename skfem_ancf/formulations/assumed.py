@@ -71,8 +71,7 @@ class Assumed(Formulation):
         return terms[0].law.stress(strain) + terms[1].law.stress(mean)
 
     def stabilisation(self, mesh, element, material, width):
-        same = mesh.is_straight and np.ptp(mesh.lengths) <= 1e-13 * np.max(mesh.lengths)
-        tind = np.arange(1 if same else mesh.nelements)
+        tind = np.arange(1 if mesh.is_uniform else mesh.nelements)
         L, EI = mesh.lengths[tind], material.E * width * mesh.height**3 / 12.0
         q = element.rigid(mesh)
         q[0] = mesh.p

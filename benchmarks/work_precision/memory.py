@@ -1,0 +1,39 @@
+"""Measures the peak memory of runs: reads [case, number] line by line, prints megabytes."""
+
+import json
+import os
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from work_precision.cases import runs_of, warm_up  # noqa: E402
+
+
+def peak(case, index, quick):
+    """Peak resident memory (MB) of a child that makes one run."""
+    pid = os.fork()
+    if pid == 0:
+        try:
+            solver = runs_of(case, quick)[index].build()
+            solver.solve()
+        except Exception:
+            os._exit(1)
+        os._exit(0)
+    _, status, usage = os.wait4(pid, 0)
+    scale = 2.0**20 if sys.platform == "darwin" else 1024.0
+    return round(usage.ru_maxrss / scale, 1) if status == 0 else ""
+
+
+def main():
+    """Serve until the input ends."""
+    quick = "--quick" in sys.argv
+    out = os.fdopen(os.dup(1), "w")  # what codes print must not come between
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    warm_up()
+    for line in sys.stdin:
+        print(json.dumps(peak(*json.loads(line), quick)), file=out, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,172 @@
+"""What a run is, and how it is timed."""
+
+import json
+import os
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+
+from .problems import Problem
+
+COLUMNS = ("case", "code", "variant", "elements", "dofs", "steps", "error", "seconds",
+           "iterations", "peak_mb", "setup_seconds", "runs", "note", "versions", "machine")
+#: Seconds spent on the repetitions of one run, each of two passes, and how many there are at most.
+BUDGET, MOST = 0.1, 7
+#: A run that takes longer than this many seconds is made once.
+LONG = 1.5
+
+
+@dataclass
+class Solver:
+    """A discretised problem: ``solve()`` is timed, ``read(result)`` is not.
+
+    ``read`` returns the tip displacement (2,), the number of load or time steps and that of the
+    iterations.
+    """
+
+    solve: Callable
+    read: Callable
+    dofs: int
+
+
+@dataclass
+class Run:
+    """One entry of a work-precision diagram; ``model`` names the reference for its error."""
+
+    problem: Problem
+    code: str
+    variant: str
+    elements: int
+    model: str
+    build: Callable
+    steps: int | None = None
+
+    @property
+    def label(self):
+        return f"{self.problem.name} {self.code} {self.variant} {self.elements}"
+
+
+def grading(n, grade=1.0):
+    """n + 1 numbers from 0 to 1, denser near 0 if grade > 1."""
+    return np.linspace(0.0, 1.0, n + 1) ** grade
+
+
+def clock():
+    """Seconds of processor time of this process: on one core the time it takes by itself."""
+    return time.process_time()
+
+
+def versions():
+    """Versions of what takes part, in one line."""
+    out = [f"python {platform.python_version()}"]
+    for name in ("skfem-ancf", "scikit-fem", "numpy", "scipy", "numba", "exudyn"):
+        try:
+            out.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            continue
+    return ", ".join(out)
+
+
+def machine():
+    """The processor, in one line."""
+    name = platform.processor() or platform.machine()
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        name = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        pass
+    return f"{name}, {platform.system()}, one core"
+
+
+def single_core():
+    """Keep this process on one core, if the system allows it."""
+    try:
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    except (AttributeError, OSError):
+        pass
+
+
+class Timed:
+    """A run with its measurements; a run that fails keeps the message instead."""
+
+    def __init__(self, run):
+        self.run, self.seconds, self.note, self.solver = run, [], "", None
+        self.first = self.setup = np.nan
+        try:
+            start = clock()
+            self.solver = run.build()
+            built = clock()
+            self.result = self.solver.read(self.solver.solve())
+            end = clock()
+        except Exception as error:  # whatever a code raises, it has not solved the problem
+            self.note = f"failed: {type(error).__name__}: {str(error).splitlines()[0][:120]}"
+            return
+        self.setup, self.first = built - start, end - built
+        if self.first > LONG:
+            self.seconds = [self.first]
+
+    def repeat(self):
+        """Time the run a few times more."""
+        if self.solver is None or self.first > LONG:
+            return
+        for _ in range(int(np.clip(BUDGET / max(self.first, 1e-6), 1, MOST))):
+            start = clock()
+            self.solver.solve()
+            self.seconds.append(clock() - start)
+
+    def row(self, reference, peak, about):
+        """A row of the CSV file; ``about`` is (versions, machine)."""
+        r = self.run
+        if self.solver is None:
+            return dict(zip(COLUMNS, (r.problem.name, r.code, r.variant, r.elements, "", r.steps,
+                                      np.nan, np.nan, "", peak, np.nan, 0, self.note, *about)))
+        tip, steps, iterations = self.result
+        seconds = float(np.median(self.seconds))
+        error = float(np.linalg.norm(np.asarray(tip) - reference) / r.problem.L)
+        return dict(zip(COLUMNS, (
+            r.problem.name, r.code, r.variant, r.elements, self.solver.dofs, steps, error, seconds,
+            iterations, peak, self.setup + max(0.0, self.first - seconds), len(self.seconds),
+            self.note, *about)))
+
+
+class Memory:
+    """Peak memory of a run by itself, in a process forked from one that has only imported.
+
+    That process is started once and loads what all runs need, the compiled kernels included, so
+    that its children show the imports and the run and nothing else.
+    """
+
+    def __init__(self, quick):
+        self.process = None
+        if hasattr(os, "fork"):
+            script = Path(__file__).with_name("memory.py")
+            self.process = subprocess.Popen(
+                [sys.executable, str(script), *(["--quick"] if quick else [])], text=True,
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process is not None:
+            self.process.stdin.close()
+            self.process.wait()
+
+    def peak(self, case, index):
+        """Peak resident memory (MB) of run number ``index`` of a case; "" where not known."""
+        if self.process is None:
+            return ""
+        try:
+            self.process.stdin.write(json.dumps([case, index]) + "\n")
+            self.process.stdin.flush()
+            return json.loads(self.process.stdout.readline())
+        except (OSError, ValueError):
+            self.process = None
+            return ""
