@@ -145,20 +145,27 @@ def fine_and_slender(quick, out):
                 fails = not np.isfinite(u)
                 note = (f"reached load {steps:.3g}" if fails else
                         f"{iterations} iterations, {steps} load step(s)")
+                held = n * s <= (1.1e8 if name == "N=2" else 1.1e7)
                 yield Row(check, f"{name}, {n} elements, L/h = {s:g}", "error of the tip",
-                          u - thin_limit(), LIMIT_ERROR[name] * 1.01 if n * s <= 1e6 else None, note)
+                          u - thin_limit(), LIMIT_ERROR[name] if held else None, note)
 
 
 def poisson(quick, out):
     """nu up to 0.4999 in plane strain."""
     check = "nearly incompressible"
-    names = ("N=2", "cubic N=2") if quick else ("N=1", "N=2", "N=6", "cubic N=2", "cable 5")
-    for name in names:
+    elements = {**ELEMENTS, "N=3": ElementBeamANCF(3), "cubic N=3": ElementBeamANCFCubic(3)}
+    # how far eps_yy, continuous along X, can follow -eps_xx, which is not: linear sections only
+    # where both are constant, quadratic ones not the square of Y in the strain
+    highest = {"N=2": 0.45, "N=3": 0.45, "N=6": 0.45, "cubic N=2": 0.499}
+    for name in ("N=1", "cubic N=3") if quick else (
+            "N=1", "N=2", "N=3", "N=6", "cubic N=2", "cubic N=3", "cable 5"):
         for nu in (0.4999,) if quick else (0.0, 0.3, 0.45, 0.49, 0.499, 0.4999):
-            scene = cantilever(ELEMENTS[name], line(16, 1e-3), soft(1e-3, nu=nu, plane="strain"))
+            scene = cantilever(elements[name], line(16, 1e-3), soft(1e-3, nu=nu, plane="strain"))
             u, iterations, steps = tip(scene)
+            bound = LIMIT_ERROR.get(name, LIMIT_ERROR["cubic N=2" if "cubic" in name else "N=2"])
             yield Row(check, f"nu = {nu:g}, plane strain, L/h = 1e3, {name}", "error of the tip",
-                      u - thin_limit("strain", nu), LIMIT_ERROR[name], f"{iterations} iterations")
+                      u - thin_limit("strain", nu), bound if nu <= highest.get(name, 0.5) else None,
+                      f"{iterations} iterations")
     # thick: the section must be rich enough to bend at constant volume
     for order in (1, 2, 3, 4):
         for nu in (0.4999,) if quick else (0.3, 0.49, 0.4999):
@@ -242,8 +249,10 @@ def units(quick, out):
         for system in list(systems)[1:]:
             now = found[system]
             for what, k in (("tip", 0), ("strain", 2), ("frequencies", 3), ("pendulum", 4)):
+                # the eigenvalues of a slender beam lose (L/h)^2 in round-off
                 yield Row(check, f"{system}, {name}", f"change of the {what}",
-                          np.max(np.abs(now[k] - base[k])) / np.max(np.abs(base[k])), 1e-8,
+                          np.max(np.abs(now[k] - base[k])) / np.max(np.abs(base[k])),
+                          1e-6 if what == "frequencies" else 1e-9,
                           f"{now[1]} iterations, in m and Pa {base[1]}")
 
 
@@ -288,14 +297,16 @@ def length_ratios(quick, out):
             scene = cantilever(ELEMENTS[name], MeshBeam.init_line(x, 1e-3), soft(1e-3))
             u, iterations, steps = tip(scene)
             yield Row(check, f"long and short in turn, 1 : {ratio:g}, L/h = 1e3, {name}",
-                      "error of the tip", u - thin_limit(), LIMIT_ERROR[name],
-                      f"{iterations} iterations, {steps} load step(s)")
+                      "error of the tip", u - thin_limit(),
+                      LIMIT_ERROR[name] if ratio <= 1e3 or "cubic" in name else None,
+                      f"{iterations} iterations, {steps} load step(s)" if np.isfinite(u) else
+                      f"reached load {steps:.3g}")
             graded = np.append(0.0, np.geomspace(1 / ratio, 1.0, 32) if ratio > 1 else
                                np.linspace(1 / 32, 1, 32))
             u, iterations, steps = tip(cantilever(
                 ELEMENTS[name], MeshBeam.init_line(graded, 1e-3), soft(1e-3)))
             yield Row(check, f"graded to the root, 1 : {ratio:g}, L/h = 1e3, {name}",
-                      "error of the tip", u - thin_limit(), 0.1,
+                      "error of the tip", u - thin_limit(), 1e-2,
                       f"{iterations} iterations, {steps} load step(s)")
 
 
@@ -304,8 +315,8 @@ def loads(quick, out):
     check = "loads"
     s = 1e4
     EI = 2e8 * WIDTH * 0.01**3 / 12
-    for name, n, bound in (("N=2", 32, 5e-2), ("cubic N=2", 32, 1e-2), ("cable 3", 32, 5e-3),
-                           ("cable 5", 32, 1e-4)):
+    for name, n, bound in (("N=2", 32, 2.5e-3), ("cubic N=2", 32, 1e-3), ("cable 3", 32, 1e-3),
+                           ("cable 5", 32, 1e-5)):
         for alpha in (1e-12, 1e3) if quick else 10.0 ** np.arange(-12, 4):
             beam = Beam(line(n, 1 / s), ELEMENTS[name], soft(1 / s), WIDTH, formulation="assumed")
             scene = Scene(beam).clamp("left", thickness="free")
@@ -404,10 +415,10 @@ def rigid_motions(quick, out):
 
 def spin(quick, out):
     """Two hundred turns of a free beam."""
-    turns, per_turn, omega = (3 if quick else 200), 100, 10.0
+    turns, per_turn, omega = (3 if quick else 200), 200, 10.0
     dt = 2 * np.pi / omega / per_turn
-    for name, element in (("N=1", ElementBeamANCF(1)), ("N=2", ElementBeamANCF(2)),
-                          ("cubic N=2", ElementBeamANCFCubic(2)), ("cable 3", ElementBeamCable(3))):
+    for name, element in (("N=2", ElementBeamANCF(2)), ("cubic N=2", ElementBeamANCFCubic(2)),
+                          ("cable 3", ElementBeamCable(3))):
         if quick and name != "N=2":
             continue
         beam = Beam(line(4, 0.02), element, StVenantKirchhoff(2e9, NU, 7800), WIDTH,
@@ -439,7 +450,7 @@ def spin(quick, out):
         rate = H[0] / inertia
         expected = len(history.t[1:]) * 2 * np.arctan(rate * dt / 2)
         yield Row("spin", case, "turn, relative to that of a rigid beam", angle[-1] / expected - 1,
-                  1e-2, f"{angle[-1] / 2 / np.pi:.2f} turns")
+                  1e-3, f"{angle[-1] / 2 / np.pi:.2f} turns")
 
 
 ROOTS = {1: None, 2: ("r", "r_X", "r_Y0^1", "r_Y1^1"),

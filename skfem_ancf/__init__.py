@@ -10,3 +10,10 @@ from .errors import (AncfError, ConvergenceError, InputError, MeshError, Missing
 from .materials import NeoHookean, StVenantKirchhoff
 from .mesh import MeshBeam
 from .scene import Scene
+
+__all__ = [
+    "AncfError", "Beam", "ConvergenceError", "ElementBeamANCF", "ElementBeamANCFCubic",
+    "ElementBeamCable", "ElementBeamPatelShabana", "EnergyMomentum", "GeneralizedAlpha", "HHT",
+    "InputError", "MeshBeam", "MeshError", "MissingExtra", "NameUnknown", "NeoHookean",
+    "Newmark", "Scene", "StVenantKirchhoff", "SupportError", "forms", "reference_coordinates",
+]

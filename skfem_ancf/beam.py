@@ -332,8 +332,8 @@ class Beam:
                           np.sqrt(1.0 + 2.0 * strain[1]) * normal], axis=1)
             return F - frame, frame
         u_e = self.kernel.gather(u, slice(None) if tind is None else tind)
-        grad = sum(np.einsum("ei,jep->ijep", u_e[:, k], self.element.gbasis(mapping, X, k, tind)[0].grad)
-                   for k in range(u_e.shape[1]))
+        fields = (self.element.gbasis(mapping, X, k, tind)[0] for k in range(u_e.shape[1]))
+        grad = sum(np.einsum("ei,jep->ijep", u_e[:, k], f.grad) for k, f in enumerate(fields))
         frame = mapping.frame(X, tind)
         return np.einsum("ijep,jJep->iJep", grad, frame), frame
 
@@ -411,7 +411,7 @@ class Beam:
 
     @cached_property
     def _shapes(self):
-        """Local functions (nb, ne, np) and volume weights (ne, np); one element if all are equal."""
+        """Local functions (nb, ne, np) and volume weights (ne, np); ne = 1 if all are equal."""
         n = self.element.axis_degree + 1 + (0 if self.mesh.is_straight else 1)
         X, W = tensor(gauss(n), AXIS if self.is_cable else gauss(self.element.order + 1))
         tind = np.array([0]) if self.mesh.is_uniform else None
@@ -440,3 +440,23 @@ class Beam:
     def mass(self):
         """The mass matrix, constant, sparse, shape (N, N)."""
         return asm(forms.mass(self.density, self.width), self.exact_basis())
+
+
+def select_beam(beams, beam):
+    """The beam meant by a Beam, a name, a number, or None where there is only one.
+
+    Raises
+    ------
+    NameUnknown
+        If there is no such beam, or None is given and there are several.
+    """
+    known = [b.name if b.name is not None else k for k, b in enumerate(beams)]
+    if beam is None:
+        if len(beams) == 1:
+            return beams[0]
+        raise InputError(f"the scene has {len(beams)} beams: say which with beam=, one of {known}")
+    for k, b in enumerate(beams):
+        if b is beam or (isinstance(beam, str) and b.name == beam) or (
+                isinstance(beam, int) and not isinstance(beam, bool) and beam == k):
+            return b
+    raise NameUnknown("beam", beam, known)

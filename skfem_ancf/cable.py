@@ -173,7 +173,8 @@ class CableKernel(Chain):
         aa = aa + M[..., None, None] * (
             -2.0 / s2**2 * (mixed + np.swapaxes(mixed, -1, -2) + c * np.eye(2))
             + 8.0 * c / s2**3 * a[..., :, None] * a[..., None, :])
-        ab = M[..., None, None] * (_J / s2 + 2.0 / s2**2 * a[..., :, None] * turned(a)[..., None, :])
+        outer = a[..., :, None] * turned(a)[..., None, :]
+        ab = M[..., None, None] * (_J / s2 + 2.0 / s2**2 * outer)
 
         def block(G, T, H):
             """sum_p G[p, k] T[p, i, j] H[p, l] as (ne, 2 nb, 2 nb)."""

@@ -323,7 +323,7 @@ def beam_loop(pack, u, f, tangent, geometric, carried, use_carried, strains, str
 def beam_increment(pack, u, du, out):
     """The strain's derivative at u in the direction du, (3, ne, np)."""
     (Gx_, Gy_, e1_, e2_, w_, D, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, constant, left, nd) = pack
-    nb, n, ns = nd, w_.shape[1], x_xx.size // Lxx.shape[1]
+    nb, ns = nd, x_xx.size // Lxx.shape[1]
     rx, dx = np.empty((Gx_.shape[1], 2)), np.empty((Gx_.shape[1], 2))
     ry, dy = np.empty((Gy_.shape[1], 2)), np.empty((Gy_.shape[1], 2))
     none = np.zeros((1, 2))
@@ -413,7 +413,6 @@ def cable_loop(pack, u, f, tangent, geometric, carried, use_carried, strains, st
     nb, m, n = nd, 2 * nd, w_.shape[1]
     K, T = np.empty((m, m)), np.empty((4, 4))
     e_a, k_a, k_b, c_a = np.empty(2), np.empty(2), np.empty(2), np.empty(2)
-    Be, Bk = np.empty(m), np.empty(m)
     EA, EI = stiffness
     for e in range(left.size):
         t = e if G1_.shape[0] > 1 else 0
@@ -637,7 +636,8 @@ def steps(cable, cpack, bpack, strains, conserving, parameters, load, fixed, M, 
                 _force(cable, cpack, bpack, u, f, strains, A)
                 for i in range(N):
                     w = (u[i] - base[i]) / (beta * dt * dt)
-                    x[i] = ((1.0 - alpha_m) * w + alpha_m * w0[i] - alpha_f * a0[i]) / (1.0 - alpha_f)
+                    x[i] = (1.0 - alpha_m) * w + alpha_m * w0[i] - alpha_f * a0[i]
+                    x[i] /= 1.0 - alpha_f
             multiply(M, ld, bw, x, inertia)
             for i in range(N):
                 R[i] = 0.0 if fixed[i] else load[i] - f[i] - inertia[i]

@@ -5,7 +5,8 @@ with the coordinates passed as ``r``:
 
 >>> import numpy as np
 >>> from skfem import Basis, ElementVector, asm
->>> from skfem_ancf import ElementBeamANCF, MeshBeam, StVenantKirchhoff, forms, reference_coordinates
+>>> from skfem_ancf import (ElementBeamANCF, MeshBeam, StVenantKirchhoff, forms,
+...                         reference_coordinates)
 >>> basis = Basis(MeshBeam.init_line(np.linspace(0, 1, 3), height=0.1),
 ...               ElementVector(ElementBeamANCF(2)))
 >>> steel = StVenantKirchhoff(E=2.1e11, nu=0.3)
@@ -189,7 +190,7 @@ def gravity(density, g, width=1.0):
 
 
 def traction(t, width=1.0):
-    """Dead traction ``int t . v dA`` for a ``FacetBasis``; ``t`` constant (2,) or t(x) -> (2, ...)."""
+    """Dead traction ``int t . v dA`` for a ``FacetBasis``; ``t`` is (2,) or t(x) -> (2, ...)."""
 
     @LinearForm
     def surface_load(v, w):

@@ -2,8 +2,6 @@
 
 from typing import NamedTuple
 
-import numpy as np
-
 from .errors import NameUnknown
 
 KINDS = ("static", "linear", "dynamic")

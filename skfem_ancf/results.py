@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .beam import select_beam
 from .errors import MeshError
 
 
@@ -67,8 +68,6 @@ class State:
     # at a material point
 
     def _find(self, point, beam):
-        from .scene import select_beam
-
         if beam is not None or len(self.beams) == 1:
             beam = select_beam(self.beams, beam)
             return beam, *beam.locate(point)
@@ -129,8 +128,6 @@ class State:
         -------
         Reaction
         """
-        from .scene import select_beam
-
         beam = select_beam(self.beams, beam)
         s = self.system.of(beam)
         total = np.where(self.system.free, 0.0, self._support_force())

@@ -7,7 +7,7 @@ import numpy as np
 from skfem.assembly import LinearForm, asm
 
 from . import eigen, forms
-from .beam import Beam
+from .beam import Beam, select_beam
 from .dynamics import get_scheme
 from .dynamics.integrate import integrate
 from .errors import (ConvergenceError, InputError, NameUnknown, SupportError, require_finite,
@@ -20,26 +20,6 @@ from .results import State
 from .statics import continuation, newton
 from .statics.adapt import solve_adaptive
 from .system import System
-
-
-def select_beam(beams, beam):
-    """The beam meant by a Beam, a name, a number, or None where there is only one.
-
-    Raises
-    ------
-    NameUnknown
-        If there is no such beam, or None is given and there are several.
-    """
-    known = [b.name if b.name is not None else k for k, b in enumerate(beams)]
-    if beam is None:
-        if len(beams) == 1:
-            return beams[0]
-        raise InputError(f"the scene has {len(beams)} beams: say which with beam=, one of {known}")
-    for k, b in enumerate(beams):
-        if b is beam or (isinstance(beam, str) and b.name == beam) or (
-                isinstance(beam, int) and not isinstance(beam, bool) and beam == k):
-            return b
-    raise NameUnknown("beam", beam, known)
 
 
 def _recorded(method):

@@ -5,7 +5,6 @@ from functools import cached_property
 
 import numpy as np
 from scipy import sparse
-from scipy.linalg import blas
 from scipy.sparse.linalg import splu
 
 from .errors import SupportError
@@ -134,7 +133,8 @@ class System:
     def curvature(self, u, t, multipliers):
         """sum_k multipliers[k] d^2 Phi_k / du^2 at free coordinates, sparse, shape (N, N)."""
         i, j, v = self._curvature(u, t, multipliers)
-        return sparse.csr_matrix((v * (self.free[i] & self.free[j]), (i, j)), shape=(self.N, self.N))
+        v = v * (self.free[i] & self.free[j])
+        return sparse.csr_matrix((v, (i, j)), shape=(self.N, self.N))
 
     def _curvature(self, u, t, multipliers):
         parts = [joint.curvature(u, t, part)

@@ -1,6 +1,7 @@
 """Runs of Exudyn's planar beams, where it is installed."""
 
 import sys
+from contextlib import redirect_stdout
 
 from .problems import GRAVITY, THROW_ALONG, arm_angle, throw
 from .runs import Run, Solver
@@ -8,10 +9,10 @@ from .runs import Run, Solver
 CODE = "Exudyn"
 sys.exudynFast = True  # its build without range checks, where the processor allows
 try:
-    import exudyn
-    import exudyn.itemInterface as items
-    from exudyn.beams import GenerateBeamElementsAlongLine
-
+    with redirect_stdout(None):
+        import exudyn
+        import exudyn.itemInterface as items
+        from exudyn.beams import GenerateBeamElementsAlongLine
     exudyn.config.printToConsole = False
 except ImportError:
     exudyn = None

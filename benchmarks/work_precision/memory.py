@@ -8,15 +8,18 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from work_precision.cases import runs_of, warm_up  # noqa: E402
+from work_precision.micro import SCALED  # noqa: E402
 
 
 def peak(case, index, quick):
-    """Peak resident memory (MB) of a child that makes one run."""
+    """Peak resident memory (MB) of a child that makes run ``index``, or scales to that size."""
     pid = os.fork()
     if pid == 0:
         try:
-            solver = runs_of(case, quick)[index].build()
-            solver.solve()
+            if case in SCALED:
+                SCALED[case](index).solve_static()
+            else:
+                runs_of(case, quick)[index].build().solve()
         except Exception:
             os._exit(1)
         os._exit(0)

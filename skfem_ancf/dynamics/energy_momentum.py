@@ -1,7 +1,5 @@
 """The energy-momentum scheme."""
 
-import numpy as np
-
 from .base import Motion, Scheme, Step
 
 

@@ -1,7 +1,5 @@
 """The generalised-alpha family: Chung-Hulbert, HHT and Newmark."""
 
-import numpy as np
-
 from ..errors import InputError, require_finite_scalar
 from .base import Motion, Scheme, Step
 

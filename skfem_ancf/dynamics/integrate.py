@@ -191,7 +191,7 @@ class Integrator:
                 rate = size / before
                 if rate > 1.0 and size <= 1e3 * floor:
                     break  # round-off
-                self._rate = max(rate, 0.01)  # of one step, used in the next, where it may be larger
+                self._rate = max(rate, 0.01)  # it is used in the next step, where it may be larger
                 left = np.log(wanted / size) / np.log(min(rate, 0.99))  # iterations to go
                 if size > wanted and (rate > SLOW or (left > MANY and not fresh)):
                     if fresh and rate > 2.0:
@@ -284,7 +284,8 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=Non
     step = 1e-4 * span if auto else min(require_positive("dt", dt), span)
     if t_eval is not None:
         t_eval = require_finite("t_eval", t_eval, (None,))
-        if not len(t_eval) or np.any(np.diff(t_eval) <= 0) or t_eval[0] < t_start or t_eval[-1] > t_end * (1 + 1e-12):
+        if (not len(t_eval) or np.any(np.diff(t_eval) <= 0) or t_eval[0] < t_start
+                or t_eval[-1] > t_end * (1 + 1e-12)):
             raise InputError(f"t_eval must increase within [{t_start}, {t_end}], got {t_eval!r}")
     rtol = require_positive("rtol", rtol)
     system.require_independent_joints()

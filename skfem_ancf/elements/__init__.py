@@ -14,5 +14,6 @@ ELEMENTS = {
     **{f"cubic-{n}": (lambda n=n: ElementBeamANCFCubic(n)) for n in (1, 2, 3, 6)},
 }
 
-__all__ = ["ELEMENTS", "ORDER_OF_FIELD", "ElementBeam", "ElementBeamANCF", "ElementBeamANCFCubic", "ElementBeamCable",
-           "ElementBeamPatelShabana", "choose_element"]
+__all__ = ["ELEMENTS", "ORDER_OF_FIELD", "ElementBeam", "ElementBeamANCF",
+           "ElementBeamANCFCubic", "ElementBeamCable", "ElementBeamPatelShabana",
+           "choose_element"]

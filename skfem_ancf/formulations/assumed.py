@@ -24,8 +24,8 @@ class Assumed(Formulation):
     likewise for each pair ``r_Yk``, ``r_XYk`` of cubic sections. The complex number beta, 1 for a
     straight element, makes c vanish in the stress-free state; c turns with the beam, so the term
     is objective, quadratic, and its matrix constant. For linear sections k = E I / L^2; for cubic
-    sections k = 10 E I / l^2 (the cubic cable: 300 E I / l^2) for the axis, l the length of the beam, and E I / N for each section
-    coordinate, which keeps the fourth order.
+    sections k = 10 E I / l^2 (the cubic cable: 300 E I / l^2) for the axis, l the length of the
+    beam, and E I / N for each section coordinate, which keeps the fourth order.
 
     Sections of order 1 cannot change their thickness linearly in Y. For them, and a law with
     constant moduli, the Poisson coupling acts on the mean of the strain over the section.

@@ -18,8 +18,8 @@ def solve_adaptive(scene, tol, max_elements=20000, **options):
     Each round solves on a mesh and on the same with every element halved. The difference is the
     estimate: in the displacement of the beams' ends relative to the size of the scene, and
     relative in the strain energy. Once the mesh resolves the solution, a method of order p leaves
-    the finer solution an error of 1 / (2^p - 1) of it, a third or less. The elements that contribute most to the difference in the energy norm are halved for
-    the next round.
+    the finer solution an error of 1 / (2^p - 1) of it, a third or less. The elements that
+    contribute most to the difference in the energy norm are halved for the next round.
 
     Parameters
     ----------

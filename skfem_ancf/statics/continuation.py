@@ -29,8 +29,8 @@ def continuation(system, steps=100, ds=0.02, ds_max=None, max_load=None, until=N
 
     Each step advances by ``ds`` along the tangent of the path, in the norm of the nodes' mean
     displacement over the size of the scene, with the load factor as an unknown, so that the path
-    may turn in load and in displacement. The geometric part of the tangent uses the carried stress, as in
-    :func:`~skfem_ancf.statics.newton.solve_static`.
+    may turn in load and in displacement. The geometric part of the tangent uses the carried
+    stress, as in :func:`~skfem_ancf.statics.newton.solve_static`.
 
     Parameters
     ----------

@@ -123,7 +123,8 @@ def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, fi
             record = LoadStep(load, 0)
             try:
                 with np.errstate(all="ignore"):  # what overflows is seen in the residual
-                    found = _iterate(system, result, load, origin, method, tol, max_iterations, record)
+                    found = _iterate(system, result, load, origin, method, tol, max_iterations,
+                                     record)
             except _Failed as failure:
                 result.rejected += 1
                 logger.info("load %.6g failed (%s), step cut", load, failure)

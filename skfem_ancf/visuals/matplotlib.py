@@ -86,12 +86,8 @@ def plot_state(state, field="eps_yy", ax=None, *, thickness="auto", undeformed=T
     >>> ax.get_title(loc="left")
     'second Piola–Kirchhoff stress $S_{xx}$, beam frame'
     """
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        raise MissingExtra("matplotlib", "plot") from None
+    Figure = _figure_class()
     from matplotlib.collections import LineCollection, PolyCollection
-    from matplotlib.figure import Figure
     from matplotlib.tri import Triangulation
 
     if field not in TITLES:
@@ -221,6 +217,74 @@ def _figsize(points, colorbar):
     area = 5.2 * 5.2 if aspect > 0.5 else 36.0
     w = min(8.0, np.sqrt(area / aspect))
     return w + (1.2 if colorbar else 0.3), max(1.6, w * aspect) + 0.9
+
+
+def _figure_class():
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise MissingExtra("matplotlib", "plot") from None
+    return Figure
+
+
+def plot_path(path, point, component=1, beam=None, ax=None, *, title=None, filename=None, dpi=200):
+    """Draw the load factor of an equilibrium path against a displacement.
+
+    Unstable parts, where they are known, are dashed; turning points of the load are marked.
+
+    Parameters
+    ----------
+    path
+        A :class:`~skfem_ancf.path.Path`.
+    point, component, beam
+        The material point, its displacement component (0 or 1), and the beam it belongs to.
+    ax
+        Axes to draw on; a new figure by default.
+    title
+        Title of the picture.
+    filename, dpi
+        Where to save it, and its resolution.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If the component is not 0 or 1.
+    MissingExtra
+        If matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamCable(),
+    ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
+    >>> path = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).continuation(steps=3)
+    >>> path.plot((1, 0)).get_ylabel()
+    'load factor'
+    """
+    Figure = _figure_class()
+    if component not in (0, 1):
+        raise InputError(f"component must be 0 or 1, got {component!r}")
+    if ax is None:
+        ax = Figure(figsize=(5.5, 4.0), layout="constrained").subplots()
+    u, load = path.displacement(point, beam)[:, component], path.load
+    color = ax.plot([], [])[0].get_color()
+    for k in range(len(u) - 1):  # a piece is drawn as its end is
+        dashed = path.stable[k + 1] is False
+        ax.plot(u[k:k + 2], load[k:k + 2], color=color, lw=1.6, ls=(0, (3, 2)) if dashed else "-")
+    turns = np.nonzero(np.diff(np.sign(np.diff(load))))[0] + 1
+    ax.plot(u[turns], load[turns], "o", ms=4, color=color)
+    _dress(ax, title, 1.0)
+    ax.set_xlabel(f"displacement $u_{'xy'[component]}$", fontsize=9, color=_INK)
+    ax.set_ylabel("load factor", fontsize=9, color=_INK)
+    if filename is not None:
+        with replacing(Path(filename)) as temporary:
+            ax.figure.savefig(temporary, dpi=dpi)
+    return ax
 
 
 def _dress(ax, title, factor):

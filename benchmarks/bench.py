@@ -1,0 +1,106 @@
+"""Measure run time against error, for this package and its peers, and judge the goals.
+
+    python benchmarks/bench.py [--out out/bench] [--quick] [--only 5.2 pendulum tangent]
+"""
+
+import argparse
+import csv
+import os
+import sys
+from pathlib import Path
+
+for _name in ("OPENBLAS", "OMP", "MKL", "NUMBA"):  # before NumPy is imported
+    os.environ[f"{_name}_NUM_THREADS"] = "1"
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from tqdm import tqdm  # noqa: E402
+from work_precision import figures, micro, runs  # noqa: E402
+from work_precision.cases import CASES, runs_of, warm_up  # noqa: E402
+from work_precision.problems import PROBLEMS  # noqa: E402
+from work_precision.references import reference  # noqa: E402
+from work_precision.report import report  # noqa: E402
+
+OPERATIONS = ("tangent", "iteration", "scaling")
+SIZES = {False: dict(tangent=(16, 256, 4096), scaling=(16, 64, 256, 1024, 4096, 16384, 100000)),
+         True: dict(tangent=(16,), scaling=(16, 64))}
+PASSES = 2
+
+
+def measure(case, quick, about, memory, watch):
+    """Rows of one case: every run once to warm up, then all of them again, pass by pass."""
+    entries = runs_of(case, quick)
+    timed = [runs.Timed(run) for run in watch(entries, f"{case}, first runs")]
+    for k in range(PASSES):
+        for entry in watch(timed, f"{case}, pass {k + 1}"):
+            entry.repeat()
+    return [entry.row(reference(case, entry.run.model), memory.peak(case, k) if memory else "",
+                      about) for k, entry in enumerate(watch(timed, f"{case}, memory"))]
+
+
+def write(filename, rows):
+    """Write a CSV file; numbers to seven digits, what is not known stays empty."""
+    with open(filename, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(runs.COLUMNS)
+        for row in rows:
+            cells = (row[c] for c in runs.COLUMNS)
+            writer.writerow(["" if v is None or v != v else f"{v:.7g}" if isinstance(v, float)
+                             else v for v in cells])
+
+
+def run(out, names, quick):
+    """Measure the named cases and operations and write everything; returns the rows by name."""
+    out = Path(out)
+    out.mkdir(parents=True, exist_ok=True)
+    runs.single_core()
+    about, results = (runs.versions(), runs.machine()), {}
+    start = runs.clock()
+    warm_up()
+    loading = runs.clock() - start
+    cases = [name for name in names if name in CASES]
+    sizes = SIZES[quick]
+    total = (sum((2 + PASSES) * len(runs_of(name, quick)) for name in cases)
+             + sum({"tangent": len(sizes["tangent"]), "iteration": 2,
+                    "scaling": 3 * len(sizes["scaling"])}[name]
+                   for name in names if name in OPERATIONS))
+    with tqdm(total=total, unit="run", dynamic_ncols=True) as bar, runs.Memory(quick) as memory:
+
+        def watch(items, label):
+            bar.set_description(label)
+            for item in items:
+                yield item
+                bar.update(1)
+
+        for name in names:
+            if name in CASES:
+                rows = measure(name, quick, about, memory, watch)
+                figures.work_precision(rows, PROBLEMS[name].title).savefig(out / f"{name}.png")
+            elif name == "tangent":
+                rows = micro.tangents(sizes["tangent"], about, watch)
+            elif name == "iteration":
+                rows = micro.iteration(about, watch)
+            else:
+                rows = micro.scaling(sizes["scaling"], about, watch, memory)
+                figures.scaling(rows).savefig(out / "scaling.png")
+            results[name] = rows
+            write(out / f"{name}.csv", rows)
+    text = report(results, about, loading, quick)
+    (out / "report.md").write_text(text, encoding="utf-8")
+    return results
+
+
+def main(arguments=None):
+    """The command line."""
+    known = [*CASES, *OPERATIONS]
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", default="out/bench", help="folder to write to")
+    parser.add_argument("--quick", action="store_true", help="a few runs only, to see it work")
+    parser.add_argument("--only", nargs="+", choices=known, default=known, metavar="CASE",
+                        help=f"some of {', '.join(known)}")
+    options = parser.parse_args(arguments)
+    run(options.out, [name for name in known if name in options.only], options.quick)
+    print(f"{options.out}/report.md")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,210 @@
+"""The runs of each case: every code over meshes, steps and settings, its best among them."""
+
+from . import exudyn_beams, ours, stock
+from .problems import PROBLEMS
+
+#: Element numbers of slender statics.
+FINE = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
+CABLES = (4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
+
+
+def gravity_52(p):
+    """Every element, formulation and code."""
+    yield from slender(p, tolerances=(1e-8, 1e-4))
+    for order in (1, 2, 3, 4):
+        for n in CABLES:
+            yield ours.run(p, "ancf", order, n)
+            yield ours.run(p, "ancf", order, n, "continuum")
+    for order in (1, 2, 3):
+        for n in FINE:
+            yield ours.run(p, "cubic", order, n)
+    for n in (4, 8, 16):
+        for kind, order in (("cable", 7), ("cubic", 2), ("ancf", 3)):
+            yield ours.run(p, kind, order, n, compiled=False)
+    yield from textbook(p)
+    for nx in (16, 32, 64, 128):
+        for steps in (1, 5):
+            yield stock.q2(p, nx, 2, steps)
+
+
+def textbook(p):
+    for n, steps in ((4, 5), (8, 5), (8, 10), (16, 10)):
+        yield stock.textbook(p, 3, n, steps)
+
+
+def slender(p, tolerances=(1e-8,), degrees=(3, 5, 7)):
+    """Cables, and the beams of Exudyn."""
+    for degree in degrees:
+        for n in CABLES if degree == 3 else FINE[:-2]:
+            for tol in tolerances:
+                yield ours.run(p, "cable", degree, n, tol=tol)
+    if exudyn_beams.exudyn is None:
+        return
+    for n in (4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192):
+        for rtol in (1e-4, 1e-8, 1e-11):
+            yield exudyn_beams.run(p, "ANCFCable2D", n, 1, rtol)
+        yield exudyn_beams.run(p, "ANCFCable2D", n, 2)
+        if n <= 16:
+            yield exudyn_beams.run(p, "ANCFCable2D", n, 1, dense=True)
+            yield exudyn_beams.run(p, "ANCFCable2D", n, 1, modified=True)
+    for n in (4, 8, 16, 32, 64, 128):
+        for steps in (1, 2, 10):
+            yield exudyn_beams.run(p, "GE2D linear", n, steps)
+            yield exudyn_beams.run(p, "GE2D quadratic", n, steps)
+
+
+def slender_fewer(p):
+    """As 5.2 with fewer entries."""
+    yield from slender(p)
+    for n in (8, 16, 32, 64):
+        yield ours.run(p, "ancf", 2, n)
+        yield ours.run(p, "ancf", 2, n, "continuum")
+        yield ours.run(p, "cubic", 2, n)
+
+
+def small(p):
+    """Small deflections: hardly more than one linear solve."""
+    yield from slender_fewer(p)
+    yield from textbook(p)
+    yield stock.q2(p, 32, 2)
+    yield stock.q2(p, 64, 2)
+
+
+def thick(p):
+    """The body against its one reference; meshes uniform and graded towards the clamp."""
+    for order in (2, 3, 4, 6, 8):
+        for n in (2, 3, 4, 6, 8, 12, 16, 32):
+            yield ours.run(p, "ancf", order, n)
+            for formulation in ("assumed", "continuum"):
+                for grade in (1.0, 2.0):
+                    yield ours.run(p, "cubic", order, n, formulation, grade=grade)
+    for n in (2, 4, 8, 16):
+        yield stock.textbook(p, 3, n, 1)
+    for nx, ny in ((4, 2), (8, 2), (12, 4), (16, 4), (32, 8), (64, 16), (96, 24)):
+        yield stock.q2(p, nx, ny)
+        if nx <= 32:  # beyond, the corners of the clamp collapse in compression
+            yield stock.q2(p, nx, ny, grade=2.0)
+
+
+def roll_up(p):
+    """An end moment; it takes several load steps."""
+    for degree in (3, 5, 7):
+        for n in (4, 6, 8, 12, 16, 24, 32, 48, 64):
+            for first in (1.0, 0.5):
+                yield ours.run(p, "cable", degree, n, first_step=first)
+    for n in (8, 16, 32, 64):
+        yield ours.run(p, "ancf", 2, n)
+        yield ours.run(p, "cubic", 2, n)
+        yield ours.run(p, "cubic", 3, n)
+    if exudyn_beams.exudyn is not None:
+        for n in (8, 16, 32, 64, 128):
+            for steps in (2, 5, 10, 20):
+                yield exudyn_beams.run(p, "ANCFCable2D", n, steps)
+                yield exudyn_beams.run(p, "GE2D quadratic", n, steps)
+
+
+def motion(p, scale=1, sections=(2,), adaptive=True):
+    """Meshes times step sizes; ``scale`` divides the numbers of steps."""
+    for degree, meshes in ((3, ((8, 8), (16, 16), (32, 32))), (5, ((4, 8), (8, 16), (12, 32))),
+                           (7, ((3, 8), (5, 16), (8, 32)))):
+        for n, most in meshes:
+            for factor in (1, 2, 4, 8, 16, 32):
+                if factor > most:
+                    break
+                steps = 250 * factor // scale
+                for scheme in ("generalized-alpha", "energy-momentum"):
+                    yield ours.run(p, "cable", degree, n, steps=steps, scheme=scheme, tol=1e-6)
+                if factor <= 2:
+                    yield ours.run(p, "cable", degree, n, steps=steps, tol=1e-4)
+                if factor >= 16:
+                    yield ours.run(p, "cable", degree, n, steps=steps, tol=1e-8)
+    if adaptive:
+        for n, rtol in ((4, 1e-4), (4, 1e-5), (6, 1e-6), (8, 1e-7)):
+            yield ours.run(p, "cable", 5, n, rtol=rtol, tol=1e-6)
+    for order in sections:
+        for n in (4, 8, 16):
+            for factor in (1, 4, 16):
+                yield ours.run(p, "cubic", order, n, steps=250 * factor // scale, tol=1e-6)
+    for n in (8, 16, 32):
+        yield ours.run(p, "ancf", 2, n, steps=1000 // scale, tol=1e-6)
+    yield ours.run(p, "cable", 5, 8, steps=1000 // scale, tol=1e-6, compiled=False)
+    yield ours.run(p, "cubic", 2, 8, steps=1000 // scale, tol=1e-6, compiled=False)
+    if exudyn_beams.exudyn is None:
+        return
+    for n, most in ((6, 2), (8, 4), (12, 8), (16, 16), (24, 32), (32, 32), (48, 32), (64, 32)):
+        for factor in (1, 2, 4, 8, 16, 32):
+            if factor > most or factor * 24 < n:
+                continue
+            steps = 250 * factor // scale
+            for rtol in (1e-2, 1e-4, 1e-6):
+                if rtol == 1e-2 and factor > 4 or rtol == 1e-6 and factor < 4:
+                    continue
+                yield exudyn_beams.run(p, "ANCFCable2D", n, steps, rtol)
+            if n in (8, 16, 32) and factor in (1, 4, 16):
+                yield exudyn_beams.run(p, "GE2D quadratic", n, steps, 1e-4)
+            if n == 8 and factor <= 2:
+                yield exudyn_beams.run(p, "ANCFCable2D", n, steps, 1e-4, dense=True)
+                yield exudyn_beams.run(p, "ANCFCable2D", n, steps, 1e-4, modified=False)
+
+
+def spin_up(p):
+    """A driven support: the joint of this package is held by a multiplier."""
+    for degree, meshes in ((3, (4, 8)), (5, (2, 4)), (7, (2,))):
+        for n in meshes:
+            for steps in (50, 250, 1000):
+                yield ours.run(p, "cable", degree, n, steps=steps, tol=1e-6)
+    for steps in (50, 250, 1000):
+        yield ours.run(p, "cubic", 2, 4, steps=steps, tol=1e-6)
+    if exudyn_beams.exudyn is None:
+        return
+    for n in (4, 8, 16):
+        for steps in (50, 250, 1000, 4000):
+            yield exudyn_beams.run(p, "ANCFCable2D", n, steps, 1e-4)
+            yield exudyn_beams.run(p, "GE2D quadratic", n, steps, 1e-4)
+
+
+def quick(p):
+    """A few cheap runs of each kind that a problem has."""
+    if p.t_end is not None:
+        steps = 100
+        yield ours.run(p, "cable", 5, 2, steps=steps, tol=1e-6)
+        yield ours.run(p, "cubic", 2, 2, steps=steps, tol=1e-6)
+        if exudyn_beams.exudyn is not None:
+            yield exudyn_beams.run(p, "ANCFCable2D", 8, steps, 1e-4)
+        return
+    if p.load == "traction":
+        yield ours.run(p, "cubic", 3, 2)
+        yield stock.q2(p, 4, 2)
+        return
+    yield ours.run(p, "cable", 5, 8)
+    yield ours.run(p, "cubic", 2, 8)
+    if exudyn_beams.exudyn is not None:
+        yield exudyn_beams.run(p, "ANCFCable2D", 16, 10 if p.load == "moment" else 1)
+    if p.name == "5.2":
+        yield ours.run(p, "ancf", 3, 4, compiled=False)
+        yield stock.textbook(p, 2, 2, 5)
+
+
+CASES = {"5.2": gravity_52, "5.2-1e3": slender_fewer, "5.2-1e4": slender_fewer, "5.1": small,
+         "thick": thick, "roll-up": roll_up, "pendulum": motion, "spin-up": spin_up,
+         "free-rod": lambda p: motion(p, 2, adaptive=False)}
+
+
+def runs_of(case, is_quick=False):
+    """The list of the runs of a case, always in the same order."""
+    return list((quick if is_quick else CASES[case])(PROBLEMS[case]))
+
+
+def warm_up():
+    """Load what is loaded once a process: compiled kernels, lazy imports."""
+    static, moving = PROBLEMS["5.2"], PROBLEMS["pendulum"]
+    runs = [ours.run(static, "cable", 3, 3), ours.run(static, "cubic", 2, 3),
+            ours.run(static, "ancf", 1, 3), stock.q2(PROBLEMS["thick"], 2, 2)]
+    for scheme in ("generalized-alpha", "energy-momentum"):
+        runs += [ours.run(moving, kind, 3, 3, steps=30, scheme=scheme) for kind in ("cable", "ancf")]
+    if exudyn_beams.exudyn is not None:
+        runs += [exudyn_beams.run(static, "ANCFCable2D", 3),
+                 exudyn_beams.run(moving, "ANCFCable2D", 8, 200, 1e-4)]
+    for run in runs:
+        solver = run.build()
+        solver.read(solver.solve())

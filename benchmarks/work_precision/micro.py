@@ -1,0 +1,124 @@
+"""Single operations: assembling the tangent, one iteration, and cost against size."""
+
+import numpy as np
+from skfem import asm
+
+from skfem_ancf import ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, forms
+
+from .ours import CODE, scene
+from .problems import PROBLEMS
+from .runs import COLUMNS, clock
+from .stock import TEXTBOOK
+
+ORDER = 3
+
+
+def seconds(function, least=0.1, most=200):
+    """Median time of a call after a warm-up."""
+    start = clock()
+    function()
+    first = max(clock() - start, 1e-7)
+    if first > 2.0:
+        return first
+    times = []
+    for _ in range(int(np.clip(least / first, 3, most))):
+        start = clock()
+        function()
+        times.append(clock() - start)
+    return float(np.median(times))
+
+
+def row(case, code, variant, n, dofs, value, about, error="", note="", **more):
+    """A row of the CSV file for one operation."""
+    out = dict.fromkeys(COLUMNS, "")
+    out.update(case=case, code=code, variant=variant, elements=n, dofs=dofs, seconds=value,
+               error=error, note=note, versions=about[0], machine=about[1], **more)
+    return out
+
+
+def bent(s):
+    """Displacements of a beam about as large as those of 5.2, so that no term vanishes."""
+    beam = s.beams[0]
+    X = beam.q0.reshape(-1, beam.nd)[:, 0]
+    u = np.zeros((len(X), beam.nd))
+    u[:, 1], u[:, 3] = -0.5 * X**2, -X
+    return u.ravel()
+
+
+def tangents(sizes, about, watch):
+    """The tangent of the same integral on ElementBeamANCF(3), assembled three ways."""
+    rows = []
+    for n in watch(sizes, "tangent"):
+        s = scene(PROBLEMS["5.2"], ElementBeamANCF(ORDER), n, "continuum")
+        beam, system, u = s.beams[0], s.system, bent(s)
+        q, k_s = beam.q0 + u, beam.material.shear_factor(beam.element)
+        pairs = forms.textbook.tangent(beam.material, beam.width, k_s)
+        batched = forms.tangent(beam.material, beam.width, k_s)
+        exact = asm(pairs, beam.basis, r=q)
+        system.assemble(u)
+        fused = system.K.tocsc()
+        scale = abs(exact).max()
+        for code, variant, function, K in (
+                (TEXTBOOK, "BilinearForm by pairs", lambda: asm(pairs, beam.basis, r=q), exact),
+                (CODE, "batched form", lambda: asm(batched, beam.basis, r=q),
+                 asm(batched, beam.basis, r=q)),
+                (CODE, "fused with the force", lambda: system.assemble(u), fused)):
+            rows.append(row("tangent", code, variant, n, s.N, seconds(function), about,
+                            float(abs(K - exact).max() / scale)))
+    return rows
+
+
+def iteration(about, watch):
+    """One static iteration on 16 elements, N = 3, beside a batched matrix product."""
+    rows, n = [], 16
+    for formulation in watch(("assumed", "continuum"), "iteration"):
+        s = scene(PROBLEMS["5.2"], ElementBeamANCF(ORDER), n, formulation)
+        system, u = s.system, bent(s)
+        residual = system.external_force(u) * system.mask
+        points = np.shape(s.beams[0].kernel.tables[0].points)[1]
+
+        def step(u=u, system=system, residual=residual):
+            _, evaluations = system.assemble(u)
+            system.factorize(u)
+            du, _ = system.solve(residual, np.zeros(0))
+            system.stress_step(evaluations, du)
+
+        state = s.solve_static()
+        solve = seconds(s.solve_static)
+        rows.append(row("iteration", CODE, f"ancf {ORDER}, {formulation}: solve_static over its "
+                        "iterations", n, s.N, solve / state.iterations, about,
+                        iterations=state.iterations))
+        rows.append(row("iteration", CODE, f"ancf {ORDER}, {formulation}: assemble, factorise, "
+                        "solve, carry", n, s.N, seconds(step), about))
+        A, B = np.random.default_rng(0).normal(size=(2, n * points, 20, 20))
+        rows.append(row("iteration", "NumPy", f"{n} x {points} products of 20 x 20 by 20 x 20", n,
+                        "", seconds(lambda A=A, B=B: A @ B), about))
+    return rows
+
+
+SCALED = {"cable 5, assumed": lambda n: scene(PROBLEMS["5.2"], ElementBeamCable(5), n),
+          "ancf 3, assumed": lambda n: scene(PROBLEMS["5.2"], ElementBeamANCF(3), n),
+          "cubic 2, assumed": lambda n: scene(PROBLEMS["5.2"], ElementBeamANCFCubic(2), n)}
+
+
+def scaling(sizes, about, watch, memory):
+    """5.2 on more and more elements: time, and peak memory of a process of its own."""
+    rows = []
+    for variant, build in SCALED.items():
+        for n in watch(sizes, "scaling"):
+            start = clock()
+            s = build(n)
+            s.system.K, s.beams[0].kernel
+            setup = clock() - start
+            start = clock()
+            try:
+                state, note = s.solve_static(), ""
+                found = state.iterations
+            except Exception as error:
+                found, note = "", f"failed: {type(error).__name__}"
+            first = clock() - start
+            value = first if first > 0.5 or note else seconds(s.solve_static)
+            rows.append(row("scaling", CODE, variant, n, s.N, np.nan if note else value, about,
+                            note=note, iterations=found, peak_mb=memory.peak(variant, n),
+                            setup_seconds=setup))
+    return rows

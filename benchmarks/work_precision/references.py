@@ -1,0 +1,107 @@
+"""What errors are measured against: the converged solution of each code's own model.
+
+    python benchmarks/work_precision/references.py
+
+computes the table :data:`CONVERGED` of the motions anew (ten minutes).
+"""
+
+import sys
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from work_precision import exudyn_beams, ours  # noqa: E402
+from work_precision.problems import GRAVITY, PROBLEMS  # noqa: E402
+
+from skfem_ancf import exact  # noqa: E402
+
+#: Tip displacements (m) of the two-dimensional body in plane stress, no shear factor, from
+#: independent codes: 1e-6 and 1e-5.
+BODY = {"5.2": (-0.741168, -0.903426), "thick": (-0.15792, -0.71438)}
+
+#: Tip displacements (m) at the end of the motions, by model: a fine mesh, and the limit in the
+#: time step from two runs.
+CONVERGED = {
+    ("pendulum", "cable"): (-1.823770862, 0.177184973),
+}
+
+
+@lru_cache(maxsize=None)
+def reference(name, model):
+    """Converged tip displacement, shape (2,), of a problem by a model.
+
+    ``model`` is "cable" (extensible, shear-rigid), "rod" (Reissner's), "section N" (planar
+    sections of order N), "section 1" with its formulation, or "body" (two-dimensional).
+    """
+    p = PROBLEMS[name]
+    if name == "thick" or model == "body":
+        return np.array(BODY[name])
+    if p.t_end is not None:
+        return np.array(CONVERGED[name, model])
+    line = {"cable": "extensible", "rod": "reissner"}.get(model)
+    if p.load == "moment":
+        return closed_circle(p) if line else bent_body(p)
+    if line and p.load == "gravity":
+        return exact.gravity_cantilever(p.E, p.nu, p.rho, p.L, p.b, p.h, GRAVITY, model=line)
+    if model == "cable":
+        return exact.elastica_extensible_tip(p.value, p.EA, p.EI, p.L)
+    if model == "rod":
+        return tip(exudyn_beams.run(p, "GE2D quadratic", 256, 1, 1e-10))
+    _, order, *formulation = model.split()
+    return tip(ours.run(p, "cubic", int(order), 256, *formulation, tol=1e-9))
+
+
+def closed_circle(p):
+    """Tip displacement of an elastic line that an end moment 2 pi EI / L has closed."""
+    return np.array([-p.L, 0.0])
+
+
+def bent_body(p):
+    """Tip displacement of a St. Venant-Kirchhoff body in pure bending, nu = 0."""
+    kappa, stretch = exact.rollup_curvature(p.value, p.E, p.b, p.h)
+    turn = kappa * p.L
+    return stretch / kappa * np.array([np.sin(turn), 1.0 - np.cos(turn)]) - [p.L, 0.0]
+
+
+def tip(run):
+    """Tip displacement of one run."""
+    solver = run.build()
+    return np.array(solver.read(solver.solve())[0])
+
+
+def limit(make, steps):
+    """Limit of second order in the step size, from two runs, and how much it differs."""
+    coarse, fine = (tip(make(k * steps)) for k in (1, 2))
+    return fine + (fine - coarse) / 3.0
+
+
+def main():
+    """Print the table, twice: with the meshes used, and with coarser ones and larger steps."""
+    for name in ("pendulum", "spin-up", "free-rod"):
+        p, slow = PROBLEMS[name], name == "spin-up"
+        steps = 1000 if slow else 16000
+        recipes = {"cable": lambda k, q: ours.run(p, "cable", 7, 8 * k, steps=2 * q, tol=1e-8)}
+        for order in (2,) if slow else (1, 2, 3):
+            model = f"section {order}" + (" assumed" if order == 1 else "")
+            recipes[model] = lambda k, q, order=order: ours.run(
+                p, "cubic", order, 12 * k, steps=q, tol=1e-8)
+        if exudyn_beams.exudyn is not None:
+            recipes["rod"] = lambda k, q: exudyn_beams.run(
+                p, "GE2D quadratic", (8 if slow else 32) * k, q, rtol=1e-4 if slow else 1e-5)
+        for model, make in recipes.items():
+            try:
+                fine = limit(lambda q, make=make: make(2, q), steps)
+                check = limit(lambda q, make=make: make(1, q), steps // 2)
+            except Exception as error:
+                print(f"    # {name} {model}: {error}", flush=True)
+                continue
+            print(f"    ({name!r}, {model!r}): ({fine[0]:.9f}, {fine[1]:.9f}),"
+                  f"  # {np.linalg.norm(fine - check):.0e}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,173 @@
+"""The report: the goals as ratios within one run, and the fronts behind them."""
+
+import numpy as np
+
+from .figures import front, usable
+from .problems import PROBLEMS
+
+OURS, EXUDYN, Q2, TEXTBOOK = "skfem-ancf", "Exudyn", "scikit-fem Q2", "scikit-fem forms"
+
+
+def table(head, rows):
+    """Lines of a Markdown table."""
+    def line(cells):
+        return "| " + " | ".join(map(str, cells)) + " |"
+
+    return [line(head), line(["---"] * len(head)), *(line(row) for row in rows), ""]
+
+
+def fastest(rows, code, target):
+    """The fastest run of a code with an error of at most the target, or None."""
+    good = [r for r in usable(rows) if r["code"] == code and r["error"] <= target]
+    return min(good, key=lambda r: r["seconds"], default=None)
+
+
+def named(r):
+    """A run in a few words."""
+    if r is None:
+        return "none reaches it"
+    steps = f", {r['steps']} steps" if r["steps"] and "steps" not in r["variant"] else ""
+    return f"{1e3 * r['seconds']:.3g} ms ({r['variant']}; {r['elements']} elements{steps})"
+
+
+def against(rows, peer, targets, factor=1.0):
+    """Rows (target, ratio, verdict, ours, peer's) of one goal: factor times faster than a peer."""
+    out = []
+    for target in targets:
+        mine, its = fastest(rows, OURS, target), fastest(rows, peer, target)
+        ratio = its["seconds"] / mine["seconds"] if mine and its else None
+        met = mine is not None and (its is None or ratio >= factor)
+        out.append((f"{target:.0e}", "" if ratio is None else f"{ratio:.3g}",
+                    "met" if met else "missed", named(mine), named(its)))
+    return out
+
+
+def goal_against(results, case, peer, targets, factor, wanted):
+    """Lines for a goal on a case."""
+    if case not in results:
+        return [f"**{wanted}**: not measured in this run.", ""]
+    if not any(r["code"] == peer for r in results[case]):
+        return [f"**{wanted}**: not measured, {peer} did not take part.", ""]
+    rows = against(results[case], peer, targets, factor)
+    met = sum(r[2] == "met" for r in rows)
+    verdict = "met" if met == len(rows) else f"met at {met} of {len(rows)}" if met else "missed"
+    return [f"**{wanted}**: {verdict}.", "",
+            *table(["error", f"times faster than {peer}", "", OURS, peer], rows)]
+
+
+def goal_tangent(results):
+    """Lines for the assembly of the tangent."""
+    wanted = "Tangent assembly 100 times faster than the textbook BilinearForm, 16 to 4096 elements"
+    if "tangent" not in results:
+        return [f"**{wanted}**: not measured in this run.", ""]
+    rows, lines = results["tangent"], []
+    for n in dict.fromkeys(r["elements"] for r in rows):
+        pairs, batched, fused = (next(r["seconds"] for r in rows if r["elements"] == n
+                                      and r["variant"].startswith(v))
+                                 for v in ("BilinearForm", "batched", "fused"))
+        lines.append((n, f"{1e3 * pairs:.3g}", f"{1e3 * batched:.3g}", f"{1e3 * fused:.3g}",
+                      f"{pairs / batched:.3g}", f"{pairs / fused:.3g}",
+                      "met" if pairs >= 100.0 * fused else "missed"))
+    verdict = "met" if all(line[-1] == "met" for line in lines) else "missed"
+    return [f"**{wanted}**: {verdict}. (N = 3, full quadrature; the fused kernel gives the internal "
+            "force as well.)", "",
+            *table(["elements", "pairs (ms)", "batched form (ms)", "fused kernel (ms)",
+                    "ratio, batched", "ratio, fused", ""], lines)]
+
+
+def goal_iteration(results):
+    """Lines for one static iteration."""
+    wanted = "A static iteration at 16 elements, N = 3, under 0.25 ms"
+    if "iteration" not in results:
+        return [f"**{wanted}**: not measured in this run.", ""]
+    rows = results["iteration"]
+    mine = [r for r in rows if r["variant"].endswith("its iterations")]
+    met = sum(r["seconds"] < 2.5e-4 for r in mine)
+    verdict = "met" if met == len(mine) else "missed" if not met else f"met by {met} of {len(mine)}"
+    return [f"**{wanted}**: {verdict}.", "",
+            *table(["what", "ms"], [(r["variant"], f"{1e3 * r['seconds']:.3g}") for r in rows])]
+
+
+def scaling(rows):
+    """Lines about size."""
+    lines = []
+    for variant in dict.fromkeys(r["variant"] for r in rows):
+        mine = [r for r in rows if r["variant"] == variant]
+        known = [r for r in mine if r["peak_mb"] != ""]
+        per = ""
+        if len(known) > 1 and known[-1]["elements"] > 10 * known[0]["elements"]:
+            a, b = known[0], known[-1]
+            per = f"{1024 * (b['peak_mb'] - a['peak_mb']) / (b['elements'] - a['elements']):.3g}"
+        for r in mine:
+            lines.append((variant, r["elements"], r["dofs"], f"{1e3 * r['seconds']:.4g}",
+                          f"{1e6 * r['seconds'] / r['elements']:.3g}", r["iterations"],
+                          r["peak_mb"], per if r is mine[-1] else "", r["note"]))
+    return ["## Size", "", "Gravity cantilever 5.2. Memory is the peak of a process that does "
+            "nothing else, imports included; the last column but one is its growth.", "",
+            *table(["variant", "elements", "coordinates", "ms", "microseconds an element",
+                    "iterations", "peak (MB)", "kB an element", ""], lines), "![](scaling.png)", ""]
+
+
+def case_lines(name, rows):
+    """Lines of a case: the front of each code."""
+    lines = [f"## {name}: {PROBLEMS[name].title}", "", f"![]({name}.png)", "",
+             f"Data: [{name}.csv]({name}.csv). Runs that no other of the same code beats:", ""]
+    cells = []
+    for code in dict.fromkeys(r["code"] for r in rows):
+        for r in front([r for r in usable(rows) if r["code"] == code]):
+            cells.append((code, r["variant"], r["elements"], r["steps"] or "", f"{r['error']:.1e}",
+                          f"{1e3 * r['seconds']:.3g}", r["iterations"], r["peak_mb"]))
+    lines += table(["code", "variant", "elements", "steps", "error", "ms", "iterations",
+                    "peak (MB)"], cells)
+    failed = [r for r in rows if str(r["note"]).startswith("failed")]
+    if failed:
+        lines += [f"{len(failed)} of {len(rows)} runs found no solution: " + "; ".join(
+            f"{count} of {code}" for code, count in _count(r["code"] for r in failed)) + ".", ""]
+    return lines
+
+
+def _count(items):
+    items = list(items)
+    return [(item, items.count(item)) for item in dict.fromkeys(items)]
+
+
+def report(results, about, loading, quick):
+    """The report as Markdown."""
+    decades = 10.0 ** -np.arange(1.0, 8.0)
+    lines = [
+        "# Time against error", "", f"{about[0]}; {about[1]}.", "",
+        "Seconds are processor time of the solution alone, median of several runs after a first "
+        "one, all in this run and on one core; building meshes, tables and systems is in "
+        "`setup_seconds`. Loading the compiled kernels and imports took "
+        f"{loading:.2g} s once. The error is the distance of the tip from the converged solution "
+        "of the code's own mechanical model, over the length of the beam; on the thick continuum "
+        "from the one two-dimensional reference. A ratio compares the fastest runs of both codes "
+        "whose error is at most the one given.", ""]
+    if quick:
+        lines += ["**Quick: a few runs only. No verdict below means anything.**", ""]
+    if not any(r["code"] == EXUDYN for rows in results.values() for r in rows):
+        lines += ["**Exudyn is not installed, or no case with it was asked for: its rows are "
+                  "missing.**", ""]
+    lines += ["## Goals", "",
+              *goal_against(results, "5.2", EXUDYN, decades[1:], 1.0,
+                            "5.2: faster than Exudyn's best at every error from 1e-2 to 1e-7"),
+              *goal_against(results, "pendulum", EXUDYN, decades[2:6], 1.0,
+                            "Soft pendulum: faster than Exudyn's best from 1e-3 to 1e-6"),
+              *goal_against(results, "thick", Q2, decades[1:4], 100.0,
+                            "Thick continuum: stock scikit-fem Q2 beaten a hundredfold"),
+              *goal_tangent(results), *goal_iteration(results)]
+    others = [name for name in ("5.2-1e3", "5.2-1e4", "5.1", "roll-up", "spin-up", "free-rod")
+              if name in results and any(r["code"] == EXUDYN for r in results[name])]
+    if others:
+        lines += ["## The other cases against Exudyn", "", "Times faster; below 1 it is slower.",
+                  "", *table(["case", *(f"{t:.0e}" for t in decades[1:])],
+                             [[name, *(row[1] or ("only ours" if row[2] == "met" else "neither"
+                                                  if row[3] == row[4] else "only Exudyn")
+                                       for row in against(results[name], EXUDYN, decades[1:]))]
+                              for name in others])]
+    if "scaling" in results:
+        lines += scaling(results["scaling"])
+    for name in PROBLEMS:
+        if name in results:
+            lines += case_lines(name, results[name])
+    return "\n".join(lines)
