@@ -175,6 +175,7 @@ def quick(p):
     if p.load == "traction":
         yield ours.run(p, "cubic", 3, 2)
         yield stock.q2(p, 4, 2)
+        yield stock.textbook(p, 1, 1, 1)
         return
     yield ours.run(p, "cable", 5, 8)
     yield ours.run(p, "cubic", 2, 8)
@@ -182,7 +183,6 @@ def quick(p):
         yield exudyn_beams.run(p, "ANCFCable2D", 16, 10 if p.load == "moment" else 1)
     if p.name == "5.2":
         yield ours.run(p, "ancf", 3, 4, compiled=False)
-        yield stock.textbook(p, 2, 2, 5)
 
 
 CASES = {"5.2": gravity_52, "5.2-1e3": slender_fewer, "5.2-1e4": slender_fewer, "5.1": small,
