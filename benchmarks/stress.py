@@ -68,7 +68,7 @@ def cantilever(element, mesh, material, formulation="assumed", clamp="free"):
 
 
 def tip(scene):
-    """Vertical tip displacement, iterations and load steps; NaN and the load reached if it fails."""
+    """Vertical tip displacement, iterations, load steps; NaN, 0 and the load reached if it fails."""
     mesh = scene.beams[0].mesh
     try:
         state = scene.solve_static()
@@ -106,11 +106,13 @@ LIMIT_ERROR = {"N=1": 2.6e-3, "N=2": 2.5e-3, "N=6": 2.4e-3, "cubic N=2": 4e-4, "
 def slenderness(quick, out):
     """L/h from 1 to 1e6."""
     check = "slenderness"
-    for s in (1.0, 10.0) if quick else (1.0, 2.0, 5.0, 10.0, 30.0):  # small load, against full quadrature
+    # small load, against full quadrature on a fine mesh
+    for s in (1.0, 10.0) if quick else (1.0, 2.0, 5.0, 10.0, 30.0):
         h, tips = 1.0 / s, {}
         for name, element, n, formulation in (
                 ("reference", ElementBeamANCFCubic(4), 24, "continuum"),
-                ("N=2", ElementBeamANCF(2), 16, "assumed"), ("N=6", ElementBeamANCF(6), 16, "assumed"),
+                ("N=2", ElementBeamANCF(2), 16, "assumed"),
+                ("N=6", ElementBeamANCF(6), 16, "assumed"),
                 ("cubic N=4", ElementBeamANCFCubic(4), 8, "assumed")):
             beam = Beam(line(n, h), element, soft(h), WIDTH, formulation=formulation)
             scene = Scene(beam).clamp("left").traction("right", (0, -1e-6 * beam.material.E * h**2))
@@ -498,14 +500,15 @@ def thick_and_heavy(quick, out):
                                    clamp="fixed")
                 u, iterations, steps = tip(scene)
                 fails = not np.isfinite(u)
-                yield Row(check, f"{law.__name__}, {name}, {n} elements, {formulation}", "tip", u,
-                          0.95 if law is NeoHookean else None,
+                yield Row(check, f"{law.__name__}, {name}, {n} elements, {formulation}",
+                          "tip, less -0.93635 of many elements", u + 0.93635,
+                          3e-3 if law is NeoHookean else None,
                           f"no equilibrium beyond load {steps:.3g}" if fails else
                           f"{iterations} iterations, {steps} load step(s)")
 
 
-CHECKS = (formulations_table, slenderness, fine_and_slender, thick_and_heavy, poisson, orders, units,
-          far_away, length_ratios, loads, rigid_motions, spin, pendulum)
+CHECKS = (formulations_table, slenderness, fine_and_slender, thick_and_heavy, poisson, orders,
+          units, far_away, length_ratios, loads, rigid_motions, spin, pendulum)
 
 
 def run(out="out/stress", quick=False, progress=None, checks=CHECKS):
@@ -551,8 +554,9 @@ def report(rows, checks, times):
     text = ["# Numerical stability", "", f"{len(rows)} rows, "
             f"{sum(r.bound is not None for r in rows)} with a bound, {len(failed)} beyond it.", ""]
     if failed:
-        text += ["Beyond their bound:", ""] + [f"* {r.check}: {r.case}: {r.quantity} {r.value:.3g}, "
-                                               f"bound {r.bound:.3g}" for r in failed] + [""]
+        text += ["Beyond their bound:", ""]
+        text += [f"* {r.check}: {r.case}: {r.quantity} {r.value:.3g}, bound {r.bound:.3g}"
+                 for r in failed] + [""]
     names = list(dict.fromkeys(r.check for r in rows))
     for name, check in zip(names, checks):
         text += [f"## {name}", "", f"{check.__doc__} ({times[check.__name__]:.1f} s)", "",

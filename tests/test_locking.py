@@ -86,7 +86,8 @@ def pulled_quarter():
             c, s = np.cos(y[2]), np.sin(y[2])
             return [c, s, 1.0 + y[3], part * (s * PULL[0] - c * PULL[1])]
 
-        return solve_ivp(rate, (0, np.pi / 2), [1, 0, np.pi / 2, m], rtol=1e-11, atol=1e-12).y[:, -1]
+        start = [1, 0, np.pi / 2, m]
+        return solve_ivp(rate, (0, np.pi / 2), start, rtol=1e-11, atol=1e-12).y[:, -1]
 
     m = 0.0
     for part in np.linspace(0.2, 1.0, 5):
@@ -219,7 +220,8 @@ def test_a_free_beam_has_three_zero_modes(name, shape):
 
 
 def test_without_stabilisation_there_are_more_zero_modes():
-    beam = Beam(line(2, 0.01), ElementBeamANCF(2), soft(0.01), WIDTH, formulation=Assumed(alpha=0.0))
+    beam = Beam(line(2, 0.01), ElementBeamANCF(2), soft(0.01), WIDTH,
+                formulation=Assumed(alpha=0.0))
     assert np.sum(scaled_eigenvalues(beam) < 1e-12) > 3
 
 

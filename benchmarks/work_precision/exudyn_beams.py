@@ -94,6 +94,7 @@ def settings(problem, steps, rtol, dense=False, modified=None):
         integration.endTime, integration.numberOfSteps = problem.t_end, steps
         integration.adaptiveStep = False
         newton = integration.newton
+        newton.absoluteTolerance = 1e-11 * problem.EA  # about the round-off of the axial force
     newton.relativeTolerance = rtol
     if modified is not None:
         newton.useModifiedNewton = modified

@@ -107,6 +107,7 @@ class Timed:
             end = clock()
         except Exception as error:  # whatever a code raises, it has not solved the problem
             self.note = f"failed: {type(error).__name__}: {str(error).splitlines()[0][:120]}"
+            self.solver = None
             return
         self.setup, self.first = built - start, end - built
         if self.first > LONG:
@@ -115,6 +116,7 @@ class Timed:
     def repeat(self):
         """Time the run a few times more."""
         if self.solver is None or self.first > LONG:
+            self.solver = None
             return
         for _ in range(int(np.clip(BUDGET / max(self.first, 1e-6), 1, MOST))):
             start = clock()
