@@ -250,9 +250,20 @@ class System:
 
     @cached_property
     def stiffness_scale(self):
-        """Round-off floor: eps times the square root of modulus times volume."""
+        """eps times the square root of modulus times volume: the round-off of strains of 1."""
         total = sum(b.kernel.volume * b.material.E for b in self.beams)
         return np.finfo(float).eps * np.sqrt(total)
+
+    @cached_property
+    def work_noise(self):
+        """Round-off of a correction's work, as a square root.
+
+        A displacement of the scene's size is known to eps times that size, its gradient in an
+        element to that over the element's length.
+        """
+        total = sum(b.material.E * b.width * b.mesh.height * np.sum(1.0 / b.mesh.lengths)
+                    for b in self.beams)
+        return np.finfo(float).eps * self.size * np.sqrt(total)
 
     @cached_property
     def noise(self):

@@ -50,7 +50,7 @@ def reference(name, model):
     if model == "cable":
         return exact.elastica_extensible_tip(p.value, p.EA, p.EI, p.L)
     if model == "rod":
-        return tip(exudyn_beams.run(p, "GE2D quadratic", 256, 1, 1e-10))
+        return tip(exudyn_beams.run(p, "GE2D quadratic", 64))
     _, order, *formulation = model.split()
     n = 256 if p.L < 5e3 * p.h else 128  # beyond, round-off in E A / E I
     return tip(ours.run(p, "cubic", int(order), n, *formulation))

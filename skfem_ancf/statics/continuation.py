@@ -105,7 +105,7 @@ def _advance(system, start, ds, direction, weights, tol, max_iterations):
     """The next point of the path, and the step from the last one to it."""
     u, m, load = start.u.copy(), start.multipliers.copy(), start.load
     step, carried = np.zeros(system.N), None
-    floor = 8.0 * system.stiffness_scale
+    floor = 8.0 * system.work_noise
     unit = system.values(1.0) - system.values(0.0)
     work, reference = np.inf, 0.0
     stable = None

@@ -160,7 +160,7 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record):
     full load, or None for the stress-free state; the missing part is reduced to nothing.
     """
     u, multipliers, carried = result.u.copy(), result.multipliers.copy(), None
-    floor = 8.0 * system.stiffness_scale
+    floor = 8.0 * system.work_noise
     # the residual sums the noise of all coordinates, the work that of the strains
     force_floor = floor * system.noise
     u0, gap = start
@@ -201,7 +201,7 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record):
             raise _Failed("the strain is not finite")
         record.force_residuals.append(float(rho / size) if size > 0 else 0.0)
         if closed and not moving and (
-                rho <= 1e-3 * tol * size + force_floor if k == 0 else
+                rho <= 1e-3 * tol * size + (force_floor if np.any(u) else 0.0) if k == 0 else
                 last and rho <= tol * size + force_floor):
             if any(b.kernel.inverted(u[s]) for b, s in zip(system.beams, system.slices)):
                 raise _Failed("the body is turned inside out")
