@@ -694,6 +694,101 @@ def steps(cable, cpack, bpack, strains, conserving, parameters, load, fixed, M, 
     return rows.shape[0], energy
 
 
+@jit
+def _carry(cable, cpack, bpack, u, du, stresses, out):
+    """The stress, linearised, at u + du."""
+    if cable:
+        cable_increment(cpack, u, du, out)
+        EA, EI = cpack[7]
+        for e in range(out.shape[1]):
+            for p in range(out.shape[2]):
+                out[0, e, p] = stresses[0, e, p] + EA * out[0, e, p]
+                out[1, e, p] = stresses[1, e, p] + EI * out[1, e, p]
+    else:
+        beam_increment(bpack, u, du, out)
+        D = bpack[5]
+        for e in range(out.shape[1]):
+            for p in range(out.shape[2]):
+                x, y, z = out[0, e, p], out[1, e, p], out[2, e, p]
+                for c in range(3):
+                    out[c, e, p] = stresses[c, e, p] + D[c, 0] * x + D[c, 1] * y + D[c, 2] * z
+
+
+@jit
+def equilibrium(cable, cpack, bpack, mixed, u, load, free, A, ld, bw, tol, floor, force_floor,
+                strains, stresses, carried, f, record):
+    """Iterate to equilibrium from u, in place, as :mod:`skfem_ancf.statics.newton` does.
+
+    ``record`` (max_iterations + 1, 2) takes the residuals. Returns the number of linear systems
+    solved, or -1 if the tangent is not positive definite, -2 if there is no convergence.
+    """
+    N, limit = u.size, record.shape[0] - 1
+    R, du, scale = np.empty(N), np.empty(N), np.empty(N)
+    work = before = reference = np.inf
+    moved = False
+    for i in range(N):
+        moved = moved or u[i] != 0.0
+    for k in range(limit + 1):
+        last = k > 1 and work * min(1.0, work / before) <= tol * reference + floor
+        f[:] = 0.0
+        for turn in range(2):
+            if last and turn == 0:
+                _force(cable, cpack, bpack, u, f, strains, A)
+            elif turn == 0 or last:
+                f[:] = 0.0
+                A[:] = 0.0
+                if cable:
+                    cable_loop(cpack, u, f, True, True, carried, mixed and k > 0, strains, stresses,
+                               A, ld, 0)
+                else:
+                    beam_loop(bpack, u, f, True, True, carried, mixed and k > 0, strains, stresses,
+                              A, ld, 0)
+                for i in range(N):
+                    scale[i] = 1.0 / abs(A[i * ld])
+            if turn == 1:
+                break
+            rho, inner, outer = 0.0, 0.0, 0.0
+            for i in range(N):
+                R[i] = (load[i] - f[i]) * free[i]
+                rho += R[i] * R[i] * scale[i]
+                inner += f[i] * f[i] * scale[i]
+                outer += load[i] * load[i] * scale[i]
+            rho, size = math.sqrt(rho), math.sqrt(max(inner, outer))
+            if not rho < 1e300:
+                return -1
+            record[k, 0] = rho / size if size > 0.0 else 0.0
+            if k == 0:
+                small = rho <= 1e-3 * tol * size + (force_floor if moved else 0.0)
+            else:
+                small = last and rho <= tol * size + force_floor
+            if small:
+                return k
+            if k == limit:
+                return -2
+        for i in range(N):
+            du[i] = R[i]
+        fix(A, ld, bw, free == 0.0)
+        if not cholesky(A, ld, bw, N):
+            return -1
+        cholesky_solve(A, ld, bw, du)
+        before, work = work, 0.0
+        for i in range(N):
+            work += R[i] * du[i]
+        work = math.sqrt(abs(work))
+        if not work < 1e300:
+            return -1
+        if mixed:
+            _carry(cable, cpack, bpack, u, du, stresses, carried)
+        inner, outer = 0.0, 0.0
+        for i in range(N):
+            u[i] += du[i]
+            inner += f[i] * u[i]
+            outer += load[i] * u[i]
+        reference = math.sqrt(max(abs(inner), abs(outer)))
+        record[k, 1] = work / reference if reference > 0.0 else 0.0
+    return -2
+
+
 class CompiledKernel:
     """The compiled functions of one beam, with the tables of its NumPy kernel.
 
@@ -717,6 +812,25 @@ class CompiledKernel:
             (beam_loop, beam_increment, beam_mean))
         self._none = np.zeros((1, 1, 1))
 
+    @property
+    def packs(self):
+        """The tables of a cable and of a beam, one of them empty."""
+        none = _empty_pack(not self.cable)
+        return (self.pack, none) if self.cable else (none, self.pack)
+
+    def equilibrium(self, u, load, free, K, mixed, tol, max_iterations, floor, force_floor):
+        """Displacement, force, and residuals of each iteration at the equilibrium; or None.
+
+        None where the iteration does not converge or leaves the positive definite tangents: the
+        caller's own iteration then finds out more.
+        """
+        u, f = u.copy(), np.empty(u.size)
+        strains, stresses, carried = np.empty((3,) + self.shape)
+        record = np.zeros((max_iterations + 1, 2))
+        n = equilibrium(self.cable, *self.packs, mixed, u, load, free, K._flat, K._ld, K.bandwidth,
+                        tol, floor, force_floor, strains, stresses, carried, f, record)
+        return None if n < 0 else (u, f, record[:n + 1, 0], record[:n, 1])
+
     def assemble(self, u, K, start, force, carried, geometric):
         """Add force and tangent; see :meth:`skfem_ancf.kernel.Chain.assemble`."""
         strains, stresses = np.empty(self.shape), np.empty(self.shape)
@@ -737,6 +851,15 @@ class CompiledKernel:
         out = np.zeros(u0.size)
         self._mean(self.pack, u0, u1, out)
         return out
+
+
+def _empty_pack(cable):
+    """Tables of the right types and no size, for the kind of beam that the scene has not."""
+    one, two, three = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0, 0))
+    index = np.zeros(0, dtype=np.int64)
+    if cable:
+        return (three, three, three, three, two, two, two, one, three, index, 0)
+    return (three, three, three, three, two, two, *[index] * 4, *[two] * 3, three, index, 0)
 
 
 class CompiledEvaluation:

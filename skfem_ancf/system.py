@@ -38,6 +38,7 @@ class System:
         self.offsets = np.concatenate([[0], np.cumsum([b.N for b in self.beams])])
         self.N = int(self.offsets[-1])
         self.slices = [slice(int(a), int(b)) for a, b in zip(self.offsets[:-1], self.offsets[1:])]
+        self._supported = False
         self._index = {id(b): k for k, b in enumerate(self.beams)}
         self._eliminate(fixed, values, joints)
         self.symmetric = all(load.symmetric for load in self.loads)
@@ -270,6 +271,16 @@ class System:
         """How much larger the round-off of a residual is than that of the strains."""
         return np.sqrt(max(b.nd for b in self.beams))
 
+    def inverted(self, u):
+        """True if a body is turned inside out somewhere."""
+        return any(b.kernel.inverted(u[s]) for b, s in zip(self.beams, self.slices))
+
+    @cached_property
+    def simple(self):
+        """True for one beam with compiled kernels, dead loads and no joints."""
+        return (len(self.beams) == 1 and not self.joints and self.constant_loads
+                and self.symmetric and self.beams[0].kernel.compiled is not None)
+
     @property
     def constant_loads(self):
         """True if no load depends on displacement or time."""
@@ -446,6 +457,8 @@ class System:
 
     def require_supports(self):
         """Raise SupportError if a rigid motion is free, or joints are not independent."""
+        if self._supported:  # nothing of it changes in the life of a system
+            return
         self.require_independent_joints()
         free = self.free_rigid_motions()
         if free:
@@ -453,3 +466,4 @@ class System:
                 "the supports leave rigid motions free: " + "; ".join(free)
                 + ". Add a support, for example scene.clamp('left'), or solve in time with "
                 "scene.integrate")
+        self._supported = True

@@ -64,9 +64,14 @@ def arm_angle(t):
 
 
 def throw(X, L):
-    """Velocity of the axis across the thrown rod, and its derivative by X."""
+    """Velocity of the axis across the thrown rod, and its derivative by X.
+
+    It turns and bends; the rate of the curvature and its slope vanish at the free ends.
+    """
     s = 2.0 * X / L - 1.0
-    return 6.0 * s + 4.0 * (1.5 * s * s - 0.5), (6.0 + 12.0 * s) * 2.0 / L
+    bend = s**2 / 2.0 - s**4 / 6.0 + s**6 / 30.0 - 29.0 / 210.0
+    slope = s - 2.0 * s**3 / 3.0 + s**5 / 5.0
+    return 6.0 * s + 17.0 * bend, (6.0 + 17.0 * slope) * 2.0 / L
 
 
 THROW_ALONG = 1.0  # m/s, along the axis

@@ -21,8 +21,7 @@ class CompiledSteps:
         self._steps, self._solver, self._system = steps, solver, system
         self._conserving, self._parameters = scheme.compiled
         kernel = system.beams[0].kernel.compiled
-        none = _empty_pack(not kernel.cable)
-        self._packs = (kernel.pack, none) if kernel.cable else (none, kernel.pack)
+        self._packs = kernel.packs
         self._cable = kernel.cable
         self._strains = np.empty(kernel.shape)
         self._A = np.empty_like(system.mass._flat)
@@ -32,9 +31,7 @@ class CompiledSteps:
     @staticmethod
     def applies(scheme, system):
         """True if the scene is simple enough and the scheme has a compiled step."""
-        return (scheme.compiled is not None and len(system.beams) == 1 and not system.joints
-                and system.beams[0].kernel.compiled is not None and system.constant_loads
-                and not system.moves and system.symmetric)
+        return scheme.compiled is not None and system.simple and not system.moves
 
     def run(self, y, dt, n):
         """Up to ``n`` steps from the Motion ``y``; fewer where one fails. A list of Motions."""
@@ -61,12 +58,3 @@ class CompiledSteps:
         if done < n:
             self._state[0] = 0.0
         return motions
-
-
-def _empty_pack(cable):
-    """Tables of the right types and no size, for the kind of beam that the scene has not."""
-    one, two, three = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0, 0))
-    index = np.zeros(0, dtype=np.int64)
-    if cable:
-        return (three, three, three, three, two, two, two, one, three, index, 0)
-    return (three, three, three, three, two, two, *[index] * 4, *[two] * 3, three, index, 0)
