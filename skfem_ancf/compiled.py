@@ -229,31 +229,20 @@ def _shear_row(L, ns, i, j, x_rows, y_rows, Gx, Gy, rx, ry, B, nb):
 
 
 @jit
-def _add_material(B, D, weight, DB, K00, K10, K11, nb):
-    """K += weight B^T D B for B (3, 2, nb); the diagonal blocks' lower halves only."""
-    for c in range(3):
-        d0, d1, d2 = weight * D[c, 0], weight * D[c, 1], weight * D[c, 2]
-        for k in range(2):
-            for a in range(nb):
-                DB[c, k, a] = d0 * B[0, k, a] + d1 * B[1, k, a] + d2 * B[2, k, a]
-    for a in range(nb):
-        x0, x1, x2 = DB[0, 0, a], DB[1, 0, a], DB[2, 0, a]
-        y0, y1, y2 = DB[0, 1, a], DB[1, 1, a], DB[2, 1, a]
-        for b in range(a + 1):
-            K00[a, b] += x0 * B[0, 0, b] + x1 * B[1, 0, b] + x2 * B[2, 0, b]
-            K11[a, b] += y0 * B[0, 1, b] + y1 * B[1, 1, b] + y2 * B[2, 1, b]
-        for b in range(nb):
-            K10[a, b] += y0 * B[0, 0, b] + y1 * B[1, 0, b] + y2 * B[2, 0, b]
-
-
-@jit
-def _add_geometric(s, g, h, K00, K11, nb):
-    """K += s g h^T for both components, lower halves."""
-    for a in range(nb):
-        x = s * g[a]
-        for b in range(a + 1):
-            K00[a, b] += x * h[b]
-            K11[a, b] += x * h[b]
+def _pairs(Gx, Gy, x_xx, y_yy, x_xy, y_xy, P, Q):
+    """Rows of both factors of the geometric part: sum of stress times P^T Q over the rows."""
+    a, b, c = x_xx.size, y_yy.size, x_xy.size
+    for p in range(a):
+        P[p] = Gx[x_xx[p]]
+        Q[p] = Gx[x_xx[p]]
+    for p in range(b):
+        P[a + p] = Gy[y_yy[p]]
+        Q[a + p] = Gy[y_yy[p]]
+    for p in range(c):
+        P[a + b + p] = Gx[x_xy[p]]
+        Q[a + b + p] = Gy[y_xy[p]]
+        P[a + b + c + p] = Gy[y_xy[p]]
+        Q[a + b + c + p] = Gx[x_xy[p]]
 
 
 @jit
@@ -269,8 +258,12 @@ def beam_loop(pack, u, f, tangent, geometric, carried, use_carried, strains, str
     size = max(x_xx.size, y_yy.size, x_xy.size)
     s, hat = np.empty(size), np.empty((3, size))
     strain, S = np.empty((3, n)), np.empty((3, n))
-    K, B, DB = np.empty((m, m)), np.empty((3, 2, nb)), np.empty((3, 2, nb))
-    K00, K10, K11 = np.empty((nb, nb)), np.empty((nb, nb)), np.empty((nb, nb))
+    K, Km, Kg = np.empty((m, m)), np.empty((m, m)), np.empty((nb, nb))
+    # rows are strains at points, columns the x components and then the y components
+    B, DB = np.empty((3 * n, m)), np.empty((3 * n, m))
+    parts = B.reshape(3, n, 2, nb)
+    pairs = x_xx.size + y_yy.size + 2 * x_xy.size
+    P, Q, SP = np.empty((pairs, nb)), np.empty((pairs, nb)), np.empty((pairs, nb))
     for e in range(left.size):
         t = e if Gx_.shape[0] > 1 else 0
         Gx, Gy, w = Gx_[t], Gy_[t], w_[t]
@@ -288,13 +281,18 @@ def beam_loop(pack, u, f, tangent, geometric, carried, use_carried, strains, str
         _beam_force(Gx, Gy, rx, ry, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, ns, w, S, hat, Tx, Ty,
                     f, first, nb)
         if tangent:
-            K00[:], K10[:], K11[:] = 0.0, 0.0, 0.0
             for i in range(Lxx.shape[0]):
                 for j in range(ns):
-                    _normal_row(Lxx, ns, i, j, x_xx, Gx, rx, B[0], nb)
-                    _normal_row(Lyy, ns, i, j, y_yy, Gy, ry, B[1], nb)
-                    _shear_row(Lxy, ns, i, j, x_xy, y_xy, Gx, Gy, rx, ry, B[2], nb)
-                    _add_material(B, D, w[i * ns + j], DB, K00, K10, K11, nb)
+                    p = i * ns + j
+                    _normal_row(Lxx, ns, i, j, x_xx, Gx, rx, parts[0, p], nb)
+                    _normal_row(Lyy, ns, i, j, y_yy, Gy, ry, parts[1, p], nb)
+                    _shear_row(Lxy, ns, i, j, x_xy, y_xy, Gx, Gy, rx, ry, parts[2, p], nb)
+                    for c in range(3):
+                        d0, d1, d2 = w[p] * D[c, 0], w[p] * D[c, 1], w[p] * D[c, 2]
+                        for a in range(m):
+                            DB[c * n + p, a] = d0 * B[p, a] + d1 * B[n + p, a] + d2 * B[2 * n + p, a]
+            np.dot(DB.T, B, Km)
+            Kg[:] = 0.0
             if geometric:
                 if use_carried:
                     for c in range(3):
@@ -303,17 +301,20 @@ def beam_loop(pack, u, f, tangent, geometric, carried, use_carried, strains, str
                     _collect(Lxx, ns, S[0], hat[0])
                     _collect(Lyy, ns, S[1], hat[1])
                     _collect(Lxy, ns, S[2], hat[2])
-                for p in range(x_xx.size):
-                    _add_geometric(hat[0, p], Gx[x_xx[p]], Gx[x_xx[p]], K00, K11, nb)
-                for p in range(y_yy.size):
-                    _add_geometric(hat[1, p], Gy[y_yy[p]], Gy[y_yy[p]], K00, K11, nb)
-                for p in range(x_xy.size):
-                    _add_geometric(hat[2, p], Gx[x_xy[p]], Gy[y_xy[p]], K00, K11, nb)
-                    _add_geometric(hat[2, p], Gy[y_xy[p]], Gx[x_xy[p]], K00, K11, nb)
+                if e == 0 or t > 0:
+                    _pairs(Gx, Gy, x_xx, y_yy, x_xy, y_xy, P, Q)
+                row = 0
+                for c in (0, 1, 2, 2):
+                    for p in range((x_xx.size, y_yy.size, x_xy.size)[c]):
+                        for a in range(nb):
+                            SP[row, a] = hat[c, p] * P[row, a]
+                        row += 1
+                np.dot(SP.T, Q, Kg)
             for a in range(nb):
                 for b in range(nb):
-                    K[2 * a, 2 * b], K[2 * a + 1, 2 * b + 1] = K00[a, b], K11[a, b]
-                    K[2 * a + 1, 2 * b], K[2 * b, 2 * a + 1] = K10[a, b], K10[a, b]
+                    K[2 * a, 2 * b] = Km[a, b] + Kg[a, b]
+                    K[2 * a + 1, 2 * b + 1] = Km[nb + a, nb + b] + Kg[a, b]
+                    K[2 * a + 1, 2 * b] = K[2 * b, 2 * a + 1] = Km[nb + a, b]
         _constant(constant, e, u, first, m, f, K, tangent)
         if tangent:
             add_block(K, flat, ld, start + first)

@@ -101,48 +101,45 @@ def roll_up(p):
                 yield exudyn_beams.run(p, "GE2D quadratic", n, steps)
 
 
-def motion(p, scale=1, sections=(2,), adaptive=True):
+def motion(p, scale=1, adaptive=True):
     """Meshes times step sizes; ``scale`` divides the numbers of steps."""
-    for degree, meshes in ((3, ((8, 8), (16, 16), (32, 32))), (5, ((4, 8), (8, 16), (12, 32))),
-                           (7, ((3, 8), (5, 16), (8, 32)))):
+    def counts(least, most):
+        return [int(250 * f) // scale for f in (0.5, 1, 2, 4, 8, 16, 24, 32) if least <= f <= most]
+
+    for degree, meshes in ((3, ((6, 4), (8, 8), (16, 16), (32, 32))),
+                           (5, ((3, 4), (4, 8), (8, 16), (12, 32))),
+                           (7, ((2, 4), (3, 8), (5, 24), (8, 32)))):
         for n, most in meshes:
-            for factor in (1, 2, 4, 8, 16, 32):
-                if factor > most:
-                    break
-                steps = 250 * factor // scale
+            for steps in counts(1, most):
                 for scheme in ("generalized-alpha", "energy-momentum"):
                     yield ours.run(p, "cable", degree, n, steps=steps, scheme=scheme, tol=1e-6)
-                if factor <= 2:
-                    yield ours.run(p, "cable", degree, n, steps=steps, tol=1e-4)
-                if factor >= 16:
-                    yield ours.run(p, "cable", degree, n, steps=steps, tol=1e-8)
+            for steps in counts(0.5, min(2, most)):
+                yield ours.run(p, "cable", degree, n, steps=steps, tol=1e-4)
+            for steps in counts(16, most):
+                yield ours.run(p, "cable", degree, n, steps=steps, tol=1e-8)
     if adaptive:
         for n, rtol in ((4, 1e-4), (4, 1e-5), (6, 1e-6), (8, 1e-7)):
             yield ours.run(p, "cable", 5, n, rtol=rtol, tol=1e-6)
-    for order in sections:
-        for n in (4, 8, 16):
-            for factor in (1, 4, 16):
-                yield ours.run(p, "cubic", order, n, steps=250 * factor // scale, tol=1e-6)
+    for n in (4, 8, 16):
+        for steps in (250, 1000, 4000):
+            yield ours.run(p, "cubic", 2, n, steps=steps // scale, tol=1e-6)
     for n in (8, 16, 32):
         yield ours.run(p, "ancf", 2, n, steps=1000 // scale, tol=1e-6)
-    yield ours.run(p, "cable", 5, 8, steps=1000 // scale, tol=1e-6, compiled=False)
-    yield ours.run(p, "cubic", 2, 8, steps=1000 // scale, tol=1e-6, compiled=False)
+    for kind, order in (("cable", 5), ("cubic", 2)):
+        yield ours.run(p, kind, order, 8, steps=1000 // scale, tol=1e-6, compiled=False)
     if exudyn_beams.exudyn is None:
         return
-    for n, most in ((6, 2), (8, 4), (12, 8), (16, 16), (24, 32), (32, 32), (48, 32), (64, 32)):
-        for factor in (1, 2, 4, 8, 16, 32):
-            if factor > most or factor * 24 < n:
-                continue
-            steps = 250 * factor // scale
-            for rtol in (1e-2, 1e-4, 1e-6):
-                if rtol == 1e-2 and factor > 4 or rtol == 1e-6 and factor < 4:
-                    continue
+    for n, least, most in ((4, 0.5, 2), (6, 0.5, 2), (8, 0.5, 4), (12, 1, 8), (16, 1, 16),
+                           (24, 2, 32), (32, 2, 32), (48, 4, 32), (64, 8, 32)):
+        for rtol, low, high in ((1e-2, 0.5, 4), (1e-4, 0.5, 24), (1e-6, 4, 32)):
+            for steps in counts(max(least, low), min(most, high)):
                 yield exudyn_beams.run(p, "ANCFCable2D", n, steps, rtol)
-            if n in (8, 16, 32) and factor in (1, 4, 16):
-                yield exudyn_beams.run(p, "GE2D quadratic", n, steps, 1e-4)
-            if n == 8 and factor <= 2:
-                yield exudyn_beams.run(p, "ANCFCable2D", n, steps, 1e-4, dense=True)
-                yield exudyn_beams.run(p, "ANCFCable2D", n, steps, 1e-4, modified=False)
+    for n in (8, 16, 32):
+        for steps in counts(1, n):
+            yield exudyn_beams.run(p, "GE2D quadratic", n, steps, 1e-4)
+    for steps in counts(1, 2):
+        yield exudyn_beams.run(p, "ANCFCable2D", 8, steps, 1e-4, dense=True)
+        yield exudyn_beams.run(p, "ANCFCable2D", 8, steps, 1e-4, modified=False)
 
 
 def spin_up(p):
