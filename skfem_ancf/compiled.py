@@ -290,7 +290,8 @@ def beam_loop(pack, u, f, tangent, geometric, carried, use_carried, strains, str
                     for c in range(3):
                         d0, d1, d2 = w[p] * D[c, 0], w[p] * D[c, 1], w[p] * D[c, 2]
                         for a in range(m):
-                            DB[c * n + p, a] = d0 * B[p, a] + d1 * B[n + p, a] + d2 * B[2 * n + p, a]
+                            DB[c * n + p, a] = (d0 * B[p, a] + d1 * B[n + p, a]
+                                                + d2 * B[2 * n + p, a])
             np.dot(DB.T, B, Km)
             Kg[:] = 0.0
             if geometric:

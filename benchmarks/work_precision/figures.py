@@ -47,7 +47,7 @@ def work_precision(rows, title, floor=1e-11):
         ax.plot([r["error"] for r in mine], [1e3 * r["seconds"] for r in mine], ls="",
                 marker=marker, ms=4, mfc="none", color=colour, alpha=0.35)
         best = front(mine)
-        ax.step([r["error"] for r in best], [1e3 * r["seconds"] for r in best], where="post",
+        ax.step([r["error"] for r in best], [1e3 * r["seconds"] for r in best], where="pre",
                 color=colour, marker=marker, ms=5, label=code)
     ax.invert_xaxis()
     ax.set_xlabel(f"error of the tip / length (below {floor:g} drawn there)")

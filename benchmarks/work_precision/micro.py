@@ -96,7 +96,7 @@ def iteration(about, watch):
     return rows
 
 
-SCALED = {"cable 5, assumed": lambda n: scene(PROBLEMS["5.2"], ElementBeamCable(5), n),
+SCALED = {"cable 3, assumed": lambda n: scene(PROBLEMS["5.2"], ElementBeamCable(3), n),
           "ancf 3, assumed": lambda n: scene(PROBLEMS["5.2"], ElementBeamANCF(3), n),
           "cubic 2, assumed": lambda n: scene(PROBLEMS["5.2"], ElementBeamANCFCubic(2), n)}
 

@@ -160,6 +160,7 @@ class Memory:
         if self.process is not None:
             self.process.stdin.close()
             self.process.wait()
+            self.process.stdout.close()
 
     def peak(self, case, index):
         """Peak resident memory (MB) of run number ``index`` of a case; "" where not known."""

@@ -1,0 +1,25 @@
+"""The benchmark script in its quick form: rows, errors beside times, a report. Times are not judged."""
+
+import csv
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+bench = pytest.importorskip("bench")
+
+
+@pytest.mark.parametrize("case", ["5.1", "tangent"])
+def test_quick_case_writes_rows_picture_and_report(case, tmp_path, monkeypatch):
+    monkeypatch.setattr(bench.runs, "single_core", lambda: None)  # leave the other tests a core
+    bench.run(tmp_path, [case], quick=True)
+    with open(tmp_path / f"{case}.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert {"case", "code", "variant", "elements", "dofs", "steps", "error", "seconds", "iterations",
+            "peak_mb", "versions", "machine"} <= set(rows[0])
+    ours = [r for r in rows if r["code"] == "skfem-ancf" and r["seconds"]]
+    assert ours and all(float(r["seconds"]) > 0 for r in ours)
+    if case == "5.1":
+        assert min(float(r["error"]) for r in ours if r["error"]) < 1e-4
+    assert case in (tmp_path / "report.md").read_text(encoding="utf-8")
