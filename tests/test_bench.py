@@ -22,4 +22,4 @@ def test_quick_case_writes_rows_picture_and_report(case, tmp_path, monkeypatch):
     assert ours and all(float(r["seconds"]) > 0 for r in ours)
     if case == "5.1":
         assert min(float(r["error"]) for r in ours if r["error"]) < 1e-4
-    assert case in (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert case in (tmp_path / "report.md").read_text(encoding="utf-8").lower()
