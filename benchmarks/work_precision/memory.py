@@ -17,7 +17,7 @@ def peak(case, index, quick):
     if pid == 0:
         try:
             if case in SCALED:
-                SCALED[case](index).solve_static()
+                SCALED[case](index).solve_linear()
             else:
                 runs_of(case, quick)[index].build().solve()
         except Exception:
