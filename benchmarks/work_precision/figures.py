@@ -58,7 +58,7 @@ def work_precision(rows, title, floor=1e-11):
 
 def scaling(rows):
     """Time and memory against the number of elements."""
-    figure, (left, right) = subplots("gravity cantilever 5.2 on many elements", 2)
+    figure, (left, right) = subplots("one linear system of many elements", 2)
     rows = [r for r in rows if np.isfinite(r["seconds"])]
     for variant in dict.fromkeys(r["variant"] for r in rows):
         mine = [r for r in rows if r["variant"] == variant]
