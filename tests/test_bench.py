@@ -23,3 +23,18 @@ def test_quick_case_writes_rows_picture_and_report(case, tmp_path, monkeypatch):
     if case == "5.1":
         assert min(float(r["error"]) for r in ours if r["error"]) < 1e-4
     assert case in (tmp_path / "report.md").read_text(encoding="utf-8").lower()
+
+
+def test_a_long_run_is_made_once_and_a_failed_one_says_so(monkeypatch):
+    from work_precision import ours
+
+    problem = bench.PROBLEMS["5.1"]
+    monkeypatch.setattr(bench.runs, "LONG", 0.0)
+    entry = bench.runs.Timed(ours.run(problem, "cable", 3, 2))
+    entry.repeat()
+    row = entry.row(bench.reference("5.1", "cable"), "", ("", ""))
+    assert row["runs"] == 1 and row["seconds"] > 0 and row["error"] < 1e-3
+    entry = bench.runs.Timed(ours.run(problem, "cable", 3, 2, max_iterations=1))
+    entry.repeat()
+    row = entry.row(bench.reference("5.1", "cable"), "", ("", ""))
+    assert row["runs"] == 0 and row["note"].startswith("failed: ConvergenceError")

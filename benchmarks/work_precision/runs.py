@@ -116,7 +116,6 @@ class Timed:
     def repeat(self):
         """Time the run a few times more."""
         if self.solver is None or self.first > LONG:
-            self.solver = None
             return
         for _ in range(int(np.clip(BUDGET / max(self.first, 1e-6), 1, MOST))):
             start = clock()
