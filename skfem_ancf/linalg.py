@@ -1,7 +1,7 @@
-"""Banded matrices of chains of elements, over LAPACK."""
+"""Banded matrices of chains of elements, over LAPACK, and their borders."""
 
 import numpy as np
-from scipy.linalg import blas, lapack
+from scipy.linalg import blas, lapack, lu_solve
 from scipy.sparse import coo_matrix
 
 
@@ -169,3 +169,92 @@ class BandMatrix:
             i, j, v = (np.concatenate([i, j[off]]), np.concatenate([j, i[off]]),
                        np.concatenate([v, v[off]]))
         return coo_matrix((v, (i, j)), shape=(self.n, self.n)).tocsc()
+
+
+class BorderedMatrix:
+    """Solves ``[A, J^T; J, 0] [x; l] = [b; c]`` by the factors of a band matrix.
+
+    ``A`` is the band matrix plus a few entries outside of its band. Coordinates in ``springs``
+    are held by springs before the band is factorised, and let go in the border, because a beam
+    that only joints hold has a singular matrix of its own.
+
+    Parameters
+    ----------
+    K : BandMatrix
+        With its supports fixed. Springs, and the entries that lie in the band, are added to it.
+    J
+        Shape (m, n), dense and small.
+    i, j, values
+        Entries to add to K, of both halves where it is symmetric.
+    springs
+        Coordinates to hold.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the matrix is singular.
+    """
+
+    def __init__(self, K, J, i, j, values, springs):
+        inside = np.abs(i - j) <= K.bandwidth
+        K.add(i[inside], j[inside], values[inside])
+        diagonal = np.abs(K.diagonal())
+        stiffness = diagonal[springs]
+        stiffness[stiffness == 0.0] = np.mean(diagonal)
+        K.add(springs, springs, stiffness)
+        K.factorize()
+        self._K, self._J = K, J
+        i, j, values = i[~inside], j[~inside], values[~inside]
+        far, where = np.unique(np.append(i, j), return_inverse=True)
+        # A = K + P^T S P, where the rows of P pick the springs and what lies outside the band
+        self._picked = np.append(springs, far)
+        k, ns = len(self._picked), len(springs)
+        self._S = np.zeros((k, k))
+        self._S[np.arange(ns), np.arange(ns)] = -stiffness
+        np.add.at(self._S, (ns + where[:len(i)], ns + where[len(i):]), values)
+        columns = np.zeros((K.n, k + len(J)), order="F")
+        columns[self._picked, np.arange(k)] = 1.0
+        columns[:, k:] = J.T
+        Z = K.solve(columns)
+        # equations of joints have units of their own: scale them to a unit diagonal
+        size = np.abs(np.einsum("kn,nk->k", J, Z[:, k:]))
+        self._scale = 1.0 / np.sqrt(np.where(size > 0, size, 1.0))
+        Z[:, k:] *= self._scale
+        Z[:, :k] = Z[:, :k] @ self._S
+        H = np.vstack([Z[self._picked], self._scale[:, None] * (J @ Z)])
+        H[np.arange(k), np.arange(k)] += 1.0
+        if not np.all(np.isfinite(H)):
+            raise np.linalg.LinAlgError("the matrix is singular")
+        self._Z = Z
+        lu, pivots, info = lapack.dgetrf(H)
+        if info != 0:
+            raise np.linalg.LinAlgError("the matrix is singular")
+        self._H = lu, pivots
+
+    def tocsc(self):
+        """A as a scipy.sparse array in CSC format."""
+        rows = np.broadcast_to(self._picked[:, None], self._S.shape)
+        S = coo_matrix((self._S.ravel(), (rows.ravel(), rows.T.ravel())),
+                       (self._K.n, self._K.n))
+        return self._K.tocsc() + S.tocsc()
+
+    def _once(self, b, c):
+        x = self._K.solve(b)
+        k = len(self._picked)
+        y = lu_solve(self._H, np.append(x[self._picked], self._scale * (self._J @ x - c)),
+                     check_finite=False)
+        return x - self._Z @ y, self._scale * y[k:]
+
+    def _multiply(self, x):
+        out = self._K.multiply(x)
+        np.add.at(out, self._picked, self._S @ x[self._picked])
+        return out
+
+    def solve(self, b, c):
+        """x, l and how large the correction by one refinement was, relative to x."""
+        x, l = self._once(b, c)
+        dx, dl = self._once(b - self._multiply(x) - l @ self._J, c - self._J @ x)
+        weight = np.abs(self._K.diagonal())
+        size = weight @ (x * x)
+        error = np.sqrt(weight @ (dx * dx) / size) if size > 0 else 0.0
+        return x + dx, l + dl, float(error)

@@ -88,13 +88,16 @@ def make_plan(scene, kind="static"):
         f"{s.m} equations of {len(s.joints)} joint(s)" if s.m else
         "no joints" if not scene.joints else "the joints only fix coordinates")
     bandwidth = s.K.bandwidth
-    if s.m and not dynamic:
-        solver = "sparse LU with the multipliers"
+    if s.m and not dynamic and not s.bordered:
+        solver = f"sparse LU with the multipliers: too many for a border ({s.m})"
     elif not s.symmetric:
         solver = f"banded LU, half bandwidth {bandwidth}: a pressure has no potential"
     else:
-        solver = f"banded Cholesky, half bandwidth {bandwidth}" + (
-            ", bordered by the multipliers" if s.m else "")
+        solver = f"banded Cholesky, half bandwidth {bandwidth}"
+    if s.m and (dynamic or s.bordered):
+        springs = 0 if dynamic else len(s.springs)
+        solver += ", bordered by the multipliers" + (
+            f" and by {springs} springs on beams that joints alone hold" if springs else "")
     add("linear solver", "computed", solver)
     rules = sorted({(b.element.order, b.kernel.section_points) for b in beams if not b.is_cable})
     add("section quadrature", "constant" if rules else "skipped",

@@ -8,10 +8,14 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from .errors import SupportError
-from .linalg import BandMatrix
+from .linalg import BandMatrix, BorderedMatrix
 
 logger = logging.getLogger(__name__)
 _NONE = np.zeros(0)
+#: Columns of a border above which sparse LU is faster.
+WIDE_BORDER = 64
+#: Relative correction of a border's solution above which sparse LU is used.
+INACCURATE = 1e-5
 
 
 class System:
@@ -385,16 +389,48 @@ class System:
         """The assembled tangent times a vector, before :meth:`factorize`."""
         return self.K.multiply(v)
 
+    @cached_property
+    def springs(self):
+        """Coordinates that hold the beams which their own supports leave free to move.
+
+        The positions of two nodes far apart, for each such beam.
+        """
+        out = []
+        for beam, s in zip(self.beams, self.slices):
+            held = self.fixed[(self.fixed >= s.start) & (self.fixed < s.stop)] - s.start
+            motions = beam.rigid_motions()[held] / [1.0, 1.0, self.size]
+            if np.linalg.matrix_rank(motions, 1e-9 * np.abs(motions).max(initial=0.0)) == 3:
+                continue
+            p = beam.mesh.p
+            far = int(np.argmax(np.sum((p - p[:, :1]) ** 2, axis=0)))
+            out += [s.start + node * beam.nd + k for node in (0, far) for k in range(2)]
+        out = np.array(out, dtype=int)
+        return out[self.free[out]]
+
+    @property
+    def bordered(self):
+        """True if the multipliers are few enough for a border about the band matrix."""
+        return self.m + len(self.springs) <= WIDE_BORDER
+
     def factorize(self, u=None, t=0.0, multipliers=None):
         """Fix the supports in the tangent and factorise it, with the joints where there are any."""
         self.K.fix(self.fixed_positions)
         if not self.joints:
             self.K.factorize()
             return
-        K = self.K.tocsc() + self.curvature(u, t, multipliers)
+        self._J = self.jacobian(u, t)
+        i, j, v = self._curvature(u, t, multipliers)
+        v = v * (self.free[i] & self.free[j])
+        if self.bordered:
+            self._factors = BorderedMatrix(self.K, self._J, i, j, v, self.springs)
+        else:
+            self._factors = self._sparse_factors(
+                self.K.tocsc() + sparse.csc_matrix((v, (i, j)), shape=(self.N, self.N)))
+
+    def _sparse_factors(self, K):
         self._weight = float(np.mean(np.abs(K.diagonal()[self.free])))
-        J = sparse.csr_matrix(self.jacobian(u, t) * self._weight)
-        self._kkt = splu(sparse.bmat([[K, J.T], [J, None]], format="csc"))
+        J = sparse.csr_matrix(self._J * self._weight)
+        return splu(sparse.bmat([[K, J.T], [J, None]], format="csc"))
 
     def solve(self, residual, phi=None):
         """Solve with the factors.
@@ -414,7 +450,13 @@ class System:
         b = residual * self.mask
         if not self.joints:
             return self.K.solve(b), _NONE
-        x = self._kkt.solve(np.append(b, self._weight * phi))
+        if isinstance(self._factors, BorderedMatrix):
+            x, multipliers, error = self._factors.solve(b, phi)
+            if error < INACCURATE:
+                return x, multipliers
+            logger.debug("border inaccurate by %.3g: sparse LU", error)
+            self._factors = self._sparse_factors(self._factors.tocsc())
+        x = self._factors.solve(np.append(b, self._weight * phi))
         return x[:self.N], self._weight * x[self.N:]
 
     # rigid motions

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamPatelShabana,
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
+                        ElementBeamPatelShabana,
                         EnergyMomentum, GeneralizedAlpha, MeshBeam, Scene, StVenantKirchhoff, exact)
 from skfem_ancf.errors import InputError, NameUnknown, SupportError
 from skfem_ancf.joints import JOINTS, get_joint
+from skfem_ancf.system import System
 
 E, NU, RHO = 1e6, 0.3, 1000.0
 GRAVITY = (0.0, -9.81)
@@ -81,6 +83,73 @@ def test_curvature_is_the_derivative_of_the_jacobian(joint):
     assert np.allclose(C @ v, along, rtol=0, atol=1e-12)
     assert joint.constant == (not np.any(joint.jacobian(u + v, t + 0.1) - joint.jacobian(u, t)))
     assert joint.moving == bool(np.any(joint.value(u, t + 0.1) - joint.value(u, t)))
+
+
+# the linear systems of statics
+
+
+def held(name, pressure=False):
+    """The elbow with a joint, and as few supports and other joints as hold it."""
+    scene = Scene(*elbow()).gravity(GRAVITY)
+    if name not in ("hinge", "weld"):
+        scene.joint("hinge", **CASES["hinge"])
+    scene.joint(name, **CASES[name])
+    scene.clamp("left", beam="arm")
+    if pressure:
+        scene.pressure("top", 10.0, beam="forearm")
+    return scene
+
+
+@pytest.mark.parametrize("pressure", [False, True])
+@pytest.mark.parametrize("border", [True, False])
+@pytest.mark.parametrize("name", JOINTS)
+def test_joints_are_solved_like_the_dense_system(name, border, pressure, monkeypatch):
+    """The border, and sparse LU where it is too wide, against the whole matrix."""
+    if not border:
+        monkeypatch.setattr("skfem_ancf.system.WIDE_BORDER", 0)
+    s = held(name, pressure).system
+    rng = np.random.default_rng(4)
+    # the prescribed joints leave the forearm of the elbow one motion: a stress holds it
+    u, m, t = 0.02 * rng.standard_normal(s.N), rng.standard_normal(s.m), 0.7
+    s.assemble(u, 1.0)
+    K, J = s.K.tocsc().toarray() + s.curvature(u, t, m).toarray(), s.jacobian(u, t)
+    K[s.fixed], K[:, s.fixed] = 0.0, 0.0
+    K[s.fixed, s.fixed] = 1.0
+    b, c = rng.standard_normal(s.N) * s.free, rng.standard_normal(s.m)
+    expected = np.linalg.solve(np.block([[K, J.T], [J, np.zeros((s.m, s.m))]]), np.append(b, c))
+    s.factorize(u, t, m)
+    assert s.bordered == border
+    assert s.symmetric == (not pressure)
+    assert len(s.springs) == 4  # nothing but joints holds the forearm
+    x, l = s.solve(b, c)
+    assert np.allclose(x, expected[:s.N], rtol=0, atol=1e-9 * np.abs(expected[:s.N]).max())
+    assert np.allclose(l, expected[s.N:], rtol=0, atol=1e-9 * np.abs(expected[s.N:]).max())
+
+
+def test_a_border_that_is_not_accurate_gives_way_to_sparse_lu(monkeypatch):
+    scene = held("weld")
+    expected = scene.solve_static().u
+    monkeypatch.setattr("skfem_ancf.system.INACCURATE", 0.0)
+    calls = []
+    sparse = System._sparse_factors
+    monkeypatch.setattr(System, "_sparse_factors",
+                        lambda self, K: calls.append(1) or sparse(self, K))
+    state = held("weld").solve_static()
+    assert len(calls) >= state.iterations  # also in load steps that were cut
+    assert np.allclose(state.u, expected, rtol=0, atol=1e-12)
+
+
+def test_a_frame_of_hinges_and_welds_is_solved_through_its_border():
+    """Beams that joints alone hold, an arch of three hinges: symmetric, and in equilibrium."""
+    beams = [between(a, b, 3, element=ElementBeamCable(5), name=n, E=1e8) for a, b, n in (
+        ((0, 0), (1, 1), "left"), ((1, 1), (2, 1), "middle"), ((2, 1), (3, 0), "right"))]
+    scene = Scene(*beams).pin("left", beam="left").pin("right", beam="right").gravity(GRAVITY)
+    scene.joint("weld", beams=("left", "middle"), at=("right", "left"))
+    scene.joint("hinge", beams=("middle", "right"), at=(2, 1))
+    state = scene.solve_static()
+    assert len(scene.system.springs) == 8
+    up = sum(state.reactions(end, beam=end).force[1] for end in ("left", "right"))
+    assert np.isclose(up, 9.81 * sum(b.total_mass for b in beams))
 
 
 # conservation and drift

@@ -112,7 +112,10 @@ def test_plan_of_every_kind():
     s.joint("line", at=(1, 0), direction=(1, 0.5))
     plan = s.plan()
     assert plan["multipliers"].status == plan["varying loads"].status == "computed"
-    assert "sparse" in plan["linear solver"].reason
+    assert "bordered" in plan["linear solver"].reason
+    for k in range(70):
+        s.joint("line", at=(1 - k / 100, 0), direction=(1, 0.5))
+    assert "sparse" in s.plan()["linear solver"].reason
     assert "LU" in s.plan("dynamic")["linear solver"].reason
     assert all(item.term in str(plan) and item.reason in str(plan) for item in plan)
     with pytest.raises(NameUnknown, match="'static', 'linear', 'dynamic'"):
