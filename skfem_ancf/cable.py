@@ -9,7 +9,7 @@ the mode of equal slopes that this leaves is stabilised.
 import numpy as np
 
 from .errors import InputError
-from .kernel import Chain
+from .kernel import Chain, writable
 from .quadrature import gauss
 
 _J = np.array([[0.0, 1.0], [-1.0, 0.0]])  # a x b = a . _J b
@@ -91,10 +91,10 @@ class CableKernel(Chain):
         self.constant = (formulation.stabilisation(mesh, element, material, width)
                          if m == 2 and formulation.name == "assumed" else None)
 
-    def _pack(self):
+    def _packs(self):
         constant = np.zeros((0, 1, 1)) if self.constant is None else self.constant
-        return (self.G1, self.G2, self.a0, self.b0, self.s0, self.kappa0, self.w, self.stiffness,
-                np.ascontiguousarray(constant), self.t[0].astype(np.int64), self.nd)
+        return [writable(self.G1, self.G2, self.a0, self.b0, self.s0, self.kappa0, self.w,
+                         self.stiffness, constant, self.t[0].astype(np.int64)) + (self.nd,)]
 
     def _part(self, table, elements):
         return table[elements] if len(table) > 1 else table

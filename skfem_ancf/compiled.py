@@ -2,7 +2,7 @@
 
 Found at run time: without the package numba nothing changes but the speed. The functions repeat
 what :mod:`skfem_ancf.kernel` and :mod:`skfem_ancf.cable` say, element by element and into the band
-matrix, and are tested against them; :func:`steps` does whole time steps.
+matrix, and are tested against them.
 """
 
 import math
@@ -540,328 +540,60 @@ def cable_mean(pack, u0, u1, f):
         _constant(constant, e, middle, first, 2 * nd, f, K, False)
 
 
-# time steps of a scene of one beam without joints
-
-
-@jit
-def _force(cable, cpack, bpack, u, f, dummy, flat):
-    f[:] = 0.0
-    if cable:
-        cable_loop(cpack, u, f, False, False, dummy, False, dummy, dummy, flat, 1, 0)
-    else:
-        beam_loop(bpack, u, f, False, False, dummy, False, dummy, dummy, flat, 1, 0)
-
-
-@jit
-def _mean(cable, cpack, bpack, u0, u1, f):
-    f[:] = 0.0
-    if cable:
-        cable_mean(cpack, u0, u1, f)
-    else:
-        beam_mean(bpack, u0, u1, f)
-
-
-@jit
-def _tangent(cable, cpack, bpack, u, f, strains, flat, ld):
-    f[:] = 0.0
-    if cable:
-        cable_loop(cpack, u, f, True, True, strains, False, strains, strains, flat, ld, 0)
-    else:
-        beam_loop(bpack, u, f, True, True, strains, False, strains, strains, flat, ld, 0)
-
-
-@jit
-def steps(cable, cpack, bpack, strains, conserving, parameters, load, fixed, M, ld, bw, A, state, y,
-          t0, dt, tol, floor, energy, rows, times):
-    """Time steps; one row of ``rows`` (n, 3, N) for each: u, v and the acceleration.
-
-    ``y`` (4, N) is u, v, acceleration and the scheme's acceleration, and is advanced; ``state`` is
-    [has factors, iterations, factorisations, rate, size of the step before]. Returns the number
-    of steps done, and the energy scale.
-    """
-    N = load.size
-    alpha_m, alpha_f, beta, gamma = parameters
-    u, f, R, du, inertia = np.empty(N), np.empty(N), np.empty(N), np.empty(N), np.empty(N)
-    base, x = np.empty(N), np.empty(N)
-    if conserving:
-        c_m, c_k = 2.0 / dt**2, 0.5
-    else:
-        c_m, c_k = (1.0 - alpha_m) / ((1.0 - alpha_f) * beta * dt * dt), 1.0
-    for n in range(rows.shape[0]):
-        u0, v0, a0, w0 = y[0], y[1], y[2], y[3]
-        for i in range(N):
-            if conserving:
-                u[i] = u0[i] + dt * v0[i] + 0.5 * dt * dt * a0[i]
-                base[i] = u0[i] + dt * v0[i]
-            else:
-                base[i] = u0[i] + dt * v0[i] + dt * dt * (0.5 - beta) * w0[i]
-                u[i] = base[i] + dt * dt * beta * w0[i]
-            if fixed[i]:
-                u[i] = u0[i]
-        for i in range(N):  # the velocity of the guess, for the scale of the energy
-            if conserving:
-                x[i] = (u[i] - u0[i]) * (2.0 / dt) - v0[i]
-            else:
-                x[i] = v0[i] + dt * ((1.0 - gamma) * w0[i]
-                                     + gamma * (u[i] - base[i]) / (beta * dt * dt))
-            if fixed[i]:
-                x[i] = 0.0
-        multiply(M, ld, bw, x, inertia)
-        kinetic, noise = 0.0, 0.0
-        for i in range(N):
-            kinetic += 0.5 * x[i] * inertia[i]
-        multiply(M, ld, bw, u, inertia)
-        for i in range(N):
-            noise += u[i] * inertia[i]
-        rough = math.sqrt(floor * floor * c_k + 4.9e-32 * c_m * abs(noise))
-        wanted = tol * math.sqrt(max(energy, kinetic)) + rough
-        fresh, before, done = False, -1.0, False
-        for k in range(30):
-            if state[0] == 0.0:
-                A[:] = 0.0
-                for i in range(N):
-                    x[i] = 0.5 * (u[i] + u0[i]) if conserving else u[i]
-                _tangent(cable, cpack, bpack, x, f, strains, A, ld)
-                for i in range(A.size):
-                    A[i] = c_m * M[i] + c_k * A[i]
-                fix(A, ld, bw, fixed)
-                if not cholesky(A, ld, bw, N):
-                    return n, energy
-                state[0], state[3] = 1.0, 0.1
-                state[2] += 1.0
-                fresh, before = True, -1.0
-            if conserving:
-                _mean(cable, cpack, bpack, u0, u, f)
-                for i in range(N):
-                    x[i] = (u[i] - base[i]) * c_m
-            else:
-                _force(cable, cpack, bpack, u, f, strains, A)
-                for i in range(N):
-                    w = (u[i] - base[i]) / (beta * dt * dt)
-                    x[i] = (1.0 - alpha_m) * w + alpha_m * w0[i] - alpha_f * a0[i]
-                    x[i] /= 1.0 - alpha_f
-            multiply(M, ld, bw, x, inertia)
-            for i in range(N):
-                R[i] = 0.0 if fixed[i] else load[i] - f[i] - inertia[i]
-                du[i] = R[i]
-            cholesky_solve(A, ld, bw, du)
-            size = 0.0
-            for i in range(N):
-                size += R[i] * du[i]
-                u[i] += du[i]
-            size = math.sqrt(abs(size))
-            state[1] += 1.0
-            if not size < 1e300:
-                return n, energy
-            if before > 0.0:
-                rate = size / before
-                if rate > 1.0 and size <= 1e3 * rough:
-                    done = True
-                    break
-                state[3] = max(rate, 0.01)  # of one step, used in the next, where it may be larger
-                if rate > 0.1 and size * min(1.0, rate) > wanted:
-                    if fresh and rate > 2.0:
-                        return n, energy
-                    state[0] = 0.0
-                    continue
-            if size * min(1.0, state[3]) <= wanted:
-                done = True
-                break
-            before = size
-        if not done:
-            return n, energy
-        ahead = dt / (dt + state[4])
-        state[4] = dt
-        for i in range(N):
-            if conserving:
-                v = (u[i] - u0[i]) * (2.0 / dt) - v0[i]
-                middle = (v - v0[i]) / dt
-                y[2, i] = middle + ahead * (middle - w0[i])
-                y[3, i] = middle
-            else:
-                w = (u[i] - base[i]) / (beta * dt * dt)
-                a = ((1.0 - alpha_m) * w + alpha_m * w0[i] - alpha_f * a0[i]) / (1.0 - alpha_f)
-                v = v0[i] + dt * ((1.0 - gamma) * w0[i] + gamma * w)
-                y[2, i], y[3, i] = a, w
-            y[0, i], y[1, i] = u[i], v
-            if fixed[i]:
-                y[1, i] = y[2, i] = y[3, i] = 0.0
-            rows[n, 0, i], rows[n, 1, i], rows[n, 2, i] = y[0, i], y[1, i], y[2, i]
-        multiply(M, ld, bw, y[1], inertia)
-        kinetic = 0.0
-        for i in range(N):
-            kinetic += 0.5 * y[1, i] * inertia[i]
-        energy = max(energy, kinetic)
-        times[n] = t0 + (n + 1) * dt
-    return rows.shape[0], energy
-
-
-@jit
-def _carry(cable, cpack, bpack, u, du, stresses, out):
-    """The stress, linearised, at u + du."""
-    if cable:
-        cable_increment(cpack, u, du, out)
-        EA, EI = cpack[7]
-        for e in range(out.shape[1]):
-            for p in range(out.shape[2]):
-                out[0, e, p] = stresses[0, e, p] + EA * out[0, e, p]
-                out[1, e, p] = stresses[1, e, p] + EI * out[1, e, p]
-    else:
-        beam_increment(bpack, u, du, out)
-        D = bpack[5]
-        for e in range(out.shape[1]):
-            for p in range(out.shape[2]):
-                x, y, z = out[0, e, p], out[1, e, p], out[2, e, p]
-                for c in range(3):
-                    out[c, e, p] = stresses[c, e, p] + D[c, 0] * x + D[c, 1] * y + D[c, 2] * z
-
-
-@jit
-def equilibrium(cable, cpack, bpack, mixed, u, load, free, A, ld, bw, tol, floor, force_floor,
-                strains, stresses, carried, f, record):
-    """Iterate to equilibrium from u, in place, as :mod:`skfem_ancf.statics.newton` does.
-
-    ``record`` (max_iterations + 1, 2) takes the residuals. Returns the number of linear systems
-    solved, or -1 if the tangent is not positive definite, -2 if there is no convergence.
-    """
-    N, limit = u.size, record.shape[0] - 1
-    R, du, scale = np.empty(N), np.empty(N), np.empty(N)
-    work = before = reference = np.inf
-    moved = False
-    for i in range(N):
-        moved = moved or u[i] != 0.0
-    for k in range(limit + 1):
-        last = k > 1 and work * min(1.0, work / before) <= tol * reference + floor
-        f[:] = 0.0
-        for turn in range(2):
-            if last and turn == 0:
-                _force(cable, cpack, bpack, u, f, strains, A)
-            elif turn == 0 or last:
-                f[:] = 0.0
-                A[:] = 0.0
-                if cable:
-                    cable_loop(cpack, u, f, True, True, carried, mixed and k > 0, strains, stresses,
-                               A, ld, 0)
-                else:
-                    beam_loop(bpack, u, f, True, True, carried, mixed and k > 0, strains, stresses,
-                              A, ld, 0)
-                for i in range(N):
-                    scale[i] = 1.0 / abs(A[i * ld])
-            if turn == 1:
-                break
-            rho, inner, outer = 0.0, 0.0, 0.0
-            for i in range(N):
-                R[i] = (load[i] - f[i]) * free[i]
-                rho += R[i] * R[i] * scale[i]
-                inner += f[i] * f[i] * scale[i]
-                outer += load[i] * load[i] * scale[i]
-            rho, size = math.sqrt(rho), math.sqrt(max(inner, outer))
-            if not rho < 1e300:
-                return -1
-            record[k, 0] = rho / size if size > 0.0 else 0.0
-            if k == 0:
-                small = rho <= 1e-3 * tol * size + (force_floor if moved else 0.0)
-            else:
-                small = last and rho <= tol * size + force_floor
-            if small:
-                return k
-            if k == limit:
-                return -2
-        for i in range(N):
-            du[i] = R[i]
-        fix(A, ld, bw, free == 0.0)
-        if not cholesky(A, ld, bw, N):
-            return -1
-        cholesky_solve(A, ld, bw, du)
-        before, work = work, 0.0
-        for i in range(N):
-            work += R[i] * du[i]
-        work = math.sqrt(abs(work))
-        if not work < 1e300:
-            return -1
-        if mixed:
-            _carry(cable, cpack, bpack, u, du, stresses, carried)
-        inner, outer = 0.0, 0.0
-        for i in range(N):
-            u[i] += du[i]
-            inner += f[i] * u[i]
-            outer += load[i] * u[i]
-        reference = math.sqrt(max(abs(inner), abs(outer)))
-        record[k, 1] = work / reference if reference > 0.0 else 0.0
-    return -2
-
-
 class CompiledKernel:
     """The compiled functions of one beam, with the tables of its NumPy kernel.
 
     Parameters
     ----------
-    kernel
-        A :class:`~skfem_ancf.kernel.Kernel` or :class:`~skfem_ancf.cable.CableKernel`.
-    pack
-        The tables, in the order that the functions take.
+    packs
+        The tables of each term of the strain energy, in the order that the functions take.
     cable
         Whether it is a cable.
+    elements
+        Number of elements.
     """
 
-    def __init__(self, kernel, pack, cable):
-        self.kernel, self.pack, self.cable = kernel, pack, cable
-        self.stiffness = pack[7] if cable else pack[5]
-        self.shape = ((2, kernel.t.shape[1], pack[6].shape[1]) if cable else
-                      (3, kernel.t.shape[1], pack[4].shape[1]))
+    def __init__(self, packs, cable, elements):
+        self.packs, self.cable = packs, cable
+        self.shapes = [(2, elements, pack[6].shape[1]) if cable else
+                       (3, elements, pack[4].shape[1]) for pack in packs]
         self._loop, self._increment, self._mean = (
             (cable_loop, cable_increment, cable_mean) if cable else
             (beam_loop, beam_increment, beam_mean))
         self._none = np.zeros((1, 1, 1))
 
-    @property
-    def packs(self):
-        """The tables of a cable and of a beam, one of them empty."""
-        none = _empty_pack(not self.cable)
-        return (self.pack, none) if self.cable else (none, self.pack)
-
-    def equilibrium(self, u, load, free, K, mixed, tol, max_iterations, floor, force_floor):
-        """Displacement, force, and residuals of each iteration at the equilibrium; or None.
-
-        None where the iteration does not converge or leaves the positive definite tangents: the
-        caller's own iteration then finds out more.
-        """
-        u, f = u.copy(), np.empty(u.size)
-        strains, stresses, carried = np.empty((3,) + self.shape)
-        record = np.zeros((max_iterations + 1, 2))
-        n = equilibrium(self.cable, *self.packs, mixed, u, load, free, K._flat, K._ld, K.bandwidth,
-                        tol, floor, force_floor, strains, stresses, carried, f, record)
-        return None if n < 0 else (u, f, record[:n + 1, 0], record[:n, 1])
-
     def assemble(self, u, K, start, force, carried, geometric):
         """Add force and tangent; see :meth:`skfem_ancf.kernel.Chain.assemble`."""
-        strains, stresses = np.empty(self.shape), np.empty(self.shape)
-        self._loop(self.pack, u, force, True, geometric,
-                   self._none if carried is None else carried, carried is not None, strains,
-                   stresses, K._flat, K._ld, start)
+        stresses = [np.empty(shape) for shape in self.shapes]
+        for k, (pack, S) in enumerate(zip(self.packs, stresses)):
+            self._loop(pack, u, force, True, geometric, carried[k] if carried else self._none,
+                       carried is not None, np.empty_like(S), S, K._flat, K._ld, start)
         return CompiledEvaluation(self, u, stresses)
 
     def force(self, u):
         """Internal force, shape (N,)."""
         out = np.zeros(u.size)
-        self._loop(self.pack, u, out, False, False, self._none, False, self._none, self._none,
-                   self._none[0, 0], 1, 0)
+        for pack in self.packs:
+            self._loop(pack, u, out, False, False, self._none, False, self._none, self._none,
+                       self._none[0, 0], 1, 0)
         return out
 
     def mean_force(self, u0, u1):
         """The force whose work from u0 to u1 is the change of the energy."""
         out = np.zeros(u0.size)
-        self._mean(self.pack, u0, u1, out)
+        for pack in self.packs:
+            self._mean(pack, u0, u1, out)
         return out
 
 
-def _empty_pack(cable):
-    """Tables of the right types and no size, for the kind of beam that the scene has not."""
-    one, two, three = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0, 0))
+def empty_pack(cable):
+    """Tables of the right types and no size: they give a list of tables its type."""
+    two, three = np.zeros((0, 0)), np.zeros((0, 0, 0))
     index = np.zeros(0, dtype=np.int64)
     if cable:
-        return (three, three, three, three, two, two, two, one, three, index, 0)
-    return (three, three, three, three, two, two, *[index] * 4, *[two] * 3, three, index, 0)
+        return (three, three, three, three, two, two, two, np.zeros(2), three, index, 0)
+    one_by_one = np.ones((1, 1))
+    return (three, three, three, three, two, two, *[index] * 4, *[one_by_one] * 3, three, index, 0)
 
 
 class CompiledEvaluation:
@@ -871,13 +603,15 @@ class CompiledEvaluation:
         self._compiled, self._u, self._stresses = compiled, u.copy(), stresses
 
     def carry(self, du):
-        """The stress, linearised, at ``u + du``."""
-        c = self._compiled
-        out = np.empty(c.shape)
-        c._increment(c.pack, self._u, np.ascontiguousarray(du), out)
-        if c.cable:
-            out *= c.stiffness[:, None, None]
-        else:
-            out = np.tensordot(c.stiffness, out, 1)
-        out += self._stresses
-        return out
+        """The stresses, linearised, at ``u + du``: one array a term."""
+        c, carried = self._compiled, []
+        for pack, S in zip(c.packs, self._stresses):
+            out = np.empty_like(S)
+            c._increment(pack, self._u, np.ascontiguousarray(du), out)
+            if c.cable:
+                out *= pack[7][:, None, None]
+            else:
+                out = np.tensordot(pack[5], out, 1)
+            out += S
+            carried.append(out)
+        return carried

@@ -20,6 +20,11 @@ from .quadrature import tensor
 CHUNK = 1024
 
 
+def writable(*arrays):
+    """The arrays, contiguous and writable: Numba takes those that are not for other types."""
+    return tuple(np.require(a, requirements=["C", "W"]) for a in arrays)
+
+
 def beam_gradients(mesh, element, X, tind=None):
     """Derivatives of the local functions along the axis and across the section.
 
@@ -105,14 +110,23 @@ class TermTables:
                          term.matrix(name))
 
         self.xx, self.yy, self.xy = map(component, ("xx", "yy", "xy"))
-        self.along = None if term.section_samples is not None else [
-            np.eye(len(term.axis[0])) if matrix is None else matrix
-            for matrix in (term.interpolation(c, term.axis[0]) for c in ("xx", "yy", "xy"))]
+        self.interpolation = [
+            np.eye(len(of)) if matrix is None else matrix for matrix, of in (
+                (term.interpolation(c, term.axis[0]) if term.section_samples is None else
+                 term.matrix(c), term.axis[0]) for c in ("xx", "yy", "xy"))]
         X, W = term.quadrature
         self.points = X
         self.w = width * W * mesh.mapping().detDF(X, tind)
         if same:
             self._pairs = self._pair_tables()
+
+    def pack(self, constant, left, nd):
+        """The tables in the order that :mod:`skfem_ancf.compiled` takes."""
+        n = [self.Gx.shape[1], self.Gy.shape[1]]
+        where = [np.arange(size, dtype=np.int64)[rows] for rows, size in (
+            (self.xx.x, n[0]), (self.yy.y, n[1]), (self.xy.x, n[0]), (self.xy.y, n[1]))]
+        return writable(self.Gx, self.Gy, self.e1, self.e2, self.w, self.law.D, *where,
+                        *self.interpolation, constant, left) + (nd,)
 
     def _pair_tables(self):
         """G_a G_b of each sample, for the geometric part of the tangent, (samples, nb^2)."""
@@ -285,17 +299,17 @@ class Chain:
 
     def compile(self):
         """Use Numba from now on, if it is installed and has what this kernel needs."""
-        pack = self._pack()
-        if pack is None:
+        packs = self._packs()
+        if packs is None:
             return
         try:
             from .compiled import CompiledKernel
         except ImportError:
             return
-        self.compiled = CompiledKernel(self, pack, cable=len(pack) == 11)
+        self.compiled = CompiledKernel(packs, len(packs[0]) == 11, self.t.shape[1])
 
-    def _pack(self):
-        """The tables for the compiled functions, or None."""
+    def _packs(self):
+        """The tables of each term for the compiled functions, or None."""
         return None
 
     def assemble(self, u, K, start, force, carried=None, geometric=True):
@@ -365,16 +379,14 @@ class Kernel(Chain):
                        for term in formulation.terms(element, material)]
         self.constant = formulation.stabilisation(mesh, element, material, width)
 
-    def _pack(self):
-        t = self.tables[0]
-        if len(self.tables) > 1 or not isinstance(t.law, LinearLaw) or t.along is None:
+    def _packs(self):
+        if not all(isinstance(t.law, LinearLaw) for t in self.tables):
             return None
-        n = [t.Gx.shape[1], t.Gy.shape[1]]
-        where = [np.arange(size, dtype=np.int64)[rows] for rows, size in (
-            (t.xx.x, n[0]), (t.yy.y, n[1]), (t.xy.x, n[0]), (t.xy.y, n[1]))]
-        constant = np.zeros((0, 1, 1)) if self.constant is None else self.constant
-        return (t.Gx, t.Gy, t.e1, t.e2, t.w, np.ascontiguousarray(t.law.D), *where, *t.along,
-                np.ascontiguousarray(constant), self.t[0].astype(np.int64), self.nd)
+        none = np.zeros((0, 1, 1))
+        constant = none if self.constant is None else self.constant
+        left = self.t[0].astype(np.int64)
+        return [t.pack(none if k else constant, left, self.nd)
+                for k, t in enumerate(self.tables)]
 
     @property
     def shared(self):

@@ -47,16 +47,16 @@ class System:
         self._eliminate(fixed, values, joints)
         self.symmetric = all(load.symmetric for load in self.loads)
         self.size = float(sum(b.mesh.lengths.sum() for b in self.beams))
-        self._constant, self._varying = np.zeros(self.N), []
+        self.constant_force, self._varying = np.zeros(self.N), []
         for load in self.loads:
             if load.constant and load.amplitude is None:
-                self._constant[self.of(load)] += load.force(None)
+                self.constant_force[self.of(load)] += load.force(None)
             else:
                 self._varying.append(load)
 
     def _eliminate(self, fixed, values, joints):
         """Sort joints that only fix coordinates to the supports, the others to the multipliers."""
-        fixed, values = np.asarray(fixed, dtype=int), np.asarray(values, dtype=float)
+        fixed, values = np.array(fixed, dtype=np.int64), np.array(values, dtype=float)
         self.all_joints, self.joints, self._moving, zero = list(joints), [], [], np.zeros(self.N)
         for joint in joints:
             rows = joint.jacobian(zero, 0.0)
@@ -94,8 +94,15 @@ class System:
         """Displacements of the fixed coordinates at a load factor and a time."""
         values = load * self._values
         for joint, first, factors in self._moving:
-            phi = joint.value(np.zeros(self.N), load if t is None else t)
+            phi = joint.offset(np.array([load if t is None else t]), self.N)[0]
             values[first:first + len(factors)] = -phi / factors
+        return values
+
+    def values_at(self, times):
+        """Displacements of the fixed coordinates at full load, at times (n,): (n, nfixed)."""
+        values = np.tile(self._values, (len(times), 1))
+        for joint, first, factors in self._moving:
+            values[:, first:first + len(factors)] = -joint.offset(times, self.N) / factors
         return values
 
     @property
@@ -198,8 +205,8 @@ class System:
     def external_force(self, u, t=None):
         """The force of all loads at full size, shape (N,); at time ``t`` if it is given."""
         if not self._varying:
-            return self._constant
-        out = self._constant.copy()
+            return self.constant_force
+        out = self.constant_force.copy()
         for load in self._varying:
             s = self.of(load)
             out[s] += load.factor(t) * load.force(u[s])
@@ -221,8 +228,8 @@ class System:
     def mean_external_force(self, u0, u1, t0, t1):
         """The loads' mean over a step from u0 to u1."""
         if not self._varying:
-            return self._constant
-        out = self._constant.copy()
+            return self.constant_force
+        out = self.constant_force.copy()
         for load in self._varying:
             s = self.of(load)
             out[s] += load.factor(0.5 * (t0 + t1)) * load.mean_force(u0[s], u1[s])
@@ -280,10 +287,12 @@ class System:
         return any(b.kernel.inverted(u[s]) for b, s in zip(self.beams, self.slices))
 
     @cached_property
-    def simple(self):
-        """True for one beam with compiled kernels, dead loads and no joints."""
-        return (len(self.beams) == 1 and not self.joints and self.constant_loads
-                and self.symmetric and self.beams[0].kernel.compiled is not None)
+    def structure(self):
+        """The tables for whole compiled iterations, or None where not all is compiled."""
+        if any(beam.kernel.compiled is None for beam in self.beams):
+            return None
+        from .structure import structure_of
+        return structure_of(self)
 
     @property
     def constant_loads(self):

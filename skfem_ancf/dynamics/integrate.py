@@ -9,6 +9,7 @@ from ..progress import progress_bar
 from .base import Motion
 from .blocks import CompiledSteps
 from .history import History
+from .rates import rates
 
 logger = logging.getLogger(__name__)
 
@@ -52,27 +53,15 @@ class Integrator:
     # motions given as functions of time
 
     def _rates(self, function, t, dt):
-        """First and second derivative of a function of time, by fourth-order differences.
-
-        The function is asked for times within the motion only.
-        """
-        start, end = self.span
-        h = min(0.25 * dt, 0.2 * (end - start))
-        if t - 2 * h >= start and t + 2 * h <= end:
-            f = np.array([function(t + i * h) for i in range(-2, 3)])
-            return ((f[0] - 8 * f[1] + 8 * f[3] - f[4]) / (12 * h),
-                    (-f[0] + 16 * f[1] - 30 * f[2] + 16 * f[3] - f[4]) / (12 * h**2))
-        h = h if t - 2 * h < start else -h
-        f = np.array([function(t + i * h) for i in range(6)])
-        return (np.tensordot([-137, 300, -300, 200, -75, 12], f, 1) / (60 * h),
-                np.tensordot([45, -154, 214, -156, 61, -10], f, 1) / (12 * h**2))
+        """First and second derivative of a function of one time."""
+        return rates(lambda times: np.array([function(t) for t in times]), t, dt, self.span)
 
     def _support_rates(self, t, dt):
         """Velocity and acceleration of the fixed coordinates, shape (nfixed,)."""
         s = self.system
         if not s.moves:
             return np.zeros((2, len(s.fixed)))
-        return self._rates(lambda t: s.values(1.0, t), t, dt)
+        return rates(s.values_at, t, dt, self.span)
 
     def _constraint_rate(self, u, v, t, dt):
         """The rate of the joints' Phi, shape (m,)."""
@@ -313,18 +302,35 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=Non
             next_time = next(wanted, None)
         if t_eval is None:
             history.append(new)
-        bar.update(new.t - old.t)
+
+    def store_block(y, first, done, motion):
+        """The same for a block of steps, of which only those that hold a time to store are made."""
+        def instant(k):
+            if k < 0:
+                return y
+            new = motion(k)
+            new.t = t_start + (first + k + 1) * step if first + k + 1 < steps else t_end
+            return new
+
+        k, last = -1, y
+        while k < done - 1:
+            old, k = k, k + 1
+            if t_eval is not None:
+                until = np.inf if next_time is None else (next_time - t_start) / step - 1 - first
+                k = int(min(max(k, until - 1), done - 1))
+            before = last if k == old + 1 else instant(k - 1)
+            last = instant(k)
+            store(before, last)
+        return last
 
     with progress_bar(progress, total=span, desc="time") as bar:
         while (n < steps) if steps is not None else (y.t < t_end - 1e-12 * span):
             if blocks is not None and n < whole:
-                motions = blocks.run(y, step, whole - n)
-                for new in motions:
-                    n += 1
-                    new.t = t_start + n * step if n < steps else t_end
-                    store(y, new)
-                    y = new
-                if motions:
+                done, motion = blocks.run(y, step, whole - n)
+                if done:
+                    old, y = y, store_block(y, n, done, motion)
+                    n += done
+                    bar.update(y.t - old.t)
                     continue
             if steps is not None:
                 # the last step may be shorter; the others are of one size, to keep the factors
@@ -349,6 +355,7 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=Non
                 new.t = t_start + (n + 1) * step if n < steps - 1 else t_end
             n += 1
             store(y, new)
+            bar.update(new.t - y.t)
             y = new
     return history.close()
 

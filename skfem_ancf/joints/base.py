@@ -70,6 +70,23 @@ class Joint:
         """Rows, columns and values of sum_k multipliers[k] d^2 Phi_k / du^2, or None."""
         return None
 
+    def offset(self, times, N):
+        """Phi of the stress-free state at each of the times, shape (n, m).
+
+        A joint that moves may override it to ask for its motion only.
+        """
+        zero = np.zeros(N)
+        return np.array([self.value(zero, t) for t in times])
+
+    def slope(self, times, N):
+        """The derivative of Phi in the stress-free state: columns (k,) and values (n, m, k)."""
+        zero = np.zeros(N)
+        if self.moving and not self.constant:
+            return np.arange(N), np.array([self.jacobian(zero, t) for t in times])
+        rows = self.jacobian(zero, times[0])
+        columns = np.flatnonzero(np.any(rows != 0, axis=0))
+        return columns, np.broadcast_to(rows[:, columns], (len(times), len(rows), len(columns)))
+
     def __repr__(self):
         return f"<{type(self).__name__} {self.name or ''}>"
 

@@ -31,6 +31,9 @@ class PrescribedPosition(Joint):
     def value(self, u, t):
         return self.r(u) - np.asarray(self.motion(t), dtype=float)
 
+    def offset(self, times, N):
+        return self.r.start - np.array([self.motion(t) for t in times], dtype=float)
+
     def jacobian(self, u, t):
         return self.rows
 
@@ -67,3 +70,14 @@ class PrescribedAngle(Joint):
     def jacobian(self, u, t):
         a = self.start + self.angle(t)
         return self.d.row((-np.sin(a), np.cos(a)), self.N)[None]
+
+    def _normals(self, times):
+        a = self.start + np.array([self.angle(t) for t in times], dtype=float)
+        return np.array([-np.sin(a), np.cos(a)]).T
+
+    def offset(self, times, N):
+        return self._normals(times) @ self.d.start[:, None]
+
+    def slope(self, times, N):
+        values = self._normals(times)[:, :, None] * self.d.weights
+        return self.d.dofs.ravel(), values.reshape(len(times), 1, -1)

@@ -171,16 +171,17 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record):
         gap = (1.0 - load) * gap
     prescribed = target - u[system.fixed]
     moving = bool(np.any(prescribed))
-    external = full * system.external_force(u)
-    if gap is None and not moving and system.simple:
-        found = system.beams[0].kernel.compiled.equilibrium(
-            u, external, system.mask, system.K, method == "mixed", tol, max_iterations, floor,
-            force_floor)
+    structure = system.structure
+    if structure is not None and not system.joints:
+        found = structure.equilibrium(
+            u, system.constant_force, full, np.zeros(system.N) if gap is None else gap, prescribed,
+            method == "mixed", tol, max_iterations, floor, force_floor)
         if found is not None and not system.inverted(found[0]):
             u, force, *residuals = found
             record.force_residuals, record.energy_residuals = (r.tolist() for r in residuals)
             record.iterations = len(record.energy_residuals)
             return u, multipliers, force
+    external = full * system.external_force(u)
     work = before = reference = np.inf
     scale = None
     for k in range(max_iterations + 1):

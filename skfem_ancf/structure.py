@@ -1,0 +1,191 @@
+"""The tables of a scene for :mod:`skfem_ancf.loops`."""
+
+import numpy as np
+
+from .compiled import cholesky, empty_pack
+from .loads import DeadLoad, EndMoment
+from .loops import append, equilibrium, new_list
+
+
+class Structure:
+    """A scene in the tables that the compiled loops take; :func:`structure_of` makes it.
+
+    Attributes
+    ----------
+    body, moments, joints
+        As :mod:`skfem_ancf.loops` says.
+    vectors
+        The loads of constant direction, shape (k, N): the first are all those without an
+        amplitude together.
+    """
+
+    def __init__(self, system):
+        self.system = system
+        cables = [(p, s) for b, s in zip(system.beams, system.slices)
+                  for p in b.kernel.compiled.packs if b.kernel.compiled.cable]
+        beams = [(p, s) for b, s in zip(system.beams, system.slices)
+                 for p in b.kernel.compiled.packs if not b.kernel.compiled.cable]
+        self.body = (*self._list(cables, True), *self._list(beams, False))
+        self.shapes = [[(2, len(p[9]), p[6].shape[1]) for p, _ in cables],
+                       [(3, len(p[14]), p[4].shape[1]) for p, _ in beams]]
+        varying = [load for load in system.loads if load.amplitude is not None]
+        self._amplitudes = [load for load in varying if isinstance(load, DeadLoad)]
+        self.vectors = np.zeros((1 + len(self._amplitudes), system.N))
+        self.vectors[0] = system.constant_force
+        for row, load in zip(self.vectors[1:], self._amplitudes):
+            row[system.of(load)] = load.vector
+        self._turning = [load for load in system.loads if isinstance(load, EndMoment)]
+        self.moments = self._moment_tables()
+        self.joints = self._joint_tables()
+
+    @staticmethod
+    def _list(packs, cable):
+        """A typed list of packs, closed by an empty one, and the coordinates of each."""
+        items = new_list(packs[0][0] if packs else empty_pack(cable))
+        for pack, _ in packs[1:]:
+            append(items, pack)
+        at = [(s.start, s.stop) for _, s in packs] or [(0, 0)]
+        return items, np.array(at, dtype=np.int64)
+
+    def stresses(self):
+        """Room for the stresses of cables and of beams: two typed lists."""
+        out = []
+        for shapes, rows in zip(self.shapes, (2, 3)):
+            arrays = [np.zeros(shape) for shape in shapes] or [np.zeros((rows, 0, 0))]
+            items = new_list(arrays[0])
+            for array in arrays[1:]:
+                append(items, array)
+            out.append(items)
+        return tuple(out)
+
+    def _moment_tables(self):
+        most = max((load.dofs.shape[1] for load in self._turning), default=0)
+        n = len(self._turning)
+        dofs, c = np.zeros((n, 2, most), dtype=np.int64), np.zeros((n, most))
+        start = np.zeros((n, 2))
+        for k, load in enumerate(self._turning):
+            size, first = load.dofs.shape[1], self.system.of(load).start
+            dofs[k] = first + load.dofs[:, :1]  # what is left over has no weight
+            dofs[k, :, :size], c[k, :size] = first + load.dofs, load.c
+            start[k] = load.direction(np.zeros(load.beam.N))
+        return dofs, c, start, np.array([load.M for load in self._turning], dtype=float)
+
+    def _joint_tables(self):
+        """Second derivatives, and the columns that the first has in the stress-free state."""
+        s, second, first, at = self.system, [], [], 0
+        zero, probe = np.zeros(s.N), np.zeros(1)
+        for joint in s.joints:
+            for unit in np.eye(len(joint.equations)):
+                found = joint.curvature(zero, 0.0, unit)
+                if found is not None:
+                    i, j, v = (np.asarray(x) for x in found)
+                    keep = v != 0
+                    second.append((np.full(keep.sum(), at), i[keep], j[keep], v[keep]))
+                at += 1
+        at = 0
+        for joint in s.joints:
+            columns = joint.slope(probe, s.N)[0]
+            rows = np.arange(at, at + len(joint.equations))
+            first.append((np.repeat(rows, len(columns)), np.tile(columns, len(rows))))
+            at += len(rows)
+        none = np.zeros(0)
+        k, i, j, v = (np.concatenate(x) for x in zip(*second)) if second else [none] * 4
+        gk, gi = (np.concatenate(x) for x in zip(*first)) if first else [none] * 2
+        return (*(x.astype(np.int64) for x in (k, i, j)), v.astype(float),
+                gk.astype(np.int64), gi.astype(np.int64))
+
+    # what depends on time
+
+    @property
+    def motion_varies(self):
+        """True if a joint moves or turns with time."""
+        return any(joint.moving for joint in self.system.joints)
+
+    @property
+    def turns(self):
+        """True if a joint's derivative in the stress-free state depends on time."""
+        return any(joint.moving and not joint.constant for joint in self.system.joints)
+
+    def offsets(self, times):
+        """c of all joints at the times, shape (n, m)."""
+        s = self.system
+        return np.hstack([np.zeros((len(times), 0))] + [j.offset(times, s.N) for j in s.joints])
+
+    def slopes(self, times):
+        """g of all joints at the times, shape (n, k)."""
+        s = self.system
+        return np.hstack([np.zeros((len(times), 0))] + [
+            j.slope(times, s.N)[1].reshape(len(times), -1) for j in s.joints])
+
+    def factors(self, times):
+        """Factors of :attr:`vectors`, shape (n, k); of one row where no load has an amplitude."""
+        if not self._amplitudes:
+            return np.ones((1, 1))
+        return np.array([[1.0] + [load.factor(t) for load in self._amplitudes] for t in times])
+
+    def moment_factors(self, times):
+        """Factors of the moments, shape (n, k); of one row where none has an amplitude."""
+        if all(load.amplitude is None for load in self._turning):
+            return np.ones((1, len(self._turning)))
+        return np.array([[load.factor(t) for load in self._turning] for t in times])
+
+    # statics
+
+    def equilibrium(self, u, load, factor, gap, prescribed, mixed, tol, max_iterations, floor,
+                    force_floor):
+        """Displacement, force, and residuals of each iteration at the equilibrium; or None.
+
+        None where the iteration does not converge or leaves the positive definite tangents: the
+        caller's own iteration then finds out more. The arguments are those of
+        :func:`skfem_ancf.loops.equilibrium`.
+        """
+        s = self.system
+        u, f = u.copy(), np.empty(s.N)
+        record = np.zeros((max_iterations + 1, 2))
+        carried, stresses = self._work = getattr(self, "_work", None) or (
+            self.stresses(), self.stresses())
+        n = equilibrium(self.body, self.moments, mixed, u, load, factor,
+                        np.full(len(self._turning), factor), gap, s.fixed, prescribed, s.mask,
+                        s.K._flat, s.K._ld, s.K.bandwidth, tol, floor, force_floor, carried,
+                        stresses, f, record)
+        return None if n < 0 else (u, f, record[:n + 1, 0], record[:n, 1])
+
+    # mass
+
+    def mass_factor(self):
+        """The factor of the mass matrix with its supports fixed, in the same band."""
+        s = self.system
+        M = s.new_band().combine(1.0, s.mass, 0.0, s.mass)
+        M.fix(s.fixed_positions)
+        if not cholesky(M._flat, M._ld, M.bandwidth, s.N):
+            raise np.linalg.LinAlgError("the mass matrix is not positive definite")
+        return M._flat
+
+
+def structure_of(system):
+    """The Structure of a system, or None where something in it is not compiled."""
+    if not (system.symmetric and all(b.kernel.compiled is not None for b in system.beams)
+            and all(type(load) in (DeadLoad, EndMoment) for load in system.loads)):
+        return None
+    structure = Structure(system)
+    return structure if _is_quadratic(structure) else None
+
+
+def _is_quadratic(structure):
+    """True if the tables give Phi and its derivative: joints of others may not be quadratic."""
+    s = structure.system
+    if not s.joints:
+        return True
+    k, i, j, v, gk, gi = structure.joints
+    t, start = 0.0, np.zeros(1)
+    c, g = structure.offsets(start)[0], structure.slopes(start)[0]
+    for u in 0.1 * np.random.default_rng(0).standard_normal((2, s.N)):
+        J = np.zeros((s.m, s.N))
+        np.add.at(J, (gk, gi), g)
+        slope = J.copy()
+        np.add.at(J, (k, i), v * u[j])
+        phi = c + 0.5 * (J + slope) @ u
+        if not (np.allclose(phi, s.constraint(u, t), rtol=0, atol=1e-9 * s.size)
+                and np.allclose(J, s.full_jacobian(u, t), rtol=0, atol=1e-9 * np.abs(J).max())):
+            return False
+    return True
