@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 # no "nnan" and "ninf": a strain that is not finite must be seen
+LOST = 1e-13  # a pivot that small beside what it came from is round-off
 _FAST = {"contract", "reassoc", "nsz", "arcp"}
 
 
@@ -43,41 +44,48 @@ def multiply(flat, ld, bw, x, y):
 
 
 @jit
-def cholesky(flat, ld, bw, n):
-    """Factorise in place; returns False if the matrix is not positive definite."""
+def factorize(flat, ld, bw, n):
+    """Factorise in place into L D L^T; returns False if a pivot is lost.
+
+    There is no pivoting: a matrix that is not positive definite has factors too, unless one of
+    its leading parts is singular.
+    """
     for j in range(n):
         at = j * ld
-        if not flat[at] > 0.0:
+        d = flat[at]
+        if not abs(d) > 0.0:
             return False
-        d = math.sqrt(flat[at])
-        flat[at] = d
         m = min(bw, n - 1 - j)
         inverse = 1.0 / d
         for k in range(1, m + 1):
-            flat[at + k] *= inverse
-        for k in range(1, m + 1):
             c = flat[at + k]
             if c != 0.0:
+                c *= inverse
                 other = (j + k) * ld - k
+                before = flat[other + k]
                 for i in range(k, m + 1):
                     flat[other + i] -= c * flat[at + i]
+                if abs(flat[other + k]) < LOST * abs(before):
+                    return False
+        for k in range(1, m + 1):
+            flat[at + k] *= inverse
     return True
 
 
 @jit
-def cholesky_solve(flat, ld, bw, x):
+def solve(flat, ld, bw, x):
+    """Solve in place with the factors."""
     n = x.size
     for j in range(n):
-        at = j * ld
-        x[j] /= flat[at]
+        at, xj = j * ld, x[j]
         for k in range(1, min(bw, n - 1 - j) + 1):
-            x[j + k] -= flat[at + k] * x[j]
+            x[j + k] -= flat[at + k] * xj
     for j in range(n - 1, -1, -1):
         at = j * ld
-        s = x[j]
+        s = x[j] / flat[at]
         for k in range(1, min(bw, n - 1 - j) + 1):
             s -= flat[at + k] * x[j + k]
-        x[j] = s / flat[at]
+        x[j] = s
 
 
 @jit
@@ -584,16 +592,6 @@ class CompiledKernel:
         for pack in self.packs:
             self._mean(pack, u0, u1, out)
         return out
-
-
-def empty_pack(cable):
-    """Tables of the right types and no size: they give a list of tables its type."""
-    two, three = np.zeros((0, 0)), np.zeros((0, 0, 0))
-    index = np.zeros(0, dtype=np.int64)
-    if cable:
-        return (three, three, three, three, two, two, two, np.zeros(2), three, index, 0)
-    one_by_one = np.ones((1, 1))
-    return (three, three, three, three, two, two, *[index] * 4, *[one_by_one] * 3, three, index, 0)
 
 
 class CompiledEvaluation:

@@ -5,7 +5,7 @@ all compiled: any number of beams, loads of constant direction, end moments, pre
 displacements, and in motion supports and joints that move as given. The tables that the functions
 take are made in :mod:`skfem_ancf.structure`:
 
-* body: cables, where their coordinates are (k, 2), beams, where theirs are;
+* cables, beams: packs, and the coordinates (k, 2) of each, first and behind the last; or None;
 * moments: coordinates (k, 2, c), weights (k, c), directions at the start (k, 2), sizes (k,);
 * joints: the second derivatives as equation, row, column, value, and where the first derivative
   at u = 0 is not zero, as equation and column. ``Phi = c + g . u + u . H u / 2``.
@@ -17,7 +17,7 @@ import numpy as np
 from numba.typed import List
 
 from .compiled import (beam_increment, beam_loop, beam_mean, cable_increment, cable_loop,
-                       cable_mean, cholesky, cholesky_solve, fix, jit, multiply)
+                       cable_mean, factorize, fix, jit, multiply, solve)
 
 EPS = 2.2e-16
 MAX_ITERATIONS = 30
@@ -38,94 +38,106 @@ def append(items, item):
     items.append(item)
 
 
-# forces and tangents of all beams
+# forces and tangents of all beams; Numba leaves out what a scene has not, given as None
 
 
 @jit
-def body_force(body, u, f, none, flat):
+def body_force(cables, beams, u, f, none, flat):
     """The internal force."""
-    cables, cable_at, beams, beam_at = body
     f[:] = 0.0
-    for k in range(len(cables)):
-        a, b = cable_at[k, 0], cable_at[k, 1]
-        cable_loop(cables[k], u[a:b], f[a:b], False, False, none, False, none, none, flat, 1, 0)
-    for k in range(len(beams)):
-        a, b = beam_at[k, 0], beam_at[k, 1]
-        beam_loop(beams[k], u[a:b], f[a:b], False, False, none, False, none, none, flat, 1, 0)
+    if cables is not None:
+        packs, at = cables
+        for k in range(len(packs)):
+            a, b = at[k, 0], at[k, 1]
+            cable_loop(packs[k], u[a:b], f[a:b], False, False, none, False, none, none, flat, 1, 0)
+    if beams is not None:
+        packs, at = beams
+        for k in range(len(packs)):
+            a, b = at[k, 0], at[k, 1]
+            beam_loop(packs[k], u[a:b], f[a:b], False, False, none, False, none, none, flat, 1, 0)
 
 
 @jit
-def body_mean(body, u0, u1, f):
+def body_mean(cables, beams, u0, u1, f):
     """The force whose work from u0 to u1 is the change of the energy."""
-    cables, cable_at, beams, beam_at = body
     f[:] = 0.0
-    for k in range(len(cables)):
-        a, b = cable_at[k, 0], cable_at[k, 1]
-        cable_mean(cables[k], u0[a:b], u1[a:b], f[a:b])
-    for k in range(len(beams)):
-        a, b = beam_at[k, 0], beam_at[k, 1]
-        beam_mean(beams[k], u0[a:b], u1[a:b], f[a:b])
+    if cables is not None:
+        packs, at = cables
+        for k in range(len(packs)):
+            a, b = at[k, 0], at[k, 1]
+            cable_mean(packs[k], u0[a:b], u1[a:b], f[a:b])
+    if beams is not None:
+        packs, at = beams
+        for k in range(len(packs)):
+            a, b = at[k, 0], at[k, 1]
+            beam_mean(packs[k], u0[a:b], u1[a:b], f[a:b])
 
 
 @jit
-def body_tangent(body, u, f, carried, use_carried, stresses, flat, ld):
+def body_tangent(cables, beams, u, f, carried, use_carried, stresses, flat, ld):
     """The internal force, the tangent into the band, and the stresses."""
-    cables, cable_at, beams, beam_at = body
     f[:] = 0.0
     flat[:] = 0.0
-    for k in range(len(cables)):
-        a, b = cable_at[k, 0], cable_at[k, 1]
-        s = stresses[0][k]
-        cable_loop(cables[k], u[a:b], f[a:b], True, True, carried[0][k], use_carried, s, s, flat,
-                   ld, a)
-    for k in range(len(beams)):
-        a, b = beam_at[k, 0], beam_at[k, 1]
-        s = stresses[1][k]
-        beam_loop(beams[k], u[a:b], f[a:b], True, True, carried[1][k], use_carried, s, s, flat,
-                  ld, a)
+    if cables is not None:
+        packs, at = cables
+        for k in range(len(packs)):
+            a, b, s = at[k, 0], at[k, 1], stresses[0][k]
+            cable_loop(packs[k], u[a:b], f[a:b], True, True, carried[0][k], use_carried, s, s,
+                       flat, ld, a)
+    if beams is not None:
+        packs, at = beams
+        for k in range(len(packs)):
+            a, b, s = at[k, 0], at[k, 1], stresses[1][k]
+            beam_loop(packs[k], u[a:b], f[a:b], True, True, carried[1][k], use_carried, s, s,
+                      flat, ld, a)
 
 
 @jit
-def _law(stiffness, strain, S):
-    """S = D strain, in place, for a diagonal (n,) or full (n, n) stiffness."""
+def _law(stiffness, strain):
+    """Stress in place of strain."""
     for e in range(strain.shape[1]):
         for p in range(strain.shape[2]):
             x, y, z = strain[0, e, p], strain[1, e, p], strain[2, e, p]
             for c in range(3):
-                S[c, e, p] = stiffness[c, 0] * x + stiffness[c, 1] * y + stiffness[c, 2] * z
+                strain[c, e, p] = stiffness[c, 0] * x + stiffness[c, 1] * y + stiffness[c, 2] * z
 
 
 @jit
-def carry(body, u, du, stresses, out):
+def carry(cables, beams, u, du, stresses, out):
     """The stresses, linearised, at u + du."""
-    cables, cable_at, beams, beam_at = body
-    for k in range(len(cables)):
-        a, b = cable_at[k, 0], cable_at[k, 1]
-        S, stiffness = out[0][k], cables[k][7]
-        cable_increment(cables[k], u[a:b], du[a:b], S)
-        for c in range(S.shape[0]):
-            S[c] *= stiffness[c]
-        S += stresses[0][k]
-    for k in range(len(beams)):
-        a, b = beam_at[k, 0], beam_at[k, 1]
-        S = out[1][k]
-        beam_increment(beams[k], u[a:b], du[a:b], S)
-        _law(beams[k][5], S, S)
-        S += stresses[1][k]
+    if cables is not None:
+        packs, at = cables
+        for k in range(len(packs)):
+            a, b = at[k, 0], at[k, 1]
+            S, stiffness = out[0][k], packs[k][7]
+            cable_increment(packs[k], u[a:b], du[a:b], S)
+            for c in range(S.shape[0]):
+                S[c] *= stiffness[c]
+            S += stresses[0][k]
+    if beams is not None:
+        packs, at = beams
+        for k in range(len(packs)):
+            a, b = at[k, 0], at[k, 1]
+            S = out[1][k]
+            beam_increment(packs[k], u[a:b], du[a:b], S)
+            _law(packs[k][5], S)
+            S += stresses[1][k]
 
 
 @jit
-def body_stress(body, u, out):
+def body_stress(cables, beams, u, out):
     """The stresses at u."""
-    cables, cable_at, beams, beam_at = body
-    for k in range(len(cables)):
-        a, b = cable_at[k, 0], cable_at[k, 1]
-        cable_stress(cables[k], u[a:b], out[0][k])
-    for k in range(len(beams)):
-        a, b = beam_at[k, 0], beam_at[k, 1]
-        S = out[1][k]
-        beam_increment(beams[k], 0.5 * u[a:b], u[a:b], S)  # the strain is quadratic
-        _law(beams[k][5], S, S)
+    if cables is not None:
+        packs, at = cables
+        for k in range(len(packs)):
+            cable_stress(packs[k], u[at[k, 0]:at[k, 1]], out[0][k])
+    if beams is not None:
+        packs, at = beams
+        for k in range(len(packs)):
+            a, b = at[k, 0], at[k, 1]
+            S = out[1][k]
+            beam_increment(packs[k], 0.5 * u[a:b], u[a:b], S)  # the strain is quadratic
+            _law(packs[k][5], S)
 
 
 @jit
@@ -283,7 +295,7 @@ def solve_rows(flat, ld, bw, J, free, Y):
     for k in range(J.shape[0]):
         for i in range(free.size):
             Y[k, i] = J[k, i] * free[i]
-        cholesky_solve(flat, ld, bw, Y[k])
+        solve(flat, ld, bw, Y[k])
 
 
 @jit
@@ -325,7 +337,7 @@ def constraint_acceleration(joints, c2, g1, g2, J, u, v, acceleration, out):
 
 
 @jit
-def steps(body, moments, joints, conserving, parameters, vectors, factors, moment_factors,
+def steps(cables, beams, moments, joints, conserving, parameters, vectors, factors, moment_factors,
           fixed, free, supports, motion, M, M_factor, ld, bw, A, stresses, carried, state, y,
           multipliers, dt, tol, floor, energy, rows, multiplier_rows):
     """Time steps; one row of ``rows`` (n, 3, N) for each: u, v and the acceleration.
@@ -412,19 +424,19 @@ def steps(body, moments, joints, conserving, parameters, vectors, factors, momen
                 middle[i] = 0.5 * (u[i] + u0[i]) if conserving else u[i]
             if state[0] == 0.0:
                 # the stress of an iterate may be far off: that of the start is not
-                body_stress(body, u0, carried)
-                body_tangent(body, middle, f, carried, True, stresses, A, ld)
+                body_stress(cables, beams, u0, carried)
+                body_tangent(cables, beams, middle, f, carried, True, stresses, A, ld)
                 add_moment_stiffness(moments, moment, middle, A, ld)
                 for i in range(A.size):
                     A[i] = c_m * M[i] + c_k * A[i]
                 fix(A, ld, bw, free == 0.0)
-                if not cholesky(A, ld, bw, N):
+                if not factorize(A, ld, bw, N):
                     return n, energy
                 state[0], state[3] = 1.0, 0.1
                 state[2] += 1.0
                 fresh, before, known = True, -1.0, False
             if conserving:
-                body_mean(body, u0, u, f)
+                body_mean(cables, beams, u0, u, f)
                 for i in range(N):
                     R[i] = load[i] - f[i]
                 add_mean_moments(moments, moment, u0, u, R)
@@ -433,7 +445,7 @@ def steps(body, moments, joints, conserving, parameters, vectors, factors, momen
                 for j in range(fixed.size):
                     x[fixed[j]] = (speed[j] - v0[fixed[j]]) / dt
             else:
-                body_force(body, u, f, none, A)
+                body_force(cables, beams, u, f, none, A)
                 for i in range(N):
                     R[i] = load[i] - f[i]
                 add_moments(moments, moment, u, R)
@@ -464,7 +476,7 @@ def steps(body, moments, joints, conserving, parameters, vectors, factors, momen
                                      * (v0[hj[a]] + v[hj[a]]))
             for i in range(N):
                 du[i] = R[i]
-            cholesky_solve(A, ld, bw, du)
+            solve(A, ld, bw, du)
             size = 0.0
             if m > 0:
                 constraint(joints, c_[jt], g_[gt], u, phi)
@@ -592,14 +604,14 @@ def _impulse(joints, c1, g1, J, J1, M_factor, ld, bw, free, u, v, Y, S, impulse)
 
 
 @jit
-def equilibrium(body, moments, mixed, u, dead, factor, factors, gap, fixed, prescribed, free, A, ld,
+def equilibrium(cables, beams, moments, mixed, u, dead, factor, factors, gap, fixed, prescribed, free, A, ld,
                 bw, tol, floor, force_floor, carried, stresses, f, record):
     """Iterate to equilibrium from u, in place, as :mod:`skfem_ancf.statics.newton` does.
 
     ``dead`` is the constant force, ``factor`` the load's, ``gap`` (N,) the force that may be
     missing, ``prescribed`` the change of the fixed coordinates; ``record`` (max_iterations + 1, 2)
     takes the residuals. Returns the number of linear systems solved, or -1 if the tangent is not
-    positive definite, -2 if there is no convergence.
+    regular, -2 if there is no convergence.
     """
     N, limit = u.size, record.shape[0] - 1
     R, du, scale, load = np.empty(N), np.empty(N), np.empty(N), np.empty(N)
@@ -614,9 +626,9 @@ def equilibrium(body, moments, mixed, u, dead, factor, factors, gap, fixed, pres
         last = k > 1 and work * min(1.0, work / before) <= tol * reference + floor
         for turn in range(2):
             if last and turn == 0:
-                body_force(body, u, f, none, A)
+                body_force(cables, beams, u, f, none, A)
             elif turn == 0 or last:
-                body_tangent(body, u, f, carried, mixed and k > 0, stresses, A, ld)
+                body_tangent(cables, beams, u, f, carried, mixed and k > 0, stresses, A, ld)
                 add_moment_stiffness(moments, factors, u, A, ld)
                 for i in range(N):
                     scale[i] = 1.0 / abs(A[i * ld])
@@ -654,9 +666,9 @@ def equilibrium(body, moments, mixed, u, dead, factor, factors, gap, fixed, pres
         for i in range(N):
             du[i] = R[i]
         fix(A, ld, bw, free == 0.0)
-        if not cholesky(A, ld, bw, N):
+        if not factorize(A, ld, bw, N):
             return -1
-        cholesky_solve(A, ld, bw, du)
+        solve(A, ld, bw, du)
         before, work = work, 0.0
         for i in range(N):
             work += R[i] * du[i]
@@ -668,7 +680,7 @@ def equilibrium(body, moments, mixed, u, dead, factor, factors, gap, fixed, pres
                 du[fixed[i]] = prescribed[i]
             moving = False
         if mixed:
-            carry(body, u, du, stresses, carried)
+            carry(cables, beams, u, du, stresses, carried)
         inner, outer = 0.0, 0.0
         for i in range(N):
             u[i] += du[i]

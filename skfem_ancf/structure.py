@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .compiled import cholesky, empty_pack
+from .compiled import factorize
 from .loads import DeadLoad, EndMoment
 from .loops import append, equilibrium, new_list
 
@@ -12,7 +12,7 @@ class Structure:
 
     Attributes
     ----------
-    body, moments, joints
+    cables, beams, moments, joints
         As :mod:`skfem_ancf.loops` says.
     vectors
         The loads of constant direction, shape (k, N): the first are all those without an
@@ -25,7 +25,8 @@ class Structure:
                   for p in b.kernel.compiled.packs if b.kernel.compiled.cable]
         beams = [(p, s) for b, s in zip(system.beams, system.slices)
                  for p in b.kernel.compiled.packs if not b.kernel.compiled.cable]
-        self.body = (*self._list(cables, True), *self._list(beams, False))
+        self._many = len(cables) + len(beams) > 1
+        self.cables, self.beams = self._packs(cables), self._packs(beams)
         self.shapes = [[(2, len(p[9]), p[6].shape[1]) for p, _ in cables],
                        [(3, len(p[14]), p[4].shape[1]) for p, _ in beams]]
         varying = [load for load in system.loads if load.amplitude is not None]
@@ -38,25 +39,26 @@ class Structure:
         self.moments = self._moment_tables()
         self.joints = self._joint_tables()
 
-    @staticmethod
-    def _list(packs, cable):
-        """A typed list of packs, closed by an empty one, and the coordinates of each."""
-        items = new_list(packs[0][0] if packs else empty_pack(cable))
-        for pack, _ in packs[1:]:
-            append(items, pack)
-        at = [(s.start, s.stop) for _, s in packs] or [(0, 0)]
-        return items, np.array(at, dtype=np.int64)
+    def _collect(self, items):
+        """A typed list; a tuple where there is one item, which Numba takes in much less time."""
+        if not self._many:
+            return tuple(items)
+        out = new_list(items[0])
+        for item in items[1:]:
+            append(out, item)
+        return out
+
+    def _packs(self, packs):
+        """The tables of each term of each beam, and their coordinates; None for none."""
+        if not packs:
+            return None
+        at = np.array([(s.start, s.stop) for _, s in packs], dtype=np.int64)
+        return self._collect([pack for pack, _ in packs]), at
 
     def stresses(self):
-        """Room for the stresses of cables and of beams: two typed lists."""
-        out = []
-        for shapes, rows in zip(self.shapes, (2, 3)):
-            arrays = [np.zeros(shape) for shape in shapes] or [np.zeros((rows, 0, 0))]
-            items = new_list(arrays[0])
-            for array in arrays[1:]:
-                append(items, array)
-            out.append(items)
-        return tuple(out)
+        """Room for the stresses of cables and of beams."""
+        return tuple(self._collect([np.zeros(shape) for shape in shapes]) if shapes else None
+                     for shapes in self.shapes)
 
     def _moment_tables(self):
         most = max((load.dofs.shape[1] for load in self._turning), default=0)
@@ -135,7 +137,7 @@ class Structure:
                     force_floor):
         """Displacement, force, and residuals of each iteration at the equilibrium; or None.
 
-        None where the iteration does not converge or leaves the positive definite tangents: the
+        None where the iteration does not converge, or meets a tangent without factors: the
         caller's own iteration then finds out more. The arguments are those of
         :func:`skfem_ancf.loops.equilibrium`.
         """
@@ -144,7 +146,7 @@ class Structure:
         record = np.zeros((max_iterations + 1, 2))
         carried, stresses = self._work = getattr(self, "_work", None) or (
             self.stresses(), self.stresses())
-        n = equilibrium(self.body, self.moments, mixed, u, load, factor,
+        n = equilibrium(self.cables, self.beams, self.moments, mixed, u, load, factor,
                         np.full(len(self._turning), factor), gap, s.fixed, prescribed, s.mask,
                         s.K._flat, s.K._ld, s.K.bandwidth, tol, floor, force_floor, carried,
                         stresses, f, record)
@@ -157,7 +159,7 @@ class Structure:
         s = self.system
         M = s.new_band().combine(1.0, s.mass, 0.0, s.mass)
         M.fix(s.fixed_positions)
-        if not cholesky(M._flat, M._ld, M.bandwidth, s.N):
+        if not factorize(M._flat, M._ld, M.bandwidth, s.N):
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
         return M._flat
 

@@ -57,7 +57,7 @@ class System:
     def _eliminate(self, fixed, values, joints):
         """Sort joints that only fix coordinates to the supports, the others to the multipliers."""
         fixed, values = np.array(fixed, dtype=np.int64), np.array(values, dtype=float)
-        self.all_joints, self.joints, self._moving, zero = list(joints), [], [], np.zeros(self.N)
+        self.all_joints, self.joints, self._fixing, zero = list(joints), [], [], np.zeros(self.N)
         for joint in joints:
             rows = joint.jacobian(zero, 0.0)
             dofs = np.argmax(np.abs(rows), axis=1)
@@ -67,11 +67,16 @@ class System:
                     raise SupportError(
                         f"{joint!r} prescribes {self.describe_dof(clash[0])}, which a support or "
                         "another joint fixes already: remove one of them")
-                self._moving.append((joint, len(fixed), rows[np.arange(len(dofs)), dofs]))
+                self._fixing.append((joint, len(fixed), rows[np.arange(len(dofs)), dofs]))
                 fixed, values = np.append(fixed, dofs), np.append(values, np.zeros(len(dofs)))
             else:
                 self.joints.append(joint)
-        self.fixed, self._values = fixed, values
+        self.fixed, self._values, self._held = fixed, values, np.zeros(len(fixed))
+        self._moving = [item for item in self._fixing if item[0].moving]
+        for joint, first, factors in self._fixing:
+            if not joint.moving:
+                phi = joint.value(zero, 0.0)
+                self._held[first:first + len(factors)] = -phi / factors
         self.free = np.ones(self.N, dtype=bool)
         self.free[fixed] = False
         self.mask = self.free.astype(float)
@@ -92,7 +97,7 @@ class System:
 
     def values(self, load, t=None):
         """Displacements of the fixed coordinates at a load factor and a time."""
-        values = load * self._values
+        values = load * self._values + self._held
         for joint, first, factors in self._moving:
             phi = joint.offset(np.array([load if t is None else t]), self.N)[0]
             values[first:first + len(factors)] = -phi / factors
@@ -100,7 +105,7 @@ class System:
 
     def values_at(self, times):
         """Displacements of the fixed coordinates at full load, at times (n,): (n, nfixed)."""
-        values = np.tile(self._values, (len(times), 1))
+        values = np.tile(self._values + self._held, (len(times), 1))
         for joint, first, factors in self._moving:
             values[:, first:first + len(factors)] = -joint.offset(times, self.N) / factors
         return values
@@ -108,7 +113,7 @@ class System:
     @property
     def moves(self):
         """True if a fixed coordinate has a displacement that is not zero, now or later."""
-        return bool(self._moving) or bool(np.any(self._values))
+        return bool(self._moving) or bool(np.any(self._values + self._held))
 
     def constraint(self, u, t):
         """Phi of the joints with multipliers, shape (m,)."""
@@ -174,7 +179,7 @@ class System:
         for known, part in zip(self.joints, self.multipliers_of(multipliers)):
             if known is joint:
                 return -part
-        for known, first, factors in self._moving:
+        for known, first, factors in self._fixing:
             if known is joint:
                 return reaction[self.fixed[first:first + len(factors)]] / factors
         raise SupportError(f"{joint!r} is not a joint of this scene")

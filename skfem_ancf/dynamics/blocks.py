@@ -73,7 +73,7 @@ class CompiledSteps:
         ends = y.t + dt * np.arange(1, n + 1)
         acting = ends - 0.5 * dt if self._conserving else ends
         done, solver._energy = self._steps(
-            structure.body, structure.moments, structure.joints, self._conserving,
+            structure.cables, structure.beams, structure.moments, structure.joints, self._conserving,
             self._parameters, structure.vectors, structure.factors(acting),
             structure.moment_factors(acting), s.fixed, s.mask, self._supports(y.t, dt, n),
             self._motion(y.t, dt, n), s.mass._flat, self._M, s.mass._ld, s.mass.bandwidth, self._A,
