@@ -372,7 +372,8 @@ def steps(cables, beams, moments, joints, conserving, parameters, vectors, facto
     u, f, R, du, inertia = np.empty(N), np.empty(N), np.empty(N), np.empty(N), np.empty(N)
     base, x, v, load, middle = np.empty(N), np.empty(N), np.empty(N), np.empty(N), np.empty(N)
     J, J1, Y = np.zeros((m, N)), np.zeros((m, N)), np.zeros((m, N))
-    S, phi, dm, impulse = np.empty((m, m)), np.empty(m), np.empty(m), np.empty(m)
+    S, phi, dm = np.empty((m, m)), np.empty(m), np.empty(m)
+    impulse, l, guess = np.empty(m), np.empty(m), np.empty(N)
     none = np.empty((1, 1, 1))
     constant = joints[0].size == 0 and g_.shape[0] == 1
     couples = conserving and not constant
@@ -400,7 +401,7 @@ def steps(cables, beams, moments, joints, conserving, parameters, vectors, facto
                 u[i] = base[i] + dt * dt * beta * w0[i]
         for k in range(fixed.size):
             u[fixed[k]] = position[k]
-        l = multipliers[0].copy()
+        guess[:], l[:] = u, multipliers[0]
         for i in range(N):  # the velocity of the guess, for the scale of the energy
             if conserving:
                 v[i] = (u[i] - u0[i]) * (2.0 / dt) - v0[i]
@@ -510,6 +511,8 @@ def steps(cables, beams, moments, joints, conserving, parameters, vectors, facto
                 if rate > REUSED and size * min(1.0, rate) > wanted:
                     if fresh and rate > 2.0:
                         return n, energy
+                    if rate > 1.0:  # old factors have led astray
+                        u[:], l[:] = guess, multipliers[0]
                     state[0] = 0.0
                     continue
             if size * min(1.0, state[3]) <= wanted:

@@ -137,6 +137,7 @@ class Integrator:
         step = self.scheme.begin(s, y, dt)
         u, multipliers = step.guess.copy(), y.multipliers.copy()
         u[s.fixed] = s.values(1.0, step.t)
+        guess = u.copy()
         v_fixed, a_fixed = self._support_rates(step.t, dt)
         held = step.support_acceleration(v_fixed, a_fixed)
         couples = self.scheme.couples_velocity and not all(joint.constant for joint in s.joints)
@@ -185,6 +186,8 @@ class Integrator:
                 if size > wanted and (rate > SLOW or (left > MANY and not fresh)):
                     if fresh and rate > 2.0:
                         raise StepFailed("the iteration diverges")
+                    if rate > 1.0:  # old factors have led astray
+                        u, multipliers = guess.copy(), y.multipliers.copy()
                     self._factorize(step, u, y.u)
                     fresh, before, self._rate = True, None, 0.1
                     continue
