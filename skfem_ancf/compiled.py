@@ -1,8 +1,8 @@
 """The kernels compiled by Numba, for scenes too small for batched NumPy.
 
 Found at run time: without the package numba nothing changes but the speed. The functions repeat
-what :mod:`skfem_ancf.kernel` and :mod:`skfem_ancf.cable` say, element by element and into the band
-matrix, and are tested against them.
+what :mod:`skfem_ancf.kernel` and :mod:`skfem_ancf.cable` say, a block of elements at a time and
+into the band matrix, and are tested against them.
 """
 
 import math
@@ -13,6 +13,9 @@ from numba import njit
 # no "nnan" and "ninf": a strain that is not finite must be seen
 LOST = 1e-13  # a pivot that small beside what it came from is round-off
 _FAST = {"contract", "reassoc", "nsz", "arcp"}
+
+#: Elements evaluated together: several vectors wide, with the work arrays still in cache.
+BLOCK = 32
 
 
 def jit(function):
@@ -116,287 +119,464 @@ def _constant(constant, e, u, first, m, f, K, tangent):
 
 
 # the beam: one term, a law with constant moduli
-# pack = Gx, Gy, e1, e2, w, D, where (4 index arrays), along (3 matrices), constant, left, nd
+#
+# G and e are rows of d/dX, then of d/dY, of the local functions and of the frame. A strain sample
+# is c (r_g . G_h u + G_g u . e_h) of two rows; g = h and c = 1/2 for a normal strain. With moduli
+# between samples, which have the interpolation and the weights in them, the tangent is a sum over
+# pairs of rows
+#
+#     K[(a, i), (b, j)] = sum_{g, h} M[g, h, i, j] G[g, a] G[h, b]
+#
+# and where elements share G its products are constants: a matrix product for a whole block of
+# elements. The parts symmetric and skew in (a, b) need each pair of rows once.
+#
+# pack = G, e, rows, factors, w, D, along (3 matrices), constant, left, nd, terms, moduli, pairs,
+# symmetric, skew; tables are (1, ...) where elements share them
+
+
+def beam_tables(Gx, Gy, e1, e2, w, D, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, constant, left, nd):
+    """The pack of a beam, from the tables of its NumPy kernel.
+
+    Of each sample, ``rows`` (3, samples) are g, h and the number of that pair, ``factors`` its c.
+    ``pairs`` (3, pairs) are g <= h and the number of the skew part, -1 if g = h. ``terms`` (4, n)
+    are the pair, its skew part, and the rows k and l of ``M[pair] += modulus r_k r_l``; the moduli
+    are (1 or elements, n). ``symmetric`` and ``skew`` have the products of G, a row each pair;
+    where elements have tables of their own they have no contents but the shapes.
+    """
+    n, nt = Gx.shape[1], len(Gx)
+    G = np.concatenate([Gx, Gy], axis=1)
+    e = np.concatenate([np.broadcast_to(frame, (max(len(e1), len(e2)), rows.shape[1], 2))
+                        for frame, rows in ((e1, Gx), (e2, Gy))], axis=1)
+    rows = np.array([np.concatenate([x_xx, n + y_yy, x_xy]),
+                     np.concatenate([x_xx, n + y_yy, n + y_xy])])
+    factors = np.where(rows[0] == rows[1], 0.5, 1.0)
+    s, t, A = _sample_moduli(w, D, (Lxx, Lyy, Lxy))
+    A = A * (factors[s] * factors[t])
+    # derivative of a sample: G_h with r_g and G_g with r_h
+    terms = np.stack(np.broadcast_arrays(rows[:, None, s], rows[None, :, t], rows[::-1, None, s],
+                                         rows[None, ::-1, t])).reshape(4, -1)
+    A = np.tile(A, 4)
+    keep = terms[0] <= terms[1]  # the others are the same transposed
+    terms, A = terms[:, keep], A[:, keep]
+    same = terms[0] == terms[1]
+    terms[2:, same] = np.sort(terms[2:, same], axis=0)
+    terms, of = np.unique(terms, axis=1, return_inverse=True)
+    total = np.zeros((terms.shape[1], len(A)))
+    np.add.at(total, of.ravel(), A.T)
+    pairs, of = np.unique(np.concatenate([terms[:2], rows], axis=1), axis=1, return_inverse=True)
+    of, count = of.ravel(), terms.shape[1]
+    off = pairs[0] != pairs[1]
+    pairs = np.stack([*pairs, np.where(off, np.cumsum(off) - 1, -1)])
+    terms = np.stack([of[:count], pairs[2, of[:count]], terms[2], terms[3]])
+    symmetric = np.empty((pairs.shape[1], nd * (nd + 1) // 2))
+    skew = np.empty((np.sum(off), nd * (nd - 1) // 2))
+    if nt == 1:
+        _pair_products(G[0], pairs, symmetric, skew)
+    return (G, e, np.stack([*rows, of[count:]]), factors, w, np.ascontiguousarray(D), Lxx, Lyy, Lxy,
+            np.ascontiguousarray(constant), left, nd, terms, w @ total.T, pairs, symmetric, skew)
+
+
+def _sample_moduli(w, D, along):
+    """Samples s and t of all strain components, and A with moduli w A: L_ps D L_pt."""
+    ns = w.shape[1] // len(along[0])
+    L = [np.kron(matrix, np.eye(ns)) for matrix in along]
+    start = np.cumsum([0] + [matrix.shape[1] for matrix in L])
+    found = []
+    for c, d in np.argwhere(D):
+        s, t = np.nonzero((L[c] != 0.0).T.astype(float) @ (L[d] != 0.0))
+        A = D[c, d] * L[c][:, s] * L[d][:, t]
+        keep = np.any(np.abs(w @ A) > 1e-14 * (w @ np.abs(A)), axis=0)  # else orthogonal
+        found.append((start[c] + s[keep], start[d] + t[keep], A[:, keep]))
+    return [np.concatenate(part, axis=-1) for part in zip(*found)]
 
 
 @jit
-def _gradients(G, e0, u, first, nb, r, du):
-    for p in range(G.shape[0]):
-        x, y = 0.0, 0.0
-        for k in range(nb):
-            x += G[p, k] * u[first + 2 * k]
-            y += G[p, k] * u[first + 2 * k + 1]
-        du[p, 0], du[p, 1] = x, y
-        q = p if e0.shape[0] > 1 else 0
-        r[p, 0], r[p, 1] = e0[q, 0] + x, e0[q, 1] + y
+def _pair_products(G, pairs, symmetric, skew):
+    """Products of G of each pair, by the lower half of (a, b); without the diagonal if skew."""
+    nb = G.shape[1]
+    for p in range(pairs.shape[1]):
+        g, h, q = pairs[0, p], pairs[1, p], pairs[2, p]
+        n, m = 0, 0
+        for b in range(nb):
+            if q < 0:
+                for a in range(b, nb):
+                    symmetric[p, n + a - b] = G[g, a] * G[g, b]
+            else:
+                x, y = G[g, b], G[h, b]
+                for a in range(b, nb):
+                    symmetric[p, n + a - b] = G[g, a] * y + G[h, a] * x
+                for a in range(b + 1, nb):
+                    skew[q, m + a - b - 1] = G[g, a] * y - G[h, a] * x
+                m += nb - b - 1
+            n += nb - b
 
 
 @jit
-def _interpolate(L, ns, samples, points):
-    """points[i, j] = sum_k L[i, k] samples[k, j]."""
-    for i in range(L.shape[0]):
-        for j in range(ns):
-            s = 0.0
-            for k in range(L.shape[1]):
-                s += L[i, k] * samples[k * ns + j]
-            points[i * ns + j] = s
+def _pair_rows(G, pairs, M, M_skew, e, H, out, K, K_skew):
+    """What the products of G do, for one element with tables of its own: G^T (M G)."""
+    nb = G.shape[1]
+    H[:] = 0.0
+    for p in range(pairs.shape[1]):
+        g, h, q = pairs[0, p], pairs[1, p], pairs[2, p]
+        x, y, xy = M[0, p, e], M[1, p, e], M[2, p, e]
+        d = M_skew[q, e] if q >= 0 else 0.0
+        for a in range(nb):
+            H[g, a] += x * G[h, a]
+            H[g, nb + a] += y * G[h, a]
+            H[g, 2 * nb + a] += (xy + d) * G[h, a]
+        if q >= 0:
+            for a in range(nb):
+                H[h, a] += x * G[g, a]
+                H[h, nb + a] += y * G[g, a]
+                H[h, 2 * nb + a] += (xy - d) * G[g, a]
+    np.dot(G.T, H, out)
+    n, m = 0, 0
+    for b in range(nb):
+        for a in range(b, nb):
+            K[0, e, n], K[1, e, n] = out[a, b], out[a, nb + b]
+            K[2, e, n] = 0.5 * (out[a, 2 * nb + b] + out[b, 2 * nb + a])
+            n += 1
+            if a > b:
+                K_skew[e, m] = 0.5 * (out[a, 2 * nb + b] - out[b, 2 * nb + a])
+                m += 1
 
 
 @jit
-def _collect(L, ns, points, samples):
-    """The transpose of _interpolate."""
-    for k in range(L.shape[1]):
-        for j in range(ns):
-            s = 0.0
-            for i in range(L.shape[0]):
-                s += L[i, k] * points[i * ns + j]
-            samples[k * ns + j] = s
+def _block_arrays(pack, size):
+    """Work arrays for a block of elements; the elements are the last axis, for vector units."""
+    G, factors, w, nd = pack[0], pack[3], pack[4], pack[11]
+    rows = G.shape[1]
+    return (np.empty((nd, 2, size)), np.empty((rows, 2, size)), np.empty((rows, 2, size)),
+            np.empty((rows, 2, size)), np.empty((factors.size, size)),
+            np.empty((3, w.shape[1], size)), np.empty((3, w.shape[1], size)),
+            np.empty((2, size, nd)), np.empty((2 * nd, size)),
+            np.empty((rows, 2, size)), np.empty((w.shape[1], size)))
 
 
 @jit
-def _beam_strain(rx, ry, ux, uy, e1, e2, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, ns, s, out):
-    for p in range(x_xx.size):
-        q = x_xx[p]
-        g = q if e1.shape[0] > 1 else 0
-        s[p] = 0.5 * ((rx[q, 0] + e1[g, 0]) * ux[q, 0] + (rx[q, 1] + e1[g, 1]) * ux[q, 1])
-    _interpolate(Lxx, ns, s, out[0])
-    for p in range(y_yy.size):
-        q = y_yy[p]
-        g = q if e2.shape[0] > 1 else 0
-        s[p] = 0.5 * ((ry[q, 0] + e2[g, 0]) * uy[q, 0] + (ry[q, 1] + e2[g, 1]) * uy[q, 1])
-    _interpolate(Lyy, ns, s, out[1])
-    for p in range(x_xy.size):
-        q, h = x_xy[p], y_xy[p]
-        g = h if e2.shape[0] > 1 else 0
-        s[p] = (rx[q, 0] * uy[h, 0] + rx[q, 1] * uy[h, 1]
-                + ux[q, 0] * e2[g, 0] + ux[q, 1] * e2[g, 1])
-    _interpolate(Lxy, ns, s, out[2])
+def _block_tangents(symmetric, skew, size):
+    """Work arrays for the tangents of a block: factors of the pairs, and what comes of them."""
+    return (np.empty((3, symmetric.shape[0], size)), np.empty((skew.shape[0], size)),
+            np.empty((3, size, symmetric.shape[1])), np.empty((size, skew.shape[1])))
 
 
 @jit
-def _beam_force(Gx, Gy, rx, ry, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, ns, w, S, hat, Tx, Ty, f,
-                first, nb):
-    n = w.size
-    for c in range(3):
-        for p in range(n):
-            S[c, p] *= w[p]
-    _collect(Lxx, ns, S[0], hat[0])
-    _collect(Lyy, ns, S[1], hat[1])
-    _collect(Lxy, ns, S[2], hat[2])
-    Tx[:] = 0.0
-    Ty[:] = 0.0
-    for p in range(x_xx.size):
-        q = x_xx[p]
-        Tx[q, 0] += hat[0, p] * rx[q, 0]
-        Tx[q, 1] += hat[0, p] * rx[q, 1]
-    for p in range(y_yy.size):
-        q = y_yy[p]
-        Ty[q, 0] += hat[1, p] * ry[q, 0]
-        Ty[q, 1] += hat[1, p] * ry[q, 1]
-    for p in range(x_xy.size):
-        q, h = x_xy[p], y_xy[p]
+def _block_tables(e_, w_, first, e0, w):
+    """The frame and the weights of each element of the block."""
+    for e in range(w.shape[1]):
+        t = first + e if e_.shape[0] > 1 else 0
+        for g in range(e0.shape[0]):
+            e0[g, 0, e], e0[g, 1, e] = e_[t, g, 0], e_[t, g, 1]
+        t = first + e if w_.shape[0] > 1 else 0
+        for p in range(w.shape[0]):
+            w[p, e] = w_[t, p]
+
+
+@jit
+def _block_load(left, nd, first, u, U):
+    for e in range(U.shape[2]):
+        at = left[first + e] * nd
+        for k in range(nd):
+            U[k, 0, e], U[k, 1, e] = u[at + 2 * k], u[at + 2 * k + 1]
+@jit
+def _block_gradients(G, first, U, d):
+    """d = G U."""
+    size = d.shape[2]
+    if G.shape[0] == 1:
+        np.dot(G[0], U.reshape(U.shape[0], 2 * size), d.reshape(d.shape[0], 2 * size))
+        return
+    u, du = np.empty((U.shape[0], 2)), np.empty((d.shape[0], 2))
+    for e in range(size):
+        for k in range(U.shape[0]):
+            u[k, 0], u[k, 1] = U[k, 0, e], U[k, 1, e]
+        np.dot(G[first + e], u, du)
+        for g in range(d.shape[0]):
+            d[g, 0, e], d[g, 1, e] = du[g, 0], du[g, 1]
+
+
+@jit
+def _block_strain(G, first, e0, rows, factors, U, d, r, samples):
+    """Displacement gradients d, position gradients r, and the strain samples."""
+    size = d.shape[2]
+    _block_gradients(G, first, U, d)
+    for g in range(d.shape[0]):
         for i in range(2):
-            Tx[q, i] += hat[2, p] * ry[h, i]
-            Ty[h, i] += hat[2, p] * rx[q, i]
-    for k in range(nb):
-        x, y = 0.0, 0.0
-        for p in range(Gx.shape[0]):
-            x += Gx[p, k] * Tx[p, 0]
-            y += Gx[p, k] * Tx[p, 1]
-        for p in range(Gy.shape[0]):
-            x += Gy[p, k] * Ty[p, 0]
-            y += Gy[p, k] * Ty[p, 1]
-        f[first + 2 * k] += x
-        f[first + 2 * k + 1] += y
+            for e in range(size):
+                r[g, i, e] = e0[g, i, e] + d[g, i, e]
+    for s in range(factors.size):
+        g, h, c = rows[0, s], rows[1, s], factors[s]
+        for e in range(size):
+            samples[s, e] = c * (r[g, 0, e] * d[h, 0, e] + r[g, 1, e] * d[h, 1, e]
+                                 + d[g, 0, e] * e0[h, 0, e] + d[g, 1, e] * e0[h, 1, e])
 
 
 @jit
-def _normal_row(L, ns, i, j, rows, G, r, B, nb):
-    """B of a normal strain at the integration point (i, j): B[0] for x, B[1] for y."""
-    B[:, :] = 0.0
-    for k in range(L.shape[1]):
-        if L[i, k] != 0.0:
-            p = rows[k * ns + j]
-            x, y = L[i, k] * r[p, 0], L[i, k] * r[p, 1]
-            for a in range(nb):
-                B[0, a] += x * G[p, a]
-                B[1, a] += y * G[p, a]
-
-
-@jit
-def _shear_row(L, ns, i, j, x_rows, y_rows, Gx, Gy, rx, ry, B, nb):
-    """B of the shear strain at the integration point (i, j)."""
-    B[:, :] = 0.0
-    for k in range(L.shape[1]):
-        if L[i, k] != 0.0:
-            p, q = x_rows[k * ns + j], y_rows[k * ns + j]
-            for c in range(2):
-                x, y = L[i, k] * ry[q, c], L[i, k] * rx[p, c]
-                for a in range(nb):
-                    B[c, a] += x * Gx[p, a] + y * Gy[q, a]
-
-
-@jit
-def _pairs(Gx, Gy, x_xx, y_yy, x_xy, y_xy, P, Q):
-    """Rows of both factors of the geometric part: sum of stress times P^T Q over the rows."""
-    a, b, c = x_xx.size, y_yy.size, x_xy.size
-    for p in range(a):
-        P[p] = Gx[x_xx[p]]
-        Q[p] = Gx[x_xx[p]]
-    for p in range(b):
-        P[a + p] = Gy[y_yy[p]]
-        Q[a + p] = Gy[y_yy[p]]
-    for p in range(c):
-        P[a + b + p] = Gx[x_xy[p]]
-        Q[a + b + p] = Gy[y_xy[p]]
-        P[a + b + c + p] = Gy[y_xy[p]]
-        Q[a + b + c + p] = Gx[x_xy[p]]
-
-
-@jit
-def beam_loop(pack, u, f, tangent, geometric, carried, use_carried, strains, stresses, flat, ld,
-              start):
-    """Force into f, tangent into the band; strains and stresses (3, ne, np) are filled."""
-    (Gx_, Gy_, e1_, e2_, w_, D, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, constant, left, nd) = pack
-    nb, m = nd, 2 * nd
-    n, ns = w_.shape[1], x_xx.size // Lxx.shape[1]
-    rx, ux = np.empty((Gx_.shape[1], 2)), np.empty((Gx_.shape[1], 2))
-    ry, uy = np.empty((Gy_.shape[1], 2)), np.empty((Gy_.shape[1], 2))
-    Tx, Ty = np.empty_like(rx), np.empty_like(ry)
-    size = max(x_xx.size, y_yy.size, x_xy.size)
-    s, hat = np.empty(size), np.empty((3, size))
-    strain, S = np.empty((3, n)), np.empty((3, n))
-    K, Km, Kg = np.empty((m, m)), np.empty((m, m)), np.empty((nb, nb))
-    # rows are strains at points, columns the x components and then the y components
-    B, DB = np.empty((3 * n, m)), np.empty((3 * n, m))
-    parts = B.reshape(3, n, 2, nb)
-    pairs = x_xx.size + y_yy.size + 2 * x_xy.size
-    P, Q, SP = np.empty((pairs, nb)), np.empty((pairs, nb)), np.empty((pairs, nb))
-    for e in range(left.size):
-        t = e if Gx_.shape[0] > 1 else 0
-        Gx, Gy, w = Gx_[t], Gy_[t], w_[t]
-        e1, e2 = e1_[e if e1_.shape[0] > 1 else 0], e2_[e if e2_.shape[0] > 1 else 0]
-        first = left[e] * nd
-        _gradients(Gx, e1, u, first, nb, rx, ux)
-        _gradients(Gy, e2, u, first, nb, ry, uy)
-        _beam_strain(rx, ry, ux, uy, e1, e2, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, ns, s, strain)
-        for p in range(n):
-            for c in range(3):
-                v = D[c, 0] * strain[0, p] + D[c, 1] * strain[1, p] + D[c, 2] * strain[2, p]
-                S[c, p] = v
-                if tangent:
-                    strains[c, e, p], stresses[c, e, p] = strain[c, p], v
-        _beam_force(Gx, Gy, rx, ry, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, ns, w, S, hat, Tx, Ty,
-                    f, first, nb)
-        if tangent:
-            for i in range(Lxx.shape[0]):
+def _block_along(L, first, samples, points):
+    """points = L samples, from the sample ``first``; returns the sample after."""
+    ns = points.shape[0] // L.shape[0]
+    for p in range(points.shape[0]):
+        for e in range(points.shape[1]):
+            points[p, e] = 0.0
+    for i in range(L.shape[0]):
+        for k in range(L.shape[1]):
+            c = L[i, k]
+            if c != 0.0:
                 for j in range(ns):
+                    p, s = i * ns + j, first + k * ns + j
+                    for e in range(points.shape[1]):
+                        points[p, e] += c * samples[s, e]
+    return first + L.shape[1] * ns
+
+
+@jit
+def _block_back(L, first, w, points, samples):
+    """samples = L^T w points, from the sample ``first``; returns the sample after."""
+    ns = points.shape[0] // L.shape[0]
+    for k in range(L.shape[1]):
+        for j in range(ns):
+            s = first + k * ns + j
+            for e in range(points.shape[1]):
+                samples[s, e] = 0.0
+            for i in range(L.shape[0]):
+                if L[i, k] != 0.0:
                     p = i * ns + j
-                    _normal_row(Lxx, ns, i, j, x_xx, Gx, rx, parts[0, p], nb)
-                    _normal_row(Lyy, ns, i, j, y_yy, Gy, ry, parts[1, p], nb)
-                    _shear_row(Lxy, ns, i, j, x_xy, y_xy, Gx, Gy, rx, ry, parts[2, p], nb)
-                    for c in range(3):
-                        d0, d1, d2 = w[p] * D[c, 0], w[p] * D[c, 1], w[p] * D[c, 2]
-                        for a in range(m):
-                            DB[c * n + p, a] = (d0 * B[p, a] + d1 * B[n + p, a]
-                                                + d2 * B[2 * n + p, a])
-            np.dot(DB.T, B, Km)
-            Kg[:] = 0.0
-            if geometric:
-                if use_carried:
-                    for c in range(3):
-                        for p in range(n):
-                            S[c, p] = w[p] * carried[c, e, p]
-                    _collect(Lxx, ns, S[0], hat[0])
-                    _collect(Lyy, ns, S[1], hat[1])
-                    _collect(Lxy, ns, S[2], hat[2])
-                if e == 0 or t > 0:
-                    _pairs(Gx, Gy, x_xx, y_yy, x_xy, y_xy, P, Q)
-                row = 0
-                for c in (0, 1, 2, 2):
-                    for p in range((x_xx.size, y_yy.size, x_xy.size)[c]):
-                        for a in range(nb):
-                            SP[row, a] = hat[c, p] * P[row, a]
-                        row += 1
-                np.dot(SP.T, Q, Kg)
-            for a in range(nb):
-                for b in range(nb):
-                    K[2 * a, 2 * b] = Km[a, b] + Kg[a, b]
-                    K[2 * a + 1, 2 * b + 1] = Km[nb + a, nb + b] + Kg[a, b]
-                    K[2 * a + 1, 2 * b] = K[2 * b, 2 * a + 1] = Km[nb + a, b]
-        _constant(constant, e, u, first, m, f, K, tangent)
-        if tangent:
-            add_block(K, flat, ld, start + first)
+                    c = L[i, k]
+                    for e in range(points.shape[1]):
+                        samples[s, e] += c * w[p, e] * points[p, e]
+    return first + L.shape[1] * ns
+
+
+@jit
+def _block_points(Lxx, Lyy, Lxy, samples, points):
+    """Samples of the strain, interpolated to the integration points, (3, points, elements)."""
+    first = _block_along(Lxx, 0, samples, points[0])
+    first = _block_along(Lyy, first, samples, points[1])
+    _block_along(Lxy, first, samples, points[2])
+
+
+@jit
+def _block_samples(Lxx, Lyy, Lxy, w, points, samples):
+    """The transpose of _block_points, with the weights of the points."""
+    first = _block_back(Lxx, 0, w, points[0], samples)
+    first = _block_back(Lyy, first, w, points[1], samples)
+    _block_back(Lxy, first, w, points[2], samples)
+
+
+@jit
+def _block_stress(D, strain, S):
+    for p in range(strain.shape[1]):
+        for c in range(3):
+            d0, d1, d2 = D[c, 0], D[c, 1], D[c, 2]
+            for e in range(strain.shape[2]):
+                S[c, p, e] = d0 * strain[0, p, e] + d1 * strain[1, p, e] + d2 * strain[2, p, e]
+@jit
+def _block_store(points, first, out):
+    for c in range(3):
+        for e in range(points.shape[2]):
+            for p in range(points.shape[1]):
+                out[c, first + e, p] = points[c, p, e]
+@jit
+def _block_force(G, rows, factors, constant, left, nd, first, u, U, r, samples, T, F, held, f):
+    """Add G^T T to f, where T is what the stress samples do on the gradients; and C u."""
+    size = r.shape[2]
+    T[:] = 0.0
+    for s in range(factors.size):
+        g, h, c = rows[0, s], rows[1, s], factors[s]
+        for i in range(2):
+            for e in range(size):
+                T[g, i, e] += c * samples[s, e] * r[h, i, e]
+            for e in range(size):
+                T[h, i, e] += c * samples[s, e] * r[g, i, e]
+    if G.shape[0] == 1:
+        np.dot(T.reshape(T.shape[0], 2 * size).T, G[0], F.reshape(2 * size, nd))
+    else:
+        F[:] = 0.0
+        for e in range(size):
+            for g in range(G.shape[1]):
+                x, y = T[g, 0, e], T[g, 1, e]
+                for k in range(nd):
+                    F[0, e, k] += G[first + e, g, k] * x
+                    F[1, e, k] += G[first + e, g, k] * y
+    held[:] = 0.0
+    if constant.shape[0] == 1:
+        np.dot(constant[0], U.reshape(2 * nd, size), held)
+    elif constant.shape[0] > 1:
+        for e in range(size):
+            for i in range(2 * nd):
+                x = 0.0
+                for j in range(2 * nd):
+                    x += constant[first + e, i, j] * u[left[first + e] * nd + j]
+                held[i, e] = x
+    for e in range(size):
+        at = left[first + e] * nd
+        for k in range(nd):
+            f[at + 2 * k] += F[0, e, k] + held[2 * k, e]
+            f[at + 2 * k + 1] += F[1, e, k] + held[2 * k + 1, e]
+
+
+@jit
+def _block_geometric(rows, samples, M):
+    """Add the stress to the factors of the pairs, the same for both components."""
+    for s in range(samples.shape[0]):
+        p = rows[2, s]
+        for e in range(samples.shape[1]):
+            M[0, p, e] += samples[s, e]
+            M[1, p, e] += samples[s, e]
+
+
+@jit
+def _block_moduli(terms, moduli, first, r, M, skew, c):
+    """Add the material part to the factors of the pairs: xx, yy, xy symmetric, and xy skew."""
+    skew[:] = 0.0
+    for t in range(moduli.shape[1]):
+        p, q, g, h = terms[0, t], terms[1, t], terms[2, t], terms[3, t]
+        for e in range(c.size):
+            c[e] = moduli[first + e if moduli.shape[0] > 1 else 0, t]
+        if q >= 0:
+            for e in range(r.shape[2]):
+                gx, gy, hx, hy = r[g, 0, e], r[g, 1, e], r[h, 0, e], r[h, 1, e]
+                x, y = c[e] * gx * hy, c[e] * gy * hx
+                M[0, p, e] += c[e] * gx * hx
+                M[1, p, e] += c[e] * gy * hy
+                M[2, p, e] += 0.5 * (x + y)
+                skew[q, e] += 0.5 * (x - y)
+        else:
+            for e in range(r.shape[2]):
+                gx, gy, hx, hy = r[g, 0, e], r[g, 1, e], r[h, 0, e], r[h, 1, e]
+                M[0, p, e] += c[e] * gx * hx
+                M[1, p, e] += c[e] * gy * hy
+                M[2, p, e] += 0.5 * c[e] * (gx * hy + gy * hx)
+
+
+@jit
+def _block_add(K, skew, e, nd, flat, ld, row):
+    """Add one element of the block to the band: coordinates (a, i) are 2 a + i."""
+    n, m = 0, 0
+    for b in range(nd):
+        left, right = (row + 2 * b) * ld, (row + 2 * b + 1) * ld
+        flat[left] += K[0, e, n]
+        flat[left + 1] += K[2, e, n]
+        flat[right] += K[1, e, n]
+        n += 1
+        for k in range(1, nd - b):
+            flat[left + 2 * k] += K[0, e, n]
+            flat[left + 2 * k + 1] += K[2, e, n] - skew[e, m]
+            flat[right + 2 * k - 1] += K[2, e, n] + skew[e, m]
+            flat[right + 2 * k] += K[1, e, n]
+            n += 1
+            m += 1
+@jit
+def beam_loop(pack, u, f, tangent, geometric, carried, use_carried, stresses, flat, ld, start):
+    """Force into f, and if asked for tangent into the band and stresses (3, ne, np)."""
+    (G_, e_, rows, factors, w_, D, Lxx, Lyy, Lxy, constant, left, nd, terms, moduli, pairs,
+     symmetric, skew) = pack
+    size = min(BLOCK, left.size)
+    alone = G_.shape[0] > 1
+    H = np.empty((G_.shape[1], 3 * nd if tangent and alone else 0))
+    out = np.empty((nd, H.shape[1]))
+    arrays = _block_arrays(pack, size)
+    tangents = _block_tangents(symmetric, skew, size if tangent else 0)
+    for first in range(0, left.size, BLOCK):
+        if left.size - first < size:
+            size = left.size - first
+            arrays = _block_arrays(pack, size)
+            tangents = _block_tangents(symmetric, skew, size if tangent else 0)
+        U, d, r, T, samples, strain, S, F, held, e0, w = arrays
+        if first == 0 or left.size - first < BLOCK or e_.shape[0] > 1 or w_.shape[0] > 1:
+            _block_tables(e_, w_, first, e0, w)
+        _block_load(left, nd, first, u, U)
+        _block_strain(G_, first, e0, rows, factors, U, d, r, samples)
+        _block_points(Lxx, Lyy, Lxy, samples, strain)
+        _block_stress(D, strain, S)
+        _block_samples(Lxx, Lyy, Lxy, w, S, samples)
+        _block_force(G_, rows, factors, constant, left, nd, first, u, U, r, samples, T, F,
+                     held, f)
+        if not tangent:
+            continue
+        M, M_skew, K, K_skew = tangents
+        _block_store(S, first, stresses)
+        if use_carried:
+            for c in range(3):
+                for p in range(S.shape[1]):
+                    for e in range(size):
+                        S[c, p, e] = carried[c, first + e, p]
+            _block_samples(Lxx, Lyy, Lxy, w, S, samples)
+        M[:] = 0.0
+        if geometric:
+            _block_geometric(rows, samples, M)
+        _block_moduli(terms, moduli, first, r, M, M_skew, np.empty(size))
+        if alone:
+            for e in range(size):
+                _pair_rows(G_[first + e], pairs, M, M_skew, e, H, out, K, K_skew)
+        else:
+            for c in range(3):
+                np.dot(M[c].T, symmetric, K[c])
+            np.dot(M_skew.T, skew, K_skew)
+        for e in range(size):
+            row = start + left[first + e] * nd
+            _block_add(K, K_skew, e, nd, flat, ld, row)
+            if constant.shape[0] > 0:
+                add_block(constant[first + e if constant.shape[0] > 1 else 0], flat, ld, row)
 
 
 @jit
 def beam_increment(pack, u, du, out):
     """The strain's derivative at u in the direction du, (3, ne, np)."""
-    (Gx_, Gy_, e1_, e2_, w_, D, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, constant, left, nd) = pack
-    nb, ns = nd, x_xx.size // Lxx.shape[1]
-    rx, dx = np.empty((Gx_.shape[1], 2)), np.empty((Gx_.shape[1], 2))
-    ry, dy = np.empty((Gy_.shape[1], 2)), np.empty((Gy_.shape[1], 2))
-    none = np.zeros((1, 2))
-    s = np.empty(max(x_xx.size, y_yy.size, x_xy.size))
-    for e in range(left.size):
-        t = e if Gx_.shape[0] > 1 else 0
-        first = left[e] * nd
-        _gradients(Gx_[t], e1_[e if e1_.shape[0] > 1 else 0], u, first, nb, rx, dx)
-        _gradients(Gy_[t], e2_[e if e2_.shape[0] > 1 else 0], u, first, nb, ry, dy)
-        _gradients(Gx_[t], none, du, first, nb, dx, dx)
-        _gradients(Gy_[t], none, du, first, nb, dy, dy)
-        for p in range(x_xx.size):
-            q = x_xx[p]
-            s[p] = rx[q, 0] * dx[q, 0] + rx[q, 1] * dx[q, 1]
-        _interpolate(Lxx, ns, s, out[0, e])
-        for p in range(y_yy.size):
-            q = y_yy[p]
-            s[p] = ry[q, 0] * dy[q, 0] + ry[q, 1] * dy[q, 1]
-        _interpolate(Lyy, ns, s, out[1, e])
-        for p in range(x_xy.size):
-            q, h = x_xy[p], y_xy[p]
-            s[p] = (rx[q, 0] * dy[h, 0] + rx[q, 1] * dy[h, 1]
-                    + dx[q, 0] * ry[h, 0] + dx[q, 1] * ry[h, 1])
-        _interpolate(Lxy, ns, s, out[2, e])
+    (G_, e_, rows, factors, w_, D, Lxx, Lyy, Lxy, constant, left, nd) = pack[:12]
+    size = min(BLOCK, left.size)
+    arrays = _block_arrays(pack, size)
+    for first in range(0, left.size, BLOCK):
+        if left.size - first < size:
+            size = left.size - first
+            arrays = _block_arrays(pack, size)
+        U, d, r, T, samples, strain, S, F, held, e0, w = arrays
+        if first == 0 or left.size - first < BLOCK or e_.shape[0] > 1 or w_.shape[0] > 1:
+            _block_tables(e_, w_, first, e0, w)
+        _block_load(left, nd, first, u, U)
+        _block_strain(G_, first, e0, rows, factors, U, d, r, samples)
+        _block_load(left, nd, first, du, U)
+        _block_gradients(G_, first, U, d)
+        for s in range(factors.size):
+            g, h, c = rows[0, s], rows[1, s], factors[s]
+            for e in range(size):
+                samples[s, e] = c * (r[g, 0, e] * d[h, 0, e] + r[g, 1, e] * d[h, 1, e]
+                                     + d[g, 0, e] * r[h, 0, e] + d[g, 1, e] * r[h, 1, e])
+        _block_points(Lxx, Lyy, Lxy, samples, strain)
+        _block_store(strain, first, out)
 
 
 @jit
 def beam_mean(pack, u0, u1, f):
     """B(middle)^T mean stress, added to f."""
-    (Gx_, Gy_, e1_, e2_, w_, D, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, constant, left, nd) = pack
-    nb, m, n, ns = nd, 2 * nd, w_.shape[1], x_xx.size // Lxx.shape[1]
-    rx, ux = np.empty((Gx_.shape[1], 2)), np.empty((Gx_.shape[1], 2))
-    ry, uy = np.empty((Gy_.shape[1], 2)), np.empty((Gy_.shape[1], 2))
-    mx, my = np.empty_like(rx), np.empty_like(ry)
-    Tx, Ty = np.empty_like(rx), np.empty_like(ry)
-    size = max(x_xx.size, y_yy.size, x_xy.size)
-    s, hat = np.empty(size), np.empty((3, size))
-    old, strain, S = np.empty((3, n)), np.empty((3, n)), np.empty((3, n))
-    K, middle = np.empty((1, 1)), 0.5 * (u0 + u1)
-    for e in range(left.size):
-        t = e if Gx_.shape[0] > 1 else 0
-        Gx, Gy = Gx_[t], Gy_[t]
-        e1, e2 = e1_[e if e1_.shape[0] > 1 else 0], e2_[e if e2_.shape[0] > 1 else 0]
-        first = left[e] * nd
-        _gradients(Gx, e1, u0, first, nb, rx, ux)
-        _gradients(Gy, e2, u0, first, nb, ry, uy)
-        mx[:], my[:] = rx, ry
-        _beam_strain(rx, ry, ux, uy, e1, e2, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, ns, s, old)
-        _gradients(Gx, e1, u1, first, nb, rx, ux)
-        _gradients(Gy, e2, u1, first, nb, ry, uy)
-        _beam_strain(rx, ry, ux, uy, e1, e2, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, ns, s, strain)
-        for p in range(mx.shape[0]):
-            mx[p, 0], mx[p, 1] = 0.5 * (mx[p, 0] + rx[p, 0]), 0.5 * (mx[p, 1] + rx[p, 1])
-        for p in range(my.shape[0]):
-            my[p, 0], my[p, 1] = 0.5 * (my[p, 0] + ry[p, 0]), 0.5 * (my[p, 1] + ry[p, 1])
-        for p in range(n):
-            for c in range(3):
-                S[c, p] = 0.5 * (D[c, 0] * (old[0, p] + strain[0, p])
-                                 + D[c, 1] * (old[1, p] + strain[1, p])
-                                 + D[c, 2] * (old[2, p] + strain[2, p]))
-        _beam_force(Gx, Gy, mx, my, x_xx, y_yy, x_xy, y_xy, Lxx, Lyy, Lxy, ns, w_[t], S, hat, Tx,
-                    Ty, f, first, nb)
-        _constant(constant, e, middle, first, m, f, K, False)
+    (G_, e_, rows, factors, w_, D, Lxx, Lyy, Lxy, constant, left, nd) = pack[:12]
+    size, middle = min(BLOCK, left.size), 0.5 * (u0 + u1)
+    arrays, old = _block_arrays(pack, size), np.empty((2, nd, 2, size))
+    for first in range(0, left.size, BLOCK):
+        if left.size - first < size:
+            size = left.size - first
+            arrays, old = _block_arrays(pack, size), np.empty((2, nd, 2, size))
+        U, d, r, T, samples, strain, S, F, held, e0, w = arrays
+        if first == 0 or left.size - first < BLOCK or e_.shape[0] > 1 or w_.shape[0] > 1:
+            _block_tables(e_, w_, first, e0, w)
+        _block_load(left, nd, first, u0, old[0])
+        _block_load(left, nd, first, u1, U)
+        for k in range(nd):
+            for i in range(2):
+                for e in range(size):
+                    old[1, k, i, e] = 0.5 * (U[k, i, e] - old[0, k, i, e])
+                    U[k, i, e] = 0.5 * (U[k, i, e] + old[0, k, i, e])
+        # the mean of both strains is the strain of the mean, and half the square of the rest
+        _block_strain(G_, first, e0, rows, factors, U, d, r, samples)
+        _block_gradients(G_, first, old[1], d)
+        for s in range(factors.size):
+            g, h, c = rows[0, s], rows[1, s], factors[s]
+            for e in range(size):
+                samples[s, e] += c * (d[g, 0, e] * d[h, 0, e] + d[g, 1, e] * d[h, 1, e])
+        _block_points(Lxx, Lyy, Lxy, samples, strain)
+        _block_stress(D, strain, S)
+        _block_samples(Lxx, Lyy, Lxy, w, S, samples)
+        _block_force(G_, rows, factors, constant, left, nd, first, middle, U, r, samples, T, F,
+                     held, f)
 
 
 # the cable
@@ -416,9 +596,8 @@ def _cable_point(G1, G2, p, u, first, nb):
 
 
 @jit
-def cable_loop(pack, u, f, tangent, geometric, carried, use_carried, strains, stresses, flat, ld,
-               start):
-    """Force into f, tangent into the band; strains and stresses (2, ne, np) are filled."""
+def cable_loop(pack, u, f, tangent, geometric, carried, use_carried, stresses, flat, ld, start):
+    """Force into f, and if asked for tangent into the band and stresses (2, ne, np)."""
     G1_, G2_, A0_, B0_, s0_, kappa0_, w_, stiffness, constant, left, nd = pack
     nb, m, n = nd, 2 * nd, w_.shape[1]
     K, T = np.empty((m, m)), np.empty((4, 4))
@@ -452,7 +631,6 @@ def cable_loop(pack, u, f, tangent, geometric, carried, use_carried, strains, st
                                              + G2[p, k] * m_ * k_b[i])
             if not tangent:
                 continue
-            strains[0, e, p], strains[1, e, p] = eps, change
             stresses[0, e, p], stresses[1, e, p] = N, M
             # the 4 x 4 second derivative by (a, b)
             T[:] = 0.0
@@ -562,7 +740,8 @@ class CompiledKernel:
     """
 
     def __init__(self, packs, cable, elements):
-        self.packs, self.cable = packs, cable
+        self.packs = packs = packs if cable else [beam_tables(*pack) for pack in packs]
+        self.cable = cable
         self.shapes = [(2, elements, pack[6].shape[1]) if cable else
                        (3, elements, pack[4].shape[1]) for pack in packs]
         self._loop, self._increment, self._mean = (
@@ -575,14 +754,14 @@ class CompiledKernel:
         stresses = [np.empty(shape) for shape in self.shapes]
         for k, (pack, S) in enumerate(zip(self.packs, stresses)):
             self._loop(pack, u, force, True, geometric, carried[k] if carried else self._none,
-                       carried is not None, np.empty_like(S), S, K._flat, K._ld, start)
+                       carried is not None, S, K._flat, K._ld, start)
         return CompiledEvaluation(self, u, stresses)
 
     def force(self, u):
         """Internal force, shape (N,)."""
         out = np.zeros(u.size)
         for pack in self.packs:
-            self._loop(pack, u, out, False, False, self._none, False, self._none, self._none,
+            self._loop(pack, u, out, False, False, self._none, False, self._none,
                        self._none[0, 0], 1, 0)
         return out
 

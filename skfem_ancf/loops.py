@@ -49,12 +49,12 @@ def body_force(cables, beams, u, f, none, flat):
         packs, at = cables
         for k in range(len(packs)):
             a, b = at[k, 0], at[k, 1]
-            cable_loop(packs[k], u[a:b], f[a:b], False, False, none, False, none, none, flat, 1, 0)
+            cable_loop(packs[k], u[a:b], f[a:b], False, False, none, False, none, flat, 1, 0)
     if beams is not None:
         packs, at = beams
         for k in range(len(packs)):
             a, b = at[k, 0], at[k, 1]
-            beam_loop(packs[k], u[a:b], f[a:b], False, False, none, False, none, none, flat, 1, 0)
+            beam_loop(packs[k], u[a:b], f[a:b], False, False, none, False, none, flat, 1, 0)
 
 
 @jit
@@ -82,13 +82,13 @@ def body_tangent(cables, beams, u, f, carried, use_carried, stresses, flat, ld):
         packs, at = cables
         for k in range(len(packs)):
             a, b, s = at[k, 0], at[k, 1], stresses[0][k]
-            cable_loop(packs[k], u[a:b], f[a:b], True, True, carried[0][k], use_carried, s, s,
+            cable_loop(packs[k], u[a:b], f[a:b], True, True, carried[0][k], use_carried, s,
                        flat, ld, a)
     if beams is not None:
         packs, at = beams
         for k in range(len(packs)):
             a, b, s = at[k, 0], at[k, 1], stresses[1][k]
-            beam_loop(packs[k], u[a:b], f[a:b], True, True, carried[1][k], use_carried, s, s,
+            beam_loop(packs[k], u[a:b], f[a:b], True, True, carried[1][k], use_carried, s,
                       flat, ld, a)
 
 

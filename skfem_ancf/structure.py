@@ -27,8 +27,8 @@ class Structure:
                  for p in b.kernel.compiled.packs if not b.kernel.compiled.cable]
         self._many = len(cables) + len(beams) > 1
         self.cables, self.beams = self._packs(cables), self._packs(beams)
-        self.shapes = [[(2, len(p[9]), p[6].shape[1]) for p, _ in cables],
-                       [(3, len(p[14]), p[4].shape[1]) for p, _ in beams]]
+        self.shapes = [[shape for b in system.beams for shape in b.kernel.compiled.shapes
+                        if b.kernel.compiled.cable == cable] for cable in (True, False)]
         varying = [load for load in system.loads if load.amplitude is not None]
         self._amplitudes = [load for load in varying if isinstance(load, DeadLoad)]
         self.vectors = np.zeros((1 + len(self._amplitudes), system.N))

@@ -7,6 +7,8 @@ from numpy.testing import assert_allclose
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana, EnergyMomentum, GeneralizedAlpha, MeshBeam,
                         NeoHookean, Scene, StVenantKirchhoff)
+from skfem_ancf.linalg import BandMatrix
+from skfem_ancf.materials import LinearLaw
 
 pytest.importorskip("numba")
 
@@ -47,6 +49,51 @@ def test_same_force_tangent_and_carried_stress(mesh, element, formulation):
     assert scenes[1].beams[0].kernel.compiled is not None
     for a, b in zip(*found):
         assert_allclose(b, a, rtol=0, atol=1e-12 * np.abs(a).max())
+
+
+@pytest.mark.parametrize("n", [1, 2, 31, 32, 33, 70])
+@pytest.mark.parametrize("grading", [1.0, 1.5])
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamANCFCubic(2)], ids=repr)
+@pytest.mark.parametrize("formulation", ["assumed", "continuum"])
+@pytest.mark.parametrize("geometric", [True, False])
+def test_same_in_blocks(n, grading, element, formulation, geometric):
+    rng = np.random.default_rng(n)
+    mesh = MeshBeam.init_line(n * np.linspace(0, 1, n + 1)**grading, 0.5, angle=0.3)
+    kernels = [scene.beams[0].kernel for scene in both(mesh, element, formulation)]
+    assert kernels[0].shared == (n == 1 or grading == 1.0)
+    N, start = kernels[0].N, 3
+    u, v = 0.05 * rng.standard_normal((2, N))
+    found = []
+    for kernel in kernels:
+        out = [kernel.force(u), kernel.mean_force(u, v, kernel.strains(u))]
+        carried = None
+        for _ in range(2):
+            K, force = BandMatrix(start + N, 2 * kernel.nd - 1), np.ones(N)
+            assembly = kernel.assemble(u, K, start, force, carried, geometric)
+            out += [K.ab.copy(), force]
+            carried = assembly.carry(v)
+        found.append(out)
+    for a, b in zip(*found):
+        assert_allclose(b, a, rtol=0, atol=1e-12 * np.abs(a).max())
+
+
+def test_same_with_moduli_that_couple_all_components():
+    class Skew(StVenantKirchhoff):
+        def law(self, shear_factor=1.0):
+            A = np.array([[2.0, 0.5, 0.4], [0.5, 1.0, -0.3], [0.4, -0.3, 0.7]])
+            return LinearLaw(A)
+
+    mesh = MeshBeam.init_line(np.linspace(0, 2, 4), 0.3)
+    for formulation in ("assumed", "continuum"):
+        systems = [s.system for s in both(mesh, ElementBeamANCF(3), formulation,
+                                          Skew(2.0, 0.3, 1.0))]
+        u = 0.05 * np.random.default_rng(2).standard_normal(systems[0].N)
+        found = []
+        for s in systems:
+            force, _ = s.assemble(u)
+            found.append((force, s.K.tocsc().toarray()))
+        for a, b in zip(*found):
+            assert_allclose(b, a, rtol=0, atol=1e-12 * np.abs(a).max())
 
 
 def test_other_laws_and_followers_fall_back():
