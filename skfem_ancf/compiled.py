@@ -19,13 +19,20 @@ BLOCK = 32
 
 
 def jit(function):
-    return njit(cache=True, fastmath=_FAST)(function)
+    """Compile a function that Python calls, and keep it on disk."""
+    return njit(cache=True, fastmath=_FAST, error_model="numpy")(function)
+
+
+def inner(function):
+    """Compile a function that compiled ones call: no entrance for Python, which takes as long."""
+    return njit(fastmath=_FAST, error_model="numpy", no_cpython_wrapper=True,
+                no_cfunc_wrapper=True)(function)
 
 
 # the band: lower half of a symmetric matrix, entry (i, j) at j * ld + i - j
 
 
-@jit
+@inner
 def add_block(K, flat, ld, row):
     for b in range(K.shape[0]):
         at = (row + b) * ld - b
@@ -33,7 +40,7 @@ def add_block(K, flat, ld, row):
             flat[at + a] += K[a, b]
 
 
-@jit
+@inner
 def multiply(flat, ld, bw, x, y):
     n = x.size
     for i in range(n):
@@ -75,7 +82,7 @@ def factorize(flat, ld, bw, n):
     return True
 
 
-@jit
+@inner
 def solve(flat, ld, bw, x):
     """Solve in place with the factors."""
     n = x.size
@@ -91,7 +98,7 @@ def solve(flat, ld, bw, x):
         x[j] = s
 
 
-@jit
+@inner
 def fix(flat, ld, bw, fixed):
     """Rows and columns of the fixed coordinates become those of the identity."""
     n = fixed.size
@@ -103,7 +110,7 @@ def fix(flat, ld, bw, fixed):
             flat[j * ld] = 1.0
 
 
-@jit
+@inner
 def _constant(constant, e, u, first, m, f, K, tangent):
     """The stabilisation: f += C u, K += C."""
     if constant.shape[0] == 0:
@@ -211,7 +218,7 @@ def _pair_products(G, pairs, symmetric, skew):
             n += nb - b
 
 
-@jit
+@inner
 def _pair_rows(G, pairs, M, M_skew, e, H, out, K, K_skew):
     """What the products of G do, for one element with tables of its own: G^T (M G)."""
     nb = G.shape[1]
@@ -241,7 +248,7 @@ def _pair_rows(G, pairs, M, M_skew, e, H, out, K, K_skew):
                 m += 1
 
 
-@jit
+@inner
 def _block_arrays(pack, size):
     """Work arrays for a block of elements; the elements are the last axis, for vector units."""
     G, factors, w, nd = pack[0], pack[3], pack[4], pack[11]
@@ -253,14 +260,14 @@ def _block_arrays(pack, size):
             np.empty((rows, 2, size)), np.empty((w.shape[1], size)))
 
 
-@jit
+@inner
 def _block_tangents(symmetric, skew, size):
     """Work arrays for the tangents of a block: factors of the pairs, and what comes of them."""
     return (np.empty((3, symmetric.shape[0], size)), np.empty((skew.shape[0], size)),
             np.empty((3, size, symmetric.shape[1])), np.empty((size, skew.shape[1])))
 
 
-@jit
+@inner
 def _block_tables(e_, w_, first, e0, w):
     """The frame and the weights of each element of the block."""
     for e in range(w.shape[1]):
@@ -272,13 +279,13 @@ def _block_tables(e_, w_, first, e0, w):
             w[p, e] = w_[t, p]
 
 
-@jit
+@inner
 def _block_load(left, nd, first, u, U):
     for e in range(U.shape[2]):
         at = left[first + e] * nd
         for k in range(nd):
             U[k, 0, e], U[k, 1, e] = u[at + 2 * k], u[at + 2 * k + 1]
-@jit
+@inner
 def _block_gradients(G, first, U, d):
     """d = G U."""
     size = d.shape[2]
@@ -294,7 +301,7 @@ def _block_gradients(G, first, U, d):
             d[g, 0, e], d[g, 1, e] = du[g, 0], du[g, 1]
 
 
-@jit
+@inner
 def _block_strain(G, first, e0, rows, factors, U, d, r, samples):
     """Displacement gradients d, position gradients r, and the strain samples."""
     size = d.shape[2]
@@ -310,7 +317,7 @@ def _block_strain(G, first, e0, rows, factors, U, d, r, samples):
                                  + d[g, 0, e] * e0[h, 0, e] + d[g, 1, e] * e0[h, 1, e])
 
 
-@jit
+@inner
 def _block_along(L, first, samples, points):
     """points = L samples, from the sample ``first``; returns the sample after."""
     ns = points.shape[0] // L.shape[0]
@@ -328,7 +335,7 @@ def _block_along(L, first, samples, points):
     return first + L.shape[1] * ns
 
 
-@jit
+@inner
 def _block_back(L, first, w, points, samples):
     """samples = L^T w points, from the sample ``first``; returns the sample after."""
     ns = points.shape[0] // L.shape[0]
@@ -346,7 +353,7 @@ def _block_back(L, first, w, points, samples):
     return first + L.shape[1] * ns
 
 
-@jit
+@inner
 def _block_points(Lxx, Lyy, Lxy, samples, points):
     """Samples of the strain, interpolated to the integration points, (3, points, elements)."""
     first = _block_along(Lxx, 0, samples, points[0])
@@ -354,7 +361,7 @@ def _block_points(Lxx, Lyy, Lxy, samples, points):
     _block_along(Lxy, first, samples, points[2])
 
 
-@jit
+@inner
 def _block_samples(Lxx, Lyy, Lxy, w, points, samples):
     """The transpose of _block_points, with the weights of the points."""
     first = _block_back(Lxx, 0, w, points[0], samples)
@@ -362,20 +369,20 @@ def _block_samples(Lxx, Lyy, Lxy, w, points, samples):
     _block_back(Lxy, first, w, points[2], samples)
 
 
-@jit
+@inner
 def _block_stress(D, strain, S):
     for p in range(strain.shape[1]):
         for c in range(3):
             d0, d1, d2 = D[c, 0], D[c, 1], D[c, 2]
             for e in range(strain.shape[2]):
                 S[c, p, e] = d0 * strain[0, p, e] + d1 * strain[1, p, e] + d2 * strain[2, p, e]
-@jit
+@inner
 def _block_store(points, first, out):
     for c in range(3):
         for e in range(points.shape[2]):
             for p in range(points.shape[1]):
                 out[c, first + e, p] = points[c, p, e]
-@jit
+@inner
 def _block_force(G, rows, factors, constant, left, nd, first, u, U, r, samples, T, F, held, f):
     """Add G^T T to f, where T is what the stress samples do on the gradients; and C u."""
     size = r.shape[2]
@@ -414,7 +421,7 @@ def _block_force(G, rows, factors, constant, left, nd, first, u, U, r, samples, 
             f[at + 2 * k + 1] += F[1, e, k] + held[2 * k + 1, e]
 
 
-@jit
+@inner
 def _block_geometric(rows, samples, M):
     """Add the stress to the factors of the pairs, the same for both components."""
     for s in range(samples.shape[0]):
@@ -424,7 +431,7 @@ def _block_geometric(rows, samples, M):
             M[1, p, e] += samples[s, e]
 
 
-@jit
+@inner
 def _block_moduli(terms, moduli, first, r, M, skew, c):
     """Add the material part to the factors of the pairs: xx, yy, xy symmetric, and xy skew."""
     skew[:] = 0.0
@@ -448,7 +455,7 @@ def _block_moduli(terms, moduli, first, r, M, skew, c):
                 M[2, p, e] += 0.5 * c[e] * (gx * hy + gy * hx)
 
 
-@jit
+@inner
 def _block_add(K, skew, e, nd, flat, ld, row):
     """Add one element of the block to the band: coordinates (a, i) are 2 a + i."""
     n, m = 0, 0
@@ -465,7 +472,7 @@ def _block_add(K, skew, e, nd, flat, ld, row):
             flat[right + 2 * k] += K[1, e, n]
             n += 1
             m += 1
-@jit
+@inner
 def beam_loop(pack, u, f, tangent, geometric, carried, use_carried, stresses, flat, ld, start):
     """Force into f, and if asked for tangent into the band and stresses (3, ne, np)."""
     (G_, e_, rows, factors, w_, D, Lxx, Lyy, Lxy, constant, left, nd, terms, moduli, pairs,
@@ -579,11 +586,24 @@ def beam_mean(pack, u0, u1, f):
                      held, f)
 
 
+@jit
+def beam_force(pack, u, f):
+    """The internal force, added to f."""
+    none = np.empty((1, 1, 1))
+    beam_loop(pack, u, f, False, False, none, False, none, none[0, 0], 1, 0)
+
+
+@jit
+def beam_tangent(pack, u, f, geometric, carried, use_carried, stresses, flat, ld, start):
+    """The internal force, added to f, the tangent, added to the band, and the stresses."""
+    beam_loop(pack, u, f, True, geometric, carried, use_carried, stresses, flat, ld, start)
+
+
 # the cable
 # pack = G1, G2, a0, b0, s0, kappa0, w, stiffness, constant, left, nd
 
 
-@jit
+@inner
 def _cable_point(G1, G2, p, u, first, nb):
     a0, a1, b0, b1 = 0.0, 0.0, 0.0, 0.0
     for k in range(nb):
@@ -595,7 +615,7 @@ def _cable_point(G1, G2, p, u, first, nb):
     return a0, a1, b0, b1
 
 
-@jit
+@inner
 def cable_loop(pack, u, f, tangent, geometric, carried, use_carried, stresses, flat, ld, start):
     """Force into f, and if asked for tangent into the band and stresses (2, ne, np)."""
     G1_, G2_, A0_, B0_, s0_, kappa0_, w_, stiffness, constant, left, nd = pack
@@ -726,6 +746,19 @@ def cable_mean(pack, u0, u1, f):
         _constant(constant, e, middle, first, 2 * nd, f, K, False)
 
 
+@jit
+def cable_force(pack, u, f):
+    """The internal force, added to f."""
+    none = np.empty((1, 1, 1))
+    cable_loop(pack, u, f, False, False, none, False, none, none[0, 0], 1, 0)
+
+
+@jit
+def cable_tangent(pack, u, f, geometric, carried, use_carried, stresses, flat, ld, start):
+    """The internal force, added to f, the tangent, added to the band, and the stresses."""
+    cable_loop(pack, u, f, True, geometric, carried, use_carried, stresses, flat, ld, start)
+
+
 class CompiledKernel:
     """The compiled functions of one beam, with the tables of its NumPy kernel.
 
@@ -744,25 +777,23 @@ class CompiledKernel:
         self.cable = cable
         self.shapes = [(2, elements, pack[6].shape[1]) if cable else
                        (3, elements, pack[4].shape[1]) for pack in packs]
-        self._loop, self._increment, self._mean = (
-            (cable_loop, cable_increment, cable_mean) if cable else
-            (beam_loop, beam_increment, beam_mean))
-        self._none = np.zeros((1, 1, 1))
+        self._force, self._tangent, self._increment, self._mean = (
+            (cable_force, cable_tangent, cable_increment, cable_mean) if cable else
+            (beam_force, beam_tangent, beam_increment, beam_mean))
 
     def assemble(self, u, K, start, force, carried, geometric):
         """Add force and tangent; see :meth:`skfem_ancf.kernel.Chain.assemble`."""
         stresses = [np.empty(shape) for shape in self.shapes]
         for k, (pack, S) in enumerate(zip(self.packs, stresses)):
-            self._loop(pack, u, force, True, geometric, carried[k] if carried else self._none,
-                       carried is not None, S, K._flat, K._ld, start)
+            self._tangent(pack, u, force, geometric, carried[k] if carried else S,
+                          carried is not None, S, K._flat, K._ld, start)
         return CompiledEvaluation(self, u, stresses)
 
     def force(self, u):
         """Internal force, shape (N,)."""
         out = np.zeros(u.size)
         for pack in self.packs:
-            self._loop(pack, u, out, False, False, self._none, False, self._none,
-                       self._none[0, 0], 1, 0)
+            self._force(pack, u, out)
         return out
 
     def mean_force(self, u0, u1):

@@ -14,10 +14,11 @@ take are made in :mod:`skfem_ancf.structure`:
 import math
 
 import numpy as np
+from numba import njit
 from numba.typed import List
 
 from .compiled import (beam_increment, beam_loop, beam_mean, cable_increment, cable_loop,
-                       cable_mean, factorize, fix, jit, multiply, solve)
+                       cable_mean, factorize, fix, inner, jit, multiply, solve)
 
 EPS = 2.2e-16
 MAX_ITERATIONS = 30
@@ -38,10 +39,15 @@ def append(items, item):
     items.append(item)
 
 
+def spliced(function):
+    """Compile a function as a part of those that call it."""
+    return njit(inline="always")(function)
+
+
 # forces and tangents of all beams; Numba leaves out what a scene has not, given as None
 
 
-@jit
+@spliced
 def body_force(cables, beams, u, f, none, flat):
     """The internal force."""
     f[:] = 0.0
@@ -57,7 +63,7 @@ def body_force(cables, beams, u, f, none, flat):
             beam_loop(packs[k], u[a:b], f[a:b], False, False, none, False, none, flat, 1, 0)
 
 
-@jit
+@spliced
 def body_mean(cables, beams, u0, u1, f):
     """The force whose work from u0 to u1 is the change of the energy."""
     f[:] = 0.0
@@ -73,8 +79,8 @@ def body_mean(cables, beams, u0, u1, f):
             beam_mean(packs[k], u0[a:b], u1[a:b], f[a:b])
 
 
-@jit
-def body_tangent(cables, beams, u, f, carried, use_carried, stresses, flat, ld):
+@spliced
+def body_tangent(cables, beams, u, f, geometric, carried, use_carried, stresses, flat, ld):
     """The internal force, the tangent into the band, and the stresses."""
     f[:] = 0.0
     flat[:] = 0.0
@@ -82,27 +88,44 @@ def body_tangent(cables, beams, u, f, carried, use_carried, stresses, flat, ld):
         packs, at = cables
         for k in range(len(packs)):
             a, b, s = at[k, 0], at[k, 1], stresses[0][k]
-            cable_loop(packs[k], u[a:b], f[a:b], True, True, carried[0][k], use_carried, s,
+            cable_loop(packs[k], u[a:b], f[a:b], True, geometric, carried[0][k], use_carried, s,
                        flat, ld, a)
     if beams is not None:
         packs, at = beams
         for k in range(len(packs)):
             a, b, s = at[k, 0], at[k, 1], stresses[1][k]
-            beam_loop(packs[k], u[a:b], f[a:b], True, True, carried[1][k], use_carried, s,
+            beam_loop(packs[k], u[a:b], f[a:b], True, geometric, carried[1][k], use_carried, s,
                       flat, ld, a)
 
 
-@jit
-def _law(stiffness, strain):
-    """Stress in place of strain."""
+@inner
+def _law(stiffness, strain, before):
+    """In place of the strain the stress, added to the one before if there is one."""
     for e in range(strain.shape[1]):
         for p in range(strain.shape[2]):
             x, y, z = strain[0, e, p], strain[1, e, p], strain[2, e, p]
             for c in range(3):
-                strain[c, e, p] = stiffness[c, 0] * x + stiffness[c, 1] * y + stiffness[c, 2] * z
+                S = stiffness[c, 0] * x + stiffness[c, 1] * y + stiffness[c, 2] * z
+                strain[c, e, p] = S + before[c, e, p] if before.size > 0 else S
 
 
-@jit
+@inner
+def scale_add(strain, stiffness, before):
+    """In place of a cable's strain the stress, added to the one before."""
+    for c in range(2):
+        for e in range(strain.shape[1]):
+            for p in range(strain.shape[2]):
+                strain[c, e, p] = stiffness[c] * strain[c, e, p] + before[c, e, p]
+
+
+@inner
+def copy(a, b):
+    """b = a; the assignment of a slice would bring in code for its errors."""
+    for i in range(a.size):
+        b[i] = a[i]
+
+
+@spliced
 def carry(cables, beams, u, du, stresses, out):
     """The stresses, linearised, at u + du."""
     if cables is not None:
@@ -111,22 +134,20 @@ def carry(cables, beams, u, du, stresses, out):
             a, b = at[k, 0], at[k, 1]
             S, stiffness = out[0][k], packs[k][7]
             cable_increment(packs[k], u[a:b], du[a:b], S)
-            for c in range(S.shape[0]):
-                S[c] *= stiffness[c]
-            S += stresses[0][k]
+            scale_add(S, stiffness, stresses[0][k])
     if beams is not None:
         packs, at = beams
         for k in range(len(packs)):
             a, b = at[k, 0], at[k, 1]
             S = out[1][k]
             beam_increment(packs[k], u[a:b], du[a:b], S)
-            _law(packs[k][5], S)
-            S += stresses[1][k]
+            _law(packs[k][5], S, stresses[1][k])
 
 
-@jit
+@spliced
 def body_stress(cables, beams, u, out):
     """The stresses at u."""
+    none = np.empty((0, 0, 0))
     if cables is not None:
         packs, at = cables
         for k in range(len(packs)):
@@ -137,10 +158,10 @@ def body_stress(cables, beams, u, out):
             a, b = at[k, 0], at[k, 1]
             S = out[1][k]
             beam_increment(packs[k], 0.5 * u[a:b], u[a:b], S)  # the strain is quadratic
-            _law(packs[k][5], S)
+            _law(packs[k][5], S, none)
 
 
-@jit
+@inner
 def cable_stress(pack, u, out):
     """Normal force and moment at u."""
     G1_, G2_, A0_, B0_, s0_, kappa0_, w_, stiffness, constant, left, nd = pack
@@ -167,7 +188,7 @@ def cable_stress(pack, u, out):
 # moments that turn with a section
 
 
-@jit
+@inner
 def _direction(moments, k, u):
     dofs, c, start = moments[0], moments[1], moments[2]
     x, y = start[k, 0], start[k, 1]
@@ -177,7 +198,7 @@ def _direction(moments, k, u):
     return x, y
 
 
-@jit
+@inner
 def add_moments(moments, factors, u, f):
     """Add the forces of the moments at u."""
     dofs, c, M = moments[0], moments[1], moments[3]
@@ -189,7 +210,7 @@ def add_moments(moments, factors, u, f):
             f[dofs[k, 1, i]] += size * x * c[k, i]
 
 
-@jit
+@inner
 def add_mean_moments(moments, factors, u0, u1, f):
     """Add the forces whose work from u0 to u1 is the moments times the angles turned."""
     dofs, c, M = moments[0], moments[1], moments[3]
@@ -208,7 +229,7 @@ def add_mean_moments(moments, factors, u0, u1, f):
             f[dofs[k, 1, i]] += factors[k] * c[k, i] * fy
 
 
-@jit
+@inner
 def add_moment_stiffness(moments, factors, u, flat, ld):
     """Subtract the derivative of the moments' forces from the band."""
     dofs, c, M = moments[0], moments[1], moments[3]
@@ -229,18 +250,18 @@ def add_moment_stiffness(moments, factors, u, flat, ld):
 # joints
 
 
-@jit
+@inner
 def constraint(joints, c, g, u, phi):
     """Phi at u."""
     hk, hi, hj, hv, gk, gi = joints
-    phi[:] = c
+    copy(c, phi)
     for a in range(gk.size):
         phi[gk[a]] += g[a] * u[gi[a]]
     for a in range(hk.size):
         phi[hk[a]] += 0.5 * hv[a] * u[hi[a]] * u[hj[a]]
 
 
-@jit
+@inner
 def jacobian(joints, g, u, J):
     """dPhi / du at u, shape (m, N)."""
     hk, hi, hj, hv, gk, gi = joints
@@ -251,7 +272,7 @@ def jacobian(joints, g, u, J):
         J[hk[a], hi[a]] += hv[a] * u[hj[a]]
 
 
-@jit
+@inner
 def times_columns(J, x, out):
     """out = J x."""
     for k in range(J.shape[0]):
@@ -261,7 +282,7 @@ def times_columns(J, x, out):
         out[k] = s
 
 
-@jit
+@inner
 def dense_solve(A, b):
     """Solve in place, by elimination with pivots; False if A is singular."""
     n = b.size
@@ -289,7 +310,7 @@ def dense_solve(A, b):
     return True
 
 
-@jit
+@inner
 def solve_rows(flat, ld, bw, J, free, Y):
     """Y[k] = A^-1 J[k] at free coordinates, with the factors of A."""
     for k in range(J.shape[0]):
@@ -298,7 +319,7 @@ def solve_rows(flat, ld, bw, J, free, Y):
         solve(flat, ld, bw, Y[k])
 
 
-@jit
+@inner
 def products(J, Y, S):
     """S = J Y^T."""
     for k in range(J.shape[0]):
@@ -309,7 +330,7 @@ def products(J, Y, S):
             S[k, l] = s
 
 
-@jit
+@inner
 def constraint_rate(joints, c1, g1, J, u, v, out):
     """The rate of Phi."""
     gk, gi = joints[4], joints[5]
@@ -320,7 +341,7 @@ def constraint_rate(joints, c1, g1, J, u, v, out):
         out[gk[a]] += g1[a] * u[gi[a]]
 
 
-@jit
+@inner
 def constraint_acceleration(joints, c2, g1, g2, J, u, v, acceleration, out):
     """The second rate of Phi."""
     hk, hi, hj, hv, gk, gi = joints
@@ -376,6 +397,7 @@ def steps(cables, beams, moments, joints, conserving, parameters, vectors, facto
     impulse, l, guess = np.empty(m), np.empty(m), np.empty(N)
     none = np.empty((1, 1, 1))
     constant = joints[0].size == 0 and g_.shape[0] == 1
+    yes = N > 0  # as a constant it would compile the tangent once more
     couples = conserving and not constant
     if conserving:
         c_m, c_k = 2.0 / dt**2, 0.5
@@ -401,7 +423,8 @@ def steps(cables, beams, moments, joints, conserving, parameters, vectors, facto
                 u[i] = base[i] + dt * dt * beta * w0[i]
         for k in range(fixed.size):
             u[fixed[k]] = position[k]
-        guess[:], l[:] = u, multipliers[0]
+        copy(u, guess)
+        copy(multipliers[0], l)
         for i in range(N):  # the velocity of the guess, for the scale of the energy
             if conserving:
                 v[i] = (u[i] - u0[i]) * (2.0 / dt) - v0[i]
@@ -426,7 +449,7 @@ def steps(cables, beams, moments, joints, conserving, parameters, vectors, facto
             if state[0] == 0.0:
                 # the stress of an iterate may be far off: that of the start is not
                 body_stress(cables, beams, u0, carried)
-                body_tangent(cables, beams, middle, f, carried, True, stresses, A, ld)
+                body_tangent(cables, beams, middle, f, yes, carried, yes, stresses, A, ld)
                 add_moment_stiffness(moments, moment, middle, A, ld)
                 for i in range(A.size):
                     A[i] = c_m * M[i] + c_k * A[i]
@@ -512,7 +535,8 @@ def steps(cables, beams, moments, joints, conserving, parameters, vectors, facto
                     if fresh and rate > 2.0:
                         return n, energy
                     if rate > 1.0:  # old factors have led astray
-                        u[:], l[:] = guess, multipliers[0]
+                        copy(guess, u)
+                        copy(multipliers[0], l)
                     state[0] = 0.0
                     continue
             if size * min(1.0, state[3]) <= wanted:
@@ -576,7 +600,7 @@ def steps(cables, beams, moments, joints, conserving, parameters, vectors, facto
     return rows.shape[0], energy
 
 
-@jit
+@inner
 def _velocity(conserving, u, u0, v0, w0, base, dt, beta, gamma, fixed, speed, v):
     """The velocity at the end of the step, without the joints' part."""
     for i in range(u.size):
@@ -589,7 +613,7 @@ def _velocity(conserving, u, u0, v0, w0, base, dt, beta, gamma, fixed, speed, v)
         v[fixed[k]] = speed[k]
 
 
-@jit
+@inner
 def _impulse(joints, c1, g1, J, J1, M_factor, ld, bw, free, u, v, Y, S, impulse):
     """The joints' impulses, and their part in the velocity."""
     solve_rows(M_factor, ld, bw, J, free, Y)
@@ -620,7 +644,7 @@ def equilibrium(cables, beams, moments, mixed, u, dead, factor, factors, gap, fi
     R, du, scale, load = np.empty(N), np.empty(N), np.empty(N), np.empty(N)
     none = np.empty((1, 1, 1))
     work = before = reference = np.inf
-    moved, moving = False, False
+    moved, moving, yes = False, False, N > 0  # as a constant it would compile the tangent anew
     for i in range(N):
         moved = moved or u[i] != 0.0
     for i in range(fixed.size):
@@ -631,7 +655,7 @@ def equilibrium(cables, beams, moments, mixed, u, dead, factor, factors, gap, fi
             if last and turn == 0:
                 body_force(cables, beams, u, f, none, A)
             elif turn == 0 or last:
-                body_tangent(cables, beams, u, f, carried, mixed and k > 0, stresses, A, ld)
+                body_tangent(cables, beams, u, f, yes, carried, mixed and k > 0, stresses, A, ld)
                 add_moment_stiffness(moments, factors, u, A, ld)
                 for i in range(N):
                     scale[i] = 1.0 / abs(A[i * ld])
