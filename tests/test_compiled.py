@@ -7,6 +7,8 @@ from numpy.testing import assert_allclose
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana, EnergyMomentum, GeneralizedAlpha, MeshBeam,
                         NeoHookean, Scene, StVenantKirchhoff)
+from skfem_ancf.joints import JOINTS, Joint
+from skfem_ancf.joints.base import point
 from skfem_ancf.linalg import BandMatrix
 from skfem_ancf.materials import LinearLaw
 
@@ -136,3 +138,199 @@ def test_same_motion_in_compiled_blocks(element, scheme, monkeypatch):
     assert_allclose(some.u, fast.u[[100, 250]], rtol=0, atol=1e-12)
     if scheme.name == "energy-momentum":
         assert np.ptp(fast.total_energy) < 1e-11 * fast.kinetic_energy.max()
+
+
+# whole iterations and time steps of scenes with joints, moving supports and loads that vary
+
+
+def elbow(compiled):
+    """Two beams that meet at a corner; a section beam and a cable."""
+    a = Beam(MeshBeam.init_line(np.linspace(0, 1, 3), 0.1), ElementBeamANCF(1),
+             StVenantKirchhoff(1e6, 0.3, 1000.0), 0.1, compiled=compiled, name="arm")
+    b = Beam(MeshBeam.init_line(np.linspace(0, 1, 4), 0.15, origin=(1, 0), angle=1.1),
+             ElementBeamCable(5), StVenantKirchhoff(1e6, 0.3, 1000.0), 0.07, compiled=compiled,
+             name="forearm")
+    return Scene(a, b).gravity((0, -9.81))
+
+
+JOINED = {
+    "hinge": dict(beams=("arm", "forearm"), at=(1, 0)),
+    "weld": dict(beams=("arm", "forearm"), at=("right", "left")),
+    "line": dict(beam="arm", at=(0.3, 0.02), direction=(1, 2)),
+    "circle": dict(beam="forearm", at=(1.0, 0.0), center=(0.4, 0.1)),
+    "position": dict(beam="arm", at=(0.4, -0.03), r=lambda t: (0.4 + np.sin(t), t * t - 0.03)),
+    "angle": dict(beam="forearm", at="right", angle=lambda t: np.sin(3 * t)),
+    "plane": dict(beam="forearm", at="left"),
+}
+
+
+def same_motion(build, scheme, monkeypatch, t_end=0.1, dt=2.5e-3, left=0):
+    """Integrate in NumPy and compiled, count the steps that Python does in the second."""
+    from skfem_ancf.dynamics.integrate import Integrator
+    calls = []
+    advance = Integrator.advance
+    slow = build(False).integrate(t_end, dt, scheme=scheme, tol=1e-12)
+    monkeypatch.setattr(Integrator, "advance",
+                        lambda self, y, dt: calls.append(dt) or advance(self, y, dt))
+    fast = build(True).integrate(t_end, dt, scheme=scheme, tol=1e-12)
+    assert len(calls) == left
+    for name in ("t", "u", "v", "acceleration", "multipliers"):
+        a, b = getattr(slow, name), getattr(fast, name)
+        # rates divide the round-off of the positions by dt and dt^2
+        tol = {"t": 1e-14, "u": 1e-10, "v": 1e-7}.get(name, 1e-5)
+        assert_allclose(b, a, rtol=0, atol=tol * max(1.0, np.abs(a).max(initial=0.0)), err_msg=name)
+    assert np.abs(slow.u[-1] - slow.u[0]).max() > 1e-3
+    return fast
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+@pytest.mark.parametrize("name", JOINTS)
+def test_same_motion_with_every_joint(name, scheme, monkeypatch):
+    def build(compiled):
+        scene = elbow(compiled)
+        scene.joint(name, **JOINED[name])
+        return scene
+
+    same_motion(build, scheme, monkeypatch)
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+def test_same_motion_with_moving_supports_and_varying_loads(scheme, monkeypatch):
+    """A driven end, a moment that turns with its section, an amplitude."""
+    def build(compiled):
+        mesh = MeshBeam.init_line(np.linspace(0, 1, 4), 0.05)
+        scene = Scene(Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(1e6, 0.3, 1000.0), 0.1,
+                           compiled=compiled))
+        scene.joint("position", at=(0, 0), r=lambda t: (0.05 * np.sin(8 * t), 0.0))
+        scene.point_force((0, -2.0), at=(0.5, 0), amplitude=lambda t: np.cos(20 * t))
+        scene.moment("right", 0.4, amplitude=lambda t: 1.0 - t)
+        return scene
+
+    fast = same_motion(build, scheme, monkeypatch)
+    end = fast.position((0, 0))
+    assert_allclose(end[:, 0], 0.05 * np.sin(8 * fast.t), rtol=0, atol=1e-14)
+    assert_allclose(fast.velocity((0, 0))[1:, 0], 0.4 * np.cos(8 * fast.t[1:]), rtol=0, atol=1e-7)
+
+
+def test_energy_is_kept_under_a_moment_and_a_weld_in_compiled_steps():
+    scene = elbow(True)
+    scene.joint("weld", **JOINED["weld"])
+    scene.moment("left", 3.0, beam="arm")
+    history = scene.integrate(0.5, 2.5e-3)
+    assert scene.system.structure is not None
+    assert history.kinetic_energy.max() > 1.0
+    assert np.ptp(history.total_energy) < 1e-10 * history.kinetic_energy.max()
+
+
+def test_a_joint_that_is_not_quadratic_is_stepped_in_python(monkeypatch):
+    class Distance(Joint):
+        """|r - c| = R, with a root: the same motion as on the circle."""
+
+        equations = ("force",)
+        constant = False
+        at, center = (1.0, 0.0), np.array([0.4, 0.1])
+
+        def bind(self, scene):
+            self.r, self.N = point(scene, "forearm", self.at), scene.N
+            self.R = np.hypot(*(self.r.start - self.center))
+
+        def value(self, u, t):
+            return np.array([np.hypot(*(self.r(u) - self.center)) - self.R])
+
+        def jacobian(self, u, t):
+            d = self.r(u) - self.center
+            return self.r.row(d / np.hypot(*d), self.N)[None]
+
+        def curvature(self, u, t, multipliers):
+            d, w = self.r(u) - self.center, self.r.weights
+            s = np.hypot(*d)
+            H = (np.eye(2) - np.outer(d, d) / s**2) / s * multipliers[0]
+            values = np.einsum("ij,k,l->ikjl", H, w, w)
+            rows = np.broadcast_to(self.r.dofs[:, :, None, None], values.shape)
+            columns = np.broadcast_to(self.r.dofs[None, None], values.shape)
+            return rows.ravel(), columns.ravel(), values.ravel()
+
+    rooted, squared = elbow(True), elbow(True)
+    rooted.joint(Distance())
+    squared.joint("circle", **JOINED["circle"])
+    assert rooted.system.structure is None and squared.system.structure is not None
+    a, b = (s.integrate(0.05, 2.5e-3, scheme="generalized-alpha", tol=1e-12)
+            for s in (rooted, squared))
+    assert_allclose(a.u, b.u, rtol=0, atol=1e-9)
+
+
+def count_equilibrium(monkeypatch):
+    """Solutions found by compiled iterations, as a list that grows."""
+    from skfem_ancf.structure import Structure
+    found = []
+    equilibrium = Structure.equilibrium
+
+    def counted(self, *args):
+        out = equilibrium(self, *args)
+        found.append(out is not None)
+        return out
+
+    monkeypatch.setattr(Structure, "equilibrium", counted)
+    return found
+
+
+def test_same_statics_under_a_moment_of_the_section(monkeypatch):
+    """A quarter of a turn, from one load step."""
+    found = count_equilibrium(monkeypatch)
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 9), 0.01)
+    EI = 2e8 * 0.3 * 0.01**3 / 12
+    a, b = (s.clamp("left", thickness="free").moment("right", 0.5 * np.pi * EI).solve_static()
+            for s in both(mesh, ElementBeamCable(5), "assumed", StVenantKirchhoff(2e8, 0.3, 7800)))
+    assert found == [True] * len(b.steps)
+    assert a.iterations == b.iterations
+    assert_allclose(b.u, a.u, rtol=0, atol=1e-10)
+    assert abs(b.displacement((1, 0))[0] + 1 - 2 / np.pi) < 1e-4
+
+
+def test_same_statics_with_prescribed_displacements_and_several_beams(monkeypatch):
+    found, results = count_equilibrium(monkeypatch), []
+    for compiled in (False, True):
+        scene = elbow(compiled).clamp("left", beam="arm").clamp("left", beam="forearm")
+        scene.fix("right", ["r^1"], beam="arm")
+        scene.fix("right", ["r^2"], displacement=0.1, beam="arm")
+        results.append(scene.solve_static())
+    a, b = results
+    assert found == [True] * len(b.steps) and a.iterations == b.iterations
+    assert_allclose(b.u, a.u, rtol=0, atol=1e-10)
+    assert_allclose(b.displacement((1, 0), beam="arm")[1], 0.1, rtol=0, atol=1e-14)
+
+
+def test_restart_under_another_load_is_compiled(monkeypatch):
+    """From a state that another load holds: what is missing there is taken away by steps."""
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 9), 0.01)
+    results = []
+    found = count_equilibrium(monkeypatch)
+    for s in both(mesh, ElementBeamANCF(2), "assumed", StVenantKirchhoff(2e8, 0.3, 7800)):
+        s.clamp("left", thickness="free").gravity((0, -9.81))
+        start = s.solve_static()
+        other = Scene(s.beams[0]).clamp("left", thickness="free").gravity((0, -4.0))
+        results.append(other.solve_static(start=start))
+    assert all(found)
+    assert_allclose(results[1].u, results[0].u, rtol=0, atol=1e-9)
+
+
+def test_indefinite_tangents_have_factors():
+    """L D L^T without pivots, and its refusal where a leading part is singular."""
+    from skfem_ancf.compiled import factorize
+    from skfem_ancf.linalg import BandMatrix
+    rng = np.random.default_rng(3)
+    n, bw = 12, 3
+    dense = np.triu(np.tril(rng.standard_normal((n, n)), bw), -bw)
+    dense = dense + dense.T
+    K = BandMatrix(n, bw)
+    i, j = np.nonzero(np.tril(dense))
+    K.add(i, j, dense[i, j])
+    assert np.linalg.eigvalsh(dense)[0] < 0
+    assert factorize(K._flat, K._ld, bw, n)
+    L = np.eye(n)
+    for k in range(1, bw + 1):
+        L[np.arange(k, n), np.arange(n - k)] = K.ab[k, :n - k]
+    assert_allclose(L @ np.diag(K.ab[0]) @ L.T, dense, rtol=0, atol=1e-11 * np.abs(dense).max())
+    singular = BandMatrix(2, 1)
+    singular.add([0, 1, 1], [0, 0, 1], [1.0, 1.0, 1.0])
+    assert not factorize(singular._flat, singular._ld, 1, 2)
