@@ -5,6 +5,7 @@ import numpy as np
 from .compiled import factorize
 from .loads import DeadLoad, EndMoment
 from .loops import append, equilibrium, new_list
+from .sampling import sample
 
 
 class Structure:
@@ -123,13 +124,14 @@ class Structure:
         """Factors of :attr:`vectors`, shape (n, k); of one row where no load has an amplitude."""
         if not self._amplitudes:
             return np.ones((1, 1))
-        return np.array([[1.0] + [load.factor(t) for load in self._amplitudes] for t in times])
+        return np.stack([np.ones(len(times))] + [_amplitude(load, times)
+                                                 for load in self._amplitudes], axis=1)
 
     def moment_factors(self, times):
         """Factors of the moments, shape (n, k); of one row where none has an amplitude."""
         if all(load.amplitude is None for load in self._turning):
             return np.ones((1, len(self._turning)))
-        return np.array([[load.factor(t) for load in self._turning] for t in times])
+        return np.stack([_amplitude(load, times) for load in self._turning], axis=1)
 
     # statics
 
@@ -162,6 +164,12 @@ class Structure:
         if not factorize(M._flat, M._ld, M.bandwidth, s.N):
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
         return M._flat
+
+
+def _amplitude(load, times):
+    if load.amplitude is None:
+        return np.ones(len(times))
+    return sample(load.amplitude, times).reshape(len(times))
 
 
 def structure_of(system):

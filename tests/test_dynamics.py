@@ -1,5 +1,6 @@
 """Time integration: order, dissipation, conservation, storage, and motions known from elsewhere."""
 
+import math
 from functools import lru_cache
 
 import numpy as np
@@ -14,6 +15,7 @@ from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.errors import ConvergenceError, InputError, NameUnknown, SupportError
 from skfem_ancf.formulations import FORMULATIONS
 from skfem_ancf.linalg import BandMatrix
+from skfem_ancf.sampling import sample
 
 from conftest import quarter_arc
 
@@ -721,3 +723,22 @@ def test_rotating_arm():
     rate, moment = np.gradient(history.angular_momentum, history.t), history.joint_force(hub)[:, 0]
     early = (history.t > 0.2) & (history.t < 8)
     assert np.abs(moment - rate)[early].max() < 0.02 * np.abs(rate).max()
+
+
+@pytest.mark.parametrize("function", [
+    lambda t: 0.3 * np.sin(t), lambda t: 2.0, lambda t: math.exp(-t), lambda t: float(t < 0.5),
+    lambda t: 1.0 if t < 0.5 else t, lambda t: max(t, 0.3), lambda t: (t, 0.0), lambda t: (t, 2 * t),
+    lambda t: np.array([np.cos(t), 1.0]), lambda t: t * (1 if np.all(t < 0.9) else 2),
+    lambda t: np.interp(t, [0, 1], [2, 5]), lambda t: [t**2, np.ones_like(t)], np.cumsum,
+    lambda t: int(10 * t) % 2])
+def test_sampling_is_asking_one_by_one(function):
+    """Whether or not a function takes arrays."""
+    times = np.linspace(0, 1, 21)
+    expected = np.array([np.squeeze(function(t)) for t in times], dtype=float)
+    assert np.allclose(np.squeeze(sample(function, times)), expected, rtol=0, atol=1e-14)
+
+
+def test_a_function_that_takes_arrays_is_asked_a_few_times():
+    asked = []
+    sample(lambda t: asked.append(np.shape(t)) or np.sin(t), np.linspace(0, 1, 1000))
+    assert asked == [(1000,), (), (), ()]

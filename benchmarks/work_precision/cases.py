@@ -146,16 +146,22 @@ def spin_up(p):
     """A driven support: the joint of this package is held by a multiplier."""
     for degree, meshes in ((3, (4, 8)), (5, (2, 4)), (7, (2,))):
         for n in meshes:
-            for steps in (50, 250, 1000):
-                yield ours.run(p, "cable", degree, n, steps=steps, tol=1e-6)
-    for steps in (50, 250, 1000):
+            for steps, tol in ((50, 1e-4), (50, 1e-6), (100, 1e-6), (250, 1e-4), (250, 1e-6),
+                               (500, 1e-6), (1000, 1e-6), (2000, 1e-6), (4000, 1e-6),
+                               (4000, 1e-8), (8000, 1e-8)):
+                yield ours.run(p, "cable", degree, n, steps=steps, tol=tol)
+            for steps in (250, 500, 1000, 2000):
+                yield ours.run(p, "cable", degree, n, steps=steps, scheme="energy-momentum",
+                               tol=1e-6)
+    for steps in (100, 500, 2000):
         yield ours.run(p, "cubic", 2, 4, steps=steps, tol=1e-6)
     if exudyn_beams.exudyn is None:
         return
     for n in (4, 8, 16):
-        for steps in (50, 250, 1000, 4000):
-            yield exudyn_beams.run(p, "ANCFCable2D", n, steps, 1e-4)
-            yield exudyn_beams.run(p, "GE2D quadratic", n, steps, 1e-4)
+        for steps in (50, 100, 250, 500, 1000, 2000, 4000, 8000):
+            for rtol in (1e-4, 1e-6) if steps > 250 else (1e-2, 1e-4):
+                yield exudyn_beams.run(p, "ANCFCable2D", n, steps, rtol)
+                yield exudyn_beams.run(p, "GE2D quadratic", n, steps, rtol)
 
 
 def quick(p):

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..sampling import sample
 from .base import Joint, point, section
 
 
@@ -32,7 +33,7 @@ class PrescribedPosition(Joint):
         return self.r(u) - np.asarray(self.motion(t), dtype=float)
 
     def offset(self, times, N):
-        return self.r.start - np.array([self.motion(t) for t in times], dtype=float)
+        return self.r.start - sample(self.motion, times)
 
     def jacobian(self, u, t):
         return self.rows
@@ -72,7 +73,7 @@ class PrescribedAngle(Joint):
         return self.d.row((-np.sin(a), np.cos(a)), self.N)[None]
 
     def _normals(self, times):
-        a = self.start + np.array([self.angle(t) for t in times], dtype=float)
+        a = self.start + sample(self.angle, times)
         return np.array([-np.sin(a), np.cos(a)]).T
 
     def offset(self, times, N):
