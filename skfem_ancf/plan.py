@@ -107,5 +107,17 @@ def make_plan(scene, kind="static"):
     add("compiled kernels", "computed" if compiled else "skipped",
         f"{len(compiled)} of {len(beams)} beams by Numba" if compiled else
         "Numba is not installed, not wanted, or does not apply")
+    what = "time steps" if dynamic else "iterations"
+    if linear:
+        whole, reason = False, "one solve"
+    elif s.structure is None:
+        whole, reason = False, (
+            "a pressure, a load or a joint of your own, or a beam without compiled kernels")
+    elif s.joints and not dynamic:
+        whole, reason = False, "the border of the multipliers is made in NumPy"
+    else:
+        whole, reason = True, f"whole {what} are compiled" + (
+            ", in blocks; a step that fails is taken again in NumPy" if dynamic else "")
+    add("compiled loop", "computed" if whole else "skipped", reason)
     add("fields", "skipped", "strain and stress are computed where a State is asked for them")
     return Plan(items)

@@ -12,6 +12,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, Mes
 from skfem_ancf.beam import Beam as BeamClass
 from skfem_ancf.kernel import TermTables
 from skfem_ancf.linalg import BandMatrix
+from skfem_ancf.system import System
 
 
 def scene(element=None, nu=0.3, formulation="assumed", **options):
@@ -101,6 +102,36 @@ def test_no_field_that_nobody_asked_for(count):
     assert len(strains) == 0
     state.strain((0.5, 0))
     assert len(strains) == 1
+
+
+def compiled_scene():
+    pytest.importorskip("numba")
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.01), ElementBeamCable(3),
+                StVenantKirchhoff(2e8, 0.3, 7800), 0.01)
+    return Scene(beam).pin("left").gravity((0, -9.81))
+
+
+@pytest.mark.parametrize("add", ["nothing", "joint", "moment", "pressure"])
+def test_compiled_loop_as_planned(count, add):
+    """What the plan says is compiled calls no assembly of Python's, what it says is not does."""
+    s = compiled_scene()
+    if add == "joint":
+        s.joint("line", at=(1, 0), direction=(1, 0.5))
+    else:
+        s.fix("left", ["r_X^2"])
+    if add == "moment":
+        s.moment("right", 0.01)
+    if add == "pressure":
+        s.pressure("top", 1e-3)
+    assembled = count(System, "assemble")
+    expected = {"nothing": (True, True), "joint": (False, True), "moment": (True, True),
+                "pressure": (False, False)}[add]
+    for kind, whole in zip(("static", "dynamic"), expected):
+        before = len(assembled)
+        s.solve_static() if kind == "static" else s.integrate(0.02, 1e-3)
+        assert s.plan(kind)["compiled loop"].status == ("computed" if whole else "skipped")
+        assert (len(assembled) == before) == whole
+    assert s.plan("linear")["compiled loop"].status == "skipped"
 
 
 def test_plan_of_every_kind():
