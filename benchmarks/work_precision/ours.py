@@ -51,8 +51,8 @@ def run(problem, kind, order, n, formulation="assumed", compiled=True, grade=1.0
     """A Run: static, or in ``steps`` time steps (None with rtol: of automatic size)."""
     p = problem
     element, model = element_of(kind, order)
-    if model == "section 1":  # the formulation decides how such a section couples
-        model += " " + formulation
+    if model == "section 1" or formulation not in ("assumed", "continuum") and kind != "cable":
+        model += " " + formulation  # it decides how the section couples
     words = [f"{kind} {order}", formulation, *([] if compiled else ["NumPy"]),
              *([f"graded {grade:g}"] if grade != 1.0 else [])]
     if p.t_end is not None:

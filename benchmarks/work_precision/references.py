@@ -44,7 +44,8 @@ def reference(name, model):
     """Converged tip displacement, shape (2,), of a problem by a model.
 
     ``model`` is "cable" (extensible, shear-rigid), "rod" (Reissner's), "section N" (planar
-    sections of order N), "section 1" with its formulation, or "body" (two-dimensional).
+    sections of order N), with its formulation where that changes the solution, or "body"
+    (two-dimensional).
     """
     p = PROBLEMS[name]
     if name == "thick" or model == "body":
