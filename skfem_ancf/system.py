@@ -491,7 +491,7 @@ class System:
         held = held[norms > 0] / norms[norms > 0, None]
         if not len(held):
             return [self._describe(v, sizes) for v in np.eye(n)]
-        _, sigma, V = np.linalg.svd(held)
+        _, sigma, V = np.linalg.svd(np.linalg.qr(held, mode="r"))  # held may have many rows
         return [self._describe(v, sizes) for v in V[int(np.sum(sigma > 1e-9 * sigma[0])):]]
 
     def _describe(self, v, sizes):
