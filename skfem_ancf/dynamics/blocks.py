@@ -24,6 +24,7 @@ class CompiledSteps:
         self._structure = s = system.structure
         self._work = s.stresses(), s.stresses()
         self._M, self._A = s.mass_factor(), np.empty_like(system.mass._flat)
+        self._dt = None
         # factors are there, iterations, factorisations, rate, size of the step before
         self._state = np.zeros(5)
         self._longest = int(np.clip(STORED // (3 * system.N), 1, BLOCK))
@@ -64,6 +65,8 @@ class CompiledSteps:
         """
         s, solver, structure = self._system, self._solver, self._structure
         n = min(n, self._longest)
+        if dt != self._dt:
+            self._dt, self._state[0] = dt, 0.0
         rows, multiplier_rows = np.empty((n, 3, s.N)), np.empty((n, s.m))
         now = np.array([y.u, y.v, y.acceleration, y.algorithmic])
         before, _, force = y.memory or (0.0, None, y.multipliers)

@@ -292,10 +292,18 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=Non
         next_time = next(wanted, None)
     n = 0
     steps = None if auto else max(1, int(np.ceil(span / step * (1 - 1e-12))))
-    blocks = None
-    if steps is not None and CompiledSteps.applies(scheme, system):
-        blocks = CompiledSteps(solver, scheme, system)
+    blocks = CompiledSteps(solver, scheme, system) if CompiledSteps.applies(scheme, system) else None
+    whole = 0  # steps of one size, of which a block may take many
+    if blocks is not None and not auto:
         whole = steps if abs(steps * step - span) < 1e-9 * step else steps - 1
+
+    def advance(y, h):
+        """One step, in Python where there is no compiled one or it fails."""
+        if blocks is not None:
+            done, motion = blocks.run(y, h, 1)
+            if done:
+                return motion(0)
+        return solver.advance_safely(y, h)
 
     def store(old, new):
         """Keep what was asked for of the step from one Motion to the next."""
@@ -328,7 +336,7 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=Non
 
     with progress_bar(progress, total=span, desc="time") as bar:
         while (n < steps) if steps is not None else (y.t < t_end - 1e-12 * span):
-            if blocks is not None and n < whole:
+            if n < whole:
                 done, motion = blocks.run(y, step, whole - n)
                 if done:
                     old, y = y, store_block(y, n, done, motion)
@@ -342,7 +350,7 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=Non
             else:
                 h = min(step, t_end - y.t)
             try:
-                new = solver.advance_safely(y, h)
+                new = advance(y, h)
             except StepFailed as failure:
                 raise ConvergenceError(f"the motion could not be continued beyond t = {y.t:.6g}: "
                                        f"{failure}; try a smaller dt", history.close()) from None
