@@ -4,6 +4,9 @@ import numpy as np
 from scipy.linalg import blas, lapack, lu_solve
 from scipy.sparse import coo_matrix
 
+#: Relative correction of a border's solution above which sparse LU is used.
+INACCURATE = 1e-5
+
 
 class BandMatrix:
     """A square band matrix that is filled element by element and factorised by LAPACK.

@@ -113,8 +113,8 @@ def make_plan(scene, kind="static"):
     elif s.structure is None:
         whole, reason = False, (
             "a pressure, a load or a joint of your own, or a beam without compiled kernels")
-    elif s.joints and not dynamic:
-        whole, reason = False, "the border of the multipliers is made in NumPy"
+    elif s.joints and not dynamic and not s.bordered:
+        whole, reason = False, "too many multipliers for a border"
     else:
         whole, reason = True, f"whole {what} are compiled" + (
             ", in blocks; a step that fails is taken again in NumPy" if dynamic else "")

@@ -8,14 +8,12 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from .errors import SupportError
-from .linalg import BandMatrix, BorderedMatrix
+from .linalg import INACCURATE, BandMatrix, BorderedMatrix
 
 logger = logging.getLogger(__name__)
 _NONE = np.zeros(0)
 #: Columns of a border above which sparse LU is faster.
 WIDE_BORDER = 64
-#: Relative correction of a border's solution above which sparse LU is used.
-INACCURATE = 1e-5
 
 
 class System:
@@ -296,7 +294,7 @@ class System:
         """The tables for whole compiled iterations, or None where not all is compiled."""
         if any(beam.kernel.compiled is None for beam in self.beams):
             return None
-        from .structure import structure_of
+        from .compiled.structure import structure_of
         return structure_of(self)
 
     @property

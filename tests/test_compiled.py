@@ -143,12 +143,12 @@ def test_same_motion_in_compiled_blocks(element, scheme, monkeypatch):
 # whole iterations and time steps of scenes with joints, moving supports and loads that vary
 
 
-def elbow(compiled):
+def elbow(compiled, E=1e6):
     """Two beams that meet at a corner; a section beam and a cable."""
     a = Beam(MeshBeam.init_line(np.linspace(0, 1, 3), 0.1), ElementBeamANCF(1),
-             StVenantKirchhoff(1e6, 0.3, 1000.0), 0.1, compiled=compiled, name="arm")
+             StVenantKirchhoff(E, 0.3, 1000.0), 0.1, compiled=compiled, name="arm")
     b = Beam(MeshBeam.init_line(np.linspace(0, 1, 4), 0.15, origin=(1, 0), angle=1.1),
-             ElementBeamCable(5), StVenantKirchhoff(1e6, 0.3, 1000.0), 0.07, compiled=compiled,
+             ElementBeamCable(5), StVenantKirchhoff(E, 0.3, 1000.0), 0.07, compiled=compiled,
              name="forearm")
     return Scene(a, b).gravity((0, -9.81))
 
@@ -271,7 +271,7 @@ def test_a_joint_that_is_not_quadratic_is_stepped_in_python(monkeypatch):
 
 def count_equilibrium(monkeypatch):
     """Solutions found by compiled iterations, as a list that grows."""
-    from skfem_ancf.structure import Structure
+    from skfem_ancf.compiled.structure import Structure
     found = []
     equilibrium = Structure.equilibrium
 
@@ -282,6 +282,33 @@ def count_equilibrium(monkeypatch):
 
     monkeypatch.setattr(Structure, "equilibrium", counted)
     return found
+
+
+@pytest.mark.parametrize("name", JOINTS)
+def test_same_statics_with_every_joint(name, monkeypatch):
+    """Through the border, with springs on the beam that only joints hold."""
+    found, results = count_equilibrium(monkeypatch), []
+    for compiled in (False, True):
+        scene = elbow(compiled, 1e8)
+        scene.fix("left", ["r"], beam="arm")
+        scene.fix("left", ["r_Y0^1"], beam="arm")
+        if name != "hinge":
+            scene.joint("hinge", **JOINED["hinge"])
+        if name not in ("weld", "angle"):  # the forearm turns
+            scene.joint("line", beam="forearm", at=(1 + np.cos(1.1), np.sin(1.1)),
+                        direction=(1.0, 0.2))
+        if name == "weld":
+            scene.joint("angle", beam="forearm", at="left", angle=lambda t: 0.3 * t)
+        else:
+            slow = dict(r=lambda t: (0.4 + 0.01 * t, 0.05 * t - 0.03))
+            scene.joint(name, **(JOINED[name] | (slow if name == "position" else {})))
+        results.append((scene, scene.solve_static()))
+    (_, a), (scene, b) = results
+    assert found == [True] * len(b.steps) and len(scene.system.springs) == 4
+    assert a.iterations == b.iterations and np.abs(b.u).max() > 1e-4
+    assert_allclose(b.u, a.u, rtol=0, atol=1e-10)
+    assert_allclose(b.multipliers, a.multipliers, rtol=1e-8,
+                    atol=1e-10 * np.abs(a.multipliers).max())
 
 
 def test_same_statics_under_a_moment_of_the_section(monkeypatch):
@@ -327,7 +354,7 @@ def test_restart_under_another_load_is_compiled(monkeypatch):
 
 def test_indefinite_tangents_have_factors():
     """L D L^T without pivots, and its refusal where a leading part is singular."""
-    from skfem_ancf.compiled import factorize
+    from skfem_ancf.compiled.band import factorize
     from skfem_ancf.linalg import BandMatrix
     rng = np.random.default_rng(3)
     n, bw = 12, 3

@@ -17,7 +17,7 @@ class CompiledSteps:
     """
 
     def __init__(self, solver, scheme, system):
-        from ..loops import steps
+        from ..compiled.steps import steps
 
         self._steps, self._solver, self._system = steps, solver, system
         self._conserving, self._parameters = scheme.compiled
@@ -45,6 +45,8 @@ class CompiledSteps:
     def _motion(self, t, dt, n):
         """c and g of the joints, g where they act, and the rates of c and g."""
         s, span = self._structure, self._solver.span
+        if s.joints is None:
+            return None
         start = np.array([t])
         c, g = s.offsets(start), s.slopes(start)
         c_rates, g_rates, g_joint = (0 * c, 0 * c), (0 * g, 0 * g), g
@@ -76,8 +78,8 @@ class CompiledSteps:
         ends = y.t + dt * np.arange(1, n + 1)
         acting = ends - 0.5 * dt if self._conserving else ends
         done, solver._energy = self._steps(
-            structure.cables, structure.beams, structure.moments, structure.joints, self._conserving,
-            self._parameters, structure.vectors, structure.factors(acting),
+            structure.cables, structure.beams, structure.moments, structure.joints,
+            self._conserving, self._parameters, structure.vectors, structure.factors(acting),
             structure.moment_factors(acting), s.fixed, s.mask, self._supports(y.t, dt, n),
             self._motion(y.t, dt, n), s.mass._flat, self._M, s.mass._ld, s.mass.bandwidth, self._A,
             *self._work, self._state, now, multipliers, dt, solver.tol, 8.0 * s.stiffness_scale,

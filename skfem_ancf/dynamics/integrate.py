@@ -292,7 +292,9 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=Non
         next_time = next(wanted, None)
     n = 0
     steps = None if auto else max(1, int(np.ceil(span / step * (1 - 1e-12))))
-    blocks = CompiledSteps(solver, scheme, system) if CompiledSteps.applies(scheme, system) else None
+    blocks = None
+    if CompiledSteps.applies(scheme, system):
+        blocks = CompiledSteps(solver, scheme, system)
     whole = 0  # steps of one size, of which a block may take many
     if blocks is not None and not auto:
         whole = steps if abs(steps * step - span) < 1e-9 * step else steps - 1

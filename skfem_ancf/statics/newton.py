@@ -172,12 +172,13 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record):
     prescribed = target - u[system.fixed]
     moving = bool(np.any(prescribed))
     structure = system.structure
-    if structure is not None and not system.joints:
+    if structure is not None:
         found = structure.equilibrium(
-            u, system.constant_force, full, np.zeros(system.N) if gap is None else gap, prescribed,
-            method == "mixed", tol, max_iterations, floor, force_floor)
+            u, multipliers, system.constant_force, full, at,
+            np.zeros(system.N) if gap is None else gap, prescribed, method == "mixed", tol,
+            max_iterations, floor, force_floor)
         if found is not None and not system.inverted(found[0]):
-            u, force, *residuals = found
+            u, multipliers, force, *residuals = found
             record.force_residuals, record.energy_residuals = (r.tolist() for r in residuals)
             record.iterations = len(record.energy_residuals)
             return u, multipliers, force

@@ -1,11 +1,13 @@
-"""The tables of a scene for :mod:`skfem_ancf.loops`."""
+"""The tables of a scene, for whole compiled iterations and time steps."""
 
 import numpy as np
 
-from .compiled import factorize
-from .loads import DeadLoad, EndMoment
-from .loops import append, equilibrium, new_list
-from .sampling import sample
+from ..linalg import INACCURATE
+from ..loads import DeadLoad, EndMoment
+from ..sampling import sample
+from .band import factorize
+from .body import append, new_list
+from .equilibrium import equilibrium
 
 
 class Structure:
@@ -14,7 +16,8 @@ class Structure:
     Attributes
     ----------
     cables, beams, moments, joints
-        As :mod:`skfem_ancf.loops` says.
+        As :mod:`~skfem_ancf.compiled.body`, :mod:`~skfem_ancf.compiled.moments` and
+        :mod:`~skfem_ancf.compiled.constraints` say; None where there are none.
     vectors
         The loads of constant direction, shape (k, N): the first are all those without an
         amplitude together.
@@ -39,6 +42,7 @@ class Structure:
         self._turning = [load for load in system.loads if isinstance(load, EndMoment)]
         self.moments = self._moment_tables()
         self.joints = self._joint_tables()
+        self.border = None if self.joints is None or not system.bordered else self._border_tables()
 
     def _collect(self, items):
         """A typed list; a tuple where there is one item, which Numba takes in much less time."""
@@ -62,8 +66,10 @@ class Structure:
                      for shapes in self.shapes)
 
     def _moment_tables(self):
-        most = max((load.dofs.shape[1] for load in self._turning), default=0)
         n = len(self._turning)
+        if not n:
+            return None
+        most = max(load.dofs.shape[1] for load in self._turning)
         dofs, c = np.zeros((n, 2, most), dtype=np.int64), np.zeros((n, most))
         start = np.zeros((n, 2))
         for k, load in enumerate(self._turning):
@@ -76,6 +82,8 @@ class Structure:
     def _joint_tables(self):
         """Second derivatives, and the columns that the first has in the stress-free state."""
         s, second, first, at = self.system, [], [], 0
+        if not s.joints:
+            return None
         zero, probe = np.zeros(s.N), np.zeros(1)
         for joint in s.joints:
             for unit in np.eye(len(joint.equations)):
@@ -96,6 +104,15 @@ class Structure:
         gk, gi = (np.concatenate(x) for x in zip(*first)) if first else [none] * 2
         return (*(x.astype(np.int64) for x in (k, i, j)), v.astype(float),
                 gk.astype(np.int64), gi.astype(np.int64))
+
+    def _border_tables(self):
+        """Coordinates picked, springs first, and where the second derivatives are among them."""
+        s, (_, i, j, *_) = self.system, self.joints
+        outside = np.abs(i - j) > s.K.bandwidth
+        far = np.unique(np.append(i[outside], j[outside]))
+        springs, ns = s.springs.astype(np.int64), len(s.springs)
+        row, column = (np.where(outside, ns + np.searchsorted(far, x), -1) for x in (i, j))
+        return np.append(springs, far), ns, row, column
 
     # what depends on time
 
@@ -135,24 +152,31 @@ class Structure:
 
     # statics
 
-    def equilibrium(self, u, load, factor, gap, prescribed, mixed, tol, max_iterations, floor,
-                    force_floor):
-        """Displacement, force, and residuals of each iteration at the equilibrium; or None.
+    def equilibrium(self, u, multipliers, load, factor, at, gap, prescribed, mixed, tol,
+                    max_iterations, floor, force_floor):
+        """Displacement, multipliers, force, and residuals of each iteration; or None.
 
         None where the iteration does not converge, or meets a tangent without factors: the
-        caller's own iteration then finds out more. The arguments are those of
-        :func:`skfem_ancf.loops.equilibrium`.
+        caller's own iteration then finds out more. ``at`` is the time of the joints; the other
+        arguments are those of :func:`skfem_ancf.compiled.equilibrium.equilibrium`.
         """
         s = self.system
-        u, f = u.copy(), np.empty(s.N)
+        if s.joints and self.border is None:
+            return None
+        u, multipliers, f = u.copy(), multipliers.copy(), np.empty(s.N)
         record = np.zeros((max_iterations + 1, 2))
         carried, stresses = self._work = getattr(self, "_work", None) or (
             self.stresses(), self.stresses())
-        n = equilibrium(self.cables, self.beams, self.moments, mixed, u, load, factor,
-                        np.full(len(self._turning), factor), gap, s.fixed, prescribed, s.mask,
-                        s.K._flat, s.K._ld, s.K.bandwidth, tol, floor, force_floor, carried,
-                        stresses, f, record)
-        return None if n < 0 else (u, f, record[:n + 1, 0], record[:n, 1])
+        motion = None
+        if s.joints:
+            at = np.array([at])
+            motion = tuple(np.ascontiguousarray(x(at)[0]) for x in (self.offsets, self.slopes))
+        n = equilibrium(self.cables, self.beams, self.moments, self.joints, motion, self.border,
+                        mixed, u, multipliers, load, factor, np.full(len(self._turning), factor),
+                        gap, s.fixed, prescribed, s.mask, s.K._flat, s.K._ld, s.K.bandwidth, tol,
+                        floor, force_floor, 1e-12 * s.size, INACCURATE, carried, stresses, f,
+                        record)
+        return None if n < 0 else (u, multipliers, f, record[:n + 1, 0], record[:n, 1])
 
     # mass
 
