@@ -13,7 +13,7 @@ from .linalg import INACCURATE, BandMatrix, BorderedMatrix
 logger = logging.getLogger(__name__)
 _NONE = np.zeros(0)
 #: Columns of a border above which sparse LU is faster.
-WIDE_BORDER = 64
+WIDE_BORDER = 96
 
 
 class System:

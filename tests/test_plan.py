@@ -144,8 +144,8 @@ def test_plan_of_every_kind():
     plan = s.plan()
     assert plan["multipliers"].status == plan["varying loads"].status == "computed"
     assert "bordered" in plan["linear solver"].reason
-    for k in range(70):
-        s.joint("line", at=(1 - k / 100, 0), direction=(1, 0.5))
+    for k in range(110):
+        s.joint("line", at=(1 - k / 200, 0), direction=(1, 0.5))
     assert "sparse" in s.plan()["linear solver"].reason
     assert "LU" in s.plan("dynamic")["linear solver"].reason
     assert all(item.term in str(plan) and item.reason in str(plan) for item in plan)
