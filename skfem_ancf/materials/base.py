@@ -86,7 +86,8 @@ class Material:
         """:meth:`law` as a sum: the law of the shear modulus, and what Lame's parameter multiplies.
 
         The second grows without bound as nu goes to 1/2. The formulation "assumed" integrates it
-        with fewer points, to keep sections from locking. A law of your own may return its parts.
+        with fewer points, to keep sections from locking. A law of your own, a subclass of another
+        one too, may return its parts; the first must be positive in every strain.
 
         Returns
         -------
