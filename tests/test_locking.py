@@ -242,7 +242,8 @@ def test_the_volumetric_part_is_apart_only_where_it_must():
 @pytest.mark.parametrize("order", [2, 5])
 def test_constant_strain_is_exact(order, law):
     material = law(2.0, 0.49, plane="strain", shear_correction=1.0)
-    beam = Beam(MeshBeam.init_line([0.0, 0.2, 0.7, 1.0], 0.3), ElementBeamANCF(order), material, 0.4)
+    mesh = MeshBeam.init_line([0.0, 0.2, 0.7, 1.0], 0.3)
+    beam = Beam(mesh, ElementBeamANCF(order), material, 0.4)
     F = np.array([[1.1, 0.2], [-0.1, 0.95]])
     u = (beam.q0.reshape(-1, 2) @ F.T).ravel() - beam.q0
     C = 0.5 * (F.T @ F - np.eye(2))
