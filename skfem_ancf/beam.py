@@ -365,8 +365,11 @@ class Beam:
             ratio = nu if self.material.plane == "stress" else nu / (1.0 - nu)
             xx = e + 0.5 * e * e
             return np.array([xx, -ratio * xx, 0.0 * xx])
-        term = self.formulation.terms(self.element, self.material)[0]
+        return self.sampled_strain(self.formulation.terms(self.element, self.material)[0],
+                                   u, X, tind)
 
+    def sampled_strain(self, term, u, X, tind=None):
+        """As :meth:`strain`, with the samples along the axis of a term of the formulation."""
         def component(k, X):
             H, e = self.gradients(u, X, tind)
             F = e + H

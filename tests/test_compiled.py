@@ -30,12 +30,16 @@ def both(mesh, element, formulation, material=None):
             for c in (False, True)]
 
 
+CASES = [(f, "stress") for f in ("assumed", "continuum", "ecm", "strain-split")]
+
+
 @pytest.mark.parametrize("mesh", MESHES)
 @pytest.mark.parametrize("element", ELEMENTS, ids=repr)
-@pytest.mark.parametrize("formulation", ["assumed", "continuum", "ecm", "strain-split"])
-def test_same_force_tangent_and_carried_stress(mesh, element, formulation):
+@pytest.mark.parametrize("formulation, plane", [*CASES, ("assumed", "strain")])
+def test_same_force_tangent_and_carried_stress(mesh, element, formulation, plane):
     rng = np.random.default_rng(1)
-    scenes = both(MESHES[mesh](), element, formulation)
+    scenes = both(MESHES[mesh](), element, formulation,
+                  StVenantKirchhoff(2.0, 0.3, 1.0, plane=plane))
     u, v = 0.05 * rng.standard_normal((2, scenes[0].N))
     if element.order == 0:  # r_XX would bend the cable past its own length
         for x in (u, v):
@@ -108,11 +112,12 @@ def test_other_laws_and_followers_fall_back():
     assert_allclose(pressed[1].u, pressed[0].u, rtol=0, atol=1e-10 * np.abs(pressed[0].u).max())
 
 
+@pytest.mark.parametrize("plane", ["stress", "strain"])
 @pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)], ids=repr)
-def test_same_statics(element):
+def test_same_statics(element, plane):
     mesh = MeshBeam.init_line(np.linspace(0, 1, 9), 0.01)
     a, b = (s.clamp("left", thickness="free").gravity((0, -9.81)).solve_static()
-            for s in both(mesh, element, "assumed", StVenantKirchhoff(2e8, 0.3, 7800)))
+            for s in both(mesh, element, "assumed", StVenantKirchhoff(2e8, 0.3, 7800, plane)))
     assert_allclose(b.displacement((1, 0)), a.displacement((1, 0)), rtol=0, atol=1e-11)
     assert a.iterations == b.iterations and abs(a.displacement((1, 0))[1]) > 0.8
 

@@ -31,23 +31,23 @@ def quarter(n, h):
                                np.linspace(0.0, np.pi / 2, n + 1), h)
 
 
-def soft(h, plane="stress", law=StVenantKirchhoff, **options):
+def soft(h, plane="stress", law=StVenantKirchhoff, nu=NU, **options):
     """A material whose bending stiffness and mass per length do not depend on the height."""
-    return law(2e8 * (0.01 / h) ** 3, NU, 7800 * 0.01 / h, plane=plane, **options)
+    return law(2e8 * (0.01 / h) ** 3, nu, 7800 * 0.01 / h, plane=plane, **options)
 
 
 def cantilever(element, n, slenderness, plane="stress", clamp="free", formulation="assumed",
-               law=StVenantKirchhoff):
+               law=StVenantKirchhoff, nu=NU):
     """The tip of the gravity cantilever and the state."""
     h = 1.0 / slenderness
-    beam = Beam(line(n, h), element, soft(h, plane, law), WIDTH, formulation=formulation)
+    beam = Beam(line(n, h), element, soft(h, plane, law, nu), WIDTH, formulation=formulation)
     state = Scene(beam).clamp("left", thickness=clamp).gravity((0, -9.81)).solve_static()
     return state.displacement((1, 0))[1], state
 
 
-def thin(plane):
+def thin(plane, nu=NU):
     """The tip of the inextensible line."""
-    return exact.gravity_cantilever(2e8, NU, 7800, 1.0, WIDTH, 0.01, model="elastica",
+    return exact.gravity_cantilever(2e8, nu, 7800, 1.0, WIDTH, 0.01, model="elastica",
                                     plane=plane)[1]
 
 
@@ -189,6 +189,86 @@ def test_cables_converge(degree, meshes, order, error, slenderness):
     assert errors[-1] < error
 
 
+# nearly incompressible in plane strain
+
+
+@pytest.mark.parametrize("order, highest", [(2, 0.4999), (3, 0.49999), (4, 0.49999),
+                                            (6, 0.49999)])
+def test_no_volumetric_locking(order, highest):
+    for nu in (0.1, 0.3, 0.45, 0.49, 0.499, highest):
+        tip, state = cantilever(ElementBeamANCF(order), 16, 1e3, "strain", nu=nu)
+        assert abs(tip - thin("strain", nu)) < 2.2e-3
+        assert state.iterations <= 12
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.49, 0.4999])
+@pytest.mark.parametrize("order", [3, 4, 6])
+def test_second_order_whatever_the_poisson_ratio(order, nu):
+    errors = np.array([cantilever(ElementBeamANCF(order), n, 1e3, "strain", nu=nu)[0]
+                       for n in (8, 16, 32)]) - thin("strain", nu)
+    assert np.all(rate(errors) > 1.9)
+
+
+@pytest.mark.parametrize("clamp, error", [("free", 3e-3), ("fixed", 3e-2)])
+def test_no_volumetric_locking_of_thick_beams(clamp, error):
+    tips = []
+    for element, n in ((ElementBeamANCF(6), 16), (ElementBeamANCFCubic(6), 32)):
+        beam = Beam(line(n, 0.2), element, StVenantKirchhoff(1.0, 0.4999, plane="strain"), 1.0)
+        scene = Scene(beam).clamp("left", thickness=clamp).traction("right", (0, -1e-6))
+        tips.append(scene.solve_linear().displacement((1, 0))[1])
+    assert abs(tips[0] / tips[1] - 1) < error
+
+
+@pytest.mark.parametrize("order", [3, 6])
+def test_no_volumetric_locking_of_neo_hookean(order):
+    tip, _ = cantilever(ElementBeamANCF(order), 16, 1e3, "strain", law=NeoHookean, nu=0.499)
+    assert abs(tip - thin("strain", 0.499)) < 2e-3
+
+
+def test_the_volumetric_part_is_apart_only_where_it_must():
+    def terms(element, law, nu, plane):
+        return len(Assumed().terms(element, law(1.0, nu, plane=plane)))
+
+    for law in (StVenantKirchhoff, NeoHookean):
+        for order in (2, 3):
+            assert terms(ElementBeamANCF(order), law, 0.3, "strain") == 2
+            assert terms(ElementBeamANCF(order), law, 0.3, "stress") == 1
+            assert terms(ElementBeamANCF(order), law, 0.0, "strain") == 1
+            assert terms(ElementBeamANCFCubic(order), law, 0.3, "strain") == 1
+    assert terms(ElementBeamANCF(2), Hencky, 0.3, "strain") == 1
+
+
+@pytest.mark.parametrize("law", [StVenantKirchhoff, NeoHookean])
+@pytest.mark.parametrize("order", [2, 5])
+def test_constant_strain_is_exact(order, law):
+    material = law(2.0, 0.49, plane="strain", shear_correction=1.0)
+    mesh = MeshBeam.init_line([0.0, 0.2, 0.7, 1.0], 0.3)
+    beam = Beam(mesh, ElementBeamANCF(order), material, 0.4)
+    F = np.array([[1.1, 0.2], [-0.1, 0.95]])
+    u = (beam.q0.reshape(-1, 2) @ F.T).ravel() - beam.q0
+    C = 0.5 * (F.T @ F - np.eye(2))
+    strain = np.array([C[0, 0], C[1, 1], 2 * C[0, 1]])
+    np.testing.assert_allclose(beam.kernel.energy(u), material.energy(strain) * 0.3 * 0.4,
+                               rtol=1e-13)
+    np.testing.assert_allclose(beam.stress(u, np.array([[0.1, 0.8], [0.0, 0.6]])) - material.stress(
+        strain)[:, None, None], 0, atol=1e-12)
+    force = beam.kernel.force(u)
+    assert np.max(np.abs(force[beam.nd:-beam.nd].reshape(2, -1, 2)[:, 0])) < 1e-14
+
+
+@pytest.mark.parametrize("law", [StVenantKirchhoff, NeoHookean])
+@pytest.mark.parametrize("order", [1, 2, 3, 6])
+def test_work_of_the_stress_is_that_of_the_internal_force(order, law):
+    rng = np.random.default_rng(order)
+    beam = Beam(MeshBeam.init_line([0.0, 0.3, 1.0], 0.3), ElementBeamANCF(order),
+                law(2.0, 0.49, plane="strain"), 0.4, formulation=Assumed(alpha=0.0))
+    u, v = 1e-2 * rng.standard_normal((2, beam.N))
+    X, w = beam.kernel.tables[0].points, beam.kernel.tables[0].w
+    rate = (beam.strain(u + v, X) - beam.strain(u - v, X)) / 2  # exact: strains are quadratic
+    work = np.sum(w * np.sum(beam.stress(u, X) * rate, axis=0))
+    np.testing.assert_allclose(work, beam.kernel.force(u) @ v, rtol=1e-11)
+
+
 # zero modes
 
 
@@ -217,6 +297,29 @@ def test_a_free_beam_has_three_zero_modes(name, shape):
                                             formulation="assumed"))
                 assert np.max(np.abs(w[:3])) < 1e-14
                 assert w[3] > 2e-2 / slenderness**2  # bending against stretching
+
+
+def spiral(s):
+    return (1 + s) * np.array([np.cos(s), np.sin(s)])
+
+
+BODIES = {"one": lambda h: line(1, h),
+          "unequal": lambda h: MeshBeam.init_line([0.0, 0.2, 1.3], h, angle=0.4),
+          "arc": lambda h: quarter(1, h),
+          "spiral": lambda h: MeshBeam.init_curve(spiral, [0.0, 0.4, 1.5], h)}
+
+
+@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("nu", [-0.9, -0.5, 0.3, 0.49, 0.49999])
+def test_three_zero_modes_at_any_poisson_ratio(body, nu):
+    rng = np.random.default_rng(0)
+    for order in (2, 3, 6):
+        for h in (0.5, 0.1, 1e-3):
+            beam = Beam(BODIES[body](h), ElementBeamANCF(order), soft(h, "strain", nu=nu), WIDTH)
+            w = scaled_eigenvalues(beam)
+            assert np.max(np.abs(w[:3])) < min(1e-14, 1e-2 * w[3])
+            for u in 1e-2 * h * rng.standard_normal((20, beam.N)):
+                assert beam.kernel.energy(u) > 0
 
 
 def test_without_stabilisation_there_are_more_zero_modes():

@@ -237,6 +237,22 @@ class Stiffening(Material):
         return np.tensordot(D, e, 1) + self.c * np.sum(e * e, axis=0) * e
 
 
+class Apart(Stiffening):
+    """The same, which names its volumetric part in plane strain."""
+
+    def volumetric_split(self, k_s=1.0):
+        if self.plane == "stress":
+            return None
+        hooke = StVenantKirchhoff(self.E, self.nu, plane="strain").volumetric_split(k_s)
+        rest = Stiffening(2 * self.G, 0.0, plane="strain")  # lambda is zero
+        rest.c = self.c
+        return rest.law(k_s), hooke[1]
+
+
+class Whole(StVenantKirchhoff):
+    """St. Venant-Kirchhoff that is not taken apart: a subclass must say its parts."""
+
+
 def _cantilever(material, N=2, **options):
     mesh = MeshBeam.init_line(np.linspace(0, 1, 5), 0.1)
     scene = Scene(Beam(mesh, ElementBeamANCF(N), material, 0.1))
@@ -246,8 +262,9 @@ def _cantilever(material, N=2, **options):
 
 @pytest.mark.parametrize("plane", ["stress", "strain"])
 @pytest.mark.parametrize("method", ["mixed", "newton"])
-def test_law_of_the_users_own(plane, method):
-    own, soft = Stiffening(2e8, NU, plane=plane), StVenantKirchhoff(2e8, NU, plane=plane)
+@pytest.mark.parametrize("law, hooke", [(Stiffening, Whole), (Apart, StVenantKirchhoff)])
+def test_law_of_the_users_own(plane, method, law, hooke):
+    own, soft = law(2e8, NU, plane=plane), hooke(2e8, NU, plane=plane)
     same, reference = _cantilever(own, method=method), _cantilever(soft, method=method)
     assert_allclose(same.u, reference.u, atol=1e-10)
     assert same.iterations == reference.iterations
@@ -262,6 +279,19 @@ def test_law_of_the_users_own(plane, method):
     # quadratic convergence of Newton's method with moduli by the complex step
     if method == "newton":
         assert state.steps[-1].force_residuals[-1] < 1e-9 < state.steps[-1].force_residuals[-3]
+
+
+@pytest.mark.parametrize("law", [StVenantKirchhoff, NeoHookean])
+@pytest.mark.parametrize("k_s", [1.0, 0.8])
+def test_parts_add_up_to_the_law(law, k_s):
+    material = law(E, 0.49, plane="strain")
+    parts, whole = material.volumetric_split(k_s), material.law(k_s)
+    for name in ("energy", "stress", "moduli"):
+        found = sum(getattr(part, name)(STRAINS) for part in parts)
+        expected = getattr(whole, name)(STRAINS)
+        assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+    assert law(E, NU).volumetric_split() is None
+    assert law(E, 0.0, plane="strain").volumetric_split() is None
 
 
 def test_thickness_stretch_of_the_users_own_law():

@@ -27,6 +27,14 @@ class Assumed(Formulation):
     sections k = 10 E I / l^2 (the cubic cable: 300 E I / l^2) for the axis, l the length of the
     beam, and E I / N for each section coordinate, which keeps the fourth order.
 
+    Linear sections of order 2 and more in plane strain: eps_yy is continuous from element to
+    element, the curvature is not, so their sum cannot vanish at two points of each. The volumetric
+    part of the law (:meth:`~skfem_ancf.materials.base.Material.volumetric_split`) is integrated
+    with one point, the same strains interpolated to it: selective reduced integration, which does
+    not lock as nu goes to 1/2. The rest, of the shear modulus, is positive at both points. The
+    stress of :meth:`stress` has the volumetric part of the element's middle; its work over the
+    two points is that of the internal force.
+
     Sections of order 1 cannot change their thickness linearly in Y. For them, and a law with
     constant moduli, the Poisson coupling acts on the mean of the strain over the section.
 
@@ -49,26 +57,53 @@ class Assumed(Formulation):
             nodes = (0.0, 0.5, 1.0)
             axis, samples = gauss(3), {"xx": tuple(gauss(2)[0]), "yy": nodes, "xy": nodes}
         law = material.law(material.shear_factor(element))
-        if element.order > 1 or not isinstance(law, LinearLaw):
-            return [Term(law, axis, section, samples)]
+        whole = Term(law, axis, section, samples)
+        if element.order > 1:
+            linear = element.sections == "linear"
+            return (linear and self._volumetric_apart(whole, element, material)) or [whole]
+        if not isinstance(law, LinearLaw):
+            return [whole]
         uncoupled, coupling = split_moduli(self.name, material, element)
         if material.plane == "strain":  # a bent section is as stiff as E / (1 - nu^2)
             more = np.diag([1.0, 1.0, 0.0]) * material.E * material.nu**2 / (1.0 - material.nu**2)
             uncoupled, coupling = uncoupled + more, coupling - more
         if not np.any(coupling):
-            return [Term(law, axis, section, samples)]
+            return [whole]
         mean = (section[0], section[1][None])
         return [Term(LinearLaw(uncoupled), axis, section, samples),
                 Term(LinearLaw(coupling), axis, AXIS, samples, mean)]
 
+    @staticmethod
+    def _volumetric_apart(whole, element, material):
+        """The term in two, the volumetric one with one point along the axis; None if it has none.
+
+        The rest alone is positive in every sampled strain: one point adds no zero modes.
+        """
+        laws = material.volumetric_split(material.shear_factor(element))
+        if laws is None:
+            return None
+        points = tuple(whole.axis[0])
+        samples = {"xx": points, "xy": points, **whole.samples}
+        return [Term(laws[0], whole.axis, whole.section, whole.samples),
+                Term(laws[1], gauss(1), whole.section, samples)]
+
     def stress(self, beam, strain, u, X, tind):
-        terms = self.terms(beam.element, beam.material)
-        if len(terms) == 1:
-            return terms[0].law.stress(strain)
-        eta, w = terms[0].section
-        mean = sum(wi * beam.strain(u, np.array([X[0], 0.0 * X[1] + y]), tind)
+        first, *others = self.terms(beam.element, beam.material)
+        total = first.law.stress(strain)
+        for term in others:
+            total = total + term.law.stress(self._strain_of(term, beam, u, X, tind))
+        return total
+
+    @staticmethod
+    def _strain_of(term, beam, u, X, tind):
+        """What a term takes for the strain at X: that of the middle, or the section's mean."""
+        xi = term.axis[0]
+        x = X[0] if len(xi) > 1 else 0.0 * X[0] + xi[0]
+        if term.section_samples is None:
+            return beam.sampled_strain(term, u, np.array([x, X[1]]), tind)
+        eta, (w,) = term.section_samples
+        return sum(wi * beam.sampled_strain(term, u, np.array([x, 0.0 * X[1] + y]), tind)
                    for y, wi in zip(eta, w))
-        return terms[0].law.stress(strain) + terms[1].law.stress(mean)
 
     def stabilisation(self, mesh, element, material, width):
         tind = np.arange(1 if mesh.is_uniform else mesh.nelements)

@@ -77,6 +77,25 @@ class Material:
         """The law with its shear corrected: a function of (eps_xx, eps_yy, sqrt(k_s) 2 eps_xy)."""
         return self if k_s == 1.0 else ShearCorrected(self, k_s)
 
+    @property
+    def lame(self):
+        """Lame's first parameter, which grows without bound as nu goes to 1/2."""
+        return self.E * self.nu / ((1.0 + self.nu) * (1.0 - 2.0 * self.nu))
+
+    def volumetric_split(self, k_s=1.0):
+        """:meth:`law` as a sum: the law of the shear modulus, and what Lame's parameter multiplies.
+
+        The second grows without bound as nu goes to 1/2. The formulation "assumed" integrates it
+        with fewer points, to keep sections from locking. A law of your own, a subclass of another
+        one too, may return its parts; the first must be positive in every strain.
+
+        Returns
+        -------
+        tuple of two laws, or None
+            None in plane stress, at nu = 0, and if the law has no such parts.
+        """
+        return None
+
     def energy(self, strain):
         """Energy per volume of the stress-free body, shape (...)."""
         raise NotImplementedError

@@ -33,10 +33,12 @@ class NeoHookean(Material):
         if self.nu == 0.5:
             raise InputError("the compressible neo-Hookean law needs nu below 0.5, got 0.5")
 
-    @property
-    def lame(self):
-        """Lame's first parameter."""
-        return self.E * self.nu / ((1.0 + self.nu) * (1.0 - 2.0 * self.nu))
+    def volumetric_split(self, k_s=1.0):
+        # a subclass may have changed the law
+        if type(self) is not NeoHookean or self.plane == "stress" or self.nu == 0.0:
+            return None
+        rest = NeoHookean(2.0 * self.G, 0.0, plane=self.plane)
+        return rest.law(k_s), _Volumetric(self.E, self.nu, plane=self.plane).law(k_s)
 
     def _state(self, strain):
         """C_11, C_22, C_12, ln det C and ln C_33."""
@@ -85,3 +87,9 @@ class NeoHookean(Material):
 
     def thickness_stretch(self, strain):
         return np.exp(0.5 * self._state(strain)[4].real)
+
+
+class _Volumetric(NeoHookean):
+    """lambda/2 (ln J)^2 alone."""
+
+    G = 0.0

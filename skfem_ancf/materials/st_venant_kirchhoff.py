@@ -36,6 +36,13 @@ class StVenantKirchhoff(Material):
     def law(self, k_s=1.0):
         return LinearLaw(self.D * np.diag([1.0, 1.0, k_s]) + self.D * (1 - np.eye(3)))
 
+    def volumetric_split(self, k_s=1.0):
+        # a subclass may have other moduli
+        if type(self) is not StVenantKirchhoff or self.plane == "stress" or self.nu == 0.0:
+            return None
+        volumetric = self.lame * np.outer([1.0, 1.0, 0.0], [1.0, 1.0, 0.0])
+        return LinearLaw(self.law(k_s).D - volumetric), LinearLaw(volumetric)
+
     def energy(self, strain):
         return self.law().energy(strain)
 
