@@ -344,7 +344,12 @@ class System:
 
     def new_band(self):
         """An empty band matrix of the scene."""
-        return BandMatrix(self.N, max(2 * b.nd for b in self.beams) - 1, self.symmetric)
+        return BandMatrix(self.N, self.bandwidth, self.symmetric)
+
+    @property
+    def bandwidth(self):
+        """Subdiagonals of the tangent and of the mass matrix."""
+        return max(2 * b.nd for b in self.beams) - 1
 
     @cached_property
     def K(self):

@@ -343,6 +343,19 @@ def test_same_statics_with_prescribed_displacements_and_several_beams(monkeypatc
     assert_allclose(b.displacement((1, 0), beam="arm")[1], 0.1, rtol=0, atol=1e-14)
 
 
+def test_an_amplitude_counts_as_one_in_compiled_statics(monkeypatch):
+    found = count_equilibrium(monkeypatch)
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 9), 0.01)
+    tips = []
+    for amplitude in (None, lambda t: 0.0):
+        s = both(mesh, ElementBeamCable(5), "assumed", StVenantKirchhoff(2e8, 0.3, 7800))[1]
+        s.clamp("left").point_force((0, -0.1), at=(1, 0), amplitude=amplitude)
+        s.moment("right", 0.1, amplitude=amplitude).gravity((0, -1.0))
+        tips.append(s.solve_static().displacement((1, 0)))
+    assert found == [True, True]
+    assert_allclose(tips[1], tips[0], rtol=0, atol=1e-12)
+
+
 def test_restart_under_another_load_is_compiled(monkeypatch):
     """From a state that another load holds: what is missing there is taken away by steps."""
     mesh = MeshBeam.init_line(np.linspace(0, 1, 9), 0.01)

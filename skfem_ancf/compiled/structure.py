@@ -1,5 +1,7 @@
 """The tables of a scene, for whole compiled iterations and time steps."""
 
+from functools import cached_property
+
 import numpy as np
 
 from ..linalg import INACCURATE
@@ -39,6 +41,7 @@ class Structure:
         self.vectors[0] = system.constant_force
         for row, load in zip(self.vectors[1:], self._amplitudes):
             row[system.of(load)] = load.vector
+        self._dead = self.vectors.sum(axis=0)  # in statics an amplitude counts as one
         self._turning = [load for load in system.loads if isinstance(load, EndMoment)]
         self.moments = self._moment_tables()
         self.joints = self._joint_tables()
@@ -59,6 +62,10 @@ class Structure:
             return None
         at = np.array([(s.start, s.stop) for _, s in packs], dtype=np.int64)
         return self._collect([pack for pack, _ in packs]), at
+
+    @cached_property
+    def _work(self):
+        return self.stresses(), self.stresses()
 
     def stresses(self):
         """Room for the stresses of cables and of beams."""
@@ -108,7 +115,7 @@ class Structure:
     def _border_tables(self):
         """Coordinates picked, springs first, and where the second derivatives are among them."""
         s, (_, i, j, *_) = self.system, self.joints
-        outside = np.abs(i - j) > s.K.bandwidth
+        outside = np.abs(i - j) > s.bandwidth
         far = np.unique(np.append(i[outside], j[outside]))
         springs, ns = s.springs.astype(np.int64), len(s.springs)
         row, column = (np.where(outside, ns + np.searchsorted(far, x), -1) for x in (i, j))
@@ -152,8 +159,8 @@ class Structure:
 
     # statics
 
-    def equilibrium(self, u, multipliers, load, factor, at, gap, prescribed, mixed, tol,
-                    max_iterations, floor, force_floor):
+    def equilibrium(self, u, multipliers, factor, at, gap, prescribed, mixed, tol, max_iterations,
+                    floor, force_floor):
         """Displacement, multipliers, force, and residuals of each iteration; or None.
 
         None where the iteration does not converge, or meets a tangent without factors: the
@@ -165,14 +172,13 @@ class Structure:
             return None
         u, multipliers, f = u.copy(), multipliers.copy(), np.empty(s.N)
         record = np.zeros((max_iterations + 1, 2))
-        carried, stresses = self._work = getattr(self, "_work", None) or (
-            self.stresses(), self.stresses())
+        carried, stresses = self._work
         motion = None
         if s.joints:
             at = np.array([at])
             motion = tuple(np.ascontiguousarray(x(at)[0]) for x in (self.offsets, self.slopes))
         n = equilibrium(self.cables, self.beams, self.moments, self.joints, motion, self.border,
-                        mixed, u, multipliers, load, factor, np.full(len(self._turning), factor),
+                        mixed, u, multipliers, self._dead, factor, np.full(len(self._turning), factor),
                         gap, s.fixed, prescribed, s.mask, s.K._flat, s.K._ld, s.K.bandwidth, tol,
                         floor, force_floor, 1e-12 * s.size, INACCURATE, carried, stresses, f,
                         record)

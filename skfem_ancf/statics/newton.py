@@ -174,7 +174,7 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record):
     structure = system.structure
     if structure is not None:
         found = structure.equilibrium(
-            u, multipliers, system.constant_force, full, at,
+            u, multipliers, full, at,
             np.zeros(system.N) if gap is None else gap, prescribed, method == "mixed", tol,
             max_iterations, floor, force_floor)
         if found is not None and not system.inverted(found[0]):
