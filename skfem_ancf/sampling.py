@@ -13,7 +13,7 @@ def sample(function, times):
 
     Examples
     --------
-    >>> sample(lambda t: 2 * t, np.linspace(0, 1, 11))[-1]
+    >>> float(sample(lambda t: 2 * t, np.linspace(0, 1, 11))[-1])
     2.0
     >>> sample(lambda t: (t, 1.0 if t < 0.5 else 2.0), np.array([0.0, 1.0])).tolist()
     [[0.0, 1.0], [1.0, 2.0]]

@@ -33,7 +33,7 @@ def test_a_long_run_is_made_once_and_a_failed_one_says_so(monkeypatch):
     entry = bench.runs.Timed(ours.run(problem, "cable", 3, 2))
     entry.repeat()
     row = entry.row(bench.reference("5.1", "cable"), "", ("", ""))
-    assert row["runs"] == 1 and row["seconds"] > 0 and row["error"] < 1e-3
+    assert row["runs"] == 1 and row["seconds"] > 0 and row["error"] < 2e-3
     entry = bench.runs.Timed(ours.run(problem, "cable", 3, 2, max_iterations=1))
     entry.repeat()
     row = entry.row(bench.reference("5.1", "cable"), "", ("", ""))
