@@ -18,7 +18,7 @@ from work_precision import figures, micro, runs  # noqa: E402
 from work_precision.cases import CASES, runs_of, warm_up  # noqa: E402
 from work_precision.problems import PROBLEMS  # noqa: E402
 from work_precision.references import reference  # noqa: E402
-from work_precision.report import report  # noqa: E402
+from work_precision.report import OURS, goals, report  # noqa: E402
 
 OPERATIONS = ("tangent", "iteration", "scaling")
 SIZES = {False: dict(tangent=(16, 256, 4096), scaling=(16, 64, 256, 1024, 4096, 16384, 100000)),
@@ -37,13 +37,12 @@ def measure(case, quick, about, memory, watch):
                       about) for k, entry in enumerate(watch(timed, f"{case}, memory"))]
 
 
-def write(filename, rows):
+def write(filename, head, rows):
     """Write a CSV file; numbers to seven digits, what is not known stays empty."""
     with open(filename, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(runs.COLUMNS)
-        for row in rows:
-            cells = (row[c] for c in runs.COLUMNS)
+        writer.writerow(head)
+        for cells in rows:
             writer.writerow(["" if v is None or v != v else f"{v:.7g}" if isinstance(v, float)
                              else v for v in cells])
 
@@ -83,7 +82,9 @@ def run(out, names, quick):
                 rows = micro.scaling(sizes["scaling"], about, watch, memory)
                 figures.scaling(rows).savefig(out / "scaling.png")
             results[name] = rows
-            write(out / f"{name}.csv", rows)
+            write(out / f"{name}.csv", runs.COLUMNS, ([r[c] for c in runs.COLUMNS] for r in rows))
+    write(out / "goals.csv", ("goal", "at", "wanted", "found", "verdict", OURS, "peer"),
+          goals(results))
     text = report(results, about, loading, quick)
     (out / "report.md").write_text(text, encoding="utf-8")
     return results

@@ -38,3 +38,20 @@ def test_a_long_run_is_made_once_and_a_failed_one_says_so(monkeypatch):
     entry.repeat()
     row = entry.row(bench.reference("5.1", "cable"), "", ("", ""))
     assert row["runs"] == 0 and row["note"].startswith("failed: ConvergenceError")
+
+
+def test_goals_say_which_error_is_missed():
+    """Twice as fast at 1e-2 and 1e-3, half as fast below: from numbers made up."""
+    def row(code, error, seconds):
+        return dict(code=code, error=error, seconds=seconds, variant="v", elements=4, steps="",
+                    note="")
+
+    rows = [row("skfem-ancf", 5e-4, 1e-3), row("skfem-ancf", 5e-8, 1e-2), row("Exudyn", 9e-4, 2e-3),
+            row("Exudyn", 6e-8, 5e-3)]
+    found = {r[1]: r[3:5] for r in bench.goals({"5.2": rows})}
+    assert found["error 1e-02"] == found["error 1e-03"] == ("2", "met")
+    assert found["error 1e-04"] == found["error 1e-07"] == ("0.5", "missed")
+    times = [dict(elements=16, variant=v, seconds=s) for v, s in (
+        ("BilinearForm by pairs", 1.0), ("batched form", 0.1), ("fused with the force", 0.02))]
+    (tangent,) = bench.goals({"tangent": times})
+    assert tangent[1:5] == ("16 elements", "100 times", "50", "missed")

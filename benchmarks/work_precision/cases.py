@@ -197,15 +197,18 @@ def runs_of(case, is_quick=False):
 
 
 def warm_up():
-    """Load what is loaded once a process: compiled kernels, lazy imports."""
-    static, moving = PROBLEMS["5.2"], PROBLEMS["pendulum"]
-    runs = [ours.run(static, "cable", 3, 3), ours.run(static, "cubic", 2, 3),
-            ours.run(static, "ancf", 1, 3), stock.q2(PROBLEMS["thick"], 2, 2)]
-    for scheme in ("generalized-alpha", "energy-momentum"):
-        runs += [ours.run(moving, kind, 3, 3, steps=30, scheme=scheme) for kind in ("cable", "ancf")]
+    """Load what is loaded once a process: lazy imports, and the code compiled for each problem."""
+    runs = [stock.q2(PROBLEMS["thick"], 2, 2), ours.run(PROBLEMS["5.2"], "ancf", 1, 16)]
+    for p in PROBLEMS.values():
+        for kind in ("cubic",) if p.name == "thick" else ("cable", "cubic"):
+            if p.t_end is None:
+                runs.append(ours.run(p, kind, 3, 16))
+            else:
+                runs += [ours.run(p, kind, 3, 4, steps=200, scheme=scheme, tol=1e-6)
+                         for scheme in ("generalized-alpha", "energy-momentum")]
     if exudyn_beams.exudyn is not None:
-        runs += [exudyn_beams.run(static, "ANCFCable2D", 3),
-                 exudyn_beams.run(moving, "ANCFCable2D", 8, 200, 1e-4)]
+        runs += [exudyn_beams.run(PROBLEMS["5.2"], "ANCFCable2D", 3),
+                 exudyn_beams.run(PROBLEMS["pendulum"], "ANCFCable2D", 8, 200, 1e-4)]
     for run in runs:
         solver = run.build()
         solver.read(solver.solve())
