@@ -49,6 +49,8 @@ def beam_gradients(mesh, element, X, tind=None):
     grad = np.array([element.gbasis(mapping, X, i, tind)[0].grad
                      for i in range(2 * element.nodal_dofs)])
     G = np.einsum("jkep,ijep->kepi", frame, grad, optimize=True)
+    # the positions of both nodes together are a translation: exactly, or round-off resists it
+    G[..., element.nodal_dofs] = -G[..., 0]
     return np.ascontiguousarray(G), np.ascontiguousarray(np.moveaxis(frame, 0, -1))
 
 

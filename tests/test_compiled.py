@@ -390,3 +390,31 @@ def test_indefinite_tangents_have_factors():
     singular = BandMatrix(2, 1)
     singular.add([0, 1, 1], [0, 0, 1], [1.0, 1.0, 1.0])
     assert not factorize(singular._flat, singular._ld, 1, 2)
+
+
+@pytest.mark.parametrize("mesh", ["equal", "unequal"])
+def test_translations_meet_no_round_off_of_the_tangent(mesh):
+    """Of an element: what it does on one node's position it undoes on the other's, to the bit."""
+    x = {"equal": [0.0, 1 / 3], "unequal": [0.1, 0.4]}[mesh]
+    beam = Beam(MeshBeam.init_line(x, 1e-5, angle=0.3), ElementBeamANCF(2),
+                StVenantKirchhoff(2.0, 0.3, 1.0), 0.3)
+    s = Scene(beam).system
+    u = np.random.default_rng(2).standard_normal(s.N)
+    s.assemble(u)
+    K, right = s.K.tocsc().toarray(), beam.nd
+    inside = [k for k in range(s.N) if k not in (0, 1, right, right + 1)]
+    for i in range(2):
+        assert np.array_equal(K[inside, i], -K[inside, right + i])
+        assert K[i, i] == K[right + i, right + i] == -K[right + i, i]
+
+
+@pytest.mark.parametrize("n", [205, 256, 307, 460])
+def test_fine_and_slender_beams_find_their_equilibrium(n):
+    """Axial stiffness is 1e11 times the bending stiffness: its round-off must cancel."""
+    h = 1e-5
+    E, rho = 2e8 * (0.01 / h) ** 3, 7800 * 0.01 / h
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, n + 1), h), ElementBeamANCF(2),
+                StVenantKirchhoff(E, 0.3, rho), 0.01)
+    state = Scene(beam).clamp("left", thickness="free").gravity((0, -9.81)).solve_static()
+    assert state.iterations <= 12
+    assert_allclose(state.displacement((1, 0)), (-0.74099, -0.90313), rtol=0, atol=2e-4)

@@ -338,22 +338,47 @@ def _block_moduli(terms, moduli, first, r, M, skew, c):
 
 
 @inner
-def _block_add(K, skew, e, nd, flat, ld, row):
-    """Add one element of the block to the band: coordinates (a, i) are 2 a + i."""
+def _block_translate(K, skew, e, nd):
+    """Take what the right node's position does from the left one's, which is the opposite.
+
+    Round-off, of the size of the axial stiffness, would else resist translations: in a long
+    chain of short elements as much as bending does.
+    """
+    q = nd // 2
+    for a in range(nd):  # of the packed lower halves, (a, 0) is entry a, or a - 1 if skew
+        low, high = min(a, q), max(a, q)
+        n = low * nd - low * (low - 1) // 2 + high - low
+        m = low * (nd - 1) - low * (low - 1) // 2 + high - low - 1
+        for c in range(3):
+            K[c, e, n] = K[c, e, 0] if a == q else -K[c, e, a]
+        if a == 0:
+            skew[e, m] = 0.0
+        elif a != q:
+            skew[e, m] = skew[e, a - 1] if a < q else -skew[e, a - 1]
+
+
+@inner
+def _block_element(K, skew, C, e, nd, out):
+    """The lower half of one element's tangent, and C: coordinates (a, i) are 2 a + i.
+
+    Their sum is made before it goes into the band: so it is rounded as its opposite is.
+    """
     n, m = 0, 0
     for b in range(nd):
-        left, right = (row + 2 * b) * ld, (row + 2 * b + 1) * ld
-        flat[left] += K[0, e, n]
-        flat[left + 1] += K[2, e, n]
-        flat[right] += K[1, e, n]
+        x, y = 2 * b, 2 * b + 1
+        out[x, x] = K[0, e, n] + C[x, x]
+        out[y, x] = K[2, e, n] + C[y, x]
+        out[y, y] = K[1, e, n] + C[y, y]
         n += 1
-        for k in range(1, nd - b):
-            flat[left + 2 * k] += K[0, e, n]
-            flat[left + 2 * k + 1] += K[2, e, n] - skew[e, m]
-            flat[right + 2 * k - 1] += K[2, e, n] + skew[e, m]
-            flat[right + 2 * k] += K[1, e, n]
+        for i in range(2, 2 * (nd - b), 2):
+            out[x + i, x] = K[0, e, n] + C[x + i, x]
+            out[y + i, x] = K[2, e, n] - skew[e, m] + C[y + i, x]
+            out[x + i, y] = K[2, e, n] + skew[e, m] + C[x + i, y]
+            out[y + i, y] = K[1, e, n] + C[y + i, y]
             n += 1
             m += 1
+
+
 @inner
 def beam_loop(pack, u, f, tangent, geometric, carried, use_carried, stresses, flat, ld, start):
     """Force into f, and if asked for tangent into the band and stresses (3, ne, np)."""
@@ -362,6 +387,7 @@ def beam_loop(pack, u, f, tangent, geometric, carried, use_carried, stresses, fl
     size = min(BLOCK, left.size)
     alone = G_.shape[0] > 1
     H = np.empty((G_.shape[1], 3 * nd if tangent and alone else 0))
+    Ke, C = np.empty((2 * nd, 2 * nd)), np.zeros((2 * nd, 2 * nd))
     out = np.empty((nd, H.shape[1]))
     arrays = _block_arrays(pack, size)
     tangents = _block_tangents(symmetric, skew, size if tangent else 0)
@@ -403,9 +429,11 @@ def beam_loop(pack, u, f, tangent, geometric, carried, use_carried, stresses, fl
             np.dot(M_skew.T, skew, K_skew)
         for e in range(size):
             row = start + left[first + e] * nd
-            _block_add(K, K_skew, e, nd, flat, ld, row)
+            _block_translate(K, K_skew, e, nd)
             if constant.shape[0] > 0:
-                add_block(constant[first + e if constant.shape[0] > 1 else 0], flat, ld, row)
+                C = constant[first + e if constant.shape[0] > 1 else 0]
+            _block_element(K, K_skew, C, e, nd, Ke)
+            add_block(Ke, flat, ld, row)
 
 
 @jit

@@ -178,10 +178,10 @@ class Structure:
             at = np.array([at])
             motion = tuple(np.ascontiguousarray(x(at)[0]) for x in (self.offsets, self.slopes))
         n = equilibrium(self.cables, self.beams, self.moments, self.joints, motion, self.border,
-                        mixed, u, multipliers, self._dead, factor, np.full(len(self._turning), factor),
-                        gap, s.fixed, prescribed, s.mask, s.K._flat, s.K._ld, s.K.bandwidth, tol,
-                        floor, force_floor, 1e-12 * s.size, INACCURATE, carried, stresses, f,
-                        record)
+                        mixed, u, multipliers, self._dead, factor,
+                        np.full(len(self._turning), factor), gap, s.fixed, prescribed, s.mask,
+                        s.K._flat, s.K._ld, s.K.bandwidth, tol, floor, force_floor, 1e-12 * s.size,
+                        INACCURATE, carried, stresses, f, record)
         return None if n < 0 else (u, multipliers, f, record[:n + 1, 0], record[:n, 1])
 
     # mass
