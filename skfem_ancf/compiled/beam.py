@@ -162,11 +162,25 @@ def _block_tables(e_, w_, first, e0, w):
 
 
 @inner
+def _block_open(pack, first, arrays):
+    """Work arrays for the block at ``first``, the last one smaller, with frames and weights."""
+    e_, w_, left = pack[1], pack[4], pack[10]
+    size = min(BLOCK, left.size - first)
+    if size < arrays[0].shape[2]:
+        arrays = _block_arrays(pack, size)
+    if first == 0 or size < BLOCK or e_.shape[0] > 1 or w_.shape[0] > 1:
+        _block_tables(e_, w_, first, arrays[9], arrays[10])
+    return arrays
+
+
+@inner
 def _block_load(left, nd, first, u, U):
     for e in range(U.shape[2]):
         at = left[first + e] * nd
         for k in range(nd):
             U[k, 0, e], U[k, 1, e] = u[at + 2 * k], u[at + 2 * k + 1]
+
+
 @inner
 def _block_gradients(G, first, U, d):
     """d = G U."""
@@ -192,11 +206,17 @@ def _block_strain(G, first, e0, rows, factors, U, d, r, samples):
         for i in range(2):
             for e in range(size):
                 r[g, i, e] = e0[g, i, e] + d[g, i, e]
+    _block_pairs(rows, factors, r, d, e0, samples)
+
+
+@inner
+def _block_pairs(rows, factors, r, d, x, samples):
+    """c (r_g . d_h + d_g . x_h): the strain if x is the frame, its derivative if x is r."""
     for s in range(factors.size):
         g, h, c = rows[0, s], rows[1, s], factors[s]
-        for e in range(size):
+        for e in range(d.shape[2]):
             samples[s, e] = c * (r[g, 0, e] * d[h, 0, e] + r[g, 1, e] * d[h, 1, e]
-                                 + d[g, 0, e] * e0[h, 0, e] + d[g, 1, e] * e0[h, 1, e])
+                                 + d[g, 0, e] * x[h, 0, e] + d[g, 1, e] * x[h, 1, e])
 
 
 @inner
@@ -258,12 +278,16 @@ def _block_stress(D, strain, S):
             d0, d1, d2 = D[c, 0], D[c, 1], D[c, 2]
             for e in range(strain.shape[2]):
                 S[c, p, e] = d0 * strain[0, p, e] + d1 * strain[1, p, e] + d2 * strain[2, p, e]
+
+
 @inner
 def _block_store(points, first, out):
     for c in range(3):
         for e in range(points.shape[2]):
             for p in range(points.shape[1]):
                 out[c, first + e, p] = points[c, p, e]
+
+
 @inner
 def _block_force(G, rows, factors, constant, left, nd, first, u, U, r, samples, T, F, held, f):
     """Add G^T T to f, where T is what the stress samples do on the gradients; and C u."""
@@ -382,23 +406,20 @@ def _block_element(K, skew, C, e, nd, out):
 @inner
 def beam_loop(pack, u, f, tangent, geometric, carried, use_carried, stresses, flat, ld, start):
     """Force into f, and if asked for tangent into the band and stresses (3, ne, np)."""
-    (G_, e_, rows, factors, w_, D, Lxx, Lyy, Lxy, constant, left, nd, terms, moduli, pairs,
-     symmetric, skew) = pack
-    size = min(BLOCK, left.size)
+    G_, _, rows, factors, _, D, Lxx, Lyy, Lxy, constant, left, nd = pack[:12]
+    terms, moduli, pairs, symmetric, skew = pack[12:]
     alone = G_.shape[0] > 1
     H = np.empty((G_.shape[1], 3 * nd if tangent and alone else 0))
     Ke, C = np.empty((2 * nd, 2 * nd)), np.zeros((2 * nd, 2 * nd))
     out = np.empty((nd, H.shape[1]))
-    arrays = _block_arrays(pack, size)
-    tangents = _block_tangents(symmetric, skew, size if tangent else 0)
+    arrays = _block_arrays(pack, min(BLOCK, left.size))
+    tangents = _block_tangents(symmetric, skew, min(BLOCK, left.size) if tangent else 0)
     for first in range(0, left.size, BLOCK):
-        if left.size - first < size:
-            size = left.size - first
-            arrays = _block_arrays(pack, size)
-            tangents = _block_tangents(symmetric, skew, size if tangent else 0)
+        arrays = _block_open(pack, first, arrays)
         U, d, r, T, samples, strain, S, F, held, e0, w = arrays
-        if first == 0 or left.size - first < BLOCK or e_.shape[0] > 1 or w_.shape[0] > 1:
-            _block_tables(e_, w_, first, e0, w)
+        size = U.shape[2]
+        if tangent and size < tangents[1].shape[1]:
+            tangents = _block_tangents(symmetric, skew, size)
         _block_load(left, nd, first, u, U)
         _block_strain(G_, first, e0, rows, factors, U, d, r, samples)
         _block_points(Lxx, Lyy, Lxy, samples, strain)
@@ -437,44 +458,51 @@ def beam_loop(pack, u, f, tangent, geometric, carried, use_carried, stresses, fl
 
 
 @jit
-def beam_increment(pack, u, du, out):
-    """The strain's derivative at u in the direction du, (3, ne, np)."""
-    (G_, e_, rows, factors, w_, D, Lxx, Lyy, Lxy, constant, left, nd) = pack[:12]
-    size = min(BLOCK, left.size)
-    arrays = _block_arrays(pack, size)
+def beam_carry(pack, u, du, before, out):
+    """The stresses, linearised, at u + du, from those before; (3, ne, np)."""
+    G_, _, rows, factors, _, D, Lxx, Lyy, Lxy, _, left, nd = pack[:12]
+    arrays = _block_arrays(pack, min(BLOCK, left.size))
     for first in range(0, left.size, BLOCK):
-        if left.size - first < size:
-            size = left.size - first
-            arrays = _block_arrays(pack, size)
-        U, d, r, T, samples, strain, S, F, held, e0, w = arrays
-        if first == 0 or left.size - first < BLOCK or e_.shape[0] > 1 or w_.shape[0] > 1:
-            _block_tables(e_, w_, first, e0, w)
+        arrays = _block_open(pack, first, arrays)
+        U, d, r, _, samples, strain, S, _, _, e0, _ = arrays
         _block_load(left, nd, first, u, U)
         _block_strain(G_, first, e0, rows, factors, U, d, r, samples)
         _block_load(left, nd, first, du, U)
         _block_gradients(G_, first, U, d)
-        for s in range(factors.size):
-            g, h, c = rows[0, s], rows[1, s], factors[s]
-            for e in range(size):
-                samples[s, e] = c * (r[g, 0, e] * d[h, 0, e] + r[g, 1, e] * d[h, 1, e]
-                                     + d[g, 0, e] * r[h, 0, e] + d[g, 1, e] * r[h, 1, e])
+        _block_pairs(rows, factors, r, d, r, samples)
         _block_points(Lxx, Lyy, Lxy, samples, strain)
-        _block_store(strain, first, out)
+        _block_stress(D, strain, S)
+        for c in range(3):
+            for e in range(S.shape[2]):
+                for p in range(S.shape[1]):
+                    out[c, first + e, p] = before[c, first + e, p] + S[c, p, e]
+
+
+@inner
+def beam_stress(pack, u, out):
+    """The stresses at u, (3, ne, np)."""
+    G_, _, rows, factors, _, D, Lxx, Lyy, Lxy, _, left, nd = pack[:12]
+    arrays = _block_arrays(pack, min(BLOCK, left.size))
+    for first in range(0, left.size, BLOCK):
+        arrays = _block_open(pack, first, arrays)
+        U, d, r, _, samples, strain, S, _, _, e0, _ = arrays
+        _block_load(left, nd, first, u, U)
+        _block_strain(G_, first, e0, rows, factors, U, d, r, samples)
+        _block_points(Lxx, Lyy, Lxy, samples, strain)
+        _block_stress(D, strain, S)
+        _block_store(S, first, out)
 
 
 @jit
 def beam_mean(pack, u0, u1, f):
     """B(middle)^T mean stress, added to f."""
-    (G_, e_, rows, factors, w_, D, Lxx, Lyy, Lxy, constant, left, nd) = pack[:12]
-    size, middle = min(BLOCK, left.size), 0.5 * (u0 + u1)
-    arrays, old = _block_arrays(pack, size), np.empty((2, nd, 2, size))
+    G_, _, rows, factors, _, D, Lxx, Lyy, Lxy, constant, left, nd = pack[:12]
+    arrays, middle = _block_arrays(pack, min(BLOCK, left.size)), 0.5 * (u0 + u1)
     for first in range(0, left.size, BLOCK):
-        if left.size - first < size:
-            size = left.size - first
-            arrays, old = _block_arrays(pack, size), np.empty((2, nd, 2, size))
+        arrays = _block_open(pack, first, arrays)
         U, d, r, T, samples, strain, S, F, held, e0, w = arrays
-        if first == 0 or left.size - first < BLOCK or e_.shape[0] > 1 or w_.shape[0] > 1:
-            _block_tables(e_, w_, first, e0, w)
+        size = U.shape[2]
+        old = np.empty((2, nd, 2, size))
         _block_load(left, nd, first, u0, old[0])
         _block_load(left, nd, first, u1, U)
         for k in range(nd):

@@ -4,12 +4,11 @@ Cables and beams are given as packs and the coordinates (k, 2) of each, first an
 Numba leaves out what a scene has not, given as None.
 """
 
-import numpy as np
 from numba.typed import List
 
-from .beam import beam_increment, beam_loop, beam_mean
-from .cable import cable_increment, cable_loop, cable_mean, cable_stress
-from .jit import inner, jit, spliced
+from .beam import beam_carry, beam_loop, beam_mean, beam_stress
+from .cable import cable_carry, cable_loop, cable_mean, cable_stress
+from .jit import jit, spliced
 
 
 @jit
@@ -26,36 +25,71 @@ def append(items, item):
     items.append(item)
 
 
+# of one kind of beam, which may be None
+
+
+@spliced
+def _forces(loop, part, u, f, none, flat):
+    if part is not None:
+        packs, at = part
+        for k in range(len(packs)):
+            a, b = at[k, 0], at[k, 1]
+            loop(packs[k], u[a:b], f[a:b], False, False, none, False, none, flat, 1, 0)
+
+
+@spliced
+def _tangents(loop, part, u, f, geometric, carried, use_carried, stresses, flat, ld):
+    if part is not None:
+        packs, at = part
+        for k in range(len(packs)):
+            a, b = at[k, 0], at[k, 1]
+            loop(packs[k], u[a:b], f[a:b], True, geometric, carried[k], use_carried, stresses[k],
+                 flat, ld, a)
+
+
+@spliced
+def _means(mean, part, u0, u1, f):
+    if part is not None:
+        packs, at = part
+        for k in range(len(packs)):
+            a, b = at[k, 0], at[k, 1]
+            mean(packs[k], u0[a:b], u1[a:b], f[a:b])
+
+
+@spliced
+def _carries(carry, part, u, du, stresses, out):
+    if part is not None:
+        packs, at = part
+        for k in range(len(packs)):
+            a, b = at[k, 0], at[k, 1]
+            carry(packs[k], u[a:b], du[a:b], stresses[k], out[k])
+
+
+@spliced
+def _stresses(stress, part, u, out):
+    if part is not None:
+        packs, at = part
+        for k in range(len(packs)):
+            stress(packs[k], u[at[k, 0]:at[k, 1]], out[k])
+
+
+# of all beams
+
+
 @spliced
 def body_force(cables, beams, u, f, none, flat):
     """The internal force."""
     f[:] = 0.0
-    if cables is not None:
-        packs, at = cables
-        for k in range(len(packs)):
-            a, b = at[k, 0], at[k, 1]
-            cable_loop(packs[k], u[a:b], f[a:b], False, False, none, False, none, flat, 1, 0)
-    if beams is not None:
-        packs, at = beams
-        for k in range(len(packs)):
-            a, b = at[k, 0], at[k, 1]
-            beam_loop(packs[k], u[a:b], f[a:b], False, False, none, False, none, flat, 1, 0)
+    _forces(cable_loop, cables, u, f, none, flat)
+    _forces(beam_loop, beams, u, f, none, flat)
 
 
 @spliced
 def body_mean(cables, beams, u0, u1, f):
     """The force whose work from u0 to u1 is the change of the energy."""
     f[:] = 0.0
-    if cables is not None:
-        packs, at = cables
-        for k in range(len(packs)):
-            a, b = at[k, 0], at[k, 1]
-            cable_mean(packs[k], u0[a:b], u1[a:b], f[a:b])
-    if beams is not None:
-        packs, at = beams
-        for k in range(len(packs)):
-            a, b = at[k, 0], at[k, 1]
-            beam_mean(packs[k], u0[a:b], u1[a:b], f[a:b])
+    _means(cable_mean, cables, u0, u1, f)
+    _means(beam_mean, beams, u0, u1, f)
 
 
 @spliced
@@ -63,71 +97,19 @@ def body_tangent(cables, beams, u, f, geometric, carried, use_carried, stresses,
     """The internal force, the tangent into the band, and the stresses."""
     f[:] = 0.0
     flat[:] = 0.0
-    if cables is not None:
-        packs, at = cables
-        for k in range(len(packs)):
-            a, b, s = at[k, 0], at[k, 1], stresses[0][k]
-            cable_loop(packs[k], u[a:b], f[a:b], True, geometric, carried[0][k], use_carried, s,
-                       flat, ld, a)
-    if beams is not None:
-        packs, at = beams
-        for k in range(len(packs)):
-            a, b, s = at[k, 0], at[k, 1], stresses[1][k]
-            beam_loop(packs[k], u[a:b], f[a:b], True, geometric, carried[1][k], use_carried, s,
-                      flat, ld, a)
-
-
-@inner
-def _law(stiffness, strain, before):
-    """In place of the strain the stress, added to the one before if there is one."""
-    for e in range(strain.shape[1]):
-        for p in range(strain.shape[2]):
-            x, y, z = strain[0, e, p], strain[1, e, p], strain[2, e, p]
-            for c in range(3):
-                S = stiffness[c, 0] * x + stiffness[c, 1] * y + stiffness[c, 2] * z
-                strain[c, e, p] = S + before[c, e, p] if before.size > 0 else S
-
-
-@inner
-def scale_add(strain, stiffness, before):
-    """In place of a cable's strain the stress, added to the one before."""
-    for c in range(2):
-        for e in range(strain.shape[1]):
-            for p in range(strain.shape[2]):
-                strain[c, e, p] = stiffness[c] * strain[c, e, p] + before[c, e, p]
+    _tangents(cable_loop, cables, u, f, geometric, carried[0], use_carried, stresses[0], flat, ld)
+    _tangents(beam_loop, beams, u, f, geometric, carried[1], use_carried, stresses[1], flat, ld)
 
 
 @spliced
-def carry(cables, beams, u, du, stresses, out):
+def body_carry(cables, beams, u, du, stresses, out):
     """The stresses, linearised, at u + du."""
-    if cables is not None:
-        packs, at = cables
-        for k in range(len(packs)):
-            a, b = at[k, 0], at[k, 1]
-            S, stiffness = out[0][k], packs[k][7]
-            cable_increment(packs[k], u[a:b], du[a:b], S)
-            scale_add(S, stiffness, stresses[0][k])
-    if beams is not None:
-        packs, at = beams
-        for k in range(len(packs)):
-            a, b = at[k, 0], at[k, 1]
-            S = out[1][k]
-            beam_increment(packs[k], u[a:b], du[a:b], S)
-            _law(packs[k][5], S, stresses[1][k])
+    _carries(cable_carry, cables, u, du, stresses[0], out[0])
+    _carries(beam_carry, beams, u, du, stresses[1], out[1])
 
 
 @spliced
 def body_stress(cables, beams, u, out):
     """The stresses at u."""
-    none = np.empty((0, 0, 0))
-    if cables is not None:
-        packs, at = cables
-        for k in range(len(packs)):
-            cable_stress(packs[k], u[at[k, 0]:at[k, 1]], out[0][k])
-    if beams is not None:
-        packs, at = beams
-        for k in range(len(packs)):
-            a, b = at[k, 0], at[k, 1]
-            S = out[1][k]
-            beam_increment(packs[k], 0.5 * u[a:b], u[a:b], S)  # the strain is quadratic
-            _law(packs[k][5], S, none)
+    _stresses(cable_stress, cables, u, out[0])
+    _stresses(beam_stress, beams, u, out[1])

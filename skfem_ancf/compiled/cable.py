@@ -39,31 +39,41 @@ def _cable_point(G1, G2, p, u, first, nb):
 
 
 @inner
+def _cable_tables(pack, e):
+    """The tables of one element: G1, G2, a0, b0, s0, kappa0 and w."""
+    G1, G2, A, B, s0, kappa0, w = pack[:7]
+    t = e if G1.shape[0] > 1 else 0
+    r = e if A.shape[0] > 1 else 0
+    return G1[t], G2[t], A[r], B[r], s0[r], kappa0[r], w[t]
+
+
+@inner
+def _cable_strain(G1, G2, A, B, s0, p, u, first, nb):
+    """At one point: r' and r'', |r'|^2, the extension without cancellation, and the curvature."""
+    d0, d1, d2, d3 = _cable_point(G1, G2, p, u, first, nb)
+    a0, a1, b0, b1 = A[p, 0] + d0, A[p, 1] + d1, B[p, 0] + d2, B[p, 1] + d3
+    s = a0 * a0 + a1 * a1
+    eps = (((a0 + A[p, 0]) * d0 + (a1 + A[p, 1]) * d1) / (math.sqrt(s) + math.sqrt(s0[p])))
+    return a0, a1, b0, b1, s, eps, (a0 * b1 - a1 * b0) / s
+
+
+@inner
 def cable_loop(pack, u, f, tangent, geometric, carried, use_carried, stresses, flat, ld, start):
     """Force into f, and if asked for tangent into the band and stresses (2, ne, np)."""
-    G1_, G2_, A0_, B0_, s0_, kappa0_, w_, stiffness, constant, left, nd = pack
-    nb, m, n = nd, 2 * nd, w_.shape[1]
+    stiffness, constant, left, nd = pack[7:]
+    nb, m = nd, 2 * nd
     K, T = np.empty((m, m)), np.empty((4, 4))
     e_a, k_a, k_b, c_a = np.empty(2), np.empty(2), np.empty(2), np.empty(2)
     EA, EI = stiffness
     for e in range(left.size):
-        t = e if G1_.shape[0] > 1 else 0
-        r = e if A0_.shape[0] > 1 else 0
-        G1, G2, w = G1_[t], G2_[t], w_[t]
+        G1, G2, A, B, s0, kappa0, w = _cable_tables(pack, e)
         first = left[e] * nd
         if tangent:
             K[:] = 0.0
-        for p in range(n):
-            d0, d1, d2, d3 = _cable_point(G1, G2, p, u, first, nb)
-            a0, a1 = A0_[r, p, 0] + d0, A0_[r, p, 1] + d1
-            b0, b1 = B0_[r, p, 0] + d2, B0_[r, p, 1] + d3
-            s = a0 * a0 + a1 * a1
+        for p in range(w.size):
+            a0, a1, b0, b1, s, eps, kappa = _cable_strain(G1, G2, A, B, s0, p, u, first, nb)
             root = math.sqrt(s)
-            eps = (((a0 + A0_[r, p, 0]) * d0 + (a1 + A0_[r, p, 1]) * d1)
-                   / (root + math.sqrt(s0_[r, p])))
-            kappa = (a0 * b1 - a1 * b0) / s
-            change = kappa - kappa0_[r, p]
-            N, M = EA * eps, EI * change
+            N, M = EA * eps, EI * (kappa - kappa0[p])
             e_a[0], e_a[1] = a0 / root, a1 / root
             k_a[0], k_a[1] = (b1 - 2 * kappa * a0) / s, (-b0 - 2 * kappa * a1) / s
             k_b[0], k_b[1] = -a1 / s, a0 / s
@@ -114,49 +124,48 @@ def cable_loop(pack, u, f, tangent, geometric, carried, use_carried, stresses, f
 
 
 @jit
-def cable_increment(pack, u, du, out):
-    """The strain's derivative at u in the direction du, (2, ne, np)."""
-    G1_, G2_, A0_, B0_, s0_, kappa0_, w_, stiffness, constant, left, nd = pack
+def cable_carry(pack, u, du, before, out):
+    """The stresses, linearised, at u + du, from those before; (2, ne, np)."""
+    stiffness, _, left, nd = pack[7:]
     for e in range(left.size):
-        t = e if G1_.shape[0] > 1 else 0
-        r = e if A0_.shape[0] > 1 else 0
+        G1, G2, A, B, s0, _, w = _cable_tables(pack, e)
         first = left[e] * nd
-        for p in range(w_.shape[1]):
-            d0, d1, d2, d3 = _cable_point(G1_[t], G2_[t], p, u, first, nd)
-            x0, x1, x2, x3 = _cable_point(G1_[t], G2_[t], p, du, first, nd)
-            a0, a1 = A0_[r, p, 0] + d0, A0_[r, p, 1] + d1
-            b0, b1 = B0_[r, p, 0] + d2, B0_[r, p, 1] + d3
-            s = a0 * a0 + a1 * a1
+        for p in range(w.size):
+            a0, a1, b0, b1, s, _, kappa = _cable_strain(G1, G2, A, B, s0, p, u, first, nd)
+            x0, x1, x2, x3 = _cable_point(G1, G2, p, du, first, nd)
             ax = a0 * x0 + a1 * x1
-            kappa = (a0 * b1 - a1 * b0) / s
-            out[0, e, p] = ax / math.sqrt(s)
-            out[1, e, p] = (x0 * b1 - x1 * b0 + a0 * x3 - a1 * x2 - 2 * kappa * ax) / s
+            change = (x0 * b1 - x1 * b0 + a0 * x3 - a1 * x2 - 2 * kappa * ax) / s
+            out[0, e, p] = before[0, e, p] + stiffness[0] * ax / math.sqrt(s)
+            out[1, e, p] = before[1, e, p] + stiffness[1] * change
+
+
+@inner
+def cable_stress(pack, u, out):
+    """Normal force and moment at u, (2, ne, np)."""
+    stiffness, _, left, nd = pack[7:]
+    for e in range(left.size):
+        G1, G2, A, B, s0, kappa0, w = _cable_tables(pack, e)
+        for p in range(w.size):
+            _, _, _, _, _, eps, kappa = _cable_strain(G1, G2, A, B, s0, p, u, left[e] * nd, nd)
+            out[0, e, p], out[1, e, p] = stiffness[0] * eps, stiffness[1] * (kappa - kappa0[p])
 
 
 @jit
 def cable_mean(pack, u0, u1, f):
     """The force whose work from u0 to u1 is the change of the energy, added to f."""
-    G1_, G2_, A0_, B0_, s0_, kappa0_, w_, stiffness, constant, left, nd = pack
+    stiffness, constant, left, nd = pack[7:]
     EA, EI = stiffness
     K, middle = np.empty((1, 1)), 0.5 * (u0 + u1)
     for e in range(left.size):
-        t = e if G1_.shape[0] > 1 else 0
-        r = e if A0_.shape[0] > 1 else 0
-        G1, G2, w = G1_[t], G2_[t], w_[t]
+        G1, G2, A, B, s0, kappa0, w = _cable_tables(pack, e)
         first = left[e] * nd
         for p in range(w.size):
-            A0, A1, start = A0_[r, p, 0], A0_[r, p, 1], math.sqrt(s0_[r, p])
-            d0, d1, d2, d3 = _cable_point(G1, G2, p, u0, first, nd)
-            a0, a1, b0, b1 = A0 + d0, A1 + d1, B0_[r, p, 0] + d2, B0_[r, p, 1] + d3
-            x0, x1, x2, x3 = _cable_point(G1, G2, p, u1, first, nd)
-            c0, c1, g0, g1 = A0 + x0, A1 + x1, B0_[r, p, 0] + x2, B0_[r, p, 1] + x3
-            s, z = a0 * a0 + a1 * a1, c0 * c0 + c1 * c1
+            a0, a1, b0, b1, s, eps, k0 = _cable_strain(G1, G2, A, B, s0, p, u0, first, nd)
+            c0, c1, g0, g1, z, eps1, k1 = _cable_strain(G1, G2, A, B, s0, p, u1, first, nd)
             rs, rz = math.sqrt(s), math.sqrt(z)
-            k0, k1 = (a0 * b1 - a1 * b0) / s, (c0 * g1 - c1 * g0) / z
-            N = 0.5 * w[p] * EA * (((a0 + A0) * d0 + (a1 + A1) * d1) / (rs + start)
-                                   + ((c0 + A0) * x0 + (c1 + A1) * x1) / (rz + start))
+            N = 0.5 * w[p] * EA * (eps + eps1)
             kappa = 0.5 * (k0 + k1)
-            M = w[p] * EI * (kappa - kappa0_[r, p])
+            M = w[p] * EI * (kappa - kappa0[p])
             m0, m1, q0, q1 = 0.5 * (a0 + c0), 0.5 * (a1 + c1), 0.5 * (b0 + g0), 0.5 * (b1 + g1)
             mean = 0.5 * (s + z)
             x = 2.0 * N / (rs + rz)
@@ -180,27 +189,3 @@ def cable_force(pack, u, f):
 def cable_tangent(pack, u, f, geometric, carried, use_carried, stresses, flat, ld, start):
     """The internal force, added to f, the tangent, added to the band, and the stresses."""
     cable_loop(pack, u, f, True, geometric, carried, use_carried, stresses, flat, ld, start)
-
-
-@inner
-def cable_stress(pack, u, out):
-    """Normal force and moment at u."""
-    G1_, G2_, A0_, B0_, s0_, kappa0_, w_, stiffness, constant, left, nd = pack
-    for e in range(left.size):
-        t = e if G1_.shape[0] > 1 else 0
-        r = e if A0_.shape[0] > 1 else 0
-        first = left[e] * nd
-        for p in range(w_.shape[1]):
-            d0, d1, d2, d3 = 0.0, 0.0, 0.0, 0.0
-            for k in range(nd):
-                x, y = u[first + 2 * k], u[first + 2 * k + 1]
-                d0 += G1_[t, p, k] * x
-                d1 += G1_[t, p, k] * y
-                d2 += G2_[t, p, k] * x
-                d3 += G2_[t, p, k] * y
-            A0, A1 = A0_[r, p, 0], A0_[r, p, 1]
-            a0, a1, b0, b1 = A0 + d0, A1 + d1, B0_[r, p, 0] + d2, B0_[r, p, 1] + d3
-            s = a0 * a0 + a1 * a1
-            out[0, e, p] = stiffness[0] * (((a0 + A0) * d0 + (a1 + A1) * d1)
-                                           / (math.sqrt(s) + math.sqrt(s0_[r, p])))
-            out[1, e, p] = stiffness[1] * ((a0 * b1 - a1 * b0) / s - kappa0_[r, p])

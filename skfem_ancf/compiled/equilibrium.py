@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from .band import copy, factorize, fix, multiply, solve
-from .body import body_force, body_tangent, carry
+from .body import body_carry, body_force, body_tangent
 from .border import add_outside, border_solve, make_border
 from .constraints import constraint, jacobian
 from .jit import jit
@@ -146,7 +146,7 @@ def equilibrium(cables, beams, moments, joints, motion, border, mixed, u, multip
                 du[fixed[i]] = prescribed[i]
             moving = False
         if mixed:
-            carry(cables, beams, u, du, stresses, carried)
+            body_carry(cables, beams, u, du, stresses, carried)
         inner, outer = 0.0, 0.0
         for i in range(N):
             u[i] += du[i]

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from .beam import beam_force, beam_increment, beam_mean, beam_tables, beam_tangent
-from .cable import cable_force, cable_increment, cable_mean, cable_tangent
+from .beam import beam_carry, beam_force, beam_mean, beam_tables, beam_tangent
+from .cable import cable_carry, cable_force, cable_mean, cable_tangent
 
 
 class CompiledKernel:
@@ -24,9 +24,9 @@ class CompiledKernel:
         self.cable = cable
         self.shapes = [(2, elements, pack[6].shape[1]) if cable else
                        (3, elements, pack[4].shape[1]) for pack in packs]
-        self._force, self._tangent, self._increment, self._mean = (
-            (cable_force, cable_tangent, cable_increment, cable_mean) if cable else
-            (beam_force, beam_tangent, beam_increment, beam_mean))
+        self._force, self._tangent, self._carry, self._mean = (
+            (cable_force, cable_tangent, cable_carry, cable_mean) if cable else
+            (beam_force, beam_tangent, beam_carry, beam_mean))
 
     def assemble(self, u, K, start, force, carried, geometric):
         """Add force and tangent; see :meth:`skfem_ancf.kernel.Chain.assemble`."""
@@ -59,14 +59,8 @@ class CompiledEvaluation:
 
     def carry(self, du):
         """The stresses, linearised, at ``u + du``: one array a term."""
-        c, carried = self._compiled, []
-        for pack, S in zip(c.packs, self._stresses):
-            out = np.empty_like(S)
-            c._increment(pack, self._u, np.ascontiguousarray(du), out)
-            if c.cable:
-                out *= pack[7][:, None, None]
-            else:
-                out = np.tensordot(pack[5], out, 1)
-            out += S
-            carried.append(out)
+        c, du = self._compiled, np.ascontiguousarray(du)
+        carried = [np.empty_like(S) for S in self._stresses]
+        for pack, S, out in zip(c.packs, self._stresses, carried):
+            c._carry(pack, self._u, du, S, out)
         return carried
