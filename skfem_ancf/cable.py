@@ -186,18 +186,12 @@ class CableKernel(Chain):
         K = block(G1, ab, G2)
         return block(G1, aa, G1) + K + K.transpose(0, 2, 1)
 
-    def energy(self, u):
-        """Strain energy of a coordinate displacement (N,)."""
-        total = 0.0
-        for part in self.chunks():
-            u_e = self.gather(u, part)
-            strain, _ = self._strain(self._state(u_e, part), part)
-            total += 0.5 * np.sum(self._part(self.w, part)
-                                  * np.tensordot(self.stiffness, strain**2, 1))
-            if self.constant is not None:
-                v = u_e.reshape(len(u_e), -1, 1)
-                total += 0.5 * np.sum(v * (self._part(self.constant, part) @ v))
-        return total
+    def element_energies(self, u_e, elements=slice(None)):
+        """As :meth:`skfem_ancf.kernel.Kernel.element_energies`."""
+        strain, _ = self._strain(self._state(u_e, elements), elements)
+        density = 0.5 * np.tensordot(self.stiffness, strain**2, 1)
+        return (np.sum(self._part(self.w, elements) * density, axis=1)
+                + self.held_energies(u_e, elements))
 
     def strains(self, u):
         """What :meth:`mean_force` wants of the start of a step; None if it is not needed."""

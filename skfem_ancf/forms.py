@@ -1,7 +1,7 @@
 """The weak forms of a planar body: energy, internal force, tangent, mass, loads.
 
-Each factory returns a scikit-fem form for stock ``asm`` on any ``Basis`` of the position field,
-with the coordinates passed as ``r``:
+Each factory returns a scikit-fem form for stock ``asm`` on a stock ``Basis`` of the position
+field, with the coordinates passed as ``r``:
 
 >>> import numpy as np
 >>> from skfem import Basis, ElementVector, asm
@@ -15,16 +15,106 @@ with the coordinates passed as ``r``:
 >>> K.shape, bool(abs(asm(forms.internal_force(steel, width=0.1), basis, r=q)).max() < 1e-3)
 ((24, 24), True)
 
-The forms of :data:`textbook` are the same integrals, written for scikit-fem's pairwise assembly;
-they are the reference that everything faster is tested against.
+There are three kinds, which agree where they are the same integral:
+
+* :func:`textbook_energy`, :func:`textbook_internal_force`, :func:`textbook_tangent`: the
+  mathematics as it is written down, for scikit-fem's assembly of one pair of local functions
+  after the other. The others are tested against them.
+* :func:`energy`, :func:`internal_force`, :func:`tangent`: the same, contracted for all local
+  functions at once.
+* :func:`of`: what a Beam's own formulation makes of them, whatever it samples and stabilises: the
+  forms that :class:`~skfem_ancf.Scene` solves with.
+
+In all of them the strain is that of Green and Lagrange in the beam's frame, ``(F^T F - 1) / 2``
+with ``F = grad r``, and S the second Piola-Kirchhoff stress of the material's law.
 """
 
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
-from skfem.assembly import BilinearForm, Form, Functional, LinearForm
+from skfem.assembly import BilinearForm, CellBasis, Form, Functional, LinearForm
 from skfem.assembly.form.form import FormExtraParams
+from skfem.element import DiscreteField
 from skfem.helpers import dot
+
+from .errors import InputError
+
+
+# kinematics: grad[i, j] = d r_i / d X_j
+
+def deformation_gradient(r, frame):
+    """F in the beam's frame: F[i, J] = d r_i / d X_j frame[j, J]."""
+    return np.einsum("ij...,jJ...->iJ...", r.grad, frame)
+
+
+def green_lagrange(F):
+    """(eps_xx, eps_yy, 2 eps_xy), shape (3, ...), of a deformation gradient (2, 2, ...)."""
+    return np.array([0.5 * (dot(F[:, 0], F[:, 0]) - 1.0), 0.5 * (dot(F[:, 1], F[:, 1]) - 1.0),
+                     dot(F[:, 0], F[:, 1])])
+
+
+def strain_variation(F, dF):
+    """The variation of :func:`green_lagrange` at F in the direction dF; linear in both."""
+    return np.array([dot(F[:, 0], dF[:, 0]), dot(F[:, 1], dF[:, 1]),
+                     dot(F[:, 0], dF[:, 1]) + dot(F[:, 1], dF[:, 0])])
+
+
+def _tensor(S):
+    return np.array([[S[0], S[2]], [S[2], S[1]]])
+
+
+def _voigt_to_tensor(D):
+    k = np.array([[0, 2], [2, 1]])
+    return D[k][:, :, k]
+
+
+# the textbook's forms
+
+
+def textbook_energy(material, width=1.0, k_s=1.0):
+    """Strain energy ``U(r) = int W(eps) dV``, a ``Functional``."""
+    law = material.law(k_s)
+
+    @EnergyForm
+    def strain_energy(w):
+        return width * law.energy(green_lagrange(deformation_gradient(w.r, w.frame)))
+
+    return strain_energy
+
+
+def textbook_internal_force(material, width=1.0, k_s=1.0):
+    """The first variation ``delta U = int S : delta eps dV``, a ``LinearForm``."""
+    law = material.law(k_s)
+
+    @BeamLinearForm
+    def force(v, w):
+        F, dF = (deformation_gradient(f, w.frame) for f in (w.r, v))
+        return width * dot(law.stress(green_lagrange(F)), strain_variation(F, dF))
+
+    return force
+
+
+def textbook_tangent(material, width=1.0, k_s=1.0):
+    """The second, ``int delta eps : D : d eps + S : d delta eps dV``, a ``BilinearForm``."""
+    law = material.law(k_s)
+
+    @BeamBilinearForm
+    def stiffness(u, v, w):
+        F, DF, dF = (deformation_gradient(f, w.frame) for f in (w.r, u, v))
+        eps, d, D = green_lagrange(F), strain_variation(F, dF), strain_variation(F, DF)
+        return width * (np.einsum("a...,ab...,b...->...", d, law.moduli(eps), D)
+                        + dot(law.stress(eps), strain_variation(dF, DF)))
+
+    return stiffness
+
+
+#: The three of them: ``textbook.energy``, ``textbook.internal_force``, ``textbook.tangent``.
+textbook = SimpleNamespace(energy=textbook_energy, internal_force=textbook_internal_force,
+                           tangent=textbook_tangent)
+
+
+# scikit-fem's forms with the beam's frame
 
 
 class _BeamFrame:
@@ -87,10 +177,7 @@ class ModuliForm(BeamBilinearForm):
         A = np.moveaxis(A.reshape(4, 4, ne, -1), (2, 3), (0, 1))
         AB = A @ B.transpose(0, 2, 3, 1)  # (ne, np, 4, nq)
         K = B.reshape(ne, nq, -1) @ AB.reshape(ne, -1, nq)  # rows v, columns u
-        dofs = ubasis.element_dofs
-        rows, cols = np.tile(dofs, (nq, 1)), np.repeat(dofs, nq, axis=0)
-        return (np.array([rows.ravel(), cols.ravel()]), K.transpose(2, 1, 0).ravel(),
-                (ubasis.N, ubasis.N), (nq, nq))
+        return _scattered(K, ubasis)
 
 
 def _gradient_table(basis):
@@ -99,45 +186,18 @@ def _gradient_table(basis):
                                             (0, 3, 4, 1, 2), (1, 0, 2, 3, 4)))
 
 
-# kinematics: grad[i, j] = d r_i / d X_j
-
-def deformation_gradient(r, frame):
-    """F in the beam's frame: F[i, J] = d r_i / d X_j frame[j, J]."""
-    return np.einsum("ij...,jJ...->iJ...", r.grad, frame)
-
-
-def green_lagrange(F):
-    """(eps_xx, eps_yy, 2 eps_xy), shape (3, ...), of a deformation gradient (2, 2, ...)."""
-    return np.array([0.5 * (dot(F[:, 0], F[:, 0]) - 1.0), 0.5 * (dot(F[:, 1], F[:, 1]) - 1.0),
-                     dot(F[:, 0], F[:, 1])])
+def _scattered(K, basis):
+    """Element matrices (ne, nq, nq), rows of v and columns of u, as scikit-fem's COO data."""
+    nq, dofs = basis.Nbfun, basis.element_dofs
+    rows, cols = np.tile(dofs, (nq, 1)), np.repeat(dofs, nq, axis=0)
+    return (np.array([rows.ravel(), cols.ravel()]), K.transpose(2, 1, 0).ravel(),
+            (basis.N, basis.N), (nq, nq))
 
 
-def strain_variation(F, dF):
-    """The variation of :func:`green_lagrange` at F in the direction dF; linear in both."""
-    return np.array([dot(F[:, 0], dF[:, 0]), dot(F[:, 1], dF[:, 1]),
-                     dot(F[:, 0], dF[:, 1]) + dot(F[:, 1], dF[:, 0])])
+# the same for all local functions at once, and mass and loads
 
-
-def _tensor(S):
-    return np.array([[S[0], S[2]], [S[2], S[1]]])
-
-
-def _voigt_to_tensor(D):
-    k = np.array([[0, 2], [2, 1]])
-    return D[k][:, :, k]
-
-
-# the forms
-
-def energy(material, width=1.0, k_s=1.0):
-    """Strain energy ``int W(eps) dV``, a ``Functional``."""
-    law = material.law(k_s)
-
-    @EnergyForm
-    def strain_energy(w):
-        return width * law.energy(green_lagrange(deformation_gradient(w.r, w.frame)))
-
-    return strain_energy
+#: :func:`textbook_energy`, whose assembly has no pairs of local functions.
+energy = textbook_energy
 
 
 def internal_force(material, width=1.0, k_s=1.0):
@@ -216,32 +276,102 @@ def pressure(width=1.0):
     return follower
 
 
-def _textbook_internal_force(material, width=1.0, k_s=1.0):
-    """``int S : delta eps dV``, for scikit-fem's stock assembly."""
-    law = material.law(k_s)
-
-    @BeamLinearForm
-    def force(v, w):
-        F, dF = (deformation_gradient(f, w.frame) for f in (w.r, v))
-        return width * dot(law.stress(green_lagrange(F)), strain_variation(F, dF))
-
-    return force
+# a beam's own forms
 
 
-def _textbook_tangent(material, width=1.0, k_s=1.0):
-    """``int delta eps : D : d eps + S : d delta eps dV``, for scikit-fem's stock assembly."""
-    law = material.law(k_s)
+class BeamForms(NamedTuple):
+    """The forms of one beam; :func:`of` makes them."""
 
-    @BeamBilinearForm
-    def stiffness(u, v, w):
-        F, DF, dF = (deformation_gradient(f, w.frame) for f in (w.r, u, v))
-        eps = green_lagrange(F)
-        d, D = strain_variation(F, dF), strain_variation(F, DF)
-        return width * (np.einsum("a...,ab...,b...->...", d, law.moduli(eps), D)
-                        + dot(law.stress(eps), strain_variation(dF, DF)))
-
-    return stiffness
+    energy: Functional
+    internal_force: LinearForm
+    tangent: BilinearForm
 
 
-#: The pairwise forms: ``textbook.internal_force`` and ``textbook.tangent``.
-textbook = SimpleNamespace(internal_force=_textbook_internal_force, tangent=_textbook_tangent)
+def of(beam):
+    """The weak forms of a beam's own formulation, whatever it is.
+
+    They are ``U(r)``, ``delta U`` and ``delta^2 U`` of the strain energy that
+    :class:`~skfem_ancf.Scene` solves with, stabilisation included, for stock ``asm(form, basis,
+    r=q)``. The formulation has its own quadrature: that of the basis does not matter.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`. A ``Basis`` of ``ElementVector(element)`` on its mesh, or a
+        part of it, takes the forms.
+
+    Returns
+    -------
+    BeamForms
+        ``energy``, ``internal_force`` and ``tangent``: a ``Functional``, a ``LinearForm`` and a
+        ``BilinearForm``.
+
+    Raises
+    ------
+    InputError
+        When assembled, if the basis is not one of the beam, or ``r`` is not the vector of its
+        coordinates.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem import Basis, ElementVector, asm
+    >>> from skfem_ancf import (Beam, ElementBeamANCF, MeshBeam, StVenantKirchhoff, forms,
+    ...                         reference_coordinates)
+    >>> mesh, element = MeshBeam.init_line(np.linspace(0, 1, 3), height=0.1), ElementBeamANCF(2)
+    >>> own = forms.of(Beam(mesh, element, StVenantKirchhoff(E=2.1e11, nu=0.3), width=0.1))
+    >>> basis = Basis(mesh, ElementVector(element))
+    >>> asm(own.tangent, basis, r=reference_coordinates(basis)).shape
+    (24, 24)
+    """
+    return BeamForms(_OwnEnergy(beam), _OwnForce(beam), _OwnTangent(beam))
+
+
+class _Own:
+    """A form whose element contributions come from the kernel of a beam."""
+
+    def __init__(self, beam):
+        super().__init__(self._named)
+        self.beam = beam
+
+    def _named(self, *_):
+        raise InputError("the form of a beam's own formulation is assembled as a whole: "
+                         "asm(form, basis, r=q)")
+
+    def _displacement(self, basis, r=None, idx=None, **other):
+        """Coordinates' displacement, and the elements of the basis; ``idx`` is scikit-fem's."""
+        mesh, element = self.beam.mesh, self.beam.element
+        other_element = getattr(basis.elem, "elem", None)
+        same = (isinstance(basis, CellBasis) and basis.N == self.beam.N
+                and type(other_element) is type(element)
+                and np.array_equal(other_element.doflocs, element.doflocs)
+                and np.array_equal(basis.mesh.p, mesh.p) and basis.mesh.height == mesh.height)
+        if not same:
+            raise InputError(f"this is a form of {self.beam!r}: assemble it on "
+                             f"Basis(beam.mesh, ElementVector(beam.element)), not on {basis!r}")
+        if other or isinstance(r, DiscreteField) or np.shape(r) != (basis.N,):
+            raise InputError(f"pass the coordinates as r=q, a vector of {basis.N} numbers, and "
+                             f"nothing else; got r of shape {np.shape(r)}"
+                             + (f" and {sorted(other)}" if other else ""))
+        u = np.asarray(r, dtype=np.float64) - self.beam.q0
+        return u, slice(None) if basis.tind is None else basis.tind
+
+
+class _OwnEnergy(_Own, Functional):
+    def elemental(self, v, **kwargs):
+        u, tind = self._displacement(v, **kwargs)
+        return self.beam.kernel.energies(u)[tind]
+
+
+class _OwnForce(_Own, LinearForm):
+    def _assemble(self, ubasis, vbasis=None, **kwargs):
+        u, tind = self._displacement(ubasis, **kwargs)
+        data = self.beam.kernel.forces(u)[tind].reshape(-1, ubasis.Nbfun).T
+        dofs = ubasis.element_dofs
+        return np.array([dofs.ravel()]), data.ravel(), (ubasis.N,), (ubasis.Nbfun,)
+
+
+class _OwnTangent(_Own, BilinearForm):
+    def _assemble(self, ubasis, vbasis=None, **kwargs):
+        u, tind = self._displacement(ubasis, **kwargs)
+        return _scattered(self.beam.kernel.tangents(u)[tind], ubasis)

@@ -295,6 +295,14 @@ class Chain:
         nodes[t[1]] += parts[:, 1]
         return out
 
+    def held_energies(self, u_e, elements=slice(None)):
+        """The part of the stabilisation, (ne,)."""
+        if self.constant is None:
+            return np.zeros(len(u_e))
+        constant = self.constant[elements] if len(self.constant) > 1 else self.constant
+        v = u_e.reshape(len(u_e), -1, 1)
+        return 0.5 * np.sum(v * (constant @ v), axis=(1, 2))
+
     def chunks(self):
         """Slices of the elements that are evaluated together."""
         return [slice(k, k + CHUNK) for k in range(0, self.t.shape[1], CHUNK)]
@@ -355,6 +363,20 @@ class Chain:
         for part in self.chunks():
             self.scatter(self.evaluate(self.gather(u, part), part, tangent=False).force, part, out)
         return out
+
+    def energy(self, u):
+        """Strain energy of a coordinate displacement (N,)."""
+        return np.sum(self.energies(u))
+
+    def energies(self, u):
+        """Strain energy of each element, shape (ne,)."""
+        return np.concatenate([self.element_energies(self.gather(u, part), part)
+                               for part in self.chunks()])
+
+    def forces(self, u):
+        """Element forces (ne, nb, 2) of a coordinate displacement (N,)."""
+        return np.concatenate([self.evaluate(self.gather(u, part), part, tangent=False).force
+                               for part in self.chunks()])
 
     def tangents(self, u, **options):
         """Element tangents (ne, 2 nb, 2 nb) of a coordinate displacement (N,)."""
@@ -458,17 +480,11 @@ class Kernel(Chain):
             out.tangent = K
         return out
 
-    def energy(self, u):
-        """Strain energy of a coordinate displacement (N,)."""
-        total = 0.0
-        for part in self.chunks():
-            u_e = self.gather(u, part)
-            for t in (t.part(part) for t in self.tables):
-                total += np.sum(t.w * t.law.energy(t.strain(t.gradients(u_e))))
-            if self.constant is not None:
-                constant = self.constant[part] if len(self.constant) > 1 else self.constant
-                v = u_e.reshape(len(u_e), -1, 1)
-                total += 0.5 * np.sum(v * (constant @ v))
+    def element_energies(self, u_e, elements=slice(None)):
+        """Strain energies (ne,) of element displacements (ne, nb, 2)."""
+        total = self.held_energies(u_e, elements)
+        for t in (t.part(elements) for t in self.tables):
+            total = total + np.sum(t.w * t.law.energy(t.strain(t.gradients(u_e))), axis=1)
         return total
 
     def strains(self, u):

@@ -1,0 +1,129 @@
+"""The weak forms of a beam's own formulation, by stock assembly, against what a Scene solves with."""
+
+import numpy as np
+import pytest
+from skfem import Basis, ElementVector, asm, condense, solve
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, NeoHookean,
+                        Scene, StVenantKirchhoff, forms, reference_coordinates)
+from skfem_ancf.elements import ELEMENTS
+from skfem_ancf.formulations import FORMULATIONS
+
+SHAPES = {**ELEMENTS, **{f"cable-{n}": (lambda n=n: ElementBeamCable(n)) for n in (3, 5, 7)}}
+LAWS = {"svk": StVenantKirchhoff(2.0, 0.3, density=1.7),
+        "svk-strain": StVenantKirchhoff(2.0, 0.45, plane="strain"),
+        "neo": NeoHookean(2.0, 0.3, plane="strain")}
+BODIES = {
+    "straight": lambda: MeshBeam.init_line([0.0, 0.5, 1.2], 0.2, angle=0.4),
+    "arc": lambda: MeshBeam.init_curve(lambda s: np.array([np.cos(s), np.sin(s)]),
+                                       np.linspace(0.0, 1.2, 3), 0.2),
+}
+
+
+def beams(element, formulation, law, body):
+    """The Beam, or a skip where the package says that there is none."""
+    try:
+        return Beam(BODIES[body](), SHAPES[element](), LAWS[law], 0.4, formulation)
+    except InputError as error:
+        pytest.skip(str(error))
+
+
+def coordinates(beam, seed=0):
+    """Coordinates a little off those of the stress-free state."""
+    scale = np.tile(np.repeat([beam.mesh.lengths.min()] + [
+        beam.mesh.height ** min(0, 1 - f[2]) for f in beam.element.functionals[1:]], 2),
+        beam.N // beam.nd)
+    return beam.q0 + 0.05 * scale * np.random.default_rng(seed).uniform(-1, 1, beam.N)
+
+
+def close(a, b, tol=1e-11):
+    return np.abs(a - b).max() <= tol * np.abs(b).max()
+
+
+@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("element", SHAPES)
+def test_own_forms_are_what_a_scene_solves_with(element, formulation, law, body):
+    beam = beams(element, formulation, law, body)
+    try:
+        system = Scene(beam).system
+        beam.kernel
+    except InputError as error:
+        pytest.skip(str(error))
+    own, basis = forms.of(beam), Basis(beam.mesh, ElementVector(beam.element))
+    q = coordinates(beam)
+    u = q - beam.q0
+    f, K = (asm(form, basis, r=q) for form in (own.internal_force, own.tangent))
+    force, _ = system.assemble(u)
+    assert close(f, force)
+    assert close(K.toarray(), system.K.tocsc().toarray())
+    assert abs(asm(own.energy, basis, r=q) - system.strain_energy(u)) < 1e-12 * abs(
+        system.strain_energy(u))
+    if formulation == "continuum" and 1 <= beam.element.order <= 4:  # the pairs take long
+        k_s = beam.material.shear_factor(beam.element)
+        for name, value in (("internal_force", f), ("tangent", K.toarray())):
+            textbook = asm(getattr(forms.textbook, name)(beam.material, beam.width, k_s),
+                           beam.basis, r=q)
+            assert close(textbook if name == "internal_force" else textbook.toarray(), value)
+
+
+def test_own_forms_are_derivatives_of_the_energy():
+    """Central differences of the Functional, which no other code of the package takes part in."""
+    beam = beams("ancf-3", "assumed", "svk", "arc")
+    own, basis = forms.of(beam), Basis(beam.mesh, ElementVector(beam.element))
+    q, dq = coordinates(beam), coordinates(beam, 1) - beam.q0
+    eps = 1e-5
+    U = [asm(own.energy, basis, r=q + s * eps * dq) for s in (1, -1)]
+    f = [asm(own.internal_force, basis, r=q + s * eps * dq) for s in (1, -1)]
+    assert (U[0] - U[1]) / (2 * eps) == pytest.approx(
+        asm(own.internal_force, basis, r=q) @ dq, rel=1e-7)
+    assert close((f[0] - f[1]) / (2 * eps), asm(own.tangent, basis, r=q) @ dq, 1e-7)
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(3)])
+def test_parts_of_a_beam_add_up(element):
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.1), element, LAWS["svk"], 0.4)
+    own, q = forms.of(beam), coordinates(beam)
+    basis = Basis(beam.mesh, ElementVector(element))
+    parts = [basis.with_elements([0, 2]), basis.with_elements([1, 3])]
+    for form in own:
+        whole = asm(form, basis, r=q)
+        assert abs(sum(asm(form, part, r=q) for part in parts) - whole).max() <= 1e-13 * np.max(
+            np.abs(whole))
+
+
+def test_newton_with_the_default_formulation_in_stock_scikit_fem():
+    """Own Newton, stock condense and solve: the tip of the scene, to the tolerance of both."""
+    mesh, element = MeshBeam.init_line(np.linspace(0, 1, 9), 0.05), ElementBeamANCF(3)
+    beam = Beam(mesh, element, StVenantKirchhoff(2e8, 0.3), 0.05)
+    own, basis = forms.of(beam), Basis(mesh, ElementVector(element))
+    clamped = basis.get_dofs("left").all([n for n in beam.dofnames if "r_X" not in n])
+    tip = basis.probes(np.array([[1.0], [0.0]]))
+    load, q = tip.T @ np.array([0.0, -50.0]), reference_coordinates(basis)
+    for _ in range(30):
+        residual = load - asm(own.internal_force, basis, r=q)
+        dq = solve(*condense(asm(own.tangent, basis, r=q), residual, D=clamped))
+        q += dq
+        if np.abs(dq).max() < 1e-10:
+            break
+    state = Scene(beam).clamp("left").point_force((0, -50), at=(1, 0)).solve_static()
+    assert np.allclose(tip @ q - [1, 0], state.displacement((1, 0)), rtol=0, atol=1e-8)
+
+
+def test_a_basis_or_coordinates_of_another_kind():
+    mesh, element = MeshBeam.init_line([0.0, 0.5, 1.0], 0.1), ElementBeamANCF(2)
+    own = forms.of(Beam(mesh, element, LAWS["svk"], 0.4))
+    basis = Basis(mesh, ElementVector(element))
+    q = reference_coordinates(basis)
+    others = [Basis(mesh, ElementVector(ElementBeamANCF(3))), Basis(mesh, element),
+              Basis(mesh.translated((0.1, 0)), ElementVector(element)), basis.boundary("left")]
+    for form in own:
+        for other in others:
+            with pytest.raises(InputError, match="assemble it on"):
+                asm(form, other, r=q)
+        for r in (dict(), dict(r=q[:-1]), dict(r=basis.interpolate(q)), dict(r=q, k=1.0)):
+            with pytest.raises(InputError, match="r=q, a vector of 24 numbers"):
+                asm(form, basis, **r)
+    with pytest.raises(InputError, match="as a whole"):
+        own.tangent.form(None, None, None)
