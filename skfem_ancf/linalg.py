@@ -1,11 +1,46 @@
 """Banded matrices of chains of elements, over LAPACK, and their borders."""
 
+from typing import NamedTuple
+
 import numpy as np
-from scipy.linalg import blas, lapack, lu_solve
+from scipy.linalg import blas, eigh, lapack, lu_solve
 from scipy.sparse import coo_matrix
 
 #: Relative correction of a border's solution above which sparse LU is used.
 INACCURATE = 1e-5
+#: Eigenvalue of a matrix of unit diagonal that is round-off.
+SINGULAR = 4.0 * np.finfo(float).eps
+#: Pivot of a matrix of unit diagonal below which its smallest eigenvalue may be round-off.
+SMALL = 1e-7
+#: Growth of the entries of a matrix of unit diagonal at which a pivot block is made larger.
+GROWTH = 1e2
+#: Columns of a border that are solved for together where only the inertia is wanted.
+COLUMNS = 64
+
+
+class Inertia(NamedTuple):
+    """Signs of the eigenvalues of a symmetric matrix, on the tangent space of the constraints.
+
+    Attributes
+    ----------
+    negative : int
+        Number of negative eigenvalues.
+    singular : bool
+        An eigenvalue is zero to round-off.
+    """
+
+    negative: int
+    singular: bool
+
+
+def beside_zero(negative):
+    """The :class:`Inertia` of a matrix, from the negative eigenvalues of those beside it.
+
+    ``negative`` is a function of the shift, relative to the diagonal. What changes its sign
+    between two shifts of round-off is zero.
+    """
+    below, above = negative(-SINGULAR), negative(SINGULAR)
+    return Inertia(above, below != above)
 
 
 class BandMatrix:
@@ -156,6 +191,99 @@ class BandMatrix:
         return lapack.dgbtrs(self._factor[1], self.bandwidth, self.bandwidth, b,
                              self._factor[2])[0]
 
+    def inertia(self):
+        """Signs of the eigenvalues of a symmetric matrix, from its factors.
+
+        Cholesky says it where it succeeds. Else the matrix, scaled to a unit diagonal, is
+        eliminated block by block along the chain; a block whose elimination makes entries grow is
+        merged with the next one.
+
+        Returns
+        -------
+        Inertia
+            By Sylvester's law, as that of any symmetric matrix it is congruent to.
+
+        Raises
+        ------
+        ValueError
+            If the matrix is not symmetric.
+        """
+        if not self.symmetric:
+            raise ValueError("the inertia is that of a symmetric matrix")
+        if self._factor is None:
+            self.factorize()
+        diagonal = self.diagonal()
+        if self.positive_definite and np.all(self._factor[1][0] ** 2 > SMALL * diagonal):
+            return Inertia(0, False)
+        return beside_zero(lambda shift: self.shifted(shift).negative())
+
+    def negative(self):
+        """The number of negative eigenvalues of a symmetric matrix, round-off counted too."""
+        _, info = lapack.dpbtrf(self.ab, lower=1)
+        if info == 0:
+            return 0
+        size = np.abs(self.diagonal())
+        size[size == 0.0] = np.max(size)  # a diagonal may be zero where a beam has buckled
+        return self._block_negative(1.0 / np.sqrt(size))
+
+    def shifted(self, shift):
+        """The matrix plus ``shift`` times its diagonal's size."""
+        out = BandMatrix(self.n, self.bandwidth, self.symmetric).combine(1.0, self, 0.0, self)
+        out._flat[self._diagonal::self._ld] += shift * np.abs(self.diagonal())
+        return out
+
+    def _block_negative(self, scale):
+        negative, n, width = 0, self.n, max(self.bandwidth, 1)
+        first, last = 0, min(width, n)
+        P = self._dense(first, last, first, last, scale)
+        while True:
+            values, X = eigh(P)
+            if last == n:
+                return negative + int(np.sum(values < 0.0))
+            after = min(last + width, n)
+            A = self._dense(last, after, last, after, scale)
+            E = self._dense(first, last, last, after, scale)
+            Y = X.T @ E
+            used = values != 0.0
+            update = Y[used].T @ (Y[used] / values[used, None])
+            if np.max(np.abs(update)) <= GROWTH and not np.any(Y[~used]):
+                negative += int(np.sum(values < 0.0))
+                first, last, P = last, after, A - update
+            else:
+                # rows before these are eliminated: they are in P, and touch no later ones
+                P = np.block([[P, E], [E.T, A]])
+                last = after
+
+    def _dense(self, i0, i1, j0, j1, scale):
+        """Rows i0 to i1 and columns j0 to j1 of a symmetric matrix, scaled on both sides."""
+        i, j = np.arange(i0, i1)[:, None], np.arange(j0, j1)
+        row, column = np.maximum(i, j), np.minimum(i, j)
+        inside = row - column <= self.bandwidth
+        out = np.where(inside, self._flat[np.where(inside, self._position(row, column), 0)], 0.0)
+        return scale[i0:i1, None] * out * scale[j0:j1]
+
+    def determinant_sign(self):
+        """The sign of the determinant, from the factors of :meth:`factorize`: 1 or -1."""
+        if self._factor is None:
+            self.factorize()
+        if self._factor[0] == "pb":
+            return 1
+        _, lu, pivots = self._factor
+        exchanges = int(np.sum(pivots != np.arange(self.n)))
+        return -1 if (exchanges + int(np.sum(lu[2 * self.bandwidth] < 0.0))) % 2 else 1
+
+    def symmetric_part(self):
+        """(A + A^T) / 2 as a symmetric band matrix."""
+        out = BandMatrix(self.n, self.bandwidth)
+        if self.symmetric:
+            out._flat[:] = self._flat
+            return out
+        lower, ab, top = out.ab, self.ab, 2 * self.bandwidth
+        lower[0] = ab[top]
+        for k in range(1, self.bandwidth + 1):
+            lower[k, :self.n - k] = 0.5 * (ab[top + k, :self.n - k] + ab[top - k, k:])
+        return out
+
     def tocsc(self):
         """The matrix as a scipy.sparse array in CSC format."""
         k = np.arange(-self.bandwidth, self.bandwidth + 1)
@@ -172,6 +300,81 @@ class BandMatrix:
             i, j, v = (np.concatenate([i, j[off]]), np.concatenate([j, i[off]]),
                        np.concatenate([v, v[off]]))
         return coo_matrix((v, (i, j)), shape=(self.n, self.n)).tocsc()
+
+
+def hold(K, i, j, values, springs):
+    """Add entries and springs to a band matrix, and factorise it.
+
+    Parameters
+    ----------
+    K, i, j, values, springs
+        As for :class:`BorderedMatrix`.
+
+    Returns
+    -------
+    picked, S
+        The matrix with its entries and without springs is ``K + P^T S P``; the rows of P pick the
+        coordinates ``picked``: springs, and what lies outside of the band.
+    """
+    inside = np.abs(i - j) <= K.bandwidth
+    K.add(i[inside], j[inside], values[inside])
+    diagonal = np.abs(K.diagonal())
+    stiffness = diagonal[springs]
+    stiffness[stiffness == 0.0] = np.mean(diagonal)
+    K.add(springs, springs, stiffness)
+    K.factorize()
+    i, j, values = i[~inside], j[~inside], values[~inside]
+    far, where = np.unique(np.append(i, j), return_inverse=True)
+    picked, ns = np.append(springs, far), len(springs)
+    S = np.zeros((len(picked), len(picked)))
+    S[np.arange(ns), np.arange(ns)] = -stiffness
+    np.add.at(S, (ns + where[:len(i)], ns + where[len(i):]), values)
+    return picked, S
+
+
+def border_inertia(K, picked, S, J):
+    """The :class:`Inertia` of ``K + P^T S P`` on the null space of J.
+
+    By Haynsworth: with ``S = V L V^T`` and ``C = [P^T V, J^T]`` the matrix
+    ``[K, C; C^T, -L^-1 (+) 0]`` has as many negative eigenvalues as K and
+    ``-(L^-1 (+) 0) - C^T K^-1 C`` together, and as ``-L^-1`` and the bordered matrix together; the
+    latter has one more for each row of J than the matrix on its null space.
+
+    Parameters
+    ----------
+    K : BandMatrix
+        Symmetric, held by springs.
+    picked, S
+        What :func:`hold` returned; S symmetric.
+    J
+        Shape (m, n).
+    """
+    negative, smallest = _border_negative(K, picked, S, J)
+    if negative == 0 and smallest > SMALL and K.positive_definite:
+        return Inertia(0, False)
+    return beside_zero(lambda shift: _border_negative(K.shifted(shift), picked, S, J)[0])
+
+
+def _border_negative(K, picked, S, J):
+    """The number of negative eigenvalues, and the smallest one of the border, scaled."""
+    size = np.sqrt(np.abs(K.diagonal()[picked]))
+    size[size == 0.0] = 1.0
+    values, V = eigh(S / (size[:, None] * size))
+    keep = np.abs(values) > SINGULAR * np.max(np.abs(values), initial=0.0)
+    values, V = values[keep], size[:, None] * V[:, keep]
+    k, m = len(values), len(J)
+    left = np.zeros((k + m, K.n))
+    np.add.at(left.T, picked, np.hstack([V, np.zeros((len(V), m))]))
+    left[k:] = J
+    G = np.diag(np.append(1.0 / values, np.zeros(m)))
+    for first in range(0, k + m, COLUMNS):
+        some = slice(first, first + COLUMNS)
+        G[:, some] += left @ K.solve(np.asfortranarray(left[some].T))
+    size = np.sqrt(np.abs(np.diag(G)))
+    size[size == 0.0] = 1.0
+    mu = np.linalg.eigvalsh(0.5 * (G + G.T) / (size[:, None] * size))
+    negative = K.negative() + int(np.sum(mu > 0.0)) - int(np.sum(values > 0.0)) - m
+    return negative, float(np.min(np.abs(mu), initial=1.0))
 
 
 class BorderedMatrix:
@@ -199,22 +402,9 @@ class BorderedMatrix:
     """
 
     def __init__(self, K, J, i, j, values, springs):
-        inside = np.abs(i - j) <= K.bandwidth
-        K.add(i[inside], j[inside], values[inside])
-        diagonal = np.abs(K.diagonal())
-        stiffness = diagonal[springs]
-        stiffness[stiffness == 0.0] = np.mean(diagonal)
-        K.add(springs, springs, stiffness)
-        K.factorize()
+        self._picked, self._S = hold(K, i, j, values, springs)
         self._K, self._J = K, J
-        i, j, values = i[~inside], j[~inside], values[~inside]
-        far, where = np.unique(np.append(i, j), return_inverse=True)
-        # A = K + P^T S P, where the rows of P pick the springs and what lies outside the band
-        self._picked = np.append(springs, far)
-        k, ns = len(self._picked), len(springs)
-        self._S = np.zeros((k, k))
-        self._S[np.arange(ns), np.arange(ns)] = -stiffness
-        np.add.at(self._S, (ns + where[:len(i)], ns + where[len(i):]), values)
+        k = len(self._picked)
         columns = np.zeros((K.n, k + len(J)), order="F")
         columns[self._picked, np.arange(k)] = 1.0
         columns[:, k:] = J.T
@@ -233,6 +423,18 @@ class BorderedMatrix:
         if info != 0:
             raise np.linalg.LinAlgError("the matrix is singular")
         self._H = lu, pivots
+
+    def inertia(self):
+        """The :class:`Inertia` of A where J x = 0; of its symmetric part if K is not symmetric."""
+        K = self._K if self._K.symmetric else self._K.symmetric_part()
+        return border_inertia(K, self._picked, self._S, self._J)
+
+    def determinant_sign(self):
+        """The sign of the determinant of A where J x = 0: 1 or -1."""
+        lu, pivots = self._H
+        exchanges = int(np.sum(pivots != np.arange(len(pivots))))
+        odd = (exchanges + int(np.sum(np.diag(lu) < 0.0))) % 2
+        return self._K.determinant_sign() * (-1 if odd else 1)
 
     def tocsc(self):
         """A as a scipy.sparse array in CSC format."""

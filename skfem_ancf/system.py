@@ -8,7 +8,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from .errors import SupportError
-from .linalg import INACCURATE, BandMatrix, BorderedMatrix
+from .linalg import INACCURATE, BandMatrix, BorderedMatrix, border_inertia, hold
 
 logger = logging.getLogger(__name__)
 _NONE = np.zeros(0)
@@ -438,11 +438,49 @@ class System:
         self._J = self.jacobian(u, t)
         i, j, v = self._curvature(u, t, multipliers)
         v = v * (self.free[i] & self.free[j])
+        self._outside, self._sparse = (i, j, v), None
         if self.bordered:
             self._factors = BorderedMatrix(self.K, self._J, i, j, v, self.springs)
         else:
-            self._factors = self._sparse_factors(
+            self._sparse = self._sparse_factors(
                 self.K.tocsc() + sparse.csc_matrix((v, (i, j)), shape=(self.N, self.N)))
+
+    def inertia(self):
+        """Signs of the eigenvalues of the tangent that :meth:`factorize` has factorised.
+
+        Of the free coordinates, and with joints on the tangent space of their equations: how many
+        directions there are in which the scene gives way. Of a tangent that is not symmetric they
+        are those of its symmetric part.
+
+        Returns
+        -------
+        Inertia
+            With ``negative``, the number of negative eigenvalues, and ``singular``, whether one is
+            zero to round-off.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line([0, 0.5, 1], 0.01), ElementBeamCable(5),
+        ...                    StVenantKirchhoff(2e8, 0.3), width=0.01)).pin("left").pin("right")
+        >>> system = scene.system
+        >>> u = np.zeros(system.N)
+        >>> u.reshape(-1, 6)[:, 0] = [0, -1e-4, -2e-4]  # compressed by 2.4 times Euler's load
+        >>> u.reshape(-1, 6)[:, 2] = -2e-4
+        >>> _ = system.assemble(u)
+        >>> system.factorize(u)
+        >>> system.inertia()
+        Inertia(negative=1, singular=False)
+        """
+        if not self.joints:
+            K = self.K if self.symmetric else self.K.symmetric_part()
+            return K.inertia()
+        if self.bordered:
+            return self._factors.inertia()
+        K = self.K.symmetric_part()
+        picked, S = hold(K, *self._outside, self.springs)
+        return border_inertia(K, picked, S, self._J)
 
     def _sparse_factors(self, K):
         self._weight = float(np.mean(np.abs(K.diagonal()[self.free])))
@@ -467,13 +505,13 @@ class System:
         b = residual * self.mask
         if not self.joints:
             return self.K.solve(b), _NONE
-        if isinstance(self._factors, BorderedMatrix):
+        if self._sparse is None:
             x, multipliers, error = self._factors.solve(b, phi)
             if error < INACCURATE:
                 return x, multipliers
             logger.debug("border inaccurate by %.3g: sparse LU", error)
-            self._factors = self._sparse_factors(self._factors.tocsc())
-        x = self._factors.solve(np.append(b, self._weight * phi))
+            self._sparse = self._sparse_factors(self._factors.tocsc())
+        x = self._sparse.solve(np.append(b, self._weight * phi))
         return x[:self.N], self._weight * x[self.N:]
 
     # rigid motions
