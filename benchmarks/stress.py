@@ -357,7 +357,7 @@ def pendulum(quick, out):
         drift.append((energy - first) / scale)
         iterations += history.iterations
         start = history.state(len(history) - 1)
-        scene._velocity[id(beam)] = history.v[-1]
+        scene.initial_velocity(history.v[-1])
     times, drift = np.concatenate(times), np.concatenate(drift)
     elapsed = time.perf_counter() - before
     case = f"{steps} steps of {dt:g} s, 2 cubic cables"

@@ -15,6 +15,7 @@ from .cable import CableKernel
 from .kernel import Kernel
 from .materials import Material
 from .mesh import MeshBeam
+from .places import as_point, facets_of
 from .quadrature import gauss, tensor
 
 
@@ -139,9 +140,9 @@ class Beam:
                      quadrature=tensor(gauss(n), gauss(self.element.order + 1)))
 
     def facet_basis(self, facets, intorder=None):
-        """A scikit-fem ``FacetBasis`` of the position field."""
+        """A scikit-fem ``FacetBasis`` of the position field at a place, see :meth:`dofs`."""
         order = 2 * max(self.element.axis_degree, self.element.order) + 2
-        return FacetBasis(self.mesh, self.vector_element, facets=facets,
+        return FacetBasis(self.mesh, self.vector_element, facets=facets_of(self.mesh, facets),
                           intorder=order if intorder is None else intorder)
 
     @cached_property
@@ -181,16 +182,19 @@ class Beam:
         return self.vector_element.dofnames
 
     def nodes(self, boundary):
-        """Nodes of a named boundary, or of anything else scikit-fem takes for facets."""
-        return self.mesh._expand_facets(self.mesh.normalize_facets(boundary))[0]
+        """Nodes at a place, see :meth:`dofs`."""
+        return self.mesh._expand_facets(facets_of(self.mesh, boundary))[0]
 
     def dofs(self, boundary, names=None):
-        """Coordinate numbers at a boundary.
+        """Coordinate numbers at a place.
 
         Parameters
         ----------
         boundary
-            A boundary name, or anything else scikit-fem takes for facets.
+            A place: the name of a boundary; a point (x, y) of the stress-free body, which means
+            the section of a node; a function of the points x that returns truth values; or
+            numbers of facets as an array of integers. See
+            :func:`skfem_ancf.places.facets_of`.
         names
             Coordinate names, as ``"r^1"``, or without component, as ``"r"``; None for all.
 
@@ -229,9 +233,7 @@ class Beam:
         MeshError
             If the point is outside the body.
         """
-        x = np.asarray(point, dtype=np.float64)
-        if x.shape != (2,):
-            raise MeshError(f"a material point has two coordinates, got {point!r}")
+        x = as_point(point, self.mesh)
         e = self._finder(*x[:, None])
         X = self.mesh.mapping().invF(x[:, None, None], tind=e)[:, 0, 0]
         return int(e[0]), np.clip(X, 0.0, 1.0)
@@ -277,11 +279,11 @@ class Beam:
         return first + np.arange(2 * self.nd).reshape(-1, 2).T, weights
 
     def section_node(self, boundary):
-        """The one node of a boundary that is an end section."""
-        facets = np.asarray(self.mesh.normalize_facets(boundary))
+        """The node of a place that is one section, see :meth:`dofs`."""
+        facets = np.asarray(facets_of(self.mesh, boundary))
         if len(facets) != 1 or facets[0] >= self.mesh.p.shape[1]:
             raise MeshError(f"boundary {boundary!r} is not one section of the beam; sections are "
-                            "'left' and 'right'")
+                            "'left' and 'right', or the point of a node of the axis")
         return int(facets[0])
 
     def section_direction(self, node):

@@ -1,25 +1,76 @@
-"""Loads: their force on the coordinates of a beam, its derivative, and its potential."""
+"""Loads: their force on the coordinates of a beam, its derivative, and its potential.
+
+A :class:`~skfem_ancf.Scene` keeps loads as they were given, and binds them to its beams: once, and
+again for the same scene on other meshes.
+"""
+
+from copy import copy
 
 import numpy as np
-from skfem.assembly import asm
+from skfem.assembly import LinearForm, asm
 
 from . import forms
-from .errors import require_finite
+from .beam import Beam
+from .errors import AncfError, InputError, require_finite
 
 
 class Load:
     """Base class: a force on the coordinates of one beam as a function of their displacement.
 
+    A load of your own is a subclass, given to a scene by :meth:`skfem_ancf.Scene.add`. It defines
+
+    * :meth:`force`, and :meth:`stiffness` if the force depends on the displacement: then it sets
+      ``constant = False``,
+    * :meth:`potential`, if it has one and energies are asked for; else, and if its stiffness is
+      not symmetric, it sets ``symmetric = False``,
+    * :meth:`bind`, if it computes something of the beam: what it needs to act on another mesh,
+      as ``solve_static(adapt=...)`` wants.
+
+    Parameters
+    ----------
+    beam
+        The beam it acts on, its name or its number; None where the scene has only one.
+    amplitude
+        A function of time by which the force is multiplied in a motion, or None.
+
     Attributes
     ----------
     beam
-        The beam it acts on.
+        The beam it acts on: a :class:`~skfem_ancf.Beam` once the load is bound.
     constant : bool
         The force does not depend on the displacement.
     symmetric : bool
         The derivative of the force is symmetric: the load has a potential.
-    amplitude
-        A function of time by which the force is multiplied in dynamics, or None.
+
+    Examples
+    --------
+    Springs below a beam, so many newton a metre at each node:
+
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+    >>> from skfem_ancf.loads import Load
+    >>> class Springs(Load):
+    ...     constant = False
+    ...     def __init__(self, k, beam=None):
+    ...         super().__init__(beam)
+    ...         self.k = k
+    ...     def bind(self, beam):
+    ...         bound = super().bind(beam)
+    ...         bound.dofs = np.arange(1, beam.N, beam.nd)  # r^2 of each node
+    ...         return bound
+    ...     def force(self, u):
+    ...         out = np.zeros(self.beam.N)
+    ...         out[self.dofs] = -self.k * u[self.dofs]
+    ...         return out
+    ...     def stiffness(self, u):
+    ...         return self.dofs, self.dofs, np.full(len(self.dofs), -self.k)
+    ...     def potential(self, u):
+    ...         return 0.5 * self.k * float(u[self.dofs] @ u[self.dofs])
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.01), ElementBeamANCF(2),
+    ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)
+    >>> scene = Scene(beam).clamp("left").gravity((0, -9.81)).add(Springs(2.0))
+    >>> scene.solve_static().converged
+    True
     """
 
     constant = True
@@ -27,8 +78,29 @@ class Load:
 
     amplitude = None
 
-    def __init__(self, beam):
-        self.beam = beam
+    def __init__(self, beam=None, amplitude=None):
+        if amplitude is not None and not callable(amplitude):
+            raise InputError(f"an amplitude is a function of time, got {amplitude!r}")
+        self.beam, self.amplitude = beam, amplitude
+
+    def bind(self, beam):
+        """The load on a beam.
+
+        By default a copy with :attr:`beam` set. Override it where something is computed from the
+        beam; leave ``self`` as it is, which is bound to other beams later.
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+
+        Returns
+        -------
+        Load
+        """
+        bound = copy(self)
+        bound.beam = beam
+        return bound
 
     def factor(self, t):
         """The amplitude at time ``t``; 1 without one, or in statics, where ``t`` is None."""
@@ -43,20 +115,160 @@ class Load:
         raise NotImplementedError
 
     def stiffness(self, u):
-        """Derivative of the force: rows, columns and values."""
+        """Derivative of the force: rows, columns and values.
+
+        Rows and columns are coordinates of one node or of neighbouring nodes.
+        """
         raise NotImplementedError
 
     def potential(self, u):
         """The potential, minus the work done from the stress-free state; None if there is none."""
         return None
 
+    def __repr__(self):
+        return f"<{type(self).__name__} on {self.beam!r}>"
+
+
+def bind_load(load, beam):
+    """A load on a beam, tried there: what it returns fits the beam.
+
+    Raises
+    ------
+    InputError
+        If the load does not keep to the interface of :class:`Load`.
+    """
+    bound = load.bind(beam)
+    if type(bound) in (DeadLoad, Pressure, EndMoment):
+        return bound
+    if not isinstance(bound, Load) or bound.beam is not beam:
+        raise InputError(f"{load!r}.bind(beam) must return a Load on that beam, got {bound!r}")
+    zero = np.zeros(beam.N)
+    try:
+        require_finite("its force", bound.force(zero), (beam.N,))
+        if bound.constant:
+            return bound
+        i, j, v = bound.stiffness(zero)
+    except AncfError as error:
+        raise InputError(f"{load!r} is no load of this beam: {error}") from None
+    except Exception as error:  # it is the user's: it may raise anything
+        raise InputError(f"{load!r} fails in the stress-free state: {type(error).__name__}: "
+                         f"{error}; a load defines force(u) of shape (beam.N,), and stiffness(u) "
+                         "unless it is constant") from error
+    require_entries(f"the stiffness of {load!r}", i, j, v, beam.N)
+    far = np.abs(np.asarray(i) // beam.nd - np.asarray(j) // beam.nd)
+    if np.any(far > 1):
+        raise InputError(f"the stiffness of {load!r} couples nodes that are {np.max(far)} apart: "
+                         "only neighbours of the chain may be coupled, as they are in its elements")
+    return bound
+
+
+def require_entries(what, i, j, v, n):
+    """Raise InputError unless rows, columns and values are entries of an n x n matrix."""
+    i, j = np.asarray(i), np.asarray(j)
+    v = require_finite(what, v, (None,))
+    if i.dtype.kind not in "iu" or j.dtype.kind not in "iu" or not i.shape == j.shape == v.shape:
+        raise InputError(f"{what} must be rows, columns and values of one length, got shapes "
+                         f"{i.shape}, {j.shape}, {v.shape}")
+    if len(i) and not (0 <= min(i.min(), j.min()) and max(i.max(), j.max()) < n):
+        raise InputError(f"{what} has entries in rows and columns {min(i.min(), j.min())} to "
+                         f"{max(i.max(), j.max())}: there are 0 to {n - 1}")
+
+
+class Weight(Load):
+    """The weight of a beam under an acceleration g (2,)."""
+
+    def __init__(self, g, beam=None, amplitude=None):
+        super().__init__(beam, amplitude)
+        self.g = require_finite("g", g, (2,))
+
+    def bind(self, beam):
+        return DeadLoad(beam, beam.weight(self.g), self.amplitude)
+
+
+class PointForce(Load):
+    """A dead force (2,) on the material point ``at``."""
+
+    def __init__(self, force, at, beam=None, amplitude=None):
+        super().__init__(beam, amplitude)
+        self.total, self.at = require_finite("force", force, (2,)), at
+
+    def bind(self, beam):
+        dofs, weights = beam.probe(self.at)
+        vector = np.zeros(beam.N)
+        np.add.at(vector, dofs, np.outer(self.total, weights))
+        return DeadLoad(beam, vector, self.amplitude)
+
+
+class Traction(Load):
+    """A dead traction on a surface: (2,), or a function of the points x that returns (2, ...)."""
+
+    def __init__(self, boundary, t, beam=None, amplitude=None):
+        super().__init__(beam, amplitude)
+        self.boundary, self.t = boundary, t if callable(t) else require_finite("t", t, (2,))
+
+    def bind(self, beam):
+        t = self.t
+        basis = beam.facet_basis(self.boundary, intorder=12 if callable(t) else None)
+        if callable(t):
+            require_field("t(x)", t, np.asarray(basis.global_coordinates()))
+        return DeadLoad(beam, asm(forms.traction(t, beam.width), basis), self.amplitude)
+
+
+class FormLoad(Load):
+    """A scikit-fem ``LinearForm`` as a dead load, on the body or on a place of its boundary."""
+
+    def __init__(self, form, boundary=None, beam=None, amplitude=None):
+        super().__init__(beam, amplitude)
+        if not isinstance(form, LinearForm):
+            raise InputError(f"a load is a scikit-fem LinearForm, got {form!r}")
+        self.form, self.boundary = form, boundary
+
+    def bind(self, beam):
+        basis = (beam.exact_basis() if self.boundary is None else
+                 beam.facet_basis(self.boundary))
+        return DeadLoad(beam, asm(self.form, basis), self.amplitude)
+
+
+def require_field(name, function, x):
+    """The values (2, ...) of a function at points x (2, ...); it may return a constant (2,).
+
+    Raises
+    ------
+    InputError
+        If the function fails, or its values have another shape or are not finite.
+    """
+    try:
+        value = function(x)
+    except AncfError:
+        raise
+    except Exception as error:  # it is the user's: it may raise anything
+        raise InputError(f"{name} fails for points x of shape {x.shape}: {type(error).__name__}: "
+                         f"{error}") from error
+    try:
+        rows = [np.broadcast_to(require_finite(name, row), x.shape[1:]) for row in value]
+    except (TypeError, ValueError) as error:
+        if isinstance(error, AncfError):
+            raise
+        rows = []
+    if len(rows) != 2:
+        raise InputError(f"{name} must return two components, as np.array([0 * x[0], x[0]]), each "
+                         f"of the shape of x[0] or a number; for x of shape {x.shape} it returned "
+                         f"{np.shape(value) if isinstance(value, np.ndarray) else value!r}")
+    return np.array(rows)
+
 
 class DeadLoad(Load):
     """A force that keeps its direction and size."""
 
-    def __init__(self, beam, vector):
-        super().__init__(beam)
+    def __init__(self, beam, vector, amplitude=None):
+        super().__init__(_the_beam(beam), amplitude)
         self.vector = require_finite("the load", vector, (beam.N,))
+
+    def bind(self, beam):
+        if beam is not self.beam:
+            raise InputError("a DeadLoad is a vector of the coordinates of one mesh and cannot be "
+                             "put on another: use scene.load(form) or a Load with bind(beam)")
+        return self
 
     def force(self, u):
         return self.vector
@@ -71,11 +283,15 @@ class Pressure(Load):
     constant = False
     symmetric = False
 
-    def __init__(self, beam, facets, p):
-        super().__init__(beam)
-        basis = beam.facet_basis(facets)
+    def __init__(self, beam, boundary, p, amplitude=None):
+        super().__init__(_the_beam(beam), amplitude)
+        self.boundary, self.p = boundary, p
+        basis = beam.facet_basis(boundary)
         self.matrix = (p * asm(forms.pressure(beam.width), basis)).tocoo()
         self._rows = self.matrix.tocsr()
+
+    def bind(self, beam):
+        return self if beam is self.beam else Pressure(beam, self.boundary, self.p, self.amplitude)
 
     def force(self, u):
         return self._rows @ (self.beam.q0_local + u)
@@ -90,15 +306,31 @@ class EndMoment(Load):
     The section's direction is ``d = 12 / h^3 int Y r dY``, the best fit of a straight line to the
     deformed face, and its angle that of ``d``. The force is a traction linear in Y and normal
     to ``d``; it turns with the section.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    boundary
+        A place that is one section, or the number of a node.
+    M
+        The moment, counterclockwise.
+    amplitude
+        As for :class:`Load`.
     """
 
     constant = False
 
-    def __init__(self, beam, node, M):
-        super().__init__(beam)
-        self.M = M
-        self.node = node
-        self.dofs, self.c = beam.section_direction(node)
+    def __init__(self, beam, boundary, M, amplitude=None):
+        super().__init__(_the_beam(beam), amplitude)
+        self.M, self.boundary = M, boundary
+        if isinstance(boundary, (int, np.integer)):
+            self.boundary = np.array([boundary])
+        self.node = beam.section_node(self.boundary)
+        self.dofs, self.c = beam.section_direction(self.node)
+
+    def bind(self, beam):
+        return self if beam is self.beam else EndMoment(beam, self.boundary, self.M, self.amplitude)
 
     def direction(self, u):
         """The section's direction d, shape (2,)."""
@@ -147,3 +379,9 @@ class EndMoment(Load):
 
     def potential(self, u):
         return -self.M * self.angle(u)
+
+
+def _the_beam(beam):
+    if not isinstance(beam, Beam):
+        raise InputError(f"this load acts on a Beam, got {beam!r}")
+    return beam

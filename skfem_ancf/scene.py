@@ -1,44 +1,37 @@
 """A scene: beams, supports and loads, and what can be asked of them."""
 
 from copy import copy
-from functools import wraps
+from threading import RLock
 
 import numpy as np
-from skfem.assembly import LinearForm, asm
 
-from . import eigen, forms
+from . import eigen
 from .beam import Beam, select_beam
 from .dynamics import get_scheme
 from .dynamics.integrate import integrate
-from .errors import (ConvergenceError, InputError, NameUnknown, SupportError, require_finite,
+from .errors import (ConvergenceError, InputError, NameUnknown, require_finite,
                      require_finite_scalar)
-from .joints import Joint, get_joint
-from .loads import DeadLoad, EndMoment, Pressure
+from .joints import Joint, bind_joint, get_joint
+from .loads import (EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight, bind_load,
+                    require_field)
 from .path import Path
+from .places import on_other_mesh
 from .plan import make_plan
 from .results import State
 from .statics import continuation, newton
 from .statics.adapt import solve_adaptive
+from .supports import Support
 from .system import System
 
 
-def _recorded(method):
-    """Keep the call, so that the scene can be built again on other meshes."""
+class _Things(tuple):
+    """The loads or joints of a scene."""
 
-    @wraps(method)
-    def wrapper(self, *args, **kwargs):
-        outermost = not self._inside
-        self._inside = True
-        try:
-            result = method(self, *args, **kwargs)
-        finally:
-            if outermost:
-                self._inside = False
-        if outermost:
-            self._calls.append((method.__name__, args, kwargs))
-        return result
+    def append(self, thing):
+        raise InputError("the loads and joints of a scene are not changed by hand: "
+                         "scene.add(thing) takes a Load or a Joint of your own")
 
-    return wrapper
+    extend = insert = remove = clear = append
 
 
 class Scene:
@@ -77,54 +70,142 @@ class Scene:
         if len(set(names)) < len(names) or len(set(map(id, beams))) < len(beams):
             raise InputError(f"the beams of a scene must be different, and so must their names: "
                              f"{names}")
-        self.beams = beams
-        self.loads = []
-        self.joints = []
-        self._calls, self._inside = [], False
-        self._velocity = {}
-        self._fixed = {}  # (number of the beam, coordinate) -> displacement
+        self._beams = beams
+        self._lock = RLock()  # one thread at a time: a solution works in the arrays of the system
+        self._supports, self._fixed = (), {}  # (number of the beam, coordinate) -> displacement
+        # pairs (as given, bound), those of loads with the number of the beam before them
+        self._loads, self._joints = (), ()
+        self._velocities = {}  # number of the beam -> (as given, bound)
         self._system = None
 
     def __repr__(self):
         return (f"<Scene of {len(self.beams)} beam(s), {len(self._fixed)} fixed coordinates, "
                 f"{len(self.loads)} load(s)>")
 
+    @property
+    def beams(self):
+        """The beams."""
+        return self._beams
+
+    @property
+    def supports(self):
+        """What is held: a tuple of :class:`~skfem_ancf.supports.Support`."""
+        return self._supports
+
+    @property
+    def loads(self):
+        """The loads, bound to the beams: a tuple of :class:`~skfem_ancf.loads.Load`."""
+        return _Things(bound for _, _, bound in self._loads)
+
+    @property
+    def joints(self):
+        """The joints, bound to the beams: a tuple of :class:`~skfem_ancf.joints.Joint`."""
+        return _Things(bound for _, bound in self._joints)
+
     def beam(self, beam=None):
         """The Beam meant by a Beam, a name, a number, or None where there is only one."""
         return select_beam(self.beams, beam)
 
+    def _number(self, beam):
+        return self._beams.index(select_beam(self._beams, beam))
+
     def offset(self, beam):
         """Number of the first coordinate of a beam among those of the scene."""
-        return sum(b.N for b in self.beams[:self.beams.index(self.beam(beam))])
+        return sum(b.N for b in self._beams[:self._number(beam)])
 
     @property
     def N(self):
         """Number of coordinates of the scene."""
         return sum(b.N for b in self.beams)
 
-    # supports
+    # what it is made of
 
-    def _fix(self, beam, dofs, displacement=0.0):
-        k = self.beams.index(beam)
-        values = np.broadcast_to(displacement, np.shape(dofs))
-        for d, v in zip(dofs, values):
-            before = self._fixed.get((k, int(d)))
-            if before is not None and before != v:
-                raise SupportError(
-                    f"coordinate {beam.dofnames[int(d) % beam.nd]} of node {int(d) // beam.nd} is "
-                    f"fixed twice, with displacements {before!r} and {float(v)!r}")
-            self._fixed[k, int(d)] = float(v)
-        self._system = None
+    def _put(self, supports=(), loads=(), joints=(), velocities=()):
+        """Bind everything, then keep it: what fails leaves the scene as it was.
+
+        Loads come as (number of the beam, load), velocities as (number of the beam, v).
+        """
+        with self._lock:
+            fixed = dict(self._fixed)
+            for support in supports:
+                support.bind(self._beams[support.beam], fixed)
+            loads = tuple((k, load, bind_load(load, self._beams[k])) for k, load in loads)
+            joints = tuple((self._portable(joint), bind_joint(joint, self)) for joint in joints)
+            velocities = {k: (v, self._bind_velocity(k, v)) for k, v in velocities}
+            self._fixed, self._supports = fixed, self._supports + tuple(supports)
+            self._loads, self._joints = self._loads + loads, self._joints + joints
+            self._velocities = {**self._velocities, **velocities}
+            if supports or loads or joints:
+                self._system = None
         return self
 
-    @_recorded
+    def _portable(self, joint):
+        """A copy of a joint as it was given, with beams by number: it fits other meshes."""
+        def numbered(value):
+            if isinstance(value, Beam):
+                return self._number(value)
+            return (tuple(map(numbered, value)) if isinstance(value, (tuple, list))
+                    and any(isinstance(v, Beam) for v in value) else value)
+
+        joint = copy(joint)
+        for name, value in vars(joint).items():
+            vars(joint)[name] = numbered(value)
+        return joint
+
+    def add(self, thing):
+        """Add a load or a joint, of the package's or of your own.
+
+        Parameters
+        ----------
+        thing
+            A :class:`~skfem_ancf.loads.Load` or a :class:`~skfem_ancf.joints.Joint`. The scene
+            keeps it as it is now, and binds a copy to its beams; on another mesh, as for
+            ``solve_static(adapt=...)``, it is bound again.
+
+        Returns
+        -------
+        Scene
+            Itself. Ask a State or History for the force of a joint with ``joint_force(thing)``.
+
+        Raises
+        ------
+        InputError
+            If it is neither, or does not keep to the interface.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> from skfem_ancf.loads import Load
+        >>> class TipForce(Load):
+        ...     def force(self, u):
+        ...         out = np.zeros(self.beam.N)
+        ...         out[-self.beam.nd + 1] = -1e-3
+        ...         return out
+        >>> scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.01),
+        ...                    ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.3), width=0.01))
+        >>> len(scene.clamp("left").add(TipForce()).loads)
+        1
+        """
+        if isinstance(thing, Joint):
+            return self._put(joints=[thing])
+        if isinstance(thing, Load):
+            return self._put(loads=[(self._number(thing.beam), thing)])
+        raise InputError(f"a scene takes a Load or a Joint, got {thing!r}: derive yours from "
+                         "skfem_ancf.loads.Load or skfem_ancf.joints.Joint")
+
+    # supports
+
     def clamp(self, boundary, beam=None, thickness="fixed"):
         """Weld a face, or hold it as a plane.
 
         Parameters
         ----------
         boundary
-            A boundary name, or anything else scikit-fem takes for facets.
+            A place: the name of a boundary; a point (x, y) of the stress-free body, which means
+            the section of a node; a function of the points x that returns truth values; or
+            numbers of facets as an array of integers. See
+            :func:`skfem_ancf.places.facets_of`.
         thickness
             "fixed": the position of every material point of the face is fixed, that is ``r`` and
             the section coordinates at the node; the slope ``r_X``, a strain measure there, stays
@@ -132,29 +213,29 @@ class Scene:
             or thicker there. With nu not zero a welded face causes a boundary layer as long as
             the beam is high, which long elements exaggerate; the plane does not.
         """
-        beam = select_beam(self.beams, beam)
+        k = self._number(beam)
+        beam = self._beams[k]
         if thickness not in ("fixed", "free"):
             raise NameUnknown("thickness", thickness, ("fixed", "free"))
         if thickness == "fixed" and not beam.is_cable:
-            return self._fix(beam, beam.dofs(boundary, beam.element.welded))
-        self._fix(beam, beam.dofs(boundary, "r"))
-        self.joint("plane", at=boundary, beam=beam)
-        return self
+            return self._put([Support(k, boundary, tuple(beam.element.welded))])
+        return self._put([Support(k, boundary, "r")],
+                         joints=[get_joint("plane", at=boundary, beam=beam)])
 
-    @_recorded
     def pin(self, boundary, beam=None):
         """Fix the position of the axis; the section may turn."""
-        beam = select_beam(self.beams, beam)
-        return self._fix(beam, beam.dofs(boundary, "r"))
+        return self._put([Support(self._number(beam), boundary, "r", on_axis=True)])
 
-    @_recorded
     def fix(self, boundary, names=None, displacement=0.0, beam=None):
         """Fix coordinates by their scikit-fem names.
 
         Parameters
         ----------
         boundary
-            A boundary name, or anything else scikit-fem takes for facets.
+            A place: the name of a boundary; a point (x, y) of the stress-free body, which means
+            the section of a node; a function of the points x that returns truth values; or
+            numbers of facets as an array of integers. See
+            :func:`skfem_ancf.places.facets_of`.
         names
             As ``["r^1", "r_Y0^2"]``; ``"r"`` means both components; None means all.
         displacement
@@ -167,11 +248,10 @@ class Scene:
         SupportError
             If a coordinate is given two displacements.
         """
-        beam = select_beam(self.beams, beam)
-        return self._fix(beam, beam.dofs(boundary, names),
-                         require_finite_scalar("displacement", displacement))
+        names = names if names is None or isinstance(names, str) else tuple(names)
+        return self._put([Support(self._number(beam), boundary, names,
+                                  require_finite_scalar("displacement", displacement))])
 
-    @_recorded
     def joint(self, joint, **options):
         """Add a joint, held by Lagrange multipliers.
 
@@ -205,23 +285,11 @@ class Scene:
         In statics the time of a motion is the load factor. A joint that only fixes coordinates
         is eliminated like a support.
         """
-        joint = get_joint(joint, **options)
-        joint.bind(self)
-        self.joints.append(joint)
-        self._system = None
-        return joint
+        self._put(joints=[get_joint(joint, **options)])
+        return self._joints[-1][1]
 
     # loads
 
-    def _load(self, load, amplitude=None):
-        if amplitude is not None and not callable(amplitude):
-            raise InputError(f"an amplitude is a function of time, got {amplitude!r}")
-        load.amplitude = amplitude
-        self.loads.append(load)
-        self._system = None
-        return self
-
-    @_recorded
     def gravity(self, g, beam=None, amplitude=None):
         """Weight of every beam, or of one.
 
@@ -230,74 +298,60 @@ class Scene:
         g
             Acceleration, shape (2,), as ``(0, -9.81)``.
         """
-        g = require_finite("g", g, (2,))
-        for b in self.beams if beam is None else [select_beam(self.beams, beam)]:
-            self._load(DeadLoad(b, b.weight(g)), amplitude)
-        return self
+        load = Weight(g, None, amplitude)
+        beams = range(len(self._beams)) if beam is None else [self._number(beam)]
+        return self._put(loads=[(k, load) for k in beams])
 
-    @_recorded
     def point_force(self, force, at, beam=None, amplitude=None):
         """A dead force (2,) on the material point ``at`` of the stress-free body."""
-        force = require_finite("force", force, (2,))
-        beam = select_beam(self.beams, beam)
-        dofs, weights = beam.probe(at)
-        vector = np.zeros(beam.N)
-        np.add.at(vector, dofs, np.outer(force, weights))
-        return self._load(DeadLoad(beam, vector), amplitude)
+        return self._put(loads=[(self._number(beam), PointForce(force, at, None, amplitude))])
 
-    @_recorded
     def traction(self, boundary, t, beam=None, amplitude=None):
         """A dead traction on a surface, per area of the stress-free body.
 
         Parameters
         ----------
         boundary
-            A boundary name, or anything else scikit-fem takes for facets.
+            A place: the name of a boundary; a point (x, y) of the stress-free body, which means
+            the section of a node; a function of the points x that returns truth values; or
+            numbers of facets as an array of integers. See
+            :func:`skfem_ancf.places.facets_of`.
         t
             Constant, shape (2,), or a function of the points x (2, ...) that returns (2, ...).
         """
-        beam = select_beam(self.beams, beam)
-        if not callable(t):
-            t = require_finite("t", t, (2,))
-        basis = beam.facet_basis(boundary, intorder=12 if callable(t) else None)
-        return self._load(DeadLoad(beam, asm(forms.traction(t, beam.width), basis)), amplitude)
+        return self._put(loads=[(self._number(beam), Traction(boundary, t, None, amplitude))])
 
-    @_recorded
     def pressure(self, boundary, p, beam=None, amplitude=None):
         """A pressure on a surface that stays normal to it as it deforms; positive pushes."""
-        beam = select_beam(self.beams, beam)
-        return self._load(Pressure(beam, boundary, require_finite_scalar("p", p)), amplitude)
+        k = self._number(beam)
+        load = Pressure(self._beams[k], boundary, require_finite_scalar("p", p), amplitude)
+        return self._put(loads=[(k, load)])
 
-    @_recorded
     def moment(self, boundary, M, beam=None, amplitude=None):
         """A moment on an end section, counterclockwise, that turns with it."""
-        beam = select_beam(self.beams, beam)
-        return self._load(EndMoment(beam, beam.section_node(boundary),
-                                    require_finite_scalar("M", M)), amplitude)
+        k = self._number(beam)
+        load = EndMoment(self._beams[k], boundary, require_finite_scalar("M", M), amplitude)
+        return self._put(loads=[(k, load)])
 
-    @_recorded
     def load(self, form, boundary=None, beam=None, amplitude=None):
         """Any scikit-fem ``LinearForm``, as a dead load on the body or on a boundary of it."""
-        beam = select_beam(self.beams, beam)
-        if not isinstance(form, LinearForm):
-            raise InputError(f"a load is a scikit-fem LinearForm, got {form!r}")
-        basis = beam.exact_basis() if boundary is None else beam.facet_basis(boundary)
-        return self._load(DeadLoad(beam, asm(form, basis)), amplitude)
+        return self._put(loads=[(self._number(beam), FormLoad(form, boundary, None, amplitude))])
 
     # solution
 
     @property
     def system(self):
         """The discrete equations, built when first asked for."""
-        if self._system is None:
-            offsets = np.concatenate([[0], np.cumsum([b.N for b in self.beams])])
-            fixed = np.array([offsets[k] + d for k, d in self._fixed], dtype=int)
-            self._system = System(self.beams, self.loads, fixed,
-                                  np.array(list(self._fixed.values()), dtype=float), self.joints)
-        return self._system
+        with self._lock:
+            if self._system is None:
+                offsets = np.concatenate([[0], np.cumsum([b.N for b in self._beams])])
+                fixed = np.array([offsets[k] + d for k, d in self._fixed], dtype=int)
+                values = np.array(list(self._fixed.values()), dtype=float)
+                self._system = System(self._beams, self.loads, fixed, values, self.joints)
+            return self._system
 
     def with_beams(self, beams):
-        """The same supports, loads and joints on other beams.
+        """The same supports, loads, joints and velocities on other beams.
 
         Parameters
         ----------
@@ -308,26 +362,35 @@ class Scene:
         Raises
         ------
         InputError
-            If a boundary was given by facet numbers, or velocities by coordinates.
+            If a boundary was given by facet numbers, or velocities by coordinates, and the mesh
+            of their beam is another one.
+        MeshError
+            If a place or a point is not found on the other mesh.
         """
         scene = Scene(*beams)
-        known = {id(a): b for a, b in zip(self.beams, beams)}
+        if len(scene.beams) != len(self._beams):
+            raise InputError(f"the scene has {len(self._beams)} beams, got {len(scene.beams)}")
+        changed = [a.mesh is not b.mesh for a, b in zip(self._beams, scene.beams)]
 
-        def moved(value):
-            if isinstance(value, Joint):
-                return copy(value)  # bound to the new scene below
-            if isinstance(value, tuple) and any(id(v) in known for v in value):
-                return tuple(map(moved, value))
-            return known.get(id(value), value)
+        def require_portable(thing, moved):
+            for name, value in vars(thing).items():
+                if moved and name in ("boundary", "at") and not on_other_mesh(value):
+                    raise InputError(f"{thing!r} is at facets given by numbers, {value!r}, and "
+                                     "cannot be put on another mesh: give names or functions")
 
-        for name, args, kwargs in self._calls:
-            first = args[0] if args else kwargs.get("boundary", kwargs.get("v"))
-            if name in ("clamp", "pin", "fix", "traction", "pressure", "moment",
-                        "initial_velocity") and not (isinstance(first, str) or callable(first)):
-                raise InputError(f"{name}({first!r}) cannot be put on another mesh: give names or "
-                                 "functions")
-            getattr(scene, name)(*map(moved, args), **{k: moved(v) for k, v in kwargs.items()})
-        return scene
+        for support in self._supports:
+            require_portable(support, changed[support.beam])
+        for k, load, _ in self._loads:
+            require_portable(load, changed[k])
+        for joint, _ in self._joints:
+            require_portable(joint, any(changed))
+        for k, (v, _) in self._velocities.items():
+            if changed[k] and not callable(v):
+                raise InputError("initial_velocity was given by coordinates and cannot be put on "
+                                 "another mesh: give names or functions")
+        return scene._put(self._supports, [(k, load) for k, load, _ in self._loads],
+                          [joint for joint, _ in self._joints],
+                          [(k, v) for k, (v, _) in self._velocities.items()])
 
     def plan(self, kind="static"):
         """What a solution computes, keeps constant or skips, and why; ``print`` it.
@@ -439,7 +502,6 @@ class Scene:
         except ConvergenceError as error:
             raise ConvergenceError(str(error), Path(system, error.state)) from None
 
-    @_recorded
     def initial_velocity(self, v, beam=None):
         """The velocity at the start of :meth:`integrate`.
 
@@ -449,13 +511,14 @@ class Scene:
             Velocities of the coordinates, shape (beam.N,), or a function of the points x, shape
             (2, ...), of the stress-free body that returns velocities (2, ...).
         """
-        beam = select_beam(self.beams, beam)
+        return self._put(velocities=[(self._number(beam), v)])
+
+    def _bind_velocity(self, k, v):
+        beam = self._beams[k]
         if callable(v):
             basis = beam.exact_basis()
-            rate = require_finite("v(x)", v(np.asarray(basis.global_coordinates())))
-            v = basis.project(np.broadcast_to(rate, (2, basis.nelems, len(basis.W))))
-        self._velocity[id(beam)] = require_finite("v", v, (beam.N,))
-        return self
+            v = basis.project(require_field("v(x)", v, np.asarray(basis.global_coordinates())))
+        return require_finite("v", v, (beam.N,))
 
     def integrate(self, t_end, dt, scheme="energy-momentum", start=None, **options):
         """The motion from the stress-free state, or from a given one.
@@ -493,7 +556,8 @@ class Scene:
         >>> bool(np.ptp(history.total_energy) < 1e-12)
         True
         """
-        velocity = np.concatenate([self._velocity.get(id(b), np.zeros(b.N)) for b in self.beams])
+        velocity = np.concatenate([self._velocities[k][1] if k in self._velocities else
+                                   np.zeros(b.N) for k, b in enumerate(self._beams)])
         u = None if start is None else require_finite("start.u", start.u, (self.N,))
         return integrate(self.system, t_end, dt, get_scheme(scheme), u, velocity, **options)
 

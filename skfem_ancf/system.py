@@ -8,6 +8,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from .errors import SupportError
+from .joints.base import same_joint
 from .linalg import INACCURATE, BandMatrix, BorderedMatrix, border_inertia, hold
 
 logger = logging.getLogger(__name__)
@@ -175,10 +176,10 @@ class System:
     def joint_force(self, joint, multipliers, reaction):
         """What a joint does to its first beam, in the order of ``joint.equations``."""
         for known, part in zip(self.joints, self.multipliers_of(multipliers)):
-            if known is joint:
+            if same_joint(known, joint):
                 return -part
         for known, first, factors in self._fixing:
-            if known is joint:
+            if same_joint(known, joint):
                 return reaction[self.fixed[first:first + len(factors)]] / factors
         raise SupportError(f"{joint!r} is not a joint of this scene")
 

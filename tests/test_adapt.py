@@ -84,4 +84,4 @@ def test_scene_is_put_on_other_beams():
     assert_allclose(b.displacement((2, 0), "right"), a.displacement((2, 0), "right"), rtol=0.1)
     numbered = Scene(left).clamp(np.array([0]))
     with pytest.raises(InputError, match="names or functions"):
-        numbered.with_beams([left])
+        numbered.with_beams([left.with_mesh(left.mesh.refined())])

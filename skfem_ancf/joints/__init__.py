@@ -1,7 +1,7 @@
 """Joints: constraints with Lagrange multipliers. A new joint is one file and one line here."""
 
 from ..errors import NameUnknown
-from .base import Joint
+from .base import Joint, bind_joint
 from .guides import OnCircle, OnLine
 from .hinge import Hinge
 from .plane_section import PlaneSection
@@ -36,4 +36,4 @@ def get_joint(joint, **options):
 
 
 __all__ = ["JOINTS", "Hinge", "Joint", "OnCircle", "OnLine", "PlaneSection", "PrescribedAngle",
-           "PrescribedPosition", "Weld", "get_joint"]
+           "PrescribedPosition", "Weld", "bind_joint", "get_joint"]

@@ -1,8 +1,13 @@
 """What every joint shares: constraint equations on points and sections of beams."""
 
+from copy import copy
+from uuid import uuid4
+
 import numpy as np
 
-from ..errors import InputError
+from ..errors import AncfError, InputError, require_finite
+from ..loads import require_entries
+from ..places import is_point
 
 
 class Vector:
@@ -38,6 +43,11 @@ class Joint:
     the displacement of all coordinates of the scene. The multipliers are the forces (or moment)
     that the joint exerts, in the order of :attr:`equations`.
 
+    A joint of your own is a subclass that sets :attr:`equations` and defines :meth:`bind`,
+    :meth:`value`, :meth:`jacobian`, and :meth:`curvature` if it is not constant;
+    :meth:`skfem_ancf.Scene.add` takes it. The scene keeps a copy and binds others: one to its own
+    beams, and one to those of each finer mesh of ``solve_static(adapt=...)``.
+
     Attributes
     ----------
     equations : tuple of str
@@ -55,7 +65,14 @@ class Joint:
     name = None
 
     def bind(self, scene):
-        """Find the points and sections in the scene's coordinates."""
+        """Find the points and sections in the scene's coordinates.
+
+        Parameters
+        ----------
+        scene
+            Has ``beam(which)``, the Beam meant by a Beam, a name, a number or None,
+            ``offset(which)``, the number of its first coordinate, and ``N``.
+        """
         raise NotImplementedError
 
     def value(self, u, t):
@@ -91,6 +108,47 @@ class Joint:
         return f"<{type(self).__name__} {self.name or ''}>"
 
 
+def bind_joint(joint, scene):
+    """A copy of a joint, bound to a scene and tried there: what it returns fits the scene.
+
+    Raises
+    ------
+    InputError
+        If the joint does not keep to the interface of :class:`Joint`.
+    """
+    # by which it is known again: in a bound copy, on another mesh, in another process
+    vars(joint).setdefault("_key", uuid4().hex)
+    bound = copy(joint)
+    try:
+        bound.bind(scene)
+        if type(joint).__module__.rpartition(".")[0] != __package__:
+            _try(bound, scene.N)
+    except AncfError:
+        raise
+    except Exception as error:
+        if type(joint).__module__.rpartition(".")[0] == __package__:
+            raise
+        raise InputError(  # it is the user's: it may raise anything
+            f"{joint!r} fails in the stress-free state: {type(error).__name__}: {error}; a joint "
+            "defines bind(scene), value(u, t), jacobian(u, t)") from error
+    return bound
+
+
+def _try(joint, n):
+    m, zero = len(joint.equations), np.zeros(n)
+    require_finite(f"value(u, t) of {joint!r}", joint.value(zero, 0.0), (m,))
+    require_finite(f"jacobian(u, t) of {joint!r}", joint.jacobian(zero, 0.0), (m, n))
+    found = joint.curvature(zero, 0.0, np.ones(m))
+    if found is not None:
+        require_entries(f"curvature of {joint!r}", *found, n)
+
+
+def same_joint(a, b):
+    """True if both are the same joint, bound or not, to whatever mesh."""
+    return a is b or (getattr(a, "_key", None) is not None
+                      and getattr(a, "_key", None) == getattr(b, "_key", None))
+
+
 def point(scene, beam, at):
     """The position of the material point ``at`` of a beam, as a :class:`Vector`."""
     beam = scene.beam(beam)
@@ -111,11 +169,11 @@ def section(scene, beam, boundary):
 
 
 def pair(value, what):
-    """A value as a pair: given once for both beams, or once for each."""
-    if isinstance(value, (tuple, list)) and len(value) == 2 and not np.isscalar(value[0]):
-        return tuple(value)
+    """A point as a pair: given once for both beams, or once for each."""
     if value is None:
         raise InputError(f"a joint needs {what}")
+    if isinstance(value, (tuple, list)) and len(value) == 2 and not is_point(value):
+        return tuple(value)
     return value, value
 
 

@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from .base import Joint, cross_terms, pair, rotation, section
+from ..errors import InputError
+from ..places import is_place
+from .base import Joint, cross_terms, rotation, section
 
 
 class Weld(Joint):
@@ -16,19 +18,41 @@ class Weld(Joint):
     beams
         Two beams, by Beam, name or number.
     at
-        The end section of each beam, as ``("right", "left")``.
+        The section of each beam, as ``("right", "left")``; or one place for both, as the point of
+        the axis ``(1, 0)`` that they share.
+    apart
+        Allow that the sections are apart in the stress-free state: the weld draws them together.
+
+    Raises
+    ------
+    InputError
+        If the sections are apart.
     """
 
     equations = ("force along x", "force along y", "moment")
     constant = False
 
-    def __init__(self, beams, at, name=None):
-        self.beams, self.at, self.name = beams, at if isinstance(at, (tuple, list)) else pair(
-            at, "the sections at="), name
+    def __init__(self, beams, at, name=None, apart=False):
+        self.beams, self.name, self.apart = beams, name, apart
+        if is_place(at):
+            at = at, at
+        if not isinstance(at, (tuple, list)) or len(at) != 2:
+            raise InputError("a weld needs the section of each of its two beams, as "
+                             f"at=('right', 'left'), or one point of both axes, got {at!r}")
+        self.at = tuple(at)
 
     def bind(self, scene):
         (self.a, self.da), (self.b, self.db) = (
             section(scene, beam, at) for beam, at in zip(self.beams, self.at))
+        gap = self.b.start - self.a.start
+        if not self.apart and np.hypot(*gap) > 1e-6 * min(
+                scene.beam(beam).mesh.lengths.sum() for beam in self.beams):
+            raise InputError(
+                f"the sections to weld are {np.hypot(*gap):.6g} apart, one at "
+                f"({self.a.start[0]:.6g}, {self.a.start[1]:.6g}), the other at "
+                f"({self.b.start[0]:.6g}, {self.b.start[1]:.6g}): name sections that meet, move a "
+                f"mesh by mesh.translated(({-gap[0]:.6g}, {-gap[1]:.6g})), or weld with apart=True "
+                "to draw them together")
         angle = np.arctan2(*self.da.start[::-1]) - np.arctan2(*self.db.start[::-1])
         self.Q = rotation(angle)
         self.N = scene.N

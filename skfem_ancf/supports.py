@@ -1,0 +1,62 @@
+"""Supports: coordinates held at a place."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .errors import InputError, SupportError
+from .places import is_point
+
+
+@dataclass(frozen=True)
+class Support:
+    """Coordinates at a place that are given a displacement.
+
+    Attributes
+    ----------
+    beam : int
+        Number of the beam in its scene.
+    boundary
+        A place, see :func:`skfem_ancf.places.facets_of`.
+    names
+        Names of coordinates, or None for all.
+    displacement : float
+        At full load.
+    on_axis : bool
+        What is held is on the axis: a point that names the place must be, too.
+    """
+
+    beam: int
+    boundary: Any
+    names: Any = None
+    displacement: float = 0.0
+    on_axis: bool = False
+
+    def bind(self, beam, fixed):
+        """Add what is held of a beam to ``fixed``: (number of the beam, coordinate) -> value.
+
+        Raises
+        ------
+        SupportError
+            If a coordinate is given two displacements.
+        """
+        dofs = beam.dofs(self.boundary, self.names)
+        if self.on_axis and is_point(self.boundary):
+            self._require_on_axis(beam)
+        for d in map(int, dofs):
+            before = fixed.get((self.beam, d))
+            if before is not None and before != self.displacement:
+                raise SupportError(
+                    f"coordinate {beam.dofnames[d % beam.nd]} of node {d // beam.nd} is fixed "
+                    f"twice, with displacements {before!r} and {self.displacement!r}")
+            fixed[self.beam, d] = self.displacement
+
+    def _require_on_axis(self, beam):
+        x = np.asarray(self.boundary, dtype=float)
+        axis = beam.mesh.p[:, beam.section_node(self.boundary)]
+        if np.hypot(*(x - axis)) > 1e-3 * beam.mesh.height:
+            raise InputError(
+                f"pin holds the axis, at ({axis[0]:.9g}, {axis[1]:.9g}), and not the point "
+                f"({x[0]:.9g}, {x[1]:.9g}) of its section: give that point of the axis, or hold "
+                'the other with scene.joint("position", at=..., r=lambda t: point)')
