@@ -11,6 +11,8 @@ from .materials import NeoHookean, StVenantKirchhoff
 from .mesh import MeshBeam
 from .scene import Scene
 
+__version__ = "0.1.0"
+
 __all__ = [
     "AncfError", "Beam", "ConvergenceError", "ElementBeamANCF", "ElementBeamANCFCubic",
     "ElementBeamCable", "ElementBeamPatelShabana", "EnergyMomentum", "GeneralizedAlpha", "HHT",

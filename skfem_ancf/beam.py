@@ -71,7 +71,7 @@ class Beam:
         What messages and multi-beam scenes call the beam.
     compiled
         Use the kernels compiled by Numba, if it is installed and they apply; the results agree to
-        round-off.
+        round-off. The environment variable ``SKFEM_ANCF_COMPILED=0`` leaves Numba out everywhere.
     fields, tolerance
         For the element "auto": names of section fields that will be looked at, and the relative
         error that the beam theory may have.

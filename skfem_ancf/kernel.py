@@ -15,6 +15,7 @@ import numpy as np
 
 from .materials import LinearLaw
 from .quadrature import tensor
+from .switch import compiled_off
 
 #: Elements evaluated together; keeps the work arrays in cache and the memory bounded.
 CHUNK = 1024
@@ -308,14 +309,12 @@ class Chain:
         return [slice(k, k + CHUNK) for k in range(0, self.t.shape[1], CHUNK)]
 
     def compile(self):
-        """Use Numba from now on, if it is installed and has what this kernel needs."""
+        """Use Numba from now on, if it is there and has what this kernel needs."""
         packs = self._packs()
-        if packs is None:
+        if packs is None or compiled_off() is not None:
             return
-        try:
-            from .compiled import CompiledKernel
-        except ImportError:
-            return
+        from .compiled import CompiledKernel
+
         self.compiled = CompiledKernel(packs, len(packs[0]) == 11, self.t.shape[1])
 
     def _packs(self):

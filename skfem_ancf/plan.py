@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from .errors import NameUnknown
+from .switch import compiled_off
 
 KINDS = ("static", "linear", "dynamic")
 
@@ -106,7 +107,8 @@ def make_plan(scene, kind="static"):
     compiled = [b for b in beams if b.kernel.compiled is not None]
     add("compiled kernels", "computed" if compiled else "skipped",
         f"{len(compiled)} of {len(beams)} beams by Numba" if compiled else
-        "Numba is not installed, not wanted, or does not apply")
+        compiled_off() or ("moduli that vary" if any(b.compiled for b in beams) else
+                           "compiled=False"))
     what = "time steps" if dynamic else "iterations"
     if linear:
         whole, reason = False, "one solve"

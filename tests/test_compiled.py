@@ -11,8 +11,10 @@ from skfem_ancf.joints import JOINTS, Joint
 from skfem_ancf.joints.base import point
 from skfem_ancf.linalg import BandMatrix
 from skfem_ancf.materials import LinearLaw
+from skfem_ancf.switch import compiled_off
 
-pytest.importorskip("numba")
+if compiled_off() is not None:
+    pytest.skip(compiled_off(), allow_module_level=True)
 
 MESHES = {
     "equal": lambda: MeshBeam.init_line(np.linspace(0, 1, 5), 0.1),

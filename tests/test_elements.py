@@ -103,6 +103,17 @@ def test_fourth_order_function_in_full():
     assert_allclose(P, eta * (-1 / 2 + eta / 2 + 4 * eta ** 2 / 3 - 2 * eta ** 3), atol=1e-15)
 
 
+@pytest.mark.parametrize("n", range(3, 13))
+def test_gauss_lobatto_points_are_the_roots(n):
+    """Of (1 - x^2) P'_{n-1}: real, antisymmetric to the last digit, with the rule's exactness."""
+    x = 2 * ElementBeamANCF(n, "gauss-lobatto").section_points
+    assert x.dtype == np.float64 and np.array_equal(x, -x[::-1]) and np.all(np.diff(x) > 0)
+    P = np.polynomial.Legendre.basis(n - 1)
+    w = 2 / (n * (n - 1) * P(x)**2)
+    for k in range(2 * n - 2):
+        assert_allclose(w @ x**k, 2 / (k + 1) if k % 2 == 0 else 0.0, atol=1e-14)
+
+
 def test_gauss_lobatto_points():
     assert_allclose(ElementBeamANCF(4, "gauss-lobatto").section_points * 2,
                     [-1, -1 / np.sqrt(5), 1 / np.sqrt(5), 1], atol=1e-15)

@@ -1,5 +1,6 @@
 """What a scene does not need is not computed: counted by calls, not read from the plan alone."""
 
+import os
 import subprocess
 import sys
 
@@ -12,6 +13,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, Mes
 from skfem_ancf.beam import Beam as BeamClass
 from skfem_ancf.kernel import TermTables
 from skfem_ancf.linalg import BandMatrix
+from skfem_ancf.switch import compiled_off
 from skfem_ancf.system import System
 
 
@@ -105,7 +107,8 @@ def test_no_field_that_nobody_asked_for(count):
 
 
 def compiled_scene():
-    pytest.importorskip("numba")
+    if compiled_off() is not None:
+        pytest.skip(compiled_off())
     beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.01), ElementBeamCable(3),
                 StVenantKirchhoff(2e8, 0.3, 7800), 0.01)
     return Scene(beam).pin("left").gravity((0, -9.81))
@@ -132,6 +135,34 @@ def test_compiled_loop_as_planned(count, add):
         assert s.plan(kind)["compiled loop"].status == ("computed" if whole else "skipped")
         assert (len(assembled) == before) == whole
     assert s.plan("linear")["compiled loop"].status == "skipped"
+
+
+def test_numba_is_left_out_on_request(monkeypatch):
+    """One variable for all beams; what else it may be set to is refused, and the plan says why."""
+    assert "compiled=False" in scene().plan()["compiled kernels"].reason
+    monkeypatch.setenv("SKFEM_ANCF_COMPILED", "0")
+    beam = Beam(MeshBeam.init_line([0, 0.5, 1], 0.01), ElementBeamCable(3),
+                StVenantKirchhoff(2e8, 0.3, 7800), 0.01)
+    assert beam.compiled and beam.kernel.compiled is None
+    off = Scene(beam).pin("left")
+    assert off.plan()["compiled kernels"][1:] == ("skipped", "SKFEM_ANCF_COMPILED=0")
+    monkeypatch.setenv("SKFEM_ANCF_COMPILED", "no")
+    with pytest.raises(InputError, match="must be 0 .* or 1, got 'no'"):
+        Beam(beam.mesh, beam.element, beam.material, 0.01).kernel
+
+
+@pytest.mark.parametrize("module", ["raise ImportError('NumPy is too new')",
+                                    "class config: DISABLE_JIT = 1"])
+def test_a_numba_that_cannot_be_used_is_left_out(tmp_path, module):
+    (tmp_path / "numba.py").write_text(module)
+    code = ("from skfem_ancf import *; beam = Beam(MeshBeam.init_line([0, 1], 0.1), "
+            "ElementBeamCable(3), StVenantKirchhoff(1.0, 0.3), 0.1); "
+            "print(Scene(beam).pin('left').plan()['compiled kernels'].reason)")
+    paths = [str(tmp_path), os.getcwd(), *filter(None, [os.environ.get("PYTHONPATH")])]
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
+                         env={**os.environ, "SKFEM_ANCF_COMPILED": "1",
+                              "PYTHONPATH": os.pathsep.join(paths)}).stdout
+    assert ("NumPy is too new" if "raise" in module else "NUMBA_DISABLE_JIT") in out
 
 
 def test_plan_of_every_kind():

@@ -94,7 +94,7 @@ def shapes(sheet, times, title):
     ax.set_xlabel("x (m)")
     ax.set_ylabel("y (m)")
     figure.suptitle(title)
-    figure.legend(loc="outside right center", fontsize=8.5)
+    ax.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), fontsize=8.5)
     return figure
 
 

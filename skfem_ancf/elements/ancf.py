@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.polynomial import legendre
+from scipy.special import roots_jacobi
 
 from ..errors import InputError, NameUnknown
 from .base import ElementBeam, SectionFunctions
@@ -14,8 +15,9 @@ def _chebyshev(n):
 
 
 def _gauss_lobatto(n):
-    inner = legendre.legroots(legendre.legder(np.eye(n)[n - 1]))
-    return np.concatenate([[-1.0], inner, [1.0]])
+    """Both faces, and the zeros of P_{n-1}' between them: those of a Jacobi polynomial."""
+    inner, _ = roots_jacobi(n - 2, 1.0, 1.0)
+    return np.concatenate([[-1.0], 0.5 * (inner - inner[::-1]), [1.0]])
 
 
 POINT_FAMILIES = {

@@ -1,0 +1,123 @@
+"""sdist and wheel hold what they should: built, installed where no checkout is, and tested."""
+
+import os
+import re
+import subprocess
+import sys
+import sysconfig
+import tarfile
+import venv
+import zipfile
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import pytest
+
+import skfem_ancf
+
+ROOT = Path(__file__).resolve().parent.parent
+#: Quick, and of every folder that the tests read: docs, demos, benchmarks, the Makefile.
+SUBSET = ["tests/test_readme.py::" + name for name in (
+    "test_links_lead_somewhere", "test_targets_of_the_readme_are_in_the_makefile",
+    "test_scripts_of_a_page_run_in_order[README.md]")] + [
+    "tests/test_demos.py::test_plain_scikit_fem_and_scene_agree",
+    "tests/test_bench.py::test_goals_say_which_error_is_missed", "tests/test_mapping.py"]
+BUILD = "import sys, setuptools.build_meta as b; b.build_sdist(sys.argv[1])"
+WHEEL = "import sys, setuptools.build_meta as b; b.build_wheel(sys.argv[1])"
+
+
+def run(*command, cwd, **env):
+    """Run in an environment that knows no checkout; what it printed, or a failure with it."""
+    clean = {k: v for k, v in os.environ.items()
+             if not k.startswith(("PYTHON", "PYTEST", "COV_")) or k == "PYTHONWARNINGS"}
+    done = subprocess.run([str(c) for c in command], cwd=cwd, env={**clean, **env}, text=True,
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    assert done.returncode == 0, done.stdout[-4000:]
+    return done.stdout
+
+
+def major(package):
+    """Its version, not imported: setuptools changes the import system."""
+    try:
+        return int(version(package).split(".")[0])
+    except PackageNotFoundError:
+        return -1
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """The sdist of a copy of the checkout, unpacked, and the wheel made from it."""
+    if major("setuptools") < 77:
+        pytest.skip("setuptools is older than pyproject.toml wants")
+    if not (ROOT / "MANIFEST.in").exists():
+        pytest.skip("not run from a checkout or an sdist")
+    tmp = tmp_path_factory.mktemp("built")
+    copy = tmp / "copy"
+    listed = subprocess.run(["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+                            cwd=ROOT, capture_output=True, text=True)
+    files = [ROOT / f for f in listed.stdout.split("\0") if f] or [
+        p for p in ROOT.rglob("*") if not {"__pycache__", ".venv", "out"} & set(p.parts)]
+    for source in files:
+        if source.is_file():
+            target = copy / source.relative_to(ROOT)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(source.read_bytes())
+    run(sys.executable, "-c", BUILD, tmp, cwd=copy)
+    sdist, = tmp.glob("*.tar.gz")
+    with tarfile.open(sdist) as archive:
+        if hasattr(tarfile, "data_filter"):
+            archive.extractall(tmp, filter="data")
+        else:
+            archive.extractall(tmp)
+    source = tmp / sdist.name[:-len(".tar.gz")]
+    run(sys.executable, "-c", WHEEL, tmp, cwd=source)
+    wheel, = tmp.glob("*.whl")
+    return copy, sdist, source, wheel
+
+
+def test_the_sdist_holds_the_tests_and_what_they_read(built):
+    copy, _, source, _ = built
+    for folder in ("skfem_ancf", "tests", "docs", "demos", "benchmarks"):
+        wanted = {p.relative_to(copy) for p in (copy / folder).rglob("*") if p.is_file()}
+        assert wanted - {p.relative_to(source) for p in source.rglob("*")} == set(), folder
+    for name in ("Makefile", "LICENSE", "README.md", "pyproject.toml", "MANIFEST.in"):
+        assert (source / name).is_file(), name
+
+
+def test_the_wheel_holds_the_package_and_nothing_else(built):
+    copy, _, _, wheel = built
+    with zipfile.ZipFile(wheel) as archive:
+        names = [n for n in archive.namelist() if ".dist-info/" not in n]
+        metadata, = (n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
+        metadata = archive.read(metadata).decode()
+    assert sorted(names) == sorted(p.relative_to(copy).as_posix()
+                                   for p in (copy / "skfem_ancf").rglob("*.py"))
+    assert f"\nVersion: {skfem_ancf.__version__}\n" in metadata
+    assert "\nLicense-Expression: BSD-3-Clause\n" in metadata
+
+
+@pytest.mark.parametrize("kind", ["sdist", "wheel"])
+def test_installed_in_an_environment_of_its_own(built, kind, tmp_path):
+    """The tests of the sdist run against what was installed; the dependencies are this Python's."""
+    if major("pip") < 0:
+        pytest.skip("there is no pip")
+    _, sdist, source, wheel = built
+    venv.create(tmp_path / "env", with_pip=False)
+    python = tmp_path / "env" / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    site = Path(run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))",
+                    cwd=tmp_path).strip())
+    # searched after the environment's own; the .pth files there, of checkouts, are not read
+    (site / "dependencies.pth").write_text("\n".join(
+        {sysconfig.get_path("purelib"), sysconfig.get_path("platlib")}))
+    run(python, "-m", "pip", "install", "--no-index", "--no-deps", "--no-build-isolation",
+        "--ignore-installed", "--disable-pip-version-check", sdist if kind == "sdist" else wheel,
+        cwd=tmp_path)
+    found = run(python, "-c", "import skfem_ancf as a; print(a.__version__, a.__file__)",
+                cwd=tmp_path).split()
+    assert found[0] == skfem_ancf.__version__ and Path(found[1]).is_relative_to(site)
+    code = ("import sys, pytest; sys.path.remove(''); status = pytest.main(sys.argv[1:]); "
+            "import skfem_ancf; print('tested', skfem_ancf.__file__); sys.exit(status)")
+    out = run(python, "-c", code, "-p", "no:cacheprovider", *SUBSET, cwd=source,
+              SKFEM_ANCF_COMPILED="0")  # not to compile it anew
+    assert f"tested {found[1]}" in out
+    assert re.search(r"\d+ passed", out) or "[100%]" in out
