@@ -17,6 +17,15 @@ _NONE = np.zeros(0)
 WIDE_BORDER = 96
 
 
+def _unit_rows(rows):
+    """The rows scaled to a largest entry of 1, without those that are zero.
+
+    Rows for slopes have another unit than rows for positions.
+    """
+    norms = np.abs(rows).max(axis=1, initial=0.0)
+    return rows[norms > 0] / norms[norms > 0, None]
+
+
 class System:
     """The discrete equations of a scene.
 
@@ -416,8 +425,8 @@ class System:
         out = []
         for beam, s in zip(self.beams, self.slices):
             held = self.fixed[(self.fixed >= s.start) & (self.fixed < s.stop)] - s.start
-            motions = beam.rigid_motions()[held] / [1.0, 1.0, self.size]
-            if np.linalg.matrix_rank(motions, 1e-9 * np.abs(motions).max(initial=0.0)) == 3:
+            motions = _unit_rows(beam.rigid_motions()[held] / [1.0, 1.0, self.size])
+            if len(motions) and np.linalg.matrix_rank(motions, 1e-9) == 3:
                 continue
             p = beam.mesh.p
             far = int(np.argmax(np.sum((p - p[:, :1]) ** 2, axis=0)))
@@ -528,9 +537,7 @@ class System:
         if self.joints:
             zero = np.zeros(self.N)
             held = np.vstack([held] + [j.jacobian(zero, 0.0) @ motions for j in self.joints])
-        # rows for slopes have another unit than rows for positions: scale each to its size
-        norms = np.abs(held).max(axis=1, initial=0.0)
-        held = held[norms > 0] / norms[norms > 0, None]
+        held = _unit_rows(held)
         if not len(held):
             return [self._describe(v, sizes) for v in np.eye(n)]
         _, sigma, V = np.linalg.svd(np.linalg.qr(held, mode="r"))  # held may have many rows
