@@ -1,6 +1,8 @@
 # make demo    the cantilever of the paper: numbers, out/*.vtu, out/*.png
 # make test    the tests, on two processes
 # make paper   the paper's tables; bench: timings; stress: large and hard cases
+# make fuzz    2000 random scenes; mutants: changes of the text that the tests should see
+# make coverage  the tests, with the lines and branches that they run
 # make docs    reference pages from the docstrings, out/docs, and the pictures of docs/
 # make clean   removes .venv and out
 #
@@ -14,7 +16,7 @@ PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test paper bench stress docs clean
+.PHONY: demo test paper bench stress fuzz mutants coverage docs clean
 
 demo: $(VENV)/test.stamp
 	$(PY) demos/cantilever.py
@@ -30,6 +32,16 @@ bench: $(VENV)/bench.stamp
 
 stress: $(VENV)/test.stamp
 	$(PY) benchmarks/stress.py
+
+fuzz: $(VENV)/test.stamp
+	$(PY) benchmarks/fuzz.py $(ARGS)
+
+mutants: $(VENV)/coverage.stamp
+	$(PY) benchmarks/mutation/mutation.py --named
+	$(PY) benchmarks/mutation/mutation.py $(ARGS)
+
+coverage: $(VENV)/coverage.stamp
+	$(PY) -m pytest -n 2 --cov --cov-report=term-missing:skip-covered --cov-fail-under=95 $(ARGS)
 
 docs: $(VENV)/docs.stamp
 	$(PY) docs/pictures.py

@@ -1,0 +1,505 @@
+"""Random static scenes: each ends in an equilibrium, which is checked, or in an error of ours.
+
+    python benchmarks/fuzz.py --scenes 2000 --seed 1
+    python benchmarks/fuzz.py --scenes 1 --seed 1 --first 1234 --show   # one of them, as a script
+
+A scene is drawn as the text of a script (:func:`draw`), which is what is run and what is shown
+where something is wrong. The equilibrium is checked by an evaluation of its own
+(:class:`Body`): the strains by scikit-fem's ``Basis``, the cable by monomials, their derivatives
+by the complex step. Where the formulation is "continuum", scikit-fem assembles the textbook's form
+as well. Its stability is checked by the dense eigenvalues of the derivative of that residual.
+
+Ends with 1 if an end is neither of the two, and says which scenes they were.
+"""
+
+import argparse
+import collections
+import math
+import signal
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+from scipy.linalg import null_space
+from skfem import Basis, asm
+
+from skfem_ancf import AncfError, ElementBeamCable, forms
+from skfem_ancf.elements import ELEMENTS
+
+FORMULATIONS = ("assumed", "continuum", "ecm", "strain-split")
+HEADER = '''import numpy as np
+from skfem_ancf import *
+from skfem_ancf.elements import ELEMENTS
+'''
+
+
+# drawing
+
+
+class Dice:
+    """Draws from a random generator. The tests draw from Hypothesis by the same three methods."""
+
+    def __init__(self, seed):
+        self.rng = np.random.default_rng(seed)
+
+    def integer(self, low, high):
+        """An integer from low to high, both included."""
+        return int(self.rng.integers(low, high + 1))
+
+    def number(self, low, high):
+        """A number between two bounds, to three digits: scripts stay short."""
+        return float(f"{self.rng.uniform(low, high):.3g}")
+
+    def choice(self, items):
+        """One of the items, which may be repeated for weight."""
+        return items[int(self.rng.integers(len(items)))]
+
+
+def _mesh(dice, most, origin):
+    """The text of a mesh that starts at ``origin``, and whether it is straight."""
+    kind = dice.choice(("line", "line", "graded", "arc", "wave"))
+    n, L = dice.integer(2, most), dice.number(0.5, 2.0)
+    slenderness = dice.choice((5, 20, 100, 1000))
+    if dice.integer(0, 9) == 0:
+        n = 1
+    h, angle = float(f"{L / slenderness:.3g}"), dice.choice((0.0, 0.0, dice.number(-3, 3)))
+    if kind in ("line", "graded"):
+        x = (f"np.linspace(0, {L}, {n + 1})" if kind == "line" else
+             f"{L} * np.linspace(0, 1, {n + 1})**{dice.choice((1.5, 2.0))}")
+        return (f"MeshBeam.init_line({x}, {h}, origin={origin}, angle={angle})", True, L, h)
+    if kind == "arc":
+        R = float(f"{L / dice.number(0.3, 2.5):.3g}")
+        r = f"{R} * np.sin(s / {R}), {R} - {R} * np.cos(s / {R})"
+    else:
+        r = f"s, {float(f'{0.1 * L:.3g}')} * np.sin({float(f'{3 / L:.3g}')} * s)"
+    return (f"MeshBeam.init_curve(lambda s: np.array([{r}]),\n    np.linspace(0, {L}, {n + 1}), "
+            f"{h}).rotated({angle}).translated({origin})", False, L, h)
+
+
+def _beam(dice, k, most, origin):
+    """Lines of a beam, its length, and its bending stiffness."""
+    mesh, straight, L, h = _mesh(dice, most, origin)
+    if dice.integer(0, 3) == 0:
+        element = f"ElementBeamCable({dice.choice((3, 5, 7) if straight else (3, 5))})"
+    else:
+        name = dice.choice([n for n in ELEMENTS if most <= 4 or n not in
+                            ("ancf-7", "ancf-8", "ancf-9", "ancf-10", "cubic-6")])
+        element = f"ELEMENTS[{name!r}]()"
+    law = dice.choice(("StVenantKirchhoff",) * 3 + ("NeoHookean",))
+    formulation = dice.choice(("assumed", "assumed") + FORMULATIONS)
+    if law == "NeoHookean" and formulation in ("ecm", "strain-split") and dice.integer(0, 9):
+        formulation = "assumed"
+    E, nu = dice.choice((1e3, 1e6, 2e11)), dice.choice((0.0, 0.3, 0.3, 0.45, -0.2))
+    plane = dice.choice(("stress", "stress", "strain"))
+    lines = [f"mesh{k} = {mesh}",
+             f"material{k} = {law}(E={E}, nu={nu}, density=1.0, plane={plane!r})",
+             f"beam{k} = Beam(mesh{k}, {element}, material{k}, 0.1, {formulation!r}, "
+             f"name='b{k}', compiled=COMPILED)"]
+    return lines, L, E * 0.1 * h**3 / 12.0, E * 0.1 * h
+
+
+def _supports(dice, n):
+    """Lines that hold the first beam, and perhaps the last."""
+    last, out = f"beam{n - 1}", []
+    far = f"tuple(mesh{n - 1}.p[:, -1])"
+    kind = dice.choice(("clamp", "clamp", "clamp free", "pin", "both", "all"))
+    if kind.startswith("clamp") or kind == "both":
+        free = kind == "clamp free" or dice.integer(0, 2) == 0
+        out.append(f"scene.clamp('left', beam=beam0, thickness={'free' if free else 'fixed'!r})")
+    elif kind == "all":
+        out.append("scene.fix('left', beam=beam0)")
+    else:
+        out.append("scene.pin('left', beam=beam0)")
+        if dice.integer(0, 5):
+            out.append(f"scene.pin('right', beam={last})")
+        else:
+            out.append(f"scene.fix('right', ['r^2'], beam={last})")
+    if kind == "both":
+        out.append(dice.choice((
+            f"scene.clamp('right', beam={last})",
+            f"scene.fix('right', ['r^1'], displacement={dice.number(-0.1, 0.1)}, beam={last})",
+            f"scene.joint('line', at={far}, direction=(1, {dice.number(-1, 1)}), beam={last})",
+            f"scene.joint('circle', at={far}, center=(0.3, {dice.number(2, 4)}), beam={last})",
+            f"scene.joint('angle', at='right', angle=lambda t: {dice.number(-1, 1)} * t, "
+            f"beam={last})",
+            f"scene.joint('position', at={far}, beam={last},\n    r=lambda t, p={far}: "
+            f"(p[0] + {dice.number(-0.1, 0.1)} * t, p[1] + {dice.number(-0.2, 0.2)} * t))",
+            f"scene.joint('plane', at='right', beam={last})")))
+    return out
+
+
+def _loads(dice, n, size, stiff, wild):
+    """Lines of one to three loads; ``size`` is E I / L^2 of the softest beam."""
+    out = []
+    for _ in range(dice.integer(1, 3)):
+        k = dice.integer(0, n - 1)
+        P = size * 10.0 ** dice.number(-2, 1) * dice.choice((1.0, -1.0)) * (30.0 if wild else 1.0)
+        P = float(f"{P:.3g}")
+        a = dice.number(-3.2, 3.2)
+        force = f"({P} * np.cos({a}), {P} * np.sin({a}))"
+        at = f"tuple(mesh{k}.p[:, {dice.choice((-1, -1, 1))}])"
+        kind = dice.choice(("point", "point", "point", "gravity", "traction", "moment", "pressure"))
+        L = f"mesh{k}.lengths.sum()"
+        out.append({
+            "point": f"scene.point_force({force}, at={at}, beam=beam{k})",
+            "gravity": f"scene.gravity(np.array({force}) / beam{k}.total_mass, beam=beam{k})",
+            "traction": f"scene.traction('top', np.array({force}) / (0.1 * {L}), beam=beam{k})",
+            "moment": f"scene.moment('right', {P} * {L}, beam=beam{k})",
+            "pressure": f"scene.pressure('top', {P} / (0.1 * {L}), beam=beam{k})"}[kind])
+    return out
+
+
+def draw(dice):
+    """The script of a scene: it makes ``scene`` and ``options``; COMPILED is given to it."""
+    n = dice.choice((1,) * 6 + (2,) * 3 + (3,))
+    most = dice.choice((8, 8, 4)) if n == 1 else 4
+    lines, origin, EI = [], "(0.0, 0.0)", []
+    for k in range(n):
+        beam, L, stiffness, stiff = _beam(dice, k, most, origin)
+        lines += beam
+        EI.append(stiffness / L**2)
+        origin = f"tuple(mesh{k}.p[:, -1])"
+    lines.append(f"scene = Scene({', '.join(f'beam{k}' for k in range(n))})")
+    for k in range(n - 1):
+        lines.append(f"scene.joint('weld', beams=(beam{k}, beam{k + 1}), at=('right', 'left'))"
+                     if dice.integer(0, 2) else
+                     f"scene.joint('hinge', beams=(beam{k}, beam{k + 1}), "
+                     f"at=tuple(mesh{k}.p[:, -1]))")
+    lines += _supports(dice, n)
+    lines += _loads(dice, n, min(EI), stiff, wild=dice.integer(0, 19) == 0)
+    options = {"method": "newton"} if dice.integer(0, 7) == 0 else {}
+    if dice.integer(0, 7) == 0:
+        options["first_step"] = 0.25
+    return "\n".join(lines + [f"options = {options}", ""])
+
+
+# an evaluation of its own
+
+
+class Body:
+    """Internal force of a beam at coordinate displacements (..., N), real or complex.
+
+    Where the strain is sampled is asked of the formulation's terms; the strain itself is that of
+    scikit-fem's fields. The stabilisation, whose matrix is constant, is the formulation's own.
+    """
+
+    def __init__(self, beam):
+        self.beam, self.nb = beam, beam.nd // 2
+        t = beam.mesh.t
+        self.dofs = np.concatenate([t[0][:, None] * self.nb + np.arange(self.nb),
+                                    t[1][:, None] * self.nb + np.arange(self.nb)], axis=1)
+        self.q0 = (beam.q0 - np.tile(np.append(beam.mesh.p[:, 0], np.zeros(beam.nd - 2)),
+                                     len(beam.q0) // beam.nd))
+        self.constant = (beam.formulation.stabilisation(
+            beam.mesh, beam.element, beam.material, beam.width)
+            if not beam.is_cable or (self.nb == 2 and beam.formulation.name == "assumed") else None)
+        if beam.is_cable:
+            self._cable()
+        else:
+            self.terms = [self._term(t) for t in beam.formulation.terms(beam.element,
+                                                                       beam.material)]
+
+    def _gradients(self, X, W):
+        basis = Basis(self.beam.mesh, self.beam.vector_element, quadrature=(X, W))
+        # of the first component of the vector element: the scalar functions
+        grad = np.array([basis.basis[k][0].grad[0] for k in range(0, basis.Nbfun, 2)])
+        frame = self.beam.mesh.mapping().frame(X)
+        return np.einsum("kjep,jJep->Jepk", grad, frame)
+
+    def _term(self, term):
+        eta = term.section_nodes
+        tables = []
+        for name in ("xx", "yy", "xy"):
+            xi = term.nodes(name)
+            X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
+            tables.append((self._gradients(X, np.ones(X.shape[1])), term.matrix(name)))
+        X, W = term.quadrature
+        dV = self.beam.width * W * self.beam.mesh.mapping().detDF(X)
+        return term.law, tables, dV
+
+    def _cable(self):
+        """r' and r'' at the points by monomials whose values at the ends are the coordinates."""
+        beam, m = self.beam, self.nb
+        n = 2 * m - 2 + (m > 2 and beam.mesh.nelements == 1)
+        n = n if beam.formulation.name == "assumed" else 2 * m
+        x, w = np.polynomial.legendre.leggauss(n)
+        first, second = [], []
+        for L in beam.mesh.lengths:
+            ends = np.array([[math.perm(j, d) * s**(j - d) if j >= d else 0.0
+                              for j in range(2 * m)] for s in (0.0, L) for d in range(m)])
+            inverse = np.linalg.inv(ends)
+            s = 0.5 * L * (x + 1)
+            for out, d in ((first, 1), (second, 2)):
+                powers = np.array([math.perm(j, d) * s**max(j - d, 0) if j >= d else 0.0 * s
+                                   for j in range(2 * m)]).T
+                out.append(powers @ inverse)
+        self.G = np.array(first), np.array(second)
+        self.w = 0.5 * w * beam.mesh.lengths[:, None]
+        E = beam.material.E / (1 if beam.material.plane == "stress" else 1 - beam.material.nu**2)
+        A = beam.width * beam.mesh.height
+        self.EA, self.EI = E * A, E * A * beam.mesh.height**2 / 12
+
+    def _elements(self, v):
+        return v.reshape(v.shape[:-1] + (-1, 2))[..., self.dofs, :]
+
+    def force(self, u):
+        """(..., N)."""
+        out = np.zeros_like(u)
+        q = self._elements(self.q0 + u)
+        f = self._cable_force(q) if self.beam.is_cable else self._body_force(q)
+        if self.constant is not None:
+            du = self._elements(u)
+            f = f + np.einsum("eab,...eb->...ea", np.broadcast_to(
+                self.constant, (len(self.dofs),) + self.constant.shape[1:]),
+                du.reshape(du.shape[:-2] + (-1,))).reshape(f.shape)
+        rows = out.reshape(out.shape[:-1] + (-1, 2))
+        for e, dofs in enumerate(self.dofs):
+            rows[..., dofs, :] += f[..., e, :, :]
+        return out
+
+    def _body_force(self, q):
+        total = 0.0
+        for law, tables, dV in self.terms:
+            strain, F = [], []
+            for name, (T, matrix) in zip(("xx", "yy", "xy"), tables):
+                rx, ry = (np.einsum("epk,...eki->...epi", T[J], q, optimize=True) for J in (0, 1))
+                a, b = {"xx": (rx, rx), "yy": (ry, ry), "xy": (rx, ry)}[name]
+                value = np.sum(a * b, axis=-1)
+                value = value if name == "xy" else 0.5 * (value - 1.0)
+                strain.append(value if matrix is None else value @ matrix.T)
+                F.append((rx, ry))
+            S = law.stress(np.array(strain)) * dV
+            for name, (T, matrix), (rx, ry), s in zip(("xx", "yy", "xy"), tables, F, S):
+                s = (s if matrix is None else s @ matrix)[..., None]
+                if name == "xy":
+                    total = total + np.einsum("epk,...epi->...eki", T[0], s * ry, optimize=True)
+                    total = total + np.einsum("epk,...epi->...eki", T[1], s * rx, optimize=True)
+                else:
+                    J, r = (0, rx) if name == "xx" else (1, ry)
+                    total = total + np.einsum("epk,...epi->...eki", T[J], s * r, optimize=True)
+        return total
+
+    def _curvature(self, q):
+        a, b = (np.einsum("epk,...eki->...epi", G, q) for G in self.G)
+        s = np.sum(a * a, axis=-1)
+        return a, b, s, (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]) / s
+
+    def _cable_force(self, q):
+        a, b, s, kappa = self._curvature(q)
+        _, _, s0, kappa0 = self._curvature(self._elements(self.q0))
+        N = self.EA * (np.sqrt(s) - np.sqrt(s0)) * self.w
+        M = self.EI * (kappa - kappa0) * self.w
+        turned_a, turned_b = (np.stack([-x[..., 1], x[..., 0]], -1) for x in (a, b))
+        along = (N / np.sqrt(s))[..., None] * a + (M / s)[..., None] * (
+            -turned_b - 2.0 * kappa[..., None] * a)
+        return (np.einsum("epk,...epi->...eki", self.G[0], along)
+                + np.einsum("epk,...epi->...eki", self.G[1], (M / s)[..., None] * turned_a))
+
+
+def internal_force(bodies, system, u):
+    """Of a scene, (..., N)."""
+    return np.concatenate([b.force(u[..., s]) for b, s in zip(bodies, system.slices)], axis=-1)
+
+
+def external_force(system, u):
+    out = np.zeros(system.N, dtype=u.dtype)
+    for load in system.loads:
+        s = system.of(load)
+        out[s] += load.force(u[s])
+    return out
+
+
+def tangent(bodies, state):
+    """The derivative of the residual, dense, by the complex step; of the joints by differences."""
+    system, N, step = state.system, state.system.N, 1e-30
+    K = np.imag(internal_force(bodies, system, state.u + 1j * step * np.eye(N))).T / step
+    for j in range(N) if not all(load.constant for load in system.loads) else ():
+        K[:, j] -= np.imag(external_force(system, state.u + 1j * step * np.eye(N)[j])) / step
+    if system.joints:
+        h = 1e-3 * system.size
+        for j in range(N):
+            a, b = (state.multipliers @ system.full_jacobian(state.u + x * np.eye(N)[j], state.load)
+                    for x in (-h, h))
+            K[:, j] += (b - a) / (2 * h)  # exact: the joints are quadratic at most
+    return K
+
+
+# checks
+
+
+class Wrong(Exception):
+    """An equilibrium that is none, or that is not what it says."""
+
+
+def check(scene, state, tol=1e-5):
+    """The verdict of the dense eigenvalues; raises Wrong."""
+    system, u = state.system, state.u
+    if not np.all(np.isfinite(u)) or not state.converged:
+        raise Wrong("it says that it has converged, and it has not")
+    bodies = [Body(b) for b in system.beams]
+    force = internal_force(bodies, system, u)
+    for body, s in zip(bodies, system.slices):  # the textbook, as scikit-fem assembles it
+        beam = body.beam
+        if beam.formulation.name == "continuum" and not beam.is_cable:
+            f = asm(forms.textbook.internal_force(beam.material, beam.width,
+                                                  beam.material.shear_factor(beam.element)),
+                    beam.basis, r=beam.q0 + u[s])
+            if np.max(np.abs(f - force[s])) > 1e-8 * np.max(np.abs(f)) + 1e-10 * beam.material.E \
+                    * beam.width * beam.mesh.height:
+                raise Wrong("the textbook's form gives another force")
+    external = external_force(system, u) * state.load
+    R = external - force - state.multipliers @ system.full_jacobian(u, state.load)
+    K = tangent(bodies, state)
+    scale = 1.0 / np.maximum(np.abs(np.diag(K)), 1e-300)
+    free = system.free
+    rho = np.sqrt(np.sum((R**2 * scale)[free]))
+    size = np.sqrt(max(np.sum(force**2 * scale), np.sum(external**2 * scale)))
+    if rho > tol * size + 100.0 * system.work_noise * system.noise:
+        raise Wrong(f"the residual is {rho / size:.3g} of the forces")
+    gap = np.max(np.abs(system.constraint(u, state.load)), initial=0.0)
+    if gap > 1e-9 * system.size:
+        raise Wrong(f"a joint is open by {gap:.3g}")
+    if np.max(np.abs(u[system.fixed] - system.values(state.load)), initial=0.0) > 1e-12 * (
+            system.size):
+        raise Wrong("a support is not where it should be")
+    return _stability(system, state, K, scale)
+
+
+def verdict_of(system, state, K, scale):
+    """What the dense eigenvalues say, whether K is symmetric, and the lowest of them."""
+    free = np.nonzero(system.free)[0]
+    d = np.sqrt(scale[free])
+    A = d[:, None] * K[np.ix_(free, free)] * d
+    symmetric = np.abs(A - A.T).max(initial=0.0) < 1e-8 * np.abs(A).max(initial=1.0)
+    if system.m:
+        Z = null_space(system.jacobian(state.u, state.load)[:, free] * d)
+        A = Z.T @ A @ Z
+    values = np.linalg.eigvalsh(0.5 * (A + A.T))
+    # round-off of stresses that are small beside the diagonal in slender beams
+    zero = 1e-9 + 1e-14 * len(values) * np.abs(values).max(initial=0.0)
+    verdict = ("singular" if np.any(np.abs(values) <= zero) else
+               "unstable" if np.any(values < 0) else "stable")
+    return verdict, symmetric, values[:3]
+
+
+def _stability(system, state, K, scale):
+    """The verdict of the eigenvalues, after a comparison with what the state says."""
+    verdict, symmetric, lowest = verdict_of(system, state, K, scale)
+    said = getattr(state, "stability", None)
+    if not symmetric:
+        return f"follower, {said or 'no verdict'}"
+    if said is not None and verdict != "singular" and said != verdict:
+        raise Wrong(f"stability {said!r}, by dense eigenvalues {verdict!r}: the lowest of the "
+                    f"scaled tangent are {lowest}")
+    return verdict
+
+
+class TooLong(Exception):
+    """More than the seconds that a scene may take."""
+
+
+def _alarm(*_):
+    raise TooLong
+
+
+def build(script, compiled=True):
+    """The scene and the options that a script makes."""
+    space = {"COMPILED": compiled}
+    exec(compile(HEADER + script, "<scene>", "exec"), space)
+    return space["scene"], space["options"]
+
+
+def solve(script, compiled):
+    """(scene, state or None, the error's name)."""
+    try:
+        scene, options = build(script, compiled)
+        return scene, scene.solve_static(**options), ""
+    except AncfError as error:
+        return None, None, type(error).__name__
+
+
+def run(script, compare=False, seconds=120):
+    """How a scene ends: (outcome, what is wrong with it or "")."""
+    known = signal.signal(signal.SIGALRM, _alarm)
+    signal.alarm(seconds)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            _own_warnings()
+            scene, state, error = solve(script, True)
+            outcome = error or check(scene, state)
+            if compare:
+                return outcome, _compared(script, state, error)
+            return outcome, ""
+    except Wrong as wrong:
+        return "WRONG", str(wrong)
+    except TooLong:
+        return "TOO LONG", f"more than {seconds} s"
+    except Exception as error:  # whatever it is, it is not ours
+        return "FOREIGN", f"{type(error).__name__}: {error}"
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, known)
+
+
+def _own_warnings():
+    """Warnings of the package are no errors here."""
+    from skfem_ancf import errors
+    for kind in vars(errors).values():
+        if isinstance(kind, type) and issubclass(kind, Warning):
+            warnings.simplefilter("ignore", kind)
+
+
+def _compared(script, state, error):
+    """What is wrong with the same scene without compiled kernels."""
+    scene, plain, plain_error = solve(script, False)
+    if plain_error != error:
+        if plain is not None:
+            check(scene, plain)
+        return "" if "ConvergenceError" in (error, plain_error) else (
+            f"compiled: {error or 'solved'}, in NumPy: {plain_error or 'solved'}")
+    if plain is None:
+        return ""
+    check(scene, plain)
+    gap = np.max(np.abs(plain.u - state.u)) / max(np.max(np.abs(state.u)), 1e-300)
+    if gap > 1e-6 and np.max(np.abs(plain.u - state.u)) > 1e-9 * scene.system.size:
+        # an equilibrium each, as checked: which one is decided by round-off where several are near
+        return "" if gap > 1e-3 else f"compiled and NumPy differ by {gap:.3g}"
+    return ""
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--scenes", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0, help="number of the first scene")
+    parser.add_argument("--compare", type=int, default=8, help="one in how many in NumPy as well")
+    parser.add_argument("--show", action="store_true", help="print every script")
+    arguments = parser.parse_args()
+    from tqdm import tqdm
+
+    ends, bad, begin = collections.Counter(), [], time.time()
+    bar = tqdm(range(arguments.first, arguments.first + arguments.scenes), mininterval=2.0)
+    for number in bar:
+        script = draw(Dice((arguments.seed, number)))
+        if arguments.show:
+            print(script)
+        outcome, wrong = run(script, number % arguments.compare == 0)
+        ends[outcome] += 1
+        if wrong:
+            bad.append((number, outcome, wrong, script))
+            bar.write(f"# scene {number}: {outcome}: {wrong}")
+    print(f"{sum(ends.values())} scenes of seed {arguments.seed} in {time.time() - begin:.0f} s")
+    for outcome, n in ends.most_common():
+        print(f"{n:6}  {outcome}")
+    for number, outcome, wrong, script in bad[:20]:
+        print(f"\n# scene {number} of seed {arguments.seed}: {outcome}: {wrong}\n{HEADER}"
+              f"COMPILED = True\n{script}state = scene.solve_static(**options)")
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+    sys.exit(main())

@@ -1,0 +1,98 @@
+"""Random static scenes: an equilibrium that holds on its own evaluation, or an error of ours.
+
+The scenes and the checks are those of benchmarks/fuzz.py, which runs thousands of them
+(``make fuzz``). Here Hypothesis draws a few, the same each time, and shrinks what fails.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, note, settings
+from hypothesis import strategies as st
+
+FOLDER = Path(__file__).resolve().parents[1] / "benchmarks"
+if not (FOLDER / "fuzz.py").exists():
+    pytest.skip("benchmarks/ is not part of this installation", allow_module_level=True)
+sys.path.insert(0, str(FOLDER))
+
+import fuzz  # noqa: E402
+
+
+class Drawn:
+    """Draws by Hypothesis, with the methods of ``fuzz.Dice``."""
+
+    def __init__(self, draw):
+        self.draw = draw
+
+    def integer(self, low, high):
+        return self.draw(st.integers(low, high))
+
+    def number(self, low, high):
+        return float(f"{low + (high - low) * self.draw(st.integers(0, 200)) / 200:.3g}")
+
+    def choice(self, items):
+        return self.draw(st.sampled_from(list(items)))
+
+
+@st.composite
+def scripts(draw):
+    return fuzz.draw(Drawn(draw))
+
+
+@settings(max_examples=50, derandomize=True, database=None, deadline=None,
+          suppress_health_check=list(HealthCheck))
+@given(scripts(), st.integers(0, 4))
+def test_a_random_scene_ends_in_an_equilibrium_or_in_an_error_of_ours(script, number):
+    outcome, wrong = fuzz.run(script, compare=number == 0)
+    note(f"{fuzz.HEADER}COMPILED = True\n{script}{outcome}: {wrong}")
+    assert not wrong
+
+
+# the checks see what they are there for
+
+PLAIN = """mesh0 = MeshBeam.init_line(np.linspace(0, 1.0, 4), 0.05)
+beam0 = Beam(mesh0, ELEMENTS["ancf-2"](), StVenantKirchhoff(1e6, 0.3, 1.0), 0.1, {formulation!r},
+             compiled=COMPILED)
+scene = Scene(beam0).clamp("left").point_force((0.0, -1.0), at=(1.0, 0.0))
+options = {{}}
+"""
+
+
+@pytest.mark.parametrize("formulation", fuzz.FORMULATIONS)
+def test_a_wrong_equilibrium_is_seen(formulation):
+    script = PLAIN.format(formulation=formulation)
+    assert fuzz.run(script, compare=True) == ("stable", "")
+    scene, state, _ = fuzz.solve(script, False)
+    state.u = state.u * (1 + 1e-3)
+    with pytest.raises(fuzz.Wrong, match="residual"):
+        fuzz.check(scene, state)
+
+
+def test_a_foreign_error_is_seen_and_so_is_an_open_joint():
+    assert fuzz.run("1 / 0")[0] == "FOREIGN"
+    script = PLAIN.format(formulation="assumed") + (
+        "scene.joint('line', at=(1.0, 0.0), direction=(1, 1))\n")
+    scene, state, _ = fuzz.solve(script, False)
+    assert fuzz.check(scene, state) == "stable"
+    state.system.joints[0].normal = np.array([1.0, 0.0])
+    with pytest.raises(fuzz.Wrong, match="open by"):
+        fuzz.check(scene, state)
+
+
+@pytest.mark.parametrize("load, verdict", [("(-0.14, 0.0)", "stable"), ("(-0.2, 0.0)", "unstable")])
+def test_the_dense_tangent_is_the_derivative_and_knows_euler(load, verdict):
+    """Against the package's tangent at any displacement; P_cr = pi^2 E I / (4 L^2) = 0.164."""
+    mesh = "mesh0 = MeshBeam.init_line(np.linspace(0, 1.0, 9), 0.02)\n"
+    script = mesh + PLAIN.split("\n", 1)[1].format(formulation="assumed").replace(
+        "(0.0, -1.0)", load)
+    scene, _ = fuzz.build(script, False)
+    system, state, bodies = scene.system, scene.solve_linear(), [fuzz.Body(scene.beams[0])]
+    K = fuzz.tangent(bodies, state)
+    assert fuzz.verdict_of(system, state, K, 1.0 / np.abs(np.diag(K)))[0] == verdict
+    state.u = 0.05 * np.random.default_rng(0).standard_normal(system.N)
+    system.assemble(state.u)
+    expected = system.K.tocsc().toarray()
+    np.testing.assert_allclose(fuzz.tangent(bodies, state), expected, rtol=0,
+                               atol=1e-11 * np.abs(expected).max())
