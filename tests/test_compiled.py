@@ -410,13 +410,17 @@ def test_translations_meet_no_round_off_of_the_tangent(mesh):
         assert K[i, i] == K[right + i, right + i] == -K[right + i, i]
 
 
-@pytest.mark.parametrize("n", [205, 256, 307, 460])
-def test_fine_and_slender_beams_find_their_equilibrium(n):
-    """Axial stiffness is 1e11 times the bending stiffness: its round-off must cancel."""
-    h = 1e-5
+@pytest.mark.parametrize("slenderness, n", [(1e5, 64), (1e5, 100), (1e4, 460), (1e4, 1000)])
+def test_fine_and_slender_beams_find_their_equilibrium(slenderness, n):
+    """Axial stiffness is up to 1e11 times the bending stiffness: its round-off must cancel.
+
+    As far as it can: eps 12 (L/h n)^2 is 0.3 at most here. At 1, by summing and factorising alone,
+    the tangent loses its bending stiffness, and the number of iterations is a matter of luck.
+    """
+    h = 1.0 / slenderness
     E, rho = 2e8 * (0.01 / h) ** 3, 7800 * 0.01 / h
     beam = Beam(MeshBeam.init_line(np.linspace(0, 1, n + 1), h), ElementBeamANCF(2),
                 StVenantKirchhoff(E, 0.3, rho), 0.01)
     state = Scene(beam).clamp("left", thickness="free").gravity((0, -9.81)).solve_static()
-    assert state.iterations <= 12
+    assert state.iterations <= 10
     assert_allclose(state.displacement((1, 0)), (-0.74099, -0.90313), rtol=0, atol=2e-4)

@@ -667,7 +667,8 @@ def circle(s):
 @pytest.mark.parametrize("r, s, height, message", [
     (circle, np.linspace(0, 1, 9), 2.01,
      "radius of curvature 1 is below half the height 1.005; use a smaller height"),
-    (lambda s: np.array([s, 5 * s ** 2]), np.linspace(-1, 1, 5), 0.25, "folds near s = -?0.0"),
+    (lambda s: np.array([s, 5 * s ** 2]), np.linspace(-1, 1, 5), 0.25,
+     "folds near s = (0|-0.03125): "),
     (lambda s: np.array([s ** 3, 0 * s]), [-1, 0, 1], 0.1, "stands still at s = 0"),
     (lambda s: np.array([s ** 3, 0 * s]), [-1, 1], 0.1, "stands still at s = 0"),
     (lambda s: 0 * np.array([s, s]), [0, 1], 0.1, "stands still"),
