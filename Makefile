@@ -1,5 +1,6 @@
 # make demo    the cantilever of the paper: numbers, out/*.vtu, out/*.png
-# make test    the tests, on two processes
+# make test    the tests, on two processes; ARGS="..." goes to pytest
+# make test-settings   most of them as on an old processor, and without Numba
 # make paper   the paper's tables; bench: timings; stress: large and hard cases
 # make fuzz    2000 random scenes; mutants: changes of the text that the tests should see
 # make coverage  the tests, with the lines and branches that they run
@@ -16,13 +17,25 @@ PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test paper bench stress fuzz mutants coverage docs clean
+.PHONY: demo test test-settings paper bench stress fuzz mutants coverage docs clean
 
 demo: $(VENV)/test.stamp
 	$(PY) demos/cantilever.py
 
 test: $(VENV)/test.stamp
 	$(PY) -m pytest -n 2 $(ARGS)
+
+# what round-off could decide, in other kernels of OpenBLAS and without fused multiply-add;
+# the code that Numba compiles for it is kept apart. Then all but the scripts, without Numba.
+GENERIC := mesh elements statics joints dynamics continuation locking compiled
+SCRIPTS := bench package paper stress
+
+test-settings: $(VENV)/test.stamp
+	OPENBLAS_CORETYPE=Nehalem NUMBA_CPU_NAME=generic \
+	  NUMBA_CACHE_DIR=$(CURDIR)/out/numba-generic \
+	  $(PY) -m pytest -n 2 $(ARGS) $(GENERIC:%=tests/test_%.py)
+	OPENBLAS_CORETYPE=Haswell SKFEM_ANCF_COMPILED=0 \
+	  $(PY) -m pytest -n 2 $(ARGS) $(SCRIPTS:%=--ignore=tests/test_%.py)
 
 paper: $(VENV)/test.stamp
 	$(PY) benchmarks/paper.py
