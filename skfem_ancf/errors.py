@@ -1,10 +1,20 @@
 """The errors of the package: what was wrong, the value, and what to change.
 
 Every error derives from :class:`AncfError`; those about bad input are also
-``ValueError``, so existing ``except ValueError`` clauses keep working.
+``ValueError``, so existing ``except ValueError`` clauses keep working. The functions are the doors:
+what a caller gives passes one of them before anything is computed.
 """
 
+import difflib
+import inspect
+import os
+from functools import wraps
+from pathlib import Path
+
 import numpy as np
+
+#: Longest text of a value in a message.
+WIDTH = 80
 
 
 class AncfError(Exception):
@@ -20,13 +30,40 @@ class MeshError(InputError):
 
 
 class NameUnknown(InputError):
-    """A boundary, coordinate, formulation or scheme name is not known."""
+    """A boundary, coordinate, formulation or scheme name is not known.
+
+    The message lists the known ones and suggests the nearest.
+
+    Attributes
+    ----------
+    kind, name, known
+        What was named, the name given, and those that are known.
+    """
 
     def __init__(self, kind, name, known):
         self.kind, self.name, self.known = kind, name, tuple(known)
+        near = nearest(name, self.known)
         super().__init__(
-            f"unknown {kind} {name!r}; known: " + ", ".join(map(repr, self.known))
-        )
+            f"unknown {kind} {shown(name)}; known: " + (", ".join(map(repr, self.known)) or "none")
+            + (f"; did you mean {near!r}?" if near is not None else ""))
+
+    def __reduce__(self):
+        return type(self), (self.kind, self.name, self.known)
+
+
+class CallError(InputError, TypeError):
+    """A call with unknown or missing arguments; the message lists those that there are."""
+
+
+class CallbackError(InputError):
+    """A function of the caller's raised an error, or returned what cannot be used."""
+
+
+class FileError(InputError, OSError):
+    """A file cannot be read or written, or holds something else."""
+
+    def __str__(self):
+        return str(self.args[0])
 
 
 class SupportError(AncfError):
@@ -37,10 +74,14 @@ class MissingExtra(AncfError, ImportError):
     """An optional dependency is missing; the message names the extra."""
 
     def __init__(self, module, extra):
+        self.module, self.extra = module, extra
         super().__init__(
             f"this needs the package {module!r}, which is not installed: "
-            f'pip install "skfem-ancf[{extra}]"'
-        )
+            f"pip install '.[{extra}]' in a clone of the repository, or "
+            f"pip install 'skfem-ancf[{extra}]'")
+
+    def __reduce__(self):
+        return type(self), (self.module, self.extra)
 
 
 class ConvergenceError(AncfError):
@@ -57,6 +98,37 @@ class ConvergenceError(AncfError):
         self.state = state
 
 
+# messages
+
+def shown(value):
+    """A value as a message shows it: its repr on one line, shortened."""
+    if isinstance(value, int) and value.bit_length() > 256:  # Python refuses to print the largest
+        return f"{'-' * (value < 0)}10**{int(0.30103 * (value.bit_length() - 1))} or more"
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # whatever it is, it has no repr
+        text = f"<{type(value).__name__}>"
+    return text if len(text) <= WIDTH else text[:WIDTH - 3] + "..."
+
+
+def nearest(name, known):
+    """The known name that is most like one, or None.
+
+    Examples
+    --------
+    >>> from skfem_ancf.errors import nearest
+    >>> nearest("Newtn", ["mixed", "newton"])
+    'newton'
+    """
+    if not isinstance(name, str):
+        return None
+    names = {k.lower(): k for k in known if isinstance(k, str)}
+    found = difflib.get_close_matches(name.lower(), names, 1, 0.5)
+    return names[found[0]] if found else None
+
+
+# numbers
+
 def require_positive(name, value, unit=""):
     """Return ``value`` as a float, or raise :class:`InputError` if it is not > 0."""
     value = require_finite_scalar(name, value)
@@ -66,14 +138,46 @@ def require_positive(name, value, unit=""):
 
 
 def require_finite_scalar(name, value):
-    """Return ``value`` as a float, or raise :class:`InputError` if it is not finite."""
-    try:
-        value = float(value)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be a number, got {value!r}") from None
-    if not np.isfinite(value):
+    """Return ``value`` as a float, or raise :class:`InputError` if it is no finite real number.
+
+    True and False, texts and arrays of one number are none.
+    """
+    if type(value) is not float:
+        if not _is_real(value):
+            raise InputError(f"{name} must be a number, got {shown(value)}")
+        try:
+            value = float(value)
+        except OverflowError:
+            raise InputError(f"{name} is too large for a float: {shown(value)}") from None
+        except (TypeError, ValueError):
+            raise InputError(f"{name} must be a number, got {shown(value)}") from None
+    if not -np.inf < value < np.inf:
         raise InputError(f"{name} must be finite, got {value!r}")
     return value
+
+
+def _is_real(value):
+    dtype = getattr(value, "dtype", None)
+    return (hasattr(type(value), "__float__") and not isinstance(value, bool)
+            and getattr(dtype, "kind", "f") in "iuf" and getattr(value, "ndim", 0) == 0)
+
+
+def require_integer(name, value, low, high=None, why=""):
+    """Return ``value`` as an int from ``low`` to ``high``, or raise :class:`InputError`.
+
+    ``why`` says where the bound comes from; ``high`` is None where there is none.
+    """
+    if (isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < low
+            or (high is not None and value > high)):
+        wanted = f">= {low}" if high is None else f"from {low} to {high}"
+        raise InputError(f"{name} must be an integer {wanted}{why and f' ({why})'}, got "
+                         f"{shown(value)}")
+    return int(value)
+
+
+def require_index(name, value, n):
+    """Return ``value`` as an index into ``n`` things, counted from the end if it is negative."""
+    return require_integer(name, value, -n, n - 1) % n
 
 
 def require_finite(name, array, shape=None):
@@ -81,19 +185,197 @@ def require_finite(name, array, shape=None):
 
     ``shape`` may hold None for a free extent.
     """
-    if np.iscomplexobj(array):
-        raise InputError(f"{name} must be real, got complex numbers")
-    try:
-        array = np.asarray(array, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be an array of numbers, got {array!r}") from None
+    if not (type(array) is np.ndarray and array.dtype == np.float64):
+        array = _real_array(name, array)
     if shape is not None and (
         array.ndim != len(shape)
         or any(n is not None and n != m for n, m in zip(shape, array.shape))
     ):
-        wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
+        wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + (
+            ",)" if len(shape) == 1 else ")")
         raise InputError(f"{name} must have shape {wanted}, got {array.shape}")
     if not np.all(np.isfinite(array)):
         bad = array[~np.isfinite(array)][0]
         raise InputError(f"{name} has a value that is NaN or infinite: {bad}")
     return array
+
+
+def _real_array(name, value):
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError, OverflowError):  # rows of different lengths, for one
+        raise InputError(f"{name} must be an array of numbers, got {shown(value)}") from None
+    if array.dtype.kind == "c":
+        raise InputError(f"{name} must be real, got complex numbers: {shown(value)}")
+    if array.dtype.kind == "O" and all(map(_is_real, array.flat)):  # fractions, or large integers
+        try:
+            return array.astype(np.float64)
+        except OverflowError:
+            raise InputError(f"{name} has a value that is too large for a float: {shown(value)}"
+                             ) from None
+    if array.dtype.kind not in "iuf":
+        raise InputError(f"{name} must be an array of numbers, got {shown(value)}")
+    return array.astype(np.float64)
+
+
+# names and flags
+
+def require_option(kind, name, known):
+    """Return ``name`` if it is a text among the known, or raise :class:`NameUnknown`."""
+    if not isinstance(name, str) or name not in known:
+        raise NameUnknown(kind, name, known)
+    return name
+
+
+def require_flag(name, value):
+    """Return True or False, or raise :class:`InputError` if it is neither."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name} must be True or False, got {shown(value)}")
+    return bool(value)
+
+
+def require_label(name, value):
+    """Return a text that is not empty, or None, or raise :class:`InputError`."""
+    if value is not None and not (isinstance(value, str) and value):
+        raise InputError(f"{name} must be a text, or None for none, got {shown(value)}")
+    return value
+
+
+def require_kind(name, value, kind, hint=""):
+    """Return ``value`` if it is of a class, or of one of several, or raise InputError."""
+    if not isinstance(value, kind):
+        kinds = kind if isinstance(kind, tuple) else (kind,)
+        raise InputError(f"{name} must be a {' or '.join(k.__name__ for k in kinds)}"
+                         f"{hint and f' ({hint})'}, got {shown(value)}")
+    return value
+
+
+def require_like(name, value, kind, *attributes):
+    """Return ``value`` if it has what is asked of a kind of object, or raise InputError."""
+    if isinstance(value, type) or not all(hasattr(value, a) for a in attributes):
+        raise InputError(f"{name} must be a {kind}, got {shown(value)}")
+    return value
+
+
+def require_path(name, value):
+    """Return a file name as a ``pathlib.Path``, or raise :class:`InputError`."""
+    if not isinstance(value, (str, os.PathLike)) or not os.fspath(value) or (
+            "\0" in str(os.fspath(value))):
+        raise InputError(f"{name} must be the path of a file, got {shown(value)}")
+    try:
+        return Path(value)
+    except TypeError:
+        raise InputError(f"{name} must be the path of a file, got {shown(value)}") from None
+
+
+# functions of the caller's
+
+def require_function(name, value, returns):
+    """Return ``value`` if it can be called, or raise :class:`InputError`.
+
+    ``returns`` says what of, and what is wanted, as "of time that returns a number".
+    """
+    if not callable(value):
+        raise InputError(f"{name} must be a function {returns}, got {shown(value)}")
+    return value
+
+
+def ask(what, function, *args):
+    """Call a function of the caller's, and say what was asked if it raises.
+
+    Parameters
+    ----------
+    what
+        The call for the message, as ``"amplitude(t={:g})"``; formatted with the arguments.
+    function
+        Any function.
+    *args
+        Its arguments.
+
+    Raises
+    ------
+    CallbackError
+        From what the function raised; errors of the package pass.
+
+    Examples
+    --------
+    >>> from skfem_ancf.errors import ask
+    >>> ask("amplitude(t={:g})", lambda t: 1 / t, 0.0)
+    Traceback (most recent call last):
+    ...
+    skfem_ancf.errors.CallbackError: amplitude(t=0) raised ZeroDivisionError: float division by zero
+    """
+    try:
+        return function(*args)
+    except AncfError:
+        raise
+    except Exception as error:
+        raise CallbackError(f"{what.format(*args)} raised {type(error).__name__}: {error}"
+                            ) from error
+
+
+def ask_number(what, function, *args):
+    """As :func:`ask`, for a function that returns a finite number."""
+    value = ask(what, function, *args)
+    if type(value) is float and -np.inf < value < np.inf:
+        return value
+    return _returned(require_finite_scalar, what, value, args)
+
+
+def ask_array(what, shape, function, *args):
+    """As :func:`ask`, for a function that returns finite numbers of a shape."""
+    return _returned(require_finite, what, ask(what, function, *args), args, shape)
+
+
+def _returned(door, what, value, args, *more):
+    try:
+        return door(what.format(*args), value, *more)
+    except InputError as error:
+        hint = "; does the function return something?" if value is None else ""
+        raise CallbackError(str(error) + hint) from None
+
+
+# calls
+
+def taught(function):
+    """A function whose wrong calls raise :class:`CallError`, which lists its arguments."""
+    explain = _explain
+
+    def call(*args, **kwargs):
+        try:
+            return function(*args, **kwargs)
+        except TypeError as error:
+            if error.__traceback__.tb_next is None:  # it is the call that is wrong
+                explain(function, kwargs, error)
+            raise
+
+    # doctest finds functions by the globals of their module
+    call = type(call)(call.__code__, function.__globals__, call.__name__, None, call.__closure__)
+    return wraps(function)(call)
+
+
+def teaching(cls):
+    """A class decorator: :func:`taught` for the constructor and the public methods of a class."""
+    for name, value in list(vars(cls).items()):
+        if name.startswith("_") and name != "__init__":
+            continue
+        if inspect.isfunction(value):
+            setattr(cls, name, taught(value))
+        elif isinstance(value, (classmethod, staticmethod)):
+            setattr(cls, name, type(value)(taught(value.__func__)))
+    return cls
+
+
+def _explain(function, kwargs, error):
+    parameters = [p for p in inspect.signature(function).parameters.values()
+                  if p.name not in ("self", "cls", "system")]
+    known = [p.name for p in parameters if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]
+    unknown = [name for name in kwargs if name not in known]
+    near = nearest(unknown[0], known) if unknown else None
+    message = str(error).replace("<lambda>", "function")
+    if near is not None:
+        message = message.split(". Did you mean")[0] + f"; did you mean {near!r}?"
+    else:
+        message += ";"
+    arguments = ", ".join(str(p.replace(annotation=p.empty)) for p in parameters)
+    raise CallError(f"{message} Arguments: {arguments or 'none'}") from None

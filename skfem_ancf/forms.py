@@ -38,7 +38,8 @@ from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 from skfem.helpers import dot
 
-from .errors import InputError
+from .errors import (InputError, ask_array, require_finite, require_like, require_positive, shown,
+                     taught)
 
 
 # kinematics: grad[i, j] = d r_i / d X_j
@@ -69,12 +70,19 @@ def _voigt_to_tensor(D):
     return D[k][:, :, k]
 
 
+def _law(material, k_s):
+    """The law of a material with its shear corrected."""
+    require_like("material", material, "Material", "law")
+    return material.law(require_positive("k_s", k_s))
+
+
 # the textbook's forms
 
 
+@taught
 def textbook_energy(material, width=1.0, k_s=1.0):
     """Strain energy ``U(r) = int W(eps) dV``, a ``Functional``."""
-    law = material.law(k_s)
+    law, width = _law(material, k_s), require_positive("width", width)
 
     @EnergyForm
     def strain_energy(w):
@@ -83,9 +91,10 @@ def textbook_energy(material, width=1.0, k_s=1.0):
     return strain_energy
 
 
+@taught
 def textbook_internal_force(material, width=1.0, k_s=1.0):
     """The first variation ``delta U = int S : delta eps dV``, a ``LinearForm``."""
-    law = material.law(k_s)
+    law, width = _law(material, k_s), require_positive("width", width)
 
     @BeamLinearForm
     def force(v, w):
@@ -95,9 +104,10 @@ def textbook_internal_force(material, width=1.0, k_s=1.0):
     return force
 
 
+@taught
 def textbook_tangent(material, width=1.0, k_s=1.0):
     """The second, ``int delta eps : D : d eps + S : d delta eps dV``, a ``BilinearForm``."""
-    law = material.law(k_s)
+    law, width = _law(material, k_s), require_positive("width", width)
 
     @BeamBilinearForm
     def stiffness(u, v, w):
@@ -200,9 +210,10 @@ def _scattered(K, basis):
 energy = textbook_energy
 
 
+@taught
 def internal_force(material, width=1.0, k_s=1.0):
     """Internal force ``int P : grad v dV``, P = F S; a batched ``LinearForm``."""
-    law = material.law(k_s)
+    law, width = _law(material, k_s), require_positive("width", width)
 
     @StressForm
     def force(w):
@@ -213,9 +224,10 @@ def internal_force(material, width=1.0, k_s=1.0):
     return force
 
 
+@taught
 def tangent(material, width=1.0, k_s=1.0):
     """Tangent ``int grad v : dP/dF : grad u dV``; a batched ``BilinearForm``."""
-    law = material.law(k_s)
+    law, width = _law(material, k_s), require_positive("width", width)
 
     @ModuliForm
     def stiffness(w):
@@ -229,8 +241,10 @@ def tangent(material, width=1.0, k_s=1.0):
     return stiffness
 
 
+@taught
 def mass(density, width=1.0):
     """Mass ``int rho v . u dV``, a ``BilinearForm``: constant, whatever the motion."""
+    density, width = require_positive("density", density), require_positive("width", width)
 
     @BilinearForm
     def inertia(u, v, _):
@@ -239,8 +253,11 @@ def mass(density, width=1.0):
     return inertia
 
 
+@taught
 def gravity(density, g, width=1.0):
     """Dead load ``int rho g . v dV``, a ``LinearForm``; ``g`` is the acceleration (2,)."""
+    density, width = require_positive("density", density), require_positive("width", width)
+    g = require_finite("g", g, (2,))
 
     @LinearForm
     def weight(v, _):
@@ -249,23 +266,53 @@ def gravity(density, g, width=1.0):
     return weight
 
 
+def field(what, function, x):
+    """A function of the points x (2, ...) that returns vectors, asked: shape (2, ...).
+
+    It may return (2,), or components that do not depend on all of x.
+
+    Raises
+    ------
+    CallbackError
+        If it raises, or returns something else.
+    """
+    def ask_it(x):
+        value = function(x)
+        if isinstance(value, (tuple, list)) and len(value) == 2:  # one may be a constant
+            value = [np.broadcast_to(v, x.shape[1:]) for v in value]
+        if np.shape(value) == (2,):
+            value = np.reshape(value, (2,) + (1,) * (x.ndim - 1))
+        elif np.shape(value)[:1] != (2,) or np.ndim(value) > x.ndim:
+            raise InputError(f"{what} must return two components at each point, shape (2, ...), "
+                             f"got {shown(value)}")
+        return np.broadcast_to(value, x.shape)
+
+    return ask_array(what, x.shape, ask_it, np.asarray(x))
+
+
+@taught
 def traction(t, width=1.0):
     """Dead traction ``int t . v dA`` for a ``FacetBasis``; ``t`` is (2,) or t(x) -> (2, ...)."""
+    width = require_positive("width", width)
+    if not callable(t):
+        t = require_finite("t", t, (2,))
 
     @LinearForm
     def surface_load(v, w):
-        value = t(w.x) if callable(t) else t
+        value = field("t(x)", t, w.x) if callable(t) else t
         return width * (value[0] * v[0] + value[1] * v[1])
 
     return surface_load
 
 
+@taught
 def pressure(width=1.0):
     """Follower pressure of 1 as ``int -n . v da``, linear in the position: a ``BilinearForm``.
 
     On the deformed facet ``n da`` is the derivative of the position along the facet, turned by
     -90 degrees. The matrix times the coordinates is the force.
     """
+    width = require_positive("width", width)
 
     @BilinearForm
     def follower(u, v, w):
@@ -287,6 +334,7 @@ class BeamForms(NamedTuple):
     tangent: BilinearForm
 
 
+@taught
 def of(beam):
     """The weak forms of a beam's own formulation, whatever it is.
 

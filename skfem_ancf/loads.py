@@ -11,7 +11,17 @@ from skfem.assembly import LinearForm, asm
 
 from . import forms
 from .beam import Beam
-from .errors import AncfError, InputError, require_finite
+from .errors import AncfError, InputError, ask_number, require_finite, require_function
+
+
+class Amplitude:
+    """A function of time, asked with care: what it raises or returns is said."""
+
+    def __init__(self, function):
+        self.function = require_function("amplitude", function, "of time that returns a number")
+
+    def __call__(self, t):
+        return self.function(t) if np.ndim(t) else ask_number("amplitude(t={:g})", self.function, t)
 
 
 class Load:
@@ -76,11 +86,7 @@ class Load:
     constant = True
     symmetric = True
 
-    amplitude = None
-
     def __init__(self, beam=None, amplitude=None):
-        if amplitude is not None and not callable(amplitude):
-            raise InputError(f"an amplitude is a function of time, got {amplitude!r}")
         self.beam, self.amplitude = beam, amplitude
 
     def bind(self, beam):
@@ -102,9 +108,18 @@ class Load:
         bound.beam = beam
         return bound
 
+    @property
+    def amplitude(self):
+        return getattr(self, "_amplitude", None)
+
+    @amplitude.setter
+    def amplitude(self, function):
+        self._amplitude = (function if function is None or isinstance(function, Amplitude) else
+                           Amplitude(function))
+
     def factor(self, t):
         """The amplitude at time ``t``; 1 without one, or in statics, where ``t`` is None."""
-        return 1.0 if self.amplitude is None or t is None else float(self.amplitude(t))
+        return 1.0 if self.amplitude is None or t is None else self.amplitude(t)
 
     def mean_force(self, u0, u1):
         """A mean of the force between two displacements whose work is exact if it can be."""

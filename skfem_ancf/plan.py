@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from .errors import NameUnknown
+from .errors import NameUnknown, require_option
 from .switch import compiled_off
 
 KINDS = ("static", "linear", "dynamic")
@@ -47,8 +47,7 @@ def make_plan(scene, kind="static"):
     NameUnknown
         If the kind is not known.
     """
-    if kind not in KINDS:
-        raise NameUnknown("kind of solution", kind, KINDS)
+    require_option("kind of solution", kind, KINDS)
     s, beams = scene.system, scene.beams
     dynamic, linear = kind == "dynamic", kind == "linear"
     items = []

@@ -2,9 +2,15 @@
 
 import numpy as np
 
+from .errors import InputError, require_finite, require_integer, shown
+
+#: Points of the largest rule.
+MAX_POINTS = 1000
+
 
 def gauss(n):
     """The n-point Gauss rule on [0, 1], exact to degree 2 n - 1: points (n,) and weights (n,)."""
+    n = require_integer("the number of Gauss points n", n, 1, MAX_POINTS)
     x, w = np.polynomial.legendre.leggauss(n)
     return 0.5 * (x + 1.0), 0.5 * w
 
@@ -23,14 +29,24 @@ def tensor(axis, section):
         Points (2, n) and weights (n,), the section running fastest: as scikit-fem's
         ``Basis(quadrature=(X, W))`` wants them.
     """
-    (x, wx), (y, wy) = axis, section
+    (x, wx), (y, wy) = _rule("axis", axis), _rule("section", section)
     X = np.array([np.repeat(x, len(y)), np.tile(y, len(x))])
     return X, np.outer(wx, wy).ravel()
 
 
+def _rule(name, rule):
+    """Points and weights of a rule, as arrays."""
+    if not isinstance(rule, (tuple, list)) or len(rule) != 2:
+        raise InputError(f"{name} must be a pair of points and weights, got {shown(rule)}")
+    x = require_finite(f"the points of {name}", rule[0], (None,))
+    return x, require_finite(f"the weights of {name}", rule[1], x.shape)
+
+
 def lagrange(nodes, x):
     """Values at ``x`` of the Lagrange polynomials of ``nodes``, shape (len(x), len(nodes))."""
-    nodes, x = np.asarray(nodes, dtype=float), np.asarray(x, dtype=float)
+    nodes, x = require_finite("nodes", nodes, (None,)), require_finite("x", x, (None,))
+    if len(np.unique(nodes)) < len(nodes):
+        raise InputError(f"nodes must be different, got {shown(nodes)}")
     out = np.ones((len(x), len(nodes)))
     for i, a in enumerate(nodes):
         for j, b in enumerate(nodes):

@@ -1,6 +1,6 @@
 """Time integration. A new scheme is one file and one line here."""
 
-from ..errors import NameUnknown
+from ..errors import require_option, taught
 from .base import Motion, Scheme, Step
 from .energy_momentum import EnergyMomentum
 from .generalized_alpha import HHT, GeneralizedAlpha, Newmark
@@ -9,6 +9,7 @@ from .generalized_alpha import HHT, GeneralizedAlpha, Newmark
 SCHEMES = {cls.name: cls for cls in (EnergyMomentum, GeneralizedAlpha, HHT, Newmark)}
 
 
+@taught
 def get_scheme(scheme):
     """A :class:`Scheme` from its name, its class or itself.
 
@@ -21,9 +22,7 @@ def get_scheme(scheme):
         return scheme
     if isinstance(scheme, type) and issubclass(scheme, Scheme):
         return scheme()
-    if scheme not in SCHEMES:
-        raise NameUnknown("scheme", scheme, SCHEMES)
-    return SCHEMES[scheme]()
+    return SCHEMES[require_option("scheme", scheme, SCHEMES)]()
 
 
 __all__ = ["HHT", "SCHEMES", "EnergyMomentum", "GeneralizedAlpha", "Motion", "Newmark", "Scheme",

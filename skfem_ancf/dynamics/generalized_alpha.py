@@ -1,6 +1,6 @@
 """The generalised-alpha family: Chung-Hulbert, HHT and Newmark."""
 
-from ..errors import InputError, require_finite_scalar
+from ..errors import InputError, require_finite_scalar, taught
 from .base import Motion, Scheme, Step
 
 
@@ -27,6 +27,7 @@ class GeneralizedAlpha(Scheme):
 
     name = "generalized-alpha"
 
+    @taught
     def __init__(self, rho_inf=0.9):
         rho = require_finite_scalar("rho_inf", rho_inf)
         if not 0.0 <= rho <= 1.0:
@@ -67,6 +68,7 @@ class HHT(GeneralizedAlpha):
 
     name = "hht"
 
+    @taught
     def __init__(self, alpha=0.05):
         alpha = require_finite_scalar("alpha", alpha)
         if not 0.0 <= alpha <= 1.0 / 3.0:
@@ -90,6 +92,7 @@ class Newmark(GeneralizedAlpha):
 
     name = "newmark"
 
+    @taught
     def __init__(self, beta=0.25, gamma=0.5):
         self._set(0.0, 0.0)
         self.beta = require_finite_scalar("beta", beta)

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from scipy.special import roots_jacobi
 
-from ..errors import InputError, NameUnknown
+from ..errors import require_integer, require_option, teaching
 from .base import ElementBeam, SectionFunctions
 
 
@@ -20,6 +20,9 @@ def _gauss_lobatto(n):
     return np.concatenate([[-1.0], 0.5 * (inner - inner[::-1]), [1.0]])
 
 
+#: Largest degree of a section.
+MAX_ORDER = 64
+
 POINT_FAMILIES = {
     "chebyshev": _chebyshev,
     "gauss-lobatto": _gauss_lobatto,
@@ -27,6 +30,7 @@ POINT_FAMILIES = {
 }
 
 
+@teaching
 class ElementBeamANCF(ElementBeam):
     """Beam element with position, axis slope and N section slopes at each node.
 
@@ -66,11 +70,9 @@ class ElementBeamANCF(ElementBeam):
     """
 
     def __init__(self, order, points="chebyshev"):
-        if isinstance(order, bool) or not isinstance(order, (int, np.integer)) or order < 1:
-            raise InputError(f"the order of an ANCF beam element is an integer >= 1, got {order!r}")
-        if not isinstance(points, str) or points not in POINT_FAMILIES:
-            raise NameUnknown("family of section points", points, POINT_FAMILIES)
-        n = int(order)
+        n = require_integer("the order of an ANCF beam element", order, 1, MAX_ORDER,
+                            "polynomials of a higher degree have no digits left")
+        require_option("family of section points", points, POINT_FAMILIES)
         x = np.zeros(1) if n == 1 else (
             np.array([-1.0, 1.0]) if n == 2 else POINT_FAMILIES[points](n))
         self.section_points = 0.5 * x

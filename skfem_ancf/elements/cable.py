@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, shown, teaching
 from ..reference import hermite_basis
 from .base import ElementBeam, SectionFunctions
 
 
+@teaching
 class ElementBeamCable(ElementBeam):
     """An axis without a section of its own: ``r`` and its derivatives along X only.
 
@@ -42,8 +43,9 @@ class ElementBeamCable(ElementBeam):
     carries_shear_parabola = False
 
     def __init__(self, degree=3):
-        if degree not in (3, 5, 7) or isinstance(degree, bool):
-            raise InputError(f"the degree of a cable is 3, 5 or 7, got {degree!r}")
+        if (isinstance(degree, bool) or not isinstance(degree, (int, np.integer))
+                or degree not in (3, 5, 7)):
+            raise InputError(f"the degree of a cable is 3, 5 or 7, got {shown(degree)}")
         self.axis_degree = int(degree)
         m = (self.axis_degree + 1) // 2
         super().__init__(SectionFunctions(np.zeros((1, 0))), [], [], [])

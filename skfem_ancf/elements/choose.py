@@ -1,6 +1,7 @@
 """The element of lowest order that can show what is asked for."""
 
-from ..errors import InputError, NameUnknown, require_positive
+from ..errors import (InputError, require_like, require_option, require_positive, shown,
+                      taught)
 from .ancf import ElementBeamANCF
 from .cable import ElementBeamCable
 from .cubic import ElementBeamANCFCubic
@@ -10,6 +11,7 @@ ORDER_OF_FIELD = {"displacement": 0, "eps_xx": 0, "S_xx": 0, "eps_yy": 2, "eps_x
                   "S_xy": 3}
 
 
+@taught
 def choose_element(mesh, material, fields=(), tolerance=1e-3):
     """The element of lowest order that carries the fields and is accurate enough.
 
@@ -39,10 +41,15 @@ def choose_element(mesh, material, fields=(), tolerance=1e-3):
     NameUnknown
         If a field is not known.
     """
-    fields = [fields] if isinstance(fields, str) else list(fields)
+    require_like("mesh", mesh, "MeshBeam", "height", "lengths")
+    require_like("material", material, "Material", "E", "G", "nu")
+    try:
+        fields = [fields] if isinstance(fields, str) else list(fields)
+    except TypeError:
+        raise InputError(f"fields must be names of fields of the section, got {shown(fields)}"
+                         ) from None
     for name in fields:
-        if name not in ORDER_OF_FIELD:
-            raise NameUnknown("field", name, ORDER_OF_FIELD)
+        require_option("field", name, ORDER_OF_FIELD)
     tolerance = require_positive("tolerance", tolerance)
     if tolerance >= 1.0:
         raise InputError(f"the tolerance is relative and below 1, got {tolerance!r}")

@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from ..errors import teaching
 from .base import ElementBeam, SectionFunctions
 
 
+@teaching
 class ElementBeamPatelShabana(ElementBeam):
     """Beam element with ``r``, ``r_X``, ``r_Y`` and the second derivative ``r_YY`` on the axis.
 

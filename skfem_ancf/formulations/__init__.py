@@ -1,6 +1,6 @@
 """Formulations of the strain energy. A new one is one file and one line here."""
 
-from ..errors import NameUnknown
+from ..errors import require_option, taught
 from .assumed import Assumed
 from .base import COMPONENTS, Formulation, Term
 from .continuum import Continuum
@@ -11,6 +11,7 @@ from .strain_split import StrainSplit
 FORMULATIONS = {cls.name: cls for cls in (Continuum, EnhancedContinuum, StrainSplit, Assumed)}
 
 
+@taught
 def get_formulation(formulation):
     """A :class:`Formulation` from its name, its class or itself.
 
@@ -23,9 +24,7 @@ def get_formulation(formulation):
         return formulation
     if isinstance(formulation, type) and issubclass(formulation, Formulation):
         return formulation()
-    if formulation not in FORMULATIONS:
-        raise NameUnknown("formulation", formulation, FORMULATIONS)
-    return FORMULATIONS[formulation]()
+    return FORMULATIONS[require_option("formulation", formulation, FORMULATIONS)]()
 
 
 __all__ = ["COMPONENTS", "FORMULATIONS", "Assumed", "Continuum", "EnhancedContinuum",

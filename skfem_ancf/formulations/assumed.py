@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..errors import InputError, require_finite_scalar, require_like, taught
 from ..materials import LinearLaw
 from ..quadrature import gauss
 from .base import Formulation, Term
@@ -46,8 +47,11 @@ class Assumed(Formulation):
 
     name = "assumed"
 
+    @taught
     def __init__(self, alpha=1.0):
-        self.alpha = alpha
+        self.alpha = require_finite_scalar("alpha", alpha)
+        if self.alpha < 0.0:
+            raise InputError(f"alpha must not be negative, got {alpha!r}")
 
     def terms(self, element, material):
         _, section = self.full_rules(element)
@@ -56,6 +60,7 @@ class Assumed(Formulation):
         else:
             nodes = (0.0, 0.5, 1.0)
             axis, samples = gauss(3), {"xx": tuple(gauss(2)[0]), "yy": nodes, "xy": nodes}
+        require_like("material", material, "Material", "law")
         law = material.law(material.shear_factor(element))
         whole = Term(law, axis, section, samples)
         if element.order > 1:

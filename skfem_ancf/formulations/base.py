@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..errors import require_like
 from ..quadrature import gauss, lagrange, tensor
 
 COMPONENTS = ("xx", "yy", "xy")
@@ -107,6 +108,7 @@ class Formulation:
         That is of twice the degree of the strain: ``element.strain_degree`` along the axis of a
         straight element, and 2 N across the section, for St. Venant-Kirchhoff.
         """
+        require_like("element", element, "beam element", "strain_degree", "order")
         return gauss(element.strain_degree + 1), gauss(2 * element.order + 1)
 
     def __repr__(self):

@@ -1,5 +1,6 @@
 """The formulation of the paper: every strain component at every integration point."""
 
+from ..errors import require_like
 from .base import Formulation, Term
 
 
@@ -15,4 +16,6 @@ class Continuum(Formulation):
     name = "continuum"
 
     def terms(self, element, material):
+        require_like("material", material, "Material", "law")
+        require_like("element", element, "beam element", "strain_degree", "order")
         return [Term(material.law(material.shear_factor(element)), *self.full_rules(element))]

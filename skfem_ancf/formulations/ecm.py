@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, require_like
 from ..materials import LinearLaw
 from .base import Formulation, Term
 
@@ -18,6 +18,7 @@ def split_moduli(name, material, element):
     InputError
         If the material's stress is not linear in the strain.
     """
+    require_like("material", material, "Material", "law")
     law = material.law(material.shear_factor(element))
     if not isinstance(law, LinearLaw):
         raise InputError(

@@ -1,6 +1,6 @@
 """Joints: constraints with Lagrange multipliers. A new joint is one file and one line here."""
 
-from ..errors import NameUnknown
+from ..errors import require_option
 from .base import Joint, bind_joint
 from .guides import OnCircle, OnLine
 from .hinge import Hinge
@@ -30,9 +30,7 @@ def get_joint(joint, **options):
     """
     if isinstance(joint, Joint):
         return joint
-    if joint not in JOINTS:
-        raise NameUnknown("joint", joint, JOINTS)
-    return JOINTS[joint](**options)
+    return JOINTS[require_option("joint", joint, JOINTS)](**options)
 
 
 __all__ = ["JOINTS", "Hinge", "Joint", "OnCircle", "OnLine", "PlaneSection", "PrescribedAngle",

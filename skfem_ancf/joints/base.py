@@ -5,7 +5,7 @@ from uuid import uuid4
 
 import numpy as np
 
-from ..errors import AncfError, InputError, require_finite
+from ..errors import AncfError, InputError, require_finite, shown
 from ..loads import require_entries
 from ..places import is_point
 
@@ -105,7 +105,11 @@ class Joint:
         return columns, np.broadcast_to(rows[:, columns], (len(times), len(rows), len(columns)))
 
     def __repr__(self):
-        return f"<{type(self).__name__} {self.name or ''}>"
+        at = getattr(self, "at", None)
+        if isinstance(at, tuple) and len(at) == 2 and at[0] is at[1]:  # given once for both beams
+            at = at[0]
+        parts = [type(self).__name__, self.name, None if at is None else f"at {shown(at)}"]
+        return f"<{' '.join(part for part in parts if part)}>"
 
 
 def bind_joint(joint, scene):
@@ -175,6 +179,13 @@ def pair(value, what):
     if isinstance(value, (tuple, list)) and len(value) == 2 and not is_point(value):
         return tuple(value)
     return value, value
+
+
+def both(beams):
+    """The two beams of a joint."""
+    if not isinstance(beams, (tuple, list)) or len(beams) != 2:
+        raise InputError(f"beams must be two beams, by Beam, name or number, got {shown(beams)}")
+    return tuple(beams)
 
 
 def cross_terms(a, b, Q):

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from ..errors import InputError, require_finite, require_positive
+from ..errors import InputError, require_finite, require_label, require_positive, teaching
 from .base import Joint, point
 
 
+@teaching
 class OnLine(Joint):
     """n . (r - p) = 0: a material point slides on a straight line.
 
@@ -28,11 +29,12 @@ class OnLine(Joint):
         if not np.any(d):
             raise InputError("the direction of the line must not be zero")
         self.normal = np.array([-d[1], d[0]]) / np.hypot(*d)
-        self.beam, self.at, self.through, self.name = beam, at, through, name
+        self.through = None if through is None else require_finite("through", through, (2,))
+        self.beam, self.at, self.name = beam, at, require_label("name", name)
 
     def bind(self, scene):
         self.r = point(scene, self.beam, self.at)
-        self.p = self.r.start if self.through is None else require_finite("through", self.through)
+        self.p = self.r.start if self.through is None else self.through
         self.rows = self.r.row(self.normal, scene.N)[None]
 
     def value(self, u, t):
@@ -42,6 +44,7 @@ class OnLine(Joint):
         return self.rows
 
 
+@teaching
 class OnCircle(Joint):
     """(|r - c|^2 - R^2) / (2 R) = 0: a material point slides on a circle.
 
@@ -63,7 +66,7 @@ class OnCircle(Joint):
     def __init__(self, at, center, beam=None, radius=None, name=None):
         self.center = require_finite("center", center, (2,))
         self.radius = None if radius is None else require_positive("radius", radius)
-        self.beam, self.at, self.name = beam, at, name
+        self.beam, self.at, self.name = beam, at, require_label("name", name)
 
     def bind(self, scene):
         self.r, self.N = point(scene, self.beam, self.at), scene.N

@@ -2,9 +2,11 @@
 
 import numpy as np
 
-from .base import Joint, pair, point
+from ..errors import require_label, teaching
+from .base import Joint, both, pair, point
 
 
+@teaching
 class Hinge(Joint):
     """r_a = r_b for a material point of each of two beams.
 
@@ -24,7 +26,8 @@ class Hinge(Joint):
     equations = ("force along x", "force along y")
 
     def __init__(self, beams, at, name=None):
-        self.beams, self.at, self.name = beams, pair(at, "the point at="), name
+        self.beams, self.at = both(beams), pair(at, "the point at=")
+        self.name = require_label("name", name)
 
     def bind(self, scene):
         self.a, self.b = (point(scene, beam, at) for beam, at in zip(self.beams, self.at))

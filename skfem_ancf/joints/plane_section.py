@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from ..errors import require_label, teaching
 from .base import Joint, Vector
 
 
+@teaching
 class PlaneSection(Joint):
     """t . r_Y = 0 at every section point: no section slope leaves the stress-free plane.
 
@@ -19,7 +21,7 @@ class PlaneSection(Joint):
     """
 
     def __init__(self, at, beam=None, name=None):
-        self.at, self.beam, self.name = at, beam, name
+        self.at, self.beam, self.name = at, beam, require_label("name", name)
 
     def bind(self, scene):
         beam = scene.beam(self.beam)

@@ -2,10 +2,12 @@
 
 import numpy as np
 
+from ..errors import ask_array, ask_number, require_function, require_label, teaching
 from ..sampling import sample
 from .base import Joint, point, section
 
 
+@teaching
 class PrescribedPosition(Joint):
     """r = r(t) for a material point. At a node of the axis it only fixes coordinates.
 
@@ -23,22 +25,24 @@ class PrescribedPosition(Joint):
     moving = True
 
     def __init__(self, at, r, beam=None, name=None):
-        self.at, self.motion, self.beam, self.name = at, r, beam, name
+        self.motion = require_function("r", r, "of time that returns a position (2,)")
+        self.at, self.beam, self.name = at, beam, require_label("name", name)
 
     def bind(self, scene):
         self.r = point(scene, self.beam, self.at)
         self.rows = np.array([self.r.row(e, scene.N) for e in np.eye(2)])
 
     def value(self, u, t):
-        return self.r(u) - np.asarray(self.motion(t), dtype=float)
+        return self.r(u) - ask_array("r(t={:g})", (2,), self.motion, t)
 
     def offset(self, times, N):
-        return self.r.start - sample(self.motion, times)
+        return self.r.start - sample(self.motion, times, "r", (2,))
 
     def jacobian(self, u, t):
         return self.rows
 
 
+@teaching
 class PrescribedAngle(Joint):
     """The direction of an end section has turned by angle(t): e(t) x d = 0.
 
@@ -58,22 +62,26 @@ class PrescribedAngle(Joint):
     moving = True
 
     def __init__(self, at, angle, beam=None, name=None):
-        self.at, self.angle, self.beam, self.name = at, angle, beam, name
+        self.angle = require_function("angle", angle, "of time that returns radians")
+        self.at, self.beam, self.name = at, beam, require_label("name", name)
 
     def bind(self, scene):
         _, self.d = section(scene, self.beam, self.at)
         self.N, self.start = scene.N, np.arctan2(*self.d.start[::-1])
 
+    def _angle(self, t):
+        return ask_number("angle(t={:g})", self.angle, t)
+
     def value(self, u, t):
-        a, d = self.start + self.angle(t), self.d(u)
+        a, d = self.start + self._angle(t), self.d(u)
         return np.array([np.cos(a) * d[1] - np.sin(a) * d[0]])
 
     def jacobian(self, u, t):
-        a = self.start + self.angle(t)
+        a = self.start + self._angle(t)
         return self.d.row((-np.sin(a), np.cos(a)), self.N)[None]
 
     def _normals(self, times):
-        a = self.start + sample(self.angle, times)
+        a = self.start + sample(self.angle, times, "angle", ())
         return np.array([-np.sin(a), np.cos(a)]).T
 
     def offset(self, times, N):

@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, require_flag, require_label, shown, teaching
 from ..places import is_place
-from .base import Joint, cross_terms, rotation, section
+from .base import Joint, both, cross_terms, rotation, section
 
 
+@teaching
 class Weld(Joint):
     """The axis points coincide, and the directions of the two sections keep their angle.
 
@@ -33,12 +34,13 @@ class Weld(Joint):
     constant = False
 
     def __init__(self, beams, at, name=None, apart=False):
-        self.beams, self.name, self.apart = beams, name, apart
+        self.beams, self.name = both(beams), require_label("name", name)
+        self.apart = require_flag("apart", apart)
         if is_place(at):
             at = at, at
         if not isinstance(at, (tuple, list)) or len(at) != 2:
             raise InputError("a weld needs the section of each of its two beams, as "
-                             f"at=('right', 'left'), or one point of both axes, got {at!r}")
+                             f"at=('right', 'left'), or one point of both axes, got {shown(at)}")
         self.at = tuple(at)
 
     def bind(self, scene):

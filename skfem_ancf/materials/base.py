@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..errors import InputError, NameUnknown, require_finite_scalar, require_positive
+from ..errors import (InputError, require_finite_scalar, require_like, require_option,
+                      require_positive, taught)
 
 PLANES = ("stress", "strain")
 
@@ -42,21 +43,19 @@ class Material:
         If ``plane`` or ``shear_correction`` is a name that is not known.
     """
 
+    @taught
     def __init__(self, E, nu, density=None, plane="stress", shear_correction="auto"):
         self.E = require_positive("E", E)
         self.nu = require_finite_scalar("nu", nu)
         self.density = None if density is None else require_positive("density", density)
-        if plane not in PLANES:
-            raise NameUnknown("plane", plane, PLANES)
-        self.plane = plane
+        self.plane = require_option("plane", plane, PLANES)
         if not (-1.0 < self.nu < 0.5 or (self.nu == 0.5 and plane == "stress")):
             raise InputError(
                 f"the Poisson ratio nu must lie in (-1, 0.5), or be 0.5 in plane stress, got "
                 f"{self.nu!r} in plane {plane}")
         if isinstance(shear_correction, str):
-            if shear_correction not in ("auto", "paper"):
-                raise NameUnknown("shear correction", shear_correction, ("auto", "paper"))
-            self.shear_correction = shear_correction
+            self.shear_correction = require_option("shear correction", shear_correction,
+                                                   ("auto", "paper"))
         else:
             self.shear_correction = require_positive("shear_correction", shear_correction)
 
@@ -67,6 +66,7 @@ class Material:
 
     def shear_factor(self, element):
         """The factor k_s on the shear modulus for sections of an element."""
+        require_like("element", element, "beam element", "carries_shear_parabola")
         if isinstance(self.shear_correction, float):
             return self.shear_correction
         if self.shear_correction == "auto" and element.carries_shear_parabola:
@@ -75,6 +75,7 @@ class Material:
 
     def law(self, k_s=1.0):
         """The law with its shear corrected: a function of (eps_xx, eps_yy, sqrt(k_s) 2 eps_xy)."""
+        k_s = require_positive("k_s", k_s)
         return self if k_s == 1.0 else ShearCorrected(self, k_s)
 
     @property

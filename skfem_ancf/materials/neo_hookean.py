@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, taught
 from .base import Material
 
 
@@ -28,6 +28,7 @@ class NeoHookean(Material):
     1.098901
     """
 
+    @taught
     def __init__(self, E, nu, density=None, plane="stress", shear_correction="auto"):
         super().__init__(E, nu, density, plane, shear_correction)
         if self.nu == 0.5:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..errors import require_positive
 from .base import LinearLaw, Material
 
 
@@ -34,6 +35,7 @@ class StVenantKirchhoff(Material):
         return np.array([[a, b, 0.0], [b, a, 0.0], [0.0, 0.0, self.G]])
 
     def law(self, k_s=1.0):
+        k_s = require_positive("k_s", k_s)
         return LinearLaw(self.D * np.diag([1.0, 1.0, k_s]) + self.D * (1 - np.eye(3)))
 
     def volumetric_split(self, k_s=1.0):
