@@ -191,8 +191,7 @@ def require_finite(name, array, shape=None):
         array.ndim != len(shape)
         or any(n is not None and n != m for n, m in zip(shape, array.shape))
     ):
-        wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + (
-            ",)" if len(shape) == 1 else ")")
+        wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
         raise InputError(f"{name} must have shape {wanted}, got {array.shape}")
     if not np.all(np.isfinite(array)):
         bad = array[~np.isfinite(array)][0]

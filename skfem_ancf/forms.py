@@ -372,6 +372,7 @@ def of(beam):
     >>> asm(own.tangent, basis, r=reference_coordinates(basis)).shape
     (24, 24)
     """
+    require_like("beam", beam, "Beam", "facet_basis")
     return BeamForms(_OwnEnergy(beam), _OwnForce(beam), _OwnTangent(beam))
 
 

@@ -14,13 +14,22 @@ from skfem.element import Element
 from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import Mesh, MeshQuad
 
-from .errors import MeshError, NameUnknown, require_finite, require_finite_scalar, require_positive
+from .errors import (CallbackError, FileError, MeshError, NameUnknown, ask, ask_array,
+                     require_finite, require_finite_scalar, require_function, require_integer,
+                     require_option, require_path, require_positive, shown, teaching)
 from .mapping import MappingBeam
 from .reference import ElementBeamP1
 
 logger = logging.getLogger(__name__)
 
+#: Elements of the largest mesh that :meth:`MeshBeam.refined` makes.
+MAX_ELEMENTS = 2**24
 
+#: Points of a picture or a file along and across an element.
+MAX_SUBDIVISION = 1000
+
+
+@teaching
 @dataclass(repr=False, eq=False)
 class MeshBeam(Mesh):
     """A planar beam in its stress-free state, divided into elements along its axis.
@@ -160,8 +169,11 @@ class MeshBeam(Mesh):
             k = int(np.argmin(np.diff(s)))
             raise MeshError(f"the parameters of the nodes must increase: s[{k}] = {s[k]:.9g}, "
                             f"s[{k + 1}] = {s[k + 1]:.9g}")
-        curve = Curve(r, dr if dr is not None else _curve_derivative(r, s[0], s[-1]),
-                      (s[0], s[-1]))
+        what = "of parameters (n,) that returns positions (2, n)"
+        require_function("r", r, what)
+        if dr is None:
+            dr = _curve_derivative(r, s[0], s[-1])
+        curve = Curve(r, require_function("dr", dr, what), (s[0], s[-1]))
         p, tangent = curve.nodes(s)
         curve.check(s)
         _check_curvature(curve, s, height)
@@ -182,7 +194,11 @@ class MeshBeam(Mesh):
         return cls.init_line([0.0, 1.0], height=1.0, origin=(0.0, 0.5))
 
     def __post_init__(self):
-        p, shape = require_finite("the nodes", self.doflocs, (2, None)), np.shape(self.t)
+        p = require_finite("the nodes", self.doflocs, (2, None))
+        t = require_finite("t", self.t)
+        if np.any(t != np.floor(t)) or np.any(np.abs(t) > 2**31 - 1):
+            raise MeshError(f"t must hold the numbers of nodes, got {shown(self.t)}")
+        shape = t.shape
         if len(shape) != 2 or shape[0] != 2 or shape[1] == 0:
             raise MeshError(
                 f"a MeshBeam has two nodes per element and at least one element, t has shape "
@@ -204,8 +220,7 @@ class MeshBeam(Mesh):
             self._straight()
         self.p_X = require_finite("p_X", self.p_X, p.shape)
         self.p_Y = require_finite("p_Y", self.p_Y, p.shape)
-        if self.sections not in ("linear", "cubic"):
-            raise NameUnknown("interpolation of the sections", self.sections, ("linear", "cubic"))
+        require_option("interpolation of the sections", self.sections, ("linear", "cubic"))
         if self.p_XY is not None:
             self.p_XY = require_finite("p_XY", self.p_XY, p.shape)
         elif self.sections == "cubic":
@@ -244,6 +259,7 @@ class MeshBeam(Mesh):
         beam exactly on a mesh with "linear", those with cubic sections on one with "cubic". A
         ``Beam`` chooses for itself; it makes no difference for straight beams.
         """
+        require_option("interpolation of the sections", sections, ("linear", "cubic"))
         return self if sections == self.sections else replace(self, sections=sections)
 
     # topology
@@ -288,15 +304,26 @@ class MeshBeam(Mesh):
         return super().normalize_facets(facets)
 
     def normalize_elements(self, elements):
-        if isinstance(elements, str) and elements not in (self.subdomains or {}):
-            raise NameUnknown("subdomain", elements, self.subdomains or {})
-        if isinstance(elements, np.integer):
-            elements = int(elements)
-        elif isinstance(elements, (tuple, list, set)) and len(elements) == 0:
-            elements = np.zeros(0, dtype=np.int32)
-        elements = super().normalize_elements(elements)
-        if elements.dtype == bool:
+        if isinstance(elements, str):
+            require_option("subdomain", elements, self.subdomains or {})
+            return np.asarray(super().normalize_elements(elements))
+        if callable(elements):
+            return self.elements_satisfying(elements)
+        given = elements
+        elements = list(elements) if isinstance(elements, (tuple, list, set)) else elements
+        if isinstance(elements, list) and any(isinstance(e, str) for e in elements):
+            return np.unique(np.concatenate([self.normalize_elements(e) for e in elements]))
+        try:
+            elements = np.atleast_1d(np.asarray(elements))
+        except (ValueError, TypeError):
+            elements = np.zeros(1, dtype=object)
+        if elements.dtype == bool and elements.shape == (self.nelements,):
             elements = np.nonzero(elements)[0]
+        if not elements.size:
+            return np.zeros(0, dtype=np.int32)
+        if elements.dtype.kind not in "iu" or elements.ndim != 1:
+            raise MeshError("elements are given by their numbers, by the name of a subdomain, by a "
+                            f"function or a mask, got {shown(given)}")
         bad = elements[(elements < 0) | (elements >= self.nelements)]
         if len(bad):
             raise MeshError(f"the elements are numbered 0 to {self.nelements - 1}, got {bad[0]}")
@@ -305,7 +332,7 @@ class MeshBeam(Mesh):
     def facets_satisfying(self, test, boundaries_only=False, normal=None):
         middle = np.array([[0.5]])
         mapping = self._mapping()
-        facets = np.nonzero(test(mapping.G(middle)[:, :, 0]))[0].astype(np.int32)
+        facets = _satisfying(test, mapping.G(middle)[:, :, 0])
         if boundaries_only:
             facets = np.intersect1d(facets, self.boundary_facets())
         if normal is None:
@@ -316,7 +343,7 @@ class MeshBeam(Mesh):
 
     def elements_satisfying(self, test):
         middle = self._mapping().F(np.array([[0.5], [0.5]]))[:, :, 0]
-        return np.nonzero(test(middle))[0].astype(np.int32)
+        return _satisfying(test, middle)
 
     def params(self):
         """Length of each element."""
@@ -401,9 +428,10 @@ class MeshBeam(Mesh):
             The number of uniform refinements, or the elements to halve.
         """
         if isinstance(times_or_ix, (int, np.integer)) and not isinstance(times_or_ix, bool):
-            if times_or_ix < 0:
-                raise MeshError(f"the number of refinements must be >= 0, got {times_or_ix}")
-            return super().refined(int(times_or_ix))
+            most = int(np.log2(MAX_ELEMENTS / self.nelements))
+            return super().refined(require_integer(
+                "the number of refinements", times_or_ix, 0, max(most, 0),
+                f"a mesh of {MAX_ELEMENTS} elements at most"))
         return self._adaptive(times_or_ix)
 
     def _adaptive(self, ix):
@@ -531,7 +559,7 @@ class MeshBeam(Mesh):
 
     def scaled(self, factors):
         """The mesh, with its height, scaled by one positive factor."""
-        f = np.unique(require_finite("factors", np.atleast_1d(factors)))
+        f = np.unique(require_finite("factors", factors))
         if len(f) != 1 or f[0] <= 0:
             raise MeshError(f"a beam is scaled by one positive factor in all directions, got "
                             f"{factors!r}; sections would not stay normal otherwise")
@@ -561,6 +589,8 @@ class MeshBeam(Mesh):
 
     def to_meshquad(self, nx=8, ny=4):
         """Quads of the stress-free body, ``nx`` by ``ny`` an element, as a scikit-fem MeshQuad."""
+        nx, ny = (require_integer(name, n, 1, MAX_SUBDIVISION) for name, n in (("nx", nx),
+                                                                             ("ny", ny)))
         quad = MeshQuad.init_tensor(np.linspace(0, 1, nx + 1), np.linspace(0, 1, ny + 1))
         number = np.arange(quad.p.shape[1] * self.nelements).reshape(self.nelements, -1)
         left, right = (np.nonzero(quad.p[0] == end)[0] for end in (0.0, 1.0))
@@ -594,6 +624,28 @@ class MeshBeam(Mesh):
 
     @classmethod
     def from_dict(cls, data):
+        """The mesh of what :meth:`to_dict` returned.
+
+        Raises
+        ------
+        MeshError
+            If it is something else.
+        """
+        wanted = {"p", "t", "height", "p_X", "p_Y", "lengths", "sections"}
+        if not isinstance(data, dict) or wanted - set(data):
+            raise MeshError("this is no dictionary of a beam"
+                            + (f": {sorted(wanted - set(data))} are missing" if isinstance(
+                                data, dict) else f", but {shown(data)}"))
+        try:
+            return cls._from_dict(data)
+        except MeshError:
+            raise
+        except Exception as error:  # whatever it holds, it is no mesh
+            raise MeshError(f"the dictionary holds no beam: {type(error).__name__}: {error}"
+                            ) from error
+
+    @classmethod
+    def _from_dict(cls, data):
         data = {"boundaries": None, "subdomains": None, **data}
         for name in ("p_X", "p_Y", "p_XY"):
             if data.get(name) is not None:
@@ -609,17 +661,38 @@ class MeshBeam(Mesh):
 
     def save_npz(self, filename):
         """Save everything but the function ``curve``; read it with :meth:`load_npz`."""
+        filename = require_path("filename", filename)
         tags = {f"b_{k}": v for k, v in (self.boundaries or {}).items()}
         tags |= {f"o_{k}": v.ori for k, v in (self.boundaries or {}).items()
                  if getattr(v, "ori", None) is not None}
         tags |= {f"s_{k}": v for k, v in (self.subdomains or {}).items()}
         s = {name: getattr(self, name) for name in ("s", "p_XY") if getattr(self, name) is not None}
-        np.savez(filename, doflocs=self.doflocs, t=self.t, height=self.height, p_X=self.p_X,
-                 p_Y=self.p_Y, lengths=self.lengths, sections=self.sections, **s, **tags)
+        try:
+            np.savez(filename, doflocs=self.doflocs, t=self.t, height=self.height, p_X=self.p_X,
+                     p_Y=self.p_Y, lengths=self.lengths, sections=self.sections, **s, **tags)
+        except OSError as error:
+            raise FileError(f"cannot write {str(filename)!r}: {error}") from error
 
     @classmethod
     def load_npz(cls, filename):
-        with np.load(filename) as data:
+        """Load a mesh saved by :meth:`save_npz`; nothing in the file is executed.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be read.
+        MeshError
+            If it holds no beam.
+        """
+        path = require_path("filename", filename)
+        return _read(path, lambda: cls._load_npz(path))
+
+    @classmethod
+    def _load_npz(cls, filename):
+        with filename.open("rb") as file:
+            if file.read(4) not in (b"PK\x03\x04", b"PK\x05\x06"):
+                raise MeshError(f"{str(filename)!r} is no .npz file")
+        with np.load(filename, allow_pickle=False) as data:
             missing = {"doflocs", "t", "height", "p_X", "p_Y", "lengths",
                        "sections"} - set(data.files)
             if missing:
@@ -638,24 +711,76 @@ class MeshBeam(Mesh):
 
         Any other suffix that meshio knows writes the quads of :meth:`to_meshquad`.
         """
-        path = Path(filename)
+        import meshio
+
+        path = require_path("filename", filename)
         if path.suffix == ".npz":
             self.save_npz(path)
-        elif path.suffix == ".json":
-            path.write_text(json.dumps(self.to_dict()))
-        else:
-            self.to_meshquad().save(filename, point_data, cell_data, **kwargs)
+            return
+        try:
+            if path.suffix == ".json":
+                path.write_text(json.dumps(self.to_dict()), encoding="utf-8")
+            elif not path.suffix:
+                raise FileError(f"the file name {str(path)!r} does not say the format: end it with "
+                                ".npz, .json, .vtu or what else meshio writes")
+            else:
+                self.to_meshquad().save(filename, point_data, cell_data, **kwargs)
+        except FileError:
+            raise
+        except (OSError, meshio.WriteError, SystemExit) as error:
+            raise FileError(f"cannot write {str(path)!r}: {error}") from error
 
     @classmethod
     def load(cls, filename, out=None, **kwargs):
         """Load a mesh saved as ``.npz`` or ``.json``."""
-        path = Path(filename)
+        path = require_path("filename", filename)
         if path.suffix == ".npz":
             return cls.load_npz(path)
         if path.suffix == ".json":
-            return cls.from_dict(json.loads(path.read_text()))
+            return _read(path, lambda: cls.from_dict(json.loads(path.read_text(encoding="utf-8"))))
         raise MeshError(f"cannot read a beam from {path.name!r}: only .npz and .json files keep "
                         "the axis, the tangents and the height; save the mesh in one of them")
+
+
+def _read(path, read):
+    """What a function reads from a file, or an error that says what is wrong with it."""
+    try:
+        return read()
+    except MeshError as error:
+        name = repr(str(path))
+        raise MeshError(str(error) if name in str(error) else f"{name}: {error}") from error
+    except OSError as error:
+        raise FileError(f"cannot read {str(path)!r}: {error}") from error
+    except Exception as error:  # whatever is in the file
+        raise MeshError(f"{str(path)!r} holds no beam, or is damaged: {type(error).__name__}: "
+                        f"{error}") from error
+
+
+def _satisfying(test, x):
+    """The numbers of the points x (2, n) for which a function is true."""
+    require_function("the function of the points", test, "that returns True or False for each")
+    found = ask("the function of the points", test, x)
+    if np.shape(found) != x.shape[1:] or np.asarray(found).dtype != bool:
+        raise CallbackError("the function of the points x, shape (2, n), must return n times True "
+                            f"or False, got {shown(found)}")
+    return np.nonzero(found)[0].astype(np.int32)
+
+
+def _components(value, s):
+    """Two components at parameters s; one may be a constant."""
+    if isinstance(value, (tuple, list)) and len(value) == 2:
+        return [np.broadcast_to(v, s.shape) if np.ndim(v) == 0 else v for v in value]
+    return value
+
+
+def _on_curve(what, function, s):
+    """A function of parameters s (n,) that returns (2, n), asked."""
+    try:
+        return ask_array(what, (2, len(s)), lambda s: _components(function(s), s), s)
+    except CallbackError as error:
+        raise CallbackError(f"{error}; the function takes parameters of shape (n,) and returns "
+                            "positions of shape (2, n): a component that is constant is 0 * s + 1"
+                            ) from error.__cause__
 
 
 class Curve:
@@ -665,11 +790,15 @@ class Curve:
         self.r, self.derivative, self.ends = r, derivative, ends
 
     def __call__(self, s):
-        return require_finite("r(s)", self.r(s), (2, len(s)))
+        return _on_curve("r(s)", self.r, s)
+
+    def rate(self, s):
+        """The derivative at parameters ``s``, shape (2, n)."""
+        return _on_curve("the derivative of r", self.derivative, s)
 
     def nodes(self, s):
         """Positions and unit tangents at parameters ``s``, both of shape (2, n)."""
-        p, d = self(s), require_finite("the derivative of r", self.derivative(s), (2, len(s)))
+        p, d = self(s), self.rate(s)
         size = np.hypot(*d)
         if len(s) and np.min(size) <= 1e-12 * np.max(size):
             raise MeshError(f"the curve stands still at s = {s[np.argmin(size)]:.9g}: it has no "
@@ -679,7 +808,7 @@ class Curve:
     def turning(self, s):
         """Derivative of the unit normal by the arc length at parameters ``s``, shape (2, n)."""
         dt = _differences(lambda x: self.nodes(x)[1], s, *self.ends)
-        return np.array([-dt[1], dt[0]]) / np.hypot(*self.derivative(s))
+        return np.array([-dt[1], dt[0]]) / np.hypot(*self.rate(s))
 
     def lengths(self, a, b):
         """Arc lengths from parameters ``a`` to ``b``, both of shape (n,)."""
@@ -700,21 +829,21 @@ class Curve:
     def _at_gauss_points(self, a, b):
         x, w = np.polynomial.legendre.leggauss(12)
         at = a[:, None] + (b - a)[:, None] * (0.5 + 0.5 * x)
-        return np.reshape(self.derivative(at.ravel()), (2,) + at.shape), 0.5 * w
+        return np.reshape(self.rate(at.ravel()), (2,) + at.shape), 0.5 * w
 
     def moved(self, A, shift):
         """The curve ``A r(s) + shift``."""
-        return Curve(lambda s: A @ self(s) + shift[:, None], lambda s: A @ self.derivative(s),
+        return Curve(lambda s: A @ self(s) + shift[:, None], lambda s: A @ self.rate(s),
                      self.ends)
 
 
 def _curve_derivative(r, s0, s1):
     """The derivative of ``r`` on [s0, s1]: complex step if exact, else sixth-order differences."""
     def differences(s):
-        return _differences(r, s, s0, s1)
+        return _differences(lambda s: _on_curve("r(s)", r, s), s, s0, s1)
 
     def complex_step(s):
-        return np.imag(np.asarray(r(s + 1e-30j))) / 1e-30
+        return np.imag(np.asarray(_components(r(s + 1e-30j), s))) / 1e-30
 
     try:
         probe = s0 + (s1 - s0) * np.linspace(0.0137, 0.991, 24)
