@@ -326,6 +326,33 @@ def ask_array(what, shape, function, *args):
     return _returned(require_finite, what, ask(what, function, *args), args, shape)
 
 
+def ask_field(what, function, x):
+    """The values (2, ...) of a function at points x (2, ...), asked; each may be a constant.
+
+    Raises
+    ------
+    CallbackError
+        If the function fails, or its values have another shape or are not finite.
+    """
+    try:
+        value = ask(what, function, x)
+    except CallbackError as error:
+        raise CallbackError(f"{error}, for points x of shape {x.shape}") from error.__cause__
+    try:
+        rows = [np.broadcast_to(_returned(require_finite, what, row, ()), x.shape[1:])
+                for row in value]
+    except (TypeError, ValueError) as error:
+        if isinstance(error, AncfError):
+            raise
+        rows = []
+    if len(rows) != 2:
+        raise CallbackError(
+            f"{what} must return two components, as np.array([0 * x[0], x[0]]), each of the shape "
+            f"of x[0] or a number; for x of shape {x.shape} it returned "
+            f"{np.shape(value) if isinstance(value, np.ndarray) else shown(value)}")
+    return np.array(rows)
+
+
 def _returned(door, what, value, args, *more):
     try:
         return door(what.format(*args), value, *more)

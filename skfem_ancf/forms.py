@@ -38,8 +38,7 @@ from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 from skfem.helpers import dot
 
-from .errors import (InputError, ask_array, require_finite, require_like, require_positive, shown,
-                     taught)
+from .errors import InputError, ask_field, require_finite, require_like, require_positive, taught
 
 
 # kinematics: grad[i, j] = d r_i / d X_j
@@ -266,30 +265,6 @@ def gravity(density, g, width=1.0):
     return weight
 
 
-def field(what, function, x):
-    """A function of the points x (2, ...) that returns vectors, asked: shape (2, ...).
-
-    It may return (2,), or components that do not depend on all of x.
-
-    Raises
-    ------
-    CallbackError
-        If it raises, or returns something else.
-    """
-    def ask_it(x):
-        value = function(x)
-        if isinstance(value, (tuple, list)) and len(value) == 2:  # one may be a constant
-            value = [np.broadcast_to(v, x.shape[1:]) for v in value]
-        if np.shape(value) == (2,):
-            value = np.reshape(value, (2,) + (1,) * (x.ndim - 1))
-        elif np.shape(value)[:1] != (2,) or np.ndim(value) > x.ndim:
-            raise InputError(f"{what} must return two components at each point, shape (2, ...), "
-                             f"got {shown(value)}")
-        return np.broadcast_to(value, x.shape)
-
-    return ask_array(what, x.shape, ask_it, np.asarray(x))
-
-
 @taught
 def traction(t, width=1.0):
     """Dead traction ``int t . v dA`` for a ``FacetBasis``; ``t`` is (2,) or t(x) -> (2, ...)."""
@@ -299,7 +274,7 @@ def traction(t, width=1.0):
 
     @LinearForm
     def surface_load(v, w):
-        value = field("t(x)", t, w.x) if callable(t) else t
+        value = ask_field("t(x)", t, np.asarray(w.x)) if callable(t) else t
         return width * (value[0] * v[0] + value[1] * v[1])
 
     return surface_load

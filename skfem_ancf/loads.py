@@ -11,7 +11,8 @@ from skfem.assembly import LinearForm, asm
 
 from . import forms
 from .beam import Beam
-from .errors import AncfError, InputError, ask_number, require_finite, require_function
+from .errors import (AncfError, InputError, ask_field, ask_number, require_finite,
+                     require_function)
 
 
 class Amplitude:
@@ -225,7 +226,7 @@ class Traction(Load):
         t = self.t
         basis = beam.facet_basis(self.boundary, intorder=12 if callable(t) else None)
         if callable(t):
-            require_field("t(x)", t, np.asarray(basis.global_coordinates()))
+            ask_field("t(x)", t, np.asarray(basis.global_coordinates()))
         return DeadLoad(beam, asm(forms.traction(t, beam.width), basis), self.amplitude)
 
 
@@ -242,34 +243,6 @@ class FormLoad(Load):
         basis = (beam.exact_basis() if self.boundary is None else
                  beam.facet_basis(self.boundary))
         return DeadLoad(beam, asm(self.form, basis), self.amplitude)
-
-
-def require_field(name, function, x):
-    """The values (2, ...) of a function at points x (2, ...); it may return a constant (2,).
-
-    Raises
-    ------
-    InputError
-        If the function fails, or its values have another shape or are not finite.
-    """
-    try:
-        value = function(x)
-    except AncfError:
-        raise
-    except Exception as error:  # it is the user's: it may raise anything
-        raise InputError(f"{name} fails for points x of shape {x.shape}: {type(error).__name__}: "
-                         f"{error}") from error
-    try:
-        rows = [np.broadcast_to(require_finite(name, row), x.shape[1:]) for row in value]
-    except (TypeError, ValueError) as error:
-        if isinstance(error, AncfError):
-            raise
-        rows = []
-    if len(rows) != 2:
-        raise InputError(f"{name} must return two components, as np.array([0 * x[0], x[0]]), each "
-                         f"of the shape of x[0] or a number; for x of shape {x.shape} it returned "
-                         f"{np.shape(value) if isinstance(value, np.ndarray) else value!r}")
-    return np.array(rows)
 
 
 class DeadLoad(Load):

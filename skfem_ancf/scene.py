@@ -9,11 +9,10 @@ from . import eigen
 from .beam import Beam, select_beam
 from .dynamics import get_scheme
 from .dynamics.integrate import integrate
-from .errors import (ConvergenceError, InputError, NameUnknown, require_finite,
+from .errors import (ConvergenceError, InputError, NameUnknown, ask_field, require_finite,
                      require_finite_scalar)
 from .joints import Joint, bind_joint, get_joint
-from .loads import (EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight, bind_load,
-                    require_field)
+from .loads import (EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight, bind_load)
 from .path import Path
 from .places import on_other_mesh
 from .plan import make_plan
@@ -517,7 +516,7 @@ class Scene:
         beam = self._beams[k]
         if callable(v):
             basis = beam.exact_basis()
-            v = basis.project(require_field("v(x)", v, np.asarray(basis.global_coordinates())))
+            v = basis.project(ask_field("v(x)", v, np.asarray(basis.global_coordinates())))
         return require_finite("v", v, (beam.N,))
 
     def integrate(self, t_end, dt, scheme="energy-momentum", start=None, **options):
