@@ -9,7 +9,7 @@ the mode of equal slopes that this leaves is stabilised.
 import numpy as np
 
 from .errors import InputError
-from .kernel import Chain, writable
+from .kernel import Chain, square_root, writable
 from .quadrature import gauss
 
 _J = np.array([[0.0, 1.0], [-1.0, 0.0]])  # a x b = a . _J b
@@ -145,12 +145,8 @@ class CableKernel(Chain):
                      + G2.transpose(0, 2, 1) @ (m * k_b))
         out.tangent = None
         if tangent:
-            B = np.zeros(e_a.shape[:2] + (2, self.nd, 2))  # (ne, np, eps or kappa, nb, 2)
-            B[:, :, 0] = G1[..., None] * e_a[:, :, None]
-            B[:, :, 1] = G1[..., None] * k_a[:, :, None] + G2[..., None] * k_b[:, :, None]
-            B = B.reshape(len(a), -1, 2 * self.nd)
-            weights = (w[..., None] * self.stiffness).reshape(len(w), -1, 1)
-            K = B.transpose(0, 2, 1) @ (weights * B)
+            B, CB = self._rows(G1, G2, w, rates)
+            K = B.transpose(0, 2, 1) @ CB
             if geometric:
                 K += self._geometric(carried[0] if carried else stress, a, b, s, kappa, G1, G2, w)
             out.tangent = K
@@ -160,6 +156,31 @@ class CableKernel(Chain):
             if tangent:
                 out.tangent += constant
         return out
+
+    def factors(self, u_e, elements=slice(None)):
+        """As :meth:`skfem_ancf.kernel.Kernel.factors`."""
+        p = self._part
+        G1, G2, w = p(self.G1, elements), p(self.G2, elements), p(self.w, elements)
+        state = self._state(u_e, elements)
+        a, b, _ = state
+        strain, s = self._strain(state, elements)
+        kappa = strain[1] + p(self.kappa0, elements)
+        B, CB = self._rows(G1, G2, w, self._rates(a, b, s, kappa))
+        S = self._geometric(self.stiffness[:, None, None] * strain, a, b, s, kappa, G1, G2, w)
+        if self.constant is not None:
+            rows = square_root(p(self.constant, elements))
+            rows = np.broadcast_to(rows, (len(B),) + rows.shape[1:])
+            B, CB = (np.concatenate([part, rows], axis=1) for part in (B, CB))
+        return B, CB, S
+
+    def _rows(self, G1, G2, w, rates):
+        """The strains' derivatives B by the coordinates, and the weighted stiffnesses times B."""
+        e_a, k_a, k_b = rates
+        B = np.zeros(e_a.shape[:2] + (2, self.nd, 2))  # (ne, np, eps or kappa, nb, 2)
+        B[:, :, 0] = G1[..., None] * e_a[:, :, None]
+        B[:, :, 1] = G1[..., None] * k_a[:, :, None] + G2[..., None] * k_b[:, :, None]
+        B = B.reshape(len(e_a), -1, 2 * self.nd)
+        return B, (w[..., None] * self.stiffness).reshape(len(w), -1, 1) * B
 
     def _geometric(self, stress, a, b, s, kappa, G1, G2, w):
         """int N d^2 eps + M d^2 kappa."""

@@ -4,37 +4,61 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
-from .errors import InputError, SupportError
+from .errors import ConvergenceError, InputError, SupportError
 from .results import State
+from .tangent import Inverse, StrainTangent
 
 DENSE = 600  # free coordinates up to which the dense solver is used
+WINDOW = 1e-8  # smallest over largest eigenvalue of an inverse that is taken from it
+REAL = 1e-7  # imaginary over absolute value of an eigenvalue that counts as real
 
 
 @dataclass
 class Modes:
     """Natural frequencies and shapes, the lowest first.
 
+    A motion ``shape * exp(i omega t)`` has ``omega^2`` as its eigenvalue. Where all loads have a
+    potential every eigenvalue is real. Loads that follow the body may cause complex pairs: two
+    motions that oscillate, one of which grows, which is flutter.
+
     Attributes
     ----------
     frequencies
-        Angular frequencies in rad/s, shape (k,); imaginary parts of unstable motions as
-        negative numbers.
+        Angular frequencies in rad/s, shape (k,): the square roots of the eigenvalues. That of a
+        negative eigenvalue, a motion that leaves the state without oscillating, is given as a
+        negative number: minus its rate of growth. With :attr:`flutter` the array is complex: the
+        real part is the angular frequency, and minus the imaginary part the rate of growth.
     shapes
-        Displacements of the coordinates, shape (k, N), of unit modal mass.
+        Displacements of the coordinates, shape (k, N), of unit modal mass; complex with flutter.
     state
         The state about which the beam vibrates.
+    eigenvalues
+        ``omega^2``, shape (k,), complex.
     """
 
     frequencies: np.ndarray
     shapes: np.ndarray
     state: State
+    eigenvalues: np.ndarray
+
+    @property
+    def flutter(self):
+        """True if an oscillation grows: there is a complex pair among the eigenvalues."""
+        return bool(np.any(self.eigenvalues.imag != 0.0))
+
+    @property
+    def stable(self):
+        """True if none of these motions grows."""
+        return not self.flutter and bool(np.all(self.frequencies >= 0.0))
 
     def mode(self, i, amplitude):
-        """The state displaced by ``amplitude`` times shape ``i``, to plot or save."""
-        return State(self.state.system, self.state.u + amplitude * self.shapes[i],
+        """The state displaced by ``amplitude`` times shape ``i``, to plot or save.
+
+        Of a complex shape the real part.
+        """
+        return State(self.state.system, self.state.u + amplitude * self.shapes[i].real,
                      load=self.state.load, message=f"mode {i}")
 
 
@@ -48,26 +72,138 @@ class Buckling:
         Multiples of the loads of the scene, shape (k,).
     shapes
         Displacements of the coordinates, shape (k, N).
+    follower : bool
+        The loads follow the body and have no potential: it may flutter at a lower factor, which
+        these of divergence do not say; :func:`modes` about a state under load does.
     """
 
     factors: np.ndarray
     shapes: np.ndarray
+    follower: bool = False
 
 
 def modes(system, state, k):
     """The k lowest natural frequencies about a state, prestress and joints included.
 
+    The eigenvalues of ``K x = lambda M x`` are found as ``1 / (lambda + s)``, the largest first, s
+    a small shift: of ``(K + s M)^-1 M``, with solutions refined by strains instead of assembled
+    stiffnesses, and at last as quotients of sums of squares of strains. So the low ones, of
+    bending, are accurate although the largest are ``(L / h)^4`` times as large. With loads that
+    have no potential K is not symmetric, and its eigenvalues may be complex.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    state
+        A State of it.
+    k
+        How many; those with the smallest real part of ``lambda``.
+
+    Returns
+    -------
+    Modes
+
     Raises
     ------
     InputError
         If k is out of range.
+    SupportError
+        If joints are not independent in this state.
     """
-    t = state.load if state.t is None else state.t
-    system.assemble(state.u, state.load, t=state.t)
-    K, M = system.K.tocsc() + system.curvature(state.u, t, state.multipliers), system.mass.tocsc()
-    J = system.jacobian(state.u, t)
-    values, shapes = _lowest(K, M, J, system.free, k)
-    return Modes(np.sign(values) * np.sqrt(np.abs(values)), shapes, state)
+    tangent = StrainTangent(system, state.u, state.load, state.t, state.multipliers)
+    tangent.require_independent()
+    M = system.mass.tocsc()[tangent.free][:, tangent.free]
+    n, m = tangent.size
+    k = _count(k, n - m)
+    shift = _bending_eigenvalue(system)
+    small = n <= DENSE or 2 * k > n - m
+    if tangent.symmetric:
+        values, X = (_dense if small else _sparse)(tangent, M, k, shift)
+    else:
+        values, X = _unsymmetric(tangent, M, k, shift, small)
+    shapes = np.zeros((k, system.N), dtype=X.dtype)
+    shapes[:, tangent.free] = X.T
+    frequencies = np.sqrt(values) if np.any(values.imag) else (
+        np.sign(values.real) * np.sqrt(np.abs(values.real)))
+    return Modes(frequencies, shapes, state, values.astype(complex))
+
+
+def _bending_eigenvalue(system):
+    """omega^2 of the slowest bending that a beam as long as the scene could have."""
+    stiffness = min(b.material.E * b.mesh.height**2 / b.density for b in system.beams) / 12.0
+    return stiffness * (np.pi / system.size) ** 4
+
+
+def _dense(tangent, M, k, shift):
+    """The k lowest by all eigenvalues of the inverse, so many at once as it has digits for."""
+    inverse, L = Inverse(tangent, M, shift), scipy.linalg.cholesky(M.toarray(), lower=True)
+    X, values = np.zeros((len(L), 0)), np.zeros(0)
+    while len(values) < k:
+        MX = M @ X
+        Y = inverse.solve(L - MX @ (X.T @ L))  # of what is left, M-orthogonal to those known
+        Y -= X @ (MX.T @ Y)
+        T = L.T @ Y
+        theta, V = scipy.linalg.eigh(0.5 * (T + T.T))
+        seen = np.abs(theta) > WINDOW * np.abs(theta).max()
+        theta, V = theta[seen], V[:, seen]
+        lowest = np.argsort(1.0 / theta)[:k - len(values)]
+        found, quotients = _quotients(tangent, M, (Y @ V / theta)[:, lowest])
+        X, values = np.column_stack([X, found]), np.append(values, quotients)
+    order = np.argsort(values)
+    return values[order], X[:, order]
+
+
+def _sparse(tangent, M, k, shift):
+    """The k lowest by Lanczos on the inverse."""
+    inverse = Inverse(tangent, M, shift)
+    start = np.random.default_rng(0).standard_normal(M.shape[0])
+    try:
+        _, X = eigsh(M, k=k, M=M, sigma=-shift, v0=inverse.solve(start),
+                     OPinv=LinearOperator(M.shape, inverse.solve, dtype=float))
+    except ArpackNoConvergence as failure:
+        raise ConvergenceError(f"of {k} modes Lanczos found {len(failure.eigenvalues)}; ask for "
+                               "another number") from None
+    X, values = _polished(tangent, M, inverse, X)
+    order = np.argsort(values)
+    return values[order], X[:, order]
+
+
+def _quotients(tangent, M, X):
+    """Columns X of unit modal mass, and their Rayleigh quotients."""
+    X = X / np.sqrt(np.sum(X * (M @ X), axis=0))
+    return X, tangent.energies(X)
+
+
+def _polished(tangent, M, inverse, X):
+    """Columns X after a step of subspace iteration."""
+    Y = inverse.solve(M @ X)
+    theta, V = scipy.linalg.eigh(X.T @ (M @ Y), X.T @ (M @ X))
+    return _quotients(tangent, M, Y @ V / theta)
+
+
+def _unsymmetric(tangent, M, k, shift, small):
+    """The k lowest where K is not symmetric: complex values, shapes (n, k)."""
+    inverse, n = Inverse(tangent, M, shift), M.shape[0]
+    if small:
+        theta, X = scipy.linalg.eig(inverse.solve(M.toarray()))
+    else:
+        start = np.random.default_rng(0).standard_normal(n)
+        theta, X = eigs(LinearOperator(M.shape, lambda x: inverse.solve(M @ x), dtype=float),
+                        k=min(k + 2, n - 2), v0=inverse.solve(start))
+    seen = np.abs(theta) > WINDOW * np.abs(theta).max()
+    if np.sum(seen) < k:
+        raise InputError(f"under loads that follow the body {int(np.sum(seen))} modes can be "
+                         f"told from round-off, k = {k} were asked for")
+    values, X = 1.0 / theta[seen] - shift, X[:, seen]
+    real = np.abs(values.imag) <= REAL * np.abs(values)
+    values[real] = values[real].real
+    order = np.lexsort((values.imag, values.real))[:k]
+    values, X = values[order], X[:, order]
+    # a real shape may have any phase
+    X = X * np.exp(-1j * np.angle(X[np.argmax(np.abs(X), axis=0), np.arange(k)]))
+    X /= np.sqrt(np.sum(X.conj() * (M @ X), axis=0).real)
+    return (values, X) if np.any(values.imag) else (values, X.real)
 
 
 def buckling(system, k):
@@ -75,7 +211,19 @@ def buckling(system, k):
 
     ``(K_0 + factor K_s) phi = 0``, K_s the geometric part for the stress that the full load, moved
     supports included, causes in the stress-free geometry, less the stiffness of the loads. Factors
-    at which the mean strain before buckling is not below one are left out.
+    at which the mean strain before buckling is not below one are left out. With loads that have no
+    potential K_s is not symmetric, and only real factors, of divergence, are found.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    k
+        How many.
+
+    Returns
+    -------
+    Buckling
 
     Raises
     ------
@@ -95,77 +243,50 @@ def buckling(system, k):
     carried = system.stress_step(evaluations, du)
     system.assemble(zero, 1.0, carried)
     Ks = system.K.tocsc() + system.curvature(zero, 0.0, multipliers) - K0
-    J = system.jacobian(zero, 0.0)
-    # K_s phi = -1/factor K_0 phi: the most negative ones
-    free = np.nonzero(system.free)[0]
-    Z = _null_space(J[:, free])
-    if Z is None and len(free) > DENSE:
-        lu = splu(K0[free][:, free].tocsc())
-        A = K0[free][:, free]
-        theta, X = eigsh(Ks[free][:, free], k=_count(k, len(free)), M=A, which="SA",
-                         Minv=LinearOperator(A.shape, lu.solve))
-    else:
-        A, B = (_reduced(S, free, Z) for S in (Ks, K0))
-        theta, X = scipy.linalg.eigh(A, B, subset_by_index=[0, _count(k, len(A)) - 1])
-        X = X if Z is None else Z @ X
-    # square roots of the energies of the strain before buckling and of a strain of one
+    # round-off of the strain before buckling in terms of energy
     smallest = np.sqrt(max(du @ (K0 @ du), 0.0)) * np.finfo(float).eps / system.stiffness_scale
-    good = theta < -smallest
+    tangent = StrainTangent(system, zero, 0.0, None, none)
+    Ks = Ks[tangent.free][:, tangent.free]
+    n, m = tangent.size
+    k = _count(k, n - m)
+    symmetric = abs(Ks - Ks.T).max() <= 1e-10 * abs(Ks).max()
+    theta, X = _geometric(tangent, Ks, k, symmetric, n <= DENSE or 2 * k > n - m)
+    good = (theta.real < -smallest) & (np.abs(theta.imag) <= REAL * np.abs(theta))
     if not np.any(good):
-        raise InputError("no positive load factor: these loads pull the beam straight")
-    order = np.argsort(-1.0 / theta[good])
-    shapes = np.zeros((int(good.sum()), system.N))
-    shapes[:, free] = X[:, good].T[order]
-    return Buckling((-1.0 / theta[good])[order], shapes)
+        raise InputError("no positive load factor: these loads pull the beam straight"
+                         if symmetric else _FLUTTER)
+    factors = -1.0 / theta[good].real
+    order = np.argsort(factors)[:k]
+    shapes = np.zeros((len(order), system.N))
+    shapes[:, tangent.free] = X[:, good].real.T[order]
+    return Buckling(factors[order], shapes, not symmetric)
+
+
+_FLUTTER = (
+    "no real positive load factor: these loads follow the body and have no potential, so it does "
+    "not buckle into a neighbouring equilibrium, but it may flutter. Look at "
+    "scene.modes(k, state) about states under load: above the critical load modes.flutter is True")
+
+
+def _geometric(tangent, Ks, k, symmetric, small):
+    """Eigenvalues ``-1 / factor`` of ``K_s x = theta K_0 x``, and their columns x."""
+    inverse = Inverse(tangent)
+
+    def apply(x):
+        return inverse.solve(Ks @ x)
+
+    if small:
+        theta, X = scipy.linalg.eig(apply(np.eye(Ks.shape[0])))
+        if symmetric:
+            theta = theta.real
+    else:
+        start = apply(np.random.default_rng(0).standard_normal(Ks.shape[0]))
+        theta, X = eigs(LinearOperator(Ks.shape, apply, dtype=float), k=k, which="SR", v0=start)
+    X = X * np.exp(-1j * np.angle(X[np.argmax(np.abs(X), axis=0), np.arange(X.shape[1])]))
+    return theta, X
 
 
 def _count(k, n):
     if isinstance(k, bool) or not isinstance(k, (int, np.integer)) or not 1 <= k <= n:
         raise InputError(f"the number of modes must be an integer from 1 to {n}, got {k!r}")
     return int(k)
-
-
-def _null_space(J):
-    if not len(J):
-        return None
-    q, r = scipy.linalg.qr(J.T)
-    if np.min(np.abs(np.diag(r))) < 1e-12 * np.max(np.abs(r)):
-        raise SupportError("the joints are not independent in this state")
-    return q[:, len(J):]
-
-
-def _reduced(S, free, Z):
-    A = S[free][:, free].toarray()
-    A = A if Z is None else Z.T @ A @ Z
-    return 0.5 * (A + A.T)
-
-
-def _lowest(K, M, J, free, k):
-    """The k lowest eigenvalues of K x = w M x on the free coordinates and J x = 0."""
-    free = np.nonzero(free)[0]
-    n = len(free) - len(J)
-    k = _count(k, n)
-    if n <= DENSE or k > n // 2:
-        Z = _null_space(J[:, free])
-        values, X = scipy.linalg.eigh(_reduced(K, free, Z), _reduced(M, free, Z),
-                                      subset_by_index=[0, k - 1])
-        X = X if Z is None else Z @ X
-    else:
-        A, B = K[free][:, free], M[free][:, free]
-        # below the lowest eigenvalue of a stable state, so that rigid motions are no trouble
-        shift = -1e-6 * abs(A.diagonal() / B.diagonal()).min()
-        Jf = sparse.csr_matrix(J[:, free])
-        lu = splu(sparse.bmat([[A - shift * B, Jf.T], [Jf, None]], format="csc")
-                  if len(J) else (A - shift * B).tocsc())
-        rest = np.zeros(len(J))
-
-        def inverse(b):
-            return lu.solve(np.append(b, rest))[:len(free)]
-
-        start = inverse(B @ np.ones(len(free)))
-        values, X = eigsh(A, k=k, M=B, sigma=shift, v0=start,
-                          OPinv=LinearOperator(A.shape, inverse))
-    order = np.argsort(values)
-    shapes = np.zeros((k, K.shape[0]))
-    shapes[:, free] = X.T[order]
-    return values[order], shapes

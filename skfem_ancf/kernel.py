@@ -479,6 +479,43 @@ class Kernel(Chain):
             out.tangent = K
         return out
 
+    def factors(self, u_e, elements=slice(None)):
+        """The element tangents as ``B^T (C B) + S``: nothing has cancelled yet in B.
+
+        Parameters
+        ----------
+        u_e, elements
+            As in :meth:`evaluate`.
+
+        Returns
+        -------
+        B, CB
+            The strains' derivatives at all integration points, and the weighted moduli times
+            them, shape (ne, m, 2 nb).
+        S
+            The geometric part, shape (ne, 2 nb, 2 nb).
+        """
+        ne, nb = u_e.shape[:2]
+        B, CB, S = [], [], np.zeros((ne, 2 * nb, 2 * nb))
+        blocks = S.reshape(ne, nb, 2, nb, 2)
+        for t in (t.part(elements) for t in self.tables):
+            gradients = t.gradients(u_e)
+            strain = t.strain(gradients)
+            rows = t.strain_matrix(gradients)
+            moduli = t.law.moduli(strain) * t.w
+            B.append(rows.reshape(ne, -1, 2 * nb))
+            CB.append(np.einsum("abep,ebpk->eapk", moduli, rows, optimize=True
+                                ).reshape(ne, -1, 2 * nb))
+            geometric = t.geometric_tangent(t.law.stress(strain))
+            for i in range(2):
+                blocks[:, :, i, :, i] += geometric
+        if self.constant is not None:
+            rows = square_root(self.constant[elements] if len(self.constant) > 1 else self.constant)
+            rows = np.broadcast_to(rows, (ne,) + rows.shape[1:])
+            B.append(rows)
+            CB.append(rows)
+        return np.concatenate(B, axis=1), np.concatenate(CB, axis=1), S
+
     def element_energies(self, u_e, elements=slice(None)):
         """Strain energies (ne,) of element displacements (ne, nb, 2)."""
         total = self.held_energies(u_e, elements)
@@ -513,6 +550,13 @@ class Kernel(Chain):
                 total += (constant @ middle.reshape(len(middle), -1, 1)).reshape(middle.shape)
             self.scatter(total, part, out)
         return out
+
+
+def square_root(K):
+    """Rows R with R^T R = K for positive semidefinite matrices K, shape (ne, rank, n)."""
+    values, V = np.linalg.eigh(K)
+    keep = np.max(values / values[:, -1:], axis=0) > 1e-12
+    return (np.sqrt(values[:, None, keep]) * V[:, :, keep]).transpose(0, 2, 1)
 
 
 def mean_stress(law, eps0, eps1):
