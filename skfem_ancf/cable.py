@@ -9,7 +9,7 @@ the mode of equal slopes that this leaves is stabilised.
 import numpy as np
 
 from .errors import InputError
-from .kernel import Chain, square_root, writable
+from .kernel import Chain, append_square_root, writable
 from .quadrature import gauss
 
 _J = np.array([[0.0, 1.0], [-1.0, 0.0]])  # a x b = a . _J b
@@ -162,16 +162,24 @@ class CableKernel(Chain):
         p = self._part
         G1, G2, w = p(self.G1, elements), p(self.G2, elements), p(self.w, elements)
         state = self._state(u_e, elements)
-        a, b, _ = state
         strain, s = self._strain(state, elements)
         kappa = strain[1] + p(self.kappa0, elements)
-        B, CB = self._rows(G1, G2, w, self._rates(a, b, s, kappa))
-        S = self._geometric(self.stiffness[:, None, None] * strain, a, b, s, kappa, G1, G2, w)
+        B, CB = ([part] for part in self._rows(G1, G2, w, self._rates(*state[:2], s, kappa)))
+        N, M = w * self.stiffness[:, None, None] * strain
+        stress = [np.stack([N, M], axis=2).reshape(len(u_e), -1)]
         if self.constant is not None:
-            rows = square_root(p(self.constant, elements))
-            rows = np.broadcast_to(rows, (len(B),) + rows.shape[1:])
-            B, CB = (np.concatenate([part, rows], axis=1) for part in (B, CB))
-        return B, CB, S
+            append_square_root(self.constant, u_e, elements, B, CB, stress)
+        return tuple(np.concatenate(part, axis=1) for part in (B, CB, stress))
+
+    def geometric(self, u_e, elements, stress):
+        """As :meth:`skfem_ancf.kernel.Kernel.geometric`."""
+        p = self._part
+        G1, G2, w = p(self.G1, elements), p(self.G2, elements), p(self.w, elements)
+        state = self._state(u_e, elements)
+        strain, s = self._strain(state, elements)
+        own = stress[:, :2 * w.shape[1]].reshape(len(u_e), -1, 2)
+        return self._geometric(np.moveaxis(own, -1, 0) / w, *state[:2], s,
+                               strain[1] + p(self.kappa0, elements), G1, G2, w)
 
     def _rows(self, G1, G2, w, rates):
         """The strains' derivatives B by the coordinates, and the weighted stiffnesses times B."""

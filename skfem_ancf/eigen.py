@@ -118,6 +118,7 @@ def modes(system, state, k):
     k = _count(k, n - m)
     shift = _bending_eigenvalue(system)
     small = n <= DENSE or 2 * k > n - m
+    tangent.balance(M, shift)
     if tangent.symmetric:
         values, X = (_dense if small else _sparse)(tangent, M, k, shift)
     else:

@@ -480,7 +480,7 @@ class Kernel(Chain):
         return out
 
     def factors(self, u_e, elements=slice(None)):
-        """The element tangents as ``B^T (C B) + S``: nothing has cancelled yet in B.
+        """The material part of the element tangents as ``B^T (C B)``: in B nothing cancels.
 
         Parameters
         ----------
@@ -491,30 +491,37 @@ class Kernel(Chain):
         -------
         B, CB
             The strains' derivatives at all integration points, and the weighted moduli times
-            them, shape (ne, m, 2 nb).
-        S
-            The geometric part, shape (ne, 2 nb, 2 nb).
+            them, shape (ne, m, 2 nb); what is stabilised is a strain too.
+        stress
+            Weighted stresses, shape (ne, m): ``B^T stress`` is the internal force.
         """
         ne, nb = u_e.shape[:2]
-        B, CB, S = [], [], np.zeros((ne, 2 * nb, 2 * nb))
-        blocks = S.reshape(ne, nb, 2, nb, 2)
+        B, CB, stress = [], [], []
         for t in (t.part(elements) for t in self.tables):
             gradients = t.gradients(u_e)
             strain = t.strain(gradients)
             rows = t.strain_matrix(gradients)
-            moduli = t.law.moduli(strain) * t.w
             B.append(rows.reshape(ne, -1, 2 * nb))
-            CB.append(np.einsum("abep,ebpk->eapk", moduli, rows, optimize=True
+            CB.append(np.einsum("abep,ebpk->eapk", t.law.moduli(strain) * t.w, rows, optimize=True
                                 ).reshape(ne, -1, 2 * nb))
-            geometric = t.geometric_tangent(t.law.stress(strain))
-            for i in range(2):
-                blocks[:, :, i, :, i] += geometric
+            stress.append((t.w * t.law.stress(strain)).transpose(1, 0, 2).reshape(ne, -1))
         if self.constant is not None:
-            rows = square_root(self.constant[elements] if len(self.constant) > 1 else self.constant)
-            rows = np.broadcast_to(rows, (ne,) + rows.shape[1:])
-            B.append(rows)
-            CB.append(rows)
-        return np.concatenate(B, axis=1), np.concatenate(CB, axis=1), S
+            append_square_root(self.constant, u_e, elements, B, CB, stress)
+        return tuple(np.concatenate(part, axis=1) for part in (B, CB, stress))
+
+    def geometric(self, u_e, elements, stress):
+        """The geometric part (ne, 2 nb, 2 nb) of the element tangents for weighted stresses."""
+        ne, nb = u_e.shape[:2]
+        S, first = np.zeros((ne, 2 * nb, 2 * nb)), 0
+        blocks = S.reshape(ne, nb, 2, nb, 2)
+        for t in (t.part(elements) for t in self.tables):
+            n = t.w.shape[1]
+            own = stress[:, first:first + 3 * n].reshape(ne, 3, n).transpose(1, 0, 2) / t.w
+            first += 3 * n
+            part = t.geometric_tangent(own)
+            for i in range(2):
+                blocks[:, :, i, :, i] += part
+        return S
 
     def element_energies(self, u_e, elements=slice(None)):
         """Strain energies (ne,) of element displacements (ne, nb, 2)."""
@@ -552,11 +559,16 @@ class Kernel(Chain):
         return out
 
 
-def square_root(K):
-    """Rows R with R^T R = K for positive semidefinite matrices K, shape (ne, rank, n)."""
+def append_square_root(K, u_e, elements, B, CB, stress):
+    """Rows R with R^T R = K, a constant and semidefinite element stiffness, and R u."""
+    K = K[elements] if len(K) > 1 else K
     values, V = np.linalg.eigh(K)
     keep = np.max(values / values[:, -1:], axis=0) > 1e-12
-    return (np.sqrt(values[:, None, keep]) * V[:, :, keep]).transpose(0, 2, 1)
+    R = (np.sqrt(values[:, None, keep]) * V[:, :, keep]).transpose(0, 2, 1)
+    R = np.broadcast_to(R, (len(u_e),) + R.shape[1:])
+    B.append(R)
+    CB.append(R)
+    stress.append((R @ u_e.reshape(len(u_e), -1, 1))[..., 0])
 
 
 def mean_stress(law, eps0, eps1):

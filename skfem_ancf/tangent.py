@@ -17,6 +17,10 @@ from .errors import ConvergenceError, SupportError
 
 #: Corrections of a solution; relative size of one that is the last, and of one that may be.
 REFINEMENTS, REFINED, ACCEPTED = 6, 1e-12, 1e-6
+#: Relative size of the correction of a state that is in equilibrium but for round-off.
+NEAR = 1e-5
+#: Tolerance of that correction, whose right-hand side is round-off.
+ROUGH = 1e-2
 #: Ratio of one correction to the one before at which they lead nowhere.
 SLOW = 0.5
 
@@ -35,18 +39,40 @@ class StrainTangent:
     """
 
     def __init__(self, system, u, load, t, multipliers):
-        B, CB, S = [], [], []
-        for beam, s in zip(system.beams, system.slices):
-            parts = _beam_parts(beam, u[s])
-            B.append(parts[0])
-            CB.append(parts[1])
-            S.append(parts[2])
         self.system, self.free = system, np.nonzero(system.free)[0]
-        self.B, self.CB = (sparse.block_diag(part, format="csr")[:, self.free] for part in (B, CB))
-        S = sparse.block_diag(S, format="csr") + load_stiffness(system, u, load, t)
-        time = load if t is None else t
-        self.S = (S + system.curvature(u, time, multipliers))[self.free][:, self.free]
-        self.J = sparse.csr_matrix(system.jacobian(u, time)[:, self.free])
+        self._at = u, load, t, load if t is None else t
+        parts = [_beam_rows(beam, u[s]) for beam, s in zip(system.beams, system.slices)]
+        self.B, self.CB = (sparse.block_diag([part[k] for part in parts], format="csr"
+                                             )[:, self.free] for k in range(2))
+        self.stress = np.concatenate([part[2] for part in parts])
+        self.J = sparse.csr_matrix(system.jacobian(u, self._at[-1])[:, self.free])
+        self._set_stress(self.stress, multipliers)
+
+    def _set_stress(self, stress, multipliers):
+        u, load, t, time = self._at
+        self.stress, self.multipliers, first, S = stress, multipliers, 0, []
+        for beam, s in zip(self.system.beams, self.system.slices):
+            part, first = _beam_geometric(beam, u[s], stress, first)
+            S.append(part)
+        S = (sparse.block_diag(S, format="csr") + load_stiffness(self.system, u, load, t)
+             + self.system.curvature(u, time, multipliers))
+        self.S = S[self.free][:, self.free]
+
+    def balance(self, M, shift):
+        """Correct the stress to what is in equilibrium, if the state is one to round-off.
+
+        The normal force of a slender beam is E A times a strain that is all round-off. The
+        correction of the displacement is too small to matter; that of the stress is not.
+        """
+        u, load, t, _ = self._at
+        rest = (load * self.system.external_force(u, t)[self.free] - self.B.T @ self.stress
+                - self.J.T @ self.multipliers)
+        if not np.any(u) or not np.any(rest):
+            return
+        du, dm = Inverse(self, M, shift).solve_both(rest[:, None], ROUGH)
+        weight = np.sqrt(abs((self.B.multiply(self.CB)).sum(axis=0)).A1)
+        if np.max(weight * np.abs(du[:, 0])) <= NEAR * np.max(weight * np.abs(u[self.free])):
+            self._set_stress(self.stress + self.CB @ du[:, 0], self.multipliers + dm[:, 0])
 
     @property
     def symmetric(self):
@@ -77,27 +103,40 @@ class StrainTangent:
                 + np.sum(X * (self.S @ X), axis=0))
 
 
-def _beam_parts(beam, u):
-    """B, C B and S of one beam as sparse matrices."""
-    kernel, nd = beam.kernel, beam.nd
-    rows, cols, B, CB, i, j, S, first = [], [], [], [], [], [], [], 0
+def _beam_rows(beam, u):
+    """B and C B of one beam as sparse matrices, and its weighted stresses."""
+    kernel, rows, cols, first = beam.kernel, [], [], 0
+    values = [], [], []
     for part in kernel.chunks():
-        b, cb, s = kernel.factors(kernel.gather(u, part), part)
-        ne, m, n = b.shape
-        dofs = nd * beam.mesh.t[0, part][:, None] + np.arange(n)
+        found = kernel.factors(kernel.gather(u, part), part)
+        ne, m, n = found[0].shape
+        dofs = beam.nd * beam.mesh.t[0, part][:, None, None] + np.arange(n)
         number = first + np.arange(ne * m).reshape(ne, m, 1)
         first += ne * m
-        rows.append(np.broadcast_to(number, b.shape).ravel())
-        cols.append(np.broadcast_to(dofs[:, None], b.shape).ravel())
-        B.append(b.ravel())
-        CB.append(cb.ravel())
-        i.append(np.broadcast_to(dofs[:, :, None], s.shape).ravel())
-        j.append(np.broadcast_to(dofs[:, None, :], s.shape).ravel())
-        S.append(s.ravel())
-    where = np.concatenate(rows), np.concatenate(cols)
-    B, CB = (sparse.csr_matrix((np.concatenate(x), where), shape=(first, beam.N)) for x in (B, CB))
-    return B, CB, sparse.csr_matrix((np.concatenate(S), (np.concatenate(i), np.concatenate(j))),
-                                    shape=(beam.N, beam.N))
+        rows.append(np.broadcast_to(number, (ne, m, n)).ravel())
+        cols.append(np.broadcast_to(dofs, (ne, m, n)).ravel())
+        for all_values, new in zip(values, found):
+            all_values.append(new.ravel())
+    B, CB, stress = map(np.concatenate, values)
+    where, shape = (np.concatenate(rows), np.concatenate(cols)), (first, beam.N)
+    return (*(sparse.csr_matrix((v, where), shape=shape) for v in (B, CB)), stress)
+
+
+def _beam_geometric(beam, u, stress, first):
+    """The geometric part of one beam, sparse, and where the stresses of the next one begin."""
+    kernel, i, j, values = beam.kernel, [], [], []
+    rows = len(kernel.factors(kernel.gather(u, slice(0, 1)), slice(0, 1))[2][0])
+    for part in kernel.chunks():
+        u_e = kernel.gather(u, part)
+        last = first + rows * len(u_e)
+        S = kernel.geometric(u_e, part, stress[first:last].reshape(len(u_e), rows))
+        first = last
+        dofs = beam.nd * beam.mesh.t[0, part][:, None] + np.arange(S.shape[1])
+        i.append(np.broadcast_to(dofs[:, :, None], S.shape).ravel())
+        j.append(np.broadcast_to(dofs[:, None, :], S.shape).ravel())
+        values.append(S.ravel())
+    i, j, values = map(np.concatenate, (i, j, values))
+    return sparse.csr_matrix((values, (i, j)), shape=(beam.N, beam.N)), first
 
 
 def load_stiffness(system, u, load, t=None):
@@ -199,19 +238,22 @@ class Inverse:
         ConvergenceError
             If the refinement does not converge.
         """
-        columns = b.reshape(self._n, -1)
-        x, good = self._refined(columns)
+        return self.solve_both(b.reshape(self._n, -1))[0].reshape(b.shape)
+
+    def solve_both(self, b, accepted=ACCEPTED):
+        """x and l for columns b, shapes (n, k) and (m, k), and with a tolerance."""
+        x, l, good = self._refined(b, accepted)
         if not good and not self._by_strains:
             logger.info("assembled stiffnesses are too inaccurate: stresses become unknowns")
             self._use_strains()
-            x, good = self._refined(columns)
+            x, l, good = self._refined(b, accepted)
         if not good:
             raise ConvergenceError(
                 "this tangent cannot be inverted in double precision: the beam is too slender for "
                 "elements so short, or the state is critical to round-off")
-        return x.reshape(b.shape)
+        return x, l
 
-    def _refined(self, b):
+    def _refined(self, b, accepted):
         J, before = self._tangent.J, np.inf
         x, l = self._once(b, np.zeros((len(self._e), b.shape[1])))
         for _ in range(REFINEMENTS):
@@ -222,6 +264,6 @@ class Inverse:
             if not step > REFINED * size:
                 break
             if not step < SLOW * before:
-                return x, step < ACCEPTED * size
+                return x, l, step < accepted * size
             before = step
-        return x, step < ACCEPTED * size
+        return x, l, step < accepted * size
