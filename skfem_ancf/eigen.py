@@ -8,7 +8,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
 from .errors import ConvergenceError, InputError, SupportError
 from .results import State
-from .tangent import Inverse, StrainTangent
+from .tangent import Inverse, StrainTangent, is_symmetric
 
 DENSE = 600  # free coordinates up to which the dense solver is used
 WINDOW = 1e-8  # smallest over largest eigenvalue of an inverse that is taken from it
@@ -116,8 +116,7 @@ def modes(system, state, k):
     M = system.mass.tocsc()[tangent.free][:, tangent.free]
     n, m = tangent.size
     k = _count(k, n - m)
-    shift = _bending_eigenvalue(system)
-    small = n <= DENSE or 2 * k > n - m
+    shift, small = _shift(system, state), n <= DENSE or 2 * k > n - m
     tangent.balance(M, shift)
     if tangent.symmetric:
         values, X = (_dense if small else _sparse)(tangent, M, k, shift)
@@ -134,6 +133,21 @@ def _bending_eigenvalue(system):
     """omega^2 of the slowest bending that a beam as long as the scene could have."""
     stiffness = min(b.material.E * b.mesh.height**2 / b.density for b in system.beams) / 12.0
     return stiffness * (np.pi / system.size) ** 4
+
+
+def _shift(system, state):
+    """A number s for which K + s M is positive definite between the free coordinates."""
+    shift, t = _bending_eigenvalue(system), state.load if state.t is None else state.t
+    while True:
+        system.assemble(state.u, state.load, t=state.t)
+        system.K.combine(1.0, system.K, shift, system.mass)
+        try:
+            system.factorize(state.u, t, state.multipliers)
+            if system.inertia().negative == 0:
+                return shift
+        except (np.linalg.LinAlgError, RuntimeError):
+            pass
+        shift *= 4.0
 
 
 def _dense(tangent, M, k, shift):
@@ -201,10 +215,9 @@ def _unsymmetric(tangent, M, k, shift, small):
     values[real] = values[real].real
     order = np.lexsort((values.imag, values.real))[:k]
     values, X = values[order], X[:, order]
-    # a real shape may have any phase
-    X = X * np.exp(-1j * np.angle(X[np.argmax(np.abs(X), axis=0), np.arange(k)]))
-    X /= np.sqrt(np.sum(X.conj() * (M @ X), axis=0).real)
-    return (values, X) if np.any(values.imag) else (values, X.real)
+    if not np.any(values.imag):
+        X = _real(X)
+    return values, X / np.sqrt(np.sum(X.conj() * (M @ X), axis=0).real)
 
 
 def buckling(system, k):
@@ -233,58 +246,92 @@ def buckling(system, k):
     """
     system.require_supports()
     zero, none = np.zeros(system.N), np.zeros(system.m)
-    _, evaluations = system.assemble(zero, 0.0)
-    K0 = system.K.tocsc()
-    system.factorize(zero, 0.0, none)
-    du0 = np.zeros(system.N)
-    du0[system.fixed] = system.values(1.0)
-    du, multipliers = system.solve(system.external_force(zero) - K0 @ du0,
-                                   -system.constraint(du0, 1.0))
-    du += du0
-    carried = system.stress_step(evaluations, du)
-    system.assemble(zero, 1.0, carried)
-    Ks = system.K.tocsc() + system.curvature(zero, 0.0, multipliers) - K0
-    # round-off of the strain before buckling in terms of energy
-    smallest = np.sqrt(max(du @ (K0 @ du), 0.0)) * np.finfo(float).eps / system.stiffness_scale
     tangent = StrainTangent(system, zero, 0.0, None, none)
-    Ks = Ks[tangent.free][:, tangent.free]
     n, m = tangent.size
     k = _count(k, n - m)
-    symmetric = abs(Ks - Ks.T).max() <= 1e-10 * abs(Ks).max()
-    theta, X = _geometric(tangent, Ks, k, symmetric, n <= DENSE or 2 * k > n - m)
-    good = (theta.real < -smallest) & (np.abs(theta.imag) <= REAL * np.abs(theta))
+    du, stress, multipliers = tangent.response(1.0)
+    Ks = tangent.geometric(stress, multipliers, 1.0)
+    if not Ks.nnz or not abs(Ks).max() > 0.0:
+        raise InputError("no positive load factor: the loads do not stress the beam")
+    symmetric = is_symmetric(Ks)
+    theta, X = (_geometric if symmetric else _follower)(tangent, Ks, k)
+    # mean strain before buckling over that of the strain energy of a strain of one
+    strain = np.sqrt(max(du @ tangent.internal(stress), 0.0)) * np.finfo(float).eps
+    good = theta < -strain / system.stiffness_scale
     if not np.any(good):
         raise InputError("no positive load factor: these loads pull the beam straight"
                          if symmetric else _FLUTTER)
-    factors = -1.0 / theta[good].real
+    factors = -1.0 / theta[good]
     order = np.argsort(factors)[:k]
+    if not symmetric:
+        _require_no_flutter(system, tangent, Ks, factors[order[0]])
     shapes = np.zeros((len(order), system.N))
-    shapes[:, tangent.free] = X[:, good].real.T[order]
+    shapes[:, tangent.free] = X[:, good].T[order]
     return Buckling(factors[order], shapes, not symmetric)
 
 
 _FLUTTER = (
-    "no real positive load factor: these loads follow the body and have no potential, so it does "
-    "not buckle into a neighbouring equilibrium, but it may flutter. Look at "
-    "scene.modes(k, state) about states under load: above the critical load modes.flutter is True")
+    "no real positive load factor at which a neighbouring equilibrium appears: these loads follow "
+    "the body and have no potential. It may flutter: look at scene.modes(k, state) about "
+    "states under load, beyond the critical load modes.flutter is True")
 
 
-def _geometric(tangent, Ks, k, symmetric, small):
-    """Eigenvalues ``-1 / factor`` of ``K_s x = theta K_0 x``, and their columns x."""
-    inverse = Inverse(tangent)
+def _geometric(tangent, Ks, k):
+    """The lowest eigenvalues ``-1 / factor`` of ``K_s x = theta K_0 x``, and columns x."""
+    inverse, n = Inverse(tangent), Ks.shape[0]
+    if n <= 60 or 2 * k > n - tangent.size[1]:
+        theta, X = scipy.linalg.eig(inverse.solve(np.eye(n)) @ Ks)
+        return theta.real, _real(X)
+    start = inverse.solve(Ks @ np.random.default_rng(0).standard_normal(n))
 
-    def apply(x):
-        return inverse.solve(Ks @ x)
+    def operator(f):
+        return LinearOperator(Ks.shape, f, dtype=float)
 
-    if small:
-        theta, X = scipy.linalg.eig(apply(np.eye(Ks.shape[0])))
-        if symmetric:
-            theta = theta.real
+    _, X = eigsh(Ks, k=k, M=operator(tangent.multiply), Minv=operator(inverse.solve), which="SA",
+                 v0=start)
+    Y = inverse.solve(Ks @ X)
+    theta, V = scipy.linalg.eigh(Y.T @ (Ks @ Y), Y.T @ (Ks @ X))
+    return theta, Y @ V
+
+
+def _follower(tangent, Ks, k):
+    """As :func:`_geometric` where K_s is not symmetric: only what is real."""
+    inverse, n = Inverse(tangent), Ks.shape[0]
+    if n <= DENSE or 2 * k > n - tangent.size[1]:
+        theta, X = scipy.linalg.eig(inverse.solve(np.eye(n)) @ Ks)
     else:
-        start = apply(np.random.default_rng(0).standard_normal(Ks.shape[0]))
-        theta, X = eigs(LinearOperator(Ks.shape, apply, dtype=float), k=k, which="SR", v0=start)
+        start = inverse.solve(Ks @ np.random.default_rng(0).standard_normal(n))
+        theta, X = eigs(LinearOperator(Ks.shape, lambda x: inverse.solve(Ks @ x), dtype=float),
+                        k=k + 2, which="SR", v0=start)
+    real = np.abs(theta.imag) <= REAL * np.abs(theta)
+    return theta[real].real, _real(X[:, real])
+
+
+def _require_no_flutter(system, tangent, Ks, factor):
+    """Raise InputError if oscillations grow below a load factor, as far as linear theory says."""
+    if any(beam.material.density is None for beam in system.beams):
+        return
+    M, S = system.mass.tocsc()[tangent.free][:, tangent.free], tangent.S
+    k, small = min(8, tangent.size[0] - tangent.size[1]), tangent.size[0] <= DENSE
+    shift = _bending_eigenvalue(system)
+    try:
+        for part in factor * 0.5 ** np.arange(20):
+            tangent.S = S + part * Ks
+            values, _ = _unsymmetric(tangent, M, k, shift, small)
+            if np.any(values.imag):
+                raise InputError(
+                    f"it flutters before it buckles at the factor {factor:.6g}, for example at "
+                    f"{part:.3g} times these loads, which follow the body: look at "
+                    "scene.modes(k, state) about states under load, beyond the critical load "
+                    "modes.flutter is True")
+    finally:
+        tangent.S = S
+
+
+def _real(X):
+    """Columns X turned in the complex plane so that their largest entry is real."""
     X = X * np.exp(-1j * np.angle(X[np.argmax(np.abs(X), axis=0), np.arange(X.shape[1])]))
-    return theta, X
+    return X.real
 
 
 def _count(k, n):

@@ -42,21 +42,49 @@ class StrainTangent:
         self.system, self.free = system, np.nonzero(system.free)[0]
         self._at = u, load, t, load if t is None else t
         parts = [_beam_rows(beam, u[s]) for beam, s in zip(system.beams, system.slices)]
-        self.B, self.CB = (sparse.block_diag([part[k] for part in parts], format="csr"
-                                             )[:, self.free] for k in range(2))
+        self._rows = [sparse.block_diag([part[k] for part in parts], format="csr")
+                      for k in range(2)]
+        self.B, self.CB = (rows[:, self.free] for rows in self._rows)
         self.stress = np.concatenate([part[2] for part in parts])
         self.J = sparse.csr_matrix(system.jacobian(u, self._at[-1])[:, self.free])
         self._set_stress(self.stress, multipliers)
 
     def _set_stress(self, stress, multipliers):
-        u, load, t, time = self._at
-        self.stress, self.multipliers, first, S = stress, multipliers, 0, []
+        self.stress, self.multipliers = stress, multipliers
+        self.S = self.geometric(stress, multipliers, self._at[1])
+
+    def geometric(self, stress, multipliers, load):
+        """The part of the tangent due to stresses, multipliers and loads, sparse, (n, n)."""
+        u, _, t, time = self._at
+        first, S = 0, []
         for beam, s in zip(self.system.beams, self.system.slices):
             part, first = _beam_geometric(beam, u[s], stress, first)
             S.append(part)
         S = (sparse.block_diag(S, format="csr") + load_stiffness(self.system, u, load, t)
              + self.system.curvature(u, time, multipliers))
-        self.S = S[self.free][:, self.free]
+        return S[self.free][:, self.free]
+
+    def response(self, load):
+        """The stress and the multipliers that a load causes by linear theory.
+
+        Parameters
+        ----------
+        load
+            Factor on the loads and on the displacements of supports.
+
+        Returns
+        -------
+        du, stress, multipliers
+            Shapes (N,), that of ``stress``, and (m,).
+        """
+        system, u = self.system, self._at[0]
+        du = np.zeros(system.N)
+        du[system.fixed] = system.values(load)
+        rest = load * system.external_force(u)[self.free] - self.B.T @ (self._rows[1] @ du)
+        gap = -system.constraint(u + du, load)
+        x, multipliers = Inverse(self).solve_both(rest[:, None], gap[:, None])
+        du[self.free] = x[:, 0]
+        return du, self._rows[1] @ du, multipliers[:, 0]
 
     def balance(self, M, shift):
         """Correct the stress to what is in equilibrium, if the state is one to round-off.
@@ -69,7 +97,7 @@ class StrainTangent:
                 - self.J.T @ self.multipliers)
         if not np.any(u) or not np.any(rest):
             return
-        du, dm = Inverse(self, M, shift).solve_both(rest[:, None], ROUGH)
+        du, dm = Inverse(self, M, shift).solve_both(rest[:, None], accepted=ROUGH)
         weight = np.sqrt(abs((self.B.multiply(self.CB)).sum(axis=0)).A1)
         if np.max(weight * np.abs(du[:, 0])) <= NEAR * np.max(weight * np.abs(u[self.free])):
             self._set_stress(self.stress + self.CB @ du[:, 0], self.multipliers + dm[:, 0])
@@ -77,8 +105,7 @@ class StrainTangent:
     @property
     def symmetric(self):
         """True if the tangent is symmetric between the free coordinates, to round-off."""
-        gap = abs(self.S - self.S.T)
-        return gap.max() <= 1e-12 * abs(self.S).max() if gap.nnz else True
+        return is_symmetric(self.S)
 
     def multiply(self, x, S=None):
         """The tangent, or with another S, times x, shape (n,) or (n, k)."""
@@ -97,10 +124,17 @@ class StrainTangent:
         if np.min(np.abs(np.diag(R))) < 1e-12 * np.max(np.abs(R)):
             raise SupportError("the joints are not independent in this state")
 
+    def internal(self, stress):
+        """The internal force of stresses, shape (N,)."""
+        return self._rows[0].T @ stress
+
+    def material_energies(self, X):
+        """x^T B^T C B x of each column x of X, shape (k,)."""
+        return np.sum((self.B @ X) * (self.CB @ X), axis=0)
+
     def energies(self, X):
-        """x^T K x of each column of X, shape (k,)."""
-        return (np.sum((self.B @ X) * (self.CB @ X), axis=0)
-                + np.sum(X * (self.S @ X), axis=0))
+        """x^T K x of each column x of X, shape (k,)."""
+        return self.material_energies(X) + np.sum(X * (self.S @ X), axis=0)
 
 
 def _beam_rows(beam, u):
@@ -137,6 +171,12 @@ def _beam_geometric(beam, u, stress, first):
         values.append(S.ravel())
     i, j, values = map(np.concatenate, (i, j, values))
     return sparse.csr_matrix((values, (i, j)), shape=(beam.N, beam.N)), first
+
+
+def is_symmetric(S):
+    """True if a sparse matrix is symmetric to round-off."""
+    gap = abs(S - S.T)
+    return not gap.nnz or bool(gap.max() <= 1e-12 * abs(S).max())
 
 
 def load_stiffness(system, u, load, t=None):
@@ -176,6 +216,7 @@ class Inverse:
 
     def __init__(self, tangent, M=None, shift=0.0):
         self._tangent, self._n, m = tangent, *tangent.size
+        self._M, self._shift = M, shift
         self._rest = tangent.S + shift * M if shift else tangent.S
         K = tangent.B.T @ tangent.CB + self._rest
         # unit diagonal: coordinates and joints have units of their own
@@ -240,30 +281,38 @@ class Inverse:
         """
         return self.solve_both(b.reshape(self._n, -1))[0].reshape(b.shape)
 
-    def solve_both(self, b, accepted=ACCEPTED):
-        """x and l for columns b, shapes (n, k) and (m, k), and with a tolerance."""
-        x, l, good = self._refined(b, accepted)
+    def solve_both(self, b, c=None, accepted=ACCEPTED):
+        """x and l for columns b and ``J x = c``, shapes (n, k) and (m, k), to a tolerance."""
+        c = np.zeros((len(self._e), b.shape[1])) if c is None else c
+        x, l, good = self._refined(b, c, accepted)
         if not good and not self._by_strains:
             logger.info("assembled stiffnesses are too inaccurate: stresses become unknowns")
             self._use_strains()
-            x, l, good = self._refined(b, accepted)
+            x, l, good = self._refined(b, c, accepted)
         if not good:
             raise ConvergenceError(
                 "this tangent cannot be inverted in double precision: the beam is too slender for "
                 "elements so short, or the state is critical to round-off")
         return x, l
 
-    def _refined(self, b, accepted):
+    def _norm(self, x):
+        """The energy norm of the largest of columns x."""
+        energy = self._tangent.material_energies(x)
+        if self._shift:
+            energy = energy + self._shift * np.sum(x * (self._M @ x), axis=0)
+        return np.sqrt(np.max(np.abs(energy)))
+
+    def _refined(self, b, c, accepted):
         J, before = self._tangent.J, np.inf
-        x, l = self._once(b, np.zeros((len(self._e), b.shape[1])))
+        x, l = self._once(b, c)
         for _ in range(REFINEMENTS):
             rest = b - self._tangent.multiply(x, self._rest) - J.T @ l
-            dx, dl = self._once(rest, -(J @ x))
+            dx, dl = self._once(rest, c - J @ x)
             x, l = x + dx, l + dl
-            size, step = (np.abs(v / self._d[:, None]).max() for v in (x, dx))
+            size, step = self._norm(x), self._norm(dx)
             if not step > REFINED * size:
                 break
             if not step < SLOW * before:
-                return x, l, step < accepted * size
+                return x, l, step <= accepted * size
             before = step
-        return x, l, step < accepted * size
+        return x, l, step <= accepted * size
