@@ -315,9 +315,12 @@ def _require_no_flutter(system, tangent, Ks, factor):
     k, small = min(8, tangent.size[0] - tangent.size[1]), tangent.size[0] <= DENSE
     shift = _bending_eigenvalue(system)
     try:
-        for part in factor * 0.5 ** np.arange(20):
+        for part in factor * 0.5 ** np.arange(20, 0, -1):
             tangent.S = S + part * Ks
-            values, _ = _unsymmetric(tangent, M, k, shift, small)
+            try:
+                values, _ = _unsymmetric(tangent, M, k, shift, small)
+            except ConvergenceError:  # critical to round-off just there
+                continue
             if np.any(values.imag):
                 raise InputError(
                     f"it flutters before it buckles at the factor {factor:.6g}, for example at "
