@@ -573,7 +573,15 @@ class Scene:
         Returns
         -------
         Modes
-            With ``frequencies`` in rad/s, ``shapes`` and ``mode(i, amplitude)``.
+            With ``frequencies`` in rad/s, ``shapes`` and ``mode(i, amplitude)``; ``flutter`` and
+            complex ``eigenvalues`` where loads follow the body.
+
+        Raises
+        ------
+        InputError
+            If k is out of range.
+        SupportError
+            If joints are not independent in this state.
 
         Examples
         --------
@@ -597,6 +605,13 @@ class Scene:
         -------
         Buckling
             With ``factors`` on the loads of the scene and ``shapes``.
+
+        Raises
+        ------
+        InputError
+            If there is no positive factor, or loads that follow the body make it flutter first.
+        SupportError
+            If a rigid motion is free.
         """
         return eigen.buckling(self.system, k)
 

@@ -1,0 +1,249 @@
+"""Slender beams, loads that follow the body, and whole spectra, against beam theory and scipy."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+from scipy.optimize import brentq, fsolve
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
+                        MeshBeam, Scene, StVenantKirchhoff, eigen, exact)
+from skfem_ancf.elements import ELEMENTS
+
+# units in which E I = rho A = L = 1 at every slenderness
+ALL = {**ELEMENTS, **{f"cable-{n}": (lambda n=n: ElementBeamCable(n)) for n in (3, 5, 7)}}
+
+
+def unit_beam(element, ne, slenderness, nu=0.3, L=1.0, **options):
+    h = 1.0 / slenderness
+    mesh = MeshBeam.init_line(np.linspace(0, L, ne + 1), h, **options)
+    return Beam(mesh, element, StVenantKirchhoff(12.0 * slenderness**3, nu, slenderness), 1.0)
+
+
+def cantilever(element, ne, slenderness, nu=0.3):
+    return Scene(unit_beam(element, ne, slenderness, nu)).clamp("left", thickness="free")
+
+
+def theory(ends, n):
+    return exact.euler_bernoulli_frequencies(1.0, 1.0, 1.0, 1.0, 1.0, n, ends)
+
+
+def matrices(scene):
+    system, free = scene.system, scene.system.free
+    system.assemble(np.zeros(system.N))
+    K, M = system.K.tocsc().toarray(), system.mass.tocsc().toarray()
+    return K[np.ix_(free, free)], M[np.ix_(free, free)]
+
+
+# slender beams
+
+
+@pytest.mark.parametrize("slenderness", [1e3, 1e6])
+@pytest.mark.parametrize("name", ALL)
+def test_first_frequency_of_every_element(name, slenderness):
+    """Meshes of 8 and 16 elements, extrapolated by the order of the element."""
+    element = ALL[name]()
+    coarse, fine = (cantilever(element, n, slenderness).modes(1).frequencies[0] for n in (8, 16))
+    order = 4 if element.sections == "cubic" or element.order == 0 else 2
+    limit = fine + (fine - coarse) / (2**order - 1)
+    assert limit == pytest.approx(theory("fixed-free", 1)[0], rel=1e-4)
+
+
+@pytest.mark.parametrize("slenderness", [1e1, 1e2, 1e3, 1e4, 1e5, 1e6])
+@pytest.mark.parametrize("element", [ElementBeamANCFCubic(2), ElementBeamANCF(3)])
+def test_every_slenderness(element, slenderness):
+    """Timoshenko's beam has the terms in (h / L)^2 that Euler's lacks; at nu = 0."""
+    coarse, fine = (cantilever(element, n, slenderness, nu=0.0).modes(1).frequencies[0]
+                    for n in (12, 24))
+    order = 4 if element.sections == "cubic" else 2
+    limit = fine + (fine - coarse) / (2**order - 1)
+    h = 1.0 / slenderness
+    if slenderness <= 1e2:
+        known = exact.timoshenko_frequencies(12 / h**3, h**3 / 12, h, 1 / h, 1.0,
+                                             exact.shear_factor(0.0) * 6 / h**2, 1)[0]
+    else:
+        known = theory("fixed-free", 1)[0]
+    # a section of order 3 that is clamped cannot carry its parabola there: order (h / L)^3
+    assert limit == pytest.approx(known, rel=1e-4 if slenderness > 10 else 1e-3)
+
+
+@pytest.mark.parametrize("slenderness", [1e1, 1e6])
+@pytest.mark.parametrize("dense", [600, 10], ids=["dense", "sparse"])
+@pytest.mark.parametrize("element", [ElementBeamANCF(3), ElementBeamANCFCubic(1),
+                                     ElementBeamCable(5)])
+def test_free_beam_has_three_modes_that_are_zero_to_round_off(element, dense, slenderness,
+                                                              monkeypatch):
+    monkeypatch.setattr(eigen, "DENSE", dense)
+    frequencies = Scene(unit_beam(element, 16, slenderness)).modes(5).frequencies
+    first = theory("free-free", 1)[0]
+    assert np.abs(frequencies[:3]).max() < 1e-6 * first
+    assert frequencies[3] == pytest.approx(first, rel=0.1 if slenderness == 10 else 0.01)
+
+
+@pytest.mark.parametrize("slenderness", [1e2, 1e6])
+def test_slender_beams_with_joints(slenderness):
+    """Four zero modes of two hinged bars, and the antisymmetric mode of the whole one."""
+    a = unit_beam(ElementBeamCable(5), 4, slenderness, L=0.5)
+    b = unit_beam(ElementBeamCable(5), 4, slenderness, L=0.5, origin=(0.5, 0))
+    hinged, welded = Scene(a, b), Scene(a, b)
+    hinged.joint("hinge", beams=(a, b), at=(0.5, 0))
+    welded.joint("weld", beams=(a, b), at=("right", "left"))
+    known = theory("free-free", 3)
+    four, three = hinged.modes(5).frequencies, welded.modes(6).frequencies
+    assert np.abs(four[:4]).max() < 1e-6 and np.abs(three[:3]).max() < 1e-6
+    assert four[4] == pytest.approx(known[1], rel=1e-5)
+    assert np.allclose(three[3:], known, rtol=1e-5)
+
+
+@pytest.mark.parametrize("dense", [600, 10], ids=["dense", "sparse"])
+@pytest.mark.parametrize("element, tol", [(ElementBeamCable(5), 1e-8),
+                                          (ElementBeamANCFCubic(2), 2e-4)])
+def test_slender_and_under_an_axial_force(element, tol, dense, monkeypatch):
+    """omega^2 = (n pi)^4 (1 + T / n^2), T in units of pi^2; -6 is beyond two buckling loads."""
+    monkeypatch.setattr(eigen, "DENSE", dense)
+    for T in (-6.0, -0.8, 20.0):
+        scene = Scene(unit_beam(element, 16, 1e6)).pin("left").fix("right", "r^2")
+        state = scene.point_force((T * np.pi**2, 0), (1, 0)).solve_static()
+        n = np.arange(1, 4)
+        known = np.sort((n * np.pi) ** 4 * (1 + T / n**2))
+        modes = scene.modes(3, state)
+        assert np.allclose(modes.eigenvalues, known, rtol=10 * tol)
+        assert np.allclose(np.sign(modes.frequencies) * modes.frequencies**2, known, rtol=10 * tol)
+        assert modes.stable == (T > -1.0) and not modes.flutter
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCF(2)])
+def test_bent_states_do_not_see_the_slenderness(element):
+    """The normal force of the strain is round-off of E A: 7 % of E I / L^2 at L / h = 1e6."""
+    found = []
+    for slenderness in (1e4, 1e6):
+        scene = cantilever(element, 16, slenderness).gravity((0, -10))
+        found.append(scene.modes(3, scene.solve_static()).frequencies)
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-5)
+
+
+def test_slender_column_buckles_at_eulers_load():
+    for slenderness in (1e2, 1e6):
+        scene = cantilever(ElementBeamCable(5), 8, slenderness).point_force((-1, 0), (1, 0))
+        known = np.pi**2 / 4 * np.array([1, 9])
+        assert np.allclose(scene.buckling(2).factors, known, rtol=1e-7)
+
+
+# whole spectra
+
+
+@pytest.mark.parametrize("element, slenderness", [
+    (ElementBeamANCF(2), 10), (ElementBeamCable(3), 10), (ElementBeamANCFCubic(1), 1e4)])
+def test_all_modes(element, slenderness):
+    """scipy's eigenvalues are good to round-off times the largest."""
+    scene = cantilever(element, 4, slenderness)
+    K, M = matrices(scene)
+    modes = scene.modes(len(K))
+    values = scipy.linalg.eigh(K, M, eigvals_only=True)
+    np.testing.assert_allclose(modes.frequencies**2, values, rtol=1e-8, atol=1e-11 * values[-1])
+    X = modes.shapes[:, scene.system.free]
+    np.testing.assert_allclose(X @ M @ X.T, np.eye(len(K)), rtol=0, atol=1e-6)
+
+
+def test_too_many_modes_of_a_beam_too_slender():
+    scene = cantilever(ElementBeamANCF(3), 6, 1e6)
+    n = int(scene.system.free.sum())
+    with pytest.raises(InputError, match="told from round-off"):
+        scene.modes(n)
+
+
+# loads that follow the body
+
+
+def becks_column(P, slenderness=1e3):
+    """A cantilever pushed at its end by a force P along its end section's normal."""
+    scene = Scene(unit_beam(ElementBeamANCFCubic(2), 12, slenderness, nu=0.0)).clamp("left")
+    return scene.pressure("right", P * slenderness)
+
+
+def becks_equation(P, omega):
+    """The frequency equation of the cantilever under a tangential force at its end.
+
+    w'''' + P w'' = omega^2 w, w = w' = 0 at the foot and w'' = w''' = 0 at the end.
+    """
+    root = np.sqrt(P**2 / 4 + omega**2)
+    a, b = np.sqrt(P / 2 + root), np.sqrt(root - P / 2)
+    return (P**2 + 2 * omega**2 * (1 + np.cos(a) * np.cosh(b))
+            + omega * P * np.sin(a) * np.sinh(b))
+
+
+def test_becks_column_below_flutter():
+    scene = becks_column(10.0)
+    modes = scene.modes(2, scene.solve_static())
+    known = [brentq(lambda x: becks_equation(10.0, x), *ends) for ends in ((4, 6), (17, 20))]
+    assert known[0] == pytest.approx(5.18, abs=5e-3)
+    np.testing.assert_allclose(modes.frequencies, known, rtol=2e-3)
+    assert not modes.flutter and modes.stable and modes.frequencies.dtype == float
+
+
+def test_becks_column_flutters():
+    """Two roots of the frequency equation meet at 20.05 E I / L^2."""
+    def meet(z):
+        P, omega = z
+        step = 1e-4
+        return [becks_equation(P, omega),
+                (becks_equation(P, omega + step) - becks_equation(P, omega - step)) / (2 * step)]
+
+    known = fsolve(meet, (20.0, 11.0))[0]
+    assert known == pytest.approx(20.05, abs=2e-3)
+    low, high = 19.5, 20.5
+    while high - low > 1e-3:
+        P = 0.5 * (low + high)
+        scene = becks_column(P, 1e4)
+        modes = scene.modes(2, scene.solve_static())
+        low, high = (low, P) if modes.flutter else (P, high)
+    assert 0.5 * (low + high) == pytest.approx(known, rel=1e-3)
+
+
+def test_flutter_is_a_complex_pair(monkeypatch):
+    scene = becks_column(25.0)
+    state = scene.solve_static()
+    modes = scene.modes(3, state)
+    assert modes.flutter and not modes.stable
+    omega = modes.frequencies
+    assert omega[0] == pytest.approx(omega[1].conj()) and omega[0].imag != 0
+    assert omega[2].imag == 0
+    np.testing.assert_allclose(omega**2, modes.eigenvalues, rtol=1e-12)
+    # the roots of the frequency equation in the complex plane
+    known = fsolve(lambda z: [f(becks_equation(25.0, z[0] + 1j * z[1])) for f in (np.real, np.imag)],
+                   (10.7, 4.8))
+    assert [omega[0].real, abs(omega[0].imag)] == pytest.approx(list(known), rel=0.02)
+    # K x = omega^2 M x, and it can be drawn
+    shape = modes.mode(0, 0.1)
+    assert shape.u.dtype == float and np.any(shape.u != state.u)
+    monkeypatch.setattr(eigen, "DENSE", 10)
+    np.testing.assert_allclose(scene.modes(3, state).eigenvalues, modes.eigenvalues, rtol=1e-6)
+
+
+def test_becks_column_does_not_buckle():
+    with pytest.raises(InputError, match="flutter"):
+        becks_column(1.0).buckling()
+
+
+def test_pressure_between_clamped_ends_has_a_potential():
+    """A clamped half circle under pressure: p R^3 / E I = k^2 - 1, k tan(a) cot(k a) = 1.
+
+    With a = pi / 2 that is 8 (Timoshenko and Gere, Theory of Elastic Stability, 1961), for a thin arch.
+    """
+    h = 1e-3
+    mesh = MeshBeam.init_curve(lambda s: np.array([np.cos(s), np.sin(s)]),
+                               np.linspace(0, np.pi, 17), h)
+
+    def arch(side):
+        beam = Beam(mesh, ElementBeamANCFCubic(2), StVenantKirchhoff(12 / h**3, 0.0, 1 / h), 1.0)
+        return Scene(beam).clamp("left").clamp("right").pressure(side, 1.0)
+
+    buckling = arch("bottom").buckling()
+    assert buckling.factors[0] == pytest.approx(8.0, rel=2e-3) and not buckling.follower
+    with pytest.raises(InputError, match="pull the beam straight"):
+        arch("top").buckling()
+
+
+def test_loads_that_do_not_stress():
+    scene = Scene(unit_beam(ElementBeamCable(3), 3, 100.0)).clamp("left")
+    with pytest.raises(InputError, match="do not stress"):
+        scene.buckling()
