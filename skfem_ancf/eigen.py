@@ -168,8 +168,8 @@ def _dense(tangent, M, k, shift):
         # a rounded window shows those known once more
         new = np.max(np.abs(MX.T @ found), axis=0, initial=0.0) < ORTHOGONAL
         if not np.any(new):
-            raise InputError(f"{len(values)} modes of so slender a beam can be told from round-off, "
-                             f"k = {k} were asked for")
+            raise InputError(f"{len(values)} modes of so slender a beam can be told from "
+                             f"round-off, k = {k} were asked for")
         X = np.column_stack([X, found[:, new]])
         values = np.append(values, quotients[new])
     order = np.argsort(values)

@@ -209,8 +209,11 @@ def test_flutter_is_a_complex_pair(monkeypatch):
     assert omega[2].imag == 0
     np.testing.assert_allclose(omega**2, modes.eigenvalues, rtol=1e-12)
     # the roots of the frequency equation in the complex plane
-    known = fsolve(lambda z: [f(becks_equation(25.0, z[0] + 1j * z[1])) for f in (np.real, np.imag)],
-                   (10.7, 4.8))
+    def parts(z):
+        value = becks_equation(25.0, z[0] + 1j * z[1])
+        return value.real, value.imag
+
+    known = fsolve(parts, (10.7, 4.8))
     assert [omega[0].real, abs(omega[0].imag)] == pytest.approx(list(known), rel=0.02)
     # K x = omega^2 M x, and it can be drawn
     shape = modes.mode(0, 0.1)
@@ -225,7 +228,9 @@ def test_becks_column_does_not_buckle():
 
 
 def test_pressure_between_clamped_ends_has_a_potential():
-    """A clamped half circle under pressure: p R^3 / E I = k^2 - 1, k tan(a) cot(k a) = 1.
+    """A clamped half circle under pressure: p R^3 / E I = k^2 - 1.
+
+    k tan(a) cot(k a) = 1.
 
     With a = pi / 2 that is 8 (Timoshenko and Gere, Theory of Elastic Stability, 1961), for a thin arch.
     """
