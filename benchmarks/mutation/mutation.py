@@ -36,8 +36,9 @@ FILES = [
     "eigen", "path", "results", "sampling", "elements/*", "formulations/*", "materials/*",
     "joints/*", "statics/*", "dynamics/*",
 ]
-# what starts processes of its own or draws, or repeats the other tests at random
-LEFT_OUT = ["test_bench.py", "test_demos.py", "test_visuals.py", "test_fuzz.py"]
+# what starts processes of its own, needs Numba, draws, or repeats the others at random
+LEFT_OUT = ["test_bench.py", "test_compiled.py", "test_demos.py", "test_fuzz.py",
+            "test_visuals.py"]
 KILLED, SURVIVED, TIME, BROKEN = "killed", "survived", "killed (time)", "broken"
 EXPLAINED = "explained"
 
@@ -177,7 +178,7 @@ class Watch:
     """A pytest plugin: contexts for coverage, durations, and which test failed first."""
 
     def __init__(self, cov=None):
-        self.cov, self.durations, self.failed = cov, {}, None
+        self.cov, self.durations, self.failed, self.red = cov, {}, None, []
 
     def pytest_runtest_logstart(self, nodeid):
         if self.cov is not None:
@@ -185,8 +186,9 @@ class Watch:
 
     def pytest_runtest_logreport(self, report):
         self.durations[report.nodeid] = self.durations.get(report.nodeid, 0.0) + report.duration
-        if report.failed and self.failed is None:
-            self.failed = report.nodeid
+        if report.failed:
+            self.failed = self.failed or report.nodeid
+            self.red.append(report.nodeid)
 
 
 def pytest_in(arguments, plugin):
@@ -251,13 +253,14 @@ def baseline(again):
             code = pytest_in(new, watch)
             cov.stop()
             cov.save()
-            return [int(code), watch.durations, watch.failed]
+            green = {t: s for t, s in watch.durations.items() if t not in watch.red}
+            return [int(code), green, watch.red]
 
-        code, added, failed = forked(run, 7200)
+        code, added, red = forked(run, 7200)
         if code not in (0, 1):
             raise SystemExit(f"the tests do not run: pytest ends with {code}")
-        if failed:
-            print(f"red without a mutant: {failed}")
+        if red:
+            print("red without a mutant, and left out:", *red)
         durations.update(added)
         times.write_text(json.dumps(durations))
     found = coverage.CoverageData(basename=str(data))
