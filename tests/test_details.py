@@ -125,6 +125,26 @@ def test_a_free_cable_has_three_zero_modes(degree, n):
     assert np.all(np.abs(values[:3]) < 1e-12) and values[3] > 1e-9
 
 
+@pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCF(3), ElementBeamCable(5)],
+                         ids=repr)
+@pytest.mark.parametrize("nodes", [np.linspace(0, 2, 5), np.array([0, 0.3, 2])], ids=str)
+def test_volume_and_mass(element, nodes):
+    beam = Beam(MeshBeam.init_line(nodes, 0.1, angle=0.2), element, STEEL, 0.3)
+    assert beam.kernel.volume == pytest.approx(2 * 0.1 * 0.3, rel=1e-13)
+    assert beam.total_mass == pytest.approx(2 * 0.1 * 0.3, rel=1e-13)
+
+
+@pytest.mark.parametrize("plane, stiffer", [("stress", 1.0), ("strain", 1.0 / 0.91)])
+@pytest.mark.parametrize("order", [1, 2])
+def test_no_poisson_locking(order, plane, stiffer):
+    """A linear tip force against E I, in plane strain E I / (1 - nu^2)."""
+    material = StVenantKirchhoff(1e6, 0.3, plane=plane)
+    beam = Beam(line(32, 0.02), ElementBeamANCF(order), material, 0.1)
+    scene = Scene(beam).clamp("left", thickness="free").point_force((0.0, -1e-3), at=(1, 0))
+    tip = scene.solve_linear().displacement((1, 0))[1]
+    assert tip == pytest.approx(-1e-3 / (3 * 1e6 * 0.1 * 0.02**3 / 12 * stiffer), rel=3e-3)
+
+
 # what is chosen
 
 
@@ -335,6 +355,14 @@ def test_a_step_is_halved_six_times(monkeypatch):
 def test_and_not_more_often(monkeypatch):
     with pytest.raises(ConvergenceError, match=f"nor with steps of {0.01 / 64:.3g}"):
         fails_above(monkeypatch, 0.0099 / 64).integrate(0.01, 0.01)
+
+
+def test_loads_that_vary_push_in_steps_of_energy_and_momentum():
+    """Impulse of a gravity that grows with time, g t^2 / 2: the midpoint rule is exact."""
+    beam = Beam(line(2), ElementBeamANCF(2), STEEL, 0.1, compiled=False)
+    history = Scene(beam).gravity((0.0, -2.0), amplitude=lambda t: t).integrate(0.2, 0.05)
+    assert_allclose(history.momentum[:, 1], -beam.total_mass * history.t**2, rtol=0, atol=1e-13)
+    assert_allclose(history.momentum[:, 0], 0.0, rtol=0, atol=1e-13)
 
 
 def test_acceleration_between_two_steps():
