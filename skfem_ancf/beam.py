@@ -11,6 +11,7 @@ from .elements import ElementBeam, choose_element
 from .errors import InputError, MeshError, NameUnknown, require_positive
 from .formulations import COMPONENTS, get_formulation
 from .formulations.ecm import AXIS
+from .frozen import Frozen, read_only
 from .cable import CableKernel
 from .kernel import Kernel
 from .materials import Material
@@ -49,8 +50,8 @@ def _coordinates(mesh, element, p):
     return np.ascontiguousarray(q.transpose(2, 0, 1)).ravel()
 
 
-class Beam:
-    """A planar beam.
+class Beam(Frozen):
+    """A planar beam. It does not change; :meth:`replace` returns a changed copy.
 
     Parameters
     ----------
@@ -106,6 +107,11 @@ class Beam:
         self.width = require_positive("width", width)
         self.formulation = get_formulation(formulation)
         self.name, self.compiled = name, bool(compiled)
+        if element.order == 0 and not material.is_hooke:
+            raise InputError(
+                "a cable has Hooke's law of E and nu along its axis and bends with E I: it cannot "
+                f"have the law of {material!r}. Use StVenantKirchhoff, or an element with "
+                "sections, as ElementBeamANCFCubic(2)")
         self.nd = 2 * element.nodal_dofs
         self.N = self.nd * mesh.p.shape[1]
 
@@ -113,10 +119,37 @@ class Beam:
         return (f"<Beam {self.name or ''}: {self.mesh.nelements} elements of order "
                 f"{self.element.order}, {self.N} coordinates, {self.formulation.name}>")
 
+    def replace(self, **changes):
+        """The same beam with some arguments of its constructor changed.
+
+        Parameters
+        ----------
+        **changes
+            Arguments of :class:`Beam`, as ``material=...`` or ``width=...``.
+
+        Raises
+        ------
+        NameUnknown
+            If an argument is not known.
+
+        Examples
+        --------
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line([0, 1], height=0.1), ElementBeamANCF(2),
+        ...             StVenantKirchhoff(E=1.0, nu=0.3), width=0.1)
+        >>> stiffer = beam.replace(material=beam.material.replace(E=2.0), width=0.2)
+        >>> beam.width, stiffer.width, stiffer.material.E
+        (0.1, 0.2, 2.0)
+        """
+        known = ("mesh", "element", "material", "width", "formulation", "name", "compiled")
+        for name in changes:
+            if name not in known + ("fields", "tolerance"):
+                raise NameUnknown("argument of Beam", name, known)
+        return type(self)(**{**{name: getattr(self, name) for name in known}, **changes})
+
     def with_mesh(self, mesh):
         """The same beam on another mesh."""
-        return Beam(mesh, self.element, self.material, self.width, self.formulation, self.name,
-                    self.compiled)
+        return self.replace(mesh=mesh)
 
     # the scikit-fem side
 
@@ -164,17 +197,18 @@ class Beam:
     @cached_property
     def q0(self):
         """Coordinates of the stress-free state, shape (N,)."""
-        return _coordinates(self.mesh, self.element, self.mesh.p)
+        return read_only(_coordinates(self.mesh, self.element, self.mesh.p))
 
     @cached_property
     def origin(self):
         """A point near the beam, from which positions are measured inside the package."""
-        return self.mesh.p.mean(axis=1)
+        return read_only(self.mesh.p.mean(axis=1))
 
     @cached_property
     def q0_local(self):
         """Coordinates of the stress-free state with positions measured from :attr:`origin`."""
-        return _coordinates(self.mesh, self.element, self.mesh.p - self.origin[:, None])
+        return read_only(_coordinates(self.mesh, self.element,
+                                      self.mesh.p - self.origin[:, None]))
 
     @property
     def dofnames(self):

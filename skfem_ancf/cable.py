@@ -240,7 +240,7 @@ class CableKernel(Chain):
         ``mean(s) d kappa = d(a x b) - mean(kappa) ds``.
         """
         if self.compiled is not None:
-            return self.compiled.mean_force(u0, u1)
+            return self.compiled.mean_force(self.checked(u0), self.checked(u1))
         out = np.zeros(self.N)
         for part, (old, strain0, s0) in zip(self.chunks(), strains0):
             p = self._part

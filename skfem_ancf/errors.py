@@ -70,6 +70,10 @@ class SupportError(AncfError):
     """The supports leave a rigid motion free, or contradict each other."""
 
 
+class ImmutableError(AncfError, AttributeError):
+    """An attribute of an object that does not change was set."""
+
+
 class MissingExtra(AncfError, ImportError):
     """An optional dependency is missing; the message names the extra."""
 

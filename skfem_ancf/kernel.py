@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .errors import InputError
 from .materials import LinearLaw
 from .quadrature import tensor
 from .switch import compiled_off
@@ -304,6 +305,23 @@ class Chain:
         v = u_e.reshape(len(u_e), -1, 1)
         return 0.5 * np.sum(v * (constant @ v), axis=(1, 2))
 
+    def checked(self, u):
+        """A coordinate vector as compiled code takes it: float64, (N,), contiguous, writeable.
+
+        Complex numbers stay: NumPy takes them.
+
+        Raises
+        ------
+        InputError
+            If it is of another shape: compiled code would read other memory.
+        """
+        if u.shape != (self.N,):
+            raise InputError(f"this beam has {self.N} coordinates: their displacement is of shape "
+                             f"({self.N},), got {u.shape}; the state of another mesh?")
+        if u.dtype == np.float64 and u.flags.c_contiguous and u.flags.writeable:
+            return u
+        return u if u.dtype == np.complex128 else np.array(u, dtype=np.float64)
+
     def chunks(self):
         """Slices of the elements that are evaluated together."""
         return [slice(k, k + CHUNK) for k in range(0, self.t.shape[1], CHUNK)]
@@ -343,6 +361,7 @@ class Chain:
         Assembly
             With ``carry(du)``.
         """
+        u = self.checked(u)
         if self.compiled is not None and K.symmetric:
             return self.compiled.assemble(u, K, start, force, carried, geometric)
         parts = []
@@ -356,6 +375,7 @@ class Chain:
 
     def force(self, u):
         """Internal force of a coordinate displacement (N,), shape (N,)."""
+        u = self.checked(u)
         if self.compiled is not None and u.dtype == np.float64:
             return self.compiled.force(u)
         out = np.zeros(self.N, dtype=u.dtype)
@@ -543,7 +563,7 @@ class Kernel(Chain):
         ``strains0`` is :meth:`strains` of u0.
         """
         if self.compiled is not None:
-            return self.compiled.mean_force(u0, u1)
+            return self.compiled.mean_force(self.checked(u0), self.checked(u1))
         out = np.zeros(self.N)
         for part, known in zip(self.chunks(), strains0):
             a, b = self.gather(u0, part), self.gather(u1, part)

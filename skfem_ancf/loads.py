@@ -4,8 +4,6 @@ A :class:`~skfem_ancf.Scene` keeps loads as they were given, and binds them to i
 again for the same scene on other meshes.
 """
 
-from copy import copy
-
 import numpy as np
 from skfem.assembly import LinearForm, asm
 
@@ -13,6 +11,7 @@ from . import forms
 from .beam import Beam
 from .errors import (AncfError, InputError, ask_field, ask_number, require_finite,
                      require_function)
+from .frozen import Sealable, read_only
 
 
 class Amplitude:
@@ -25,7 +24,7 @@ class Amplitude:
         return self.function(t) if np.ndim(t) else ask_number("amplitude(t={:g})", self.function, t)
 
 
-class Load:
+class Load(Sealable):
     """Base class: a force on the coordinates of one beam as a function of their displacement.
 
     A load of your own is a subclass, given to a scene by :meth:`skfem_ancf.Scene.add`. It defines
@@ -91,7 +90,7 @@ class Load:
         self.beam, self.amplitude = beam, amplitude
 
     def bind(self, beam):
-        """The load on a beam.
+        """The load on a beam; the scene seals it, so that its attributes do not change then.
 
         By default a copy with :attr:`beam` set. Override it where something is computed from the
         beam; leave ``self`` as it is, which is bound to other beams later.
@@ -105,7 +104,7 @@ class Load:
         -------
         Load
         """
-        bound = copy(self)
+        bound = self._unsealed()
         bound.beam = beam
         return bound
 
@@ -155,12 +154,14 @@ def bind_load(load, beam):
     """
     bound = load.bind(beam)
     if type(bound) in (DeadLoad, Pressure, EndMoment):
+        bound._seal()
         return bound
     if not isinstance(bound, Load) or bound.beam is not beam:
         raise InputError(f"{load!r}.bind(beam) must return a Load on that beam, got {bound!r}")
     zero = np.zeros(beam.N)
     try:
         require_finite("its force", bound.force(zero), (beam.N,))
+        bound._seal()
         if bound.constant:
             return bound
         i, j, v = bound.stiffness(zero)
@@ -250,7 +251,7 @@ class DeadLoad(Load):
 
     def __init__(self, beam, vector, amplitude=None):
         super().__init__(_the_beam(beam), amplitude)
-        self.vector = require_finite("the load", vector, (beam.N,))
+        self.vector = read_only(require_finite("the load", vector, (beam.N,)))
 
     def bind(self, beam):
         if beam is not self.beam:
@@ -300,7 +301,8 @@ class EndMoment(Load):
     beam
         A :class:`~skfem_ancf.Beam`.
     boundary
-        A place that is one section, or the number of a node.
+        A place that is one section, see :func:`skfem_ancf.places.facets_of`; or the number of a
+        node.
     M
         The moment, counterclockwise.
     amplitude

@@ -14,9 +14,10 @@ from skfem.element import Element
 from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import Mesh, MeshQuad
 
-from .errors import (CallbackError, FileError, MeshError, NameUnknown, ask, ask_array,
+from .errors import (CallbackError, FileError, InputError, MeshError, NameUnknown, ask, ask_array,
                      require_finite, require_finite_scalar, require_function, require_integer,
                      require_option, require_path, require_positive, shown, teaching)
+from .frozen import Frozen, ReadOnlyDict
 from .mapping import MappingBeam
 from .reference import ElementBeamP1
 
@@ -31,8 +32,10 @@ MAX_SUBDIVISION = 1000
 
 @teaching
 @dataclass(repr=False, eq=False)
-class MeshBeam(Mesh):
+class MeshBeam(Frozen, Mesh):
     """A planar beam in its stress-free state, divided into elements along its axis.
+
+    A mesh does not change; its methods return other meshes.
 
     Use :meth:`init_line` or :meth:`init_curve`. The nodes are numbered along the axis, which
     keeps matrices banded; the boundaries ``left`` and ``right`` are the end sections, ``top``
@@ -97,7 +100,8 @@ class MeshBeam(Mesh):
         origin
             The point from which ``x`` is measured.
         angle
-            Direction of the axis, in radians from the first coordinate axis.
+            Direction of the axis, in radians from the first coordinate axis, at most 2 pi in
+            size.
 
         Raises
         ------
@@ -115,7 +119,7 @@ class MeshBeam(Mesh):
         x = require_finite("x", x, (None,))
         height = require_positive("height", height)
         origin = require_finite("origin", origin, (2,))
-        angle = require_finite_scalar("angle", angle)
+        angle = _radians(angle)
         if len(x) < 2:
             raise MeshError(f"a beam needs at least two nodes, got {len(x)}")
         if not np.all(np.diff(x) > 0):
@@ -146,8 +150,8 @@ class MeshBeam(Mesh):
         Raises
         ------
         MeshError
-            If the curve folds (radius of curvature below h/2), stands still, jumps, or an element
-            has no length.
+            If the curve folds (radius of curvature below h/2), has a kink at a node, stands
+            still, jumps, or an element has no length.
 
         Notes
         -----
@@ -176,6 +180,7 @@ class MeshBeam(Mesh):
         curve = Curve(r, require_function("dr", dr, what), (s[0], s[-1]))
         p, tangent = curve.nodes(s)
         curve.check(s)
+        curve.check_kinks(s)
         _check_curvature(curve, s, height)
         return cls._from_nodes(p, tangent, curve.lengths(s[:-1], s[1:]), height, s=s, curve=curve,
                                p_XY=curve.turning(s))
@@ -261,6 +266,33 @@ class MeshBeam(Mesh):
         """
         require_option("interpolation of the sections", sections, ("linear", "cubic"))
         return self if sections == self.sections else replace(self, sections=sections)
+
+    def replace(self, **changes):
+        """The mesh with another ``height``, or without its ``curve``.
+
+        Positions, tangents and lengths depend on each other: for others use :meth:`init_line`,
+        :meth:`init_curve`, :meth:`refined`, :meth:`translated`, :meth:`rotated`, :meth:`scaled`.
+
+        Raises
+        ------
+        NameUnknown
+            If it is another attribute.
+
+        Examples
+        --------
+        >>> MeshBeam.init_line([0, 1], height=0.1).replace(height=0.2).height
+        0.2
+        """
+        for name in changes:
+            if name not in ("height", "curve"):
+                raise NameUnknown("attribute that may be replaced alone", name,
+                                  ("height", "curve"))
+        return replace(self, **changes)
+
+    def __setattr__(self, name, value):
+        if name in ("_boundaries", "_subdomains") and value is not None:
+            value = ReadOnlyDict(value)
+        super().__setattr__(name, value)
 
     # topology
 
@@ -528,13 +560,14 @@ class MeshBeam(Mesh):
         if self._boundaries is not None and not skip_boundaries:
             facets = np.full(self.nfacets, -1, dtype=np.int32)
             facets[self.t2f[:, elements].ravel()] = m.t2f.ravel()
-            m._boundaries = {}
+            tags = {}
             for name, f in self._boundaries.items():
                 keep = facets[np.asarray(f)] >= 0
                 new = facets[np.asarray(f)[keep]]
                 if getattr(f, "ori", None) is not None:  # a cut section has one side left
                     new = OrientedBoundary(new, np.where(m.f2t[1, new] < 0, 0, f.ori[keep]))
-                m._boundaries[name] = new
+                tags[name] = new
+            m._boundaries = tags
         return (m, nodes) if return_mapping else m
 
     # rigid motion and scale
@@ -552,7 +585,7 @@ class MeshBeam(Mesh):
 
     def rotated(self, angle, about=(0.0, 0.0)):
         """The mesh turned by an angle in radians about a point."""
-        angle, about = require_finite_scalar("angle", angle), require_finite("about", about, (2,))
+        angle, about = _radians(angle), require_finite("about", about, (2,))
         c, s = np.cos(angle), np.sin(angle)
         Q = np.array([[c, -s], [s, c]])
         return self._moved(Q, about - Q @ about)
@@ -655,8 +688,11 @@ class MeshBeam(Mesh):
                 data[name] = np.array(data[name])
         orientations = data.pop("orientations", {})
         mesh = super().from_dict(data)
-        for name, ori in orientations.items():
-            mesh._boundaries[name] = OrientedBoundary(mesh._boundaries[name], ori)
+        if orientations:
+            tags = dict(mesh._boundaries)
+            for name, ori in orientations.items():
+                tags[name] = OrientedBoundary(tags[name], ori)
+            mesh._boundaries = tags
         return mesh
 
     def save_npz(self, filename):
@@ -826,6 +862,29 @@ class Curve:
                 f"r jumps, or its derivative does not fit, between s = {s[k]:.9g} and "
                 f"{s[k + 1]:.9g}: the derivative adds up to a point {gap[k]:.6g} from r")
 
+    def check_kinks(self, s):
+        """Raise :class:`MeshError` if the direction of the curve jumps at a node inside.
+
+        The angle between chords to both sides of a node falls with their length where the curve
+        is smooth; at a kink it stays.
+        """
+        at = s[1:-1]
+        if not len(at):
+            return
+        size, p = np.minimum(np.diff(s)[:-1], np.diff(s)[1:]), self(at)
+        angles = []
+        for part in (1e-3, 2.5e-4):
+            before, after = p - self(at - part * size), self(at + part * size) - p
+            cross = before[0] * after[1] - before[1] * after[0]
+            angles.append(np.arctan2(cross, np.sum(before * after, axis=0)))
+        kink = np.where(np.abs(angles[1]) > 0.7 * np.abs(angles[0]), np.abs(angles[1]), 0.0)
+        k = int(np.argmax(kink))
+        if kink[k] > 1e-3:
+            raise MeshError(
+                f"the curve has a kink of {np.rad2deg(angles[1][k]):.3g} degrees at s = "
+                f"{at[k]:.9g}: give one beam for each smooth part, and weld them in a scene with "
+                'scene.joint("weld", ...)')
+
     def _at_gauss_points(self, a, b):
         x, w = np.polynomial.legendre.leggauss(12)
         at = a[:, None] + (b - a)[:, None] * (0.5 + 0.5 * x)
@@ -835,6 +894,15 @@ class Curve:
         """The curve ``A r(s) + shift``."""
         return Curve(lambda s: A @ self(s) + shift[:, None], lambda s: A @ self.rate(s),
                      self.ends)
+
+
+def _radians(angle):
+    """An angle as a float; raises InputError where it is likely to be in degrees."""
+    angle = require_finite_scalar("angle", angle)
+    if abs(angle) > 2.0 * np.pi * (1 + 1e-12):
+        raise InputError(f"an angle is given in radians, at most 2 pi in size, got {angle!r}: for "
+                         f"degrees write np.deg2rad({angle:g})")
+    return angle
 
 
 def _curve_derivative(r, s0, s1):

@@ -151,6 +151,7 @@ def section_at(mesh, point):
 
 
 def _pair(x):
+    x = np.where(np.abs(x) < 1e-15 * np.max(np.abs(x)), 0.0, x)
     return f"({x[0]:.9g}, {x[1]:.9g})"
 
 

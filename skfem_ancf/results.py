@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .beam import select_beam
-from .errors import MeshError
+from .errors import InputError, MeshError, NameUnknown
+from .frozen import Frozen
 
 
 class Reaction(NamedTuple):
@@ -26,8 +27,8 @@ class Reaction(NamedTuple):
     coordinates: dict
 
 
-class State:
-    """A configuration of a scene.
+class State(Frozen):
+    """A configuration of a scene. It does not change; :meth:`replace` returns a changed copy.
 
     Attributes
     ----------
@@ -43,9 +44,35 @@ class State:
                  steps=(), multipliers=None, t=None, inertia=0.0):
         self.system, self.u, self.load = system, u, load
         self.converged, self.iterations, self.message = converged, iterations, message
-        self.steps = list(steps)
+        self.steps = tuple(steps)
         self._force, self.t, self._inertia = force, t, inertia
         self.multipliers = np.zeros(system.m) if multipliers is None else multipliers
+        for name, size in (("u", system.N), ("multipliers", system.m)):
+            if np.shape(getattr(self, name)) != (size,):
+                raise InputError(f"{name} must have shape ({size},) in this scene, got "
+                                 f"{np.shape(getattr(self, name))}")
+
+    def replace(self, **changes):
+        """The same state with other attributes, as ``replace(message="guess")``.
+
+        ``error_estimate`` and ``scene`` are those of an adaptive solution.
+
+        Raises
+        ------
+        NameUnknown
+            If an attribute is not known.
+        """
+        known = [name for name in vars(self) if not name.startswith("_")]
+        known += [name for name in ("error_estimate", "scene") if name not in known]
+        for name in changes:
+            if name not in known:
+                raise NameUnknown("attribute of State", name, known)
+        other = object.__new__(type(self))
+        vars(other).update(vars(self), **changes)
+        if {"u", "multipliers", "system"} & set(changes):
+            vars(other)["_force"] = None
+        other._seal()
+        return other
 
     def __repr__(self):
         return (f"<State of {len(self.system.beams)} beam(s), {self.system.N} coordinates, load "

@@ -1,12 +1,12 @@
 """A scene: beams, supports and loads, and what can be asked of them."""
 
-from copy import copy
 from threading import RLock
 
 import numpy as np
 
 from . import eigen
 from .beam import Beam, select_beam
+from .doors import configuration, displacement
 from .dynamics import get_scheme
 from .dynamics.integrate import integrate
 from .errors import (ConvergenceError, InputError, NameUnknown, ask_field, require_finite,
@@ -129,7 +129,8 @@ class Scene:
             for support in supports:
                 support.bind(self._beams[support.beam], fixed)
             loads = tuple((k, load, bind_load(load, self._beams[k])) for k, load in loads)
-            joints = tuple((self._portable(joint), bind_joint(joint, self)) for joint in joints)
+            bound = [bind_joint(joint, self) for joint in joints]
+            joints = tuple(zip(map(self._portable, joints), bound))
             velocities = {k: (v, self._bind_velocity(k, v)) for k, v in velocities}
             self._fixed, self._supports = fixed, self._supports + tuple(supports)
             self._loads, self._joints = self._loads + loads, self._joints + joints
@@ -146,9 +147,10 @@ class Scene:
             return (tuple(map(numbered, value)) if isinstance(value, (tuple, list))
                     and any(isinstance(v, Beam) for v in value) else value)
 
-        joint = copy(joint)
+        joint = joint._unsealed()
         for name, value in vars(joint).items():
             vars(joint)[name] = numbered(value)
+        joint._seal()
         return joint
 
     def add(self, thing):
@@ -329,6 +331,7 @@ class Scene:
     def moment(self, boundary, M, beam=None, amplitude=None):
         """A moment on an end section, counterclockwise, that turns with it."""
         k = self._number(beam)
+        self._beams[k].section_node(boundary)
         load = EndMoment(self._beams[k], boundary, require_finite_scalar("M", M), amplitude)
         return self._put(loads=[(k, load)])
 
@@ -443,7 +446,8 @@ class Scene:
         Parameters
         ----------
         start
-            A State to start from; the stress-free state by default.
+            A State to start from, of this scene or of one whose beams have equal meshes and
+            elements; the stress-free state by default. :meth:`state` makes one of coordinates.
         adapt
             Tolerance of the error: refine the meshes where it is, starting from those given. The
             state's ``error_estimate`` says what was reached; its beams are the refined ones. See
@@ -463,9 +467,50 @@ class Scene:
         ConvergenceError
             If there is no convergence; its ``state`` is the last converged State.
         """
-        if adapt is not None:
-            return solve_adaptive(self, adapt, **options)
-        return self._solve(None if start is None else start.u, **options)
+        with self._lock:
+            if adapt is not None:
+                if start is not None:
+                    raise InputError("an adaptive solution begins each mesh from its stress-free "
+                                     "state: give adapt= without start=")
+                return solve_adaptive(self, adapt, **options)
+            u = None if start is None else displacement(self.system, start)
+            return self._solve(u, **options)
+
+    def state(self, u=None, multipliers=None, load=1.0):
+        """A State of this scene with given coordinates: a start, or a shape to look at.
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates from the stress-free state, beam after beam, shape
+            (N,); zero by default. What it comes from is not asked: so coordinates of another
+            scene are taken over.
+        multipliers
+            Of the joints, shape (m,); zero by default.
+        load
+            Factor on the loads, for modes about the state and its reactions.
+
+        Returns
+        -------
+        State
+            It is no equilibrium, ``converged`` is False.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line([0, 0.5, 1], height=0.1), ElementBeamANCF(1),
+        ...                    StVenantKirchhoff(E=1.0, nu=0.3), width=0.1))
+        >>> lifted = scene.state(np.tile([0.0, 0.2, 0, 0, 0, 0], 3))
+        >>> lifted.displacement((1, 0)).round(6).tolist()
+        [0.0, 0.2]
+        """
+        system = self.system
+        u = np.zeros(system.N) if u is None else np.array(require_finite("u", u, (system.N,)))
+        if multipliers is not None:
+            multipliers = np.array(require_finite("multipliers", multipliers, (system.m,)))
+        return State(system, u, require_finite_scalar("load", load), converged=False,
+                     message="given coordinates", multipliers=multipliers)
 
     def _solve(self, u, **options):
         system = self.system
@@ -557,7 +602,7 @@ class Scene:
         """
         velocity = np.concatenate([self._velocities[k][1] if k in self._velocities else
                                    np.zeros(b.N) for k, b in enumerate(self._beams)])
-        u = None if start is None else require_finite("start.u", start.u, (self.N,))
+        u = None if start is None else displacement(self.system, start)
         return integrate(self.system, t_end, dt, get_scheme(scheme), u, velocity, **options)
 
     def modes(self, k, state=None):
@@ -595,7 +640,8 @@ class Scene:
         True
         """
         if state is None:
-            state = State(self.system, np.zeros(self.N), load=0.0)
+            state = self.state(load=0.0)
+        state = configuration(self.system, state)
         return eigen.modes(self.system, state, k)
 
     def buckling(self, k=1):

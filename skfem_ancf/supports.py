@@ -54,7 +54,7 @@ class Support:
 
     def _require_on_axis(self, beam):
         x = np.asarray(self.boundary, dtype=float)
-        axis = beam.mesh.p[:, beam.section_node(self.boundary)]
+        axis = np.round(beam.mesh.p[:, beam.section_node(self.boundary)], 12) + 0.0
         if np.hypot(*(x - axis)) > 1e-3 * beam.mesh.height:
             raise InputError(
                 f"pin holds the axis, at ({axis[0]:.9g}, {axis[1]:.9g}), and not the point "

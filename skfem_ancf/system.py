@@ -7,7 +7,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from .errors import SupportError
+from .errors import InputError, SupportError
 from .joints.base import same_joint
 from .linalg import INACCURATE, BandMatrix, BorderedMatrix, border_inertia, hold
 
@@ -225,8 +225,14 @@ class System:
             out[s] += load.factor(t) * load.force(u[s])
         return out
 
+    def _require_coordinates(self, u):
+        if u.shape != (self.N,):
+            raise InputError(f"the displacement of the scene's coordinates has shape ({self.N},), "
+                             f"got {u.shape}; the state of another mesh?")
+
     def internal_force(self, u):
         """The internal force, shape (N,)."""
+        self._require_coordinates(u)
         return np.concatenate([b.kernel.force(u[s]) for b, s in zip(self.beams, self.slices)])
 
     def strains(self, u):
@@ -392,6 +398,7 @@ class System:
         force, evaluations
             The internal force (N,), and the pieces that :meth:`stress_step` takes.
         """
+        self._require_coordinates(u)
         self.K.clear()
         force = np.zeros(self.N)
         evaluations = []

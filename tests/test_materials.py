@@ -223,7 +223,9 @@ def test_no_density():
 class Stiffening(Material):
     """W = W_svk + c/4 (eps . eps)^2: energy and stress, nothing else."""
 
-    c = 0.0
+    def __init__(self, *args, c=0.0, **kwargs):
+        super().__init__(*args, **kwargs)
+        self.c = c
 
     def energy(self, strain):
         e = np.asarray(strain)
@@ -244,8 +246,7 @@ class Apart(Stiffening):
         if self.plane == "stress":
             return None
         hooke = StVenantKirchhoff(self.E, self.nu, plane="strain").volumetric_split(k_s)
-        rest = Stiffening(2 * self.G, 0.0, plane="strain")  # lambda is zero
-        rest.c = self.c
+        rest = Stiffening(2 * self.G, 0.0, plane="strain", c=self.c)  # lambda is zero
         return rest.law(k_s), hooke[1]
 
 
@@ -268,8 +269,7 @@ def test_law_of_the_users_own(plane, method, law, hooke):
     same, reference = _cantilever(own, method=method), _cantilever(soft, method=method)
     assert_allclose(same.u, reference.u, atol=1e-10)
     assert same.iterations == reference.iterations
-    own.c = 1e11
-    state = _cantilever(own, method=method)
+    state = _cantilever(own.replace(c=1e11), method=method)
     load = state.system.external_force(state.u)
     error = (state.internal_force - load)[state.system.free]
     assert np.abs(error).max() < 1e-4  # of 1e4 N

@@ -7,10 +7,11 @@ from numpy.polynomial import legendre
 from skfem.element import DiscreteField, Element
 
 from ..errors import MeshError
+from ..frozen import Frozen
 from ..reference import RefBeam, hermite, linear
 
 
-class ElementBeam(Element):
+class ElementBeam(Frozen, Element):
     """A scalar beam element; wrap it in scikit-fem's ``ElementVector`` for the position field.
 
     The local functions are, for each of the two nodes, a cubic Hermite function in xi for the
@@ -23,7 +24,7 @@ class ElementBeam(Element):
         The functions P_k of the section.
     welded : list of str
         Names of the coordinates that a welded face fixes: the position of every point of it.
-    functionals : list of (float, int, int)
+    functionals : tuple of (float, int, int)
         For each coordinate of a node: eta - 1/2 of the point, and the number of derivatives
         along X and Y that the coordinate is.
     axis_degree : int
@@ -45,7 +46,7 @@ class ElementBeam(Element):
         self.section = section
         self.dofnames = ["r", "r_X", *names]
         self.nodal_dofs = len(self.dofnames)
-        self.functionals = [(0.0, 0, 0), (0.0, 1, 0), *functionals]
+        self.functionals = ((0.0, 0, 0), (0.0, 1, 0), *functionals)
         self.welded = ["r", *welded]
         self.doflocs = np.array([[xi, 0.5 + f[0]] for xi in (0.0, 1.0) for f in self.functionals])
         # stock quadrature takes 2 maxdeg in each direction: exact for the energy, which is of
@@ -153,7 +154,7 @@ class ElementBeam(Element):
         return f"<{type(self).__name__} of order {self.order}, coordinates {self.dofnames}>"
 
 
-class SectionFunctions:
+class SectionFunctions(Frozen):
     """Polynomials P_k(eta), P_k(0) = 0, given by their derivatives in the Legendre basis.
 
     The beam's section function is ``h^m P_k(Y / h)`` for a coordinate that is an m-th derivative.

@@ -49,7 +49,7 @@ class ElementBeamCable(ElementBeam):
         self.axis_degree = int(degree)
         m = (self.axis_degree + 1) // 2
         super().__init__(SectionFunctions(np.zeros((1, 0))), [], [], [])
-        self.functionals = [(0.0, k, 0) for k in range(m)]
+        self.functionals = tuple((0.0, k, 0) for k in range(m))
         self.dofnames = ["r"] + ["r_" + "X" * k for k in range(1, m)]
         self.nodal_dofs = m
         self.doflocs = np.repeat([[0.0, 0.5], [1.0, 0.5]], m, axis=0)

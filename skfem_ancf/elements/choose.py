@@ -59,6 +59,8 @@ def choose_element(mesh, material, fields=(), tolerance=1e-3):
     wanted = max((ORDER_OF_FIELD[name] for name in fields), default=0)
     enough = (0 if shear <= tolerance else 2 if 0.1 * ratio**2 <= tolerance else
               3 if ratio**3 <= tolerance else 5)
+    if not material.is_hooke:  # a cable has E and nu alone
+        wanted = max(wanted, 2)
     order = max(wanted, enough)
     if order == 0:
         return ElementBeamCable(5)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import require_like
+from ..frozen import Frozen
 from ..quadrature import gauss, lagrange, tensor
 
 COMPONENTS = ("xx", "yy", "xy")
@@ -64,7 +65,7 @@ class Term:
         return np.kron(np.eye(len(self.axis[0])) if along is None else along, across)
 
 
-class Formulation:
+class Formulation(Frozen):
     """Base class of the formulations; a subclass gives its name and its terms."""
 
     name = ""

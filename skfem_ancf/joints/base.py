@@ -1,11 +1,11 @@
 """What every joint shares: constraint equations on points and sections of beams."""
 
-from copy import copy
 from uuid import uuid4
 
 import numpy as np
 
 from ..errors import AncfError, InputError, require_finite, shown
+from ..frozen import Sealable
 from ..loads import require_entries
 from ..places import is_point
 
@@ -36,7 +36,7 @@ def rotation(angle):
     return np.array([[c, -s], [s, c]])
 
 
-class Joint:
+class Joint(Sealable):
     """Constraint equations Phi(u, t) = 0 with Lagrange multipliers.
 
     A joint is bound to a scene by :meth:`bind`, which finds its points; from then on ``u`` is
@@ -122,9 +122,10 @@ def bind_joint(joint, scene):
     """
     # by which it is known again: in a bound copy, on another mesh, in another process
     vars(joint).setdefault("_key", uuid4().hex)
-    bound = copy(joint)
+    bound = joint._unsealed()
     try:
         bound.bind(scene)
+        bound._seal()
         if type(joint).__module__.rpartition(".")[0] != __package__:
             _try(bound, scene.N)
     except AncfError:

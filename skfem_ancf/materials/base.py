@@ -4,16 +4,22 @@ import numpy as np
 
 from ..errors import (InputError, require_finite_scalar, require_like, require_option,
                       require_positive, taught)
+from ..frozen import Frozen, rebuilt
+from ..quadrature import gauss
 
 PLANES = ("stress", "strain")
 
 
-class Material:
+class Material(Frozen):
     """An isotropic hyperelastic material in plane stress or plane strain.
+
+    A material does not change; :meth:`replace` returns a changed copy.
 
     A law of your own is a subclass that defines :meth:`energy` and :meth:`stress`, and
     :meth:`moduli` if the complex step of ``stress`` is not good enough; in plane stress also
-    :meth:`thickness_stretch` if Cauchy stress is asked for. Strains and stresses are
+    :meth:`thickness_stretch` if Cauchy stress is asked for. A subclass of a law of the package
+    that overrides ``stress`` alone has the energy of that stress, integrated from zero along the
+    strain, and its moduli. Strains and stresses are
     in the beam's frame (first index along the axis, second across the section):
 
     * strain: Green-Lagrange, ``(eps_xx, eps_yy, 2 eps_xy)``, shape (3, ...),
@@ -73,10 +79,43 @@ class Material:
             return 1.0
         return 10.0 * (1.0 + self.nu) / (12.0 + 11.0 * self.nu)
 
+    def replace(self, **changes):
+        """A copy with some arguments of its constructor changed, as ``replace(E=2e8)``.
+
+        Raises
+        ------
+        NameUnknown
+            If an argument is not known.
+
+        Examples
+        --------
+        >>> from skfem_ancf import StVenantKirchhoff
+        >>> StVenantKirchhoff(E=1.0, nu=0.3).replace(E=2.0).E
+        2.0
+        """
+        return rebuilt(self, changes, ("E", "nu", "density", "plane", "shear_correction"))
+
     def law(self, k_s=1.0):
         """The law with its shear corrected: a function of (eps_xx, eps_yy, sqrt(k_s) 2 eps_xy)."""
         k_s = require_positive("k_s", k_s)
-        return self if k_s == 1.0 else ShearCorrected(self, k_s)
+        if not self._fits("stress", "energy"):
+            raise InputError(f"{type(self).__name__} overrides energy and not stress, with which "
+                             "beams are solved: define stress(strain), its derivative, too")
+        law = self if self._fits("energy") and self._fits("moduli") else OverriddenLaw(self)
+        return law if k_s == 1.0 else ShearCorrected(law, k_s)
+
+    def _fits(self, name, other="stress"):
+        """False if ``other`` was overridden in a subclass of the class that defines a method."""
+        def depth(name):
+            return next(k for k, cls in enumerate(type(self).__mro__) if name in vars(cls))
+
+        return vars(Material)[name] is getattr(type(self), name) or depth(name) <= depth(other)
+
+    @property
+    def is_hooke(self):
+        """True if the law is Hooke's of E and nu, in Green-Lagrange strain."""
+        law, D = self.law(), hooke(self.E, self.nu, self.plane)
+        return isinstance(law, LinearLaw) and np.allclose(law.D, D, rtol=1e-9, atol=1e-9 * D[0, 0])
 
     @property
     def lame(self):
@@ -128,6 +167,16 @@ class Material:
                 f"plane={self.plane!r}, shear_correction={self.shear_correction!r})")
 
 
+def hooke(E, nu, plane):
+    """Moduli (3, 3) of Hooke's law, for (eps_xx, eps_yy, 2 eps_xy)."""
+    if plane == "stress":
+        a, b = E / (1.0 - nu**2), E * nu / (1.0 - nu**2)
+    else:
+        a = E * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu))
+        b = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+    return np.array([[a, b, 0.0], [b, a, 0.0], [0.0, 0.0, E / (2.0 * (1.0 + nu))]])
+
+
 class ShearCorrected:
     """A law whose shear strain enters multiplied by sqrt(k_s), so that k_s G is its modulus."""
 
@@ -147,6 +196,49 @@ class ShearCorrected:
     def moduli(self, strain):
         D = self.base.moduli(self._scaled(strain))
         return D * np.outer(self.scale, self.scale).reshape((3, 3) + (1,) * (D.ndim - 2))
+
+
+class OverriddenLaw:
+    """The law of a subclass that overrides ``stress``, with what it inherits made to fit.
+
+    The energy is ``int_0^1 strain . stress(x strain) dx`` by eight Gauss points, and the moduli
+    are the complex step of the stress, where they are those of the class it was derived from.
+
+    Raises
+    ------
+    InputError
+        If the moduli are wanted and the stress takes no complex strain.
+    """
+
+    def __init__(self, material):
+        self.base, self.stress = material, material.stress
+        self.energy = material.energy if material._fits("energy") else self._energy
+        self.moduli = material.moduli
+        if not material._fits("moduli"):
+            self.moduli = self._moduli
+            self._require_complex_step()
+
+    def _energy(self, strain):
+        strain = np.asarray(strain)
+        return sum(w * np.sum(strain * self.stress(x * strain), axis=0) for x, w in zip(*gauss(8)))
+
+    def _moduli(self, strain):
+        return Material.moduli(self.base, strain)
+
+    def _require_complex_step(self):
+        strain = np.array([[1.3e-3], [-0.7e-3], [0.9e-3]])
+        h = 1e-6
+        steps = h * np.eye(3)[:, :, None]
+        near = np.stack([(np.asarray(self.stress(strain + d)) - self.stress(strain - d)) / (2 * h)
+                         for d in steps], 1)
+        try:
+            exact = self._moduli(strain)
+        except TypeError:
+            exact = np.inf * near
+        if not np.allclose(exact, near, rtol=1e-4, atol=1e-4 * np.max(np.abs(near))):
+            raise InputError(
+                f"{type(self.base).__name__} overrides stress, whose derivative cannot be found by "
+                "the complex step: define moduli(strain), too")
 
 
 class LinearLaw:

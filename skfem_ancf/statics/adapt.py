@@ -54,7 +54,7 @@ def solve_adaptive(scene, tol, max_elements=20000, **options):
         fine, prolong = refine(coarse, everywhere)
         better = fine._solve(None, **options)
         estimate = _compare(coarse, state, fine, better)
-        better.error_estimate, better.scene = estimate, fine
+        better = better.replace(error_estimate=estimate, scene=fine)
         n = sum(b.mesh.nelements for b in fine.beams)
         logger.info("%d elements, estimated error %.3g", n, max(estimate.values()))
         if max(estimate.values()) <= tol:

@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import ConvergenceError, InputError, NameUnknown, require_positive
+from ..errors import (ConvergenceError, InputError, NameUnknown, require_finite,
+                      require_positive)
 from ..progress import progress_bar
 
 logger = logging.getLogger(__name__)
@@ -109,6 +110,7 @@ def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, fi
         raise InputError(f"max_iterations must be at least 1, got {max_iterations!r}")
     origin = np.zeros(system.N), None
     if u is not None:
+        u = require_finite("u", u, (system.N,))
         missing = system.external_force(u) - system.internal_force(u)
         origin = u.copy(), missing * system.mask
     u = origin[0].copy()

@@ -1,0 +1,90 @@
+"""What enters the equations of a scene from outside: states and coordinates."""
+
+import numpy as np
+
+from .errors import InputError, require_finite
+from .results import State
+
+_GEOMETRY = ("p", "t", "p_X", "p_Y", "p_XY", "lengths")
+
+
+def difference(a, b):
+    """Why coordinates of one beam mean something else on another, in words; None if they do not.
+
+    Materials, widths and loads do not matter: a displacement is one of the body.
+    """
+    if a is b or (a.mesh is b.mesh and a.element is b.element):
+        return None
+    if repr(a.element) != repr(b.element) or not _same(a.element.doflocs, b.element.doflocs):
+        return f"its element is {a.element!r}, that of the scene {b.element!r}"
+    if a.mesh.nelements != b.mesh.nelements:
+        return f"its mesh has {a.mesh.nelements} elements, that of the scene {b.mesh.nelements}"
+    if a.mesh.height != b.mesh.height:
+        return f"its height is {a.mesh.height:.9g}, that of the scene {b.mesh.height:.9g}"
+    if a.mesh.sections != b.mesh.sections:
+        return f"its sections are {a.mesh.sections}, those of the scene {b.mesh.sections}"
+    for name in _GEOMETRY:
+        if not _same(getattr(a.mesh, name), getattr(b.mesh, name)):
+            what = "the nodes lie elsewhere" if name in ("p", "p_X", "lengths") else (
+                f"{name} of the mesh differs")
+            return f"{what} in the stress-free body"
+    return None
+
+
+def _same(a, b):
+    return a is b or (a is not None and b is not None and np.array_equal(a, b))
+
+
+def displacement(system, state, name="start"):
+    """The displacement of a State, for the equations of a scene: a new array, shape (N,).
+
+    Parameters
+    ----------
+    system
+        The :class:`~skfem_ancf.system.System`.
+    state
+        A State of the same scene, or of one whose beams have equal meshes and elements.
+    name
+        What messages call it.
+
+    Raises
+    ------
+    InputError
+        If it is not a State, or one of another mesh, or not finite.
+    """
+    if not isinstance(state, State):
+        raise InputError(f"{name} is a State, as solve_static returns it, got "
+                         f"{type(state).__name__}; scene.state(u) makes one of coordinates "
+                         f"of shape ({system.N},)")
+    other = state.system
+    if other is not system:
+        if len(other.beams) != len(system.beams):
+            raise InputError(f"{name} is a state of {len(other.beams)} beams, the scene has "
+                             f"{len(system.beams)}")
+        for k, (a, b) in enumerate(zip(other.beams, system.beams)):
+            why = difference(a, b)
+            if why:
+                who = "" if len(system.beams) == 1 else f" of beam {b.name or k}"
+                raise InputError(
+                    f"{name} is a state of another mesh{who}: {why}. Its coordinates mean "
+                    "something else here; where they do not, scene.state(other.u) takes them over")
+    return np.array(require_finite(f"{name}.u", state.u, (system.N,)))
+
+
+def configuration(system, state, name="state"):
+    """A State with its multipliers, as one of the equations of a scene.
+
+    Raises
+    ------
+    InputError
+        As :func:`displacement`, and if the state has multipliers of other joints.
+    """
+    u = displacement(system, state, name)
+    if state.system is system:
+        return state
+    kinds = [[(type(j), j.equations) for j in s.joints] for s in (state.system, system)]
+    if kinds[0] != kinds[1]:
+        raise InputError(f"{name} has multipliers of other joints: {list(state.system.joints)} "
+                         f"there, {list(system.joints)} in the scene; scene.state(u, multipliers) "
+                         "takes them as they are")
+    return state.replace(system=system, u=u)

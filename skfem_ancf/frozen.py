@@ -1,0 +1,136 @@
+"""Objects that stay as they were made."""
+
+import inspect
+from copy import copy
+
+import numpy as np
+
+from .errors import ImmutableError, InputError, NameUnknown
+
+
+def read_only(array):
+    """The array, not writeable; a copy of it where it is."""
+    if array.flags.writeable:
+        array = array.copy()
+        array.flags.writeable = False
+    return array
+
+
+class _Sealing(type):
+    """Seals what its classes make, once the outermost constructor is done."""
+
+    def __call__(cls, *args, **kwargs):
+        made = super().__call__(*args, **kwargs)
+        made._seal()
+        return made
+
+
+class Sealable:
+    """Base class of objects whose public attributes do not change once they are sealed."""
+
+    _sealed = False
+
+    def _seal(self):
+        vars(self)["_sealed"] = True
+
+    def __setattr__(self, name, value):
+        self._require_open(name)
+        super().__setattr__(name, value)
+
+    def __delattr__(self, name):
+        self._require_open(name)
+        super().__delattr__(name)
+
+    def _require_open(self, name):
+        if not self._sealed or name.startswith("_"):
+            return
+        instead = "make a new one"
+        if hasattr(self, "replace"):
+            instead = f"use replace({name}=...), which returns a changed copy"
+        raise ImmutableError(f"a {type(self).__name__} does not change, and {name!r} cannot be "
+                             f"set: {instead}")
+
+    def _unsealed(self):
+        """A copy that may be changed."""
+        other = copy(self)
+        vars(other)["_sealed"] = False
+        return other
+
+
+class Frozen(Sealable, metaclass=_Sealing):
+    """Base class of objects whose public attributes and arrays do not change.
+
+    A solution keeps what it has computed of them, so a change would be ignored in part. Caches,
+    with names that begin with an underscore, may be set.
+    """
+
+    def _seal(self):
+        attributes = vars(self)
+        for name, value in attributes.items():
+            if isinstance(value, np.ndarray):
+                attributes[name] = read_only(value)
+        super()._seal()
+
+    def __copy__(self):
+        return self
+
+    def __deepcopy__(self, memo):
+        return self
+
+    def __setstate__(self, state):
+        vars(self).update(state)
+        self._seal()
+
+
+class ReadOnlyDict(dict):
+    """A dictionary of arrays that does not change."""
+
+    def __init__(self, *args, **kwargs):
+        super().__init__(*args, **kwargs)
+        for name, value in self.items():
+            if isinstance(value, np.ndarray):
+                super().__setitem__(name, read_only(value))
+
+    def _refuse(self, *args, **kwargs):
+        raise ImmutableError("the names of a mesh do not change: use mesh.with_boundaries or "
+                             "mesh.with_subdomains, which return a mesh with other names")
+
+    __setitem__ = __delitem__ = pop = popitem = clear = update = setdefault = __ior__ = _refuse
+
+    def __reduce__(self):
+        return type(self), (dict(self),)
+
+    def __copy__(self):
+        return self
+
+    def __deepcopy__(self, memo):
+        return self
+
+
+def rebuilt(thing, changes, more=()):
+    """An object made as ``thing`` was, with some arguments of its constructor changed.
+
+    Arguments that are not changed are those attributes of ``thing`` that have their names;
+    ``more`` names attributes that ``**kwargs`` of the constructor take.
+
+    Raises
+    ------
+    NameUnknown
+        If an argument is not known.
+    InputError
+        If the object does not know the argument it was made with.
+    """
+    kinds = inspect.Parameter
+    parameters = inspect.signature(type(thing).__init__).parameters.values()
+    names = [p.name for p in list(parameters)[1:] if p.kind not in (
+        kinds.VAR_KEYWORD, kinds.VAR_POSITIONAL)]
+    if any(p.kind == kinds.VAR_KEYWORD for p in parameters):
+        names += [name for name in more if name not in names]
+    for name in changes:
+        if name not in names:
+            raise NameUnknown(f"argument of {type(thing).__name__}", name, names)
+    missing = [name for name in names if name not in changes and not hasattr(thing, name)]
+    if missing:
+        raise InputError(f"{thing!r} does not keep the argument {missing[0]!r} it was made with: "
+                         "keep it as an attribute of that name, or give it to replace")
+    return type(thing)(**{name: changes.get(name, getattr(thing, name, None)) for name in names})

@@ -1,0 +1,276 @@
+"""Places: a boundary, a point, a function, facets; what is refused leaves the scene as it was."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from skfem import LinearForm
+
+from skfem_ancf import (AncfError, Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam,
+                        MeshError, NameUnknown, Scene, StVenantKirchhoff)
+from skfem_ancf.joints import Joint
+from skfem_ancf.loads import Load
+from skfem_ancf.places import facets_of
+
+MATERIAL = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)
+
+
+def line(n=4, length=2.0, **options):
+    return MeshBeam.init_line(np.linspace(0, length, n + 1), 0.1, **options)
+
+
+def beam(mesh=None, element=None, **options):
+    return Beam(mesh or line(), element or ElementBeamANCF(2), MATERIAL, 0.1, **options)
+
+
+@pytest.mark.parametrize("place, facets", [
+    ("right", [4]),
+    ((1, 0), [2]), ([1, 0], [2]), ((np.int64(1), 0.0), [2]), (np.array([1.0, 0.0]), [2]),
+    ((1, 0.05), [2]), ((1.0, -0.02), [2]),  # on the section, off the axis
+    (np.array([1, 0]), [1, 0]), (np.array([3]), [3]), (np.array([12], dtype=np.uint8), [12]),
+    (lambda x: x[0] > 1.9, [4]), (lambda x: x[1] > 0.04, [9, 10, 11, 12]),
+    (("left", "right"), [0, 4]), ([(0, 0), (1, 0)], [0, 2]), ({"left"}, [0]),
+])
+def test_the_rule(place, facets):
+    assert_array_equal(facets_of(line(), place), facets)
+
+
+@pytest.mark.parametrize("place, error, message", [
+    ((1, 1), MeshError, r"the point \(1, 1\) is on no section .* node 2 with its axis at \(1, 0\)"),
+    ((0.9, 0), MeshError, r"nearest is that of node 2 with its axis at \(1, 0\), 0.1 away"),
+    ((1, 0.06), MeshError, "0.01 away"),
+    (lambda x: x[0] > 99, MeshError, r"selects none of the 13 facets.* \(0, -0.05\) to \(2, 0.05\)"),
+    (lambda x: 3, InputError, "returns n truth values, as lambda"),
+    (lambda x: x[0], InputError, "returned float64"),
+    (lambda x: x[7] > 0, InputError, "fails for points x of shape .* IndexError"),
+    ("lefft", NameUnknown, "'left', 'right'"),
+    ("empty", MeshError, "'empty' is empty.*'left'"),
+    (1, InputError, r"np.array\(\[1\]\)"), ([1, 2, 3], InputError, r"np.array\(\[1, 2, 3\]\)"),
+    (3.5, InputError, "a place is"), ([], InputError, "a place is"), (None, InputError, "a place"),
+    (True, InputError, "a place is"), ((1, "a"), InputError, "a place is"),
+    (np.array([99]), MeshError, "numbered 0 to 12, got 99: 0 to 4 are the sections"),
+    (np.array([-1]), MeshError, "got -1"), (np.array([], dtype=int), InputError, "not empty"),
+    (np.array([True, False]), InputError, "array of integers"),
+    (np.array([1.0, 2.0, 3.0]), InputError, "array of integers"),
+    ((np.nan, 0), InputError, "NaN"),
+])
+def test_what_is_no_place(place, error, message):
+    mesh = line().with_boundaries({"empty": np.array([], dtype=np.int32)})
+    with pytest.raises(error, match=message):
+        facets_of(mesh, place)
+    scene = Scene(beam(mesh))
+    for ask in (scene.clamp, scene.pin, scene.fix, lambda p: scene.traction(p, (0, 1)),
+                lambda p: scene.pressure(p, 1.0), lambda p: scene.moment(p, 1.0),
+                lambda p: scene.joint("plane", at=p), scene.state().reactions):
+        with pytest.raises(error, match=message):
+            ask(place)
+    assert repr(scene) == "<Scene of 1 beam(s), 0 fixed coordinates, 0 load(s)>"
+
+
+def test_a_point_is_where_it_says():
+    """Points of a turned, a curved and a closed beam; what they hold does not move."""
+    turned = line(angle=0.5, origin=(3, 1))
+    point = (3 + np.cos(0.5), 1 + np.sin(0.5))
+    scene = Scene(beam(turned)).clamp("left").pin(point).point_force((0, -1e3), at=turned.p[:, -1])
+    state = scene.solve_static()
+    assert_allclose(state.displacement(point), 0, atol=1e-15)
+    assert np.abs(state.displacement(turned.p[:, -1])).max() > 1e-3
+    arc = MeshBeam.init_curve(lambda s: np.array([np.cos(s), np.sin(s)]),
+                              np.linspace(0, 2 * np.pi, 9), 0.1)
+    assert_array_equal(facets_of(arc, (0, 1)), [2])
+    assert_array_equal(facets_of(arc, (0, 1.03)), [2])
+    with pytest.raises(MeshError, match=r"sections of the nodes \[0, 8\] at once"):
+        facets_of(arc, (1, 0))
+    with pytest.raises(InputError, match=r"pin holds the axis, at \(0, 1\)"):
+        Scene(beam(arc)).pin((0, 1.03))
+
+
+def test_a_point_is_the_same_on_a_finer_mesh():
+    scene = Scene(beam()).pin((0, 0)).pin((1, 0)).pin((2, 0)).gravity((0, -9.81))
+    scene.moment((1, 0), 3.0)
+    fine = scene.with_beams([b.with_mesh(b.mesh.refined()) for b in scene.beams])
+    assert {k for k, _ in fine._fixed} == {0} and len(fine.system.fixed) == 6
+    assert fine.loads[1].node == 4
+    with pytest.raises(MeshError, match="on no section"):
+        scene.with_beams([beam(line(3))])
+
+
+def test_material_points():
+    scene = Scene(beam())
+    for point in ("right", (1, 2, 3), 1.0, None, ("1", "0"), (1, 2j), (True, False)):
+        with pytest.raises(InputError, match="material point"):
+            scene.point_force((0, -1), at=point)
+        with pytest.raises(InputError, match="material point"):
+            scene.state().displacement(point)
+    with pytest.raises(MeshError, match=r"the axis at 'right' is \(2, 0\)"):
+        scene.point_force((0, -1), at="right")
+
+
+def test_welds_meet():
+    a, b = beam(line(), name="a"), beam(line(origin=(2.5, 0)), name="b")
+    scene = Scene(a, b).clamp("left", beam="a")
+    with pytest.raises(InputError, match=r"0.5 apart.*mesh.translated\(\(-0.5, 0\)\)"):
+        scene.joint("weld", beams=("a", "b"), at=("right", "left"))
+    with pytest.raises(MeshError, match=r"the point \(1, 1\) is on no section"):
+        scene.joint("weld", beams=("a", "b"), at=((1, 1), "left"))
+    for wrong in (None, ("right",), 3):
+        with pytest.raises(InputError, match="a weld needs the section of each"):
+            scene.joint("weld", beams=("a", "b"), at=wrong)
+    assert scene.joints == ()
+    moved = b.with_mesh(b.mesh.translated((-0.5, 0)))
+    for at in (("right", "left"), (2, 0), ((2, 0), "left")):
+        joined = Scene(a, moved).clamp("left", beam="a").gravity((0, -9.81))
+        joined.joint("weld", beams=(a, moved), at=at)
+        tip = joined.solve_static().displacement((4, 0))
+    whole = Scene(beam(line(8, 4.0))).clamp("left").gravity((0, -9.81)).solve_static()
+    assert_allclose(tip, whole.displacement((4, 0)), rtol=1e-3)  # the axis may bend sharply
+    drawn = Scene(a, b).clamp("left", beam="a")
+    drawn.joint("weld", beams=("a", "b"), at=("right", "left"), apart=True)
+    assert_allclose(drawn.solve_static().displacement((4.5, 0)), (-0.5, 0), atol=1e-12)
+
+
+def test_angles_are_radians():
+    for call in (lambda: line(angle=90), lambda: line().rotated(-45)):
+        with pytest.raises(InputError, match="radians.*np.deg2rad"):
+            call()
+    line(angle=-2 * np.pi), line().rotated(np.pi)
+
+
+def kinked(angle):
+    """Straight to s = 1, then on in another direction; the derivative by any of three ways."""
+    d = np.array([[np.cos(angle)], [np.sin(angle)]])
+    e = np.array([[1.0], [0.0]])
+
+    def exact(s):
+        return np.where(s < 1, e * s, e + d * (s - 1))
+
+    def by_differences(s):
+        return np.where(s < 1, e * np.abs(s), e + d * np.abs(s - 1))
+
+    return [(exact, None), (by_differences, None), (exact, lambda s: np.where(s < 1, e, d + 0 * s))]
+
+
+@pytest.mark.parametrize("angle", [0.02, 0.5, -1.5])
+@pytest.mark.parametrize("way", [0, 1, 2])
+def test_a_curve_has_no_kink_at_a_node(angle, way):
+    r, dr = kinked(angle)[way]
+    with pytest.raises(MeshError, match=r"kink of .* degrees at s = 1:.*weld"):
+        MeshBeam.init_curve(r, np.linspace(0, 2, 9), 0.001, dr=dr)
+
+
+def test_a_line_and_an_arc_have_no_kink():
+    def r(s):
+        t = np.clip(s - 1, 0, None)
+        return np.array([np.clip(s, None, 1) + np.sin(t), 1 - np.cos(t)])
+
+    assert MeshBeam.init_curve(r, np.linspace(0, 2, 9), 0.01).nelements == 8
+    tight = MeshBeam.init_curve(lambda s: 1e-3 * np.array([np.cos(s), np.sin(s)]),
+                                np.linspace(0, 6, 4), 1e-5)
+    assert tight.nelements == 3
+
+
+# what fails leaves the scene as it was
+
+class Broken(Load):
+    constant = False
+
+    def __init__(self, what):
+        super().__init__()
+        self.what = what
+
+    def bind(self, beam):
+        return self if self.what == "bind" else super().bind(beam)
+
+    def force(self, u):
+        if self.what == "raises":
+            raise KeyError("x")
+        return np.zeros(3 if self.what == "shape" else self.beam.N)
+
+    def stiffness(self, u):
+        last = self.beam.N - (0 if self.what == "range" else 1)
+        return np.array([last]), np.array([0 if self.what == "far" else last]), np.ones(1)
+
+
+class Loose(Joint):
+    equations = ("force",)
+
+    def __init__(self, what):
+        self.what = what
+
+    def bind(self, scene):
+        self.N = scene.N
+        if self.what == "raises":
+            raise ZeroDivisionError
+
+    def value(self, u, t):
+        return np.zeros(2 if self.what == "value" else 1)
+
+    def jacobian(self, u, t):
+        return np.zeros((1, self.N + (self.what == "jacobian")))
+
+    def curvature(self, u, t, multipliers):
+        return np.array([self.N]), np.array([0]), np.ones(1)
+
+
+@LinearForm
+def fails(v, w):
+    return w.nothing
+
+
+BAD = {
+    "clamp": [("lefft",), ((9, 9),), ("left", "b"), ("left", None, "loose"), (lambda x: x[0] > 99,)],
+    "pin": [(3.5,), ("right", 7), ((1, 0.03),)],
+    "fix": [("right", "r_Z"), ("right", ["r", "s"]), ("right", "r", np.nan), ("left", "r", 0.5)],
+    "joint": [("glue",), ("line",), ("line", (9, 9), (1, 0)), ("plane", "top"),
+              ("circle", (1, 0), (1, 0)), (Loose("raises"),)],
+    "gravity": [(9.81,), ((0, np.inf),), ((0, -1), "b"), ((0, -1), None, 3.0)],
+    "point_force": [((0, -1), (9, 9)), ((0, -1), "right"), ((0, 1, 2), (1, 0)),
+                    ((0, 1), (1, 0), None, "t")],
+    "traction": [("top", (0, np.nan)), ("nowhere", (0, 1)), ("top", lambda x: x[9]),
+                 ("top", lambda x: [x[0]]), ("top", lambda x: "up")],
+    "pressure": [("top", "much"), ((9, 9), 1.0), ("top", 1.0, None, 2)],
+    "moment": [("top", 1.0), ("right", np.nan), ((0.1, 0), 1.0)],
+    "load": [("gravity",), (fails, "nowhere")],
+    "initial_velocity": [(0.0,), (np.zeros(3),), (lambda x: 0.0,), (lambda x: x[0],),
+                         (lambda x: np.inf * x,), (lambda x: x[5],)],
+    "add": [(3,), (None,), (Beam,), (Loose("value"),), (Loose("jacobian"),), (Loose("curvature"),),
+            *((Broken(what),) for what in ("bind", "raises", "shape", "range", "far"))],
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_failing_call_leaves_the_scene_as_it_was(name):
+    scene = Scene(beam()).clamp("left").gravity((0, -9.81)).moment("right", 10.0)
+    scene.initial_velocity(lambda x: np.array([0 * x[0], x[0]]))
+    joint = scene.joint("line", at=(2, 0), direction=(1, 1))
+
+    def what_it_is():
+        return (repr(scene), dict(scene._fixed), scene.supports, scene.loads, scene.joints,
+                scene._velocities, scene.system)
+
+    before, solution = what_it_is(), scene.solve_static()
+    for args in BAD[name]:
+        options = {}
+        if name == "joint" and len(args) > 1:
+            names = {"line": ("at", "direction"), "plane": ("at",), "circle": ("at", "center")}
+            options, args = dict(zip(names[args[0]], args[1:])), args[:1]
+        with pytest.raises((AncfError, TypeError)) as failure:
+            getattr(scene, name)(*args, **options)
+        assert failure.type is not TypeError or "missing" in str(failure.value)  # no such call
+        assert what_it_is() == before
+    again = scene.solve_static()
+    assert_array_equal(again.u, solution.u)
+    assert_array_equal(again.joint_force(joint), solution.joint_force(joint))
+
+
+def test_two_supports_that_differ_leave_the_first():
+    scene = Scene(beam()).fix("right", "r^1", displacement=0.1)
+    with pytest.raises(AncfError, match="fixed twice"):
+        scene.clamp("right")
+    assert len(scene.system.fixed) == 1 and len(scene.supports) == 1
+
+
+def test_reactions_at_a_point():
+    state = Scene(beam(element=ElementBeamCable(3))).pin((0, 0)).pin((2, 0)).gravity(
+        (0, -9.81)).solve_static()
+    weight = 2 * 0.1 * 0.1 * 7800 * 9.81
+    assert_allclose(state.reactions((0, 0)).force[1], weight / 2, rtol=1e-6)
