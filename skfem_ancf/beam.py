@@ -1,6 +1,6 @@
 """A beam: a mesh, an element, a material and a formulation."""
 
-from functools import cached_property
+from functools import cached_property, wraps
 
 import numpy as np
 from skfem.assembly import Basis, FacetBasis, asm
@@ -8,7 +8,9 @@ from skfem.element import ElementVector
 
 from . import forms
 from .elements import ElementBeam, choose_element
-from .errors import InputError, MeshError, NameUnknown, require_positive
+from .errors import (InputError, MeshError, NameUnknown, require_finite, require_flag,
+                     require_integer, require_label, require_like, require_names,
+                     require_positive, shown, taught, teaching)
 from .formulations import COMPONENTS, get_formulation
 from .formulations.ecm import AXIS
 from .frozen import Frozen, read_only
@@ -20,6 +22,7 @@ from .places import as_point, facets_of
 from .quadrature import gauss, tensor
 
 
+@taught
 def reference_coordinates(basis):
     """Coordinates of the stress-free state of a basis of the position field.
 
@@ -41,7 +44,12 @@ def reference_coordinates(basis):
     >>> reference_coordinates(basis).tolist()  # r, r_X, r_Y of both nodes
     [0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 2.0, 0.0, 1.0, 0.0, 0.0, 1.0]
     """
-    return _coordinates(basis.mesh, basis.elem.elem, basis.mesh.p)
+    require_like("basis", basis, "Basis of ElementVector(element) on a MeshBeam", "mesh", "elem")
+    element = getattr(basis.elem, "elem", None)
+    if not isinstance(basis.mesh, MeshBeam) or not isinstance(element, ElementBeam):
+        raise InputError("the basis must be one of ElementVector(element) on a MeshBeam, got "
+                         f"{shown(basis)}")
+    return _coordinates(basis.mesh, element, basis.mesh.p)
 
 
 def _coordinates(mesh, element, p):
@@ -50,6 +58,25 @@ def _coordinates(mesh, element, p):
     return np.ascontiguousarray(q.transpose(2, 0, 1)).ravel()
 
 
+def _fields(method):
+    """A method of coordinates, points and elements, with what it is given checked."""
+
+    @wraps(method)
+    def call(self, u, X, tind=None):
+        u, X = require_finite("u", u, (self.N,)), require_finite("X", X)
+        if X.ndim not in (2, 3) or X.shape[0] != 2:
+            raise InputError("X must have shape (2, npoints) or (2, nelements, npoints), got "
+                             f"{X.shape}")
+        if tind is not None:
+            tind = self.mesh.normalize_elements(tind)
+        if X.ndim == 3 and X.shape[1] != (self.mesh.nelements if tind is None else len(tind)):
+            raise InputError(f"X must hold points for each element, got shape {X.shape}")
+        return method(self, u, X, tind)
+
+    return call
+
+
+@teaching
 class Beam(Frozen):
     """A planar beam. It does not change; :meth:`replace` returns a changed copy.
 
@@ -106,7 +133,8 @@ class Beam(Frozen):
         self.element, self.material = element, material
         self.width = require_positive("width", width)
         self.formulation = get_formulation(formulation)
-        self.name, self.compiled = name, bool(compiled)
+        self.name = require_label("name", name)
+        self.compiled = require_flag("compiled", compiled)
         if element.order == 0 and not material.is_hooke:
             raise InputError(
                 "a cable has Hooke's law of E and nu along its axis and bends with E I: it cannot "
@@ -174,6 +202,8 @@ class Beam(Frozen):
 
     def facet_basis(self, facets, intorder=None):
         """A scikit-fem ``FacetBasis`` of the position field at a place, see :meth:`dofs`."""
+        if intorder is not None:
+            intorder = require_integer("intorder", intorder, 0, 200)
         order = 2 * max(self.element.axis_degree, self.element.order) + 2
         return FacetBasis(self.mesh, self.vector_element, facets=facets_of(self.mesh, facets),
                           intorder=order if intorder is None else intorder)
@@ -241,10 +271,8 @@ class Beam(Frozen):
         if names is None:
             rows = np.arange(len(known))
         else:
-            names = [names] if isinstance(names, str) else list(names)
-            for name in names:
-                if name not in known and name not in self.element.dofnames:
-                    raise NameUnknown("coordinate", name, known)
+            both = [name for name in self.element.dofnames if name not in known]
+            names = require_names("coordinate", names, known + both)
             rows = np.array([k for k, full in enumerate(known)
                              if full in names or full.rsplit("^", 1)[0] in names])
         return np.sort((self.nodes(boundary)[:, None] * self.nd + rows).ravel())
@@ -340,6 +368,7 @@ class Beam(Frozen):
 
     # fields
 
+    @_fields
     def gradients(self, u, X, tind=None):
         """Displacement gradient in the beam's frame and the frame.
 
@@ -373,6 +402,7 @@ class Beam(Frozen):
         frame = mapping.frame(X, tind)
         return np.einsum("ijep,jJep->iJep", grad, frame), frame
 
+    @_fields
     def displacements(self, u, X, tind=None):
         """Displacement at reference points, shape (2, nelements, npoints)."""
         mapping = self.mesh.mapping()
@@ -389,6 +419,7 @@ class Beam(Frozen):
     def _cable_section(self, u, X, tind):
         return self.kernel.section(u, X[0], tind, self.mesh, self.element)
 
+    @_fields
     def strain(self, u, X, tind=None):
         """Green-Lagrange strain of the formulation: (eps_xx, eps_yy, 2 eps_xy).
 
@@ -424,6 +455,7 @@ class Beam(Frozen):
                            for j, xi in enumerate(term.nodes(name))))
         return np.array(out)
 
+    @_fields
     def stress(self, u, X, tind=None):
         """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy); arguments as in :meth:`gradients`."""
         strain = self.strain(u, X, tind)
@@ -471,6 +503,7 @@ class Beam(Frozen):
 
     def weight(self, g):
         """The dead load of an acceleration ``g`` (2,), shape (N,)."""
+        g = require_finite("g", g, (2,))
         N, dV = self._shapes
         mean = self.density * np.einsum("iep,ep->ei", N, dV)
         load = np.broadcast_to(mean[:, :, None] * g, (self.mesh.nelements,) + mean.shape[1:] + (2,))

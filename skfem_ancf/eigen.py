@@ -6,7 +6,8 @@ import numpy as np
 import scipy.linalg
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
-from .errors import ConvergenceError, InputError, SupportError
+from .errors import (ConvergenceError, InputError, SupportError, require_finite_scalar,
+                     require_index, require_integer)
 from .results import State
 from .tangent import Inverse, StrainTangent, is_symmetric
 
@@ -59,6 +60,8 @@ class Modes:
 
         Of a complex shape the real part.
         """
+        i = require_index("i", i, len(self.shapes))
+        amplitude = require_finite_scalar("amplitude", amplitude)
         return State(self.state.system, self.state.u + amplitude * self.shapes[i].real,
                      load=self.state.load, message=f"mode {i}")
 
@@ -350,6 +353,4 @@ def _real(X):
 
 
 def _count(k, n):
-    if isinstance(k, bool) or not isinstance(k, (int, np.integer)) or not 1 <= k <= n:
-        raise InputError(f"the number of modes must be an integer from 1 to {n}, got {k!r}")
-    return int(k)
+    return require_integer("the number of modes", k, 1, n)

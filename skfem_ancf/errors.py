@@ -81,8 +81,8 @@ class MissingExtra(AncfError, ImportError):
         self.module, self.extra = module, extra
         super().__init__(
             f"this needs the package {module!r}, which is not installed: "
-            f"pip install '.[{extra}]' in a clone of the repository, or "
-            f"pip install 'skfem-ancf[{extra}]'")
+            f'pip install "skfem-ancf[{extra}]", or pip install ".[{extra}]" in a clone of the '
+            "repository")
 
     def __reduce__(self):
         return type(self), (self.module, self.extra)
@@ -258,6 +258,27 @@ def require_like(name, value, kind, *attributes):
     if isinstance(value, type) or not all(hasattr(value, a) for a in attributes):
         raise InputError(f"{name} must be a {kind}, got {shown(value)}")
     return value
+
+
+def require_names(kind, names, known):
+    """Return one name or several as a tuple, or raise :class:`NameUnknown`."""
+    if isinstance(names, str):
+        names = (names,)
+    if not isinstance(names, (tuple, list, set, frozenset, np.ndarray)) or (
+            getattr(names, "ndim", 1) != 1):
+        raise InputError(f"{kind}s are named by a text or a list of texts, got {shown(names)}")
+    return tuple(require_option(kind, name, known) for name in names)
+
+
+def require_options(what, options, known):
+    """Return the options of a call, or raise :class:`CallError` if one is not known."""
+    for name in options:
+        if name not in known:
+            near = nearest(name, known)
+            raise CallError(f"{what} has no option {name!r}; known: "
+                            + ", ".join(map(repr, known))
+                            + (f"; did you mean {near!r}?" if near is not None else ""))
+    return options
 
 
 def require_path(name, value):

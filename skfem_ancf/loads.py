@@ -4,12 +4,14 @@ A :class:`~skfem_ancf.Scene` keeps loads as they were given, and binds them to i
 again for the same scene on other meshes.
 """
 
+import warnings
+
 import numpy as np
 from skfem.assembly import LinearForm, asm
 
 from . import forms
 from .beam import Beam
-from .errors import (AncfError, InputError, ask_field, ask_number, require_finite,
+from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number, require_finite,
                      require_function)
 from .frozen import Sealable, read_only
 
@@ -243,7 +245,28 @@ class FormLoad(Load):
     def bind(self, beam):
         basis = (beam.exact_basis() if self.boundary is None else
                  beam.facet_basis(self.boundary))
-        return DeadLoad(beam, asm(self.form, basis), self.amplitude)
+        return DeadLoad(beam, _assembled(self.form, basis), self.amplitude)
+
+
+def _assembled(form, basis):
+    """The vector of a form of the caller's."""
+    complex_to_real = getattr(np, "exceptions", np).ComplexWarning
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", complex_to_real)
+            return asm(form, basis)
+    except KeyError as error:
+        raise CallbackError(
+            f"the form of a load uses w.{error.args[0]}, which there is not: it is assembled once, "
+            "on the stress-free body, and knows w.x, w.h and, on a boundary, w.n. A load that "
+            "follows the deformation is scene.pressure, scene.moment or a Load of your own"
+        ) from error
+    except AncfError:
+        raise
+    except Exception as error:  # it is the user's: it may raise anything
+        raise CallbackError(f"the form of a load, form(v, w), fails: {type(error).__name__}: "
+                            f"{error}; it must return a real number at each point, as v[1]"
+                            ) from error
 
 
 class DeadLoad(Load):

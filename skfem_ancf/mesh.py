@@ -4,7 +4,6 @@ import json
 import logging
 import warnings
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Optional, Type
 
 import numpy as np
@@ -429,7 +428,7 @@ class MeshBeam(Frozen, Mesh):
             return candidates[rows, which].astype(np.int32), outside[rows, which]
 
         def finder(*x):
-            x = require_finite("the points", np.array(x), (2, None))
+            x = require_finite("the points", x, (2, None))
             near = tree.query(x.T, k=k)[1].reshape(x.shape[1], k) // 4
             found, outside = best(x, np.sort(near, axis=1))
             for i in np.nonzero(outside > allowed)[0]:  # rare: neighbouring coils are nearer
@@ -763,7 +762,7 @@ class MeshBeam(Frozen, Mesh):
                 self.to_meshquad().save(filename, point_data, cell_data, **kwargs)
         except FileError:
             raise
-        except (OSError, meshio.WriteError, SystemExit) as error:
+        except (OSError, meshio.ReadError, meshio.WriteError, SystemExit) as error:
             raise FileError(f"cannot write {str(path)!r}: {error}") from error
 
     @classmethod

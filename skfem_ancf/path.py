@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from .errors import require_index, teaching
 from .results import State
 
 
+@teaching
 class Path:
     """The equilibria that a continuation found.
 
@@ -38,7 +40,7 @@ class Path:
 
     def state(self, k):
         """Point ``k`` as a State."""
-        p = self.points[k]
+        p = self.points[require_index("k", k, len(self.points))]
         return State(self.system, p.u, p.load, p.force, True, p.iterations, f"point {k}", (),
                      p.multipliers)
 

@@ -4,7 +4,7 @@ import numbers
 
 import numpy as np
 
-from .errors import AncfError, InputError, MeshError, NameUnknown, require_finite
+from .errors import AncfError, InputError, MeshError, NameUnknown, require_finite, shown
 
 #: How far off a section a point may be that names it, relative to an element next to it.
 NEAR = 1e-6
@@ -38,7 +38,12 @@ def is_place(place):
 
 def as_point(point, mesh=None):
     """A material point as an array (2,); raises InputError for anything else."""
-    if isinstance(point, (list, tuple, np.ndarray)) and np.shape(point) == (2,) and not any(
+    if isinstance(point, (list, tuple)):
+        flat = len(point) == 2 and not any(
+            isinstance(x, (list, tuple)) or np.ndim(x) for x in point)
+    else:
+        flat = isinstance(point, np.ndarray) and point.shape == (2,)
+    if flat and not any(
             isinstance(x, (str, bytes, bool, np.bool_)) for x in point):
         return require_finite("a material point", point, (2,))
     hint = ""
@@ -47,7 +52,7 @@ def as_point(point, mesh=None):
         if len(facets) == 1 and facets[0] < mesh.p.shape[1]:
             hint = f"; the axis at {point!r} is {_pair(mesh.p[:, facets[0]])}"
     raise MeshError(f"a material point has two coordinates (x, y), its place in the stress-free "
-                    f"body, got {point!r}{hint}")
+                    f"body, got {shown(point)}{hint}")
 
 
 def on_other_mesh(place):
@@ -117,7 +122,7 @@ def facets_of(mesh, place):
     elif isinstance(place, (tuple, list)) and len(place) and all(
             isinstance(p, numbers.Integral) for p in place):
         hint = f"; for facets of those numbers write np.array({list(place)!r})"
-    raise InputError(f"a place is {KINDS}, got {place!r}{hint}")
+    raise InputError(f"a place is {KINDS}, got {shown(place)}{hint}")
 
 
 def section_at(mesh, point):

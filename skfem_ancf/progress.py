@@ -3,7 +3,7 @@
 import sys
 from contextlib import contextmanager
 
-from .errors import MissingExtra
+from .errors import InputError, MissingExtra, shown
 
 
 class _NoBar:
@@ -24,6 +24,8 @@ def progress_bar(show, total, desc):
     desc
         What is counted.
     """
+    if show is not None and not isinstance(show, bool):
+        raise InputError(f"progress must be True, False or None, got {shown(show)}")
     if show is False or (show is None and not sys.stderr.isatty()):
         yield _NoBar()
         return

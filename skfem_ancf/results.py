@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .beam import select_beam
-from .errors import InputError, MeshError, NameUnknown
+from .errors import InputError, MeshError, NameUnknown, shown, teaching
 from .frozen import Frozen
 
 
@@ -27,6 +27,7 @@ class Reaction(NamedTuple):
     coordinates: dict
 
 
+@teaching
 class State(Frozen):
     """A configuration of a scene. It does not change; :meth:`replace` returns a changed copy.
 
@@ -90,7 +91,7 @@ class State(Frozen):
 
     def u_of(self, beam):
         """Coordinate displacements of one beam."""
-        return self.u[self.system.of(beam)]
+        return self.u[self.system.of(select_beam(self.beams, beam))]
 
     # at a material point
 
@@ -103,7 +104,7 @@ class State(Frozen):
                 return candidate, *candidate.locate(point)
             except MeshError:
                 continue
-        raise MeshError(f"the point {tuple(point)} is in none of the {len(self.beams)} beams")
+        raise MeshError(f"the point {shown(point)} is in none of the {len(self.beams)} beams")
 
     def displacement(self, point, beam=None):
         """Displacement of a material point, named by its place in the stress-free body; (2,)."""

@@ -9,8 +9,8 @@ from .beam import Beam, select_beam
 from .doors import configuration, displacement
 from .dynamics import get_scheme
 from .dynamics.integrate import integrate
-from .errors import (ConvergenceError, InputError, NameUnknown, ask_field, require_finite,
-                     require_finite_scalar)
+from .errors import (ConvergenceError, InputError, ask_field, require_finite, require_finite_scalar,
+                     require_option, shown, teaching)
 from .joints import Joint, bind_joint, get_joint
 from .loads import (EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight, bind_load)
 from .path import Path
@@ -33,6 +33,7 @@ class _Things(tuple):
     extend = insert = remove = clear = append
 
 
+@teaching
 class Scene:
     """Beams with supports and loads.
 
@@ -216,12 +217,11 @@ class Scene:
         """
         k = self._number(beam)
         beam = self._beams[k]
-        if thickness not in ("fixed", "free"):
-            raise NameUnknown("thickness", thickness, ("fixed", "free"))
+        require_option("thickness", thickness, ("fixed", "free"))
         if thickness == "fixed" and not beam.is_cable:
             return self._put([Support(k, boundary, tuple(beam.element.welded))])
         return self._put([Support(k, boundary, "r")],
-                         joints=[get_joint("plane", at=boundary, beam=beam)])
+                         joints=[get_joint("plane", at=boundary, beam=beam, name="of a clamp")])
 
     def pin(self, boundary, beam=None):
         """Fix the position of the axis; the section may turn."""
@@ -249,7 +249,8 @@ class Scene:
         SupportError
             If a coordinate is given two displacements.
         """
-        names = names if names is None or isinstance(names, str) else tuple(names)
+        if isinstance(names, (list, set, frozenset, np.ndarray)):
+            names = tuple(names)
         return self._put([Support(self._number(beam), boundary, names,
                                   require_finite_scalar("displacement", displacement))])
 
@@ -369,6 +370,9 @@ class Scene:
         MeshError
             If a place or a point is not found on the other mesh.
         """
+        if not isinstance(beams, (list, tuple)) or len(beams) != len(self._beams):
+            raise InputError(f"beams must be a list of {len(self._beams)} Beam(s), got "
+                             f"{shown(beams)}")
         scene = Scene(*beams)
         if len(scene.beams) != len(self._beams):
             raise InputError(f"the scene has {len(self._beams)} beams, got {len(scene.beams)}")

@@ -74,7 +74,8 @@ class System:
                 if len(clash):
                     raise SupportError(
                         f"{joint!r} prescribes {self.describe_dof(clash[0])}, which a support or "
-                        "another joint fixes already: remove one of them")
+                        "another joint fixes already: remove one of them, as the second of two "
+                        "clamps at one place")
                 self._fixing.append((joint, len(fixed), rows[np.arange(len(dofs)), dofs]))
                 fixed, values = np.append(fixed, dofs), np.append(values, np.zeros(len(dofs)))
             else:

@@ -4,9 +4,11 @@ from functools import cached_property
 
 import numpy as np
 
+from ..errors import require_index, teaching
 from ..results import State
 
 
+@teaching
 class History:
     """A motion at its stored instants.
 
@@ -50,6 +52,7 @@ class History:
 
     def state(self, k):
         """The instant ``k`` as a State: strain, reactions (inertia included), plots, files."""
+        k = require_index("k", k, len(self))
         return State(self.system, self.u[k], load=1.0, converged=True, t=float(self.t[k]),
                      message=f"t = {self.t[k]:g}", multipliers=self.multipliers[k],
                      inertia=self.system.mass.multiply(self.acceleration[k]))

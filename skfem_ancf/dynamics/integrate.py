@@ -4,7 +4,8 @@ import logging
 
 import numpy as np
 
-from ..errors import ConvergenceError, InputError, SupportError, require_finite, require_positive
+from ..errors import (AncfError, ConvergenceError, InputError, SupportError, require_finite,
+                      require_finite_scalar, require_positive, taught)
 from ..progress import progress_bar
 from .base import Motion
 from .blocks import CompiledSteps
@@ -15,6 +16,8 @@ logger = logging.getLogger(__name__)
 
 MAX_ITERATIONS = 25
 EPS = np.finfo(float).eps
+MAX_STEPS = 10**9
+MIN_RTOL = 1e-12
 SLOW = 0.3  # contraction above which the factors are made anew
 MANY = 4  # iterations to go above which old factors are made anew
 
@@ -229,6 +232,7 @@ class Integrator:
         return np.sqrt(max(de @ self.system.mass.multiply(de), 0.0) / mass) / self.system.size
 
 
+@taught
 def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=None, tol=None,
               rtol=1e-5, progress=None):
     """Integrate the equation of motion.
@@ -268,18 +272,23 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=Non
     SupportError
         If joints repeat or contradict each other, or are open at the start.
     """
+    t_start = require_finite_scalar("t_start", t_start)
+    t_end = require_finite_scalar("t_end", t_end)
     t_end = require_positive("t_end - t_start", t_end - t_start) + t_start
     auto = isinstance(dt, str)
     if auto and dt != "auto":
         raise InputError(f'dt must be a positive number or "auto", got {dt!r}')
     span = t_end - t_start
     step = 1e-4 * span if auto else min(require_positive("dt", dt), span)
+    _require_step(t_start, t_end, step)
     if t_eval is not None:
         t_eval = require_finite("t_eval", t_eval, (None,))
         if (not len(t_eval) or np.any(np.diff(t_eval) <= 0) or t_eval[0] < t_start
                 or t_eval[-1] > t_end * (1 + 1e-12)):
             raise InputError(f"t_eval must increase within [{t_start}, {t_end}], got {t_eval!r}")
     rtol = require_positive("rtol", rtol)
+    if rtol < MIN_RTOL:
+        raise InputError(f"rtol must be at least {MIN_RTOL:g}, got {rtol!r}")
     system.require_independent_joints()
     zero = np.zeros(system.N)
     solver = Integrator(system, scheme, tol, (t_start, t_end))
@@ -356,6 +365,9 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=Non
             except StepFailed as failure:
                 raise ConvergenceError(f"the motion could not be continued beyond t = {y.t:.6g}: "
                                        f"{failure}; try a smaller dt", history.close()) from None
+            except AncfError as error:  # of a function of the caller's: what is done is kept
+                error.state = history.close()
+                raise
             if auto and n > 0:
                 error = solver.error(y, new, h)
                 factor = 0.9 * (rtol / max(error, 1e-300)) ** (1.0 / 3.0)
@@ -371,6 +383,20 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=Non
             bar.update(new.t - y.t)
             y = new
     return history.close()
+
+
+def _require_step(t_start, t_end, step):
+    """Raise InputError where the times of the steps cannot be told apart, or never end."""
+    if step < 1e-100 or t_end > 1e100:  # their squares are in the equations
+        raise InputError(f"times must lie between 1e-100 and 1e100, got dt = {step!r}, t_end = "
+                         f"{t_end!r}")
+    if step <= 8 * EPS * max(abs(t_start), abs(t_end)):
+        raise InputError(f"dt = {step!r} is below the round-off of the times {t_start!r} to "
+                         f"{t_end!r}")
+    steps = (t_end - t_start) / step
+    if steps > MAX_STEPS:
+        raise InputError(f"dt = {step!r} takes {steps:.3g} steps to t_end = {t_end!r}: more than "
+                         f"{MAX_STEPS:.0e} are not taken")
 
 
 def _between(a, b, t):

@@ -1,7 +1,6 @@
 """The element of lowest order that can show what is asked for."""
 
-from ..errors import (InputError, require_like, require_option, require_positive, shown,
-                      taught)
+from ..errors import InputError, require_like, require_names, require_positive, taught
 from .ancf import ElementBeamANCF
 from .cable import ElementBeamCable
 from .cubic import ElementBeamANCFCubic
@@ -43,13 +42,7 @@ def choose_element(mesh, material, fields=(), tolerance=1e-3):
     """
     require_like("mesh", mesh, "MeshBeam", "height", "lengths")
     require_like("material", material, "Material", "E", "G", "nu")
-    try:
-        fields = [fields] if isinstance(fields, str) else list(fields)
-    except TypeError:
-        raise InputError(f"fields must be names of fields of the section, got {shown(fields)}"
-                         ) from None
-    for name in fields:
-        require_option("field", name, ORDER_OF_FIELD)
+    fields = require_names("field", fields, ORDER_OF_FIELD)
     tolerance = require_positive("tolerance", tolerance)
     if tolerance >= 1.0:
         raise InputError(f"the tolerance is relative and below 1, got {tolerance!r}")

@@ -1,15 +1,16 @@
 """A series of states in time for ParaView."""
 
 import logging
-from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from ..errors import InputError, require_finite_scalar
+from ..errors import (InputError, require_finite_scalar, require_like, require_options,
+                      require_path, teaching)
 from .vtu import replacing, save_vtu
 
 logger = logging.getLogger(__name__)
 
 
+@teaching
 class PvdWriter:
     """Writes one .vtu a frame, and a .pvd that lists them with their times.
 
@@ -47,10 +48,11 @@ class PvdWriter:
     """
 
     def __init__(self, filename, **options):
-        self.path = Path(filename)
+        self.path = require_path("filename", filename)
         if self.path.suffix.lower() != ".pvd":
             raise InputError(f"the file name must end with .pvd, got {str(filename)!r}")
-        self.options = options
+        self.options = require_options("PvdWriter", options,
+                                       ("subdivide", "lagrange", "undeformed"))
         self.frames = []  # (time, name of the file)
 
     def __enter__(self):
@@ -75,6 +77,7 @@ class PvdWriter:
         pathlib.Path
             The frame's file.
         """
+        require_like("state", state, "State", "beams", "u_of")
         t = require_finite_scalar("t", t)
         if self.frames and t <= self.frames[-1][0]:
             raise InputError(f"the times of the frames must increase: {t!r} after "

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import (FileError, InputError, require_flag, require_integer, require_like,
+                      require_path, shown, taught)
 from ..quadrature import tensor
 
 logger = logging.getLogger(__name__)
@@ -17,6 +18,9 @@ SUFFIXES = (".vtu", ".vtk")
 
 #: VTK evaluates Lagrange cells up to this degree.
 MAX_LAGRANGE_DEGREE = 10
+
+#: Subdivisions of an element along or across, and points of a whole body, at most.
+MAX_SUBDIVISION, MAX_POINTS = 1000, 10**8
 
 COMPONENTS = ("xx", "yy", "xy")
 
@@ -76,6 +80,7 @@ def sample(state, beam, X):
     return out
 
 
+@taught
 def body_fields(state, subdivide=(8, 4), lagrange=False, undeformed=False):
     """The body of a state on points.
 
@@ -99,7 +104,13 @@ def body_fields(state, subdivide=(8, 4), lagrange=False, undeformed=False):
     >>> sorted(body.point_data)[:4]
     ['S_xx', 'S_xy', 'S_yy', 'displacement']
     """
+    require_like("state", state, "State", "beams", "u_of")
     m, n = _subdivision(subdivide)
+    lagrange = require_flag("lagrange", lagrange)
+    undeformed = require_flag("undeformed", undeformed)
+    total = sum(b.mesh.nelements for b in state.beams) * (m + 1) * (n + 1)
+    if total > MAX_POINTS and not lagrange:
+        raise InputError(f"subdivide={(m, n)} makes {total} points, more than {MAX_POINTS}")
     first, points, cells, data = 0, [], [], {}
     numbers = {"beam": [], "element": []}
     for b, beam in enumerate(state.beams):
@@ -124,6 +135,7 @@ def body_fields(state, subdivide=(8, 4), lagrange=False, undeformed=False):
                       {name: np.concatenate(v) for name, v in data.items()}, numbers)
 
 
+@taught
 def save_vtu(state, filename, subdivide=(8, 4), lagrange=False, undeformed=False):
     """Write the deformed body of a state for ParaView.
 
@@ -185,7 +197,7 @@ def save_vtu(state, filename, subdivide=(8, 4), lagrange=False, undeformed=False
     """
     import meshio
 
-    path = Path(filename)
+    path = require_path("filename", filename)
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"the file name must end with one of {', '.join(SUFFIXES)}, got "
                          f"{str(filename)!r}")
@@ -205,14 +217,23 @@ class replacing:  # noqa: N801
         self.temporary = self.path.with_name(f".{self.path.stem}.{os.getpid()}{self.path.suffix}")
 
     def __enter__(self):
-        self.path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise FileError(f"cannot make the folder {str(self.path.parent)!r}: {error}"
+                            ) from error
         return self.temporary
 
-    def __exit__(self, error, *_):
-        if error is None:
-            os.replace(self.temporary, self.path)
-        else:
-            self.temporary.unlink(missing_ok=True)
+    def __exit__(self, kind, error, _):
+        try:
+            if error is None:
+                os.replace(self.temporary, self.path)
+            else:
+                self.temporary.unlink(missing_ok=True)
+        except OSError as failure:
+            error = error or failure
+        if isinstance(error, OSError) and not isinstance(error, FileError):
+            raise FileError(f"cannot write {str(self.path)!r}: {error}") from error
 
 
 def _subdivision(subdivide):
@@ -220,11 +241,11 @@ def _subdivision(subdivide):
         m, n = subdivide
     except (TypeError, ValueError):
         m = n = None
-    if not all(isinstance(k, (int, np.integer)) and not isinstance(k, bool) and k >= 1
-               for k in (m, n)):
-        raise InputError("subdivide must be two positive integers, along and across an element, "
-                         f"got {subdivide!r}")
-    return int(m), int(n)
+    try:
+        return tuple(require_integer("subdivide", k, 1, MAX_SUBDIVISION) for k in (m, n))
+    except InputError:
+        raise InputError(f"subdivide must be two positive integers up to {MAX_SUBDIVISION}, along "
+                         f"and across an element, got {shown(subdivide)}") from None
 
 
 def _rows(x):

@@ -72,6 +72,9 @@ class OnCircle(Joint):
         self.r, self.N = point(scene, self.beam, self.at), scene.N
         self.R = self.radius or require_positive(
             "the distance of the point from the centre", np.hypot(*(self.r.start - self.center)))
+        if self.R < 1e-9 * np.hypot(*(self.r.start - self.center)):
+            raise InputError(f"radius = {self.R!r} is nothing beside the distance of the point "
+                             "from the centre")
 
     def value(self, u, t):
         d = self.r(u) - self.center

@@ -4,14 +4,18 @@ import logging
 
 import numpy as np
 
-from ..errors import ConvergenceError, require_positive
+from ..errors import ConvergenceError, require_integer, require_positive, taught
 
 logger = logging.getLogger(__name__)
 
 #: Part of the squared error whose elements are halved.
 BULK = 0.7
 
+#: Largest number of elements that may be allowed.
+MAX_ELEMENTS = 10**7
 
+
+@taught
 def solve_adaptive(scene, tol, max_elements=20000, **options):
     """Solve on meshes that are refined until the estimated error is small enough.
 
@@ -45,6 +49,7 @@ def solve_adaptive(scene, tol, max_elements=20000, **options):
         If ``max_elements`` do not suffice; its ``state`` is the last State.
     """
     tol = require_positive("adapt", tol)
+    max_elements = require_integer("max_elements", max_elements, 1, MAX_ELEMENTS)
     coarse = scene
     while True:
         # each from the stress-free state: what a coarse mesh does not see as strain a finer one

@@ -4,10 +4,15 @@ import logging
 
 import numpy as np
 
-from ..errors import ConvergenceError, require_positive
+from ..errors import (CallbackError, ConvergenceError, ask, require_function,
+                      require_integer, require_positive, shown, taught)
 from ..progress import progress_bar
 
 logger = logging.getLogger(__name__)
+
+
+#: Steps of the longest path.
+MAX_STEPS = 10**6
 
 
 class _Failed(Exception):
@@ -23,6 +28,7 @@ class Point:
         self.rate = np.nan  # of the load with the arc length; known once the next step begins
 
 
+@taught
 def continuation(system, steps=100, ds=0.02, ds_max=None, max_load=None, until=None, tol=1e-8,
                  max_iterations=15, progress=None):
     """Follow the equilibrium path from the stress-free state.
@@ -68,7 +74,13 @@ def continuation(system, steps=100, ds=0.02, ds_max=None, max_load=None, until=N
     International Journal of Solids and Structures 15 (1979); Magisano, Leonetti, Garcea, CMAME 313
     (2017).
     """
-    ds = require_positive("ds", ds)
+    steps = require_integer("steps", steps, 1, MAX_STEPS)
+    max_iterations = require_integer("max_iterations", max_iterations, 1, 10000)
+    tol, ds = require_positive("tol", tol), require_positive("ds", ds)
+    if max_load is not None:
+        max_load = require_positive("max_load", max_load)
+    if until is not None:
+        require_function("until", until, "of a point of the path that returns True or False")
     ds_max = 5.0 * ds if ds_max is None else require_positive("ds_max", ds_max)
     weights = np.zeros(system.N)
     for beam, s in zip(system.beams, system.slices):
@@ -95,10 +107,18 @@ def continuation(system, steps=100, ds=0.02, ds_max=None, max_load=None, until=N
             bar.update(1)
             if max_load is not None and abs(point.load) > max_load:
                 break
-            if until is not None and until(point):
+            if until is not None and _ends(until, point):
                 break
             step = min(ds_max, step * np.clip(np.sqrt(6.0 / max(point.iterations, 1)), 0.5, 1.5))
     return points
+
+
+def _ends(until, point):
+    """What the caller's function says to a point."""
+    answer = ask("until(point)", until, point)
+    if not isinstance(answer, (bool, np.bool_)):
+        raise CallbackError(f"until(point) must return True or False, got {shown(answer)}")
+    return answer
 
 
 def _advance(system, start, ds, direction, weights, tol, max_iterations):

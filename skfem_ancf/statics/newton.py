@@ -5,12 +5,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import (ConvergenceError, InputError, NameUnknown, require_finite,
-                      require_positive)
+from ..errors import (ConvergenceError, InputError, require_finite, require_integer,
+                      require_option, require_positive, taught)
 from ..progress import progress_bar
 
 logger = logging.getLogger(__name__)
 
+#: Iterations in a load step, at most.
+MAX_ITERATIONS = 10000
 METHODS = ("mixed", "newton")
 _NONE = np.zeros(0)
 
@@ -55,6 +57,7 @@ class StaticResult:
         return sum(step.iterations for step in self.steps)
 
 
+@taught
 def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, first_step=1.0,
                  min_step=1e-4, progress=None):
     """Find the equilibrium at full load.
@@ -101,13 +104,11 @@ def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, fi
     geometrically non-linear structural problem discretized via displacement-based finite
     elements", Computer Methods in Applied Mechanics and Engineering 313 (2017).
     """
-    if method not in METHODS:
-        raise NameUnknown("method", method, METHODS)
+    require_option("method", method, METHODS)
     tol, min_step = require_positive("tol", tol), require_positive("min_step", min_step)
     if not 0.0 < require_positive("first_step", first_step) <= 1.0:
         raise InputError(f"first_step must lie in (0, 1], got {first_step!r}")
-    if require_positive("max_iterations", max_iterations) < 1:
-        raise InputError(f"max_iterations must be at least 1, got {max_iterations!r}")
+    max_iterations = require_integer("max_iterations", max_iterations, 1, MAX_ITERATIONS)
     origin = np.zeros(system.N), None
     if u is not None:
         u = require_finite("u", u, (system.N,))

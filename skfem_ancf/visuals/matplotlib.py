@@ -1,11 +1,10 @@
 """Pictures of the deformed body, coloured by a field."""
 
-from pathlib import Path
-
 import numpy as np
 
-from ..errors import (InputError, MissingExtra, NameUnknown, require_finite_scalar,
-                      require_positive)
+from ..errors import (InputError, MissingExtra, require_finite_scalar, require_flag,
+                      require_integer, require_like, require_option, require_path,
+                      require_positive, shown, taught)
 from ..io.vtu import _subdivision, grid, quads, replacing, sample
 
 #: Titles of the fields: the names are those in the files of :func:`~skfem_ancf.io.vtu.save_vtu`.
@@ -23,11 +22,15 @@ TITLES = {
 #: ``thickness="auto"`` draws a section at least this part of the picture high.
 READABLE = 1 / 25
 
+#: Largest resolution of a file, in dots per inch.
+MAX_DPI = 2400
+
 _EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max",
            (True, True): "both"}
 _INK, _MUTED, _GHOST = "#222222", "#666666", "#d9d9d9"
 
 
+@taught
 def plot_state(state, field="eps_yy", ax=None, *, thickness="auto", undeformed=True, colorbar=True,
                cmap=None, limits=None, title=None, subdivide=(16, 8), filename=None, dpi=200):
     """Draw the deformed body of a state, coloured by a field.
@@ -90,8 +93,11 @@ def plot_state(state, field="eps_yy", ax=None, *, thickness="auto", undeformed=T
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.tri import Triangulation
 
-    if field not in TITLES:
-        raise NameUnknown("field", field, TITLES)
+    require_option("field", field, TITLES)
+    require_like("state", state, "State", "beams", "u_of")
+    undeformed = require_flag("undeformed", undeformed)
+    colorbar, cmap = require_flag("colorbar", colorbar), _colormap(cmap)
+    filename, dpi = _page(ax, title, filename, dpi)
     m, n = _subdivision(subdivide)
     bodies = [_Body(state, beam, field, m, n) for beam in state.beams]
     factor = _thickness(thickness, bodies)
@@ -125,9 +131,39 @@ def plot_state(state, field="eps_yy", ax=None, *, thickness="auto", undeformed=T
     if colorbar:
         _add_colorbar(ax, image, bool(np.any(values < low)), bool(np.any(values > high)))
     if filename is not None:
-        with replacing(Path(filename)) as temporary:
+        with replacing(filename) as temporary:
             ax.figure.savefig(temporary, dpi=dpi, bbox_inches="tight")
     return ax
+
+
+def _colormap(cmap):
+    """A colour map by its name, or itself; None for none."""
+    from matplotlib import colormaps
+    from matplotlib.colors import Colormap
+
+    if cmap is None or isinstance(cmap, Colormap):
+        return cmap
+    return require_option("colour map", cmap, tuple(colormaps))
+
+
+def _page(ax, title, filename, dpi):
+    """The file, or None, and its resolution; what is wrong is said before anything is drawn."""
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    if ax is not None:
+        require_like("ax", ax, "matplotlib Axes", "tripcolor", "figure")
+    if title is not None and not isinstance(title, str):
+        raise InputError(f"title must be a text, got {shown(title)}")
+    dpi = require_positive("dpi", dpi)
+    if not 1.0 <= dpi <= MAX_DPI:
+        raise InputError(f"dpi must lie between 1 and {MAX_DPI}, got {dpi!r}")
+    if filename is not None:
+        filename = require_path("filename", filename)
+        known = sorted(FigureCanvasBase.get_supported_filetypes())
+        if filename.suffix[1:].lower() not in known:
+            raise InputError(f"the file name must end with one of .{', .'.join(known)}, got "
+                             f"{str(filename)!r}")
+    return filename, dpi
 
 
 class _Body:
@@ -165,7 +201,7 @@ class _Body:
 
 
 def _thickness(thickness, bodies):
-    if thickness != "auto":
+    if not (isinstance(thickness, str) and thickness == "auto"):
         return require_positive("thickness", thickness)
     shapes = [(b, p) for b in bodies for p in (b.reference, b.deformed)]
     x = np.concatenate([axis.reshape(2, -1) for _, (_, axis) in shapes], axis=1)
@@ -227,6 +263,7 @@ def _figure_class():
     return Figure
 
 
+@taught
 def plot_path(path, point, component=1, beam=None, ax=None, *, title=None, filename=None, dpi=200):
     """Draw the load factor of an equilibrium path against a displacement.
 
@@ -267,8 +304,8 @@ def plot_path(path, point, component=1, beam=None, ax=None, *, title=None, filen
     'load factor'
     """
     Figure = _figure_class()
-    if component not in (0, 1):
-        raise InputError(f"component must be 0 or 1, got {component!r}")
+    component = require_integer("component", component, 0, 1)
+    filename, dpi = _page(ax, title, filename, dpi)
     if ax is None:
         ax = Figure(figsize=(5.5, 4.0), layout="constrained").subplots()
     u, load = path.displacement(point, beam)[:, component], path.load
@@ -282,7 +319,7 @@ def plot_path(path, point, component=1, beam=None, ax=None, *, title=None, filen
     ax.set_xlabel(f"displacement $u_{'xy'[component]}$", fontsize=9, color=_INK)
     ax.set_ylabel("load factor", fontsize=9, color=_INK)
     if filename is not None:
-        with replacing(Path(filename)) as temporary:
+        with replacing(filename) as temporary:
             ax.figure.savefig(temporary, dpi=dpi)
     return ax
 
