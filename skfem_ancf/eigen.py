@@ -7,7 +7,7 @@ import scipy.linalg
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
 from .errors import (ConvergenceError, InputError, SupportError, require_finite_scalar,
-                     require_index, require_integer)
+                     require_index, require_integer, teaching)
 from .results import State
 from .tangent import Inverse, StrainTangent, is_symmetric
 
@@ -17,6 +17,7 @@ ORTHOGONAL = 1e-5  # scalar product of two shapes of unit mass
 REAL = 1e-7  # imaginary over absolute value of an eigenvalue that counts as real
 
 
+@teaching
 @dataclass
 class Modes:
     """Natural frequencies and shapes, the lowest first.

@@ -3,6 +3,7 @@
 import json
 import logging
 import warnings
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from typing import Optional, Type
 
@@ -15,7 +16,8 @@ from skfem.mesh import Mesh, MeshQuad
 
 from .errors import (CallbackError, FileError, InputError, MeshError, NameUnknown, ask, ask_array,
                      require_finite, require_finite_scalar, require_function, require_integer,
-                     require_option, require_path, require_positive, shown, teaching)
+                     require_option, require_options, require_path, require_positive, shown,
+                     teaching)
 from .frozen import Frozen, ReadOnlyDict
 from .mapping import MappingBeam
 from .reference import ElementBeamP1
@@ -724,10 +726,12 @@ class MeshBeam(Frozen, Mesh):
 
     @classmethod
     def _load_npz(cls, filename):
-        with filename.open("rb") as file:
+        with ExitStack() as stack:  # closes the file of one that is damaged
+            file = stack.enter_context(filename.open("rb"))
             if file.read(4) not in (b"PK\x03\x04", b"PK\x05\x06"):
                 raise MeshError(f"{str(filename)!r} is no .npz file")
-        with np.load(filename, allow_pickle=False) as data:
+            file.seek(0)
+            data = stack.enter_context(np.load(file, allow_pickle=False))
             missing = {"doflocs", "t", "height", "p_X", "p_Y", "lengths",
                        "sections"} - set(data.files)
             if missing:
@@ -749,6 +753,8 @@ class MeshBeam(Frozen, Mesh):
         import meshio
 
         path = require_path("filename", filename)
+        if path.suffix in (".npz", ".json"):
+            require_options(f"save({path.name!r})", kwargs, ("filename",))
         if path.suffix == ".npz":
             self.save_npz(path)
             return
@@ -769,6 +775,7 @@ class MeshBeam(Frozen, Mesh):
     def load(cls, filename, out=None, **kwargs):
         """Load a mesh saved as ``.npz`` or ``.json``."""
         path = require_path("filename", filename)
+        require_options("load", kwargs, ("filename",))
         if path.suffix == ".npz":
             return cls.load_npz(path)
         if path.suffix == ".json":

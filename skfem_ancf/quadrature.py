@@ -2,12 +2,13 @@
 
 import numpy as np
 
-from .errors import InputError, require_finite, require_integer, shown
+from .errors import InputError, require_finite, require_integer, shown, taught
 
 #: Points of the largest rule.
 MAX_POINTS = 1000
 
 
+@taught
 def gauss(n):
     """The n-point Gauss rule on [0, 1], exact to degree 2 n - 1: points (n,) and weights (n,)."""
     n = require_integer("the number of Gauss points n", n, 1, MAX_POINTS)
@@ -15,6 +16,7 @@ def gauss(n):
     return 0.5 * (x + 1.0), 0.5 * w
 
 
+@taught
 def tensor(axis, section):
     """The product of a rule along the axis and one across the section.
 
@@ -42,6 +44,7 @@ def _rule(name, rule):
     return x, require_finite(f"the weights of {name}", rule[1], x.shape)
 
 
+@taught
 def lagrange(nodes, x):
     """Values at ``x`` of the Lagrange polynomials of ``nodes``, shape (len(x), len(nodes))."""
     nodes, x = require_finite("nodes", nodes, (None,)), require_finite("x", x, (None,))

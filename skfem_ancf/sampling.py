@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from .errors import ask_array, require_finite, require_function
+from .errors import ask_array, require_finite, require_function, taught
 
 FEW = 8  # times up to which a function is asked one by one
 
 
+@taught
 def sample(function, times, name="function", shape=None):
     """A function of one time at each of the times, shape (n,) + that of its value.
 

@@ -1,6 +1,6 @@
 """The formulation of the paper: every strain component at every integration point."""
 
-from ..errors import require_like
+from ..errors import require_like, taught
 from .base import Formulation, Term
 
 
@@ -15,6 +15,7 @@ class Continuum(Formulation):
 
     name = "continuum"
 
+    @taught
     def terms(self, element, material):
         require_like("material", material, "Material", "law")
         require_like("element", element, "beam element", "strain_degree", "order")

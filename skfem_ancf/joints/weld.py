@@ -53,8 +53,8 @@ class Weld(Joint):
                 f"the sections to weld are {np.hypot(*gap):.6g} apart, one at "
                 f"({self.a.start[0]:.6g}, {self.a.start[1]:.6g}), the other at "
                 f"({self.b.start[0]:.6g}, {self.b.start[1]:.6g}): name sections that meet, move a "
-                f"mesh by mesh.translated(({0 - gap[0]:.6g}, {0 - gap[1]:.6g})), or weld with apart=True "
-                "to draw them together")
+                f"mesh by mesh.translated(({0 - gap[0]:.6g}, {0 - gap[1]:.6g})), or weld with "
+                "apart=True to draw them together")
         angle = np.arctan2(*self.da.start[::-1]) - np.arctan2(*self.db.start[::-1])
         self.Q = rotation(angle)
         self.N = scene.N

@@ -70,6 +70,7 @@ class Material(Frozen):
         """Shear modulus E / (2 (1 + nu))."""
         return self.E / (2.0 * (1.0 + self.nu))
 
+    @taught
     def shear_factor(self, element):
         """The factor k_s on the shear modulus for sections of an element."""
         require_like("element", element, "beam element", "carries_shear_parabola")
@@ -95,6 +96,7 @@ class Material(Frozen):
         """
         return rebuilt(self, changes, ("E", "nu", "density", "plane", "shear_correction"))
 
+    @taught
     def law(self, k_s=1.0):
         """The law with its shear corrected: a function of (eps_xx, eps_yy, sqrt(k_s) 2 eps_xy)."""
         k_s = require_positive("k_s", k_s)
