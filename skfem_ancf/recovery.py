@@ -1,0 +1,394 @@
+"""Recovered strain and stress: from the section forces and the equilibrium of the body.
+
+The strain of an element at a point is the derivative of its displacement, which is less accurate
+than the displacement, and not continuous. Here the fields are found again, for each piece of a
+beam between two places where its section force jumps:
+
+1. The internal forces of the elements give the force and the moment of every section
+   (:mod:`skfem_ancf.section_forces`).
+2. The stretch of the fibres follows from the compatibility ``d(r_X)/dY = d(r_Y)/dX``: they turn at
+   the rate of their section. This rate and the stretch of the axis are those for which the
+   section has its force and moment; S_xx is that of the law.
+3. S_xy and S_yy follow from the equilibrium of the body, ``div P + b = 0``, integrated across the
+   section from the lower face with its load. What is left at the upper face is spread linearly,
+   and a parabola added to S_xy that gives the section its shear force. The law's inverse gives
+   eps_yy and eps_xy, which enter step 2: both are repeated.
+4. This is the solution of Saint-Venant, to high order in h / L. Supports and point loads cause
+   boundary layers of the length h besides. Where the elements there are short enough to resolve
+   them, their own stress is taken, from where it is most accurate: the mean of two Gauss points,
+   put at the element's centre (sections cubic along the axis: at the Gauss points), splined.
+"""
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.linalg import solve_banded
+
+from .formulations.ecm import EnhancedContinuum
+from .materials import LinearLaw
+from .quadrature import gauss, lagrange
+from .section_forces import NotRecovered, SectionForces, Sections, cross
+
+#: Points across a section: 2 N + 1, and at least these.
+ACROSS = 7
+
+#: Rounds of steps 2 and 3.
+ROUNDS = 6
+
+#: Within INNER heights of an end of a piece the elements' own stress is used, from LAYER heights on
+#: no longer. Not at all if the elements there are longer than COARSE heights; if they are longer
+#: than FINE, in part.
+INNER, LAYER, FINE, COARSE = 0.5, 1.2, 0.25, 0.5
+
+
+def integration(nodes):
+    """From values at the nodes on [0, 1] to the integrals from 0 to each node; shape (n, n)."""
+    x, w = gauss(len(nodes))
+    return np.array([b * (w @ lagrange(nodes, b * x)) for b in nodes])
+
+
+def strain_of_stress(law, stress, strain, unknown=(0, 1, 2), tol=1e-12):
+    """The strain (3, ...) whose stress is given, by Newton's method.
+
+    Parameters
+    ----------
+    law
+        With ``stress`` and ``moduli``.
+    stress
+        Shape (3, ...); only the components ``unknown`` are used.
+    strain
+        To start from, shape (3, ...); components that are not in ``unknown`` keep their values.
+    unknown
+        Components to find.
+
+    Raises
+    ------
+    NotRecovered
+        If there is no such strain.
+    """
+    k = list(unknown)
+    strain, size = np.array(strain, dtype=float), np.max(np.abs(stress), initial=1e-300)
+    if isinstance(law, LinearLaw):
+        gap = (stress - law.stress(strain))[k]
+        strain[k] += np.tensordot(np.linalg.inv(law.D[np.ix_(k, k)]), gap, 1)
+        return strain
+    with np.errstate(all="ignore"):
+        for _ in range(30):
+            gap = (stress - law.stress(strain))[k]
+            if not np.all(np.isfinite(gap)):
+                break
+            if np.max(np.abs(gap)) <= tol * size:
+                return strain
+            D = np.moveaxis(law.moduli(strain)[np.ix_(k, k)], (0, 1), (-2, -1))
+            strain[k] += np.moveaxis(np.linalg.solve(D, np.moveaxis(gap, 0, -1)[..., None])[..., 0],
+                                     -1, 0)
+    raise NotRecovered("no strain has the stress of the section under this law")
+
+
+class _Spline:
+    """A cubic spline through values (n, ...), of lower degree where n is below 4."""
+
+    def __init__(self, s, values):
+        self.constant = values[0] if len(s) == 1 else None
+        self.spline = None if len(s) == 1 else CubicSpline(s, values)
+
+    def __call__(self, s, derivative=0):
+        if self.spline is not None:
+            return self.spline(s, derivative)
+        out = np.broadcast_to(self.constant, np.shape(s) + self.constant.shape)
+        return out if derivative == 0 else 0.0 * out
+
+
+def smoothed(s, values, length):
+    """The solution f of ``f - length^2 f'' = values`` with f' = 0 at both ends; (n, ...)."""
+    d = np.diff(s)
+    w = 0.5 * (np.append(d, 0.0) + np.append(0.0, d))
+    c = length**2 / d
+    band = np.zeros((3, len(s)))
+    band[0, 1:], band[2, :-1] = -c, -c
+    band[1] = w + np.append(c, 0.0) + np.append(0.0, c)
+    return solve_banded((1, 1), band, w[:, None] * values)
+
+
+class _Piece:
+    """The field between two stations: on sections, at nodes and middles of the elements.
+
+    Attributes
+    ----------
+    s
+        Arc length of the sections, (n,).
+    strain, stress
+        At the sections and the points ``eta``, (3, n, m).
+    angle
+        Direction of the fibres along the axis, (n, m), in radians.
+    """
+
+    def __init__(self, recovery, start, end):
+        self.recovery, self.forces = recovery, recovery.forces
+        mesh = recovery.beam.mesh
+        e = np.arange(int(np.floor(start)), int(np.ceil(end)))
+        a, b = np.maximum(start - e, 0.0), np.minimum(end - e, 1.0)
+        if np.any((a > 0) & (b < 1)):
+            raise NotRecovered("two point loads act inside of one element: put a node at them")
+        whole = (a == 0) & (b == 1)
+        self.elements = e[whole] if np.any(whole) else e
+        side = np.where(a > 0, 1.0, np.where(b < 1, 0.0, 0.5))
+        self.e = np.append(np.repeat(e, 2), e[-1])
+        xi = np.append(np.stack([a, 0.5 * (a + b)], 1).ravel(), b[-1])
+        self.s = recovery.arc(self.e, xi)
+        self.R, self.M = self.forces.at(self.e, xi, np.append(np.repeat(side, 2), side[-1]))
+        eta, h = recovery.eta, mesh.height
+        self.Y = h * (eta - 0.5)
+        sections = Sections(self.forces, self.e, xi, eta)
+        speed = np.hypot(*sections.J[:, 0, :, len(eta) // 2])
+        self.g = sections.volume / (speed[:, None] * h)
+        self.body = self.g * sections.body
+        self.faces = [Sections(self.forces, self.e, xi, np.array([float(k)])).face(k)[..., 0]
+                      / speed for k in (0, 1)]
+        r = Sections(self.forces, self.e, xi, np.array([0.5])).field(self.forces.q, slope=True)
+        self.raw_angle = np.unwrap(np.arctan2(r[1, :, 0], r[0, :, 0]))
+        self.phi = self.raw_angle
+        self._solve()
+
+    def d_ds(self, values):
+        """The derivative along the axis of values (n, ...)."""
+        return _Spline(self.s, values)(self.s, 1)
+
+    def integral(self, values):
+        """The integral over the section, with the width, of values (n, m)."""
+        return self.recovery.beam.width * (values @ self.recovery.whole)
+
+    # step 2
+
+    def _strain(self):
+        """The strain (3, n, m) with S_yy, S_xy, and the stretch, or S_xx, as they are."""
+        r = self.recovery
+        if self.stress_given:
+            return strain_of_stress(r.law, self.S, self.eps)
+        self.eps[0] = 0.5 * (self.stretch**2 - 1.0)
+        # short waves would grow from round to round: S_yy holds second derivatives of S_xx
+        fed = np.array([0.0 * self.S[0], *(
+            smoothed(self.s, S, 0.5 * r.beam.mesh.height) for S in self.S[1:])])
+        eps = strain_of_stress(r.law, fed, self.eps, (1, 2))
+        self.S[0] = r.law.stress(eps)[0]
+        return eps
+
+    def _section(self):
+        """r_Y along t and n, and P_1 along t and n; (n, m) each."""
+        self.eps = eps = self._strain()
+        lam_y = np.sqrt(1.0 + 2.0 * eps[1])
+        lean = self.alpha - np.arcsin(np.clip(eps[2] / (self.stretch * lam_y), -1.0, 1.0))
+        self.rY = np.array([-lam_y * np.sin(lean), lam_y * np.cos(lean)])
+        self.rX = self.stretch * np.array([np.cos(self.alpha), np.sin(self.alpha)])
+        self.P = self.rX * self.S[0] + self.rY * self.S[2]
+
+    def _balance(self):
+        """Change S_xx linearly in Y until the section has its normal force and moment."""
+        h = self.recovery.beam.mesh.height
+        E = self.recovery.modulus
+        t, n = (np.array([np.cos(self.phi), np.sin(self.phi)]),
+                np.array([-np.sin(self.phi), np.cos(self.phi)]))
+        N, self.Q = np.sum(self.R * t, axis=0), np.sum(self.R * n, axis=0)
+        for _ in range(4):
+            self._section()
+            x, y = (self.rY @ self.recovery.from_axis.T)
+            missing = np.array([N - self.integral(self.P[0]),
+                                self.M - self.integral(x * self.P[1] - y * self.P[0])])
+            unit = np.array([1.0 + 0.0 * y, y / h]) / self.g
+            force = (self.S[0] + E * self.stretch**2) * unit
+            K = np.array([[self.integral(f) for f in force], [-self.integral(y * f) for f in force]])
+            det = K[0, 0] * K[1, 1] - K[0, 1] * K[1, 0]
+            a = (K[1, 1] * missing[0] - K[0, 1] * missing[1]) / det
+            b = (K[0, 0] * missing[1] - K[1, 0] * missing[0]) / det
+            change = a[:, None] * unit[0] + b[:, None] * unit[1]
+            self.stretch = self.stretch + change
+            if self.stress_given:
+                self.S[0] += E * self.stretch * change
+            if np.max(np.abs(change)) < 1e-12 * np.max(np.abs(self.eps[0])):
+                break
+
+    # the geometry
+
+    def _turn(self):
+        """The rate at which sections turn, the angles of fibres and of the frame."""
+        r, along = self.recovery, self.g * self.rX[0]
+        total = self.rY @ r.whole
+        self.rate = (self.d_ds(total[0]) - (along[:, -1] - along[:, 0])) / total[1]
+        dt, dn = (self.d_ds(component) for component in self.rY)
+        normal = (dn + self.rate[:, None] * self.rY[0]) @ r.from_axis.T
+        self.alpha = np.arcsin(np.clip(normal / (self.g * self.stretch), -1.0, 1.0))
+        turned = (smoothed(self.s, dt, 0.5 * r.beam.mesh.height)
+                  - self.rate[:, None] * self.rY[1]) @ r.from_axis.T
+        self.stretch = (along[:, r.middle, None] + turned) / (self.g * np.cos(self.alpha))
+        phi = np.append(0.0, np.cumsum(np.diff(_Spline(self.s, self.rate).spline.antiderivative()(
+            self.s))))
+        fit = np.polynomial.Polynomial.fit(self.s, self.raw_angle - phi, min(1, len(phi) - 1))
+        self.phi = phi + fit(self.s)
+
+    # step 3
+
+    def _equilibrium(self):
+        """S_xy and S_yy from div P + b = 0 and the loads of the faces."""
+        r, h = self.recovery, self.recovery.beam.mesh.height
+        c, s = np.cos(self.phi), np.sin(self.phi)
+
+        def turned(f):
+            f = np.asarray(f)
+            k = (slice(None),) + (None,) * (f.ndim - 2)
+            return np.array([c[k] * f[0] + s[k] * f[1], -s[k] * f[0] + c[k] * f[1]])
+
+        rate = self.rate[:, None]
+        dP = np.array([self.d_ds(self.P[0]) - rate * self.P[1],
+                       self.d_ds(self.P[1]) + rate * self.P[0]]) + turned(self.body)
+        bottom, top = (turned(f)[..., None] for f in self.faces)
+        P2 = -bottom - dP @ r.from_bottom.T
+        P2 = P2 + (top - P2[..., -1:]) * (self.Y / h + 0.5)
+        P2 = P2 / self.g
+        det = cross(self.rX, self.rY)
+        S = np.array([self.S[0], cross(self.rX, P2) / det, cross(P2, self.rY) / det])
+        self.S = S
+        self._shear()
+
+    def _shear(self):
+        """Add a parabola to S_xy that gives the section its shear force."""
+        bubble = 1.0 - (2.0 * self.Y / self.recovery.beam.mesh.height) ** 2
+        missing = self.Q - self.integral(self.rX[1] * self.S[0] + self.rY[1] * self.S[2])
+        self.S[2] += (missing / self.integral(self.rY[1] * bubble))[:, None] * bubble
+
+    def _solve(self):
+        self.alpha, self.eps = np.zeros(self.g.shape), np.zeros((3,) + self.g.shape)
+        self.S, self.stretch = np.zeros((3,) + self.g.shape), np.ones(self.g.shape)
+        self.stress_given = False
+        for _ in range(ROUNDS):
+            self._balance()
+            self._turn()
+            self._equilibrium()
+        self._balance()
+        weight = self._layers()
+        if np.any(weight):
+            self.S += weight[:, None] * (self._samples() - self.S)
+            self.stress_given = True
+            self._balance()
+            self._shear()
+        self.stress, self.angle = self.S, self.phi[:, None] + self.alpha
+        self.strain = strain_of_stress(self.recovery.law, self.S, self.eps)
+
+    # step 4
+
+    def _layers(self):
+        """How much of the elements' own stress each section takes, (n,): near ends that is fine."""
+        r, h = self.recovery, self.recovery.beam.mesh.height
+        if r.samples is None:
+            return np.zeros(len(self.s))
+        lengths = np.diff(r.lengths)[self.e]
+        weight = np.zeros(len(self.s))
+        for end in (self.s[0], self.s[-1]):
+            x = np.abs(self.s - end) / h
+            size = np.max(lengths[x <= LAYER]) / h
+            fine = np.clip((COARSE - size) / (COARSE - FINE), 0.0, 1.0)
+            z = np.clip((LAYER - x) / (LAYER - INNER), 0.0, 1.0)
+            weight = np.maximum(weight, fine * z * z * (3.0 - 2.0 * z))
+        return weight
+
+    def _samples(self):
+        """The elements' stress (3, n, m): from where they are most accurate, splined."""
+        r = self.recovery
+        at, stress = r.samples
+        s = r.arc(np.repeat(self.elements, len(at)), np.tile(at, len(self.elements)))
+        values = np.moveaxis(stress[:, self.elements], 0, 2)  # (elements, p, 3, m)
+        return np.moveaxis(_Spline(s, values.reshape(len(s), 3, -1))(self.s), 1, 0)
+
+
+class Recovery:
+    """The recovered field of one beam.
+
+    Parameters
+    ----------
+    forces
+        The :class:`~skfem_ancf.section_forces.SectionForces` of the beam.
+    u
+        Displacement of its coordinates, shape (N,).
+
+    Raises
+    ------
+    NotRecovered
+        If the fields cannot be recovered.
+    """
+
+    def __init__(self, forces, u):
+        self.forces, self.beam = forces, forces.beam
+        beam, mesh = self.beam, self.beam.mesh
+        self.law = beam.material.law()
+        self.modulus = 1.0 / np.linalg.inv(self.law.moduli(np.zeros(3)))[0, 0]
+        m = max(ACROSS, 2 * beam.element.order + 1)
+        self.eta = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, m))
+        self.middle = m // 2
+        self.eta[self.middle] = 0.5
+        self.from_bottom = mesh.height * integration(self.eta)
+        self.from_axis = self.from_bottom - self.from_bottom[self.middle]
+        self.whole = self.from_bottom[-1]
+        self.lengths = self._arc_tables()
+        shows = beam.element.carries_shear_parabola and not isinstance(
+            beam.formulation, EnhancedContinuum)
+        self.samples = self._samples(u) if shows else None
+        self.pieces = [_Piece(self, a, b) for a, b in zip(forces.cuts[:-1], forces.cuts[1:])]
+        self._splines = [_Spline(p.s, np.concatenate(
+            [np.moveaxis(p.strain, 0, 1), np.moveaxis(p.stress, 0, 1), p.angle[:, None]], axis=1))
+            for p in self.pieces]
+
+    def _arc_tables(self):
+        x, w = gauss(8)
+        axis = self.beam.mesh.mapping().DF(np.array([x, np.full(8, 0.5)]))[:, 0]
+        self._speed = np.hypot(*axis)
+        return np.append(0.0, np.cumsum(self._speed @ w))
+
+    def arc(self, e, xi):
+        """Arc length along the stress-free axis of places of elements, shape of both."""
+        e, xi = np.broadcast_arrays(e, xi)
+        if self.beam.mesh.is_straight:
+            return self.lengths[e] + xi * (self.lengths[e + 1] - self.lengths[e])
+        x, w = gauss(8)
+        inside = lagrange(x, np.multiply.outer(xi, x).ravel()).reshape(xi.shape + (8, 8))
+        return self.lengths[e] + xi * np.einsum("q,...qk,...k->...", w, inside, self._speed[e])
+
+    def _samples(self, u):
+        """Places along an element, (p,), and the stress there, (3, ne, p, m)."""
+        beam, (x, _) = self.beam, gauss(2)
+        X = np.array([np.repeat(x, len(self.eta)), np.tile(self.eta, 2)])
+        stress = beam.stress(u, X).reshape(3, -1, 2, len(self.eta))
+        if beam.element.sections == "linear":
+            return np.array([0.5]), stress.mean(axis=2, keepdims=True)
+        return x, stress
+
+    def fields(self, X, tind=None):
+        """Strain (eps_xx, eps_yy, 2 eps_xy), stress (S_xx, S_yy, S_xy) and angle of the fibres.
+
+        Parameters
+        ----------
+        X
+            Reference points, (2, npoints) or (2, nelements, npoints).
+        tind
+            Elements, or None for all.
+
+        Returns
+        -------
+        strain, stress, angle
+            Shapes (3, ne, np), (3, ne, np) and (ne, np).
+        """
+        e = np.arange(self.beam.mesh.nelements) if tind is None else np.asarray(tind)
+        shape = (len(e), X.shape[-1])
+        xi, eta = (np.broadcast_to(x, shape) for x in X)
+        e = np.broadcast_to(e[:, None], shape)
+        place, s = e + xi, self.arc(e, xi)
+        cuts = self.forces.cuts
+        # a point at a cut that is a node belongs to the piece of its own element
+        piece = np.clip(np.searchsorted(cuts, place, side="right") - 1, 0, len(cuts) - 2)
+        piece = np.where((place == cuts[piece]) & (xi == 1.0), piece - 1, piece)
+        piece = np.maximum(piece, 0)
+        values = np.empty((7,) + shape)
+        m = len(self.eta)
+        for k in np.unique(piece):
+            on = piece == k
+            weights = lagrange(self.eta, eta[on])
+            values[:, on] = np.einsum("pcm,pm->cp", self._splines[k](s[on]).reshape(-1, 7, m),
+                                      weights)
+        return values[:3], values[3:6], values[6]

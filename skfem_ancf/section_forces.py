@@ -1,0 +1,232 @@
+"""The force and the moment in the sections of a beam, from the internal forces of its elements.
+
+The internal force of an element does no work in a rigid motion. With the loads that act on the
+element it is therefore in exact equilibrium, whatever the error of the displacement, and the part
+of the element between a node and a section gives the force and the moment there.
+"""
+
+from functools import cached_property
+
+import numpy as np
+
+from .errors import AncfError
+from .quadrature import gauss, lagrange
+from .spread import SNAP, station_of_node
+
+#: Points along an element for its loads.
+ALONG = 8
+
+#: A section force that changes at a node without a load by more than this part of its largest
+#: value: the state is no equilibrium.
+UNBALANCED = 0.02
+
+
+class NotRecovered(AncfError):
+    """The section forces or fields of a beam cannot be recovered; the message says why."""
+
+
+def cross(a, b):
+    """The out-of-plane component of a x b of vectors (2, ...)."""
+    return a[0] * b[1] - a[1] * b[0]
+
+
+class Sections:
+    """Geometry and loads at points across given sections.
+
+    Parameters
+    ----------
+    forces
+        The :class:`SectionForces` they belong to.
+    e, xi
+        Element of each section and its place there, shapes (n,).
+    eta
+        Points across each section, shape (k,).
+    """
+
+    def __init__(self, forces, e, xi, eta):
+        self.forces, self.e = forces, e
+        beam = forces.beam
+        self.shape = len(e), len(eta)
+        self.X = np.array([np.broadcast_to(xi[:, None], self.shape),
+                           np.broadcast_to(eta, self.shape)])
+        element = beam.element
+        rows = [element.local(self.X, beam.mesh.height, i) for i in range(2 * element.nodal_dofs)]
+        scale = (beam.mesh.lengths[e][:, None] ** np.array([row[3] for row in rows])).T
+        self._value, self._slope = (
+            np.array([np.broadcast_to(row[k], self.shape) for row in rows]) * scale[:, :, None]
+            for k in (0, 1))
+        self.J = beam.mesh.mapping().DF(self.X, e)
+        self.volume = self.J[0, 0] * self.J[1, 1] - self.J[0, 1] * self.J[1, 0]
+
+    def field(self, q_e, slope=False):
+        """A field (2, n, k) of element coordinates (ne, nb, 2), or its derivative by xi."""
+        return np.einsum("bnk,nbi->ink", self._slope if slope else self._value, q_e[self.e],
+                         optimize=True)
+
+    def spread(self, values):
+        """Element vectors (ne, nb, 2) of forces (2, n, k), summed."""
+        f = self.forces
+        out = np.zeros((f.beam.mesh.nelements,) + f.q.shape[1:])
+        np.add.at(out, self.e, np.einsum("bnk,ink->nbi", self._value, values, optimize=True))
+        return out
+
+    @cached_property
+    def body(self):
+        """Force per volume of the stress-free body, inertia included, (2, n, k)."""
+        f = self.forces
+        out = np.broadcast_to(f.body[:, None, None], (2,) + self.shape)
+        return out if f.acceleration is None else out - f.beam.density * self.field(f.acceleration)
+
+    def face(self, side):
+        """Force per width and xi on the bottom (0) or top (1), on which the points are; (2, n, k)."""
+        f, out = self.forces, np.zeros((2,) + self.shape)
+        for factor, load in f.faces:
+            on = factor * load.faces[side][self.e][:, None]
+            if not np.any(on):
+                continue
+            if load.pressure is not None:
+                r = self.field(f.q, slope=True)
+                out += on * load.pressure * (1.0 - 2.0 * side) * np.array([-r[1], r[0]])
+            else:
+                t = load.traction
+                if callable(t):
+                    x = f.beam.mesh.mapping().F(self.X, self.e)
+                    t = np.array([np.broadcast_to(c, self.shape) for c in t(x)])
+                else:
+                    t = np.asarray(t, dtype=float)[:, None, None]
+                out += on * t * np.hypot(*self.J[:, 0])
+        return out
+
+
+class SectionForces:
+    """Force and moment in the sections of one beam.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    u
+        Displacement of its coordinates, shape (N,).
+    loads
+        Pairs of a factor and a :class:`~skfem_ancf.spread.Spread`, or None for a load whose spread is not known.
+    stations
+        Where supports and joints act: element + xi.
+    acceleration
+        Of the coordinates, shape (N,), or None.
+
+    Attributes
+    ----------
+    cuts
+        Stations, ends included, between which the section force is continuous.
+
+    Raises
+    ------
+    NotRecovered
+        If the spread of a load is not known, or the state is no equilibrium.
+    """
+
+    def __init__(self, beam, u, loads, stations=(), acceleration=None):
+        self.beam = beam
+        if any(load is None for _, load in loads):
+            raise NotRecovered("a load is given by its force on the coordinates only: where it "
+                               "acts across the section is not known")
+        self.q = beam.kernel.gather(beam.q0_local + u)
+        self.acceleration = None if acceleration is None else beam.kernel.gather(acceleration)
+        self.body = sum((factor * np.asarray(load.body) for factor, load in loads
+                         if load.body is not None), np.zeros(2))
+        self.faces = [(factor, load) for factor, load in loads if load.faces is not None
+                      and factor != 0.0 and np.any(load.faces)]
+        self._loads(u)
+        self._cut(loads, stations)
+        self._check()
+
+    # loads of the elements
+
+    def _loads(self, u):
+        """Section forces at both ends of each element, and the loads at points along it."""
+        beam, mesh = self.beam, self.beam.mesh
+        ne, (x, w) = mesh.nelements, gauss(ALONG)
+        e, xi = np.repeat(np.arange(ne), ALONG), np.tile(x, ne)
+        eta, v = (np.array([0.5]), np.ones(1)) if beam.is_cable else gauss(beam.element.order + 1)
+        inside = Sections(self, e, xi, eta)
+        parts = [(inside, beam.width * v * inside.volume * inside.body)]
+        for side in (0, 1):
+            if any(np.any(load.faces[side]) for _, load in self.faces):
+                face = Sections(self, e, xi, np.array([float(side)]))
+                parts.append((face, beam.width * face.face(side)))
+        axis = Sections(self, e, xi, np.array([0.5])).field(self.q)
+        self._r = axis[..., 0].reshape(2, ne, ALONG)
+        force = sum(f.sum(axis=-1) for _, f in parts)
+        moment = sum(cross(at.field(self.q) - axis, f).sum(axis=-1) for at, f in parts)
+        self._force, self._moment = force.reshape(2, ne, ALONG), moment.reshape(ne, ALONG)
+        w = np.tile(w, ne)
+        load = sum(at.spread(f * w[:, None]) for at, f in parts)
+        kernel = beam.kernel
+        internal = np.concatenate([
+            kernel.evaluate(kernel.gather(u, part), part, tangent=False).force
+            for part in kernel.chunks()])
+        left, right = np.split(internal - load, 2, axis=1)
+        q = np.split(self.q, 2, axis=1)
+        # of the part of the beam on the right of a section on that on its left
+        self.R = np.array([-left[:, 0], right[:, 0]])  # (2 ends, ne, 2)
+        self.M = np.array([-np.sum(cross(q[0][:, 1:].T, left[:, 1:].T), axis=0),
+                           np.sum(cross(q[1][:, 1:].T, right[:, 1:].T), axis=0)])
+        self.ends = np.array([q[0][:, 0], q[1][:, 0]])
+
+    def at(self, e, xi, side):
+        """Force (2, n) and moment (n,) about the axis, of the right part of the beam on the left.
+
+        Parameters
+        ----------
+        e, xi
+            Sections, shapes (n,).
+        side
+            End of the element from which the equilibrium is followed: 0, 1, or 0.5 for the mean
+            of both; shape (n,).
+        """
+        x, w = gauss(ALONG)
+        inner = lagrange(x, np.outer(xi, x).ravel()).reshape(len(xi), ALONG, ALONG)
+        till = xi[:, None] * np.einsum("q,nqk->nk", w, inner)  # the integral from 0 to xi
+        r = Sections(self, e, xi, np.array([0.5])).field(self.q)[..., 0]
+        out = []
+        for end, weights in ((0, till), (1, till - w)):
+            f, m = self._force[:, e], self._moment[e]
+            arm = self._r[:, e] - r[:, :, None]
+            R = self.R[end][e].T - np.sum(weights * f, axis=-1)
+            M = (self.M[end][e] + cross(self.ends[end][e].T - r, self.R[end][e].T)
+                 - np.sum(weights * (cross(arm, f) + m), axis=-1))
+            out.append((R, M))
+        (R0, M0), (R1, M1) = out
+        return R0 + side * (R1 - R0), M0 + side * (M1 - M0)
+
+    # where they jump
+
+    def _cut(self, loads, stations):
+        mesh = self.beam.mesh
+        stations = list(stations) + [s for _, load in loads for s in load.stations]
+        ends = np.setdiff1d(mesh.t[0], mesh.t[1]), np.setdiff1d(mesh.t[1], mesh.t[0])
+        stations += [station_of_node(mesh, k) for k in np.concatenate(ends)]
+        gaps = np.nonzero(mesh.t[1, :-1] != mesh.t[0, 1:])[0] + 1.0
+        for _, load in self.faces:
+            for face in load.faces:
+                stations += list(np.nonzero(face[1:] != face[:-1])[0] + 1.0)
+        cuts = np.concatenate([stations, gaps, [0.0, mesh.nelements]])
+        near = np.round(cuts)
+        self.cuts = np.unique(np.where(np.abs(cuts - near) < SNAP, near, cuts))
+
+    def _check(self):
+        mesh = self.beam.mesh
+        inner = np.arange(1, mesh.nelements)
+        inner = inner[~np.isin(inner, self.cuts)]
+        inner = inner[mesh.t[1, inner - 1] == mesh.t[0, inner]]
+        height = mesh.height
+        size = np.max(np.abs(self.R)) * height + np.max(np.abs(self.M))
+        if size == 0.0:
+            raise NotRecovered("the beam carries no load")
+        jump = (np.abs(self.R[0, inner] - self.R[1, inner - 1]).max(axis=1, initial=0.0) * height
+                + np.abs(self.M[0, inner] - self.M[1, inner - 1]))
+        if np.any(jump > UNBALANCED * size):
+            k = int(inner[np.argmax(jump)])
+            raise NotRecovered(
+                f"the state is no equilibrium under the loads of the scene: at node {k} the "
+                f"section force changes by {jump.max() / size:.1%} of its largest value")

@@ -1,0 +1,83 @@
+"""Where forces act on a beam: spread over its body and faces, or on sections and points."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Places nearer than this part of an element to a node are at the node.
+SNAP = 1e-6
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How a load is spread over a beam.
+
+    Attributes
+    ----------
+    body
+        Force per volume of the stress-free body, shape (2,), or None.
+    faces
+        For the bottom and the top the elements whose faces are loaded, two arrays (nelements,) of
+        truth values, or None.
+    traction
+        Force per stress-free area of the faces, (2,), or a function of the points x (2, ...).
+    pressure
+        Force per deformed area, normal to the faces, or None.
+    stations
+        Where it acts on a section or a point: element + xi.
+    """
+
+    body: object = None
+    faces: tuple = None
+    traction: object = None
+    pressure: float = None
+    stations: tuple = ()
+
+
+def on_facets(mesh, facets, **how):
+    """The Spread of a load on facets: faces of elements, or sections."""
+    facets = np.asarray(facets)
+    n, ne = mesh.p.shape[1], mesh.nelements
+    faces = tuple(np.isin(np.arange(ne) + n + side * ne, facets) for side in (0, 1))
+    stations = tuple(station_of_node(mesh, k) for k in facets[facets < n])
+    return Spread(faces=faces, stations=stations, **how)
+
+
+def station_of_node(mesh, node):
+    """A node as element + xi."""
+    right = np.nonzero(mesh.t[1] == node)[0]
+    return float(right[0]) + 1.0 if len(right) else float(np.nonzero(mesh.t[0] == node)[0][0])
+
+
+def stations_of_vector(beam, vector):
+    """Where a force on few coordinates acts: element + xi; None if it is spread.
+
+    A force on a point inside an element acts on the coordinates ``r`` of its two nodes as the
+    Hermite functions of xi say, whose values are found again.
+    """
+    rows = np.asarray(vector).reshape(-1, beam.nd)
+    loaded = np.nonzero(np.any(rows != 0, axis=1))[0]
+    if len(loaded) == 2 and np.any(beam.mesh.t[0] == loaded[0]) and loaded[1] == loaded[0] + 1:
+        a, b = rows[loaded, :2]
+        total = a + b
+        if total @ total > 0:
+            value = float(b @ total / (total @ total))
+            xi = _where(beam.element, value)
+            if xi is not None:
+                return (float(np.nonzero(beam.mesh.t[0] == loaded[0])[0][0]) + xi,)
+    if np.any(np.diff(loaded) == 1):
+        return None
+    return tuple(station_of_node(beam.mesh, k) for k in loaded)
+
+
+def _where(element, value):
+    """Where the function of ``r`` at the right node has a value; it rises from 0 to 1."""
+    low, high = 0.0, 1.0
+    if not 0.0 <= value <= 1.0:
+        return None
+    for _ in range(60):
+        xi = 0.5 * (low + high)
+        X = np.array([[xi], [0.5]])
+        low, high = ((xi, high) if element.local(X, 1.0, element.nodal_dofs)[0][0] < value
+                     else (low, xi))
+    return 0.5 * (low + high)
