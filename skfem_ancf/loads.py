@@ -14,6 +14,7 @@ from .beam import Beam
 from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number, require_finite,
                      require_function)
 from .frozen import Sealable, read_only
+from .spread import Spread, on_facets, stations_of_vector
 
 
 class Amplitude:
@@ -142,6 +143,19 @@ class Load(Sealable):
         """The potential, minus the work done from the stress-free state; None if there is none."""
         return None
 
+    def spread(self, u):
+        """How the force at the displacement ``u`` is spread over the body, or None.
+
+        Recovered fields need to know. By default it is taken to act on the nodes, or the point
+        inside of an element, whose coordinates it acts on, and not known if they are neighbours.
+
+        Returns
+        -------
+        skfem_ancf.spread.Spread or None
+        """
+        stations = stations_of_vector(self.beam, self.force(u))
+        return None if stations is None else Spread(stations=stations)
+
     def __repr__(self):
         return f"<{type(self).__name__} on {self.beam!r}>"
 
@@ -201,7 +215,8 @@ class Weight(Load):
         self.g = require_finite("g", g, (2,))
 
     def bind(self, beam):
-        return DeadLoad(beam, beam.weight(self.g), self.amplitude)
+        return DeadLoad(beam, beam.weight(self.g), self.amplitude,
+                        Spread(body=beam.density * self.g))
 
 
 class PointForce(Load):
@@ -215,7 +230,8 @@ class PointForce(Load):
         dofs, weights = beam.probe(self.at)
         vector = np.zeros(beam.N)
         np.add.at(vector, dofs, np.outer(self.total, weights))
-        return DeadLoad(beam, vector, self.amplitude)
+        e, X = beam.locate(self.at)
+        return DeadLoad(beam, vector, self.amplitude, Spread(stations=(e + float(X[0]),)))
 
 
 class Traction(Load):
@@ -230,7 +246,8 @@ class Traction(Load):
         basis = beam.facet_basis(self.boundary, intorder=12 if callable(t) else None)
         if callable(t):
             ask_field("t(x)", t, np.asarray(basis.global_coordinates()))
-        return DeadLoad(beam, asm(forms.traction(t, beam.width), basis), self.amplitude)
+        return DeadLoad(beam, asm(forms.traction(t, beam.width), basis), self.amplitude,
+                        on_facets(beam.mesh, basis.find, traction=t))
 
 
 class FormLoad(Load):
@@ -272,9 +289,13 @@ def _assembled(form, basis):
 class DeadLoad(Load):
     """A force that keeps its direction and size."""
 
-    def __init__(self, beam, vector, amplitude=None):
+    def __init__(self, beam, vector, amplitude=None, spread=None):
         super().__init__(_the_beam(beam), amplitude)
         self.vector = read_only(require_finite("the load", vector, (beam.N,)))
+        self._spread = spread
+
+    def spread(self, u):
+        return self._spread or super().spread(u)
 
     def bind(self, beam):
         if beam is not self.beam:
@@ -301,6 +322,10 @@ class Pressure(Load):
         basis = beam.facet_basis(boundary)
         self.matrix = (p * asm(forms.pressure(beam.width), basis)).tocoo()
         self._rows = self.matrix.tocsr()
+        self._spread = on_facets(beam.mesh, basis.find, pressure=p)
+
+    def spread(self, u):
+        return self._spread
 
     def bind(self, beam):
         return self if beam is self.beam else Pressure(beam, self.boundary, self.p, self.amplitude)

@@ -27,6 +27,7 @@ from .formulations.ecm import EnhancedContinuum
 from .materials import LinearLaw
 from .quadrature import gauss, lagrange
 from .section_forces import NotRecovered, SectionForces, Sections, cross
+from .spread import station_of_node, stations_of_vector
 
 #: Points across a section: 2 N + 1, and at least these.
 ACROSS = 7
@@ -46,7 +47,7 @@ def integration(nodes):
     return np.array([b * (w @ lagrange(nodes, b * x)) for b in nodes])
 
 
-def strain_of_stress(law, stress, strain, unknown=(0, 1, 2), tol=1e-12):
+def strain_of_stress(law, stress, strain, unknown=(0, 1, 2), tol=1e-10):
     """The strain (3, ...) whose stress is given, by Newton's method.
 
     Parameters
@@ -66,17 +67,18 @@ def strain_of_stress(law, stress, strain, unknown=(0, 1, 2), tol=1e-12):
         If there is no such strain.
     """
     k = list(unknown)
-    strain, size = np.array(strain, dtype=float), np.max(np.abs(stress), initial=1e-300)
+    strain = np.array(strain, dtype=float)
     if isinstance(law, LinearLaw):
         gap = (stress - law.stress(strain))[k]
         strain[k] += np.tensordot(np.linalg.inv(law.D[np.ix_(k, k)]), gap, 1)
         return strain
     with np.errstate(all="ignore"):
         for _ in range(30):
-            gap = (stress - law.stress(strain))[k]
+            found = law.stress(strain)
+            gap = (stress - found)[k]
             if not np.all(np.isfinite(gap)):
                 break
-            if np.max(np.abs(gap)) <= tol * size:
+            if np.max(np.abs(gap)) <= tol * max(np.max(np.abs(found)), np.max(np.abs(stress))):
                 return strain
             D = np.moveaxis(law.moduli(strain)[np.ix_(k, k)], (0, 1), (-2, -1))
             strain[k] += np.moveaxis(np.linalg.solve(D, np.moveaxis(gap, 0, -1)[..., None])[..., 0],
@@ -392,3 +394,64 @@ class Recovery:
             values[:, on] = np.einsum("pcm,pm->cp", self._splines[k](s[on]).reshape(-1, 7, m),
                                       weights)
         return values[:3], values[3:6], values[6]
+
+    @staticmethod
+    def gradient(strain, angle):
+        """The deformation gradient (2, 2, ...) of a strain and the angle of the fibres.
+
+        ``F[:, 0]`` and ``F[:, 1]`` are the derivatives of the position along the axis and across
+        the section, in global components.
+        """
+        lam_x, lam_y = np.sqrt(1.0 + 2.0 * strain[:2])
+        across = angle + np.arccos(strain[2] / (lam_x * lam_y))
+        return np.array([[lam_x * np.cos(angle), lam_y * np.cos(across)],
+                         [lam_x * np.sin(angle), lam_y * np.sin(across)]])
+
+
+def actions(state):
+    """Where supports and joints act on each beam of a state: element + xi, a list a beam."""
+    system = state.system
+    t = state.load if state.t is None else state.t
+    held = np.zeros(system.N)
+    held[system.fixed] = 1.0
+    rows = [held] + [row for joint in system.joints for row in joint.jacobian(state.u, t)]
+    out = []
+    for beam, s in zip(system.beams, system.slices):
+        nodes = np.nonzero(np.any(held[s].reshape(-1, beam.nd) != 0, axis=1))[0]
+        stations = [station_of_node(beam.mesh, k) for k in nodes]
+        for row in rows[1:]:
+            if np.any(row[s]):
+                # an equation between neighbouring nodes: at both
+                loaded = np.nonzero(np.any(row[s].reshape(-1, beam.nd) != 0, axis=1))[0]
+                stations += (stations_of_vector(beam, row[s])
+                             or [station_of_node(beam.mesh, k) for k in loaded])
+        out.append(stations)
+    return out
+
+
+def recover(state, beam, stations):
+    """The :class:`Recovery` of one beam of a state.
+
+    Parameters
+    ----------
+    state
+        A :class:`~skfem_ancf.results.State`.
+    beam
+        One of its beams.
+    stations
+        Where supports and joints act on it, of :func:`actions`.
+
+    Raises
+    ------
+    NotRecovered
+        If the fields cannot be recovered; the message says why.
+    """
+    u, s = state.u_of(beam), state.system.of(beam)
+    loads = [(state.load * load.factor(state.t), load.spread(u)) for load in state.system.loads
+             if load.beam is beam]
+    acceleration = None if state.acceleration is None else state.acceleration[s]
+    with np.errstate(all="ignore"):
+        recovery = Recovery(SectionForces(beam, u, loads, stations, acceleration), u)
+    if not all(np.all(np.isfinite(p.strain)) for p in recovery.pieces):
+        raise NotRecovered("the strain is too large: the section has no state of equilibrium")
+    return recovery

@@ -1,5 +1,7 @@
 """What a solution knows: positions, strains, stresses, energies, reactions."""
 
+import logging
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -7,6 +9,10 @@ import numpy as np
 from .beam import select_beam
 from .errors import InputError, MeshError, NameUnknown, shown, teaching
 from .frozen import Frozen
+from .recovery import actions, recover
+from .section_forces import NotRecovered
+
+logger = logging.getLogger(__name__)
 
 
 class Reaction(NamedTuple):
@@ -39,14 +45,17 @@ class State(Frozen):
         Load factor.
     converged, iterations, message, steps
         How the solver got here; ``steps`` holds the residuals of every iteration.
+    acceleration
+        Of the coordinates, shape (N,), in a motion; else None.
     """
 
     def __init__(self, system, u, load=1.0, force=None, converged=True, iterations=0, message="",
-                 steps=(), multipliers=None, t=None, inertia=0.0):
+                 steps=(), multipliers=None, t=None, inertia=0.0, acceleration=None):
         self.system, self.u, self.load = system, u, load
         self.converged, self.iterations, self.message = converged, iterations, message
         self.steps = tuple(steps)
         self._force, self.t, self._inertia = force, t, inertia
+        self.acceleration = acceleration
         self.multipliers = np.zeros(system.m) if multipliers is None else multipliers
         for name, size in (("u", system.N), ("multipliers", system.m)):
             if np.shape(getattr(self, name)) != (size,):
@@ -70,6 +79,8 @@ class State(Frozen):
                 raise NameUnknown("attribute of State", name, known)
         other = object.__new__(type(self))
         vars(other).update(vars(self), **changes)
+        for name in ("_recoveries", "_actions"):
+            vars(other).pop(name, None)
         if {"u", "multipliers", "system"} & set(changes):
             vars(other)["_force"] = None
         other._seal()
@@ -117,16 +128,73 @@ class State(Frozen):
         start = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
         return start + beam.point_displacement(self.u_of(beam), e, X)
 
-    def strain(self, point, beam=None):
-        """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, shape (3,)."""
-        beam, e, X = self._find(point, beam)
-        strain = beam.strain(self.u_of(beam), X[:, None], np.array([e]))[:, 0, 0]
-        return strain * np.array([1.0, 1.0, 0.5])
+    def strain(self, point, beam=None, recover=True):
+        """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, shape (3,).
 
-    def stress(self, point, beam=None):
-        """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, shape (3,)."""
+        Parameters
+        ----------
+        point
+            A material point, named by its place in the stress-free body.
+        beam
+            The beam, its name or its number; found if it is not given.
+        recover
+            The recovered field, see :mod:`skfem_ancf.recovery`, where there is one
+            (:attr:`recovered`); False for the strain of the element at the point.
+        """
         beam, e, X = self._find(point, beam)
-        return beam.stress(self.u_of(beam), X[:, None], np.array([e]))[:, 0, 0]
+        X, e, r = X[:, None], np.array([e]), self.recovery(beam) if recover else None
+        strain = beam.strain(self.u_of(beam), X, e) if r is None else r.fields(X, e)[0]
+        return strain[:, 0, 0] * np.array([1.0, 1.0, 0.5])
+
+    def stress(self, point, beam=None, recover=True):
+        """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, shape (3,).
+
+        Parameters are those of :meth:`strain`.
+        """
+        beam, e, X = self._find(point, beam)
+        X, e, r = X[:, None], np.array([e]), self.recovery(beam) if recover else None
+        return (beam.stress(self.u_of(beam), X, e) if r is None else r.fields(X, e)[1])[:, 0, 0]
+
+    # recovered fields
+
+    def recovery(self, beam=None):
+        """The recovered field of a beam, a :class:`~skfem_ancf.recovery.Recovery`, or None.
+
+        None where the field cannot be recovered; :attr:`recovered` says why.
+        """
+        beam = select_beam(self.beams, beam)
+        k = self.beams.index(beam)
+        if k not in self._recoveries:
+            try:
+                self._recoveries[k] = recover(self, beam, self._actions[k])
+            except NotRecovered as reason:
+                logger.info("%r: strain and stress are those of the elements: %s", beam, reason)
+                self._recoveries[k] = reason
+        found = self._recoveries[k]
+        return None if isinstance(found, NotRecovered) else found
+
+    @property
+    def recovered(self):
+        """For each beam, by name or number, "" if its fields are recovered, else why not: dict.
+
+        Recovered fields need an equilibrium (of statics or of a motion) under loads of which it is
+        known where they act. Elsewhere strain and stress are those of the elements.
+        """
+        out = {}
+        for k, beam in enumerate(self.beams):
+            self.recovery(beam)
+            found = self._recoveries[k]
+            out[k if beam.name is None else beam.name] = (
+                str(found) if isinstance(found, NotRecovered) else "")
+        return out
+
+    @cached_property
+    def _recoveries(self):
+        return {}
+
+    @cached_property
+    def _actions(self):
+        return actions(self)
 
     # of the whole
 

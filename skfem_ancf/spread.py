@@ -7,6 +7,9 @@ import numpy as np
 #: Places nearer than this part of an element to a node are at the node.
 SNAP = 1e-6
 
+#: A function of ``r`` that differs from 0 or 1 by less is that at a node, where it is flat.
+FLAT = 1e-11
+
 
 @dataclass(frozen=True)
 class Spread:
@@ -73,8 +76,10 @@ def stations_of_vector(beam, vector):
 def _where(element, value):
     """Where the function of ``r`` at the right node has a value; it rises from 0 to 1."""
     low, high = 0.0, 1.0
-    if not 0.0 <= value <= 1.0:
+    if not -FLAT <= value <= 1.0 + FLAT:
         return None
+    if min(value, 1.0 - value) < FLAT:
+        return float(round(value))
     for _ in range(60):
         xi = 0.5 * (low + high)
         X = np.array([[xi], [0.5]])

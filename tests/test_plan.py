@@ -102,7 +102,8 @@ def test_no_field_that_nobody_asked_for(count):
     state = scene().solve_static()
     state.displacement((1, 0)), state.strain_energy, state.reactions("left")
     assert len(strains) == 0
-    state.strain((0.5, 0))
+    assert "_recoveries" not in vars(state)
+    state.strain((0.5, 0), recover=False)
     assert len(strains) == 1
 
 

@@ -55,7 +55,8 @@ class History:
         k = require_index("k", k, len(self))
         return State(self.system, self.u[k], load=1.0, converged=True, t=float(self.t[k]),
                      message=f"t = {self.t[k]:g}", multipliers=self.multipliers[k],
-                     inertia=self.system.mass.multiply(self.acceleration[k]))
+                     inertia=self.system.mass.multiply(self.acceleration[k]),
+                     acceleration=self.acceleration[k])
 
     def __iter__(self):
         return (self.state(k) for k in range(len(self)))

@@ -46,7 +46,7 @@ class BodyFields(NamedTuple):
     cell_data: dict
 
 
-def sample(state, beam, X):
+def sample(state, beam, X, recover=True):
     """The fields of one beam at reference points.
 
     Parameters
@@ -57,6 +57,8 @@ def sample(state, beam, X):
         One of its beams.
     X
         Reference points (xi, eta) in [0, 1], shape (2, npoints).
+    recover
+        As in :func:`save_vtu`.
 
     Returns
     -------
@@ -66,9 +68,14 @@ def sample(state, beam, X):
     """
     u = state.u_of(beam)
     out = {"x": beam.mesh.mapping().F(X), "displacement": beam.displacements(u, X)}
-    strain, S = beam.strain(u, X), beam.stress(u, X)
-    H, frame = beam.gradients(u, X)
-    F = frame + H
+    recovery = state.recovery(beam) if recover and hasattr(state, "recovery") else None
+    if recovery is None:
+        strain, S = beam.strain(u, X), beam.stress(u, X)
+        H, frame = beam.gradients(u, X)
+        F = frame + H
+    else:
+        strain, S, angle = recovery.fields(X)
+        F = recovery.gradient(strain, angle)
     with np.errstate(invalid="ignore", divide="ignore"):  # NaN where no such state can exist
         J = (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) * beam.material.thickness_stretch(strain)
         sigma = np.einsum("iJ...,JK...,jK...->ij...", F, np.array([[S[0], S[2]], [S[2], S[1]]]),
@@ -81,7 +88,7 @@ def sample(state, beam, X):
 
 
 @taught
-def body_fields(state, subdivide=(8, 4), lagrange=False, undeformed=False):
+def body_fields(state, subdivide=(8, 4), lagrange=False, undeformed=False, recover=True):
     """The body of a state on points.
 
     Parameters are those of :func:`save_vtu`.
@@ -118,7 +125,7 @@ def body_fields(state, subdivide=(8, 4), lagrange=False, undeformed=False):
             X, local = lagrange_cell(beam)
         else:
             X, local = grid(m, n), quads(m, n)
-        fields = sample(state, beam, X)
+        fields = sample(state, beam, X, recover)
         x, u = fields.pop("x"), fields.pop("displacement")
         points.append(_rows(x if undeformed else x + u))
         data.setdefault("displacement", []).append(_rows(u))
@@ -136,11 +143,11 @@ def body_fields(state, subdivide=(8, 4), lagrange=False, undeformed=False):
 
 
 @taught
-def save_vtu(state, filename, subdivide=(8, 4), lagrange=False, undeformed=False):
+def save_vtu(state, filename, subdivide=(8, 4), lagrange=False, undeformed=False, recover=True):
     """Write the deformed body of a state for ParaView.
 
     All beams go into one file. Points belong to one element each, since strains and stresses
-    jump between elements. The file replaces an older one of the same name only once it is
+    may jump between elements. The file replaces an older one of the same name only once it is
     complete.
 
     =============================  ==========================================================
@@ -172,6 +179,9 @@ def save_vtu(state, filename, subdivide=(8, 4), lagrange=False, undeformed=False
     undeformed
         Put the points at their stress-free places. ParaView's filter "Warp By Vector" then moves
         them by any multiple of ``displacement``.
+    recover
+        Recovered strain and stress (:mod:`skfem_ancf.recovery`) where the state has them; False for
+        those of the elements at the points.
 
     Returns
     -------
@@ -201,7 +211,7 @@ def save_vtu(state, filename, subdivide=(8, 4), lagrange=False, undeformed=False
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"the file name must end with one of {', '.join(SUFFIXES)}, got "
                          f"{str(filename)!r}")
-    body = body_fields(state, subdivide, lagrange, undeformed)
+    body = body_fields(state, subdivide, lagrange, undeformed, recover)
     mesh = meshio.Mesh(body.points, body.cells, body.point_data, body.cell_data)
     with replacing(path) as temporary:
         meshio.write(temporary, mesh)

@@ -32,7 +32,8 @@ _INK, _MUTED, _GHOST = "#222222", "#666666", "#d9d9d9"
 
 @taught
 def plot_state(state, field="eps_yy", ax=None, *, thickness="auto", undeformed=True, colorbar=True,
-               cmap=None, limits=None, title=None, subdivide=(16, 8), filename=None, dpi=200):
+               cmap=None, limits=None, title=None, subdivide=(16, 8), filename=None, dpi=200,
+               recover=True):
     """Draw the deformed body of a state, coloured by a field.
 
     Parameters
@@ -66,6 +67,9 @@ def plot_state(state, field="eps_yy", ax=None, *, thickness="auto", undeformed=T
         Write the picture here too (.png, .pdf, .svg); missing folders are made.
     dpi
         Resolution of the file.
+    recover
+        Recovered strain and stress (:mod:`skfem_ancf.recovery`) where the state has them; False for
+        those of the elements at the points.
 
     Returns
     -------
@@ -99,7 +103,7 @@ def plot_state(state, field="eps_yy", ax=None, *, thickness="auto", undeformed=T
     colorbar, cmap = require_flag("colorbar", colorbar), _colormap(cmap)
     filename, dpi = _page(ax, title, filename, dpi)
     m, n = _subdivision(subdivide)
-    bodies = [_Body(state, beam, field, m, n) for beam in state.beams]
+    bodies = [_Body(state, beam, field, m, n, recover) for beam in state.beams]
     factor = _thickness(thickness, bodies)
     ghosts = [line for b in bodies for line in b.outline(b.reference, factor)] if undeformed else []
     outlines = [line for b in bodies for line in b.outline(b.deformed, factor)]
@@ -169,8 +173,8 @@ def _page(ax, title, filename, dpi):
 class _Body:
     """One beam on a grid: the deformed and the stress-free place of each point, and the field."""
 
-    def __init__(self, state, beam, field, m, n):
-        fields = sample(state, beam, grid(m, n))
+    def __init__(self, state, beam, field, m, n, recover):
+        fields = sample(state, beam, grid(m, n), recover)
         self.n, self.height = n, beam.mesh.height
         self.shape = (2, beam.mesh.nelements, m + 1, n + 1)
         # the axis is at eta = 1/2, which is on the grid only if n is even

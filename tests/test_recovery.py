@@ -1,0 +1,324 @@
+"""Recovered strain and stress, against two-dimensional solutions and closed forms."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from skfem import LinearForm
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
+                        ElementBeamPatelShabana, MeshBeam, NeoHookean, Scene, StVenantKirchhoff)
+from skfem_ancf.dynamics import GeneralizedAlpha
+from skfem_ancf.io import body_fields
+from skfem_ancf.quadrature import gauss, tensor
+from skfem_ancf.recovery import integration, smoothed, strain_of_stress
+
+REFERENCE = np.load(Path(__file__).parent / "data" / "reference_2d.npz")
+NU = 0.3
+
+
+def gravity_cantilever(element, mesh=None, n=16, **options):
+    """Example 5.2 of the paper, with a welded face."""
+    mesh = mesh or MeshBeam.init_line(np.linspace(0, 1, n + 1), height=0.01)
+    beam = Beam(mesh, element, StVenantKirchhoff(2e8, NU, 7800), width=0.01, **options)
+    return Scene(beam).clamp("left").gravity((0, -9.81)).solve_static()
+
+
+def thick_cantilever(element, mesh=None, n=16, **options):
+    """L / h = 4, a large shear force at the end."""
+    mesh = mesh or MeshBeam.init_line(np.linspace(0, 2, n + 1), height=0.5)
+    beam = Beam(mesh, element, StVenantKirchhoff(2.07e11, NU), width=0.1, **options)
+    return Scene(beam).clamp("left").traction("right", (0, -62.5e6 / 0.05)).solve_static()
+
+
+CANTILEVERS = {"gravity": gravity_cantilever, "thick": thick_cantilever}
+
+
+def field(state, x, recover=True):
+    """Strain and stress (6, n) at points (2, n): all at once what State.strain gives for one."""
+    beam, = state.beams
+    e = beam._finder(*x)
+    X = np.clip(beam.mesh.mapping().invF(x[:, :, None], tind=e), 0, 1)
+    strain, stress = (state.recovery().fields(X, e)[:2] if recover else
+                      (beam.strain(state.u, X, e), beam.stress(state.u, X, e)))
+    return np.concatenate([strain * [[[1.0]], [[1.0]], [[0.5]]], stress])[..., 0]
+
+
+def errors(name, state, where="inside", recover=True):
+    """Largest errors of eps_xx, eps_yy, eps_xy, S_xx, S_yy in % of the largest value.
+
+    S_yy in % of S_xx.
+    """
+    x, strain = REFERENCE[f"{name}_{where}_x"], REFERENCE[f"{name}_{where}"].astype(float)
+    stress = state.beams[0].material.D @ (strain * [[1.0], [1.0], [2.0]])
+    got = field(state, x, recover)
+    scale = np.append(np.abs(strain).max(axis=1), 2 * [np.abs(stress[0]).max()])
+    gap = np.abs(got[:5] - np.concatenate([strain, stress[:2]])).max(axis=1)
+    return 100 * gap / scale
+
+
+ELEMENTS = [ElementBeamANCF(2), ElementBeamANCF(3), ElementBeamANCF(4), ElementBeamANCFCubic(2),
+            ElementBeamANCFCubic(3)]
+GOALS = {"gravity": (2, 2, 5, 2, 0.1), "thick": (0.5, 0.7, 2, 0.5, 0.3)}
+
+
+def test_one_point_as_many():
+    state = gravity_cantilever(ElementBeamANCF(2), n=4)
+    for recover in (True, False):
+        one = [state.strain((0.3, 0.002), recover=recover),
+               state.stress((0.3, 0.002), recover=recover)]
+        many = field(state, np.array([[0.1, 0.3], [0.0, 0.002]]), recover)[:, 1]
+        assert_allclose(np.concatenate(one), many, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", CANTILEVERS)
+def test_the_reference_states_its_error(name):
+    assert np.all(REFERENCE[name + "_inside_error"] < 1e-3)
+    limit = {"gravity": [-0.741168, -0.903426], "thick": [-0.15792, -0.71438]}[name]
+    assert_allclose(REFERENCE[name + "_tip"], limit, rtol=2e-4)
+
+
+@pytest.mark.parametrize("name", CANTILEVERS)
+@pytest.mark.parametrize("element", ELEMENTS, ids=repr)
+def test_goals_away_from_the_weld(name, element):
+    """The goals for 16 elements, further than h from the ends; the raw field is far from them."""
+    state = CANTILEVERS[name](element)
+    assert np.all(errors(name, state) < GOALS[name])
+    assert np.any(errors(name, state, recover=False) > GOALS[name])
+
+
+@pytest.mark.parametrize("element, bound", [
+    (ElementBeamANCF(1), (2.5, 2.5, 5, 2.5, 0.15)), (ElementBeamCable(5), (0.5, 0.5, 5, 0.5, 0.1)),
+    (ElementBeamPatelShabana(), (2, 2, 5, 2, 0.1))], ids=repr)
+def test_other_elements(element, bound):
+    assert np.all(errors("gravity", gravity_cantilever(element)) < bound)
+
+
+def test_the_papers_formulation():
+    """It locks: the section forces of a body that hangs too far out."""
+    state = gravity_cantilever(ElementBeamANCF(3), formulation="continuum")
+    assert np.all(errors("gravity", state) < (13, 13, 7, 13, 0.6))
+    assert errors("gravity", state, recover=False)[2] > 100
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(3), ElementBeamANCFCubic(3)], ids=repr)
+def test_no_jumps(element):
+    state = gravity_cantilever(element)
+    r = state.recovery()
+    X = np.array([[0.0, 1.0] * 5, np.repeat(np.linspace(0, 1, 5), 2)])
+    for field_ in r.fields(X)[:2]:
+        left, right = field_[..., 0::2], field_[..., 1::2]
+        jump = np.abs(left[:, 1:] - right[:, :-1]).max(axis=(1, 2))
+        assert np.all(jump <= 1e-9 * np.abs(field_).max(axis=(1, 2)))
+
+
+def test_section_forces_are_those_of_the_free_body():
+    """The weight on the right of a section, exactly, inside of the elements as well."""
+    state = gravity_cantilever(ElementBeamANCF(3), n=5)
+    forces, weight = state.recovery().forces, 7800 * 9.81 * 1e-4
+    e, xi = np.repeat(np.arange(5), 3), np.tile([0.1, 0.5, 0.9], 5)
+    R, M = forces.at(e, xi, 0.5)
+    x = (e + xi) / 5
+    assert_allclose(R, [0 * x, -weight * (1 - x)], atol=1e-7 * weight)
+    (s, w), beam = gauss(6), state.beams[0]
+
+    def position(X, e=None):
+        return beam.mesh.mapping().F(X, e) + beam.displacements(state.u, X, e)
+
+    for k in range(len(x)):  # the weight of each piece on the right, and its arm
+        total = 0.0
+        for j in range(e[k], 5):
+            start = xi[k] if j == e[k] else 0.0
+            X, v = tensor((start + (1 - start) * s, (1 - start) * w), (s, w))
+            total += 0.2 * np.sum(v * position(X, np.array([j]))[0, 0])
+        at = position(np.array([[xi[k]], [0.5]]), e[k:k + 1])[0, 0, 0]
+        assert M[k] == pytest.approx(-weight * (total - at * (1 - x[k])), rel=1e-8, abs=1e-8)
+    reaction = state.reactions("left")
+    assert reaction.force[1] == pytest.approx(weight, rel=1e-6)
+    assert forces.M[0, 0] == pytest.approx(-reaction.moment, rel=1e-6)
+
+
+# closed forms of small deformation
+
+def small_beam(element, load, n=8, material=None, length=1.0, h=0.1, **clamp):
+    mesh = MeshBeam.init_line(np.linspace(0, length, n + 1), height=h)
+    beam = Beam(mesh, element, material or StVenantKirchhoff(1e9, NU), width=0.1)
+    scene = Scene(beam).clamp("left", **clamp)
+    load(scene)
+    return scene.solve_static()
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCF(3), ElementBeamCable(5),
+                                     ElementBeamANCFCubic(2)], ids=repr)
+def test_a_parabola_of_shear(element):
+    state = small_beam(element, lambda s: s.point_force((0, -1.0), at=(1, 0)))
+    for Y in (-0.04, 0.0, 0.025):
+        S = state.stress((0.45, Y))
+        assert S[2] == pytest.approx(-1.5 / 0.01 * (1 - (Y / 0.05) ** 2), rel=2e-3)
+        assert S[0] == pytest.approx(0.55 * Y / (0.1 * 0.1**3 / 12), rel=2e-3, abs=1.0)
+        assert abs(S[1]) < 1.0
+        assert state.strain((0.45, Y))[2] == pytest.approx(S[2] / (1e9 / 1.3), rel=1e-12)
+
+
+@pytest.mark.parametrize("side, follows", [("top", False), ("top", True), ("bottom", True)])
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamANCF(4)], ids=repr)
+def test_loaded_faces(element, side, follows):
+    """S_yy of a beam with a uniform pressure q: -q/2 (1 + 3 y - 4 y^3), y = Y / h to the face."""
+    q, sign = 10.0, 1.0 if side == "top" else -1.0
+    state = small_beam(element, lambda s: s.pressure(side, q) if follows else
+                       s.traction(side, (0, -sign * q)))
+    for Y in (-0.05, -0.02, 0.0, 0.03, 0.05):
+        y = sign * Y / 0.1
+        exact = -q / 2 * (1 + 3 * y - 4 * y**3)
+        assert state.stress((0.5, Y))[1] == pytest.approx(exact, abs=0.02 * q)
+
+
+@pytest.mark.parametrize("plane", ["stress", "strain"])
+@pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCF(3),
+                                     ElementBeamANCFCubic(2), ElementBeamCable(5)], ids=repr)
+def test_pure_bending_of_a_curved_bar(element, plane):
+    """Golovin's solution: inner radius a, outer b, moment M per width."""
+    a, b, width, M = 0.8, 1.2, 0.1, 2.0
+    arc = MeshBeam.init_curve(lambda s: np.array([np.sin(s), 1 - np.cos(s)]),
+                              np.linspace(0, 1.5, 13), height=b - a)
+    beam = Beam(arc, element, StVenantKirchhoff(1e9, NU, plane=plane), width=width)
+    state = Scene(beam).clamp("left", thickness="free").moment("right", M).solve_static()
+    log, N = np.log(b / a), (b * b - a * a) ** 2 - 4 * a * a * b * b * np.log(b / a) ** 2
+    phi = 0.75  # the centre of curvature is (0, 1): Y is measured towards it
+    for r in np.linspace(a, b, 5):
+        x = (r * np.sin(phi), 1 - r * np.cos(phi))
+        p = a * a * b * b / (r * r) * log
+        radial = -4 * M / (width * N) * (
+            p + b * b * np.log(r / b) + a * a * np.log(a / r))
+        hoop = -4 * M / (width * N) * (
+            -p + b * b * np.log(r / b) + a * a * np.log(a / r) + b * b - a * a)
+        S = state.stress(x)
+        size = 6 * M / (width * (b - a) ** 2)
+        # the moment that closes the bar presses outside and pulls inside
+        assert_allclose(S[:2], [-hoop, -radial], atol=0.01 * size)
+        assert abs(S[2]) < 0.01 * size
+
+
+def test_a_point_load_in_the_span_stops_the_recovery():
+    """The shear jumps at the load, at a node and inside of an element, and is right beside it."""
+    for at in (0.5, 0.5625 + 0.01):
+        mesh = MeshBeam.init_line(np.linspace(0, 1, 17), height=0.02)
+        beam = Beam(mesh, ElementBeamANCF(3), StVenantKirchhoff(1e9, NU), width=0.1)
+        scene = Scene(beam).clamp("left").point_force((0, -1.0), at=(at, 0))
+        state = scene.point_force((0, -0.25), at=(1, 0)).solve_static()
+        shear = 1.5 / (0.1 * 0.02)
+        for x, Q in ((at - 0.004, -1.25), (at + 0.004, -0.25), (0.3, -1.25), (0.8, -0.25)):
+            assert state.stress((x, 0))[2] == pytest.approx(Q * shear, rel=1e-2)
+
+
+def test_beams_with_a_joint():
+    """A hinge in a Gerber beam: shear and moment on both sides by statics."""
+    material = StVenantKirchhoff(1e9, NU)
+    beams = [Beam(MeshBeam.init_line(np.linspace(*ends, 9), height=0.02), ElementBeamANCF(2),
+                  material, width=0.1, name=name) for name, ends in
+             (("a", (0, 1)), ("b", (1, 2)))]
+    scene = Scene(*beams).clamp("left", beam="a").pin("right", beam="b")
+    scene.joint("hinge", beams=("a", "b"), at=(1, 0))
+    state = scene.point_force((0, -0.1), at=(1.5, 0), beam="b").solve_static()
+    assert state.recovered == {"a": "", "b": ""}
+    shear, bending = 1.5 / (0.1 * 0.02), 0.01 / (0.1 * 0.02**3 / 12)
+    for x, beam, Q, M in ((0.5, "a", -0.05, -0.025), (1.25, "b", -0.05, 0.0125),
+                          (1.75, "b", 0.05, 0.0125)):
+        assert state.stress((x, 0), beam=beam)[2] == pytest.approx(Q * shear, rel=1e-2)
+        low, high = (state.stress((x, y), beam=beam)[0] for y in (-0.01, 0.01))
+        assert 0.5 * (low - high) == pytest.approx(M * bending, rel=1e-2)
+
+
+def test_graded_mesh():
+    x = np.concatenate([np.linspace(0, 0.1, 8)[:-1], np.geomspace(0.1, 1, 9)])
+    mesh = MeshBeam.init_line(x, height=0.01)
+    assert np.all(errors("gravity", gravity_cantilever(ElementBeamANCF(3), mesh)) < GOALS["gravity"])
+
+
+# motion, laws
+
+def test_centrifugal_stress_of_a_spinning_rod():
+    """S_xx = rho omega^2 (L^2 / 4 - x^2) / 2: inertia is a body force."""
+    beam = Beam(MeshBeam.init_line(np.linspace(-0.5, 0.5, 9), height=0.05), ElementBeamANCF(2),
+                StVenantKirchhoff(1e9, NU, 1000.0), width=0.1)
+    omega = 2.0
+    scene = Scene(beam).initial_velocity(lambda x: omega * np.array([-x[1], x[0]]))
+    history = scene.integrate(t_end=0.2, dt=1e-3, scheme=GeneralizedAlpha(0.0))
+    state = history.state(len(history) - 1)
+    assert list(state.recovered.values()) == [""]
+    for x in (0.0, 0.2, 0.4):
+        exact = 0.5 * 1000 * omega**2 * (0.25 - x * x)
+        assert state.stress((x, 0.01))[0] == pytest.approx(exact, rel=0.03, abs=5.0)
+
+
+@pytest.mark.parametrize("plane", ["stress", "strain"])
+@pytest.mark.parametrize("law", [StVenantKirchhoff, NeoHookean])
+def test_inverse_of_the_law(law, plane):
+    law = law(2.0, 0.4, plane=plane).law()
+    rng = np.random.default_rng(0)
+    strain = 0.1 * rng.uniform(-1, 1, (3, 4, 5))
+    found = strain_of_stress(law, law.stress(strain), np.zeros(strain.shape))
+    assert_allclose(found, strain, atol=1e-10)
+    start = np.array([strain[0], 0 * strain[0], 0 * strain[0]])
+    assert_allclose(strain_of_stress(law, law.stress(strain), start, (1, 2)), strain, atol=1e-10)
+
+
+def test_neo_hookean_in_large_tension():
+    """The strain of a bar whose stress is uniaxial, S_11 by the law from lambda^2 C^-1."""
+    material = NeoHookean(1e6, NU)
+    state = small_beam(ElementBeamANCF(2), lambda s: s.point_force((2000.0, 0), at=(1, 0)),
+                       material=material)
+    eps, S = state.strain((0.5, 0.02)), state.stress((0.5, 0.02))
+    assert abs(S[1]) < 1e-6 * S[0] and eps[0] > 0.15
+    assert np.sqrt(1 + 2 * eps[0]) * S[0] == pytest.approx(2000 / 0.01, rel=1e-6)
+    assert_allclose(material.law().stress(np.array([eps[0], eps[1], 2 * eps[2]])), S, atol=1e-3)
+
+
+# what is not recovered
+
+def test_what_cannot_be_recovered_is_raw_and_says_why():
+    element = ElementBeamANCF(3)
+
+    @LinearForm
+    def push(v, w):
+        return -100.0 * v[1]
+
+    state = small_beam(element, lambda s: s.load(push))
+    assert "not known" in state.recovered[0] and state.recovery() is None
+    assert_allclose(state.strain((0.3, 0.02)), state.strain((0.3, 0.02), recover=False))
+    scene = gravity_cantilever(element)
+    assert scene.recovered == {0: ""}
+    linear = Scene(*scene.beams).clamp("left").gravity((0, -9.81)).solve_linear()
+    assert "no equilibrium" in linear.recovered[0]
+    mode = Scene(*scene.beams).clamp("left").modes(1).mode(0, 0.1)
+    assert "no equilibrium" in mode.recovered[0]
+
+
+def test_files_and_pictures_show_the_recovered_field():
+    pytest.importorskip("matplotlib")
+    state = gravity_cantilever(ElementBeamANCF(3))
+    for recover in (True, False):
+        data = body_fields(state, subdivide=(2, 2), recover=recover).point_data
+        X = np.array([[0.5], [1.0]])
+        k = 1 * 3 + 2  # the middle of the first element's upper face
+        point = state.beams[0].mesh.mapping().F(X)[:, 0, 0]
+        strain = state.strain(point, recover=recover)
+        assert_allclose([data[n][k] for n in ("eps_xx", "eps_yy", "eps_xy")], strain, atol=1e-12)
+    pictures = [state.plot("eps_xx", subdivide=(4, 2), recover=r) for r in (True, False)]
+    shown = [np.sort(ax.collections[1].get_array()) for ax in pictures]
+    assert np.abs(shown[0] - shown[1]).max() > 1e-3
+
+
+# tools
+
+def test_integration_matrix():
+    x = np.array([0.0, 0.1, 0.5, 0.8, 1.0])
+    assert_allclose(integration(x) @ x**3, x**4 / 4, atol=1e-14)
+
+
+def test_smoothing():
+    """cos(k s) is damped by 1 / (1 + k^2 l^2); its slope at the ends is zero."""
+    s = np.sort(np.append(np.linspace(0, 1, 400), [0.501, 0.777]))
+    out = smoothed(s, np.cos(4 * np.pi * s)[:, None], 0.1)[:, 0]
+    assert_allclose(out, np.cos(4 * np.pi * s) / (1 + (0.4 * np.pi) ** 2), atol=1e-3)
