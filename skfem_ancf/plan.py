@@ -106,8 +106,8 @@ def make_plan(scene, kind="static"):
     compiled = [b for b in beams if b.kernel.compiled is not None]
     add("compiled kernels", "computed" if compiled else "skipped",
         f"{len(compiled)} of {len(beams)} beams by Numba" if compiled else
-        compiled_off() or ("moduli that vary" if any(b.compiled for b in beams) else
-                           "compiled=False"))
+        compiled_off() or "moduli that vary" if any(b.compiled for b in beams) else
+        "compiled=False")
     what = "time steps" if dynamic else "iterations"
     if linear:
         whole, reason = False, "one solve"

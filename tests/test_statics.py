@@ -546,3 +546,24 @@ def _scene():
 def test_bad_input(call, error, message):
     with pytest.raises(error, match=message):
         call(_scene())
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_a_load_as_small_as_the_round_off_of_the_axis_is_not_ignored(compiled):
+    """Beside its axial stiffness all that bends a beam with L/h = 1e6 looks like round-off."""
+    h = 1e-6
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 17), h), ElementBeamANCF(2),
+                StVenantKirchhoff(2e8 * (0.01 / h)**3, 0.3, 7800 * 0.01 / h), 0.01,
+                compiled=compiled)
+
+    def scene(part):
+        return Scene(beam).clamp("left", thickness="free").gravity((0, -9.81 * part))
+
+    whole, less = scene(1.0).solve_static(), scene(0.98).solve_static()
+    stepped = scene(1.0).solve_static(first_step=0.25)
+    assert [step.load for step in stepped.steps] == [0.25, 0.75, 1.0]
+    assert_allclose(stepped.displacement((1, 0)), whole.displacement((1, 0)), rtol=1e-7)
+    assert abs(less.displacement((1, 0))[1] / whole.displacement((1, 0))[1] - 1) > 1e-3
+    restarted = scene(1.0).solve_static(start=less)
+    assert_allclose(restarted.displacement((1, 0)), whole.displacement((1, 0)), rtol=1e-7)
+    assert scene(1.0).solve_static(start=whole).iterations <= 2

@@ -49,13 +49,12 @@ def equilibrium(cables, beams, moments, joints, motion, border, mixed, u, multip
         J, S, H = np.zeros((m, N)), np.zeros((k_, k_)), np.empty((k_ + m, k_ + m))
         Z, W, K = np.empty((k_ + m, N)), np.empty((k_, N)), np.empty(A.size)
     work = before = reference = np.inf
-    moved, moving, yes = False, False, N > 0  # as a constant it would compile the tangent anew
-    for i in range(N):
-        moved = moved or u[i] != 0.0
+    quiet, moving, yes = False, False, N > 0  # as a constant it would compile the tangent anew
     for i in range(fixed.size):
         moving = moving or prescribed[i] != 0.0
     for k in range(limit + 1):
-        last = k > 1 and work * min(1.0, work / before) <= tol * reference + floor
+        part = min(1.0, work / before) if k > 1 else 1.0
+        last = (k > 1 or k > 0 and quiet) and work * part <= tol * reference + floor
         for turn in range(2):
             if last and turn == 0:
                 body_force(cables, beams, u, f, none, A)
@@ -91,7 +90,7 @@ def equilibrium(cables, beams, moments, joints, motion, border, mixed, u, multip
                 return -1
             record[k, 0] = rho / size if size > 0.0 else 0.0
             if k == 0:
-                small = rho <= 1e-3 * tol * size + (force_floor if moved else 0.0)
+                small, quiet = rho <= 1e-3 * tol * size, rho <= force_floor
             else:
                 small = last and rho <= tol * size + force_floor
             if small and not moving and open_ <= closed:

@@ -187,10 +187,11 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record):
             return u, multipliers, force
     external = full * system.external_force(u)
     work = before = reference = np.inf
-    scale = None
+    scale, quiet = None, False
     for k in range(max_iterations + 1):
         # after the last correction only the residual is wanted, not the tangent
-        last = k > 1 and work * min(1.0, work / before) <= tol * reference + floor
+        last = (k > 1 or k > 0 and quiet) and (
+            work * (min(1.0, work / before) if k > 1 else 1.0) <= tol * reference + floor)
         if last:
             force = system.internal_force(u)
         else:
@@ -215,11 +216,13 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record):
             raise _Failed("the strain is not finite")
         record.force_residuals.append(float(rho / size) if size > 0 else 0.0)
         if closed and not moving and (
-                rho <= 1e-3 * tol * size + (force_floor if np.any(u) else 0.0) if k == 0 else
+                rho <= 1e-3 * tol * size if k == 0 else
                 last and rho <= tol * size + force_floor):
             if system.inverted(u):
                 raise _Failed("the body is turned inside out")
             return u, multipliers, force
+        # no more than round-off: of a slender beam that may be a load, the correction tells
+        quiet = k == 0 and rho <= force_floor
         if k == max_iterations:
             break
         if last:
