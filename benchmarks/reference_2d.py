@@ -141,14 +141,14 @@ def main():
     data = {}
     for name, (n, m) in (("thick", (16, 4)), ("gravity", (96, 2))):
         results, data[name + "_tip"] = reference(name, [
-            (ElementQuad2(), (n // 2, m, 0)), (ElementQuadP(4), (n, m, 1)),
-            (ElementQuadP(4), (n * 3 // 2, m * 3 // 2, 2))])
+            (ElementQuad2(), (n // 2, m, 0)), (ElementQuadP(4), (n, m, 2)),
+            (ElementQuadP(4), (n * 3 // 2, m * 3 // 2, 3))])
         for k, where in enumerate(("inside", "weld")):
             old, new = results[-2][k], results[-1][k]
             error = np.abs(new - old).max(axis=1) / np.abs(new).max(axis=1)
             print(name, where, "relative change of the strain", error)
             data[f"{name}_{where}_x"] = points(CASES[name])[k]
-            data[f"{name}_{where}"], data[f"{name}_{where}_error"] = new, error
+            data[f"{name}_{where}"], data[f"{name}_{where}_error"] = np.float32(new), error
     FILE.parent.mkdir(exist_ok=True)
     np.savez_compressed(FILE, **data)
 

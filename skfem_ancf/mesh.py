@@ -20,6 +20,7 @@ from .errors import (CallbackError, FileError, InputError, MeshError, NameUnknow
                      teaching)
 from .frozen import Frozen, ReadOnlyDict
 from .mapping import MappingBeam
+from .places import is_point
 from .reference import ElementBeamP1
 
 logger = logging.getLogger(__name__)
@@ -466,6 +467,69 @@ class MeshBeam(Frozen, Mesh):
                 "the number of refinements", times_or_ix, 0, max(most, 0),
                 f"a mesh of {MAX_ELEMENTS} elements at most"))
         return self._adaptive(times_or_ix)
+
+    def graded(self, at=("left",), size=None, growth=0.5):
+        """A mesh that is finer near sections: for the boundary layers of supports and loads.
+
+        Elements are halved until those within one and a half heights of the sections are not
+        longer than ``size``, and those further off not longer than ``growth`` times their distance
+        from there.
+
+        Parameters
+        ----------
+        at
+            Sections: "left", "right", or points (x, y) of the axis; one, or a tuple or list of
+            several.
+        size
+            Length of the elements at the sections; a quarter of the height by default. See
+            docs/fields.md for the accuracy to expect.
+        growth
+            How fast the elements get longer, positive.
+
+        Returns
+        -------
+        MeshBeam
+            New nodes are on the curve, names are kept.
+
+        Raises
+        ------
+        InputError
+            If ``size`` or ``growth`` is not positive.
+        MeshError
+            If a section is not known, or a point is far from the beam.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import MeshBeam
+        >>> mesh = MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1).graded("left")
+        >>> mesh.p[0].tolist()[:8], mesh.nelements
+        ([0.0, 0.015625, 0.03125, 0.046875, 0.0625, 0.078125, 0.09375, 0.109375], 23)
+        """
+        size = 0.25 * self.height if size is None else require_positive("size", size)
+        growth = require_positive("growth", growth)
+        single = isinstance(at, str) or is_point(at)
+        places = np.array([self._section_point(place) for place in ([at] if single else at)])
+        mesh = self
+        while True:
+            X = np.array([np.linspace(0, 1, 5), np.full(5, 0.5)])
+            x = mesh._mapping().F(X)
+            far = np.min(np.hypot(*(x[..., None] - places.T[:, None, None])), axis=(1, 2))
+            allowed = np.maximum(size, growth * (far - 1.5 * self.height))
+            marked = np.nonzero(mesh.lengths > allowed * (1 + 1e-9))[0]
+            if len(marked) == 0:
+                return mesh
+            mesh = mesh.refined(marked)
+
+    def _section_point(self, place):
+        """The point of the axis that a place names, shape (2,)."""
+        if isinstance(place, str):
+            if place not in ("left", "right"):
+                raise NameUnknown("section", place, ("left", "right"))
+            return self.p[:, np.asarray(self.boundaries[place])[0]]
+        point = require_finite("at", place, (2,))
+        self.element_finder()(*point[:, None])
+        return point
 
     def _adaptive(self, ix):
         ix = np.unique(self.normalize_elements(ix))

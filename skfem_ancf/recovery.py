@@ -19,6 +19,8 @@ beam between two places where its section force jumps:
    put at the element's centre (sections cubic along the axis: at the Gauss points), splined.
 """
 
+from functools import cached_property
+
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_banded
@@ -32,8 +34,12 @@ from .spread import station_of_node, stations_of_vector
 #: Points across a section: 2 N + 1, and at least these.
 ACROSS = 7
 
-#: Rounds of steps 2 and 3.
-ROUNDS = 6
+#: Rounds of steps 2 and 3 at most, and the change of the stretch, relative to its largest, at which
+#: they end.
+ROUNDS, SETTLED = 6, 1e-7
+
+#: Sections up to which the derivative along the axis is a matrix.
+FEW = 128
 
 #: Within INNER heights of an end of a piece the elements' own stress is used, from LAYER heights on
 #: no longer. Not at all if the elements there are longer than COARSE heights; if they are longer
@@ -148,12 +154,16 @@ class _Piece:
                       / speed for k in (0, 1)]
         r = Sections(self.forces, self.e, xi, np.array([0.5])).field(self.forces.q, slope=True)
         self.raw_angle = np.unwrap(np.arctan2(r[1, :, 0], r[0, :, 0]))
-        self.phi = self.raw_angle
+        self.phi, self._derivative = self.raw_angle, None
         self._solve()
 
     def d_ds(self, values):
-        """The derivative along the axis of values (n, ...)."""
-        return _Spline(self.s, values)(self.s, 1)
+        """The derivative along the axis of values (n, ...), by a cubic spline."""
+        if len(self.s) > FEW:
+            return _Spline(self.s, values)(self.s, 1)
+        if self._derivative is None:
+            self._derivative = _Spline(self.s, np.eye(len(self.s)))(self.s, 1)
+        return self._derivative @ values
 
     def integral(self, values):
         """The integral over the section, with the width, of values (n, m)."""
@@ -167,10 +177,7 @@ class _Piece:
         if self.stress_given:
             return strain_of_stress(r.law, self.S, self.eps)
         self.eps[0] = 0.5 * (self.stretch**2 - 1.0)
-        # short waves would grow from round to round: S_yy holds second derivatives of S_xx
-        fed = np.array([0.0 * self.S[0], *(
-            smoothed(self.s, S, 0.5 * r.beam.mesh.height) for S in self.S[1:])])
-        eps = strain_of_stress(r.law, fed, self.eps, (1, 2))
+        eps = strain_of_stress(r.law, self._fed, self.eps, (1, 2))
         self.S[0] = r.law.stress(eps)[0]
         return eps
 
@@ -187,6 +194,8 @@ class _Piece:
         """Change S_xx linearly in Y until the section has its normal force and moment."""
         h = self.recovery.beam.mesh.height
         E = self.recovery.modulus
+        # short waves would grow from round to round: S_yy holds second derivatives of S_xx
+        self._fed = np.array([0.0 * self.S[0], *(smoothed(self.s, S, 0.5 * h) for S in self.S[1:])])
         t, n = (np.array([np.cos(self.phi), np.sin(self.phi)]),
                 np.array([-np.sin(self.phi), np.cos(self.phi)]))
         N, self.Q = np.sum(self.R * t, axis=0), np.sum(self.R * n, axis=0)
@@ -261,9 +270,13 @@ class _Piece:
         self.S, self.stretch = np.zeros((3,) + self.g.shape), np.ones(self.g.shape)
         self.stress_given = False
         for _ in range(ROUNDS):
+            before = self.stretch
             self._balance()
             self._turn()
             self._equilibrium()
+            size = np.max(np.abs(self.stretch - 1.0))
+            if np.max(np.abs(self.stretch - before)) <= SETTLED * size:
+                break
         self._balance()
         weight = self._layers()
         if np.any(weight):
@@ -279,7 +292,7 @@ class _Piece:
     def _layers(self):
         """How much of the elements' own stress each section takes, (n,): near ends that is fine."""
         r, h = self.recovery, self.recovery.beam.mesh.height
-        if r.samples is None:
+        if not r.has_stress:
             return np.zeros(len(self.s))
         lengths = np.diff(r.lengths)[self.e]
         weight = np.zeros(len(self.s))
@@ -329,9 +342,9 @@ class Recovery:
         self.from_axis = self.from_bottom - self.from_bottom[self.middle]
         self.whole = self.from_bottom[-1]
         self.lengths = self._arc_tables()
-        shows = beam.element.carries_shear_parabola and not isinstance(
+        self.has_stress = beam.element.carries_shear_parabola and not isinstance(
             beam.formulation, EnhancedContinuum)
-        self.samples = self._samples(u) if shows else None
+        self._u = u
         self.pieces = [_Piece(self, a, b) for a, b in zip(forces.cuts[:-1], forces.cuts[1:])]
         self._splines = [_Spline(p.s, np.concatenate(
             [np.moveaxis(p.strain, 0, 1), np.moveaxis(p.stress, 0, 1), p.angle[:, None]], axis=1))
@@ -352,11 +365,12 @@ class Recovery:
         inside = lagrange(x, np.multiply.outer(xi, x).ravel()).reshape(xi.shape + (8, 8))
         return self.lengths[e] + xi * np.einsum("q,...qk,...k->...", w, inside, self._speed[e])
 
-    def _samples(self, u):
-        """Places along an element, (p,), and the stress there, (3, ne, p, m)."""
+    @cached_property
+    def samples(self):
+        """Places along an element, (p,), and its own stress there, (3, ne, p, m)."""
         beam, (x, _) = self.beam, gauss(2)
         X = np.array([np.repeat(x, len(self.eta)), np.tile(self.eta, 2)])
-        stress = beam.stress(u, X).reshape(3, -1, 2, len(self.eta))
+        stress = beam.stress(self._u, X).reshape(3, -1, 2, len(self.eta))
         if beam.element.sections == "linear":
             return np.array([0.5]), stress.mean(axis=2, keepdims=True)
         return x, stress

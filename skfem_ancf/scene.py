@@ -454,7 +454,8 @@ class Scene:
             elements; the stress-free state by default. :meth:`state` makes one of coordinates.
         adapt
             Tolerance of the error: refine the meshes where it is, starting from those given. The
-            state's ``error_estimate`` says what was reached; its beams are the refined ones. See
+            state's ``error_estimate`` says what was reached; its beams are the refined ones. With
+            ``goal="strain"`` it is the error of the strain. See
             :func:`skfem_ancf.statics.adapt.solve_adaptive`.
         **options
             Those of :func:`skfem_ancf.statics.newton.solve_static`: ``method``, ``tol``,

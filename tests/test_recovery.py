@@ -10,9 +10,11 @@ from skfem import LinearForm
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana, MeshBeam, NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.dynamics import GeneralizedAlpha
+from skfem_ancf.errors import ConvergenceError, MeshError, NameUnknown
 from skfem_ancf.io import body_fields
 from skfem_ancf.quadrature import gauss, tensor
 from skfem_ancf.recovery import integration, smoothed, strain_of_stress
+from skfem_ancf.statics.adapt import strain_error
 
 REFERENCE = np.load(Path(__file__).parent / "data" / "reference_2d.npz")
 NU = 0.3
@@ -230,10 +232,72 @@ def test_beams_with_a_joint():
         assert 0.5 * (low - high) == pytest.approx(M * bending, rel=1e-2)
 
 
+def test_order_of_convergence():
+    """L2 norm over the points inside: above 2.5 for sections linear along the axis."""
+    ref, w = REFERENCE["gravity_inside"].astype(float), np.array([[1.0], [1.0], [2.0]])
+    norms = []
+    for n in (8, 16, 32):
+        gap = field(gravity_cantilever(ElementBeamANCF(3), n=n), REFERENCE["gravity_inside_x"])[:3]
+        norms.append(np.sqrt(np.sum(w * (gap - ref) ** 2) / np.sum(w * ref**2)))
+    assert np.all(np.log2(np.array(norms[:-1]) / norms[1:]) > 2.5) and norms[-1] < 0.003
+
+
+@pytest.mark.parametrize("name, element, n", [
+    ("gravity", ElementBeamANCF(3), 8), ("gravity", ElementBeamANCF(3), 32),
+    ("gravity", ElementBeamANCFCubic(2), 16), ("thick", ElementBeamANCF(2), 16),
+    ("thick", ElementBeamANCF(4), 32), ("thick", ElementBeamANCFCubic(3), 16)], ids=repr)
+def test_raw_less_recovered_estimates_the_error(name, element, n):
+    state = CANTILEVERS[name](element, n=n)
+    x, ref = REFERENCE[name + "_inside_x"], REFERENCE[name + "_inside"].astype(float)
+    raw, recovered = (field(state, x, r)[:3] for r in (False, True))
+    estimate, error = (np.linalg.norm(raw - other) for other in (recovered, ref))
+    assert 0.9 < estimate / error < 1.1  # the goal is 0.5 to 3
+
+
+def test_adaptive_strain():
+    scene = Scene(*gravity_cantilever(ElementBeamANCF(3)).beams).clamp("left")
+    state = scene.gravity((0, -9.81)).solve_static(adapt=0.1, goal="strain")
+    assert state.error_estimate["strain"] <= 0.1
+    error, size = (x.sum() for x in strain_error(state, state.beams[0]))
+    assert np.sqrt(error / size) == pytest.approx(state.error_estimate["strain"])
+    x, ref = REFERENCE["gravity_inside_x"], REFERENCE["gravity_inside"].astype(float)
+    gaps = [np.linalg.norm(field(state, x, r)[:3] - ref) / np.linalg.norm(ref)
+            for r in (False, True)]
+    assert 0.5 < state.error_estimate["strain"] / gaps[0] < 3
+    assert gaps[1] < 0.1 * gaps[0]
+    lengths = state.beams[0].mesh.lengths
+    assert lengths[0] < 0.5 * lengths[-1]
+    with pytest.raises(NameUnknown, match="stress"):
+        scene.solve_static(adapt=0.1, goal="stress")
+    thick = Scene(*thick_cantilever(ElementBeamANCF(2)).beams).clamp("left")
+    with pytest.raises(ConvergenceError, match="higher order"):
+        thick.traction("right", (0, -1e6)).solve_static(adapt=0.01, goal="strain")
+
+
 def test_graded_mesh():
     x = np.concatenate([np.linspace(0, 0.1, 8)[:-1], np.geomspace(0.1, 1, 9)])
     mesh = MeshBeam.init_line(x, height=0.01)
     assert np.all(errors("gravity", gravity_cantilever(ElementBeamANCF(3), mesh)) < GOALS["gravity"])
+
+
+def test_meshes_graded_to_sections():
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 9), height=0.02)
+    for at, places in (("left", [0.0]), (["left", (0.5, 0.0)], [0.0, 0.5]), ((0.5, 0.0), [0.5])):
+        fine = mesh.graded(at, size=0.005)
+        assert set(np.round(mesh.p[0], 12)) <= set(np.round(fine.p[0], 12))
+        middle = 0.5 * (fine.p[0, 1:] + fine.p[0, :-1])
+        far = np.min(np.abs(middle[:, None] - np.array(places)), axis=1)
+        assert np.all(fine.lengths[far < 0.03] <= 0.005 + 1e-12)
+        assert fine.lengths[np.argmax(far)] == pytest.approx(0.125)
+        assert np.all(fine.lengths[1:] / fine.lengths[:-1] < 4.1)
+    arc = MeshBeam.init_curve(lambda s: np.array([np.sin(s), 1 - np.cos(s)]),
+                              np.linspace(0, 1.5, 4), height=0.1).graded("right")
+    assert arc.lengths[-1] <= 0.025 < arc.lengths[0]
+    assert np.allclose(arc.p, [np.sin(arc.s), 1 - np.cos(arc.s)])
+    with pytest.raises(NameUnknown):
+        mesh.graded("middle")
+    with pytest.raises(MeshError):
+        mesh.graded((0.5, 3.0))
 
 
 # motion, laws

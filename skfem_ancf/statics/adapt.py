@@ -4,26 +4,36 @@ import logging
 
 import numpy as np
 
-from ..errors import ConvergenceError, require_integer, require_positive, taught
+from ..errors import (ConvergenceError, InputError, NameUnknown, require_integer,
+                      require_positive, taught)
+from ..quadrature import gauss, tensor
 
 logger = logging.getLogger(__name__)
 
 #: Part of the squared error whose elements are halved.
 BULK = 0.7
 
+#: What the error is measured in.
+GOALS = ("displacement", "strain")
+
 #: Largest number of elements that may be allowed.
 MAX_ELEMENTS = 10**7
 
 
 @taught
-def solve_adaptive(scene, tol, max_elements=20000, **options):
+def solve_adaptive(scene, tol, max_elements=20000, goal="displacement", **options):
     """Solve on meshes that are refined until the estimated error is small enough.
 
-    Each round solves on a mesh and on the same with every element halved. The difference is the
+    With the goal "displacement" each round solves on a mesh and on the same with every element halved. The difference is the
     estimate: in the displacement of the beams' ends relative to the size of the scene, and
     relative in the strain energy. Once the mesh resolves the solution, a method of order p leaves
     the finer solution an error of 1 / (2^p - 1) of it, a third or less. The elements that
     contribute most to the difference in the energy norm are halved for the next round.
+
+    With the goal "strain" the estimate is the difference of the elements' strain and the recovered
+    one (:mod:`skfem_ancf.recovery`), in the L2 norm over the body relative to that of the strain,
+    and the elements that contribute most to it are halved. It estimates the error of the elements'
+    strain; that of the recovered strain, which is what State.strain returns, is smaller.
 
     Parameters
     ----------
@@ -34,6 +44,8 @@ def solve_adaptive(scene, tol, max_elements=20000, **options):
         Tolerance of both estimates.
     max_elements
         Largest number of elements of the finer mesh.
+    goal
+        "displacement" or "strain".
     **options
         Those of :func:`~skfem_ancf.statics.newton.solve_static`.
 
@@ -41,15 +53,23 @@ def solve_adaptive(scene, tol, max_elements=20000, **options):
     -------
     State
         On the finer mesh of the last round, with ``error_estimate``, a dictionary with
-        "displacement" and "energy", and ``scene``, the scene on that mesh.
+        "displacement" and "energy", or "strain", and ``scene``, the scene on that mesh.
 
     Raises
     ------
+    NameUnknown
+        If the goal is not known.
+    InputError
+        If the goal is "strain" and a beam's strain cannot be recovered.
     ConvergenceError
         If ``max_elements`` do not suffice; its ``state`` is the last State.
     """
     tol = require_positive("adapt", tol)
     max_elements = require_integer("max_elements", max_elements, 1, MAX_ELEMENTS)
+    if goal not in GOALS:
+        raise NameUnknown("goal", goal, GOALS)
+    if goal == "strain":
+        return _solve_for_strain(scene, tol, max_elements, **options)
     coarse = scene
     while True:
         # each from the stress-free state: what a coarse mesh does not see as strain a finer one
@@ -65,12 +85,75 @@ def solve_adaptive(scene, tol, max_elements=20000, **options):
         if max(estimate.values()) <= tol:
             return better
         if n >= max_elements:
-            raise ConvergenceError(
-                f"{n} elements leave an estimated error of {max(estimate.values()):.3g}, adapt = "
-                f"{tol:g} is not reached: raise max_elements or use an element of higher order",
-                better)
+            raise _too_few(n, estimate, tol, better)
         marked = _mark(coarse, fine, better.u - prolong(state.u), better.u)
         coarse, _ = refine(coarse, marked)
+
+
+def _too_few(n, estimate, tol, state):
+    return ConvergenceError(
+        f"{n} elements leave an estimated error of {max(estimate.values()):.3g}, adapt = {tol:g} is "
+        "not reached: raise max_elements or use an element of higher order", state)
+
+
+def _solve_for_strain(scene, tol, max_elements, **options):
+    before = 0, np.inf
+    while True:
+        state = scene._solve(None, **options)
+        parts = [strain_error(state, b) for b in scene.beams]
+        errors, sizes = (np.concatenate(x) for x in zip(*parts))
+        size = sizes.sum()
+        estimate = {"strain": float(np.sqrt(errors.sum() / size)) if size else 0.0}
+        state = state.replace(error_estimate=estimate, scene=scene)
+        logger.info("%d elements, estimated error of the strain %.3g", len(errors),
+                    estimate["strain"])
+        if estimate["strain"] <= tol:
+            return state
+        stuck = False
+        if len(errors) >= 2 * before[0]:
+            stuck = estimate["strain"] > 0.95 * before[1]
+            before = len(errors), estimate["strain"]
+        if stuck:
+            raise ConvergenceError(
+                f"the estimated error of the strain stays at {before[1]:.3g} as elements are added, "
+                f"adapt = {tol:g} is not reached: the sections cannot show this field, use an "
+                "element of higher order", state)
+        if len(errors) >= max_elements:
+            raise _too_few(len(errors), estimate, tol, state)
+        scene, _ = refine(scene, _largest(errors, [len(e) for e, _ in parts]))
+
+
+def strain_error(state, beam):
+    """Squared L2 norm of recovered minus elements' strain, and of the strain, by element.
+
+    Parameters
+    ----------
+    state
+        A State.
+    beam
+        One of its beams.
+
+    Returns
+    -------
+    error, size
+        Shapes (nelements,).
+
+    Raises
+    ------
+    InputError
+        If the strain of the beam cannot be recovered.
+    """
+    recovery = state.recovery(beam)
+    if recovery is None:
+        k = list(state.beams).index(beam)
+        raise InputError('the goal "strain" needs recovered fields, which this scene has not: '
+                         f"{list(state.recovered.values())[k]}")
+    X, W = tensor(gauss(5), gauss(2 * max(beam.element.order, 1) + 1))
+    dV = beam.width * W * beam.mesh.mapping().detDF(X)
+    strain = recovery.fields(X)[0]
+    gap = strain - beam.strain(state.u_of(beam), X)
+    weights = np.array([1.0, 1.0, 0.5])  # eps_xy twice, from its double
+    return tuple(np.einsum("k,kep,ep->e", weights, f * f, dV) for f in (gap, strain))
 
 
 def refine(scene, marked):
@@ -128,9 +211,13 @@ def _mark(coarse, fine, difference, u):
         K = b.kernel.tangents(u[s])
         local = np.abs(np.einsum("ei,eij,ej->e", d, K, d))
         errors.append(local.reshape(-1, 2).sum(axis=1))
-    every = np.concatenate(errors)
-    order = np.argsort(-every)
-    keep = order[:1 + int(np.searchsorted(np.cumsum(every[order]), BULK * every.sum()))]
-    chosen = np.zeros(len(every), dtype=bool)
+    return _largest(np.concatenate(errors), [len(e) for e in errors])
+
+
+def _largest(errors, numbers):
+    """For each beam its elements among those that make up most of the squared error."""
+    order = np.argsort(-errors)
+    keep = order[:1 + int(np.searchsorted(np.cumsum(errors[order]), BULK * errors.sum()))]
+    chosen = np.zeros(len(errors), dtype=bool)
     chosen[keep] = True
-    return [np.nonzero(c)[0] for c in np.split(chosen, np.cumsum([len(e) for e in errors])[:-1])]
+    return [np.nonzero(c)[0] for c in np.split(chosen, np.cumsum(numbers)[:-1])]
