@@ -321,6 +321,26 @@ def test_iterations_that_are_enough(P, most, compiled):
     assert_allclose(state.u, fine.u, rtol=0, atol=1e-8)
 
 
+def test_a_moved_support_and_a_joint_beside_it_take_no_more_iterations():
+    """The joint's equation sees what the support moves in the first step."""
+    beams = [Beam(line(3, origin=(k, 0)), ElementBeamCable(), STEEL, 0.1, compiled=False)
+             for k in (0, 1)]
+    scene = Scene(*beams).clamp("left", beam=0).fix("right", ["r^2"], displacement=0.05, beam=1)
+    scene.joint("hinge", beams=(0, 1), at=(1, 0))
+    scene.joint("line", at=(2.0, 0.0), direction=(1, 0.2), beam=1, through=(2.0, 0.05))
+    state = scene.solve_static()
+    assert len(state.steps) == 1 and state.iterations <= 5
+    assert_allclose(state.displacement((2, 0), 1), (0.0, 0.05), rtol=0, atol=1e-12)
+
+
+def test_a_restart_at_the_solution_does_nothing():
+    """Round-off of slender strains is known to be that: the tolerance is below it."""
+    beam = Beam(line(4, 1e-4), ElementBeamCable(5), STEEL, 0.1, compiled=False)
+    scene = Scene(beam).clamp("left").point_force((0, -1e-10), at=(1, 0))
+    state = scene.solve_static(tol=1e-13)
+    assert scene.solve_static(start=state, tol=1e-13).iterations == 0
+
+
 def test_a_restart_goes_by_way_of_the_loads_between():
     """Every load step has something to do; the last ends where a new start ends."""
     old, scene = loaded(1.0).solve_static(), loaded(8.0)
