@@ -350,6 +350,15 @@ def test_a_restart_goes_by_way_of_the_loads_between():
     assert_allclose(state.u, scene.solve_static().u, rtol=0, atol=1e-7)
 
 
+def test_a_path_begins_with_any_arc_length():
+    """Ten times the size of the scene is cut until it leads somewhere: more than 10 times here."""
+    scene = loaded(1.0)
+    path = scene.continuation(ds=10.0, steps=1)
+    assert len(path) == 2 and 0.05 < path.arc[1] < 1.0
+    expected = loaded(path.load[1]).solve_static()
+    assert_allclose(path.displacement((1, 0))[1], expected.displacement((1, 0)), rtol=0, atol=1e-6)
+
+
 # motion
 
 

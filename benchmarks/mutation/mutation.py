@@ -244,7 +244,7 @@ def baseline(again):
         print(f"one run of {len(new)} files of tests under coverage ...", flush=True)
 
         def run():
-            cov = coverage.Coverage(data_file=str(data), source=[str(PACKAGE)], branch=False,
+            cov = coverage.Coverage(data_file=str(data), source=[str(PACKAGE)], branch=True,
                                     config_file=False)
             if durations:
                 cov.load()
@@ -317,8 +317,9 @@ def sampled(arguments):
     every = [(name, *m) for name in files(arguments.only or FILES) for m in mutants(name)]
     rng = random.Random(arguments.seed)
     rng.shuffle(every)
-    print(f"{len(every)} mutants, of which {min(arguments.sample, len(every))} are run")
-    for name, line, what, number in every[:arguments.sample]:
+    chosen = every[arguments.skip:arguments.skip + arguments.sample]
+    print(f"{len(every)} mutants, of which {len(chosen)} are run")
+    for name, line, what, number in chosen:
         tree, text = mutated(name, number)
         yield f"{name}:{line} [{number}] {what}: {text[:70]}", name, tree, (line,)
 
@@ -327,6 +328,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="*", help="files, as joints/weld or statics/*")
     parser.add_argument("--sample", type=int, default=300, help="how many, drawn at random")
+    parser.add_argument("--skip", type=int, default=0, help="how many of them were run before")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--named", action="store_true", help="those written by hand instead")
     parser.add_argument("--match", default="", help="with --named: part of the title")
@@ -347,7 +349,7 @@ def main():
     import scipy.sparse.linalg  # noqa: F401
     import skfem  # noqa: F401
 
-    count, log = {}, OUT / ("named.txt" if arguments.named else f"run-{arguments.seed}.txt")
+    count, log = {}, OUT / ("named.txt" if arguments.named else f"run-{arguments.seed}-{arguments.skip}.txt")
     begin = time.time()
     with open(log, "w") as lines:
         for title, name, tree, where in (named() if arguments.named else sampled(arguments)):
