@@ -1,9 +1,44 @@
 """An equilibrium path as a result."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .errors import require_index, teaching
 from .results import State
+
+
+@dataclass(repr=False)
+class CriticalPoint:
+    """A limit or bifurcation point of a path.
+
+    Attributes
+    ----------
+    kind : str
+        "limit", where the load turns, or "bifurcation", where another path crosses.
+    load
+        Load factor.
+    arc
+        Arc length along the path.
+    state : State
+        The equilibrium.
+    mode
+        The null vector of the tangent stiffness, shape (N,); at a limit point the direction of
+        the path.
+    change
+        By how many the number of negative eigenvalues changes there; None if it is not known.
+    """
+
+    kind: str
+    load: float
+    arc: float
+    state: State
+    mode: np.ndarray
+    change: int
+    critical: object
+
+    def __repr__(self):
+        return f"<{self.kind} point at load {self.load:.8g}, arc length {self.arc:.6g}>"
 
 
 @teaching
@@ -19,30 +54,46 @@ class Path:
     arc
         Arc length along the path, shape (n,).
     stable
-        Whether each equilibrium is stable, None where it was not computed (scenes with
-        multipliers).
+        Whether each equilibrium is stable; None where the loads have no potential.
+    negative
+        Number of negative eigenvalues of the tangent stiffness of each, or None.
+    error
+        Size of the last correction of each point in the energy norm, relative to the work done,
+        shape (n,): all of them are equilibria to this accuracy, however long the steps.
+    critical_points : list of CriticalPoint
+        Limit and bifurcation points in the order of the path, each solved for as a point of it.
     """
 
-    def __init__(self, system, points):
+    def __init__(self, system, points, critical=()):
         self.system, self.points = system, points
         self.load = np.array([p.load for p in points])
         self.u = np.array([p.u for p in points])
         self.arc = np.array([p.arc for p in points])
+        self.error = np.array([p.error for p in points])
+        self.negative = [p.negative for p in points]
         self.stable = [p.stable for p in points]
         self.iterations = sum(p.iterations for p in points)
+        self.critical_points = [
+            CriticalPoint(c.kind, c.load, c.arc, self._state(c, f"{c.kind} point"), c.mode,
+                          c.change, c) for c in critical]
 
     def __len__(self):
         return len(self.points)
 
     def __repr__(self):
         return (f"<Path of {len(self)} points, load {self.load.min():.6g} to "
-                f"{self.load.max():.6g}, {self.iterations} iterations>")
+                f"{self.load.max():.6g}, {len(self.limit_points())} limit and "
+                f"{len(self.bifurcation_points())} bifurcation points, {self.iterations} "
+                f"iterations, relative error {self.error.max():.1g}>")
+
+    def _state(self, p, message, iterations=0):
+        return State(self.system, p.u, p.load, p.force, True, iterations, message, (),
+                     p.multipliers)
 
     def state(self, k):
         """Point ``k`` as a State."""
         p = self.points[require_index("k", k, len(self.points))]
-        return State(self.system, p.u, p.load, p.force, True, p.iterations, f"point {k}", (),
-                     p.multipliers)
+        return self._state(p, f"point {k}", p.iterations)
 
     def displacement(self, point, beam=None):
         """Displacement of a material point along the path, shape (n, 2)."""
@@ -50,30 +101,19 @@ class Path:
         return beam.point_displacement(self.u[:, self.system.of(beam)], e, X)
 
     def limit_points(self):
-        """Load factors at the turning points of the load.
+        """Load factors at the turning points of the load, in the order of the path."""
+        return self._loads("limit")
 
-        Between two points the load is a cubic polynomial of the arc length, by its values and its
-        rates at both.
+    def bifurcation_points(self):
+        """Load factors where other paths cross this one, in its order.
 
-        Returns
-        -------
-        ndarray
-            In the order of the path.
+        :attr:`critical_points` has their states and modes; ``scene.continuation(branch=...)`` with
+        one of them follows the other path.
         """
-        out = []
-        for p, q in zip(self.points[:-1], self.points[1:]):
-            h = q.arc - p.arc
-            if not p.rate * q.rate < 0:
-                continue
-            # coefficients in x = (arc - p.arc) / h
-            a, b = p.load, h * p.rate
-            c = 3 * (q.load - a) - 2 * b - h * q.rate
-            d = -2 * (q.load - a) + b + h * q.rate
-            roots = np.roots([3 * d, 2 * c, b]) if d else np.array([-b / (2 * c)])
-            x = [r.real for r in roots if abs(r.imag) < 1e-12 and 0 <= r.real <= 1]
-            if x:
-                out.append(a + x[0] * (b + x[0] * (c + x[0] * d)))
-        return np.array(out)
+        return self._loads("bifurcation")
+
+    def _loads(self, kind):
+        return np.array([c.load for c in self.critical_points if c.kind == kind])
 
     def plot(self, point, component=1, beam=None, **options):
         """Draw load against a displacement; see :func:`skfem_ancf.visuals.matplotlib.plot_path`."""

@@ -13,7 +13,7 @@ from .errors import (ConvergenceError, InputError, ask_field, require_finite, re
                      require_option, shown, teaching)
 from .joints import Joint, bind_joint, get_joint
 from .loads import (EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight, bind_load)
-from .path import Path
+from .path import CriticalPoint, Path
 from .places import on_other_mesh
 from .plan import make_plan
 from .results import State
@@ -526,30 +526,55 @@ class Scene:
             raise ConvergenceError(str(error), self._state(error.state)) from None
         return self._state(result)
 
-    def continuation(self, **options):
+    def continuation(self, branch=None, **options):
         """The equilibrium path through limit and snap-back points, by arc length.
 
         Parameters
         ----------
+        branch
+            One of the ``critical_points`` of an earlier path of this scene, of kind "bifurcation":
+            follow the path that leaves the other one there.
         **options
             Those of :func:`skfem_ancf.statics.continuation.continuation`: ``steps``, ``ds``,
-            ``ds_max``, ``max_load``, ``until``, ``tol``, ``max_iterations``, ``progress``.
+            ``ds_max``, ``max_load``, ``until``, ``tol``, ``max_iterations``, ``locate``, ``side``,
+            ``progress``.
 
         Returns
         -------
         Path
+            With ``limit_points()``, ``bifurcation_points()`` and ``critical_points``.
 
         Raises
         ------
+        InputError
+            If an argument is out of range or the branch point belongs to another scene.
         ConvergenceError
             If the path cannot be followed further; its ``state`` is the Path so far.
+
+        Examples
+        --------
+        Euler's column buckles at pi^2 E I / (4 L^2); its two paths:
+
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> column = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(5),
+        ...               StVenantKirchhoff(12e6, 0.3), width=1.0)
+        >>> scene = Scene(column).clamp("left").point_force((-1, 0), (1, 0))
+        >>> path = scene.continuation(max_load=3, ds=1e-4)
+        >>> bool(abs(path.bifurcation_points()[0] / (np.pi**2 / 4) - 1) < 1e-3), path.stable[-1]
+        (True, False)
+        >>> buckled = scene.continuation(branch=path.critical_points[0], max_load=3, ds=0.05)
+        >>> float(buckled.load[-1]), buckled.stable[-1]
+        (3.0, True)
         """
         system = self.system
         system.require_supports()
+        if branch is not None:
+            branch = _branch(branch, system)
         try:
-            return Path(system, continuation(system, **options))
+            return Path(system, *continuation(system, branch=branch, **options))
         except ConvergenceError as error:
-            raise ConvergenceError(str(error), Path(system, error.state)) from None
+            raise ConvergenceError(str(error), Path(system, *error.state)) from None
 
     def initial_velocity(self, v, beam=None):
         """The velocity at the start of :meth:`integrate`.
@@ -669,3 +694,14 @@ class Scene:
     def _state(self, result):
         return State(self.system, result.u, result.load, result.force, result.converged,
                      result.iterations, result.message, result.steps, result.multipliers)
+
+
+def _branch(point, system):
+    """What a CriticalPoint of a path of a system was made from."""
+    if not isinstance(point, CriticalPoint) or point.kind != "bifurcation":
+        raise InputError("branch must be a point of path.critical_points of kind 'bifurcation', "
+                         f"got {point!r}")
+    if point.state.system is not system:
+        raise InputError("the branch point belongs to another scene, or to this one before it was "
+                         "changed: follow its path again")
+    return point.critical

@@ -1,72 +1,240 @@
-"""Arc-length continuation: equilibria beyond limit and snap-back points."""
+"""Arc-length continuation: equilibria beyond limit, snap-back and bifurcation points."""
 
 import logging
 
 import numpy as np
 
-from ..errors import (CallbackError, ConvergenceError, ask, require_function,
+from ..errors import (CallbackError, ConvergenceError, InputError, ask, require_function,
                       require_integer, require_positive, shown, taught)
 from ..progress import progress_bar
+from .critical import find_critical
 
 logger = logging.getLogger(__name__)
-
-
 #: Steps of the longest path.
 MAX_STEPS = 10**6
+#: How far a step may be off a straight line, relative to its length and to the load.
+TURN = 0.03
 
 
-class _Failed(Exception):
+class Failed(Exception):
     """A step did not converge."""
 
 
 class Point:
-    """One equilibrium of a path."""
+    """One equilibrium of a path.
 
-    def __init__(self, u, multipliers, load, force, stable, iterations, arc):
+    Attributes
+    ----------
+    u, multipliers, load, force
+        Displacement (N,), multipliers (m,), load factor and internal force (N,).
+    arc
+        Arc length from the start of the path.
+    rate
+        Of the load with the arc length; zero at a limit point.
+    tangent
+        Of the displacement with the arc length, (N,).
+    negative
+        Number of negative eigenvalues of the tangent stiffness on the tangent space of the
+        constraints; None where the loads have no potential.
+    stable
+        Whether ``negative`` is zero; None where it is not known.
+    error
+        Size of the last correction in the energy norm, relative to the work done.
+    iterations
+        Linear systems solved.
+    """
+
+    def __init__(self, u, multipliers, load, force, arc, error, iterations):
         self.u, self.multipliers, self.load, self.force = u, multipliers, load, force
-        self.stable, self.iterations, self.arc = stable, iterations, arc
-        self.rate = np.nan  # of the load with the arc length; known once the next step begins
+        self.arc, self.error, self.iterations = arc, error, iterations
+        self.rate, self.tangent, self.multiplier_rate, self.negative = np.nan, None, None, None
+
+    @property
+    def stable(self):
+        return None if self.negative is None else self.negative == 0
+
+
+class Tracer:
+    """Corrector and tangent of the equilibrium path of a system.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    tol, max_iterations
+        As for :func:`continuation`.
+    """
+
+    def __init__(self, system, tol, max_iterations):
+        self.system, self.tol, self.max_iterations = system, tol, max_iterations
+        weights = np.zeros(system.N)
+        for beam, s in zip(system.beams, system.slices):
+            weights[s].reshape(-1, beam.nd)[:, :2] = 1.0
+        self.weights = weights / (0.5 * weights.sum() * system.size**2)
+        self.unit = system.values(1.0) - system.values(0.0)
+
+    def norm(self, v):
+        """The norm of the nodes' mean displacement over the size of the scene."""
+        return np.sqrt(v @ (self.weights * v))
+
+    def stress_free(self):
+        """The stress-free state as a point."""
+        zero = np.zeros(self.system.N)
+        return Point(zero, np.zeros(self.system.m), 0.0, zero, 0.0, 0.0, 0)
+
+    def _drive(self, external, u, load):
+        """What a unit of load adds to the residual and to the constraints."""
+        system, phi = self.system, np.zeros(self.system.m)
+        if system.drives:
+            h = 1e-6 * max(1.0, abs(load))
+            phi = (system.constraint(u, load + h) - system.constraint(u, load - h)) / (2.0 * h)
+        if np.any(self.unit):
+            du0 = np.zeros(system.N)
+            du0[system.fixed] = self.unit
+            external = external - system.multiply(du0)
+            if system.joints:
+                phi = phi + system.full_jacobian(u, load) @ du0
+        return external, -phi
+
+    def factorize(self, point):
+        """Factorise the tangent stiffness of a point and count its negative eigenvalues."""
+        system = self.system
+        system.assemble(point.u, point.load)
+        drive = self._drive(system.external_force(point.u), point.u, point.load)
+        try:
+            system.factorize(point.u, point.load, point.multipliers)
+            if system.symmetric:
+                point.negative = system.inertia().negative
+        except (np.linalg.LinAlgError, RuntimeError):
+            raise Failed("the tangent is singular") from None
+        return drive
+
+    def set_tangent(self, point, along=None):
+        """Find the tangent of the path at a point, in the sense of the displacement ``along``."""
+        drive, phi = self.factorize(point)
+        dF, mF = self.system.solve(drive, phi)
+        dF[self.system.fixed] += self.unit
+        size = self.norm(dF)
+        if not size > 0 or not np.isfinite(size):
+            raise Failed("the loads move nothing" if size == 0 else "the tangent is singular")
+        if along is not None and along @ (self.weights * dF) < 0:
+            size = -size
+        point.rate, point.tangent, point.multiplier_rate = 1.0 / size, dF / size, mF / size
+        return point
+
+    def set_tangent_after(self, start, point):
+        """:meth:`set_tangent` in the sense of the way from ``start``."""
+        return self.set_tangent(point, point.u - start.u)
+
+    def advance(self, start, ds):
+        """The point at distance ds along the tangent of ``start``."""
+        first = ds * start.tangent, ds * start.multiplier_rate, ds * start.rate
+        plane = self.weights * start.tangent
+
+        def increment(step, dR, dF):  # the plane at distance ds
+            return (ds - plane @ (step + dR)) / (plane @ dF)
+
+        return self._correct(start, first, increment, ds)
+
+    def at_load(self, start, load, guess):
+        """The point at a load near ``start``, from a guess of the displacement from it."""
+        first = guess[0], guess[1], load - start.load
+        return self._correct(start, first, lambda step, dR, dF: 0.0, np.inf)
+
+    def _correct(self, start, first, increment, ds):
+        """Iterate from ``start`` and a first increment of u, multipliers and load."""
+        system, weights = self.system, self.weights
+        u, m, load = start.u, start.multipliers, start.load
+        _, evaluations = system.assemble(u, load)
+        du, dm, dl = first
+        step, floor, work, reference = np.zeros(system.N), 8.0 * system.work_noise, np.inf, 0.0
+        for k in range(1, self.max_iterations + 1):
+            carried = system.stress_step(evaluations, du)
+            u, m, load, step = u + du, m + dm, load + dl, step + du
+            with np.errstate(over="ignore", invalid="ignore"):
+                force, evaluations = system.assemble(u, load, carried)
+                external = system.external_force(u)
+            if not np.all(np.isfinite(force)):
+                raise Failed("the strain is not finite")
+            residual, phi = load * external - force, system.constraint(u, load)
+            if system.joints:
+                residual = residual - m @ system.jacobian(u, load)
+            closed = np.max(np.abs(phi), initial=0.0) <= 1e-12 * system.size
+            reference = np.sqrt(max(abs(load * external @ u), abs(force @ u),
+                                    abs(external @ step * dl)))
+            if closed and work <= self.tol * reference + floor:
+                return Point(u, m, load, force, start.arc + ds,
+                             work / reference if reference > 0 else 0.0, k)
+            drive, gap = self._drive(external, u, load)
+            try:
+                system.factorize(u, load, m)
+                dR, mR = system.solve(residual, -phi)
+                dF, mF = system.solve(drive, gap)
+            except (np.linalg.LinAlgError, RuntimeError):
+                raise Failed("the tangent is singular") from None
+            dF[system.fixed] += self.unit
+            dl = increment(step, dR, dF)
+            du, dm = dR + dl * dF, mR + dl * mF
+            if not np.all(np.isfinite(du)) or np.sqrt(du @ (weights * du)) > 10 * ds:
+                raise Failed("the iteration leaves the path")
+            work = np.sqrt(abs((residual * system.free) @ du) + abs(phi @ dm)
+                           + abs(dl * (external @ du)))
+        raise Failed(f"no convergence in {self.max_iterations} iterations")
 
 
 @taught
 def continuation(system, steps=100, ds=0.02, ds_max=None, max_load=None, until=None, tol=1e-8,
-                 max_iterations=15, progress=None):
-    """Follow the equilibrium path from the stress-free state.
+                 max_iterations=15, locate=1e-8, branch=None, side=1, progress=None):
+    """Follow the equilibrium path from the stress-free state or from a bifurcation point.
 
     Each step advances by ``ds`` along the tangent of the path, in the norm of the nodes' mean
     displacement over the size of the scene, with the load factor as an unknown, so that the path
-    may turn in load and in displacement. The geometric part of the tangent uses the carried
-    stress, as in :func:`~skfem_ancf.statics.newton.solve_static`.
+    may turn in load and in displacement. Steps become shorter where the path or its load turns
+    and where iterations multiply. The geometric part of the tangent uses the carried stress, as in
+    :func:`~skfem_ancf.statics.newton.solve_static`.
+
+    Where the load turns, or the number of negative eigenvalues of the tangent stiffness changes,
+    the limit or bifurcation point is solved for within its step.
 
     Parameters
     ----------
     system
         A :class:`~skfem_ancf.system.System`.
     steps
-        Largest number of steps.
+        Largest number of steps, at most 10**6.
     ds
-        First arc length, relative to the size of the scene; later ones adapt to the iterations.
+        First arc length, relative to the size of the scene; later ones adapt.
     ds_max
         Largest arc length; 5 ds by default.
     max_load
-        Stop when the load factor exceeds this in size.
+        End where the load factor reaches this in size; the last point is there.
     until
         A function of a :class:`Point` that returns True to stop.
     tol
         Relative error of a correction in the energy norm.
     max_iterations
         Iterations before a step is halved.
+    locate
+        Tolerance of the arc length at critical points, relative to that of their step; the load
+        of a limit point is then good to its square. None not to look for them.
+    branch
+        A critical point of an earlier path, of kind "bifurcation": follow the path that leaves
+        the other one there, along its mode.
+    side
+        1 or -1: in the sense of the mode or against it.
     progress
         Show a progress bar: True, False, or None for "if it takes long".
 
     Returns
     -------
-    list of Point
+    points, critical : list of Point, list of Critical
 
     Raises
     ------
+    InputError
+        If an argument is out of range.
     ConvergenceError
-        If the arc length falls below ``1e-4 ds``; ``state`` is the list of points so far.
+        If the arc length falls below ``1e-4 ds``; ``state`` is the two lists so far.
 
     References
     ----------
@@ -75,42 +243,47 @@ def continuation(system, steps=100, ds=0.02, ds_max=None, max_load=None, until=N
     (2017).
     """
     steps = require_integer("steps", steps, 1, MAX_STEPS)
-    max_iterations = require_integer("max_iterations", max_iterations, 1, 10000)
-    tol, ds = require_positive("tol", tol), require_positive("ds", ds)
-    if max_load is not None:
-        max_load = require_positive("max_load", max_load)
+    ds = require_positive("ds", ds)
+    ds_max = 5.0 * ds if ds_max is None else require_positive("ds_max", ds_max)
+    max_load = None if max_load is None else require_positive("max_load", max_load)
+    locate = None if locate is None else require_positive("locate", locate)
     if until is not None:
         require_function("until", until, "of a point of the path that returns True or False")
-    ds_max = 5.0 * ds if ds_max is None else require_positive("ds_max", ds_max)
-    weights = np.zeros(system.N)
-    for beam, s in zip(system.beams, system.slices):
-        weights[s].reshape(-1, beam.nd)[:, :2] = 1.0
-    weights /= 0.5 * weights.sum() * system.size**2
-    zero = np.zeros(system.N)
-    points = [Point(zero, np.zeros(system.m), 0.0, zero, True, 0, 0.0)]
-    step, direction = ds, None
+    if isinstance(side, bool) or side not in (1, -1):
+        raise InputError(f"side must be 1 or -1, got {side!r}")
+    tracer = Tracer(system, require_positive("tol", tol),
+                    require_integer("max_iterations", max_iterations, 1, 10000))
+    points, critical, step = [_start(tracer, branch, side)], [], ds
     with progress_bar(progress, total=steps, desc="path") as bar:
         while len(points) <= steps:
+            start, straight = points[-1], branch is None or len(points) > 1
             try:
-                point, new_direction = _advance(system, points[-1], step, direction, weights, tol,
-                                                max_iterations)
-            except _Failed as failure:
+                point, bend = _step(tracer, start, step)
+                if straight and bend > 4.0 * TURN and step > ds / 64.0:
+                    raise Failed("the path turns")
+                last = max_load is not None and abs(point.load) >= max_load
+                if last:
+                    point = _land(tracer, start, point, float(np.copysign(max_load, point.load)))
+                if locate is not None and straight:
+                    critical += find_critical(tracer, start, point, locate)
+            except Failed as failure:
                 step *= 0.5
                 logger.info("arc length halved to %.3g: %s", step, failure)
                 if step < 1e-4 * ds:
                     raise ConvergenceError(
-                        f"the path could not be followed beyond load {points[-1].load:.6g}: "
-                        f"{failure}; more elements or a smaller ds may help", points) from None
+                        f"the path could not be followed beyond load {start.load:.6g}: "
+                        f"{failure}; more elements or a smaller ds may help",
+                        (points, critical)) from None
                 continue
-            direction = new_direction
             points.append(point)
             bar.update(1)
-            if max_load is not None and abs(point.load) > max_load:
+            if last or (until is not None and _ends(until, point)):
                 break
-            if until is not None and _ends(until, point):
-                break
-            step = min(ds_max, step * np.clip(np.sqrt(6.0 / max(point.iterations, 1)), 0.5, 1.5))
-    return points
+            growth = np.sqrt(6.0 / max(point.iterations, 1))
+            if straight and bend > 0:
+                growth = min(growth, np.sqrt(TURN / bend))
+            step = min(ds_max, step * np.clip(growth, 0.5, 1.5))
+    return points, critical
 
 
 def _ends(until, point):
@@ -121,58 +294,51 @@ def _ends(until, point):
     return answer
 
 
-def _advance(system, start, ds, direction, weights, tol, max_iterations):
-    """The next point of the path, and the step from the last one to it."""
-    u, m, load = start.u.copy(), start.multipliers.copy(), start.load
-    step, carried = np.zeros(system.N), None
-    floor = 8.0 * system.work_noise
-    unit = system.values(1.0) - system.values(0.0)
-    work, reference = np.inf, 0.0
-    stable = None
-    for k in range(max_iterations + 1):
-        with np.errstate(over="ignore", invalid="ignore"):
-            force, evaluations = system.assemble(u, load, carried)
-            external = system.external_force(u)
-        if not np.all(np.isfinite(force)):
-            raise _Failed("the strain is not finite")
-        residual, phi = load * external - force, system.constraint(u, load)
-        if system.joints:
-            residual = residual - m @ system.jacobian(u, load)
-        closed = np.max(np.abs(phi), initial=0.0) <= 1e-12 * system.size
-        if k > 0 and closed and work <= tol * reference + floor:
-            return Point(u, m, load, force, stable, k, start.arc + ds), step
-        if k == max_iterations:
-            break
-        drive = external.copy()
-        if np.any(unit):
-            du0 = np.zeros(system.N)
-            du0[system.fixed] = unit
-            drive -= system.multiply(du0)
+def _start(tracer, branch, side):
+    """The first point of a path."""
+    if branch is None:
+        point = tracer.stress_free()
         try:
-            system.factorize(u, load, m)
-            stable = system.K.positive_definite if not system.joints else None
-            dR, mR = system.solve(residual, -phi)
-            dF, mF = system.solve(drive, np.zeros(system.m))
-        except (np.linalg.LinAlgError, RuntimeError):
-            raise _Failed("the tangent is singular") from None
-        dF[system.fixed] += unit
-        if k == 0:
-            size = np.sqrt(dF @ (weights * dF))
-            if not size > 0:
-                raise _Failed("the loads move nothing")
-            sign = 1.0 if direction is None or direction @ (weights * dF) >= 0 else -1.0
-            dl = sign * ds / size
-            start.rate, plane = sign / size, weights * (sign / size * dF)
-            dR, mR = 0.0 * dR, 0.0 * mR
-        else:  # the plane at distance ds along the path's tangent
-            dl = (ds - plane @ (step + dR)) / (plane @ dF)
-        du, dm = dR + dl * dF, mR + dl * mF
-        if not np.all(np.isfinite(du)) or np.sqrt(du @ (weights * du)) > 10 * ds:
-            raise _Failed("the iteration leaves the path")
-        # the first is no correction: there is no residual yet
-        work = np.inf if k == 0 else np.sqrt(
-            abs((residual * system.free) @ du) + abs(phi @ dm) + abs(dl * (external @ du)))
-        carried = system.stress_step(evaluations, du)
-        u, m, load, step = u + du, m + dm, load + dl, step + du
-        reference = np.sqrt(max(abs(load * external @ u), abs(force @ u), abs(drive @ step * dl)))
-    raise _Failed(f"no convergence in {max_iterations} iterations")
+            return tracer.set_tangent(point)
+        except Failed as failure:
+            raise ConvergenceError(f"the path cannot begin: {failure}", ([point], [])) from None
+    point = Point(branch.u, branch.multipliers, branch.load, branch.force, 0.0, branch.error, 0)
+    point.tangent, point.multiplier_rate = side * branch.mode, side * branch.multiplier_mode
+    point.rate, point.negative = 0.0, branch.negative
+    return point
+
+
+def _step(tracer, start, ds):
+    """The next point with its tangent, and how far the step is off a straight line."""
+    point = tracer.set_tangent_after(start, tracer.advance(start, ds))
+    mean = 0.5 * ds * (start.tangent + point.tangent)
+    bend = tracer.norm(point.u - start.u - mean) / ds
+    scale = max(abs(start.load), abs(point.load))
+    if scale > 0:
+        gap = point.load - start.load - 0.5 * ds * (start.rate + point.rate)
+        bend = max(bend, abs(gap) / scale)
+    return point, bend
+
+
+def _land(tracer, start, point, load):
+    """The point between two where the load is reached."""
+    h, low, high, x = point.arc - start.arc, 0.0, 1.0, 1.0
+    for _ in range(60):  # bisection by the cubic polynomial of the load
+        x = 0.5 * (low + high)
+        low, high = (x, high) if abs(load_between(start, point, x)) < abs(load) else (low, x)
+    near = point
+    if x < 1.0 - 1e-9:
+        near = tracer.set_tangent_after(start, tracer.advance(start, x * h))
+    ds = (load - near.load) / near.rate
+    landed = tracer.at_load(near, load, (ds * near.tangent, ds * near.multiplier_rate))
+    landed.load, landed.arc = load, near.arc + ds
+    return tracer.set_tangent_after(start, landed)
+
+
+def load_between(p, q, x):
+    """The load at part x between two points: a cubic polynomial of the arc length."""
+    h = q.arc - p.arc
+    a, b = p.load, h * p.rate
+    c = 3 * (q.load - a) - 2 * b - h * q.rate
+    d = -2 * (q.load - a) + b + h * q.rate
+    return a + x * (b + x * (c + x * d))
