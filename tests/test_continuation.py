@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
+from skfem import LinearForm
 
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamCable, InputError, MeshBeam, Scene, StVenantKirchhoff,
@@ -72,13 +75,12 @@ def test_limits_of_lee_frame_with_quintic_cables():
 
 
 @pytest.mark.parametrize("element, n, slenderness, tol", [
-    (ElementBeamCable(5), 10, 1e4, 3e-5), (ElementBeamCable(3), 20, 1e3, 5e-3),
+    (ElementBeamCable(5), 10, 1e4, 6e-5), (ElementBeamCable(3), 20, 1e3, 5e-3),
     (ElementBeamANCFCubic(2), 20, 1e3, 2e-3), (ElementBeamANCF(2), 40, 1e3, 0.05),
     (ElementBeamANCFCubic(3), 20, 1e5, 2e-3)])
 def test_limits_of_the_slender_lee_frame(element, n, slenderness, tol):
     h = 1.0 / slenderness
-    ds = 0.01 if tol < 1e-3 else 0.02
-    _, limits = lee_limits(element, n, ds, h=h, L=1.0, b=1.0, E=12.0 / h**3)
+    _, limits = lee_limits(element, n, 0.03, h=h, L=1.0, b=1.0, E=12.0 / h**3)
     np.testing.assert_allclose(limits, exact.lee_frame_limits(), rtol=0, atol=tol)
 
 
@@ -97,10 +99,9 @@ def arch(element, n, h=1e-3, angle=215.0):
     (ElementBeamCable(5), 32, 1e-5), (ElementBeamANCFCubic(2), 48, 5e-3),
     (ElementBeamANCF(2), 64, 0.2)])
 def test_limit_of_the_deep_arch(element, n, tol):
-    path = arch(element, n).continuation(steps=100, ds=0.005, ds_max=0.005,
-                                         until=past_the_maximum())
-    assert len(path.limit_points()) == 1
-    assert abs(path.limit_points()[0] - exact.clamped_hinged_arch_limit()) < tol
+    limits = arch(element, n).continuation(until=past_the_maximum()).limit_points()
+    assert len(limits) == 1
+    assert abs(limits[0] - exact.clamped_hinged_arch_limit()) < tol
 
 
 SPAN, RISE, EA, EI = 12.943, 0.386, 1.885e6, 9.27e3
@@ -123,7 +124,7 @@ def toggle(element, n):
     (ElementBeamANCFCubic(2), 8, 0.2), (ElementBeamANCF(2), 32, 0.5)])
 def test_williams_toggle(element, n, tol):
     path = toggle(element, n).continuation(steps=100, ds=0.002, ds_max=0.002, max_load=80)
-    assert path.load[-1] > 80 > path.load[-2]
+    assert path.load[-1] == 80 > path.load[-2]
     deflection = -path.displacement((SPAN, RISE))[:, 1]
     assert np.max(np.abs(path.load - exact.williams_toggle(deflection))) < tol
     highest, lowest = path.limit_points()
@@ -132,11 +133,122 @@ def test_williams_toggle(element, n, tol):
 
 
 def test_limit_points_do_not_depend_on_the_step():
-    found = [toggle(ElementBeamCable(5), 6).continuation(steps=200, ds=ds, ds_max=ds,
-                                                         max_load=60).limit_points()
-             for ds in (0.001, 0.002, 0.004)]
-    np.testing.assert_allclose(found[1], found[0], rtol=0, atol=3e-4)
-    np.testing.assert_allclose(found[2], found[0], rtol=0, atol=1e-2)
+    found = [toggle(ElementBeamCable(5), 6).continuation(steps=200, max_load=60, **options)
+             .limit_points() for options in ({}, dict(ds=0.001, ds_max=0.001), dict(ds=0.03))]
+    np.testing.assert_allclose(found[1:], [found[0]] * 2, rtol=1e-7)
+
+
+# critical points of an arch whose loads are known in closed form
+
+
+def sine_arch(ratio, h=1e-3):
+    """A shallow arch H sin(pi x) of L = 1, H = ratio h, under a load q sin(pi x).
+
+    In the theory of shallow arches the deflection is a multiple x of the arch, and
+    q = EI pi^4 H ((1 - x) + c x (1 - x^2)), c = H^2 A / 4 I. The load factor is q.
+    """
+    H = ratio * h
+    mesh = MeshBeam.init_curve(lambda s: np.array([s, H * np.sin(np.pi * s)]),
+                               np.linspace(0, 1, 9), h)
+    beam = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(12 / h**3, 0.0), 1.0)
+    form = LinearForm(lambda v, w: -np.sin(np.pi * w.x[0]) * v[1] / h)
+    c = 3.0 * ratio**2
+
+    def load(x):
+        return np.pi**4 * H * ((1 - x) + c * x * (1 - x**2))
+
+    return Scene(beam).pin("left").pin("right").load(form), c, load
+
+
+def test_critical_loads_of_a_shallow_arch():
+    """Default steps: the axis force reaches that of two half waves, then the load turns.
+
+    With x^2 = 1 - 4 / c and (1 - 1 / c) / 3; the way down has both once more. In arches with
+    c > 9 three half waves come as well.
+    """
+    scene, c, load = sine_arch(1.6)
+    path = scene.continuation(steps=200, max_load=1.2 * load(np.sqrt((1 - 1 / c) / 3)))
+    x, y = np.sqrt((1 - 1 / c) / 3), np.sqrt(1 - 4 / c)
+    assert [p.kind for p in path.critical_points] == ["bifurcation", "limit", "limit",
+                                                      "bifurcation"]
+    np.testing.assert_allclose(path.limit_points(), [load(x), load(-x)], rtol=1e-4)
+    np.testing.assert_allclose(path.bifurcation_points(), [load(y), load(-y)], rtol=1e-4)
+    assert [p.change for p in path.critical_points] == [1, 1, -1, -1]
+    assert path.load[-1] == pytest.approx(1.2 * load(x), rel=1e-15)
+    first = path.critical_points[0]
+    across = first.mode.reshape(-1, 6)[:, 1]
+    assert np.abs(across + across[::-1]).max() < 1e-4 * np.abs(across).max()  # two half waves
+    assert np.abs(path.error).max() < 1e-7
+    # the state is an equilibrium, and its tangent is singular
+    system = first.state.system
+    system.assemble(first.state.u, first.load)
+    force = system.K.tocsc() @ first.mode * system.free
+    scale = system.K.diagonal() * np.abs(first.mode)
+    assert np.abs(force).max() < 1e-6 * scale.max()
+
+
+def test_critical_points_do_not_depend_on_the_step():
+    scene, _, _ = sine_arch(2.0, h=0.02)
+    found = [[p.load for p in scene.continuation(until=past_the_maximum(), steps=300,
+                                                 **options).critical_points]
+             for options in ({}, dict(ds=1e-3, ds_max=1e-3), dict(ds=0.1))]
+    np.testing.assert_allclose(found[1:], [found[0]] * 2, rtol=1e-6)
+    assert scene.continuation(steps=20, locate=None).critical_points == []
+
+
+# branches
+
+
+def column(slenderness=1e3, n=8):
+    """A cantilever under a load at its end; the load factor is in EI / L^2."""
+    mesh = MeshBeam.init_line(np.linspace(0, 1, n + 1), 1 / slenderness)
+    beam = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(12 * slenderness**3, 0.0), 1.0)
+    return Scene(beam).clamp("left").point_force((-1, 0), (1, 0))
+
+
+def test_bifurcation_loads_of_eulers_column():
+    path = column().continuation(max_load=30, ds=1e-5)
+    known = np.pi**2 / 4 * np.array([1, 9])
+    np.testing.assert_allclose(path.bifurcation_points(), known, rtol=1e-5)
+    assert path.stable[0] and not path.stable[-1] and path.negative[-1] == 2
+    assert len(path.limit_points()) == 0
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_post_buckling_of_eulers_column(side):
+    """The elastica: with k = sin(alpha / 2), alpha the angle of the end, P = K(k)^2,
+    deflection 2 k / K(k) and height of the end 2 E(k) / K(k) - 1."""
+    scene = column()
+    trunk = scene.continuation(max_load=5, ds=1e-5)
+    path = scene.continuation(branch=trunk.critical_points[0], side=side, max_load=9)
+    assert path.load[0] == trunk.critical_points[0].load and path.load[-1] == 9.0
+    tip = path.displacement((1, 0))
+    assert np.all(side * tip[1:, 1] * tip[-1, 1] * side > 0) and all(path.stable[1:])
+    for P, (ux, uy) in zip(path.load[1:], tip[1:]):
+        m = brentq(lambda m: 2 * ellipe(m) / ellipk(m) - 2 - ux, 0.0, 0.99)
+        assert P == pytest.approx(ellipk(m) ** 2, rel=1e-4)
+        assert abs(uy) == pytest.approx(2 * np.sqrt(m) / ellipk(m), abs=1e-4)
+
+
+def test_the_sides_of_a_branch_differ():
+    scene = column(n=4)
+    point = scene.continuation(max_load=5, ds=1e-5).critical_points[0]
+    ends = [scene.continuation(branch=point, side=side, steps=2).displacement((1, 0))[-1, 1]
+            for side in (1, -1)]
+    assert ends[0] == pytest.approx(-ends[1], rel=1e-6) and ends[0] != 0
+
+
+def test_branch_of_another_scene():
+    scene, other = column(n=4), column(n=3)
+    path = scene.continuation(max_load=5, ds=1e-5)
+    with pytest.raises(InputError, match="another scene"):
+        other.continuation(branch=path.critical_points[0])
+    with pytest.raises(InputError, match="critical_points"):
+        scene.continuation(branch=path.state(1))
+    limit = shallow(0.02).continuation(steps=60, ds=1e-3, ds_max=1e-3).critical_points[0]
+    assert limit.kind == "limit" and "limit point" in repr(limit)
+    with pytest.raises(InputError, match="bifurcation"):
+        scene.continuation(branch=limit)
 
 
 # stability
@@ -166,9 +278,19 @@ def test_stability_is_lost_before_the_limit_point_where_the_path_branches():
     assert path.load[lost] < 0.98 * path.limit_points()[0] and path.points[lost].rate > 0
 
 
-def test_stability_is_not_said_with_multipliers():
-    path = toggle(ElementBeamCable(5), 2).continuation(steps=3)
-    assert path.stable[1:] == [None] * 3
+def test_stability_with_multipliers():
+    """On the tangent space of the constraints: lost and found at the limits of the toggle."""
+    path = toggle(ElementBeamCable(5), 4).continuation(steps=100, ds=0.002, ds_max=0.002,
+                                                       max_load=80)
+    assert [p.change for p in path.critical_points] == [1, -1]
+    assert path.stable == [p.rate > 0 for p in path.points]
+
+
+def test_stability_is_not_said_of_loads_without_a_potential():
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 4), 0.1)
+    beam = Beam(mesh, ElementBeamANCF(1), StVenantKirchhoff(1e6, 0.3), 1.0)
+    path = Scene(beam).clamp("left").pressure("right", 1.0).continuation(steps=3)
+    assert path.stable == [None] * 4 and path.critical_points == []
 
 
 # what a path offers
@@ -226,7 +348,10 @@ def test_steps_until_and_max_load():
     path = scene.continuation(steps=50, ds=1e-3, until=lambda p: seen.append(p.arc) or p.arc > 4e-3)
     assert len(seen) == len(path) - 1 and path.arc[-1] > 4e-3 >= path.arc[-2]
     path = scene.continuation(steps=100, ds=1e-3, max_load=1.5)
-    assert path.load[-1] > 1.5 > np.max(path.load[:-1])
+    assert path.load[-1] == 1.5 > np.max(path.load[:-1])
+    state = path.state(-1)
+    reaction = state.reactions("left").force + state.reactions("right").force
+    np.testing.assert_allclose(reaction, [0, 1.5], rtol=0, atol=1e-6)
 
 
 def test_steps_grow_up_to_ds_max():
@@ -252,8 +377,11 @@ def test_loads_that_move_nothing():
         Scene(beam).clamp("left").continuation()
 
 
-@pytest.mark.parametrize("options", [dict(ds=0.0), dict(ds=-1.0), dict(ds=np.nan),
-                                     dict(ds_max=-0.1), dict(ds="a")])
+@pytest.mark.parametrize("options", [
+    dict(ds=0.0), dict(ds=-1.0), dict(ds=np.nan), dict(ds_max=-0.1), dict(ds="a"),
+    dict(steps=10**30), dict(steps=0), dict(steps=1.5), dict(steps="a"), dict(max_load=0.0),
+    dict(tol=-1.0), dict(max_iterations=0), dict(locate=0.0), dict(side=2), dict(side="left"),
+    dict(until=3), dict(branch=7)])
 def test_bad_input(options):
     with pytest.raises(InputError):
         shallow(0.02).continuation(**options)

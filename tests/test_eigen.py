@@ -230,9 +230,8 @@ def test_becks_column_does_not_buckle():
 def test_pressure_between_clamped_ends_has_a_potential():
     """A clamped half circle under pressure: p R^3 / E I = k^2 - 1.
 
-    k tan(a) cot(k a) = 1.
-
-    With a = pi / 2 that is 8 (Timoshenko and Gere, Theory of Elastic Stability, 1961), for a thin arch.
+    With k tan(a) cot(k a) = 1 and a = pi / 2 that is 8 for a thin arch (Timoshenko and Gere, Theory
+    of Elastic Stability, 1961).
     """
     h = 1e-3
     mesh = MeshBeam.init_curve(lambda s: np.array([np.cos(s), np.sin(s)]),

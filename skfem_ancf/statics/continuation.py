@@ -14,6 +14,8 @@ logger = logging.getLogger(__name__)
 MAX_STEPS = 10**6
 #: How far a step may be off a straight line, relative to its length and to the load.
 TURN = 0.03
+#: Shortest step that is tried, relative to ds.
+SHORTEST = 1e-6
 
 
 class Failed(Exception):
@@ -234,7 +236,7 @@ def continuation(system, steps=100, ds=0.02, ds_max=None, max_load=None, until=N
     InputError
         If an argument is out of range.
     ConvergenceError
-        If the arc length falls below ``1e-4 ds``; ``state`` is the two lists so far.
+        If the arc length falls below ``1e-6 ds``; ``state`` is the two lists so far.
 
     References
     ----------
@@ -269,7 +271,7 @@ def continuation(system, steps=100, ds=0.02, ds_max=None, max_load=None, until=N
             except Failed as failure:
                 step *= 0.5
                 logger.info("arc length halved to %.3g: %s", step, failure)
-                if step < 1e-4 * ds:
+                if step < SHORTEST * ds:
                     raise ConvergenceError(
                         f"the path could not be followed beyond load {start.load:.6g}: "
                         f"{failure}; more elements or a smaller ds may help",
