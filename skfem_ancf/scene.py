@@ -700,7 +700,7 @@ def _branch(point, system):
     """What a CriticalPoint of a path of a system was made from."""
     if not isinstance(point, CriticalPoint) or point.kind != "bifurcation":
         raise InputError("branch must be a point of path.critical_points of kind 'bifurcation', "
-                         f"got {point!r}")
+                         f"got {shown(point)}")
     if point.state.system is not system:
         raise InputError("the branch point belongs to another scene, or to this one before it was "
                          "changed: follow its path again")

@@ -251,8 +251,8 @@ def continuation(system, steps=100, ds=0.02, ds_max=None, max_load=None, until=N
     locate = None if locate is None else require_positive("locate", locate)
     if until is not None:
         require_function("until", until, "of a point of the path that returns True or False")
-    if isinstance(side, bool) or side not in (1, -1):
-        raise InputError(f"side must be 1 or -1, got {side!r}")
+    if require_integer("side", side, -1, 1) == 0:
+        raise InputError("side must be 1 or -1, got 0")
     tracer = Tracer(system, require_positive("tol", tol),
                     require_integer("max_iterations", max_iterations, 1, 10000))
     points, critical, step = [_start(tracer, branch, side)], [], ds
