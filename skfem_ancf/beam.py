@@ -128,7 +128,7 @@ class Beam(Frozen):
         for argument, kind, value in (("mesh", MeshBeam, mesh), ("element", ElementBeam, element),
                                       ("material", Material, material)):
             if not isinstance(value, kind):
-                raise InputError(f"{argument} must be a {kind.__name__}, got {value!r}")
+                raise InputError(f"{argument} must be a {kind.__name__}, got {shown(value)}")
         self.mesh = mesh if mesh.is_straight else mesh.with_sections(element.sections)
         self.element, self.material = element, material
         self.width = require_positive("width", width)

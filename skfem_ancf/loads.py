@@ -4,6 +4,7 @@ A :class:`~skfem_ancf.Scene` keeps loads as they were given, and binds them to i
 again for the same scene on other meshes.
 """
 
+import re
 import warnings
 
 import numpy as np
@@ -12,7 +13,7 @@ from skfem.assembly import LinearForm, asm
 from . import forms
 from .beam import Beam
 from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number, require_finite,
-                     require_function)
+                     require_function, shown)
 from .frozen import Sealable, read_only
 from .spread import Spread, on_facets, stations_of_vector
 
@@ -173,7 +174,7 @@ def bind_load(load, beam):
         bound._seal()
         return bound
     if not isinstance(bound, Load) or bound.beam is not beam:
-        raise InputError(f"{load!r}.bind(beam) must return a Load on that beam, got {bound!r}")
+        raise InputError(f"{load!r}.bind(beam) must return a Load on that beam, got {shown(bound)}")
     zero = np.zeros(beam.N)
     try:
         require_finite("its force", bound.force(zero), (beam.N,))
@@ -256,7 +257,7 @@ class FormLoad(Load):
     def __init__(self, form, boundary=None, beam=None, amplitude=None):
         super().__init__(beam, amplitude)
         if not isinstance(form, LinearForm):
-            raise InputError(f"a load is a scikit-fem LinearForm, got {form!r}")
+            raise InputError(f"a load is a scikit-fem LinearForm, got {shown(form)}")
         self.form, self.boundary = form, boundary
 
     def bind(self, beam):
@@ -272,11 +273,15 @@ def _assembled(form, basis):
         with warnings.catch_warnings():
             warnings.simplefilter("error", complex_to_real)
             return asm(form, basis)
-    except KeyError as error:
+    except (KeyError, AttributeError) as error:
+        name = re.search("'([^']*)' not found in 'w'|^'([^']*)'$", str(error))
+        if name is None:
+            raise CallbackError(f"the form of a load, form(v, w), raised {type(error).__name__}: "
+                                f"{error}") from error
         raise CallbackError(
-            f"the form of a load uses w.{error.args[0]}, which there is not: it is assembled once, "
-            "on the stress-free body, and knows w.x, w.h and, on a boundary, w.n. A load that "
-            "follows the deformation is scene.pressure, scene.moment or a Load of your own"
+            f"the form of a load uses w.{name[1] or name[2]}, which there is not: it is assembled "
+            "once, on the stress-free body, and knows w.x, w.h and, on a boundary, w.n. A load "
+            "that follows the deformation is scene.pressure, scene.moment or a Load of your own"
         ) from error
     except AncfError:
         raise
@@ -421,5 +426,5 @@ class EndMoment(Load):
 
 def _the_beam(beam):
     if not isinstance(beam, Beam):
-        raise InputError(f"this load acts on a Beam, got {beam!r}")
+        raise InputError(f"this load acts on a Beam, got {shown(beam)}")
     return beam

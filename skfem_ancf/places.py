@@ -118,10 +118,10 @@ def facets_of(mesh, place):
             return np.unique(np.concatenate([np.asarray(facets_of(mesh, p)) for p in place]))
     hint = ""
     if isinstance(place, numbers.Integral) and not isinstance(place, bool):
-        hint = f"; for the facet of that number write np.array([{place}])"
+        hint = f"; for the facet of that number write np.array([{shown(place)}])"
     elif isinstance(place, (tuple, list)) and len(place) and all(
             isinstance(p, numbers.Integral) for p in place):
-        hint = f"; for facets of those numbers write np.array({list(place)!r})"
+        hint = f"; for facets of those numbers write np.array({shown(list(place))})"
     raise InputError(f"a place is {KINDS}, got {shown(place)}{hint}")
 
 
@@ -177,7 +177,7 @@ def _named(mesh, name):
 def _numbered(mesh, facets):
     if facets.dtype.kind not in "iu" or facets.ndim != 1 or not len(facets):
         raise InputError(f"facets are a one-dimensional array of integers that is not empty, got "
-                         f"{facets!r}; a place may also be {KINDS.rsplit(', or', 1)[0]}")
+                         f"{shown(facets)}; a place may also be {KINDS.rsplit(', or', 1)[0]}")
     bad = facets[(facets < 0) | (facets >= mesh.nfacets)]
     if len(bad):
         n = mesh.p.shape[1]

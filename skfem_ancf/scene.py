@@ -65,7 +65,7 @@ class Scene:
             raise InputError("a scene needs at least one beam")
         for b in beams:
             if not isinstance(b, Beam):
-                raise InputError(f"a scene is made of Beams, got {b!r}")
+                raise InputError(f"a scene is made of Beams, got {shown(b)}")
         names = [b.name for b in beams if b.name is not None]
         if len(set(names)) < len(names) or len(set(map(id, beams))) < len(beams):
             raise InputError(f"the beams of a scene must be different, and so must their names: "
@@ -193,7 +193,7 @@ class Scene:
             return self._put(joints=[thing])
         if isinstance(thing, Load):
             return self._put(loads=[(self._number(thing.beam), thing)])
-        raise InputError(f"a scene takes a Load or a Joint, got {thing!r}: derive yours from "
+        raise InputError(f"a scene takes a Load or a Joint, got {shown(thing)}: derive yours from "
                          "skfem_ancf.loads.Load or skfem_ancf.joints.Joint")
 
     # supports

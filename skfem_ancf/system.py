@@ -7,7 +7,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from .errors import InputError, SupportError
+from .errors import InputError, SupportError, shown
 from .joints.base import same_joint
 from .linalg import INACCURATE, BandMatrix, BorderedMatrix, border_inertia, hold
 
@@ -191,7 +191,7 @@ class System:
         for known, first, factors in self._fixing:
             if same_joint(known, joint):
                 return reaction[self.fixed[first:first + len(factors)]] / factors
-        raise SupportError(f"{joint!r} is not a joint of this scene")
+        raise SupportError(f"{shown(joint)} is not a joint of this scene")
 
     def require_independent_joints(self):
         """Raise SupportError if joints repeat or contradict each other or the supports."""

@@ -33,7 +33,7 @@ def fails(*args, **kwargs):
 
 #: What is tried for every argument, by a name for messages.
 BAD = {
-    "10**400": 10**400, "-10**400": -10**400, "10**30": 10**30, "-1": -1, "0": 0, "3.5": 3.5,
+    "10**400": 10**400, "-10**5000": -10**5000, "10**30": 10**30, "-1": -1, "0": 0, "3.5": 3.5,
     "nan": float("nan"), "inf": float("inf"), "-inf": -float("inf"), "1e-320": 1e-320,
     "True": True, "None": None, "'1.0'": "1.0", "'text'": "text", "''": "", "b'1'": b"1",
     "1j": 1j, "object()": object(), "[]": [], "[99]": [99], "{}": {}, "set": {1.0},
@@ -78,6 +78,20 @@ TAKES = {
     "file": {},
 }
 _OPTIONAL = {"None": "the default"}
+
+
+#: What messages call an argument, where that is not its name: regular expressions.
+WORDS = {
+    "doflocs": "nodes", "diffs": "shift", "x": "points|nodes", "y": "points", "s": "nodes",
+    "test": "function", "data": "dictionary", "beams": "[Bb]eam", "thing": "Load or a Joint",
+    "k": "number of modes|index", "cmap": "colour map", "names": "coordinate", "form": "[Ff]orm|load",
+    "times_or_ix": "refinements|elements|subdomain|function", "tind": "elements|subdomain|function",
+    "elements": "element|subdomain|points", "at": "place|point|boundary|section|facet",
+    "boundary": "place|point|facet|function", "facets": "place|point|boundary|function",
+    "fields": "field", "dr": "derivative", "factors": "factor|body", "filename": "file|read|write",
+    "shear_correction": "shear correction", "t_start": "t_eval", "radius": "joints",
+    "t_end": "times", "adapt": "max_elements",
+}
 
 
 class Call(NamedTuple):

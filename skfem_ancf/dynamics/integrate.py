@@ -5,7 +5,7 @@ import logging
 import numpy as np
 
 from ..errors import (AncfError, ConvergenceError, InputError, SupportError, require_finite,
-                      require_finite_scalar, require_positive, taught)
+                      require_finite_scalar, require_positive, shown, taught)
 from ..progress import progress_bar
 from .base import Motion
 from .blocks import CompiledSteps
@@ -285,7 +285,8 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=0.0, t_eval=Non
         t_eval = require_finite("t_eval", t_eval, (None,))
         if (not len(t_eval) or np.any(np.diff(t_eval) <= 0) or t_eval[0] < t_start
                 or t_eval[-1] > t_end * (1 + 1e-12)):
-            raise InputError(f"t_eval must increase within [{t_start}, {t_end}], got {t_eval!r}")
+            raise InputError(f"t_eval must increase within [{t_start}, {t_end}], got "
+                             f"{shown(t_eval)}")
     rtol = require_positive("rtol", rtol)
     if rtol < MIN_RTOL:
         raise InputError(f"rtol must be at least {MIN_RTOL:g}, got {rtol!r}")

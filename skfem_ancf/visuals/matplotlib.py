@@ -224,10 +224,10 @@ def _limits(limits, values, signed):
         try:
             low, high = limits
         except (TypeError, ValueError):
-            raise InputError(f"limits must be two numbers, got {limits!r}") from None
+            raise InputError(f"limits must be two numbers, got {shown(limits)}") from None
         low, high = require_finite_scalar("limits", low), require_finite_scalar("limits", high)
         if not low < high:
-            raise InputError(f"limits must increase, got {limits!r}")
+            raise InputError(f"limits must increase, got {shown(limits)}")
         return low, high
     size = np.max(np.abs(values[np.isfinite(values)]), initial=0.0) or 1.0
     return (-size, size) if signed else (0.0, size)
