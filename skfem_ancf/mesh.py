@@ -12,7 +12,7 @@ from numpy import ndarray
 from scipy.spatial import cKDTree
 from skfem.element import Element
 from skfem.generic_utils import OrientedBoundary
-from skfem.mesh import Mesh, MeshQuad
+from skfem.mesh import Mesh2D, MeshQuad
 
 from .errors import (CallbackError, FileError, InputError, MeshError, NameUnknown, ask, ask_array,
                      require_finite, require_finite_scalar, require_function, require_integer,
@@ -25,6 +25,9 @@ from .reference import ElementBeamP1
 
 logger = logging.getLogger(__name__)
 
+#: Angle of a kink of a curve that is refused; one of a fine polygon is smaller.
+KINK = 1e-2
+
 #: Elements of the largest mesh that :meth:`MeshBeam.refined` makes.
 MAX_ELEMENTS = 2**24
 
@@ -34,7 +37,7 @@ MAX_SUBDIVISION = 1000
 
 @teaching
 @dataclass(repr=False, eq=False)
-class MeshBeam(Frozen, Mesh):
+class MeshBeam(Frozen, Mesh2D):
     """A planar beam in its stress-free state, divided into elements along its axis.
 
     A mesh does not change; its methods return other meshes.
@@ -211,6 +214,11 @@ class MeshBeam(Frozen, Mesh):
                 f"a MeshBeam has two nodes per element and at least one element, t has shape "
                 f"{shape}; for quads of its body use mesh.to_meshquad()")
         super().__post_init__()
+        if self.height is None:  # what refinterp of a Basis asks for
+            raise MeshError(
+                "height must be a number, got None: build meshes of beams with MeshBeam.init_line "
+                "or init_curve. For a picture of a Basis take quad = mesh.to_meshquad() and "
+                "quad.plot(basis.probes(quad.p) @ y), not basis.plot or basis.refinterp")
         self.height = require_positive("height", self.height)
         t = self.t
         if not (np.array_equal(t[1], t[0] + 1) and np.all(np.diff(t[0]) > 0)):
@@ -949,7 +957,7 @@ class Curve:
             angles.append(np.arctan2(cross, np.sum(before * after, axis=0)))
         kink = np.where(np.abs(angles[1]) > 0.7 * np.abs(angles[0]), np.abs(angles[1]), 0.0)
         k = int(np.argmax(kink))
-        if kink[k] > 1e-3:
+        if kink[k] > KINK:
             raise MeshError(
                 f"the curve has a kink of {np.rad2deg(angles[1][k]):.3g} degrees at s = "
                 f"{at[k]:.9g}: give one beam for each smooth part, and weld them in a scene with "

@@ -471,3 +471,22 @@ def test_projection_on_an_arc_converges():
     rates = np.log2(np.divide(errors[:-1], errors[1:]))
     assert np.all(np.less(errors[-1], [2e-4, 0.03]))
     assert np.all(rates[:, 0] > 1.9) and np.all(np.abs(rates[:, 1] - 1) < 0.15)
+
+
+def test_scikit_fem_draws_a_beam_or_says_what_does():
+    """Pictures by stock scikit-fem: of the mesh, and of a field on quads of the body."""
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    from skfem.visuals.matplotlib import draw, plot
+
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 4), height=0.1)
+    basis = Basis(mesh, ElementBeamANCF(2))
+    y = basis.project(lambda x: x[0] + 2 * x[1])
+    assert len(draw(mesh).lines) == 1
+    for refused in (lambda: basis.refinterp(y, 2), lambda: plot(basis, y)):
+        with pytest.raises(MeshError, match="to_meshquad"):
+            refused()
+    quad = mesh.to_meshquad()
+    z = basis.probes(quad.p) @ y
+    assert np.allclose(z, quad.p[0] + 2 * quad.p[1], rtol=0, atol=1e-12)
+    assert plot(quad, z).collections
+    pyplot.close("all")
