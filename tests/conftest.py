@@ -5,6 +5,7 @@ import pytest
 
 from skfem_ancf import MeshBeam
 from skfem_ancf.elements import ELEMENTS
+from skfem_ancf.switch import compiled_off
 
 
 def quarter_arc(n=3, height=0.3, radius=1.0):
@@ -46,6 +47,13 @@ def mesh(request):
 @pytest.fixture(params=STRAIGHT)
 def straight_mesh(request):
     return MESHES[request.param]()
+
+
+@pytest.fixture
+def needs_compiled():
+    """Skips a test where Numba is missing or left out."""
+    if compiled_off() is not None:
+        pytest.skip(compiled_off())
 
 
 @pytest.fixture

@@ -143,9 +143,8 @@ DOORS = """
 """
 
 
-def test_doors_with_bounds_checked(tmp_path):
+def test_doors_with_bounds_checked(needs_compiled, tmp_path):
     """The compiled code checks every index: what passes the doors reads its own memory only."""
-    pytest.importorskip("numba")
     environment = {**os.environ, "NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
     done = subprocess.run([sys.executable, "-c", textwrap.dedent(DOORS)], env=environment,
                           capture_output=True, text=True)

@@ -13,7 +13,6 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, Mes
 from skfem_ancf.beam import Beam as BeamClass
 from skfem_ancf.kernel import TermTables
 from skfem_ancf.linalg import BandMatrix
-from skfem_ancf.switch import compiled_off
 from skfem_ancf.system import System
 
 
@@ -108,15 +107,13 @@ def test_no_field_that_nobody_asked_for(count):
 
 
 def compiled_scene():
-    if compiled_off() is not None:
-        pytest.skip(compiled_off())
     beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.01), ElementBeamCable(3),
                 StVenantKirchhoff(2e8, 0.3, 7800), 0.01)
     return Scene(beam).pin("left").gravity((0, -9.81))
 
 
 @pytest.mark.parametrize("add", ["nothing", "joint", "moment", "pressure"])
-def test_compiled_loop_as_planned(count, add):
+def test_compiled_loop_as_planned(needs_compiled, count, add):
     """What the plan says is compiled calls no assembly of Python's, what it says is not does."""
     s = compiled_scene()
     if add == "joint":
