@@ -27,8 +27,8 @@ test: $(VENV)/test.stamp
 
 # what round-off could decide, in other kernels of OpenBLAS and without fused multiply-add;
 # the code that Numba compiles for it is kept apart. Then all but the scripts, without Numba.
-GENERIC := mesh elements statics joints dynamics continuation locking compiled
-SCRIPTS := bench package paper stress
+GENERIC := compiled joints locking stability statics
+SCRIPTS := bench fuzz package paper stress
 
 test-settings: $(VENV)/test.stamp
 	OPENBLAS_CORETYPE=Nehalem NUMBA_CPU_NAME=generic \
