@@ -11,9 +11,9 @@ import pytest
 from numpy.testing import assert_allclose
 from skfem import Basis, Functional, asm
 
-from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamCable,
-                        ElementBeamPatelShabana, MeshBeam, MeshError, Scene, StVenantKirchhoff,
-                        SupportError)
+from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
+                        ElementBeamCable, ElementBeamPatelShabana, MeshBeam, MeshError, Scene,
+                        StVenantKirchhoff, SupportError, forms)
 from skfem_ancf.dynamics.integrate import Integrator, StepFailed
 from skfem_ancf.io import PvdWriter
 from skfem_ancf.quadrature import gauss, tensor
@@ -77,6 +77,17 @@ def test_energy_of_split_strains(name, element, mesh):
     expected = 0.3 * (uncoupled + coupled)
     assert abs(coupled) > 1e-3 * uncoupled
     assert beam.kernel.energy(q - beam.q0) == pytest.approx(expected, rel=1e-11)
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCF(3),
+                                     ElementBeamANCFCubic(1), ElementBeamANCFCubic(2)], ids=repr)
+def test_full_quadrature_is_exact(element):
+    """The energy of any displacement, against scikit-fem with 12 by 12 points an element."""
+    beam = Beam(line(2), element, STEEL, 0.3, "continuum")
+    basis = Basis(beam.mesh, beam.vector_element, quadrature=tensor(gauss(12), gauss(12)))
+    q = beam.q0 + 0.2 * np.random.default_rng(3).standard_normal(beam.N)
+    energy = asm(forms.energy(STEEL, 0.3, STEEL.shear_factor(element)), basis, r=q)
+    assert beam.kernel.energy(q - beam.q0) == pytest.approx(energy, rel=1e-12)
 
 
 @pytest.mark.parametrize("name", ["ecm", "strain-split", "assumed", "continuum"])
@@ -207,6 +218,17 @@ def test_points_off_the_axis_are_found_in_their_element(mesh):
             found, where = beam.locate(x)
             assert found == e
             assert_allclose(where, X, rtol=0, atol=1e-9)
+
+
+def test_round_off_has_units():
+    """Its squares are energies: in another unit of length, u, with E / u^2, they are u times."""
+    def noise(unit):
+        beam = Beam(line(4, 0.1 * unit, L=unit), ElementBeamANCF(2),
+                    StVenantKirchhoff(1e6 / unit**2, 0.3), 0.1 * unit)
+        s = Scene(beam).clamp("left").system
+        return np.array([s.work_noise, s.stiffness_scale])
+
+    assert_allclose(noise(1e3)**2, 1e3 * noise(1.0)**2, rtol=1e-12)
 
 
 # rigid motions, supports and joints
