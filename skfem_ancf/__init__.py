@@ -5,8 +5,8 @@ from .beam import Beam, reference_coordinates
 from .dynamics import HHT, EnergyMomentum, GeneralizedAlpha, Newmark
 from .elements import (ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                        ElementBeamPatelShabana)
-from .errors import (AncfError, ConvergenceError, InputError, MeshError, MissingExtra, NameUnknown,
-                     SupportError)
+from .errors import (AncfError, CallbackError, CallError, ConvergenceError, FileError, InputError,
+                     MeshError, MissingExtra, NameUnknown, SupportError)
 from .materials import NeoHookean, StVenantKirchhoff
 from .mesh import MeshBeam
 from .scene import Scene
@@ -14,8 +14,9 @@ from .scene import Scene
 __version__ = "0.1.0"
 
 __all__ = [
-    "AncfError", "Beam", "ConvergenceError", "ElementBeamANCF", "ElementBeamANCFCubic",
-    "ElementBeamCable", "ElementBeamPatelShabana", "EnergyMomentum", "GeneralizedAlpha", "HHT",
-    "InputError", "MeshBeam", "MeshError", "MissingExtra", "NameUnknown", "NeoHookean",
-    "Newmark", "Scene", "StVenantKirchhoff", "SupportError", "forms", "reference_coordinates",
+    "AncfError", "Beam", "CallbackError", "CallError", "ConvergenceError", "ElementBeamANCF",
+    "ElementBeamANCFCubic", "ElementBeamCable", "ElementBeamPatelShabana", "EnergyMomentum",
+    "FileError", "GeneralizedAlpha", "HHT", "InputError", "MeshBeam", "MeshError", "MissingExtra",
+    "NameUnknown", "NeoHookean", "Newmark", "Scene", "StVenantKirchhoff", "SupportError", "forms",
+    "reference_coordinates",
 ]

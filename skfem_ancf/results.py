@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .beam import select_beam
-from .errors import InputError, MeshError, NameUnknown, shown, teaching
+from .errors import InputError, MeshError, NameUnknown, require_flag, shown, teaching
 from .frozen import Frozen
 from .recovery import actions, recover
 from .section_forces import NotRecovered
@@ -142,7 +142,7 @@ class State(Frozen):
             (:attr:`recovered`); False for the strain of the element at the point.
         """
         beam, e, X = self._find(point, beam)
-        X, e, r = X[:, None], np.array([e]), self.recovery(beam) if recover else None
+        X, e, r = X[:, None], np.array([e]), self._wanted(beam, recover)
         strain = beam.strain(self.u_of(beam), X, e) if r is None else r.fields(X, e)[0]
         return strain[:, 0, 0] * np.array([1.0, 1.0, 0.5])
 
@@ -152,8 +152,11 @@ class State(Frozen):
         Parameters are those of :meth:`strain`.
         """
         beam, e, X = self._find(point, beam)
-        X, e, r = X[:, None], np.array([e]), self.recovery(beam) if recover else None
+        X, e, r = X[:, None], np.array([e]), self._wanted(beam, recover)
         return (beam.stress(self.u_of(beam), X, e) if r is None else r.fields(X, e)[1])[:, 0, 0]
+
+    def _wanted(self, beam, recover):
+        return self.recovery(beam) if require_flag("recover", recover) else None
 
     # recovered fields
 

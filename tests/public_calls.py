@@ -84,7 +84,8 @@ _OPTIONAL = {"None": "the default"}
 WORDS = {
     "doflocs": "nodes", "diffs": "shift", "x": "points|nodes", "y": "points", "s": "nodes",
     "test": "function", "data": "dictionary", "beams": "[Bb]eam", "thing": "Load or a Joint",
-    "k": "number of modes|index", "cmap": "colour map", "names": "coordinate", "form": "[Ff]orm|load",
+    "k": "number of modes|index", "cmap": "colour map", "names": "coordinate",
+    "form": "[Ff]orm|load",
     "times_or_ix": "refinements|elements|subdomain|function", "tind": "elements|subdomain|function",
     "elements": "element|subdomain|points", "at": "place|point|boundary|section|facet",
     "boundary": "place|point|facet|function", "facets": "place|point|boundary|function",
@@ -500,6 +501,14 @@ call("scene.buckling", lambda **k: column().buckling(**k), dict(k=1), k="count")
 for _name in ("displacement", "position", "strain", "stress"):
     call(f"state.{_name}", lambda _name=_name, **k: getattr(state(), _name)(**k),
          dict(point=(1.0, 0.0), beam=0), point="vector", beam="beam?")
+for _name in ("strain", "stress"):
+    call(f"state.{_name}, recover",
+         lambda _name=_name, **k: getattr(state(), _name)((1.0, 0.0), **k),
+         dict(recover=False), recover="flag")
+call("state.recovery", lambda **k: state().recovery(**k), dict(beam=0), beam="beam?")
+call("scene.state", lambda **k: loaded_once().state(**k),
+     dict(u=np.zeros(beam().N), multipliers=None, load=1.0),
+     {"multipliers": {"[]": "there are none"}}, u="other?", multipliers="other?", load="number")
 call("state.reactions", lambda **k: state().reactions(**k), dict(boundary="left", beam=0),
      boundary="facets", beam="beam?")
 call("state.u_of", lambda **k: state().u_of(**k), dict(beam=state().beams[0]),
@@ -507,13 +516,13 @@ call("state.u_of", lambda **k: state().u_of(**k), dict(beam=state().beams[0]),
 call("state.joint_force", lambda joint=None, **k: jointed()[1].joint_force(
     jointed()[0] if isinstance(joint, str) and joint == "its own" else joint, **k),
      dict(joint="its own"), joint="other")
-pictures = dict(subdivide=(2, 2), lagrange=False, undeformed=False)
+pictures = dict(subdivide=(2, 2), lagrange=False, undeformed=False, recover=False)
 for _name, _call in (("state.save", lambda **k: state().save(**k)),
                      ("save_vtu", lambda **k: save_vtu(state(), **k))):
     call(_name, _call, dict(filename="s.vtu", **pictures), filename="file", subdivide="other",
-         lagrange="flag", undeformed="flag")
+         lagrange="flag", undeformed="flag", recover="flag")
 call("body_fields", lambda **k: body_fields(**k), dict(state=state(), **pictures), state="other",
-     subdivide="other", lagrange="flag", undeformed="flag")
+     subdivide="other", lagrange="flag", undeformed="flag", recover="flag")
 call("PvdWriter", lambda **k: PvdWriter(**k).add(state(), 0.0),
      dict(filename="s.pvd", **pictures), filename="file", subdivide="other", lagrange="flag",
      undeformed="flag")

@@ -52,7 +52,7 @@ class PvdWriter:
         if self.path.suffix.lower() != ".pvd":
             raise InputError(f"the file name must end with .pvd, got {str(filename)!r}")
         self.options = require_options("PvdWriter", options,
-                                       ("subdivide", "lagrange", "undeformed"))
+                                       ("subdivide", "lagrange", "undeformed", "recover"))
         self.frames = []  # (time, name of the file)
 
     def __enter__(self):

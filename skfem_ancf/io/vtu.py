@@ -115,6 +115,7 @@ def body_fields(state, subdivide=(8, 4), lagrange=False, undeformed=False, recov
     m, n = _subdivision(subdivide)
     lagrange = require_flag("lagrange", lagrange)
     undeformed = require_flag("undeformed", undeformed)
+    recover = require_flag("recover", recover)
     total = sum(b.mesh.nelements for b in state.beams) * (m + 1) * (n + 1)
     if total > MAX_POINTS and not lagrange:
         raise InputError(f"subdivide={(m, n)} makes {total} points, more than {MAX_POINTS}")

@@ -100,6 +100,7 @@ def plot_state(state, field="eps_yy", ax=None, *, thickness="auto", undeformed=T
     require_option("field", field, TITLES)
     require_like("state", state, "State", "beams", "u_of")
     undeformed = require_flag("undeformed", undeformed)
+    recover = require_flag("recover", recover)
     colorbar, cmap = require_flag("colorbar", colorbar), _colormap(cmap)
     filename, dpi = _page(ax, title, filename, dpi)
     m, n = _subdivision(subdivide)
