@@ -102,6 +102,31 @@ class ConvergenceError(AncfError):
         self.state = state
 
 
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C during a motion: what was found until then is kept.
+
+    A KeyboardInterrupt, so that ``except Exception`` does not take it for an error, and a script
+    does not go on as if all were done.
+
+    Attributes
+    ----------
+    state
+        The History up to there.
+    """
+
+    def __init__(self, message, state=None):
+        super().__init__(message)
+        self.state = state
+
+
+class CheckpointError(AncfError):
+    """A checkpoint cannot be written, is damaged, or is of another scene."""
+
+
+class CheckpointWarning(UserWarning):
+    """A checkpoint could not be written; the run goes on, the last good file stays."""
+
+
 # messages
 
 def shown(value):

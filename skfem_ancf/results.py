@@ -45,17 +45,22 @@ class State(Frozen):
         Load factor.
     converged, iterations, message, steps
         How the solver got here; ``steps`` holds the residuals of every iteration.
+    t
+        Time, in a motion; else None.
     acceleration
         Of the coordinates, shape (N,), in a motion; else None.
     """
 
     def __init__(self, system, u, load=1.0, force=None, converged=True, iterations=0, message="",
-                 steps=(), multipliers=None, t=None, inertia=0.0, acceleration=None):
+                 steps=(), multipliers=None, t=None, inertia=0.0, acceleration=None, motion=None,
+                 origin=None):
         self.system, self.u, self.load = system, u, load
         self.converged, self.iterations, self.message = converged, iterations, message
         self.steps = tuple(steps)
         self._force, self.t, self._inertia = force, t, inertia
         self.acceleration = acceleration
+        # the Motion of an instant, its scheme, and what a run of it keeps
+        self._motion, self._origin = motion, origin
         self.multipliers = np.zeros(system.m) if multipliers is None else multipliers
         for name, size in (("u", system.N), ("multipliers", system.m)):
             if np.shape(getattr(self, name)) != (size,):
@@ -82,7 +87,7 @@ class State(Frozen):
         for name in ("_recoveries", "_actions"):
             vars(other).pop(name, None)
         if {"u", "multipliers", "system"} & set(changes):
-            vars(other)["_force"] = None
+            vars(other).update(_force=None, _motion=None, _origin=None)
         other._seal()
         return other
 
@@ -99,6 +104,11 @@ class State(Frozen):
     def q(self):
         """Absolute coordinates, beam after beam, shape (N,)."""
         return np.concatenate([b.q0 for b in self.beams]) + self.u
+
+    @property
+    def v(self):
+        """Velocity of the coordinates, shape (N,); zero where there is no motion."""
+        return np.zeros_like(self.u) if self._motion is None else self._motion.v
 
     def u_of(self, beam):
         """Coordinate displacements of one beam."""
@@ -127,6 +137,12 @@ class State(Frozen):
         beam, e, X = self._find(point, beam)
         start = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
         return start + beam.point_displacement(self.u_of(beam), e, X)
+
+    def velocity(self, point, beam=None):
+        """Velocity of a material point, shape (2,); zero where there is no motion."""
+        beam, e, X = self._find(point, beam)
+        dofs, weights = beam.probe_reference(e, X)
+        return self.v[self.system.of(beam)][dofs] @ weights
 
     def strain(self, point, beam=None, recover=True):
         """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, shape (3,).

@@ -8,7 +8,8 @@ from . import eigen
 from .beam import Beam, select_beam
 from .doors import configuration, displacement
 from .dynamics import get_scheme
-from .dynamics.integrate import integrate
+from .dynamics.checkpoint import resume
+from .dynamics.integrate import follow, integrate
 from .errors import (ConvergenceError, InputError, ask_field, require_finite, require_finite_scalar,
                      require_option, shown, teaching)
 from .joints import Joint, bind_joint, get_joint
@@ -606,10 +607,12 @@ class Scene:
         scheme
             A scheme or a name from :data:`skfem_ancf.dynamics.SCHEMES`.
         start
-            A State to start from, or None for the stress-free state.
+            A State to start from, or None for the stress-free state. An instant of a motion
+            (``history.state(k)``) goes on with its velocity, from its time; every other State
+            starts with the scene's :meth:`initial_velocity`.
         **options
             Those of :func:`skfem_ancf.dynamics.integrate.integrate`: ``t_eval``, ``tol``,
-            ``rtol``, ``t_start``, ``progress``.
+            ``rtol``, ``t_start``, ``breakpoints``, ``checkpoint``, ``every``, ``progress``.
 
         Returns
         -------
@@ -619,6 +622,8 @@ class Scene:
         ------
         ConvergenceError
             If a step fails; its ``state`` is the History up to there.
+        Interrupted
+            On Ctrl-C; its ``state`` is the History up to there.
 
         Examples
         --------
@@ -633,7 +638,49 @@ class Scene:
         velocity = np.concatenate([self._velocities[k][1] if k in self._velocities else
                                    np.zeros(b.N) for k, b in enumerate(self._beams)])
         u = None if start is None else displacement(self.system, start)
-        return integrate(self.system, t_end, dt, get_scheme(scheme), u, velocity, **options)
+        return integrate(self.system, t_end, dt, get_scheme(scheme), u, velocity, start=start,
+                         **options)
+
+    def resume(self, path, scheme=None, progress=None):
+        """Go on with a motion from its checkpoint, to the end that it was given.
+
+        On the same machine its numbers are those of a run that was not interrupted, bit for bit.
+
+        Parameters
+        ----------
+        path
+            The file of ``integrate(..., checkpoint=path)``, which goes on to be written.
+        scheme
+            The scheme, if it is one of your own.
+        progress
+            Show a progress bar: True, False, or None for "if it takes long".
+
+        Returns
+        -------
+        History
+            Of the whole motion.
+
+        Raises
+        ------
+        CheckpointError
+            If the file cannot be read, is damaged, or of another scene. Functions of time are
+            compared at 33 times only.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.01),
+        ...                    ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.3, 7800), width=0.01))
+        >>> scene = scene.pin("left").gravity((0, -9.81))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     history = scene.integrate(0.02, 1e-3, checkpoint=folder + "/run.npz", every=5)
+        ...     again = scene.resume(folder + "/run.npz")
+        >>> bool(np.array_equal(again.u, history.u))
+        True
+        """
+        return follow(*resume(self.system, path, scheme), progress)
 
     def modes(self, k, state=None):
         """The k lowest natural frequencies and their shapes.

@@ -12,15 +12,15 @@ from .jit import inner, jit
 from .moments import add_mean_moments, add_moment_stiffness, add_moments
 
 EPS = 2.2e-16
-MAX_ITERATIONS = 30
-REUSED = 0.1  # contraction up to which factors are kept
 
 
 @jit
 def steps(cables, beams, moments, joints, conserving, parameters, vectors, factors, moment_factors,
           fixed, free, supports, motion, M, M_factor, ld, bw, A, stresses, carried, state, y,
-          multipliers, dt, tol, floor, energy, rows, multiplier_rows):
-    """Time steps; one row of ``rows`` (n, 3, N) for each: u, v and the acceleration.
+          multipliers, dt, tol, floor, iteration, energy, rows, multiplier_rows):
+    """Time steps; one row of ``rows`` (n, 4, N) and ``multiplier_rows`` (n, 2, m) for each.
+
+    They are ``y`` and ``multipliers`` at its end.
 
     Parameters
     ----------
@@ -41,6 +41,8 @@ def steps(cables, beams, moments, joints, conserving, parameters, vectors, facto
         u, v, acceleration and the scheme's acceleration (4, N); advanced.
     multipliers
         At the end of the step, and in its middle (2, m); advanced.
+    iteration
+        :data:`skfem_ancf.dynamics.base.ITERATION`.
 
     Returns
     -------
@@ -48,6 +50,7 @@ def steps(cables, beams, moments, joints, conserving, parameters, vectors, facto
     """
     N, m = y.shape[1], multipliers.shape[1]
     alpha_m, alpha_f, beta, gamma = parameters
+    most, reused, fresh_rate, least_rate, diverging = iteration
     u, f, R, du, inertia = np.empty(N), np.empty(N), np.empty(N), np.empty(N), np.empty(N)
     base, x, v, load, middle = np.empty(N), np.empty(N), np.empty(N), np.empty(N), np.empty(N)
     J, J1, Y = np.zeros((m, N)), np.zeros((m, N)), np.zeros((m, N))
@@ -99,7 +102,7 @@ def steps(cables, beams, moments, joints, conserving, parameters, vectors, facto
         rough = math.sqrt(floor * floor * c_k + EPS * EPS * c_m * abs(noise))
         wanted = tol * math.sqrt(max(energy, kinetic)) + rough
         fresh, before, done, known = False, -1.0, False, False
-        for k in range(MAX_ITERATIONS):
+        for k in range(most):
             for i in range(N):
                 middle[i] = 0.5 * (u[i] + u0[i]) if conserving else u[i]
             if state[0] == 0.0:
@@ -113,7 +116,7 @@ def steps(cables, beams, moments, joints, conserving, parameters, vectors, facto
                 fix(A, ld, bw, free == 0.0)
                 if not factorize(A, ld, bw, N):
                     return n, energy
-                state[0], state[3] = 1.0, 0.1
+                state[0], state[3] = 1.0, fresh_rate
                 state[2] += 1.0
                 fresh, before, known = True, -1.0, False
             if conserving:
@@ -189,9 +192,9 @@ def steps(cables, beams, moments, joints, conserving, parameters, vectors, facto
                 if rate > 1.0 and size <= 1e3 * rough:
                     done = True
                     break
-                state[3] = max(rate, 0.01)  # of one step, used in the next, where it may be larger
-                if rate > REUSED and size * min(1.0, rate) > wanted:
-                    if fresh and rate > 2.0:
+                state[3] = max(rate, least_rate)  # of one step, used in the next, where it may be larger
+                if rate > reused and size * min(1.0, rate) > wanted:
+                    if fresh and rate > diverging:
                         return n, energy
                     if rate > 1.0:  # old factors have led astray
                         copy(guess, u)
@@ -249,9 +252,11 @@ def steps(cables, beams, moments, joints, conserving, parameters, vectors, facto
                         R[i] -= share * dm[j] * Y[j, i]
         for i in range(N):
             y[0, i], y[1, i], y[2, i], y[3, i] = u[i], v[i], x[i], R[i]
-            rows[n, 0, i], rows[n, 1, i], rows[n, 2, i] = u[i], v[i], x[i]
+            for j in range(4):
+                rows[n, j, i] = y[j, i]
         for j in range(m):
-            multiplier_rows[n, j] = multipliers[0, j]
+            multiplier_rows[n, 0, j] = multipliers[0, j]
+            multiplier_rows[n, 1, j] = multipliers[1, j] if conserving else multipliers[0, j]
         multiply(M, ld, bw, v, inertia)
         kinetic = 0.0
         for i in range(N):

@@ -69,7 +69,6 @@ class _Step(Step):
         y, dt = self.y, self.dt
         middle, force = (v - y.v) / dt, multipliers + impulse / dt
         # what acts at the middle of the step, extrapolated to its end from the last two steps
-        before, middle0, force0 = y.memory or (0.0, y.acceleration, y.multipliers)
-        ahead = dt / (dt + before)
-        return Motion(self.t, u, v, middle + ahead * (middle - middle0), middle,
-                      force + ahead * (force - force0), (dt, middle, force))
+        ahead = dt / (dt + y.before)
+        return Motion(self.t, u, v, middle + ahead * (middle - y.algorithmic), middle,
+                      force + ahead * (force - y.force), force, dt)

@@ -47,6 +47,11 @@ class GeneralizedAlpha(Scheme):
     def begin(self, system, y, dt):
         return _Step(self, system, y, dt)
 
+    def local_error(self, old, new, dt):
+        # the damping of first order that gamma above that of second order causes
+        damping = 0.5 * (self.gamma - 0.5 - self.alpha_f + self.alpha_m)
+        return super().local_error(old, new, dt) + damping * dt * (new.v - old.v)
+
     def __repr__(self):
         return (f"<{type(self).__name__} alpha_m={self.alpha_m:.4g} alpha_f={self.alpha_f:.4g} "
                 f"beta={self.beta:.4g} gamma={self.gamma:.4g}>")
@@ -131,4 +136,5 @@ class _Step(Step):
         return self._v + self.dt * self.scheme.gamma * self._algorithmic(u)
 
     def finish(self, u, v, multipliers, impulse):
-        return Motion(self.t, u, v, self.acceleration(u), self._algorithmic(u), multipliers)
+        return Motion(self.t, u, v, self.acceleration(u), self._algorithmic(u), multipliers,
+                      before=self.dt)

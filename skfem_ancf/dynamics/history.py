@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import require_index, teaching
 from ..results import State
+from .base import Motion
 
 
 @teaching
@@ -20,43 +21,88 @@ class History:
         Displacement of the coordinates and its rates, shape (nt, N).
     multipliers
         Of the joints, shape (nt, m).
+    steps
+        Steps of the motion; the instants may be fewer or more.
+    substeps
+        Parts into which steps that did not converge were cut.
+    rejected
+        Steps that the automatic step size took again.
     iterations, factorizations
         Residuals solved for, and tangents factorised, in all steps.
     """
 
-    def __init__(self, system, scheme, solver):
-        self.system, self.scheme, self._solver = system, scheme, solver
-        self._rows = []
+    #: What is stored of a Motion.
+    COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before")
+
+    def __init__(self, system, scheme, run):
+        self.system, self.scheme, self._run = system, scheme, run
+        self._rows, self._memories, self._kept = [], [], None
 
     def append(self, y):
         """Store an instant."""
-        self._rows.append((y.t, y.u, y.v, y.acceleration, y.multipliers))
+        self._rows.append(y)
+
+    def columns(self):
+        """What was stored, as arrays by their names in :attr:`COLUMNS`."""
+        n, N, m = len(self._rows), self.system.N, self.system.m
+        shapes = {"t": (), "before": (), "multipliers": (m,), "force": (m,)}
+        return {name: np.array([getattr(y, name) for y in self._rows],
+                               dtype=float).reshape(n, *shapes.get(name, (N,)))
+                for name in self.COLUMNS}
+
+    def restore(self, columns, memories):
+        """Fill an empty History with what :meth:`columns` gave."""
+        rows = zip(*(columns[name] for name in self.COLUMNS))
+        for (t, *arrays, before), memory in zip(rows, memories):
+            self._rows.append(Motion(float(t), *arrays, float(before), memory))
+
+    @property
+    def memories(self):
+        """What the scheme itself kept at each instant."""
+        return [y.memory for y in self._rows]
 
     def close(self):
         """Turn what was stored into arrays."""
-        if self._rows:
-            self.t, self.u, self.v, self.acceleration, self.multipliers = (
-                np.array(column) for column in zip(*self._rows))
-        self._rows = []
-        self.iterations = self._solver.iterations
-        self.factorizations = self._solver.factorizations
+        columns, run = self.columns(), self._run
+        self.t, self.u, self.v = columns["t"], columns["u"], columns["v"]
+        self.acceleration, self.multipliers = columns["acceleration"], columns["multipliers"]
+        self._others = columns["algorithmic"], columns["force"], columns["before"]
+        self._memories = self.memories
+        if self._rows and run.y is not None and self._rows[-1].t == run.y.t:
+            self._kept = run.remember()  # of the last instant: the factors too
+        self.steps, self.rejected = run.steps, run.rejected
+        solver = run.stepper.solver
+        self.iterations, self.factorizations = solver.iterations, solver.factorizations
+        self.substeps = solver.substeps
+        self._rows, self._run = [], None
         return self
 
     def __len__(self):
         return len(self.t)
 
     def __repr__(self):
-        return (f"<History of {len(self)} instants, t = {self.t[0]:g} to {self.t[-1]:g}, "
-                f"{self.scheme!r}, {self.iterations} iterations, {self.factorizations} "
-                "factorisations>")
+        span = f", t = {self.t[0]:g} to {self.t[-1]:g}" if len(self) else ""
+        cut = "".join(f", {n} {what}" for n, what in (
+            (self.substeps, "substeps"), (self.rejected, "rejected")) if n)
+        return (f"<History of {len(self)} instants{span}, {self.scheme!r}, {self.steps} steps"
+                f"{cut}, {self.iterations} iterations, {self.factorizations} factorisations>")
 
     def state(self, k):
-        """The instant ``k`` as a State: strain, reactions (inertia included), plots, files."""
+        """The instant ``k`` as a State: strain, reactions (inertia included), plots, files.
+
+        It has the velocity too, and what the scheme needs to go on: :meth:`Scene.integrate
+        <skfem_ancf.Scene.integrate>` from it (``start=``) continues the motion.
+        """
         k = require_index("k", k, len(self))
-        return State(self.system, self.u[k], load=1.0, converged=True, t=float(self.t[k]),
-                     message=f"t = {self.t[k]:g}", multipliers=self.multipliers[k],
-                     inertia=self.system.mass.multiply(self.acceleration[k]),
-                     acceleration=self.acceleration[k])
+        algorithmic, force, before = (x[k] for x in self._others)
+        motion = Motion(float(self.t[k]), self.u[k], self.v[k], self.acceleration[k], algorithmic,
+                        self.multipliers[k], force, float(before), self._memories[k])
+        last = k == len(self) - 1
+        return State(self.system, self.u[k], load=1.0, converged=True, t=motion.t,
+                     message=f"t = {motion.t:g}", multipliers=motion.multipliers,
+                     inertia=self.system.mass.multiply(motion.acceleration),
+                     acceleration=motion.acceleration, motion=motion,
+                     origin=(self.scheme, self._kept if last else None))
 
     def __iter__(self):
         return (self.state(k) for k in range(len(self)))

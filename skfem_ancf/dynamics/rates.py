@@ -1,48 +1,49 @@
-"""Rates of motions that are given as functions of time, by fourth-order differences."""
+"""Rates of motions that are given as functions of time, by differences within one step.
+
+No value from outside of a step is used: neither do the rates at the end of a motion differ from
+those of a motion that goes on, nor does a kink at the end of a step spoil those of the next.
+"""
 
 import numpy as np
 
-
-def central(f, h):
-    """First and second derivative in the middle of five values (5, ...) at distance h."""
-    return ((f[0] - 8 * f[1] + 8 * f[3] - f[4]) / (12 * h),
-            (-f[0] + 16 * f[1] - 30 * f[2] + 16 * f[3] - f[4]) / (12 * h**2))
-
-
-def one_sided(f, h):
-    """First and second derivative at the first of six values (6, ...) at distance h."""
-    return (np.tensordot([-137, 300, -300, 200, -75, 12], f, 1) / (60 * h),
-            np.tensordot([45, -154, 214, -156, 61, -10], f, 1) / (12 * h**2))
+#: Intervals into which a step is divided.
+PARTS = 4
+_FIRST = np.array([25.0, -48.0, 36.0, -16.0, 3.0]) / 12.0
+_SECOND = np.array([35.0, -104.0, 114.0, -56.0, 11.0]) / 12.0
 
 
-def rates(function, t, dt, span):
+def rates(function, t, dt, ahead=False, limit=np.inf):
     """First and second derivative at one time, of a function of an array of times.
 
-    Within ``span`` (start, end) only: the function is not asked for other times.
+    Parameters
+    ----------
+    function
+        Takes times (n,), returns (n, ...).
+    t, dt
+        End and size of the step; its start with ``ahead``.
+    limit
+        Time beyond which the function is not asked.
     """
-    start, end = span
-    h = min(0.5 * dt, 0.2 * (end - start))
-    if t - 2 * h >= start and t + 2 * h <= end:
-        return central(function(t + h * np.arange(-2, 3)), h)
-    h = min(0.25 * dt, 0.2 * (end - start))
-    h = h if t - 2 * h < start else -h
-    return one_sided(function(t + h * np.arange(6)), h)
+    h = dt / PARTS if ahead else -dt / PARTS
+    f = function(np.minimum(t + h * np.arange(PARTS + 1), limit))
+    return np.tensordot(_FIRST, f, 1) / -h, np.tensordot(_SECOND, f, 1) / h**2
 
 
-def step_rates(function, t, dt, n, span):
-    """Values and rates at the ends of n steps from t.
+def step_rates(function, times, dt):
+    """Values and rates at the ends of steps.
+
+    Parameters
+    ----------
+    times
+        The times at which the function is asked, ``PARTS`` in each step, shape (4 n + 1,).
 
     Returns
     -------
     middle, value, first, second
         Arrays (n, ...): the function in the middle and at the end of each step, and its rates.
     """
-    last = t + n * dt
-    inside = last + dt <= span[1] and t >= span[0]
-    f = function(t + 0.5 * dt * np.arange(2 * n + (3 if inside else 1)))
-    m = n if inside else n - 1  # central differences at the first m ends
-    first, second = central([f[k:k + 2 * m:2] for k in range(5)], 0.5 * dt)
-    if not inside:
-        end = rates(function, last, dt, span)
-        first, second = (np.concatenate([x, y[None]]) for x, y in zip((first, second), end))
-    return f[1:2 * n:2], f[2:2 * n + 1:2], first, second
+    f, h = function(times), dt / PARTS
+    n = len(f) - 1
+    back = [f[PARTS - k:n + 1 - k:PARTS] for k in range(PARTS + 1)]
+    return (f[PARTS // 2::PARTS], back[0], np.tensordot(_FIRST, back, 1) / h,
+            np.tensordot(_SECOND, back, 1) / h**2)

@@ -1,0 +1,383 @@
+"""Files from which a motion goes on: what they hold, how they are written and checked."""
+
+import hashlib
+import json
+import logging
+import os
+import time
+import warnings
+import zipfile
+import zlib
+
+import numpy as np
+
+from ..errors import (CheckpointError, CheckpointWarning, InputError, MissingExtra, require_integer,
+                      require_path, shown)
+from .base import Motion
+from .run import Run, Task
+
+logger = logging.getLogger(__name__)
+
+FORMAT = 1
+#: Times of a motion at which functions of time are compared.
+TIMES = 33
+#: Seconds between two files by default, and the part of the time that writing may take.
+SECONDS, SHARE = 60.0, 0.05
+_MAGIC = "skfem-ancf checkpoint"
+_DAMAGED = (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, MemoryError,
+            RuntimeError, OverflowError, zipfile.BadZipFile, zlib.error)
+
+
+# the scene
+
+
+def _digest(*items):
+    h = hashlib.sha256()
+    for item in items:
+        if isinstance(item, np.ndarray):
+            h.update(f"{item.dtype.str}{item.shape}".encode() + np.ascontiguousarray(item).tobytes())
+        else:
+            h.update(repr(item).encode())
+    return h.hexdigest()
+
+
+def _numbers(thing):
+    """The attributes of an object that are numbers, text or arrays, in a fixed order."""
+    return [(k, v) for k, v in sorted(vars(thing).items())
+            if not k.startswith("_")
+            and isinstance(v, (bool, int, float, str, tuple, np.ndarray, type(None)))]
+
+
+def fingerprint(system):
+    """What a scene is, part by part, as text; functions of time are not in it.
+
+    Returns
+    -------
+    dict
+        From the name of a part to its hash.
+    """
+    parts, probe = {}, np.random.default_rng(0).standard_normal(system.N)
+    for k, beam in enumerate(system.beams):
+        mesh, who = beam.mesh, f"of beam {beam.name or k}"
+        parts[f"mesh {who}"] = _digest(mesh.p, mesh.t, mesh.height, mesh.lengths, mesh.sections,
+                                       beam.q0)
+        parts[f"element {who}"] = _digest(type(beam.element).__name__, beam.element.order,
+                                          beam.element.axis_degree, beam.nd)
+        parts[f"material {who}"] = _digest(type(beam.material).__name__, *_numbers(beam.material))
+        parts[f"width {who}"] = _digest(beam.width)
+        parts[f"formulation {who}"] = _digest(beam.formulation.name, *_numbers(beam.formulation))
+    parts["supports"] = _digest(system.fixed, system.values(1.0, 0.0)[:0], system._values)
+    for k, load in enumerate(system.loads):
+        u = 1e-3 * load.beam.mesh.height * probe[system.of(load)]
+        parts[f"load {k}"] = _digest(type(load).__name__, system.beams.index(load.beam),
+                                     load.amplitude is None, load.force(0.0 * u), load.force(u))
+    for k, joint in enumerate(system.all_joints):
+        J = [] if joint.moving else [joint.jacobian(u, 0.0) for u in (0.0 * probe, probe)]
+        J += [] if joint.moving else [joint.value(0.0 * probe, 0.0)]
+        parts[f"joint {k}"] = _digest(type(joint).__name__, joint.equations, joint.moving, *J)
+    return parts
+
+
+def functions(system, t_start, t_end):
+    """Functions of time of a scene at a few times, by name: dict of arrays (n, k).
+
+    A function has no hash; these values tell most that differ.
+    """
+    times, found = np.linspace(t_start, t_end, TIMES), {}
+    for k, load in enumerate(system.loads):
+        if load.amplitude is not None:
+            found[f"amplitude of load {k}"] = np.array([[load.factor(t)] for t in times])
+    for k, joint in enumerate(system.all_joints):
+        if joint.moving:
+            found[f"motion of joint {k}"] = np.asarray(joint.offset(times, system.N), dtype=float)
+    return found
+
+
+def same_problem(system, start, t):
+    """True if a State's accelerations and multipliers are those of the system at a time."""
+    other, u = start.system, start.u
+    if other is system and t == start.t:
+        return True
+    if len(u) != system.N or fingerprint(other) != fingerprint(system):
+        return False
+    now, then = np.array([t]), np.array([start.t])
+    return all(np.array_equal(a, b) for a, b in (
+        (system.external_force(u, t), other.external_force(u, start.t)),
+        (system.values_at(now), other.values_at(then)),
+        (system.constraint(u, t), other.constraint(u, start.t))))
+
+
+# schemes as text
+
+
+def _scheme_text(scheme):
+    from . import SCHEMES
+
+    values = vars(scheme)
+    known = type(scheme) in SCHEMES.values() and all(
+        isinstance(v, (int, float)) for v in values.values())
+    return {"name": scheme.name or type(scheme).__name__, "values": values if known else None}
+
+
+def _scheme_of(text, given):
+    from . import SCHEMES, get_scheme
+
+    if given is not None:
+        scheme = get_scheme(given)
+        if _scheme_text(scheme) != text:
+            raise CheckpointError(f"the file is of a run by {text}, not by {scheme!r}")
+        return scheme
+    if text["values"] is None or text["name"] not in SCHEMES:
+        raise CheckpointError(f"the run was made by a scheme of your own, {text['name']!r}: give "
+                              "it, resume(path, scheme=...)")
+    scheme = object.__new__(SCHEMES[text["name"]])
+    vars(scheme).update(text["values"])
+    return scheme
+
+
+# files
+
+
+def _h5py():
+    try:
+        import h5py
+    except ImportError:
+        raise MissingExtra("h5py", "files") from None
+    return h5py
+
+
+def _checksum(arrays):
+    return np.frombuffer(bytes.fromhex(_digest(*(
+        part for name in sorted(arrays) for part in (name, arrays[name])))), dtype=np.uint8)
+
+
+def _write(path, arrays):
+    """Write a file beside its place, and put it there when it is complete and on the disk."""
+    part = path.with_name(path.name + ".part")
+    try:
+        with open(part, "wb") as file:
+            if path.suffix == ".h5":
+                with _h5py().File(file, "w") as h5:
+                    for name, array in arrays.items():
+                        h5.create_dataset(name, data=array)
+            else:
+                np.savez(file, **arrays)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+        _sync_folder(path.parent)
+    except BaseException:
+        try:
+            part.unlink(missing_ok=True)
+        except OSError:
+            pass
+        raise
+
+
+def _sync_folder(folder):
+    """Put the new name on the disk too, where the system can."""
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:  # not on Windows
+        return
+    try:
+        os.fsync(handle)
+    except OSError:
+        pass
+    finally:
+        os.close(handle)
+
+
+def _load(path):
+    if path.suffix == ".h5":
+        with _h5py().File(path, "r") as h5:
+            return {name: np.asarray(h5[name][()]) for name in h5}
+    with open(path, "rb") as file, np.load(file, allow_pickle=False) as npz:
+        return {name: npz[name] for name in npz.files}
+
+
+def read(path):
+    """The arrays of a checkpoint by name, and its text; raises CheckpointError."""
+    path = _path(path)
+    if not path.exists():
+        raise CheckpointError(f"there is no file {str(path)!r}")
+    try:
+        arrays = _load(path)
+    except _DAMAGED as error:
+        raise CheckpointError(f"{str(path)!r} cannot be read, it is no checkpoint or damaged: "
+                              f"{type(error).__name__}: {error}") from None
+    checksum = arrays.pop("checksum", None)
+    try:
+        text = json.loads(bytes(arrays.pop("text")).decode())
+        is_one = isinstance(text, dict) and text.get("what") == _MAGIC
+    except (KeyError, ValueError, TypeError):
+        is_one = False
+    if not is_one:
+        raise CheckpointError(f"{str(path)!r} is no checkpoint of a motion")
+    if text["format"] != FORMAT:
+        raise CheckpointError(f"{str(path)!r} has the format {text['format']!r}, this version "
+                              f"reads {FORMAT}")
+    if checksum is None or not np.array_equal(checksum, _checksum({**arrays, "text": _bytes(text)})):
+        raise CheckpointError(f"{str(path)!r} is damaged: its checksum is not that of its content")
+    return arrays, text
+
+
+def _bytes(text):
+    return np.frombuffer(json.dumps(text, sort_keys=True).encode(), dtype=np.uint8)
+
+
+def _path(path):
+    path = require_path("checkpoint", path)
+    if path.suffix not in (".npz", ".h5"):
+        raise InputError(f"a checkpoint ends in .npz or .h5, got {shown(str(path))}")
+    if path.suffix == ".h5":
+        _h5py()
+    return path
+
+
+class Checkpoint:
+    """Writes a Run to a file now and then.
+
+    Parameters
+    ----------
+    path
+        Name of the file, ``.npz`` or ``.h5``.
+    every
+        Steps between two files, or None: by time.
+    run
+        The Run.
+    """
+
+    def __init__(self, path, every, run):
+        self.path, self.run = _path(path), run
+        self.every = None if every is None else require_integer("every", every, 1)
+        run.longest = self.every
+        self._steps, self._clock, self._took = run.steps, time.monotonic(), 0.0
+        task, system = run.task, run.system
+        self._functions = functions(system, task.t_start, task.t_end)
+        self._text = {
+            "what": _MAGIC, "format": FORMAT, "every": self.every,
+            "scheme": _scheme_text(run.scheme), "scene": fingerprint(system),
+            "functions": sorted(self._functions),
+            "task": {k: v for k, v in vars(task).items() if k != "t_eval"}}
+
+    def begin(self):
+        """Write the start, so that what is wrong is said before the run."""
+        if self.path.exists():
+            self._spare()
+        if not self.path.parent.is_dir():
+            raise CheckpointError(f"the folder {str(self.path.parent)!r} of the checkpoint does "
+                                  "not exist")
+        try:
+            self._write()
+        except OSError as error:
+            raise CheckpointError(f"the checkpoint {str(self.path)!r} cannot be written: "
+                                  f"{error}") from None
+
+    def _spare(self):
+        """Raise CheckpointError if the file that is there is worth keeping."""
+        try:
+            _, text = read(self.path)
+        except CheckpointError as error:
+            raise CheckpointError(f"{error}; it is not overwritten: choose another name") from None
+        if not text["done"]:
+            raise CheckpointError(
+                f"{str(self.path)!r} holds a run up to t = {text['t']:.6g} of "
+                f"{text['task']['t_end']:.6g}: scene.resume({str(self.path)!r}) goes on with it; "
+                "delete the file to begin again")
+
+    def _write(self):
+        run, y = self.run, self.run.y
+        arrays = {f"run.{k}": v for k, v in run.remember().items()}
+        arrays.update({f"history.{k}": v for k, v in run.history.columns().items()})
+        for name in run.history.COLUMNS:
+            arrays[f"now.{name}"] = np.asarray(getattr(y, name), dtype=float)
+        for k, memory in enumerate([y.memory, *run.history.memories]):
+            arrays.update({f"memory.{k}.{name}": np.asarray(v)
+                           for name, v in (memory or {}).items()})
+        for name, values in self._functions.items():
+            arrays[f"function.{name}"] = values
+        if run.task.t_eval is not None:
+            arrays["t_eval"] = run.task.t_eval
+        arrays["text"] = _bytes({**self._text, "t": y.t, "done": run.done})
+        _write(self.path, {**arrays, "checksum": _checksum(arrays)})
+        self._steps, self._clock = run.steps, time.monotonic()
+
+    def update(self):
+        """Write if it is time to, or the end; warns with CheckpointWarning where it fails."""
+        run = self.run
+        waited = time.monotonic() - self._clock
+        if self.every is not None:
+            due = run.steps - self._steps >= self.every
+        else:
+            due = waited > max(SECONDS, self._took / SHARE)
+        if not (due or run.done):
+            return
+        before = time.monotonic()
+        try:
+            self._write()
+        except OSError as error:
+            self._steps, self._clock = run.steps, time.monotonic()
+            warnings.warn(f"the checkpoint {str(self.path)!r} could not be written at t = "
+                          f"{run.y.t:.6g}, the last good one stays: {error}", CheckpointWarning,
+                          stacklevel=4)
+        self._took = time.monotonic() - before
+
+
+# going on
+
+
+def _compare(system, text, arrays, path):
+    """Raise CheckpointError if the scene is another than that of the file."""
+    now, then = fingerprint(system), text["scene"]
+    other = [part for part in sorted(set(now) | set(then)) if now.get(part) != then.get(part)]
+    if not other:
+        task = text["task"]
+        for name, values in functions(system, task["t_start"], task["t_end"]).items():
+            known = arrays.get(f"function.{name}")
+            size = np.abs(values).max(initial=0.0)
+            if known is None or known.shape != values.shape or not np.allclose(
+                    values, known, rtol=0, atol=1e-12 * size, equal_nan=True):
+                other.append(name)
+    if other:
+        raise CheckpointError(f"{str(path)!r} is of another scene, it differs in: "
+                              + ", ".join(other))
+
+
+def resume(system, path, scheme=None):
+    """The Run of a checkpoint, and the Checkpoint that goes on writing it.
+
+    Raises
+    ------
+    CheckpointError
+        If the file cannot be read, is damaged, or of another scene.
+    """
+    arrays, text = read(path)
+    _compare(system, text, arrays, path)
+    task = Task(**{**text["task"], "t_eval": arrays.get("t_eval"),
+                   "breakpoints": tuple(text["task"]["breakpoints"])})
+    run = Run(system, _scheme_of(text["scheme"], scheme), task)
+    try:
+        _restore(run, arrays)
+    except (KeyError, ValueError, TypeError, IndexError) as error:
+        raise CheckpointError(f"{str(path)!r} does not hold what a run needs: "
+                              f"{type(error).__name__}: {error}") from None
+    return run, Checkpoint(path, text["every"], run)
+
+
+def _restore(run, arrays):
+    columns = {name: arrays[f"history.{name}"] for name in run.history.COLUMNS}
+    shapes = {name: x.shape for name, x in run.history.columns().items()}
+    for name, shape in shapes.items():
+        if columns[name].shape[1:] != shape[1:] or arrays[f"now.{name}"].shape != shape[1:]:
+            raise ValueError(f"{name} has the shape {columns[name].shape}")
+    memories = [{} for _ in range(len(columns["t"]) + 1)]
+    for name, value in arrays.items():
+        if name.startswith("memory."):
+            _, k, key = name.split(".", 2)
+            memories[int(k)][key] = value
+    now, *stored = [memory or None for memory in memories]
+    run.history.restore(columns, stored)
+    t, *rest, before = (arrays[f"now.{name}"] for name in run.history.COLUMNS)
+    run.recall(Motion(float(t), *rest, float(before), now),
+               {k[4:]: v for k, v in arrays.items() if k.startswith("run.")})

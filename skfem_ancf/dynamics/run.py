@@ -1,0 +1,364 @@
+"""A motion on its way: steps, their sizes, instants to store, and what it takes to go on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .base import Motion
+from .blocks import CompiledSteps
+from .history import History
+from .integrator import Integrator, StepFailed
+from .stepsize import StepSize
+
+#: Part of a step up to which an instant is interpolated: a step that short is all round-off.
+CLOSE = 1e-6
+#: Part of a step up to which the acceleration is interpolated, for the same reason.
+NEAR = 0.1
+
+
+@dataclass
+class Task:
+    """What is asked for.
+
+    Attributes
+    ----------
+    t_start, t_end
+        Times of start and end.
+    dt
+        Step size, or None for an automatic one.
+    tol, rtol
+        Tolerances of the iteration (None: the scheme's), and of the automatic step size.
+    t_eval
+        Times to store, shape (n,), or None for all steps.
+    breakpoints
+        Times inside of the motion at which a step ends and the next starts afresh.
+    """
+
+    t_start: float
+    t_end: float
+    dt: float = None
+    tol: float = None
+    rtol: float = 1e-5
+    t_eval: np.ndarray = None
+    breakpoints: tuple = ()
+
+    @property
+    def span(self):
+        """Length of the motion in time."""
+        return self.t_end - self.t_start
+
+
+class Stepper:
+    """Single steps, compiled where they can be."""
+
+    def __init__(self, system, scheme, tol=None):
+        self.solver = Integrator(system, scheme, tol)
+        self.blocks = None
+        if CompiledSteps.applies(scheme, system):
+            self.blocks = CompiledSteps(self.solver, scheme, system)
+
+    def step(self, y, dt):
+        """One step, in Python where there is no compiled one or it fails; raises StepFailed."""
+        if self.blocks is not None:
+            done, motion = self.blocks.run(y, dt, 1)
+            if done:
+                return motion(0)
+            self.solver.forget()
+        return self.solver.advance_safely(y, dt)
+
+    def forget(self):
+        """Make new factors in the next step."""
+        self.solver.forget()
+        if self.blocks is not None:
+            self.blocks.forget()
+
+    @property
+    def _last(self):
+        return self.blocks if self.blocks is not None and self.blocks.ready else self.solver
+
+    @property
+    def ready(self):
+        """True if there are factors of an iteration matrix."""
+        return self._last.ready
+
+    def solve(self, b):
+        """The inverse of the last iteration matrix times b (N,)."""
+        return self._last.solve(b)
+
+    def mass_factor(self, dt):
+        """Factor of the mass in the iteration matrix."""
+        if self._last is self.solver:
+            return self.solver._coefficients[0]
+        return self.blocks.mass_factor(dt)
+
+    def remember(self):
+        """Numbers and arrays from which :meth:`recall` goes on as if there had been no break."""
+        memory = {f"solver.{k}": v for k, v in self.solver.remember().items()}
+        if self.blocks is not None:
+            memory.update({f"blocks.{k}": v for k, v in self.blocks.remember().items()})
+        return memory
+
+    def recall(self, memory):
+        """Go on with what :meth:`remember` gave."""
+        def part(name):
+            return {k.split(".", 1)[1]: v for k, v in memory.items() if k.startswith(name + ".")}
+
+        self.solver.recall(part("solver"))
+        if self.blocks is not None and "blocks.A" in memory:
+            self.blocks.recall(part("blocks"))
+
+
+class Run:
+    """The loop over steps, so that it can stop after any of them and go on.
+
+    Attributes
+    ----------
+    y : Motion
+        Where the motion is.
+    history : History
+        The instants stored so far.
+    steps, rejected
+        Steps done, and steps that the automatic size took again.
+    longest
+        Steps of a compiled block at most, or None.
+    """
+
+    def __init__(self, system, scheme, task):
+        self.system, self.scheme, self.task = system, scheme, task
+        self.stepper, self._side = Stepper(system, scheme, task.tol), None
+        self.sizes = None
+        if task.dt is None:
+            self.sizes = StepSize(system, scheme, task.rtol, task.t_start, task.t_end)
+        self._times = np.array([task.t_start, *task.breakpoints, task.t_end], dtype=float)
+        self.segment = self.n = self._next = self.steps = self.rejected = 0
+        self.size = 1e-4 * task.span if task.dt is None else task.dt
+        self.history = History(system, scheme, self)
+        self.y, self.longest = None, None
+        self._limit()
+
+    # the start
+
+    def begin(self, u, v):
+        """Begin with a displacement and a velocity, shape (N,)."""
+        self.y = self.stepper.solver.start(u, v, self.task.t_start, self._first_step())
+        self._store_start()
+
+    def go_on(self, y, memory=None):
+        """Begin with a Motion of the same scheme, and what its Run kept."""
+        self.y = Motion(self.task.t_start, y.u, y.v, y.acceleration, y.algorithmic, y.multipliers,
+                        y.force, y.before, y.memory)
+        if memory is not None:
+            self.stepper.recall(memory)
+            solver = self.stepper.solver
+            solver.iterations = solver.factorizations = solver.substeps = 0
+            if self.sizes is not None and "averages" in memory:
+                self.size = min(float(memory["size"]), self.task.span)
+                self.sizes.recall(memory)
+        self._store_start()
+
+    def _store_start(self):
+        wanted = self.task.t_eval
+        if wanted is None or wanted[0] <= self.task.t_start:
+            self.history.append(self.y)
+            self._next = 1
+
+    def _first_step(self):
+        """Size of the first step of a segment."""
+        return min(self.size, self._end - self._begun)
+
+    # segments between breakpoints
+
+    @property
+    def _begun(self):
+        return float(self._times[self.segment])
+
+    @property
+    def _end(self):
+        return float(self._times[self.segment + 1])
+
+    @property
+    def _last(self):
+        return self.segment == len(self._times) - 2
+
+    @property
+    def done(self):
+        """True at the end of the motion."""
+        return self._last and self.y.t >= self._end
+
+    def _limit(self):
+        """Functions of time are asked before a breakpoint in the steps that end there."""
+        near = 16 * np.spacing(max(abs(self._begun), abs(self._end)))
+        self.stepper.solver.limit = np.inf if self._last else self._end - near
+        self._count = 0 if self.sizes else max(1, int(np.ceil(
+            (self._end - self._begun) / self.size * (1 - 1e-12))))
+        even = abs(self._begun + self._count * self.size - self._end) < 1e-9 * self.size
+        # the last step may be shorter; the others are of one size, to keep the factors
+        self._whole = self._count if even and self._last else self._count - 1
+
+    def _turn(self, y):
+        """Beyond a breakpoint: accelerations and rates are those of what comes."""
+        self.segment, self.n = self.segment + 1, 0
+        self._limit()
+        if self.sizes is not None:
+            self.size = 1e-4 * self.task.span
+            self.sizes.begin()
+        return self.stepper.solver.start(y.u, y.v, self._begun, self._first_step())
+
+    # steps
+
+    def advance(self):
+        """Go on by a step, or by a block of them; raises StepFailed."""
+        if self.sizes is not None:
+            self._automatic()
+            return
+        blocks, old = self.stepper.blocks, self.y
+        if blocks is not None and self.n < self._whole:
+            first = self.n - self.n % blocks.longest
+            block = first, min(first + blocks.longest, self._whole)
+            number = block[1] - self.n
+            if self.longest is not None:
+                number = min(number, self.longest - self.n % self.longest)
+            done, motion = blocks.run(old, self.size, number, self._begun, self.n, block)
+            if done:
+                self._store_block(old, done, motion)
+                return
+        h = self._end - old.t
+        if self.n < self._count - 1 or abs(h - self.size) < 1e-9 * self.size:
+            h = self.size
+        new = self.stepper.step(old, h)
+        new.t = self._time(self.n + 1)
+        self._commit(old, new)
+
+    def _time(self, n):
+        """Time after n steps of the segment."""
+        return self._begun + n * self.size if n < self._count else self._end
+
+    def _automatic(self):
+        """One step of automatic size, or a rejected one."""
+        y = self.y
+        left = self._end - y.t
+        h = self.sizes.cut(y.t, min(self.size, left))
+        if left < (1 + 1e-3) * h:
+            h = left
+        elif left < 2 * h:
+            h = 0.5 * left
+        new = self.stepper.step(y, h)
+        error = self.sizes.error(self.stepper, y, new, h)
+        self.size, kept = self.sizes.next(error, h, self.size)
+        if not kept:
+            self.rejected += 1
+            return
+        if h == left:
+            new.t = self._end
+        self._commit(y, new)
+
+    def _commit(self, old, new):
+        """A step is done."""
+        if new.t >= self._end and not self._last:
+            new = self._turn(new)
+        else:
+            self.n += 1
+        self._store(old, new)
+        self.y, self.steps = new, self.steps + 1
+
+    # storage
+
+    def _wanted(self):
+        """The next time to store."""
+        wanted = self.task.t_eval
+        return np.inf if wanted is None or self._next == len(wanted) else wanted[self._next]
+
+    def _store(self, old, new):
+        """Keep what was asked for of the step from one Motion to the next."""
+        if self.task.t_eval is None:
+            self.history.append(new)
+            return
+        until = new.t + 1e-14 * max(abs(self.task.t_start), abs(self.task.t_end))
+        while self._wanted() <= until:
+            self.history.append(self._between(old, new, float(self._wanted())))
+            self._next += 1
+
+    def _store_block(self, y, done, motion):
+        """The same for a block of steps, of which only those that hold a time to store are made."""
+        first, k, last = self.n, -1, y
+
+        def instant(k):
+            if k < 0:
+                return y
+            new = motion(k)
+            new.t = self._time(first + k + 1)
+            return new
+
+        while k < done - 1:
+            old, k = k, k + 1
+            if self.task.t_eval is not None:
+                wanted = self._wanted()
+                until = (wanted - self._begun) / self.size - 1 - first if wanted < np.inf else done
+                k = int(min(max(k, until - 1), done - 1))
+            before = last if k == old + 1 else instant(k - 1)
+            last = instant(k)
+            self._store(before, last)
+        self.n, self.steps, self.y = first + done, self.steps + done, last
+
+    def _between(self, old, new, t):
+        """The motion at a time within a step: by a shorter step from the same start.
+
+        So it has what a step of the scheme keeps: its order, energy and momenta, closed joints.
+        """
+        h, s = new.t - old.t, (t - old.t) / (new.t - old.t)
+        if s > 1.0 - 1e-12:
+            return new
+        if s < CLOSE:
+            return interpolate(old, new, t)
+        if self._side is None:
+            self._side = Stepper(self.system, self.scheme, self.task.tol)
+        side, solver = self._side, self.stepper.solver
+        side.forget()
+        side.solver._energy, side.solver.limit = solver._energy, solver.limit
+        found = side.step(old, s * h)
+        for name in ("iterations", "factorizations", "substeps"):
+            setattr(solver, name, getattr(solver, name) + getattr(side.solver, name))
+            setattr(side.solver, name, 0)
+        found.t = t
+        if s < NEAR:
+            smooth = interpolate(old, new, t)
+            found.acceleration, found.multipliers = smooth.acceleration, smooth.multipliers
+        return found
+
+    # what it takes to go on
+
+    def remember(self):
+        """Numbers and arrays that, with :attr:`y` and the history, make a Run go on exactly."""
+        memory = self.stepper.remember()
+        if self.sizes is not None:
+            memory.update(self.sizes.remember())
+        memory["size"] = np.array(self.size)
+        memory["counts"] = np.array([self.segment, self.n, self._next, self.steps, self.rejected])
+        return memory
+
+    def recall(self, y, memory):
+        """Go on with what :meth:`remember` gave."""
+        self.y = y
+        self.stepper.recall(memory)
+        if self.sizes is not None:
+            self.sizes.recall(memory)
+        self.segment, self.n, self._next, self.steps, self.rejected = map(int, memory["counts"])
+        self.size = float(memory["size"])
+        self._limit()
+
+
+def interpolate(a, b, t):
+    """The motion at t between two instants: cubic in the displacement, linear in accelerations."""
+    h, s = b.t - a.t, (t - a.t) / (b.t - a.t)
+    du = b.u - a.u
+    u = (a.u + s * s * (3 - 2 * s) * du + h * s * (1 - s) ** 2 * a.v + h * s * s * (s - 1) * b.v)
+    v = (6 * s * (1 - s) / h * du + (1 - s) * (1 - 3 * s) * a.v + s * (3 * s - 2) * b.v)
+
+    def linear(x, y):
+        return (1 - s) * x + s * y
+
+    return Motion(t, u, v, linear(a.acceleration, b.acceleration), a.algorithmic,
+                  linear(a.multipliers, b.multipliers), a.force, a.before, a.memory)
+
+
+__all__ = ["Run", "StepFailed", "Stepper", "Task", "interpolate"]

@@ -1,0 +1,143 @@
+"""The automatic step size: what a step adds to the error, and events ahead."""
+
+import numpy as np
+
+from ..sampling import sample
+
+#: Intervals of the whole motion at whose ends functions of time are asked ahead.
+SAMPLES = 4096
+#: Part of a function's range by which it may leave a parabola within one step.
+HIDDEN = 0.1
+#: The largest error of a point's displacement, over the root of the mean square that is added up:
+#: a tip moves twice as far as the mean, and errors grow on their way.
+LARGEST = 3.0
+#: Part of ``rtol`` that a single step may add.
+SINGLE = 0.1
+#: Error, relative to its share, above which a step is taken again.
+REJECTED = 1.2
+#: Growth of the step below which it keeps its size, and with it the factors.
+WORTH = 1.3
+
+
+class StepSize:
+    """Chooses steps so that the error of the displacement is about ``rtol`` at the end.
+
+    The error that a step adds may be its share of ``rtol``, in proportion to its size: error per
+    unit step. It is estimated from the change of the scheme's acceleration, of which two things
+    are taken out, since the error of a vibration does not grow beyond its amplitude:
+
+    * what the step does not resolve, by the iteration matrix as a filter,
+    * vibrations whose phase is lost within the motion whatever the tolerance asks, by two
+      averages over the time W in which they turn: after the time T a vibration of the frequency w
+      has lost the phase C w^3 dt^2 T, so W = (C dt^2 T)^(1/3) / 2.
+
+    Parameters
+    ----------
+    system, scheme
+        What is integrated, and how.
+    rtol
+        Error of the displacement at ``t_end``, relative to the size of the scene.
+    t_start, t_end
+        Times of start and end.
+
+    References
+    ----------
+    Error per unit step: Hairer, Norsett, Wanner: "Solving ordinary differential equations I",
+    II.4. The first filter: Shampine, Baca: "Error estimators for stiff differential equations", Journal
+    of Computational and Applied Mathematics 11 (1984).
+    """
+
+    def __init__(self, system, scheme, rtol, t_start, t_end):
+        self.system, self.scheme, self.rtol = system, scheme, rtol
+        self.span = t_end - t_start
+        self._mass = sum(b.total_mass for b in system.beams)
+        self._averages = self._new = np.zeros((2, system.N))
+        self.times = np.linspace(t_start, t_end, SAMPLES + 1)
+        self._values = self._sample()
+
+    def _sample(self):
+        """Functions of time at :attr:`times`, of range 1, shape (SAMPLES + 1, k)."""
+        s, columns = self.system, [np.zeros((len(self.times), 0))]
+        for load in s.loads:
+            if load.amplitude is not None:
+                columns.append(sample(load.amplitude, self.times).reshape(-1, 1))
+        for joint in s.all_joints:
+            if joint.moving:
+                columns.append(joint.offset(self.times, s.N))
+        values = np.hstack(columns)
+        values = values[:, np.all(np.isfinite(values), axis=0)]
+        size = np.ptp(values, axis=0)
+        varies = size > 1e-12 * np.abs(values).max(axis=0, initial=0.0)
+        return values[:, varies] / size[varies]
+
+    def cut(self, t, dt):
+        """The step size from t, at most dt, in which no function of time does what is not seen.
+
+        It is not seen if it is no parabola within the step: a blow that begins and ends there.
+        """
+        values = self._values
+        while values.shape[1]:
+            i, j = np.searchsorted(self.times, (t, t + dt))
+            if j - i < 3:
+                return dt
+            at = np.array([np.interp((t, t + 0.5 * dt, t + dt), self.times, c) for c in values.T]).T
+            x = ((self.times[i:j] - t) / dt)[:, None]
+            parabola = (at[0] * (1 - x) * (1 - 2 * x) + at[1] * 4 * x * (1 - x)
+                        + at[2] * x * (2 * x - 1))
+            if np.all(np.abs(values[i:j] - parabola) <= HIDDEN):
+                return dt
+            dt *= 0.5
+        return dt
+
+    def _size(self, de):
+        return (np.sqrt(max(de @ self.system.mass.multiply(de), 0.0) / self._mass)
+                / (self.system.size * self.rtol))
+
+    def error(self, stepper, old, new, dt):
+        """What a step adds to the error, over what it may add."""
+        s = self.system
+        de = self.scheme.local_error(old, new, dt)
+        if stepper.ready:
+            de = stepper.solve(stepper.mass_factor(dt) * s.mass.multiply(de) * s.free)
+        width = 0.5 * (self.scheme.error_constant * dt**2 * self.span) ** (1.0 / 3.0)
+        part = -np.expm1(-dt / width)
+        power = self.scheme.order + 1
+        rate = de / dt**power  # of the motion, not of the step
+        self._new = self._averages.copy()
+        for average in self._new:
+            average += part * (rate - average)
+            rate = average
+        return LARGEST * max(self._size(rate) * dt**(power - 1) * self.span,
+                             self._size(de) / SINGLE)
+
+    def begin(self):
+        """Forget what was: at the start, and after a breakpoint."""
+        self._averages = np.zeros_like(self._averages)
+
+    def next(self, error, dt, size):
+        """Size of the next step after one of dt, and whether this one is to be kept.
+
+        Parameters
+        ----------
+        error
+            That of :meth:`error`.
+        size
+            The size wished for, of which dt may be a part.
+        """
+        factor = 0.9 * max(error, 1e-300) ** (-1.0 / self.scheme.order)
+        if error > REJECTED and dt > 1e-9 * self.span:
+            return dt * max(0.2, min(0.8, factor)), False
+        self._averages = self._new
+        if factor > WORTH or factor < 0.95:
+            new = dt * min(2.0, max(0.5, factor))
+        else:
+            new = dt
+        return (max(size, new) if dt < 0.99 * size and factor >= 1.0 else new), True
+
+    def remember(self):
+        """What :meth:`recall` takes to go on as if there had been no break."""
+        return {"averages": self._averages}
+
+    def recall(self, memory):
+        """Go on with what :meth:`remember` gave."""
+        self._averages = memory["averages"]

@@ -1,0 +1,469 @@
+"""Motions that are written to files, killed, and gone on with."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+from skfem_ancf.dynamics import SCHEMES, GeneralizedAlpha, Newmark, checkpoint
+from skfem_ancf.errors import (CheckpointError, CheckpointWarning, ConvergenceError, InputError,
+                               Interrupted, MissingExtra)
+
+from test_restart import driven, swinging
+
+NAMES = ("t", "u", "v", "acceleration", "multipliers")
+
+
+def assert_identical(a, b):
+    for name in NAMES:
+        assert np.array_equal(getattr(a, name), getattr(b, name)), name
+    for name in ("steps", "rejected", "substeps", "iterations", "factorizations"):
+        assert getattr(a, name) == getattr(b, name), name
+
+
+def stages(monkeypatch, path):
+    """Copies of the file after each time that it is written: a list that grows."""
+    copies, write = [], checkpoint._write
+
+    def kept(target, arrays):
+        write(target, arrays)
+        copies.append(shutil.copy(path, path.with_name(f"{len(copies)}{path.suffix}")))
+
+    monkeypatch.setattr(checkpoint, "_write", kept)
+    return copies
+
+
+OPTIONS = {
+    "equal steps": dict(dt=2.5e-3, every=9),
+    "compiled blocks": dict(dt=1e-3, every=64),
+    "instants asked for": dict(dt=2.5e-3, every=7, t_eval=np.linspace(0.011, 0.099, 12)),
+    "automatic": dict(dt="auto", rtol=1e-3, every=6),
+    "breakpoints": dict(dt=2.5e-3, every=8, breakpoints=[0.0312, 0.07]),
+}
+
+
+@pytest.mark.parametrize("name", OPTIONS)
+@pytest.mark.parametrize("build", [swinging, driven])
+def test_from_every_file_bit_for_bit(name, build, tmp_path, monkeypatch):
+    path, options = tmp_path / "run.npz", OPTIONS[name]
+    plain = build().integrate(0.1, **{k: v for k, v in options.items() if k != "every"})
+    copies = stages(monkeypatch, path)
+    whole = build().integrate(0.1, checkpoint=path, **options)
+    assert_identical(whole, plain)  # writing changes nothing
+    assert len(copies) > 2
+    scene = build()
+    for copy in copies[::2] + copies[-1:]:
+        assert_identical(scene.resume(copy), whole)
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".h5"])
+@pytest.mark.parametrize("scheme", [cls() for cls in SCHEMES.values()]
+                         + [GeneralizedAlpha(0.3), Newmark(0.36, 0.6)], ids=repr)
+def test_every_scheme_and_kind_of_file(scheme, suffix, tmp_path, monkeypatch):
+    if suffix == ".h5":
+        pytest.importorskip("h5py")
+    path = tmp_path / f"run{suffix}"
+    copies = stages(monkeypatch, path)
+    whole = driven(False).integrate(0.03, 2.5e-3, scheme=scheme, checkpoint=path, every=5)
+    again = driven(False).resume(copies[1])
+    assert_identical(again, whole)
+    assert repr(again.scheme) == repr(scheme)
+    assert sorted(p.name for p in tmp_path.iterdir() if ".part" in p.name) == []
+    # an instant of what was gone on with is one of the motion
+    assert driven(False).integrate(0.035, 2.5e-3, scheme=scheme, start=again.state(-1)).steps == 2
+
+
+class Counting(Newmark):
+    """A scheme that remembers something of its own."""
+
+    name = "counting"
+    compiled = None
+
+    def begin(self, system, y, dt):
+        step = super().begin(system, y, dt)
+        count = 0 if y.memory is None else y.memory["count"]
+        finish = step.finish
+
+        def counted(*args):
+            new = finish(*args)
+            new.memory = {"count": count + 1, "u": new.u}
+            return new
+
+        step.finish = counted
+        return step
+
+
+def test_a_scheme_of_ones_own(tmp_path, monkeypatch):
+    path = tmp_path / "run.npz"
+    copies = stages(monkeypatch, path)
+    whole = swinging().integrate(0.02, 2.5e-3, scheme=Counting(), checkpoint=path, every=3)
+    with pytest.raises(CheckpointError, match="'counting': give it"):
+        swinging().resume(copies[1])
+    again = swinging().resume(copies[1], scheme=Counting())
+    assert_identical(again, whole)
+    assert [int(again.state(k)._motion.memory["count"]) for k in (1, 8)] == [1, 8]
+
+
+def test_a_finished_file_gives_the_history(tmp_path):
+    path = tmp_path / "run.npz"
+    whole = swinging().integrate(0.02, 2.5e-3, checkpoint=path)  # by time: start and end
+    assert_identical(swinging().resume(path), whole)
+    swinging().integrate(0.01, 2.5e-3, checkpoint=path)  # a finished one may be replaced
+    assert swinging().resume(path).t[-1] == pytest.approx(0.01)
+
+
+# killed
+
+CHILD = '''
+import json, os, random, signal, sys, time, warnings
+sys.path[:0] = {paths!r}
+import numpy as np
+from skfem_ancf.dynamics import checkpoint
+from test_restart import swinging
+
+path, every, end = sys.argv[1], 3, 0.1
+def whole():
+    return swinging(False).integrate(end, 2.5e-3)
+def run():
+    done = os.path.exists(path)
+    scene = swinging(False)
+    return scene.resume(path) if done else scene.integrate(end, 2.5e-3, checkpoint=path, every=every)
+def child(work):
+    pid = os.fork()
+    if pid == 0:
+        try:
+            work()
+            os._exit(0)
+        except BaseException as error:
+            print(repr(error), file=sys.stderr, flush=True)
+            os._exit(3)
+    return pid
+def same(a, b):
+    return all(np.array_equal(getattr(a, n), getattr(b, n))
+               for n in ("t", "u", "v", "acceleration", "multipliers"))
+'''
+
+
+def in_child(code, path):
+    """Run code after CHILD, in a process of its own; what it prints last, from JSON."""
+    here = Path(__file__).parent
+    head = CHILD.format(paths=[str(here.parent), str(here)])
+    out = subprocess.run([sys.executable, "-W", "error", "-c", head + code, str(path)],
+                         capture_output=True, text=True, timeout=300,
+                         env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"})
+    assert out.returncode == 0, out.stderr
+    return json.loads(out.stdout.strip().splitlines()[-1])
+
+
+needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
+
+
+@needs_fork
+@pytest.mark.parametrize("suffix", [".npz", ".h5"])
+def test_killed_at_random_moments(suffix, tmp_path):
+    if suffix == ".h5":
+        pytest.importorskip("h5py")
+    found = in_child('''
+random.seed(5)
+kills, moments, status = 0, [], None
+while status != 0:
+    pid = child(run)
+    time.sleep(random.uniform(0.0, 0.08) * (1 + kills / 10))
+    os.kill(pid, signal.SIGKILL)
+    status = os.waitpid(pid, 0)[1]
+    assert status in (0, signal.SIGKILL), status
+    kills += status != 0
+    if os.path.exists(path):
+        moments.append(checkpoint.read(path)[1]["t"])  # the file is whole, always
+history = swinging(False).resume(path)
+print(json.dumps([kills, moments, same(history, whole())]))
+''', tmp_path / f"run{suffix}")
+    kills, moments, identical = found
+    assert identical and kills >= 2
+    assert moments == sorted(moments) and moments[-1] == pytest.approx(0.1)
+
+
+@needs_fork
+def test_killed_while_writing(tmp_path):
+    """After a part of the file, before it is on the disk, before and after it gets its name."""
+    found = in_child('''
+def at(n, module, name, after):
+    """Kill this process at the n-th call of a function."""
+    function, count = getattr(module, name), [0]
+    def killing(*args, **kwargs):
+        count[0] += 1
+        if count[0] == n and not after:
+            os.kill(os.getpid(), signal.SIGKILL)
+        out = function(*args, **kwargs)
+        if count[0] == n:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return out
+    setattr(module, name, killing)
+
+def half(n):
+    savez, count = np.savez, [0]
+    def killing(file, **arrays):
+        count[0] += 1
+        if count[0] == n:
+            file.write(b"PK" + bytes(1000)); file.flush()
+            os.kill(os.getpid(), signal.SIGKILL)
+        savez(file, **arrays)
+    np.savez = killing
+
+out = []
+for prepare in (lambda: half(3), lambda: at(5, os, "fsync", False),
+                lambda: at(4, os, "replace", False), lambda: at(4, os, "replace", True)):
+    pid = child(lambda: (prepare(), run()))
+    status = os.waitpid(pid, 0)[1]
+    out.append([status == signal.SIGKILL, checkpoint.read(path)[1]["t"]])
+    assert os.path.exists(path + ".part") or len(out) > 3
+history = run()
+print(json.dumps([out, same(history, whole()), os.path.exists(path + ".part")]))
+''', tmp_path / "run.npz")
+    killed, identical, rest = found
+    assert all(k for k, _ in killed) and identical and not rest
+    assert killed[0][1] < killed[1][1] < killed[3][1] < 0.1
+
+
+# where it cannot be written
+
+
+@needs_fork
+def test_a_file_that_may_not_grow(tmp_path):
+    """A limit on the size of files stands in for a full disk: the last good file stays."""
+    pytest.importorskip("resource")
+    found = in_child('''
+import resource
+resource.setrlimit(resource.RLIMIT_FSIZE, (40000, resource.RLIM_INFINITY))
+with warnings.catch_warnings(record=True) as caught:
+    warnings.simplefilter("always")
+    history = run()
+resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+t = checkpoint.read(path)[1]["t"]
+first = str(caught[0].message)
+print(json.dumps([t, len(caught), type(caught[0].message).__name__, first,
+                  same(history, whole()), same(run(), whole()), os.listdir(os.path.dirname(path))]))
+''', tmp_path / "run.npz")
+    t, n, kind, message, went_on, identical, files = found
+    assert 0.0 < t < 0.1 and n >= 2 and kind == "CheckpointWarning"
+    assert "the last good one stays" in message
+    assert went_on and identical and files == ["run.npz"]
+
+
+def test_a_disk_that_fills_up(tmp_path):
+    if sys.platform != "linux" or os.geteuid() != 0:
+        pytest.skip("mounting a small file system needs root on Linux")
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", disk],
+                      capture_output=True).returncode:
+        pytest.skip("a small file system could not be mounted")
+    try:
+        path = disk / "run.npz"
+        scene = swinging(False, ne=30)
+        with pytest.warns(CheckpointWarning, match="last good one stays"):
+            whole = scene.integrate(0.25, 2.5e-3, checkpoint=path, every=10)
+        assert 0 < checkpoint.read(path)[1]["t"] < 0.25
+        copy = shutil.copy(path, tmp_path / "copy.npz")
+        assert_identical(scene.resume(copy), whole)
+        room = os.statvfs(disk)
+        (disk / "other").write_bytes(bytes(room.f_bavail * room.f_frsize - 8192))
+        with pytest.raises(CheckpointError, match="cannot be written"):
+            scene.integrate(0.25, 2.5e-3, checkpoint=disk / "new.npz")
+    finally:
+        subprocess.run(["umount", disk], check=True)
+
+
+@pytest.mark.parametrize("path, error, message", [
+    ("missing/run.npz", CheckpointError, "folder .*missing.* does not exist"),
+    ("run.txt", InputError, "ends in .npz or .h5"), (3, InputError, "path of a file"),
+])
+def test_bad_places(path, error, message, tmp_path):
+    path = tmp_path / path if isinstance(path, str) else path
+    with pytest.raises(error, match=message):
+        swinging(False).integrate(0.1, 2.5e-3, checkpoint=path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_may_not_be_written(tmp_path):
+    folder = tmp_path
+    if hasattr(os, "geteuid") and os.geteuid() == 0:  # may write anywhere but here
+        folder = Path("/proc")
+        if not folder.is_dir():
+            pytest.skip("root may write to every folder")
+    else:
+        folder.chmod(0o500)
+    try:
+        with pytest.raises(CheckpointError, match="cannot be written"):
+            swinging(False).integrate(0.1, 2.5e-3, checkpoint=folder / "run.npz")
+    finally:
+        if folder == tmp_path:
+            folder.chmod(0o700)
+
+
+@pytest.mark.parametrize("every", [0, -1, 1.5, True, "often", None, [2]])
+def test_how_often(every, tmp_path):
+    if every is None:
+        swinging(False).integrate(0.01, 2.5e-3, checkpoint=tmp_path / "run.npz", every=None)
+        return
+    with pytest.raises(InputError, match="every"):
+        swinging(False).integrate(0.01, 2.5e-3, checkpoint=tmp_path / "run.npz", every=every)
+
+
+# files that are not the right ones
+
+
+@pytest.fixture
+def unfinished(tmp_path, monkeypatch):
+    path = tmp_path / "run.npz"
+    copies = stages(monkeypatch, path)
+    swinging(False).integrate(0.02, 2.5e-3, checkpoint=path, every=3)
+    monkeypatch.undo()
+    return Path(copies[1])
+
+
+def test_an_unfinished_run_is_not_overwritten(unfinished):
+    with pytest.raises(CheckpointError, match="holds a run up to t = 0.0075 of 0.02.*resume"):
+        swinging(False).integrate(0.02, 2.5e-3, checkpoint=unfinished)
+    foreign = unfinished.with_name("mine.npz")
+    np.savez(foreign, a=np.zeros(3))
+    with pytest.raises(CheckpointError, match="no checkpoint.*not overwritten"):
+        swinging(False).integrate(0.02, 2.5e-3, checkpoint=foreign)
+    assert np.load(foreign)["a"].shape == (3,)
+
+
+def rewritten(path, change):
+    arrays = dict(np.load(path))
+    change(arrays)
+    np.savez(path, **arrays)
+    return path
+
+
+def test_damaged_files(unfinished, tmp_path):
+    scene, content = swinging(False), unfinished.read_bytes()
+    path = tmp_path / "bad.npz"
+    for bad in (content[:-100], content[:len(content) // 2], b"", b"text", content[100:]):
+        path.write_bytes(bad)
+        with pytest.raises(CheckpointError, match="cannot be read|no checkpoint"):
+            scene.resume(path)
+
+    def bit(arrays):
+        arrays["now.u"].view(np.uint8)[3] ^= 1
+
+    def gone(arrays):
+        del arrays["now.v"]
+
+    for change in (bit, gone):
+        shutil.copy(unfinished, path)
+        with pytest.raises(CheckpointError, match="checksum"):
+            scene.resume(rewritten(path, change))
+    # a checksum can be made again: shapes are looked at too
+    def short(arrays):
+        arrays["now.u"] = arrays["now.u"][:-2]
+        arrays["checksum"] = checkpoint._checksum({k: v for k, v in arrays.items()
+                                                   if k != "checksum"})
+
+    shutil.copy(unfinished, path)
+    with pytest.raises(CheckpointError, match="what a run needs"):
+        scene.resume(rewritten(path, short))
+    with pytest.raises(CheckpointError, match="no file"):
+        scene.resume(tmp_path / "nowhere.npz")
+
+
+def test_nothing_is_unpickled(tmp_path):
+    class Evil:
+        def __reduce__(self):
+            return os.mkdir, (str(tmp_path / "broken into"),)
+
+    path = tmp_path / "evil.npz"
+    np.savez(path, text=np.array([Evil()], dtype=object))
+    with pytest.raises(CheckpointError, match="cannot be read"):
+        swinging(False).resume(path)
+    assert not (tmp_path / "broken into").exists()
+
+
+def test_files_of_another_version(unfinished, monkeypatch):
+    monkeypatch.setattr(checkpoint, "FORMAT", 99)
+    with pytest.raises(CheckpointError, match="format 1, this version reads 99"):
+        swinging(False).resume(unfinished)
+
+
+def test_other_scenes_are_refused(tmp_path, monkeypatch):
+    def build(E=1e5, ne=2, width=0.1, element=2, g=-9.81, at=(0.5, 0), joint=(1, 0), f=np.cos,
+              hold="pin"):
+        beam = Beam(MeshBeam.init_line(np.linspace(0, 1, ne + 1), 0.1), ElementBeamANCF(element),
+                    StVenantKirchhoff(E, 0.3, 1000.0), width, compiled=False)
+        scene = getattr(Scene(beam), hold)("left").gravity((0, g))
+        scene.point_force((1, 0), at, amplitude=f)
+        scene.joint("line", at=(1, 0), direction=joint)
+        return scene
+
+    path = tmp_path / "run.npz"
+    copies = stages(monkeypatch, path)
+    build().integrate(0.02, 2.5e-3, checkpoint=path, every=3)
+    assert build().resume(copies[1]).t[-1] == pytest.approx(0.02)
+    for change, part in (({"E": 1.1e5}, "material of beam 0"), ({"ne": 3}, "mesh of beam 0"),
+                         ({"width": 0.2}, "width of beam 0"), ({"element": 3}, "element of beam 0"),
+                         ({"g": -9.82}, "load 0"), ({"at": (0.6, 0)}, "load 1"),
+                         ({"joint": (1, 1)}, "joint 0"), ({"f": np.sin}, "amplitude of load 1"),
+                         ({"f": None}, "load 1"), ({"hold": "clamp"}, "supports")):
+        with pytest.raises(CheckpointError, match=f"of another scene, .*{part}"):
+            build(**change).resume(copies[1])
+
+
+def test_without_h5py(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(MissingExtra, match=r"skfem-ancf\[files\]"):
+        swinging(False).integrate(0.01, 2.5e-3, checkpoint=tmp_path / "run.h5")
+    with pytest.raises(MissingExtra, match=r"skfem-ancf\[files\]"):
+        swinging(False).resume(tmp_path / "run.h5")
+
+
+# stopped
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_interrupted(compiled, tmp_path):
+    """A real signal, while the amplitude of a load is asked for."""
+    struck, path = [], tmp_path / "run.npz"
+
+    def amplitude(t):
+        if path.exists() and not struck and np.ndim(t) == 0 and t > 0.07:
+            struck.append(t)
+            os.kill(os.getpid(), signal.SIGINT)
+        return 0.0 * t
+
+    def build(f):
+        return swinging(compiled).point_force((0, 0), (1, 0), amplitude=f)
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        build(amplitude).integrate(0.1, 2.5e-4, checkpoint=path, every=40)
+    assert isinstance(caught.value, Interrupted) and "of 0.1" in str(caught.value)
+    history = caught.value.state
+    whole = build(lambda t: 0.0 * t).integrate(0.1, 2.5e-4)
+    n = len(history)
+    assert 200 < n < len(whole)
+    for name in NAMES:
+        assert np.array_equal(getattr(history, name), getattr(whole, name)[:n])
+    # on from what is there, and from the file
+    scene = build(lambda t: 0.0 * t)
+    rest = scene.integrate(0.1, 2.5e-4, start=history.state(-1))
+    assert np.allclose(rest.u[-1], whole.u[-1], rtol=0, atol=1e-11)
+    assert np.array_equal(scene.resume(path).u, whole.u)
+
+
+def test_a_failure_leaves_the_file(tmp_path):
+    path = tmp_path / "run.npz"
+    beam = swinging(False).beams[0]
+    scene = Scene(beam).clamp("left")
+    scene.traction("right", (1.0, 0.0), amplitude=lambda t: np.inf if t > 0.055 else 1.0)
+    with pytest.raises(ConvergenceError):
+        scene.integrate(0.1, 0.01, scheme="newmark", checkpoint=path, every=2)
+    assert checkpoint.read(path)[1]["t"] == pytest.approx(0.04)

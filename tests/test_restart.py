@@ -1,0 +1,153 @@
+"""A motion goes on from one of its instants."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, MeshBeam, NeoHookean, Scene,
+                        StVenantKirchhoff)
+from skfem_ancf.dynamics import SCHEMES, GeneralizedAlpha, Newmark
+from skfem_ancf.errors import InputError
+
+VARIANTS = [cls() for cls in SCHEMES.values()] + [GeneralizedAlpha(0.3), Newmark(0.36, 0.6)]
+
+
+def swinging(compiled=True, ne=2, element=None, material=None):
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, ne + 1), 0.1), element or ElementBeamANCF(2),
+                material or StVenantKirchhoff(1e5, 0.3, 1000.0), 0.1, compiled=compiled)
+    scene = Scene(beam).pin("left").gravity((0, -9.81))
+    return scene.initial_velocity(lambda x: np.array([0 * x[0], 2 * x[0]]))
+
+
+def driven(compiled=True):
+    """Everything at once: a driven support, a driven joint, a hinge, amplitudes, a moment."""
+    a = Beam(MeshBeam.init_line(np.linspace(0, 1, 3), 0.1), ElementBeamANCF(1),
+             StVenantKirchhoff(1e5, 0.3, 1000.0), 0.1, compiled=compiled, name="arm")
+    b = Beam(MeshBeam.init_line(np.linspace(0, 1, 3), 0.1, origin=(1, 0), angle=0.5),
+             ElementBeamCable(3), StVenantKirchhoff(1e5, 0.3, 1000.0), 0.1, compiled=compiled,
+             name="forearm")
+    scene = Scene(a, b).gravity((0, -9.81))
+    scene.joint("position", at=(0, 0), beam="arm", r=lambda t: (0.05 * np.sin(8 * t), 0.0))
+    scene.joint("angle", at="left", beam="arm", angle=lambda t: 0.3 * np.sin(5 * t))
+    scene.joint("hinge", beams=("arm", "forearm"), at=(1, 0))
+    scene.point_force((0, -2.0), (0.5, 0), beam="arm", amplitude=lambda t: np.cos(20 * t))
+    return scene.moment("right", 0.4, beam="forearm", amplitude=lambda t: 1.0 - t)
+
+
+NAMES = ("u", "v", "acceleration", "multipliers")
+#: What the sizes are divided by: rates have the round-off of positions over dt and dt^2.
+ROUND_OFF = {"u": 1e-11, "v": 1e-9, "acceleration": 1e-6, "multipliers": 1e-6}
+
+
+def assert_same_end(parts, whole, tolerances=ROUND_OFF):
+    assert parts.t[-1] == pytest.approx(whole.t[-1], rel=1e-14)
+    for name in NAMES:
+        a, b = getattr(parts, name)[-1], getattr(whole, name)[-1]
+        size = np.abs(getattr(whole, name)).max(initial=1.0)
+        assert_allclose(a, b, rtol=0, atol=tolerances[name] * size, err_msg=name)
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("build", [swinging, driven])
+@pytest.mark.parametrize("scheme", VARIANTS, ids=repr)
+def test_two_halves_are_the_whole(scheme, build, compiled):
+    scene = build(compiled)
+    whole = scene.integrate(0.2, 2.5e-3, scheme=scheme)
+    half = scene.integrate(0.1, 2.5e-3, scheme=scheme)
+    rest = scene.integrate(0.2, 2.5e-3, scheme=scheme, start=half.state(-1))
+    assert rest.t[0] == half.t[-1] and len(half) + len(rest) == len(whole) + 1
+    assert np.array_equal(rest.u[0], half.u[-1]) and np.array_equal(rest.v[0], half.v[-1])
+    assert_same_end(rest, whole)
+    assert half.factorizations + rest.factorizations == whole.factorizations
+    assert np.abs(whole.u[-1] - half.u[-1]).max() > 0.01
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+@pytest.mark.parametrize("build", [swinging, driven])
+def test_from_an_instant_in_the_middle(build, scheme):
+    """The factors are not kept for it: the tolerance of the iteration is the bound."""
+    scene = build()
+    whole = scene.integrate(0.2, 2.5e-3, scheme=scheme, tol=1e-13)
+    rest = scene.integrate(0.2, 2.5e-3, scheme=scheme, tol=1e-13, start=whole.state(30))
+    assert rest.t[0] == whole.t[30]
+    assert_same_end(rest, whole, {"u": 1e-9, "v": 1e-7, "acceleration": 1e-4, "multipliers": 1e-4})
+
+
+def test_what_a_scheme_remembers_is_needed():
+    """From the same displacement and velocity, but with new accelerations, the end differs."""
+    scene = driven()
+    whole = scene.integrate(0.2, 2.5e-3, scheme="generalized-alpha")
+    state = scene.integrate(0.1, 2.5e-3, scheme="generalized-alpha").state(-1)
+    rest = scene.integrate(0.2, 2.5e-3, scheme="newmark", start=state)
+    assert 1e-8 < np.abs(rest.u[-1] - whole.u[-1]).max() < 0.01
+
+
+def test_a_scene_built_again_goes_on_too():
+    whole = driven().integrate(0.2, 2.5e-3)
+    half = driven().integrate(0.1, 2.5e-3)
+    assert_same_end(driven().integrate(0.2, 2.5e-3, start=half.state(-1)), whole)
+    # one with other loads starts from the position and velocity, with its own accelerations
+    other = driven().gravity((0, 5.0))
+    rest = other.integrate(0.2, 2.5e-3, start=half.state(-1))
+    assert np.array_equal(rest.u[0], half.u[-1])
+    assert np.abs(rest.acceleration[0] - half.acceleration[-1]).max() > 1.0
+    free = ~np.isin(np.arange(other.N), other.system.fixed)
+    assert_allclose(rest.v[0][free], half.v[-1][free], rtol=0, atol=1e-6)
+
+
+def test_other_laws_and_many_parts():
+    scene = swinging(material=NeoHookean(1e5, 0.3, 1000.0))
+    whole = scene.integrate(0.1, 2.5e-3)
+    state = None
+    for k in range(4):
+        part = scene.integrate(0.025 * (k + 1), 2.5e-3, start=state)
+        state = part.state(len(part) - 1)
+    assert_same_end(part, whole)
+    assert np.ptp(whole.total_energy) < 1e-11
+
+
+def test_the_start_has_the_last_word_about_the_velocity():
+    scene = swinging()
+    half = scene.integrate(0.1, 2.5e-3)
+    assert np.array_equal(scene.integrate(0.2, 2.5e-3, start=half.state(-1)).v[0], half.v[-1])
+    # a static state has none: that of the scene is taken
+    still = Scene(scene.beams[0]).clamp("left").gravity((0, -1.0)).solve_static()
+    assert not np.any(still.v) and not np.any(still.acceleration) and still.t is None
+    begun = scene.integrate(0.01, 2.5e-3, start=still)
+    assert begun.t[0] == 0.0
+    assert_allclose(begun.velocity((1, 0))[0], [0.0, 2.0], rtol=0, atol=1e-9)
+
+
+def test_a_state_knows_its_velocity():
+    history = swinging().integrate(0.05, 2.5e-3)
+    state = history.state(7)
+    assert state.t == history.t[7]
+    assert np.array_equal(state.v, history.v[7])
+    assert np.array_equal(state.acceleration, history.acceleration[7])
+    assert_allclose(state.velocity((0.7, 0)), history.velocity((0.7, 0))[7], rtol=1e-14)
+
+
+def test_time_may_be_shifted():
+    """Nothing depends on time here, so that the motion is the same at other times."""
+    scene = swinging()
+    whole = scene.integrate(0.2, 2.5e-3)
+    half = scene.integrate(0.1, 2.5e-3)
+    later = scene.integrate(5.1, 2.5e-3, start=half.state(-1), t_start=5.0)
+    assert later.t[0] == 5.0
+    assert_allclose(later.u[-1], whole.u[-1], rtol=0, atol=1e-11)
+
+
+def test_the_end_must_lie_ahead():
+    half = swinging().integrate(0.1, 2.5e-3)
+    with pytest.raises(InputError, match="t_end - t_start"):
+        swinging().integrate(0.1, 2.5e-3, start=half.state(-1))
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_automatic_steps_go_on_in_their_size(compiled):
+    scene = swinging(compiled)
+    half = scene.integrate(0.1, "auto", rtol=1e-4)
+    rest = scene.integrate(0.2, "auto", rtol=1e-4, start=half.state(-1))
+    assert rest.t[1] - rest.t[0] > 0.1 * (half.t[-2] - half.t[-3])
+    fine = scene.integrate(0.2, 5e-4, t_eval=[0.2])
+    assert np.abs(rest.u[-1] - fine.u[-1]).max() < 1e-2

@@ -1,0 +1,263 @@
+"""Steps of automatic size, events, instants within steps, and what a History counts."""
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+from skfem_ancf.dynamics import SCHEMES, GeneralizedAlpha, Newmark
+from skfem_ancf.dynamics.run import interpolate
+from skfem_ancf.errors import InputError
+
+from test_dynamics import GRAVITY, by_scipy, soft
+from test_restart import driven
+
+
+def positions(scene):
+    """Which coordinates are positions of nodes."""
+    return np.concatenate([np.arange(b.N) % b.nd < 2 for b in scene.beams])
+
+
+# accuracy
+
+
+def swinging():
+    return Scene(soft(2, 2, E=1e5, h=0.1)).pin("left").gravity(GRAVITY)
+
+
+def vibrating():
+    """A cantilever that a force shakes faster than it vibrates itself."""
+    beam = soft(2, 1, E=1e7, h=0.2)
+    return Scene(beam).clamp("left").gravity((0, -400.0), amplitude=lambda t: np.sin(40 * t) ** 2)
+
+
+MOTIONS = {"swinging": (swinging, 0.5), "vibrating": (vibrating, 0.5)}
+
+
+@lru_cache
+def known(name):
+    build, t_end = MOTIONS[name]
+    times = np.linspace(0, t_end, 6)[1:]
+    return times, by_scipy(build(), times, rtol=1e-9, atol=1e-10)[0]
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_error_is_in_proportion_to_the_tolerance(scheme, name):
+    build, t_end = MOTIONS[name]
+    times, u = known(name)
+    ratios = []
+    for rtol in (1e-3, 1e-4):
+        scene = build()
+        history = scene.integrate(t_end, "auto", scheme=scheme, rtol=rtol, t_eval=times)
+        error = np.abs(history.u - u)[:, positions(scene)].max() / scene.system.size
+        ratios.append(error / rtol)
+    assert np.abs(u).max() > 0.1
+    assert 0.03 < min(ratios) and max(ratios) < 5, ratios
+    assert max(ratios) < 10 * min(ratios)
+
+
+def test_first_order_schemes_too():
+    times, u = known("swinging")
+    scene = swinging()
+    ratios = []
+    for rtol in (1e-2, 2e-3):
+        run = scene.integrate(0.5, "auto", scheme=Newmark(0.36, 0.6), rtol=rtol, t_eval=times)
+        ratios.append(np.abs(run.u - u)[:, positions(scene)].max() / rtol)
+    assert 0.03 < min(ratios) and max(ratios) < 5, ratios
+
+
+# events
+
+
+def blow(t, at=0.7, width=0.002):
+    return np.where(np.abs(t - at) < width, np.cos(0.5 * np.pi * (t - at) / width) ** 2, 0.0)
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+def test_a_blow_after_rest_is_seen(scheme):
+    scene = Scene(soft(2, 1, E=1e4))
+    scene.point_force((3e4, 0.0), (0.5, 0.1), amplitude=blow)
+    history = scene.integrate(1.0, "auto", scheme=scheme, rtol=1e-3)
+    assert history.momentum[-1][0] == pytest.approx(3e4 * 0.002, rel=0.02)
+    assert np.diff(history.t).max() > 50 * np.diff(history.t).min()
+    # whatever is at rest before and after does not ask for many steps
+    assert history.steps < 400 and history.rejected > 0
+
+
+@pytest.mark.parametrize("kind", ["support", "joint"])
+def test_a_driven_motion_after_rest_is_seen(kind):
+    """A bump of a support, and one of a point that multipliers hold."""
+    at = (0.0, 0.0) if kind == "support" else (0.3, 0.01)
+    def build():
+        scene = Scene(soft(2, 1, E=1e4))
+        scene.joint("position", at=at, r=lambda t: (at[0], at[1] + 0.05 * float(blow(t, 0.7, 0.02))))
+        return scene
+
+    scene = build()
+    history = scene.integrate(1.0, "auto", rtol=1e-4)
+    fine = build().integrate(1.0, 2e-4, t_eval=[1.0])
+    assert np.abs(fine.u).max() > 0.02
+    assert np.abs(history.u[-1] - fine.u[-1]).max() < 2e-3
+
+
+def test_a_shorter_event_needs_breakpoints():
+    def run(**options):
+        scene = Scene(soft(2, 1, E=1e4))
+        scene.point_force((3e4, 0.0), (0.5, 0.1), amplitude=lambda t: 1.0 * (0.71 <= t < 0.71001))
+        return scene.integrate(1.0, "auto", rtol=1e-3, **options).momentum[-1][0]
+
+    assert run() == 0.0  # as documented
+    assert run(breakpoints=[0.71, 0.71001]) == pytest.approx(0.3, rel=1e-9)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("compiled", [True, False])
+def test_steps_end_at_breakpoints(scheme, compiled):
+    """A force that is switched: its impulse is exact, and the accelerations jump with it."""
+    def run(**options):
+        scene = Scene(soft(2, 1, E=1e4, compiled=compiled))
+        scene.point_force((3.0, 0.0), (0.5, 0.1),
+                          amplitude=lambda t: np.where((t >= 0.0333) & (t < 0.0777), 1.0, 0.0))
+        return scene.integrate(0.1, 5e-3, scheme=scheme, **options)
+
+    history = run(breakpoints=[0.0333, 0.0777, 5.0])  # what lies outside does not matter
+    assert {0.0333, 0.0777} < set(history.t.tolist()) and np.all(np.diff(history.t) > 1e-6)
+    assert history.momentum[-1][0] == pytest.approx(3.0 * 0.0444, rel=1e-9)
+    mass = history.system.mass.multiply(history.acceleration.T[:, 0])  # of one instant: shape
+    assert mass.shape == (history.u.shape[1],)
+    total = np.array([history.system.momentum(a)[0] for a in history.acceleration])
+    on = (history.t >= 0.0333) & (history.t < 0.0777)
+    first = np.searchsorted(history.t, 0.0333)
+    assert total[first] == pytest.approx(3.0, rel=1e-9) and abs(total[first - 1]) < 1e-9
+    assert np.abs(total[on][2:] - 3.0).max() < 1e-6
+    assert abs(run().momentum[-1][0] - 3.0 * 0.0444) > 1e-4
+
+
+def test_a_kink_of_a_driven_motion_at_a_breakpoint():
+    """A support that stands and then runs: its velocity jumps between two steps."""
+    scene = Scene(soft(2, 1, E=1e4))
+    scene.joint("position", at=(0, 0), r=lambda t: (max(0.0, t - 0.05), 0.0))
+    history = scene.integrate(0.1, 4e-3, breakpoints=[0.05])
+    v = history.velocity((0, 0))[:, 0]
+    assert_allclose(v, np.where(history.t < 0.05, 0.0, 1.0), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("breakpoints", ["soon", [np.nan], [[0.1]]])
+def test_bad_breakpoints(breakpoints):
+    with pytest.raises(InputError, match="breakpoints"):
+        swinging().integrate(0.1, 0.01, breakpoints=breakpoints)
+
+
+# instants within steps
+
+
+def test_instants_within_steps_have_the_energy():
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.02), ElementBeamANCF(2),
+                StVenantKirchhoff(2e8, 0.3, 7800.0), 0.02)
+    scene = Scene(beam).pin("left").gravity(GRAVITY)
+    times = np.linspace(0.0007, 0.1993, 41)
+    every = scene.integrate(0.2, 2e-3)
+    some = scene.integrate(0.2, 2e-3, t_eval=times)
+    scale = every.kinetic_energy.max()
+    energy = every.total_energy[0]
+    assert np.abs(some.total_energy - energy).max() < 1e-9 * scale
+    # what a polynomial between the steps would give
+    motions = [every.state(k)._motion for k in range(len(every))]
+    at = np.searchsorted(every.t, times)
+    hermite = [interpolate(motions[k - 1], motions[k], t) for k, t in zip(at, times)]
+    s = scene.system
+    drift = [s.strain_energy(y.u) + 0.5 * y.v @ s.mass.multiply(y.v) + s.load_potential(y.u)
+             - energy for y in hermite]
+    assert np.abs(drift).max() > 1e-6 * scale
+    # the steps do not depend on what is asked for
+    both = scene.integrate(0.2, 2e-3, t_eval=np.append(times, 0.2))
+    assert np.array_equal(both.u[-1], every.u[-1])
+    assert every.steps == some.steps == 100
+
+
+@pytest.mark.parametrize("dt", [2.5e-3, "auto"])
+def test_instants_within_steps_have_closed_joints(dt):
+    scene = driven()
+    times = np.linspace(0.0011, 0.0999, 23)
+    history = scene.integrate(0.1, dt, t_eval=times, rtol=1e-3)
+    s = scene.system
+    for t, u, v in zip(times, history.u, history.v):
+        assert np.abs(s.constraint(u, t)).max() < 1e-12
+        assert_allclose(u[s.fixed], s.values(1.0, t), rtol=0, atol=1e-14)
+    assert np.array_equal(history.t, times)
+
+
+@pytest.mark.parametrize("scheme", [cls() for cls in SCHEMES.values()] + [GeneralizedAlpha(0.5)],
+                         ids=repr)
+def test_order_within_steps(scheme):
+    """Displacement, velocity, acceleration and multipliers at instants that no step meets."""
+    def build():
+        scene = Scene(soft(2, 1, E=1e4, h=0.3)).gravity(GRAVITY)
+        scene.joint("position", at=(0.0, 0.05), r=lambda t: (0.1 * np.sin(2 * t) ** 3, 0.05))
+        return scene
+
+    times = np.array([0.05137, 0.1113, 0.19779])
+    errors = []
+    exact = (build().integrate(0.2, 0.2 / n, t_eval=times) for n in (1600, 3200))
+    coarse, fine = exact
+    names = ("u", "v", "acceleration", "multipliers")
+    best = {k: (4 * getattr(fine, k) - getattr(coarse, k)) / 3 for k in names}
+    for n in (60, 120):
+        run = build().integrate(0.2, 0.2 / n, scheme=scheme, t_eval=times)
+        errors.append([np.abs(getattr(run, k) - best[k]).max() for k in names])
+    rates = np.log2(np.divide(*errors))
+    # where in its step an instant lies changes too: the rates scatter
+    assert np.all(rates[:2] > 1.5) and np.all(rates[2:] > 1.2), rates
+    assert np.all(rates < 3.5), rates
+
+
+def test_instants_close_to_a_step():
+    scene = swinging()
+    every = scene.integrate(0.1, 5e-3)
+    for part in (1e-13, 1e-9, 1e-7, 1e-5, 1e-3, 1 - 1e-5, 1 - 1e-9):
+        t = 0.05 + part * 5e-3
+        found = scene.integrate(0.1, 5e-3, t_eval=[t])
+        near = interpolate(every.state(10)._motion, every.state(11)._motion, t)
+        assert_allclose(found.u[0], near.u, rtol=0, atol=1e-5)
+        assert_allclose(found.v[0], near.v, rtol=0, atol=1e-2)
+        assert_allclose(found.acceleration[0], near.acceleration, rtol=0, atol=2.0)
+
+
+def test_interpolation_is_of_fourth_order():
+    times = np.array([0.3, 0.305, 0.31, 0.32, 0.34, 0.38])
+    scene = Scene(soft()).clamp("left")
+    scene.gravity((0, -3.0), amplitude=lambda t: np.sin(1.5 * t) ** 2)
+    u, v = by_scipy(scene, times, rtol=1e-13, atol=1e-14)
+    from skfem_ancf.dynamics import Motion
+
+    motions = {round(t, 6): Motion(t, a, b, a, a, np.zeros(0)) for t, a, b in zip(times, u, v)}
+    errors = []
+    for h in (0.08, 0.04, 0.02):
+        found = interpolate(motions[0.3], motions[round(0.3 + h, 6)], 0.3 + 0.25 * h)
+        exact = motions[round(0.3 + 0.25 * h, 6)]
+        errors.append([np.abs(found.u - exact.u).max(), np.abs(found.v - exact.v).max()])
+    rates = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert np.all(np.abs(rates[-1] - [4, 3]) < 0.25)
+
+
+# what is counted
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_parts_of_steps_that_are_cut_are_counted(compiled):
+    scene = Scene(soft(1, 1, E=1e6, h=0.1, compiled=compiled)).initial_velocity(
+        lambda x: 30.0 * np.array([-x[1], x[0] - 0.5]) + 5.0 * np.array([x[0] ** 2, 0 * x[0]]))
+    history = scene.integrate(0.4, 0.2)
+    assert history.substeps >= 2 and history.steps == 2 and len(history) == 3
+    assert f"{history.substeps} substeps" in repr(history) and "rejected" not in repr(history)
+    assert scene.integrate(0.01, 1e-3).substeps == 0
+
+
+def test_counts_of_automatic_steps():
+    history = swinging().integrate(0.1, "auto", rtol=1e-4)
+    assert history.steps == len(history) - 1
+    assert history.iterations >= history.steps + history.rejected
+    assert history.factorizations > 0
