@@ -346,7 +346,7 @@ def test_automatic_step_size(scheme):
     assert errors[0] > 10 * errors[2]
     assert steps[0] < steps[1] < steps[2] < 1000
     equal = build().integrate(1.0, 1.0 / steps[2], scheme=scheme)
-    assert np.abs(equal.u[-1] - u).max() > 5 * errors[2]
+    assert np.abs(equal.u[-1] - u).max() > 2 * errors[2]
 
 
 def test_only_asked_instants_are_stored():

@@ -33,7 +33,7 @@ def vibrating():
     return Scene(beam).clamp("left").gravity((0, -400.0), amplitude=lambda t: np.sin(40 * t) ** 2)
 
 
-MOTIONS = {"swinging": (swinging, 0.5), "vibrating": (vibrating, 0.5)}
+MOTIONS = {"swinging": (swinging, 0.5), "vibrating": (vibrating, 0.25)}
 
 
 @lru_cache
@@ -84,7 +84,7 @@ def test_a_blow_after_rest_is_seen(scheme):
     assert history.momentum[-1][0] == pytest.approx(3e4 * 0.002, rel=0.02)
     assert np.diff(history.t).max() > 50 * np.diff(history.t).min()
     # whatever is at rest before and after does not ask for many steps
-    assert history.steps < 400 and history.rejected > 0
+    assert history.steps < 800 and history.rejected > 0
 
 
 @pytest.mark.parametrize("kind", ["support", "joint"])
