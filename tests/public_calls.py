@@ -482,11 +482,12 @@ call("scene.continuation", lambda **k: loaded_once().continuation(**k),
      steps="count", ds="positive", ds_max="positive?", max_load="positive?", until="function?",
      tol="positive", max_iterations="count", progress="progress")
 motion = dict(t_end=0.02, dt=0.01, scheme="energy-momentum", start=None, t_eval=[0.0, 0.02],
-              tol=1e-10, t_start=0.0, progress=False)
+              tol=1e-10, t_start=0.0, progress=False, breakpoints=[0.005], checkpoint=None,
+              every=None)
 call("scene.integrate", lambda **k: loaded_once().integrate(**k), motion,
      {"t_eval": {"[]": "no time"}},
      dt="positive", scheme="name", start="other?", t_eval="increasing?",
-     tol="positive?", t_start="number", progress="progress")
+     tol="positive?", t_start="number?", progress="progress")
 call("scene.integrate, t_end", lambda t_end: clamped().integrate(t_end=t_end, dt=0.5),
      dict(t_end=1.0), t_end="positive")
 call("scene.integrate, auto",
