@@ -8,6 +8,7 @@ what a caller gives passes one of them before anything is computed.
 import difflib
 import inspect
 import os
+import pickle
 from functools import wraps
 from pathlib import Path
 
@@ -72,6 +73,10 @@ class SupportError(AncfError):
 
 class ImmutableError(AncfError, AttributeError):
     """An attribute of an object that does not change was set."""
+
+
+class PickleError(AncfError, pickle.PicklingError):
+    """An object holds a function that pickle cannot take; the message says which."""
 
 
 class MissingExtra(AncfError, ImportError):

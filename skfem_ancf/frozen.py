@@ -2,6 +2,7 @@
 
 import inspect
 from copy import copy
+from functools import cached_property
 
 import numpy as np
 
@@ -77,6 +78,11 @@ class Frozen(Sealable, metaclass=_Sealing):
     def __deepcopy__(self, memo):
         return self
 
+    def __getstate__(self):
+        """What was given; what is computed from it is computed again."""
+        return {name: value for name, value in vars(self).items()
+                if not isinstance(getattr(type(self), name, None), cached_property)}
+
     def __setstate__(self, state):
         vars(self).update(state)
         self._seal()
@@ -98,13 +104,24 @@ class ReadOnlyDict(dict):
     __setitem__ = __delitem__ = pop = popitem = clear = update = setdefault = __ior__ = _refuse
 
     def __reduce__(self):
-        return type(self), (dict(self),)
+        # arrays of a class of their own lose their attributes: orientations are kept beside them
+        plain = {name: np.asarray(value) for name, value in self.items()}
+        more = {name: (type(value), vars(value)) for name, value in self.items()
+                if type(value) is not np.ndarray}
+        return _read_only_dict, (plain, more)
 
     def __copy__(self):
         return self
 
     def __deepcopy__(self, memo):
         return self
+
+
+def _read_only_dict(plain, more):
+    for name, (kind, attributes) in more.items():
+        plain[name] = plain[name].view(kind)
+        vars(plain[name]).update(attributes)
+    return ReadOnlyDict(plain)
 
 
 def rebuilt(thing, changes, more=()):

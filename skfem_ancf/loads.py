@@ -15,6 +15,7 @@ from .beam import Beam
 from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number, require_finite,
                      require_function, shown)
 from .frozen import Sealable, read_only
+from .pickling import picklable_form
 from .spread import Spread, on_facets, stations_of_vector
 
 
@@ -253,6 +254,12 @@ class Traction(Load):
 
 class FormLoad(Load):
     """A scikit-fem ``LinearForm`` as a dead load, on the body or on a place of its boundary."""
+
+    def __getstate__(self):
+        return {**vars(self), "form": picklable_form(self.form)}
+
+    def __setstate__(self, state):
+        vars(self).update(state, form=state["form"].form)
 
     def __init__(self, form, boundary=None, beam=None, amplitude=None):
         super().__init__(beam, amplitude)

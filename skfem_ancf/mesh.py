@@ -4,7 +4,8 @@ import json
 import logging
 import warnings
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from threading import Lock
 from typing import Optional, Type
 
 import numpy as np
@@ -20,10 +21,13 @@ from .errors import (CallbackError, FileError, InputError, MeshError, NameUnknow
                      teaching)
 from .frozen import Frozen, ReadOnlyDict
 from .mapping import MappingBeam
+from .pickling import require_picklable
 from .places import is_point
 from .reference import ElementBeamP1
 
 logger = logging.getLogger(__name__)
+#: The filters of warnings belong to all threads: one at a time sets and restores them.
+_WARNINGS = Lock()
 
 #: Angle of a kink of a curve that is refused; one of a fine polygon is smaller.
 KINK = 1e-2
@@ -303,6 +307,12 @@ class MeshBeam(Frozen, Mesh2D):
         if name in ("_boundaries", "_subdomains") and value is not None:
             value = ReadOnlyDict(value)
         super().__setattr__(name, value)
+
+    def __getstate__(self):
+        if self.curve is not None:
+            require_picklable(self.curve.functions())
+        names = {field.name for field in fields(self)}
+        return {name: value for name, value in vars(self).items() if name in names}
 
     # topology
 
@@ -970,8 +980,47 @@ class Curve:
 
     def moved(self, A, shift):
         """The curve ``A r(s) + shift``."""
-        return Curve(lambda s: A @ self(s) + shift[:, None], lambda s: A @ self.rate(s),
-                     self.ends)
+        return Curve(_Moved(self, A, shift), _Moved(self.rate, A, np.zeros(2)), self.ends)
+
+    def functions(self):
+        """Pairs of a description and a function, for those that the curve was given."""
+        r, rate = self.r, self.derivative
+        while isinstance(r, _Moved):
+            r, rate = r.function.r, r.function.derivative
+        items = [("the curve r(s) of the mesh", r)]
+        if not isinstance(rate, (_ComplexStep, _Differences)):
+            items.append(("the derivative dr of the curve of the mesh", rate))
+        return items
+
+
+class _Moved:
+    """``A f(s) + shift`` for a function f of parameters."""
+
+    def __init__(self, function, A, shift):
+        self.function, self.A, self.shift = function, A, shift
+
+    def __call__(self, s):
+        return self.A @ self.function(s) + self.shift[:, None]
+
+
+class _ComplexStep:
+    """The derivative of a function of parameters that takes complex ones."""
+
+    def __init__(self, r):
+        self.r = r
+
+    def __call__(self, s):
+        return np.imag(np.asarray(_components(self.r(s + 1e-30j), s))) / 1e-30
+
+
+class _Differences:
+    """The derivative of a function of parameters on [s0, s1] by differences."""
+
+    def __init__(self, r, s0, s1):
+        self.r, self.ends = r, (s0, s1)
+
+    def __call__(self, s):
+        return _differences(lambda s: _on_curve("r(s)", self.r, s), s, *self.ends)
 
 
 def _radians(angle):
@@ -985,15 +1034,10 @@ def _radians(angle):
 
 def _curve_derivative(r, s0, s1):
     """The derivative of ``r`` on [s0, s1]: complex step if exact, else sixth-order differences."""
-    def differences(s):
-        return _differences(lambda s: _on_curve("r(s)", r, s), s, s0, s1)
-
-    def complex_step(s):
-        return np.imag(np.asarray(_components(r(s + 1e-30j), s))) / 1e-30
-
+    differences, complex_step = _Differences(r, s0, s1), _ComplexStep(r)
     try:
         probe = s0 + (s1 - s0) * np.linspace(0.0137, 0.991, 24)
-        with warnings.catch_warnings():
+        with _WARNINGS, warnings.catch_warnings():
             warnings.simplefilter("error")  # among them: the imaginary part is discarded
             exact, near = complex_step(probe), differences(probe)
         if exact.shape == near.shape and np.allclose(exact, near, rtol=1e-6,

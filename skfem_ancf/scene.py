@@ -1,5 +1,7 @@
 """A scene: beams, supports and loads, and what can be asked of them."""
 
+from copy import copy
+from functools import wraps
 from threading import RLock
 
 import numpy as np
@@ -15,6 +17,7 @@ from .errors import (ConvergenceError, InputError, ask_field, require_finite, re
 from .joints import Joint, bind_joint, get_joint
 from .loads import (EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight, bind_load)
 from .path import CriticalPoint, Path
+from .pickling import functions_of, require_picklable
 from .places import on_other_mesh
 from .plan import make_plan
 from .results import State
@@ -22,6 +25,17 @@ from .statics import continuation, newton
 from .statics.adapt import solve_adaptive
 from .supports import Support
 from .system import System
+
+
+def _alone(method):
+    """One thread at a time: a solution works in the arrays of the scene's system."""
+
+    @wraps(method)
+    def locked(self, *args, **kwargs):
+        with self._lock:
+            return method(self, *args, **kwargs)
+
+    return locked
 
 
 class _Things(tuple):
@@ -72,12 +86,35 @@ class Scene:
             raise InputError(f"the beams of a scene must be different, and so must their names: "
                              f"{names}")
         self._beams = beams
-        self._lock = RLock()  # one thread at a time: a solution works in the arrays of the system
+        self._lock = RLock()
         self._supports, self._fixed = (), {}  # (number of the beam, coordinate) -> displacement
         # pairs (as given, bound), those of loads with the number of the beam before them
         self._loads, self._joints = (), ()
         self._velocities = {}  # number of the beam -> (as given, bound)
         self._system = None
+
+    def __getstate__(self):
+        """What was given and bound: the equations are built again."""
+        given = [*(load for _, load, _ in self._loads), *(joint for joint, _ in self._joints)]
+        require_picklable([*functions_of([*self._supports, *given]), *(
+            (f"the initial velocity of beam {k}", v) for k, (v, _) in self._velocities.items()
+            if callable(v))])
+        return self._parts()
+
+    def _parts(self):
+        return {name: value for name, value in vars(self).items()
+                if name not in ("_lock", "_system")}
+
+    def __setstate__(self, state):
+        vars(self).update(state, _lock=RLock(), _system=None)
+
+    def __copy__(self):
+        other = object.__new__(type(self))
+        other.__setstate__(self._parts())  # none of them changes
+        return other
+
+    def __deepcopy__(self, memo):
+        return copy(self)
 
     def __repr__(self):
         return (f"<Scene of {len(self.beams)} beam(s), {len(self._fixed)} fixed coordinates, "
@@ -399,6 +436,7 @@ class Scene:
                           [joint for joint, _ in self._joints],
                           [(k, v) for k, (v, _) in self._velocities.items()])
 
+    @_alone
     def plan(self, kind="static"):
         """What a solution computes, keeps constant or skips, and why; ``print`` it.
 
@@ -418,6 +456,7 @@ class Scene:
         """
         return make_plan(self, kind)
 
+    @_alone
     def solve_linear(self):
         """The small-displacement solution: one assembly, one factorisation, one solve.
 
@@ -518,6 +557,7 @@ class Scene:
         return State(system, u, require_finite_scalar("load", load), converged=False,
                      message="given coordinates", multipliers=multipliers)
 
+    @_alone
     def _solve(self, u, **options):
         system = self.system
         system.require_supports()
@@ -527,6 +567,7 @@ class Scene:
             raise ConvergenceError(str(error), self._state(error.state)) from None
         return self._state(result)
 
+    @_alone
     def continuation(self, branch=None, **options):
         """The equilibrium path through limit and snap-back points, by arc length.
 
@@ -595,6 +636,7 @@ class Scene:
             v = basis.project(ask_field("v(x)", v, np.asarray(basis.global_coordinates())))
         return require_finite("v", v, (beam.N,))
 
+    @_alone
     def integrate(self, t_end, dt, scheme="energy-momentum", start=None, **options):
         """The motion from the stress-free state, or from a given one.
 
@@ -682,6 +724,7 @@ class Scene:
         """
         return follow(*resume(self.system, path, scheme), progress)
 
+    @_alone
     def modes(self, k, state=None):
         """The k lowest natural frequencies and their shapes.
 
@@ -721,6 +764,7 @@ class Scene:
         state = configuration(self.system, state)
         return eigen.modes(self.system, state, k)
 
+    @_alone
     def buckling(self, k=1):
         """The k lowest load factors at which the stress-free state buckles, and their shapes.
 

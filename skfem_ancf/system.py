@@ -10,6 +10,7 @@ from scipy.sparse.linalg import splu
 from .errors import InputError, SupportError, shown
 from .joints.base import same_joint
 from .linalg import INACCURATE, BandMatrix, BorderedMatrix, border_inertia, hold
+from .pickling import functions_of, require_picklable
 
 logger = logging.getLogger(__name__)
 _NONE = np.zeros(0)
@@ -46,6 +47,7 @@ class System:
     """
 
     def __init__(self, beams, loads, fixed, values, joints=()):
+        self._given = tuple(beams), tuple(loads), fixed, values, tuple(joints)
         self.beams, self.loads = list(beams), list(loads)
         self.offsets = np.concatenate([[0], np.cumsum([b.N for b in self.beams])])
         self.N = int(self.offsets[-1])
@@ -61,6 +63,20 @@ class System:
                 self.constant_force[self.of(load)] += load.force(None)
             else:
                 self._varying.append(load)
+
+    def __getstate__(self):
+        """What it was made of: work arrays and factors are made again."""
+        require_picklable(functions_of([*self.loads, *self.all_joints]))
+        return self._given
+
+    def __setstate__(self, given):
+        self.__init__(*given)
+
+    def __copy__(self):
+        return self
+
+    def __deepcopy__(self, memo):
+        return self  # it is the same equations, however many states have them
 
     def _eliminate(self, fixed, values, joints):
         """Sort joints that only fix coordinates to the supports, the others to the multipliers."""

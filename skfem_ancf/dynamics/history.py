@@ -162,6 +162,9 @@ class History:
         """Angular momentum about the origin of the coordinates, shape (nt,)."""
         return np.array([self.system.angular_momentum(u, v) for u, v in zip(self.u, self.v)])
 
+    def __getstate__(self):
+        return {**vars(self), "_solver": None}
+
     # files
 
     def save(self, filename, progress=None, **options):

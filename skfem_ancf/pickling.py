@@ -1,0 +1,74 @@
+"""What stands in the way of pickle: functions that have no name in a module."""
+
+import pickle
+import sys
+
+from skfem.assembly import LinearForm
+
+from .errors import PickleError, shown
+
+
+def functions_of(things, what="of"):
+    """Pairs of a description and a function, for the functions that objects hold."""
+    for thing in things:
+        for name, value in vars(thing).items():
+            name = name.lstrip("_")
+            value = getattr(value, "function", value)  # an Amplitude, for one
+            if callable(value) and not isinstance(value, type):
+                yield f"the function {name!r} {what} {shown(thing)}", value
+
+
+def require_picklable(items):
+    """Raise PickleError for the first of pairs (description, function) that pickle cannot take.
+
+    Where cloudpickle or dill ask, which take any function, nothing is raised.
+    """
+    items = list(items)
+    if not items or _asked_by_value():
+        return
+    for what, function in items:
+        try:
+            pickle.dumps(picklable_form(function))
+        except Exception as error:  # what a function holds may raise anything
+            raise PickleError(
+                f"{what}, {shown(function)}, cannot be pickled: {error}. Define it by def at the "
+                "top of a module, or use cloudpickle, which takes any function") from error
+
+
+def _asked_by_value():
+    frame = sys._getframe(1)
+    while frame is not None:
+        if {"cloudpickle", "dill"} & set(frame.f_globals.get("__name__", "").split(".")):
+            return True
+        frame = frame.f_back
+    return False
+
+
+class NamedForm:
+    """A LinearForm made by a decorator: pickle takes it by its name in its module."""
+
+    def __init__(self, form):
+        self.form = form
+
+    def __reduce__(self):
+        function = self.form.form
+        module, name = function.__module__, function.__qualname__
+        if getattr(sys.modules.get(module), name, None) is self.form:
+            return _named, (module, name)
+        return _made, (type(self.form), dict(vars(self.form)))
+
+
+def _named(module, name):
+    __import__(module)
+    return NamedForm(getattr(sys.modules[module], name))
+
+
+def _made(cls, state):
+    form = object.__new__(cls)
+    vars(form).update(state)
+    return NamedForm(form)
+
+
+def picklable_form(value):
+    """What pickle takes in place of a value: a LinearForm by its name."""
+    return NamedForm(value) if isinstance(value, LinearForm) else value
