@@ -11,7 +11,9 @@ from .errors import PickleError, shown
 def functions_of(things, what="of"):
     """Pairs of a description and a function, for the functions that objects hold."""
     for thing in things:
-        for name, value in vars(thing).items():
+        spread = getattr(thing, "_spread", None)  # of a load, which may hold a function too
+        more = {} if spread is None else vars(spread)
+        for name, value in (*vars(thing).items(), *more.items()):
             name = name.lstrip("_")
             value = getattr(value, "function", value)  # an Amplitude, for one
             if callable(value) and not isinstance(value, type):
