@@ -9,6 +9,7 @@ import argparse
 import csv
 import sys
 import time
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +17,8 @@ import numpy as np
 from scipy.linalg import eigh
 
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamCable, MeshBeam, NeoHookean, Scene, StVenantKirchhoff, exact)
+                        ElementBeamCable, MeshBeam, ModelWarning, NeoHookean, Scene,
+                        StVenantKirchhoff, exact)
 from skfem_ancf.formulations import Formulation, Term
 from skfem_ancf.progress import progress_bar
 from skfem_ancf.quadrature import gauss
@@ -67,11 +69,16 @@ def cantilever(element, mesh, material, formulation="assumed", clamp="free"):
     return Scene(beam).clamp("left", thickness=clamp).gravity((0, -G))
 
 
-def tip(scene):
-    """Vertical tip displacement, iterations, load steps; NaN, 0 and the load reached if it fails."""
+def tip(scene, **options):
+    """Vertical tip displacement, iterations, load steps; NaN, 0 and the load reached if it fails.
+
+    What is beyond the range of law and mesh is what is shown here: no warnings of it.
+    """
     mesh = scene.beams[0].mesh
     try:
-        state = scene.solve_static()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ModelWarning)
+            state = scene.solve_static(**options)
     except ConvergenceError as error:
         return np.nan, 0, error.state.load
     return state.displacement(mesh.p[:, -1])[1], state.iterations, len(state.steps)
@@ -471,7 +478,8 @@ def formulations_table(quick, out):
                 beam = Beam(line(16, 1 / s), ElementBeamANCF(order),
                             soft(1 / s, shear_correction="paper"), WIDTH, formulation=formulation)
                 scene = Scene(beam).fix("left", ROOTS[order]).gravity((0, -G))
-                u, iterations, steps = tip(scene)
+                # elements that are not stabilised have unstable solutions, those that are known
+                u, iterations, steps = tip(scene, stable=label == "assumed")
                 known = KNOWN.get((label, order), ())
                 case = f"{label}, N={order}, L/h = {s:g}"
                 yield Row(check, case, "tip", u, None, f"{iterations} iterations, {steps} step(s)")

@@ -6,7 +6,8 @@ from .dynamics import HHT, EnergyMomentum, GeneralizedAlpha, Newmark
 from .elements import (ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                        ElementBeamPatelShabana)
 from .errors import (AncfError, CallbackError, CallError, ConvergenceError, FileError, InputError,
-                     MeshError, MissingExtra, NameUnknown, SupportError)
+                     MeshError, MissingExtra, ModelWarning, NameUnknown, StabilityWarning,
+                     SupportError)
 from .materials import NeoHookean, StVenantKirchhoff
 from .mesh import MeshBeam
 from .scene import Scene
@@ -17,6 +18,7 @@ __all__ = [
     "AncfError", "Beam", "CallbackError", "CallError", "ConvergenceError", "ElementBeamANCF",
     "ElementBeamANCFCubic", "ElementBeamCable", "ElementBeamPatelShabana", "EnergyMomentum",
     "FileError", "GeneralizedAlpha", "HHT", "InputError", "MeshBeam", "MeshError", "MissingExtra",
-    "NameUnknown", "NeoHookean", "Newmark", "Scene", "StVenantKirchhoff", "SupportError", "forms",
+    "ModelWarning", "NameUnknown", "NeoHookean", "Newmark", "Scene", "StVenantKirchhoff",
+    "StabilityWarning", "SupportError", "forms",
     "reference_coordinates",
 ]

@@ -114,6 +114,10 @@ class CableKernel(Chain):
         eps = np.sum((a + p(self.a0, elements)) * du1, axis=-1) / (root + root0)
         return np.array([eps, cross(a, b) / s - p(self.kappa0, elements)]), s
 
+    def strain(self, u_e, elements=slice(None)):
+        """Extension and change of curvature at the integration points, shape (2, ne, np)."""
+        return self._strain(self._state(u_e, elements), elements)[0]
+
     @staticmethod
     def _rates(a, b, s, kappa):
         """Derivatives of eps by a, and of kappa by a and b, shape (ne, np, 2)."""

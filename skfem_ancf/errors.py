@@ -107,6 +107,14 @@ class ConvergenceError(AncfError):
         self.state = state
 
 
+class StabilityWarning(UserWarning):
+    """The equilibrium path has lost its stability on the way to what was found."""
+
+
+class ModelWarning(UserWarning):
+    """The solution is beyond what the law or the mesh is good for."""
+
+
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C during a motion: what was found until then is kept.
 

@@ -199,6 +199,11 @@ class TermTables:
         rx, ry = rx[:, self.xy.x], ry[:, self.xy.y]
         return not np.all(rx[..., 0] * ry[..., 1] > rx[..., 1] * ry[..., 0])
 
+    def shortest(self, u):
+        """Smallest stretch of the fibres along the axis, where eps_xx is sampled."""
+        rx = (self.e1 + self.Gx @ u)[:, self.xx.x]
+        return np.sqrt(np.min(np.sum(rx * rx, axis=-1)))
+
     # force and tangent
 
     def force(self, gradients, stress):

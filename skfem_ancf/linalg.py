@@ -191,6 +191,32 @@ class BandMatrix:
         return lapack.dgbtrs(self._factor[1], self.bandwidth, self.bandwidth, b,
                              self._factor[2])[0]
 
+    def take_factors(self):
+        """Note that the entries have been replaced by the factors L D L^T, D on the diagonal."""
+        self._factor = ("ldl",)
+
+    def to_cholesky(self):
+        """Turn factors of :meth:`take_factors` with positive D into those of Cholesky."""
+        if self._factor[0] == "ldl":
+            c = self.ab * np.sqrt(self.ab[0])
+            c[0] = np.sqrt(self.ab[0])
+            self._factor = ("pb", np.asfortranarray(c))
+
+    def factored_diagonal(self, rows):
+        """Entries of the diagonal, by the factors of Cholesky."""
+        c, rows = self._factor[1], np.asarray(rows, dtype=int)
+        k = np.arange(self.bandwidth + 1)[:, None]
+        return np.sum(np.where(k <= rows, c[k, np.maximum(rows - k, 0)], 0.0) ** 2, axis=0)
+
+    @property
+    def definite(self):
+        """True if it has factors that are those of a positive definite symmetric matrix."""
+        if self._factor is None or not self.symmetric:
+            return False
+        if self._factor[0] == "ldl":
+            return bool(np.min(self._flat[::self._ld]) > 0.0)
+        return self._factor[0] == "pb"
+
     def inertia(self):
         """Signs of the eigenvalues of a symmetric matrix, from its factors.
 
@@ -323,7 +349,13 @@ def hold(K, i, j, values, springs):
     stiffness[stiffness == 0.0] = np.mean(diagonal)
     K.add(springs, springs, stiffness)
     K.factorize()
-    i, j, values = i[~inside], j[~inside], values[~inside]
+    return border(K.bandwidth, i, j, values, springs, stiffness)
+
+
+def border(bandwidth, i, j, values, springs, stiffness):
+    """What :func:`hold` returns, of springs of a given stiffness."""
+    outside = np.abs(i - j) > bandwidth
+    i, j, values = i[outside], j[outside], values[outside]
     far, where = np.unique(np.append(i, j), return_inverse=True)
     picked, ns = np.append(springs, far), len(springs)
     S = np.zeros((len(picked), len(picked)))
@@ -349,31 +381,60 @@ def border_inertia(K, picked, S, J):
     J
         Shape (m, n).
     """
-    negative, smallest = _border_negative(K, picked, S, J)
+    negative, smallest = border_negative(K.negative(), columns_product(K, picked, J), S, len(J))
     if negative == 0 and smallest > SMALL and K.positive_definite:
         return Inertia(0, False)
-    return beside_zero(lambda shift: _border_negative(K.shifted(shift), picked, S, J)[0])
+
+    def of(shift):
+        beside = K.shifted(shift)
+        return border_negative(beside.negative(), columns_product(beside, picked, J), S, len(J))[0]
+
+    return beside_zero(of)
 
 
-def _border_negative(K, picked, S, J):
-    """The number of negative eigenvalues, and the smallest one of the border, scaled."""
-    size = np.sqrt(np.abs(K.diagonal()[picked]))
-    size[size == 0.0] = 1.0
-    values, V = eigh(S / (size[:, None] * size))
+def columns_product(K, picked, J):
+    """C K^-1 C^T of a factorised band matrix, where the rows of C pick coordinates, and J."""
+    k = len(picked)
+    C = np.zeros((k + len(J), K.n))
+    C[np.arange(k), picked] = 1.0
+    C[k:] = J
+    out = np.empty((len(C), len(C)))
+    for first in range(0, len(C), COLUMNS):
+        some = slice(first, first + COLUMNS)
+        Z = K.solve(np.asfortranarray(C[some].T))
+        out[:k, some], out[k:, some] = Z[picked], J @ Z
+    return out
+
+
+def border_negative(held, product, S, m):
+    """The number of negative eigenvalues, and the smallest eigenvalue of the border, scaled.
+
+    Parameters
+    ----------
+    held
+        The number of negative eigenvalues of the band matrix.
+    product
+        What :func:`columns_product` returned.
+    S, m
+        As for :func:`border_inertia`, and the number of rows of J.
+    """
+    n = len(S)
+    size = 1.0 / np.sqrt(np.abs(np.diag(product)[:n]))
+    size[~np.isfinite(size)] = 1.0
+    values, V = np.linalg.eigh(S / (size[:, None] * size))
     keep = np.abs(values) > SINGULAR * np.max(np.abs(values), initial=0.0)
     values, V = values[keep], size[:, None] * V[:, keep]
-    k, m = len(values), len(J)
-    left = np.zeros((k + m, K.n))
-    np.add.at(left.T, picked, np.hstack([V, np.zeros((len(V), m))]))
-    left[k:] = J
-    G = np.diag(np.append(1.0 / values, np.zeros(m)))
-    for first in range(0, k + m, COLUMNS):
-        some = slice(first, first + COLUMNS)
-        G[:, some] += left @ K.solve(np.asfortranarray(left[some].T))
+    k = len(values)
+    G = np.empty((k + m, k + m))
+    G[:k, :k] = V.T @ product[:n, :n] @ V
+    G[np.arange(k), np.arange(k)] += 1.0 / values
+    G[k:, :k] = product[n:, :n] @ V
+    G[:k, k:] = G[k:, :k].T
+    G[k:, k:] = product[n:, n:]
     size = np.sqrt(np.abs(np.diag(G)))
     size[size == 0.0] = 1.0
     mu = np.linalg.eigvalsh(0.5 * (G + G.T) / (size[:, None] * size))
-    negative = K.negative() + int(np.sum(mu > 0.0)) - int(np.sum(values > 0.0)) - m
+    negative = held + int(np.sum(mu > 0.0)) - int(np.sum(values > 0.0)) - m
     return negative, float(np.min(np.abs(mu), initial=1.0))
 
 

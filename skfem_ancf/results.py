@@ -49,11 +49,13 @@ class State(Frozen):
         Time, in a motion; else None.
     acceleration
         Of the coordinates, shape (N,), in a motion; else None.
+    doubt : str
+        Where and how the way to it left the path from the stress-free state; empty if it did not.
     """
 
     def __init__(self, system, u, load=1.0, force=None, converged=True, iterations=0, message="",
                  steps=(), multipliers=None, t=None, inertia=0.0, acceleration=None, motion=None,
-                 origin=None):
+                 origin=None, verdict=None, doubt=""):
         self.system, self.u, self.load = system, u, load
         self.converged, self.iterations, self.message = converged, iterations, message
         self.steps = tuple(steps)
@@ -62,6 +64,7 @@ class State(Frozen):
         # the Motion of an instant, its scheme, and what a run of it keeps
         self._motion, self._origin = motion, origin
         self.multipliers = np.zeros(system.m) if multipliers is None else multipliers
+        self.doubt, self._verdict, self._checks = doubt, verdict, None
         for name, size in (("u", system.N), ("multipliers", system.m)):
             if np.shape(getattr(self, name)) != (size,):
                 raise InputError(f"{name} must have shape ({size},) in this scene, got "
@@ -86,6 +89,8 @@ class State(Frozen):
         vars(other).update(vars(self), **changes)
         for name in ("_recoveries", "_actions"):
             vars(other).pop(name, None)
+        if {"u", "multipliers", "system", "load", "t"} & set(changes):
+            vars(other).update(_verdict=None, _checks=None)
         if {"u", "multipliers", "system"} & set(changes):
             vars(other).update(_force=None, _motion=None, _origin=None)
         other._seal()
@@ -94,6 +99,48 @@ class State(Frozen):
     def __repr__(self):
         return (f"<State of {len(self.system.beams)} beam(s), {self.system.N} coordinates, load "
                 f"{self.load:g}: {self.message}>")
+
+    def __str__(self):
+        lines = [repr(self)[1:-1]]
+        if self.t is None:
+            lines.append(f"  equilibrium: {self.verdict}")
+        return "\n".join(lines + [f"  {line}" for line in str(self.checks).splitlines()])
+
+    @property
+    def verdict(self):
+        """What the tangent says of an equilibrium: a
+        :class:`~skfem_ancf.statics.stability.Verdict`; None for an instant of a motion.
+        """
+        from .statics.stability import verdict
+
+        if self._verdict is None and self.t is None:
+            self._verdict = verdict(self.system, np.array(self.u), self.load, self.multipliers)
+        return self._verdict
+
+    @property
+    def stability(self):
+        """"stable", "unstable" or "singular" (to round-off); "undecided" is possible with loads
+        that have no potential, see ``state.verdict.note``. None for an instant of a motion.
+        """
+        return self.verdict and self.verdict.stability
+
+    @property
+    def negative_pivots(self):
+        """Number of directions that give way: negative eigenvalues of the tangent at the free
+        coordinates, on the tangent space of the joints. None for an instant of a motion.
+        """
+        return self.verdict and self.verdict.negative_pivots
+
+    @property
+    def checks(self):
+        """How far the state is from what law and mesh are good for: a
+        :class:`~skfem_ancf.checks.Checks`.
+        """
+        from .checks import check
+
+        if self._checks is None:
+            self._checks = check(self)
+        return self._checks
 
     @property
     def beams(self):

@@ -1,5 +1,6 @@
 """A scene: beams, supports and loads, and what can be asked of them."""
 
+import warnings
 from copy import copy
 from functools import wraps
 from threading import RLock
@@ -8,12 +9,13 @@ import numpy as np
 
 from . import eigen
 from .beam import Beam, select_beam
+from .checks import warn_of
 from .doors import configuration, displacement
 from .dynamics import get_scheme
 from .dynamics.checkpoint import resume
 from .dynamics.integrate import follow, integrate
-from .errors import (ConvergenceError, InputError, ask_field, require_finite, require_finite_scalar,
-                     require_option, shown, teaching)
+from .errors import (ConvergenceError, InputError, StabilityWarning, ask_field, require_finite,
+                     require_finite_scalar, require_option, shown, teaching)
 from .joints import Joint, bind_joint, get_joint
 from .loads import (EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight, bind_load)
 from .path import CriticalPoint, Path
@@ -23,6 +25,7 @@ from .plan import make_plan
 from .results import State
 from .statics import continuation, newton
 from .statics.adapt import solve_adaptive
+from .statics.stability import verdict
 from .supports import Support
 from .system import System
 
@@ -482,7 +485,7 @@ class Scene:
         system.factorize(zero, 1.0, none)
         du, multipliers = system.solve(load, phi)
         return State(system, du + du0, force=None, iterations=1, message="linear, one solve",
-                     multipliers=multipliers)
+                     multipliers=multipliers, verdict=verdict(system, zero, 0.0, none))
 
     def solve_static(self, start=None, adapt=None, **options):
         """The equilibrium under the full load.
@@ -499,7 +502,9 @@ class Scene:
             :func:`skfem_ancf.statics.adapt.solve_adaptive`.
         **options
             Those of :func:`skfem_ancf.statics.newton.solve_static`: ``method``, ``tol``,
-            ``max_iterations``, ``first_step``, ``min_step``, ``progress``.
+            ``max_iterations``, ``first_step``, ``min_step``, ``progress``, ``stable``. By default
+            the equilibrium is a stable one; ``stable=False`` takes any that the load steps lead
+            to, and ``state.stability`` says what it is.
 
         Returns
         -------
@@ -511,15 +516,34 @@ class Scene:
             If a rigid motion is free.
         ConvergenceError
             If there is no convergence; its ``state`` is the last converged State.
+
+        Warns
+        -----
+        StabilityWarning
+            If the path loses its stability before the full load, so that the solution went on to
+            another equilibrium, or if loads without a potential leave it unstable.
+        ModelWarning
+            If a fibre is compressed beyond what the law is good for, or the mesh is too coarse
+            for the curvature found; ``state.checks`` has the numbers.
         """
         with self._lock:
             if adapt is not None:
                 if start is not None:
                     raise InputError("an adaptive solution begins each mesh from its stress-free "
                                      "state: give adapt= without start=")
-                return solve_adaptive(self, adapt, **options)
-            u = None if start is None else displacement(self.system, start)
-            return self._solve(u, **options)
+                state = solve_adaptive(self, adapt, **options)
+            else:
+                u = None if start is None else displacement(self.system, start)
+                state = self._solve(u, **options)
+            self._warn(state)
+        return state
+
+    def _warn(self, state):
+        """Say what makes a static solution doubtful."""
+        if state.doubt:
+            warnings.warn(f"{state.doubt}; the state is {state.verdict}", StabilityWarning,
+                          stacklevel=3)
+        warn_of(state, stacklevel=4)
 
     def state(self, u=None, multipliers=None, load=1.0):
         """A State of this scene with given coordinates: a start, or a shape to look at.
@@ -784,7 +808,8 @@ class Scene:
 
     def _state(self, result):
         return State(self.system, result.u, result.load, result.force, result.converged,
-                     result.iterations, result.message, result.steps, result.multipliers)
+                     result.iterations, result.message, result.steps, result.multipliers,
+                     doubt=result.doubt)
 
 
 def _branch(point, system):

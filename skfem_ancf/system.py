@@ -7,9 +7,11 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from .checks import Screen
 from .errors import InputError, SupportError, shown
 from .joints.base import same_joint
-from .linalg import INACCURATE, BandMatrix, BorderedMatrix, border_inertia, hold
+from .linalg import (INACCURATE, BandMatrix, BorderedMatrix, border, border_inertia,
+                     border_negative, columns_product, hold)
 from .pickling import functions_of, require_picklable
 
 logger = logging.getLogger(__name__)
@@ -330,6 +332,11 @@ class System:
         from .compiled.structure import structure_of
         return structure_of(self)
 
+    @cached_property
+    def screen(self):
+        """What tells whether a state may be out of the range of laws and meshes."""
+        return Screen(self.beams)
+
     @property
     def constant_loads(self):
         """True if no load depends on displacement or time."""
@@ -515,6 +522,45 @@ class System:
         K = self.K.symmetric_part()
         picked, S = hold(K, *self._outside, self.springs)
         return border_inertia(K, picked, S, self._J)
+
+    def stays(self, u, t, multipliers):
+        """True if the factors left by an iteration say that no direction gives way.
+
+        Those of its last tangent, which is that of the solution but for the last correction.
+
+        Parameters
+        ----------
+        u, t, multipliers
+            The solution.
+        """
+        K = self.K
+        if not K.definite or (self.joints and not self.bordered):
+            return False
+        if not self.joints:
+            return True
+        K.to_cholesky()
+        J = self.jacobian(u, t)
+        i, j, v = self._curvature(u, t, multipliers)
+        v = v * (self.free[i] & self.free[j])
+        picked, S = border(K.bandwidth, i, j, v, self.springs,
+                           0.5 * K.factored_diagonal(self.springs))
+        return border_negative(0, columns_product(K, picked, J), S, self.m)[0] == 0
+
+    def determinant_sign(self):
+        """The sign of the determinant of what :meth:`inertia` counts: 1 or -1.
+
+        -1 is an odd number of negative eigenvalues, of a tangent that is not symmetric too.
+        """
+        if not self.joints:
+            return self.K.determinant_sign()
+        if self.bordered:
+            return self._factors.determinant_sign()
+        free = np.nonzero(self.free)[0]
+        i, j, v = self._outside
+        K = self.K.tocsc() + sparse.csc_matrix((v, (i, j)), shape=(self.N, self.N))
+        J = sparse.csr_matrix(self._J[:, free] * self._weight)
+        A = sparse.bmat([[K[free][:, free], J.T], [J, None]]).toarray()
+        return int(np.linalg.slogdet(A)[0]) * (-1) ** self.m
 
     def _sparse_factors(self, K):
         self._weight = float(np.mean(np.abs(K.diagonal()[self.free])))

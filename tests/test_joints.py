@@ -127,6 +127,7 @@ def test_joints_are_solved_like_the_dense_system(name, border, pressure, monkeyp
     assert np.allclose(l, expected[s.N:], rtol=0, atol=1e-9 * np.abs(expected[s.N:]).max())
 
 
+@pytest.mark.filterwarnings("ignore::skfem_ancf.ModelWarning")  # an elbow of few elements
 def test_a_border_that_is_not_accurate_gives_way_to_sparse_lu(monkeypatch):
     expected = held("weld").solve_static().u
     monkeypatch.setattr(System, "structure", None)  # Python's own iteration
@@ -351,7 +352,8 @@ def test_prescribed_position_in_statics(at, m):
     state = scene.solve_static()
     assert np.allclose(state.position(at), end, rtol=0, atol=1e-12)
     # the force is what would move the point there
-    other = Scene(beam).clamp("left").point_force(state.joint_force(joint), at).solve_static()
+    other = Scene(beam).clamp("left").point_force(state.joint_force(joint), at).solve_static(
+        stable=False)
     assert np.allclose(other.position(at), end, rtol=0, atol=1e-7)
     root = state.reactions("left").force
     assert np.allclose(root, -state.joint_force(joint), rtol=1e-7)

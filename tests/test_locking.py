@@ -127,6 +127,7 @@ def test_curved_beam_of_any_slenderness(plane):
         assert np.max(np.abs(tips[4] - tips[3])) < noise
 
 
+@pytest.mark.filterwarnings("ignore::skfem_ancf.ModelWarning")  # of the root at L/h = 10
 @pytest.mark.parametrize("name", ["linear 1", "linear 2", "linear 6", "cubic 3", "cable 3"])
 def test_iterations_do_not_depend_on_slenderness(name):
     # at L/h = 10 the load is close to what St. Venant-Kirchhoff carries at the root: only a
@@ -445,5 +446,5 @@ def test_16_elements_of_order_2_from_slender_to_very_slender(formulation, tips):
         beam = Beam(line(16, h), ElementBeamANCF(2), soft(h, shear_correction="paper"), WIDTH,
                     formulation=formulation)
         scene = Scene(beam).fix("left", ["r", "r_X", "r_Y0^1", "r_Y1^1"]).gravity((0, -9.81))
-        found.append(scene.solve_static().displacement((1, 0))[1])
+        found.append(scene.solve_static(stable=False).displacement((1, 0))[1])
     assert np.round(found, 3).tolist() == list(tips)

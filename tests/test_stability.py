@@ -1,13 +1,20 @@
 """Inertia of the tangent, the verdict of a state, and stable equilibria."""
 
+import warnings
+
 import numpy as np
 import pytest
 import scipy.linalg
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, minimize_scalar
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
-                        Scene, StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic,
+                        ElementBeamCable, MeshBeam, ModelWarning, NeoHookean, Scene,
+                        StabilityWarning, StVenantKirchhoff)
 from skfem_ancf import system as system_module
 from skfem_ancf.linalg import BandMatrix, Inertia
+from skfem_ancf.results import State
+from skfem_ancf.statics.stability import Verdict
 
 ELEMENTS = (ElementBeamANCF(2), ElementBeamCable(3), ElementBeamCable(5), ElementBeamANCFCubic(2))
 SUPPORTS = ("clamped", "pinned", "weld", "hinge", "slider")
@@ -122,3 +129,258 @@ def test_sign_of_the_determinant_counts_the_negative_eigenvalues_by_twos(kind):
         assert sign == (-1) ** system.inertia().negative
         seen.add(sign)
     assert seen == {1, -1}
+
+
+# verdicts
+
+
+def state_of(scene, u, load=1.0):
+    return State(scene.system, u, load)
+
+
+@pytest.mark.parametrize("kind", SUPPORTS)
+def test_verdict_of_a_state(kind):
+    scene = scene_of(kind, 4, 0.02, ELEMENTS[0])
+    zero = state_of(scene, np.zeros(scene.N))
+    assert (zero.stability, zero.negative_pivots) == ("stable", 0)
+    assert "stable" in str(zero) and "det F from 1, stretch from 1 to 1" in str(zero)
+    u = 0.01 * np.random.default_rng(1).standard_normal(scene.N)
+    negative = int(np.sum(dense_eigenvalues(scene.system, u) < 0))
+    state = state_of(scene, u)
+    assert (state.stability, state.negative_pivots) == ("unstable", negative)
+    assert f"unstable ({negative} negative pivots)" in str(state)
+
+
+def test_verdict_of_singular_and_linear_states_and_of_motions():
+    loose = Scene(line(6)).pin("left").gravity((0, -9.81))
+    assert state_of(loose, np.zeros(loose.N)).stability == "singular"
+    motion = loose.integrate(t_end=0.002, dt=1e-3).state(1)
+    assert motion.stability is None and motion.negative_pivots is None
+    assert "equilibrium" not in str(motion)
+    # of the stress-free tangent: the displacement is no equilibrium
+    assert Scene(line(6)).clamp("left").gravity((0, -9.81)).solve_linear().stability == "stable"
+
+
+def test_verdict_on_loads_without_a_potential():
+    """Pressure on an end: divergence at Euler's load where it is guided, none where it is free."""
+    h, n = 0.02, 12
+    beam = line(n, h)
+    EI = 2e8 * h**4 / 12
+    guided = {p: Scene(beam).pin("left").fix("right", "r^2").pressure("right", p * EI / h**2)
+              for p in (0.8 * np.pi**2, 1.5 * np.pi**2)}
+    below, above = (scene.solve_static(stable=False) for scene in guided.values())
+    assert below.stability == "stable" and "flutter" in below.verdict.note
+    assert (above.stability, above.negative_pivots) == ("unstable", 1)
+    with pytest.warns(StabilityWarning, match="no potential"):
+        state = guided[1.5 * np.pi**2].solve_static()
+    load = float(state.message.split("load level ")[1].split()[0])
+    assert abs(1.5 * load - 1.0) < 0.02 and np.allclose(state.u, above.u, rtol=0, atol=1e-10)
+    # Beck's column has no divergence at any load; its tangent's symmetric part is indefinite
+    column = Scene(beam).clamp("left").pressure("right", 15.0 * EI / h**2)
+    assert column.solve_static().stability == "undecided"
+    # edges that do not move: the pressure acts as if it had a potential
+    state = Scene(beam).clamp("left").clamp("right").pressure("top", 10.0).solve_static()
+    assert state.verdict == Verdict("stable", 0)
+
+
+# stable equilibria
+
+
+def quietly(scene, **options):
+    """The state, and the warnings' classes."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        state = scene.solve_static(**options)
+    return state, [w.category for w in caught]
+
+
+@pytest.mark.parametrize("options", [{}, {"first_step": 0.1}, {"method": "newton"},
+                                     {"method": "newton", "first_step": 0.02}],
+                         ids=lambda o: "-".join(map(str, o.values())) or "default")
+@pytest.mark.parametrize("degree", [3, 5])
+@pytest.mark.parametrize("n", [8, 16])
+def test_a_slack_rope_hangs_down(degree, n, options):
+    """Length 2, one end moved in by 0.5 under its weight: a catenary but for its stiffness."""
+    mesh = MeshBeam.init_line(np.linspace(0, 2, n + 1), 0.01)
+    beam = Beam(mesh, ElementBeamCable(degree), StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)
+    scene = Scene(beam).pin("left").fix("right", ["r^1"], displacement=-0.5)
+    scene.fix("right", ["r^2"]).gravity((0, -9.81))
+    a = brentq(lambda a: 2 * a * np.sinh(0.75 / a) - 2, 0.3, 2.0)
+    state, _ = quietly(scene, **options)
+    assert state.stability == "stable"
+    assert abs(state.displacement((1, 0))[1] + a * (np.cosh(0.75 / a) - 1)) < 3e-3
+
+
+def elastica(load, lateral):
+    """Tips of the stable equilibria of a clamped inextensible column, EI = L = 1, by shooting."""
+    def shoot(k):
+        rates = lambda s, y: [y[1], -(load * np.sin(y[0]) + lateral * np.cos(y[0])),
+                              np.sin(y[0]), np.cos(y[0])]
+        return solve_ivp(rates, [0, 1], [0, k, 0, 0], rtol=1e-10, atol=1e-12).y[:, -1]
+
+    ends = [brentq(lambda k: shoot(k)[1], a, b, xtol=1e-12) for a, b in ((-5, -1), (1, 5))]
+    return [shoot(k)[2:] for k in ends]
+
+
+EULER = 1.88 * np.pi**2 / 4
+
+
+def column(element, lateral, n=16, h=1e-3):
+    mesh = MeshBeam.init_line(np.linspace(0, 1, n + 1), h, angle=np.pi / 2)
+    EI = 2e8 * h**4 / 12
+    scene = Scene(Beam(mesh, element, StVenantKirchhoff(2e8, 0.0), width=h)).clamp("left")
+    return scene.point_force((lateral * EI, -EULER * EI), at=(0, 1))
+
+
+@pytest.mark.parametrize("first_step", [1.0, 0.25, 0.02])
+@pytest.mark.parametrize("lateral", [0.0, 1e-6, 1e-3, 0.1])
+@pytest.mark.parametrize("element, error", [
+    (ElementBeamCable(3), 4e-4), (ElementBeamCable(5), 1e-5), (ElementBeamANCF(2), 1.5e-2)])
+def test_a_column_beyond_its_critical_load_buckles(element, error, lateral, first_step):
+    """At 1.88 of Euler's load; an imperfect one to the side to which it is pushed."""
+    scene = column(element, lateral)
+    state, warned = quietly(scene, first_step=first_step)
+    tip = np.array([0, 1]) + state.displacement((0, 1))
+    if lateral == 0.0:  # both sides are alike
+        tip[0] = abs(tip[0])
+        assert warned == [StabilityWarning] and "loses its stability" in state.message
+    assert np.max(np.abs(tip - elastica(EULER, lateral)[1])) < error
+    assert (state.stability, state.negative_pivots) == ("stable", 0)
+    plain, warned = quietly(scene, first_step=first_step, stable=False)
+    assert (plain.stability, plain.negative_pivots) == ("unstable", 1) and not warned
+
+
+@pytest.mark.parametrize("factor", [0.7, 1.05, 3.0])
+def test_a_truss_snaps_through(factor):
+    """Two bars: exact for the engineering strain of the cables, beyond the limit point and before.
+
+    Stocky bars, which do not buckle.
+    """
+    H, h, E = 0.1, 0.1, 2e8
+    l0, angle = np.hypot(1, H), np.arctan(H)
+    bars = [Beam(MeshBeam.init_line(np.linspace(0, l0, 4), h, origin=o, angle=a),
+                 ElementBeamCable(5), StVenantKirchhoff(E, 0.0), width=h, name=name)
+            for name, o, a in (("a", (0, 0), angle), ("b", (1, H), -angle))]
+
+    def load(y):  # that holds the top at the height y
+        return -2 * E * h**2 * (np.hypot(1, y) / l0 - 1) * y / np.hypot(1, y)
+
+    limit = load(minimize_scalar(lambda y: -load(y), (0.02, 0.06, 0.09), tol=1e-10).x)
+    top = minimize_scalar(lambda y: -load(y), (0.02, 0.06, 0.09), tol=1e-10).x
+    scene = Scene(*bars).pin("left", beam="a").pin("right", beam="b")
+    scene.joint("hinge", beams=("a", "b"), at=(1, H))
+    scene.point_force((0, -factor * limit), at=(1, H), beam="a")
+    state, warned = quietly(scene)
+    y = brentq(lambda y: load(y) - factor * limit, *((top, H) if factor < 1 else (-1.0, -H)))
+    assert np.allclose(state.displacement((1, H), "a"), [0, y - H], rtol=0, atol=1e-8)
+    assert state.stability == "stable"
+    if factor == 1.05:  # far beyond the limit the iteration may come straight to the stable state
+        assert warned == [StabilityWarning]
+        assert "loses its stability between the load levels" in state.message
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCF(2)])
+def test_a_shallow_arch_snaps_through(element):
+    R = (0.25 + 0.01) / 0.2
+    half = np.arcsin(0.5 / R)
+    mesh = MeshBeam.init_curve(
+        lambda s: np.array([0.5 + R * np.sin((2 * s - 1) * half),
+                            0.1 - R + R * np.cos((2 * s - 1) * half)]), np.linspace(0, 1, 17), 0.01)
+    scene = Scene(Beam(mesh, element, StVenantKirchhoff(2e8, 0.0), width=0.01))
+    scene.pin("left").pin("right").point_force((0, -40 * 2e8 * 0.01**4 / 12), at=(0.5, 0.1))
+    state, warned = quietly(scene)
+    assert warned == [StabilityWarning] and state.stability == "stable"
+    assert np.min(dense_eigenvalues(scene.system, state.u)) > 0
+    # it hangs below its supports, a little longer than before
+    u = state.displacement((0.5, 0.1))
+    assert abs(u[0]) < 1e-6 and -0.22 < u[1] < -0.2
+    missing = scene.system.external_force(state.u) - scene.system.internal_force(state.u)
+    assert np.max(np.abs(missing[scene.system.free])) < 1e-9
+
+
+def test_from_an_unstable_state_on_to_a_stable_one():
+    scene = column(ElementBeamCable(5), 0.1)
+    start = scene.solve_static(stable=False)
+    assert start.stability == "unstable"
+    state, warned = quietly(scene, start=start)
+    assert state.stability == "stable" and warned == [StabilityWarning]
+    # either side is stable; nothing drives it to the one or to the other
+    tip = np.array([0, 1]) + state.displacement((0, 1))
+    assert min(np.max(np.abs(tip - x)) for x in elastica(EULER, 0.1)) < 1e-5
+
+
+def test_what_is_stable_takes_the_iterations_it_took():
+    for slenderness in (1e2, 1e4, 1e6):
+        h = 1.0 / slenderness
+        material = StVenantKirchhoff(2e8 * (0.01 / h)**2, 0.3, 7800)
+        for element in ELEMENTS:
+            mesh = MeshBeam.init_line(np.linspace(0, 1, 17), h)
+            scene = Scene(Beam(mesh, element, material, width=0.01))
+            scene.clamp("left", thickness="free").gravity((0, -9.81))
+            state, plain = scene.solve_static(), scene.solve_static(stable=False)
+            assert state.iterations == plain.iterations and np.array_equal(state.u, plain.u)
+
+
+# checks
+
+
+def test_checks_of_a_uniform_stretch():
+    stretch = 1.2
+    scene = Scene(Beam(MeshBeam.init_line([0, 0.5, 1], 0.1), ElementBeamANCF(2),
+                       StVenantKirchhoff(1e6, 0.0), width=0.1))
+    scene.clamp("left", thickness="free")
+    scene.traction("right", (1e6 * stretch * (stretch**2 - 1) / 2, 0))
+    checks = scene.solve_static().checks
+    assert np.allclose([checks.smallest_det, checks.smallest_stretch, checks.largest_stretch],
+                       [stretch, 1.0, stretch], rtol=0, atol=1e-8)
+    assert checks.turning < 1e-12 and checks.findings == ()
+    # a cable bent to a circle: fibres of 1 +- h kappa / 2, and sections that get thicker
+    h, kappa, nu = 0.1, 2.0, 0.3
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 17), h), ElementBeamCable(5),
+                StVenantKirchhoff(1e6, nu), width=h)
+    bent = Scene(beam).clamp("left").moment("right", 1e6 * h**4 / 12 * kappa).solve_static().checks
+    fibres = 1 + 0.5 * h * kappa * np.array([-1, 1])
+    assert np.allclose([bent.smallest_stretch, bent.largest_stretch], fibres, rtol=0, atol=1e-4)
+    low = fibres * np.sqrt(1 - nu * (fibres**2 - 1))
+    assert abs(bent.smallest_det - min(low)) < 1e-3 and abs(bent.turning - kappa / 16) < 1e-6
+
+
+def test_fibres_compressed_beyond_the_law_are_said():
+    """A thick cantilever at 4.2 EI / L^2, nu = 0, with cubic sections; at 3 it is in range."""
+    L, h, E = 2.0, 0.5, 2.07e11
+
+    def cantilever(material, load):
+        beam = Beam(MeshBeam.init_line(np.linspace(0, L, 17), h), ElementBeamANCFCubic(3),
+                    material, width=0.1)
+        force = load * E * 0.1 * h**3 / 12 / L**2
+        return Scene(beam).clamp("left").traction("right", (0, -force / (0.1 * h)))
+
+    svk = StVenantKirchhoff(E, 0.0)
+    state, warned = quietly(cantilever(svk, 3.0))
+    assert state.checks.smallest_stretch > 0.65 and state.checks.findings == () and not warned
+    state, warned = quietly(cantilever(svk, 4.2))
+    assert state.checks.smallest_stretch < 1 / np.sqrt(3) and ModelWarning in warned
+    assert "St. Venant-Kirchhoff resists less" in state.checks.findings[0]
+    assert ModelWarning not in quietly(cantilever(NeoHookean(E, 0.0), 4.2))[1]
+
+
+def rhombus(n, P, element=ElementBeamCable(3), h=0.01):
+    c, E, x = np.sqrt(0.5), 2e8, np.linspace(0, 1, n + 1)
+    corners = [(0, 0), (c, c), (0, 2 * c), (-c, c)]
+    beams = [Beam(MeshBeam.init_line(x, h, origin=o, angle=np.pi * (0.25 + 0.5 * k)), element,
+                  StVenantKirchhoff(E, 0.0), width=h, name="abcd"[k])
+             for k, o in enumerate(corners)]
+    scene = Scene(*beams).clamp("left", beam="a")
+    for pair in ("ab", "bc", "cd", "da"):
+        scene.joint("weld", beams=tuple(pair), at=("right", "left"))
+    return scene.point_force((0, -P * E * h**4 / 12), at=corners[2], beam="b")
+
+
+def test_a_mesh_too_coarse_for_the_curvature_is_said():
+    tops = {}
+    for n in (4, 24):
+        state, warned = quietly(rhombus(n, 20.0), stable=False)
+        tops[n] = state.displacement((0, 2 * np.sqrt(0.5)), beam="b")
+        assert (ModelWarning in warned) == (n == 4)
+        assert any("too coarse" in text for text in state.checks.findings) == (n == 4)
+    assert np.linalg.norm(tops[4] - tops[24]) > 0.02

@@ -1,13 +1,14 @@
 """Newton's method with automatic load steps, and the mixed integration point iteration."""
 
 import logging
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..errors import (ConvergenceError, InputError, require_finite, require_integer,
+from ..errors import (ConvergenceError, InputError, require_finite, require_flag, require_integer,
                       require_option, require_positive, taught)
 from ..progress import progress_bar
+from . import stability
 
 logger = logging.getLogger(__name__)
 
@@ -50,6 +51,8 @@ class StaticResult:
     converged: bool
     message: str
     rejected: int = 0
+    unstable: bool = False
+    doubt: str = ""
 
     @property
     def iterations(self):
@@ -59,7 +62,7 @@ class StaticResult:
 
 @taught
 def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, first_step=1.0,
-                 min_step=1e-4, progress=None):
+                 min_step=1e-4, progress=None, stable=True):
     """Find the equilibrium at full load.
 
     The load is applied in steps: the first is ``first_step`` of it, a step that fails is cut to a
@@ -87,6 +90,10 @@ def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, fi
         Parts of the load.
     progress
         Show a progress bar: True, False, or None for "if it takes long".
+    stable
+        Take no unstable equilibrium: a step that lands on one is cut, and where the path itself
+        loses its stability the solution goes on along the direction that gives way, see
+        :func:`~skfem_ancf.statics.stability.descend`. False takes any.
 
     Returns
     -------
@@ -105,6 +112,7 @@ def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, fi
     elements", Computer Methods in Applied Mechanics and Engineering 313 (2017).
     """
     require_option("method", method, METHODS)
+    require_flag("stable", stable)
     tol, min_step = require_positive("tol", tol), require_positive("min_step", min_step)
     if not 0.0 < require_positive("first_step", first_step) <= 1.0:
         raise InputError(f"first_step must lie in (0, 1], got {first_step!r}")
@@ -117,7 +125,8 @@ def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, fi
     u = origin[0].copy()
     result = StaticResult(u, np.zeros(system.m), 0.0, np.zeros(system.N), [], False,
                           "no load step has converged")
-    step = float(first_step)
+    step, cuts = float(first_step), 0
+    options = origin, method, tol, max_iterations
     with progress_bar(progress, total=1.0, desc="load") as bar:
         while result.load < 1.0:
             load = min(1.0, result.load + step)
@@ -126,37 +135,111 @@ def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, fi
             record = LoadStep(load, 0)
             try:
                 with np.errstate(all="ignore"):  # what overflows is seen in the residual
-                    found = _iterate(system, result, load, origin, method, tol, max_iterations,
-                                     record)
+                    found = _step(system, result, load, options, record, stable)
             except _Failed as failure:
                 result.rejected += 1
+                cuts += isinstance(failure, _Unstable)
                 logger.info("load %.6g failed (%s), step cut", load, failure)
                 step = 0.25 * (load - result.load)
-                if step < min_step:
-                    result.message = (
-                        f"no equilibrium found beyond the load level {result.load:.6g}: {failure} "
-                        f"at {load:.6g}, and steps below {min_step:g} are not tried. Beyond a "
-                        "limit point there is none: use scene.continuation(); else more elements "
-                        "or a larger max_iterations may help")
-                    raise ConvergenceError(result.message, result) from None
-                continue
+                found = None
+                if stable and (cuts > stability.CUTS or step < min_step):
+                    found = _rescue(system, result, load, options, record, failure)
+                if found is None:
+                    if step < min_step:
+                        result.message = _lost(result, load, min_step, failure)
+                        raise ConvergenceError(result.message, result) from None
+                    continue
+                step *= 4.0
             result.u, result.multipliers, result.force = found
             bar.update(load - result.load)
-            result.load = load
+            result.load, cuts = load, 0
             result.steps.append(record)
             logger.info("load %.6g converged in %d iterations", load, record.iterations)
             if record.iterations <= max(8, max_iterations // 3):
                 step *= 2.0
     result.converged = True
     result.message = f"converged in {len(result.steps)} load steps, {result.iterations} iterations"
+    if result.doubt:
+        result.message += f"; {result.doubt}"
     return result
+
+
+def _lost(result, load, min_step, failure):
+    """Why there is no solution beyond the last load step."""
+    text = (f"no equilibrium found beyond the load level {result.load:.6g}: {failure} at "
+            f"{load:.6g}, and steps below {min_step:g} are not tried. ")
+    if isinstance(failure, _Unstable):
+        return text + ("No stable one was found either from there: stable=False takes the unstable "
+                       "one, scene.continuation() follows the path")
+    return text + ("Beyond a limit point there is none: use scene.continuation(); else more "
+                   "elements or a larger max_iterations may help")
 
 
 class _Failed(Exception):
     """A load step did not converge; the message says why."""
 
 
-def _iterate(system, result, load, start, method, tol, max_iterations, record):
+class _Unstable(_Failed):
+    """A load step ended at an unstable equilibrium, ``found``."""
+
+    def __init__(self, message, found):
+        super().__init__(message)
+        self.found = found
+
+
+def _step(system, result, load, options, record, stable):
+    """One load step: a stable equilibrium if that is wanted."""
+    origin = options[0]
+    found = _iterate(system, result, load, *options, record)
+    if not stable or result.unstable:
+        return found
+    full, at = _acting(options, load)
+    if not stability.holds(system, found[0], full, found[1], at):
+        raise _Unstable("the equilibrium found is unstable", found)
+    if result.rejected and not stability.heads_on(system, result, found[0], load, options[0]):
+        raise _Unstable("the equilibrium found lies on the other side", found)
+    return found
+
+
+def _acting(options, load):
+    """Load factor and time: a start from a given state has the full load all along."""
+    return (load, load) if options[0][1] is None else (1.0, 1.0)
+
+
+def _rescue(system, result, load, options, record, failure):
+    """What :func:`_step` returns, from where the path has lost its stability; or None."""
+    full, at = _acting(options, load)
+    if not isinstance(failure, _Unstable) and not stability.gives_way(system, result, load):
+        return None
+    if not stability.has_potential(system, result.u, full):
+        if not isinstance(failure, _Unstable):
+            return None
+        result.unstable = True
+        result.doubt = (f"the path is unstable from the load level {load:.6g} on, and its loads "
+                        "have no potential that would lead to a stable equilibrium")
+        return failure.found
+    origin, method, tol, _ = options
+
+    def iterate(u, multipliers, descent):
+        one = LoadStep(load, 0)
+        found = _iterate(system, replace(result, u=u, multipliers=multipliers), load, origin,
+                         method, tol, stability.DESCENT, one, descent)
+        record.iterations += one.iterations
+        record.force_residuals += one.force_residuals
+        record.energy_residuals += one.energy_residuals
+        return found
+
+    with np.errstate(all="ignore"):
+        found, turned = stability.way_down(system, result, load, full, at, origin, iterate, _Failed)
+    if turned and not result.doubt:
+        result.doubt = (
+            f"the path loses its stability between the load levels {result.load:.6g} and "
+            f"{load:.6g}, the solution went on along the direction that gives way to a stable "
+            "equilibrium, which need not be the only one")
+    return found
+
+
+def _iterate(system, result, load, start, method, tol, max_iterations, record, descent=None):
     """Iterate to equilibrium at one load; returns displacement, multipliers, internal force.
 
     ``start`` is the displacement at load 0 and what was missing there to equilibrium under the
@@ -175,7 +258,7 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record):
     prescribed = target - u[system.fixed]
     moving = bool(np.any(prescribed))
     structure = system.structure
-    if structure is not None:
+    if structure is not None and descent is None:
         found = structure.equilibrium(
             u, multipliers, full, at,
             np.zeros(system.N) if gap is None else gap, prescribed, method == "mixed", tol,
@@ -184,6 +267,10 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record):
             u, multipliers, force, *residuals = found
             record.force_residuals, record.energy_residuals = (r.tolist() for r in residuals)
             record.iterations = len(record.energy_residuals)
+            if record.iterations:
+                system.K.take_factors()
+            else:
+                system.K.clear()
             return u, multipliers, force
     external = full * system.external_force(u)
     work = before = reference = np.inf
@@ -240,6 +327,8 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record):
         except (np.linalg.LinAlgError, RuntimeError):
             raise _Failed("the tangent is singular") from None
         du, dm = system.solve(free, -phi)
+        if descent is not None:
+            du, dm = descent.correct(free, du, dm)
         before, work = work, np.sqrt(abs(free @ du) + abs(phi @ dm))
         if not np.isfinite(work):
             raise _Failed("the tangent is singular")

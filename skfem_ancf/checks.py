@@ -1,0 +1,174 @@
+"""How far a state is from what the law and the mesh are good for."""
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import ModelWarning
+from .materials import LinearLaw
+
+#: Stretch below which St. Venant-Kirchhoff resists less the more it is compressed: the force of a
+#: fibre, E (l^3 - l) / 2, has its smallest value there.
+COMPRESSED = 1.0 / np.sqrt(3.0)
+#: Angle, in radians, by which the axis may turn over one element, for a cubic axis and others.
+#: Beyond it the solutions measured were off by 1 to 100 % of the length, below it by less than 5 %.
+TURNING = {3: 1.2}
+TURNING_SMOOTH = 1.6
+
+
+@dataclass(frozen=True)
+class Checks:
+    """Extreme values of a state.
+
+    Attributes
+    ----------
+    smallest_det
+        Smallest determinant of the deformation gradient at the integration points.
+    smallest_stretch, largest_stretch
+        Smallest and largest principal stretch at the integration points; of a cable those of its
+        outermost fibres.
+    turning
+        Largest angle in radians by which the axis turns over one element, from the stress-free
+        state.
+    findings : tuple of str
+        What is beyond the range of the law or of the mesh; empty where nothing is.
+    """
+
+    smallest_det: float
+    smallest_stretch: float
+    largest_stretch: float
+    turning: float
+    findings: tuple = ()
+
+    def __str__(self):
+        lines = [f"det F from {self.smallest_det:.4g}, stretch from {self.smallest_stretch:.4g} to "
+                 f"{self.largest_stretch:.4g}, turning {self.turning:.3g} rad an element"]
+        return "\n".join(lines + [f"beyond its range: {text}" for text in self.findings])
+
+
+def check(state):
+    """The :class:`Checks` of a state."""
+    values, found = [], []
+    for beam in state.beams:
+        u = state.u_of(beam)
+        det, stretches = _deformation(beam, u)
+        values.append((np.min(det), np.min(stretches), np.max(stretches), turning(beam, u)))
+        found += _findings(beam, values[-1][1], values[-1][3])
+    det, low, high, turn = zip(*values)
+    return Checks(float(min(det)), float(min(low)), float(max(high)), float(max(turn)),
+                  tuple(found))
+
+
+class Screen:
+    """A look at the tangents of all nodes that tells whether a state may be out of range.
+
+    Parameters
+    ----------
+    beams
+        The beams of a scene.
+    """
+
+    def __init__(self, beams):
+        first = np.concatenate([[0], np.cumsum([b.N for b in beams])])
+        node = np.concatenate([[0], np.cumsum([b.N // b.nd for b in beams])])
+        self._x = np.concatenate([n + np.arange(2, b.N, b.nd) for n, b in zip(first, beams)])
+        self._start = np.concatenate([tangents(b, 0.0) for b in beams])
+        self._left, self._right = np.hstack([n + b.mesh.t for n, b in zip(node, beams)])
+        self._slender = np.concatenate([b.mesh.height / b.mesh.lengths for b in beams])
+        self._limit = np.concatenate([np.full(b.mesh.nelements, turning_limit(b)) for b in beams])
+
+    def passes(self, u):
+        """False if a fibre may be compressed, or an element may turn, beyond the range."""
+        r = (u[self._x] + 1j * u[self._x + 1]) / self._start + 1.0
+        turn = np.abs(np.angle(r[self._right] * r[self._left].conj()))
+        # the largest curvature of an element is seldom more than twice its mean
+        return (bool(np.all(turn < self._limit))
+                and np.min(np.abs(r)) - np.max(turn * self._slender) > 1.1 * COMPRESSED)
+
+
+def warn_of(state, stacklevel):
+    """Give a :class:`~skfem_ancf.errors.ModelWarning` for each finding."""
+    if state.system.screen.passes(state.u):
+        return
+    for beam in state.beams:
+        u = state.u_of(beam)
+        for text in _findings(beam, shortest(beam, u), turning(beam, u)):
+            warnings.warn(f"{text} (state.checks has the numbers)", ModelWarning,
+                          stacklevel=stacklevel)
+
+
+def _findings(beam, stretch, turn):
+    who = "" if beam.name is None else f" of beam {beam.name!r}"
+    out = []
+    if stretch < COMPRESSED and not beam.is_cable and _is_linear(beam):
+        out.append(f"a fibre{who} is compressed to {stretch:.3g} of its length; below "
+                   f"{COMPRESSED:.3g} St. Venant-Kirchhoff resists less and less: use NeoHookean, "
+                   "or a smaller load")
+    if beam.is_cable and stretch <= 0.0:
+        out.append(f"the sections{who} overlap: the axis is bent to a radius below half the height")
+    limit = turning_limit(beam)
+    if turn > limit:
+        out.append(f"the mesh{who} is too coarse for the curvature found: the axis turns by "
+                   f"{turn:.3g} rad over one element, where {limit:g} is the limit: use more "
+                   "elements there, or solve_static(adapt=...)")
+    return out
+
+
+def _is_linear(beam):
+    return all(isinstance(t.law, LinearLaw) for t in beam.kernel.tables)
+
+
+def turning(beam, u):
+    """Largest angle by which the axis turns over an element, by its tangents at the nodes."""
+    turn = tangents(beam, u) / tangents(beam, 0.0)
+    left, right = beam.mesh.t
+    return float(np.max(np.abs(np.angle(turn[right] * turn[left].conj()))))
+
+
+def tangents(beam, u):
+    """The axis' derivative r_X at the nodes, as complex numbers."""
+    return (beam.q0_local + u).reshape(-1, beam.nd)[:, 2:4] @ [1.0, 1.0j]
+
+
+def turning_limit(beam):
+    """The angle by which the axis may turn over one element."""
+    return TURNING.get(beam.element.axis_degree, TURNING_SMOOTH)
+
+
+def shortest(beam, u):
+    """Smallest stretch of the fibres along the axis at the integration points."""
+    kernel, least = beam.kernel, np.inf
+    for part in kernel.chunks():
+        u_e = kernel.gather(u, part)
+        if beam.is_cable:
+            eps, kappa = kernel.strain(u_e, part)
+            least = min(least, np.min(1.0 + eps - 0.5 * beam.mesh.height * np.abs(kappa)))
+        else:
+            least = min(least, kernel.tables[0].part(part).shortest(u_e))
+    return float(least)
+
+
+def _deformation(beam, u):
+    """det F and both principal stretches at the integration points; two arrays."""
+    if beam.is_cable:
+        return _cable_deformation(beam, u)
+    det, stretches = [], []
+    for term in beam.formulation.terms(beam.element, beam.material):
+        H, frame = beam.gradients(u, term.quadrature[0])
+        F = H + frame
+        C = np.einsum("ikep,ijep->kjep", F, F)
+        middle, half = 0.5 * (C[0, 0] + C[1, 1]), 0.5 * (C[0, 0] - C[1, 1])
+        root = np.hypot(half, C[0, 1])
+        stretches.append(np.sqrt(np.maximum([middle - root, middle + root], 0.0)).ravel())
+        det.append((F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]).ravel())
+    return np.concatenate(det), np.concatenate(stretches)
+
+
+def _cable_deformation(beam, u):
+    eps, kappa = beam.kernel.strain(beam.kernel.gather(u))
+    along = 1.0 + eps + 0.5 * beam.mesh.height * np.abs(kappa) * np.array([[[-1.0]], [[1.0]]])
+    material = beam.material
+    ratio = material.nu / (1.0 if material.plane == "stress" else 1.0 - material.nu)
+    across = np.sqrt(np.maximum(1.0 - ratio * (along * along - 1.0), 0.0))  # S_yy = 0
+    return along * across, along

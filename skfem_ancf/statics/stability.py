@@ -1,0 +1,322 @@
+"""Which equilibrium: the verdict on its stability, and the way from an unstable one down."""
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+logger = logging.getLogger(__name__)
+
+#: Largest displacements of a node in one correction of a descent, relative to the scene's size,
+#: that are tried one after the other.
+STRIDES = (0.1, 0.02, 0.004)
+#: First displacement along a negative direction, relative to the scene's size.
+KICK = 0.02
+#: How often a descent may come to rest at an unstable point and leave it again.
+KICKS = 6
+#: Positions of nodes up to which dense eigenvalues are used.
+DENSE = 64
+#: How much more the nodes move close to a limit point than in the stress-free state.
+SOFTER = 8.0
+#: How often a step that ends at an unstable point is cut before the path counts as unstable.
+CUTS = 3
+#: Iterations of a descent.
+DESCENT = 200
+#: Largest difference of a tangent from its transpose, relative, that is round-off.
+ROUND_OFF = 1e-10
+#: What factors and eigenvalues raise: matrices that are singular, Arnoldi without convergence.
+FAILURES = (np.linalg.LinAlgError, RuntimeError)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the tangent says of an equilibrium.
+
+    Attributes
+    ----------
+    stability : str
+        "stable", "unstable", "singular" where an eigenvalue is zero to round-off, or "undecided"
+        where the loads have no potential and the tangent does not tell.
+    negative_pivots : int
+        Number of negative eigenvalues of the tangent at free coordinates, on the tangent space of
+        the joints; of its symmetric part where loads have no potential.
+    note : str
+        What the verdict does not say; empty where it says all.
+    """
+
+    stability: str
+    negative_pivots: int
+    note: str = ""
+
+    def __str__(self):
+        out = self.stability
+        if self.negative_pivots:
+            s = "" if self.negative_pivots == 1 else "s"
+            out += f" ({self.negative_pivots} negative pivot{s})"
+        return f"{out}, {self.note}" if self.note else out
+
+
+FOLLOWS = "against divergence: the loads have no potential, and flutter is not seen in statics"
+
+
+def verdict(system, u, load, multipliers, t=None):
+    """The :class:`Verdict` on an equilibrium, from the tangent there.
+
+    Where the loads have no potential (a pressure with free edges) the tangent K is not symmetric.
+    An odd number of negative eigenvalues, det K < 0, then is a motion that grows without
+    oscillating: unstable. A symmetric part that is positive definite excludes any such motion. In
+    between the tangent does not tell, and flutter needs the masses: see ``scene.modes``.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    u, multipliers
+        Displacement (N,) and multipliers (m,).
+    load, t
+        Load factor, and the time of joints that move; the load factor by default.
+    """
+    try:
+        system.assemble(u, load)
+        system.factorize(u, load if t is None else t, multipliers)
+        negative, singular = system.inertia()
+    except FAILURES:
+        return Verdict("singular", 0)
+    if system.symmetric or _is_symmetric(system):
+        return Verdict("unstable" if negative else "singular" if singular else "stable", negative)
+    if system.determinant_sign() < 0:
+        return Verdict("unstable", negative, "by divergence: the loads have no potential")
+    if negative:
+        return Verdict("undecided", negative, "the loads have no potential, and only the symmetric "
+                       "part of the tangent is indefinite: scene.modes tells")
+    return Verdict("singular" if singular else "stable", 0, FOLLOWS)
+
+
+def _is_symmetric(system):
+    """True if the tangent of loads that follow is symmetric all the same."""
+    K = system.K.tocsc()
+    return abs(K - K.T).max() <= ROUND_OFF * abs(K).max()
+
+
+def has_potential(system, u, load):
+    """True if the tangent is symmetric: the loads have a potential, or act like such."""
+    if system.symmetric:
+        return True
+    system.assemble(u, load)
+    system.K.fix(system.fixed_positions)
+    return _is_symmetric(system)
+
+
+def holds(system, u, load, multipliers, t):
+    """True unless the equilibrium that an iteration has just found is unstable.
+
+    The factors of the last iterate mostly answer at little cost; what they do not affirm is asked
+    of the tangent at the solution.
+    """
+    try:
+        if system.stays(u, t, multipliers):
+            return True
+    except FAILURES:
+        logger.debug("the last factors do not tell")
+    return verdict(system, u, load, multipliers, t).stability != "unstable"
+
+
+def heads_on(system, result, u, load, origin):
+    """True if the scene moves from the last equilibrium to ``u`` as the load drives it there.
+
+    Close to a bifurcation an iteration may jump to the other side. The nodes' displacements are
+    compared with those of the tangent.
+    """
+    if origin[1] is not None or result.load == 0.0:
+        return True
+    du = np.zeros(system.N)
+    du[system.fixed] = system.values(load) - result.u[system.fixed]
+    force, _ = system.assemble(result.u, result.load)
+    J = system.full_jacobian(result.u, load)
+    residual = (load * system.external_force(result.u) - force - system.multiply(du)
+                - result.multipliers @ J)
+    try:
+        system.factorize(result.u, load, result.multipliers)
+        du += system.solve(residual, -system.constraint(result.u, load) - J @ du)[0]
+    except FAILURES:
+        return True
+    return bool(du @ (position_weights(system) * (u - result.u)) >= 0.0)
+
+
+def gives_way(system, result, load):
+    """True if the last equilibrium is close to a limit point.
+
+    There the nodes move much more under forces that the stress-free scene withstands.
+    """
+    descent, none, ratio = Descent(system), np.zeros(system.m), []
+    if result.load == 0.0:
+        return False
+    try:
+        for u, multipliers, at in ((result.u, result.multipliers, result.load),
+                                   (np.zeros(system.N), none, 0.0)):
+            system.assemble(u, at)
+            system.factorize(u, at, multipliers)
+            ratio.append(descent.compliance())
+    except FAILURES:
+        return True
+    return ratio[0] > SOFTER * ratio[1]
+
+
+class Descent:
+    """Corrections of Newton's method that lead to a minimum of the potential.
+
+    The part of a correction along a direction of negative curvature is turned round, and the
+    whole is kept within a stride: eigenvector following, as in Cerjan and Miller, Journal of
+    Chemical Physics 75 (1981).
+
+    Attributes
+    ----------
+    turned : bool
+        A direction of negative curvature was met.
+    """
+
+    def __init__(self, system, stride=STRIDES[0]):
+        self.system, self.stride = system, stride
+        self.turned = False
+        self._weights = position_weights(system)
+
+    def correct(self, free, du, dm):
+        """The correction ``du`` of the residual ``free``, turned and shortened."""
+        system = self.system
+        negative = system.inertia().negative
+        for v, curvature in self.directions(negative):
+            self.turned = True
+            du = du - 2.0 * (v @ free / curvature) * v
+        largest = np.max(np.hypot(*du[self._weights > 0].reshape(-1, 2).T))
+        scale = min(1.0, self.stride * system.size / largest) if largest > 0 else 1.0
+        return scale * du, scale * dm
+
+    def product(self, a, b):
+        """The sum over the nodes of ``a . b``, of displacements of the coordinates."""
+        return float(a @ (self._weights * b))
+
+    def directions(self, count):
+        """Directions v with negative ``v . K v``, from the factors, and that number: pairs.
+
+        Eigenvectors of the inverse of K seen from the positions of the nodes, of its most negative
+        eigenvalues: those of K that are closest to zero.
+        """
+        inverse, values, Y = self._inverse_eigenvectors(count, "SA")
+        return [(inverse(y), value) for y, value in zip(Y.T, values) if value < 0]
+
+    def compliance(self):
+        """The largest displacement of the nodes for unit forces on them, from the factors."""
+        values = self._inverse_eigenvectors(1, "LA")[1]
+        return float(np.max(values, initial=0.0))
+
+    def _inverse_eigenvectors(self, count, which):
+        at = np.nonzero((self._weights > 0) & self.system.free)[0]
+        none, N = np.zeros(self.system.m), self.system.N
+
+        def inverse(y):
+            b = np.zeros(N)
+            b[at] = np.ravel(y)
+            return self.system.solve(b, none)[0]
+
+        count = min(count, len(at))
+        if not count:
+            return inverse, np.zeros(0), np.zeros((0, 0))
+        if len(at) <= DENSE:
+            G = np.array([inverse(y)[at] for y in np.eye(len(at))])
+            values, Y = np.linalg.eigh(0.5 * (G + G.T))
+            some = slice(count) if which == "SA" else slice(len(at) - count, None)
+            return inverse, values[some], Y[:, some]
+        G = LinearOperator((len(at), len(at)), lambda y: inverse(y)[at])
+        start = G @ np.random.default_rng(0).standard_normal(len(at))
+        values, Y = eigsh(G, k=min(count, len(at) - 1), which=which, v0=start)
+        return inverse, values, Y
+
+
+def way_down(system, result, load, full, at, origin, iterate, failed):
+    """What :func:`descend` finds, or None, and whether it met an unstable tangent.
+
+    Of the strides the first that leads where the load drives the scene.
+
+    Parameters
+    ----------
+    load, origin
+        As for :func:`heads_on`.
+    full, at
+        Load factor and time for :func:`descend`, which takes the others.
+    """
+    first = None, False
+    for stride in STRIDES:
+        descent = Descent(system, stride)
+        try:
+            found = descend(system, result, full, at, iterate, descent, failed)
+        except (failed, *FAILURES) as failure:
+            logger.info("no descent at load %.6g: %s", load, failure)
+            continue
+        if heads_on(system, result, found[0], load, origin):
+            return found, descent.turned
+        first = (found, descent.turned) if first[0] is None else first
+    return first
+
+
+def descend(system, result, load, t, iterate, descent, failed):
+    """A stable equilibrium at a load where the path from the last one has lost its stability.
+
+    Corrections of :class:`Descent` from the last stable equilibrium; where they come to rest at an
+    unstable point, the lowest direction leads on, towards the last stable equilibrium, or where it
+    points to neither side, to that of the lower potential.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    result
+        The last stable equilibrium, a :class:`~skfem_ancf.statics.newton.StaticResult`.
+    load, t
+        Where to find the next.
+    iterate
+        A function of displacement, multipliers and Descent: displacement, multipliers and force
+        of the equilibrium that the iteration finds.
+    descent
+        A :class:`Descent`.
+    failed
+        The exception to raise where there is none.
+    """
+    u, multipliers = result.u, result.multipliers
+    for _ in range(KICKS):
+        u, multipliers, force = iterate(u, multipliers, descent)
+        found = verdict(system, u, load, multipliers, t)
+        if found.stability != "unstable":
+            return u, multipliers, force
+        descent.turned = True
+        directions = descent.directions(1)
+        if not directions:  # what gives way does not move the nodes
+            break
+        v = directions[0][0]
+        v = KICK * system.size / np.max(np.abs(v)) * v
+        u = u + _side(system, descent, v, u, result.u, load) * v
+    raise failed("no stable equilibrium found along the directions that give way")
+
+
+def _side(system, descent, v, u, last, load):
+    """On which side of an unstable point to leave it along v: 1 or -1."""
+    back = descent.product(v, last - u)
+    if abs(back) > 1e-6 * descent.product(v, v):
+        return 1.0 if back > 0 else -1.0
+    here, up, down = (potential(system, x, load) for x in (u, u + v, u - v))
+    if abs(up - down) > 1e-6 * abs(up + down - 2.0 * here):
+        return 1.0 if up < down else -1.0
+    return 1.0 if v[np.argmax(np.abs(v) > 0.5 * np.max(np.abs(v)))] > 0 else -1.0
+
+
+def potential(system, u, load):
+    """The total potential: strain energy less the work of the loads."""
+    return system.strain_energy(u) + load * system.load_potential(u)
+
+
+def position_weights(system):
+    """One at the positions of the nodes, zero at other coordinates, shape (N,)."""
+    weights = np.zeros(system.N)
+    for beam, s in zip(system.beams, system.slices):
+        weights[s].reshape(-1, beam.nd)[:, :2] = 1.0
+    return weights
