@@ -65,6 +65,7 @@ ELEMENTS = [ElementBeamANCF(2), ElementBeamANCF(3), ElementBeamANCF(4), ElementB
 GOALS = {"gravity": (2, 2, 5, 2, 0.1), "thick": (0.5, 0.7, 2, 0.5, 0.3)}
 
 
+@pytest.mark.filterwarnings("ignore::skfem_ancf.ModelWarning")  # few elements
 def test_one_point_as_many():
     state = gravity_cantilever(ElementBeamANCF(2), n=4)
     for recover in (True, False):
@@ -115,6 +116,7 @@ def test_no_jumps(element):
         assert np.all(jump <= 1e-9 * np.abs(field_).max(axis=(1, 2)))
 
 
+@pytest.mark.filterwarnings("ignore::skfem_ancf.ModelWarning")  # few elements
 def test_section_forces_are_those_of_the_free_body():
     """The weight on the right of a section, exactly, inside of the elements as well."""
     state = gravity_cantilever(ElementBeamANCF(3), n=5)
