@@ -481,6 +481,9 @@ call("scene.continuation", lambda **k: loaded_once().continuation(**k),
           max_iterations=15, progress=False),
      steps="count", ds="positive", ds_max="positive?", max_load="positive?", until="function?",
      tol="positive", max_iterations="count", progress="progress")
+call("scene.continuation, located", lambda **k: loaded_once().continuation(steps=1, **k),
+     dict(locate=1e-8, branch=None, side=1),
+     {"side": {"-1": "the other side"}}, locate="positive?", branch="other?", side="other")
 motion = dict(t_end=0.02, dt=0.01, scheme="energy-momentum", start=None, t_eval=[0.0, 0.02],
               tol=1e-10, t_start=0.0, progress=False, breakpoints=[0.005], checkpoint=None,
               every=None)

@@ -54,7 +54,8 @@ def outcome(function, arguments):
     """What a call ends in: "own", "accepted", "foreign" or "hang", and the error."""
     try:
         with limit(SECONDS), warnings.catch_warnings():
-            warnings.simplefilter("error")
+            warnings.simplefilter("error", RuntimeWarning)  # complex made real, overflow
+            warnings.filterwarnings("error", module="skfem_ancf")
             function(**arguments)
     except Hang:
         return "hang", None
@@ -96,6 +97,8 @@ def folder(tmp_path, monkeypatch):
 @pytest.mark.parametrize("entry", CALLS, ids=lambda entry: entry.name)
 def test_bad_arguments(entry):
     kind, error = outcome(entry.function, entry.valid)
+    if isinstance(error, MissingExtra):
+        pytest.skip(str(error))
     assert kind == "accepted", f"the valid call fails: {error!r}"
     wrong = [f"{argument}={label} {what}" for argument, label, kind, error in tries(entry)
              if (what := verdict(entry, argument, label, kind, error))]
