@@ -11,7 +11,7 @@ some points to tests/data/reference_2d.npz, with the largest difference of the t
   the end.
 
 The face x = 0 is welded. Points "inside" are further than the height from both ends, points "weld"
-within it of the weld, but away from its corners, where the strain of the exact solution is infinite.
+within it of the weld, but away from its corners, where the exact strain is infinite.
 """
 
 from pathlib import Path

@@ -206,7 +206,8 @@ class _Piece:
                                 self.M - self.integral(x * self.P[1] - y * self.P[0])])
             unit = np.array([1.0 + 0.0 * y, y / h]) / self.g
             force = (self.S[0] + E * self.stretch**2) * unit
-            K = np.array([[self.integral(f) for f in force], [-self.integral(y * f) for f in force]])
+            K = np.array([[self.integral(f) for f in force],
+                          [-self.integral(y * f) for f in force]])
             det = K[0, 0] * K[1, 1] - K[0, 1] * K[1, 0]
             a = (K[1, 1] * missing[0] - K[0, 1] * missing[1]) / det
             b = (K[0, 0] * missing[1] - K[1, 0] * missing[0]) / det

@@ -78,7 +78,7 @@ class Sections:
         return out if f.acceleration is None else out - f.beam.density * self.field(f.acceleration)
 
     def face(self, side):
-        """Force per width and xi on the bottom (0) or top (1), on which the points are; (2, n, k)."""
+        """Force per width and xi on the bottom (0) or top (1), where the points are; (2, n, k)."""
         f, out = self.forces, np.zeros((2,) + self.shape)
         for factor, load in f.faces:
             on = factor * load.faces[side][self.e][:, None]
@@ -108,7 +108,8 @@ class SectionForces:
     u
         Displacement of its coordinates, shape (N,).
     loads
-        Pairs of a factor and a :class:`~skfem_ancf.spread.Spread`, or None for a load whose spread is not known.
+        Pairs of a factor and a :class:`~skfem_ancf.spread.Spread`, or None for a load whose spread
+        is not known.
     stations
         Where supports and joints act: element + xi.
     acceleration

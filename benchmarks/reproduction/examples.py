@@ -92,8 +92,8 @@ def example_5_1(settings, watch):
     for name, by_count in states.items():
         for Y in np.linspace(-case.h / 2, case.h / 2, 21):
             theory = bottom + (top - bottom) * (Y / case.h + 0.5)
-            section.append((name, float(Y), float(by_count[finest].strain((0.0, Y), recover=False)[1]),
-                            float(theory)))
+            strain = by_count[finest].strain((0.0, Y), recover=False)
+            section.append((name, float(Y), float(strain[1]), float(theory)))
     EA, EI = case.E * case.b * case.h, case.E * exact.inertia(case.b, case.h)
     limit = exact.elastica_extensible_tip(-case.force[1], EA, EI, case.L)[1]
     return Result({"fig06": convergence(states, case.tip, 1, lambda name, n: None),

@@ -24,11 +24,12 @@ MAX_ELEMENTS = 10**7
 def solve_adaptive(scene, tol, max_elements=20000, goal="displacement", **options):
     """Solve on meshes that are refined until the estimated error is small enough.
 
-    With the goal "displacement" each round solves on a mesh and on the same with every element halved. The difference is the
-    estimate: in the displacement of the beams' ends relative to the size of the scene, and
-    relative in the strain energy. Once the mesh resolves the solution, a method of order p leaves
-    the finer solution an error of 1 / (2^p - 1) of it, a third or less. The elements that
-    contribute most to the difference in the energy norm are halved for the next round.
+    With the goal "displacement" each round solves on a mesh and on the same with every element
+    halved. The difference is the estimate: in the displacement of the beams' ends relative to the
+    size of the scene, and relative in the strain energy. Once the mesh resolves the solution, a
+    method of order p leaves the finer solution an error of 1 / (2^p - 1) of it, a third or less.
+    The elements that contribute most to the difference in the energy norm are halved for the next
+    round.
 
     With the goal "strain" the estimate is the difference of the elements' strain and the recovered
     one (:mod:`skfem_ancf.recovery`), in the L2 norm over the body relative to that of the strain,
@@ -92,8 +93,8 @@ def solve_adaptive(scene, tol, max_elements=20000, goal="displacement", **option
 
 def _too_few(n, estimate, tol, state):
     return ConvergenceError(
-        f"{n} elements leave an estimated error of {max(estimate.values()):.3g}, adapt = {tol:g} is "
-        "not reached: raise max_elements or use an element of higher order", state)
+        f"{n} elements leave an estimated error of {max(estimate.values()):.3g}, adapt = {tol:g} "
+        "is not reached: raise max_elements or use an element of higher order", state)
 
 
 def _solve_for_strain(scene, tol, max_elements, **options):
@@ -115,7 +116,7 @@ def _solve_for_strain(scene, tol, max_elements, **options):
             before = len(errors), estimate["strain"]
         if stuck:
             raise ConvergenceError(
-                f"the estimated error of the strain stays at {before[1]:.3g} as elements are added, "
+                f"the estimated error of the strain stays at {before[1]:.3g} as elements are added; "
                 f"adapt = {tol:g} is not reached: the sections cannot show this field, use an "
                 "element of higher order", state)
         if len(errors) >= max_elements:
