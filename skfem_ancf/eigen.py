@@ -117,7 +117,8 @@ def modes(system, state, k):
         If joints are not independent in this state.
     """
     tangent = StrainTangent(system, state.u, state.load, state.t, state.multipliers)
-    tangent.require_independent()
+    if tangent.size[0] <= DENSE:
+        tangent.require_independent()
     M = system.mass.tocsc()[tangent.free][:, tangent.free]
     n, m = tangent.size
     k = _count(k, n - m)
@@ -143,7 +144,7 @@ def _bending_eigenvalue(system):
 def _shift(system, state):
     """A number s for which K + s M is positive definite between the free coordinates."""
     shift, t = _bending_eigenvalue(system), state.load if state.t is None else state.t
-    while True:
+    for _ in range(80):
         system.assemble(state.u, state.load, t=state.t)
         system.K.combine(1.0, system.K, shift, system.mass)
         try:
@@ -153,6 +154,7 @@ def _shift(system, state):
         except (np.linalg.LinAlgError, RuntimeError):
             pass
         shift *= 4.0
+    raise SupportError("the joints are not independent in this state")
 
 
 def _dense(tangent, M, k, shift):

@@ -102,7 +102,7 @@ def test_slender_and_under_an_axial_force(element, tol, dense, monkeypatch):
     monkeypatch.setattr(eigen, "DENSE", dense)
     for T in (-6.0, -0.8, 20.0):
         scene = Scene(unit_beam(element, 16, 1e6)).pin("left").fix("right", "r^2")
-        state = scene.point_force((T * np.pi**2, 0), (1, 0)).solve_static()
+        state = scene.point_force((T * np.pi**2, 0), (1, 0)).solve_linear()  # stays straight
         n = np.arange(1, 4)
         known = np.sort((n * np.pi) ** 4 * (1 + T / n**2))
         modes = scene.modes(3, state)

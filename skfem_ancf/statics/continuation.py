@@ -217,8 +217,8 @@ def continuation(system, steps=100, ds=0.02, ds_max=None, max_load=None, until=N
     max_iterations
         Iterations before a step is halved.
     locate
-        Tolerance of the arc length at critical points, relative to that of their step; the load
-        of a limit point is then good to its square. None not to look for them.
+        Tolerance at critical points: of the load at a limit point, relative to it, and of the arc
+        length at a bifurcation point, relative to its step. None not to look for them.
     branch
         A critical point of an earlier path, of kind "bifurcation": follow the path that leaves
         the other one there, along its mode.

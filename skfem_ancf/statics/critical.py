@@ -73,7 +73,9 @@ def _limit(tracer, p, a, b, tol):
     for _ in range(100):
         x = (low.arc * g - high.arc * f) / (g - f)
         best = _between(tracer, p, min(max(x, low.arc + 0.01 * end), high.arc - 0.01 * end), b)
-        if abs(best.rate) * (b.arc - a.arc) <= 1e-14 * max(abs(best.load), 1e-300):
+        # the load is a parabola here, of the second derivative that the rates at both ends say
+        gap = 0.5 * best.rate**2 * (b.arc - a.arc) / abs(b.rate - a.rate)
+        if gap <= 0.1 * tol * abs(best.load):
             break
         if f * best.rate > 0:
             moved, low, f, g = best.arc - low.arc, best, best.rate, 0.5 * g
