@@ -25,7 +25,7 @@ from .plan import make_plan
 from .results import State
 from .statics import continuation, newton
 from .statics.adapt import solve_adaptive
-from .statics.stability import verdict
+from .statics.stability import verdict_of_factors
 from .supports import Support
 from .system import System
 
@@ -485,7 +485,7 @@ class Scene:
         system.factorize(zero, 1.0, none)
         du, multipliers = system.solve(load, phi)
         return State(system, du + du0, force=None, iterations=1, message="linear, one solve",
-                     multipliers=multipliers, verdict=verdict(system, zero, 0.0, none))
+                     multipliers=multipliers, verdict=verdict_of_factors(system))
 
     def solve_static(self, start=None, adapt=None, **options):
         """The equilibrium under the full load.

@@ -80,9 +80,14 @@ def verdict(system, u, load, multipliers, t=None):
     try:
         system.assemble(u, load)
         system.factorize(u, load if t is None else t, multipliers)
-        negative, singular = system.inertia()
+        return verdict_of_factors(system)
     except FAILURES:
         return Verdict("singular", 0)
+
+
+def verdict_of_factors(system):
+    """As :func:`verdict`, from the tangent that has been factorised."""
+    negative, singular = system.inertia()
     if system.symmetric or _is_symmetric(system):
         return Verdict("unstable" if negative else "singular" if singular else "stable", negative)
     if system.determinant_sign() < 0:
