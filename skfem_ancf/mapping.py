@@ -1,5 +1,7 @@
 """The map from the reference cell to the stress-free body of a beam."""
 
+from functools import cached_property
+
 import numpy as np
 from skfem.mapping import Mapping
 
@@ -33,9 +35,12 @@ class MappingBeam(Mapping):
 
     def _coefficients(self, tind):
         """Axis (2, 4, ne) and director (2, 2 or 4, ne) coefficients of the elements ``tind``."""
-        m = self.mesh
-        t = m.t if tind is None else m.t[:, tind]
-        L = m.lengths if tind is None else m.lengths[tind]
+        axis, director = self._all_coefficients
+        return (axis, director) if tind is None else (axis[:, :, tind], director[:, :, tind])
+
+    @cached_property
+    def _all_coefficients(self):
+        m, t, L = self.mesh, self.mesh.t, self.mesh.lengths
         axis = np.stack([m.p[:, t[0]], L * m.p_X[:, t[0]], m.p[:, t[1]], L * m.p_X[:, t[1]]], 1)
         n = [m.p_Y[:, t[0]], m.p_Y[:, t[1]]]
         if m.sections == "cubic":
