@@ -27,7 +27,7 @@ test: $(VENV)/test.stamp
 
 # what round-off could decide, in other kernels of OpenBLAS and without fused multiply-add;
 # the code that Numba compiles for it is kept apart. Then all but the scripts, without Numba.
-GENERIC := compiled joints locking stability statics
+GENERIC := compiled locking stability statics
 SCRIPTS := bench fuzz package paper stress
 
 test-settings: $(VENV)/test.stamp
@@ -35,7 +35,7 @@ test-settings: $(VENV)/test.stamp
 	  NUMBA_CACHE_DIR=$(CURDIR)/out/numba-generic \
 	  $(PY) -m pytest -n 2 $(ARGS) $(GENERIC:%=tests/test_%.py)
 	OPENBLAS_CORETYPE=Haswell SKFEM_ANCF_COMPILED=0 \
-	  $(PY) -m pytest -n 2 $(ARGS) $(SCRIPTS:%=--ignore=tests/test_%.py)
+	  $(PY) -m pytest -n 2 $(ARGS) tests $(SCRIPTS:%=--ignore=tests/test_%.py)
 
 paper: $(VENV)/test.stamp
 	$(PY) benchmarks/paper.py
