@@ -16,7 +16,7 @@ from skfem_ancf import (AncfError, Beam, ElementBeamANCF, ElementBeamANCFCubic, 
 from skfem_ancf.errors import PickleError
 from skfem_ancf.formulations import FORMULATIONS
 
-MATERIAL = StVenantKirchhoff(E=2e6, nu=0.3, density=1000)
+MATERIAL = StVenantKirchhoff(E=2e8, nu=0.3, density=1000)
 
 
 def ramp(t):
@@ -62,7 +62,7 @@ def scene():
              name="a")
     b = Beam(MeshBeam.init_line(np.linspace(1, 2, 5), 0.02), ElementBeamANCF(2), MATERIAL, 0.02,
              name="b")
-    made = Scene(a, b).clamp("left", beam="a").gravity((0, -9.81))
+    made = Scene(a, b).clamp("left", beam="a").gravity((0, -0.5))
     made.joint("weld", beams=(a, b), at=("right", "left"), name="middle")
     made.moment("right", 1e-4, beam=b, amplitude=ramp).traction("top", pull, beam="a")
     made.load(sideways, beam="a").point_force((0, -1e-3), at=(2, 0), beam="b")
@@ -71,7 +71,7 @@ def scene():
 
 def followed():
     beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.02), ElementBeamCable(3), MATERIAL, 0.02)
-    made = Scene(beam).pin("left").gravity((0, -9.81)).pressure("top", 1e-2)
+    made = Scene(beam).pin("left").gravity((0, -0.5)).pressure("top", 1e-2)
     made.joint("position", at=(1, 0), r=path)
     return made
 
