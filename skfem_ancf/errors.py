@@ -116,7 +116,7 @@ class ModelWarning(UserWarning):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during a motion: what was found until then is kept.
+    """Ctrl-C during a solution: what was found until then is kept.
 
     A KeyboardInterrupt, so that ``except Exception`` does not take it for an error, and a script
     does not go on as if all were done.
@@ -124,7 +124,7 @@ class Interrupted(KeyboardInterrupt):
     Attributes
     ----------
     state
-        The History up to there.
+        The History or the Path up to there, or the last State that converged.
     """
 
     def __init__(self, message, state=None):

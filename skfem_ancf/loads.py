@@ -332,6 +332,11 @@ class Pressure(Load):
         super().__init__(_the_beam(beam), amplitude)
         self.boundary, self.p = boundary, p
         basis = beam.facet_basis(boundary)
+        if beam.is_cable and np.any(basis.find < beam.mesh.p.shape[1]):
+            raise InputError(
+                f"a pressure at {boundary!r} of a cable would do nothing: its points across the "
+                "section are no coordinates. Use an element with sections, as ElementBeamANCF(2), "
+                "or for a force of constant direction scene.traction or scene.point_force")
         self.matrix = (p * asm(forms.pressure(beam.width), basis)).tocoo()
         self._rows = self.matrix.tocsr()
         self._spread = on_facets(beam.mesh, basis.find, pressure=p)

@@ -14,8 +14,8 @@ from .doors import configuration, displacement
 from .dynamics import get_scheme
 from .dynamics.checkpoint import resume
 from .dynamics.integrate import follow, integrate
-from .errors import (ConvergenceError, InputError, StabilityWarning, ask_field, require_finite,
-                     require_finite_scalar, require_option, shown, teaching)
+from .errors import (ConvergenceError, InputError, Interrupted, StabilityWarning, ask_field,
+                     require_finite, require_finite_scalar, require_option, shown, taught, teaching)
 from .joints import Joint, bind_joint, get_joint
 from .loads import (EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight, bind_load)
 from .path import CriticalPoint, Path
@@ -32,6 +32,7 @@ from .system import System
 
 def _alone(method):
     """One thread at a time: a solution works in the arrays of the scene's system."""
+    method = taught(method)
 
     @wraps(method)
     def locked(self, *args, **kwargs):
@@ -587,8 +588,8 @@ class Scene:
         system.require_supports()
         try:
             result = newton.solve_static(system, u, **options)
-        except ConvergenceError as error:
-            raise ConvergenceError(str(error), self._state(error.state)) from None
+        except (ConvergenceError, Interrupted) as error:
+            raise type(error)(str(error), self._state(error.state)) from None
         return self._state(result)
 
     @_alone
@@ -639,8 +640,8 @@ class Scene:
             branch = _branch(branch, system)
         try:
             return Path(system, *continuation(system, branch=branch, **options))
-        except ConvergenceError as error:
-            raise ConvergenceError(str(error), Path(system, *error.state)) from None
+        except (ConvergenceError, Interrupted) as error:
+            raise type(error)(str(error), Path(system, *error.state)) from None
 
     def initial_velocity(self, v, beam=None):
         """The velocity at the start of :meth:`integrate`.

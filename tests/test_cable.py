@@ -323,3 +323,16 @@ def test_curved_cable_springs_back_with_the_right_stiffness():
     tip = state.displacement((0, R))
     # m(a) = -P R cos a for the angle a: u_y = -P R^3 pi / 4, u_x = -P R^3 / 2 by the unit loads
     np.testing.assert_allclose(tip, [-P / 2, -P * np.pi / 4], rtol=2e-4)
+
+
+def test_pressure_on_an_end_of_a_cable_is_refused():
+    """Its position does not depend on Y there, so the force would be zero without a word."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.1), ElementBeamCable(3),
+                StVenantKirchhoff(1e6, 0.3), 0.1)
+    scene = Scene(beam).clamp("left")
+    for place in ("right", lambda x: x[0] > -1):
+        with pytest.raises(InputError, match="of a cable would do nothing"):
+            scene.pressure(place, 25.0)
+    assert not scene.loads
+    total = scene.pressure("top", 25.0).loads[0].force(np.zeros(beam.N)).reshape(-1, 2, 2)[:, 0]
+    assert np.allclose(total.sum(axis=0), (0.0, -2.5))

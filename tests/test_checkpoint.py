@@ -443,8 +443,13 @@ def test_interrupted(compiled, tmp_path):
     def build(f):
         return swinging(compiled).point_force((0, 0), (1, 0), amplitude=f)
 
-    with pytest.raises(KeyboardInterrupt) as caught:
-        build(amplitude).integrate(0.1, 2.5e-4, checkpoint=path, every=40)
+    # a job in the background is started with SIGINT ignored
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt) as caught:
+            build(amplitude).integrate(0.1, 2.5e-4, checkpoint=path, every=40)
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert isinstance(caught.value, Interrupted) and "of 0.1" in str(caught.value)
     history = caught.value.state
     whole = build(lambda t: 0.0 * t).integrate(0.1, 2.5e-4)

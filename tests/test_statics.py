@@ -570,3 +570,37 @@ def test_a_load_as_small_as_the_round_off_of_the_axis_is_not_ignored(compiled):
     restarted = scene(1.0).solve_static(start=less)
     assert_allclose(restarted.displacement((1, 0)), whole.displacement((1, 0)), rtol=1e-7)
     assert scene(1.0).solve_static(start=whole).iterations <= 2
+
+
+def test_an_interrupt_keeps_what_has_converged(monkeypatch):
+    """Ctrl-C in the third step: the state of the second, an equilibrium of its own load."""
+    from skfem_ancf.errors import Interrupted
+    from importlib import import_module
+
+    newton, continuation = (import_module(f"skfem_ancf.statics.{name}")
+                            for name in ("newton", "continuation"))
+    scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.01), ElementBeamANCF(2),
+                       StVenantKirchhoff(2e8, 0.3, 7800), 0.01)).clamp("left").gravity((0, -1))
+    whole = scene.solve_static(first_step=0.25)
+    for module, name, solve in (
+            (newton, "_step", lambda: scene.solve_static(first_step=0.25)),
+            (continuation, "_step", lambda: scene.continuation(max_load=1.0, ds=0.05))):
+        calls, step = [], getattr(module, name)
+
+        def interrupted(*args, calls=calls, step=step):
+            calls.append(args)
+            if len(calls) == 3:
+                raise KeyboardInterrupt
+            return step(*args)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(module, name, interrupted)
+            with pytest.raises(Interrupted, match="stopped at the load") as info:
+                solve()
+        kept = info.value.state
+        if module is newton:
+            assert 0.0 < kept.load < 1.0 and len(kept.steps) == 2 and not kept.converged
+            again = scene.solve_static(start=kept)
+            assert np.allclose(again.u, whole.u, rtol=0, atol=1e-9)
+        else:
+            assert len(kept.load) == 3 and kept.load[-1] < 1.0

@@ -192,7 +192,7 @@ def steps(cables, beams, moments, joints, conserving, parameters, vectors, facto
                 if rate > 1.0 and size <= 1e3 * rough:
                     done = True
                     break
-                state[3] = max(rate, least_rate)  # of one step, used in the next, where it may be larger
+                state[3] = max(rate, least_rate)  # of one step, used in the next
                 if rate > reused and size * min(1.0, rate) > wanted:
                     if fresh and rate > diverging:
                         return n, energy

@@ -108,8 +108,8 @@ class CompiledSteps:
             structure.cables, structure.beams, structure.moments, structure.joints,
             self._conserving, self._parameters, structure.vectors, factors, moment_factors, s.fixed,
             s.mask, supports, motion_rows, s.mass._flat, self._M, s.mass._ld, s.mass.bandwidth,
-            self._A, *self._work, self._state, now, multipliers, dt, solver.tol, 8.0 * s.stiffness_scale,
-            ITERATION, solver._energy, rows, multiplier_rows)
+            self._A, *self._work, self._state, now, multipliers, dt, solver.tol,
+            8.0 * s.stiffness_scale, ITERATION, solver._energy, rows, multiplier_rows)
         solver.iterations += int(self._state[1] - count[1])
         solver.factorizations += int(self._state[2] - count[2])
         if done < n:

@@ -35,7 +35,8 @@ def _digest(*items):
     h = hashlib.sha256()
     for item in items:
         if isinstance(item, np.ndarray):
-            h.update(f"{item.dtype.str}{item.shape}".encode() + np.ascontiguousarray(item).tobytes())
+            h.update(f"{item.dtype.str}{item.shape}".encode())
+            h.update(np.ascontiguousarray(item).tobytes())
         else:
             h.update(repr(item).encode())
     return h.hexdigest()
@@ -217,7 +218,8 @@ def read(path):
     if text["format"] != FORMAT:
         raise CheckpointError(f"{str(path)!r} has the format {text['format']!r}, this version "
                               f"reads {FORMAT}")
-    if checksum is None or not np.array_equal(checksum, _checksum({**arrays, "text": _bytes(text)})):
+    found = _checksum({**arrays, "text": _bytes(text)})
+    if checksum is None or not np.array_equal(checksum, found):
         raise CheckpointError(f"{str(path)!r} is damaged: its checksum is not that of its content")
     return arrays, text
 

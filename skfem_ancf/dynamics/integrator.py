@@ -249,7 +249,8 @@ class Integrator:
                                        self.factorizations, self.substeps])}
         if self._coefficients is not None:
             kind, *arrays = self.A._factor
-            memory.update(coefficients=np.array(self._coefficients), kind=np.frombuffer(kind.encode(), np.uint8),
+            memory.update(coefficients=np.array(self._coefficients),
+                          kind=np.frombuffer(kind.encode(), np.uint8),
                           **{f"factor{k}": a for k, a in enumerate(arrays)})
         return memory
 

@@ -43,8 +43,8 @@ class StepSize:
     References
     ----------
     Error per unit step: Hairer, Norsett, Wanner: "Solving ordinary differential equations I",
-    II.4. The first filter: Shampine, Baca: "Error estimators for stiff differential equations", Journal
-    of Computational and Applied Mathematics 11 (1984).
+    II.4. The first filter: Shampine, Baca: "Error estimators for stiff differential equations",
+    Journal of Computational and Applied Mathematics 11 (1984).
     """
 
     def __init__(self, system, scheme, rtol, t_start, t_end):

@@ -116,8 +116,8 @@ def _solve_for_strain(scene, tol, max_elements, **options):
             before = len(errors), estimate["strain"]
         if stuck:
             raise ConvergenceError(
-                f"the estimated error of the strain stays at {before[1]:.3g} as elements are added; "
-                f"adapt = {tol:g} is not reached: the sections cannot show this field, use an "
+                f"the estimated error of the strain stays at {before[1]:.3g} as elements are "
+                f"added; adapt = {tol:g} is not reached: the sections cannot show this field, use an "
                 "element of higher order", state)
         if len(errors) >= max_elements:
             raise _too_few(len(errors), estimate, tol, state)

@@ -4,8 +4,8 @@ import logging
 
 import numpy as np
 
-from ..errors import (CallbackError, ConvergenceError, InputError, ask, require_function,
-                      require_integer, require_positive, shown, taught)
+from ..errors import (CallbackError, ConvergenceError, InputError, Interrupted, ask,
+                      require_function, require_integer, require_positive, shown, taught)
 from ..progress import progress_bar
 from .critical import find_critical
 
@@ -277,6 +277,9 @@ def continuation(system, steps=100, ds=0.02, ds_max=None, max_load=None, until=N
                         f"{failure}; more elements or a smaller ds may help",
                         (points, critical)) from None
                 continue
+            except KeyboardInterrupt:
+                raise Interrupted(f"stopped at the load {start.load:.6g}; the exception's state is "
+                                  "the path up to there", (points, critical)) from None
             points.append(point)
             bar.update(1)
             if last or (until is not None and _ends(until, point)):

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..errors import (ConvergenceError, InputError, require_finite, require_flag, require_integer,
-                      require_option, require_positive, taught)
+from ..errors import (ConvergenceError, InputError, Interrupted, require_finite, require_flag,
+                      require_integer, require_option, require_positive, taught)
 from ..progress import progress_bar
 from . import stability
 
@@ -150,10 +150,15 @@ def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, fi
                         raise ConvergenceError(result.message, result) from None
                     continue
                 step *= 4.0
-            result.u, result.multipliers, result.force = found
+            except KeyboardInterrupt:
+                raise Interrupted(f"stopped at the load level {result.load:.6g}; the exception's "
+                                  "state is what has converged", result) from None
             bar.update(load - result.load)
-            result.load, cuts = load, 0
-            result.steps.append(record)
+            u, multipliers, force = found
+            # one assignment: who interrupts finds the old result or the new one
+            result = replace(result, u=u, multipliers=multipliers, force=force, load=load,
+                             steps=[*result.steps, record])
+            cuts = 0
             logger.info("load %.6g converged in %d iterations", load, record.iterations)
             if record.iterations <= max(8, max_iterations // 3):
                 step *= 2.0
