@@ -965,7 +965,11 @@ class Curve:
             before, after = p - self(at - part * size), self(at + part * size) - p
             cross = before[0] * after[1] - before[1] * after[0]
             angles.append(np.arctan2(cross, np.sum(before * after, axis=0)))
-        kink = np.where(np.abs(angles[1]) > 0.7 * np.abs(angles[0]), np.abs(angles[1]), 0.0)
+        # far from the origin chords that short have the direction of round-off
+        chord = np.minimum(np.hypot(*before), np.hypot(*after))
+        seen = chord * KINK > 32.0 * np.finfo(float).eps * np.max(np.abs(p))
+        stays = seen & (np.abs(angles[1]) > 0.7 * np.abs(angles[0]))
+        kink = np.where(stays, np.abs(angles[1]), 0.0)
         k = int(np.argmax(kink))
         if kink[k] > KINK:
             raise MeshError(

@@ -157,6 +157,15 @@ def test_a_curve_has_no_kink_at_a_node(angle, way):
         MeshBeam.init_curve(r, np.linspace(0, 2, 9), 0.001, dr=dr)
 
 
+@pytest.mark.parametrize("distance", [1e3, 1e9, 1e12])
+def test_an_arc_far_away_has_no_kink(distance):
+    """Chords beside a node are round-off there; dr says what the direction is."""
+    mesh = MeshBeam.init_curve(
+        lambda s: np.array([[distance], [-distance / 3]]) + np.array([np.sin(s), np.cos(s)]),
+        np.linspace(0, 1, 9), 0.01, dr=lambda s: np.array([np.cos(s), -np.sin(s)]))
+    assert mesh.nelements == 8
+
+
 def test_a_line_and_an_arc_have_no_kink():
     def r(s):
         t = np.clip(s - 1, 0, None)
