@@ -8,6 +8,7 @@ import time
 import warnings
 import zipfile
 import zlib
+from io import BytesIO
 
 import numpy as np
 
@@ -161,8 +162,10 @@ def _write(path, arrays):
                 with _h5py().File(file, "w") as h5:
                     for name, array in arrays.items():
                         h5.create_dataset(name, data=array)
-            else:
-                np.savez(file, **arrays)
+            else:  # by way of memory: an archive on a full disk cannot be closed
+                content = BytesIO()
+                np.savez(content, **arrays)
+                file.write(content.getbuffer())
             file.flush()
             os.fsync(file.fileno())
         os.replace(part, path)
@@ -301,7 +304,7 @@ class Checkpoint:
             arrays[f"function.{name}"] = values
         if run.task.t_eval is not None:
             arrays["t_eval"] = run.task.t_eval
-        arrays["text"] = _bytes({**self._text, "t": y.t, "done": run.done})
+        arrays["text"] = _bytes({**self._text, "t": float(y.t), "done": bool(run.done)})
         _write(self.path, {**arrays, "checksum": _checksum(arrays)})
         self._steps, self._clock = run.steps, time.monotonic()
 
