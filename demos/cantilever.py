@@ -30,12 +30,12 @@ def cantilever(E, elements):
     return Scene(beam).fix("left", ROOT)
 
 
-def picture(state, filename):
+def picture(state, filename, recover=True):
     """The deformed body, and its root enlarged."""
-    ax = state.plot("eps_yy", limits=(-0.015, 0.015))
+    ax = state.plot("eps_yy", limits=(-0.015, 0.015), recover=recover)
     zoom = ax.inset_axes([0.42, 0.08, 0.56, 0.66])
     state.plot("eps_yy", ax=zoom, limits=(-0.015, 0.015), thickness=1, colorbar=False,
-               title="the root, to scale", undeformed=False)
+               title="the root, to scale", undeformed=False, recover=recover)
     zoom.set(xlim=(-0.005, 0.13), ylim=(-0.115, 0.0225), xlabel="", ylabel="")
     ax.figure.savefig(filename, dpi=150, bbox_inches="tight")
 
