@@ -1,0 +1,69 @@
+"""One text for two machines: plain NumPy, and compiled by Numba.
+
+A function marked by :func:`source` is plain Python on arrays. :func:`skfem_ancf.compiled.twin`
+compiles the same text, with every marked function that it calls. What a scalar loop is for a
+compiler is an array operation for NumPy: an index of :func:`lanes` is a number in the one and a
+slice in the other::
+
+    @source
+    def normal_force(EA, strain, N):
+        for p in range(strain.shape[0]):
+            for e in lanes(strain.shape[1]):
+                N[p, e] = EA * strain[p, e]
+
+Rules of such a text, where ``e`` is an index of lanes:
+
+* statements on ``[..., e]`` only: no ``if`` on values, sums into ``s[e]`` and not into a number,
+  ``np.sqrt`` and not ``math.sqrt``; ``e`` takes no part in arithmetic, an array of numbers
+  indexed by it does: ``left[e] * nd + k``,
+* lanes may be nested where the arrays broadcast: ``for s in lanes(n): for e in lanes(m):`` with
+  ``column(c[s]) * x[s, e]``,
+* ``out[at[e]] += x[e]`` needs ``at`` without repetitions.
+"""
+
+
+def lanes(*ends):
+    """Indices from ``ends`` as of ``range``: all at once, as one slice; compiled, one by one.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem_ancf.source import lanes
+    >>> x, y = np.arange(3.0), np.empty(3)
+    >>> for i in lanes(3):
+    ...     y[i] = 2.0 * x[i]
+    >>> y.tolist()
+    [0.0, 2.0, 4.0]
+    """
+    return (slice(*ends),)
+
+
+def column(x):
+    """A number for each row, beside the elements: ``x[:, None]``; compiled, the number."""
+    return x[:, None]
+
+
+def source(function):
+    """Mark a function as a text for both machines; it stays what it is."""
+    function.twin = None
+    return function
+
+
+def primitive(module):
+    """Mark a plain function whose compiled twin is another: that of its name in a module.
+
+    For what a library does better than a text: LAPACK, and calls of Python functions.
+
+    Parameters
+    ----------
+    module
+        Name of a module in :mod:`skfem_ancf.compiled`.
+    """
+    def mark(function):
+        function.twin = module
+        return function
+
+    return mark
+
+
+lanes.twin = column.twin = "jit"
