@@ -1,0 +1,145 @@
+"""Band matrices as texts and LAPACK see them.
+
+Symmetric: the lower half, entry (i, j) at ``j * ld + i - j``; its factors L D L^T take its place.
+Else entry (i, j) at ``j * ld + top + i - j``, LAPACK's storage for ``gbtrf``, whose factors take
+its place.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import blas, lapack
+
+from .source import lanes, primitive, source
+
+#: A pivot that small beside what it came from is round-off.
+LOST = 1e-13
+
+
+class Band(NamedTuple):
+    """A band matrix: its entries, the exchanges of ``gbtrf``, and its layout."""
+
+    flat: np.ndarray
+    pivots: np.ndarray
+    ld: int
+    width: int
+    top: int
+
+
+def as_lapack(A):
+    """A view of LAPACK's band storage, shape (rows, n)."""
+    ab = A.flat.reshape(-1, A.ld).T
+    return ab if A.top else ab[:A.width + 1]
+
+
+@primitive("band")
+def multiply(A, x, y):
+    """y = A x."""
+    n, k = len(x), A.width
+    ab = as_lapack(A)
+    if not A.top:
+        y[:] = blas.dsbmv(k, 1.0, ab, x, lower=1)
+    elif n > 2 * k:
+        y[:] = blas.dgbmv(n, n, k, k, 1.0, ab[k:], x)
+    else:  # scipy's wrapper refuses
+        y[:] = ab[A.top] * x
+        for d in range(1, min(k, n - 1) + 1):
+            y[d:] += ab[A.top + d, :n - d] * x[:n - d]
+            y[:n - d] += ab[A.top - d, d:] * x[d:]
+
+
+@primitive("band")
+def factorize(A):
+    """Factorise in place; False if a pivot is lost.
+
+    A symmetric matrix is not pivoted: one that is not positive definite has factors L D L^T too,
+    unless one of its leading parts is singular.
+    """
+    ab = as_lapack(A)
+    if A.top:
+        lu, A.pivots[:], info = lapack.dgbtrf(ab, A.width, A.width)
+        ab[:] = lu
+        return bool(info == 0 and np.all(np.isfinite(lu[A.top])))
+    c, info = lapack.dpbtrf(ab, lower=1)
+    if info == 0:
+        ab[0] = c[0] ** 2
+        ab[1:] = c[1:] / c[0]
+        return bool(np.all(np.isfinite(c[0])))
+    return _indefinite(A.flat.reshape(-1, A.ld), A.width)
+
+
+def _indefinite(columns, width):
+    """L D L^T of columns (n, ld)."""
+    n, where = len(columns), [np.arange(k + 1) for k in range(width + 1)]
+    for j in range(n):
+        d, m = columns[j, 0], min(width, n - 1 - j)
+        if not abs(d) > 0.0:
+            return False
+        below = columns[j, 1:m + 1]
+        factor = below / d
+        for k in np.flatnonzero(below):
+            other, at = columns[j + k + 1], where[m - k - 1]
+            before = other[0]
+            other[at] -= factor[k] * below[k:m]
+            if abs(other[0]) < LOST * abs(before):
+                return False
+        columns[j, 1:m + 1] = factor
+    return bool(np.all(np.isfinite(columns[:, 0])))
+
+
+@primitive("band")
+def solve(A, x):
+    """Solve in place with the factors; x is (n,)."""
+    ab = as_lapack(A)
+    if A.top:
+        x[:] = lapack.dgbtrs(ab, A.width, A.width, x, A.pivots)[0]
+        return
+    y = lapack.dtbtrs(ab, x, uplo="L", diag="U")[0].ravel() / ab[0]
+    x[:] = lapack.dtbtrs(ab, y, uplo="L", trans="T", diag="U")[0].ravel()
+
+
+@source
+def copy(a, b):
+    """b = a."""
+    for i in lanes(a.size):
+        b[i] = a[i]
+
+
+@source
+def mirror(A):
+    """Of a matrix that is not stored as symmetric: the upper half becomes as the lower."""
+    if A.top > 0:
+        rows = A.flat.reshape(A.flat.size // A.ld, A.ld)
+        for k in range(1, A.width + 1):
+            later = rows[k:]
+            for j in lanes(later.shape[0]):
+                later[j, A.top - k] = rows[j, A.top + k]
+
+
+@source
+def fix(A, free):
+    """Rows and columns where free is zero become those of the identity."""
+    rows = A.flat.reshape(A.flat.size // A.ld, A.ld)
+    for k in range(1, min(A.width, free.size - 1) + 1):
+        later, after = rows[k:], free[k:]
+        for j in lanes(after.size):
+            rows[j, A.top + k] *= free[j] * after[j]
+        if A.top > 0:
+            for j in lanes(after.size):
+                later[j, A.top - k] *= free[j] * after[j]
+    for j in lanes(free.size):
+        rows[j, A.top] = rows[j, A.top] * free[j] + (1.0 - free[j])
+
+
+@source
+def diagonal(A, d):
+    """The diagonal into d."""
+    rows = A.flat.reshape(A.flat.size // A.ld, A.ld)
+    for j in lanes(d.size):
+        d[j] = rows[j, A.top]
+
+
+@source
+def weighted(a, b, w):
+    """The sum of a b w."""
+    return np.dot(a * b, w)

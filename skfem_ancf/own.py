@@ -1,0 +1,59 @@
+"""What texts ask of Python objects: loads, joints and laws of one's own, wide borders, descents.
+
+An object is known by a handle, a positive number: compiled code can hold one, and calls back.
+"""
+
+import weakref
+from itertools import count
+
+from .source import primitive
+
+_numbers, _objects = count(1), weakref.WeakValueDictionary()
+
+
+def handle_of(thing):
+    """A number by which texts call an object as long as it lives."""
+    number = next(_numbers)
+    _objects[number] = thing
+    return number
+
+
+def owner(handle):
+    """The object of a handle."""
+    return _objects[handle]
+
+
+@primitive("own")
+def own_force(handle, t, scale, u, out):
+    """Add the loads of one's own at a time, which is not a number in statics."""
+    owner(handle).add_own_force(t, scale, u, out)
+
+
+@primitive("own")
+def own_mean_force(handle, t, u0, u1, out):
+    """Add their mean from u0 to u1."""
+    owner(handle).add_own_mean_force(t, u0, u1, out)
+
+
+@primitive("own")
+def own_load_stiffness(handle, t, scale, u, flat):
+    """Subtract their derivatives from the entries of a band matrix."""
+    owner(handle).subtract_own_stiffness(t, scale, u, flat)
+
+
+@primitive("own")
+def own_joints(handle, what, t, u, v, out):
+    """Joints that are no tables: 0 Phi, 1 J v, 2 J^T v, 3 J, 4 the second derivative by v, v."""
+    owner(handle).add_own_joints(what, t, u, v, out)
+
+
+@primitive("own")
+def own_solve(handle, t, u, multipliers, R, phi, du, dm):
+    """Solve with the multipliers by sparse factors; False if there is no solution."""
+    return bool(owner(handle).solve_own(t, u, multipliers, R, phi, du, dm))
+
+
+@primitive("own")
+def own_descent(handle, R, du, dm):
+    """Change a correction as a descent wants it."""
+    owner(handle).correct_own(R, du, dm)

@@ -1,0 +1,156 @@
+"""Joints and loads of a scene as tables, and what they do, as texts.
+
+Joints are ``Phi = c + g . u + u . H u / 2``; c and g may depend on time.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .kernels.moments import MomentPack, add_moment_stiffness, add_moments
+from .own import own_force, own_joints, own_load_stiffness
+from .source import lanes, primitive, source
+
+
+class JointTables(NamedTuple):
+    """The joints of a scene.
+
+    Attributes
+    ----------
+    hk, hi, hj, hv
+        H by equation, row, column and value, both halves.
+    gk, gi
+        Equation and column of each entry of g.
+    own
+        Handle of what has joints that are not quadratic, see :mod:`skfem_ancf.own`; 0 for none.
+    """
+
+    hk: np.ndarray
+    hi: np.ndarray
+    hj: np.ndarray
+    hv: np.ndarray
+    gk: np.ndarray
+    gi: np.ndarray
+    own: int
+
+
+class LoadTables(NamedTuple):
+    """The loads of a scene; each row of factors has those of vectors, of moments and of linear.
+
+    Attributes
+    ----------
+    vectors
+        Forces of constant direction, shape (k, N).
+    moments
+        A :class:`~skfem_ancf.kernels.moments.MomentPack`.
+    rows, columns, values, which
+        Forces linear in the displacement, as entries and the number of the factor.
+    own
+        Handle of what has loads of other kinds; 0 for none.
+    """
+
+    vectors: np.ndarray
+    moments: MomentPack
+    rows: np.ndarray
+    columns: np.ndarray
+    values: np.ndarray
+    which: np.ndarray
+    own: int
+
+
+@primitive("scatter")
+def add_products(out, at, v, x, i):
+    """out[at] += v x[i], however often a place occurs."""
+    np.add.at(out, at, v * x[i])
+
+
+@primitive("scatter")
+def add_triples(out, at, v, x, i, y, j):
+    """out[at] += v x[i] y[j]."""
+    np.add.at(out, at, v * x[i] * y[j])
+
+
+# joints
+
+
+@source
+def constraint(joints, c, g, t, u, phi):
+    """Phi at u."""
+    for k in lanes(phi.size):
+        phi[k] = c[k]
+    if joints.own > 0:
+        own_joints(joints.own, 0, t, u, u, phi)
+        return
+    add_products(phi, joints.gk, g, u, joints.gi)
+    add_triples(phi, joints.hk, 0.5 * joints.hv, u, joints.hi, u, joints.hj)
+
+
+@source
+def add_constraint_rate(joints, g, t, u, v, out):
+    """out += J(u) v."""
+    if joints.own > 0:
+        own_joints(joints.own, 1, t, u, v, out)
+        return
+    add_products(out, joints.gk, g, v, joints.gi)
+    add_triples(out, joints.hk, joints.hv, v, joints.hi, u, joints.hj)
+
+
+@source
+def add_joint_force(joints, g, t, u, multipliers, out):
+    """out += J(u)^T multipliers."""
+    if joints.own > 0:
+        own_joints(joints.own, 2, t, u, multipliers, out)
+        return
+    add_products(out, joints.gi, g, multipliers, joints.gk)
+    add_triples(out, joints.hi, joints.hv, multipliers, joints.hk, u, joints.hj)
+
+
+@source
+def joint_directions(joints, g, t, u, J):
+    """J(u), dense, shape (m, N)."""
+    m, N = J.shape
+    flat = J.reshape(J.size)
+    for i in lanes(flat.size):
+        flat[i] = 0.0
+    if joints.own > 0:
+        own_joints(joints.own, 3, t, u, u, flat)
+        return
+    one = np.ones(1)
+    first = np.zeros(joints.gk.size, np.int64)
+    add_products(flat, joints.gk * N + joints.gi, g, one, first)
+    add_products(flat, joints.hk * N + joints.hi, joints.hv, u, joints.hj)
+
+
+# loads
+
+
+@source
+def external_force(loads, factors, t, scale, u, out):
+    """The force of all loads; ``scale`` is on those of one's own, the others have factors."""
+    for i in lanes(out.size):
+        out[i] = 0.0
+    n = loads.vectors.shape[0]
+    for k in range(n):
+        c, vector = factors[k], loads.vectors[k]
+        for i in lanes(out.size):
+            out[i] += c * vector[i]
+    turning = loads.moments.M.size
+    add_moments(loads.moments, factors[n:n + turning], u, out)
+    if loads.rows.size > 0:
+        add_triples(out, loads.rows, loads.values, factors, loads.which, u, loads.columns)
+    if loads.own > 0:
+        own_force(loads.own, t, scale, u, out)
+
+
+@source
+def add_load_stiffness(loads, factors, t, scale, u, A):
+    """Subtract the derivative of :func:`external_force` from a band matrix."""
+    n = loads.vectors.shape[0]
+    add_moment_stiffness(loads.moments, factors[n:n + loads.moments.M.size], u, A.flat[A.top:],
+                         A.ld, A.top)
+    if loads.rows.size > 0:
+        at = loads.columns * A.ld + A.top + loads.rows - loads.columns
+        one = -np.ones(1)
+        add_triples(A.flat, at, loads.values, factors, loads.which, one, 0 * loads.which)
+    if loads.own > 0:
+        own_load_stiffness(loads.own, t, scale, u, A.flat)
