@@ -5,14 +5,25 @@ Every error derives from :class:`AncfError`; those about bad input are also
 what a caller gives passes one of them before anything is computed.
 """
 
+from __future__ import annotations
+
 import difflib
 import inspect
 import os
 import pickle
 from functools import wraps
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from .types import Array
+
+Function = TypeVar("Function", bound="Callable[..., Any]")
+Class = TypeVar("Class", bound=type)
 
 #: Longest text of a value in a message.
 WIDTH = 80
@@ -41,7 +52,7 @@ class NameUnknown(InputError):
         What was named, the name given, and those that are known.
     """
 
-    def __init__(self, kind, name, known):
+    def __init__(self, kind: str, name: object, known: Iterable[Any]) -> None:
         self.kind, self.name, self.known = kind, name, tuple(known)
         near = nearest(name, self.known)
         super().__init__(
@@ -80,9 +91,17 @@ class PickleError(AncfError, pickle.PicklingError):
 
 
 class MissingExtra(AncfError, ImportError):
-    """An optional dependency is missing; the message names the extra."""
+    """An optional dependency is missing; the message names the extra.
 
-    def __init__(self, module, extra):
+    Parameters
+    ----------
+    module
+        Name of the package that cannot be imported.
+    extra
+        Name of the extra of ``skfem-ancf`` that installs it.
+    """
+
+    def __init__(self, module: str, extra: str) -> None:
         self.module, self.extra = module, extra
         super().__init__(
             f"this needs the package {module!r}, which is not installed: "
@@ -96,13 +115,20 @@ class MissingExtra(AncfError, ImportError):
 class ConvergenceError(AncfError):
     """An iteration did not converge.
 
+    Parameters
+    ----------
+    message
+        What did not converge, where, and what to change.
+    state
+        What had converged until then, or None.
+
     Attributes
     ----------
     state
         The last converged state, or None if there is none.
     """
 
-    def __init__(self, message, state=None):
+    def __init__(self, message: str, state: Any = None) -> None:
         super().__init__(message)
         self.state = state
 
@@ -121,13 +147,20 @@ class Interrupted(KeyboardInterrupt):
     A KeyboardInterrupt, so that ``except Exception`` does not take it for an error, and a script
     does not go on as if all were done.
 
+    Parameters
+    ----------
+    message
+        Where it was stopped.
+    state
+        What was found until then.
+
     Attributes
     ----------
     state
         The History or the Path up to there, or the last State that converged.
     """
 
-    def __init__(self, message, state=None):
+    def __init__(self, message: str, state: Any = None) -> None:
         super().__init__(message)
         self.state = state
 
@@ -142,7 +175,7 @@ class CheckpointWarning(UserWarning):
 
 # messages
 
-def shown(value):
+def shown(value: object) -> str:
     """A value as a message shows it: its repr on one line, shortened."""
     if isinstance(value, int) and value.bit_length() > 256:  # Python refuses to print the largest
         return f"{'-' * (value < 0)}10**{int(0.30103 * (value.bit_length() - 1))} or more"
@@ -153,8 +186,15 @@ def shown(value):
     return text if len(text) <= WIDTH else text[:WIDTH - 3] + "..."
 
 
-def nearest(name, known):
+def nearest(name: object, known: Iterable[Any]) -> str | None:
     """The known name that is most like one, or None.
+
+    Parameters
+    ----------
+    name
+        What was given; None is returned unless it is a text.
+    known
+        The names that there are.
 
     Examples
     --------
@@ -171,18 +211,35 @@ def nearest(name, known):
 
 # numbers
 
-def require_positive(name, value, unit=""):
-    """Return ``value`` as a float, or raise :class:`InputError` if it is not > 0."""
+def require_positive(name: str, value: object, unit: str = "") -> float:
+    """Return ``value`` as a float, or raise :class:`InputError` if it is not > 0.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        What was given.
+    unit
+        What it is measured in, for the message; none by default.
+    """
     value = require_finite_scalar(name, value)
     if value <= 0.0:
         raise InputError(f"{name} must be positive{unit and f' ({unit})'}, got {value!r}")
     return value
 
 
-def require_finite_scalar(name, value):
+def require_finite_scalar(name: str, value: object) -> float:
     """Return ``value`` as a float, or raise :class:`InputError` if it is no finite real number.
 
     True and False, texts and arrays of one number are none.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        What was given.
     """
     if type(value) is not float:
         if not _is_real(value):
@@ -204,10 +261,20 @@ def _is_real(value):
             and getattr(dtype, "kind", "f") in "iuf" and getattr(value, "ndim", 0) == 0)
 
 
-def require_integer(name, value, low, high=None, why=""):
+def require_integer(name: str, value: object, low: int, high: int | None = None,
+                    why: str = "") -> int:
     """Return ``value`` as an int from ``low`` to ``high``, or raise :class:`InputError`.
 
-    ``why`` says where the bound comes from; ``high`` is None where there is none.
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        What was given; True and False are no integers.
+    low, high
+        Bounds, both allowed; ``high`` is None where there is none.
+    why
+        Where the bound comes from, for the message.
     """
     if (isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < low
             or (high is not None and value > high)):
@@ -217,15 +284,32 @@ def require_integer(name, value, low, high=None, why=""):
     return int(value)
 
 
-def require_index(name, value, n):
-    """Return ``value`` as an index into ``n`` things, counted from the end if it is negative."""
+def require_index(name: str, value: object, n: int) -> int:
+    """Return ``value`` as an index into ``n`` things, counted from the end if it is negative.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        An integer from ``-n`` to ``n - 1``.
+    n
+        How many things there are.
+    """
     return require_integer(name, value, -n, n - 1) % n
 
 
-def require_finite(name, array, shape=None):
+def require_finite(name: str, array: object, shape: Sequence[int | None] | None = None) -> Array:
     """Return ``array`` as float64, or raise :class:`InputError`.
 
-    ``shape`` may hold None for a free extent.
+    Parameters
+    ----------
+    name
+        What messages call it.
+    array
+        What was given: anything that NumPy makes an array of real, finite numbers of.
+    shape
+        The shape it must have, with None for a free extent, as ``(2, None)``; None for any.
     """
     if not (type(array) is np.ndarray and array.dtype == np.float64):
         array = _real_array(name, array)
@@ -261,29 +345,67 @@ def _real_array(name, value):
 
 # names and flags
 
-def require_option(kind, name, known):
-    """Return ``name`` if it is a text among the known, or raise :class:`NameUnknown`."""
+def require_option(kind: str, name: object, known: Iterable[str]) -> str:
+    """Return ``name`` if it is a text among the known, or raise :class:`NameUnknown`.
+
+    Parameters
+    ----------
+    kind
+        What is named, for the message.
+    name
+        What was given.
+    known
+        The names that there are.
+    """
     if not isinstance(name, str) or name not in known:
         raise NameUnknown(kind, name, known)
     return name
 
 
-def require_flag(name, value):
-    """Return True or False, or raise :class:`InputError` if it is neither."""
+def require_flag(name: str, value: object) -> bool:
+    """Return True or False, or raise :class:`InputError` if it is neither.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        What was given.
+    """
     if not isinstance(value, (bool, np.bool_)):
         raise InputError(f"{name} must be True or False, got {shown(value)}")
     return bool(value)
 
 
-def require_label(name, value):
-    """Return a text that is not empty, or None, or raise :class:`InputError`."""
+def require_label(name: str, value: object) -> str | None:
+    """Return a text that is not empty, or None, or raise :class:`InputError`.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        What was given.
+    """
     if value is not None and not (isinstance(value, str) and value):
         raise InputError(f"{name} must be a text, or None for none, got {shown(value)}")
     return value
 
 
-def require_kind(name, value, kind, hint=""):
-    """Return ``value`` if it is of a class, or of one of several, or raise InputError."""
+def require_kind(name: str, value: Any, kind: type | tuple[type, ...], hint: str = "") -> Any:
+    """Return ``value`` if it is of a class, or of one of several, or raise InputError.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        What was given.
+    kind
+        The class, or a tuple of classes.
+    hint
+        What else to say in the message.
+    """
     if not isinstance(value, kind):
         kinds = kind if isinstance(kind, tuple) else (kind,)
         raise InputError(f"{name} must be a {' or '.join(k.__name__ for k in kinds)}"
@@ -291,15 +413,37 @@ def require_kind(name, value, kind, hint=""):
     return value
 
 
-def require_like(name, value, kind, *attributes):
-    """Return ``value`` if it has what is asked of a kind of object, or raise InputError."""
+def require_like(name: str, value: Any, kind: str, *attributes: str) -> Any:
+    """Return ``value`` if it has what is asked of a kind of object, or raise InputError.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        What was given; a class has not what its objects have.
+    kind
+        What it should be, for the message.
+    *attributes
+        Names of the attributes that are asked for.
+    """
     if isinstance(value, type) or not all(hasattr(value, a) for a in attributes):
         raise InputError(f"{name} must be a {kind}, got {shown(value)}")
     return value
 
 
-def require_names(kind, names, known):
-    """Return one name or several as a tuple, or raise :class:`NameUnknown`."""
+def require_names(kind: str, names: Any, known: Iterable[str]) -> tuple[str, ...]:
+    """Return one name or several as a tuple, or raise :class:`NameUnknown`.
+
+    Parameters
+    ----------
+    kind
+        What is named, for the message, in the singular.
+    names
+        A text, or a tuple, list, set or array (n,) of texts.
+    known
+        The names that there are.
+    """
     if isinstance(names, str):
         names = (names,)
     if not isinstance(names, (tuple, list, set, frozenset, np.ndarray)) or (
@@ -308,8 +452,18 @@ def require_names(kind, names, known):
     return tuple(require_option(kind, name, known) for name in names)
 
 
-def require_options(what, options, known):
-    """Return the options of a call, or raise :class:`CallError` if one is not known."""
+def require_options(what: str, options: dict[str, Any], known: Iterable[str]) -> dict[str, Any]:
+    """Return the options of a call, or raise :class:`CallError` if one is not known.
+
+    Parameters
+    ----------
+    what
+        What is called, for the message.
+    options
+        Its keywords.
+    known
+        The keywords that it takes.
+    """
     for name in options:
         if name not in known:
             near = nearest(name, known)
@@ -319,8 +473,16 @@ def require_options(what, options, known):
     return options
 
 
-def require_path(name, value):
-    """Return a file name as a ``pathlib.Path``, or raise :class:`InputError`."""
+def require_path(name: str, value: Any) -> Path:
+    """Return a file name as a ``pathlib.Path``, or raise :class:`InputError`.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        A text that is not empty, or a ``pathlib.Path``.
+    """
     if not isinstance(value, (str, os.PathLike)) or not os.fspath(value) or (
             "\0" in str(os.fspath(value))):
         raise InputError(f"{name} must be the path of a file, got {shown(value)}")
@@ -332,17 +494,24 @@ def require_path(name, value):
 
 # functions of the caller's
 
-def require_function(name, value, returns):
+def require_function(name: str, value: Any, returns: str) -> Callable[..., Any]:
     """Return ``value`` if it can be called, or raise :class:`InputError`.
 
-    ``returns`` says what of, and what is wanted, as "of time that returns a number".
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        What was given.
+    returns
+        What it is a function of and what it should return, as "of time that returns a number".
     """
     if not callable(value):
         raise InputError(f"{name} must be a function {returns}, got {shown(value)}")
     return value
 
 
-def ask(what, function, *args):
+def ask(what: str, function: Callable[..., Any], *args: Any) -> Any:
     """Call a function of the caller's, and say what was asked if it raises.
 
     Parameters
@@ -376,21 +545,50 @@ def ask(what, function, *args):
                             ) from error
 
 
-def ask_number(what, function, *args):
-    """As :func:`ask`, for a function that returns a finite number."""
+def ask_number(what: str, function: Callable[..., Any], *args: Any) -> float:
+    """As :func:`ask`, for a function that returns a finite number.
+
+    Parameters
+    ----------
+    what, function, *args
+        As for :func:`ask`.
+    """
     value = ask(what, function, *args)
     if type(value) is float and -np.inf < value < np.inf:
         return value
     return _returned(require_finite_scalar, what, value, args)
 
 
-def ask_array(what, shape, function, *args):
-    """As :func:`ask`, for a function that returns finite numbers of a shape."""
+def ask_array(what: str, shape: Sequence[int | None] | None, function: Callable[..., Any],
+              *args: Any) -> Array:
+    """As :func:`ask`, for a function that returns finite numbers of a shape.
+
+    Parameters
+    ----------
+    what, function, *args
+        As for :func:`ask`.
+    shape
+        The shape that its value must have, as for :func:`require_finite`.
+    """
     return _returned(require_finite, what, ask(what, function, *args), args, shape)
 
 
-def ask_field(what, function, x):
-    """The values (2, ...) of a function at points x (2, ...), asked; each may be a constant.
+def ask_field(what: str, function: Callable[[Array], Any], x: Array) -> Array:
+    """The values of a vector field at points, asked; each of the two may be a constant.
+
+    Parameters
+    ----------
+    what
+        The call for the message, as ``"t(x)"``.
+    function
+        Takes the points x (2, ...), returns two values, each a number or of the shape (...).
+    x
+        Points, shape (2, ...).
+
+    Returns
+    -------
+    ndarray
+        Shape (2, ...).
 
     Raises
     ------
@@ -426,7 +624,7 @@ def _returned(door, what, value, args, *more):
 
 # calls
 
-def taught(function):
+def taught(function: Function) -> Function:
     """A function whose wrong calls raise :class:`CallError`, which lists its arguments."""
     explain = _explain
 
@@ -443,7 +641,7 @@ def taught(function):
     return wraps(function)(call)
 
 
-def teaching(cls):
+def teaching(cls: Class) -> Class:
     """A class decorator: :func:`taught` for the constructor and the public methods of a class."""
     for name, value in list(vars(cls).items()):
         if name.startswith("_") and name != "__init__":

@@ -1,12 +1,19 @@
 """The map from the reference cell to the stress-free body of a beam."""
 
+from __future__ import annotations
+
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from skfem.mapping import Mapping
 
 from .errors import MeshError
 from .reference import hermite, linear
+
+if TYPE_CHECKING:
+    from .mesh import MeshBeam
+    from .types import Array
 
 _FACET_POINTS = (  # the point of the reference cell at X on facet bottom, right, top, left
     lambda s: (s, 0.0 * s), lambda s: (1.0 + 0.0 * s, s),
@@ -29,7 +36,7 @@ class MappingBeam(Mapping):
         A :class:`~skfem_ancf.MeshBeam`.
     """
 
-    def __init__(self, mesh):
+    def __init__(self, mesh: MeshBeam) -> None:
         self.mesh = mesh
         self.dim = 2
 
@@ -58,34 +65,95 @@ class MappingBeam(Mapping):
             return np.einsum("ine,np->iep", coefficients, functions)
         return np.einsum("ine,nep->iep", coefficients, functions)
 
-    def F(self, X, tind=None):
+    def F(self, X: Array, tind: Array | None = None) -> Array:
+        """The points of the body of reference points.
+
+        Parameters
+        ----------
+        X
+            Reference points (xi, eta), shape (2, npoints) or (2, nelements, npoints).
+        tind
+            Elements, shape (nelements,), or None for all.
+
+        Returns
+        -------
+        ndarray
+            Shape (2, nelements, npoints).
+        """
         axis, director = self._coefficients(tind)
         xi, eta = X
         return self._sum(axis, hermite(xi)) + self._sum(director, (eta - 0.5) * self._director(xi))
 
-    def DF(self, X, tind=None):
+    def DF(self, X: Array, tind: Array | None = None) -> Array:
+        """The Jacobian: derivatives of :meth:`F` by xi and eta.
+
+        Parameters
+        ----------
+        X, tind
+            As for :meth:`F`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
+
+        Returns
+        -------
+        ndarray
+            Shape (2, 2, nelements, npoints).
+        """
         axis, director = self._coefficients(tind)
         xi, eta = X
         turning = self._sum(director, (eta - 0.5) * self._director(xi, 1))
         return np.stack([self._sum(axis, hermite(xi, 1)) + turning,
                          self._sum(director, self._director(xi))], 1)
 
-    def detDF(self, X, tind=None):
+    def detDF(self, X: Array, tind: Array | None = None) -> Array:
+        """The determinant of :meth:`DF`.
+
+        Parameters
+        ----------
+        X, tind
+            As for :meth:`F`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
+
+        Returns
+        -------
+        ndarray
+            Shape (nelements, npoints).
+        """
         J = self.DF(X, tind)
         return J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
 
-    def invDF(self, X, tind=None):
+    def invDF(self, X: Array, tind: Array | None = None) -> Array:
+        """The inverse of :meth:`DF`.
+
+        Parameters
+        ----------
+        X, tind
+            As for :meth:`F`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
+
+        Returns
+        -------
+        ndarray
+            Shape (2, 2, nelements, npoints).
+        """
         J = self.DF(X, tind)
         det = J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
         return np.array([[J[1, 1], -J[0, 1]], [-J[1, 0], J[0, 0]]]) / det
 
-    def turning(self, X, tind=None):
-        """Derivative by xi of the unit-height section director, shape (2, nelements, npoints)."""
+    def turning(self, X: Array, tind: Array | None = None) -> Array:
+        """Derivative by xi of the unit-height section director, shape (2, nelements, npoints).
+
+        Parameters
+        ----------
+        X, tind
+            As for :meth:`F`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
+        """
         _, director = self._coefficients(tind)
         return self._sum(director, self._director(X[0], 1)) / self.mesh.height
 
-    def frame(self, X, tind=None):
+    def frame(self, X: Array, tind: Array | None = None) -> Array:
         """The beam's own frame: ``frame[:, 0]`` the axis tangent, ``frame[:, 1]`` its normal.
+
+        Parameters
+        ----------
+        X, tind
+            As for :meth:`F`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
 
         Returns
         -------
@@ -97,8 +165,23 @@ class MappingBeam(Mapping):
         e1 = e1 / np.sqrt(e1[0] ** 2 + e1[1] ** 2)
         return np.stack([e1, np.array([-e1[1], e1[0]])], 1)
 
-    def invF(self, x, tind=None, max_iterations=30):
-        """Newton's method for the reference point of ``x``, which may lie outside the cell."""
+    def invF(self, x: Array, tind: Array | None = None, max_iterations: int = 30) -> Array:
+        """The reference points of points of the body, by Newton's method; outside the cell too.
+
+        Parameters
+        ----------
+        x
+            Points, shape (2, nelements, npoints).
+        tind
+            Elements, shape (nelements,), or None for all.
+        max_iterations
+            Corrections at most.
+
+        Returns
+        -------
+        ndarray
+            Shape (2, nelements, npoints).
+        """
         X = np.full(x.shape, 0.5)
         for _ in range(max_iterations):
             dX = np.einsum("ijep,jep->iep", self.invDF(X, tind), x - self.F(X, tind))
@@ -114,8 +197,21 @@ class MappingBeam(Mapping):
         tind = m.f2t[0, find]
         return tind, np.argmax(m.t2f[:, tind] == find, axis=0)
 
-    def facet_points(self, X, find=None):
-        """Elements (nf,) and reference points (2, nf, np) of the points X of the facets."""
+    def facet_points(self, X: Array, find: Array | None = None) -> tuple[Array, Array]:
+        """Elements and reference points of points of facets.
+
+        Parameters
+        ----------
+        X
+            Points along the facets, shape (1, np) or (1, nf, np), in [0, 1].
+        find
+            Numbers of facets, shape (nf,), or None for all.
+
+        Returns
+        -------
+        tind, points
+            Shapes (nf,) and (2, nf, np).
+        """
         tind, local = self._facet_elements(find)
         s = np.broadcast_to(X[0], (len(tind), X.shape[-1]))
         points = np.empty((2,) + s.shape)
@@ -123,24 +219,66 @@ class MappingBeam(Mapping):
             points[:, local == k] = place(s[local == k])
         return tind, points
 
-    def G(self, X, find=None):
+    def G(self, X: Array, find: Array | None = None) -> Array:
+        """The points of the body of points along facets.
+
+        Parameters
+        ----------
+        X, find
+            As for :meth:`facet_points`, shapes (1, np) or (1, nf, np), and (nf,).
+
+        Returns
+        -------
+        ndarray
+            Shape (2, nf, np).
+        """
         tind, points = self.facet_points(X, find)
         return self.F(points, tind)
 
-    def detDG(self, X, find=None):
+    def detDG(self, X: Array, find: Array | None = None) -> Array:
+        """The length of a facet for a unit of its parameter.
+
+        Parameters
+        ----------
+        X, find
+            As for :meth:`facet_points`, shapes (1, np) or (1, nf, np), and (nf,).
+
+        Returns
+        -------
+        ndarray
+            Shape (nf, np).
+        """
         tind, points = self.facet_points(X, find)
         _, local = self._facet_elements(find)
         J = self.DF(points, tind)
         along = np.where((local % 2 == 0)[:, None], J[:, 0], J[:, 1])
         return np.sqrt(along[0] ** 2 + along[1] ** 2)
 
-    def normals(self, X, tind, find, t2f):
+    def normals(self, X: Array, tind: Array, find: Array, t2f: Array) -> Array:
+        """Unit normals of facets, outward from the elements ``tind``.
+
+        Parameters
+        ----------
+        X
+            Reference points on the facets, shape (2, nf, np).
+        tind
+            An element of each facet, shape (nf,).
+        find
+            Numbers of the facets, shape (nf,).
+        t2f
+            Facets of all elements, shape (4, nelements).
+
+        Returns
+        -------
+        ndarray
+            Shape (2, nf, np).
+        """
         local = np.argmax(t2f[:, tind] == find, axis=0)
         reference = self.mesh.elem.refdom.normals[local].T
         n = np.einsum("ijkl,ik->jkl", self.invDF(X, tind), reference)
         return n / np.sqrt(n[0] ** 2 + n[1] ** 2)
 
-    def check(self):
+    def check(self) -> None:
         """Raise :class:`MeshError` where the body folds: the map is not one to one."""
         xi, eta = np.meshgrid(np.linspace(0, 1, 9), [0.0, 1.0])
         det = self.detDF(np.array([xi.ravel(), eta.ravel()]))

@@ -1,10 +1,19 @@
 """What names a place on a beam: a boundary, a point of the stress-free body, a function, facets."""
 
+from __future__ import annotations
+
 import numbers
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .errors import AncfError, InputError, MeshError, NameUnknown, require_finite, shown
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from .mesh import MeshBeam
+    from .types import Array, Place
 
 #: How far off a section a point may be that names it, relative to an element next to it.
 NEAR = 1e-6
@@ -13,7 +22,7 @@ KINDS = ("the name of a boundary, a point (x, y) of the stress-free body, a func
          "x that returns truth values, or numbers of facets as an array of integers")
 
 
-def is_point(place):
+def is_point(place: object) -> bool:
     """True for two numbers in a tuple or a list, or in an array of floats.
 
     Examples
@@ -31,13 +40,21 @@ def is_point(place):
                     for x in place))
 
 
-def is_place(place):
+def is_place(place: object) -> bool:
     """True for one place, False for a tuple of one place for each of several beams."""
     return isinstance(place, (str, np.ndarray)) or callable(place) or is_point(place)
 
 
-def as_point(point, mesh=None):
-    """A material point as an array (2,); raises InputError for anything else."""
+def as_point(point: ArrayLike, mesh: MeshBeam | None = None) -> Array:
+    """A material point as an array (2,); raises MeshError for anything else.
+
+    Parameters
+    ----------
+    point
+        Its place (x, y) in the stress-free body: a tuple, a list or an array (2,).
+    mesh
+        Of the body, to say in the message where a boundary is that was named instead; or None.
+    """
     if isinstance(point, (list, tuple)):
         flat = len(point) == 2 and not any(
             isinstance(x, (list, tuple)) or np.ndim(x) for x in point)
@@ -55,7 +72,7 @@ def as_point(point, mesh=None):
                     f"body, got {shown(point)}{hint}")
 
 
-def on_other_mesh(place):
+def on_other_mesh(place: object) -> bool:
     """True if a place means the same on another mesh: it holds no numbers of facets."""
     if isinstance(place, np.ndarray):
         return is_point(place)
@@ -64,7 +81,7 @@ def on_other_mesh(place):
     return True
 
 
-def facets_of(mesh, place):
+def facets_of(mesh: MeshBeam, place: Place) -> Array:
     """The facets that a place means.
 
     This is the one rule for every method that takes a place:
@@ -125,8 +142,16 @@ def facets_of(mesh, place):
     raise InputError(f"a place is {KINDS}, got {shown(place)}{hint}")
 
 
-def section_at(mesh, point):
+def section_at(mesh: MeshBeam, point: ArrayLike) -> int:
     """The node on whose section a point of the stress-free body lies.
+
+    Parameters
+    ----------
+    mesh
+        A :class:`~skfem_ancf.MeshBeam`.
+    point
+        Its place in the stress-free body, shape (2,); off the section by at most 1e-6 of
+        the shorter element next to it.
 
     Raises
     ------

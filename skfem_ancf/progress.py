@@ -1,9 +1,15 @@
 """A progress bar for long work, if tqdm is installed."""
 
+from __future__ import annotations
+
 import sys
 from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 
 from .errors import InputError, MissingExtra, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 
 class _NoBar:
@@ -12,7 +18,7 @@ class _NoBar:
 
 
 @contextmanager
-def progress_bar(show, total, desc):
+def progress_bar(show: bool | None, total: float, desc: str) -> Iterator[Any]:
     """A bar with ``update(amount)``.
 
     Parameters

@@ -1,15 +1,24 @@
 """Gauss rules on the reference cell of a beam, given along the axis and across the section."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .errors import InputError, require_finite, require_integer, shown, taught
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from .types import Array, Rule
 
 #: Points of the largest rule.
 MAX_POINTS = 1000
 
 
 @taught
-def gauss(n):
+def gauss(n: int) -> Rule:
     """The n-point Gauss rule on [0, 1], exact to degree 2 n - 1: points (n,) and weights (n,)."""
     n = require_integer("the number of Gauss points n", n, 1, MAX_POINTS)
     x, w = np.polynomial.legendre.leggauss(n)
@@ -17,7 +26,7 @@ def gauss(n):
 
 
 @taught
-def tensor(axis, section):
+def tensor(axis: Rule, section: Rule) -> Rule:
     """The product of a rule along the axis and one across the section.
 
     Parameters
@@ -45,8 +54,21 @@ def _rule(name, rule):
 
 
 @taught
-def lagrange(nodes, x):
-    """Values at ``x`` of the Lagrange polynomials of ``nodes``, shape (len(x), len(nodes))."""
+def lagrange(nodes: ArrayLike, x: ArrayLike) -> Array:
+    """The Lagrange polynomials of nodes, at points.
+
+    Parameters
+    ----------
+    nodes
+        Different numbers, shape (n,).
+    x
+        Points, shape (m,).
+
+    Returns
+    -------
+    ndarray
+        Shape (m, n).
+    """
     nodes, x = require_finite("nodes", nodes, (None,)), require_finite("x", x, (None,))
     if len(np.unique(nodes)) < len(nodes):
         raise InputError(f"nodes must be different, got {shown(nodes)}")

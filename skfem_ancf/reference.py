@@ -1,11 +1,19 @@
 """The reference cell of a beam and the two interpolations along its axis."""
 
+from __future__ import annotations
+
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import polynomial
 from skfem.element import ElementH1
-from skfem.refdom import RefLine, RefQuad, Refdom
+from skfem.refdom import Refdom, RefLine, RefQuad
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from .types import Array
 
 
 class RefBeam(Refdom):
@@ -28,7 +36,21 @@ class RefBeam(Refdom):
     name = "Beam"
 
     @classmethod
-    def on_facet(cls, i, X):
+    def on_facet(cls, i: int, X: Array) -> Array:
+        """Which points lie on a facet.
+
+        Parameters
+        ----------
+        i
+            Number of the facet: bottom, right, top, left.
+        X
+            Reference points, shape (2, n).
+
+        Returns
+        -------
+        ndarray
+            Truth values, shape (n,).
+        """
         return (np.abs(X[1]) < 1e-4, np.abs(X[0] - 1) < 1e-4,
                 np.abs(X[1] - 1) < 1e-4, np.abs(X[0]) < 1e-4)[i]
 
@@ -42,23 +64,53 @@ class ElementBeamP1(ElementH1):
     doflocs = np.array([[0.0, 0.5], [1.0, 0.5]])
     refdom = RefBeam
 
-    def lbasis(self, X, i):
+    def lbasis(self, X: Array, i: int) -> tuple[Array, Array]:
+        """A local function and its derivative.
+
+        Parameters
+        ----------
+        X
+            Reference points, shape (2, ...).
+        i
+            Number of the function: 0, of the left node, or 1.
+
+        Returns
+        -------
+        value, gradient
+            Shapes (...) and (2, ...).
+        """
         if i not in (0, 1):
             self._index_error()
         slope = 2.0 * i - 1.0
         return 1.0 - i + slope * X[0], np.array([slope + 0.0 * X[0], 0.0 * X[0]])
 
 
-def linear(xi, derivative=0):
-    """The two linear functions of ``xi`` that are 1 at 0 and at 1; shape (2,) + xi.shape."""
+def linear(xi: ArrayLike, derivative: int = 0) -> Array:
+    """The two linear functions of ``xi`` that are 1 at 0 and at 1; shape (2,) + xi.shape.
+
+    Parameters
+    ----------
+    xi
+        Points, of any shape (...).
+    derivative
+        Number of derivatives.
+    """
     one = np.ones_like(xi)
     if derivative == 0:
         return np.array([1.0 - xi, xi])
     return np.array([-one, one]) if derivative == 1 else np.array([0.0 * one, 0.0 * one])
 
 
-def hermite(xi, derivative=0):
-    """The cubic Hermite functions dual to f(0), f'(0), f(1), f'(1); shape (4,) + xi.shape."""
+def hermite(xi: ArrayLike, derivative: int = 0) -> Array:
+    """The cubic Hermite functions dual to f(0), f'(0), f(1), f'(1); shape (4,) + xi.shape.
+
+    Parameters
+    ----------
+    xi
+        Points, of any shape (...).
+    derivative
+        Number of derivatives, 0 to 2.
+    """
     x = np.asarray(xi)
     if derivative == 0:
         return np.array([1.0 - x * x * (3.0 - 2.0 * x), x * (1.0 - x) ** 2,
@@ -79,10 +131,19 @@ def _hermite_coefficients(m):
     return np.linalg.inv(np.array(conditions))
 
 
-def hermite_basis(m, xi, derivative=0):
+def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
     """Functions of degree 2 m - 1 dual to the derivatives 0 ... m-1 at 0, then at 1.
 
     Shape (2 m,) + xi.shape; m = 2 is :func:`hermite`.
+
+    Parameters
+    ----------
+    m
+        Derivatives that are coordinates at each end, the 0th included.
+    xi
+        Points, of any shape (...).
+    derivative
+        Number of derivatives.
     """
     coefficients = polynomial.polyder(_hermite_coefficients(m), derivative)
     return polynomial.polyval(np.asarray(xi, dtype=np.float64), coefficients)

@@ -1,20 +1,46 @@
 """Functions of time at many times."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from .errors import ask_array, require_finite, require_function, taught
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
+
+    from .types import Array
 
 FEW = 8  # times up to which a function is asked one by one
 
 
 @taught
-def sample(function, times, name="function", shape=None):
-    """A function of one time at each of the times, shape (n,) + that of its value.
-
-    ``name`` is what messages call it, ``shape`` that of its value, None for any.
+def sample(function: Callable[[Any], Any], times: ArrayLike, name: str = "function",
+           shape: tuple[int, ...] | None = None) -> Array:
+    """A function of one time at each of several times.
 
     A function that takes arrays is asked once; it is one if what it returns has the shape, and at
     the first, the middle and the last time the value that it has for that time alone.
+
+    Parameters
+    ----------
+    function
+        Takes a time, returns a number or an array.
+    times
+        Times, shape (n,).
+    name
+        What messages call the function.
+    shape
+        That of its value; None for any.
+
+    Returns
+    -------
+    ndarray
+        Shape (n,) + that of the value.
 
     Examples
     --------

@@ -1,8 +1,17 @@
 """Where forces act on a beam: spread over its body and faces, or on sections and points."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from .beam import Beam
+    from .mesh import MeshBeam
 
 #: Places nearer than this part of an element to a node are at the node.
 SNAP = 1e-6
@@ -37,8 +46,18 @@ class Spread:
     stations: tuple = ()
 
 
-def on_facets(mesh, facets, **how):
-    """The Spread of a load on facets: faces of elements, or sections."""
+def on_facets(mesh: MeshBeam, facets: ArrayLike, **how: Any) -> Spread:
+    """The Spread of a load on facets: faces of elements, or sections.
+
+    Parameters
+    ----------
+    mesh
+        A :class:`~skfem_ancf.MeshBeam`.
+    facets
+        Numbers of facets, shape (n,).
+    **how
+        ``traction`` or ``pressure`` of the :class:`Spread`.
+    """
     facets = np.asarray(facets)
     n, ne = mesh.p.shape[1], mesh.nelements
     faces = tuple(np.isin(np.arange(ne) + n + side * ne, facets) for side in (0, 1))
@@ -46,17 +65,42 @@ def on_facets(mesh, facets, **how):
     return Spread(faces=faces, stations=stations, **how)
 
 
-def station_of_node(mesh, node):
-    """A node as element + xi."""
+def station_of_node(mesh: MeshBeam, node: int) -> float:
+    """A node as element + xi.
+
+    Parameters
+    ----------
+    mesh
+        A :class:`~skfem_ancf.MeshBeam`.
+    node
+        Number of the node.
+
+    Returns
+    -------
+    float
+        Of the element on its left, if there is one, the end; else of that on its right the start.
+    """
     right = np.nonzero(mesh.t[1] == node)[0]
     return float(right[0]) + 1.0 if len(right) else float(np.nonzero(mesh.t[0] == node)[0][0])
 
 
-def stations_of_vector(beam, vector):
+def stations_of_vector(beam: Beam, vector: ArrayLike) -> tuple[float, ...] | None:
     """Where a force on few coordinates acts: element + xi; None if it is spread.
 
     A force on a point inside an element acts on the coordinates ``r`` of its two nodes as the
     Hermite functions of xi say, whose values are found again.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    vector
+        A force on its coordinates, shape (N,).
+
+    Returns
+    -------
+    tuple of float, or None
+        Element + xi of each place; None if the force is spread over neighbouring nodes.
     """
     rows = np.asarray(vector).reshape(-1, beam.nd)
     loaded = np.nonzero(np.any(rows != 0, axis=1))[0]

@@ -1,12 +1,17 @@
 """Supports: coordinates held at a place."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .errors import InputError, SupportError
 from .places import is_point
+
+if TYPE_CHECKING:
+    from .beam import Beam
 
 
 @dataclass(frozen=True)
@@ -33,8 +38,15 @@ class Support:
     displacement: float = 0.0
     on_axis: bool = False
 
-    def bind(self, beam, fixed):
-        """Add what is held of a beam to ``fixed``: (number of the beam, coordinate) -> value.
+    def bind(self, beam: Beam, fixed: dict[tuple[int, int], float]) -> None:
+        """Add what is held of a beam to what is held already.
+
+        Parameters
+        ----------
+        beam
+            The beam, of this number in its scene.
+        fixed
+            From (number of the beam, number of the coordinate) to displacement; it is added to.
 
         Raises
         ------

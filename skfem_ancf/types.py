@@ -1,0 +1,40 @@
+"""Names of types for annotations: what arguments are, and what comes back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from .beam import Beam
+
+#: An array of numbers; its shape is said where it is used.
+Array: TypeAlias = NDArray[Any]
+
+#: What :func:`skfem_ancf.places.facets_of` takes.
+Place: TypeAlias = "str | ArrayLike | Callable[[Array], Array]"
+
+#: What :func:`skfem_ancf.beam.select_beam` takes: a Beam, its name or its number; None for the
+#: only one.
+WhichBeam: TypeAlias = "Beam | str | int | None"
+
+#: A function of time, or None.
+Amplitude: TypeAlias = "Callable[[float], float] | None"
+
+#: Points and weights of a rule on [0, 1].
+Rule: TypeAlias = tuple[Array, Array]
+
+
+class Law(Protocol):
+    """What a formulation integrates: functions of the strain (3, ...)."""
+
+    def energy(self, strain: Array) -> Array:
+        """Energy per volume, shape (...)."""
+
+    def stress(self, strain: Array) -> Array:
+        """Second Piola-Kirchhoff stress, shape (3, ...)."""
+
+    def moduli(self, strain: Array) -> Array:
+        """Derivative of the stress, shape (3, 3, ...)."""
