@@ -29,8 +29,10 @@ In all of them the strain is that of Green and Lagrange in the beam's frame, ``(
 with ``F = grad r``, and S the second Piola-Kirchhoff stress of the material's law.
 """
 
+from __future__ import annotations
+
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from skfem.assembly import BilinearForm, CellBasis, Form, Functional, LinearForm
@@ -40,22 +42,57 @@ from skfem.helpers import dot
 
 from .errors import InputError, ask_field, require_finite, require_like, require_positive, taught
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
+
+    from .beam import Beam
+    from .materials.base import Material
+    from .types import Array
+
 
 # kinematics: grad[i, j] = d r_i / d X_j
 
-def deformation_gradient(r, frame):
-    """F in the beam's frame: F[i, J] = d r_i / d X_j frame[j, J]."""
+def deformation_gradient(r: Any, frame: Array) -> Array:
+    """F in the beam's frame: F[i, J] = d r_i / d X_j frame[j, J].
+
+    Parameters
+    ----------
+    r
+        The position field, with ``grad`` of shape (2, 2, ...).
+    frame
+        The beam's frame, shape (2, 2, ...).
+
+    Returns
+    -------
+    ndarray
+        Shape (2, 2, ...).
+    """
     return np.einsum("ij...,jJ...->iJ...", r.grad, frame)
 
 
-def green_lagrange(F):
+def green_lagrange(F: Array) -> Array:
     """(eps_xx, eps_yy, 2 eps_xy), shape (3, ...), of a deformation gradient (2, 2, ...)."""
     return np.array([0.5 * (dot(F[:, 0], F[:, 0]) - 1.0), 0.5 * (dot(F[:, 1], F[:, 1]) - 1.0),
                      dot(F[:, 0], F[:, 1])])
 
 
-def strain_variation(F, dF):
-    """The variation of :func:`green_lagrange` at F in the direction dF; linear in both."""
+def strain_variation(F: Array, dF: Array) -> Array:
+    """The variation of :func:`green_lagrange` at F in the direction dF; linear in both.
+
+    Parameters
+    ----------
+    F
+        Deformation gradient in the beam's frame, shape (2, 2, ...).
+    dF
+        Its variation, shape (2, 2, ...).
+
+    Returns
+    -------
+    ndarray
+        Shape (3, ...).
+    """
     return np.array([dot(F[:, 0], dF[:, 0]), dot(F[:, 1], dF[:, 1]),
                      dot(F[:, 0], dF[:, 1]) + dot(F[:, 1], dF[:, 0])])
 
@@ -79,8 +116,19 @@ def _law(material, k_s):
 
 
 @taught
-def textbook_energy(material, width=1.0, k_s=1.0):
-    """Strain energy ``U(r) = int W(eps) dV``, a ``Functional``."""
+def textbook_energy(material: Material, width: float = 1.0, k_s: float = 1.0) -> Functional:
+    """Strain energy ``U(r) = int W(eps) dV``, a ``Functional``.
+
+    Parameters
+    ----------
+    material
+        A :class:`~skfem_ancf.materials.Material`.
+    width
+        Width of the section, positive.
+    k_s
+        Factor on the shear modulus, positive, see
+        :meth:`~skfem_ancf.materials.base.Material.shear_factor`.
+    """
     law, width = _law(material, k_s), require_positive("width", width)
 
     @EnergyForm
@@ -91,8 +139,14 @@ def textbook_energy(material, width=1.0, k_s=1.0):
 
 
 @taught
-def textbook_internal_force(material, width=1.0, k_s=1.0):
-    """The first variation ``delta U = int S : delta eps dV``, a ``LinearForm``."""
+def textbook_internal_force(material: Material, width: float = 1.0, k_s: float = 1.0) -> LinearForm:
+    """The first variation ``delta U = int S : delta eps dV``, a ``LinearForm``.
+
+    Parameters
+    ----------
+    material, width, k_s
+        As for :func:`textbook_energy`.
+    """
     law, width = _law(material, k_s), require_positive("width", width)
 
     @BeamLinearForm
@@ -104,8 +158,14 @@ def textbook_internal_force(material, width=1.0, k_s=1.0):
 
 
 @taught
-def textbook_tangent(material, width=1.0, k_s=1.0):
-    """The second, ``int delta eps : D : d eps + S : d delta eps dV``, a ``BilinearForm``."""
+def textbook_tangent(material: Material, width: float = 1.0, k_s: float = 1.0) -> BilinearForm:
+    """The second, ``int delta eps : D : d eps + S : d delta eps dV``, a ``BilinearForm``.
+
+    Parameters
+    ----------
+    material, width, k_s
+        As for :func:`textbook_energy`.
+    """
     law, width = _law(material, k_s), require_positive("width", width)
 
     @BeamBilinearForm
@@ -210,8 +270,14 @@ energy = textbook_energy
 
 
 @taught
-def internal_force(material, width=1.0, k_s=1.0):
-    """Internal force ``int P : grad v dV``, P = F S; a batched ``LinearForm``."""
+def internal_force(material: Material, width: float = 1.0, k_s: float = 1.0) -> LinearForm:
+    """Internal force ``int P : grad v dV``, P = F S; a batched ``LinearForm``.
+
+    Parameters
+    ----------
+    material, width, k_s
+        As for :func:`textbook_energy`.
+    """
     law, width = _law(material, k_s), require_positive("width", width)
 
     @StressForm
@@ -224,8 +290,14 @@ def internal_force(material, width=1.0, k_s=1.0):
 
 
 @taught
-def tangent(material, width=1.0, k_s=1.0):
-    """Tangent ``int grad v : dP/dF : grad u dV``; a batched ``BilinearForm``."""
+def tangent(material: Material, width: float = 1.0, k_s: float = 1.0) -> BilinearForm:
+    """Tangent ``int grad v : dP/dF : grad u dV``; a batched ``BilinearForm``.
+
+    Parameters
+    ----------
+    material, width, k_s
+        As for :func:`textbook_energy`.
+    """
     law, width = _law(material, k_s), require_positive("width", width)
 
     @ModuliForm
@@ -241,8 +313,16 @@ def tangent(material, width=1.0, k_s=1.0):
 
 
 @taught
-def mass(density, width=1.0):
-    """Mass ``int rho v . u dV``, a ``BilinearForm``: constant, whatever the motion."""
+def mass(density: float, width: float = 1.0) -> BilinearForm:
+    """Mass ``int rho v . u dV``, a ``BilinearForm``: constant, whatever the motion.
+
+    Parameters
+    ----------
+    density
+        Mass per volume, positive.
+    width
+        Width of the section, positive.
+    """
     density, width = require_positive("density", density), require_positive("width", width)
 
     @BilinearForm
@@ -253,8 +333,18 @@ def mass(density, width=1.0):
 
 
 @taught
-def gravity(density, g, width=1.0):
-    """Dead load ``int rho g . v dV``, a ``LinearForm``; ``g`` is the acceleration (2,)."""
+def gravity(density: float, g: ArrayLike, width: float = 1.0) -> LinearForm:
+    """Dead load ``int rho g . v dV``, a ``LinearForm``.
+
+    Parameters
+    ----------
+    density
+        Mass per volume, positive.
+    g
+        The acceleration, shape (2,).
+    width
+        Width of the section, positive.
+    """
     density, width = require_positive("density", density), require_positive("width", width)
     g = require_finite("g", g, (2,))
 
@@ -266,8 +356,17 @@ def gravity(density, g, width=1.0):
 
 
 @taught
-def traction(t, width=1.0):
-    """Dead traction ``int t . v dA`` for a ``FacetBasis``; ``t`` is (2,) or t(x) -> (2, ...)."""
+def traction(t: ArrayLike | Callable[[Array], Array], width: float = 1.0) -> LinearForm:
+    """Dead traction ``int t . v dA`` for a ``FacetBasis``, a ``LinearForm``.
+
+    Parameters
+    ----------
+    t
+        Force per area of the stress-free body, shape (2,), or a function of the points x (2, ...)
+        that returns (2, ...).
+    width
+        Width of the section, positive.
+    """
     width = require_positive("width", width)
     if not callable(t):
         t = require_finite("t", t, (2,))
@@ -281,7 +380,7 @@ def traction(t, width=1.0):
 
 
 @taught
-def pressure(width=1.0):
+def pressure(width: float = 1.0) -> BilinearForm:
     """Follower pressure of 1 as ``int -n . v da``, linear in the position: a ``BilinearForm``.
 
     On the deformed facet ``n da`` is the derivative of the position along the facet, turned by
@@ -310,7 +409,7 @@ class BeamForms(NamedTuple):
 
 
 @taught
-def of(beam):
+def of(beam: Beam) -> BeamForms:
     """The weak forms of a beam's own formulation, whatever it is.
 
     They are ``U(r)``, ``delta U`` and ``delta^2 U`` of the strain energy that

@@ -4,25 +4,43 @@ A :class:`~skfem_ancf.Scene` keeps loads as they were given, and binds them to i
 again for the same scene on other meshes.
 """
 
+from __future__ import annotations
+
 import re
 import warnings
+from typing import TYPE_CHECKING
 
 import numpy as np
 from skfem.assembly import LinearForm, asm
 
 from . import forms
 from .beam import Beam
-from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number, require_finite,
-                     require_function, shown)
+from .errors import (
+    AncfError,
+    CallbackError,
+    InputError,
+    ask_field,
+    ask_number,
+    require_finite,
+    require_function,
+    shown,
+)
 from .frozen import Sealable, read_only
 from .pickling import picklable_form
 from .spread import Spread, on_facets, stations_of_vector
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
+
+    from .types import Array, Place, TimeFunction, WhichBeam
 
 
 class Amplitude:
     """A function of time, asked with care: what it raises or returns is said."""
 
-    def __init__(self, function):
+    def __init__(self, function: Callable[[float], float]) -> None:
         self.function = require_function("amplitude", function, "of time that returns a number")
 
     def __call__(self, t):
@@ -91,10 +109,10 @@ class Load(Sealable):
     constant = True
     symmetric = True
 
-    def __init__(self, beam=None, amplitude=None):
+    def __init__(self, beam: WhichBeam = None, amplitude: TimeFunction = None) -> None:
         self.beam, self.amplitude = beam, amplitude
 
-    def bind(self, beam):
+    def bind(self, beam: Beam) -> Load:
         """The load on a beam; the scene seals it, so that its attributes do not change then.
 
         By default a copy with :attr:`beam` set. Override it where something is computed from the
@@ -114,7 +132,7 @@ class Load(Sealable):
         return bound
 
     @property
-    def amplitude(self):
+    def amplitude(self) -> Amplitude | None:
         return getattr(self, "_amplitude", None)
 
     @amplitude.setter
@@ -122,30 +140,41 @@ class Load(Sealable):
         self._amplitude = (function if function is None or isinstance(function, Amplitude) else
                            Amplitude(function))
 
-    def factor(self, t):
+    def factor(self, t: float | None) -> float:
         """The amplitude at time ``t``; 1 without one, or in statics, where ``t`` is None."""
         return 1.0 if self.amplitude is None or t is None else self.amplitude(t)
 
-    def mean_force(self, u0, u1):
-        """A mean of the force between two displacements whose work is exact if it can be."""
+    def mean_force(self, u0: Array, u1: Array) -> Array:
+        """A mean of the force between two displacements whose work is exact if it can be.
+
+        Parameters
+        ----------
+        u0, u1
+            Displacements of the beam's coordinates, shape (N,).
+
+        Returns
+        -------
+        ndarray
+            Shape (N,).
+        """
         return self.force(0.5 * (u0 + u1))
 
-    def force(self, u):
+    def force(self, u: Array) -> Array:
         """Force at the displacement ``u`` of the beam's coordinates, shape (beam.N,)."""
         raise NotImplementedError
 
-    def stiffness(self, u):
+    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
         """Derivative of the force: rows, columns and values.
 
         Rows and columns are coordinates of one node or of neighbouring nodes.
         """
         raise NotImplementedError
 
-    def potential(self, u):
+    def potential(self, u: Array) -> float | None:
         """The potential, minus the work done from the stress-free state; None if there is none."""
         return None
 
-    def spread(self, u):
+    def spread(self, u: Array) -> Spread | None:
         """How the force at the displacement ``u`` is spread over the body, or None.
 
         Recovered fields need to know. By default it is taken to act on the nodes, or the point
@@ -162,8 +191,20 @@ class Load(Sealable):
         return f"<{type(self).__name__} on {self.beam!r}>"
 
 
-def bind_load(load, beam):
+def bind_load(load: Load, beam: Beam) -> Load:
     """A load on a beam, tried there: what it returns fits the beam.
+
+    Parameters
+    ----------
+    load
+        A :class:`Load`, as it was given.
+    beam
+        The :class:`~skfem_ancf.Beam` it acts on.
+
+    Returns
+    -------
+    Load
+        Sealed.
 
     Raises
     ------
@@ -197,8 +238,18 @@ def bind_load(load, beam):
     return bound
 
 
-def require_entries(what, i, j, v, n):
-    """Raise InputError unless rows, columns and values are entries of an n x n matrix."""
+def require_entries(what: str, i: ArrayLike, j: ArrayLike, v: ArrayLike, n: int) -> None:
+    """Raise InputError unless rows, columns and values are entries of an n x n matrix.
+
+    Parameters
+    ----------
+    what
+        What messages call the matrix.
+    i, j, v
+        Rows, columns and values, shapes (k,).
+    n
+        Number of rows and columns of the matrix.
+    """
     i, j = np.asarray(i), np.asarray(j)
     v = require_finite(what, v, (None,))
     if i.dtype.kind not in "iu" or j.dtype.kind not in "iu" or not i.shape == j.shape == v.shape:
@@ -210,25 +261,45 @@ def require_entries(what, i, j, v, n):
 
 
 class Weight(Load):
-    """The weight of a beam under an acceleration g (2,)."""
+    """The weight of a beam under an acceleration g (2,).
 
-    def __init__(self, g, beam=None, amplitude=None):
+    Parameters
+    ----------
+    g
+        Acceleration, shape (2,).
+    beam, amplitude
+        As for :class:`Load`.
+    """
+
+    def __init__(self, g: ArrayLike, beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> None:
         super().__init__(beam, amplitude)
         self.g = require_finite("g", g, (2,))
 
-    def bind(self, beam):
+    def bind(self, beam: Beam) -> Load:
         return DeadLoad(beam, beam.weight(self.g), self.amplitude,
                         Spread(body=beam.density * self.g))
 
 
 class PointForce(Load):
-    """A dead force (2,) on the material point ``at``."""
+    """A dead force (2,) on the material point ``at``.
 
-    def __init__(self, force, at, beam=None, amplitude=None):
+    Parameters
+    ----------
+    force
+        The force, shape (2,).
+    at
+        The material point: its place (x, y) in the stress-free body.
+    beam, amplitude
+        As for :class:`Load`.
+    """
+
+    def __init__(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> None:
         super().__init__(beam, amplitude)
         self.total, self.at = require_finite("force", force, (2,)), at
 
-    def bind(self, beam):
+    def bind(self, beam: Beam) -> Load:
         dofs, weights = beam.probe(self.at)
         vector = np.zeros(beam.N)
         np.add.at(vector, dofs, np.outer(self.total, weights))
@@ -237,13 +308,25 @@ class PointForce(Load):
 
 
 class Traction(Load):
-    """A dead traction on a surface: (2,), or a function of the points x that returns (2, ...)."""
+    """A dead traction on a surface.
 
-    def __init__(self, boundary, t, beam=None, amplitude=None):
+    Parameters
+    ----------
+    boundary
+        A place, see :func:`skfem_ancf.places.facets_of`.
+    t
+        Force per area of the stress-free body, shape (2,), or a function of the points x (2, ...)
+        that returns (2, ...).
+    beam, amplitude
+        As for :class:`Load`.
+    """
+
+    def __init__(self, boundary: Place, t: ArrayLike | Callable[[Array], Array],
+                 beam: WhichBeam = None, amplitude: TimeFunction = None) -> None:
         super().__init__(beam, amplitude)
         self.boundary, self.t = boundary, t if callable(t) else require_finite("t", t, (2,))
 
-    def bind(self, beam):
+    def bind(self, beam: Beam) -> Load:
         t = self.t
         basis = beam.facet_basis(self.boundary, intorder=12 if callable(t) else None)
         if callable(t):
@@ -253,7 +336,17 @@ class Traction(Load):
 
 
 class FormLoad(Load):
-    """A scikit-fem ``LinearForm`` as a dead load, on the body or on a place of its boundary."""
+    """A scikit-fem ``LinearForm`` as a dead load, on the body or on a place of its boundary.
+
+    Parameters
+    ----------
+    form
+        A ``LinearForm`` of scikit-fem, which knows ``w.x``, ``w.h`` and, on a boundary, ``w.n``.
+    boundary
+        A place, see :func:`skfem_ancf.places.facets_of`; None for the body.
+    beam, amplitude
+        As for :class:`Load`.
+    """
 
     def __getstate__(self):
         return {**vars(self), "form": picklable_form(self.form)}
@@ -261,13 +354,14 @@ class FormLoad(Load):
     def __setstate__(self, state):
         vars(self).update(state, form=state["form"].form)
 
-    def __init__(self, form, boundary=None, beam=None, amplitude=None):
+    def __init__(self, form: LinearForm, boundary: Place | None = None, beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> None:
         super().__init__(beam, amplitude)
         if not isinstance(form, LinearForm):
             raise InputError(f"a load is a scikit-fem LinearForm, got {shown(form)}")
         self.form, self.boundary = form, boundary
 
-    def bind(self, beam):
+    def bind(self, beam: Beam) -> Load:
         basis = (beam.exact_basis() if self.boundary is None else
                  beam.facet_basis(self.boundary))
         return DeadLoad(beam, _assembled(self.form, basis), self.amplitude)
@@ -299,36 +393,62 @@ def _assembled(form, basis):
 
 
 class DeadLoad(Load):
-    """A force that keeps its direction and size."""
+    """A force that keeps its direction and size.
 
-    def __init__(self, beam, vector, amplitude=None, spread=None):
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    vector
+        Force on its coordinates, shape (N,).
+    amplitude
+        As for :class:`Load`.
+    spread
+        How it is spread over the body, a :class:`~skfem_ancf.spread.Spread`; None to find out.
+    """
+
+    def __init__(self, beam: Beam, vector: ArrayLike, amplitude: TimeFunction = None,
+                 spread: Spread | None = None) -> None:
         super().__init__(_the_beam(beam), amplitude)
         self.vector = read_only(require_finite("the load", vector, (beam.N,)))
         self._spread = spread
 
-    def spread(self, u):
+    def spread(self, u: Array) -> Spread | None:
         return self._spread or super().spread(u)
 
-    def bind(self, beam):
+    def bind(self, beam: Beam) -> Load:
         if beam is not self.beam:
             raise InputError("a DeadLoad is a vector of the coordinates of one mesh and cannot be "
                              "put on another: use scene.load(form) or a Load with bind(beam)")
         return self
 
-    def force(self, u):
+    def force(self, u: Array) -> Array:
         return self.vector
 
-    def potential(self, u):
+    def potential(self, u: Array) -> float:
         return -float(self.vector @ u)
 
 
 class Pressure(Load):
-    """A pressure that stays normal to the deformed surface: linear in the position in the plane."""
+    """A pressure that stays normal to the deformed surface: linear in the position in the plane.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    boundary
+        A place, see :func:`skfem_ancf.places.facets_of`.
+    p
+        Force per deformed area; positive pushes.
+    amplitude
+        As for :class:`Load`.
+    """
 
     constant = False
     symmetric = False
 
-    def __init__(self, beam, boundary, p, amplitude=None):
+    def __init__(self, beam: Beam, boundary: Place, p: float,
+                 amplitude: TimeFunction = None) -> None:
         super().__init__(_the_beam(beam), amplitude)
         self.boundary, self.p = boundary, p
         basis = beam.facet_basis(boundary)
@@ -341,16 +461,16 @@ class Pressure(Load):
         self._rows = self.matrix.tocsr()
         self._spread = on_facets(beam.mesh, basis.find, pressure=p)
 
-    def spread(self, u):
+    def spread(self, u: Array) -> Spread | None:
         return self._spread
 
-    def bind(self, beam):
+    def bind(self, beam: Beam) -> Load:
         return self if beam is self.beam else Pressure(beam, self.boundary, self.p, self.amplitude)
 
-    def force(self, u):
+    def force(self, u: Array) -> Array:
         return self._rows @ (self.beam.q0_local + u)
 
-    def stiffness(self, u):
+    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
         return self.matrix.row, self.matrix.col, self.matrix.data
 
 
@@ -376,7 +496,8 @@ class EndMoment(Load):
 
     constant = False
 
-    def __init__(self, beam, boundary, M, amplitude=None):
+    def __init__(self, beam: Beam, boundary: Place | int, M: float,
+                 amplitude: TimeFunction = None) -> None:
         super().__init__(_the_beam(beam), amplitude)
         self.M, self.boundary = M, boundary
         if isinstance(boundary, (int, np.integer)):
@@ -384,14 +505,14 @@ class EndMoment(Load):
         self.node = beam.section_node(self.boundary)
         self.dofs, self.c = beam.section_direction(self.node)
 
-    def bind(self, beam):
+    def bind(self, beam: Beam) -> Load:
         return self if beam is self.beam else EndMoment(beam, self.boundary, self.M, self.amplitude)
 
-    def direction(self, u):
+    def direction(self, u: Array) -> Array:
         """The section's direction d, shape (2,)."""
         return (self.beam.q0_local[self.dofs] + u[self.dofs]) @ self.c
 
-    def angle(self, u):
+    def angle(self, u: Array) -> float:
         """The angle by which the section has turned, in radians.
 
         Whole turns are counted along the beam, from the section at its other end, whose own angle
@@ -406,13 +527,13 @@ class EndMoment(Load):
             turn = turn[::-1]
         return float(np.angle(turn[0]) + np.sum(np.angle(turn[1:] / turn[:-1])))
 
-    def force(self, u):
+    def force(self, u: Array) -> Array:
         d = self.direction(u)
         out = np.zeros(self.beam.N, dtype=d.dtype)
         out[self.dofs] = np.outer(np.array([-d[1], d[0]]) * self.M / (d @ d), self.c)
         return out
 
-    def stiffness(self, u):
+    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
         a, b = self.direction(u)
         H = np.array([[2 * a * b, b * b - a * a], [b * b - a * a, -2 * a * b]])
         H *= self.M / (a * a + b * b) ** 2
@@ -421,7 +542,7 @@ class EndMoment(Load):
         cols = np.broadcast_to(self.dofs[None, None, :, :], values.shape)
         return rows.ravel(), cols.ravel(), values.ravel()
 
-    def mean_force(self, u0, u1):
+    def mean_force(self, u0: Array, u1: Array) -> Array:
         # the discrete gradient of Gonzalez (1996): its work is the change of the angle
         force = self.force(0.5 * (u0 + u1))
         step = (u1 - u0)[self.dofs] @ self.c
@@ -432,7 +553,7 @@ class EndMoment(Load):
             force[self.dofs] += np.outer(step, self.c) * missing / (step @ step)
         return force
 
-    def potential(self, u):
+    def potential(self, u: Array) -> float:
         return -self.M * self.angle(u)
 
 

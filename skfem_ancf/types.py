@@ -20,8 +20,8 @@ Place: TypeAlias = "str | ArrayLike | Callable[[Array], Array]"
 #: only one.
 WhichBeam: TypeAlias = "Beam | str | int | None"
 
-#: A function of time, or None.
-Amplitude: TypeAlias = "Callable[[float], float] | None"
+#: What a force is multiplied by: a function of time, or None.
+TimeFunction: TypeAlias = "Callable[[float], float] | None"
 
 #: Points and weights of a rule on [0, 1].
 Rule: TypeAlias = tuple[Array, Array]

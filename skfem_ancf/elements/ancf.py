@@ -1,5 +1,7 @@
 """The ANCF beam element of order N."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.polynomial import legendre
 from scipy.special import roots_jacobi
@@ -69,7 +71,7 @@ class ElementBeamANCF(ElementBeam):
     30
     """
 
-    def __init__(self, order, points="chebyshev"):
+    def __init__(self, order: int, points: str = "chebyshev") -> None:
         n = require_integer("the order of an ANCF beam element", order, 1, MAX_ORDER,
                             "polynomials of a higher degree have no digits left")
         require_option("family of section points", points, POINT_FAMILIES)

@@ -1,6 +1,9 @@
 """What every beam element shares: products of axis and section functions."""
 
+from __future__ import annotations
+
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -10,6 +13,15 @@ from ..errors import MeshError
 from ..frozen import Frozen
 from ..reference import RefBeam, hermite, linear
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+    from ..mapping import MappingBeam
+    from ..mesh import MeshBeam
+    from ..types import Array
+
 
 class ElementBeam(Frozen, Element):
     """A scalar beam element; wrap it in scikit-fem's ``ElementVector`` for the position field.
@@ -17,6 +29,17 @@ class ElementBeam(Frozen, Element):
     The local functions are, for each of the two nodes, a cubic Hermite function in xi for the
     position ``r`` and its slope ``r_X`` on the axis, then ``(1 - xi) P_k(Y)`` or ``xi P_k(Y)``
     for each section coordinate. A subclass sets :attr:`section` and :attr:`dofnames`.
+
+    Parameters
+    ----------
+    section
+        The functions P_k of the section, a :class:`SectionFunctions`.
+    names
+        Names of the section coordinates of a node, after ``r`` and ``r_X``.
+    functionals
+        What these coordinates are, as in the attribute.
+    welded
+        Those of ``names`` that a welded face fixes.
 
     Attributes
     ----------
@@ -42,7 +65,8 @@ class ElementBeam(Frozen, Element):
     axis_degree = 3
     sections = "linear"
 
-    def __init__(self, section, names, functionals, welded):
+    def __init__(self, section: SectionFunctions, names: Sequence[str],
+                 functionals: Sequence[tuple[float, int, int]], welded: Sequence[str]) -> None:
         self.section = section
         self.dofnames = ["r", "r_X", *names]
         self.nodal_dofs = len(self.dofnames)
@@ -54,19 +78,19 @@ class ElementBeam(Frozen, Element):
         self.maxdeg = max(self.strain_degree, 2 * self.section.degree)
 
     @property
-    def order(self):
+    def order(self) -> int:
         """Degree N of the section functions."""
         return self.section.degree
 
     @property
-    def strain_degree(self):
+    def strain_degree(self) -> int:
         return 4 if self.sections == "linear" else 6
 
     @property
-    def carries_shear_parabola(self):
+    def carries_shear_parabola(self) -> bool:
         return self.section.degree >= 3
 
-    def local(self, X, h, i):
+    def local(self, X: Array, h: float, i: int) -> tuple[Array, Array, Array, int]:
         """Local function i on the reference cell, its derivatives, and its power of the length.
 
         Parameters
@@ -100,7 +124,26 @@ class ElementBeam(Frozen, Element):
         size = h**m
         return size * a * P, size * da * P, size * a * dP, slope
 
-    def gbasis(self, mapping, X, i, tind=None):
+    def gbasis(self, mapping: MappingBeam, X: Array, i: int,
+               tind: Array | None = None) -> tuple[DiscreteField, ...]:
+        """A local function on the body, with its gradient: what scikit-fem's ``Basis`` asks for.
+
+        Parameters
+        ----------
+        mapping
+            The mapping of a MeshBeam.
+        X
+            Reference points, shape (2, npoints) or (2, nelements, npoints).
+        i
+            Number of the local function, 0 to 2 nodal_dofs - 1.
+        tind
+            Elements, shape (nelements,), or None for all.
+
+        Returns
+        -------
+        tuple of DiscreteField
+            One field: value (nelements, npoints) and grad (2, nelements, npoints).
+        """
         mesh = mapping.mesh
         value, d_xi, d_eta, slope = self.local(X, mesh.height, i)
         lengths = mesh.lengths if tind is None else mesh.lengths[tind]
@@ -110,7 +153,7 @@ class ElementBeam(Frozen, Element):
         return (DiscreteField(value=scale * value, grad=grad),)
 
     @cached_property
-    def halving(self):
+    def halving(self) -> Array:
         """The coordinates of the left half of an element of length 1 and height 1 from its own.
 
         Shape (2 nodal_dofs, 2 nodal_dofs), for coordinates multiplied by the length to the number
@@ -123,7 +166,7 @@ class ElementBeam(Frozen, Element):
         own, child = (np.array([self.local(P, 1.0, k)[0] for k in i]).T for P in (half, X))
         return np.linalg.lstsq(child, own, rcond=None)[0]
 
-    def rigid(self, mesh):
+    def rigid(self, mesh: MeshBeam) -> Array:
         """The coordinates of the nodes in the stress-free state, less their positions.
 
         Parameters
@@ -165,16 +208,16 @@ class SectionFunctions(Frozen):
         Legendre coefficients of P_k' on [-1/2, 1/2], shape (degree, n).
     """
 
-    def __init__(self, derivatives):
+    def __init__(self, derivatives: ArrayLike) -> None:
         self._dP = np.asarray(derivatives)
         self._P = legendre.legint(self._dP, lbnd=0.0, axis=0) / 2
 
     @property
-    def degree(self):
+    def degree(self) -> int:
         return self._dP.shape[0]
 
     @property
-    def number(self):
+    def number(self) -> int:
         return self._dP.shape[1]
 
     def __call__(self, eta, k):

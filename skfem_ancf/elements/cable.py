@@ -1,10 +1,17 @@
 """The shear-rigid cable: order 0 of the family."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..errors import InputError, shown, teaching
 from ..reference import hermite_basis
 from .base import ElementBeam, SectionFunctions
+
+if TYPE_CHECKING:
+    from ..types import Array
 
 
 @teaching
@@ -42,7 +49,7 @@ class ElementBeamCable(ElementBeam):
     order = 0
     carries_shear_parabola = False
 
-    def __init__(self, degree=3):
+    def __init__(self, degree: int = 3) -> None:
         if (isinstance(degree, bool) or not isinstance(degree, (int, np.integer))
                 or degree not in (3, 5, 7)):
             raise InputError(f"the degree of a cable is 3, 5 or 7, got {shown(degree)}")
@@ -56,14 +63,27 @@ class ElementBeamCable(ElementBeam):
         self.maxdeg = self.axis_degree
 
     @property
-    def strain_degree(self):
+    def strain_degree(self) -> int:
         return 2 * (self.axis_degree - 1)
 
-    def axis(self, xi, derivative):
-        """The 2 m Hermite functions, or a derivative by xi, shape (2 m,) + xi.shape."""
+    def axis(self, xi: Array, derivative: int) -> Array:
+        """The 2 m Hermite functions of the axis, or a derivative of them by xi.
+
+        Parameters
+        ----------
+        xi
+            Points, of any shape (...).
+        derivative
+            Number of derivatives.
+
+        Returns
+        -------
+        ndarray
+            Shape (2 m,) + xi.shape, m coordinates a node.
+        """
         return hermite_basis(self.nodal_dofs, xi, derivative)
 
-    def local(self, X, h, i):
+    def local(self, X: Array, h: float, i: int) -> tuple[Array, Array, Array, int]:
         if not 0 <= i < 2 * self.nodal_dofs:
             self._index_error()
         value, slope = (self.axis(X[0], d)[i] for d in (0, 1))

@@ -1,9 +1,20 @@
 """The element of lowest order that can show what is asked for."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..errors import InputError, require_like, require_names, require_positive, taught
 from .ancf import ElementBeamANCF
 from .cable import ElementBeamCable
 from .cubic import ElementBeamANCFCubic
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..materials.base import Material
+    from ..mesh import MeshBeam
+    from .base import ElementBeam
 
 #: The order that a field of the section needs at least; 0 is the cable.
 ORDER_OF_FIELD = {"displacement": 0, "eps_xx": 0, "S_xx": 0, "eps_yy": 2, "eps_xy": 3, "S_yy": 5,
@@ -11,7 +22,8 @@ ORDER_OF_FIELD = {"displacement": 0, "eps_xx": 0, "S_xx": 0, "eps_yy": 2, "eps_x
 
 
 @taught
-def choose_element(mesh, material, fields=(), tolerance=1e-3):
+def choose_element(mesh: MeshBeam, material: Material, fields: str | Sequence[str] = (),
+                   tolerance: float = 1e-3) -> ElementBeam:
     """The element of lowest order that carries the fields and is accurate enough.
 
     The error of a beam theory is a power of h / L, with L the length of the beam: the cable leaves

@@ -1,5 +1,7 @@
 """The element of Patel and Shabana."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from ..errors import teaching
@@ -24,7 +26,7 @@ class ElementBeamPatelShabana(ElementBeam):
     ['r', 'r_X', 'r_Y', 'r_YY']
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         # P' = 1 for r_Y, and P' = eta for h r_YY: legendre coefficients in 2 eta
         super().__init__(SectionFunctions(np.array([[1.0, 0.0], [0.0, 0.5]])),
                          ["r_Y", "r_YY"], [(0.0, 0, 1), (0.0, 0, 2)], ["r_Y", "r_YY"])

@@ -1,5 +1,7 @@
 """Formulations of the strain energy. A new one is one file and one line here."""
 
+from __future__ import annotations
+
 from ..errors import require_option, taught
 from .assumed import Assumed
 from .base import COMPONENTS, Formulation, Term
@@ -12,7 +14,7 @@ FORMULATIONS = {cls.name: cls for cls in (Continuum, EnhancedContinuum, StrainSp
 
 
 @taught
-def get_formulation(formulation):
+def get_formulation(formulation: str | Formulation | type[Formulation]) -> Formulation:
     """A :class:`Formulation` from its name, its class or itself.
 
     Raises

@@ -1,5 +1,9 @@
 """Assumed strain: free of membrane and curvature-thickness locking."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..errors import InputError, require_finite_scalar, require_like, taught
@@ -7,6 +11,15 @@ from ..materials import LinearLaw
 from ..quadrature import gauss
 from .base import Formulation, Term
 from .ecm import AXIS, split_moduli
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..beam import Beam
+    from ..elements.base import ElementBeam
+    from ..materials.base import Material
+    from ..mesh import MeshBeam
+    from ..types import Array
 
 
 class Assumed(Formulation):
@@ -48,12 +61,12 @@ class Assumed(Formulation):
     name = "assumed"
 
     @taught
-    def __init__(self, alpha=1.0):
+    def __init__(self, alpha: float = 1.0) -> None:
         self.alpha = require_finite_scalar("alpha", alpha)
         if self.alpha < 0.0:
             raise InputError(f"alpha must not be negative, got {alpha!r}")
 
-    def terms(self, element, material):
+    def terms(self, element: ElementBeam, material: Material) -> Sequence[Term]:
         _, section = self.full_rules(element)
         if element.sections == "linear":
             axis, samples = gauss(2), {"yy": (0.0, 1.0)}
@@ -92,7 +105,7 @@ class Assumed(Formulation):
         return [Term(laws[0], whole.axis, whole.section, whole.samples),
                 Term(laws[1], gauss(1), whole.section, samples)]
 
-    def stress(self, beam, strain, u, X, tind):
+    def stress(self, beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
         first, *others = self.terms(beam.element, beam.material)
         total = first.law.stress(strain)
         for term in others:
@@ -110,7 +123,8 @@ class Assumed(Formulation):
         return sum(wi * beam.sampled_strain(term, u, np.array([x, 0.0 * X[1] + y]), tind)
                    for y, wi in zip(eta, w))
 
-    def stabilisation(self, mesh, element, material, width):
+    def stabilisation(self, mesh: MeshBeam, element: ElementBeam, material: Material,
+                      width: float) -> Array:
         tind = np.arange(1 if mesh.is_uniform else mesh.nelements)
         L, EI = mesh.lengths[tind], material.E * width * mesh.height**3 / 12.0
         q = element.rigid(mesh)

@@ -1,12 +1,26 @@
 """A formulation says where each strain component is sampled and how it is integrated."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import require_like
 from ..frozen import Frozen
 from ..quadrature import gauss, lagrange, tensor
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+    from ..beam import Beam
+    from ..elements.base import ElementBeam
+    from ..materials.base import Material
+    from ..mesh import MeshBeam
+    from ..types import Array, Rule
 
 COMPONENTS = ("xx", "yy", "xy")
 
@@ -37,26 +51,40 @@ class Term:
     section_samples: tuple = None
 
     @property
-    def quadrature(self):
+    def quadrature(self) -> Rule:
         """Points (2, n) and weights (n,) for scikit-fem's Basis."""
         return tensor(self.axis, self.section)
 
-    def nodes(self, component):
+    def nodes(self, component: str) -> Array:
         """Where along the axis a component is sampled, shape (m,)."""
         return np.asarray(self.samples.get(component, self.axis[0]), dtype=float)
 
-    def interpolation(self, component, xi):
-        """Matrix from the samples of a component to the points xi, shape (len(xi), m), or None."""
+    def interpolation(self, component: str, xi: ArrayLike) -> Array | None:
+        """From the samples of a component to points along the axis.
+
+        Parameters
+        ----------
+        component
+            "xx", "yy" or "xy".
+        xi
+            Points on [0, 1], shape (n,).
+
+        Returns
+        -------
+        ndarray or None
+            Shape (n, m), m the number of samples; None if the component is evaluated where it
+            is wanted.
+        """
         if component not in self.samples:
             return None
         return lagrange(self.samples[component], xi)
 
     @property
-    def section_nodes(self):
+    def section_nodes(self) -> Array:
         """Where across the section the strain is evaluated."""
         return np.asarray(self.section_samples[0] if self.section_samples else self.section[0])
 
-    def matrix(self, component):
+    def matrix(self, component: str) -> Array | None:
         """From the samples of a component to the integration points; None for the identity."""
         along = self.interpolation(component, self.axis[0])
         if along is None and self.section_samples is None:
@@ -70,7 +98,7 @@ class Formulation(Frozen):
 
     name = ""
 
-    def terms(self, element, material):
+    def terms(self, element: ElementBeam, material: Material) -> Sequence[Term]:
         """The integrals that make up the strain energy.
 
         Parameters
@@ -86,24 +114,54 @@ class Formulation(Frozen):
         """
         raise NotImplementedError
 
-    def stabilisation(self, mesh, element, material, width):
-        """A constant element stiffness, (ne, 2 nb, 2 nb) or (1, ...), or None for none.
+    def stabilisation(self, mesh: MeshBeam, element: ElementBeam, material: Material,
+                      width: float) -> Array | None:
+        """A constant element stiffness, added to that of the terms, or None for none.
 
         It must vanish for rigid motions of the stress-free state, large ones included.
+
+        Parameters
+        ----------
+        mesh, element, material
+            Those of the beam.
+        width
+            Width of its section.
+
+        Returns
+        -------
+        ndarray or None
+            Shape (nelements, 2 nb, 2 nb), or (1, ...) where it is the same for all; nb
+            coordinates a node.
         """
         return None
 
-    def stress(self, beam, strain, u, X, tind):
-        """Second Piola-Kirchhoff stress (3, nelements, npoints) of a beam's strain, for output.
+    def stress(self, beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
+        """Second Piola-Kirchhoff stress of a beam's strain, for output.
 
-        ``strain`` is that of ``beam.strain(u, X, tind)``; the rest is for formulations whose
-        stress depends on more than the strain at the point.
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+        strain
+            That of ``beam.strain(u, X, tind)``, shape (3, nelements, npoints); the rest is for
+            formulations whose stress depends on more than the strain at the point.
+        u
+            Displacement of the coordinates, shape (N,).
+        X
+            Reference points, (2, npoints) or (2, nelements, npoints).
+        tind
+            Elements, shape (nelements,), or None for all.
+
+        Returns
+        -------
+        ndarray
+            Shape (3, nelements, npoints).
         """
         material = beam.material
         return material.law(material.shear_factor(beam.element)).stress(strain)
 
     @staticmethod
-    def full_rules(element):
+    def full_rules(element: ElementBeam) -> tuple[Rule, Rule]:
         """Rules along the axis and across the section that integrate the energy exactly.
 
         That is of twice the degree of the strain: ``element.strain_degree`` along the axis of a

@@ -1,7 +1,17 @@
 """The formulation of the paper: every strain component at every integration point."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..errors import require_like, taught
 from .base import Formulation, Term
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..elements.base import ElementBeam
+    from ..materials.base import Material
 
 
 class Continuum(Formulation):
@@ -16,7 +26,7 @@ class Continuum(Formulation):
     name = "continuum"
 
     @taught
-    def terms(self, element, material):
+    def terms(self, element: ElementBeam, material: Material) -> Sequence[Term]:
         require_like("material", material, "Material", "law")
         require_like("element", element, "beam element", "strain_degree", "order")
         return [Term(material.law(material.shear_factor(element)), *self.full_rules(element))]

@@ -1,17 +1,41 @@
 """Enhanced continuum mechanics: the Poisson coupling acts on the axis only."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..errors import InputError, require_like
 from ..materials import LinearLaw
 from .base import Formulation, Term
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..beam import Beam
+    from ..elements.base import ElementBeam
+    from ..materials.base import Material
+    from ..types import Array
+
 #: The rule across the section that is the axis alone, with the weight of the whole section.
 AXIS = (np.array([0.5]), np.array([1.0]))
 
 
-def split_moduli(name, material, element):
+def split_moduli(name: str, material: Material, element: ElementBeam) -> tuple[Array, Array]:
     """Moduli diag(E, E, k_s G) without Poisson coupling, and the rest of D in the normal block.
+
+    Parameters
+    ----------
+    name
+        Of the formulation, for the message.
+    material, element
+        Those of the beam.
+
+    Returns
+    -------
+    uncoupled, coupling
+        Shapes (3, 3); their sum are the moduli of the law.
 
     Raises
     ------
@@ -42,7 +66,7 @@ class EnhancedContinuum(Formulation):
 
     name = "ecm"
 
-    def terms(self, element, material):
+    def terms(self, element: ElementBeam, material: Material) -> Sequence[Term]:
         axis, section = self.full_rules(element)
         uncoupled, coupling = split_moduli(self.name, material, element)
         terms = [Term(LinearLaw(uncoupled), axis, section)]
@@ -50,7 +74,7 @@ class EnhancedContinuum(Formulation):
             terms.append(Term(LinearLaw(coupling), axis, AXIS))
         return terms
 
-    def stress(self, beam, strain, u, X, tind):
+    def stress(self, beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
         uncoupled, coupling = split_moduli(self.name, beam.material, beam.element)
         on_axis = beam.strain(u, np.array([X[0], 0.0 * X[1] + 0.5]), tind)
         return np.tensordot(uncoupled, strain, 1) + np.tensordot(coupling, on_axis, 1)

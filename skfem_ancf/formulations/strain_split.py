@@ -1,10 +1,20 @@
 """The strain split method: only the strain of the axis is Poisson-coupled with the section."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..materials import LinearLaw
 from .base import Term
 from .ecm import AXIS, EnhancedContinuum, split_moduli
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..elements.base import ElementBeam
+    from ..materials.base import Material
 
 
 class StrainSplit(EnhancedContinuum):
@@ -24,7 +34,7 @@ class StrainSplit(EnhancedContinuum):
 
     name = "strain-split"
 
-    def terms(self, element, material):
+    def terms(self, element: ElementBeam, material: Material) -> Sequence[Term]:
         axis, section = self.full_rules(element)
         uncoupled, coupling = split_moduli(self.name, material, element)
         if not np.any(coupling):

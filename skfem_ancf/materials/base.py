@@ -1,11 +1,27 @@
 """The interface of a material law: energy, stress and moduli from the Green-Lagrange strain."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
-from ..errors import (InputError, require_finite_scalar, require_like, require_option,
-                      require_positive, taught)
+from ..errors import (
+    InputError,
+    require_finite_scalar,
+    require_like,
+    require_option,
+    require_positive,
+    taught,
+)
 from ..frozen import Frozen, rebuilt
 from ..quadrature import gauss
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from ..elements.base import ElementBeam
+    from ..types import Array, Law
 
 PLANES = ("stress", "strain")
 
@@ -50,7 +66,8 @@ class Material(Frozen):
     """
 
     @taught
-    def __init__(self, E, nu, density=None, plane="stress", shear_correction="auto"):
+    def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
+                 shear_correction: str | float = "auto") -> None:
         self.E = require_positive("E", E)
         self.nu = require_finite_scalar("nu", nu)
         self.density = None if density is None else require_positive("density", density)
@@ -66,12 +83,12 @@ class Material(Frozen):
             self.shear_correction = require_positive("shear_correction", shear_correction)
 
     @property
-    def G(self):
+    def G(self) -> float:
         """Shear modulus E / (2 (1 + nu))."""
         return self.E / (2.0 * (1.0 + self.nu))
 
     @taught
-    def shear_factor(self, element):
+    def shear_factor(self, element: ElementBeam) -> float:
         """The factor k_s on the shear modulus for sections of an element."""
         require_like("element", element, "beam element", "carries_shear_parabola")
         if isinstance(self.shear_correction, float):
@@ -80,7 +97,7 @@ class Material(Frozen):
             return 1.0
         return 10.0 * (1.0 + self.nu) / (12.0 + 11.0 * self.nu)
 
-    def replace(self, **changes):
+    def replace(self, **changes: Any) -> Material:
         """A copy with some arguments of its constructor changed, as ``replace(E=2e8)``.
 
         Raises
@@ -97,7 +114,7 @@ class Material(Frozen):
         return rebuilt(self, changes, ("E", "nu", "density", "plane", "shear_correction"))
 
     @taught
-    def law(self, k_s=1.0):
+    def law(self, k_s: float = 1.0) -> Law:
         """The law with its shear corrected: a function of (eps_xx, eps_yy, sqrt(k_s) 2 eps_xy)."""
         k_s = require_positive("k_s", k_s)
         if not self._fits("stress", "energy"):
@@ -114,17 +131,17 @@ class Material(Frozen):
         return vars(Material)[name] is getattr(type(self), name) or depth(name) <= depth(other)
 
     @property
-    def is_hooke(self):
+    def is_hooke(self) -> bool:
         """True if the law is Hooke's of E and nu, in Green-Lagrange strain."""
         law, D = self.law(), hooke(self.E, self.nu, self.plane)
         return isinstance(law, LinearLaw) and np.allclose(law.D, D, rtol=1e-9, atol=1e-9 * D[0, 0])
 
     @property
-    def lame(self):
+    def lame(self) -> float:
         """Lame's first parameter, which grows without bound as nu goes to 1/2."""
         return self.E * self.nu / ((1.0 + self.nu) * (1.0 - 2.0 * self.nu))
 
-    def volumetric_split(self, k_s=1.0):
+    def volumetric_split(self, k_s: float = 1.0) -> tuple[Law, Law] | None:
         """:meth:`law` as a sum: the law of the shear modulus, and what Lame's parameter multiplies.
 
         The second grows without bound as nu goes to 1/2. The formulation "assumed" integrates it
@@ -138,15 +155,15 @@ class Material(Frozen):
         """
         return None
 
-    def energy(self, strain):
+    def energy(self, strain: Array) -> Array:
         """Energy per volume of the stress-free body, shape (...)."""
         raise NotImplementedError
 
-    def stress(self, strain):
+    def stress(self, strain: Array) -> Array:
         """Second Piola-Kirchhoff stress, shape (3, ...)."""
         raise NotImplementedError
 
-    def moduli(self, strain):
+    def moduli(self, strain: Array) -> Array:
         """Derivative of the stress with respect to ``strain``, shape (3, 3, ...)."""
         strain = np.asarray(strain)
         out = []
@@ -156,7 +173,7 @@ class Material(Frozen):
             out.append(np.imag(self.stress(strain + step)) / 1e-30)
         return np.stack(out, 1)
 
-    def thickness_stretch(self, strain):
+    def thickness_stretch(self, strain: Array) -> Array:
         """Stretch out of the plane, shape (...): 1 in plane strain. Needed for Cauchy stress."""
         if self.plane == "strain":
             return np.ones(np.shape(strain)[1:])
@@ -169,8 +186,18 @@ class Material(Frozen):
                 f"plane={self.plane!r}, shear_correction={self.shear_correction!r})")
 
 
-def hooke(E, nu, plane):
-    """Moduli (3, 3) of Hooke's law, for (eps_xx, eps_yy, 2 eps_xy)."""
+def hooke(E: float, nu: float, plane: str) -> Array:
+    """Moduli (3, 3) of Hooke's law, for (eps_xx, eps_yy, 2 eps_xy).
+
+    Parameters
+    ----------
+    E
+        Young's modulus.
+    nu
+        Poisson ratio.
+    plane
+        "stress" or "strain".
+    """
     if plane == "stress":
         a, b = E / (1.0 - nu**2), E * nu / (1.0 - nu**2)
     else:
@@ -180,22 +207,30 @@ def hooke(E, nu, plane):
 
 
 class ShearCorrected:
-    """A law whose shear strain enters multiplied by sqrt(k_s), so that k_s G is its modulus."""
+    """A law whose shear strain enters multiplied by sqrt(k_s), so that k_s G is its modulus.
 
-    def __init__(self, law, k_s):
+    Parameters
+    ----------
+    law
+        The law of a material.
+    k_s
+        Factor on its shear modulus, positive.
+    """
+
+    def __init__(self, law: Law, k_s: float) -> None:
         self.base = law
         self.scale = np.array([1.0, 1.0, np.sqrt(k_s)])
 
     def _scaled(self, strain):
         return strain * self.scale.reshape((3,) + (1,) * (np.ndim(strain) - 1))
 
-    def energy(self, strain):
+    def energy(self, strain: Array) -> Array:
         return self.base.energy(self._scaled(strain))
 
-    def stress(self, strain):
+    def stress(self, strain: Array) -> Array:
         return self._scaled(self.base.stress(self._scaled(strain)))
 
-    def moduli(self, strain):
+    def moduli(self, strain: Array) -> Array:
         D = self.base.moduli(self._scaled(strain))
         return D * np.outer(self.scale, self.scale).reshape((3, 3) + (1,) * (D.ndim - 2))
 
@@ -212,7 +247,7 @@ class OverriddenLaw:
         If the moduli are wanted and the stress takes no complex strain.
     """
 
-    def __init__(self, material):
+    def __init__(self, material: Material) -> None:
         self.base, self.stress = material, material.stress
         self.energy = material.energy if material._fits("energy") else self._energy
         self.moduli = material.moduli
@@ -246,15 +281,15 @@ class OverriddenLaw:
 class LinearLaw:
     """Stress linear in the Green-Lagrange strain: S = D eps with a constant D of shape (3, 3)."""
 
-    def __init__(self, D):
+    def __init__(self, D: ArrayLike) -> None:
         self.D = np.asarray(D)
 
-    def energy(self, strain):
+    def energy(self, strain: Array) -> Array:
         return 0.5 * np.sum(strain * self.stress(strain), axis=0)
 
-    def stress(self, strain):
+    def stress(self, strain: Array) -> Array:
         return np.tensordot(self.D, strain, 1)
 
-    def moduli(self, strain):
+    def moduli(self, strain: Array) -> Array:
         shape = np.shape(strain)[1:]
         return np.broadcast_to(self.D.reshape((3, 3) + (1,) * len(shape)), (3, 3) + shape)

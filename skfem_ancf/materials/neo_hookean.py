@@ -1,9 +1,16 @@
 """Compressible neo-Hookean material."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..errors import InputError, taught
 from .base import Material
+
+if TYPE_CHECKING:
+    from ..types import Array, Law
 
 
 class NeoHookean(Material):
@@ -13,6 +20,19 @@ class NeoHookean(Material):
     St. Venant-Kirchhoff it resists compression to zero volume. In plane stress the stretch out
     of the plane follows from S_33 = 0. Parameters and errors are those of
     :class:`~skfem_ancf.materials.base.Material`, except that ``nu`` stays below 1/2.
+
+    Parameters
+    ----------
+    E
+        Young's modulus (force per area), positive.
+    nu
+        Poisson ratio, in (-1, 1/2).
+    density
+        Mass per volume in the stress-free state, positive, or None.
+    plane
+        "stress" or "strain".
+    shear_correction
+        "auto", "paper" or a positive number, see :class:`~skfem_ancf.materials.base.Material`.
 
     References
     ----------
@@ -29,12 +49,13 @@ class NeoHookean(Material):
     """
 
     @taught
-    def __init__(self, E, nu, density=None, plane="stress", shear_correction="auto"):
+    def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
+                 shear_correction: str | float = "auto") -> None:
         super().__init__(E, nu, density, plane, shear_correction)
         if self.nu == 0.5:
             raise InputError("the compressible neo-Hookean law needs nu below 0.5, got 0.5")
 
-    def volumetric_split(self, k_s=1.0):
+    def volumetric_split(self, k_s: float = 1.0) -> tuple[Law, Law] | None:
         # a subclass may have changed the law
         if type(self) is not NeoHookean or self.plane == "stress" or self.nu == 0.0:
             return None
@@ -58,7 +79,7 @@ class NeoHookean(Material):
                     break
         return C11, C22, C12, log_det, x
 
-    def energy(self, strain):
+    def energy(self, strain: Array) -> Array:
         _, _, _, log_det, x = self._state(strain)
         log_J = 0.5 * (log_det + x)
         with np.errstate(invalid="ignore"):
@@ -69,14 +90,14 @@ class NeoHookean(Material):
     def _inverse(C11, C22, C12, log_det):
         return np.array([C22, C11, -C12]) * np.exp(-log_det)
 
-    def stress(self, strain):
+    def stress(self, strain: Array) -> Array:
         C11, C22, C12, log_det, x = self._state(strain)
         c = self._inverse(C11, C22, C12, log_det)
         # det C (I - C^-1), written so that it vanishes without cancellation
         change = np.array([2 * strain[0] * C22 - C12**2, 2 * strain[1] * C11 - C12**2, C12])
         return self.G * change * np.exp(-log_det) + 0.5 * self.lame * (log_det + x) * c
 
-    def moduli(self, strain):
+    def moduli(self, strain: Array) -> Array:
         C11, C22, C12, log_det, x = self._state(strain)
         a, b, c = self._inverse(C11, C22, C12, log_det)
         lame, m = self.lame, self.G - 0.5 * self.lame * (log_det + x)
@@ -87,7 +108,7 @@ class NeoHookean(Material):
         return np.array([[xx, xy, xs], [xy, yy, ys],
                          [xs, ys, lame * c * c + m * (a * b + c * c)]])
 
-    def thickness_stretch(self, strain):
+    def thickness_stretch(self, strain: Array) -> Array:
         if not self._fits("thickness_stretch"):
             return super().thickness_stretch(strain)
         return np.exp(0.5 * self._state(strain)[4].real)

@@ -1,9 +1,16 @@
 """St. Venant-Kirchhoff: stress linear in the Green-Lagrange strain."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..errors import require_positive, taught
 from .base import LinearLaw, Material, hooke
+
+if TYPE_CHECKING:
+    from ..types import Array, Law
 
 
 class StVenantKirchhoff(Material):
@@ -24,12 +31,12 @@ class StVenantKirchhoff(Material):
     """
 
     @property
-    def D(self):
+    def D(self) -> Array:
         """Moduli without shear correction, shape (3, 3)."""
         return hooke(self.E, self.nu, self.plane)
 
     @taught
-    def law(self, k_s=1.0):
+    def law(self, k_s: float = 1.0) -> Law:
         cls = type(self)
         if any(getattr(cls, name) is not getattr(StVenantKirchhoff, name)
                for name in ("energy", "stress", "moduli")):
@@ -37,23 +44,23 @@ class StVenantKirchhoff(Material):
         k_s = require_positive("k_s", k_s)
         return LinearLaw(self.D * np.diag([1.0, 1.0, k_s]) + self.D * (1 - np.eye(3)))
 
-    def volumetric_split(self, k_s=1.0):
+    def volumetric_split(self, k_s: float = 1.0) -> tuple[Law, Law] | None:
         # a subclass may have other moduli
         if type(self) is not StVenantKirchhoff or self.plane == "stress" or self.nu == 0.0:
             return None
         volumetric = self.lame * np.outer([1.0, 1.0, 0.0], [1.0, 1.0, 0.0])
         return LinearLaw(self.law(k_s).D - volumetric), LinearLaw(volumetric)
 
-    def energy(self, strain):
+    def energy(self, strain: Array) -> Array:
         return LinearLaw(self.D).energy(strain)
 
-    def stress(self, strain):
+    def stress(self, strain: Array) -> Array:
         return LinearLaw(self.D).stress(strain)
 
-    def moduli(self, strain):
+    def moduli(self, strain: Array) -> Array:
         return LinearLaw(self.D).moduli(strain)
 
-    def thickness_stretch(self, strain):
+    def thickness_stretch(self, strain: Array) -> Array:
         if self.plane == "strain" or not self._fits("thickness_stretch"):
             return super().thickness_stretch(strain)
         return np.sqrt(1.0 - 2.0 * self.nu / (1.0 - self.nu) * (strain[0] + strain[1]))
