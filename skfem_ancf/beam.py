@@ -1,29 +1,53 @@
 """A beam: a mesh, an element, a material and a formulation."""
 
+from __future__ import annotations
+
 from functools import cached_property, wraps
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from skfem.assembly import Basis, FacetBasis, asm
 from skfem.element import ElementVector
 
 from . import forms
+from .cable import CableKernel
 from .elements import ElementBeam, choose_element
-from .errors import (InputError, MeshError, NameUnknown, require_finite, require_flag,
-                     require_integer, require_label, require_like, require_names,
-                     require_positive, shown, taught, teaching)
+from .errors import (
+    InputError,
+    MeshError,
+    NameUnknown,
+    require_finite,
+    require_flag,
+    require_integer,
+    require_label,
+    require_like,
+    require_names,
+    require_positive,
+    shown,
+    taught,
+    teaching,
+)
 from .formulations import COMPONENTS, get_formulation
 from .formulations.ecm import AXIS
 from .frozen import Frozen, read_only
-from .cable import CableKernel
 from .kernel import Kernel
 from .materials import Material
 from .mesh import MeshBeam
 from .places import as_point, facets_of
 from .quadrature import gauss, tensor
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+    from scipy.sparse import csr_matrix
+
+    from .formulations.base import Formulation, Term
+    from .types import Array, Place, WhichBeam
+
 
 @taught
-def reference_coordinates(basis):
+def reference_coordinates(basis: Basis) -> Array:
     """Coordinates of the stress-free state of a basis of the position field.
 
     Parameters
@@ -121,8 +145,10 @@ class Beam(Frozen):
     (170, 0.78)
     """
 
-    def __init__(self, mesh, element, material, width, formulation="assumed", name=None,
-                 compiled=True, fields=(), tolerance=1e-3):
+    def __init__(self, mesh: MeshBeam, element: ElementBeam | str, material: Material, width: float,
+                 formulation: str | Formulation | type[Formulation] = "assumed",
+                 name: str | None = None, compiled: bool = True, fields: str | Sequence[str] = (),
+                 tolerance: float = 1e-3) -> None:
         if isinstance(element, str) and element == "auto" and isinstance(mesh, MeshBeam):
             element = choose_element(mesh, material, fields, tolerance)
         for argument, kind, value in (("mesh", MeshBeam, mesh), ("element", ElementBeam, element),
@@ -147,7 +173,7 @@ class Beam(Frozen):
         return (f"<Beam {self.name or ''}: {self.mesh.nelements} elements of order "
                 f"{self.element.order}, {self.N} coordinates, {self.formulation.name}>")
 
-    def replace(self, **changes):
+    def replace(self, **changes: Any) -> Beam:
         """The same beam with some arguments of its constructor changed.
 
         Parameters
@@ -175,24 +201,24 @@ class Beam(Frozen):
                 raise NameUnknown("argument of Beam", name, known)
         return type(self)(**{**{name: getattr(self, name) for name in known}, **changes})
 
-    def with_mesh(self, mesh):
+    def with_mesh(self, mesh: MeshBeam) -> Beam:
         """The same beam on another mesh."""
         return self.replace(mesh=mesh)
 
     # the scikit-fem side
 
     @cached_property
-    def vector_element(self):
+    def vector_element(self) -> ElementVector:
         """The element of the position field: ``ElementVector(element)``."""
         return ElementVector(self.element)
 
     @cached_property
-    def basis(self):
+    def basis(self) -> Basis:
         """A scikit-fem ``Basis`` of the position field with the formulation's quadrature."""
         return Basis(self.mesh, self.vector_element,
                      quadrature=self.formulation.terms(self.element, self.material)[0].quadrature)
 
-    def exact_basis(self):
+    def exact_basis(self) -> Basis:
         """A ``Basis`` whose quadrature is exact for products of two coordinates, as in the mass."""
         n = self.element.axis_degree + 1 + (0 if self.mesh.is_straight else 1)
         if self.is_cable:  # its energy is a line integral, its mass that of the axis
@@ -200,8 +226,17 @@ class Beam(Frozen):
         return Basis(self.mesh, self.vector_element,
                      quadrature=tensor(gauss(n), gauss(self.element.order + 1)))
 
-    def facet_basis(self, facets, intorder=None):
-        """A scikit-fem ``FacetBasis`` of the position field at a place, see :meth:`dofs`."""
+    def facet_basis(self, facets: Place, intorder: int | None = None) -> FacetBasis:
+        """A scikit-fem ``FacetBasis`` of the position field at a place, see :meth:`dofs`.
+
+        Parameters
+        ----------
+        facets
+            A place, see :func:`skfem_ancf.places.facets_of`.
+        intorder
+            Degree of polynomials along the facets that the quadrature integrates exactly, 0 to
+            200; by default that of products of two coordinates.
+        """
         if intorder is not None:
             intorder = require_integer("intorder", intorder, 0, 200)
         order = 2 * max(self.element.axis_degree, self.element.order) + 2
@@ -209,7 +244,7 @@ class Beam(Frozen):
                           intorder=order if intorder is None else intorder)
 
     @cached_property
-    def kernel(self):
+    def kernel(self) -> Any:
         """The fused evaluation of the strain energy; see :mod:`skfem_ancf.kernel`."""
         kernel = (CableKernel if self.is_cable else Kernel)(
             self.mesh, self.element, self.material, self.width, self.formulation)
@@ -218,38 +253,38 @@ class Beam(Frozen):
         return kernel
 
     @property
-    def is_cable(self):
+    def is_cable(self) -> bool:
         """True if the element has no section of its own."""
         return self.element.order == 0
 
     # coordinates
 
     @cached_property
-    def q0(self):
+    def q0(self) -> Array:
         """Coordinates of the stress-free state, shape (N,)."""
         return read_only(_coordinates(self.mesh, self.element, self.mesh.p))
 
     @cached_property
-    def origin(self):
+    def origin(self) -> Array:
         """A point near the beam, from which positions are measured inside the package."""
         return read_only(self.mesh.p.mean(axis=1))
 
     @cached_property
-    def q0_local(self):
+    def q0_local(self) -> Array:
         """Coordinates of the stress-free state with positions measured from :attr:`origin`."""
         return read_only(_coordinates(self.mesh, self.element,
                                       self.mesh.p - self.origin[:, None]))
 
     @property
-    def dofnames(self):
+    def dofnames(self) -> list[str]:
         """Names of the coordinates of a node, as scikit-fem gives them: r^1, r^2, r_X^1, ..."""
         return self.vector_element.dofnames
 
-    def nodes(self, boundary):
+    def nodes(self, boundary: Place) -> Array:
         """Nodes at a place, see :meth:`dofs`."""
         return self.mesh._expand_facets(facets_of(self.mesh, boundary))[0]
 
-    def dofs(self, boundary, names=None):
+    def dofs(self, boundary: Place, names: str | Sequence[str] | None = None) -> Array:
         """Coordinate numbers at a place.
 
         Parameters
@@ -277,7 +312,7 @@ class Beam(Frozen):
                              if full in names or full.rsplit("^", 1)[0] in names])
         return np.sort((self.nodes(boundary)[:, None] * self.nd + rows).ravel())
 
-    def locate(self, point):
+    def locate(self, point: ArrayLike) -> tuple[int, Array]:
         """Element and reference point of a material point.
 
         Parameters
@@ -304,7 +339,7 @@ class Beam(Frozen):
     def _finder(self):
         return self.mesh.element_finder()
 
-    def probe(self, point):
+    def probe(self, point: ArrayLike) -> tuple[Array, Array]:
         """Coordinate numbers and weights of the position of a material point.
 
         Returns
@@ -320,10 +355,22 @@ class Beam(Frozen):
                 "axis, and put a moment on an end section with scene.moment")
         return self.probe_reference(e, X)
 
-    def point_displacement(self, u, e, X):
-        """Displacement of the point X of the reference cell of element ``e``.
+    def point_displacement(self, u: Array, e: int, X: Array) -> Array:
+        """Displacement of a point of an element, at one or several instants.
 
-        ``u`` of shape (N,) or (nt, N); the result is (2,) or (nt, 2).
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (N,) or (nt, N).
+        e
+            Number of the element.
+        X
+            Point (xi, eta) of its reference cell, shape (2,).
+
+        Returns
+        -------
+        ndarray
+            Shape (2,) or (nt, 2).
         """
         if self.is_cable and X[1] != 0.5:
             at, tind = np.asarray(X)[:, None], np.array([e])
@@ -332,15 +379,28 @@ class Beam(Frozen):
         dofs, weights = self.probe_reference(e, X)
         return u[..., dofs] @ weights
 
-    def probe_reference(self, e, X):
-        """As :meth:`probe`, for the point X = (xi, eta) of the reference cell of element ``e``."""
+    def probe_reference(self, e: int, X: Array) -> tuple[Array, Array]:
+        """As :meth:`probe`, for a point of an element.
+
+        Parameters
+        ----------
+        e
+            Number of the element.
+        X
+            Point (xi, eta) of its reference cell, shape (2,).
+
+        Returns
+        -------
+        dofs, weights
+            Shapes (2, n) and (n,).
+        """
         mapping, tind = self.mesh.mapping(), np.array([e])
         weights = np.array([self.element.gbasis(mapping, X[:, None], i, tind)[0][0, 0]
                             for i in range(2 * self.element.nodal_dofs)])
         first = self.mesh.t[0, e] * self.nd
         return first + np.arange(2 * self.nd).reshape(-1, 2).T, weights
 
-    def section_node(self, boundary):
+    def section_node(self, boundary: Place) -> int:
         """The node of a place that is one section, see :meth:`dofs`."""
         facets = np.asarray(facets_of(self.mesh, boundary))
         if len(facets) != 1 or facets[0] >= self.mesh.p.shape[1]:
@@ -348,7 +408,7 @@ class Beam(Frozen):
                             "'left' and 'right', or the point of a node of the axis")
         return int(facets[0])
 
-    def section_direction(self, node):
+    def section_direction(self, node: int) -> tuple[Array, Array]:
         """Coordinates (2, n) and weights (n,) of the direction 12 / h^3 int Y r dY of a section."""
         if self.is_cable:  # the tangent, which turns with the section
             return node * self.nd + 2 + np.arange(2).reshape(2, 1), np.ones(1)
@@ -358,7 +418,7 @@ class Beam(Frozen):
             w * (eta - 0.5) * self.element.section(eta - 0.5, k)[0]) for k in range(len(f))])
         return node * self.nd + 4 + np.arange(2 * len(f)).reshape(-1, 2).T, c
 
-    def rigid_motions(self):
+    def rigid_motions(self) -> Array:
         """Two translations and the rotation about :attr:`origin`: shape (N, 3)."""
         q = self.q0_local.reshape(-1, self.nd // 2, 2)
         out = np.zeros(q.shape + (3,))
@@ -369,7 +429,7 @@ class Beam(Frozen):
     # fields
 
     @_fields
-    def gradients(self, u, X, tind=None):
+    def gradients(self, u: Array, X: Array, tind: Array | None = None) -> tuple[Array, Array]:
         """Displacement gradient in the beam's frame and the frame.
 
         Parameters
@@ -379,7 +439,7 @@ class Beam(Frozen):
         X
             Reference points, (2, npoints) or (2, nelements, npoints).
         tind
-            Elements, or None for all.
+            Elements, shape (nelements,), or None for all.
 
         Returns
         -------
@@ -403,8 +463,20 @@ class Beam(Frozen):
         return np.einsum("ijep,jJep->iJep", grad, frame), frame
 
     @_fields
-    def displacements(self, u, X, tind=None):
-        """Displacement at reference points, shape (2, nelements, npoints)."""
+    def displacements(self, u: Array, X: Array, tind: Array | None = None) -> Array:
+        """Displacement at reference points.
+
+        Parameters
+        ----------
+        u, X, tind
+            As for :meth:`gradients`, shapes (N,), (2, npoints) or (2, nelements, npoints), and
+            (nelements,).
+
+        Returns
+        -------
+        ndarray
+            Shape (2, nelements, npoints).
+        """
         mapping = self.mesh.mapping()
         u_e = self.kernel.gather(u, slice(None) if tind is None else tind)
         out = sum(np.einsum("ei,ep->iep", u_e[:, k],
@@ -420,10 +492,19 @@ class Beam(Frozen):
         return self.kernel.section(u, X[0], tind, self.mesh, self.element)
 
     @_fields
-    def strain(self, u, X, tind=None):
+    def strain(self, u: Array, X: Array, tind: Array | None = None) -> Array:
         """Green-Lagrange strain of the formulation: (eps_xx, eps_yy, 2 eps_xy).
 
-        Arguments as in :meth:`gradients`; shape (3, nelements, npoints).
+        Parameters
+        ----------
+        u, X, tind
+            As for :meth:`gradients`, shapes (N,), (2, npoints) or (2, nelements, npoints), and
+            (nelements,).
+
+        Returns
+        -------
+        ndarray
+            Shape (3, nelements, npoints).
         """
         if self.is_cable:  # S_yy = 0
             _, _, eps, kappa = self._cable_section(u, X, tind)
@@ -435,8 +516,22 @@ class Beam(Frozen):
         return self.sampled_strain(self.formulation.terms(self.element, self.material)[0],
                                    u, X, tind)
 
-    def sampled_strain(self, term, u, X, tind=None):
-        """As :meth:`strain`, with the samples along the axis of a term of the formulation."""
+    def sampled_strain(self, term: Term, u: Array, X: Array, tind: Array | None = None) -> Array:
+        """As :meth:`strain`, with the samples along the axis of a term of the formulation.
+
+        Parameters
+        ----------
+        term
+            A :class:`~skfem_ancf.formulations.Term`.
+        u, X, tind
+            As for :meth:`gradients`, shapes (N,), (2, npoints) or (2, nelements, npoints), and
+            (nelements,).
+
+        Returns
+        -------
+        ndarray
+            Shape (3, nelements, npoints).
+        """
         def component(k, X):
             H, e = self.gradients(u, X, tind)
             F = e + H
@@ -456,8 +551,20 @@ class Beam(Frozen):
         return np.array(out)
 
     @_fields
-    def stress(self, u, X, tind=None):
-        """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy); arguments as in :meth:`gradients`."""
+    def stress(self, u: Array, X: Array, tind: Array | None = None) -> Array:
+        """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy), force per area of the stress-free body.
+
+        Parameters
+        ----------
+        u, X, tind
+            As for :meth:`gradients`, shapes (N,), (2, npoints) or (2, nelements, npoints), and
+            (nelements,).
+
+        Returns
+        -------
+        ndarray
+            Shape (3, nelements, npoints).
+        """
         strain = self.strain(u, X, tind)
         if self.is_cable:
             E = self.material.E
@@ -468,13 +575,13 @@ class Beam(Frozen):
     # mass
 
     @property
-    def total_mass(self):
+    def total_mass(self) -> float:
         """Mass of the beam."""
         volume = float(np.sum(self._shapes[1]))
         return self.density * volume * (self.mesh.nelements if self.mesh.is_uniform else 1)
 
     @property
-    def density(self):
+    def density(self) -> float:
         """Density of the material; raises InputError if the material has none."""
         if self.material.density is None:
             raise InputError(f"{self.material!r} has no density: give one to use mass or gravity")
@@ -491,7 +598,7 @@ class Beam(Frozen):
                       for i in range(2 * self.element.nodal_dofs)])
         return N, self.width * W * mapping.detDF(X, tind)
 
-    def mass_elements(self, elements=slice(None)):
+    def mass_elements(self, elements: slice = slice(None)) -> Array:
         """Element mass matrices of a slice of the elements, shape (n, 2 nd, 2 nd)."""
         N, dV = self._shapes
         if not self.mesh.is_uniform:
@@ -501,7 +608,7 @@ class Beam(Frozen):
         n = len(range(*elements.indices(self.mesh.nelements)))
         return np.repeat(full, n, axis=0) if self.mesh.is_uniform else full
 
-    def weight(self, g):
+    def weight(self, g: ArrayLike) -> Array:
         """The dead load of an acceleration ``g`` (2,), shape (N,)."""
         g = require_finite("g", g, (2,))
         N, dV = self._shapes
@@ -509,13 +616,20 @@ class Beam(Frozen):
         load = np.broadcast_to(mean[:, :, None] * g, (self.mesh.nelements,) + mean.shape[1:] + (2,))
         return self.kernel.scatter(np.ascontiguousarray(load))
 
-    def mass(self):
+    def mass(self) -> csr_matrix:
         """The mass matrix, constant, sparse, shape (N, N)."""
         return asm(forms.mass(self.density, self.width), self.exact_basis())
 
 
-def select_beam(beams, beam):
+def select_beam(beams: Sequence[Beam], beam: WhichBeam) -> Beam:
     """The beam meant by a Beam, a name, a number, or None where there is only one.
+
+    Parameters
+    ----------
+    beams
+        The beams of a scene.
+    beam
+        A Beam, its name or its number, or None.
 
     Raises
     ------

@@ -1,9 +1,12 @@
 """A scene: beams, supports and loads, and what can be asked of them."""
 
+from __future__ import annotations
+
 import warnings
 from copy import copy
 from functools import wraps
 from threading import RLock
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,10 +17,21 @@ from .doors import configuration, displacement
 from .dynamics import get_scheme
 from .dynamics.checkpoint import resume
 from .dynamics.integrate import follow, integrate
-from .errors import (ConvergenceError, InputError, Interrupted, StabilityWarning, ask_field,
-                     require_finite, require_finite_scalar, require_option, shown, taught, teaching)
+from .errors import (
+    ConvergenceError,
+    InputError,
+    Interrupted,
+    StabilityWarning,
+    ask_field,
+    require_finite,
+    require_finite_scalar,
+    require_option,
+    shown,
+    taught,
+    teaching,
+)
 from .joints import Joint, bind_joint, get_joint
-from .loads import (EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight, bind_load)
+from .loads import EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight, bind_load
 from .path import CriticalPoint, Path
 from .pickling import functions_of, require_picklable
 from .places import on_other_mesh
@@ -28,6 +42,18 @@ from .statics.adapt import solve_adaptive
 from .statics.stability import verdict_of_factors
 from .supports import Support
 from .system import System
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import ArrayLike
+    from skfem.assembly import LinearForm
+
+    from .dynamics.base import Scheme
+    from .dynamics.history import History
+    from .eigen import Buckling, Modes
+    from .plan import Plan
+    from .types import Array, Place, StrPath, TimeFunction, WhichBeam
 
 
 def _alone(method):
@@ -77,7 +103,7 @@ class Scene:
     (True, True)
     """
 
-    def __init__(self, *beams):
+    def __init__(self, *beams: Beam | Sequence[Beam]) -> None:
         if len(beams) == 1 and isinstance(beams[0], (list, tuple)):
             beams = tuple(beams[0])
         if not beams:
@@ -125,38 +151,38 @@ class Scene:
                 f"{len(self.loads)} load(s)>")
 
     @property
-    def beams(self):
+    def beams(self) -> tuple[Beam, ...]:
         """The beams."""
         return self._beams
 
     @property
-    def supports(self):
+    def supports(self) -> tuple[Support, ...]:
         """What is held: a tuple of :class:`~skfem_ancf.supports.Support`."""
         return self._supports
 
     @property
-    def loads(self):
+    def loads(self) -> tuple[Load, ...]:
         """The loads, bound to the beams: a tuple of :class:`~skfem_ancf.loads.Load`."""
         return _Things(bound for _, _, bound in self._loads)
 
     @property
-    def joints(self):
+    def joints(self) -> tuple[Joint, ...]:
         """The joints, bound to the beams: a tuple of :class:`~skfem_ancf.joints.Joint`."""
         return _Things(bound for _, bound in self._joints)
 
-    def beam(self, beam=None):
+    def beam(self, beam: WhichBeam = None) -> Beam:
         """The Beam meant by a Beam, a name, a number, or None where there is only one."""
         return select_beam(self.beams, beam)
 
     def _number(self, beam):
         return self._beams.index(select_beam(self._beams, beam))
 
-    def offset(self, beam):
+    def offset(self, beam: WhichBeam) -> int:
         """Number of the first coordinate of a beam among those of the scene."""
         return sum(b.N for b in self._beams[:self._number(beam)])
 
     @property
-    def N(self):
+    def N(self) -> int:
         """Number of coordinates of the scene."""
         return sum(b.N for b in self.beams)
 
@@ -196,7 +222,7 @@ class Scene:
         joint._seal()
         return joint
 
-    def add(self, thing):
+    def add(self, thing: Load | Joint) -> Scene:
         """Add a load or a joint, of the package's or of your own.
 
         Parameters
@@ -240,7 +266,7 @@ class Scene:
 
     # supports
 
-    def clamp(self, boundary, beam=None, thickness="fixed"):
+    def clamp(self, boundary: Place, beam: WhichBeam = None, thickness: str = "fixed") -> Scene:
         """Weld a face, or hold it as a plane.
 
         Parameters
@@ -250,12 +276,19 @@ class Scene:
             the section of a node; a function of the points x that returns truth values; or
             numbers of facets as an array of integers. See
             :func:`skfem_ancf.places.facets_of`.
+        beam
+            The beam, its name or its number, in a scene of several.
         thickness
             "fixed": the position of every material point of the face is fixed, that is ``r`` and
             the section coordinates at the node; the slope ``r_X``, a strain measure there, stays
             free. "free": ``r`` is fixed and the section stays in its plane, but may get thinner
             or thicker there. With nu not zero a welded face causes a boundary layer as long as
             the beam is high, which long elements exaggerate; the plane does not.
+
+        Returns
+        -------
+        Scene
+            Itself.
         """
         k = self._number(beam)
         beam = self._beams[k]
@@ -265,24 +298,42 @@ class Scene:
         return self._put([Support(k, boundary, "r")],
                          joints=[get_joint("plane", at=boundary, beam=beam, name="of a clamp")])
 
-    def pin(self, boundary, beam=None):
-        """Fix the position of the axis; the section may turn."""
+    def pin(self, boundary: Place, beam: WhichBeam = None) -> Scene:
+        """Fix the position of the axis; the section may turn.
+
+        Parameters
+        ----------
+        boundary
+            A place, as for :meth:`clamp`.
+        beam
+            The beam, its name or its number, in a scene of several.
+
+        Returns
+        -------
+        Scene
+            Itself.
+        """
         return self._put([Support(self._number(beam), boundary, "r", on_axis=True)])
 
-    def fix(self, boundary, names=None, displacement=0.0, beam=None):
+    def fix(self, boundary: Place, names: str | Sequence[str] | None = None,
+            displacement: float = 0.0, beam: WhichBeam = None) -> Scene:
         """Fix coordinates by their scikit-fem names.
 
         Parameters
         ----------
         boundary
-            A place: the name of a boundary; a point (x, y) of the stress-free body, which means
-            the section of a node; a function of the points x that returns truth values; or
-            numbers of facets as an array of integers. See
-            :func:`skfem_ancf.places.facets_of`.
+            A place, as for :meth:`clamp`.
         names
             As ``["r^1", "r_Y0^2"]``; ``"r"`` means both components; None means all.
         displacement
-            Their displacement at full load; it grows with the load.
+            Their displacement at full load, in the unit of the coordinate; it grows with the load.
+        beam
+            The beam, its name or its number, in a scene of several.
+
+        Returns
+        -------
+        Scene
+            Itself.
 
         Raises
         ------
@@ -296,7 +347,7 @@ class Scene:
         return self._put([Support(self._number(beam), boundary, names,
                                   require_finite_scalar("displacement", displacement))])
 
-    def joint(self, joint, **options):
+    def joint(self, joint: str | Joint, **options: Any) -> Joint:
         """Add a joint, held by Lagrange multipliers.
 
         Parameters
@@ -311,6 +362,8 @@ class Scene:
             * ``"position", at=point, r=function``: a point follows ``r(t)``,
             * ``"angle", at="left", angle=function``: a section turns by ``angle(t)``,
             * ``"plane", at="left"``: a section stays in its plane.
+        **options
+            Arguments of the joint's class, where it is given by its name.
 
         Returns
         -------
@@ -334,58 +387,149 @@ class Scene:
 
     # loads
 
-    def gravity(self, g, beam=None, amplitude=None):
+    def gravity(self, g: ArrayLike, beam: WhichBeam = None,
+                amplitude: TimeFunction = None) -> Scene:
         """Weight of every beam, or of one.
 
         Parameters
         ----------
         g
             Acceleration, shape (2,), as ``(0, -9.81)``.
+        beam
+            The beam, its name or its number; None for all.
+        amplitude
+            A function of time by which the force is multiplied in a motion.
+
+        Returns
+        -------
+        Scene
+            Itself.
         """
         load = Weight(g, None, amplitude)
         beams = range(len(self._beams)) if beam is None else [self._number(beam)]
         return self._put(loads=[(k, load) for k in beams])
 
-    def point_force(self, force, at, beam=None, amplitude=None):
-        """A dead force (2,) on the material point ``at`` of the stress-free body."""
+    def point_force(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
+                    amplitude: TimeFunction = None) -> Scene:
+        """A dead force on a material point.
+
+        Parameters
+        ----------
+        force
+            The force, shape (2,).
+        at
+            The point: its place (x, y) in the stress-free body.
+        beam
+            The beam, its name or its number, in a scene of several.
+        amplitude
+            A function of time by which the force is multiplied in a motion.
+
+        Returns
+        -------
+        Scene
+            Itself.
+        """
         return self._put(loads=[(self._number(beam), PointForce(force, at, None, amplitude))])
 
-    def traction(self, boundary, t, beam=None, amplitude=None):
+    def traction(self, boundary: Place, t: ArrayLike | Callable[[Array], Array],
+                 beam: WhichBeam = None, amplitude: TimeFunction = None) -> Scene:
         """A dead traction on a surface, per area of the stress-free body.
 
         Parameters
         ----------
         boundary
-            A place: the name of a boundary; a point (x, y) of the stress-free body, which means
-            the section of a node; a function of the points x that returns truth values; or
-            numbers of facets as an array of integers. See
-            :func:`skfem_ancf.places.facets_of`.
+            A place, as for :meth:`clamp`.
         t
-            Constant, shape (2,), or a function of the points x (2, ...) that returns (2, ...).
+            Force per area: constant, shape (2,), or a function of the points x (2, ...) that
+            returns (2, ...).
+        beam
+            The beam, its name or its number, in a scene of several.
+        amplitude
+            A function of time by which the force is multiplied in a motion.
+
+        Returns
+        -------
+        Scene
+            Itself.
         """
         return self._put(loads=[(self._number(beam), Traction(boundary, t, None, amplitude))])
 
-    def pressure(self, boundary, p, beam=None, amplitude=None):
-        """A pressure on a surface that stays normal to it as it deforms; positive pushes."""
+    def pressure(self, boundary: Place, p: float, beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> Scene:
+        """A pressure on a surface that stays normal to it as it deforms.
+
+        Parameters
+        ----------
+        boundary
+            A place, as for :meth:`clamp`.
+        p
+            Force per area of the deformed surface; positive pushes.
+        beam
+            The beam, its name or its number, in a scene of several.
+        amplitude
+            A function of time by which the force is multiplied in a motion.
+
+        Returns
+        -------
+        Scene
+            Itself.
+        """
         k = self._number(beam)
         load = Pressure(self._beams[k], boundary, require_finite_scalar("p", p), amplitude)
         return self._put(loads=[(k, load)])
 
-    def moment(self, boundary, M, beam=None, amplitude=None):
-        """A moment on an end section, counterclockwise, that turns with it."""
+    def moment(self, boundary: Place, M: float, beam: WhichBeam = None,
+               amplitude: TimeFunction = None) -> Scene:
+        """A moment on an end section, that turns with it.
+
+        Parameters
+        ----------
+        boundary
+            A place that is one section, as "right" or the point of a node.
+        M
+            The moment (force times length), counterclockwise.
+        beam
+            The beam, its name or its number, in a scene of several.
+        amplitude
+            A function of time by which the moment is multiplied in a motion.
+
+        Returns
+        -------
+        Scene
+            Itself.
+        """
         k = self._number(beam)
         self._beams[k].section_node(boundary)
         load = EndMoment(self._beams[k], boundary, require_finite_scalar("M", M), amplitude)
         return self._put(loads=[(k, load)])
 
-    def load(self, form, boundary=None, beam=None, amplitude=None):
-        """Any scikit-fem ``LinearForm``, as a dead load on the body or on a boundary of it."""
+    def load(self, form: LinearForm, boundary: Place | None = None, beam: WhichBeam = None,
+             amplitude: TimeFunction = None) -> Scene:
+        """Any scikit-fem ``LinearForm`` as a dead load.
+
+        Parameters
+        ----------
+        form
+            It is assembled once, on the stress-free body: it knows ``w.x``, ``w.h`` and, on a
+            boundary, ``w.n``.
+        boundary
+            A place, as for :meth:`clamp`; None for the body.
+        beam
+            The beam, its name or its number, in a scene of several.
+        amplitude
+            A function of time by which the force is multiplied in a motion.
+
+        Returns
+        -------
+        Scene
+            Itself.
+        """
         return self._put(loads=[(self._number(beam), FormLoad(form, boundary, None, amplitude))])
 
     # solution
 
     @property
-    def system(self):
+    def system(self) -> System:
         """The discrete equations, built when first asked for."""
         with self._lock:
             if self._system is None:
@@ -395,7 +539,7 @@ class Scene:
                 self._system = System(self._beams, self.loads, fixed, values, self.joints)
             return self._system
 
-    def with_beams(self, beams):
+    def with_beams(self, beams: Sequence[Beam]) -> Scene:
         """The same supports, loads, joints and velocities on other beams.
 
         Parameters
@@ -441,7 +585,7 @@ class Scene:
                           [(k, v) for k, (v, _) in self._velocities.items()])
 
     @_alone
-    def plan(self, kind="static"):
+    def plan(self, kind: str = "static") -> Plan:
         """What a solution computes, keeps constant or skips, and why; ``print`` it.
 
         Parameters
@@ -461,7 +605,7 @@ class Scene:
         return make_plan(self, kind)
 
     @_alone
-    def solve_linear(self):
+    def solve_linear(self) -> State:
         """The small-displacement solution: one assembly, one factorisation, one solve.
 
         Returns
@@ -488,7 +632,8 @@ class Scene:
         return State(system, du + du0, force=None, iterations=1, message="linear, one solve",
                      multipliers=multipliers, verdict=verdict_of_factors(system))
 
-    def solve_static(self, start=None, adapt=None, **options):
+    def solve_static(self, start: State | None = None, adapt: float | None = None,
+                     **options: Any) -> State:
         """The equilibrium under the full load.
 
         Parameters
@@ -546,7 +691,8 @@ class Scene:
                           stacklevel=3)
         warn_of(state, stacklevel=4)
 
-    def state(self, u=None, multipliers=None, load=1.0):
+    def state(self, u: ArrayLike | None = None, multipliers: ArrayLike | None = None,
+              load: float = 1.0) -> State:
         """A State of this scene with given coordinates: a start, or a shape to look at.
 
         Parameters
@@ -593,7 +739,7 @@ class Scene:
         return self._state(result)
 
     @_alone
-    def continuation(self, branch=None, **options):
+    def continuation(self, branch: CriticalPoint | None = None, **options: Any) -> Path:
         """The equilibrium path through limit and snap-back points, by arc length.
 
         Parameters
@@ -643,7 +789,8 @@ class Scene:
         except (ConvergenceError, Interrupted) as error:
             raise type(error)(str(error), Path(system, *error.state)) from None
 
-    def initial_velocity(self, v, beam=None):
+    def initial_velocity(self, v: ArrayLike | Callable[[Array], Array],
+                         beam: WhichBeam = None) -> Scene:
         """The velocity at the start of :meth:`integrate`.
 
         Parameters
@@ -651,6 +798,13 @@ class Scene:
         v
             Velocities of the coordinates, shape (beam.N,), or a function of the points x, shape
             (2, ...), of the stress-free body that returns velocities (2, ...).
+        beam
+            The beam, its name or its number, in a scene of several.
+
+        Returns
+        -------
+        Scene
+            Itself.
         """
         return self._put(velocities=[(self._number(beam), v)])
 
@@ -662,7 +816,9 @@ class Scene:
         return require_finite("v", v, (beam.N,))
 
     @_alone
-    def integrate(self, t_end, dt, scheme="energy-momentum", start=None, **options):
+    def integrate(self, t_end: float, dt: float | str,
+                  scheme: str | Scheme | type[Scheme] = "energy-momentum",
+                  start: State | None = None, **options: Any) -> History:
         """The motion from the stress-free state, or from a given one.
 
         Parameters
@@ -708,7 +864,8 @@ class Scene:
         return integrate(self.system, t_end, dt, get_scheme(scheme), u, velocity, start=start,
                          **options)
 
-    def resume(self, path, scheme=None, progress=None):
+    def resume(self, path: StrPath, scheme: str | Scheme | type[Scheme] | None = None,
+               progress: bool | None = None) -> History:
         """Go on with a motion from its checkpoint, to the end that it was given.
 
         On the same machine its numbers are those of a run that was not interrupted, bit for bit.
@@ -750,7 +907,7 @@ class Scene:
         return follow(*resume(self.system, path, scheme), progress)
 
     @_alone
-    def modes(self, k, state=None):
+    def modes(self, k: int, state: State | None = None) -> Modes:
         """The k lowest natural frequencies and their shapes.
 
         Parameters
@@ -790,7 +947,7 @@ class Scene:
         return eigen.modes(self.system, state, k)
 
     @_alone
-    def buckling(self, k=1):
+    def buckling(self, k: int = 1) -> Buckling:
         """The k lowest load factors at which the stress-free state buckles, and their shapes.
 
         Returns

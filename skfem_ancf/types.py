@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
@@ -22,6 +23,9 @@ WhichBeam: TypeAlias = "Beam | str | int | None"
 
 #: What a force is multiplied by: a function of time, or None.
 TimeFunction: TypeAlias = "Callable[[float], float] | None"
+
+#: The name of a file.
+StrPath: TypeAlias = "str | os.PathLike[str]"
 
 #: Points and weights of a rule on [0, 1].
 Rule: TypeAlias = tuple[Array, Array]

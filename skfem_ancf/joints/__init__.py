@@ -1,5 +1,9 @@
 """Joints: constraints with Lagrange multipliers. A new joint is one file and one line here."""
 
+from __future__ import annotations
+
+from typing import Any
+
 from ..errors import require_option
 from .base import Joint, bind_joint
 from .guides import OnCircle, OnLine
@@ -20,8 +24,15 @@ JOINTS = {
 }
 
 
-def get_joint(joint, **options):
+def get_joint(joint: str | Joint, **options: Any) -> Joint:
     """A :class:`Joint` from its name and options, or itself.
+
+    Parameters
+    ----------
+    joint
+        A name from :data:`JOINTS`, or a Joint.
+    **options
+        Arguments of the joint's class, where it is given by its name.
 
     Raises
     ------

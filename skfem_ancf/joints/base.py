@@ -1,5 +1,8 @@
 """What every joint shares: constraint equations on points and sections of beams."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 import numpy as np
@@ -9,28 +12,56 @@ from ..frozen import Sealable
 from ..loads import require_entries
 from ..places import is_point
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from ..scene import Scene
+    from ..types import Array, Place, WhichBeam
+
 
 class Vector:
     """A plane vector that depends affinely on the coordinates: ``start + u[dofs] @ weights``.
 
     The position of a material point and the direction of a section are such vectors.
+
+    Parameters
+    ----------
+    start
+        Its value in the stress-free state, shape (2,).
+    dofs
+        Numbers of the coordinates of both components, shape (2, n).
+    weights
+        Their weights, shape (n,).
     """
 
-    def __init__(self, start, dofs, weights):
+    def __init__(self, start: ArrayLike, dofs: Array, weights: Array) -> None:
         keep = np.abs(weights) > 1e-14 * np.max(np.abs(weights))
         self.start, self.dofs, self.weights = np.asarray(start), dofs[:, keep], weights[keep]
 
     def __call__(self, u):
         return self.start + u[self.dofs] @ self.weights
 
-    def row(self, direction, n):
-        """The derivative of ``direction . vector`` by the coordinates, as a dense row (n,)."""
+    def row(self, direction: ArrayLike, n: int) -> Array:
+        """The derivative of ``direction . vector`` by the coordinates, as a dense row (n,).
+
+        Parameters
+        ----------
+        direction
+            Shape (2,).
+        n
+            Number of all coordinates.
+
+        Returns
+        -------
+        ndarray
+            Shape (n,).
+        """
         out = np.zeros(n)
         np.add.at(out, self.dofs, np.outer(direction, self.weights))
         return out
 
 
-def rotation(angle):
+def rotation(angle: float) -> Array:
     """The matrix that turns by ``angle``."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s], [s, c]])
@@ -64,7 +95,7 @@ class Joint(Sealable):
     moving = False
     name = None
 
-    def bind(self, scene):
+    def bind(self, scene: Scene) -> None:
         """Find the points and sections in the scene's coordinates.
 
         Parameters
@@ -75,28 +106,95 @@ class Joint(Sealable):
         """
         raise NotImplementedError
 
-    def value(self, u, t):
-        """Phi, shape (m,)."""
+    def value(self, u: Array, t: float) -> Array:
+        """The equations Phi, which are zero where the joint is closed.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        t
+            Time; in statics the load factor.
+
+        Returns
+        -------
+        ndarray
+            Shape (m,).
+        """
         raise NotImplementedError
 
-    def jacobian(self, u, t):
-        """Derivative of Phi by u, shape (m, N)."""
+    def jacobian(self, u: Array, t: float) -> Array:
+        """Derivative of Phi by u.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        t
+            Time; in statics the load factor.
+
+        Returns
+        -------
+        ndarray
+            Shape (m, N).
+        """
         raise NotImplementedError
 
-    def curvature(self, u, t, multipliers):
-        """Rows, columns and values of sum_k multipliers[k] d^2 Phi_k / du^2, or None."""
+    def curvature(self, u: Array, t: float,
+                  multipliers: Array) -> tuple[Array, Array, Array] | None:
+        """The sum over k of multipliers[k] d^2 Phi_k / du^2.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        t
+            Time; in statics the load factor.
+        multipliers
+            Those of its equations, shape (m,).
+
+        Returns
+        -------
+        rows, columns, values
+            Shapes (k,); or None if the derivative of Phi is constant.
+        """
         return None
 
-    def offset(self, times, N):
-        """Phi of the stress-free state at each of the times, shape (n, m).
+    def offset(self, times: Array, N: int) -> Array:
+        """Phi of the stress-free state at several times.
 
         A joint that moves may override it to ask for its motion only.
+
+        Parameters
+        ----------
+        times
+            Times, shape (n,).
+        N
+            Number of the scene's coordinates.
+
+        Returns
+        -------
+        ndarray
+            Shape (n, m).
         """
         zero = np.zeros(N)
         return np.array([self.value(zero, t) for t in times])
 
-    def slope(self, times, N):
-        """The derivative of Phi in the stress-free state: columns (k,) and values (n, m, k)."""
+    def slope(self, times: Array, N: int) -> tuple[Array, Array]:
+        """The derivative of Phi in the stress-free state at several times.
+
+        Parameters
+        ----------
+        times
+            Times, shape (n,).
+        N
+            Number of the scene's coordinates.
+
+        Returns
+        -------
+        columns, values
+            Shapes (k,) and (n, m, k): of the coordinates on which it depends.
+        """
         zero = np.zeros(N)
         if self.moving and not self.constant:
             return np.arange(N), np.array([self.jacobian(zero, t) for t in times])
@@ -112,8 +210,15 @@ class Joint(Sealable):
         return f"<{' '.join(part for part in parts if part)}>"
 
 
-def bind_joint(joint, scene):
+def bind_joint(joint: Joint, scene: Scene) -> Joint:
     """A copy of a joint, bound to a scene and tried there: what it returns fits the scene.
+
+    Parameters
+    ----------
+    joint
+        A :class:`Joint`, as it was given.
+    scene
+        The :class:`~skfem_ancf.Scene`.
 
     Raises
     ------
@@ -148,14 +253,30 @@ def _try(joint, n):
         require_entries(f"curvature of {joint!r}", *found, n)
 
 
-def same_joint(a, b):
-    """True if both are the same joint, bound or not, to whatever mesh."""
+def same_joint(a: Joint, b: Joint) -> bool:
+    """True if both are the same joint, bound or not, to whatever mesh.
+
+    Parameters
+    ----------
+    a, b
+        Joints.
+    """
     return a is b or (getattr(a, "_key", None) is not None
                       and getattr(a, "_key", None) == getattr(b, "_key", None))
 
 
-def point(scene, beam, at):
-    """The position of the material point ``at`` of a beam, as a :class:`Vector`."""
+def point(scene: Scene, beam: WhichBeam, at: ArrayLike) -> Vector:
+    """The position of a material point, as a :class:`Vector`.
+
+    Parameters
+    ----------
+    scene
+        What :meth:`Joint.bind` was given.
+    beam
+        The beam, its name or its number.
+    at
+        The point: its place (x, y) in the stress-free body.
+    """
     beam = scene.beam(beam)
     e, X = beam.locate(at)
     dofs, weights = beam.probe(at)
@@ -163,8 +284,18 @@ def point(scene, beam, at):
     return Vector(start, dofs + scene.offset(beam), weights)
 
 
-def section(scene, beam, boundary):
-    """Axis position and direction of an end section, as two :class:`Vector`."""
+def section(scene: Scene, beam: WhichBeam, boundary: Place) -> tuple[Vector, Vector]:
+    """Axis position and direction of a section, as two :class:`Vector`.
+
+    Parameters
+    ----------
+    scene
+        What :meth:`Joint.bind` was given.
+    beam
+        The beam, its name or its number.
+    boundary
+        A place that is one section.
+    """
     beam = scene.beam(beam)
     node = beam.section_node(boundary)
     dofs, weights = beam.section_direction(node)
@@ -173,8 +304,16 @@ def section(scene, beam, boundary):
     return (Vector(beam.mesh.p[:, node], np.array([[first], [first + 1]]), np.ones(1)), direction)
 
 
-def pair(value, what):
-    """A point as a pair: given once for both beams, or once for each."""
+def pair(value: Any, what: str) -> tuple[Any, Any]:
+    """A point as a pair: given once for both beams, or once for each.
+
+    Parameters
+    ----------
+    value
+        One point, or a tuple or list of two.
+    what
+        What it is, for the message where it is None.
+    """
     if value is None:
         raise InputError(f"a joint needs {what}")
     if isinstance(value, (tuple, list)) and len(value) == 2 and not is_point(value):
@@ -182,15 +321,28 @@ def pair(value, what):
     return value, value
 
 
-def both(beams):
+def both(beams: Any) -> tuple[Any, Any]:
     """The two beams of a joint."""
     if not isinstance(beams, (tuple, list)) or len(beams) != 2:
         raise InputError(f"beams must be two beams, by Beam, name or number, got {shown(beams)}")
     return tuple(beams)
 
 
-def cross_terms(a, b, Q):
-    """Second derivative of ``a x (Q b)`` for two Vectors: rows, columns, values (symmetric)."""
+def cross_terms(a: Vector, b: Vector, Q: Array) -> tuple[Array, Array, Array]:
+    """Second derivative of ``a x (Q b)`` by the coordinates.
+
+    Parameters
+    ----------
+    a, b
+        Vectors.
+    Q
+        Matrix, shape (2, 2).
+
+    Returns
+    -------
+    rows, columns, values
+        Shapes (k,), of a symmetric matrix.
+    """
     J = np.array([[0.0, 1.0], [-1.0, 0.0]]) @ Q  # a x c = a^T [[0, 1], [-1, 0]] c
     values = np.einsum("ij,k,l->ikjl", J, a.weights, b.weights)
     rows = np.broadcast_to(a.dofs[:, :, None, None], values.shape).ravel()

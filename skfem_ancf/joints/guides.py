@@ -1,9 +1,19 @@
 """A point of a beam slides on a line or on a circle."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..errors import InputError, require_finite, require_label, require_positive, teaching
 from .base import Joint, point
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from ..scene import Scene
+    from ..types import Array, WhichBeam
 
 
 @teaching
@@ -12,19 +22,22 @@ class OnLine(Joint):
 
     Parameters
     ----------
-    beam
-        The beam, by Beam, name or number; None where there is only one.
     at
-        The material point.
+        The material point: its place (x, y) in the stress-free body.
     direction
         Direction of the line, shape (2,).
+    beam
+        The beam, by Beam, name or number; None where there is only one.
     through
-        A point of the line; the material point's stress-free place by default.
+        A point of the line, shape (2,); the material point's stress-free place by default.
+    name
+        What messages call the joint.
     """
 
     equations = ("force normal to the line",)
 
-    def __init__(self, at, direction, beam=None, through=None, name=None):
+    def __init__(self, at: ArrayLike, direction: ArrayLike, beam: WhichBeam = None,
+                 through: ArrayLike | None = None, name: str | None = None) -> None:
         d = require_finite("direction", direction, (2,))
         if not np.any(d):
             raise InputError("the direction of the line must not be zero")
@@ -32,15 +45,15 @@ class OnLine(Joint):
         self.through = None if through is None else require_finite("through", through, (2,))
         self.beam, self.at, self.name = beam, at, require_label("name", name)
 
-    def bind(self, scene):
+    def bind(self, scene: Scene) -> None:
         self.r = point(scene, self.beam, self.at)
         self.p = self.r.start if self.through is None else self.through
         self.rows = self.r.row(self.normal, scene.N)[None]
 
-    def value(self, u, t):
+    def value(self, u: Array, t: float) -> Array:
         return np.array([self.normal @ (self.r(u) - self.p)])
 
-    def jacobian(self, u, t):
+    def jacobian(self, u: Array, t: float) -> Array:
         return self.rows
 
 
@@ -50,25 +63,28 @@ class OnCircle(Joint):
 
     Parameters
     ----------
-    beam
-        The beam, by Beam, name or number; None where there is only one.
     at
-        The material point.
+        The material point: its place (x, y) in the stress-free body.
     center
         Centre of the circle, shape (2,).
+    beam
+        The beam, by Beam, name or number; None where there is only one.
     radius
         Its radius; the distance of the stress-free point by default.
+    name
+        What messages call the joint.
     """
 
     equations = ("force away from the centre",)
     constant = False
 
-    def __init__(self, at, center, beam=None, radius=None, name=None):
+    def __init__(self, at: ArrayLike, center: ArrayLike, beam: WhichBeam = None,
+                 radius: float | None = None, name: str | None = None) -> None:
         self.center = require_finite("center", center, (2,))
         self.radius = None if radius is None else require_positive("radius", radius)
         self.beam, self.at, self.name = beam, at, require_label("name", name)
 
-    def bind(self, scene):
+    def bind(self, scene: Scene) -> None:
         self.r, self.N = point(scene, self.beam, self.at), scene.N
         self.R = self.radius or require_positive(
             "the distance of the point from the centre", np.hypot(*(self.r.start - self.center)))
@@ -76,14 +92,14 @@ class OnCircle(Joint):
             raise InputError(f"radius = {self.R!r} is nothing beside the distance of the point "
                              "from the centre")
 
-    def value(self, u, t):
+    def value(self, u: Array, t: float) -> Array:
         d = self.r(u) - self.center
         return np.array([(d @ d - self.R**2) / (2 * self.R)])
 
-    def jacobian(self, u, t):
+    def jacobian(self, u: Array, t: float) -> Array:
         return self.r.row((self.r(u) - self.center) / self.R, self.N)[None]
 
-    def curvature(self, u, t, multipliers):
+    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
         w = self.r.weights
         values = np.broadcast_to(np.outer(w, w) * multipliers[0] / self.R, (2, len(w), len(w)))
         rows = np.broadcast_to(self.r.dofs[:, :, None], values.shape)

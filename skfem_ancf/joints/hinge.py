@@ -1,9 +1,19 @@
 """Two beams share a point and turn freely about it."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from ..errors import require_label, teaching
 from .base import Joint, both, pair, point
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..scene import Scene
+    from ..types import Array
 
 
 @teaching
@@ -15,7 +25,10 @@ class Hinge(Joint):
     beams
         Two beams, by Beam, name or number.
     at
-        The point, in the stress-free bodies; or one point for each beam, if they are apart.
+        The point, its place (x, y) in the stress-free bodies; or one point for each beam, if they
+        are apart.
+    name
+        What messages call the joint.
 
     References
     ----------
@@ -25,16 +38,16 @@ class Hinge(Joint):
 
     equations = ("force along x", "force along y")
 
-    def __init__(self, beams, at, name=None):
+    def __init__(self, beams: Sequence[Any], at: Any, name: str | None = None) -> None:
         self.beams, self.at = both(beams), pair(at, "the point at=")
         self.name = require_label("name", name)
 
-    def bind(self, scene):
+    def bind(self, scene: Scene) -> None:
         self.a, self.b = (point(scene, beam, at) for beam, at in zip(self.beams, self.at))
         self.rows = np.array([self.a.row(e, scene.N) - self.b.row(e, scene.N) for e in np.eye(2)])
 
-    def value(self, u, t):
+    def value(self, u: Array, t: float) -> Array:
         return self.a(u) - self.b(u)
 
-    def jacobian(self, u, t):
+    def jacobian(self, u: Array, t: float) -> Array:
         return self.rows

@@ -1,9 +1,17 @@
 """An end section keeps its direction as a plane, and may change its thickness."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..errors import require_label, teaching
 from .base import Joint, Vector
+
+if TYPE_CHECKING:
+    from ..scene import Scene
+    from ..types import Array, Place, WhichBeam
 
 
 @teaching
@@ -18,12 +26,14 @@ class PlaneSection(Joint):
         The end section, "left" or "right".
     beam
         The beam, by Beam, name or number; None where there is only one.
+    name
+        What messages call the joint.
     """
 
-    def __init__(self, at, beam=None, name=None):
+    def __init__(self, at: Place, beam: WhichBeam = None, name: str | None = None) -> None:
         self.at, self.beam, self.name = at, beam, require_label("name", name)
 
-    def bind(self, scene):
+    def bind(self, scene: Scene) -> None:
         beam = scene.beam(self.beam)
         node = beam.section_node(self.at)
         t = beam.mesh.p_X[:, node]
@@ -38,8 +48,8 @@ class PlaneSection(Joint):
         self.equations = tuple(f"moment on {beam.element.dofnames[k]}" for k in held)
         self.rows = np.array([v.row(direction, scene.N) for v in self.vectors])
 
-    def value(self, u, t):
+    def value(self, u: Array, t: float) -> Array:
         return np.array([self.direction @ v(u) for v in self.vectors])
 
-    def jacobian(self, u, t):
+    def jacobian(self, u: Array, t: float) -> Array:
         return self.rows

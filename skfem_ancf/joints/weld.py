@@ -1,10 +1,20 @@
 """Two end sections are welded at the angle they have in the stress-free state."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from ..errors import InputError, require_flag, require_label, shown, teaching
 from ..places import is_place
 from .base import Joint, both, cross_terms, rotation, section
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..scene import Scene
+    from ..types import Array
 
 
 @teaching
@@ -21,6 +31,8 @@ class Weld(Joint):
     at
         The section of each beam, as ``("right", "left")``; or one place for both, as the point of
         the axis ``(1, 0)`` that they share.
+    name
+        What messages call the joint.
     apart
         Allow that the sections are apart in the stress-free state: the weld draws them together.
 
@@ -33,7 +45,8 @@ class Weld(Joint):
     equations = ("force along x", "force along y", "moment")
     constant = False
 
-    def __init__(self, beams, at, name=None, apart=False):
+    def __init__(self, beams: Sequence[Any], at: Any, name: str | None = None,
+                 apart: bool = False) -> None:
         self.beams, self.name = both(beams), require_label("name", name)
         self.apart = require_flag("apart", apart)
         if is_place(at):
@@ -43,7 +56,7 @@ class Weld(Joint):
                              f"at=('right', 'left'), or one point of both axes, got {shown(at)}")
         self.at = tuple(at)
 
-    def bind(self, scene):
+    def bind(self, scene: Scene) -> None:
         (self.a, self.da), (self.b, self.db) = (
             section(scene, beam, at) for beam, at in zip(self.beams, self.at))
         gap = self.b.start - self.a.start
@@ -60,15 +73,15 @@ class Weld(Joint):
         self.N = scene.N
         self.rows = np.array([self.a.row(e, scene.N) - self.b.row(e, scene.N) for e in np.eye(2)])
 
-    def value(self, u, t):
+    def value(self, u: Array, t: float) -> Array:
         d, e = self.da(u), self.Q @ self.db(u)
         return np.append(self.a(u) - self.b(u), e[0] * d[1] - e[1] * d[0])
 
-    def jacobian(self, u, t):
+    def jacobian(self, u: Array, t: float) -> Array:
         d, e = self.da(u), self.Q @ self.db(u)
         turn = self.da.row((-e[1], e[0]), self.N) + self.db.row(self.Q.T @ (d[1], -d[0]), self.N)
         return np.vstack([self.rows, turn])
 
-    def curvature(self, u, t, multipliers):
+    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
         i, j, v = cross_terms(self.da, self.db, self.Q)
         return i, j, -multipliers[2] * v
