@@ -32,7 +32,7 @@ def as_lapack(A):
     return ab if A.top else ab[:A.width + 1]
 
 
-@primitive("band")
+@primitive("factors")
 def multiply(A, x, y):
     """y = A x."""
     n, k = len(x), A.width
@@ -48,7 +48,7 @@ def multiply(A, x, y):
             y[:n - d] += ab[A.top - d, d:] * x[d:]
 
 
-@primitive("band")
+@primitive("factors")
 def factorize(A):
     """Factorise in place; False if a pivot is lost.
 
@@ -61,11 +61,11 @@ def factorize(A):
         ab[:] = lu
         return bool(info == 0 and np.all(np.isfinite(lu[A.top])))
     c, info = lapack.dpbtrf(ab, lower=1)
-    if info == 0:
-        ab[0] = c[0] ** 2
-        ab[1:] = c[1:] / c[0]
-        return bool(np.all(np.isfinite(c[0])))
-    return _indefinite(A.flat.reshape(-1, A.ld), A.width)
+    if info != 0:
+        return _indefinite(A.flat.reshape(-1, A.ld), A.width)
+    before, ab[0] = ab[0].copy(), c[0] ** 2
+    ab[1:] = c[1:] / c[0]
+    return bool(np.all(ab[0] >= LOST * before))
 
 
 def _indefinite(columns, width):
@@ -87,7 +87,7 @@ def _indefinite(columns, width):
     return bool(np.all(np.isfinite(columns[:, 0])))
 
 
-@primitive("band")
+@primitive("factors")
 def solve(A, x):
     """Solve in place with the factors; x is (n,)."""
     ab = as_lapack(A)
@@ -96,6 +96,16 @@ def solve(A, x):
         return
     y = lapack.dtbtrs(ab, x, uplo="L", diag="U")[0].ravel() / ab[0]
     x[:] = lapack.dtbtrs(ab, y, uplo="L", trans="T", diag="U")[0].ravel()
+
+
+@primitive("factors")
+def dense_solve(A, b):
+    """Solve in place of b, a vector; False if A is singular."""
+    try:
+        b[:] = np.linalg.solve(A, b)
+    except np.linalg.LinAlgError:
+        return False
+    return True
 
 
 @source

@@ -6,6 +6,8 @@ import numpy as np
 from scipy.linalg import blas, eigh, lapack, lu_solve
 from scipy.sparse import coo_matrix
 
+from .band import Band, solve
+
 #: Relative correction of a border's solution above which sparse LU is used.
 INACCURATE = 1e-5
 #: Eigenvalue of a matrix of unit diagonal that is round-off.
@@ -64,6 +66,8 @@ class BandMatrix:
         self._ld = bandwidth + 2 if symmetric else 3 * bandwidth + 1
         self._diagonal = 0 if symmetric else 2 * bandwidth
         self._flat = np.zeros(n * self._ld)
+        #: What texts take: a view of the entries, and room for their factors.
+        self.band = Band(self._flat, np.zeros(n, np.int64), self._ld, bandwidth, self._diagonal)
         self._factor = None
         self.positive_definite = None
 
@@ -188,12 +192,16 @@ class BandMatrix:
             self.factorize()
         if self._factor[0] == "pb":
             return lapack.dpbtrs(self._factor[1], b, lower=1)[0]
+        if self._factor[0] == "ldl":
+            x = np.array(b, dtype=float)
+            solve(self.band, x)
+            return x
         return lapack.dgbtrs(self._factor[1], self.bandwidth, self.bandwidth, b,
                              self._factor[2])[0]
 
     def take_factors(self):
-        """Note that the entries have been replaced by the factors L D L^T, D on the diagonal."""
-        self._factor = ("ldl",)
+        """Note that the entries have been replaced by factors, of :mod:`skfem_ancf.band`."""
+        self._factor = ("ldl",) if self.symmetric else ("gb", self.ab, self.band.pivots)
 
     def to_cholesky(self):
         """Turn factors of :meth:`take_factors` with positive D into those of Cholesky."""

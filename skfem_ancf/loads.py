@@ -74,6 +74,8 @@ class Load(Sealable):
         The force does not depend on the displacement.
     symmetric : bool
         The derivative of the force is symmetric: the load has a potential.
+    linear : bool
+        The force is linear in the displacement, but for a constant: it is assembled once.
 
     Examples
     --------
@@ -108,6 +110,8 @@ class Load(Sealable):
 
     constant = True
     symmetric = True
+    linear = False
+    turning = False
 
     def __init__(self, beam: WhichBeam = None, amplitude: TimeFunction = None) -> None:
         self.beam, self.amplitude = beam, amplitude
@@ -446,6 +450,7 @@ class Pressure(Load):
 
     constant = False
     symmetric = False
+    linear = True
 
     def __init__(self, beam: Beam, boundary: Place, p: float,
                  amplitude: TimeFunction = None) -> None:
@@ -495,6 +500,7 @@ class EndMoment(Load):
     """
 
     constant = False
+    turning = True
 
     def __init__(self, beam: Beam, boundary: Place | int, M: float,
                  amplitude: TimeFunction = None) -> None:

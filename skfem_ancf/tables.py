@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .band import mirror
 from .kernels.moments import MomentPack, add_moment_stiffness, add_moments
 from .own import own_force, own_joints, own_load_stiffness
 from .source import lanes, primitive, source
@@ -144,10 +145,14 @@ def external_force(loads, factors, t, scale, u, out):
 
 @source
 def add_load_stiffness(loads, factors, t, scale, u, A):
-    """Subtract the derivative of :func:`external_force` from a band matrix."""
+    """Subtract the derivative of :func:`external_force` from a band matrix.
+
+    Of the matrix the lower half is given; what is symmetric comes first, then the upper half.
+    """
     n = loads.vectors.shape[0]
     add_moment_stiffness(loads.moments, factors[n:n + loads.moments.M.size], u, A.flat[A.top:],
-                         A.ld, A.top)
+                         A.ld)
+    mirror(A)
     if loads.rows.size > 0:
         at = loads.columns * A.ld + A.top + loads.rows - loads.columns
         one = -np.ones(1)

@@ -1,0 +1,192 @@
+"""A border about a band matrix: multipliers, springs, and entries outside of the band.
+
+``[A, J^T; J, 0] [x; l] = [b; c]`` with ``A = K + P^T S P``, of which K is in the band and the rows
+of P pick a few coordinates: those held by springs before the band is factorised and let go again,
+because a beam that only joints hold has a singular matrix of its own, and those that joints couple
+outside of the band. With ``Z = K^-1 [P^T S, J^T]``, by Sherman, Morrison and Woodbury::
+
+    H y = [P K^-1 b; J K^-1 b - c],  H = [1, 0; 0, 0] + [P; J] Z,  x = K^-1 b - Z y
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .band import Band, copy, dense_solve, diagonal, factorize, multiply, solve, weighted
+from .source import lanes, source
+from .tables import add_products
+
+
+class Border(NamedTuple):
+    """Where a scene has what lies outside of its band.
+
+    Attributes
+    ----------
+    picked, springs
+        Coordinates picked; the first of them, so many, are held by springs.
+    inside_at, inside_of, outside_at, outside_of
+        Where the second derivatives of joints go: their places in the band and in S, and which
+        of :class:`~skfem_ancf.tables.JointTables` they are.
+    wide
+        1 if sparse factors are used in its place.
+    """
+
+    picked: np.ndarray
+    springs: int
+    inside_at: np.ndarray
+    inside_of: np.ndarray
+    outside_at: np.ndarray
+    outside_of: np.ndarray
+    wide: int
+
+
+class Factors(NamedTuple):
+    """A matrix with its border, factorised: the matrix before, its factors, and the border."""
+
+    before: Band
+    after: Band
+    J: np.ndarray
+    S: np.ndarray
+    Z: np.ndarray
+    H: np.ndarray
+    scale: np.ndarray
+
+
+@source
+def new_factors(border, A, m, N):
+    """Room for the factors of A with m multipliers; none where there is no border to make."""
+    if border.wide > 0 or m == 0:
+        m, N, k = 0, 0, 0
+    else:
+        k = border.picked.size
+    room = A.flat.size if m > 0 else 0
+    before = Band(np.empty(room), np.empty(0, np.int64), A.ld, A.width, A.top)
+    return Factors(before, A, np.zeros((m, N)), np.zeros((k, k)), np.zeros((k + m, N)),
+                   np.zeros((k + m, k + m)), np.ones(m))
+
+
+@source
+def add_curvature(joints, border, multipliers, free, A, S):
+    """Add the joints' second derivative and the springs to the band, and to S what is not in it."""
+    flat, size, value = S.reshape(S.size), np.empty(free.size), np.empty(joints.hk.size)
+    for i in lanes(flat.size):
+        flat[i] = 0.0
+    for a in lanes(value.size):
+        value[a] = (multipliers[joints.hk[a]] * joints.hv[a] * free[joints.hi[a]]
+                    * free[joints.hj[a]])
+    add_products(A.flat, border.inside_at, np.ones(border.inside_at.size), value,
+                 border.inside_of)
+    add_products(flat, border.outside_at, np.ones(border.outside_at.size), value,
+                 border.outside_of)
+    diagonal(A, size)
+    mean = np.mean(np.abs(size))
+    for k in range(border.springs):
+        at = border.picked[k]
+        stiffness = abs(size[at])
+        if stiffness == 0.0:
+            stiffness = mean
+        A.flat[at * A.ld + A.top] += stiffness
+        S[k, k] = -stiffness
+
+
+@source
+def solve_rows(A, J, free, Y):
+    """Y[k] = A^-1 J[k] at free coordinates, with the factors of A."""
+    for k in range(J.shape[0]):
+        row, out = J[k], Y[k]
+        for i in lanes(free.size):
+            out[i] = row[i] * free[i]
+        solve(A, out)
+
+
+@source
+def factorize_bordered(f, border, free):
+    """Factorise what :func:`add_curvature` has completed; False if a pivot is lost.
+
+    ``f.J`` must be zero at fixed coordinates.
+    """
+    J, Z, H, S = f.J, f.Z, f.H, f.S
+    k, m, N = S.shape[0], J.shape[0], free.size
+    copy(f.after.flat, f.before.flat)
+    if not factorize(f.after):
+        return False
+    W = np.zeros((k, N))
+    for a in range(k):
+        W[a, border.picked[a]] = 1.0
+        solve(f.after, W[a])
+    solve_rows(f.after, J, free, Z[k:])
+    for b in range(m):
+        size, row = np.dot(J[b], Z[k + b]), Z[k + b]
+        f.scale[b] = 1.0 / np.sqrt(abs(size)) if size != 0.0 else 1.0
+        for i in lanes(N):
+            row[i] *= f.scale[b]
+    for a in range(k):
+        row = Z[a]
+        for i in lanes(N):
+            row[i] = 0.0
+        for c in range(k):
+            if S[c, a] != 0.0:
+                other = W[c]
+                for i in lanes(N):
+                    row[i] += S[c, a] * other[i]
+    for b in range(k + m):
+        for a in range(k):
+            H[a, b] = Z[b, border.picked[a]]
+        for a in range(m):
+            H[k + a, b] = f.scale[a] * np.dot(J[a], Z[b])
+    for a in range(k):
+        H[a, a] += 1.0
+    return True
+
+
+@source
+def _once(f, border, x, c, dm):
+    """Solve in place of x for x and the multipliers; False if H is singular."""
+    k, m = f.S.shape[0], c.size
+    y, H = np.empty(k + m), f.H.copy()
+    solve(f.after, x)
+    for a in range(k):
+        y[a] = x[border.picked[a]]
+    for b in range(m):
+        y[k + b] = f.scale[b] * (np.dot(f.J[b], x) - c[b])
+    if not dense_solve(H, y):
+        return False
+    for a in range(k + m):
+        row = f.Z[a]
+        for i in lanes(x.size):
+            x[i] -= row[i] * y[a]
+    for b in range(m):
+        dm[b] = f.scale[b] * y[k + b]
+    return True
+
+
+@source
+def solve_bordered(f, border, b, c, x, dm):
+    """x and dm with one refinement; returns its size relative to x, or -1 if H is singular."""
+    N, m, picked = x.size, c.size, border.picked
+    r, rc, dl, weight = np.empty(N), np.empty(m), np.empty(m), np.empty(N)
+    copy(b, x)
+    if not _once(f, border, x, c, dm):
+        return -1.0
+    multiply(f.before, x, r)
+    for i in lanes(N):
+        r[i] = b[i] - r[i]
+    for a in range(picked.size):
+        for e in range(picked.size):
+            r[picked[a]] -= f.S[a, e] * x[picked[e]]
+    for a in range(m):
+        row = f.J[a]
+        for i in lanes(N):
+            r[i] -= row[i] * dm[a]
+        rc[a] = c[a] - np.dot(row, x)
+    if not _once(f, border, r, rc, dl):
+        return -1.0
+    diagonal(f.before, weight)
+    for i in lanes(N):
+        weight[i] = np.abs(weight[i])
+    size, error = weighted(x, x, weight), weighted(r, r, weight)
+    for i in lanes(N):
+        x[i] += r[i]
+    for a in range(m):
+        dm[a] += dl[a]
+    return np.sqrt(error / size) if size > 0.0 else 0.0

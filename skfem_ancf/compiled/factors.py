@@ -1,0 +1,132 @@
+"""Factors of band matrices and of small dense ones: compiled, for what LAPACK does elsewhere."""
+
+import numpy as np
+
+from ..band import LOST
+from .twin import jit
+
+
+@jit
+def multiply(A, x, y):
+    """y = A x."""
+    n, flat, ld = x.size, A.flat[A.top:], A.ld
+    for i in range(n):
+        y[i] = 0.0
+    for j in range(n):
+        at = j * ld
+        y[j] += flat[at] * x[j]
+        for k in range(1, min(A.width, n - 1 - j) + 1):
+            y[j + k] += flat[at + k] * x[j]
+            y[j] += (flat[at + k * ld - k] if A.top > 0 else flat[at + k]) * x[j + k]
+
+
+@jit
+def factorize(A):
+    """L D L^T, or L U with exchanges of rows, in place; False if a pivot is lost."""
+    if A.top > 0:
+        return _exchanging(A)
+    flat, ld, n = A.flat, A.ld, A.flat.size // A.ld
+    for j in range(n):
+        at = j * ld
+        d = flat[at]
+        if not abs(d) > 0.0 or not abs(d) < np.inf:
+            return False
+        m = min(A.width, n - 1 - j)
+        inverse = 1.0 / d
+        for k in range(1, m + 1):
+            c = flat[at + k]
+            if c != 0.0:
+                c *= inverse
+                other = (j + k) * ld - k
+                before = flat[other + k]
+                for i in range(k, m + 1):
+                    flat[other + i] -= c * flat[at + i]
+                if abs(flat[other + k]) < LOST * abs(before):
+                    return False
+        for k in range(1, m + 1):
+            flat[at + k] *= inverse
+    return True
+
+
+@jit
+def _exchanging(A):
+    """As LAPACK's gbtf2."""
+    ld, top, width = A.ld, A.top, A.width
+    n = A.flat.size // ld
+    flat, last = A.flat, 0
+    for j in range(n):
+        at, m, p = j * ld + top, min(width, n - 1 - j), 0
+        for i in range(1, m + 1):
+            if abs(flat[at + i]) > abs(flat[at + p]):
+                p = i
+        A.pivots[j] = j + p
+        if not abs(flat[at + p]) > 0.0 or not abs(flat[at + p]) < np.inf:
+            return False
+        last = max(last, min(j + width + p, n - 1))
+        for c in range(j, last + 1):
+            row = c * ld + top + j - c
+            if p != 0:
+                flat[row], flat[row + p] = flat[row + p], flat[row]
+        for i in range(1, m + 1):
+            flat[at + i] /= flat[at]
+        for c in range(j + 1, last + 1):
+            row = c * ld + top + j - c
+            x = flat[row]
+            if x != 0.0:
+                for i in range(1, m + 1):
+                    flat[row + i] -= flat[at + i] * x
+    return True
+
+
+@jit
+def solve(A, x):
+    """Solve in place with the factors."""
+    flat, ld, top, n = A.flat, A.ld, A.top, x.size
+    for j in range(n):
+        if top > 0:
+            p = A.pivots[j]
+            x[j], x[p] = x[p], x[j]
+        at, xj = j * ld + top, x[j]
+        for k in range(1, min(A.width, n - 1 - j) + 1):
+            x[j + k] -= flat[at + k] * xj
+    if top > 0:
+        for j in range(n - 1, -1, -1):
+            at = j * ld + top
+            x[j] /= flat[at]
+            for k in range(1, min(top, j) + 1):
+                x[j - k] -= flat[at - k] * x[j]
+        return
+    for j in range(n - 1, -1, -1):
+        at = j * ld
+        s = x[j] / flat[at]
+        for k in range(1, min(A.width, n - 1 - j) + 1):
+            s -= flat[at + k] * x[j + k]
+        x[j] = s
+
+
+@jit
+def dense_solve(A, b):
+    """Solve in place, by elimination with pivots; False if A is singular."""
+    n = b.size
+    for j in range(n):
+        p = j
+        for i in range(j + 1, n):
+            if abs(A[i, j]) > abs(A[p, j]):
+                p = i
+        if not abs(A[p, j]) > 0.0:
+            return False
+        if p != j:
+            for k in range(n):
+                A[j, k], A[p, k] = A[p, k], A[j, k]
+            b[j], b[p] = b[p], b[j]
+        for i in range(j + 1, n):
+            c = A[i, j] / A[j, j]
+            if c != 0.0:
+                for k in range(j, n):
+                    A[i, k] -= c * A[j, k]
+                b[i] -= c * b[j]
+    for j in range(n - 1, -1, -1):
+        for k in range(j + 1, n):
+            b[j] -= A[j, k] * b[k]
+        b[j] /= A[j, j]
+    return True

@@ -1,0 +1,208 @@
+"""The equations of a scene as tables that texts take."""
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from .band import Band
+from .body import body_of, flat_body, stress_size
+from .border import Border
+from .kernels.moments import MomentPack
+from .own import handle_of
+from .sampling import sample
+from .tables import JointTables, LoadTables
+
+
+class Equations(NamedTuple):
+    """A scene for texts.
+
+    Attributes
+    ----------
+    body
+        A :class:`~skfem_ancf.body.Body`; a ``FlatBody`` for compiled code.
+    loads, joints, border
+        :class:`~skfem_ancf.tables.LoadTables`, :class:`~skfem_ancf.tables.JointTables`,
+        :class:`~skfem_ancf.border.Border`.
+    fixed, free
+        Fixed coordinates, and for each one 1 or 0.
+    K
+        The band for the tangent, work space.
+    """
+
+    body: tuple
+    loads: LoadTables
+    joints: JointTables
+    fixed: np.ndarray
+    free: np.ndarray
+    K: Band
+    border: Border
+
+
+class Tables:
+    """The tables of a system, and what of them depends on time.
+
+    Attributes
+    ----------
+    plain, flat : Equations
+        For the plain texts, and for compiled ones.
+    motion_varies, turns : bool
+        A joint moves with time; its derivative in the stress-free state does.
+    """
+
+    def __init__(self, system):
+        self.system = system
+        self._own_handle = None
+        self._loads = [[], [], [], []]  # of the constant kind, moments, linear ones, others
+        for load in system.loads:
+            self._loads[_kind(load)].append(load)
+        self.motion_varies = any(joint.moving for joint in system.joints)
+        self.turns = any(joint.moving and not joint.constant for joint in system.joints)
+        joints = self._joints()
+        self.plain = Equations(body_of(system.beams, system.slices), self._load_tables(), joints,
+                               system.fixed, system.mask, system.K.band,
+                               self._border(joints))
+
+    @cached_property
+    def flat(self):
+        return self.plain._replace(body=flat_body(self.plain.body))
+
+    @property
+    def handle(self):
+        """What texts know the system by."""
+        if self._own_handle is None:
+            self._own_handle = handle_of(self.system)
+        return self._own_handle
+
+    @property
+    def stresses(self):
+        """Room for the stresses of all beams."""
+        return np.zeros(stress_size(self.plain.body))
+
+    # loads
+
+    def _load_tables(self):
+        s = self.system
+        steady, turning, linear, others = self._loads
+        self._rows = [load for load in steady if load.amplitude is not None]
+        vectors = np.zeros((1 + len(self._rows) + len(linear), s.N))
+        for load in steady:
+            row = 0 if load.amplitude is None else 1 + self._rows.index(load)
+            vectors[row, s.of(load)] += load.force(None)
+        entries, first = [[np.zeros(0)] * 4], len(vectors) + len(turning)
+        for k, load in enumerate(linear):
+            zero, at = np.zeros(load.beam.N), s.of(load)
+            vectors[1 + len(self._rows) + k, at] = load.force(zero)
+            i, j, v = load.stiffness(zero)
+            entries.append((at.start + i, at.start + j, v, np.full(len(v), first + k)))
+        i, j, v, k = (np.concatenate(column) for column in zip(*entries))
+        return LoadTables(vectors, self._moments(turning), *(x.astype(np.int64) for x in (i, j)),
+                          v.astype(float), k.astype(np.int64), self.handle if others else 0)
+
+    def _moments(self, turning):
+        n, most = len(turning), max((load.dofs.shape[1] for load in turning), default=0)
+        dofs, c = np.zeros((n, 2, most), dtype=np.int64), np.zeros((n, most))
+        start = np.zeros((n, 2))
+        for k, load in enumerate(turning):
+            size, first = load.dofs.shape[1], self.system.of(load).start
+            dofs[k] = first + load.dofs[:, :1]  # what is left over has no weight
+            dofs[k, :, :size], c[k, :size] = first + load.dofs, load.c
+            start[k] = load.direction(np.zeros(load.beam.N))
+        return MomentPack(dofs, c, start, np.array([load.M for load in turning], dtype=float))
+
+    @property
+    def own_loads(self):
+        """Loads that are no tables."""
+        return self._loads[3]
+
+    def factors(self, times):
+        """Factors of the loads, shape (n, k); of one row where none has an amplitude."""
+        _, turning, linear, _ = self._loads
+        columns = [None, *self._rows, *linear, *turning, *linear]
+        if all(load is None or load.amplitude is None for load in columns):
+            return np.ones((1, len(columns)))
+        return np.stack([np.ones(len(times)) if load is None or load.amplitude is None else
+                         sample(load.amplitude, times).reshape(len(times)) for load in columns],
+                        axis=1)
+
+    def static_factors(self, scale):
+        """Factors of the loads in statics, where an amplitude counts as one; shape (k,)."""
+        loads = self.plain.loads
+        return np.full(len(loads.vectors) + len(loads.moments.M) + len(self._loads[2]), scale)
+
+    # joints
+
+    def _joints(self):
+        s, none = self.system, np.zeros(0)
+        second, first, at = [[none] * 4], [[none] * 2], 0
+        zero, probe = np.zeros(s.N), np.zeros(1)
+        for joint in s.joints:
+            rows = np.arange(at, at + len(joint.equations))
+            for row, unit in zip(rows, np.eye(len(rows))):
+                found = joint.curvature(zero, 0.0, unit)
+                if found is not None:
+                    i, j, v = (np.asarray(x) for x in found)
+                    keep = v != 0
+                    second.append((np.full(keep.sum(), row), i[keep], j[keep], v[keep]))
+            columns = joint.slope(probe, s.N)[0]
+            first.append((np.repeat(rows, len(columns)), np.tile(columns, len(rows))))
+            at += len(rows)
+        k, i, j, v = (np.concatenate(x) for x in zip(*second))
+        gk, gi = (np.concatenate(x) for x in zip(*first))
+        tables = JointTables(*(x.astype(np.int64) for x in (k, i, j)), v.astype(float),
+                             gk.astype(np.int64), gi.astype(np.int64), 0)
+        return tables if self._is_quadratic(tables) else tables._replace(own=self.handle)
+
+    def _is_quadratic(self, tables):
+        """True if the tables give Phi and its derivative: joints of others may not be quadratic."""
+        s = self.system
+        if not s.joints:
+            return True
+        k, i, j, v, gk, gi, _ = tables
+        t, start = 0.0, np.zeros(1)
+        c, g = self.offsets(start)[0], self.slopes(start)[0]
+        for u in 0.1 * np.random.default_rng(0).standard_normal((2, s.N)):
+            J = np.zeros((s.m, s.N))
+            np.add.at(J, (gk, gi), g)
+            slope = J.copy()
+            np.add.at(J, (k, i), v * u[j])
+            phi = c + 0.5 * (J + slope) @ u
+            if not (np.allclose(phi, s.constraint(u, t), rtol=0, atol=1e-9 * s.size)
+                    and np.allclose(J, s.full_jacobian(u, t), rtol=0,
+                                    atol=1e-9 * np.abs(J).max())):
+                return False
+        return True
+
+    def offsets(self, times):
+        """c of all joints at the times, shape (n, m)."""
+        s = self.system
+        return np.hstack([np.zeros((len(times), 0))] + [j.offset(times, s.N) for j in s.joints])
+
+    def slopes(self, times):
+        """g of all joints at the times, shape (n, k)."""
+        s = self.system
+        return np.hstack([np.zeros((len(times), 0))] + [
+            j.slope(times, s.N)[1].reshape(len(times), -1) for j in s.joints])
+
+    def _border(self, joints):
+        s, none = self.system, np.zeros(0, dtype=np.int64)
+        if not s.joints or not s.bordered or joints.own:
+            return Border(none, 0, none, none, none, none, int(bool(s.joints)))
+        i, j, ns = joints.hi, joints.hj, len(s.springs)
+        outside = np.abs(i - j) > s.bandwidth
+        far = np.unique(np.append(i[outside], j[outside]))
+        picked = np.append(s.springs.astype(np.int64), far)
+        out, = np.nonzero(outside)
+        stored, = np.nonzero(~outside & ((i >= j) | (not s.symmetric)))
+        row, column = (ns + np.searchsorted(far, x[out]) for x in (i, j))
+        return Border(picked, ns, s.K._position(i[stored], j[stored]), stored,
+                      row * len(picked) + column, out, 0)
+
+
+def _kind(load):
+    """Number of the kind of table that a load goes to."""
+    if load.constant:
+        return 0
+    if load.turning:
+        return 1
+    return 2 if load.linear else 3

@@ -1,0 +1,228 @@
+"""The iteration to equilibrium: Newton's method, mixed or not, as a text."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..band import copy, diagonal, factorize, fix, multiply, solve, weighted
+from ..body import body_carry, body_force, body_tangent
+from ..border import add_curvature, factorize_bordered, new_factors, solve_bordered
+from ..own import own_solve
+from ..source import lanes, source
+from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
+                      external_force, joint_directions)
+
+#: How an iteration ends.
+CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
+
+
+class Target(NamedTuple):
+    """The equilibrium asked for.
+
+    Attributes
+    ----------
+    factors, scale
+        Of the tables of loads, and of loads of one's own.
+    at, c, g
+        Time of the joints, and their tables at it.
+    gap
+        The force that may be missing, shape (N,).
+    prescribed
+        By how much the fixed coordinates have to change.
+    """
+
+    factors: np.ndarray
+    scale: float
+    at: float
+    c: np.ndarray
+    g: np.ndarray
+    gap: np.ndarray
+    prescribed: np.ndarray
+
+
+class Rules(NamedTuple):
+    """When it has converged.
+
+    Attributes
+    ----------
+    mixed
+        1 if the geometric part takes carried stresses.
+    iterations
+        At most.
+    tol, floor, force_floor
+        Tolerance of a correction, and round-off of its work and of the residual.
+    closed, inaccurate
+        What joints may be open by, and a border's solution be wrong by, relative.
+    solver
+        Handle of what solves the linear systems, see :mod:`skfem_ancf.own`; 0 for the band.
+    """
+
+    mixed: int
+    iterations: int
+    tol: float
+    floor: float
+    force_floor: float
+    closed: float
+    inaccurate: float
+    solver: int
+
+
+class Unknowns(NamedTuple):
+    """What is found: displacement, multipliers, internal force, stresses and those carried."""
+
+    u: np.ndarray
+    multipliers: np.ndarray
+    force: np.ndarray
+    stresses: np.ndarray
+    carried: np.ndarray
+
+
+class Work(NamedTuple):
+    """Work arrays: residual, correction, 1 / diagonal, loads, joints' opening and correction."""
+
+    R: np.ndarray
+    du: np.ndarray
+    scale: np.ndarray
+    load: np.ndarray
+    push: np.ndarray
+    phi: np.ndarray
+    dm: np.ndarray
+
+
+@source
+def equilibrium(e, target, rules, x, record):
+    """Iterate to equilibrium from x, in place.
+
+    Parameters
+    ----------
+    e
+        :class:`~skfem_ancf.equations.Equations`.
+    target, rules, x
+        As above.
+    record
+        Takes the residuals of each iteration, shape (iterations + 1, 2).
+
+    Returns
+    -------
+    status, number
+        How it ends, and the number of linear systems solved.
+    """
+    N, m = x.u.size, x.multipliers.size
+    w = Work(np.empty(N), np.empty(N), np.empty(N), np.empty(N), np.empty(N), np.zeros(m),
+             np.zeros(m))
+    factors = new_factors(e.border, e.K, m, N)
+    work = before = reference = np.inf
+    quiet, moving = False, np.any(target.prescribed != 0.0)
+    for k in range(rules.iterations + 1):
+        # after the last correction only the residual is wanted, not the tangent
+        part = min(1.0, work / before) if k > 1 else 1.0
+        last = (k > 1 or (k > 0 and quiet)) and work * part <= rules.tol * reference + rules.floor
+        if last:
+            body_force(e.body, x.u, x.force)
+        else:
+            _tangent(e, target, rules, x, w, k)
+        opening = _residual(e, target, x, w)
+        rho = np.sqrt(weighted(w.R, w.R, w.scale))
+        size = np.sqrt(max(weighted(x.force, x.force, w.scale), weighted(w.load, w.load, w.scale)))
+        if not rho < 1e300:
+            return NOT_FINITE, k
+        record[k, 0] = rho / size if size > 0.0 else 0.0
+        if k == 0:
+            small = rho <= 1e-3 * rules.tol * size
+            # no more than round-off: of a slender beam that may be a load, the correction tells
+            quiet = rho <= rules.force_floor
+        else:
+            small = last and rho <= rules.tol * size + rules.force_floor
+        if small and not moving and opening <= rules.closed:
+            return CONVERGED, k
+        if k == rules.iterations:
+            break
+        if last:
+            _tangent(e, target, rules, x, w, k)
+        before, work = work, _correction(e, target, rules, x, w, factors, moving)
+        if not (0.0 <= work < 1e300):
+            return SINGULAR, k
+        moving = False
+        if rules.mixed > 0:
+            body_carry(e.body, x.u, w.du, x.stresses, x.carried)
+        for i in lanes(N):
+            x.u[i] += w.du[i]
+        for i in lanes(m):
+            x.multipliers[i] += w.dm[i]
+        reference = np.sqrt(max(abs(np.dot(x.force, x.u)), abs(np.dot(w.load, x.u))))
+        record[k, 1] = work / reference if reference > 0.0 else 0.0
+    return NOT_CONVERGED, rules.iterations
+
+
+@source
+def _tangent(e, target, rules, x, w, k):
+    """The internal force, the tangent, and 1 / its diagonal."""
+    body_tangent(e.body, x.u, x.force, x.carried, rules.mixed > 0 and k > 0, x.stresses, e.K)
+    add_load_stiffness(e.loads, target.factors, np.nan, target.scale, x.u, e.K)
+    diagonal(e.K, w.scale)
+    for i in lanes(x.u.size):
+        w.scale[i] = 1.0 / np.abs(w.scale[i])
+
+
+@source
+def _residual(e, target, x, w):
+    """The residual at free coordinates; returns how far joints are open."""
+    external_force(e.loads, target.factors, np.nan, target.scale, x.u, w.load)
+    for i in lanes(x.u.size):
+        w.push[i] = 0.0
+    opening = 0.0
+    if w.phi.size > 0:
+        constraint(e.joints, target.c, target.g, target.at, x.u, w.phi)
+        add_joint_force(e.joints, target.g, target.at, x.u, x.multipliers, w.push)
+        opening = np.max(np.abs(w.phi))
+    for i in lanes(x.u.size):
+        w.R[i] = (w.load[i] - x.force[i] - target.gap[i] - w.push[i]) * e.free[i]
+    return opening
+
+
+@source
+def _correction(e, target, rules, x, w, f, moving):
+    """The correction into w; returns the root of its work, negative if there is none."""
+    N, m = x.u.size, w.phi.size
+    for i in lanes(N):
+        w.push[i] = 0.0
+    if moving:  # R = R - K du of the fixed coordinates
+        for k in lanes(e.fixed.size):
+            w.push[e.fixed[k]] = target.prescribed[k]
+        multiply(e.K, w.push, w.du)
+        for i in lanes(N):
+            w.R[i] = (w.R[i] - w.du[i]) * e.free[i]
+        if m > 0:
+            add_constraint_rate(e.joints, target.g, target.at, x.u, w.push, w.phi)
+    for k in lanes(m):
+        w.phi[k] = -w.phi[k]
+    fix(e.K, e.free)
+    if not _solved(e, target, rules, x, w, f):
+        return -1.0
+    work = np.sqrt(abs(np.dot(w.R, w.du)) + abs(np.dot(w.phi, w.dm)))
+    for i in lanes(N):
+        w.du[i] += w.push[i]
+    return work
+
+
+@source
+def _solved(e, target, rules, x, w, f):
+    """Solve for the correction; False if the matrix is singular."""
+    if rules.solver > 0:
+        return own_solve(rules.solver, target.at, x.u, x.multipliers, w.R, w.phi, w.du, w.dm)
+    if w.phi.size == 0:
+        copy(w.R, w.du)
+        if not factorize(e.K):
+            return False
+        solve(e.K, w.du)
+        return True
+    joint_directions(e.joints, target.g, target.at, x.u, f.J)
+    for k in range(w.phi.size):
+        row = f.J[k]
+        for i in lanes(row.size):
+            row[i] *= e.free[i]
+    add_curvature(e.joints, e.border, x.multipliers, e.free, e.K, f.S)
+    if not factorize_bordered(f, e.border, e.free):
+        return False
+    error = solve_bordered(f, e.border, w.R, w.phi, w.du, w.dm)
+    return 0.0 <= error and error <= rules.inaccurate
