@@ -12,21 +12,9 @@ from skfem.element import ElementVector
 from . import forms
 from .cable import CableKernel
 from .elements import ElementBeam, choose_element
-from .errors import (
-    InputError,
-    MeshError,
-    NameUnknown,
-    require_finite,
-    require_flag,
-    require_integer,
-    require_label,
-    require_like,
-    require_names,
-    require_positive,
-    shown,
-    taught,
-    teaching,
-)
+from .errors import (InputError, MeshError, NameUnknown, require_finite, require_flag,
+                     require_integer, require_label, require_like, require_names, require_positive,
+                     shown, taught, teaching)
 from .formulations import COMPONENTS, get_formulation
 from .formulations.ecm import AXIS
 from .frozen import Frozen, read_only

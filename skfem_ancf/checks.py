@@ -1,12 +1,22 @@
 """How far a state is from what the law and the mesh are good for."""
 
+from __future__ import annotations
+
 import warnings
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .errors import ModelWarning
 from .materials import LinearLaw
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .beam import Beam
+    from .results import State
+    from .types import Array
 
 #: Stretch below which St. Venant-Kirchhoff resists less the more it is compressed: the force of a
 #: fibre, E (l^3 - l) / 2, has its smallest value there.
@@ -48,7 +58,7 @@ class Checks:
         return "\n".join(lines + [f"beyond its range: {text}" for text in self.findings])
 
 
-def check(state):
+def check(state: State) -> Checks:
     """The :class:`Checks` of a state."""
     values, found = [], []
     for beam in state.beams:
@@ -70,7 +80,7 @@ class Screen:
         The beams of a scene.
     """
 
-    def __init__(self, beams):
+    def __init__(self, beams: Sequence[Beam]) -> None:
         first = np.concatenate([[0], np.cumsum([b.N for b in beams])])
         node = np.concatenate([[0], np.cumsum([b.N // b.nd for b in beams])])
         self._x = np.concatenate([n + np.arange(2, b.N, b.nd) for n, b in zip(first, beams)])
@@ -79,7 +89,7 @@ class Screen:
         self._slender = np.concatenate([b.mesh.height / b.mesh.lengths for b in beams])
         self._limit = np.concatenate([np.full(b.mesh.nelements, turning_limit(b)) for b in beams])
 
-    def passes(self, u):
+    def passes(self, u: Array) -> bool:
         """False if a fibre may be compressed, or an element may turn, beyond the range."""
         r = (u[self._x] + 1j * u[self._x + 1]) / self._start + 1.0
         turn = np.abs(np.angle(r[self._right] * r[self._left].conj()))
@@ -88,8 +98,16 @@ class Screen:
                 and np.min(np.abs(r)) - np.max(turn * self._slender) > 1.1 * COMPRESSED)
 
 
-def warn_of(state, stacklevel):
-    """Give a :class:`~skfem_ancf.errors.ModelWarning` for each finding."""
+def warn_of(state: State, stacklevel: int) -> None:
+    """Give a :class:`~skfem_ancf.errors.ModelWarning` for each finding.
+
+    Parameters
+    ----------
+    state
+        A static State.
+    stacklevel
+        Of the caller's line, as for ``warnings.warn``.
+    """
     if state.system.screen.passes(state.u):
         return
     for beam in state.beams:
@@ -120,25 +138,54 @@ def _is_linear(beam):
     return all(isinstance(t.law, LinearLaw) for t in beam.kernel.tables)
 
 
-def turning(beam, u):
-    """Largest angle by which the axis turns over an element, by its tangents at the nodes."""
+def turning(beam: Beam, u: Array) -> float:
+    """Largest angle by which the axis turns over an element, by its tangents at the nodes.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    u
+        Displacement of its coordinates, shape (N,).
+    """
     turn = tangents(beam, u) / tangents(beam, 0.0)
     left, right = beam.mesh.t
     return float(np.max(np.abs(np.angle(turn[right] * turn[left].conj()))))
 
 
-def tangents(beam, u):
-    """The axis' derivative r_X at the nodes, as complex numbers."""
+def tangents(beam: Beam, u: Array | float) -> Array:
+    """The axis' derivative r_X at the nodes, as complex numbers.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    u
+        Displacement of its coordinates, shape (N,), or 0.
+
+    Returns
+    -------
+    ndarray
+        Shape (nvertices,), complex.
+    """
     return (beam.q0_local + u).reshape(-1, beam.nd)[:, 2:4] @ [1.0, 1.0j]
 
 
-def turning_limit(beam):
+def turning_limit(beam: Beam) -> float:
     """The angle by which the axis may turn over one element."""
     return TURNING.get(beam.element.axis_degree, TURNING_SMOOTH)
 
 
-def shortest(beam, u):
-    """Smallest stretch of the fibres along the axis at the integration points."""
+def shortest(beam: Beam, u: Array) -> float:
+    """Smallest stretch of the fibres along the axis at the integration points.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    u
+        Displacement of its coordinates, shape (N,).
+    """
     kernel, least = beam.kernel, np.inf
     for part in kernel.chunks():
         u_e = kernel.gather(u, part)

@@ -1,17 +1,31 @@
 """What enters the equations of a scene from outside: states and coordinates."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .errors import InputError, require_finite
 from .results import State
 
+if TYPE_CHECKING:
+    from .beam import Beam
+    from .system import System
+    from .types import Array
+
 _GEOMETRY = ("p", "t", "p_X", "p_Y", "p_XY", "lengths")
 
 
-def difference(a, b):
+def difference(a: Beam, b: Beam) -> str | None:
     """Why coordinates of one beam mean something else on another, in words; None if they do not.
 
     Materials, widths and loads do not matter: a displacement is one of the body.
+
+    Parameters
+    ----------
+    a, b
+        Beams; the message calls the second that of the scene.
     """
     if a is b or (a.mesh is b.mesh and a.element is b.element):
         return None
@@ -35,7 +49,7 @@ def _same(a, b):
     return a is b or (a is not None and b is not None and np.array_equal(a, b))
 
 
-def displacement(system, state, name="start"):
+def displacement(system: System, state: State, name: str = "start") -> Array:
     """The displacement of a State, for the equations of a scene: a new array, shape (N,).
 
     Parameters
@@ -71,8 +85,17 @@ def displacement(system, state, name="start"):
     return np.array(require_finite(f"{name}.u", state.u, (system.N,)))
 
 
-def configuration(system, state, name="state"):
+def configuration(system: System, state: State, name: str = "state") -> State:
     """A State with its multipliers, as one of the equations of a scene.
+
+    Parameters
+    ----------
+    system
+        The :class:`~skfem_ancf.system.System`.
+    state
+        A State, as for :func:`displacement`.
+    name
+        What messages call it.
 
     Raises
     ------

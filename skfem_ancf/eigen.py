@@ -1,6 +1,9 @@
 """Natural frequencies about a state, and linear buckling loads."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
@@ -10,6 +13,9 @@ from .errors import (ConvergenceError, InputError, SupportError, require_finite_
                      require_index, require_integer, teaching)
 from .results import State
 from .tangent import Inverse, StrainTangent, is_symmetric
+
+if TYPE_CHECKING:
+    from .system import System
 
 DENSE = 600  # free coordinates up to which the dense solver is used
 WINDOW = 1e-8  # smallest over largest eigenvalue of an inverse that is taken from it
@@ -47,19 +53,24 @@ class Modes:
     eigenvalues: np.ndarray
 
     @property
-    def flutter(self):
+    def flutter(self) -> bool:
         """True if an oscillation grows: there is a complex pair among the eigenvalues."""
         return bool(np.any(self.eigenvalues.imag != 0.0))
 
     @property
-    def stable(self):
+    def stable(self) -> bool:
         """True if none of these motions grows."""
         return not self.flutter and bool(np.all(self.frequencies >= 0.0))
 
-    def mode(self, i, amplitude):
-        """The state displaced by ``amplitude`` times shape ``i``, to plot or save.
+    def mode(self, i: int, amplitude: float) -> State:
+        """The state displaced along a shape, to plot or save; along the real part of a complex one.
 
-        Of a complex shape the real part.
+        Parameters
+        ----------
+        i
+            Number of the shape; negative ones count from the end.
+        amplitude
+            What the shape is multiplied by.
         """
         i = require_index("i", i, len(self.shapes))
         amplitude = require_finite_scalar("amplitude", amplitude)
@@ -87,7 +98,7 @@ class Buckling:
     follower: bool = False
 
 
-def modes(system, state, k):
+def modes(system: System, state: State, k: int) -> Modes:
     """The k lowest natural frequencies about a state, prestress and joints included.
 
     The eigenvalues of ``K x = lambda M x`` are found as ``1 / (lambda + s)``, the largest first, s
@@ -233,7 +244,7 @@ def _unsymmetric(tangent, M, k, shift, small):
     return values, X / np.sqrt(np.sum(X.conj() * (M @ X), axis=0).real)
 
 
-def buckling(system, k):
+def buckling(system: System, k: int) -> Buckling:
     """The k lowest positive load factors of linear buckling.
 
     ``(K_0 + factor K_s) phi = 0``, K_s the geometric part for the stress that the full load, moved

@@ -1,15 +1,23 @@
 """Objects that stay as they were made."""
 
+from __future__ import annotations
+
 import inspect
 from copy import copy
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .errors import ImmutableError, InputError, NameUnknown
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
-def read_only(array):
+    from .types import Array
+
+
+def read_only(array: Array) -> Array:
     """The array, not writeable; a copy of it where it is."""
     if array.flags.writeable:
         array = array.copy()
@@ -89,9 +97,15 @@ class Frozen(Sealable, metaclass=_Sealing):
 
 
 class ReadOnlyDict(dict):
-    """A dictionary of arrays that does not change."""
+    """A dictionary of arrays that does not change.
 
-    def __init__(self, *args, **kwargs):
+    Parameters
+    ----------
+    *args, **kwargs
+        What ``dict`` takes.
+    """
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         for name, value in self.items():
             if isinstance(value, np.ndarray):
@@ -124,11 +138,17 @@ def _read_only_dict(plain, more):
     return ReadOnlyDict(plain)
 
 
-def rebuilt(thing, changes, more=()):
+def rebuilt(thing: Any, changes: dict[str, Any], more: Sequence[str] = ()) -> Any:
     """An object made as ``thing`` was, with some arguments of its constructor changed.
 
-    Arguments that are not changed are those attributes of ``thing`` that have their names;
-    ``more`` names attributes that ``**kwargs`` of the constructor take.
+    Parameters
+    ----------
+    thing
+        Arguments that are not changed are those of its attributes that have their names.
+    changes
+        From the names of arguments to their values.
+    more
+        Names of attributes that ``**kwargs`` of the constructor take.
 
     Raises
     ------

@@ -1,12 +1,22 @@
 """Banded matrices of chains of elements, over LAPACK, and their borders."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.linalg import blas, eigh, lapack, lu_solve
 from scipy.sparse import coo_matrix
 
 from .band import Band, solve
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
+    from scipy.sparse import csc_matrix
+
+    from .types import Array
 
 #: Relative correction of a border's solution above which sparse LU is used.
 INACCURATE = 1e-5
@@ -35,7 +45,7 @@ class Inertia(NamedTuple):
     singular: bool
 
 
-def beside_zero(negative):
+def beside_zero(negative: Callable[[float], int]) -> Inertia:
     """The :class:`Inertia` of a matrix, from the negative eigenvalues of those beside it.
 
     ``negative`` is a function of the shift, relative to the diagonal. What changes its sign
@@ -59,7 +69,7 @@ class BandMatrix:
         definite.
     """
 
-    def __init__(self, n, bandwidth, symmetric=True):
+    def __init__(self, n: int, bandwidth: int, symmetric: bool = True) -> None:
         self.n, self.bandwidth, self.symmetric = n, bandwidth, symmetric
         # gbtrf wants room for the pivots; the lower half wants one spare row, so that the upper
         # half of an element matrix falls on places that no other entry of it has
@@ -72,12 +82,12 @@ class BandMatrix:
         self.positive_definite = None
 
     @property
-    def ab(self):
+    def ab(self) -> Array:
         """LAPACK's band storage, a view of shape (rows, n)."""
         ab = self._flat.reshape(self.n, self._ld).T
         return ab[:-1] if self.symmetric else ab
 
-    def clear(self):
+    def clear(self) -> None:
         """Set every entry to zero."""
         self._flat.fill(0.0)
         self._factor = None
@@ -89,7 +99,7 @@ class BandMatrix:
             self._flat[start * ld + self._diagonal:], (count, m, m),
             (step * ld * item, item, (ld - 1) * item), writeable=True)
 
-    def add_elements(self, K, start, nd, left):
+    def add_elements(self, K: Array, start: int, nd: int, left: Array) -> None:
         """Add element matrices that couple node k and k + 1 of a chain.
 
         Parameters
@@ -118,15 +128,23 @@ class BandMatrix:
     def _position(self, i, j):
         return np.asarray(j) * self._ld + self._diagonal + np.asarray(i) - np.asarray(j)
 
-    def add(self, i, j, values):
-        """Add entries; of a symmetric matrix those above the diagonal are ignored."""
+    def add(self, i: ArrayLike, j: ArrayLike, values: ArrayLike) -> None:
+        """Add entries; of a symmetric matrix those above the diagonal are ignored.
+
+        Parameters
+        ----------
+        i, j
+            Rows and columns, shapes (k,).
+        values
+            Shape (k,).
+        """
         i, j, values = map(np.atleast_1d, (i, j, values))
         if self.symmetric:
             keep = i >= j
             i, j, values = i[keep], j[keep], values[keep]
         np.add.at(self._flat, self._position(i, j), values)
 
-    def fixed_positions(self, dofs):
+    def fixed_positions(self, dofs: ArrayLike) -> tuple[Array, Array]:
         """Where rows and columns ``dofs`` are stored, and where their diagonal is."""
         dofs = np.asarray(dofs, dtype=np.int64)
         k = np.arange(-self.bandwidth, self.bandwidth + 1)
@@ -139,17 +157,17 @@ class BandMatrix:
             i, j = i[i >= j], j[i >= j]
         return np.unique(self._position(i, j)), self._position(dofs, dofs)
 
-    def fix(self, positions):
+    def fix(self, positions: tuple[Array, Array]) -> None:
         """Make the rows and columns of :meth:`fixed_positions` those of the identity."""
         everywhere, diagonal = positions
         self._flat[everywhere] = 0.0
         self._flat[diagonal] = 1.0
 
-    def diagonal(self):
+    def diagonal(self) -> Array:
         """A copy of the diagonal."""
         return self._flat[self._diagonal::self._ld].copy()
 
-    def multiply(self, v):
+    def multiply(self, v: Array) -> Array:
         """The matrix times a vector (n,)."""
         if self.symmetric:
             return blas.dsbmv(self.bandwidth, 1.0, self.ab, v, lower=1)
@@ -158,14 +176,22 @@ class BandMatrix:
             return self.tocsc() @ v
         return blas.dgbmv(self.n, self.n, k, k, 1.0, self.ab[k:], v)
 
-    def combine(self, a, A, b, B):
-        """Fill with a A + b B of two matrices of the same layout."""
+    def combine(self, a: float, A: BandMatrix, b: float, B: BandMatrix) -> BandMatrix:
+        """Fill with ``a A + b B``.
+
+        Parameters
+        ----------
+        a, b
+            Numbers.
+        A, B
+            Matrices of the same layout.
+        """
         np.multiply(A._flat, a, out=self._flat)
         self._flat += b * B._flat
         self._factor = None
         return self
 
-    def factorize(self):
+    def factorize(self) -> BandMatrix:
         """Factorise; raises ``numpy.linalg.LinAlgError`` if the matrix is singular."""
         if self.symmetric:
             c, info = lapack.dpbtrf(self.ab, lower=1)
@@ -186,7 +212,7 @@ class BandMatrix:
         self._factor = ("gb", lu, pivots)
         return self
 
-    def solve(self, b):
+    def solve(self, b: Array) -> Array:
         """Solve with the factors; ``b`` of shape (n,) or (n, k)."""
         if self._factor is None:
             self.factorize()
@@ -199,25 +225,25 @@ class BandMatrix:
         return lapack.dgbtrs(self._factor[1], self.bandwidth, self.bandwidth, b,
                              self._factor[2])[0]
 
-    def take_factors(self):
+    def take_factors(self) -> None:
         """Note that the entries have been replaced by factors, of :mod:`skfem_ancf.band`."""
         self._factor = ("ldl",) if self.symmetric else ("gb", self.ab, self.band.pivots)
 
-    def to_cholesky(self):
+    def to_cholesky(self) -> None:
         """Turn factors of :meth:`take_factors` with positive D into those of Cholesky."""
         if self._factor[0] == "ldl":
             c = self.ab * np.sqrt(self.ab[0])
             c[0] = np.sqrt(self.ab[0])
             self._factor = ("pb", np.asfortranarray(c))
 
-    def factored_diagonal(self, rows):
+    def factored_diagonal(self, rows: ArrayLike) -> Array:
         """Entries of the diagonal, by the factors of Cholesky."""
         c, rows = self._factor[1], np.asarray(rows, dtype=int)
         k = np.arange(self.bandwidth + 1)[:, None]
         return np.sum(np.where(k <= rows, c[k, np.maximum(rows - k, 0)], 0.0) ** 2, axis=0)
 
     @property
-    def definite(self):
+    def definite(self) -> bool:
         """True if it has factors that are those of a positive definite symmetric matrix."""
         if self._factor is None or not self.symmetric:
             return False
@@ -225,7 +251,7 @@ class BandMatrix:
             return bool(np.min(self._flat[::self._ld]) > 0.0)
         return self._factor[0] == "pb"
 
-    def inertia(self):
+    def inertia(self) -> Inertia:
         """Signs of the eigenvalues of a symmetric matrix, from its factors.
 
         Cholesky says it where it succeeds. Else the matrix, scaled to a unit diagonal, is
@@ -251,7 +277,7 @@ class BandMatrix:
             return Inertia(0, False)
         return beside_zero(lambda shift: self.shifted(shift).negative())
 
-    def negative(self):
+    def negative(self) -> int:
         """The number of negative eigenvalues of a symmetric matrix, round-off counted too."""
         _, info = lapack.dpbtrf(self.ab, lower=1)
         if info == 0:
@@ -260,7 +286,7 @@ class BandMatrix:
         size[size == 0.0] = np.max(size)  # a diagonal may be zero where a beam has buckled
         return self._block_negative(1.0 / np.sqrt(size))
 
-    def shifted(self, shift):
+    def shifted(self, shift: float) -> BandMatrix:
         """The matrix plus ``shift`` times its diagonal's size."""
         out = BandMatrix(self.n, self.bandwidth, self.symmetric).combine(1.0, self, 0.0, self)
         out._flat[self._diagonal::self._ld] += shift * np.abs(self.diagonal())
@@ -296,7 +322,7 @@ class BandMatrix:
         out = np.where(inside, self._flat[np.where(inside, self._position(row, column), 0)], 0.0)
         return scale[i0:i1, None] * out * scale[j0:j1]
 
-    def determinant_sign(self):
+    def determinant_sign(self) -> int:
         """The sign of the determinant, from the factors of :meth:`factorize`: 1 or -1."""
         if self._factor is None:
             self.factorize()
@@ -306,7 +332,7 @@ class BandMatrix:
         exchanges = int(np.sum(pivots != np.arange(self.n)))
         return -1 if (exchanges + int(np.sum(lu[2 * self.bandwidth] < 0.0))) % 2 else 1
 
-    def symmetric_part(self):
+    def symmetric_part(self) -> BandMatrix:
         """(A + A^T) / 2 as a symmetric band matrix."""
         out = BandMatrix(self.n, self.bandwidth)
         if self.symmetric:
@@ -318,7 +344,7 @@ class BandMatrix:
             lower[k, :self.n - k] = 0.5 * (ab[top + k, :self.n - k] + ab[top - k, k:])
         return out
 
-    def tocsc(self):
+    def tocsc(self) -> csc_matrix:
         """The matrix as a scipy.sparse array in CSC format."""
         k = np.arange(-self.bandwidth, self.bandwidth + 1)
         if self.symmetric:
@@ -336,13 +362,13 @@ class BandMatrix:
         return coo_matrix((v, (i, j)), shape=(self.n, self.n)).tocsc()
 
 
-def hold(K, i, j, values, springs):
+def hold(K: BandMatrix, i: Array, j: Array, values: Array, springs: Array) -> tuple[Array, Array]:
     """Add entries and springs to a band matrix, and factorise it.
 
     Parameters
     ----------
     K, i, j, values, springs
-        As for :class:`BorderedMatrix`.
+        As for :class:`BorderedMatrix`: the matrix, entries of shapes (k,), coordinates (s,).
 
     Returns
     -------
@@ -360,8 +386,19 @@ def hold(K, i, j, values, springs):
     return border(K.bandwidth, i, j, values, springs, stiffness)
 
 
-def border(bandwidth, i, j, values, springs, stiffness):
-    """What :func:`hold` returns, of springs of a given stiffness."""
+def border(bandwidth: int, i: Array, j: Array, values: Array, springs: Array,
+           stiffness: Array) -> tuple[Array, Array]:
+    """What :func:`hold` returns, of springs of a given stiffness.
+
+    Parameters
+    ----------
+    bandwidth
+        Of the matrix.
+    i, j, values, springs
+        As for :class:`BorderedMatrix`, shapes (k,) and (s,).
+    stiffness
+        Of the springs, shape (s,).
+    """
     outside = np.abs(i - j) > bandwidth
     i, j, values = i[outside], j[outside], values[outside]
     far, where = np.unique(np.append(i, j), return_inverse=True)
@@ -372,7 +409,7 @@ def border(bandwidth, i, j, values, springs, stiffness):
     return picked, S
 
 
-def border_inertia(K, picked, S, J):
+def border_inertia(K: BandMatrix, picked: Array, S: Array, J: Array) -> Inertia:
     """The :class:`Inertia` of ``K + P^T S P`` on the null space of J.
 
     By Haynsworth: with ``S = V L V^T`` and ``C = [P^T V, J^T]`` the matrix
@@ -385,7 +422,7 @@ def border_inertia(K, picked, S, J):
     K : BandMatrix
         Symmetric, held by springs.
     picked, S
-        What :func:`hold` returned; S symmetric.
+        What :func:`hold` returned, shapes (k,) and (k, k); S symmetric.
     J
         Shape (m, n).
     """
@@ -400,8 +437,23 @@ def border_inertia(K, picked, S, J):
     return beside_zero(of)
 
 
-def columns_product(K, picked, J):
-    """C K^-1 C^T of a factorised band matrix, where the rows of C pick coordinates, and J."""
+def columns_product(K: BandMatrix, picked: Array, J: Array) -> Array:
+    """C K^-1 C^T of a factorised band matrix.
+
+    Parameters
+    ----------
+    K : BandMatrix
+        With factors.
+    picked
+        Coordinates that the first rows of C pick, shape (k,).
+    J
+        The other rows of C, shape (m, n).
+
+    Returns
+    -------
+    ndarray
+        Shape (k + m, k + m).
+    """
     k = len(picked)
     C = np.zeros((k + len(J), K.n))
     C[np.arange(k), picked] = 1.0
@@ -414,7 +466,7 @@ def columns_product(K, picked, J):
     return out
 
 
-def border_negative(held, product, S, m):
+def border_negative(held: int, product: Array, S: Array, m: int) -> tuple[int, float]:
     """The number of negative eigenvalues, and the smallest eigenvalue of the border, scaled.
 
     Parameters
@@ -422,9 +474,9 @@ def border_negative(held, product, S, m):
     held
         The number of negative eigenvalues of the band matrix.
     product
-        What :func:`columns_product` returned.
+        What :func:`columns_product` returned, shape (k + m, k + m).
     S, m
-        As for :func:`border_inertia`, and the number of rows of J.
+        As for :func:`border_inertia`, shape (k, k), and the number of rows of J.
     """
     n = len(S)
     size = 1.0 / np.sqrt(np.abs(np.diag(product)[:n]))
@@ -460,9 +512,9 @@ class BorderedMatrix:
     J
         Shape (m, n), dense and small.
     i, j, values
-        Entries to add to K, of both halves where it is symmetric.
+        Entries to add to K, of both halves where it is symmetric, shapes (k,).
     springs
-        Coordinates to hold.
+        Coordinates to hold, shape (s,).
 
     Raises
     ------
@@ -470,7 +522,8 @@ class BorderedMatrix:
         If the matrix is singular.
     """
 
-    def __init__(self, K, J, i, j, values, springs):
+    def __init__(self, K: BandMatrix, J: Array, i: Array, j: Array, values: Array,
+                 springs: Array) -> None:
         self._picked, self._S = hold(K, i, j, values, springs)
         self._K, self._J = K, J
         k = len(self._picked)
@@ -493,19 +546,19 @@ class BorderedMatrix:
             raise np.linalg.LinAlgError("the matrix is singular")
         self._H = lu, pivots
 
-    def inertia(self):
+    def inertia(self) -> Inertia:
         """The :class:`Inertia` of A where J x = 0; of its symmetric part if K is not symmetric."""
         K = self._K if self._K.symmetric else self._K.symmetric_part()
         return border_inertia(K, self._picked, self._S, self._J)
 
-    def determinant_sign(self):
+    def determinant_sign(self) -> int:
         """The sign of the determinant of A where J x = 0: 1 or -1."""
         lu, pivots = self._H
         exchanges = int(np.sum(pivots != np.arange(len(pivots))))
         odd = (exchanges + int(np.sum(np.diag(lu) < 0.0))) % 2
         return self._K.determinant_sign() * (-1 if odd else 1)
 
-    def tocsc(self):
+    def tocsc(self) -> csc_matrix:
         """A as a scipy.sparse array in CSC format."""
         rows = np.broadcast_to(self._picked[:, None], self._S.shape)
         S = coo_matrix((self._S.ravel(), (rows.ravel(), rows.T.ravel())),
@@ -524,8 +577,21 @@ class BorderedMatrix:
         np.add.at(out, self._picked, self._S @ x[self._picked])
         return out
 
-    def solve(self, b, c):
-        """x, l and how large the correction by one refinement was, relative to x."""
+    def solve(self, b: Array, c: Array) -> tuple[Array, Array, float]:
+        """The solution, and how large the correction by one refinement was, relative to x.
+
+        Parameters
+        ----------
+        b
+            Shape (n,).
+        c
+            Shape (m,).
+
+        Returns
+        -------
+        x, l, correction
+            Shapes (n,) and (m,), and a number.
+        """
         x, l = self._once(b, c)
         dx, dl = self._once(b - self._multiply(x) - l @ self._J, c - self._J @ x)
         weight = np.abs(self._K.diagonal())

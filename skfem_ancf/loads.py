@@ -15,16 +15,8 @@ from skfem.assembly import LinearForm, asm
 
 from . import forms
 from .beam import Beam
-from .errors import (
-    AncfError,
-    CallbackError,
-    InputError,
-    ask_field,
-    ask_number,
-    require_finite,
-    require_function,
-    shown,
-)
+from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number, require_finite,
+                     require_function, shown)
 from .frozen import Sealable, read_only
 from .pickling import picklable_form
 from .spread import Spread, on_facets, stations_of_vector

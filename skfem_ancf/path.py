@@ -1,11 +1,24 @@
 """An equilibrium path as a result."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .errors import require_index, teaching
 from .results import State
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+    from .statics.continuation import Point
+    from .statics.critical import Critical
+    from .system import System
+    from .types import Array, WhichBeam
 
 
 @dataclass(repr=False)
@@ -27,6 +40,8 @@ class CriticalPoint:
         the path.
     change
         By how many the number of negative eigenvalues changes there; None if it is not known.
+    critical : Critical
+        What the solver found, from which ``scene.continuation(branch=...)`` goes on.
     """
 
     kind: str
@@ -44,6 +59,13 @@ class CriticalPoint:
 @teaching
 class Path:
     """The equilibria that a continuation found.
+
+    Parameters
+    ----------
+    system
+        The :class:`~skfem_ancf.system.System`.
+    points, critical
+        What :func:`skfem_ancf.statics.continuation.continuation` returned.
 
     Attributes
     ----------
@@ -64,7 +86,8 @@ class Path:
         Limit and bifurcation points in the order of the path, each solved for as a point of it.
     """
 
-    def __init__(self, system, points, critical=()):
+    def __init__(self, system: System, points: Sequence[Point],
+                 critical: Sequence[Critical] = ()) -> None:
         self.system, self.points = system, points
         self.load = np.array([p.load for p in points])
         self.u = np.array([p.u for p in points])
@@ -90,21 +113,34 @@ class Path:
         return State(self.system, p.u, p.load, p.force, True, iterations, message, (),
                      p.multipliers)
 
-    def state(self, k):
+    def state(self, k: int) -> State:
         """Point ``k`` as a State."""
         p = self.points[require_index("k", k, len(self.points))]
         return self._state(p, f"point {k}", p.iterations)
 
-    def displacement(self, point, beam=None):
-        """Displacement of a material point along the path, shape (n, 2)."""
+    def displacement(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
+        """Displacement of a material point along the path.
+
+        Parameters
+        ----------
+        point
+            Its place (x, y) in the stress-free body.
+        beam
+            The beam, its name or its number; found if it is not given.
+
+        Returns
+        -------
+        ndarray
+            Shape (n, 2).
+        """
         beam, e, X = self.state(0)._find(point, beam)
         return beam.point_displacement(self.u[:, self.system.of(beam)], e, X)
 
-    def limit_points(self):
+    def limit_points(self) -> Array:
         """Load factors at the turning points of the load, in the order of the path."""
         return self._loads("limit")
 
-    def bifurcation_points(self):
+    def bifurcation_points(self) -> Array:
         """Load factors where other paths cross this one, in its order.
 
         :attr:`critical_points` has their states and modes; ``scene.continuation(branch=...)`` with
@@ -115,8 +151,21 @@ class Path:
     def _loads(self, kind):
         return np.array([c.load for c in self.critical_points if c.kind == kind])
 
-    def plot(self, point, component=1, beam=None, **options):
-        """Draw load against a displacement; see :func:`skfem_ancf.visuals.matplotlib.plot_path`."""
+    def plot(self, point: ArrayLike, component: int = 1, beam: WhichBeam = None,
+             **options: Any) -> Any:
+        """Draw load against a displacement.
+
+        Parameters
+        ----------
+        point
+            A material point: its place (x, y) in the stress-free body.
+        component
+            0 or 1: of the displacement.
+        beam
+            The beam, its name or its number; found if it is not given.
+        **options
+            Those of :func:`skfem_ancf.visuals.matplotlib.plot_path`.
+        """
         from .visuals.matplotlib import plot_path
 
         return plot_path(self, point, component, beam, **options)

@@ -1,15 +1,29 @@
 """What stands in the way of pickle: functions that have no name in a module."""
 
+from __future__ import annotations
+
 import pickle
 import sys
+from typing import TYPE_CHECKING, Any
 
 from skfem.assembly import LinearForm
 
 from .errors import PickleError, shown
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
 
-def functions_of(things, what="of"):
-    """Pairs of a description and a function, for the functions that objects hold."""
+
+def functions_of(things: Iterable[Any], what: str = "of") -> Iterator[tuple[str, Any]]:
+    """Pairs of a description and a function, for the functions that objects hold.
+
+    Parameters
+    ----------
+    things
+        Objects.
+    what
+        What stands between a function and its object in the description.
+    """
     for thing in things:
         spread = getattr(thing, "_spread", None)  # of a load, which may hold a function too
         more = {} if spread is None else vars(spread)
@@ -20,7 +34,7 @@ def functions_of(things, what="of"):
                 yield f"the function {name!r} {what} {shown(thing)}", value
 
 
-def require_picklable(items):
+def require_picklable(items: Iterable[tuple[str, Any]]) -> None:
     """Raise PickleError for the first of pairs (description, function) that pickle cannot take.
 
     Where cloudpickle or dill ask, which take any function, nothing is raised.
@@ -49,7 +63,7 @@ def _asked_by_value():
 class NamedForm:
     """A LinearForm made by a decorator: pickle takes it by its name in its module."""
 
-    def __init__(self, form):
+    def __init__(self, form: LinearForm) -> None:
         self.form = form
 
     def __reduce__(self):
@@ -71,6 +85,6 @@ def _made(cls, state):
     return NamedForm(form)
 
 
-def picklable_form(value):
+def picklable_form(value: Any) -> Any:
     """What pickle takes in place of a value: a LinearForm by its name."""
     return NamedForm(value) if isinstance(value, LinearForm) else value

@@ -1,9 +1,14 @@
 """What a solution computes, keeps constant or skips, and why."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 from .errors import NameUnknown, require_option
 from .switch import compiled_off
+
+if TYPE_CHECKING:
+    from .scene import Scene
 
 KINDS = ("static", "linear", "dynamic")
 
@@ -32,7 +37,7 @@ class Plan(tuple):
         return "\n".join(f"{i.term:<{width}}  {i.status:<8}  {i.reason}" for i in self)
 
 
-def make_plan(scene, kind="static"):
+def make_plan(scene: Scene, kind: str = "static") -> Plan:
     """The plan of a scene.
 
     Parameters

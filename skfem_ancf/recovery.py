@@ -19,7 +19,10 @@ beam between two places where its section force jumps:
    put at the element's centre (sections cubic along the axis: at the Gauss points), splined.
 """
 
+from __future__ import annotations
+
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -30,6 +33,15 @@ from .materials import LinearLaw
 from .quadrature import gauss, lagrange
 from .section_forces import NotRecovered, SectionForces, Sections, cross
 from .spread import station_of_node, stations_of_vector
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+    from .beam import Beam
+    from .results import State
+    from .types import Array, Law
 
 #: Points across a section: 2 N + 1, and at least these.
 ACROSS = 7
@@ -47,13 +59,14 @@ FEW = 128
 INNER, LAYER, FINE, COARSE = 0.5, 1.2, 0.25, 0.5
 
 
-def integration(nodes):
+def integration(nodes: Array) -> Array:
     """From values at the nodes on [0, 1] to the integrals from 0 to each node; shape (n, n)."""
     x, w = gauss(len(nodes))
     return np.array([b * (w @ lagrange(nodes, b * x)) for b in nodes])
 
 
-def strain_of_stress(law, stress, strain, unknown=(0, 1, 2), tol=1e-10):
+def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[int] = (0, 1, 2),
+                     tol: float = 1e-10) -> Array:
     """The strain (3, ...) whose stress is given, by Newton's method.
 
     Parameters
@@ -66,6 +79,8 @@ def strain_of_stress(law, stress, strain, unknown=(0, 1, 2), tol=1e-10):
         To start from, shape (3, ...); components that are not in ``unknown`` keep their values.
     unknown
         Components to find.
+    tol
+        Largest difference of the stress, relative to its largest value.
 
     Raises
     ------
@@ -106,8 +121,23 @@ class _Spline:
         return out if derivative == 0 else 0.0 * out
 
 
-def smoothed(s, values, length):
-    """The solution f of ``f - length^2 f'' = values`` with f' = 0 at both ends; (n, ...)."""
+def smoothed(s: Array, values: Array, length: float) -> Array:
+    """The solution f of ``f - length^2 f'' = values`` with f' = 0 at both ends.
+
+    Parameters
+    ----------
+    s
+        Places, increasing, shape (n,).
+    values
+        Shape (n, m).
+    length
+        Length below which waves are damped.
+
+    Returns
+    -------
+    ndarray
+        Shape (n, m).
+    """
     d = np.diff(s)
     w = 0.5 * (np.append(d, 0.0) + np.append(0.0, d))
     c = length**2 / d
@@ -330,7 +360,7 @@ class Recovery:
         If the fields cannot be recovered.
     """
 
-    def __init__(self, forces, u):
+    def __init__(self, forces: SectionForces, u: Array) -> None:
         self.forces, self.beam = forces, forces.beam
         beam, mesh = self.beam, self.beam.mesh
         self.law = beam.material.law()
@@ -357,8 +387,19 @@ class Recovery:
         self._speed = np.hypot(*axis)
         return np.append(0.0, np.cumsum(self._speed @ w))
 
-    def arc(self, e, xi):
-        """Arc length along the stress-free axis of places of elements, shape of both."""
+    def arc(self, e: ArrayLike, xi: ArrayLike) -> Array:
+        """Arc length along the stress-free axis of places of elements.
+
+        Parameters
+        ----------
+        e, xi
+            Elements and places on [0, 1] along them, of any shapes (...) that fit.
+
+        Returns
+        -------
+        ndarray
+            Shape (...).
+        """
         e, xi = np.broadcast_arrays(e, xi)
         if self.beam.mesh.is_straight:
             return self.lengths[e] + xi * (self.lengths[e + 1] - self.lengths[e])
@@ -367,7 +408,7 @@ class Recovery:
         return self.lengths[e] + xi * np.einsum("q,...qk,...k->...", w, inside, self._speed[e])
 
     @cached_property
-    def samples(self):
+    def samples(self) -> tuple[Array, Array]:
         """Places along an element, (p,), and its own stress there, (3, ne, p, m)."""
         beam, (x, _) = self.beam, gauss(2)
         X = np.array([np.repeat(x, len(self.eta)), np.tile(self.eta, 2)])
@@ -376,7 +417,7 @@ class Recovery:
             return np.array([0.5]), stress.mean(axis=2, keepdims=True)
         return x, stress
 
-    def fields(self, X, tind=None):
+    def fields(self, X: Array, tind: Array | None = None) -> tuple[Array, Array, Array]:
         """Strain (eps_xx, eps_yy, 2 eps_xy), stress (S_xx, S_yy, S_xy) and angle of the fibres.
 
         Parameters
@@ -384,7 +425,7 @@ class Recovery:
         X
             Reference points, (2, npoints) or (2, nelements, npoints).
         tind
-            Elements, or None for all.
+            Elements, shape (nelements,), or None for all.
 
         Returns
         -------
@@ -411,11 +452,23 @@ class Recovery:
         return values[:3], values[3:6], values[6]
 
     @staticmethod
-    def gradient(strain, angle):
-        """The deformation gradient (2, 2, ...) of a strain and the angle of the fibres.
+    def gradient(strain: Array, angle: Array) -> Array:
+        """The deformation gradient.
 
         ``F[:, 0]`` and ``F[:, 1]`` are the derivatives of the position along the axis and across
         the section, in global components.
+
+        Parameters
+        ----------
+        strain
+            (eps_xx, eps_yy, 2 eps_xy), shape (3, ...).
+        angle
+            Angle of the fibres, in radians, shape (...).
+
+        Returns
+        -------
+        ndarray
+            Shape (2, 2, ...).
         """
         lam_x, lam_y = np.sqrt(1.0 + 2.0 * strain[:2])
         across = angle + np.arccos(strain[2] / (lam_x * lam_y))
@@ -423,7 +476,7 @@ class Recovery:
                          [lam_x * np.sin(angle), lam_y * np.sin(across)]])
 
 
-def actions(state):
+def actions(state: State) -> list[list[float]]:
     """Where supports and joints act on each beam of a state: element + xi, a list a beam."""
     system = state.system
     t = state.load if state.t is None else state.t
@@ -444,7 +497,7 @@ def actions(state):
     return out
 
 
-def recover(state, beam, stations):
+def recover(state: State, beam: Beam, stations: Sequence[float]) -> Recovery:
     """The :class:`Recovery` of one beam of a state.
 
     Parameters

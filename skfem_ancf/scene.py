@@ -17,19 +17,8 @@ from .doors import configuration, displacement
 from .dynamics import get_scheme
 from .dynamics.checkpoint import resume
 from .dynamics.integrate import follow, integrate
-from .errors import (
-    ConvergenceError,
-    InputError,
-    Interrupted,
-    StabilityWarning,
-    ask_field,
-    require_finite,
-    require_finite_scalar,
-    require_option,
-    shown,
-    taught,
-    teaching,
-)
+from .errors import (ConvergenceError, InputError, Interrupted, StabilityWarning, ask_field,
+                     require_finite, require_finite_scalar, require_option, shown, taught, teaching)
 from .joints import Joint, bind_joint, get_joint
 from .loads import EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight, bind_load
 from .path import CriticalPoint, Path

@@ -5,13 +5,22 @@ element it is therefore in exact equilibrium, whatever the error of the displace
 of the element between a node and a section gives the force and the moment there.
 """
 
+from __future__ import annotations
+
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .errors import AncfError
 from .quadrature import gauss, lagrange
 from .spread import SNAP, station_of_node
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .beam import Beam
+    from .types import Array
 
 #: Points along an element for its loads.
 ALONG = 8
@@ -25,8 +34,19 @@ class NotRecovered(AncfError):
     """The section forces or fields of a beam cannot be recovered; the message says why."""
 
 
-def cross(a, b):
-    """The out-of-plane component of a x b of vectors (2, ...)."""
+def cross(a: Array, b: Array) -> Array:
+    """The out-of-plane component of a x b of vectors (2, ...).
+
+    Parameters
+    ----------
+    a, b
+        Vectors, shape (2, ...).
+
+    Returns
+    -------
+    ndarray
+        Shape (...).
+    """
     return a[0] * b[1] - a[1] * b[0]
 
 
@@ -43,7 +63,7 @@ class Sections:
         Points across each section, shape (k,).
     """
 
-    def __init__(self, forces, e, xi, eta):
+    def __init__(self, forces: SectionForces, e: Array, xi: Array, eta: Array) -> None:
         self.forces, self.e = forces, e
         beam = forces.beam
         self.shape = len(e), len(eta)
@@ -58,12 +78,25 @@ class Sections:
         self.J = beam.mesh.mapping().DF(self.X, e)
         self.volume = self.J[0, 0] * self.J[1, 1] - self.J[0, 1] * self.J[1, 0]
 
-    def field(self, q_e, slope=False):
-        """A field (2, n, k) of element coordinates (ne, nb, 2), or its derivative by xi."""
+    def field(self, q_e: Array, slope: bool = False) -> Array:
+        """A field of element coordinates, or its derivative by xi.
+
+        Parameters
+        ----------
+        q_e
+            Coordinates of the elements, shape (ne, nb, 2).
+        slope
+            The derivative.
+
+        Returns
+        -------
+        ndarray
+            Shape (2, n, k).
+        """
         return np.einsum("bnk,nbi->ink", self._slope if slope else self._value, q_e[self.e],
                          optimize=True)
 
-    def spread(self, values):
+    def spread(self, values: Array) -> Array:
         """Element vectors (ne, nb, 2) of forces (2, n, k), summed."""
         f = self.forces
         out = np.zeros((f.beam.mesh.nelements,) + f.q.shape[1:])
@@ -71,13 +104,13 @@ class Sections:
         return out
 
     @cached_property
-    def body(self):
+    def body(self) -> Array:
         """Force per volume of the stress-free body, inertia included, (2, n, k)."""
         f = self.forces
         out = np.broadcast_to(f.body[:, None, None], (2,) + self.shape)
         return out if f.acceleration is None else out - f.beam.density * self.field(f.acceleration)
 
-    def face(self, side):
+    def face(self, side: int) -> Array:
         """Force per width and xi on the bottom (0) or top (1), where the points are; (2, n, k)."""
         f, out = self.forces, np.zeros((2,) + self.shape)
         for factor, load in f.faces:
@@ -126,7 +159,8 @@ class SectionForces:
         If the spread of a load is not known, or the state is no equilibrium.
     """
 
-    def __init__(self, beam, u, loads, stations=(), acceleration=None):
+    def __init__(self, beam: Beam, u: Array, loads: Sequence[tuple[float, Any]],
+                 stations: Sequence[float] = (), acceleration: Array | None = None) -> None:
         self.beam = beam
         if any(load is None for _, load in loads):
             raise NotRecovered("a load is given by its force on the coordinates only: where it "
@@ -174,7 +208,7 @@ class SectionForces:
                            np.sum(cross(q[1][:, 1:].T, right[:, 1:].T), axis=0)])
         self.ends = np.array([q[0][:, 0], q[1][:, 0]])
 
-    def at(self, e, xi, side):
+    def at(self, e: Array, xi: Array, side: Array) -> tuple[Array, Array]:
         """Force (2, n) and moment (n,) about the axis, of the right part of the beam on the left.
 
         Parameters

@@ -1,5 +1,7 @@
 """Whether compiled kernels may be used."""
 
+from __future__ import annotations
+
 import os
 
 from .errors import InputError
@@ -8,7 +10,7 @@ from .errors import InputError
 VARIABLE = "SKFEM_ANCF_COMPILED"
 
 
-def compiled_off():
+def compiled_off() -> str | None:
     """Why the kernels compiled by Numba are not used, or None where they are.
 
     Raises

@@ -6,7 +6,10 @@ before. Where the strains ``B x`` are summed first nothing cancels: their round-
 ``eps |x| / L_e`` against ``h |x| / L^2``.
 """
 
+from __future__ import annotations
+
 import logging
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
@@ -14,6 +17,12 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from .errors import ConvergenceError, SupportError
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+    from .system import System
+    from .types import Array
 
 #: Corrections of a solution; relative size of one that is the last, and of one that may be.
 REFINEMENTS, REFINED, ACCEPTED = 6, 1e-12, 1e-6
@@ -35,10 +44,12 @@ class StrainTangent:
     system
         A :class:`~skfem_ancf.system.System`.
     u, load, t, multipliers
-        The state.
+        The state: displacement (N,), load factor, time of joints that move or None, and multipliers
+        (m,).
     """
 
-    def __init__(self, system, u, load, t, multipliers):
+    def __init__(self, system: System, u: Array, load: float, t: float | None,
+                 multipliers: Array) -> None:
         self.system, self.free = system, np.nonzero(system.free)[0]
         self._at = u, load, t, load if t is None else t
         parts = [_beam_rows(beam, u[s]) for beam, s in zip(system.beams, system.slices)]
@@ -53,8 +64,23 @@ class StrainTangent:
         self.stress, self.multipliers = stress, multipliers
         self.S = self.geometric(stress, multipliers, self._at[1])
 
-    def geometric(self, stress, multipliers, load):
-        """The part of the tangent due to stresses, multipliers and loads, sparse, (n, n)."""
+    def geometric(self, stress: Array, multipliers: Array, load: float) -> csr_matrix:
+        """The part of the tangent due to stresses, multipliers and loads.
+
+        Parameters
+        ----------
+        stress
+            Weighted stresses, of the shape (k,) of :attr:`stress`.
+        multipliers
+            Of the joints, shape (m,).
+        load
+            Load factor.
+
+        Returns
+        -------
+        sparse matrix
+            Shape (n, n), n free coordinates.
+        """
         u, _, t, time = self._at
         first, S = 0, []
         for beam, s in zip(self.system.beams, self.system.slices):
@@ -64,7 +90,7 @@ class StrainTangent:
              + self.system.curvature(u, time, multipliers))
         return S[self.free][:, self.free]
 
-    def response(self, load):
+    def response(self, load: float) -> tuple[Array, Array, Array]:
         """The stress and the multipliers that a load causes by linear theory.
 
         Parameters
@@ -86,11 +112,18 @@ class StrainTangent:
         du[self.free] = x[:, 0]
         return du, self._rows[1] @ du, multipliers[:, 0]
 
-    def balance(self, M, shift):
+    def balance(self, M: csr_matrix, shift: float) -> None:
         """Correct the stress to what is in equilibrium, if the state is one to round-off.
 
         The normal force of a slender beam is E A times a strain that is all round-off. The
         correction of the displacement is too small to matter; that of the stress is not.
+
+        Parameters
+        ----------
+        M
+            The mass matrix between the free coordinates, sparse, shape (n, n).
+        shift
+            A number for which ``K + shift M`` has an inverse.
         """
         u, load, t, _ = self._at
         rest = (load * self.system.external_force(u, t)[self.free] - self.B.T @ self.stress
@@ -103,20 +136,33 @@ class StrainTangent:
             self._set_stress(self.stress + self.CB @ du[:, 0], self.multipliers + dm[:, 0])
 
     @property
-    def symmetric(self):
+    def symmetric(self) -> bool:
         """True if the tangent is symmetric between the free coordinates, to round-off."""
         return is_symmetric(self.S)
 
-    def multiply(self, x, S=None):
-        """The tangent, or with another S, times x, shape (n,) or (n, k)."""
+    def multiply(self, x: Array, S: csr_matrix | None = None) -> Array:
+        """The tangent times a vector or columns.
+
+        Parameters
+        ----------
+        x
+            Shape (n,) or (n, k), n free coordinates.
+        S
+            What to take in place of the geometric part, sparse, shape (n, n), or None.
+
+        Returns
+        -------
+        ndarray
+            Of the shape of x.
+        """
         return self.B.T @ (self.CB @ x) + (self.S if S is None else S) @ x
 
     @property
-    def size(self):
+    def size(self) -> tuple[int, int]:
         """Number of free coordinates and of equations of joints."""
         return self.J.shape[1], self.J.shape[0]
 
-    def require_independent(self):
+    def require_independent(self) -> None:
         """Raise SupportError if equations of joints depend on each other in this state."""
         if not self.J.shape[0]:
             return
@@ -124,15 +170,15 @@ class StrainTangent:
         if np.min(np.abs(np.diag(R))) < 1e-12 * np.max(np.abs(R)):
             raise SupportError("the joints are not independent in this state")
 
-    def internal(self, stress):
+    def internal(self, stress: Array) -> Array:
         """The internal force of stresses, shape (N,)."""
         return self._rows[0].T @ stress
 
-    def material_energies(self, X):
+    def material_energies(self, X: Array) -> Array:
         """x^T B^T C B x of each column x of X, shape (k,)."""
         return np.sum((self.B @ X) * (self.CB @ X), axis=0)
 
-    def energies(self, X):
+    def energies(self, X: Array) -> Array:
         """x^T K x of each column x of X, shape (k,)."""
         return self.material_energies(X) + np.sum(X * (self.S @ X), axis=0)
 
@@ -173,14 +219,31 @@ def _beam_geometric(beam, u, stress, first):
     return sparse.csr_matrix((values, (i, j)), shape=(beam.N, beam.N)), first
 
 
-def is_symmetric(S):
+def is_symmetric(S: csr_matrix) -> bool:
     """True if a sparse matrix is symmetric to round-off."""
     gap = abs(S - S.T)
     return not gap.nnz or bool(gap.max() <= 1e-12 * abs(S).max())
 
 
-def load_stiffness(system, u, load, t=None):
-    """Minus the derivative of the loads by the coordinates, sparse, shape (N, N)."""
+def load_stiffness(system: System, u: Array, load: float, t: float | None = None) -> csr_matrix:
+    """Minus the derivative of the loads by the coordinates.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    u
+        Displacement of the coordinates, shape (N,).
+    load
+        Load factor.
+    t
+        Time of amplitudes, or None.
+
+    Returns
+    -------
+    sparse matrix
+        Shape (N, N).
+    """
     K = sparse.csr_matrix((system.N, system.N))
     for item in system.loads:
         if item.constant:
@@ -214,7 +277,8 @@ class Inverse:
         If the matrix is singular.
     """
 
-    def __init__(self, tangent, M=None, shift=0.0):
+    def __init__(self, tangent: StrainTangent, M: csr_matrix | None = None,
+                 shift: float = 0.0) -> None:
         self._tangent, self._n, m = tangent, *tangent.size
         self._M, self._shift = M, shift
         self._rest = tangent.S + shift * M if shift else tangent.S
@@ -271,7 +335,7 @@ class Inverse:
             x = self._lu.solve(np.concatenate([b, c]))
         return self._d[:, None] * x[:self._n], self._e[:, None] * x[self._n:]
 
-    def solve(self, b):
+    def solve(self, b: Array) -> Array:
         """x for columns b, shape (n, k) or (n,).
 
         Raises
@@ -281,8 +345,24 @@ class Inverse:
         """
         return self.solve_both(b.reshape(self._n, -1))[0].reshape(b.shape)
 
-    def solve_both(self, b, c=None, accepted=ACCEPTED):
-        """x and l for columns b and ``J x = c``, shapes (n, k) and (m, k), to a tolerance."""
+    def solve_both(self, b: Array, c: Array | None = None,
+                   accepted: float = ACCEPTED) -> tuple[Array, Array]:
+        """x and l for columns b and ``J x = c``.
+
+        Parameters
+        ----------
+        b
+            Shape (n, k), n free coordinates.
+        c
+            Shape (m, k); zero by default.
+        accepted
+            Largest size of the last correction, relative to x in the energy norm.
+
+        Returns
+        -------
+        x, l
+            Shapes (n, k) and (m, k).
+        """
         c = np.zeros((len(self._e), b.shape[1])) if c is None else c
         x, l, good = self._refined(b, c, accepted)
         if not good and not self._by_strains:

@@ -1,5 +1,7 @@
 """Time integration. A new scheme is one file and one line here."""
 
+from __future__ import annotations
+
 from ..errors import require_option, taught
 from .base import Motion, Scheme, Step
 from .energy_momentum import EnergyMomentum
@@ -10,7 +12,7 @@ SCHEMES = {cls.name: cls for cls in (EnergyMomentum, GeneralizedAlpha, HHT, Newm
 
 
 @taught
-def get_scheme(scheme):
+def get_scheme(scheme: str | Scheme | type[Scheme]) -> Scheme:
     """A :class:`Scheme` from its name, its class or itself.
 
     Raises

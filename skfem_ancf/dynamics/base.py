@@ -1,8 +1,15 @@
 """What every time integrator shares."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from ..system import System
+    from ..types import Array
 
 #: The iteration of a step, in NumPy and compiled: iterations at most; contraction up to which
 #: factors are kept; contraction expected of new factors, and the least that is expected of any;
@@ -72,33 +79,44 @@ class Step:
 
     acceleration_share = 0.0
 
-    def force(self, u):
+    def force(self, u: Array) -> Array:
         """Loads less internal force, shape (N,)."""
         raise NotImplementedError
 
-    def acceleration(self, u):
+    def acceleration(self, u: Array) -> Array:
         """The acceleration in the equation, shape (N,)."""
         raise NotImplementedError
 
-    def support_acceleration(self, v, a):
-        """As :meth:`acceleration`, at fixed coordinates, of their v and a at the end."""
+    def support_acceleration(self, v: Array, a: Array) -> Array:
+        """As :meth:`acceleration`, at fixed coordinates.
+
+        Parameters
+        ----------
+        v, a
+            Velocity and acceleration of the fixed coordinates at the end of the step, shape (k,).
+
+        Returns
+        -------
+        ndarray
+            Shape (k,).
+        """
         return a
 
-    def velocity(self, u):
+    def velocity(self, u: Array) -> Array:
         """Velocity at the end of the step before the joints' part in it, shape (N,)."""
         raise NotImplementedError
 
-    def middle(self, u):
+    def middle(self, u: Array) -> Array:
         """The displacement at which the tangent and the joints' directions are taken."""
         return u
 
-    def finish(self, u, v, multipliers, impulse):
+    def finish(self, u: Array, v: Array, multipliers: Array, impulse: Array) -> Motion:
         """The Motion at the end of the step.
 
         Parameters
         ----------
         u, v, multipliers
-            Displacement, velocity and multipliers found.
+            Displacement (N,), velocity (N,) and multipliers (m,) found.
         impulse
             The multipliers of the velocity, shape (m,): ``v = velocity(u) - M^-1 J^T impulse``.
         """
@@ -131,10 +149,37 @@ class Scheme:
     couples_velocity = False
     error_constant = 1.0 / 12.0
 
-    def begin(self, system, y, dt):
-        """A :class:`Step` from the Motion ``y``."""
+    def begin(self, system: System, y: Motion, dt: float) -> Step:
+        """The next time step.
+
+        Parameters
+        ----------
+        system
+            The :class:`~skfem_ancf.system.System`.
+        y
+            Where it starts.
+        dt
+            Its size.
+
+        Returns
+        -------
+        Step
+        """
         raise NotImplementedError
 
-    def local_error(self, old, new, dt):
-        """Estimate of the error that a step adds to the displacement, shape (N,)."""
+    def local_error(self, old: Motion, new: Motion, dt: float) -> Array:
+        """Estimate of the error that a step adds to the displacement.
+
+        Parameters
+        ----------
+        old, new
+            Start and end of the step.
+        dt
+            Its size.
+
+        Returns
+        -------
+        ndarray
+            Shape (N,).
+        """
         return self.error_constant * dt**2 * (new.algorithmic - old.algorithmic)

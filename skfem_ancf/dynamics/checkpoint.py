@@ -1,5 +1,7 @@
 """Files from which a motion goes on: what they hold, how they are written and checked."""
 
+from __future__ import annotations
+
 import hashlib
 import json
 import logging
@@ -9,6 +11,7 @@ import warnings
 import zipfile
 import zlib
 from io import BytesIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +19,12 @@ from ..errors import (CheckpointError, CheckpointWarning, InputError, MissingExt
                       require_path, shown)
 from .base import Motion
 from .run import Run, Task
+
+if TYPE_CHECKING:
+    from ..results import State
+    from ..system import System
+    from ..types import Array, StrPath
+    from .base import Scheme
 
 logger = logging.getLogger(__name__)
 
@@ -50,7 +59,7 @@ def _numbers(thing):
             and isinstance(v, (bool, int, float, str, tuple, np.ndarray, type(None)))]
 
 
-def fingerprint(system):
+def fingerprint(system: System) -> dict[str, str]:
     """What a scene is, part by part, as text; functions of time are not in it.
 
     Returns
@@ -80,10 +89,17 @@ def fingerprint(system):
     return parts
 
 
-def functions(system, t_start, t_end):
+def functions(system: System, t_start: float, t_end: float) -> dict[str, Array]:
     """Functions of time of a scene at a few times, by name: dict of arrays (n, k).
 
     A function has no hash; these values tell most that differ.
+
+    Parameters
+    ----------
+    system
+        The :class:`~skfem_ancf.system.System`.
+    t_start, t_end
+        Times of start and end of the motion.
     """
     times, found = np.linspace(t_start, t_end, TIMES), {}
     for k, load in enumerate(system.loads):
@@ -95,8 +111,18 @@ def functions(system, t_start, t_end):
     return found
 
 
-def same_problem(system, start, t):
-    """True if a State's accelerations and multipliers are those of the system at a time."""
+def same_problem(system: System, start: State, t: float) -> bool:
+    """True if a State's accelerations and multipliers are those of the system at a time.
+
+    Parameters
+    ----------
+    system
+        The :class:`~skfem_ancf.system.System`.
+    start
+        An instant of a motion.
+    t
+        The time.
+    """
     other, u = start.system, start.u
     if other is system and t == start.t:
         return True
@@ -200,7 +226,7 @@ def _load(path):
         return {name: npz[name] for name in npz.files}
 
 
-def read(path):
+def read(path: StrPath) -> tuple[dict[str, Array], dict[str, Any]]:
     """The arrays of a checkpoint by name, and its text; raises CheckpointError."""
     path = _path(path)
     if not path.exists():
@@ -253,7 +279,7 @@ class Checkpoint:
         The Run.
     """
 
-    def __init__(self, path, every, run):
+    def __init__(self, path: StrPath, every: int | None, run: Run) -> None:
         self.path, self.run = _path(path), run
         self.every = None if every is None else require_integer("every", every, 1)
         run.longest = self.every
@@ -266,7 +292,7 @@ class Checkpoint:
             "functions": sorted(self._functions),
             "task": {k: v for k, v in vars(task).items() if k != "t_eval"}}
 
-    def begin(self):
+    def begin(self) -> None:
         """Write the start, so that what is wrong is said before the run."""
         if self.path.exists():
             self._spare()
@@ -308,7 +334,7 @@ class Checkpoint:
         _write(self.path, {**arrays, "checksum": _checksum(arrays)})
         self._steps, self._clock = run.steps, time.monotonic()
 
-    def update(self):
+    def update(self) -> None:
         """Write if it is time to, or the end; warns with CheckpointWarning where it fails."""
         run = self.run
         waited = time.monotonic() - self._clock
@@ -349,8 +375,18 @@ def _compare(system, text, arrays, path):
                               + ", ".join(other))
 
 
-def resume(system, path, scheme=None):
+def resume(system: System, path: StrPath,
+           scheme: str | Scheme | type[Scheme] | None = None) -> tuple[Run, Checkpoint]:
     """The Run of a checkpoint, and the Checkpoint that goes on writing it.
+
+    Parameters
+    ----------
+    system
+        The :class:`~skfem_ancf.system.System`.
+    path
+        Name of the file.
+    scheme
+        The scheme, if it is one of the caller's own.
 
     Raises
     ------

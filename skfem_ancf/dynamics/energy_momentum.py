@@ -1,6 +1,13 @@
 """The energy-momentum scheme."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from .base import Motion, Scheme, Step
+
+if TYPE_CHECKING:
+    from ..system import System
 
 
 class EnergyMomentum(Scheme):
@@ -33,7 +40,7 @@ class EnergyMomentum(Scheme):
     couples_velocity = True
     compiled = True, (0.0, 0.0, 0.25, 0.5)
 
-    def begin(self, system, y, dt):
+    def begin(self, system: System, y: Motion, dt: float) -> Step:
         return _Step(system, y, dt)
 
     def __repr__(self):

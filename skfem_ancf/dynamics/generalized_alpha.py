@@ -1,7 +1,15 @@
 """The generalised-alpha family: Chung-Hulbert, HHT and Newmark."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from ..errors import InputError, require_finite_scalar, taught
 from .base import Motion, Scheme, Step
+
+if TYPE_CHECKING:
+    from ..system import System
+    from ..types import Array
 
 
 class GeneralizedAlpha(Scheme):
@@ -28,7 +36,7 @@ class GeneralizedAlpha(Scheme):
     name = "generalized-alpha"
 
     @taught
-    def __init__(self, rho_inf=0.9):
+    def __init__(self, rho_inf: float = 0.9) -> None:
         rho = require_finite_scalar("rho_inf", rho_inf)
         if not 0.0 <= rho <= 1.0:
             raise InputError(f"rho_inf must lie in [0, 1], got {rho!r}")
@@ -41,13 +49,13 @@ class GeneralizedAlpha(Scheme):
         self.error_constant = abs(self.beta - 1.0 / 6.0)
 
     @property
-    def compiled(self):
+    def compiled(self) -> tuple[bool, tuple[float, float, float, float]]:
         return False, (self.alpha_m, self.alpha_f, self.beta, self.gamma)
 
-    def begin(self, system, y, dt):
+    def begin(self, system: System, y: Motion, dt: float) -> Step:
         return _Step(self, system, y, dt)
 
-    def local_error(self, old, new, dt):
+    def local_error(self, old: Motion, new: Motion, dt: float) -> Array:
         # the damping of first order that gamma above that of second order causes
         damping = 0.5 * (self.gamma - 0.5 - self.alpha_f + self.alpha_m)
         return super().local_error(old, new, dt) + damping * dt * (new.v - old.v)
@@ -74,7 +82,7 @@ class HHT(GeneralizedAlpha):
     name = "hht"
 
     @taught
-    def __init__(self, alpha=0.05):
+    def __init__(self, alpha: float = 0.05) -> None:
         alpha = require_finite_scalar("alpha", alpha)
         if not 0.0 <= alpha <= 1.0 / 3.0:
             raise InputError(f"alpha must lie in [0, 1/3], got {alpha!r}")
@@ -98,7 +106,7 @@ class Newmark(GeneralizedAlpha):
     name = "newmark"
 
     @taught
-    def __init__(self, beta=0.25, gamma=0.5):
+    def __init__(self, beta: float = 0.25, gamma: float = 0.5) -> None:
         self._set(0.0, 0.0)
         self.beta = require_finite_scalar("beta", beta)
         self.gamma = require_finite_scalar("gamma", gamma)

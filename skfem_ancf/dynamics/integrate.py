@@ -1,5 +1,9 @@
 """What is asked of a motion, and the loop that finds it."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..errors import (AncfError, ConvergenceError, InputError, Interrupted, require_finite,
@@ -9,14 +13,26 @@ from .checkpoint import Checkpoint, same_problem
 from .integrator import Integrator, StepFailed
 from .run import Run, Task
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from ..results import State
+    from ..system import System
+    from ..types import Array, StrPath
+    from .base import Scheme
+    from .history import History
+
 MAX_STEPS = 10**9
 MIN_RTOL = 1e-12
 EPS = np.finfo(float).eps
 
 
 @taught
-def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=None, t_eval=None, tol=None,
-              rtol=1e-5, progress=None, start=None, breakpoints=(), checkpoint=None, every=None):
+def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: Array | None = None,
+              v: Array | None = None, t_start: float | None = None, t_eval: ArrayLike | None = None,
+              tol: float | None = None, rtol: float = 1e-5, progress: bool | None = None,
+              start: State | None = None, breakpoints: ArrayLike = (),
+              checkpoint: StrPath | None = None, every: int | None = None) -> History:
     """Integrate the equation of motion.
 
     Parameters
@@ -37,7 +53,7 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=None, t_eval=No
     t_start
         Time at the start; by default that of ``start``, or 0.
     t_eval
-        Times to store; every step by default. An instant within a step is the end of a shorter
+        Times to store, shape (n,); every step by default. An instant within a step is the end of a shorter
         step of the scheme from the same start, which is not gone on from: the steps of the motion
         do not depend on ``t_eval``, and what the scheme conserves is conserved at these instants
         too.
@@ -52,8 +68,8 @@ def integrate(system, t_end, dt, scheme, u=None, v=None, t_start=None, t_eval=No
         ``v`` too. An instant of a motion of the same scene by the same scheme goes on exactly: the
         last one of a History to round-off, another one to the tolerance of the iteration.
     breakpoints
-        Times at which loads or motions jump or have a kink: a step ends there, with the values
-        before, and the next one starts from the values after.
+        Times, shape (n,), at which loads or motions jump or have a kink: a step ends
+        there, with the values before, and the next one starts from the values after.
     checkpoint
         A file to write now and then, ``.npz`` or ``.h5``, from which
         :meth:`~skfem_ancf.Scene.resume` goes on.
@@ -142,8 +158,17 @@ def _goes_on(system, scheme, start, t):
             and same_problem(system, start, t))
 
 
-def follow(run, file=None, progress=None):
+def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = None) -> History:
     """Take the steps of a Run to its end, and write its file.
+
+    Parameters
+    ----------
+    run
+        A :class:`~skfem_ancf.dynamics.run.Run` that has begun.
+    file
+        Its Checkpoint, or None.
+    progress
+        Show a progress bar: True, False, or None for "if it takes long".
 
     Returns
     -------

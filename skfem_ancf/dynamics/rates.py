@@ -4,7 +4,16 @@ No value from outside of a step is used: neither do the rates at the end of a mo
 those of a motion that goes on, nor does a kink at the end of a step spoil those of the next.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..types import Array
 
 #: Intervals into which a step is divided.
 PARTS = 4
@@ -12,7 +21,8 @@ _FIRST = np.array([25.0, -48.0, 36.0, -16.0, 3.0]) / 12.0
 _SECOND = np.array([35.0, -104.0, 114.0, -56.0, 11.0]) / 12.0
 
 
-def rates(function, t, dt, ahead=False, limit=np.inf):
+def rates(function: Callable[[Array], Array], t: float, dt: float, ahead: bool = False,
+          limit: float = np.inf) -> tuple[Array, Array]:
     """First and second derivative at one time, of a function of an array of times.
 
     Parameters
@@ -21,21 +31,33 @@ def rates(function, t, dt, ahead=False, limit=np.inf):
         Takes times (n,), returns (n, ...).
     t, dt
         End and size of the step; its start with ``ahead``.
+    ahead
+        The rates at the start of the step, not at its end.
     limit
         Time beyond which the function is not asked.
+
+    Returns
+    -------
+    first, second
+        Shapes (...).
     """
     h = dt / PARTS if ahead else -dt / PARTS
     f = function(np.minimum(t + h * np.arange(PARTS + 1), limit))
     return np.tensordot(_FIRST, f, 1) / -h, np.tensordot(_SECOND, f, 1) / h**2
 
 
-def step_rates(function, times, dt):
+def step_rates(function: Callable[[Array], Array], times: Array,
+               dt: float) -> tuple[Array, Array, Array, Array]:
     """Values and rates at the ends of steps.
 
     Parameters
     ----------
+    function
+        Takes times (n,), returns (n, ...).
     times
         The times at which the function is asked, ``PARTS`` in each step, shape (4 n + 1,).
+    dt
+        Size of a step.
 
     Returns
     -------

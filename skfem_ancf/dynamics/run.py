@@ -1,6 +1,9 @@
 """A motion on its way: steps, their sizes, instants to store, and what it takes to go on."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -9,6 +12,11 @@ from .blocks import CompiledSteps
 from .history import History
 from .integrator import Integrator, StepFailed
 from .stepsize import StepSize
+
+if TYPE_CHECKING:
+    from ..system import System
+    from ..types import Array
+    from .base import Scheme
 
 #: Part of a step up to which an instant is interpolated: a step that short is all round-off.
 CLOSE = 1e-6
@@ -43,22 +51,38 @@ class Task:
     breakpoints: tuple = ()
 
     @property
-    def span(self):
+    def span(self) -> float:
         """Length of the motion in time."""
         return self.t_end - self.t_start
 
 
 class Stepper:
-    """Single steps, compiled where they can be."""
+    """Single steps, compiled where they can be.
 
-    def __init__(self, system, scheme, tol=None):
+    Parameters
+    ----------
+    system, scheme
+        What is integrated, and how.
+    tol
+        Tolerance of the iteration; the scheme's own by default.
+    """
+
+    def __init__(self, system: System, scheme: Scheme, tol: float | None = None) -> None:
         self.solver = Integrator(system, scheme, tol)
         self.blocks = None
         if CompiledSteps.applies(scheme, system):
             self.blocks = CompiledSteps(self.solver, scheme, system)
 
-    def step(self, y, dt):
-        """One step, in Python where there is no compiled one or it fails; raises StepFailed."""
+    def step(self, y: Motion, dt: float) -> Motion:
+        """One step, in Python where there is no compiled one or it fails; raises StepFailed.
+
+        Parameters
+        ----------
+        y
+            Where it starts.
+        dt
+            Its size.
+        """
         if self.blocks is not None:
             done, motion = self.blocks.run(y, dt, 1)
             if done:
@@ -66,7 +90,7 @@ class Stepper:
             self.solver.forget()
         return self.solver.advance_safely(y, dt)
 
-    def forget(self):
+    def forget(self) -> None:
         """Make new factors in the next step."""
         self.solver.forget()
         if self.blocks is not None:
@@ -77,28 +101,28 @@ class Stepper:
         return self.blocks if self.blocks is not None and self.blocks.ready else self.solver
 
     @property
-    def ready(self):
+    def ready(self) -> bool:
         """True if there are factors of an iteration matrix."""
         return self._last.ready
 
-    def solve(self, b):
+    def solve(self, b: Array) -> Array:
         """The inverse of the last iteration matrix times b (N,)."""
         return self._last.solve(b)
 
-    def mass_factor(self, dt):
+    def mass_factor(self, dt: float) -> float:
         """Factor of the mass in the iteration matrix."""
         if self._last is self.solver:
             return self.solver._coefficients[0]
         return self.blocks.mass_factor(dt)
 
-    def remember(self):
+    def remember(self) -> dict[str, Any]:
         """Numbers and arrays from which :meth:`recall` goes on as if there had been no break."""
         memory = {f"solver.{k}": v for k, v in self.solver.remember().items()}
         if self.blocks is not None:
             memory.update({f"blocks.{k}": v for k, v in self.blocks.remember().items()})
         return memory
 
-    def recall(self, memory):
+    def recall(self, memory: dict[str, Any]) -> None:
         """Go on with what :meth:`remember` gave."""
         def part(name):
             return {k.split(".", 1)[1]: v for k, v in memory.items() if k.startswith(name + ".")}
@@ -110,6 +134,13 @@ class Stepper:
 
 class Run:
     """The loop over steps, so that it can stop after any of them and go on.
+
+    Parameters
+    ----------
+    system, scheme
+        What is integrated, and how.
+    task : Task
+        From when to when, and what to store.
 
     Attributes
     ----------
@@ -123,7 +154,7 @@ class Run:
         Steps of a compiled block at most, or None.
     """
 
-    def __init__(self, system, scheme, task):
+    def __init__(self, system: System, scheme: Scheme, task: Task) -> None:
         self.system, self.scheme, self.task = system, scheme, task
         self.stepper, self._side = Stepper(system, scheme, task.tol), None
         self.sizes = None
@@ -138,13 +169,27 @@ class Run:
 
     # the start
 
-    def begin(self, u, v):
-        """Begin with a displacement and a velocity, shape (N,)."""
+    def begin(self, u: Array, v: Array) -> None:
+        """Begin with a displacement and a velocity.
+
+        Parameters
+        ----------
+        u, v
+            Of the coordinates, shape (N,).
+        """
         self.y = self.stepper.solver.start(u, v, self.task.t_start, self._first_step())
         self._store_start()
 
-    def go_on(self, y, memory=None):
-        """Begin with a Motion of the same scheme, and what its Run kept."""
+    def go_on(self, y: Motion, memory: dict[str, Any] | None = None) -> None:
+        """Begin where another run of the same scene was.
+
+        Parameters
+        ----------
+        y
+            Its Motion there.
+        memory
+            What its :meth:`remember` gave, or None.
+        """
         self.y = Motion(self.task.t_start, y.u, y.v, y.acceleration, y.algorithmic, y.multipliers,
                         y.force, y.before, y.memory)
         if memory is not None:
@@ -181,7 +226,7 @@ class Run:
         return self.segment == len(self._times) - 2
 
     @property
-    def done(self):
+    def done(self) -> bool:
         """True at the end of the motion."""
         return self._last and self.y.t >= self._end
 
@@ -206,7 +251,7 @@ class Run:
 
     # steps
 
-    def advance(self):
+    def advance(self) -> None:
         """Go on by a step, or by a block of them; raises StepFailed."""
         if self.sizes is not None:
             self._automatic()
@@ -327,7 +372,7 @@ class Run:
 
     # what it takes to go on
 
-    def remember(self):
+    def remember(self) -> dict[str, Any]:
         """Numbers and arrays that, with :attr:`y` and the history, make a Run go on exactly."""
         memory = self.stepper.remember()
         if self.sizes is not None:
@@ -336,8 +381,16 @@ class Run:
         memory["counts"] = np.array([self.segment, self.n, self._next, self.steps, self.rejected])
         return memory
 
-    def recall(self, y, memory):
-        """Go on with what :meth:`remember` gave."""
+    def recall(self, y: Motion, memory: dict[str, Any]) -> None:
+        """Go on with what :meth:`remember` gave.
+
+        Parameters
+        ----------
+        y
+            Where the motion is.
+        memory
+            Numbers and arrays by name.
+        """
         self.y = y
         self.stepper.recall(memory)
         if self.sizes is not None:
@@ -347,8 +400,16 @@ class Run:
         self._limit()
 
 
-def interpolate(a, b, t):
-    """The motion at t between two instants: cubic in the displacement, linear in accelerations."""
+def interpolate(a: Motion, b: Motion, t: float) -> Motion:
+    """The motion at t between two instants: cubic in the displacement, linear in accelerations.
+
+    Parameters
+    ----------
+    a, b
+        The instants.
+    t
+        The time.
+    """
     h, s = b.t - a.t, (t - a.t) / (b.t - a.t)
     du = b.u - a.u
     u = (a.u + s * s * (3 - 2 * s) * du + h * s * (1 - s) ** 2 * a.v + h * s * s * (s - 1) * b.v)

@@ -1,8 +1,17 @@
 """The automatic step size: what a step adds to the error, and events ahead."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from ..sampling import sample
+
+if TYPE_CHECKING:
+    from ..system import System
+    from .base import Motion, Scheme
+    from .run import Stepper
 
 #: Intervals of the whole motion at whose ends functions of time are asked ahead.
 SAMPLES = 4096
@@ -47,7 +56,8 @@ class StepSize:
     Journal of Computational and Applied Mathematics 11 (1984).
     """
 
-    def __init__(self, system, scheme, rtol, t_start, t_end):
+    def __init__(self, system: System, scheme: Scheme, rtol: float, t_start: float,
+                 t_end: float) -> None:
         self.system, self.scheme, self.rtol = system, scheme, rtol
         self.span = t_end - t_start
         self._mass = sum(b.total_mass for b in system.beams)
@@ -70,10 +80,17 @@ class StepSize:
         varies = size > 1e-12 * np.abs(values).max(axis=0, initial=0.0)
         return values[:, varies] / size[varies]
 
-    def cut(self, t, dt):
+    def cut(self, t: float, dt: float) -> float:
         """The step size from t, at most dt, in which no function of time does what is not seen.
 
         It is not seen if it is no parabola within the step: a blow that begins and ends there.
+
+        Parameters
+        ----------
+        t
+            Time at the start of the step.
+        dt
+            Its size at most.
         """
         values = self._values
         while values.shape[1]:
@@ -93,8 +110,23 @@ class StepSize:
         return (np.sqrt(max(de @ self.system.mass.multiply(de), 0.0) / self._mass)
                 / (self.system.size * self.rtol))
 
-    def error(self, stepper, old, new, dt):
-        """What a step adds to the error, over what it may add."""
+    def error(self, stepper: Stepper, old: Motion, new: Motion, dt: float) -> float:
+        """What a step adds to the error, over what it may add.
+
+        Parameters
+        ----------
+        stepper
+            It has the factors of the last iteration matrix, if any.
+        old, new
+            Start and end of the step.
+        dt
+            Its size.
+
+        Returns
+        -------
+        float
+            Above 1 it adds more than its share.
+        """
         s = self.system
         de = self.scheme.local_error(old, new, dt)
         if stepper.ready:
@@ -110,17 +142,19 @@ class StepSize:
         return LARGEST * max(self._size(rate) * dt**(power - 1) * self.span,
                              self._size(de) / SINGLE)
 
-    def begin(self):
+    def begin(self) -> None:
         """Forget what was: at the start, and after a breakpoint."""
         self._averages = np.zeros_like(self._averages)
 
-    def next(self, error, dt, size):
+    def next(self, error: float, dt: float, size: float) -> tuple[float, bool]:
         """Size of the next step after one of dt, and whether this one is to be kept.
 
         Parameters
         ----------
         error
             That of :meth:`error`.
+        dt
+            Size of the step that was taken.
         size
             The size wished for, of which dt may be a part.
         """
@@ -134,10 +168,10 @@ class StepSize:
             new = dt
         return (max(size, new) if dt < 0.99 * size and factor >= 1.0 else new), True
 
-    def remember(self):
+    def remember(self) -> dict[str, Any]:
         """What :meth:`recall` takes to go on as if there had been no break."""
         return {"averages": self._averages}
 
-    def recall(self, memory):
+    def recall(self, memory: dict[str, Any]) -> None:
         """Go on with what :meth:`remember` gave."""
         self._averages = memory["averages"]

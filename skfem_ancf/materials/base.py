@@ -6,14 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import (
-    InputError,
-    require_finite_scalar,
-    require_like,
-    require_option,
-    require_positive,
-    taught,
-)
+from ..errors import (InputError, require_finite_scalar, require_like, require_option,
+                      require_positive, taught)
 from ..frozen import Frozen, rebuilt
 from ..quadrature import gauss
 

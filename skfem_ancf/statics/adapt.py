@@ -1,12 +1,25 @@
 """Graded meshes: elements where the error is."""
 
+from __future__ import annotations
+
 import logging
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import (ConvergenceError, InputError, NameUnknown, require_integer,
-                      require_positive, taught)
+from ..errors import (ConvergenceError, InputError, NameUnknown, require_integer, require_positive,
+                      taught)
 from ..quadrature import gauss, tensor
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from ..beam import Beam
+    from ..results import State
+    from ..scene import Scene
+    from ..types import Array
 
 logger = logging.getLogger(__name__)
 
@@ -21,7 +34,8 @@ MAX_ELEMENTS = 10**7
 
 
 @taught
-def solve_adaptive(scene, tol, max_elements=20000, goal="displacement", **options):
+def solve_adaptive(scene: Scene, tol: float, max_elements: int = 20000, goal: str = "displacement",
+                   **options: Any) -> State:
     """Solve on meshes that are refined until the estimated error is small enough.
 
     With the goal "displacement" each round solves on a mesh and on the same with every element
@@ -124,7 +138,7 @@ def _solve_for_strain(scene, tol, max_elements, **options):
         scene, _ = refine(scene, _largest(errors, [len(e) for e, _ in parts]))
 
 
-def strain_error(state, beam):
+def strain_error(state: State, beam: Beam) -> tuple[Array, ...]:
     """Squared L2 norm of recovered minus elements' strain, and of the strain, by element.
 
     Parameters
@@ -157,7 +171,7 @@ def strain_error(state, beam):
     return tuple(np.einsum("k,kep,ep->e", weights, f * f, dV) for f in (gap, strain))
 
 
-def refine(scene, marked):
+def refine(scene: Scene, marked: Sequence[ArrayLike]) -> tuple[Scene, Callable[[Array], Array]]:
     """The scene with elements halved, and the map of displacements onto it.
 
     Parameters
@@ -165,7 +179,12 @@ def refine(scene, marked):
     scene
         A scene.
     marked
-        For each beam the elements to halve.
+        For each beam the numbers of the elements to halve, shapes (k,).
+
+    Returns
+    -------
+    scene, prolong
+        ``prolong(u)`` is the displacement u (N,) in the coordinates of the new scene.
     """
     beams = [b.with_mesh(b.mesh.refined(np.asarray(m, dtype=int)))
              for b, m in zip(scene.beams, marked)]

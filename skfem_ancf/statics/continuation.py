@@ -1,6 +1,9 @@
 """Arc-length continuation: equilibria beyond limit, snap-back and bifurcation points."""
 
+from __future__ import annotations
+
 import logging
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,6 +11,13 @@ from ..errors import (CallbackError, ConvergenceError, InputError, Interrupted, 
                       require_function, require_integer, require_positive, shown, taught)
 from ..progress import progress_bar
 from .critical import find_critical
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..system import System
+    from ..types import Array
+    from .critical import Critical
 
 logger = logging.getLogger(__name__)
 #: Steps of the longest path.
@@ -25,12 +35,19 @@ class Failed(Exception):
 class Point:
     """One equilibrium of a path.
 
-    Attributes
+    Parameters
     ----------
     u, multipliers, load, force
         Displacement (N,), multipliers (m,), load factor and internal force (N,).
     arc
         Arc length from the start of the path.
+    error
+        Size of the last correction in the energy norm, relative to the work done.
+    iterations
+        Linear systems solved.
+
+    Attributes
+    ----------
     rate
         Of the load with the arc length; zero at a limit point.
     tangent
@@ -40,19 +57,16 @@ class Point:
         constraints; None where the loads have no potential.
     stable
         Whether ``negative`` is zero; None where it is not known.
-    error
-        Size of the last correction in the energy norm, relative to the work done.
-    iterations
-        Linear systems solved.
     """
 
-    def __init__(self, u, multipliers, load, force, arc, error, iterations):
+    def __init__(self, u: Array, multipliers: Array, load: float, force: Array, arc: float,
+                 error: float, iterations: int) -> None:
         self.u, self.multipliers, self.load, self.force = u, multipliers, load, force
         self.arc, self.error, self.iterations = arc, error, iterations
         self.rate, self.tangent, self.multiplier_rate, self.negative = np.nan, None, None, None
 
     @property
-    def stable(self):
+    def stable(self) -> bool | None:
         return None if self.negative is None else self.negative == 0
 
 
@@ -67,7 +81,7 @@ class Tracer:
         As for :func:`continuation`.
     """
 
-    def __init__(self, system, tol, max_iterations):
+    def __init__(self, system: System, tol: float, max_iterations: int) -> None:
         self.system, self.tol, self.max_iterations = system, tol, max_iterations
         weights = np.zeros(system.N)
         for beam, s in zip(system.beams, system.slices):
@@ -75,11 +89,11 @@ class Tracer:
         self.weights = weights / (0.5 * weights.sum() * system.size**2)
         self.unit = system.values(1.0) - system.values(0.0)
 
-    def norm(self, v):
+    def norm(self, v: Array) -> float:
         """The norm of the nodes' mean displacement over the size of the scene."""
         return np.sqrt(v @ (self.weights * v))
 
-    def stress_free(self):
+    def stress_free(self) -> Point:
         """The stress-free state as a point."""
         zero = np.zeros(self.system.N)
         return Point(zero, np.zeros(self.system.m), 0.0, zero, 0.0, 0.0, 0)
@@ -98,7 +112,7 @@ class Tracer:
                 phi = phi + system.full_jacobian(u, load) @ du0
         return external, -phi
 
-    def factorize(self, point):
+    def factorize(self, point: Point) -> tuple[Array, Array]:
         """Factorise the tangent stiffness of a point and count its negative eigenvalues."""
         system = self.system
         system.assemble(point.u, point.load)
@@ -111,8 +125,16 @@ class Tracer:
             raise Failed("the tangent is singular") from None
         return drive
 
-    def set_tangent(self, point, along=None):
-        """Find the tangent of the path at a point, in the sense of the displacement ``along``."""
+    def set_tangent(self, point: Point, along: Array | None = None) -> Point:
+        """Find the tangent of the path at a point.
+
+        Parameters
+        ----------
+        point
+            It is changed, and returned.
+        along
+            A displacement (N,) in whose sense the tangent points; None for that of a growing load.
+        """
         drive, phi = self.factorize(point)
         dF, mF = self.system.solve(drive, phi)
         dF[self.system.fixed] += self.unit
@@ -124,12 +146,28 @@ class Tracer:
         point.rate, point.tangent, point.multiplier_rate = 1.0 / size, dF / size, mF / size
         return point
 
-    def set_tangent_after(self, start, point):
-        """:meth:`set_tangent` in the sense of the way from ``start``."""
+    def set_tangent_after(self, start: Point, point: Point) -> Point:
+        """:meth:`set_tangent` in the sense of the way from another point.
+
+        Parameters
+        ----------
+        start
+            The point before.
+        point
+            It is changed, and returned.
+        """
         return self.set_tangent(point, point.u - start.u)
 
-    def advance(self, start, ds):
-        """The point at distance ds along the tangent of ``start``."""
+    def advance(self, start: Point, ds: float) -> Point:
+        """The next point of the path.
+
+        Parameters
+        ----------
+        start
+            A point with its tangent.
+        ds
+            The distance along the tangent.
+        """
         first = ds * start.tangent, ds * start.multiplier_rate, ds * start.rate
         plane = self.weights * start.tangent
 
@@ -138,8 +176,18 @@ class Tracer:
 
         return self._correct(start, first, increment, ds)
 
-    def at_load(self, start, load, guess):
-        """The point at a load near ``start``, from a guess of the displacement from it."""
+    def at_load(self, start: Point, load: float, guess: tuple[Array, Array]) -> Point:
+        """The point at a load near another one.
+
+        Parameters
+        ----------
+        start
+            The other point.
+        load
+            Load factor.
+        guess
+            Change of displacement (N,) and multipliers (m,) from there.
+        """
         first = guess[0], guess[1], load - start.load
         return self._correct(start, first, lambda step, dR, dF: 0.0, np.inf)
 
@@ -185,8 +233,11 @@ class Tracer:
 
 
 @taught
-def continuation(system, steps=100, ds=0.02, ds_max=None, max_load=None, until=None, tol=1e-8,
-                 max_iterations=15, locate=1e-8, branch=None, side=1, progress=None):
+def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: float | None = None,
+                 max_load: float | None = None, until: Callable[[Point], bool] | None = None,
+                 tol: float = 1e-8, max_iterations: int = 15, locate: float | None = 1e-8,
+                 branch: Critical | None = None, side: int = 1,
+                 progress: bool | None = None) -> tuple[list[Point], list[Critical]]:
     """Follow the equilibrium path from the stress-free state or from a bifurcation point.
 
     Each step advances by ``ds`` along the tangent of the path, in the norm of the nodes' mean
@@ -340,8 +391,16 @@ def _land(tracer, start, point, load):
     return tracer.set_tangent_after(start, landed)
 
 
-def load_between(p, q, x):
-    """The load at part x between two points: a cubic polynomial of the arc length."""
+def load_between(p: Point, q: Point, x: float) -> float:
+    """The load between two points: a cubic polynomial of the arc length.
+
+    Parameters
+    ----------
+    p, q
+        Points with their tangents.
+    x
+        Part of the way, from 0 to 1.
+    """
     h = q.arc - p.arc
     a, b = p.load, h * p.rate
     c = 3 * (q.load - a) - 2 * b - h * q.rate

@@ -1,8 +1,15 @@
 """Limit and bifurcation points between two points of a path."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from ..types import Array
+    from .continuation import Point, Tracer
 
 #: How often a step is halved to tell critical points from each other.
 DEPTH = 12
@@ -39,8 +46,18 @@ class Critical:
     change: int
 
 
-def find_critical(tracer, p, q, tol):
-    """The critical points between two points with tangents, in order: a list of Critical."""
+def find_critical(tracer: Tracer, p: Point, q: Point, tol: float) -> list[Critical]:
+    """The critical points between two points of a path, in order.
+
+    Parameters
+    ----------
+    tracer
+        Their :class:`~skfem_ancf.statics.continuation.Tracer`.
+    p, q
+        Points with their tangents.
+    tol
+        As ``locate`` of :func:`~skfem_ancf.statics.continuation.continuation`.
+    """
     out, stack = [], [(p, q, 0)]
     while stack:
         a, b, depth = stack.pop()
@@ -112,15 +129,25 @@ def _bifurcation(tracer, p, a, b, tol):
                     best.error, v, m, before, change)
 
 
-def smallest(tracer, point, start=None, iterations=4):
+def smallest(tracer: Tracer, point: Point, start: tuple[Array, Array] | None = None,
+             iterations: int = 4) -> tuple[tuple[Array, Array], float]:
     """The eigenvalue next to zero of the tangent stiffness over its diagonal, and its vector.
 
     Parameters
     ----------
+    tracer
+        The :class:`~skfem_ancf.statics.continuation.Tracer`.
+    point
+        Where the tangent stiffness is taken.
     start
-        A vector and multipliers to begin with.
+        A vector (N,) and multipliers (m,) to begin with, or None.
     iterations
         Of the inverse power method.
+
+    Returns
+    -------
+    (vector, multipliers), value
+        Shapes (N,) and (m,), and the eigenvalue.
     """
     system = tracer.system
     tracer.factorize(point)

@@ -1,10 +1,19 @@
 """Which equilibrium: the verdict on its stability, and the way from an unstable one down."""
 
+from __future__ import annotations
+
 import logging
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..system import System
+    from ..types import Array
 
 logger = logging.getLogger(__name__)
 
@@ -60,7 +69,8 @@ class Verdict:
 FOLLOWS = "against divergence: the loads have no potential, and flutter is not seen in statics"
 
 
-def verdict(system, u, load, multipliers, t=None):
+def verdict(system: System, u: Array, load: float, multipliers: Array,
+            t: float | None = None) -> Verdict:
     """The :class:`Verdict` on an equilibrium, from the tangent there.
 
     Where the loads have no potential (a pressure with free edges) the tangent K is not symmetric.
@@ -85,7 +95,7 @@ def verdict(system, u, load, multipliers, t=None):
         return Verdict("singular", 0)
 
 
-def verdict_of_factors(system):
+def verdict_of_factors(system: System) -> Verdict:
     """As :func:`verdict`, from the tangent that has been factorised."""
     negative, singular = system.inertia()
     if system.symmetric or _is_symmetric(system):
@@ -104,8 +114,18 @@ def _is_symmetric(system):
     return abs(K - K.T).max() <= ROUND_OFF * abs(K).max()
 
 
-def has_potential(system, u, load):
-    """True if the tangent is symmetric: the loads have a potential, or act like such."""
+def has_potential(system: System, u: Array, load: float) -> bool:
+    """True if the tangent is symmetric: the loads have a potential, or act like such.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    u
+        Displacement of the coordinates, shape (N,).
+    load
+        Load factor.
+    """
     if system.symmetric:
         return True
     system.assemble(u, load)
@@ -113,11 +133,20 @@ def has_potential(system, u, load):
     return _is_symmetric(system)
 
 
-def holds(system, u, load, multipliers, t):
+def holds(system: System, u: Array, load: float, multipliers: Array, t: float | None) -> bool:
     """True unless the equilibrium that an iteration has just found is unstable.
 
     The factors of the last iterate mostly answer at little cost; what they do not affirm is asked
     of the tangent at the solution.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    u, multipliers
+        The equilibrium, shapes (N,) and (m,).
+    load, t
+        Load factor, and the time of joints that move.
     """
     try:
         if system.stays(u, t, multipliers):
@@ -127,11 +156,24 @@ def holds(system, u, load, multipliers, t):
     return verdict(system, u, load, multipliers, t).stability != "unstable"
 
 
-def heads_on(system, result, u, load, origin):
+def heads_on(system: System, result: Any, u: Array, load: float, origin: tuple[Any, Any]) -> bool:
     """True if the scene moves from the last equilibrium to ``u`` as the load drives it there.
 
     Close to a bifurcation an iteration may jump to the other side. The nodes' displacements are
     compared with those of the tangent.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    result
+        The last equilibrium, a :class:`~skfem_ancf.statics.newton.StaticResult`.
+    u
+        Displacement of the next one, shape (N,).
+    load
+        Its load factor.
+    origin
+        Displacement that the solution began with and its multipliers, or None for these.
     """
     if origin[1] is not None or result.load == 0.0:
         return True
@@ -149,10 +191,19 @@ def heads_on(system, result, u, load, origin):
     return bool(du @ (position_weights(system) * (u - result.u)) >= 0.0)
 
 
-def gives_way(system, result, load):
+def gives_way(system: System, result: Any, load: float) -> bool:
     """True if the last equilibrium is close to a limit point.
 
     There the nodes move much more under forces that the stress-free scene withstands.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    result
+        The last equilibrium, a :class:`~skfem_ancf.statics.newton.StaticResult`.
+    load
+        The next load factor.
     """
     descent, none, ratio = Descent(system), np.zeros(system.m), []
     if result.load == 0.0:
@@ -175,19 +226,39 @@ class Descent:
     whole is kept within a stride: eigenvector following, as in Cerjan and Miller, Journal of
     Chemical Physics 75 (1981).
 
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    stride
+        Largest displacement of a node in one correction, relative to the scene's size.
+
     Attributes
     ----------
     turned : bool
         A direction of negative curvature was met.
     """
 
-    def __init__(self, system, stride=STRIDES[0]):
+    def __init__(self, system: System, stride: float = STRIDES[0]) -> None:
         self.system, self.stride = system, stride
         self.turned = False
         self._weights = position_weights(system)
 
-    def correct(self, free, du, dm):
-        """The correction ``du`` of the residual ``free``, turned and shortened."""
+    def correct(self, free: Array, du: Array, dm: Array) -> tuple[Array, Array]:
+        """The correction of a residual, turned and shortened.
+
+        Parameters
+        ----------
+        free
+            Residual at the free coordinates, shape (N,).
+        du, dm
+            Newton's correction of displacement (N,) and multipliers (m,).
+
+        Returns
+        -------
+        du, dm
+            Shapes (N,) and (m,).
+        """
         system = self.system
         negative = system.inertia().negative
         for v, curvature in self.directions(negative):
@@ -197,11 +268,17 @@ class Descent:
         scale = min(1.0, self.stride * system.size / largest) if largest > 0 else 1.0
         return scale * du, scale * dm
 
-    def product(self, a, b):
-        """The sum over the nodes of ``a . b``, of displacements of the coordinates."""
+    def product(self, a: Array, b: Array) -> float:
+        """The sum over the nodes of ``a . b``, of displacements of the coordinates.
+
+        Parameters
+        ----------
+        a, b
+            Displacements of the coordinates, shape (N,).
+        """
         return float(a @ (self._weights * b))
 
-    def directions(self, count):
+    def directions(self, count: int) -> list[tuple[Array, float]]:
         """Directions v with negative ``v . K v``, from the factors, and that number: pairs.
 
         Eigenvectors of the inverse of K seen from the positions of the nodes, of its most negative
@@ -210,7 +287,7 @@ class Descent:
         inverse, values, Y = self._inverse_eigenvectors(count, "SA")
         return [(inverse(y), value) for y, value in zip(Y.T, values) if value < 0]
 
-    def compliance(self):
+    def compliance(self) -> float:
         """The largest displacement of the nodes for unit forces on them, from the factors."""
         values = self._inverse_eigenvectors(1, "LA")[1]
         return float(np.max(values, initial=0.0))
@@ -238,17 +315,23 @@ class Descent:
         return inverse, values, Y
 
 
-def way_down(system, result, load, full, at, origin, iterate, failed):
+def way_down(system: System, result: Any, load: float, full: float, at: float,
+             origin: tuple[Any, Any], iterate: Callable[..., Any],
+             failed: type[Exception]) -> tuple[Any, bool]:
     """What :func:`descend` finds, or None, and whether it met an unstable tangent.
 
     Of the strides the first that leads where the load drives the scene.
 
     Parameters
     ----------
+    system, result
+        As for :func:`descend`.
     load, origin
         As for :func:`heads_on`.
     full, at
-        Load factor and time for :func:`descend`, which takes the others.
+        Load factor and time for :func:`descend`.
+    iterate, failed
+        As for :func:`descend`.
     """
     first = None, False
     for stride in STRIDES:
@@ -264,7 +347,8 @@ def way_down(system, result, load, full, at, origin, iterate, failed):
     return first
 
 
-def descend(system, result, load, t, iterate, descent, failed):
+def descend(system: System, result: Any, load: float, t: float, iterate: Callable[..., Any],
+            descent: Descent, failed: type[Exception]) -> tuple[Array, Array, Array]:
     """A stable equilibrium at a load where the path from the last one has lost its stability.
 
     Corrections of :class:`Descent` from the last stable equilibrium; where they come to rest at an
@@ -314,12 +398,22 @@ def _side(system, descent, v, u, last, load):
     return 1.0 if v[np.argmax(np.abs(v) > 0.5 * np.max(np.abs(v)))] > 0 else -1.0
 
 
-def potential(system, u, load):
-    """The total potential: strain energy less the work of the loads."""
+def potential(system: System, u: Array, load: float) -> float:
+    """The total potential: strain energy less the work of the loads.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    u
+        Displacement of the coordinates, shape (N,).
+    load
+        Load factor.
+    """
     return system.strain_energy(u) + load * system.load_potential(u)
 
 
-def position_weights(system):
+def position_weights(system: System) -> Array:
     """One at the positions of the nodes, zero at other coordinates, shape (N,)."""
     weights = np.zeros(system.N)
     for beam, s in zip(system.beams, system.slices):

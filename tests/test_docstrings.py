@@ -1,0 +1,138 @@
+"""Every public function says what its arguments are: in words, with shapes, and as types."""
+
+import importlib
+import inspect
+import pkgutil
+import re
+from functools import cached_property
+
+import pytest
+
+import skfem_ancf
+
+#: Modules that are being rewritten: neither their docstrings nor their annotations are looked at.
+NOT_YET = ("kernel", "cable", "statics.newton", "dynamics.integrator", "dynamics.blocks", "system",
+           "exact", "mesh", "results", "dynamics.history", "visuals", "io", "band", "own", "tables",
+           "body", "border", "equations", "machine", "kernels", "statics.iteration",
+           "source", "linalg")
+
+#: Their functions are documented, their types are not given: the inside of solvers.
+UNTYPED = ()
+
+#: Annotations of arrays, whose shapes are to be said.
+ARRAYS = ("Array", "ArrayLike")
+
+
+def modules():
+    names = [m.name for m in pkgutil.walk_packages(skfem_ancf.__path__, "skfem_ancf.")]
+    for name in ["skfem_ancf", *names]:
+        short = name.partition(".")[2]
+        if not any(f"{short}.".startswith(f"{skipped}.") for skipped in ("compiled", *NOT_YET)):
+            yield name
+
+
+def functions(module):
+    """Public functions and methods of a module: name, function, class it belongs to or None."""
+    for name, thing in vars(importlib.import_module(module)).items():
+        if name.startswith("_") or getattr(thing, "__module__", None) != module:
+            continue
+        if not inspect.isclass(thing):
+            if callable(thing):
+                yield name, inspect.unwrap(thing), None
+            continue
+        for key, value in vars(thing).items():
+            private = key.startswith("_") and key != "__init__"
+            if private or (key == "__init__" and getattr(thing, "_is_protocol", False)):
+                continue
+            if isinstance(value, (staticmethod, classmethod)):
+                value = value.__func__
+            elif isinstance(value, property):
+                value = value.fget
+            elif isinstance(value, cached_property):
+                value = value.func
+            # other names of a private function are no methods of their own
+            if inspect.isfunction(value) and value.__name__.startswith("_") == (key == "__init__"):
+                yield f"{name}.{key}", inspect.unwrap(value), thing
+
+
+def section(text, *names):
+    """The lines of sections of a docstring."""
+    found = re.findall(r"^(\w[\w ]*)\n-{3,}\n((?:.*\n?)*?)(?=^\w[\w ]*\n-{3,}\n|\Z)", text or "",
+                       re.M)
+    return "\n".join(body for name, body in found if name in names)
+
+
+def described(text):
+    """From the name of an argument to what a Parameters or Attributes section says of it."""
+    out, names = {}, []
+    for line in section(text, "Parameters", "Attributes").splitlines():
+        if line and not line.startswith(" "):
+            names = [n.strip().lstrip("*") for n in line.split(" : ")[0].split(",")]
+            out.update(dict.fromkeys(names, ""))
+        else:
+            for name in names:
+                out[name] += line.strip() + " "
+    return out
+
+
+def documents(function, owner):
+    """Docstrings that may describe the arguments: its own, those it overrides, its class's."""
+    texts = [function.__doc__]
+    for base in owner.__mro__ if owner else ():
+        texts.append(getattr(vars(base).get(function.__name__), "__doc__", None))
+        if function.__name__ == "__init__":
+            texts.append(base.__doc__)
+    return [inspect.cleandoc(text) for text in texts if text]
+
+
+def arguments(function, owner):
+    """Its parameters, without the object or class that it belongs to, and private ones."""
+    parameters = list(inspect.signature(function).parameters.values())
+    if owner and parameters and parameters[0].name in ("self", "cls"):
+        parameters = parameters[1:]
+    return [p for p in parameters if not p.name.startswith("_")]
+
+
+CASES = [pytest.param(function, owner, id=f"{module.partition('.')[2]}.{name}")
+         for module in modules() for name, function, owner in functions(module)]
+TYPED = [case for case in CASES if not any(case.id.startswith(f"{m}.") for m in UNTYPED)]
+
+
+def test_the_walk_finds_the_public_api():
+    names = {case.id for case in CASES}
+    assert len(names) > 400
+    assert {"scene.Scene.clamp", "beam.Beam.__init__", "forms.tangent", "places.facets_of",
+            "mapping.MappingBeam.F"} <= names
+    assert "Parameters\n----------" in inspect.getdoc(skfem_ancf.Scene.clamp)
+
+
+@pytest.mark.parametrize("function, owner", CASES)
+def test_arguments_are_described(function, owner):
+    """Of functions with two or more; NumPy's docstring standard, under the class for __init__."""
+    wanted = arguments(function, owner)
+    if len(wanted) < 2:
+        return
+    found = {}
+    for text in reversed(documents(function, owner)):
+        found.update(described(text))
+    missing = [p.name for p in wanted if not found.get(p.name)]
+    assert not missing, f"not in the Parameters of {function.__qualname__}: {missing}"
+
+
+@pytest.mark.parametrize("function, owner", CASES)
+def test_shapes_of_arrays_are_said(function, owner):
+    found = {}
+    for text in reversed(documents(function, owner)):
+        found.update(described(text))
+    for p in arguments(function, owner):
+        if str(p.annotation).split(" |")[0] in ARRAYS and found.get(p.name):
+            assert re.search(r"\([^()]*(,|\.\.\.)[^()]*\)", found[p.name]), (
+                f"{function.__qualname__} does not say the shape of {p.name!r}")
+
+
+@pytest.mark.parametrize("function, owner", TYPED)
+def test_arguments_and_what_is_returned_have_types(function, owner):
+    bare = [p.name for p in arguments(function, owner) if p.annotation is p.empty]
+    if inspect.signature(function).return_annotation is inspect.Signature.empty:
+        bare.append("return")
+    assert not bare, f"no types in {function.__qualname__}: {bare}"
