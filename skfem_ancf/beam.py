@@ -15,6 +15,7 @@ from .elements import ElementBeam, choose_element
 from .errors import (InputError, MeshError, NameUnknown, require_finite, require_flag,
                      require_integer, require_label, require_like, require_names, require_positive,
                      shown, taught, teaching)
+from .finder import Finder
 from .formulations import COMPONENTS, get_formulation
 from .formulations.ecm import AXIS
 from .frozen import Frozen, read_only
@@ -318,14 +319,16 @@ class Beam(Frozen):
         MeshError
             If the point is outside the body.
         """
-        x = as_point(point, self.mesh)
-        e = self._finder(*x[:, None])
-        X = self.mesh.mapping().invF(x[:, None, None], tind=e)[:, 0, 0]
-        return int(e[0]), np.clip(X, 0.0, 1.0)
+        x = as_point(point, self.mesh)[:, None]
+        e, X, outside = self.finder(x)
+        if outside[0] > self.finder.allowed:
+            raise self.finder.refuse(x, outside)
+        return int(e[0]), X[:, 0]
 
     @cached_property
-    def _finder(self):
-        return self.mesh.element_finder()
+    def finder(self) -> Finder:
+        """What finds the elements that hold points, a :class:`~skfem_ancf.finder.Finder`."""
+        return Finder(self.mesh)
 
     def probe(self, point: ArrayLike) -> tuple[Array, Array]:
         """Coordinate numbers and weights of the position of a material point.
@@ -342,30 +345,6 @@ class Beam(Frozen):
                 "position there is no linear function of its coordinates: name a point of the "
                 "axis, and put a moment on an end section with scene.moment")
         return self.probe_reference(e, X)
-
-    def point_displacement(self, u: Array, e: int, X: Array) -> Array:
-        """Displacement of a point of an element, at one or several instants.
-
-        Parameters
-        ----------
-        u
-            Displacement of the coordinates, shape (N,) or (nt, N).
-        e
-            Number of the element.
-        X
-            Point (xi, eta) of its reference cell, shape (2,).
-
-        Returns
-        -------
-        ndarray
-            Shape (2,) or (nt, 2).
-        """
-        if self.is_cable and X[1] != 0.5:
-            at, tind = np.asarray(X)[:, None], np.array([e])
-            return np.reshape([self.displacements(v, at, tind)[:, 0, 0] for v in np.atleast_2d(u)],
-                              u.shape[:-1] + (2,))
-        dofs, weights = self.probe_reference(e, X)
-        return u[..., dofs] @ weights
 
     def probe_reference(self, e: int, X: Array) -> tuple[Array, Array]:
         """As :meth:`probe`, for a point of an element.

@@ -119,22 +119,22 @@ class Path:
         return self._state(p, f"point {k}", p.iterations)
 
     def displacement(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
-        """Displacement of a material point along the path.
+        """Displacement of material points along the path.
 
         Parameters
         ----------
         point
-            Its place (x, y) in the stress-free body.
+            Its place (x, y) in the stress-free body, or those of many: an array (2, m), or a list
+            of points.
         beam
             The beam, its name or its number; found if it is not given.
 
         Returns
         -------
         ndarray
-            Shape (n, 2).
+            Shape (n, 2), or (n, 2, m) for many points.
         """
-        beam, e, X = self.state(0)._find(point, beam)
-        return beam.point_displacement(self.u[:, self.system.of(beam)], e, X)
+        return self.system.points.find(point, beam).displacement(self.u)
 
     def limit_points(self) -> Array:
         """Load factors at the turning points of the load, in the order of the path."""

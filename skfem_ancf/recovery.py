@@ -21,10 +21,12 @@ beam between two places where its section force jumps:
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebint, chebvander
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_banded
 
@@ -32,7 +34,7 @@ from .formulations.ecm import EnhancedContinuum
 from .materials import LinearLaw
 from .quadrature import gauss, lagrange
 from .section_forces import NotRecovered, SectionForces, Sections, cross
-from .spread import station_of_node, stations_of_vector
+from .spread import SNAP, station_of_node, stations_of_vector
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -52,6 +54,9 @@ ROUNDS, SETTLED = 6, 1e-7
 
 #: Sections up to which the derivative along the axis is a matrix.
 FEW = 128
+
+#: Points that are evaluated at once.
+CHUNK = 2048
 
 #: Within INNER heights of an end of a piece the elements' own stress is used, from LAYER heights on
 #: no longer. Not at all if the elements there are longer than COARSE heights; if they are longer
@@ -344,6 +349,37 @@ class _Piece:
         return np.moveaxis(_Spline(s, values.reshape(len(s), 3, -1))(self.s), 1, 0)
 
 
+class _Table:
+    """Cubic splines along the axis of values (7, n, m) at m points across n sections."""
+
+    def __init__(self, s, values):
+        spline = CubicSpline(s, np.moveaxis(values, 0, 1))
+        self.starts = spline.x[:-1]
+        self._list = self.starts.tolist()
+        self._c = spline.c  # (4, n - 1, 7, m)
+
+    def one(self, s, weights, rows):
+        """The rows at one place, for the weights (m,) of the points across."""
+        k = max(bisect_right(self._list, s) - 1, 0)
+        c, d = self._c[:, k, rows], s - self._list[k]
+        return (((c[0] * d + c[1]) * d + c[2]) * d + c[3]) @ weights
+
+    def many(self, s, weights, rows):
+        """The rows (rows, n) at places (n,), for weights (n, m)."""
+        c = np.ascontiguousarray(np.moveaxis(self._c[:, :, rows], 2, 1))
+        out = np.empty((c.shape[1], len(s)))
+        for first in range(0, len(s), CHUNK):
+            part = slice(first, first + CHUNK)
+            k = np.maximum(np.searchsorted(self.starts, s[part], side="right") - 1, 0)
+            d = (s[part] - self.starts[k])[:, None]
+            value = c[0][:, k]
+            for power in (1, 2, 3):
+                value *= d
+                value += c[power][:, k]
+            out[:, part] = np.einsum("rnm,nm->rn", value, weights[part])
+        return out
+
+
 class Recovery:
     """The recovered field of one beam.
 
@@ -369,6 +405,7 @@ class Recovery:
         self.eta = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, m))
         self.middle = m // 2
         self.eta[self.middle] = 0.5
+        self._to_series = np.linalg.inv(chebvander(2.0 * self.eta - 1.0, m - 1))
         self.from_bottom = mesh.height * integration(self.eta)
         self.from_axis = self.from_bottom - self.from_bottom[self.middle]
         self.whole = self.from_bottom[-1]
@@ -377,15 +414,17 @@ class Recovery:
             beam.formulation, EnhancedContinuum)
         self._u = u
         self.pieces = [_Piece(self, a, b) for a, b in zip(forces.cuts[:-1], forces.cuts[1:])]
-        self._splines = [_Spline(p.s, np.concatenate(
-            [np.moveaxis(p.strain, 0, 1), np.moveaxis(p.stress, 0, 1), p.angle[:, None]], axis=1))
-            for p in self.pieces]
+        self._tables = [_Table(p.s, np.concatenate(
+            [p.strain, p.stress, p.angle[None]])) for p in self.pieces]
+        self._cuts = forces.cuts.tolist()
 
     def _arc_tables(self):
         x, w = gauss(8)
         axis = self.beam.mesh.mapping().DF(np.array([x, np.full(8, 0.5)]))[:, 0]
-        self._speed = np.hypot(*axis)
-        return np.append(0.0, np.cumsum(self._speed @ w))
+        speed = np.hypot(*axis)
+        series = np.linalg.solve(chebvander(2.0 * x - 1.0, 7), speed.T)
+        self._inside = chebint(series, lbnd=-1.0, scl=0.5).T  # (ne, 9): the length from xi = 0
+        return np.append(0.0, np.cumsum(speed @ w))
 
     def arc(self, e: ArrayLike, xi: ArrayLike) -> Array:
         """Arc length along the stress-free axis of places of elements.
@@ -403,9 +442,8 @@ class Recovery:
         e, xi = np.broadcast_arrays(e, xi)
         if self.beam.mesh.is_straight:
             return self.lengths[e] + xi * (self.lengths[e + 1] - self.lengths[e])
-        x, w = gauss(8)
-        inside = lagrange(x, np.multiply.outer(xi, x).ravel()).reshape(xi.shape + (8, 8))
-        return self.lengths[e] + xi * np.einsum("q,...qk,...k->...", w, inside, self._speed[e])
+        return self.lengths[e] + np.einsum("...k,...k->...", chebvander(2.0 * xi - 1.0, 8),
+                                           self._inside[e])
 
     @cached_property
     def samples(self) -> tuple[Array, Array]:
@@ -434,22 +472,54 @@ class Recovery:
         """
         e = np.arange(self.beam.mesh.nelements) if tind is None else np.asarray(tind)
         shape = (len(e), X.shape[-1])
-        xi, eta = (np.broadcast_to(x, shape) for x in X)
-        e = np.broadcast_to(e[:, None], shape)
-        place, s = e + xi, self.arc(e, xi)
-        cuts = self.forces.cuts
+        xi, eta = (np.broadcast_to(x, shape).ravel() for x in X)
+        e = np.broadcast_to(e[:, None], shape).ravel()
+        values = self._values(self._places(e, xi, eta), slice(7)).reshape((7,) + shape)
+        return values[:3], values[3:6], values[6]
+
+    def at(self, part, rows=slice(7)):
+        """Rows of strain, stress and angle (7 in all) at points of the beam; (rows, n).
+
+        Parameters
+        ----------
+        part
+            The :class:`~skfem_ancf.points.Part` with the points.
+        rows
+            A slice of the seven rows.
+        """
+        places = part.tables.get("recovery")
+        if places is None:
+            places = part.tables["recovery"] = self._places(part.e, *part.X)
+        if len(part.e) > 1:
+            return self._values(places, rows)
+        station, end, s, weights = places
+        find = bisect_left if end[0] else bisect_right
+        piece = min(max(find(self._cuts, station[0]) - 1, 0), len(self._tables) - 1)
+        return self._tables[piece].one(s[0], weights[0], rows)[:, None]
+
+    def _places(self, e, xi, eta):
+        """What evaluation at points (n,) needs and does not change with the state.
+
+        Stations, whether they are the right end of their element, arc lengths, weights (n, m).
+        """
+        end = xi > 1.0 - SNAP
+        station = e + np.where(end, 1.0, np.where(xi < SNAP, 0.0, xi))
+        return station, end, self.arc(e, xi), chebvander(2.0 * eta - 1.0, self.middle * 2) @ (
+            self._to_series)
+
+    def _values(self, places, rows):
+        station, end, s, weights = places
         # a point at a cut that is a node belongs to the piece of its own element
-        piece = np.clip(np.searchsorted(cuts, place, side="right") - 1, 0, len(cuts) - 2)
-        piece = np.where((place == cuts[piece]) & (xi == 1.0), piece - 1, piece)
-        piece = np.maximum(piece, 0)
-        values = np.empty((7,) + shape)
-        m = len(self.eta)
+        piece = np.where(end, np.searchsorted(self._cuts, station),
+                         np.searchsorted(self._cuts, station, side="right")) - 1
+        piece = np.clip(piece, 0, len(self._tables) - 1)
+        if len(self._tables) == 1:
+            return self._tables[0].many(s, weights, rows)
+        out = np.empty((len(range(*rows.indices(7))), len(s)))
         for k in np.unique(piece):
             on = piece == k
-            weights = lagrange(self.eta, eta[on])
-            values[:, on] = np.einsum("pcm,pm->cp", self._splines[k](s[on]).reshape(-1, 7, m),
-                                      weights)
-        return values[:3], values[3:6], values[6]
+            out[:, on] = self._tables[k].many(s[on], weights[on], rows)
+        return out
 
     @staticmethod
     def gradient(strain: Array, angle: Array) -> Array:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .beam import select_beam
-from .errors import InputError, MeshError, NameUnknown, require_flag, shown, teaching
+from .errors import InputError, NameUnknown, require_flag, teaching
 from .frozen import Frozen
 from .recovery import actions, recover
 from .section_forces import NotRecovered
@@ -161,65 +161,80 @@ class State(Frozen):
         """Coordinate displacements of one beam."""
         return self.u[self.system.of(select_beam(self.beams, beam))]
 
-    # at a material point
-
-    def _find(self, point, beam):
-        if beam is not None or len(self.beams) == 1:
-            beam = select_beam(self.beams, beam)
-            return beam, *beam.locate(point)
-        for candidate in self.beams:
-            try:
-                return candidate, *candidate.locate(point)
-            except MeshError:
-                continue
-        raise MeshError(f"the point {shown(point)} is in none of the {len(self.beams)} beams")
+    # at material points
 
     def displacement(self, point, beam=None):
-        """Displacement of a material point, named by its place in the stress-free body; (2,)."""
-        beam, e, X = self._find(point, beam)
-        return beam.point_displacement(self.u_of(beam), e, X)
-
-    def position(self, point, beam=None):
-        """Position of a material point, shape (2,)."""
-        beam, e, X = self._find(point, beam)
-        start = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
-        return start + beam.point_displacement(self.u_of(beam), e, X)
-
-    def velocity(self, point, beam=None):
-        """Velocity of a material point, shape (2,); zero where there is no motion."""
-        beam, e, X = self._find(point, beam)
-        dofs, weights = beam.probe_reference(e, X)
-        return self.v[self.system.of(beam)][dofs] @ weights
-
-    def strain(self, point, beam=None, recover=True):
-        """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, shape (3,).
+        """Displacement of material points.
 
         Parameters
         ----------
         point
-            A material point, named by its place in the stress-free body.
+            A material point, named by its place (x, y) in the stress-free body, or many: an array
+            (2, n), or a list of points.
         beam
-            The beam, its name or its number; found if it is not given.
+            The beam, its name or its number; found for each point if it is not given.
+
+        Returns
+        -------
+        ndarray
+            Shape (2,), or (2, n) for many points.
+
+        Raises
+        ------
+        MeshError
+            If a point is outside the body.
+        """
+        return self.system.points.find(point, beam).displacement(self.u)
+
+    def position(self, point, beam=None):
+        """Position of material points, (2,) or (2, n); parameters are those of
+        :meth:`displacement`.
+        """
+        at = self.system.points.find(point, beam)
+        return at.start + at.displacement(self.u)
+
+    def velocity(self, point, beam=None):
+        """Velocity of material points, (2,) or (2, n); zero where there is no motion.
+
+        Parameters are those of :meth:`displacement`.
+        """
+        return self.system.points.find(point, beam).velocity(self.u, self.v)
+
+    def strain(self, point, beam=None, recover=True):
+        """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, (3,) or (3, n).
+
+        Parameters
+        ----------
+        point, beam
+            As for :meth:`displacement`.
         recover
             The recovered field, see :mod:`skfem_ancf.recovery`, where there is one
             (:attr:`recovered`); False for the strain of the element at the point.
         """
-        beam, e, X = self._find(point, beam)
-        X, e, r = X[:, None], np.array([e]), self._wanted(beam, recover)
-        strain = beam.strain(self.u_of(beam), X, e) if r is None else r.fields(X, e)[0]
-        return strain[:, 0, 0] * np.array([1.0, 1.0, 0.5])
+        at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
+        values = at.gather([self._strain(part, recover) for part in at.parts])
+        values[2] *= 0.5
+        return values
 
     def stress(self, point, beam=None, recover=True):
-        """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, shape (3,).
+        """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, (3,) or (3, n).
 
         Parameters are those of :meth:`strain`.
         """
-        beam, e, X = self._find(point, beam)
-        X, e, r = X[:, None], np.array([e]), self._wanted(beam, recover)
-        return (beam.stress(self.u_of(beam), X, e) if r is None else r.fields(X, e)[1])[:, 0, 0]
+        at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
+        return at.gather([self._stress(part, recover) for part in at.parts])
 
-    def _wanted(self, beam, recover):
-        return self.recovery(beam) if require_flag("recover", recover) else None
+    def _strain(self, part, recover):
+        r = self._recovery_of(part.number) if recover else None
+        if r is not None:
+            return r.at(part, slice(0, 3))
+        return part.beam.strain(self.u[part.coordinates], part.at, part.e)[..., 0]
+
+    def _stress(self, part, recover):
+        r = self._recovery_of(part.number) if recover else None
+        if r is not None:
+            return r.at(part, slice(3, 6))
+        return part.beam.stress(self.u[part.coordinates], part.at, part.e)[..., 0]
 
     # recovered fields
 
@@ -228,15 +243,18 @@ class State(Frozen):
 
         None where the field cannot be recovered; :attr:`recovered` says why.
         """
-        beam = select_beam(self.beams, beam)
-        k = self.beams.index(beam)
-        if k not in self._recoveries:
+        return self._recovery_of(self.beams.index(select_beam(self.beams, beam)))
+
+    def _recovery_of(self, k):
+        found = self._recoveries.get(k)
+        if found is None:
+            beam = self.beams[k]
             try:
-                self._recoveries[k] = recover(self, beam, self._actions[k])
+                found = recover(self, beam, self._actions[k])
             except NotRecovered as reason:
                 logger.info("%r: strain and stress are those of the elements: %s", beam, reason)
-                self._recoveries[k] = reason
-        found = self._recoveries[k]
+                found = reason
+            self._recoveries[k] = found
         return None if isinstance(found, NotRecovered) else found
 
     @property

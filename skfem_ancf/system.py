@@ -13,6 +13,7 @@ from .joints.base import same_joint
 from .linalg import (INACCURATE, BandMatrix, BorderedMatrix, border, border_inertia,
                      border_negative, columns_product, hold)
 from .pickling import functions_of, require_picklable
+from .points import Points
 
 logger = logging.getLogger(__name__)
 _NONE = np.zeros(0)
@@ -65,6 +66,11 @@ class System:
                 self.constant_force[self.of(load)] += load.force(None)
             else:
                 self._varying.append(load)
+
+    @cached_property
+    def points(self):
+        """What finds material points, a :class:`~skfem_ancf.points.Points`."""
+        return Points(self.beams, self.slices)
 
     def __getstate__(self):
         """What it was made of: work arrays and factors are made again."""

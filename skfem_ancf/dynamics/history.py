@@ -107,24 +107,48 @@ class History:
     def __iter__(self):
         return (self.state(k) for k in range(len(self)))
 
-    # at a material point
+    # at material points
 
     def displacement(self, point, beam=None):
-        """Displacement of a material point at all instants, shape (nt, 2)."""
-        beam, e, X = self.state(0)._find(point, beam)
-        return beam.point_displacement(self.u[:, self.system.of(beam)], e, X)
+        """Displacement of material points at all instants.
+
+        Parameters
+        ----------
+        point, beam
+            One point or many, as for :meth:`State.displacement
+            <skfem_ancf.results.State.displacement>`.
+
+        Returns
+        -------
+        ndarray
+            Shape (nt, 2), or (nt, 2, n) for many points.
+        """
+        return self.system.points.find(point, beam).displacement(self.u)
 
     def position(self, point, beam=None):
-        """Position of a material point at all instants, shape (nt, 2)."""
-        first = self.state(0)
-        return (first.position(point, beam) - first.displacement(point, beam)
-                + self.displacement(point, beam))
+        """Position of material points at all instants, (nt, 2) or (nt, 2, n)."""
+        at = self.system.points.find(point, beam)
+        return at.start + at.displacement(self.u)
 
     def velocity(self, point, beam=None):
-        """Velocity of a material point at all instants, shape (nt, 2)."""
-        beam, e, X = self.state(0)._find(point, beam)
-        dofs, weights = beam.probe_reference(e, X)
-        return self.v[:, self.system.of(beam)][:, dofs] @ weights
+        """Velocity of material points at all instants, (nt, 2) or (nt, 2, n)."""
+        return self.system.points.find(point, beam).velocity(self.u, self.v)
+
+    def strain(self, point, beam=None, recover=True):
+        """Strain (eps_xx, eps_yy, eps_xy) at all instants, (nt, 3) or (nt, 3, n).
+
+        Parameters are those of :meth:`State.strain <skfem_ancf.results.State.strain>`.
+        """
+        self.system.points.find(point, beam)
+        return np.array([state.strain(point, beam, recover) for state in self])
+
+    def stress(self, point, beam=None, recover=True):
+        """Second Piola-Kirchhoff stress at all instants, (nt, 3) or (nt, 3, n).
+
+        Parameters are those of :meth:`State.strain <skfem_ancf.results.State.strain>`.
+        """
+        self.system.points.find(point, beam)
+        return np.array([state.stress(point, beam, recover) for state in self])
 
     def joint_force(self, joint):
         """What a joint does to its first beam at all instants, shape (nt, m)."""

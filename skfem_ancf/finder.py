@@ -1,0 +1,154 @@
+"""The elements that hold points of the stress-free body, many points at once."""
+
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .errors import MeshError
+
+#: Samples of each element in the tree of the finder, and candidates for a point that is in none of
+#: the elements next to its nearest sample.
+SAMPLES, CANDIDATES = 4, 6
+
+
+class Finder:
+    """Finds the elements of one mesh that hold points, many at once.
+
+    Parameters
+    ----------
+    mesh
+        A :class:`~skfem_ancf.MeshBeam`.
+    """
+
+    def __init__(self, mesh):
+        self.mesh, self.mapping = mesh, mesh.mapping()
+        self.size = float(np.max(np.abs(mesh.p)))
+        # points of an exact curve may lie a little outside its cubic elements
+        self.allowed = 1e-6 if mesh.is_straight else 1e-3
+        left, right = mesh.t
+        self._before = np.where(np.append(False, right[:-1] == left[1:]),
+                                np.arange(mesh.nelements) - 1, -1)
+        self._after = np.append(np.where(self._before[1:] >= 0, np.arange(1, mesh.nelements), -1),
+                                -1)
+        self._line = self._straight_line()
+
+    def _straight_line(self):
+        """Start and direction of the one line of all elements, and their ends on it, or None."""
+        mesh = self.mesh
+        if not mesh.is_straight:
+            return None
+        start, d = mesh.p[:, mesh.t[0, 0]], mesh.p_X[:, mesh.t[0, 0]]
+        along = d @ (mesh.p - start[:, None])
+        off = np.array([-d[1], d[0]]) @ (mesh.p - start[:, None])
+        noise = 16 * np.finfo(float).eps * (self.size + mesh.lengths.sum())
+        ends = along[mesh.t]
+        if np.max(np.abs(off)) > noise or np.any(np.diff(ends.T.ravel()) < -noise):
+            return None
+        return start, d, ends
+
+    def __call__(self, x):
+        """Elements (n,), reference points (2, n), and how far outside of them points (2, n) are.
+
+        The last is zero for points of the body, and relative to the element; infinite for points
+        that are far away.
+        """
+        noise = 1e-9 + 8 * np.finfo(float).eps * (
+            self.size + np.max(np.abs(x), initial=0.0)) / self.mesh.height
+        with np.errstate(all="ignore"):
+            return self._find(x, noise)
+
+    def _find(self, x, noise):
+        e, X, outside = (self._near if self._line is None else self._on_line)(x, noise)
+        left = np.nonzero((outside > 0) & np.isfinite(outside))[0]
+        if len(left):
+            e[left], X[:, left], outside[left] = self._best(
+                x[:, left], self._candidates(x[:, left]), noise)
+            for i in left[outside[left] > self.allowed]:  # rare: neighbouring coils are nearer
+                all_of_them = np.arange(self.mesh.nelements)[None]
+                e[i], X[:, i], outside[i] = (part[..., 0] for part in self._best(
+                    x[:, i:i + 1], all_of_them, noise))
+        return e, np.clip(X, 0.0, 1.0), outside
+
+    @staticmethod
+    def _outside(X, noise):
+        out = np.max(np.abs(X - 0.5), axis=0) - 0.5
+        out[out < noise] = 0.0
+        out[np.isnan(out)] = np.finfo(float).max
+        return out
+
+    def _on_line(self, x, noise):
+        (start, d, ends), mesh = self._line, self.mesh
+        x = x - start[:, None]
+        along = d @ x
+        e = np.searchsorted(ends[1] + noise * mesh.lengths, along)
+        e = np.minimum(e, mesh.nelements - 1)
+        before = np.maximum(e - 1, 0)  # in a gap: the nearer element
+        e = np.where(along - ends[1, before] < ends[0, e] - along, before, e)
+        X = np.array([(along - ends[0, e]) / mesh.lengths[e],
+                      (d[0] * x[1] - d[1] * x[0]) / mesh.height + 0.5])
+        outside = self._outside(X, noise)
+        outside[outside > 1.0] = np.inf
+        return e, X, outside
+
+    @cached_property
+    def _tree(self):
+        samples = np.array([(np.arange(SAMPLES) + 0.5) / SAMPLES, np.full(SAMPLES, 0.5)])
+        return cKDTree(self.mapping.F(samples).reshape(2, -1).T)
+
+    def _candidates(self, x):
+        k = min(CANDIDATES, SAMPLES * self.mesh.nelements)
+        near = self._tree.query(x.T, k=k)[1].reshape(x.shape[1], k)
+        return np.sort(near // SAMPLES, axis=1)
+
+    def _near(self, x, noise):
+        """From the nearest sample, and to the neighbour where the point is beyond a node."""
+        mesh = self.mesh
+        distance, near = self._tree.query(x.T)
+        e = near // SAMPLES
+        far = distance > 0.75 * mesh.height + np.max(mesh.lengths)
+        X, outside = np.full(x.shape, 0.5), np.full(x.shape[1], np.inf)
+        todo = np.nonzero(~far)[0]
+        for _ in range(3):
+            X[:, todo] = self.mapping.invF(x[:, todo, None], tind=e[todo])[..., 0]
+            outside[todo] = self._outside(X[:, todo], noise)
+            # a point of the section between two elements is one of the left
+            other = np.where(X[0, todo] <= noise, self._before[e[todo]],
+                             np.where(X[0, todo] > 1.0 + noise, self._after[e[todo]], -1))
+            todo, other = todo[other >= 0], other[other >= 0]
+            if not len(todo):
+                break
+            e[todo] = other
+        else:
+            X[:, todo] = self.mapping.invF(x[:, todo, None], tind=e[todo])[..., 0]
+            outside[todo] = self._outside(X[:, todo], noise)
+        return e, X, outside
+
+    def _best(self, x, candidates, noise):
+        """The best of the candidates (n, k) for each point."""
+        n, k = x.shape[1], candidates.shape[1]
+        candidates = np.broadcast_to(candidates, (n, k))
+        X = self.mapping.invF(np.repeat(x, k, axis=1)[:, :, None], tind=candidates.ravel())
+        X = X[..., 0].reshape(2, n, k)
+        outside = self._outside(X.reshape(2, -1), noise).reshape(n, k)
+        rows, which = np.arange(n), np.argmin(outside, axis=1)
+        return candidates[rows, which], X[:, rows, which], outside[rows, which]
+
+    @cached_property
+    def extent(self):
+        """Where the body is, in words."""
+        X = np.array(np.meshgrid(np.linspace(0, 1, 9), [0.0, 1.0])).reshape(2, -1)
+        x = self.mapping.F(X).reshape(2, -1)
+        low, high = x.min(axis=1), x.max(axis=1)
+        return (f"the body lies within x from {low[0]:.6g} to {high[0]:.6g} and y from "
+                f"{low[1]:.6g} to {high[1]:.6g}")
+
+    def refuse(self, x, outside):
+        """The MeshError for the points that are outside."""
+        bad, mesh = np.nonzero(outside > self.allowed)[0], self.mesh
+        x, more = x[:, bad[0]], f" ({len(bad)} of {len(outside)} points are)"
+        return MeshError(
+            f"the point ({x[0]:.9g}, {x[1]:.9g}) is outside the body"
+            f"{more if len(outside) > 1 else ''}: points are named by their place in the "
+            f"stress-free beam of height {mesh.height:.6g}, whose axis runs from "
+            f"{mesh.p[:, 0].tolist()} to {mesh.p[:, -1].tolist()}; {self.extent}")

@@ -1,0 +1,298 @@
+"""Material points: where many of them are in the beams, and what their coordinates weigh there.
+
+A point is named by its place (x, y) in the stress-free body. One is a tuple, a list or an array of
+two numbers; many are an array of shape (2, n), as scikit-fem has them, or a list of points.
+"""
+
+from collections import OrderedDict
+from functools import cached_property
+
+import numpy as np
+
+from .beam import select_beam
+from .errors import MeshError, require_finite, shown
+from .places import as_point
+
+#: Points that a scene remembers, at most, and calls.
+REMEMBERED_POINTS, REMEMBERED = 2**16, 1024
+
+
+def is_many(points):
+    """True for an array of two dimensions, and for a list or tuple of points."""
+    if isinstance(points, np.ndarray):
+        return points.ndim == 2
+    return isinstance(points, (list, tuple)) and len(points) > 0 and all(
+        isinstance(p, (list, tuple, np.ndarray)) for p in points)
+
+
+def as_points(points, mesh=None):
+    """Many points as an array (2, n), or one as an array (2,).
+
+    Raises
+    ------
+    MeshError
+        If it is neither, with what was probably meant.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> as_points([(0, 0.5), (1, 0.5), (2, 0.5)]).shape, as_points(np.zeros((2, 5))).shape
+    ((2, 3), (2, 5))
+    """
+    if not is_many(points):
+        return as_point(points, mesh)
+    if isinstance(points, np.ndarray):
+        if len(points) == 2:
+            return require_finite("points", points)
+        hint = "; give its transpose" if points.shape[1] == 2 else ""
+        raise MeshError("an array of points has shape (2, n), the x in its first row and the y in "
+                        f"its second, got {points.shape}{hint}")
+    if any(np.shape(p) != (2,) for p in points if not _ragged(p)) or any(map(_ragged, points)):
+        hint = "; an array of shape (2, n) is one too" if len(points) == 2 else ""
+        raise MeshError(f"each material point of a list is a pair (x, y), got {shown(points)}{hint}")
+    return np.array([as_point(p, mesh) for p in points]).T
+
+
+def _ragged(p):
+    return not isinstance(p, np.ndarray) and any(np.ndim(x) for x in p if not isinstance(x, str))
+
+
+class Part:
+    """Points in one beam.
+
+    Attributes
+    ----------
+    beam, number
+        The beam and its number.
+    coordinates : slice
+        Those of the beam in its scene.
+    index
+        Which of the points they are, (n,), or None for all.
+    e, X
+        Elements (n,) and reference points (2, n).
+    """
+
+    def __init__(self, beam, number, coordinates, index, e, X):
+        self.beam, self.number, self.coordinates, self.index = beam, number, coordinates, index
+        self.e, self.X = e, X
+        self.tables = {}  # of others, that depend on the beam and the points only
+
+    @cached_property
+    def at(self):
+        """Reference points as the fields of a beam take them, (2, n, 1)."""
+        return self.X[:, :, None]
+
+    @cached_property
+    def start(self):
+        """Positions in the stress-free body, (2, n)."""
+        return self.beam.mesh.mapping().F(self.at, self.e)[..., 0]
+
+    @cached_property
+    def off_axis(self):
+        """Points of a cable off its axis: their section turns with the tangent."""
+        return self.beam.is_cable and bool(np.any(np.abs(self.X[1] - 0.5) > 1e-12))
+
+    @cached_property
+    def dofs(self):
+        """Coordinates of the scene that move each point, (nb, 2, n)."""
+        beam = self.beam
+        first = self.coordinates.start + beam.mesh.t[0, self.e] * beam.nd
+        return first + np.arange(2 * beam.nd).reshape(-1, 2, 1)
+
+    def _table(self, derivative):
+        element, mesh = self.beam.element, self.beam.mesh
+        rows = [element.local(self.X, mesh.height, i) for i in range(2 * element.nodal_dofs)]
+        return np.array([row[derivative] * mesh.lengths[self.e] ** row[3] for row in rows])
+
+    @cached_property
+    def weights(self):
+        """Of these coordinates in the position, (nb, n)."""
+        return self._table(0)
+
+    @cached_property
+    def slopes(self):
+        """Of these coordinates in the derivative of the position by xi, (nb, n)."""
+        return self._table(1)
+
+    @cached_property
+    def one(self):
+        """Coordinates (2, nb) and weights (nb,) of a single point on which it depends linearly."""
+        return np.ascontiguousarray(self.dofs[:, :, 0].T), np.ascontiguousarray(self.weights[:, 0])
+
+    def combine(self, weights, u):
+        """The sum of weighted coordinates ``u`` (..., N) of the scene: (..., 2, n)."""
+        return sum(w * u[..., d] for w, d in zip(weights, self.dofs))
+
+    def displacement(self, u):
+        """Displacements (..., 2, n) for coordinates ``u`` (..., N) of the scene."""
+        out = self.combine(self.weights, u)
+        if self.off_axis:
+            out += self._lever * _turned(self._tangent(u) - self._tangent0)
+        return out
+
+    def velocity(self, u, v):
+        """Velocities (..., 2, n) for coordinates ``u`` and their rates ``v``."""
+        out = self.combine(self.weights, v)
+        if self.off_axis:
+            a, rate = self._start_slope + self.combine(self.slopes, u), self.combine(self.slopes, v)
+            size = np.sqrt(np.sum(a * a, axis=-2, keepdims=True))
+            t = a / size
+            out += self._lever * _turned(
+                (rate - t * np.sum(t * rate, axis=-2, keepdims=True)) / size)
+        return out
+
+    @cached_property
+    def _lever(self):
+        return self.beam.mesh.height * (self.X[1] - 0.5)
+
+    @cached_property
+    def _start_slope(self):
+        q0 = self.beam.q0_local
+        return sum(w * q0[d - self.coordinates.start] for w, d in zip(self.slopes, self.dofs))
+
+    @cached_property
+    def _tangent0(self):
+        return self._start_slope / np.hypot(*self._start_slope)
+
+    def _tangent(self, u):
+        a = self._start_slope + self.combine(self.slopes, u)
+        return a / np.sqrt(np.sum(a * a, axis=-2, keepdims=True))
+
+
+def _turned(t):
+    """Vectors (..., 2, n) turned by 90 degrees."""
+    return np.stack([-t[..., 1, :], t[..., 0, :]], -2)
+
+
+class Located:
+    """Points of a scene.
+
+    Attributes
+    ----------
+    one : bool
+        They were given as a single point.
+    n : int
+        How many.
+    parts : list of Part
+        Those of each beam that has some.
+    """
+
+    def __init__(self, one, n, parts):
+        self.one, self.n, self.parts = one, n, parts
+
+    def gather(self, values):
+        """One array of those of the parts, (..., n) each; (...) for a single point."""
+        if len(self.parts) == 1 and self.parts[0].index is None:
+            out = values[0]
+        else:
+            out = np.empty(values[0].shape[:-1] + (self.n,))
+            for part, value in zip(self.parts, values):
+                out[..., part.index] = value
+        return out[..., 0] if self.one else out
+
+    def displacement(self, u):
+        """Displacements for coordinates ``u`` (..., N): (..., 2), or (..., 2, n) of many."""
+        part = self.parts[0] if self.one else None
+        if part is not None and not part.off_axis:
+            dofs, weights = part.one
+            return u[..., dofs] @ weights
+        return self.gather([part.displacement(u) for part in self.parts])
+
+    def velocity(self, u, v):
+        """Velocities for coordinates ``u`` and their rates ``v``."""
+        part = self.parts[0] if self.one else None
+        if part is not None and not part.off_axis:
+            dofs, weights = part.one
+            return v[..., dofs] @ weights
+        return self.gather([part.velocity(u, v) for part in self.parts])
+
+    @cached_property
+    def start(self):
+        """Positions in the stress-free body."""
+        return self.gather([part.start for part in self.parts])
+
+
+class Points:
+    """Finds the points of a scene, and remembers the last ones.
+
+    Parameters
+    ----------
+    beams, slices
+        The beams, and their coordinates in the scene.
+    """
+
+    def __init__(self, beams, slices):
+        self.beams, self.slices = list(beams), slices
+        self._known, self._held = OrderedDict(), 0
+
+    def find(self, points, beam=None):
+        """Where points are.
+
+        Parameters
+        ----------
+        points
+            One point or many, see :func:`as_points`.
+        beam
+            The beam that they are in, its name or number; found for each if it is not given.
+
+        Returns
+        -------
+        Located
+
+        Raises
+        ------
+        MeshError
+            If a point is in none of the beams.
+        """
+        name = beam if beam is None or isinstance(beam, (str, int)) else id(beam)
+        if (type(points) is tuple and len(points) == 2 and type(points[0]) is float
+                and type(points[1]) is float):
+            key = points, name, type(beam)
+        else:
+            one = beam is not None or len(self.beams) == 1
+            points = as_points(points, select_beam(self.beams, beam).mesh if one else None)
+            key = points.tobytes(), points.ndim, name, type(beam)
+        found = self._known.get(key)
+        if found is None:
+            found = self._find(points, beam)
+            self._remember(key, found)
+        return found
+
+    def _remember(self, key, found):
+        if found.n > REMEMBERED_POINTS:
+            return
+        known = self._known
+        self._held += found.n
+        known[key] = found
+        while known and (len(known) > REMEMBERED or self._held > REMEMBERED_POINTS):
+            self._held -= known.popitem(last=False)[1].n
+
+    def _find(self, points, beam):
+        if beam is not None or len(self.beams) == 1:
+            beam = select_beam(self.beams, beam)
+            x = as_points(points, beam.mesh)
+            e, X, outside = beam.finder(np.reshape(x, (2, -1)))
+            if np.any(outside > beam.finder.allowed):
+                raise beam.finder.refuse(np.reshape(x, (2, -1)), outside)
+            k = self.beams.index(beam)
+            return Located(x.ndim == 1, len(e), [Part(beam, k, self.slices[k], None, e, X)])
+        x = as_points(points)
+        one, x = x.ndim == 1, np.reshape(x, (2, -1))
+        left, parts = np.arange(x.shape[1]), []
+        for k, candidate in enumerate(self.beams):
+            e, X, outside = candidate.finder(x[:, left])
+            on = outside <= candidate.finder.allowed
+            if np.any(on) or not x.size:
+                parts.append(Part(candidate, k, self.slices[k], left[on], e[on], X[:, on]))
+                left = left[~on]
+        if len(left):
+            p = (float(c) for c in x[:, left[0]])
+            more = f" ({len(left)} of {x.shape[1]} points are)" if x.shape[1] > 1 else ""
+            where = "; ".join(
+                f"{k if b.name is None else repr(b.name)}: {b.finder.extent}"
+                for k, b in list(enumerate(self.beams))[:4])
+            raise MeshError(f"the point {shown(tuple(p))} is in none of the {len(self.beams)} "
+                            f"beams{more}; {where}")
+        if len(parts) == 1:
+            parts[0].index = None
+        return Located(one, x.shape[1], parts)

@@ -1,0 +1,218 @@
+"""Material points, one and many: found, remembered, refused, and what they give."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from conftest import quarter_arc, s_curve
+from test_io import affine
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
+                        ElementBeamPatelShabana, InputError, MeshBeam, MeshError, NameUnknown,
+                        Scene, StVenantKirchhoff)
+from skfem_ancf import finder, points
+from skfem_ancf.points import as_points
+
+STEEL = StVenantKirchhoff(E=1e6, nu=0.3, density=10.0)
+LINE = MeshBeam.init_line([0, 0.3, 1.0], height=0.1)
+METHODS = ("displacement", "position", "velocity", "strain", "stress")
+
+
+def inside(mesh, n=40, seed=0):
+    """Elements and points of a body, some of them on faces and between elements."""
+    rng = np.random.default_rng(seed)
+    e, X = rng.integers(0, mesh.nelements, n), rng.random((2, n))
+    X[0, :8], X[1, 4:12] = np.tile([0.0, 1.0], 4), np.repeat([0.0, 1.0], 4)
+    return e, X, mesh.mapping().F(X[:, :, None], e)[..., 0]
+
+
+def bent(mesh, element):
+    return Scene(Beam(mesh, element, STEEL, 0.1)).clamp("left").point_force(
+        (2, -3), at=mesh.p[:, -1]).solve_static()
+
+
+@pytest.mark.parametrize("element", [
+    ElementBeamANCF(1), ElementBeamANCF(3), ElementBeamANCFCubic(2), ElementBeamPatelShabana(),
+    ElementBeamCable(), ElementBeamCable(5)], ids=repr)
+@pytest.mark.parametrize("mesh", [LINE, quarter_arc(height=0.1)], ids=["straight", "arc"])
+def test_many_points_are_as_many_single_ones(mesh, element):
+    state = bent(mesh, element)
+    x = inside(mesh)[2]
+    for name in METHODS:
+        many = getattr(state, name)(x)
+        one = np.array([getattr(state, name)(tuple(p)) for p in x.T]).T
+        assert many.shape == one.shape
+        assert_allclose(many, one, rtol=1e-9, atol=1e-9 * np.abs(one).max())
+        assert_array_equal(getattr(state, name)([tuple(p) for p in x.T]), many)
+    for name in METHODS[3:]:
+        raw = getattr(state, name)(x, recover=False)
+        one = np.array([getattr(state, name)(p, recover=False) for p in x.T]).T
+        assert_allclose(raw, one, rtol=1e-9, atol=1e-9 * np.abs(one).max())
+
+
+@pytest.mark.parametrize("mesh", [LINE, s_curve(), quarter_arc()], ids=["line", "s-curve", "arc"])
+def test_points_of_an_affine_body(mesh):
+    """x goes to A x; the strain is (F^T F - 1) / 2, turned into the frame of the section."""
+    A = np.array([[1.1, 0.2], [-0.1, 0.9]])
+    state = affine(Beam(mesh, ElementBeamANCF(2), STEEL, 0.1, "continuum"), A)
+    e, X, x = inside(mesh)
+    assert_allclose(state.position(x), A @ x, atol=1e-12)
+    assert_allclose(state.displacement(x), A @ x - x, atol=1e-12)
+    C = 0.5 * (A.T @ A - np.eye(2))
+    frame = mesh.mapping().frame(X[:, :, None], e)[..., 0]
+    E = np.einsum("iJp,ij,jKp->JKp", frame, C, frame)
+    assert_allclose(state.strain(x, recover=False), [E[0, 0], E[1, 1], E[0, 1]], atol=1e-10)
+
+
+@pytest.mark.parametrize("mesh", [
+    LINE, s_curve(), quarter_arc(), MeshBeam.init_line(np.linspace(0, 1, 30) ** 3, height=0.3),
+    MeshBeam.init_curve(lambda s: (1 + 0.03 * s) * np.array([np.cos(s), np.sin(s)]),
+                        np.linspace(0, 20, 41), height=0.15)],
+    ids=["line", "s-curve", "arc", "graded", "coil"])
+def test_finder_finds_the_point_again(mesh):
+    e, X, x = inside(mesh, 300)
+    found, at, outside = finder.Finder(mesh)(x)
+    assert np.all(outside == 0)
+    assert_allclose(mesh.mapping().F(at[:, :, None], found)[..., 0], x, atol=1e-11)
+    within = (X[0] > 1e-6) & (X[0] < 1 - 1e-6)
+    assert_array_equal(found[within], e[within])
+    # between two elements: the left one
+    nodes = mesh.p[:, mesh.t[0, 1:]]
+    assert_array_equal(finder.Finder(mesh)(nodes)[0], np.arange(mesh.nelements - 1))
+
+
+def test_gaps_and_parts_at_other_places():
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 11), height=0.1).restrict(np.array([0, 1, 5, 6]))
+    find = finder.Finder(mesh)
+    x = np.array([[0.0, 0.2, 0.2 + 1e-9, 0.3, 0.5, 0.6, 0.7, 0.75], np.zeros(8)])
+    e, X, outside = find(x)
+    assert_array_equal(e[[0, 1, 4, 5, 6]], [0, 1, 2, 2, 3])
+    assert_array_equal(outside > find.allowed, [0, 0, 0, 1, 0, 0, 0, 1])
+
+
+def test_points_of_several_beams():
+    a = Beam(MeshBeam.init_line([0, 1, 2], height=0.1), ElementBeamANCF(3), STEEL, 0.1, name="a")
+    b = Beam(MeshBeam.init_line([0, 0.5, 1], height=0.1, origin=(2, 1), angle=0.5),
+             ElementBeamCable(5), STEEL, 0.1, name="b")
+    scene = Scene(a, b).clamp("left", beam="a").clamp("left", beam="b")
+    state = scene.gravity((0, -9.81)).solve_static()
+    xa, xb = (inside(beam.mesh, 20)[2] for beam in (a, b))
+    order = np.random.default_rng(3).permutation(40)
+    x = np.hstack([xa, xb])[:, order]
+    for name in METHODS:
+        parts = [getattr(state, name)(xa, beam="a"), getattr(state, name)(xb, beam="b")]
+        assert_array_equal(getattr(state, name)(x), np.hstack(parts)[:, order])
+    with pytest.raises(MeshError, match=r"outside the body \(20 of 20 points are\)"):
+        state.strain(xb, beam="a")
+    with pytest.raises(MeshError, match=r"none of the 2 beams .1 of 2 points are.; 'a': the body "
+                       r"lies within x from 0 to 2 and y from -0\.05 to 0\.05"):
+        state.strain([(0.5, 0), (0.5, 3)])
+    with pytest.raises(NameUnknown, match="known: 'a', 'b'"):
+        state.strain(xa, beam="c")
+
+
+def test_points_of_a_motion():
+    scene = Scene(Beam(LINE, ElementBeamANCF(2), STEEL, 0.1)).pin("left").gravity((0, -9.81))
+    history = scene.integrate(0.05, 0.01)
+    x = inside(LINE, 20)[2]
+    for name in METHODS:
+        many = getattr(history, name)(x)
+        assert many.shape == (len(history), 3 if name in ("strain", "stress") else 2, 20)
+        assert_allclose(getattr(history, name)(x[:, 3]), many[:, :, 3], atol=1e-12 * np.abs(
+            many).max())
+        assert_allclose(getattr(history.state(4), name)(x), many[4], atol=1e-12 * np.abs(
+            many).max())
+    # the velocity is the rate of the position
+    dt = 1e-6
+    y = history.state(3)
+    moved = y.replace(u=y.u + dt * y.v).position(x) - y.replace(u=y.u - dt * y.v).position(x)
+    assert_allclose(moved / (2 * dt), y.velocity(x), rtol=1e-6, atol=1e-8)
+
+
+@pytest.mark.parametrize("mesh", [LINE, quarter_arc(height=0.1)], ids=["straight", "arc"])
+def test_velocity_off_the_axis_of_a_turning_cable(mesh):
+    """omega x r, with the axis where it is and the sections normal to it."""
+    beam = Beam(mesh, ElementBeamCable(5), STEEL, 0.1)
+    state = affine(beam, np.eye(2))
+    v = beam.rigid_motions()[:, 2]
+    x = inside(mesh)[2]
+    at, dt = state.system.points.find(x), 1e-6
+    velocity = at.velocity(state.u, v)
+    rate = (at.displacement(state.u + dt * v) - at.displacement(state.u - dt * v)) / (2 * dt)
+    assert_allclose(velocity, rate, atol=1e-9)
+    r = x - beam.origin[:, None]
+    # the sections of a curved mesh are a little shorter between its nodes
+    assert_allclose(velocity, [-r[1], r[0]], atol=1e-12 if mesh.is_straight else 2e-3)
+
+
+def test_no_points_and_one_of_many():
+    state = bent(LINE, ElementBeamANCF(2))
+    assert state.displacement(np.zeros((2, 0))).shape == (2, 0)
+    assert state.displacement(np.zeros((2, 1))).shape == (2, 1)
+    assert state.displacement([(0.5, 0.0)]).shape == (2, 1)
+    assert state.strain(np.zeros((2, 1))).shape == (3, 1)
+
+
+def test_points_are_found_once_and_not_all_are_kept(monkeypatch):
+    state = bent(LINE, ElementBeamANCF(2))
+    asked = []
+    find = finder.Finder.__call__
+    monkeypatch.setattr(finder.Finder, "__call__",
+                        lambda self, x: asked.append(x.shape[1]) or find(self, x))
+    x = inside(LINE)[2]
+    for _ in range(3):
+        for name in METHODS:
+            getattr(state, name)(x)
+            getattr(state, name)((0.5, 0.0))
+            getattr(state, name)((0.5, 0))
+    assert sorted(asked) == [1, 1, 40]  # (0.5, 0.0), its array, and x
+    monkeypatch.setattr(points, "REMEMBERED_POINTS", 60)
+    for k in range(10):
+        state.displacement(x + 1e-9 * k)
+    known = state.system.points
+    assert known._held == sum(at.n for at in known._known.values()) <= 60
+    # changed in place they are other points
+    first = state.displacement(x)
+    x[0] *= 0.5
+    assert np.abs(state.displacement(x) - first).max() > 1e-3
+
+
+@pytest.mark.parametrize("what, error, message", [
+    (np.zeros((5, 2)), MeshError, r"shape \(2, n\).*got \(5, 2\); give its transpose"),
+    (np.zeros((3, 4)), MeshError, r"got \(3, 4\)$"),
+    ([(0, 1, 2), (3, 4, 5)], MeshError, "each material point of a list is a pair.*an array of shape"),
+    ([(0, 1), (0, (1, 2))], MeshError, "is a pair"),
+    ([(0.1, 0), (np.nan, 0)], InputError, "NaN"),
+    (np.array([[0.1], [np.inf]]), InputError, "infinite"),
+    ([(True, 0.0)], MeshError, "two coordinates"),
+    ([], MeshError, "two coordinates"),
+    ("left", MeshError, "the axis at 'left' is"),
+])
+def test_what_is_no_point(what, error, message):
+    state = bent(LINE, ElementBeamANCF(2))
+    for name in METHODS:
+        with pytest.raises(error, match=message):
+            getattr(state, name)(what)
+
+
+def test_true_is_not_one_even_if_one_is_known():
+    state = bent(LINE, ElementBeamANCF(2))
+    state.displacement((1.0, 0.0))
+    with pytest.raises(MeshError, match="two coordinates"):
+        state.displacement((True, 0.0))
+
+
+def test_points_outside_name_the_extent_of_the_body():
+    state = bent(LINE, ElementBeamANCF(2))
+    with pytest.raises(MeshError, match=r"\(0\.5, 2\) is outside the body: .*lies within x from 0 "
+                       r"to 1 and y from -0\.05 to 0\.05"):
+        state.displacement((0.5, 2.0))
+    with pytest.raises(MeshError, match=r"\(1e\+200, 0\) is outside"):
+        state.displacement((1e200, 0.0))
+    with pytest.raises(MeshError, match=r"outside the body \(2 of 3 points are\)"):
+        state.displacement(np.array([[0.5, 2.0, 3.0], [0.0, 0.0, 0.0]]))
+
+
+def test_forms_of_points():
+    assert_array_equal(as_points([(1, 2), (3, 4)]), [[1, 3], [2, 4]])
+    assert_array_equal(as_points(np.array([[1, 2], [3, 4]])), [[1, 2], [3, 4]])
+    assert as_points([1, 2]).shape == (2,)
