@@ -1,11 +1,18 @@
 """The elements that hold points of the stress-free body, many points at once."""
 
+from __future__ import annotations
+
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from .errors import MeshError
+
+if TYPE_CHECKING:
+    from .mesh import MeshBeam
+    from .types import Array
 
 #: Samples of each element in the tree of the finder, and candidates for a point that is in none of
 #: the elements next to its nearest sample.
@@ -21,7 +28,7 @@ class Finder:
         A :class:`~skfem_ancf.MeshBeam`.
     """
 
-    def __init__(self, mesh):
+    def __init__(self, mesh: MeshBeam):
         self.mesh, self.mapping = mesh, mesh.mapping()
         self.size = float(np.max(np.abs(mesh.p)))
         # points of an exact curve may lie a little outside its cubic elements
@@ -47,7 +54,7 @@ class Finder:
             return None
         return start, d, ends
 
-    def __call__(self, x):
+    def __call__(self, x: Array) -> tuple[Array, Array, Array]:
         """Elements (n,), reference points (2, n), and how far outside of them points (2, n) are.
 
         The last is zero for points of the body, and relative to the element; infinite for points
@@ -135,7 +142,7 @@ class Finder:
         return candidates[rows, which], X[:, rows, which], outside[rows, which]
 
     @cached_property
-    def extent(self):
+    def extent(self) -> str:
         """Where the body is, in words."""
         X = np.array(np.meshgrid(np.linspace(0, 1, 9), [0.0, 1.0])).reshape(2, -1)
         x = self.mapping.F(X).reshape(2, -1)
@@ -143,7 +150,7 @@ class Finder:
         return (f"the body lies within x from {low[0]:.6g} to {high[0]:.6g} and y from "
                 f"{low[1]:.6g} to {high[1]:.6g}")
 
-    def refuse(self, x, outside):
+    def refuse(self, x: Array, outside: Array) -> MeshError:
         """The MeshError for the points that are outside."""
         bad, mesh = np.nonzero(outside > self.allowed)[0], self.mesh
         x, more = x[:, bad[0]], f" ({len(bad)} of {len(outside)} points are)"

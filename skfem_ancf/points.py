@@ -4,8 +4,11 @@ A point is named by its place (x, y) in the stress-free body. One is a tuple, a 
 two numbers; many are an array of shape (2, n), as scikit-fem has them, or a list of points.
 """
 
+from __future__ import annotations
+
 from collections import OrderedDict
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,11 +16,20 @@ from .beam import select_beam
 from .errors import MeshError, require_finite, shown
 from .places import as_point
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+    from .beam import Beam
+    from .mesh import MeshBeam
+    from .types import Array, WhichBeam
+
 #: Points that a scene remembers, at most, and calls.
 REMEMBERED_POINTS, REMEMBERED = 2**16, 1024
 
 
-def is_many(points):
+def is_many(points: Any) -> bool:
     """True for an array of two dimensions, and for a list or tuple of points."""
     if isinstance(points, np.ndarray):
         return points.ndim == 2
@@ -25,8 +37,15 @@ def is_many(points):
         isinstance(p, (list, tuple, np.ndarray)) for p in points)
 
 
-def as_points(points, mesh=None):
+def as_points(points: ArrayLike, mesh: MeshBeam | None = None) -> Array:
     """Many points as an array (2, n), or one as an array (2,).
+
+    Parameters
+    ----------
+    points
+        Two numbers for one point; an array (2, n), or a list of pairs, for many.
+    mesh
+        The mesh of the beam, for hints in messages.
 
     Raises
     ------
@@ -72,28 +91,29 @@ class Part:
         Elements (n,) and reference points (2, n).
     """
 
-    def __init__(self, beam, number, coordinates, index, e, X):
+    def __init__(self, beam: Beam, number: int, coordinates: slice, index: Array | None, e: Array,
+                 X: Array):
         self.beam, self.number, self.coordinates, self.index = beam, number, coordinates, index
         self.e, self.X = e, X
         self.tables = {}  # of others, that depend on the beam and the points only
 
     @cached_property
-    def at(self):
+    def at(self) -> Array:
         """Reference points as the fields of a beam take them, (2, n, 1)."""
         return self.X[:, :, None]
 
     @cached_property
-    def start(self):
+    def start(self) -> Array:
         """Positions in the stress-free body, (2, n)."""
         return self.beam.mesh.mapping().F(self.at, self.e)[..., 0]
 
     @cached_property
-    def off_axis(self):
+    def off_axis(self) -> bool:
         """Points of a cable off its axis: their section turns with the tangent."""
         return self.beam.is_cable and bool(np.any(np.abs(self.X[1] - 0.5) > 1e-12))
 
     @cached_property
-    def dofs(self):
+    def dofs(self) -> Array:
         """Coordinates of the scene that move each point, (nb, 2, n)."""
         beam = self.beam
         first = self.coordinates.start + beam.mesh.t[0, self.e] * beam.nd
@@ -105,32 +125,32 @@ class Part:
         return np.array([row[derivative] * mesh.lengths[self.e] ** row[3] for row in rows])
 
     @cached_property
-    def weights(self):
+    def weights(self) -> Array:
         """Of these coordinates in the position, (nb, n)."""
         return self._table(0)
 
     @cached_property
-    def slopes(self):
+    def slopes(self) -> Array:
         """Of these coordinates in the derivative of the position by xi, (nb, n)."""
         return self._table(1)
 
     @cached_property
-    def one(self):
+    def one(self) -> tuple[Array, Array]:
         """Coordinates (2, nb) and weights (nb,) of a single point on which it depends linearly."""
         return np.ascontiguousarray(self.dofs[:, :, 0].T), np.ascontiguousarray(self.weights[:, 0])
 
-    def combine(self, weights, u):
+    def combine(self, weights: Array, u: Array) -> Array:
         """The sum of weighted coordinates ``u`` (..., N) of the scene: (..., 2, n)."""
         return sum(w * u[..., d] for w, d in zip(weights, self.dofs))
 
-    def displacement(self, u):
+    def displacement(self, u: Array) -> Array:
         """Displacements (..., 2, n) for coordinates ``u`` (..., N) of the scene."""
         out = self.combine(self.weights, u)
         if self.off_axis:
             out += self._lever * _turned(self._tangent(u) - self._tangent0)
         return out
 
-    def velocity(self, u, v):
+    def velocity(self, u: Array, v: Array) -> Array:
         """Velocities (..., 2, n) for coordinates ``u`` and their rates ``v``."""
         out = self.combine(self.weights, v)
         if self.off_axis:
@@ -177,10 +197,10 @@ class Located:
         Those of each beam that has some.
     """
 
-    def __init__(self, one, n, parts):
+    def __init__(self, one: bool, n: int, parts: list[Part]):
         self.one, self.n, self.parts = one, n, parts
 
-    def gather(self, values):
+    def gather(self, values: Sequence[Array]) -> Array:
         """One array of those of the parts, (..., n) each; (...) for a single point."""
         if len(self.parts) == 1 and self.parts[0].index is None:
             out = values[0]
@@ -190,7 +210,7 @@ class Located:
                 out[..., part.index] = value
         return out[..., 0] if self.one else out
 
-    def displacement(self, u):
+    def displacement(self, u: Array) -> Array:
         """Displacements for coordinates ``u`` (..., N): (..., 2), or (..., 2, n) of many."""
         part = self.parts[0] if self.one else None
         if part is not None and not part.off_axis:
@@ -198,7 +218,7 @@ class Located:
             return u[..., dofs] @ weights
         return self.gather([part.displacement(u) for part in self.parts])
 
-    def velocity(self, u, v):
+    def velocity(self, u: Array, v: Array) -> Array:
         """Velocities for coordinates ``u`` and their rates ``v``."""
         part = self.parts[0] if self.one else None
         if part is not None and not part.off_axis:
@@ -207,7 +227,7 @@ class Located:
         return self.gather([part.velocity(u, v) for part in self.parts])
 
     @cached_property
-    def start(self):
+    def start(self) -> Array:
         """Positions in the stress-free body."""
         return self.gather([part.start for part in self.parts])
 
@@ -221,11 +241,11 @@ class Points:
         The beams, and their coordinates in the scene.
     """
 
-    def __init__(self, beams, slices):
+    def __init__(self, beams: Sequence[Beam], slices: Sequence[slice]):
         self.beams, self.slices = list(beams), slices
         self._known, self._held = OrderedDict(), 0
 
-    def find(self, points, beam=None):
+    def find(self, points: ArrayLike, beam: WhichBeam = None) -> Located:
         """Where points are.
 
         Parameters

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from .beam import Beam
+    from .points import Part
     from .results import State
     from .types import Array, Law
 
@@ -477,7 +478,7 @@ class Recovery:
         values = self._values(self._places(e, xi, eta), slice(7)).reshape((7,) + shape)
         return values[:3], values[3:6], values[6]
 
-    def at(self, part, rows=slice(7)):
+    def at(self, part: Part, rows: slice = slice(7)) -> Array:
         """Rows of strain, stress and angle (7 in all) at points of the beam; (rows, n).
 
         Parameters
