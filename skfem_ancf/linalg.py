@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.linalg import blas, eigh, lapack, lu_solve
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, issparse
 
 from .band import Band, solve
 
@@ -28,6 +28,11 @@ SMALL = 1e-7
 GROWTH = 1e2
 #: Columns of a border that are solved for together where only the inertia is wanted.
 COLUMNS = 64
+
+
+def dense(A):
+    """A sparse or dense matrix as a dense one in C order."""
+    return A.toarray(order="C") if issparse(A) else np.ascontiguousarray(A)
 
 
 class Inertia(NamedTuple):

@@ -8,10 +8,11 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from .checks import Screen
+from .constraints import first_dependent, null_space, unit_rows
 from .errors import InputError, SupportError, shown
 from .joints.base import same_joint
 from .linalg import (INACCURATE, BandMatrix, BorderedMatrix, border, border_inertia,
-                     border_negative, columns_product, hold)
+                     border_negative, columns_product, dense, hold)
 from .pickling import functions_of, require_picklable
 from .points import Points
 
@@ -19,15 +20,6 @@ logger = logging.getLogger(__name__)
 _NONE = np.zeros(0)
 #: Columns of a border above which sparse LU is faster.
 WIDE_BORDER = 96
-
-
-def _unit_rows(rows):
-    """The rows scaled to a largest entry of 1, without those that are zero.
-
-    Rows for slopes have another unit than rows for positions.
-    """
-    norms = np.abs(rows).max(axis=1, initial=0.0)
-    return rows[norms > 0] / norms[norms > 0, None]
 
 
 class System:
@@ -160,14 +152,37 @@ class System:
         return any(joint.moving for joint in self.joints)
 
     def full_jacobian(self, u, t):
-        """Derivative of :meth:`constraint` by all coordinates, shape (m, N)."""
-        if not self.joints:
-            return np.zeros((0, self.N))
-        return np.vstack([joint.jacobian(u, t) for joint in self.joints])
+        """Derivative of :meth:`constraint` by all coordinates, shape (m, N).
+
+        Sparse where the multipliers are too many for a border.
+        """
+        if not self.bordered:
+            return self.sparse_jacobian(u, t)
+        J = np.zeros((self.m, self.N))
+        rows, columns, values = self._entries(u, t)
+        np.add.at(J, (rows, columns), values)
+        return J
+
+    def sparse_jacobian(self, u, t):
+        """As :meth:`full_jacobian`, as a scipy.sparse array in CSR format."""
+        rows, columns, values = self._entries(u, t)
+        return sparse.csr_array((values, (rows, columns)), shape=(self.m, self.N))
+
+    def _entries(self, u, t):
+        """Rows, columns and values of :meth:`full_jacobian`."""
+        first, parts = 0, [(np.zeros(0, dtype=int), np.zeros(0, dtype=int), _NONE)]
+        for joint in self.joints:
+            rows, columns, values = joint.entries(u, t)
+            parts.append((first + rows, columns, values))
+            first += len(joint.equations)
+        return tuple(np.concatenate(column) for column in zip(*parts))
 
     def jacobian(self, u, t):
-        """Derivative of :meth:`constraint`, shape (m, N), zero at fixed coordinates."""
+        """As :meth:`full_jacobian`, zero at fixed coordinates."""
         J = self.full_jacobian(u, t)
+        if not self.bordered:
+            J.data *= self.mask[J.indices]
+            return J
         J[:, self.fixed] = 0.0
         return J
 
@@ -221,22 +236,16 @@ class System:
         """Raise SupportError if joints repeat or contradict each other or the supports."""
         if not self.joints:
             return
-        zero, basis, gaps = np.zeros(self.N), np.zeros((0, self.N)), np.zeros(0)
-        for joint in self.joints:
-            full, phi = joint.jacobian(zero, 0.0), joint.value(zero, 0.0)
-            for k, row in enumerate(full):
-                size = np.linalg.norm(row)
-                rest, gap = np.where(self.free, row, 0.0), phi[k]
-                for _ in range(2):
-                    part = basis @ rest
-                    rest, gap = rest - part @ basis, gap - part @ gaps
-                length = np.linalg.norm(rest)
-                if length <= 1e-9 * size:
-                    kind = "repeats" if abs(gap) <= 1e-9 * self.size else "contradicts"
-                    raise SupportError(
-                        f"{joint!r}, equation {joint.equations[k]!r}, {kind} what the supports and "
-                        "the joints before it hold already: remove one of them")
-                basis, gaps = np.vstack([basis, rest / length]), np.append(gaps, gap / length)
+        zero = np.zeros(self.N)
+        found = first_dependent(self.sparse_jacobian(zero, 0.0), self.free,
+                                self.constraint(zero, 0.0))
+        if found is None:
+            return
+        k, gap = found
+        joint, equation = [(joint, name) for joint in self.joints for name in joint.equations][k]
+        kind = "repeats" if abs(gap) <= 1e-9 * self.size else "contradicts"
+        raise SupportError(f"{joint!r}, equation {equation!r}, {kind} what the supports and the "
+                           "joints before it hold already: remove one of them")
 
     # forces and energies
 
@@ -382,7 +391,7 @@ class System:
         if not self.joints:
             return x, np.zeros(0)
         J = self.jacobian(u, t)
-        Y = self.mass_factors.solve(np.ascontiguousarray(J.T))
+        Y = self.mass_factors.solve(dense(J.T))
         multipliers = np.linalg.solve(J @ Y, J @ x - rate)
         return x - Y @ multipliers, multipliers
 
@@ -462,7 +471,7 @@ class System:
         out = []
         for beam, s in zip(self.beams, self.slices):
             held = self.fixed[(self.fixed >= s.start) & (self.fixed < s.stop)] - s.start
-            motions = _unit_rows(beam.rigid_motions()[held] / [1.0, 1.0, self.size])
+            motions = unit_rows(beam.rigid_motions()[held] / [1.0, 1.0, self.size])
             if len(motions) and np.linalg.matrix_rank(motions, 1e-9) == 3:
                 continue
             p = beam.mesh.p
@@ -527,7 +536,7 @@ class System:
             return self._factors.inertia()
         K = self.K.symmetric_part()
         picked, S = hold(K, *self._outside, self.springs)
-        return border_inertia(K, picked, S, self._J)
+        return border_inertia(K, picked, S, dense(self._J))
 
     def stays(self, u, t, multipliers):
         """True if the factors left by an iteration say that no direction gives way.
@@ -604,20 +613,16 @@ class System:
 
     def free_rigid_motions(self):
         """Descriptions of the rigid motions that nothing holds, one string each."""
-        n = 3 * len(self.beams)
-        motions, sizes = np.zeros((self.N, n)), []
-        for k, (beam, s) in enumerate(zip(self.beams, self.slices)):
-            sizes.append(float(beam.mesh.lengths.sum()))
-            motions[s, 3 * k:3 * k + 3] = beam.rigid_motions() / np.array([1.0, 1.0, sizes[-1]])
-        held = motions[self.fixed]
-        if self.joints:
-            zero = np.zeros(self.N)
-            held = np.vstack([held] + [j.jacobian(zero, 0.0) @ motions for j in self.joints])
-        held = _unit_rows(held)
-        if not len(held):
-            return [self._describe(v, sizes) for v in np.eye(n)]
-        _, sigma, V = np.linalg.svd(np.linalg.qr(held, mode="r"))  # held may have many rows
-        return [self._describe(v, sizes) for v in V[int(np.sum(sigma > 1e-9 * sigma[0])):]]
+        sizes = [float(beam.mesh.lengths.sum()) for beam in self.beams]
+        values = np.concatenate([beam.rigid_motions() / [1.0, 1.0, size]
+                                 for beam, size in zip(self.beams, sizes)])
+        of_beam = np.repeat(np.arange(len(self.beams)), np.diff(self.offsets))
+        motions = sparse.csr_array(
+            (values.ravel(), (3 * of_beam[:, None] + np.arange(3)).ravel(),
+             3 * np.arange(self.N + 1)), shape=(self.N, 3 * len(self.beams)))
+        held = sparse.vstack([motions[self.fixed],
+                              self.sparse_jacobian(np.zeros(self.N), 0.0) @ motions])
+        return [self._describe(v, sizes) for v in null_space(unit_rows(held))]
 
     def _describe(self, v, sizes):
         parts = []

@@ -5,6 +5,7 @@ import logging
 import numpy as np
 
 from ..errors import SupportError, require_positive
+from ..linalg import dense
 from .base import ITERATION, Motion
 from .rates import rates
 
@@ -140,7 +141,7 @@ class Integrator:
         v[s.fixed] = supports
         if not s.joints:
             return v, np.zeros(0)
-        Y = s.mass_factors.solve(np.ascontiguousarray(J.T))
+        Y = s.mass_factors.solve(dense(J.T))
         impulse = np.linalg.solve(s.full_jacobian(u, step.t) @ Y,
                                   self._constraint_rate(u, v, step.t, dt))
         return v - Y @ impulse, impulse
@@ -183,7 +184,7 @@ class Integrator:
             du = self.A.solve(R)
             work = np.sum(np.abs(R * du))
             if s.joints:
-                Y = self.A.solve(np.ascontiguousarray(J.T))
+                Y = self.A.solve(dense(J.T))
                 dm = np.linalg.solve(s.jacobian(u, step.t) @ Y,
                                      s.full_jacobian(u, step.t) @ du + phi)
                 du, multipliers = du - Y @ dm, multipliers + dm

@@ -60,6 +60,46 @@ class Vector:
         np.add.at(out, self.dofs, np.outer(direction, self.weights))
         return out
 
+    def entries(self, direction: ArrayLike) -> tuple[Array, Array]:
+        """The derivative of ``direction . vector`` by the coordinates.
+
+        Parameters
+        ----------
+        direction
+            Shape (2,).
+
+        Returns
+        -------
+        columns, values
+            Shapes (k,).
+        """
+        return self.dofs.ravel(), np.outer(direction, self.weights).ravel()
+
+
+def gradients(*equations: list) -> tuple[Array, Array, Array]:
+    """The entries of a Jacobian that are not zero.
+
+    Parameters
+    ----------
+    *equations
+        For each a list of pairs, Vector and direction (2,), whose scalar products it sums.
+
+    Returns
+    -------
+    rows, columns, values
+        Shapes (k,).
+    """
+    rows, columns, values = [], [], []
+    for k, terms in enumerate(equations):
+        for vector, direction in terms:
+            found = vector.entries(direction)
+            rows.append(np.full(len(found[0]), k))
+            columns.append(found[0])
+            values.append(found[1])
+    rows, columns, values = map(np.concatenate, (rows, columns, values))
+    keep = values != 0.0
+    return rows[keep], columns[keep], values[keep]
+
 
 def rotation(angle: float) -> Array:
     """The matrix that turns by ``angle``."""
@@ -75,7 +115,7 @@ class Joint(Sealable):
     that the joint exerts, in the order of :attr:`equations`.
 
     A joint of your own is a subclass that sets :attr:`equations` and defines :meth:`bind`,
-    :meth:`value`, :meth:`jacobian`, and :meth:`curvature` if it is not constant;
+    :meth:`value`, :meth:`jacobian` or :meth:`entries`, and :meth:`curvature` if it is not constant;
     :meth:`skfem_ancf.Scene.add` takes it. The scene keeps a copy and binds others: one to its own
     beams, and one to those of each finer mesh of ``solve_static(adapt=...)``.
 
@@ -94,6 +134,14 @@ class Joint(Sealable):
     constant = True
     moving = False
     name = None
+
+    def __init_subclass__(cls, **options):
+        """Of :meth:`jacobian` and :meth:`entries` the one that a class defines gives the other."""
+        super().__init_subclass__(**options)
+        if "jacobian" in vars(cls) and "entries" not in vars(cls):
+            cls.entries = Joint.entries
+        elif "entries" in vars(cls) and "jacobian" not in vars(cls):
+            cls.jacobian = Joint.jacobian
 
     def bind(self, scene: Scene) -> None:
         """Find the points and sections in the scene's coordinates.
@@ -124,7 +172,7 @@ class Joint(Sealable):
         raise NotImplementedError
 
     def jacobian(self, u: Array, t: float) -> Array:
-        """Derivative of Phi by u.
+        """Derivative of Phi by u; by default that of :meth:`entries`.
 
         Parameters
         ----------
@@ -138,7 +186,34 @@ class Joint(Sealable):
         ndarray
             Shape (m, N).
         """
-        raise NotImplementedError
+        if type(self).entries is Joint.entries:
+            raise NotImplementedError("a joint defines jacobian(u, t) or entries(u, t)")
+        rows, columns, values = self.entries(u, t)
+        J = np.zeros((len(self.equations), len(u)))
+        np.add.at(J, (rows, columns), values)
+        return J
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        """The entries of :meth:`jacobian` that are not zero; those at one place add up.
+
+        A joint that defines them costs what it holds, however many beams a scene has; by default
+        they are looked for in the dense rows.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        t
+            Time; in statics the load factor.
+
+        Returns
+        -------
+        rows, columns, values
+            Shapes (k,).
+        """
+        J = self.jacobian(u, t)
+        rows, columns = np.nonzero(J)
+        return rows, columns, J[rows, columns]
 
     def curvature(self, u: Array, t: float,
                   multipliers: Array) -> tuple[Array, Array, Array] | None:
@@ -198,9 +273,11 @@ class Joint(Sealable):
         zero = np.zeros(N)
         if self.moving and not self.constant:
             return np.arange(N), np.array([self.jacobian(zero, t) for t in times])
-        rows = self.jacobian(zero, times[0])
-        columns = np.flatnonzero(np.any(rows != 0, axis=0))
-        return columns, np.broadcast_to(rows[:, columns], (len(times), len(rows), len(columns)))
+        rows, found, values = self.entries(zero, times[0])
+        columns, where = np.unique(found, return_inverse=True)
+        J = np.zeros((len(self.equations), len(columns)))
+        np.add.at(J, (rows, where), values)
+        return columns, np.broadcast_to(J, (len(times),) + J.shape)
 
     def __repr__(self):
         at = getattr(self, "at", None)

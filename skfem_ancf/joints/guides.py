@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError, require_finite, require_label, require_positive, teaching
-from .base import Joint, point
+from .base import Joint, gradients, point
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -48,13 +48,13 @@ class OnLine(Joint):
     def bind(self, scene: Scene) -> None:
         self.r = point(scene, self.beam, self.at)
         self.p = self.r.start if self.through is None else self.through
-        self.rows = self.r.row(self.normal, scene.N)[None]
+        self.found = gradients([(self.r, self.normal)])
 
     def value(self, u: Array, t: float) -> Array:
         return np.array([self.normal @ (self.r(u) - self.p)])
 
-    def jacobian(self, u: Array, t: float) -> Array:
-        return self.rows
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return self.found
 
 
 @teaching
@@ -85,7 +85,7 @@ class OnCircle(Joint):
         self.beam, self.at, self.name = beam, at, require_label("name", name)
 
     def bind(self, scene: Scene) -> None:
-        self.r, self.N = point(scene, self.beam, self.at), scene.N
+        self.r = point(scene, self.beam, self.at)
         self.R = self.radius or require_positive(
             "the distance of the point from the centre", np.hypot(*(self.r.start - self.center)))
         if self.R < 1e-9 * np.hypot(*(self.r.start - self.center)):
@@ -96,8 +96,8 @@ class OnCircle(Joint):
         d = self.r(u) - self.center
         return np.array([(d @ d - self.R**2) / (2 * self.R)])
 
-    def jacobian(self, u: Array, t: float) -> Array:
-        return self.r.row((self.r(u) - self.center) / self.R, self.N)[None]
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return gradients([(self.r, (self.r(u) - self.center) / self.R)])
 
     def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
         w = self.r.weights

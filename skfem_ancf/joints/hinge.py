@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import require_label, teaching
-from .base import Joint, both, pair, point
+from .base import Joint, both, gradients, pair, point
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,10 +44,10 @@ class Hinge(Joint):
 
     def bind(self, scene: Scene) -> None:
         self.a, self.b = (point(scene, beam, at) for beam, at in zip(self.beams, self.at))
-        self.rows = np.array([self.a.row(e, scene.N) - self.b.row(e, scene.N) for e in np.eye(2)])
+        self.found = gradients(*([(self.a, e), (self.b, -e)] for e in np.eye(2)))
 
     def value(self, u: Array, t: float) -> Array:
         return self.a(u) - self.b(u)
 
-    def jacobian(self, u: Array, t: float) -> Array:
-        return self.rows
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return self.found

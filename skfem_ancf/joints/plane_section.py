@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import require_label, teaching
-from .base import Joint, Vector
+from .base import Joint, Vector, gradients
 
 if TYPE_CHECKING:
     from ..scene import Scene
@@ -46,10 +46,10 @@ class PlaneSection(Joint):
                                np.ones(1)) for k in held]
         self.direction = direction
         self.equations = tuple(f"moment on {beam.element.dofnames[k]}" for k in held)
-        self.rows = np.array([v.row(direction, scene.N) for v in self.vectors])
+        self.found = gradients(*([(v, direction)] for v in self.vectors))
 
     def value(self, u: Array, t: float) -> Array:
         return np.array([self.direction @ v(u) for v in self.vectors])
 
-    def jacobian(self, u: Array, t: float) -> Array:
-        return self.rows
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return self.found

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import ask_array, ask_number, require_function, require_label, teaching
 from ..sampling import sample
-from .base import Joint, point, section
+from .base import Joint, gradients, point, section
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -45,7 +45,7 @@ class PrescribedPosition(Joint):
 
     def bind(self, scene: Scene) -> None:
         self.r = point(scene, self.beam, self.at)
-        self.rows = np.array([self.r.row(e, scene.N) for e in np.eye(2)])
+        self.found = gradients(*([(self.r, e)] for e in np.eye(2)))
 
     def value(self, u: Array, t: float) -> Array:
         return self.r(u) - ask_array("r(t={:g})", (2,), self.motion, t)
@@ -53,8 +53,8 @@ class PrescribedPosition(Joint):
     def offset(self, times: Array, N: int) -> Array:
         return self.r.start - sample(self.motion, times, "r", (2,))
 
-    def jacobian(self, u: Array, t: float) -> Array:
-        return self.rows
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return self.found
 
 
 @teaching
@@ -84,7 +84,7 @@ class PrescribedAngle(Joint):
 
     def bind(self, scene: Scene) -> None:
         _, self.d = section(scene, self.beam, self.at)
-        self.N, self.start = scene.N, np.arctan2(*self.d.start[::-1])
+        self.start = np.arctan2(*self.d.start[::-1])
 
     def _angle(self, t):
         return ask_number("angle(t={:g})", self.angle, t)
@@ -93,9 +93,9 @@ class PrescribedAngle(Joint):
         a, d = self.start + self._angle(t), self.d(u)
         return np.array([np.cos(a) * d[1] - np.sin(a) * d[0]])
 
-    def jacobian(self, u: Array, t: float) -> Array:
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         a = self.start + self._angle(t)
-        return self.d.row((-np.sin(a), np.cos(a)), self.N)[None]
+        return gradients([(self.d, (-np.sin(a), np.cos(a)))])
 
     def _normals(self, times):
         a = self.start + sample(self.angle, times, "angle", ())

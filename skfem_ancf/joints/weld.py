@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InputError, require_flag, require_label, shown, teaching
 from ..places import is_place
-from .base import Joint, both, cross_terms, rotation, section
+from .base import Joint, both, cross_terms, gradients, rotation, section
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -70,17 +70,20 @@ class Weld(Joint):
                 "apart=True to draw them together")
         angle = np.arctan2(*self.da.start[::-1]) - np.arctan2(*self.db.start[::-1])
         self.Q = rotation(angle)
-        self.N = scene.N
-        self.rows = np.array([self.a.row(e, scene.N) - self.b.row(e, scene.N) for e in np.eye(2)])
+        rows, columns, self.values = gradients(
+            *([(self.a, e), (self.b, -e)] for e in np.eye(2)))
+        turning = np.append(self.da.dofs.ravel(), self.db.dofs.ravel())
+        self.places = (np.append(rows, np.full(len(turning), 2)), np.append(columns, turning))
 
     def value(self, u: Array, t: float) -> Array:
         d, e = self.da(u), self.Q @ self.db(u)
         return np.append(self.a(u) - self.b(u), e[0] * d[1] - e[1] * d[0])
 
-    def jacobian(self, u: Array, t: float) -> Array:
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         d, e = self.da(u), self.Q @ self.db(u)
-        turn = self.da.row((-e[1], e[0]), self.N) + self.db.row(self.Q.T @ (d[1], -d[0]), self.N)
-        return np.vstack([self.rows, turn])
+        turn = ((-e[1], e[0]) * self.da.weights[:, None],
+                (d[1], -d[0]) @ self.Q * self.db.weights[:, None])
+        return *self.places, np.concatenate([self.values, *(part.T.ravel() for part in turn)])
 
     def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
         i, j, v = cross_terms(self.da, self.db, self.Q)

@@ -325,7 +325,7 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record, d
             du0[system.fixed] = prescribed
             free = (residual - system.multiply(du0)) * system.free
             if system.joints:
-                phi = phi + np.concatenate([j.jacobian(u, at) @ du0 for j in system.joints])
+                phi = phi + system.full_jacobian(u, at) @ du0
             moving = False
         try:
             system.factorize(u, at, multipliers)
