@@ -28,7 +28,7 @@ class Finder:
         A :class:`~skfem_ancf.MeshBeam`.
     """
 
-    def __init__(self, mesh: MeshBeam):
+    def __init__(self, mesh: MeshBeam) -> None:
         self.mesh, self.mapping = mesh, mesh.mapping()
         self.size = float(np.max(np.abs(mesh.p)))
         # points of an exact curve may lie a little outside its cubic elements
@@ -151,7 +151,15 @@ class Finder:
                 f"{low[1]:.6g} to {high[1]:.6g}")
 
     def refuse(self, x: Array, outside: Array) -> MeshError:
-        """The MeshError for the points that are outside."""
+        """The MeshError for points that are outside.
+
+        Parameters
+        ----------
+        x
+            All points, shape (2, n).
+        outside
+            How far outside each of them is, as the finder says, shape (n,).
+        """
         bad, mesh = np.nonzero(outside > self.allowed)[0], self.mesh
         x, more = x[:, bad[0]], f" ({len(bad)} of {len(outside)} points are)"
         return MeshError(

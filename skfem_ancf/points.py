@@ -92,7 +92,7 @@ class Part:
     """
 
     def __init__(self, beam: Beam, number: int, coordinates: slice, index: Array | None, e: Array,
-                 X: Array):
+                 X: Array) -> None:
         self.beam, self.number, self.coordinates, self.index = beam, number, coordinates, index
         self.e, self.X = e, X
         self.tables = {}  # of others, that depend on the beam and the points only
@@ -140,7 +140,20 @@ class Part:
         return np.ascontiguousarray(self.dofs[:, :, 0].T), np.ascontiguousarray(self.weights[:, 0])
 
     def combine(self, weights: Array, u: Array) -> Array:
-        """The sum of weighted coordinates ``u`` (..., N) of the scene: (..., 2, n)."""
+        """The sum of weighted coordinates of the scene at each point.
+
+        Parameters
+        ----------
+        weights
+            Shape (nb, n).
+        u
+            Coordinates of the scene, or their rates, shape (..., N).
+
+        Returns
+        -------
+        ndarray
+            Shape (..., 2, n).
+        """
         return sum(w * u[..., d] for w, d in zip(weights, self.dofs))
 
     def displacement(self, u: Array) -> Array:
@@ -151,7 +164,13 @@ class Part:
         return out
 
     def velocity(self, u: Array, v: Array) -> Array:
-        """Velocities (..., 2, n) for coordinates ``u`` and their rates ``v``."""
+        """Velocities (..., 2, n).
+
+        Parameters
+        ----------
+        u, v
+            Displacement of the coordinates of the scene and its rate, shapes (..., N).
+        """
         out = self.combine(self.weights, v)
         if self.off_axis:
             a, rate = self._start_slope + self.combine(self.slopes, u), self.combine(self.slopes, v)
@@ -197,7 +216,7 @@ class Located:
         Those of each beam that has some.
     """
 
-    def __init__(self, one: bool, n: int, parts: list[Part]):
+    def __init__(self, one: bool, n: int, parts: list[Part]) -> None:
         self.one, self.n, self.parts = one, n, parts
 
     def gather(self, values: Sequence[Array]) -> Array:
@@ -219,7 +238,13 @@ class Located:
         return self.gather([part.displacement(u) for part in self.parts])
 
     def velocity(self, u: Array, v: Array) -> Array:
-        """Velocities for coordinates ``u`` and their rates ``v``."""
+        """Velocities (..., 2), or (..., 2, n) of many points.
+
+        Parameters
+        ----------
+        u, v
+            Displacement of the coordinates of the scene and its rate, shapes (..., N).
+        """
         part = self.parts[0] if self.one else None
         if part is not None and not part.off_axis:
             dofs, weights = part.one
@@ -241,7 +266,7 @@ class Points:
         The beams, and their coordinates in the scene.
     """
 
-    def __init__(self, beams: Sequence[Beam], slices: Sequence[slice]):
+    def __init__(self, beams: Sequence[Beam], slices: Sequence[slice]) -> None:
         self.beams, self.slices = list(beams), slices
         self._known, self._held = OrderedDict(), 0
 
@@ -251,7 +276,7 @@ class Points:
         Parameters
         ----------
         points
-            One point or many, see :func:`as_points`.
+            One point, shape (2,), or many, shape (2, n) or a list, see :func:`as_points`.
         beam
             The beam that they are in, its name or number; found for each if it is not given.
 
