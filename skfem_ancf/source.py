@@ -21,6 +21,13 @@ Rules of such a text, where ``e`` is an index of lanes:
 * ``out[at[e]] += x[e]`` needs ``at`` without repetitions.
 """
 
+from typing import Annotated
+
+import numpy as np
+
+#: Arrays in the fields of named tuples: of floats or integers, with so many axes, contiguous.
+F1, F2, F3, I1, I2 = (Annotated[np.ndarray, kind] for kind in ("f1", "f2", "f3", "i1", "i2"))
+
 
 def lanes(*ends):
     """Indices from ``ends`` as of ``range``: all at once, as one slice; compiled, one by one.

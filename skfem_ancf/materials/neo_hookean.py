@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError, taught
+from ..source import lanes, primitive, source
 from .base import Material
 
 if TYPE_CHECKING:
@@ -62,59 +63,139 @@ class NeoHookean(Material):
         rest = NeoHookean(2.0 * self.G, 0.0, plane=self.plane)
         return rest.law(k_s), _Volumetric(self.E, self.nu, plane=self.plane).law(k_s)
 
-    def _state(self, strain):
-        """C_11, C_22, C_12, ln det C and ln C_33."""
-        C11, C22, C12 = 1.0 + 2.0 * strain[0], 1.0 + 2.0 * strain[1], strain[2]
-        # det C = 1 + d: log1p keeps the digits of small strains
-        d = 2.0 * (strain[0] + strain[1]) + 4.0 * strain[0] * strain[1] - strain[2] ** 2
-        with np.errstate(invalid="ignore", divide="ignore"):
-            log_det = np.log1p(d)
-        x = np.zeros_like(log_det)
-        if self.plane == "stress":  # mu (C_33 - 1) + lambda ln J = 0 for x = ln C_33, by Newton
-            for _ in range(60):
-                g = self.G * np.expm1(x) + 0.5 * self.lame * (log_det + x)
-                dx = g / (self.G * np.exp(x) + 0.5 * self.lame)
-                x = x - np.clip(dx.real, -1.0, 1.0) - (1j * dx.imag if np.iscomplexobj(dx) else 0.0)
-                if not np.any(np.abs(dx) > 1e-14 * (1e-14 + np.abs(x))):
-                    break
-        return C11, C22, C12, log_det, x
+    @property
+    def has_texts(self) -> bool:
+        """True if the texts of this module are its energy, stress and moduli."""
+        return all(getattr(type(self), name) is getattr(NeoHookean, name)
+                   for name in ("energy", "stress", "moduli"))
 
     def energy(self, strain: Array) -> Array:
-        _, _, _, log_det, x = self._state(strain)
-        log_J = 0.5 * (log_det + x)
-        with np.errstate(invalid="ignore"):
-            trace = 2.0 * (strain[0] + strain[1]) + np.expm1(x)
-        return 0.5 * self.G * trace - self.G * log_J + 0.5 * self.lame * log_J**2
-
-    @staticmethod
-    def _inverse(C11, C22, C12, log_det):
-        return np.array([C22, C11, -C12]) * np.exp(-log_det)
+        return _evaluated(neo_hookean_energy, self, strain, ())
 
     def stress(self, strain: Array) -> Array:
-        C11, C22, C12, log_det, x = self._state(strain)
-        c = self._inverse(C11, C22, C12, log_det)
-        # det C (I - C^-1), written so that it vanishes without cancellation
-        change = np.array([2 * strain[0] * C22 - C12**2, 2 * strain[1] * C11 - C12**2, C12])
-        return self.G * change * np.exp(-log_det) + 0.5 * self.lame * (log_det + x) * c
+        return _evaluated(neo_hookean_stress, self, strain, (3,))
 
     def moduli(self, strain: Array) -> Array:
-        C11, C22, C12, log_det, x = self._state(strain)
-        a, b, c = self._inverse(C11, C22, C12, log_det)
-        lame, m = self.lame, self.G - 0.5 * self.lame * (log_det + x)
-        if self.plane == "stress":  # condensed with S_33 = 0
-            lame = 2.0 * m * lame / (lame + 2.0 * m)
-        xx, yy, xy = (lame + 2 * m) * a * a, (lame + 2 * m) * b * b, lame * a * b + 2 * m * c * c
-        xs, ys = (lame + 2 * m) * a * c, (lame + 2 * m) * b * c
-        return np.array([[xx, xy, xs], [xy, yy, ys],
-                         [xs, ys, lame * c * c + m * (a * b + c * c)]])
+        return _evaluated(neo_hookean_moduli, self, strain, (3, 3))
 
     def thickness_stretch(self, strain: Array) -> Array:
         if not self._fits("thickness_stretch"):
             return super().thickness_stretch(strain)
-        return np.exp(0.5 * self._state(strain)[4].real)
+        return np.exp(0.5 * _evaluated(_thickness, self, np.real(strain), ()))
 
 
 class _Volumetric(NeoHookean):
     """lambda/2 (ln J)^2 alone."""
 
     G = 0.0
+
+
+# the texts: strains (3, n, elements) and constants as neo_hookean_constants gives them
+
+
+def neo_hookean_constants(law):
+    """Shear modulus, Lame's first parameter, and 1 in plane stress."""
+    return np.array([law.G, law.lame, float(law.plane == "stress")])
+
+
+def _evaluated(text, law, strain, shape):
+    """What a text gives for strains of any shape (3, ...)."""
+    strain = np.asarray(strain)
+    strain = strain.astype(np.result_type(strain, float), copy=False)
+    out = np.empty(shape + (1, strain[0].size), strain.dtype)
+    text(neo_hookean_constants(law), strain.reshape(3, 1, -1), out)
+    return out.reshape(shape + strain.shape[1:])
+
+
+@primitive("primitives")
+def log1p(x):
+    """ln (1 + x), not a number where there is none."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.log1p(x)
+
+
+@source
+def _logarithms(constants, strain, log_det, x):
+    """ln det C in the plane, and x = ln C_33."""
+    G, lame, plane_stress = constants
+    for p in lanes(strain.shape[1]):
+        for e in lanes(strain.shape[2]):
+            # det C = 1 + ...: log1p keeps the digits of small strains
+            log_det[p, e] = log1p(2.0 * (strain[0, p, e] + strain[1, p, e])
+                                  + 4.0 * strain[0, p, e] * strain[1, p, e]
+                                  - strain[2, p, e] * strain[2, p, e])
+            x[p, e] = 0.0 * log_det[p, e]
+    if plane_stress == 0.0:
+        return
+    moved = np.empty(x.shape, np.bool_)
+    for _ in range(60):  # G (C_33 - 1) + lambda ln J = 0, by Newton
+        for p in lanes(x.shape[0]):
+            for e in lanes(x.shape[1]):
+                change = np.expm1(x[p, e])
+                dx = ((G * change + 0.5 * lame * (log_det[p, e] + x[p, e]))
+                      / (G * (change + 1.0) + 0.5 * lame))
+                dx = dx / np.maximum(1.0, np.abs(dx))
+                x[p, e] -= dx
+                moved[p, e] = np.abs(dx) > 1e-14 * (1e-14 + np.abs(x[p, e]))
+        if not np.any(moved):
+            return
+
+
+@source
+def _thickness(constants, strain, x):
+    """ln C_33."""
+    _logarithms(constants, strain, np.empty(x.shape, x.dtype), x)
+
+
+@source
+def neo_hookean_energy(constants, strain, W):
+    """W = G/2 (tr C - 3) - G ln J + lambda/2 (ln J)^2."""
+    G, lame = constants[0], constants[1]
+    log_det, x = np.empty(W.shape, W.dtype), np.empty(W.shape, W.dtype)
+    _logarithms(constants, strain, log_det, x)
+    for p in lanes(W.shape[0]):
+        for e in lanes(W.shape[1]):
+            log_J = 0.5 * (log_det[p, e] + x[p, e])
+            trace = 2.0 * (strain[0, p, e] + strain[1, p, e]) + np.expm1(x[p, e])
+            W[p, e] = 0.5 * G * trace - G * log_J + 0.5 * lame * log_J * log_J
+
+
+@source
+def neo_hookean_stress(constants, strain, S):
+    """S = G (I - C^-1) + lambda ln J C^-1."""
+    G, lame = constants[0], constants[1]
+    log_det, x = np.empty(S[0].shape, S.dtype), np.empty(S[0].shape, S.dtype)
+    _logarithms(constants, strain, log_det, x)
+    for p in lanes(S.shape[1]):
+        for e in lanes(S.shape[2]):
+            E1, E2, C12 = strain[0, p, e], strain[1, p, e], strain[2, p, e]
+            inverse = np.exp(-log_det[p, e])
+            g, m = G * inverse, 0.5 * lame * (log_det[p, e] + x[p, e]) * inverse
+            C11, C22 = 1.0 + 2.0 * E1, 1.0 + 2.0 * E2
+            # det C (I - C^-1), written so that it vanishes without cancellation
+            S[0, p, e] = g * (2.0 * E1 * C22 - C12 * C12) + m * C22
+            S[1, p, e] = g * (2.0 * E2 * C11 - C12 * C12) + m * C11
+            S[2, p, e] = (g - m) * C12
+
+
+@source
+def neo_hookean_moduli(constants, strain, D):
+    """The derivative of the stress, condensed with S_33 = 0 in plane stress."""
+    G, lame, plane_stress = constants
+    shape = strain[0].shape
+    log_det, x = np.empty(shape, strain.dtype), np.empty(shape, strain.dtype)
+    _logarithms(constants, strain, log_det, x)
+    for p in lanes(shape[0]):
+        for e in lanes(shape[1]):
+            inverse = np.exp(-log_det[p, e])
+            a, b = (1.0 + 2.0 * strain[1, p, e]) * inverse, (1.0 + 2.0 * strain[0, p, e]) * inverse
+            c = -strain[2, p, e] * inverse
+            m = G - 0.5 * lame * (log_det[p, e] + x[p, e])
+            # lambda, or 2 m lambda / (2 m + lambda) in plane stress
+            part = 2.0 * m * plane_stress + 1.0 - plane_stress
+            stiff = lame * part / (part + plane_stress * lame)
+            D[0, 0, p, e], D[1, 1, p, e] = (stiff + 2 * m) * a * a, (stiff + 2 * m) * b * b
+            D[2, 2, p, e] = stiff * c * c + m * (a * b + c * c)
+            D[0, 1, p, e] = D[1, 0, p, e] = stiff * a * b + 2 * m * c * c
+            D[0, 2, p, e] = D[2, 0, p, e] = (stiff + 2 * m) * a * c
+            D[1, 2, p, e] = D[2, 1, p, e] = (stiff + 2 * m) * b * c

@@ -1,0 +1,602 @@
+"""What all kinds of beams share: blocks of elements, forces and tangents from rows of a table.
+
+The ``table`` has rows G_g of derivatives of the local functions, shape (rows, nb, elements), or
+(rows, nb, 1) where elements share them. A force is ``G^T T`` with what the stresses do on each
+row; a tangent is a sum over pairs of rows
+
+    K[(a, i), (b, j)] = sum_{g, h} M[g, h, i, j] G[g, a] G[h, b]
+
+and where elements share G its products are constants: a matrix product for a whole block of
+elements. The parts symmetric and skew in (a, b) need each pair of rows once.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..source import F2, F3, I1, I2, column, lanes, primitive, source
+
+#: Elements of which Python evaluates matrices together; bounds the memory.
+CHUNK = 1024
+#: Fields of a pack whose last axis are the elements, where they have tables of their own.
+BY_ELEMENT = {"table", "frame", "weights", "moduli", "constant", "length0", "kappa0"}
+#: Fields with numbers of elements in a table, and the table.
+PLACES = {"place": "weights", "frame_place": "frame"}
+
+
+@primitive("primitives")
+def block(pairs):
+    """Elements that a text takes together: NumPy wants many, as long as they stay in cache."""
+    return max(64, min(1024, 100000 // pairs))
+
+
+@primitive("primitives")
+def element_products(A, first, B, out):
+    """out[i, j, e] = sum_k A[i, k, first + e] B[k, j, e]."""
+    np.einsum("ike,kje->ije", A[:, :, first:first + B.shape[2]], B, out=out)
+
+
+@primitive("primitives")
+def turned_element_products(A, first, B, out):
+    """out[i, j, e] = sum_k A[k, i, first + e] B[k, j, e]."""
+    A = A[:, :, first:first + B.shape[2]]
+    if B.shape[1] < 8:
+        np.einsum("kie,kje->ije", A, B, out=out)
+    else:
+        out[...] = np.matmul(np.ascontiguousarray(A.transpose(2, 1, 0)),
+                             np.ascontiguousarray(B.transpose(2, 0, 1))).transpose(1, 2, 0)
+
+
+@source
+def shared_product(A, B, out):
+    """out[i, j, e] = sum_k A[i, k, 0] B[k, j, e]."""
+    n = B.shape[1] * B.shape[2]
+    np.dot(A.reshape(A.shape[0], A.shape[1]), B.reshape(B.shape[0], n), out.reshape(len(out), n))
+
+
+@source
+def product(A, first, B, out):
+    """out[i, j, e] = sum_k A[i, k, e] B[k, j, e] for the elements from ``first`` on."""
+    if A.shape[2] == 1:
+        shared_product(A, B, out)
+    else:
+        element_products(A, first, B, out)
+
+
+@source
+def load(start, span, first, u, U):
+    """The coordinates (nb, 2, elements) of the elements from ``first`` on."""
+    at = start[first:first + U.shape[2]]
+    coordinates = U.reshape(span.size, at.size)
+    for k in lanes(span.size):
+        for e in lanes(at.size):
+            coordinates[k, e] = u[column(span[k]) + at[e]]
+
+
+@source
+def add_force(table, transposed, constant, start, span, first, T, U, f):
+    """Add G^T T to f, and C U where a stabilisation is."""
+    nb, size = U.shape[0], U.shape[2]
+    F, at = np.empty(U.shape, U.dtype), start[first:first + size]
+    if transposed.shape[2] == 1:
+        shared_product(transposed, T, F)
+    else:
+        turned_element_products(table, first, T, F)
+    force = F.reshape(2 * nb, size)
+    if constant.shape[2] > 0:
+        held = np.empty((2 * nb, 1, size), U.dtype)
+        product(constant, first, U.reshape(2 * nb, 1, size), held)
+        for k in lanes(2 * nb):
+            for e in lanes(size):
+                force[k, e] += held[k, 0, e]
+    for node in range(2):  # elements have no left node in common
+        for k in lanes(node * nb, node * nb + nb):
+            for e in lanes(size):
+                f[column(span[k]) + at[e]] += force[k, e]
+
+
+@source
+def add_held_energy(constant, first, U, total):
+    """Add 1/2 U C U of the stabilisation."""
+    nb, size = U.shape[0], U.shape[2]
+    if constant.shape[2] > 0:
+        V, held = U.reshape(2 * nb, 1, size), np.empty((2 * nb, 1, size), U.dtype)
+        product(constant, first, V, held)
+        for k in range(2 * nb):
+            for e in lanes(size):
+                total[e] += 0.5 * V[k, 0, e] * held[k, 0, e]
+
+
+class PairTables(NamedTuple):
+    """How factors of pairs of rows become tangents; :func:`pair_tables` makes it.
+
+    Attributes
+    ----------
+    pairs
+        Rows g <= h of each pair, and its number among those with g < h; what that has for g = h
+        is not used. Shape (3, p).
+    symmetric, skew
+        ``G_g G_h^T + G_h G_g^T`` (``G_g G_g^T`` for g = h) and ``G_g G_h^T - G_h G_g^T`` of each
+        pair, entries (a, b) with a >= b (a > b), shape (n, p, 1) and (m, p', 1). Not those with
+        the position of the right node: a translation moves both nodes, so that its entries are
+        minus those of the left one. Made from others they are so exactly; else round-off, of the
+        size of the axial stiffness, would resist translations: in a long chain of short elements
+        as much as bending does. Of shape (n, p, 0) where elements have tables of their own.
+    lower, strictly
+        a and b of the entries of ``symmetric`` and ``skew``, shape (2, n) and (2, m).
+    partners, rounds
+        For the tables of elements: g, h, pair and column of its factors in xy, (4, q), sorted so
+        that between two ``rounds`` no g comes twice.
+    entries, signs, ends
+        For each entry (i, j), i >= j, of an element tangent: i - j, j, and its row in the result
+        of ``symmetric`` and in that of ``skew``, (4, k); their signs, (2, k). Up to ``ends[0]``
+        those of one component and the left node, then the right node, then of two components.
+    held, held_skew
+        The stabilisation, as results of ``symmetric`` and ``skew``: (n, 3, 0), (n, 3, 1) or of
+        each element.
+    """
+
+    pairs: I2
+    symmetric: F3
+    skew: F3
+    lower: I2
+    strictly: I2
+    partners: I2
+    rounds: I1
+    entries: I2
+    signs: F2
+    ends: I1
+    held: F3
+    held_skew: F3
+
+
+@source
+def element_tangents(table, pairs, first, M, M_skew, K, K_skew):
+    """What the products of G do, for elements with tables of their own: G^T (M G)."""
+    rows, nb, size = table.shape[0], table.shape[1], M.shape[2]
+    own = table[:, :, first:first + size]
+    G, X = np.empty((rows, nb, size)), np.empty((M.shape[0], 4, 1, size))
+    for g in lanes(rows):
+        for a in lanes(nb):
+            for e in lanes(size):
+                G[g, a, e] = own[g, a, e]
+    for e in lanes(size):
+        M_skew[len(M_skew) - 1, 0, e] = 0.0  # of the pairs g = h
+    for p in lanes(M.shape[0]):
+        q = pairs.pairs[2, p]
+        for e in lanes(size):
+            X[p, 0, 0, e], X[p, 1, 0, e] = M[p, 0, e], M[p, 1, e]
+            X[p, 2, 0, e] = M[p, 2, e] + M_skew[q, 0, e]
+            X[p, 3, 0, e] = M[p, 2, e] - M_skew[q, 0, e]
+    H, out = np.zeros((rows, 3, nb, size)), np.empty((nb, 3 * nb, size))
+    for r in range(pairs.rounds.size - 1):
+        for s in lanes(pairs.rounds[r], pairs.rounds[r + 1]):
+            g, h, p, side = (pairs.partners[0, s], pairs.partners[1, s], pairs.partners[2, s],
+                             pairs.partners[3, s])
+            for z in lanes(1):
+                for a in lanes(nb):
+                    for e in lanes(size):
+                        H[g, 0, a, e] += X[p, 0, z, e] * G[h, a, e]
+                        H[g, 1, a, e] += X[p, 1, z, e] * G[h, a, e]
+                        H[g, 2, a, e] += X[p, side, z, e] * G[h, a, e]
+    turned_element_products(table, first, H.reshape(rows, 3 * nb, size), out)
+    out4 = out.reshape(nb, 3, nb, size)
+    for n in lanes(pairs.lower.shape[1]):
+        a, b = pairs.lower[0, n], pairs.lower[1, n]
+        for e in lanes(size):
+            K[n, 0, e], K[n, 1, e] = out4[a, 0, b, e], out4[a, 1, b, e]
+            K[n, 2, e] = 0.5 * (out4[a, 2, b, e] + out4[b, 2, a, e])
+    for m in lanes(pairs.strictly.shape[1]):
+        a, b = pairs.strictly[0, m], pairs.strictly[1, m]
+        for e in lanes(size):
+            K_skew[m, 0, e] = 0.5 * (out4[a, 2, b, e] - out4[b, 2, a, e])
+
+
+@source
+def add_tangent(table, pairs, start, first, M, M_skew, flat, ld, row):
+    """Add the tangents of a block of elements to a band matrix, from the factors of its pairs."""
+    size = M.shape[2]
+    K = np.empty((pairs.symmetric.shape[0], 3, size))
+    K_skew = np.empty((pairs.skew.shape[0], 1, size))
+    if pairs.symmetric.shape[2] == 1:
+        shared_product(pairs.symmetric, M, K)
+        shared_product(pairs.skew, M_skew, K_skew)
+    else:
+        element_tangents(table, pairs, first, M, M_skew, K, K_skew)
+    if pairs.held.shape[2] > 0:
+        add_rows(pairs.held, first, K)
+        add_rows(pairs.held_skew, first, K_skew)
+    where, at = np.empty(size, np.int64), start[first:first + size]
+    for e in lanes(size):
+        where[e] = (row + at[e]) * ld
+    # elements have no left node in common
+    scatter_entries(pairs, 0, pairs.ends[0], K, K_skew, where, flat, ld)
+    scatter_entries(pairs, pairs.ends[0], pairs.ends[1], K, K_skew, where, flat, ld)
+    scatter_skew_entries(pairs, pairs.ends[1], pairs.ends[2], K, K_skew, where, flat, ld)
+    scatter_skew_entries(pairs, pairs.ends[2], pairs.ends[3], K, K_skew, where, flat, ld)
+
+
+@source
+def add_rows(held, first, K):
+    """Add a constant part, of all elements or of each."""
+    own = held[:, :, first:first + K.shape[2]]
+    for c in range(K.shape[1]):
+        for n in lanes(len(K)):
+            if held.shape[2] == 1:
+                for e in lanes(K.shape[2]):
+                    K[n, c, e] += column(held[n, c, 0])
+            else:
+                for e in lanes(K.shape[2]):
+                    K[n, c, e] += own[n, c, e]
+
+
+@source
+def scatter_entries(pairs, begin, end, K, K_skew, where, flat, ld):
+    """Add entries of one component to the band."""
+    size = where.size
+    rows = K.reshape(3 * len(K), size)
+    for n in lanes(begin, end):
+        at, k, sign = (pairs.entries[0, n] + pairs.entries[1, n] * ld, pairs.entries[2, n],
+                       pairs.signs[0, n])
+        for e in lanes(size):
+            flat[column(at) + where[e]] += column(sign) * rows[k, e]
+
+
+@source
+def scatter_skew_entries(pairs, begin, end, K, K_skew, where, flat, ld):
+    """Add entries of two components to the band."""
+    size = where.size
+    rows = K.reshape(3 * len(K), size)
+    for n in lanes(begin, end):
+        at, k, m = (pairs.entries[0, n] + pairs.entries[1, n] * ld, pairs.entries[2, n],
+                    pairs.entries[3, n])
+        x, y = pairs.signs[0, n], pairs.signs[1, n]
+        for e in lanes(size):
+            flat[column(at) + where[e]] += column(x) * rows[k, e] + column(y) * K_skew[m, 0, e]
+
+
+def packed(values, dtype=np.float64):
+    """An array as compiled code takes it: contiguous and writable, of one type."""
+    return np.require(values, dtype, ["C", "W"])
+
+
+def in_rounds(keys):
+    """An order in which no key comes twice between two ``rounds``: (order, rounds)."""
+    order = np.argsort(keys, kind="stable")
+    first = np.searchsorted(keys[order], keys[order])
+    number = np.empty(len(keys), dtype=np.int64)
+    number[order] = np.arange(len(keys)) - first  # how many of the same key come before
+    order = np.lexsort((keys, number))
+    return order, packed(np.searchsorted(number[order], np.arange(np.max(number, initial=-1) + 2)),
+                         np.int64)
+
+
+def pair_tables(table, pairs, constant):
+    """The PairTables of pairs (2, p) of rows, each once, for a table and a stabilisation.
+
+    Parameters
+    ----------
+    table
+        Shape (rows, nb, elements), or (rows, nb, 1) where elements share it.
+    pairs
+        Rows g <= h, shape (2, p).
+    constant
+        Element stiffness, shape (2 nb, 2 nb, elements), (2 nb, 2 nb, 1) or (2 nb, 2 nb, 0).
+    """
+    nb, q = table.shape[1], table.shape[1] // 2
+    g, h = pairs
+    off = g != h
+    number = np.where(off, np.cumsum(off) - 1, np.sum(off))
+    kept = np.delete(np.arange(nb), q)
+    a, b = (kept[k] for k in np.tril_indices(nb - 1))
+    c, d = a[a > b], b[a > b]
+    n_of, m_of = np.zeros((2, nb, nb), dtype=np.int64)
+    n_of[a, b] = n_of[b, a] = np.arange(len(a))
+    m_of[c, d] = m_of[d, c] = np.arange(len(c))
+    symmetric, skew = np.zeros((len(a), len(g), 0)), np.zeros((len(c), np.sum(off) + 1, 0))
+    if table.shape[2] == 1:
+        G, H = table[g, :, 0].T, table[h, :, 0].T
+        symmetric = (G[a] * H[b] + off * H[a] * G[b])[:, :, None]
+        skew = np.append((G[c] * H[d] - H[c] * G[d])[:, off], np.zeros((len(c), 1)), axis=1)[..., None]
+    both = np.concatenate([[g, h, np.arange(len(g)), np.full(len(g), 2)],
+                           np.array([h, g, np.arange(len(g)), np.full(len(g), 3)])[:, off]], axis=1)
+    order, rounds = in_rounds(both[0])
+    C = constant.reshape(nb, 2, nb, 2, -1)
+    held = np.stack([C[a, 0, b, 0], C[a, 1, b, 1], 0.5 * (C[a, 0, b, 1] + C[b, 0, a, 1])], axis=1)
+    held_skew = 0.5 * (C[c, 0, d, 1] - C[d, 0, c, 1])[:, None]
+    return PairTables(packed([g, h, number], np.int64), packed(symmetric), packed(skew),
+                      packed([a, b], np.int64), packed([c, d], np.int64), packed(both[:, order], np.int64),
+                      rounds, *_entries(nb, n_of, m_of), packed(held), packed(held_skew))
+
+
+def _entries(nb, n_of, m_of):
+    """``entries``, ``signs`` and ``ends`` of PairTables."""
+    q = nb // 2
+    j, i = np.triu_indices(2 * nb)
+    (a, x), (b, y) = np.divmod(i, 2), np.divmod(j, 2)
+    sign = np.where(a == q, -1.0, 1.0) * np.where(b == q, -1.0, 1.0)
+    a, b = np.where(a == q, 0, a), np.where(b == q, 0, b)
+    skew = sign * np.sign(a - b) * np.where(x > y, -1.0, 1.0)
+    source_row = 3 * n_of[a, b] + np.where(x == y, x, 2)
+    part = 2 * (x != y) + (j >= nb)
+    order = np.argsort(part, kind="stable")
+    entries = np.array([i - j, j, source_row, m_of[a, b]])[:, order]
+    return (packed(entries, np.int64), packed(np.array([sign, skew])[:, order]),
+            packed(np.cumsum(np.bincount(part, minlength=4)), np.int64))
+
+
+def append_square_root(K, u_e, B, CB, stress):
+    """Rows R with R^T R = K, a constant and semidefinite element stiffness, and R u."""
+    values, V = np.linalg.eigh(K)
+    keep = np.max(values / values[:, -1:], axis=0) > 1e-12
+    R = (np.sqrt(values[:, None, keep]) * V[:, :, keep]).transpose(0, 2, 1)
+    R = np.broadcast_to(R, (len(u_e),) + R.shape[1:])
+    B.append(R)
+    CB.append(R)
+    stress.append((R @ u_e.reshape(len(u_e), -1, 1))[..., 0])
+
+
+class Texts(NamedTuple):
+    """The texts of a kind of beams; ``components`` is the number of its strains."""
+
+    components: int
+    force: object
+    tangent: object
+    carry: object
+    stress: object
+    mean: object
+    energy: object
+
+
+class Assembly:
+    """What :meth:`Chain.assemble` found.
+
+    Attributes
+    ----------
+    stresses
+        Of each pack, shape (components, points, elements).
+    """
+
+    def __init__(self, kernel, u, stresses):
+        self._kernel, self._u, self.stresses = kernel, u.copy(), stresses
+
+    def carry(self, du):
+        """Stresses at ``u + du``, linearised: one array a pack."""
+        out = [np.empty_like(S) for S in self.stresses]
+        for pack, before, after in zip(self._kernel.packs, self.stresses, out):
+            self._kernel.texts.carry(pack, self._u, du, before, after)
+        return out
+
+
+class Chain:
+    """Elements of a chain of nodes: gathering, scattering, and the calls of the texts.
+
+    Attributes
+    ----------
+    packs
+        The tables of each term of the strain energy.
+    constant
+        The stabilisation, shape (elements, 2 nb, 2 nb) or (1, ...), or None.
+    """
+
+    texts = None
+
+    def __init__(self, mesh, element):
+        self.nd = 2 * element.nodal_dofs
+        self.t = mesh.t
+        self.N = self.nd * mesh.p.shape[1]
+
+    def gather(self, u, elements=slice(None)):
+        """Element values (ne, nb, 2) of a coordinate vector (N,)."""
+        nodes = u.reshape(-1, self.nd)
+        t = self.t[:, elements]
+        return np.concatenate([nodes[t[0]], nodes[t[1]]], axis=1).reshape(t.shape[1], self.nd, 2)
+
+    def scatter(self, force, elements=slice(None), out=None):
+        """Add element vectors (ne, nb, 2) into a coordinate vector (N,)."""
+        out = np.zeros(self.N, dtype=force.dtype) if out is None else out
+        nodes, t = out.reshape(-1, self.nd), self.t[:, elements]
+        parts = force.reshape(t.shape[1], 2, self.nd)
+        nodes[t[0]] += parts[:, 0]  # a node is the left end of one element at most
+        nodes[t[1]] += parts[:, 1]
+        return out
+
+    def checked(self, u):
+        """A coordinate vector as compiled code takes it: float64, (N,), contiguous, writeable.
+
+        Complex numbers stay: NumPy takes them.
+
+        Raises
+        ------
+        InputError
+            If it is of another shape: compiled code would read other memory.
+        """
+        if u.shape != (self.N,):
+            raise InputError(f"this beam has {self.N} coordinates: their displacement is of shape "
+                             f"({self.N},), got {u.shape}; the state of another mesh?")
+        if u.dtype == np.float64 and u.flags.c_contiguous and u.flags.writeable:
+            return u
+        return u if u.dtype == np.complex128 else np.array(u, dtype=np.float64)
+
+    def chunks(self):
+        """Slices of the elements of which matrices are evaluated together."""
+        return [slice(k, k + CHUNK) for k in range(0, self.t.shape[1], CHUNK)]
+
+    def stresses(self):
+        """Room for the stresses of each pack, shape (components, points, elements)."""
+        return [np.zeros((self.texts.components, pack.weights.shape[0], pack.start.size))
+                for pack in self.packs]
+
+    def apart(self, elements=slice(None)):
+        """The packs of some elements, each with coordinates of its own."""
+        return [apart(pack, elements) for pack in self.packs]
+
+    def assemble(self, u, K, start, force, carried=None, geometric=True):
+        """Add the tangent to a band matrix and the internal force to a vector.
+
+        Parameters
+        ----------
+        u
+            Coordinate displacement, shape (N,).
+        K
+            A :class:`~skfem_ancf.linalg.BandMatrix`, and ``start`` the row of the first
+            coordinate in it.
+        force
+            Shape (N,); added to.
+        carried
+            What :meth:`Assembly.carry` returned, for the geometric part.
+        geometric
+            Include the geometric part.
+
+        Returns
+        -------
+        Assembly
+            With ``carry(du)``.
+        """
+        u, stresses = self.checked(u), self.stresses()
+        given = carried is not None or not geometric
+        used = carried if geometric and given else self.stresses()
+        if K.symmetric:
+            for pack, S, C in zip(self.packs, stresses, used):
+                self.texts.tangent(pack, u, force, C, given, S, K._flat, K._ld, start)
+            return Assembly(self, u, stresses)
+        force += self.force(u)
+        for pack, S in zip(self.packs, stresses):
+            self.texts.stress(pack, u, S)
+        for part in self.chunks():
+            tangents = self.element_tangents(
+                self.gather(u, part), part, [C[:, :, part] for C in used] if given else None)
+            K.add_elements(tangents, start, self.nd, self.t[0, part])
+        return Assembly(self, u, stresses)
+
+    def force(self, u):
+        """Internal force of a coordinate displacement (N,), shape (N,)."""
+        u = self.checked(u)
+        out = np.zeros(self.N, dtype=u.dtype)
+        for pack in self.packs:
+            self.texts.force(pack, u, out)
+        return out
+
+    def mean_force(self, u0, u1):
+        """A force whose work from u0 to u1 is the change of the energy, shape (N,)."""
+        u0, u1, out = self.checked(u0), self.checked(u1), np.zeros(self.N)
+        for pack in self.packs:
+            self.texts.mean(pack, u0, u1, out)
+        return out
+
+    def energy(self, u):
+        """Strain energy of a coordinate displacement (N,)."""
+        return np.sum(self.energies(u))
+
+    def energies(self, u):
+        """Strain energy of each element, shape (ne,)."""
+        u = self.checked(u)
+        out = np.zeros(self.t.shape[1], dtype=u.dtype)
+        for pack in self.packs:
+            self.texts.energy(pack, u, out)
+        return out
+
+    def forces(self, u):
+        """Element forces (ne, nb, 2) of a coordinate displacement (N,)."""
+        return self.element_forces(self.gather(self.checked(u)))
+
+    def tangents(self, u, geometric=True):
+        """Element tangents (ne, 2 nb, 2 nb) of a coordinate displacement (N,)."""
+        u = self.checked(u)
+        carried = None if geometric else self.stresses()
+        return np.concatenate([self.element_tangents(
+            self.gather(u, part), part, carried and [C[:, :, part] for C in carried])
+            for part in self.chunks()])
+
+    def element_forces(self, u_e, elements=slice(None)):
+        """Forces (ne, nb, 2) of the displacements (ne, nb, 2) of a slice of elements."""
+        out = np.zeros(u_e.size, dtype=u_e.dtype)
+        for pack in self.apart(elements):
+            self.texts.force(pack, u_e.ravel(), out)
+        return out.reshape(u_e.shape)
+
+    def element_tangents(self, u_e, elements=slice(None), carried=None):
+        """Tangents (ne, 2 nb, 2 nb) of the displacements (ne, nb, 2) of a slice of elements."""
+        return self._tangents_of(self.apart(elements), u_e, carried)
+
+    def _tangents_of(self, packs, u_e, carried=None):
+        ne, n = len(u_e), 2 * self.nd
+        u, force, flat = u_e.ravel(), np.zeros(u_e.size), np.zeros((ne, n, n + 1))
+        for k, pack in enumerate(packs):
+            S = np.zeros((self.texts.components, pack.weights.shape[0], ne))
+            self.texts.tangent(pack, u, force, S if carried is None else carried[k],
+                               carried is not None, S, flat.reshape(-1), n + 1, 0)
+        i, j = np.tril_indices(n)
+        out = np.empty((ne, n, n))
+        out[:, i, j] = out[:, j, i] = flat[:, j, i - j]
+        return out
+
+    def factors(self, u_e, elements=slice(None)):
+        """The material part of the element tangents as ``B^T (C B)``: in B nothing cancels.
+
+        Parameters
+        ----------
+        u_e
+            Displacements (ne, nb, 2) of the elements, a slice.
+        elements
+            The slice.
+
+        Returns
+        -------
+        B, CB
+            The strains' derivatives at all integration points, and the weighted moduli times
+            them, shape (ne, m, 2 nb); what is stabilised is a strain too.
+        stress
+            Weighted stresses, shape (ne, m): ``B^T stress`` is the internal force.
+        """
+        ne, u = len(u_e), u_e.ravel()
+        B, CB, stress = [], [], []
+        for pack in self.apart(elements):
+            S = np.empty((self.texts.components, pack.weights.shape[0], ne))
+            rows = np.empty((2 * self.nd,) + S.shape)
+            for k, row in enumerate(rows):
+                du = np.zeros((ne, 2 * self.nd))
+                du[:, k] = 1.0
+                self.strain_increment(pack, u, du.ravel(), row)
+            self.texts.stress(pack, u, S)
+            moduli = self.weighted_moduli(pack, u)
+            B.append(rows.transpose(3, 1, 2, 0).reshape(ne, -1, 2 * self.nd))
+            CB.append(np.einsum("abpe,kbpe->eapk", moduli, rows, optimize=True
+                                ).reshape(B[-1].shape))
+            stress.append((pack.weights * S).transpose(2, 0, 1).reshape(ne, -1))
+        if self.constant is not None:
+            K = self.constant[elements] if len(self.constant) > 1 else self.constant
+            append_square_root(K, u_e, B, CB, stress)
+        return tuple(np.concatenate(part, axis=1) for part in (B, CB, stress))
+
+    def geometric(self, u_e, elements, stress):
+        """The geometric part (ne, 2 nb, 2 nb) of the element tangents for weighted stresses."""
+        packs, carried, first = [], [], 0
+        for pack in self.apart(elements):
+            shape = self.texts.components, pack.weights.shape[0], len(u_e)
+            own = stress[:, first:first + shape[0] * shape[1]].reshape(shape[2:] + shape[:2])
+            carried.append(np.ascontiguousarray(own.transpose(1, 2, 0) / pack.weights))
+            packs.append(self.without_material(pack))
+            first += shape[0] * shape[1]
+        return self._tangents_of(packs, u_e, carried)
+
+    def inverted(self, u):
+        """True if the body is turned inside out somewhere: no deformation of a real one."""
+        return False
+
+
+def apart(pack, elements):
+    """A pack of some elements, a slice, each with coordinates of its own."""
+    number, all_elements = len(pack.start[elements]), pack.start.size
+    changes = {"start": np.arange(number) * pack.span.size}
+    for name, table in pack._asdict().items():
+        if name in BY_ELEMENT and table.shape[-1] == all_elements > 1:
+            changes[name] = np.ascontiguousarray(table[..., elements])
+        elif name in PLACES:
+            changes[name] = np.arange(number) * min(1, pack._asdict()[PLACES[name]].shape[-1] - 1)
+    if pack.pairs.held.shape[2] == all_elements > 1:
+        changes["pairs"] = pack.pairs._replace(
+            held=np.ascontiguousarray(pack.pairs.held[:, :, elements]),
+            held_skew=np.ascontiguousarray(pack.pairs.held_skew[:, :, elements]))
+    return pack._replace(**changes)
