@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +19,8 @@ from .beam import Beam
 from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number, require_finite,
                      require_function, shown)
 from .frozen import Sealable, read_only
+from .kernels.moments import (MomentPack, add_mean_moments, add_moment_stiffness,
+                              add_moments)
 from .pickling import picklable_form
 from .spread import Spread, on_facets, stations_of_vector
 
@@ -525,31 +528,33 @@ class EndMoment(Load):
             turn = turn[::-1]
         return float(np.angle(turn[0]) + np.sum(np.angle(turn[1:] / turn[:-1])))
 
+    @cached_property
+    def _pack(self):
+        start = self.direction(np.zeros(self.beam.N))
+        return MomentPack(self.dofs[None], self.c[None], start[None], np.array([float(self.M)]))
+
     def force(self, u: Array) -> Array:
-        d = self.direction(u)
-        out = np.zeros(self.beam.N, dtype=d.dtype)
-        out[self.dofs] = np.outer(np.array([-d[1], d[0]]) * self.M / (d @ d), self.c)
+        out = np.zeros(self.beam.N, dtype=u.dtype)
+        add_moments(self._pack, np.ones(1), u, out)
         return out
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
-        a, b = self.direction(u)
-        H = np.array([[2 * a * b, b * b - a * a], [b * b - a * a, -2 * a * b]])
-        H *= self.M / (a * a + b * b) ** 2
-        values = np.einsum("ij,k,l->ikjl", H, self.c, self.c)
-        rows = np.broadcast_to(self.dofs[:, :, None, None], values.shape)
-        cols = np.broadcast_to(self.dofs[None, None, :, :], values.shape)
-        return rows.ravel(), cols.ravel(), values.ravel()
+        n = self.c.size
+        own = np.arange(2 * n).reshape(n, 2).T  # as if there were no other coordinates
+        lower = np.zeros(2 * n * 2 * n)
+        at = u[self.dofs.T].ravel()
+        add_moment_stiffness(self._pack._replace(dofs=own[None]), np.ones(1), at, lower, 2 * n)
+        i, j = np.tril_indices(2 * n)
+        values = -lower[j * 2 * n + i - j]
+        rows, cols = self.dofs.T.ravel()[i], self.dofs.T.ravel()[j]
+        off = i != j
+        return (np.append(rows, cols[off]), np.append(cols, rows[off]),
+                np.append(values, values[off]))
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
-        # the discrete gradient of Gonzalez (1996): its work is the change of the angle
-        force = self.force(0.5 * (u0 + u1))
-        step = (u1 - u0)[self.dofs] @ self.c
-        if step @ step > 0:
-            d0, d1 = self.direction(u0), self.direction(u1)
-            angle = np.arctan2(d0[0] * step[1] - d0[1] * step[0], d0 @ d1)
-            missing = self.M * angle - force @ (u1 - u0)
-            force[self.dofs] += np.outer(step, self.c) * missing / (step @ step)
-        return force
+        out = np.zeros(self.beam.N)
+        add_mean_moments(self._pack, np.ones(1), u0, u1, out)
+        return out
 
     def potential(self, u: Array) -> float:
         return -self.M * self.angle(u)
