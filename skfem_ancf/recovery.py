@@ -177,7 +177,7 @@ class _Piece:
         self.elements = e[whole] if np.any(whole) else e
         side = np.where(a > 0, 1.0, np.where(b < 1, 0.0, 0.5))
         self.e = np.append(np.repeat(e, 2), e[-1])
-        xi = np.append(np.stack([a, 0.5 * (a + b)], 1).ravel(), b[-1])
+        self.xi = xi = np.append(np.stack([a, 0.5 * (a + b)], 1).ravel(), b[-1])
         self.s = recovery.arc(self.e, xi)
         self.R, self.M = self.forces.at(self.e, xi, np.append(np.repeat(side, 2), side[-1]))
         eta, h = recovery.eta, mesh.height

@@ -10,6 +10,7 @@ from .beam import select_beam
 from .errors import InputError, NameUnknown, require_flag, teaching
 from .frozen import Frozen
 from .recovery import actions, recover
+from .resultants import resultants
 from .section_forces import NotRecovered
 
 logger = logging.getLogger(__name__)
@@ -280,6 +281,48 @@ class State(Frozen):
     def _actions(self):
         return actions(self)
 
+    def resultants(self, at=None, beam=None, recover=True):
+        """Normal force, shear force and bending moment along a beam, with the strains of its axis.
+
+        Parameters
+        ----------
+        at
+            Points through which the sections go: one, shape (2,), or many, shape (2, n) or a list;
+            None for nine sections in each element, and both sides of forces between nodes.
+        beam
+            The beam, its name or its number, in a scene of several; found from ``at``.
+        recover
+            From the equilibrium of the body, exact up to the iteration of the solution, where it
+            can be had (:attr:`recovered`); False for the stress of the elements, integrated.
+
+        Returns
+        -------
+        Resultants
+            With ``s``, ``N``, ``Q``, ``M``, ``curvature``, ``stretch``, ``shear``, ``angle`` and
+            ``force``, see :class:`~skfem_ancf.resultants.Resultants` for their signs.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.01), ElementBeamANCF(2),
+        ...             StVenantKirchhoff(E=2e11, nu=0.3), width=0.01)
+        >>> state = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).solve_static()
+        >>> sections = state.resultants([(0, 0), (0.5, 0)])
+        >>> sections.M.round(4).tolist(), sections.Q.round(4).tolist()
+        ([-1.0, -0.5], [-1.0, -1.0])
+        """
+        recover = require_flag("recover", recover)
+        if at is None:
+            return resultants(self, self.beams.index(select_beam(self.beams, beam)), None, recover)
+        found = self.system.points.find(at, beam)
+        if len(found.parts) != 1:
+            raise InputError("the points are in several beams: ask for the resultants of each, "
+                             "with beam=")
+        part = found.parts[0]
+        values = resultants(self, part.number, part, recover)
+        return values.first() if found.one else values
+
     # of the whole
 
     @property
@@ -342,6 +385,12 @@ class State(Frozen):
         from .io.vtu import save_vtu
 
         return save_vtu(self, filename, **options)
+
+    def plot_resultants(self, beam=None, **options):
+        """Draw the three diagrams; see :func:`skfem_ancf.visuals.diagrams.plot_resultants`."""
+        from .visuals.diagrams import plot_resultants
+
+        return plot_resultants(self, beam, **options)
 
     def plot(self, field="eps_yy", **options):
         """Draw the deformed body; see :func:`skfem_ancf.visuals.matplotlib.plot_state`."""

@@ -5,6 +5,7 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import require_index, teaching
+from ..resultants import over_time
 from ..results import State
 from .base import Motion
 
@@ -149,6 +150,24 @@ class History:
         """
         self.system.points.find(point, beam)
         return np.array([state.stress(point, beam, recover) for state in self])
+
+    def resultants(self, at, beam=None, recover=True):
+        """Section forces and strains of the axis at all instants.
+
+        Parameters
+        ----------
+        at
+            Points through which the sections go: one, shape (2,), or many, shape (2, n) or a list.
+        beam, recover
+            Those of :meth:`State.resultants <skfem_ancf.results.State.resultants>`.
+
+        Returns
+        -------
+        Resultants
+            Its arrays begin with the axis of the instants, (nt,) or (nt, n).
+        """
+        self.system.points.find(at, beam)
+        return over_time([state.resultants(at, beam, recover) for state in self])
 
     def joint_force(self, joint):
         """What a joint does to its first beam at all instants, shape (nt, m)."""

@@ -1,0 +1,108 @@
+"""Diagrams of normal force, shear force and bending moment."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..beam import select_beam
+from ..errors import InputError, require_flag, require_like, taught
+from ..io.vtu import replacing
+from .matplotlib import _INK, _MUTED, _figure_class, _page
+
+if TYPE_CHECKING:
+    from ..results import State
+    from ..types import StrPath, WhichBeam
+
+_ROWS = (("N", "normal force $N$"), ("Q", "shear force $Q$"), ("M", "bending moment $M$"))
+
+
+@taught
+def plot_resultants(state: State, beam: WhichBeam = None, axes: Any = None, *,
+                    title: str | None = None, recover: bool = True,
+                    filename: StrPath | None = None, dpi: float = 150) -> Any:
+    """Draw normal force, shear force and bending moment along the beams.
+
+    Parameters
+    ----------
+    state
+        A :class:`~skfem_ancf.results.State`.
+    beam
+        The beam, its name or its number; all beams of the scene by default.
+    axes
+        Three matplotlib Axes to draw on; a new figure by default, which needs no display.
+    title
+        Title of the picture.
+    recover
+        As for :meth:`State.resultants <skfem_ancf.results.State.resultants>`.
+    filename
+        Write the picture here too (.png, .pdf, .svg); missing folders are made.
+    dpi
+        Resolution of the file.
+
+    Returns
+    -------
+    list of three matplotlib.axes.Axes
+
+    Raises
+    ------
+    MissingExtra
+        If matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1), ElementBeamANCF(2),
+    ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
+    >>> state = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).solve_static()
+    >>> [ax.get_ylabel() for ax in state.plot_resultants()]
+    ['normal force $N$', 'shear force $Q$', 'bending moment $M$']
+    """
+    Figure = _figure_class()
+    require_like("state", state, "State", "beams", "resultants")
+    recover = require_flag("recover", recover)
+    beams = list(state.beams) if beam is None else [select_beam(state.beams, beam)]
+    filename, dpi = _page(None, title, filename, dpi)
+    if axes is None:
+        axes = Figure(figsize=(6.0, 5.4), layout="constrained").subplots(3, 1, sharex=True)
+    axes = list(np.ravel(axes))
+    if len(axes) != 3:
+        raise InputError(f"axes must be three matplotlib Axes, got {len(axes)}")
+    several = len(beams) > 1
+    for b in beams:
+        found = state.resultants(beam=b, recover=recover)
+        label = b.name if b.name is not None else f"beam {state.beams.index(b)}"
+        for ax, (name, _) in zip(axes, _ROWS):
+            values = getattr(found, name)
+            line, = ax.plot(found.s, values, lw=1.4, label=label if several else None)
+            ax.fill_between(found.s, values, color=line.get_color(), alpha=0.18, lw=0)
+    for ax, (_, label) in zip(axes, _ROWS):
+        ax.axhline(0.0, color=_MUTED, lw=0.6)
+        ax.set_ylabel(label, fontsize=9, color=_INK)
+        ax.ticklabel_format(axis="y", scilimits=(-3, 4), useMathText=True)
+        _clear_of_noise(ax)
+        ax.tick_params(color=_MUTED, labelcolor=_INK, labelsize=8)
+        for side in ("top", "right"):
+            ax.spines[side].set_visible(False)
+        for side in ("left", "bottom"):
+            ax.spines[side].set_color(_MUTED)
+    axes[2].set_xlabel("arc length $s$", fontsize=9, color=_INK)
+    if several:
+        axes[0].legend(fontsize=8, frameon=False)
+    if title:
+        axes[0].set_title(title, loc="left", fontsize=10, color=_INK)
+    if filename is not None:
+        with replacing(filename) as temporary:
+            axes[0].figure.savefig(temporary, dpi=dpi)
+    return axes
+
+
+def _clear_of_noise(ax):
+    """Round-off about zero is not drawn as if it were a force."""
+    low, high = ax.get_ylim()
+    size = max(abs(low), abs(high))
+    others = [max(map(abs, other.get_ylim())) for other in ax.figure.axes if other is not ax]
+    if size < 1e-9 * max(others, default=0.0):
+        ax.set_ylim(-1.0, 1.0)

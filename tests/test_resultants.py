@@ -1,0 +1,203 @@
+"""Section forces, against the statics of the free body and closed forms."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from conftest import quarter_arc
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
+                        MeshBeam, NeoHookean, Scene, StVenantKirchhoff)
+from skfem_ancf.dynamics import GeneralizedAlpha
+from skfem_ancf.quadrature import gauss
+
+ELEMENTS = [ElementBeamANCF(1), ElementBeamANCF(3), ElementBeamANCFCubic(2), ElementBeamCable(5)]
+
+
+def line(n=16, h=0.01, element=None, E=2e8, nu=0.3, density=7800, length=1.0, **options):
+    return Beam(MeshBeam.init_line(np.linspace(0, length, n + 1), height=h),
+                element or ElementBeamANCF(3), StVenantKirchhoff(E, nu, density), width=h, **options)
+
+
+def axis(state, s):
+    """Positions of the axis of a straight beam from 0 on, at arc lengths (n,)."""
+    return state.position(np.array([s, 0.0 * s]))
+
+
+def cross(a, b):
+    return a[0] * b[1] - a[1] * b[0]
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=repr)
+def test_weight_behind_each_section(element):
+    state = Scene(line(element=element)).clamp("left").gravity((0, -9.81)).solve_static(tol=1e-12)
+    r, w = state.resultants(), 7800 * 9.81 * 1e-4
+    assert_allclose(r.force, [0 * r.s, -w * (1 - r.s)], atol=1e-9 * w)
+    x, v = gauss(5)
+    beam = state.beams[0]
+    eta = np.tile(x, (5, 1)).ravel() - 0.5
+    for k in range(0, len(r.s), 7):  # the moment of the weight about the axis, piece by piece
+        cuts = np.append(r.s[k], np.linspace(0, 1, 17)[np.linspace(0, 1, 17) > r.s[k] + 1e-12])
+        total = 0.0
+        for a, b in zip(cuts[:-1], cuts[1:]):
+            s, weight = np.repeat(a + (b - a) * x, 5), np.repeat((b - a) * v, 5) * np.tile(v, 5)
+            at = state.position(np.array([s, 0.01 * eta]))[0]
+            total += np.sum(weight * (at - axis(state, r.s[k:k + 1])[0]))
+        assert r.M[k] == pytest.approx(-w * total, abs=2e-9 * w)
+    root = state.reactions("left")
+    assert_allclose(root.force, -r.force[:, 0], atol=1e-9 * w)
+    assert r.M[0] == pytest.approx(-root.moment, abs=1e-9)
+    assert_allclose(r.N * r.t + r.Q * np.array([-r.t[1], r.t[0]]), r.force, atol=1e-12)
+    assert state.beams[0] is beam and r.recovered
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=repr)
+def test_end_force_on_an_arc(element):
+    """The force is the same everywhere, the moment is that of its arm in the deformed body."""
+    mesh = quarter_arc(8, height=0.05)
+    beam = Beam(mesh, element, NeoHookean(1e7, 0.3) if element.order else
+                StVenantKirchhoff(1e7, 0.3), width=0.05)
+    P = np.array([6.0, -9.0])
+    state = Scene(beam).clamp("left").point_force(P, at=mesh.p[:, -1]).solve_static(tol=1e-12)
+    r = state.resultants()
+    assert_allclose(r.force, np.repeat(P[:, None], len(r.s), 1), atol=1e-8 * 10)
+    arm = state.position(mesh.p[:, -1])[:, None] - state.position(r.x)
+    # the axis of the cable is of degree 5, that of the points cubic
+    assert_allclose(r.M, cross(arm, P[:, None]), atol=1e-3 if beam.is_cable else 1e-8 * 10)
+    assert_allclose(np.hypot(r.N, r.Q), np.hypot(*P), rtol=1e-9)
+    assert np.ptp(r.M) > 5.0 and np.abs(arm).max() > 0.5
+    # the axis points where the body's does
+    d = np.diff(state.position(r.x), axis=1)
+    middle = np.hypot(*d) > 1e-9
+    found = np.arctan2(d[1], d[0])[middle]
+    between = 0.5 * (r.angle[1:] + r.angle[:-1])[middle]
+    assert_allclose(np.exp(1j * found), np.exp(1j * between), atol=0.04)
+
+
+@pytest.mark.parametrize("side, sign", [("top", -1), ("bottom", 1)])
+def test_pressure_is_that_on_the_chord_of_the_face(side, sign):
+    """p times the turned chord of the deformed face, whatever its shape."""
+    p, h = 3.0, 0.02
+    state = Scene(line(h=h, E=2e6)).clamp("left").pressure(side, p).solve_static(tol=1e-12)
+    r = state.resultants()
+    face = state.position(np.array([r.s, -0.5 * sign * h + 0 * r.s]))
+    chord = face[:, -1:] - face
+    assert_allclose(r.force, sign * p * h * np.array([-chord[1], chord[0]]), atol=1e-8 * p * h)
+    assert np.abs(chord[1]).max() > 0.1  # it is bent
+
+
+@pytest.mark.parametrize("at", [0.5, 0.53], ids=["at a node", "inside of an element"])
+def test_beam_on_two_supports(at):
+    """Force in the span: Q and M by statics, both sides of the jump."""
+    beam = line(h=0.02, E=2e11)
+    scene = Scene(beam).pin("left").fix("right", "r^2")
+    state = scene.point_force((0, -1.0), at=(at, 0)).solve_static(tol=1e-12)
+    r = state.resultants()
+    before = r.s < at - 1e-9
+    after = r.s > at + 1e-9
+    Q, x = np.where(before, at - 1.0, at), axis(state, r.s)[0]
+    assert_allclose(r.force[1][before | after], Q[before | after], atol=1e-8)
+    load = axis(state, np.array([at]))[0]
+    M = np.where(before, (1 - at) * x, at * (x[-1] - x))
+    assert_allclose(r.M, M, atol=1e-7)
+    jump = np.nonzero(~(before | after))[0]
+    assert sorted(np.round(r.force[1][jump], 6)) == [at - 1.0, at]
+    assert_allclose(r.M[jump], at * (1 - at), atol=1e-5)
+    assert state.resultants((at, 0)).Q == pytest.approx(at - 1.0, abs=1e-6)  # before the jump
+    right = state.resultants((at + 0.001, 0.004))
+    assert right.Q == pytest.approx(at, abs=1e-6) and np.shape(right.M) == ()
+    assert right.x == pytest.approx([at + 0.001, 0.0]) and load == pytest.approx(at, abs=1e-4)
+
+
+def test_frame_with_a_hinge():
+    """A Gerber beam: no moment in the hinge, shear by statics."""
+    steel = StVenantKirchhoff(1e9, 0.3)
+    a, b = (Beam(MeshBeam.init_line(np.linspace(*ends, 9), height=0.02), ElementBeamANCF(2), steel,
+                 width=0.1, name=name) for name, ends in (("a", (0, 1)), ("b", (1, 2))))
+    scene = Scene(a, b).clamp("left", beam="a").pin("right", beam="b")
+    scene.joint("hinge", beams=("a", "b"), at=(1, 0))
+    state = scene.point_force((0, -0.1), at=(1.5, 0), beam="b").solve_static(tol=1e-12)
+    ra, rb = (state.resultants(beam=name) for name in "ab")
+    assert abs(ra.M[-1]) < 1e-9 and abs(rb.M[0]) < 1e-9
+    assert ra.Q[0] == pytest.approx(-0.05, rel=1e-3) and rb.Q[-1] == pytest.approx(0.05, rel=1e-3)
+    assert ra.M[0] == pytest.approx(-state.reactions("left", beam="a").moment, abs=1e-9)
+    with pytest.raises(InputError, match="say which with beam="):
+        state.resultants()
+    with pytest.raises(InputError, match="with beam="):
+        state.resultants([(0.5, 0), (1.7, 0)])
+
+
+@pytest.mark.parametrize("element", ELEMENTS[:3], ids=repr)
+def test_strains_of_the_axis(element):
+    """M / EI, N / EA, and the shear angle 6/5 + 3/20 nu/(1 + nu) times Q / GA.
+
+    The second part is the section's change of thickness, which the axis' inclination holds.
+    """
+    h, E, nu = 0.05, 2e11, 0.3
+    beam = line(h=h, E=E, element=element)
+    scene = Scene(beam).clamp("left", thickness="free")
+    state = scene.point_force((50.0, -10.0), at=(1, 0)).solve_static(tol=1e-12)
+    r, A = state.resultants(), h * h
+    inner = (r.s > 0.1) & (r.s < 0.9)
+    assert_allclose(r.curvature[inner], (r.M / (E * h**4 / 12))[inner], rtol=1e-5)
+    assert_allclose(r.stretch[inner] - 1, (r.N / (E * A))[inner], rtol=1e-4)
+    k = 1.2 + 0.15 * nu / (1 + nu)
+    assert_allclose(r.shear[inner], (k * r.Q / (E / (2 * (1 + nu)) * A))[inner], rtol=1e-4)
+
+
+def test_curvature_of_a_curved_bar_is_its_change():
+    mesh = quarter_arc(12, height=0.05)
+    beam = Beam(mesh, ElementBeamANCF(3), StVenantKirchhoff(1e9, 0.3), width=0.05)
+    state = Scene(beam).clamp("left", thickness="free").moment("right", 1.0).solve_static()
+    r = state.resultants()
+    assert_allclose(r.M, 1.0, atol=1e-6)
+    # Golovin's bar: M / (E I) to the order (h / R)^2
+    assert_allclose(r.curvature[20:-20], 12 / (1e9 * 0.05**4), rtol=3e-3)
+
+
+def test_the_elements_own():
+    """Without equilibrium: integrated stress, which is a little off; a cable knows no Q."""
+    state = Scene(line(32)).clamp("left").gravity((0, -9.81)).solve_static()
+    own, right = state.resultants(recover=False), state.resultants()
+    middle = slice(4, None, 9)
+    for name, size in (("M", 0.05), ("curvature", 0.05), ("angle", 0.01), ("shear", 0.05)):
+        a, b = getattr(own, name)[middle], getattr(right, name)[middle]
+        assert np.abs(a - b).max() < size * max(np.abs(b).max(), 1.0)
+    assert not own.recovered and np.array_equal(own.s, right.s)
+    cable = Scene(line(32, element=ElementBeamCable(5))).clamp("left").gravity((0, -9.81))
+    state = cable.solve_static()
+    own, right = state.resultants(recover=False), state.resultants()
+    assert np.all(np.isnan(own.Q)) and np.all(np.isfinite(right.Q))
+    assert_allclose(own.M, right.M, atol=5e-3)
+    mode = cable.modes(1).mode(0, 0.01)  # no equilibrium
+    assert not mode.resultants().recovered and np.all(np.isfinite(mode.resultants().M))
+
+
+def test_motion():
+    """In the pin the section force is the reaction; inertia is in it."""
+    scene = Scene(line(12, h=0.02, E=1e8)).pin("left").gravity((0, -9.81))
+    history = scene.integrate(0.1, 5e-3, scheme=GeneralizedAlpha(0.8))
+    many = history.resultants([(0.0, 0.0), (0.4, 0.0), (1.0, 0.0)])
+    one = history.resultants((0.4, 0.0))
+    assert many.N.shape == (len(history), 3) and one.N.shape == (len(history),)
+    assert_allclose(many.M[:, 1], one.M)
+    assert history.state(12).resultants().recovered
+    weight = 7800 * 9.81 * 4e-4
+    for k in (4, 12, 20):
+        state = history.state(k)
+        assert_allclose(many.force[k][:, 0], -state.reactions("left").force, atol=1e-3 * weight)
+        assert abs(many.M[k, 2]) < 1e-3 * weight
+        assert state.resultants((0.4, 0)).Q == many.Q[k, 1]
+
+
+def test_diagrams(tmp_path):
+    state = Scene(line(8, h=0.02)).clamp("left").point_force((1, -1.0), at=(0.5, 0)).solve_static()
+    axes = state.plot_resultants(filename=tmp_path / "new" / "diagrams.png", title="three")
+    assert (tmp_path / "new" / "diagrams.png").stat().st_size > 5000
+    r = state.resultants()
+    for ax, values in zip(axes, (r.N, r.Q, r.M)):
+        line_ = ax.lines[0]
+        assert_allclose(line_.get_xdata(), r.s)
+        assert_allclose(line_.get_ydata(), values)
+    assert axes[0].get_title(loc="left") == "three"
+    with pytest.raises(InputError, match="three matplotlib Axes, got 2"):
+        state.plot_resultants(axes=axes[:2])
