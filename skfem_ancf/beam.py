@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property, wraps
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from skfem.assembly import Basis, FacetBasis, asm
@@ -144,7 +144,8 @@ class Beam(Frozen):
                                       ("material", Material, material)):
             if not isinstance(value, kind):
                 raise InputError(f"{argument} must be a {kind.__name__}, got {shown(value)}")
-        self.mesh = mesh if mesh.is_straight else mesh.with_sections(element.sections)
+        element = cast("ElementBeam", element)
+        self.mesh: MeshBeam = mesh if mesh.is_straight else mesh.with_sections(element.sections)
         self.element, self.material = element, material
         self.width = require_positive("width", width)
         self.formulation = get_formulation(formulation)
@@ -293,7 +294,7 @@ class Beam(Frozen):
         """
         known = self.dofnames
         if names is None:
-            rows = np.arange(len(known))
+            rows: Array = np.arange(len(known))
         else:
             both = [name for name in self.element.dofnames if name not in known]
             names = require_names("coordinate", names, known + both)

@@ -280,7 +280,7 @@ def buckling(system: System, k: int) -> Buckling:
     symmetric = is_symmetric(Ks)
     theta, X = (_geometric if symmetric else _follower)(tangent, Ks, k)
     # mean strain before buckling over that of the strain energy of a strain of one
-    strain = np.sqrt(max(du @ tangent.internal(stress), 0.0)) * np.finfo(float).eps
+    strain = np.sqrt(max(float(du @ tangent.internal(stress)), 0.0)) * np.finfo(float).eps
     good = theta < -strain / system.stiffness_scale
     if not np.any(good):
         raise InputError("no positive load factor: these loads pull the beam straight"

@@ -13,7 +13,8 @@ import os
 import pickle
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from types import FunctionType
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
@@ -229,7 +230,7 @@ def require_positive(name: str, value: object, unit: str = "") -> float:
     return value
 
 
-def require_finite_scalar(name: str, value: object) -> float:
+def require_finite_scalar(name: str, value: Any) -> float:
     """Return ``value`` as a float, or raise :class:`InputError` if it is no finite real number.
 
     True and False, texts and arrays of one number are none.
@@ -299,7 +300,7 @@ def require_index(name: str, value: object, n: int) -> int:
     return require_integer(name, value, -n, n - 1) % n
 
 
-def require_finite(name: str, array: object, shape: Sequence[int | None] | None = None) -> Array:
+def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = None) -> Array:
     """Return ``array`` as float64, or raise :class:`InputError`.
 
     Parameters
@@ -637,8 +638,9 @@ def taught(function: Function) -> Function:
             raise
 
     # doctest finds functions by the globals of their module
-    call = type(call)(call.__code__, function.__globals__, call.__name__, None, call.__closure__)
-    return wraps(function)(call)
+    call = FunctionType(call.__code__, function.__globals__, call.__name__, None,
+                        call.__closure__)
+    return cast("Function", wraps(function)(call))
 
 
 def teaching(cls: Class) -> Class:

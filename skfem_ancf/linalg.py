@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import blas, eigh, lapack, lu_solve
@@ -83,8 +83,8 @@ class BandMatrix:
         self._flat = np.zeros(n * self._ld)
         #: What texts take: a view of the entries, and room for their factors.
         self.band = Band(self._flat, np.zeros(n, np.int64), self._ld, bandwidth, self._diagonal)
-        self._factor = None
-        self.positive_definite = None
+        self._factor: Any = None
+        self.positive_definite: bool | None = None
 
     @property
     def ab(self) -> Array:
@@ -351,10 +351,10 @@ class BandMatrix:
 
     def tocsc(self) -> csc_matrix:
         """The matrix as a scipy.sparse array in CSC format."""
-        k = np.arange(-self.bandwidth, self.bandwidth + 1)
+        k: Array = np.arange(-self.bandwidth, self.bandwidth + 1)
         if self.symmetric:
             k = k[k >= 0]
-        j = np.arange(self.n)
+        j: Array = np.arange(self.n)
         i = j + k[:, None]
         j = np.broadcast_to(j, i.shape)
         inside = (i >= 0) & (i < self.n)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import warnings
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from skfem.assembly import LinearForm, asm
@@ -105,6 +105,7 @@ class Load(Sealable):
 
     constant = True
     symmetric = True
+    beam: Any
     linear = False
     turning = False
 

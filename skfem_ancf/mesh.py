@@ -6,7 +6,7 @@ import warnings
 from contextlib import ExitStack
 from dataclasses import dataclass, fields, replace
 from threading import Lock
-from typing import Optional, Type
+from typing import Optional
 
 import numpy as np
 from numpy import ndarray
@@ -84,14 +84,14 @@ class MeshBeam(Frozen, Mesh2D):
     [0.0, 0.25, 0.5, 0.75, 0.875, 1.0]
     """
 
-    elem: Type[Element] = ElementBeamP1
-    height: Optional[float] = None
-    p_X: Optional[ndarray] = None
-    p_Y: Optional[ndarray] = None
-    lengths: Optional[ndarray] = None
-    s: Optional[ndarray] = None
+    elem: type[Element] = ElementBeamP1
+    height: float = None  # type: ignore[assignment]
+    p_X: ndarray = None  # type: ignore[assignment]
+    p_Y: ndarray = None  # type: ignore[assignment]
+    lengths: ndarray = None  # type: ignore[assignment]
+    s: ndarray | None = None
     curve: Optional["Curve"] = None
-    p_XY: Optional[ndarray] = None
+    p_XY: ndarray | None = None
     sections: str = "linear"
 
     # construction

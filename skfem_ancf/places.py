@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numbers
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -45,7 +45,7 @@ def is_place(place: object) -> bool:
     return isinstance(place, (str, np.ndarray)) or callable(place) or is_point(place)
 
 
-def as_point(point: ArrayLike, mesh: MeshBeam | None = None) -> Array:
+def as_point(point: Any, mesh: MeshBeam | None = None) -> Array:
     """A material point as an array (2,); raises MeshError for anything else.
 
     Parameters
@@ -125,7 +125,7 @@ def facets_of(mesh: MeshBeam, place: Place) -> Array:
     if isinstance(place, str):
         return _named(mesh, place)
     if is_point(place):
-        return np.array([section_at(mesh, place)], dtype=np.int32)
+        return np.array([section_at(mesh, cast("ArrayLike", place))], dtype=np.int32)
     if isinstance(place, np.ndarray):
         return _numbered(mesh, place)
     if callable(place):

@@ -557,13 +557,13 @@ def actions(state: State) -> list[list[float]]:
     out = []
     for beam, s in zip(system.beams, system.slices):
         nodes = np.nonzero(np.any(held[s].reshape(-1, beam.nd) != 0, axis=1))[0]
-        stations = [station_of_node(beam.mesh, k) for k in nodes]
+        stations = [station_of_node(beam.mesh, int(k)) for k in nodes]
         for row in rows[1:]:
             if np.any(row[s]):
                 # an equation between neighbouring nodes: at both
                 loaded = np.nonzero(np.any(row[s].reshape(-1, beam.nd) != 0, axis=1))[0]
                 stations += (stations_of_vector(beam, row[s])
-                             or [station_of_node(beam.mesh, k) for k in loaded])
+                             or [station_of_node(beam.mesh, int(k)) for k in loaded])
         out.append(stations)
     return out
 

@@ -95,6 +95,7 @@ def linear(xi: ArrayLike, derivative: int = 0) -> Array:
     derivative
         Number of derivatives.
     """
+    xi = np.asarray(xi)
     one = np.ones_like(xi)
     if derivative == 0:
         return np.array([1.0 - xi, xi])

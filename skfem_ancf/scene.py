@@ -6,7 +6,7 @@ import warnings
 from copy import copy
 from functools import wraps
 from threading import RLock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -100,17 +100,21 @@ class Scene:
         for b in beams:
             if not isinstance(b, Beam):
                 raise InputError(f"a scene is made of Beams, got {shown(b)}")
-        names = [b.name for b in beams if b.name is not None]
+        names = [b.name for b in beams if b.name is not None]  # type: ignore[union-attr]
         if len(set(names)) < len(names) or len(set(map(id, beams))) < len(beams):
             raise InputError(f"the beams of a scene must be different, and so must their names: "
                              f"{names}")
-        self._beams = beams
+        self._beams: tuple[Beam, ...] = cast("tuple[Beam, ...]", beams)
         self._lock = RLock()
-        self._supports, self._fixed = (), {}  # (number of the beam, coordinate) -> displacement
+        self._supports: tuple[Support, ...] = ()
+        # (number of the beam, coordinate) -> displacement
+        self._fixed: dict[tuple[int, int], float] = {}
         # pairs (as given, bound), those of loads with the number of the beam before them
-        self._loads, self._joints = (), ()
-        self._velocities = {}  # number of the beam -> (as given, bound)
-        self._system = None
+        self._loads: tuple[tuple[int, Load, Load], ...] = ()
+        self._joints: tuple[tuple[Joint, Joint], ...] = ()
+        # number of the beam -> (as given, bound)
+        self._velocities: dict[int, tuple[Any, Array]] = {}
+        self._system: System | None = None
 
     def __getstate__(self):
         """What was given and bound: the equations are built again."""
@@ -280,10 +284,10 @@ class Scene:
             Itself.
         """
         k = self._number(beam)
-        beam = self._beams[k]
+        beam = b = self._beams[k]
         require_option("thickness", thickness, ("fixed", "free"))
-        if thickness == "fixed" and not beam.is_cable:
-            return self._put([Support(k, boundary, tuple(beam.element.welded))])
+        if thickness == "fixed" and not b.is_cable:
+            return self._put([Support(k, boundary, tuple(b.element.welded))])
         return self._put([Support(k, boundary, "r")],
                          joints=[get_joint("plane", at=boundary, beam=beam, name="of a clamp")])
 
@@ -771,10 +775,9 @@ class Scene:
         """
         system = self.system
         system.require_supports()
-        if branch is not None:
-            branch = _branch(branch, system)
+        critical = None if branch is None else _branch(branch, system)
         try:
-            return Path(system, *continuation(system, branch=branch, **options))
+            return Path(system, *continuation(system, branch=critical, **options))
         except (ConvergenceError, Interrupted) as error:
             raise type(error)(str(error), Path(system, *error.state)) from None
 

@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import ArrayLike
 
     from .beam import Beam
     from .mesh import MeshBeam
+    from .types import Array
 
 #: Places nearer than this part of an element to a node are at the node.
 SNAP = 1e-6
@@ -39,11 +42,11 @@ class Spread:
         Where it acts on a section or a point: element + xi.
     """
 
-    body: object = None
-    faces: tuple = None
-    traction: object = None
-    pressure: float = None
-    stations: tuple = ()
+    body: Array | None = None
+    faces: tuple[Array, ...] | None = None
+    traction: Array | Callable[[Array], Array] | None = None
+    pressure: float | None = None
+    stations: tuple[float, ...] = ()
 
 
 def on_facets(mesh: MeshBeam, facets: ArrayLike, **how: Any) -> Spread:
@@ -114,7 +117,7 @@ def stations_of_vector(beam: Beam, vector: ArrayLike) -> tuple[float, ...] | Non
                 return (float(np.nonzero(beam.mesh.t[0] == loaded[0])[0][0]) + xi,)
     if np.any(np.diff(loaded) == 1):
         return None
-    return tuple(station_of_node(beam.mesh, k) for k in loaded)
+    return tuple(station_of_node(beam.mesh, int(k)) for k in loaded)
 
 
 def _where(element, value):

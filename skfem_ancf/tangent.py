@@ -9,7 +9,7 @@ before. Where the strains ``B x`` are summed first nothing cancels: their round-
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.linalg
@@ -277,8 +277,7 @@ class Inverse:
         If the matrix is singular.
     """
 
-    def __init__(self, tangent: StrainTangent, M: csr_matrix | None = None,
-                 shift: float = 0.0) -> None:
+    def __init__(self, tangent: StrainTangent, M: Any = None, shift: float = 0.0) -> None:
         self._tangent, self._n, m = tangent, *tangent.size
         self._M, self._shift = M, shift
         self._rest = tangent.S + shift * M if shift else tangent.S

@@ -90,8 +90,8 @@ def test_the_wheel_holds_the_package_and_nothing_else(built):
         names = [n for n in archive.namelist() if ".dist-info/" not in n]
         metadata, = (n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
         metadata = archive.read(metadata).decode()
-    assert sorted(names) == sorted(p.relative_to(copy).as_posix()
-                                   for p in (copy / "skfem_ancf").rglob("*.py"))
+    sources = [*(copy / "skfem_ancf").rglob("*.py"), copy / "skfem_ancf" / "py.typed"]
+    assert sorted(names) == sorted(p.relative_to(copy).as_posix() for p in sources)
     assert f"\nVersion: {skfem_ancf.__version__}\n" in metadata
     assert "\nLicense-Expression: BSD-3-Clause\n" in metadata
 

@@ -47,9 +47,9 @@ class Motion:
     acceleration: np.ndarray
     algorithmic: np.ndarray
     multipliers: np.ndarray
-    force: np.ndarray = None
+    force: np.ndarray | None = None
     before: float = 0.0
-    memory: dict = None
+    memory: dict | None = None
 
     def __post_init__(self):
         if self.force is None:
@@ -145,7 +145,7 @@ class Scheme:
     name = ""
     order = 2
     tol = 1e-9
-    compiled = None
+    compiled: tuple[bool, tuple[float, ...]] | None = None
     couples_velocity = False
     error_constant = 1.0 / 12.0
 

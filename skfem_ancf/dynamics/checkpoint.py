@@ -228,7 +228,7 @@ def _load(path):
 
 def read(path: StrPath) -> tuple[dict[str, Array], dict[str, Any]]:
     """The arrays of a checkpoint by name, and its text; raises CheckpointError."""
-    path = _path(path)
+    path = require_path("checkpoint", _path(path))
     if not path.exists():
         raise CheckpointError(f"there is no file {str(path)!r}")
     try:
@@ -281,7 +281,7 @@ class Checkpoint:
 
     def __init__(self, path: StrPath, every: int | None, run: Run) -> None:
         self.path, self.run = _path(path), run
-        self.every = None if every is None else require_integer("every", every, 1)
+        self.every: int | None = None if every is None else require_integer("every", every, 1)
         run.longest = self.every
         self._steps, self._clock, self._took = run.steps, time.monotonic(), 0.0
         task, system = run.task, run.system

@@ -49,7 +49,7 @@ class GeneralizedAlpha(Scheme):
         self.error_constant = abs(self.beta - 1.0 / 6.0)
 
     @property
-    def compiled(self) -> tuple[bool, tuple[float, float, float, float]]:
+    def compiled(self) -> tuple[bool, tuple[float, ...]]:  # type: ignore[override]
         return False, (self.alpha_m, self.alpha_f, self.beta, self.gamma)
 
     def begin(self, system: System, y: Motion, dt: float) -> Step:

@@ -53,10 +53,10 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     t_start
         Time at the start; by default that of ``start``, or 0.
     t_eval
-        Times to store, shape (n,); every step by default. An instant within a step is the end of a shorter
-        step of the scheme from the same start, which is not gone on from: the steps of the motion
-        do not depend on ``t_eval``, and what the scheme conserves is conserved at these instants
-        too.
+        Times to store, shape (n,); every step by default. An instant within a step is the end of
+        a shorter step of the scheme from the same start, which is not gone on from: the steps of
+        the motion do not depend on ``t_eval``, and what the scheme conserves is conserved at these
+        instants too.
     tol
         Tolerance of the iteration in a step; the scheme's own by default.
     rtol
@@ -92,9 +92,9 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     SupportError
         If joints repeat or contradict each other, or are open at the start.
     """
-    moving = start is not None and start._motion is not None
+    motion = None if start is None else start._motion
     if t_start is None:
-        t_start = start._motion.t if moving else 0.0
+        t_start = 0.0 if motion is None else motion.t
     task = _task(t_start, t_end, dt, t_eval, tol, rtol, breakpoints)
     system.require_independent_joints()
     run = Run(system, scheme, task)
@@ -102,10 +102,10 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     zero = np.zeros(system.N)
     if u is None and start is not None:
         u = start.u
-    if moving and _goes_on(system, scheme, start, t_start):
-        run.go_on(start._motion, start._origin[1])
+    if start is not None and motion is not None and _goes_on(system, scheme, start, t_start):
+        run.go_on(motion, start._origin[1])
     else:
-        v = start.v if moving else v
+        v = v if motion is None else motion.v
         run.begin(zero if u is None else u, zero if v is None else v)
     if file is not None:
         file.begin()
@@ -188,7 +188,7 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
         raise ConvergenceError(f"the motion could not be continued beyond t = {run.y.t:.6g}: "
                                f"{failure}; try a smaller dt", history.close()) from None
     except AncfError as error:  # of a function of the caller's: what is done is kept
-        error.state = history.close()
+        vars(error)["state"] = history.close()
         raise
     except KeyboardInterrupt:
         raise Interrupted(f"stopped at t = {run.y.t:.6g} of {task.t_end:.6g}; the exception's "

@@ -44,11 +44,11 @@ class Task:
 
     t_start: float
     t_end: float
-    dt: float = None
-    tol: float = None
+    dt: float | None = None
+    tol: float | None = None
     rtol: float = 1e-5
-    t_eval: np.ndarray = None
-    breakpoints: tuple = ()
+    t_eval: np.ndarray | None = None
+    breakpoints: tuple[float, ...] = ()
 
     @property
     def span(self) -> float:
@@ -69,7 +69,7 @@ class Stepper:
 
     def __init__(self, system: System, scheme: Scheme, tol: float | None = None) -> None:
         self.solver = Integrator(system, scheme, tol)
-        self.blocks = None
+        self.blocks: Any = None
         if CompiledSteps.applies(scheme, system):
             self.blocks = CompiledSteps(self.solver, scheme, system)
 
@@ -164,7 +164,8 @@ class Run:
         self.segment = self.n = self._next = self.steps = self.rejected = 0
         self.size = 1e-4 * task.span if task.dt is None else task.dt
         self.history = History(system, scheme, self)
-        self.y, self.longest = None, None
+        self.y: Any = None
+        self.longest: int | None = None
         self._limit()
 
     # the start

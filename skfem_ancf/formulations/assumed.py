@@ -68,6 +68,7 @@ class Assumed(Formulation):
 
     def terms(self, element: ElementBeam, material: Material) -> Sequence[Term]:
         _, section = self.full_rules(element)
+        samples: dict[str, tuple[float, ...]]
         if element.sections == "linear":
             axis, samples = gauss(2), {"yy": (0.0, 1.0)}
         else:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..elements.base import ElementBeam
     from ..materials.base import Material
     from ..mesh import MeshBeam
-    from ..types import Array, Rule
+    from ..types import Array, Law, Rule
 
 COMPONENTS = ("xx", "yy", "xy")
 
@@ -44,11 +44,11 @@ class Term:
         that combination of the strains at the points eta. None to evaluate it there.
     """
 
-    law: object
-    axis: tuple
-    section: tuple
-    samples: dict = field(default_factory=dict)
-    section_samples: tuple = None
+    law: Law
+    axis: Rule
+    section: Rule
+    samples: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    section_samples: Rule | None = None
 
     @property
     def quadrature(self) -> Rule:

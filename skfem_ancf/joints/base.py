@@ -57,7 +57,7 @@ class Vector:
             Shape (n,).
         """
         out = np.zeros(n)
-        np.add.at(out, self.dofs, np.outer(direction, self.weights))
+        np.add.at(out, self.dofs, np.outer(np.asarray(direction), self.weights))
         return out
 
     def entries(self, direction: ArrayLike) -> tuple[Array, Array]:
@@ -130,10 +130,10 @@ class Joint(Sealable):
         Phi depends on t.
     """
 
-    equations = ()
+    equations: tuple[str, ...] = ()
     constant = True
     moving = False
-    name = None
+    name: str | None = None
 
     def __init_subclass__(cls, **options):
         """Of :meth:`jacobian` and :meth:`entries` the one that a class defines gives the other."""

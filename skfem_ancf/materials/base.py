@@ -70,6 +70,7 @@ class Material(Frozen):
             raise InputError(
                 f"the Poisson ratio nu must lie in (-1, 0.5), or be 0.5 in plane stress, got "
                 f"{self.nu!r} in plane {plane}")
+        self.shear_correction: str | float
         if isinstance(shear_correction, str):
             self.shear_correction = require_option("shear correction", shear_correction,
                                                    ("auto", "paper"))

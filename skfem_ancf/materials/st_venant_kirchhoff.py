@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -49,7 +49,8 @@ class StVenantKirchhoff(Material):
         if type(self) is not StVenantKirchhoff or self.plane == "stress" or self.nu == 0.0:
             return None
         volumetric = self.lame * np.outer([1.0, 1.0, 0.0], [1.0, 1.0, 0.0])
-        return LinearLaw(self.law(k_s).D - volumetric), LinearLaw(volumetric)
+        whole = cast("LinearLaw", self.law(k_s))
+        return LinearLaw(whole.D - volumetric), LinearLaw(volumetric)
 
     def energy(self, strain: Array) -> Array:
         return LinearLaw(self.D).energy(strain)

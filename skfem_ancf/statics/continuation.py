@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -63,7 +63,10 @@ class Point:
                  error: float, iterations: int) -> None:
         self.u, self.multipliers, self.load, self.force = u, multipliers, load, force
         self.arc, self.error, self.iterations = arc, error, iterations
-        self.rate, self.tangent, self.multiplier_rate, self.negative = np.nan, None, None, None
+        self.rate: Any = np.nan
+        self.tangent: Any = None
+        self.multiplier_rate: Any = None
+        self.negative: Any = None
 
     @property
     def stable(self) -> bool | None:
@@ -298,7 +301,7 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
     steps = require_integer("steps", steps, 1, MAX_STEPS)
     ds = require_positive("ds", ds)
     ds_max = 5.0 * ds if ds_max is None else require_positive("ds_max", ds_max)
-    max_load = None if max_load is None else require_positive("max_load", max_load)
+    limit = np.inf if max_load is None else require_positive("max_load", max_load)
     locate = None if locate is None else require_positive("locate", locate)
     if until is not None:
         require_function("until", until, "of a point of the path that returns True or False")
@@ -314,9 +317,9 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
                 point, bend = _step(tracer, start, step)
                 if straight and bend > 4.0 * TURN and step > ds / 64.0:
                     raise Failed("the path turns")
-                last = max_load is not None and abs(point.load) >= max_load
+                last = abs(point.load) >= limit
                 if last:
-                    point = _land(tracer, start, point, float(np.copysign(max_load, point.load)))
+                    point = _land(tracer, start, point, float(np.copysign(limit, point.load)))
                 if locate is not None and straight:
                     critical += find_critical(tracer, start, point, locate)
             except Failed as failure:

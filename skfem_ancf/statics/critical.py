@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -62,7 +62,7 @@ def find_critical(tracer: Tracer, p: Point, q: Point, tol: float) -> list[Critic
     while stack:
         a, b, depth = stack.pop()
         turns = a.rate * b.rate < 0
-        change = None if a.negative is None else b.negative - a.negative
+        change: Any = None if a.negative is None else b.negative - a.negative
         if not turns and not change:
             continue
         single = change is None or (abs(change) == 1) if turns else abs(change) == 1

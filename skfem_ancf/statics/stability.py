@@ -333,7 +333,7 @@ def way_down(system: System, result: Any, load: float, full: float, at: float,
     iterate, failed
         As for :func:`descend`.
     """
-    first = None, False
+    first: tuple[Any, bool] = None, False
     for stride in STRIDES:
         descent = Descent(system, stride)
         try:
