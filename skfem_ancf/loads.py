@@ -19,8 +19,7 @@ from .beam import Beam
 from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number, require_finite,
                      require_function, shown)
 from .frozen import Sealable, read_only
-from .kernels.moments import (MomentPack, add_mean_moments, add_moment_stiffness,
-                              add_moments)
+from .kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from .pickling import picklable_form
 from .spread import Spread, on_facets, stations_of_vector
 

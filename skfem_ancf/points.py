@@ -19,8 +19,6 @@ from .places import as_point
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import ArrayLike
-
     from .beam import Beam
     from .mesh import MeshBeam
     from .types import Array, WhichBeam
@@ -37,7 +35,7 @@ def is_many(points: Any) -> bool:
         isinstance(p, (list, tuple, np.ndarray)) for p in points)
 
 
-def as_points(points: ArrayLike, mesh: MeshBeam | None = None) -> Array:
+def as_points(points: Any, mesh: MeshBeam | None = None) -> Array:
     """Many points as an array (2, n), or one as an array (2,).
 
     Parameters
@@ -95,7 +93,7 @@ class Part:
                  X: Array) -> None:
         self.beam, self.number, self.coordinates, self.index = beam, number, coordinates, index
         self.e, self.X = e, X
-        self.tables = {}  # of others, that depend on the beam and the points only
+        self.tables: dict[Any, Any] = {}  # of others, that depend on the beam and the points only
 
     @cached_property
     def at(self) -> Array:
@@ -268,9 +266,10 @@ class Points:
 
     def __init__(self, beams: Sequence[Beam], slices: Sequence[slice]) -> None:
         self.beams, self.slices = list(beams), slices
-        self._known, self._held = OrderedDict(), 0
+        self._known: OrderedDict[Any, Located] = OrderedDict()
+        self._held = 0
 
-    def find(self, points: ArrayLike, beam: WhichBeam = None) -> Located:
+    def find(self, points: Any, beam: WhichBeam = None) -> Located:
         """Where points are.
 
         Parameters
@@ -292,7 +291,7 @@ class Points:
         name = beam if beam is None or isinstance(beam, (str, int)) else id(beam)
         if (type(points) is tuple and len(points) == 2 and type(points[0]) is float
                 and type(points[1]) is float):
-            key = points, name, type(beam)
+            key: Any = points, name, type(beam)
         else:
             one = beam is not None or len(self.beams) == 1
             points = as_points(points, select_beam(self.beams, beam).mesh if one else None)

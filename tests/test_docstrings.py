@@ -14,7 +14,7 @@ import skfem_ancf
 NOT_YET = ("kernel", "cable", "statics.newton", "dynamics.integrator", "dynamics.blocks", "system",
            "exact", "mesh", "results", "dynamics.history", "visuals", "io", "band", "own", "tables",
            "body", "border", "equations", "machine", "kernels", "statics.iteration",
-           "source", "linalg")
+           "source", "linalg", "materials.neo_hookean", "constraints")
 
 #: Their functions are documented, their types are not given: the inside of solvers.
 UNTYPED = ()

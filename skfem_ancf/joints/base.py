@@ -73,7 +73,7 @@ class Vector:
         columns, values
             Shapes (k,).
         """
-        return self.dofs.ravel(), np.outer(direction, self.weights).ravel()
+        return self.dofs.ravel(), np.outer(np.asarray(direction), self.weights).ravel()
 
 
 def gradients(*equations: list) -> tuple[Array, Array, Array]:
@@ -96,9 +96,9 @@ def gradients(*equations: list) -> tuple[Array, Array, Array]:
             rows.append(np.full(len(found[0]), k))
             columns.append(found[0])
             values.append(found[1])
-    rows, columns, values = map(np.concatenate, (rows, columns, values))
-    keep = values != 0.0
-    return rows[keep], columns[keep], values[keep]
+    i, j, v = map(np.concatenate, (rows, columns, values))
+    keep = v != 0.0
+    return i[keep], j[keep], v[keep]
 
 
 def rotation(angle: float) -> Array:
