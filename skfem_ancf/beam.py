@@ -604,13 +604,19 @@ def select_beam(beams: Sequence[Beam], beam: WhichBeam) -> Beam:
     NameUnknown
         If there is no such beam, or None is given and there are several.
     """
+    if beam is None and len(beams) == 1:
+        return beams[0]
+    if isinstance(beam, Beam):
+        found = [b for b in beams if b is beam]
+    elif isinstance(beam, str):
+        found = [b for b in beams if b.name == beam]
+    elif isinstance(beam, int) and not isinstance(beam, bool):
+        found = beams[beam:beam + 1] if beam >= 0 else ()
+    else:
+        found = ()
+    if found:
+        return found[0]
     known = [b.name if b.name is not None else k for k, b in enumerate(beams)]
     if beam is None:
-        if len(beams) == 1:
-            return beams[0]
         raise InputError(f"the scene has {len(beams)} beams: say which with beam=, one of {known}")
-    for k, b in enumerate(beams):
-        if b is beam or (isinstance(beam, str) and b.name == beam) or (
-                isinstance(beam, int) and not isinstance(beam, bool) and beam == k):
-            return b
     raise NameUnknown("beam", beam, known)

@@ -1,134 +1,300 @@
-"""Which equations of joints depend on others, and which rigid motions nothing holds."""
+"""What holds a scene: fixed coordinates, and equations of joints with multipliers."""
+
+from functools import cached_property
 
 import numpy as np
-import scipy.linalg
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
 
-#: Rest of a row beside those before it, relative to the row, that is round-off.
-DEPENDENT = 1e-9
-#: Smallest over largest singular value of what is held that is round-off.
-FREE = 1e-9
-#: Columns up to which singular values are found by dense matrices.
-DENSE = 300
-#: Vectors of a null space that are looked for where it is not dense, and iterations for them.
-MOST, ITERATIONS = 8, 6
+from .errors import SupportError, shown
+from .joints.base import same_joint
+from .rank import first_dependent, null_space, unit_rows
+
+#: Columns of a border above which sparse LU is faster.
+WIDE_BORDER = 96
 
 
-def first_dependent(J, free, phi):
-    """The first equation that those before it hold already, or None.
+class Constraints:
+    """The supports and joints of a scene.
 
-    The rows of J fall apart into groups without a common coordinate. In each group QR
-    orthogonalises the rows in their order: what is left of a row is on the diagonal of R.
+    Joints that only fix coordinates are eliminated like supports; the others are equations
+    ``Phi(u, t) = 0`` with multipliers.
 
     Parameters
     ----------
-    J
-        Sparse, shape (m, N).
-    free
-        Truth values of the coordinates that supports leave free, shape (N,).
-    phi
-        What each equation is open by, shape (m,).
+    beams, slices
+        The beams, in order, and the coordinates of each.
+    size
+        Length of all beams together.
+    fixed, values
+        Numbers of the fixed coordinates and their displacements at full load.
+    joints
+        Joints, already bound.
 
-    Returns
-    -------
-    tuple or None
-        The number of the equation, and what it is open by where those before it are met.
-    """
-    size = np.sqrt(np.asarray(J.multiply(J).sum(axis=1)).ravel())
-    first = None
-    for rows, A in groups(J @ sparse.diags_array(free.astype(float))):
-        if first is not None and rows[0] > first[0]:
-            continue
-        R = scipy.linalg.qr(A.T, mode="r", check_finite=False)[0]
-        rest, k = np.zeros(len(rows)), min(R.shape)
-        rest[:k] = np.abs(np.diag(R))
-        dependent = np.flatnonzero(rest <= DEPENDENT * size[rows])
-        if len(dependent) and (first is None or rows[dependent[0]] < first[0]):
-            k = dependent[0]
-            known = scipy.linalg.solve_triangular(R[:k, :k], phi[rows[:k]], trans="T")
-            first = int(rows[k]), float(phi[rows[k]] - R[:k, k] @ known)
-    return first
-
-
-def groups(J):
-    """The rows of a sparse matrix in groups without a common column.
-
-    Yields
-    ------
-    rows, A
-        Numbers of the rows, increasing, and these rows without columns that are zero in all.
-    """
-    J = sparse.csr_array(J)
-    J.eliminate_zeros()
-    (m, n), entries = J.shape, J.tocoo()
-    links = sparse.coo_array((np.ones(J.nnz), (entries.row, m + entries.col)), (m + n, m + n))
-    number, group = connected_components(links, directed=False)
-    size = [np.bincount(part, minlength=number) for part in (group[:m], group[m:])]
-    at = [_place(part, count) for part, count in zip((group[:m], group[m:]), size)]
-    which = group[entries.row]
-    order = np.argsort(which, kind="stable")
-    ends = np.cumsum(np.bincount(which, minlength=number))
-    members = np.split(np.argsort(group[:m], kind="stable"), np.cumsum(size[0])[:-1])
-    for g in np.flatnonzero(size[0]):
-        some = order[ends[g - 1] if g else 0:ends[g]]
-        A = np.zeros((size[0][g], size[1][g]))
-        A[at[0][entries.row[some]], at[1][entries.col[some]]] = entries.data[some]
-        yield members[g], A
-
-
-def _place(group, count):
-    """The place of each member in its group."""
-    out = np.empty(len(group), dtype=int)
-    order = np.argsort(group, kind="stable")
-    out[order] = np.arange(len(group)) - np.repeat(np.cumsum(count) - count, count)
-    return out
-
-
-def unit_rows(A):
-    """The rows of a matrix scaled to a largest entry of 1, without those that are zero.
-
-    Rows for slopes have another unit than rows for positions.
-    """
-    norms = abs(A).max(axis=1) if A.shape[0] else np.zeros(0)
-    norms = norms.toarray().ravel() if sparse.issparse(norms) else norms
-    A, scale = A[norms > 0], 1.0 / norms[norms > 0]
-    return sparse.diags_array(scale) @ A if sparse.issparse(A) else scale[:, None] * A
-
-
-def null_space(H):
-    """Vectors that span the null space of a sparse matrix, as rows; of a large one some.
-
-    Parameters
+    Attributes
     ----------
-    H
-        Shape (r, n), rows of about unit size.
-
-    Returns
-    -------
-    ndarray
-        Shape (k, n); with more than :data:`DENSE` columns at most :data:`MOST`.
+    all_joints, joints : list
+        The joints, and those with multipliers.
+    N, m : int
+        Number of coordinates and of multipliers.
+    fixed
+        Numbers of the coordinates that supports and joints fix.
+    given
+        Their displacements at full load, without what joints prescribe.
+    free, mask
+        For each coordinate whether it is free, as truth values and as 1 or 0; shape (N,).
     """
-    n = H.shape[1]
-    if not H.shape[0]:
-        return np.eye(n)[:n if n <= DENSE else MOST]
-    if n <= DENSE:
-        _, sigma, V = np.linalg.svd(np.linalg.qr(H.toarray(), mode="r"))
-        return V[int(np.sum(sigma > FREE * sigma[0])):]
-    # inverse iteration with H^T H + small^2, whose condition number is the square of this one's
-    small = 0.1 * FREE
-    lu = splu(sparse.block_array([[small * sparse.eye_array(H.shape[0]), H],
-                                  [H.T, -small * sparse.eye_array(n)]], format="csc"))
-    X = np.random.default_rng(0).standard_normal((n, MOST))
-    for _ in range(ITERATIONS):
-        X = np.linalg.qr(lu.solve(np.vstack([np.zeros((H.shape[0], MOST)), X]))[H.shape[0]:])[0]
-    _, sigma, V = np.linalg.svd(np.linalg.qr(H @ X, mode="r"))
-    largest = np.sqrt(sparse.linalg.norm(H, 1) * sparse.linalg.norm(H, np.inf))
-    X = X @ V[sigma <= FREE * largest].T
-    # as few beams in each vector as there may be
-    _, R, pivots = scipy.linalg.qr(X.T, mode="economic", pivoting=True)
-    k = len(R)
-    out = np.empty((k, n))
-    out[:, pivots] = scipy.linalg.solve_triangular(R[:, :k], R)
-    return out / np.linalg.norm(out, axis=1)[:, None]
+
+    def __init__(self, beams, slices, size, fixed, values, joints):
+        self.beams, self.slices, self.size = beams, slices, size
+        self.N = slices[-1].stop
+        self._supported = False
+        self._eliminate(fixed, values, joints)
+
+    def _eliminate(self, fixed, values, joints):
+        """Sort joints that only fix coordinates to the supports, the others to the multipliers."""
+        zero, self.free = np.zeros(self.N), np.ones(self.N, dtype=bool)
+        self.free[fixed] = False
+        self.all_joints, self.joints, self._fixing = list(joints), [], []
+        fixed, held = [np.array(fixed, dtype=np.int64)], [np.zeros(len(fixed))]
+        values, first = np.array(values, dtype=float), len(fixed[0])
+        for joint in joints:
+            found = _fixes(joint, zero) if joint.constant else None
+            if found is None:
+                self.joints.append(joint)
+                continue
+            dofs, factors = found
+            clash = np.sort(dofs[~self.free[dofs]])
+            if len(clash):
+                raise SupportError(
+                    f"{joint!r} prescribes {self.describe_dof(clash[0])}, which a support or "
+                    "another joint fixes already: remove one of them, as the second of two "
+                    "clamps at one place")
+            self._fixing.append((joint, first, factors))
+            self.free[dofs] = False
+            fixed.append(dofs)
+            held.append(0.0 * factors if joint.moving else -joint.value(zero, 0.0) / factors)
+            first += len(dofs)
+        self.fixed, self._held = np.concatenate(fixed), np.concatenate(held)
+        self.given = np.append(values, np.zeros(first - len(values)))
+        self._moving = [item for item in self._fixing if item[0].moving]
+        self.mask = self.free.astype(float)
+        self.m = sum(len(joint.equations) for joint in self.joints)
+
+    def describe_dof(self, k):
+        """What coordinate number k is, in words."""
+        b = int(np.searchsorted([s.start for s in self.slices], k, side="right")) - 1
+        beam, k = self.beams[b], k - self.slices[b].start
+        who = "" if len(self.beams) == 1 else f" of beam {beam.name or b}"
+        return f"{beam.dofnames[k % beam.nd]} of node {k // beam.nd}{who}"
+
+    # fixed coordinates
+
+    def values(self, load, t=None):
+        """Displacements of the fixed coordinates at a load factor and a time."""
+        values = load * self.given + self._held
+        for joint, first, factors in self._moving:
+            phi = joint.offset(np.array([load if t is None else t]), self.N)[0]
+            values[first:first + len(factors)] = -phi / factors
+        return values
+
+    def values_at(self, times):
+        """Displacements of the fixed coordinates at full load, at times (n,): (n, nfixed)."""
+        values = np.tile(self.given + self._held, (len(times), 1))
+        for joint, first, factors in self._moving:
+            values[:, first:first + len(factors)] = -joint.offset(times, self.N) / factors
+        return values
+
+    @property
+    def moves(self):
+        """True if a fixed coordinate has a displacement that is not zero, now or later."""
+        return bool(self._moving) or bool(np.any(self.given + self._held))
+
+    # equations of joints
+
+    def constraint(self, u, t):
+        """Phi of the joints with multipliers, shape (m,)."""
+        if not self.joints:
+            return np.zeros(0)
+        return np.concatenate([joint.value(u, t) for joint in self.joints])
+
+    @property
+    def drives(self):
+        """True if a joint with multipliers depends on time."""
+        return any(joint.moving for joint in self.joints)
+
+    def full_jacobian(self, u, t):
+        """Derivative of :meth:`constraint` by all coordinates, shape (m, N).
+
+        Sparse where the multipliers are too many for a border.
+        """
+        if not self.bordered:
+            return self.sparse_jacobian(u, t)
+        J = np.zeros((self.m, self.N))
+        rows, columns, values = self._entries(u, t)
+        np.add.at(J, (rows, columns), values)
+        return J
+
+    def sparse_jacobian(self, u, t):
+        """As :meth:`full_jacobian`, as a scipy.sparse array in CSR format."""
+        rows, columns, values = self._entries(u, t)
+        return sparse.csr_array((values, (rows, columns)), shape=(self.m, self.N))
+
+    def _entries(self, u, t):
+        """Rows, columns and values of :meth:`full_jacobian`."""
+        first, parts = 0, [(*[np.zeros(0, dtype=int)] * 2, np.zeros(0))]
+        for joint in self.joints:
+            rows, columns, values = joint.entries(u, t)
+            parts.append((first + rows, columns, values))
+            first += len(joint.equations)
+        return tuple(np.concatenate(column) for column in zip(*parts))
+
+    def jacobian(self, u, t):
+        """As :meth:`full_jacobian`, zero at fixed coordinates."""
+        J = self.full_jacobian(u, t)
+        if not self.bordered:
+            J.data *= self.mask[J.indices]
+            return J
+        J[:, self.fixed] = 0.0
+        return J
+
+    def quadratic(self, u, t, v):
+        """The second derivative of :meth:`constraint` in the direction v, shape (m,)."""
+        out = []
+        for joint in self.joints:
+            for unit in np.eye(len(joint.equations)):
+                second = joint.curvature(u, t, unit)
+                out.append(0.0 if second is None else second[2] @ (v[second[0]] * v[second[1]]))
+        return np.array(out)
+
+    def curvature(self, u, t, multipliers):
+        """sum_k multipliers[k] d^2 Phi_k / du^2 at free coordinates, sparse, shape (N, N)."""
+        i, j, v = self.curvature_entries(u, t, multipliers)
+        return sparse.csr_matrix((v, (i, j)), shape=(self.N, self.N))
+
+    def curvature_entries(self, u, t, multipliers):
+        """Rows, columns and values of :meth:`curvature`."""
+        i, j, v = self._curvature(u, t, multipliers)
+        return i, j, v * (self.free[i] & self.free[j])
+
+    def _curvature(self, u, t, multipliers):
+        none = np.zeros(0, dtype=int)
+        parts = [joint.curvature(u, t, part)
+                 for joint, part in zip(self.joints, self.multipliers_of(multipliers))]
+        parts = [(none, none, np.zeros(0))] + [part for part in parts if part is not None]
+        return tuple(np.concatenate(column) for column in zip(*parts))
+
+    def curvature_times(self, u, t, multipliers, v):
+        """:meth:`curvature` times a vector (N,)."""
+        i, j, values = self._curvature(u, t, multipliers)
+        return np.bincount(i, values * v[j], self.N)
+
+    def multipliers_of(self, multipliers):
+        """The multipliers joint by joint: a list in the order of :attr:`joints`."""
+        if not self.joints:
+            return []
+        ends = np.cumsum([len(joint.equations) for joint in self.joints])[:-1]
+        return np.split(multipliers, ends)
+
+    def joint_force(self, joint, multipliers, reaction):
+        """What a joint does to its first beam, in the order of ``joint.equations``."""
+        for known, part in zip(self.joints, self.multipliers_of(multipliers)):
+            if same_joint(known, joint):
+                return -part
+        for known, first, factors in self._fixing:
+            if same_joint(known, joint):
+                return reaction[self.fixed[first:first + len(factors)]] / factors
+        raise SupportError(f"{shown(joint)} is not a joint of this scene")
+
+    # what is held
+
+    def require_independent_joints(self):
+        """Raise SupportError if joints repeat or contradict each other or the supports."""
+        if not self.joints:
+            return
+        zero = np.zeros(self.N)
+        found = first_dependent(self.sparse_jacobian(zero, 0.0), self.free,
+                                self.constraint(zero, 0.0))
+        if found is None:
+            return
+        k, gap = found
+        joint, equation = [(joint, name) for joint in self.joints for name in joint.equations][k]
+        kind = "repeats" if abs(gap) <= 1e-9 * self.size else "contradicts"
+        raise SupportError(f"{joint!r}, equation {equation!r}, {kind} what the supports and the "
+                           "joints before it hold already: remove one of them")
+
+    @cached_property
+    def springs(self):
+        """Coordinates that hold the beams which their own supports leave free to move.
+
+        The positions of two nodes far apart, for each such beam.
+        """
+        out = []
+        for beam, s in zip(self.beams, self.slices):
+            held = np.flatnonzero(~self.free[s])
+            motions = unit_rows(beam.rigid_motions()[held] / [1.0, 1.0, self.size])
+            if len(motions) and np.linalg.matrix_rank(motions, 1e-9) == 3:
+                continue
+            p = beam.mesh.p
+            far = int(np.argmax(np.sum((p - p[:, :1]) ** 2, axis=0)))
+            out += [s.start + node * beam.nd + k for node in (0, far) for k in range(2)]
+        out = np.array(out, dtype=int)
+        return out[self.free[out]]
+
+    @property
+    def bordered(self):
+        """True if the multipliers are few enough for a border about the band matrix."""
+        return self.m + len(self.springs) <= WIDE_BORDER
+
+    def free_rigid_motions(self):
+        """Descriptions of the rigid motions that nothing holds, one string each."""
+        sizes = [float(beam.mesh.lengths.sum()) for beam in self.beams]
+        values = np.concatenate([beam.rigid_motions() / [1.0, 1.0, size]
+                                 for beam, size in zip(self.beams, sizes)])
+        of_beam = np.repeat(np.arange(len(self.beams)), [b.N for b in self.beams])
+        motions = sparse.csr_array(
+            (values.ravel(), (3 * of_beam[:, None] + np.arange(3)).ravel(),
+             3 * np.arange(self.N + 1)), shape=(self.N, 3 * len(self.beams)))
+        held = sparse.vstack([motions[self.fixed],
+                              self.sparse_jacobian(np.zeros(self.N), 0.0) @ motions])
+        return [self._describe(v, sizes) for v in null_space(unit_rows(held))]
+
+    def _describe(self, v, sizes):
+        parts = []
+        for k, beam in enumerate(self.beams):
+            a, b, c = v[3 * k:3 * k + 3]
+            who = "" if len(self.beams) == 1 else f" of beam {beam.name or k}"
+            if max(abs(a), abs(b), abs(c)) < 1e-8:
+                continue
+            if abs(c) < 1e-8:
+                d = np.round(np.array([a, b]) / np.hypot(a, b), 8)
+                d = (d if d[np.argmax(np.abs(d))] > 0 else -d) + 0.0  # no -0
+                parts.append(f"translation along ({d[0]:.3g}, {d[1]:.3g}){who}")
+            else:
+                x = beam.origin + np.array([-b, a]) * sizes[k] / c
+                x = np.where(np.abs(x) < 1e-9 * sizes[k], 0.0, x)
+                parts.append(f"rotation about ({x[0]:.4g}, {x[1]:.4g}){who}")
+        return " with ".join(parts)
+
+    def require_supports(self):
+        """Raise SupportError if a rigid motion is free, or joints are not independent."""
+        if self._supported:  # nothing of it changes in the life of a system
+            return
+        self.require_independent_joints()
+        free = self.free_rigid_motions()
+        if free:
+            raise SupportError(
+                "the supports leave rigid motions free: " + "; ".join(free)
+                + ". Add a support, for example scene.clamp('left'), or solve in time with "
+                "scene.integrate")
+        self._supported = True
+
+
+def _fixes(joint, zero):
+    """Coordinates that the equations of a joint fix, and their factors; None if it does more."""
+    rows, dofs, factors = joint.entries(zero, 0.0)
+    if len(rows) != len(joint.equations) or not np.all(factors):
+        return None
+    order = np.argsort(rows)
+    if np.any(rows[order] != np.arange(len(rows))):
+        return None
+    return dofs[order], factors[order]

@@ -553,16 +553,16 @@ def actions(state: State) -> list[list[float]]:
     t = state.load if state.t is None else state.t
     held = np.zeros(system.N)
     held[system.fixed] = 1.0
-    rows = [held] + [row for joint in system.joints for row in joint.jacobian(state.u, t)]
-    out = []
+    J, out = system.sparse_jacobian(state.u, t).tocsc(), []
     for beam, s in zip(system.beams, system.slices):
         nodes = np.nonzero(np.any(held[s].reshape(-1, beam.nd) != 0, axis=1))[0]
         stations = [station_of_node(beam.mesh, int(k)) for k in nodes]
-        for row in rows[1:]:
-            if np.any(row[s]):
+        here = J[:, s]
+        for row in here[np.unique(here.indices)].toarray():
+            if np.any(row):
                 # an equation between neighbouring nodes: at both
-                loaded = np.nonzero(np.any(row[s].reshape(-1, beam.nd) != 0, axis=1))[0]
-                stations += (stations_of_vector(beam, row[s])
+                loaded = np.nonzero(np.any(row.reshape(-1, beam.nd) != 0, axis=1))[0]
+                stations += (stations_of_vector(beam, row)
                              or [station_of_node(beam.mesh, int(k)) for k in loaded])
         out.append(stations)
     return out

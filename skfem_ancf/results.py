@@ -370,8 +370,8 @@ class State(Frozen):
         total = (self.internal_force - self.load * self.system.external_force(self.u, self.t)
                  + self._inertia)
         t = self.load if self.t is None else self.t
-        for joint, part in zip(self.system.joints, self.system.multipliers_of(self.multipliers)):
-            total = total + part @ joint.jacobian(self.u, t)
+        if self.system.joints:
+            total = total + self.multipliers @ self.system.full_jacobian(self.u, t)
         return total
 
     def joint_force(self, joint):

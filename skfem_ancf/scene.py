@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from copy import copy
-from functools import wraps
+from functools import cached_property, wraps
 from threading import RLock
 from typing import TYPE_CHECKING, Any, cast
 
@@ -126,7 +126,7 @@ class Scene:
 
     def _parts(self):
         return {name: value for name, value in vars(self).items()
-                if name not in ("_lock", "_system")}
+                if name not in ("_lock", "_system", "_places", "N")}
 
     def __setstate__(self, state):
         vars(self).update(state, _lock=RLock(), _system=None)
@@ -165,16 +165,26 @@ class Scene:
 
     def beam(self, beam: WhichBeam = None) -> Beam:
         """The Beam meant by a Beam, a name, a number, or None where there is only one."""
-        return select_beam(self.beams, beam)
+        return self._beams[self._number(beam)]
+
+    @cached_property
+    def _places(self) -> dict:
+        """Number and first coordinate of each beam, by the identity of the object."""
+        first = np.cumsum([0] + [b.N for b in self._beams]).tolist()
+        return {id(b): (k, n) for k, (b, n) in enumerate(zip(self._beams, first))}
 
     def _number(self, beam):
-        return self._beams.index(select_beam(self._beams, beam))
+        if isinstance(beam, Beam):  # without asking all the others
+            found = self._places.get(id(beam))
+            if found is not None:
+                return found[0]
+        return self._places[id(select_beam(self._beams, beam))][0]
 
     def offset(self, beam: WhichBeam) -> int:
         """Number of the first coordinate of a beam among those of the scene."""
-        return sum(b.N for b in self._beams[:self._number(beam)])
+        return self._places[id(self.beam(beam))][1]
 
-    @property
+    @cached_property
     def N(self) -> int:
         """Number of coordinates of the scene."""
         return sum(b.N for b in self.beams)

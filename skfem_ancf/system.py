@@ -8,18 +8,22 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from .checks import Screen
-from .constraints import first_dependent, null_space, unit_rows
-from .errors import InputError, SupportError, shown
-from .joints.base import same_joint
-from .linalg import (INACCURATE, BandMatrix, BorderedMatrix, border, border_inertia,
-                     border_negative, columns_product, dense, hold)
+from .constraints import Constraints
+from .errors import InputError
+from .linalg import (INACCURATE, BandMatrix, BorderedMatrix, border, border_negative,
+                     columns_product, dense)
 from .pickling import functions_of, require_picklable
 from .points import Points
+from .rank import determinant_sign, null_basis, sparse_inertia
 
 logger = logging.getLogger(__name__)
 _NONE = np.zeros(0)
-#: Columns of a border above which sparse LU is faster.
-WIDE_BORDER = 96
+
+
+def _of_constraints(name):
+    """What the constraints have by this name, as an attribute of the system."""
+    return property(lambda self: getattr(self.constraints, name),
+                    doc=f"See :class:`~skfem_ancf.constraints.Constraints`, ``{name}``.")
 
 
 class System:
@@ -47,17 +51,42 @@ class System:
         self.offsets = np.concatenate([[0], np.cumsum([b.N for b in self.beams])])
         self.N = int(self.offsets[-1])
         self.slices = [slice(int(a), int(b)) for a, b in zip(self.offsets[:-1], self.offsets[1:])]
-        self._supported = False
         self._index = {id(b): k for k, b in enumerate(self.beams)}
-        self._eliminate(fixed, values, joints)
-        self.symmetric = all(load.symmetric for load in self.loads)
         self.size = float(sum(b.mesh.lengths.sum() for b in self.beams))
+        self.constraints = Constraints(self.beams, self.slices, self.size, fixed, values, joints)
+        self.symmetric = all(load.symmetric for load in self.loads)
         self.constant_force, self._varying = np.zeros(self.N), []
         for load in self.loads:
             if load.constant and load.amplitude is None:
                 self.constant_force[self.of(load)] += load.force(None)
             else:
                 self._varying.append(load)
+
+    fixed = _of_constraints("fixed")
+    free = _of_constraints("free")
+    mask = _of_constraints("mask")
+    values = _of_constraints("values")
+    values_at = _of_constraints("values_at")
+    given = _of_constraints("given")
+    moves = _of_constraints("moves")
+    all_joints = _of_constraints("all_joints")
+    joints = _of_constraints("joints")
+    m = _of_constraints("m")
+    constraint = _of_constraints("constraint")
+    drives = _of_constraints("drives")
+    full_jacobian = _of_constraints("full_jacobian")
+    sparse_jacobian = _of_constraints("sparse_jacobian")
+    jacobian = _of_constraints("jacobian")
+    quadratic = _of_constraints("quadratic")
+    curvature = _of_constraints("curvature")
+    curvature_times = _of_constraints("curvature_times")
+    multipliers_of = _of_constraints("multipliers_of")
+    joint_force = _of_constraints("joint_force")
+    springs = _of_constraints("springs")
+    bordered = _of_constraints("bordered")
+    free_rigid_motions = _of_constraints("free_rigid_motions")
+    require_independent_joints = _of_constraints("require_independent_joints")
+    require_supports = _of_constraints("require_supports")
 
     @cached_property
     def points(self):
@@ -78,174 +107,9 @@ class System:
     def __deepcopy__(self, memo):
         return self  # it is the same equations, however many states have them
 
-    def _eliminate(self, fixed, values, joints):
-        """Sort joints that only fix coordinates to the supports, the others to the multipliers."""
-        fixed, values = np.array(fixed, dtype=np.int64), np.array(values, dtype=float)
-        self.all_joints, self.joints, self._fixing, zero = list(joints), [], [], np.zeros(self.N)
-        for joint in joints:
-            rows = joint.jacobian(zero, 0.0)
-            dofs = np.argmax(np.abs(rows), axis=1)
-            if joint.constant and np.all(np.sum(rows != 0, axis=1) == 1):
-                clash = np.intersect1d(dofs, fixed)
-                if len(clash):
-                    raise SupportError(
-                        f"{joint!r} prescribes {self.describe_dof(clash[0])}, which a support or "
-                        "another joint fixes already: remove one of them, as the second of two "
-                        "clamps at one place")
-                self._fixing.append((joint, len(fixed), rows[np.arange(len(dofs)), dofs]))
-                fixed, values = np.append(fixed, dofs), np.append(values, np.zeros(len(dofs)))
-            else:
-                self.joints.append(joint)
-        self.fixed, self._values, self._held = fixed, values, np.zeros(len(fixed))
-        self._moving = [item for item in self._fixing if item[0].moving]
-        for joint, first, factors in self._fixing:
-            if not joint.moving:
-                phi = joint.value(zero, 0.0)
-                self._held[first:first + len(factors)] = -phi / factors
-        self.free = np.ones(self.N, dtype=bool)
-        self.free[fixed] = False
-        self.mask = self.free.astype(float)
-        self.m = sum(len(joint.equations) for joint in self.joints)
-
-    def describe_dof(self, k):
-        """What coordinate number k is, in words."""
-        b = int(np.searchsorted(self.offsets, k, side="right")) - 1
-        beam, node = self.beams[b], (k - self.offsets[b]) // self.beams[b].nd
-        who = "" if len(self.beams) == 1 else f" of beam {beam.name or b}"
-        return f"{beam.dofnames[(k - self.offsets[b]) % beam.nd]} of node {node}{who}"
-
     def of(self, load_or_beam):
         """The slice of the coordinates that a load or a beam has."""
         return self.slices[self._index[id(getattr(load_or_beam, "beam", load_or_beam))]]
-
-    # supports and joints
-
-    def values(self, load, t=None):
-        """Displacements of the fixed coordinates at a load factor and a time."""
-        values = load * self._values + self._held
-        for joint, first, factors in self._moving:
-            phi = joint.offset(np.array([load if t is None else t]), self.N)[0]
-            values[first:first + len(factors)] = -phi / factors
-        return values
-
-    def values_at(self, times):
-        """Displacements of the fixed coordinates at full load, at times (n,): (n, nfixed)."""
-        values = np.tile(self._values + self._held, (len(times), 1))
-        for joint, first, factors in self._moving:
-            values[:, first:first + len(factors)] = -joint.offset(times, self.N) / factors
-        return values
-
-    @property
-    def moves(self):
-        """True if a fixed coordinate has a displacement that is not zero, now or later."""
-        return bool(self._moving) or bool(np.any(self._values + self._held))
-
-    def constraint(self, u, t):
-        """Phi of the joints with multipliers, shape (m,)."""
-        if not self.joints:
-            return np.zeros(0)
-        return np.concatenate([joint.value(u, t) for joint in self.joints])
-
-    @property
-    def drives(self):
-        """True if a joint with multipliers depends on time."""
-        return any(joint.moving for joint in self.joints)
-
-    def full_jacobian(self, u, t):
-        """Derivative of :meth:`constraint` by all coordinates, shape (m, N).
-
-        Sparse where the multipliers are too many for a border.
-        """
-        if not self.bordered:
-            return self.sparse_jacobian(u, t)
-        J = np.zeros((self.m, self.N))
-        rows, columns, values = self._entries(u, t)
-        np.add.at(J, (rows, columns), values)
-        return J
-
-    def sparse_jacobian(self, u, t):
-        """As :meth:`full_jacobian`, as a scipy.sparse array in CSR format."""
-        rows, columns, values = self._entries(u, t)
-        return sparse.csr_array((values, (rows, columns)), shape=(self.m, self.N))
-
-    def _entries(self, u, t):
-        """Rows, columns and values of :meth:`full_jacobian`."""
-        first, parts = 0, [(np.zeros(0, dtype=int), np.zeros(0, dtype=int), _NONE)]
-        for joint in self.joints:
-            rows, columns, values = joint.entries(u, t)
-            parts.append((first + rows, columns, values))
-            first += len(joint.equations)
-        return tuple(np.concatenate(column) for column in zip(*parts))
-
-    def jacobian(self, u, t):
-        """As :meth:`full_jacobian`, zero at fixed coordinates."""
-        J = self.full_jacobian(u, t)
-        if not self.bordered:
-            J.data *= self.mask[J.indices]
-            return J
-        J[:, self.fixed] = 0.0
-        return J
-
-    def quadratic(self, u, t, v):
-        """The second derivative of :meth:`constraint` in the direction v, shape (m,)."""
-        out = []
-        for joint in self.joints:
-            for unit in np.eye(len(joint.equations)):
-                second = joint.curvature(u, t, unit)
-                out.append(0.0 if second is None else second[2] @ (v[second[0]] * v[second[1]]))
-        return np.array(out)
-
-    def curvature(self, u, t, multipliers):
-        """sum_k multipliers[k] d^2 Phi_k / du^2 at free coordinates, sparse, shape (N, N)."""
-        i, j, v = self._curvature(u, t, multipliers)
-        v = v * (self.free[i] & self.free[j])
-        return sparse.csr_matrix((v, (i, j)), shape=(self.N, self.N))
-
-    def _curvature(self, u, t, multipliers):
-        parts = [joint.curvature(u, t, part)
-                 for joint, part in zip(self.joints, self.multipliers_of(multipliers))]
-        parts = [part for part in parts if part is not None]
-        if not parts:
-            none = np.zeros(0, dtype=int)
-            return none, none, np.zeros(0)
-        return tuple(np.concatenate(column) for column in zip(*parts))
-
-    def curvature_times(self, u, t, multipliers, v):
-        """:meth:`curvature` times a vector (N,)."""
-        i, j, values = self._curvature(u, t, multipliers)
-        return np.bincount(i, values * v[j], self.N)
-
-    def multipliers_of(self, multipliers):
-        """The multipliers joint by joint: a list in the order of :attr:`joints`."""
-        if not self.joints:
-            return []
-        ends = np.cumsum([len(joint.equations) for joint in self.joints])[:-1]
-        return np.split(multipliers, ends)
-
-    def joint_force(self, joint, multipliers, reaction):
-        """What a joint does to its first beam, in the order of ``joint.equations``."""
-        for known, part in zip(self.joints, self.multipliers_of(multipliers)):
-            if same_joint(known, joint):
-                return -part
-        for known, first, factors in self._fixing:
-            if same_joint(known, joint):
-                return reaction[self.fixed[first:first + len(factors)]] / factors
-        raise SupportError(f"{shown(joint)} is not a joint of this scene")
-
-    def require_independent_joints(self):
-        """Raise SupportError if joints repeat or contradict each other or the supports."""
-        if not self.joints:
-            return
-        zero = np.zeros(self.N)
-        found = first_dependent(self.sparse_jacobian(zero, 0.0), self.free,
-                                self.constraint(zero, 0.0))
-        if found is None:
-            return
-        k, gap = found
-        joint, equation = [(joint, name) for joint in self.joints for name in joint.equations][k]
-        kind = "repeats" if abs(gap) <= 1e-9 * self.size else "contradicts"
-        raise SupportError(f"{joint!r}, equation {equation!r}, {kind} what the supports and the "
-                           "joints before it hold already: remove one of them")
 
     # forces and energies
 
@@ -462,29 +326,6 @@ class System:
         """The assembled tangent times a vector, before :meth:`factorize`."""
         return self.K.multiply(v)
 
-    @cached_property
-    def springs(self):
-        """Coordinates that hold the beams which their own supports leave free to move.
-
-        The positions of two nodes far apart, for each such beam.
-        """
-        out = []
-        for beam, s in zip(self.beams, self.slices):
-            held = self.fixed[(self.fixed >= s.start) & (self.fixed < s.stop)] - s.start
-            motions = unit_rows(beam.rigid_motions()[held] / [1.0, 1.0, self.size])
-            if len(motions) and np.linalg.matrix_rank(motions, 1e-9) == 3:
-                continue
-            p = beam.mesh.p
-            far = int(np.argmax(np.sum((p - p[:, :1]) ** 2, axis=0)))
-            out += [s.start + node * beam.nd + k for node in (0, far) for k in range(2)]
-        out = np.array(out, dtype=int)
-        return out[self.free[out]]
-
-    @property
-    def bordered(self):
-        """True if the multipliers are few enough for a border about the band matrix."""
-        return self.m + len(self.springs) <= WIDE_BORDER
-
     def factorize(self, u=None, t=0.0, multipliers=None):
         """Fix the supports in the tangent and factorise it, with the joints where there are any."""
         self.K.fix(self.fixed_positions)
@@ -492,14 +333,12 @@ class System:
             self.K.factorize()
             return
         self._J = self.jacobian(u, t)
-        i, j, v = self._curvature(u, t, multipliers)
-        v = v * (self.free[i] & self.free[j])
+        i, j, v = self.constraints.curvature_entries(u, t, multipliers)
         self._outside, self._sparse = (i, j, v), None
         if self.bordered:
             self._factors = BorderedMatrix(self.K, self._J, i, j, v, self.springs)
         else:
-            self._sparse = self._sparse_factors(
-                self.K.tocsc() + sparse.csc_matrix((v, (i, j)), shape=(self.N, self.N)))
+            self._sparse = self._sparse_factors(self._whole())
 
     def inertia(self):
         """Signs of the eigenvalues of the tangent that :meth:`factorize` has factorised.
@@ -534,9 +373,8 @@ class System:
             return K.inertia()
         if self.bordered:
             return self._factors.inertia()
-        K = self.K.symmetric_part()
-        picked, S = hold(K, *self._outside, self.springs)
-        return border_inertia(K, picked, S, dense(self._J))
+        K = self._reduced()
+        return sparse_inertia(0.5 * (K + K.T))
 
     def stays(self, u, t, multipliers):
         """True if the factors left by an iteration say that no direction gives way.
@@ -555,8 +393,7 @@ class System:
             return True
         K.to_cholesky()
         J = self.jacobian(u, t)
-        i, j, v = self._curvature(u, t, multipliers)
-        v = v * (self.free[i] & self.free[j])
+        i, j, v = self.constraints.curvature_entries(u, t, multipliers)
         picked, S = border(K.bandwidth, i, j, v, self.springs,
                            0.5 * K.factored_diagonal(self.springs))
         return border_negative(0, columns_product(K, picked, J), S, self.m)[0] == 0
@@ -570,12 +407,17 @@ class System:
             return self.K.determinant_sign()
         if self.bordered:
             return self._factors.determinant_sign()
-        free = np.nonzero(self.free)[0]
+        return determinant_sign(self._reduced())
+
+    def _whole(self):
+        """The tangent with what joints add to it, sparse."""
         i, j, v = self._outside
-        K = self.K.tocsc() + sparse.csc_matrix((v, (i, j)), shape=(self.N, self.N))
-        J = sparse.csr_matrix(self._J[:, free] * self._weight)
-        A = sparse.bmat([[K[free][:, free], J.T], [J, None]]).toarray()
-        return int(np.linalg.slogdet(A)[0]) * (-1) ** self.m
+        return self.K.tocsc() + sparse.csc_array((v, (i, j)), shape=(self.N, self.N))
+
+    def _reduced(self):
+        """The tangent on the tangent space of the joints, sparse."""
+        T = null_basis(self._J)
+        return (T.T @ self._whole() @ T).tocsc()
 
     def _sparse_factors(self, K):
         self._weight = float(np.mean(np.abs(K.diagonal()[self.free])))
@@ -608,48 +450,3 @@ class System:
             self._sparse = self._sparse_factors(self._factors.tocsc())
         x = self._sparse.solve(np.append(b, self._weight * phi))
         return x[:self.N], self._weight * x[self.N:]
-
-    # rigid motions
-
-    def free_rigid_motions(self):
-        """Descriptions of the rigid motions that nothing holds, one string each."""
-        sizes = [float(beam.mesh.lengths.sum()) for beam in self.beams]
-        values = np.concatenate([beam.rigid_motions() / [1.0, 1.0, size]
-                                 for beam, size in zip(self.beams, sizes)])
-        of_beam = np.repeat(np.arange(len(self.beams)), np.diff(self.offsets))
-        motions = sparse.csr_array(
-            (values.ravel(), (3 * of_beam[:, None] + np.arange(3)).ravel(),
-             3 * np.arange(self.N + 1)), shape=(self.N, 3 * len(self.beams)))
-        held = sparse.vstack([motions[self.fixed],
-                              self.sparse_jacobian(np.zeros(self.N), 0.0) @ motions])
-        return [self._describe(v, sizes) for v in null_space(unit_rows(held))]
-
-    def _describe(self, v, sizes):
-        parts = []
-        for k, beam in enumerate(self.beams):
-            a, b, c = v[3 * k:3 * k + 3]
-            who = "" if len(self.beams) == 1 else f" of beam {beam.name or k}"
-            if max(abs(a), abs(b), abs(c)) < 1e-8:
-                continue
-            if abs(c) < 1e-8:
-                d = np.round(np.array([a, b]) / np.hypot(a, b), 8)
-                d = (d if d[np.argmax(np.abs(d))] > 0 else -d) + 0.0  # no -0
-                parts.append(f"translation along ({d[0]:.3g}, {d[1]:.3g}){who}")
-            else:
-                x = beam.origin + np.array([-b, a]) * sizes[k] / c
-                x = np.where(np.abs(x) < 1e-9 * sizes[k], 0.0, x)
-                parts.append(f"rotation about ({x[0]:.4g}, {x[1]:.4g}){who}")
-        return " with ".join(parts)
-
-    def require_supports(self):
-        """Raise SupportError if a rigid motion is free, or joints are not independent."""
-        if self._supported:  # nothing of it changes in the life of a system
-            return
-        self.require_independent_joints()
-        free = self.free_rigid_motions()
-        if free:
-            raise SupportError(
-                "the supports leave rigid motions free: " + "; ".join(free)
-                + ". Add a support, for example scene.clamp('left'), or solve in time with "
-                "scene.integrate")
-        self._supported = True

@@ -108,7 +108,7 @@ def held(name, pressure=False):
 def test_joints_are_solved_like_the_dense_system(name, border, pressure, monkeypatch):
     """The border, and sparse LU where it is too wide, against the whole matrix."""
     if not border:
-        monkeypatch.setattr("skfem_ancf.system.WIDE_BORDER", 0)
+        monkeypatch.setattr("skfem_ancf.constraints.WIDE_BORDER", 0)
     s = held(name, pressure).system
     rng = np.random.default_rng(4)
     # the prescribed joints leave the forearm of the elbow one motion: a stress holds it

@@ -77,13 +77,14 @@ def fingerprint(system: System) -> dict[str, str]:
         parts[f"material {who}"] = _digest(type(beam.material).__name__, *_numbers(beam.material))
         parts[f"width {who}"] = _digest(beam.width)
         parts[f"formulation {who}"] = _digest(beam.formulation.name, *_numbers(beam.formulation))
-    parts["supports"] = _digest(system.fixed, system.values(1.0, 0.0)[:0], system._values)
+    parts["supports"] = _digest(system.fixed, system.values(1.0, 0.0)[:0], system.given)
     for k, load in enumerate(system.loads):
         u = 1e-3 * load.beam.mesh.height * probe[system.of(load)]
         parts[f"load {k}"] = _digest(type(load).__name__, system.beams.index(load.beam),
                                      load.amplitude is None, load.force(0.0 * u), load.force(u))
     for k, joint in enumerate(system.all_joints):
-        J = [] if joint.moving else [joint.jacobian(u, 0.0) for u in (0.0 * probe, probe)]
+        J = [] if joint.moving else [a for u in (0.0 * probe, probe)
+                                     for a in joint.entries(u, 0.0)]
         J += [] if joint.moving else [joint.value(0.0 * probe, 0.0)]
         parts[f"joint {k}"] = _digest(type(joint).__name__, joint.equations, joint.moving, *J)
     return parts

@@ -89,7 +89,8 @@ def gradients(*equations: list) -> tuple[Array, Array, Array]:
     rows, columns, values
         Shapes (k,).
     """
-    rows, columns, values = [], [], []
+    none = np.zeros(0, dtype=int)
+    rows, columns, values = [none], [none], [np.zeros(0)]
     for k, terms in enumerate(equations):
         for vector, direction in terms:
             found = vector.entries(direction)
@@ -139,9 +140,20 @@ class Joint(Sealable):
         """Of :meth:`jacobian` and :meth:`entries` the one that a class defines gives the other."""
         super().__init_subclass__(**options)
         if "jacobian" in vars(cls) and "entries" not in vars(cls):
-            cls.entries = Joint.entries
+            def entries(self, u, t):
+                J = cls.jacobian(self, u, t)
+                rows, columns = np.nonzero(J)
+                return rows, columns, J[rows, columns]
+
+            cls.entries = entries
         elif "entries" in vars(cls) and "jacobian" not in vars(cls):
-            cls.jacobian = Joint.jacobian
+            def jacobian(self, u, t):
+                rows, columns, values = cls.entries(self, u, t)
+                J = np.zeros((len(self.equations), len(u)))
+                np.add.at(J, (rows, columns), values)
+                return J
+
+            cls.jacobian = jacobian
 
     def bind(self, scene: Scene) -> None:
         """Find the points and sections in the scene's coordinates.
@@ -186,18 +198,13 @@ class Joint(Sealable):
         ndarray
             Shape (m, N).
         """
-        if type(self).entries is Joint.entries:
-            raise NotImplementedError("a joint defines jacobian(u, t) or entries(u, t)")
-        rows, columns, values = self.entries(u, t)
-        J = np.zeros((len(self.equations), len(u)))
-        np.add.at(J, (rows, columns), values)
-        return J
+        raise NotImplementedError("a joint defines jacobian(u, t) or entries(u, t)")
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         """The entries of :meth:`jacobian` that are not zero; those at one place add up.
 
-        A joint that defines them costs what it holds, however many beams a scene has; by default
-        they are looked for in the dense rows.
+        A joint that defines them costs what it holds, however many beams a scene has; else they
+        are looked for in the dense rows.
 
         Parameters
         ----------
@@ -211,9 +218,7 @@ class Joint(Sealable):
         rows, columns, values
             Shapes (k,).
         """
-        J = self.jacobian(u, t)
-        rows, columns = np.nonzero(J)
-        return rows, columns, J[rows, columns]
+        raise NotImplementedError("a joint defines jacobian(u, t) or entries(u, t)")
 
     def curvature(self, u: Array, t: float,
                   multipliers: Array) -> tuple[Array, Array, Array] | None:

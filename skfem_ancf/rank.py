@@ -1,0 +1,221 @@
+"""Rank, null spaces and inertia of sparse matrices."""
+
+import numpy as np
+import scipy.linalg
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+
+from .linalg import SMALL, Inertia, beside_zero
+
+#: Rest of a row beside those before it, relative to the row, that is round-off.
+DEPENDENT = 1e-9
+#: Smallest over largest singular value of what is held that is round-off.
+FREE = 1e-9
+#: Entries of L, of a matrix of unit diagonal, from which its pivots are not trusted.
+LARGEST = 1e6
+#: Columns up to which singular values are found by dense matrices.
+DENSE = 300
+#: Vectors of a null space that are looked for where it is not dense, and iterations for them.
+MOST, ITERATIONS = 8, 6
+
+
+def first_dependent(J, free, phi):
+    """The first equation that those before it hold already, or None.
+
+    The rows of J fall apart into groups without a common coordinate. In each group QR
+    orthogonalises the rows in their order: what is left of a row is on the diagonal of R.
+
+    Parameters
+    ----------
+    J
+        Sparse, shape (m, N).
+    free
+        Truth values of the coordinates that supports leave free, shape (N,).
+    phi
+        What each equation is open by, shape (m,).
+
+    Returns
+    -------
+    tuple or None
+        The number of the equation, and what it is open by where those before it are met.
+    """
+    size = np.sqrt(np.asarray(J.multiply(J).sum(axis=1)).ravel())
+    first = None
+    for rows, _, A in groups(J @ sparse.diags(free.astype(float))):
+        if first is not None and rows[0] > first[0]:
+            continue
+        R = np.linalg.qr(A.T, mode="r")
+        rest, k = np.zeros(len(rows)), min(R.shape)
+        rest[:k] = np.abs(np.diag(R))
+        dependent = np.flatnonzero(rest <= DEPENDENT * size[rows])
+        if len(dependent) and (first is None or rows[dependent[0]] < first[0]):
+            k = dependent[0]
+            known = scipy.linalg.solve_triangular(R[:k, :k], phi[rows[:k]], trans="T")
+            first = int(rows[k]), float(phi[rows[k]] - R[:k, k] @ known)
+    return first
+
+
+def groups(J):
+    """The rows of a sparse matrix in groups without a common column.
+
+    Yields
+    ------
+    rows, columns, A
+        Numbers of the rows, increasing, of the columns that are not zero in all of them, and the
+        dense matrix between both.
+    """
+    J = sparse.csr_array(J)
+    J.eliminate_zeros()
+    (m, n), entries = J.shape, J.tocoo()
+    links = sparse.coo_array((np.ones(J.nnz), (entries.row, m + entries.col)), (m + n, m + n))
+    number, group = connected_components(links, directed=False)
+    rows, row = _members(group[:m], number)
+    columns, column = _members(group[m:], number)
+    for g, some in enumerate(_members(group[entries.row], number)[0]):
+        if len(rows[g]):
+            A = np.zeros((len(rows[g]), len(columns[g])))
+            A[row[entries.row[some]], column[entries.col[some]]] = entries.data[some]
+            yield rows[g], columns[g], A
+
+
+def _members(group, number):
+    """The members of each group, and the place that each member has in its group."""
+    order, count = np.argsort(group, kind="stable"), np.bincount(group, minlength=number)
+    place, ends = np.empty(len(group), dtype=int), np.cumsum(count)
+    place[order] = np.arange(len(group)) - np.repeat(ends - count, count)
+    return [order[last - n:last] for n, last in zip(count, ends)], place
+
+
+def null_basis(J):
+    """A sparse matrix whose columns span the null space of a sparse J of full rank.
+
+    In each of the :func:`groups` of its rows as many coordinates as there are rows are given by
+    the others: those that QR with pivots takes first.
+
+    Parameters
+    ----------
+    J
+        Shape (m, N).
+
+    Returns
+    -------
+    scipy.sparse.csr_array
+        Shape (N, N - m): every other coordinate is an unknown of its own.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the rows depend on each other.
+    """
+    n, given = J.shape[1], []
+    for rows, columns, A in groups(J):
+        k = len(rows)
+        R, order = scipy.linalg.qr(A, mode="r", pivoting=True, check_finite=False)
+        rest = np.abs(np.diag(R))
+        if k > A.shape[1] or rest[k - 1] <= DEPENDENT * rest[0]:
+            raise np.linalg.LinAlgError("the joints are not independent in this state")
+        C = -scipy.linalg.solve_triangular(R[:, :k], R[:, k:])
+        given.append((np.repeat(columns[order[:k]], C.shape[1]), np.tile(columns[order[k:]], k),
+                      C.ravel(), columns[order[:k]]))
+    none = np.zeros(0, dtype=int)
+    rows, columns, values, pivots = map(np.concatenate, zip((none, none, np.zeros(0), none),
+                                                            *given))
+    own = np.delete(np.arange(n), pivots)
+    number = np.empty(n, dtype=int)
+    number[own] = np.arange(len(own))
+    return sparse.csr_array(
+        (np.append(values, np.ones(len(own))),
+         (np.append(rows, own), np.append(number[columns], number[own]))), shape=(n, len(own)))
+
+
+def sparse_inertia(A):
+    """The :class:`~skfem_ancf.linalg.Inertia` of a sparse symmetric matrix.
+
+    From the signs of the pivots of ``L D L^T``, by Sylvester's law.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If there are no factors with pivots on the diagonal.
+    """
+    size = np.abs(A.diagonal())
+    size[size == 0.0] = np.max(size)
+    scale = sparse.diags(1.0 / np.sqrt(size))
+    A = scale @ A @ scale
+    try:
+        if np.all(_pivots(A) > SMALL):
+            return Inertia(0, False)
+    except np.linalg.LinAlgError:  # singular to the last bit, which a shift is not
+        pass
+    one = sparse.eye(len(size))
+    return beside_zero(lambda shift: int(np.sum(_pivots(A + shift * one) < 0.0)))
+
+
+def _pivots(A):
+    """The pivots of a symmetric matrix of unit diagonal; entries of L that grow are refused."""
+    for order in ("MMD_AT_PLUS_A", "COLAMD"):
+        try:
+            lu = splu(A.tocsc(), order, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        except RuntimeError:  # a pivot is zero
+            continue
+        if np.array_equal(lu.perm_r, lu.perm_c) and np.max(np.abs(lu.L.data)) < LARGEST:
+            return lu.U.diagonal()
+    raise np.linalg.LinAlgError("the matrix is singular")
+
+
+def determinant_sign(A):
+    """The sign of the determinant of a sparse matrix: 1 or -1."""
+    lu, one = splu(A.tocsc()), sparse.eye(A.shape[0], format="csr")
+    odd = np.sum(lu.U.diagonal() < 0.0)
+    for order in (lu.perm_r, lu.perm_c):  # a cycle of k is k - 1 exchanges
+        odd += len(order) - connected_components(one[order])[0]
+    return -1 if odd % 2 else 1
+
+
+def unit_rows(A):
+    """The rows of a matrix scaled to a largest entry of 1, without those that are zero.
+
+    Rows for slopes have another unit than rows for positions.
+    """
+    norms = abs(A).max(axis=1) if A.shape[0] else np.zeros(0)
+    norms = norms.toarray().ravel() if sparse.issparse(norms) else norms
+    A, scale = A[norms > 0], 1.0 / norms[norms > 0]
+    return sparse.diags(scale) @ A if sparse.issparse(A) else scale[:, None] * A
+
+
+def null_space(H):
+    """Vectors that span the null space of a sparse matrix, as rows; of a large one some.
+
+    Parameters
+    ----------
+    H
+        Shape (r, n), rows of about unit size.
+
+    Returns
+    -------
+    ndarray
+        Shape (k, n); with more than :data:`DENSE` columns at most :data:`MOST`.
+    """
+    n = H.shape[1]
+    if not H.shape[0]:
+        return np.eye(n)[:n if n <= DENSE else MOST]
+    if n <= DENSE:
+        _, sigma, V = np.linalg.svd(np.linalg.qr(H.toarray(), mode="r"))
+        return V[int(np.sum(sigma > FREE * sigma[0])):]
+    # inverse iteration with H^T H + small^2, whose condition number is the square of this one's
+    small = 0.1 * FREE
+    lu = splu(sparse.bmat([[small * sparse.eye(H.shape[0]), H],
+                                  [H.T, -small * sparse.eye(n)]], format="csc"))
+    X = np.random.default_rng(0).standard_normal((n, MOST))
+    for _ in range(ITERATIONS):
+        X = np.linalg.qr(lu.solve(np.vstack([np.zeros((H.shape[0], MOST)), X]))[H.shape[0]:])[0]
+    _, sigma, V = np.linalg.svd(np.linalg.qr(H @ X, mode="r"))
+    largest = np.sqrt(sparse.linalg.norm(H, 1) * sparse.linalg.norm(H, np.inf))
+    X = X @ V[sigma <= FREE * largest].T
+    # as few beams in each vector as there may be
+    _, R, pivots = scipy.linalg.qr(X.T, mode="economic", pivoting=True)
+    k = len(R)
+    out = np.empty((k, n))
+    out[:, pivots] = scipy.linalg.solve_triangular(R[:, :k], R)
+    return out / np.linalg.norm(out, axis=1)[:, None]
