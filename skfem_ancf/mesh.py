@@ -1,12 +1,14 @@
 """Meshes of planar beams: a chain of nodes on the axis, and the height of the section."""
 
+from __future__ import annotations
+
 import json
 import logging
 import warnings
 from contextlib import ExitStack
 from dataclasses import dataclass, fields, replace
 from threading import Lock
-from typing import Optional
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 from numpy import ndarray
@@ -24,6 +26,13 @@ from .mapping import MappingBeam
 from .pickling import require_picklable
 from .places import is_point
 from .reference import ElementBeamP1
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
+
+    from .types import Array, StrPath
 
 logger = logging.getLogger(__name__)
 #: The filters of warnings belong to all threads: one at a time sets and restores them.
@@ -90,14 +99,15 @@ class MeshBeam(Frozen, Mesh2D):
     p_Y: ndarray = None  # type: ignore[assignment]
     lengths: ndarray = None  # type: ignore[assignment]
     s: ndarray | None = None
-    curve: Optional["Curve"] = None
+    curve: Curve | None = None
     p_XY: ndarray | None = None
     sections: str = "linear"
 
     # construction
 
     @classmethod
-    def init_line(cls, x, height, origin=(0.0, 0.0), angle=0.0):
+    def init_line(cls, x: ArrayLike, height: float, origin: ArrayLike = (0.0, 0.0),
+                  angle: float = 0.0) -> MeshBeam:
         """A straight beam.
 
         Parameters
@@ -107,7 +117,7 @@ class MeshBeam(Frozen, Mesh2D):
         height
             Height of the section.
         origin
-            The point from which ``x`` is measured.
+            The point, shape (2,), from which ``x`` is measured.
         angle
             Direction of the axis, in radians from the first coordinate axis, at most 2 pi in
             size.
@@ -141,7 +151,8 @@ class MeshBeam(Frozen, Mesh2D):
                                np.diff(x), height, s=x)
 
     @classmethod
-    def init_curve(cls, r, s, height, dr=None):
+    def init_curve(cls, r: Callable[[Array], ArrayLike], s: ArrayLike, height: float,
+                   dr: Callable[[Array], ArrayLike] | None = None) -> MeshBeam:
         """A beam that is curved in its stress-free state.
 
         Parameters
@@ -204,7 +215,7 @@ class MeshBeam(Frozen, Mesh2D):
         return mesh
 
     @classmethod
-    def init_refdom(cls):
+    def init_refdom(cls) -> MeshBeam:
         return cls.init_line([0.0, 1.0], height=1.0, origin=(0.0, 0.5))
 
     def __post_init__(self):
@@ -271,7 +282,7 @@ class MeshBeam(Frozen, Mesh2D):
         self.p_Y = np.array([-self.p_X[1], self.p_X[0]])
         self.p_XY = np.zeros(p.shape)
 
-    def with_sections(self, sections):
+    def with_sections(self, sections: str) -> MeshBeam:
         """The mesh with section directors interpolated "linear" or "cubic" along the axis.
 
         Elements with sections that vary linearly along X hold the stress-free state of a curved
@@ -281,7 +292,7 @@ class MeshBeam(Frozen, Mesh2D):
         require_option("interpolation of the sections", sections, ("linear", "cubic"))
         return self if sections == self.sections else replace(self, sections=sections)
 
-    def replace(self, **changes):
+    def replace(self, **changes: Any) -> MeshBeam:
         """The mesh with another ``height``, or without its ``curve``.
 
         Positions, tangents and lengths depend on each other: for others use :meth:`init_line`,
@@ -338,7 +349,7 @@ class MeshBeam(Frozen, Mesh2D):
         self._f2t = f2t
 
     @property
-    def f2t(self):
+    def f2t(self) -> Array:
         if not hasattr(self, "_f2t"):
             self._init_facets()
         return self._f2t
@@ -350,12 +361,12 @@ class MeshBeam(Frozen, Mesh2D):
         return {"left": ends[0][:1].astype(np.int32), "right": ends[1][-1:].astype(np.int32),
                 "bottom": n + elements, "top": n + ne + elements}
 
-    def normalize_facets(self, facets):
+    def normalize_facets(self, facets: Any) -> Array:
         if isinstance(facets, str) and facets not in (self.boundaries or {}):
             raise NameUnknown("boundary", facets, self.boundaries or {})
         return super().normalize_facets(facets)
 
-    def normalize_elements(self, elements):
+    def normalize_elements(self, elements: Any) -> Array:
         if isinstance(elements, str):
             require_option("subdomain", elements, self.subdomains or {})
             return np.asarray(super().normalize_elements(elements))
@@ -381,7 +392,24 @@ class MeshBeam(Frozen, Mesh2D):
             raise MeshError(f"the elements are numbered 0 to {self.nelements - 1}, got {bad[0]}")
         return elements
 
-    def facets_satisfying(self, test, boundaries_only=False, normal=None):
+    def facets_satisfying(self, test: Callable[[Array], Array], boundaries_only: bool = False,
+                          normal: ArrayLike | None = None) -> Array:
+        """The facets for whose middle a function is true.
+
+        Parameters
+        ----------
+        test
+            Takes points x (2, n), returns n truth values.
+        boundaries_only
+            No sections between two elements.
+        normal
+            Direction, shape (2,), of the side that the facets are given; None for no side.
+
+        Returns
+        -------
+        ndarray
+            Numbers of facets, shape (k,); an ``OrientedBoundary`` with ``normal``.
+        """
         middle = np.array([[0.5]])
         mapping = self._mapping()
         facets = _satisfying(test, mapping.G(middle)[:, :, 0])
@@ -393,20 +421,20 @@ class MeshBeam(Frozen, Mesh2D):
         normals = mapping.normals(points, tind, facets, self.t2f)[:, :, 0]
         return OrientedBoundary(facets, 1 * (np.asarray(normal) @ normals < 0))
 
-    def elements_satisfying(self, test):
+    def elements_satisfying(self, test: Callable[[Array], Array]) -> Array:
         middle = self._mapping().F(np.array([[0.5], [0.5]]))[:, :, 0]
         return _satisfying(test, middle)
 
-    def params(self):
+    def params(self) -> Array:
         """Length of each element."""
         return self.lengths
 
-    def param(self):
+    def param(self) -> float:
         """Length of the longest element."""
         return float(np.max(self.lengths))
 
     @property
-    def is_straight(self):
+    def is_straight(self) -> bool:
         """True if every element is straight with sections normal to it."""
         if not hasattr(self, "_is_straight"):
             d = (self.p[:, self.t[1]] - self.p[:, self.t[0]]) / self.lengths
@@ -417,7 +445,7 @@ class MeshBeam(Frozen, Mesh2D):
         return self._is_straight
 
     @property
-    def is_uniform(self):
+    def is_uniform(self) -> bool:
         """True if every element is straight and of the same length: one table serves them all."""
         if not hasattr(self, "_is_uniform"):
             # the round-off of the nodes' positions is no difference in length
@@ -426,7 +454,7 @@ class MeshBeam(Frozen, Mesh2D):
                 np.ptp(self.lengths) <= 1e-13 * np.max(self.lengths) + noise)
         return self._is_uniform
 
-    def element_finder(self, mapping=None):
+    def element_finder(self, mapping: Any = None) -> Callable[..., Array]:
         """A function from points x, y to the elements that hold them.
 
         The function raises :class:`MeshError` for points outside the body.
@@ -471,7 +499,7 @@ class MeshBeam(Frozen, Mesh2D):
     def _uniform(self):
         return self._adaptive(np.arange(self.nelements))
 
-    def refined(self, times_or_ix=1):
+    def refined(self, times_or_ix: Any = 1) -> MeshBeam:
         """A finer mesh: new nodes on the curve, numbered along the axis; names are kept.
 
         Parameters
@@ -486,7 +514,8 @@ class MeshBeam(Frozen, Mesh2D):
                 f"a mesh of {MAX_ELEMENTS} elements at most"))
         return self._adaptive(times_or_ix)
 
-    def graded(self, at=("left",), size=None, growth=0.5):
+    def graded(self, at: Any = ("left",), size: float | None = None,
+               growth: float = 0.5) -> MeshBeam:
         """A mesh that is finer near sections: for the boundary layers of supports and loads.
 
         Elements are halved until those within one and a half heights of the sections are not
@@ -623,9 +652,25 @@ class MeshBeam(Frozen, Mesh2D):
                          OrientedBoundary(new[order], np.asarray(ori)[source][order]))
         return out
 
-    def restrict(self, elements, return_mapping=False, skip_boundaries=False,
-                 skip_subdomains=False):
-        """The mesh of some elements; a part cut off keeps the numbering along the axis."""
+    def restrict(self, elements: Any, return_mapping: bool = False, skip_boundaries: bool = False,
+                 skip_subdomains: bool = False) -> Any:
+        """The mesh of some elements; a part cut off keeps the numbering along the axis.
+
+        Parameters
+        ----------
+        elements
+            Numbers of elements, shape (k,), a mask, the name of a subdomain, or a function of
+            the points.
+        return_mapping
+            Return the numbers of the nodes that are left, too.
+        skip_boundaries, skip_subdomains
+            Leave the names out.
+
+        Returns
+        -------
+        MeshBeam
+            With ``return_mapping`` a pair: the mesh, and nodes of shape (n,).
+        """
         elements = np.unique(self.normalize_elements(elements))
         if len(elements) == 0:
             raise MeshError("a mesh needs at least one element: the given set is empty")
@@ -662,37 +707,61 @@ class MeshBeam(Frozen, Mesh2D):
                        p_XY=None if self.p_XY is None else rotation @ self.p_XY / scale,
                        lengths=scale * self.lengths, height=scale * self.height)
 
-    def translated(self, diffs):
-        """The mesh moved by a vector of shape (2,)."""
+    def translated(self, diffs: ArrayLike) -> MeshBeam:
+        """The mesh moved by a vector.
+
+        Parameters
+        ----------
+        diffs
+            The vector, shape (2,).
+        """
         return self._moved(np.eye(2), require_finite("the shift", diffs, (2,)))
 
-    def rotated(self, angle, about=(0.0, 0.0)):
-        """The mesh turned by an angle in radians about a point."""
+    def rotated(self, angle: float, about: ArrayLike = (0.0, 0.0)) -> MeshBeam:
+        """The mesh turned about a point.
+
+        Parameters
+        ----------
+        angle
+            In radians, counterclockwise, at most 2 pi in size.
+        about
+            The point, shape (2,).
+
+        Returns
+        -------
+        MeshBeam
+        """
         angle, about = _radians(angle), require_finite("about", about, (2,))
         c, s = np.cos(angle), np.sin(angle)
         Q = np.array([[c, -s], [s, c]])
         return self._moved(Q, about - Q @ about)
 
-    def scaled(self, factors):
-        """The mesh, with its height, scaled by one positive factor."""
+    def scaled(self, factors: ArrayLike) -> MeshBeam:
+        """The mesh, with its height, scaled.
+
+        Parameters
+        ----------
+        factors
+            One positive number, or several that are equal, shape (n,).
+        """
         f = np.unique(require_finite("factors", factors))
         if len(f) != 1 or f[0] <= 0:
             raise MeshError(f"a beam is scaled by one positive factor in all directions, got "
                             f"{factors!r}; sections would not stay normal otherwise")
         return self._moved(np.eye(2), np.zeros(2), f[0])
 
-    def _refuse(self, what):
+    def _refuse(self, what: str) -> NoReturn:
         raise MeshError(
             f"a MeshBeam cannot be {what}: it is one chain of nodes with sections. Put several "
             "beams into one Scene and join them, or build the mesh with init_line or init_curve")
 
-    def mirrored(self, normal, point=None):
+    def mirrored(self, normal: Any, point: Any = None) -> MeshBeam:
         self._refuse("mirrored")
 
-    def morphed(self, *args):
+    def morphed(self, *args: Any) -> MeshBeam:
         self._refuse("morphed")
 
-    def smoothed(self, fixed_nodes=None):
+    def smoothed(self, fixed_nodes: Any = None) -> MeshBeam:
         self._refuse("smoothed")
 
     def __add__(self, other):
@@ -703,8 +772,18 @@ class MeshBeam(Frozen, Mesh2D):
 
     # pictures and files
 
-    def to_meshquad(self, nx=8, ny=4):
-        """Quads of the stress-free body, ``nx`` by ``ny`` an element, as a scikit-fem MeshQuad."""
+    def to_meshquad(self, nx: int = 8, ny: int = 4) -> MeshQuad:
+        """Quads of the stress-free body.
+
+        Parameters
+        ----------
+        nx, ny
+            Quads along and across each element.
+
+        Returns
+        -------
+        skfem.MeshQuad
+        """
         nx, ny = (require_integer(name, n, 1, MAX_SUBDIVISION) for name, n in (("nx", nx),
                                                                              ("ny", ny)))
         quad = MeshQuad.init_tensor(np.linspace(0, 1, nx + 1), np.linspace(0, 1, ny + 1))
@@ -716,8 +795,16 @@ class MeshBeam(Frozen, Mesh2D):
         t = number.reshape(self.nelements, -1)[:, quad.t[::-1]].transpose(1, 0, 2)
         return MeshQuad(self._mapping().F(quad.p).reshape(2, -1)[:, kept], t.reshape(4, -1))
 
-    def draw(self, visuals="matplotlib", **kwargs):
-        """Draw the outline of the elements; see :meth:`skfem.Mesh.draw`."""
+    def draw(self, visuals: str = "matplotlib", **kwargs: Any) -> Any:
+        """Draw the outline of the elements.
+
+        Parameters
+        ----------
+        visuals
+            Name of the module of ``skfem.visuals``.
+        **kwargs
+            Those of :meth:`skfem.Mesh.draw`.
+        """
         return self.to_meshquad(1 if self.is_straight else 8, 1).draw(visuals, **kwargs)
 
     def _repr_svg_(self):
@@ -728,7 +815,7 @@ class MeshBeam(Frozen, Mesh2D):
         return (super().__repr__() + f"\n  Height, length: {self.height:.6g}, "
                 f"{self.lengths.sum():.6g} ({kind})")
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, Any]:
         """Everything but the function ``curve``, as lists."""
         out = super().to_dict()
         out["orientations"] = {k: v.ori.tolist() for k, v in (self.boundaries or {}).items()
@@ -739,7 +826,7 @@ class MeshBeam(Frozen, Mesh2D):
         return {**out, "height": self.height, "sections": self.sections}
 
     @classmethod
-    def from_dict(cls, data):
+    def from_dict(cls, data: dict[str, Any]) -> MeshBeam:
         """The mesh of what :meth:`to_dict` returned.
 
         Raises
@@ -778,7 +865,7 @@ class MeshBeam(Frozen, Mesh2D):
             mesh._boundaries = tags
         return mesh
 
-    def save_npz(self, filename):
+    def save_npz(self, filename: StrPath) -> None:
         """Save everything but the function ``curve``; read it with :meth:`load_npz`."""
         filename = require_path("filename", filename)
         tags = {f"b_{k}": v for k, v in (self.boundaries or {}).items()}
@@ -793,7 +880,7 @@ class MeshBeam(Frozen, Mesh2D):
             raise FileError(f"cannot write {str(filename)!r}: {error}") from error
 
     @classmethod
-    def load_npz(cls, filename):
+    def load_npz(cls, filename: StrPath) -> MeshBeam:
         """Load a mesh saved by :meth:`save_npz`; nothing in the file is executed.
 
         Raises
@@ -827,10 +914,18 @@ class MeshBeam(Frozen, Mesh2D):
                        lengths=data["lengths"], sections=str(data["sections"]),
                        **{name: data[name] for name in ("s", "p_XY") if name in data.files})
 
-    def save(self, filename, point_data=None, cell_data=None, **kwargs):
+    def save(self, filename: StrPath, point_data: dict[str, Any] | None = None,
+             cell_data: dict[str, Any] | None = None, **kwargs: Any) -> None:
         """Save the mesh: ``.npz`` or ``.json`` to load it again, else the body for a viewer.
 
         Any other suffix that meshio knows writes the quads of :meth:`to_meshquad`.
+
+        Parameters
+        ----------
+        filename
+            Its suffix says the format.
+        point_data, cell_data, **kwargs
+            For a viewer: as for ``skfem.MeshQuad.save``.
         """
         import meshio
 
@@ -854,8 +949,16 @@ class MeshBeam(Frozen, Mesh2D):
             raise FileError(f"cannot write {str(path)!r}: {error}") from error
 
     @classmethod
-    def load(cls, filename, out=None, **kwargs):
-        """Load a mesh saved as ``.npz`` or ``.json``."""
+    def load(cls, filename: StrPath, out: Any = None, **kwargs: Any) -> MeshBeam:
+        """Load a mesh saved as ``.npz`` or ``.json``.
+
+        Parameters
+        ----------
+        filename
+            Of a file that :meth:`save` wrote.
+        out, **kwargs
+            Not used: they are there as for ``skfem.Mesh.load``.
+        """
         path = require_path("filename", filename)
         require_options("load", kwargs, ("filename",))
         if path.suffix == ".npz":

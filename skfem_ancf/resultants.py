@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -14,7 +14,6 @@ from .spread import SNAP
 
 if TYPE_CHECKING:
     from .points import Part
-    from .recovery import Recovery
     from .results import State
     from .types import Array
 
@@ -86,14 +85,17 @@ class Resultants:
 
     def first(self) -> Resultants:
         """Those of the first section, without the axis n."""
-        return Resultants(**{f.name: value if isinstance(value := getattr(self, f.name), bool)
-                             else value[..., 0] for f in fields(self)})
+        values: dict[str, Any] = {
+            f.name: value if isinstance(value := getattr(self, f.name), bool) else value[..., 0]
+            for f in fields(self)}
+        return Resultants(**values)
 
 
 def over_time(instants: list[Resultants]) -> Resultants:
     """The Resultants of several instants at the same sections as one."""
     first = instants[0]
-    values = {f.name: np.array([getattr(r, f.name) for r in instants]) for f in fields(first)}
+    values: dict[str, Any] = {f.name: np.array([getattr(r, f.name) for r in instants])
+                              for f in fields(first)}
     return Resultants(**{**values, "s": first.s, "x": first.x,
                          "recovered": all(r.recovered for r in instants)})
 
@@ -160,7 +162,7 @@ def _directions(angle):
     return (np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)]))
 
 
-def _recovered(recovery: Recovery, e, xi, after):
+def _recovered(recovery, e, xi, after):
     forces = recovery.forces
     cuts, end = forces.cuts, xi > 1.0 - SNAP
     place = e + np.where(end, 1.0, np.where(xi < SNAP, 0.0, xi))

@@ -1,8 +1,10 @@
 """What a solution knows: positions, strains, stresses, energies, reactions."""
 
+from __future__ import annotations
+
 import logging
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -10,8 +12,22 @@ from .beam import select_beam
 from .errors import InputError, NameUnknown, require_flag, teaching
 from .frozen import Frozen
 from .recovery import actions, recover
-from .resultants import resultants
+from .resultants import Resultants, resultants
 from .section_forces import NotRecovered
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from numpy.typing import ArrayLike
+
+    from .beam import Beam
+    from .checks import Checks
+    from .joints.base import Joint
+    from .recovery import Recovery
+    from .statics.stability import Verdict
+    from .system import System
+    from .types import Array, Place, StrPath, WhichBeam
 
 logger = logging.getLogger(__name__)
 
@@ -38,6 +54,27 @@ class Reaction(NamedTuple):
 class State(Frozen):
     """A configuration of a scene. It does not change; :meth:`replace` returns a changed copy.
 
+    Parameters
+    ----------
+    system
+        The :class:`~skfem_ancf.system.System` of the scene.
+    u
+        Displacement of the coordinates, shape (N,).
+    load
+        Load factor.
+    force
+        Internal force there, shape (N,), or None: it is computed when asked for.
+    converged, iterations, message, steps, doubt
+        As in the attributes.
+    multipliers
+        Of the joints, shape (m,); zero by default.
+    t, inertia, acceleration, motion, origin
+        Of an instant of a motion: its time; the force of inertia and the acceleration of the
+        coordinates, shape (N,); its :class:`~skfem_ancf.dynamics.Motion`; its scheme, and what the
+        run kept.
+    verdict
+        What is known of its stability, or None: it is found when asked for.
+
     Attributes
     ----------
     u
@@ -54,9 +91,12 @@ class State(Frozen):
         Where and how the way to it left the path from the stress-free state; empty if it did not.
     """
 
-    def __init__(self, system, u, load=1.0, force=None, converged=True, iterations=0, message="",
-                 steps=(), multipliers=None, t=None, inertia=0.0, acceleration=None, motion=None,
-                 origin=None, verdict=None, doubt=""):
+    def __init__(self, system: System, u: Array, load: float = 1.0, force: Array | None = None,
+                 converged: bool = True, iterations: int = 0, message: str = "",
+                 steps: Iterable[Any] = (), multipliers: Array | None = None,
+                 t: float | None = None, inertia: Array | float = 0.0,
+                 acceleration: Array | None = None, motion: Any = None, origin: Any = None,
+                 verdict: Verdict | None = None, doubt: str = "") -> None:
         self.system, self.u, self.load = system, u, load
         self.converged, self.iterations, self.message = converged, iterations, message
         self.steps = tuple(steps)
@@ -65,13 +105,14 @@ class State(Frozen):
         # the Motion of an instant, its scheme, and what a run of it keeps
         self._motion, self._origin = motion, origin
         self.multipliers = np.zeros(system.m) if multipliers is None else multipliers
-        self.doubt, self._verdict, self._checks = doubt, verdict, None
+        self.doubt, self._verdict = doubt, verdict
+        self._checks: Checks | None = None
         for name, size in (("u", system.N), ("multipliers", system.m)):
             if np.shape(getattr(self, name)) != (size,):
                 raise InputError(f"{name} must have shape ({size},) in this scene, got "
                                  f"{np.shape(getattr(self, name))}")
 
-    def replace(self, **changes):
+    def replace(self, **changes: Any) -> State:
         """The same state with other attributes, as ``replace(message="guess")``.
 
         ``error_estimate`` and ``scene`` are those of an adaptive solution.
@@ -108,7 +149,7 @@ class State(Frozen):
         return "\n".join(lines + [f"  {line}" for line in str(self.checks).splitlines()])
 
     @property
-    def verdict(self):
+    def verdict(self) -> Verdict | None:
         """What the tangent says of an equilibrium: a
         :class:`~skfem_ancf.statics.stability.Verdict`; None for an instant of a motion.
         """
@@ -119,21 +160,21 @@ class State(Frozen):
         return self._verdict
 
     @property
-    def stability(self):
+    def stability(self) -> str | None:
         """"stable", "unstable" or "singular" (to round-off); "undecided" is possible with loads
         that have no potential, see ``state.verdict.note``. None for an instant of a motion.
         """
-        return self.verdict and self.verdict.stability
+        return None if self.verdict is None else self.verdict.stability
 
     @property
-    def negative_pivots(self):
+    def negative_pivots(self) -> int | None:
         """Number of directions that give way: negative eigenvalues of the tangent at the free
         coordinates, on the tangent space of the joints. None for an instant of a motion.
         """
-        return self.verdict and self.verdict.negative_pivots
+        return None if self.verdict is None else self.verdict.negative_pivots
 
     @property
-    def checks(self):
+    def checks(self) -> Checks:
         """How far the state is from what law and mesh are good for: a
         :class:`~skfem_ancf.checks.Checks`.
         """
@@ -144,27 +185,27 @@ class State(Frozen):
         return self._checks
 
     @property
-    def beams(self):
+    def beams(self) -> tuple[Beam, ...]:
         """The beams of the scene."""
         return self.system.beams
 
     @property
-    def q(self):
+    def q(self) -> Array:
         """Absolute coordinates, beam after beam, shape (N,)."""
         return np.concatenate([b.q0 for b in self.beams]) + self.u
 
     @property
-    def v(self):
+    def v(self) -> Array:
         """Velocity of the coordinates, shape (N,); zero where there is no motion."""
         return np.zeros_like(self.u) if self._motion is None else self._motion.v
 
-    def u_of(self, beam):
+    def u_of(self, beam: WhichBeam) -> Array:
         """Coordinate displacements of one beam."""
         return self.u[self.system.of(select_beam(self.beams, beam))]
 
     # at material points
 
-    def displacement(self, point, beam=None):
+    def displacement(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
         """Displacement of material points.
 
         Parameters
@@ -187,27 +228,41 @@ class State(Frozen):
         """
         return self.system.points.find(point, beam).displacement(self.u)
 
-    def position(self, point, beam=None):
+    def position(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
         """Position of material points, (2,) or (2, n); parameters are those of
         :meth:`displacement`.
+
+        Parameters
+        ----------
+        point
+            One point, shape (2,), or many, as for :meth:`displacement`.
+        beam
+            The beam, its name or its number; found if it is not given.
         """
         at = self.system.points.find(point, beam)
         return at.start + at.displacement(self.u)
 
-    def velocity(self, point, beam=None):
+    def velocity(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
         """Velocity of material points, (2,) or (2, n); zero where there is no motion.
 
         Parameters are those of :meth:`displacement`.
+
+        Parameters
+        ----------
+        point
+            One point, shape (2,), or many, as for :meth:`displacement`.
+        beam
+            The beam, its name or its number; found if it is not given.
         """
         return self.system.points.find(point, beam).velocity(self.u, self.v)
 
-    def strain(self, point, beam=None, recover=True):
+    def strain(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True) -> Array:
         """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, (3,) or (3, n).
 
         Parameters
         ----------
         point, beam
-            As for :meth:`displacement`.
+            As for :meth:`displacement`: one point, shape (2,), or many.
         recover
             The recovered field, see :mod:`skfem_ancf.recovery`, where there is one
             (:attr:`recovered`); False for the strain of the element at the point.
@@ -217,10 +272,15 @@ class State(Frozen):
         values[2] *= 0.5
         return values
 
-    def stress(self, point, beam=None, recover=True):
+    def stress(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True) -> Array:
         """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, (3,) or (3, n).
 
         Parameters are those of :meth:`strain`.
+
+        Parameters
+        ----------
+        point, beam, recover
+            As for :meth:`strain`: one point, shape (2,), or many.
         """
         at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
         return at.gather([self._stress(part, recover) for part in at.parts])
@@ -239,7 +299,7 @@ class State(Frozen):
 
     # recovered fields
 
-    def recovery(self, beam=None):
+    def recovery(self, beam: WhichBeam = None) -> Recovery | None:
         """The recovered field of a beam, a :class:`~skfem_ancf.recovery.Recovery`, or None.
 
         None where the field cannot be recovered; :attr:`recovered` says why.
@@ -259,7 +319,7 @@ class State(Frozen):
         return None if isinstance(found, NotRecovered) else found
 
     @property
-    def recovered(self):
+    def recovered(self) -> dict[Any, str]:
         """For each beam, by name or number, "" if its fields are recovered, else why not: dict.
 
         Recovered fields need an equilibrium (of statics or of a motion) under loads of which it is
@@ -281,7 +341,8 @@ class State(Frozen):
     def _actions(self):
         return actions(self)
 
-    def resultants(self, at=None, beam=None, recover=True):
+    def resultants(self, at: ArrayLike | None = None, beam: WhichBeam = None,
+                   recover: bool = True) -> Resultants:
         """Normal force, shear force and bending moment along a beam, with the strains of its axis.
 
         Parameters
@@ -326,18 +387,18 @@ class State(Frozen):
     # of the whole
 
     @property
-    def strain_energy(self):
+    def strain_energy(self) -> float:
         """Strain energy of the scene."""
         return self.system.strain_energy(self.u)
 
     @property
-    def internal_force(self):
+    def internal_force(self) -> Array:
         """Internal force on all coordinates, shape (N,)."""
         if self._force is None:
             self._force = self.system.internal_force(self.u)
         return self._force
 
-    def reactions(self, boundary, beam=None):
+    def reactions(self, boundary: Place, beam: WhichBeam = None) -> Reaction:
         """What the supports at a boundary do to the beam: force, moment, and by coordinate.
 
         Parameters
@@ -374,26 +435,59 @@ class State(Frozen):
             total = total + self.multipliers @ self.system.full_jacobian(self.u, t)
         return total
 
-    def joint_force(self, joint):
+    def joint_force(self, joint: Joint) -> Array:
         """What a joint does to its first beam, in the order of ``joint.equations``; (m,)."""
         return self.system.joint_force(joint, self.multipliers, self._support_force())
 
     # files and pictures
 
-    def save(self, filename, **options):
-        """Write the deformed body for ParaView; see :func:`skfem_ancf.io.vtu.save_vtu`."""
+    def save(self, filename: StrPath, **options: Any) -> Path:
+        """Write the deformed body for ParaView.
+
+        Parameters
+        ----------
+        filename
+            Path that ends with .vtu.
+        **options
+            Those of :func:`skfem_ancf.io.vtu.save_vtu`.
+
+        Returns
+        -------
+        pathlib.Path
+            The file.
+        """
         from .io.vtu import save_vtu
 
         return save_vtu(self, filename, **options)
 
-    def plot_resultants(self, beam=None, **options):
-        """Draw the three diagrams; see :func:`skfem_ancf.visuals.diagrams.plot_resultants`."""
+    def plot_resultants(self, beam: WhichBeam = None, **options: Any) -> Any:
+        """Draw the three diagrams; see :func:`skfem_ancf.visuals.diagrams.plot_resultants`.
+
+        Parameters
+        ----------
+        beam
+            The beam, its name or its number.
+        **options
+            Those of :func:`skfem_ancf.visuals.diagrams.plot_resultants`.
+        """
         from .visuals.diagrams import plot_resultants
 
         return plot_resultants(self, beam, **options)
 
-    def plot(self, field="eps_yy", **options):
-        """Draw the deformed body; see :func:`skfem_ancf.visuals.matplotlib.plot_state`."""
+    def plot(self, field: str = "eps_yy", **options: Any) -> Any:
+        """Draw the deformed body.
+
+        Parameters
+        ----------
+        field
+            What it is coloured by, as for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
+        **options
+            Those of :func:`skfem_ancf.visuals.matplotlib.plot_state`.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
         from .visuals.matplotlib import plot_state
 
         return plot_state(self, field, **options)

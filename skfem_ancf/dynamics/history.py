@@ -1,6 +1,9 @@
 """What a motion was: times, positions, energies, momenta."""
 
+from __future__ import annotations
+
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -9,10 +12,28 @@ from ..resultants import over_time
 from ..results import State
 from .base import Motion
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+    from ..joints.base import Joint
+    from ..resultants import Resultants
+    from ..system import System
+    from ..types import Array, StrPath, WhichBeam
+    from .base import Scheme
+
 
 @teaching
 class History:
     """A motion at its stored instants.
+
+    Parameters
+    ----------
+    system, scheme
+        What was integrated, and how.
+    run
+        The :class:`~skfem_ancf.dynamics.run.Run` that stores its instants here.
 
     Attributes
     ----------
@@ -35,15 +56,17 @@ class History:
     #: What is stored of a Motion.
     COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before")
 
-    def __init__(self, system, scheme, run):
+    def __init__(self, system: System, scheme: Scheme, run: Any) -> None:
         self.system, self.scheme, self._run = system, scheme, run
-        self._rows, self._memories, self._kept = [], [], None
+        self._rows: list[Motion] = []
+        self._memories: list[Any] = []
+        self._kept: Any = None
 
-    def append(self, y):
+    def append(self, y: Motion) -> None:
         """Store an instant."""
         self._rows.append(y)
 
-    def columns(self):
+    def columns(self) -> dict[str, Array]:
         """What was stored, as arrays by their names in :attr:`COLUMNS`."""
         n, N, m = len(self._rows), self.system.N, self.system.m
         shapes = {"t": (), "before": (), "multipliers": (m,), "force": (m,)}
@@ -51,18 +74,28 @@ class History:
                                dtype=float).reshape(n, *shapes.get(name, (N,)))
                 for name in self.COLUMNS}
 
-    def restore(self, columns, memories):
-        """Fill an empty History with what :meth:`columns` gave."""
+    def restore(self, columns: dict[str, Array], memories: Sequence[Any]) -> None:
+        """Fill an empty History with what :meth:`columns` gave.
+
+        Parameters
+        ----------
+        columns
+            Arrays by their names in :attr:`COLUMNS`.
+        memories
+            What the scheme kept at each instant, :attr:`memories`.
+        """
         rows = zip(*(columns[name] for name in self.COLUMNS))
         for (t, *arrays, before), memory in zip(rows, memories):
-            self._rows.append(Motion(float(t), *arrays, float(before), memory))
+            u, v, acceleration, algorithmic, multipliers, force = arrays
+            self._rows.append(Motion(float(t), u, v, acceleration, algorithmic, multipliers, force,
+                                     float(before), memory))
 
     @property
-    def memories(self):
+    def memories(self) -> list[Any]:
         """What the scheme itself kept at each instant."""
         return [y.memory for y in self._rows]
 
-    def close(self):
+    def close(self) -> History:
         """Turn what was stored into arrays."""
         columns, run = self.columns(), self._run
         self.t, self.u, self.v = columns["t"], columns["u"], columns["v"]
@@ -88,7 +121,7 @@ class History:
         return (f"<History of {len(self)} instants{span}, {self.scheme!r}, {self.steps} steps"
                 f"{cut}, {self.iterations} iterations, {self.factorizations} factorisations>")
 
-    def state(self, k):
+    def state(self, k: int) -> State:
         """The instant ``k`` as a State: strain, reactions (inertia included), plots, files.
 
         It has the velocity too, and what the scheme needs to go on: :meth:`Scene.integrate
@@ -110,13 +143,13 @@ class History:
 
     # at material points
 
-    def displacement(self, point, beam=None):
+    def displacement(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
         """Displacement of material points at all instants.
 
         Parameters
         ----------
         point, beam
-            One point or many, as for :meth:`State.displacement
+            One point, shape (2,), or many, as for :meth:`State.displacement
             <skfem_ancf.results.State.displacement>`.
 
         Returns
@@ -126,32 +159,66 @@ class History:
         """
         return self.system.points.find(point, beam).displacement(self.u)
 
-    def position(self, point, beam=None):
-        """Position of material points at all instants, (nt, 2) or (nt, 2, n)."""
+    def position(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
+        """Position of material points at all instants, (nt, 2) or (nt, 2, n).
+
+        Parameters
+        ----------
+        point
+            One point, shape (2,), or many, as for :meth:`displacement`.
+        beam
+            The beam, its name or its number; found if it is not given.
+        """
         at = self.system.points.find(point, beam)
         return at.start + at.displacement(self.u)
 
-    def velocity(self, point, beam=None):
-        """Velocity of material points at all instants, (nt, 2) or (nt, 2, n)."""
+    def velocity(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
+        """Velocity of material points at all instants, (nt, 2) or (nt, 2, n).
+
+        Parameters
+        ----------
+        point
+            One point, shape (2,), or many, as for :meth:`displacement`.
+        beam
+            The beam, its name or its number; found if it is not given.
+        """
         return self.system.points.find(point, beam).velocity(self.u, self.v)
 
-    def strain(self, point, beam=None, recover=True):
+    def strain(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True) -> Array:
         """Strain (eps_xx, eps_yy, eps_xy) at all instants, (nt, 3) or (nt, 3, n).
 
         Parameters are those of :meth:`State.strain <skfem_ancf.results.State.strain>`.
+
+        Parameters
+        ----------
+        point
+            One point, shape (2,), or many, as for :meth:`displacement`.
+        beam
+            The beam, its name or its number; found if it is not given.
+        recover
+            As for :meth:`State.strain <skfem_ancf.results.State.strain>`.
         """
         self.system.points.find(point, beam)
         return np.array([state.strain(point, beam, recover) for state in self])
 
-    def stress(self, point, beam=None, recover=True):
+    def stress(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True) -> Array:
         """Second Piola-Kirchhoff stress at all instants, (nt, 3) or (nt, 3, n).
 
         Parameters are those of :meth:`State.strain <skfem_ancf.results.State.strain>`.
+
+        Parameters
+        ----------
+        point
+            One point, shape (2,), or many, as for :meth:`displacement`.
+        beam
+            The beam, its name or its number; found if it is not given.
+        recover
+            As for :meth:`State.strain <skfem_ancf.results.State.strain>`.
         """
         self.system.points.find(point, beam)
         return np.array([state.stress(point, beam, recover) for state in self])
 
-    def resultants(self, at, beam=None, recover=True):
+    def resultants(self, at: ArrayLike, beam: WhichBeam = None, recover: bool = True) -> Resultants:
         """Section forces and strains of the axis at all instants.
 
         Parameters
@@ -169,39 +236,39 @@ class History:
         self.system.points.find(at, beam)
         return over_time([state.resultants(at, beam, recover) for state in self])
 
-    def joint_force(self, joint):
+    def joint_force(self, joint: Joint) -> Array:
         """What a joint does to its first beam at all instants, shape (nt, m)."""
         return np.array([state.joint_force(joint) for state in self])
 
     # of the whole
 
     @cached_property
-    def strain_energy(self):
+    def strain_energy(self) -> Array:
         """Strain energy, shape (nt,)."""
         return np.array([self.system.strain_energy(u) for u in self.u])
 
     @cached_property
-    def kinetic_energy(self):
+    def kinetic_energy(self) -> Array:
         """Kinetic energy, shape (nt,)."""
         return np.array([0.5 * v @ self.system.mass.multiply(v) for v in self.v])
 
     @cached_property
-    def potential_energy(self):
+    def potential_energy(self) -> Array:
         """Potential of the loads, zero in the stress-free state, shape (nt,)."""
         return np.array([self.system.load_potential(u, t) for u, t in zip(self.u, self.t)])
 
     @property
-    def total_energy(self):
+    def total_energy(self) -> Array:
         """Sum of the three energies, shape (nt,)."""
         return self.strain_energy + self.kinetic_energy + self.potential_energy
 
     @cached_property
-    def momentum(self):
+    def momentum(self) -> Array:
         """Linear momentum, shape (nt, 2)."""
         return np.array([self.system.momentum(v) for v in self.v])
 
     @cached_property
-    def angular_momentum(self):
+    def angular_momentum(self) -> Array:
         """Angular momentum about the origin of the coordinates, shape (nt,)."""
         return np.array([self.system.angular_momentum(u, v) for u, v in zip(self.u, self.v)])
 
@@ -210,7 +277,7 @@ class History:
 
     # files
 
-    def save(self, filename, progress=None, **options):
+    def save(self, filename: StrPath, progress: bool | None = None, **options: Any) -> None:
         """Write a time series for ParaView: a ``.pvd`` and one ``.vtu`` for each instant.
 
         Parameters

@@ -1,11 +1,19 @@
 """A series of states in time for ParaView."""
 
+from __future__ import annotations
+
 import logging
+from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
 from ..errors import (InputError, require_finite_scalar, require_like, require_options,
                       require_path, teaching)
 from .vtu import replacing, save_vtu
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from ..types import StrPath
 
 logger = logging.getLogger(__name__)
 
@@ -47,13 +55,13 @@ class PvdWriter:
     load_00001.vtu
     """
 
-    def __init__(self, filename, **options):
+    def __init__(self, filename: StrPath, **options: Any) -> None:
         self.path = require_path("filename", filename)
         if self.path.suffix.lower() != ".pvd":
             raise InputError(f"the file name must end with .pvd, got {str(filename)!r}")
         self.options = require_options("PvdWriter", options,
                                        ("subdivide", "lagrange", "undeformed", "recover"))
-        self.frames = []  # (time, name of the file)
+        self.frames: list[tuple[float, str]] = []  # (time, name of the file)
 
     def __enter__(self):
         return self
@@ -62,7 +70,7 @@ class PvdWriter:
         if self.frames:
             logger.info("wrote %s: %d frames", self.path, len(self.frames))
 
-    def add(self, state, t):
+    def add(self, state: Any, t: float) -> Path:
         """Write a frame.
 
         Parameters

@@ -1,15 +1,21 @@
 """The deformed body with its strains and stresses, as points and cells, and as a .vtu file."""
 
+from __future__ import annotations
+
 import logging
 import os
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..errors import (FileError, InputError, require_flag, require_integer, require_like,
                       require_path, shown, taught)
 from ..quadrature import tensor
+
+if TYPE_CHECKING:
+    from ..beam import Beam
+    from ..types import Array, StrPath
 
 logger = logging.getLogger(__name__)
 
@@ -46,7 +52,7 @@ class BodyFields(NamedTuple):
     cell_data: dict
 
 
-def sample(state, beam, X, recover=True):
+def sample(state: Any, beam: Beam, X: Array, recover: bool = True) -> dict[str, Array]:
     """The fields of one beam at reference points.
 
     Parameters
@@ -88,10 +94,14 @@ def sample(state, beam, X, recover=True):
 
 
 @taught
-def body_fields(state, subdivide=(8, 4), lagrange=False, undeformed=False, recover=True):
+def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool = False,
+                undeformed: bool = False, recover: bool = True) -> BodyFields:
     """The body of a state on points.
 
-    Parameters are those of :func:`save_vtu`.
+    Parameters
+    ----------
+    state, subdivide, lagrange, undeformed, recover
+        As for :func:`save_vtu`.
 
     Returns
     -------
@@ -119,8 +129,9 @@ def body_fields(state, subdivide=(8, 4), lagrange=False, undeformed=False, recov
     total = sum(b.mesh.nelements for b in state.beams) * (m + 1) * (n + 1)
     if total > MAX_POINTS and not lagrange:
         raise InputError(f"subdivide={(m, n)} makes {total} points, more than {MAX_POINTS}")
-    first, points, cells, data = 0, [], [], {}
-    numbers = {"beam": [], "element": []}
+    first, points, cells = 0, [], []
+    data: dict[str, list[Array]] = {}
+    numbers: dict[str, list[Array]] = {"beam": [], "element": []}
     for b, beam in enumerate(state.beams):
         if lagrange:
             X, local = lagrange_cell(beam)
@@ -144,7 +155,8 @@ def body_fields(state, subdivide=(8, 4), lagrange=False, undeformed=False, recov
 
 
 @taught
-def save_vtu(state, filename, subdivide=(8, 4), lagrange=False, undeformed=False, recover=True):
+def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
+             lagrange: bool = False, undeformed: bool = False, recover: bool = True) -> Path:
     """Write the deformed body of a state for ParaView.
 
     All beams go into one file. Points belong to one element each, since strains and stresses
@@ -223,7 +235,7 @@ def save_vtu(state, filename, subdivide=(8, 4), lagrange=False, undeformed=False
 class replacing:  # noqa: N801
     """A context with a temporary path beside ``path``, which replaces ``path`` on success."""
 
-    def __init__(self, path):
+    def __init__(self, path: StrPath) -> None:
         self.path = Path(path)
         self.temporary = self.path.with_name(f".{self.path.stem}.{os.getpid()}{self.path.suffix}")
 
@@ -265,19 +277,31 @@ def _rows(x):
     return np.hstack([x, np.zeros((len(x), 1))])
 
 
-def grid(m, n):
-    """A grid of (m + 1) (n + 1) points of the reference cell, eta fastest; shape (2, npoints)."""
+def grid(m: int, n: int) -> Array:
+    """A grid of (m + 1) (n + 1) points of the reference cell, eta fastest; shape (2, npoints).
+
+    Parameters
+    ----------
+    m, n
+        Intervals along and across.
+    """
     xi, eta = np.linspace(0, 1, m + 1), np.linspace(0, 1, n + 1)
     return tensor((xi, xi), (eta, eta))[0]
 
 
-def quads(m, n):
-    """The m n quads of :func:`grid` as rows of 4 points, counterclockwise."""
+def quads(m: int, n: int) -> Array:
+    """The m n quads of :func:`grid` as rows of 4 points, counterclockwise.
+
+    Parameters
+    ----------
+    m, n
+        Intervals along and across.
+    """
     k = np.arange((m + 1) * (n + 1)).reshape(m + 1, n + 1)
     return np.stack([k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]], -1).reshape(-1, 4)
 
 
-def lagrange_cell(beam):
+def lagrange_cell(beam: Beam) -> tuple[Array, Array]:
     """Points of the Lagrange cell that holds an element, and their order in VTK.
 
     VTK numbers the corners, then the inner points of the edges bottom, right, top, left (in the

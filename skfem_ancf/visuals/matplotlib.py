@@ -1,11 +1,21 @@
 """Pictures of the deformed body, coloured by a field."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from ..errors import (InputError, MissingExtra, require_finite_scalar, require_flag,
-                      require_integer, require_like, require_option, require_path,
-                      require_positive, shown, taught)
+                      require_integer, require_like, require_option, require_path, require_positive,
+                      shown, taught)
 from ..io.vtu import _subdivision, grid, quads, replacing, sample
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from ..path import Path
+    from ..types import StrPath, WhichBeam
 
 #: Titles of the fields: the names are those in the files of :func:`~skfem_ancf.io.vtu.save_vtu`.
 TITLES = {
@@ -31,9 +41,11 @@ _INK, _MUTED, _GHOST = "#222222", "#666666", "#d9d9d9"
 
 
 @taught
-def plot_state(state, field="eps_yy", ax=None, *, thickness="auto", undeformed=True, colorbar=True,
-               cmap=None, limits=None, title=None, subdivide=(16, 8), filename=None, dpi=200,
-               recover=True):
+def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
+               thickness: float | str = "auto", undeformed: bool = True, colorbar: bool = True,
+               cmap: Any = None, limits: tuple[float, float] | None = None,
+               title: str | None = None, subdivide: tuple[int, int] = (16, 8),
+               filename: StrPath | None = None, dpi: float = 200, recover: bool = True) -> Any:
     """Draw the deformed body of a state, coloured by a field.
 
     Parameters
@@ -269,17 +281,21 @@ def _figure_class():
 
 
 @taught
-def plot_path(path, point, component=1, beam=None, ax=None, *, title=None, filename=None, dpi=200):
+def plot_path(path: Path, point: ArrayLike, component: int = 1, beam: WhichBeam = None,
+              ax: Any = None, *, title: str | None = None, filename: StrPath | None = None,
+              dpi: float = 200) -> Any:
     """Draw the load factor of an equilibrium path against a displacement.
 
     Unstable parts, where they are known, are dashed; turning points of the load are marked.
 
     Parameters
     ----------
+    point
+        The material point: its place (x, y) in the stress-free body.
     path
         A :class:`~skfem_ancf.path.Path`.
-    point, component, beam
-        The material point, its displacement component (0 or 1), and the beam it belongs to.
+    component, beam
+        Its displacement's component (0 or 1), and the beam it belongs to.
     ax
         Axes to draw on; a new figure by default.
     title
