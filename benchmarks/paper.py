@@ -10,7 +10,8 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parent / "validation")]
 
 from reproduction.examples import EXAMPLES  # noqa: E402
 from reproduction.figures import DRAW  # noqa: E402

@@ -606,14 +606,13 @@ def select_beam(beams: Sequence[Beam], beam: WhichBeam) -> Beam:
     """
     if beam is None and len(beams) == 1:
         return beams[0]
+    found: Sequence[Beam] = ()
     if isinstance(beam, Beam):
         found = [b for b in beams if b is beam]
     elif isinstance(beam, str):
         found = [b for b in beams if b.name == beam]
-    elif isinstance(beam, int) and not isinstance(beam, bool):
-        found = beams[beam:beam + 1] if beam >= 0 else ()
-    else:
-        found = ()
+    elif isinstance(beam, int) and not isinstance(beam, bool) and beam >= 0:
+        found = beams[beam:beam + 1]
     if found:
         return found[0]
     known = [b.name if b.name is not None else k for k, b in enumerate(beams)]

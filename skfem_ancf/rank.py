@@ -1,5 +1,9 @@
 """Rank, null spaces and inertia of sparse matrices."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 import scipy.linalg
 from scipy import sparse
@@ -7,6 +11,11 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from .linalg import SMALL, Inertia, beside_zero
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from .types import Array
 
 #: Rest of a row beside those before it, relative to the row, that is round-off.
 DEPENDENT = 1e-9
@@ -20,7 +29,7 @@ DENSE = 300
 MOST, ITERATIONS = 8, 6
 
 
-def first_dependent(J, free, phi):
+def first_dependent(J: sparse.csr_array, free: Array, phi: Array) -> tuple[int, float] | None:
     """The first equation that those before it hold already, or None.
 
     The rows of J fall apart into groups without a common coordinate. In each group QR
@@ -45,7 +54,7 @@ def first_dependent(J, free, phi):
     for rows, _, A in groups(J @ sparse.diags(free.astype(float))):
         if first is not None and rows[0] > first[0]:
             continue
-        R = np.linalg.qr(A.T, mode="r")
+        R = np.asarray(np.linalg.qr(A.T, mode="r"))
         rest, k = np.zeros(len(rows)), min(R.shape)
         rest[:k] = np.abs(np.diag(R))
         dependent = np.flatnonzero(rest <= DEPENDENT * size[rows])
@@ -56,7 +65,7 @@ def first_dependent(J, free, phi):
     return first
 
 
-def groups(J):
+def groups(J: sparse.csr_array) -> Iterator[tuple[Array, Array, Array]]:
     """The rows of a sparse matrix in groups without a common column.
 
     Yields
@@ -87,7 +96,7 @@ def _members(group, number):
     return [order[last - n:last] for n, last in zip(count, ends)], place
 
 
-def null_basis(J):
+def null_basis(J: sparse.csr_array) -> sparse.csr_array:
     """A sparse matrix whose columns span the null space of a sparse J of full rank.
 
     In each of the :func:`groups` of its rows as many coordinates as there are rows are given by
@@ -129,7 +138,7 @@ def null_basis(J):
          (np.append(rows, own), np.append(number[columns], number[own]))), shape=(n, len(own)))
 
 
-def sparse_inertia(A):
+def sparse_inertia(A: sparse.csr_array) -> Inertia:
     """The :class:`~skfem_ancf.linalg.Inertia` of a sparse symmetric matrix.
 
     From the signs of the pivots of ``L D L^T``, by Sylvester's law.
@@ -164,7 +173,7 @@ def _pivots(A):
     raise np.linalg.LinAlgError("the matrix is singular")
 
 
-def determinant_sign(A):
+def determinant_sign(A: sparse.csr_array) -> int:
     """The sign of the determinant of a sparse matrix: 1 or -1."""
     lu, one = splu(A.tocsc()), sparse.eye(A.shape[0], format="csr")
     odd = np.sum(lu.U.diagonal() < 0.0)
@@ -173,18 +182,18 @@ def determinant_sign(A):
     return -1 if odd % 2 else 1
 
 
-def unit_rows(A):
+def unit_rows(A: Array | sparse.csr_array) -> Array | sparse.csr_array:
     """The rows of a matrix scaled to a largest entry of 1, without those that are zero.
 
     Rows for slopes have another unit than rows for positions.
     """
-    norms = abs(A).max(axis=1) if A.shape[0] else np.zeros(0)
-    norms = norms.toarray().ravel() if sparse.issparse(norms) else norms
+    largest = abs(A).max(axis=1) if A.shape[0] else np.zeros(0)
+    norms = largest.toarray().ravel() if sparse.issparse(largest) else np.asarray(largest)
     A, scale = A[norms > 0], 1.0 / norms[norms > 0]
     return sparse.diags(scale) @ A if sparse.issparse(A) else scale[:, None] * A
 
 
-def null_space(H):
+def null_space(H: sparse.csr_array) -> Array:
     """Vectors that span the null space of a sparse matrix, as rows; of a large one some.
 
     Parameters

@@ -7,9 +7,10 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 from skfem import LinearForm
 
+import exact
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamCable, InputError, MeshBeam, Scene, StVenantKirchhoff,
-                        SupportError, exact)
+                        SupportError)
 
 
 def lee(element, n, h, L, b, E):

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, MeshBeam, NeoHookean, Scene,
-                        StVenantKirchhoff, exact)
+                        StVenantKirchhoff)
 from skfem_ancf.dynamics import (HHT, SCHEMES, EnergyMomentum, GeneralizedAlpha, Motion, Newmark,
                                  get_scheme)
 from skfem_ancf.elements import ELEMENTS

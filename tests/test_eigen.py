@@ -5,8 +5,9 @@ import pytest
 import scipy.linalg
 from scipy.optimize import brentq, fsolve
 
+import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        MeshBeam, Scene, StVenantKirchhoff, eigen, exact)
+                        MeshBeam, Scene, StVenantKirchhoff, eigen)
 from skfem_ancf.elements import ELEMENTS
 
 # units in which E I = rho A = L = 1 at every slenderness

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
-from skfem_ancf import exact
+import exact
 from skfem_ancf.errors import InputError
 
 SOFT = dict(E=2e8, nu=0.3, rho=7800.0, L=1.0, b=0.01, h=0.01)

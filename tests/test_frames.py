@@ -83,7 +83,7 @@ def test_a_joint_gives_its_entries_or_its_dense_rows():
     scene = Scene(bar((0, 0), (1, 0)))
     u = np.zeros(scene.N)
     full, part = scene.joint(Dense()), scene.joint(Entries())
-    rows, columns, values = full.entries(u, 0.0)
+    _, columns, values = full.entries(u, 0.0)
     assert set(columns) == set(full.r.dofs[1]) and np.all(values == full.rows[0, columns])
     assert np.count_nonzero(part.jacobian(u, 0.0)) == 2  # of its own entries, not the rows above
     with pytest.raises(NotImplementedError, match="entries"):

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
+import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana,
-                        EnergyMomentum, GeneralizedAlpha, MeshBeam, Scene, StVenantKirchhoff, exact)
+                        EnergyMomentum, GeneralizedAlpha, MeshBeam, Scene, StVenantKirchhoff)
 from skfem_ancf.errors import InputError, NameUnknown, SupportError
 from skfem_ancf.joints import JOINTS, get_joint
 from skfem_ancf.linalg import dense

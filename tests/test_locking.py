@@ -6,8 +6,9 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from scipy.optimize import root
 
+import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
-                        InputError, NeoHookean, Scene, StVenantKirchhoff, exact)
+                        InputError, NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.formulations import Assumed, Formulation, Term
 from skfem_ancf.materials import Material
 from skfem_ancf.quadrature import gauss

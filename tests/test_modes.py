@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, MeshBeam, Scene,
-                        StVenantKirchhoff, eigen, exact)
+                        StVenantKirchhoff, eigen)
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.errors import InputError, SupportError
 from skfem_ancf.formulations import FORMULATIONS

@@ -77,7 +77,7 @@ def built(tmp_path_factory):
 
 def test_the_sdist_holds_the_tests_and_what_they_read(built):
     copy, _, source, _ = built
-    for folder in ("skfem_ancf", "tests", "docs", "demos", "benchmarks"):
+    for folder in ("skfem_ancf", "tests", "docs", "demos", "benchmarks", "validation"):
         wanted = {p.relative_to(copy) for p in (copy / folder).rglob("*") if p.is_file()}
         assert wanted - {p.relative_to(source) for p in source.rglob("*")} == set(), folder
     for name in ("Makefile", "LICENSE", "README.md", "pyproject.toml", "MANIFEST.in"):

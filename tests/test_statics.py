@@ -6,9 +6,10 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, root
 
+import exact
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamPatelShabana,
                         InputError, MeshBeam, MeshError, NameUnknown, Scene, StVenantKirchhoff,
-                        SupportError, exact)
+                        SupportError)
 from skfem_ancf.formulations import FORMULATIONS
 from skfem_ancf.materials import LinearLaw, Material
 

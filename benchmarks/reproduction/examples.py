@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from skfem_ancf import exact
+import exact
 
 from .continuum import cantilever_tip
 from .models import BY_NAME, CASES, MODELS, TABLE4, TABLE4_ELEMENTS, THICK, Model

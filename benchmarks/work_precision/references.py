@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-if __name__ == "__main__":
-    sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "validation"), str(ROOT / "benchmarks")]
 
 from work_precision import exudyn_beams, ours  # noqa: E402
 from work_precision.problems import GRAVITY, PROBLEMS  # noqa: E402
 
-from skfem_ancf import exact  # noqa: E402
+import exact  # noqa: E402
 
 #: Tip displacements (m) of the two-dimensional body in plane stress, no shear factor, from
 #: independent codes: 1e-6 and 1e-5.

@@ -140,14 +140,14 @@ class Joint(Sealable):
         """Of :meth:`jacobian` and :meth:`entries` the one that a class defines gives the other."""
         super().__init_subclass__(**options)
         if "jacobian" in vars(cls) and "entries" not in vars(cls):
-            def entries(self, u, t):
+            def entries(self: Joint, u: Array, t: float) -> tuple[Array, Array, Array]:
                 J = cls.jacobian(self, u, t)
                 rows, columns = np.nonzero(J)
                 return rows, columns, J[rows, columns]
 
             cls.entries = entries
         elif "entries" in vars(cls) and "jacobian" not in vars(cls):
-            def jacobian(self, u, t):
+            def jacobian(self: Joint, u: Array, t: float) -> Array:
                 rows, columns, values = cls.entries(self, u, t)
                 J = np.zeros((len(self.equations), len(u)))
                 np.add.at(J, (rows, columns), values)
