@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.linalg
@@ -187,7 +187,9 @@ def unit_rows(A: Array | sparse.csr_array) -> Array | sparse.csr_array:
 
     Rows for slopes have another unit than rows for positions.
     """
-    largest = abs(A).max(axis=1) if A.shape[0] else np.zeros(0)
+    if not A.shape[0]:
+        return A
+    largest: Any = abs(A).max(axis=1)
     norms = largest.toarray().ravel() if sparse.issparse(largest) else np.asarray(largest)
     A, scale = A[norms > 0], 1.0 / norms[norms > 0]
     return sparse.diags(scale) @ A if sparse.issparse(A) else scale[:, None] * A
