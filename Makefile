@@ -4,6 +4,7 @@
 # make paper   the paper's tables; bench: timings; stress: large and hard cases
 # make fuzz    2000 random scenes; mutants: changes of the text that the tests should see
 # make coverage  the tests, with the lines and branches that they run
+# make lint    ruff and mypy, of the versions that pyproject.toml names
 # make docs    reference pages from the docstrings, out/docs, and the pictures of docs/
 # make clean   removes .venv and out
 #
@@ -17,7 +18,7 @@ PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test test-settings paper bench stress fuzz mutants coverage docs clean
+.PHONY: demo test test-settings lint paper bench stress fuzz mutants coverage docs clean
 
 demo: $(VENV)/test.stamp
 	$(PY) demos/cantilever.py
@@ -36,6 +37,18 @@ test-settings: $(VENV)/test.stamp
 	  $(PY) -m pytest -n 2 $(ARGS) $(GENERIC:%=tests/test_%.py)
 	OPENBLAS_CORETYPE=Haswell SKFEM_ANCF_COMPILED=0 \
 	  $(PY) -m pytest -n 2 $(ARGS) tests $(SCRIPTS:%=--ignore=tests/test_%.py)
+
+# in an environment of its own: nothing else depends on the versions
+LINT := $(VENV)/lint
+
+lint: $(LINT)/stamp
+	$(LINT)/bin/ruff check
+	$(LINT)/bin/mypy
+
+$(LINT)/stamp: pyproject.toml | $(PY)
+	$(PY) -m venv $(LINT)
+	$(LINT)/bin/python -m pip install --quiet --disable-pip-version-check '.[lint]'
+	@touch $@
 
 paper: $(VENV)/test.stamp
 	$(PY) benchmarks/paper.py

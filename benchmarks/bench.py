@@ -13,12 +13,12 @@ for _name in ("OPENBLAS", "OMP", "MKL", "NUMBA"):  # before NumPy is imported
     os.environ[f"{_name}_NUM_THREADS"] = "1"
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from tqdm import tqdm  # noqa: E402
-from work_precision import figures, micro, runs  # noqa: E402
-from work_precision.cases import CASES, runs_of, warm_up  # noqa: E402
-from work_precision.problems import PROBLEMS  # noqa: E402
-from work_precision.references import reference  # noqa: E402
-from work_precision.report import OURS, goals, report  # noqa: E402
+from tqdm import tqdm
+from work_precision import figures, micro, runs
+from work_precision.cases import CASES, runs_of, warm_up
+from work_precision.problems import PROBLEMS
+from work_precision.references import reference
+from work_precision.report import OURS, goals, report
 
 OPERATIONS = ("tangent", "iteration", "scaling")
 SIZES = {False: dict(tangent=(16, 256, 4096), scaling=(16, 64, 256, 1024, 4096, 16384, 100000)),

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.linalg import null_space
 from skfem import Basis, asm
 
-from skfem_ancf import AncfError, ElementBeamCable, forms
+from skfem_ancf import AncfError, forms
 from skfem_ancf.elements import ELEMENTS
 
 FORMULATIONS = ("assumed", "continuum", "ecm", "strain-split")

@@ -13,10 +13,10 @@ from tqdm import tqdm
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "validation")]
 
-from reproduction.examples import EXAMPLES  # noqa: E402
-from reproduction.figures import DRAW  # noqa: E402
-from reproduction.models import FULL, QUICK  # noqa: E402
-from reproduction.report import report  # noqa: E402
+from reproduction.examples import EXAMPLES
+from reproduction.figures import DRAW
+from reproduction.models import FULL, QUICK
+from reproduction.report import report
 
 
 def run(out, numbers, settings):

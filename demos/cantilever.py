@@ -51,8 +51,10 @@ def main(out="out", elements=16, progress=True):
     small = cantilever(2e11, elements).point_force((0, -10), at=(LENGTH, 0)).solve_static(
         first_step=0.1, progress=progress)
 
-    rows = [("gravity, tip u_y (m)", large.displacement((LENGTH, 0))[1], -0.885455, "paper, table 4"),
-            ("tip force, tip u_y (m)", small.displacement((LENGTH, 0))[1], -0.02, "Euler-Bernoulli"),
+    rows = [("gravity, tip u_y (m)", large.displacement((LENGTH, 0))[1], -0.885455,
+             "paper, table 4"),
+            ("tip force, tip u_y (m)", small.displacement((LENGTH, 0))[1], -0.02,
+             "Euler-Bernoulli"),
             ("tip force, eps_y at the root, top", small.strain((0, SIDE / 2))[1], -90e-6, "paper"),
             ("tip force, eps_y at the root, bottom", small.strain((0, -SIDE / 2))[1], 90e-6,
              "paper")]

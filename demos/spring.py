@@ -40,7 +40,8 @@ def main(out="out", elements=72, progress=True):
         stiffness = (now[0] - before[0]) / (now[1] - before[1])
         print(f"{force:8g}{now[1]:12.4f}{stiffness:11.3f}")
         before = now
-        state.plot("eps_xx", ax=ax, thickness=1, limits=(-0.06, 0.06), title=f"axial strain at a force of {force:g}",
+        state.plot("eps_xx", ax=ax, thickness=1, limits=(-0.06, 0.06),
+                   title=f"axial strain at a force of {force:g}",
                    colorbar=ax is axes[-1])
         ax.set(xlabel="x" if ax is axes[-1] else "", ylim=(-2.4, 2.4))
     state.save(out / "spring.vtu")

@@ -8,9 +8,9 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS.parent / "demos"))
 
-import cantilever  # noqa: E402
-import rollup  # noqa: E402
-import spring  # noqa: E402
+import cantilever
+import rollup
+import spring
 
 
 def main(folder=DOCS):

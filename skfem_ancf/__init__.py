@@ -15,10 +15,9 @@ from .scene import Scene
 __version__ = "0.1.0"
 
 __all__ = [
-    "AncfError", "Beam", "CallbackError", "CallError", "ConvergenceError", "ElementBeamANCF",
-    "ElementBeamANCFCubic", "ElementBeamCable", "ElementBeamPatelShabana", "EnergyMomentum",
-    "FileError", "GeneralizedAlpha", "HHT", "InputError", "MeshBeam", "MeshError", "MissingExtra",
-    "ModelWarning", "NameUnknown", "NeoHookean", "Newmark", "Scene", "StVenantKirchhoff",
-    "StabilityWarning", "SupportError", "forms",
-    "reference_coordinates",
+    "HHT", "AncfError", "Beam", "CallError", "CallbackError", "ConvergenceError",
+    "ElementBeamANCF", "ElementBeamANCFCubic", "ElementBeamCable", "ElementBeamPatelShabana",
+    "EnergyMomentum", "FileError", "GeneralizedAlpha", "InputError", "MeshBeam", "MeshError",
+    "MissingExtra", "ModelWarning", "NameUnknown", "NeoHookean", "Newmark", "Scene",
+    "StVenantKirchhoff", "StabilityWarning", "SupportError", "forms", "reference_coordinates",
 ]

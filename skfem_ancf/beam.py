@@ -612,7 +612,7 @@ def select_beam(beams: Sequence[Beam], beam: WhichBeam) -> Beam:
     elif isinstance(beam, str):
         found = [b for b in beams if b.name == beam]
     elif isinstance(beam, int) and not isinstance(beam, bool) and beam >= 0:
-        found = beams[beam:beam + 1]
+        found = list(beams[beam:beam + 1])
     if found:
         return found[0]
     known = [b.name if b.name is not None else k for k, b in enumerate(beams)]

@@ -26,6 +26,7 @@ from .mapping import MappingBeam
 from .pickling import require_picklable
 from .places import is_point
 from .reference import ElementBeamP1
+import itertools
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -1174,7 +1175,7 @@ def _lagrange_derivative(nodes, i, x):
 
 def _check_curvature(curve, s, height):
     """Raise MeshError where the radius of curvature of the curve is below h/2."""
-    at = np.unique(np.concatenate([np.linspace(a, b, 17) for a, b in zip(s[:-1], s[1:])]))
+    at = np.unique(np.concatenate([np.linspace(a, b, 17) for a, b in itertools.pairwise(s)]))
     _, tangent = curve.nodes(at)
     angle = np.unwrap(np.arctan2(tangent[1], tangent[0]))
     kappa = np.abs(np.diff(angle)) / curve.lengths(at[:-1], at[1:])

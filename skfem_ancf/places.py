@@ -130,9 +130,9 @@ def facets_of(mesh: MeshBeam, place: Place) -> Array:
         return _numbered(mesh, place)
     if callable(place):
         return _satisfying(mesh, place)
-    if isinstance(place, (tuple, list, set, frozenset)) and len(place):
-        if not all(isinstance(p, numbers.Number) for p in place):
-            return np.unique(np.concatenate([np.asarray(facets_of(mesh, p)) for p in place]))
+    if isinstance(place, (tuple, list, set, frozenset)) and len(place) and not all(
+            isinstance(p, numbers.Number) for p in place):
+        return np.unique(np.concatenate([np.asarray(facets_of(mesh, p)) for p in place]))
     hint = ""
     if isinstance(place, numbers.Integral) and not isinstance(place, bool):
         hint = f"; for the facet of that number write np.array([{shown(place)}])"

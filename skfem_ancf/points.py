@@ -66,7 +66,8 @@ def as_points(points: Any, mesh: MeshBeam | None = None) -> Array:
                         f"its second, got {points.shape}{hint}")
     if any(np.shape(p) != (2,) for p in points if not _ragged(p)) or any(map(_ragged, points)):
         hint = "; an array of shape (2, n) is one too" if len(points) == 2 else ""
-        raise MeshError(f"each material point of a list is a pair (x, y), got {shown(points)}{hint}")
+        raise MeshError(f"each material point of a list is a pair (x, y), got "
+                        f"{shown(points)}{hint}")
     return np.array([as_point(p, mesh) for p in points]).T
 
 

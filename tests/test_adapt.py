@@ -73,7 +73,8 @@ def test_refined_space_holds_the_coarse_one(name):
 def test_scene_is_put_on_other_beams():
     left = Beam(MeshBeam.init_line([0, 1], 0.1), ElementBeamANCF(2), StVenantKirchhoff(1e6, 0.3, 1),
                 0.1, name="left")
-    right = Beam(MeshBeam.init_line([1, 2], 0.1), ElementBeamANCF(2), StVenantKirchhoff(1e6, 0.3, 1),
+    right = Beam(MeshBeam.init_line([1, 2], 0.1), ElementBeamANCF(2),
+                 StVenantKirchhoff(1e6, 0.3, 1),
                  0.1, name="right")
     scene = Scene(left, right).clamp("left", beam="left").gravity((0, -1))
     scene.joint("weld", beams=(left, right), at=("right", "left"))

@@ -108,7 +108,7 @@ def test_bad_arguments(entry):
 @pytest.mark.parametrize("entry", [c for c in CALLS if c.kinds and c.function is not load],
                          ids=lambda entry: entry.name)
 def test_wrong_calls_list_the_arguments(entry):
-    kind, error = outcome(entry.function, {**entry.valid, "nonsense": 1})
+    _kind, error = outcome(entry.function, {**entry.valid, "nonsense": 1})
     if "<lambda>" in str(error) or entry.name.startswith("Scene"):
         pytest.skip("the keyword does not get past the helper of the table")
     assert isinstance(error, CallError), repr(error)

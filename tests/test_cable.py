@@ -213,7 +213,7 @@ def test_full_quadrature_of_the_cubic_axis_is_less_accurate():
 @pytest.mark.parametrize("degree, n, tol", [(3, 32, 5e-5), (5, 8, 1e-6), (7, 5, 1e-6)])
 def test_frequencies(degree, n, tol):
     beam = cable(degree, line(n))
-    A, I = B * 0.01, B * 0.01**3 / 12  # noqa: E741
+    A, I = B * 0.01, B * 0.01**3 / 12
     for scene, ends, skip in ((Scene(beam).clamp("left"), "fixed-free", 0),
                               (Scene(beam), "free-free", 3)):
         found = scene.modes(skip + 2).frequencies[skip:]
@@ -270,7 +270,7 @@ def test_strain_of_a_stretched_cable(plane, ratio):
 @pytest.mark.parametrize("degree", DEGREES)
 def test_strain_of_a_bent_cable(degree):
     beam = cable(degree, line(16))
-    P, I = 1e-3, B * 0.01**3 / 12  # noqa: E741
+    P, I = 1e-3, B * 0.01**3 / 12
     state = Scene(beam).clamp("left").point_force((0, -P), at=(1, 0)).solve_static()
     # where the curvature of a cubic axis is best, at the Gauss points of an element
     x = 0.25 + (0.5 - 0.5 / np.sqrt(3)) / 16

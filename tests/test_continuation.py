@@ -63,7 +63,7 @@ def test_limits_of_lee_frame_with_quintic_cables():
     fall = (path.load > -5) & (np.arange(len(path)) > np.argmax(path.load))
     assert np.any(np.diff(tip[fall]) < 0)
     # and the whole path lies on that of the rod
-    ux, uy, load = exact.lee_frame(21, A=6, I=2, L=120)
+    _ux, uy, load = exact.lee_frame(21, A=6, I=2, L=120)
     point = np.array([tip, path.load / 10]).T
     rod = np.array([-uy, load / 10]).T
     rod = rod[: np.argmin(load) + 2]

@@ -62,7 +62,7 @@ def functions(module):
 def section(text, *names):
     """The lines of sections of a docstring."""
     found = re.findall(r"^(\w[\w ]*)\n-{3,}\n((?:.*\n?)*?)(?=^\w[\w ]*\n-{3,}\n|\Z)", text or "",
-                       re.M)
+                       re.MULTILINE)
     return "\n".join(body for name, body in found if name in names)
 
 

@@ -644,7 +644,7 @@ def test_flying_flexible_rod():
     """
     L, EA, EI, rhoA = 10.0, 1e5, 100.0, 1.0
     h, angle = np.sqrt(12 * EI / EA), np.arctan2(8, -6)
-    pulse = lambda t: 1.0 * (t < 1.25) * np.sin(np.pi * t / 1.25) ** 2  # noqa: E731
+    pulse = lambda t: 1.0 * (t < 1.25) * np.sin(np.pi * t / 1.25) ** 2
     mesh = MeshBeam.init_line(np.linspace(0, L, 11), h, origin=(6, 0), angle=angle)
     material = StVenantKirchhoff(EA / h, 0.0, rhoA / h, shear_correction=2.0)
     beam = Beam(mesh, ElementBeamANCFCubic(1), material, 1.0, formulation="assumed")
@@ -706,7 +706,8 @@ def test_rotating_arm():
 
 @pytest.mark.parametrize("function", [
     lambda t: 0.3 * np.sin(t), lambda t: 2.0, lambda t: math.exp(-t), lambda t: float(t < 0.5),
-    lambda t: 1.0 if t < 0.5 else t, lambda t: max(t, 0.3), lambda t: (t, 0.0), lambda t: (t, 2 * t),
+    lambda t: 1.0 if t < 0.5 else t, lambda t: max(t, 0.3), lambda t: (t, 0.0),
+    lambda t: (t, 2 * t),
     lambda t: np.array([np.cos(t), 1.0]), lambda t: t * (1 if np.all(t < 0.9) else 2),
     lambda t: np.interp(t, [0, 1], [2, 5]), lambda t: [t**2, np.ones_like(t)], np.cumsum,
     lambda t: int(10 * t) % 2])

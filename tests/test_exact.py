@@ -24,7 +24,7 @@ def close(value, reference, tol):
 
 
 def test_small_deflection_of_the_slender_cantilever():
-    I = exact.inertia(0.01, 0.01)  # noqa: E741
+    I = exact.inertia(0.01, 0.01)
     close(exact.euler_bernoulli_tip(10.0, 2e11, I, 1.0), [0.0, -0.02], 1e-16)
     strain = exact.root_transverse_strain(10.0, 2e11, 0.3, L=1.0, h=0.01, b=0.01)
     close(strain, [-90e-6, 90e-6], 1e-18)  # the fibre in tension is on top
@@ -226,7 +226,7 @@ def test_self_buckling():
 # Vibration
 
 
-def ritz(E, I, A, rho, L, kGA, n, clamped, degree=24):  # noqa: E741
+def ritz(E, I, A, rho, L, kGA, n, clamped, degree=24):
     """Timoshenko frequencies by a Ritz method with Legendre polynomials."""
     x, weight = legendre.leggauss(degree + 4)
     V = legendre.legvander(x, degree)

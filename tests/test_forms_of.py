@@ -1,4 +1,4 @@
-"""The weak forms of a beam's own formulation, by stock assembly, against what a Scene solves with."""
+"""Weak forms of a beam's own formulation, by stock assembly, against what a Scene solves with."""
 
 import numpy as np
 import pytest

@@ -13,6 +13,7 @@ from skfem_ancf import (Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchho
 from skfem_ancf.errors import SupportError
 from skfem_ancf.joints import Joint, OnCircle
 from skfem_ancf.joints.base import point
+import itertools
 
 E, RHO, H = 2e11, 7800.0, 0.02
 EI = E * H**4 / 12
@@ -28,9 +29,9 @@ def bar(a, b, ne=1, name=None):
 def chain(number, length=1.0, ne=1):
     """A straight beam in pieces that are welded, none of them held."""
     x = np.linspace(0, length, number + 1)
-    beams = [bar((a, 0), (b, 0), ne) for a, b in zip(x[:-1], x[1:])]
+    beams = [bar((a, 0), (b, 0), ne) for a, b in itertools.pairwise(x)]
     scene = Scene(*beams)
-    for a, b in zip(beams[:-1], beams[1:]):
+    for a, b in itertools.pairwise(beams):
         scene.joint("weld", beams=(a, b), at=("right", "left"))
     return scene
 

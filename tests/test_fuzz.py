@@ -17,7 +17,7 @@ if not (FOLDER / "fuzz.py").exists():
     pytest.skip("benchmarks/ is not part of this installation", allow_module_level=True)
 sys.path.insert(0, str(FOLDER))
 
-import fuzz  # noqa: E402
+import fuzz
 
 
 class Drawn:

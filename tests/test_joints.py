@@ -474,7 +474,7 @@ def test_four_bar_mechanism(scheme):
     scene = Scene(bars).pin("left", beam="crank").pin("left", beam="rocker")
     scene.joint("hinge", beams=("crank", "coupler"), at=A)
     scene.joint("hinge", beams=("coupler", "rocker"), at=B)
-    turn = lambda t: omega * t**3 / (1 + t**2)  # noqa: E731
+    turn = lambda t: omega * t**3 / (1 + t**2)
     drive = scene.joint("angle", beam="crank", at="left", angle=turn)
     history = scene.integrate(1.0, 5e-3, scheme=scheme)
     for k in (50, 100, 150, 200):

@@ -292,7 +292,7 @@ def test_refined_nodes_lie_on_the_curve(r, how):
     m = r()
     fine = m.refined(how)
     assert_array_equal(fine.p, m.curve(fine.s))
-    p, tangent = m.curve.nodes(fine.s)
+    _p, tangent = m.curve.nodes(fine.s)
     assert_array_equal(fine.p_X, tangent)
     assert_allclose(fine.lengths, m.curve.lengths(fine.s[:-1], fine.s[1:]), rtol=1e-14)
     assert_allclose(fine.lengths.sum(), m.lengths.sum(), rtol=1e-10)

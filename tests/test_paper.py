@@ -148,7 +148,7 @@ def test_time_files(parts, motions, number, file, t_end):
 
 def test_stiff_pendulum_is_nearly_a_rigid_rod(motions):
     result = motions["5.4"]
-    t, *rigid = result.facts["rigid"]
+    _t, *rigid = result.facts["rigid"]
     for name in result.sheets["fig14"].models:
         tip = result.sheets["fig14"].of(name, "tip_x", "tip_y")
         np.testing.assert_allclose(tip, rigid, atol=3e-3)

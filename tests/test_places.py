@@ -38,7 +38,8 @@ def test_the_rule(place, facets):
     ((1, 1), MeshError, r"the point \(1, 1\) is on no section .* node 2 with its axis at \(1, 0\)"),
     ((0.9, 0), MeshError, r"nearest is that of node 2 with its axis at \(1, 0\), 0.1 away"),
     ((1, 0.06), MeshError, "0.01 away"),
-    (lambda x: x[0] > 99, MeshError, r"selects none of the 13 facets.* \(0, -0.05\) to \(2, 0.05\)"),
+    (lambda x: x[0] > 99, MeshError,
+     r"selects none of the 13 facets.* \(0, -0.05\) to \(2, 0.05\)"),
     (lambda x: 3, InputError, "returns n truth values, as lambda"),
     (lambda x: x[0], InputError, "returned float64"),
     (lambda x: x[7] > 0, InputError, "fails for points x of shape .* IndexError"),
@@ -226,7 +227,8 @@ def fails(v, w):
 
 
 BAD = {
-    "clamp": [("lefft",), ((9, 9),), ("left", "b"), ("left", None, "loose"), (lambda x: x[0] > 99,)],
+    "clamp": [("lefft",), ((9, 9),), ("left", "b"), ("left", None, "loose"),
+              (lambda x: x[0] > 99,)],
     "pin": [(3.5,), ("right", 7), ((1, 0.03),)],
     "fix": [("right", "r_Z"), ("right", ["r", "s"]), ("right", "r", np.nan), ("left", "r", 0.5)],
     "joint": [("glue",), ("line",), ("line", (9, 9), (1, 0)), ("plane", "top"),

@@ -195,7 +195,8 @@ def test_lowest_order_that_will_do(fields, height, tolerance, order):
     assert beam.element.order == order
 
 
-@pytest.mark.parametrize("height, tolerance", [(0.01, 1e-3), (0.05, 1e-3), (0.1, 1e-2), (0.1, 2e-3)])
+@pytest.mark.parametrize("height, tolerance", [
+    (0.01, 1e-3), (0.05, 1e-3), (0.1, 1e-2), (0.1, 2e-3)])
 def test_chosen_element_keeps_the_tolerance(height, tolerance):
     """Tip of a linear cantilever against sections of order 7; a fine mesh for both."""
     def tip(element):

@@ -84,7 +84,7 @@ def test_gaps_and_parts_at_other_places():
     mesh = MeshBeam.init_line(np.linspace(0, 1, 11), height=0.1).restrict(np.array([0, 1, 5, 6]))
     find = finder.Finder(mesh)
     x = np.array([[0.0, 0.2, 0.2 + 1e-9, 0.3, 0.5, 0.6, 0.7, 0.75], np.zeros(8)])
-    e, X, outside = find(x)
+    e, _X, outside = find(x)
     assert_array_equal(e[[0, 1, 4, 5, 6]], [0, 1, 2, 2, 3])
     assert_array_equal(outside > find.allowed, [0, 0, 0, 1, 0, 0, 0, 1])
 
@@ -179,7 +179,8 @@ def test_points_are_found_once_and_not_all_are_kept(monkeypatch):
 @pytest.mark.parametrize("what, error, message", [
     (np.zeros((5, 2)), MeshError, r"shape \(2, n\).*got \(5, 2\); give its transpose"),
     (np.zeros((3, 4)), MeshError, r"got \(3, 4\)$"),
-    ([(0, 1, 2), (3, 4, 5)], MeshError, "each material point of a list is a pair.*an array of shape"),
+    ([(0, 1, 2), (3, 4, 5)], MeshError,
+     "each material point of a list is a pair.*an array of shape"),
     ([(0, 1), (0, (1, 2))], MeshError, "is a pair"),
     ([(0.1, 0), (np.nan, 0)], InputError, "NaN"),
     (np.array([[0.1], [np.inf]]), InputError, "infinite"),

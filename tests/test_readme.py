@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
 def scripts(page):
-    return re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.S)
+    return re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
@@ -22,6 +22,25 @@ def test_scripts_of_a_page_run_in_order(page, tmp_path, monkeypatch, capsys):
     if page.name == "README.md":
         assert abs(names["state"].displacement((1, 0))[1] + 0.0199) < 1e-4
         assert {p.name for p in tmp_path.iterdir()} == {"cantilever.vtu", "cantilever.png"}
+
+
+def test_recipes_do_what_they_say(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for script in scripts(PAGES[1]):
+        exec(compile(script, "CONTRIBUTING.md", "exec"), names)
+    linear, I, E = names["tip"](), 0.05**4 / 12, 2e8
+    weight = 7800 * 9.81 * 0.05**2
+    assert abs(linear / (-weight / (8 * E * I)) - 1) < 0.06  # a large deflection
+    strain = 0.5 * weight * 0.025 / (E * I)  # at the clamp
+    assert 0.05 * strain**2 < 1 - names["law"] / linear < strain**2  # its modulus is E (1 + eps^2)
+    one, same = names["element"]
+    assert abs(one / same - 1) < 1e-9
+    assert abs(names["formulation"] / linear - 1) < 0.2
+    assert abs(names["load"] / (5.0 / (3 * E * I)) - 1) < 0.02
+    assert abs(names["joint"]) < 1e-12 and abs(names["level"].displacement((1, 0))[1]) > 1e-5
+    newmark = names["pendulum"].integrate(0.05, 1e-3, "newmark").displacement((1, 0))[-1, 1]
+    assert 0 < abs(names["scheme"] / newmark - 1) < 1e-2
 
 
 def test_the_readme_has_one_script_of_at_most_15_lines():

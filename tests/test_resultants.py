@@ -9,13 +9,15 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         MeshBeam, NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.dynamics import GeneralizedAlpha
 from skfem_ancf.quadrature import gauss
+import itertools
 
 ELEMENTS = [ElementBeamANCF(1), ElementBeamANCF(3), ElementBeamANCFCubic(2), ElementBeamCable(5)]
 
 
 def line(n=16, h=0.01, element=None, E=2e8, nu=0.3, density=7800, length=1.0, **options):
     return Beam(MeshBeam.init_line(np.linspace(0, length, n + 1), height=h),
-                element or ElementBeamANCF(3), StVenantKirchhoff(E, nu, density), width=h, **options)
+                element or ElementBeamANCF(3), StVenantKirchhoff(E, nu, density), width=h,
+                **options)
 
 
 def axis(state, s):
@@ -38,7 +40,7 @@ def test_weight_behind_each_section(element):
     for k in range(0, len(r.s), 7):  # the moment of the weight about the axis, piece by piece
         cuts = np.append(r.s[k], np.linspace(0, 1, 17)[np.linspace(0, 1, 17) > r.s[k] + 1e-12])
         total = 0.0
-        for a, b in zip(cuts[:-1], cuts[1:]):
+        for a, b in itertools.pairwise(cuts):
             s, weight = np.repeat(a + (b - a) * x, 5), np.repeat((b - a) * v, 5) * np.tile(v, 5)
             at = state.position(np.array([s, 0.01 * eta]))[0]
             total += np.sum(weight * (at - axis(state, r.s[k:k + 1])[0]))

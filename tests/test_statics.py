@@ -324,7 +324,7 @@ def test_follower_pressure():
     h, b = 0.01, 1.0
 
     def rate(s, z):  # x, y, theta, n, m backwards from the tip
-        x, y, a, n0, n1, m = z
+        _x, _y, a, n0, n1, m = z
         c, s = np.cos(a), np.sin(a)
         return -np.array([c, s, m / EI, -q * s, q * c, -(c * n1 - s * n0)])
 

@@ -93,7 +93,8 @@ def test_a_driven_motion_after_rest_is_seen(kind):
     at = (0.0, 0.0) if kind == "support" else (0.3, 0.01)
     def build():
         scene = Scene(soft(2, 1, E=1e4))
-        scene.joint("position", at=at, r=lambda t: (at[0], at[1] + 0.05 * float(blow(t, 0.7, 0.02))))
+        scene.joint("position", at=at,
+                    r=lambda t: (at[0], at[1] + 0.05 * float(blow(t, 0.7, 0.02))))
         return scene
 
     scene = build()

@@ -68,10 +68,8 @@ def changes(node):
     def replace(**fields):
         return lambda n: [setattr(n, name, value) for name, value in fields.items()]
 
-    if isinstance(node, (ast.BinOp, ast.AugAssign)) and type(node.op) in SWAPS:
-        new = SWAPS[type(node.op)]
-        yield f"{type(node.op).__name__} -> {new.__name__}", replace(op=new())
-    elif isinstance(node, ast.BoolOp):
+    if isinstance(node, ast.BoolOp) or (
+            isinstance(node, (ast.BinOp, ast.AugAssign)) and type(node.op) in SWAPS):
         new = SWAPS[type(node.op)]
         yield f"{type(node.op).__name__} -> {new.__name__}", replace(op=new())
     elif isinstance(node, ast.Compare) and len(node.ops) == 1:
@@ -101,8 +99,7 @@ def changes(node):
 
 def ignored(node):
     """True for what is said, not done: messages, logging, representations."""
-    return (isinstance(node, ast.Raise)
-            or isinstance(node, ast.JoinedStr)
+    return (isinstance(node, (ast.Raise, ast.JoinedStr))
             or (isinstance(node, ast.FunctionDef) and node.name in ("__repr__", "describe_dof"))
             or (isinstance(node, ast.Expr) and isinstance(node.value, ast.Call)
                 and ast.unparse(node.value.func).startswith(("logger.", "bar.")))
@@ -343,13 +340,14 @@ def main():
     import matplotlib
     matplotlib.use("Agg")
     import meshio  # noqa: F401  what every child would import
-    import scipy.integrate  # noqa: F401
-    import scipy.linalg  # noqa: F401
-    import scipy.optimize  # noqa: F401
+    import scipy.integrate
+    import scipy.linalg
+    import scipy.optimize
     import scipy.sparse.linalg  # noqa: F401
     import skfem  # noqa: F401
 
-    count, log = {}, OUT / ("named.txt" if arguments.named else f"run-{arguments.seed}-{arguments.skip}.txt")
+    run = f"run-{arguments.seed}-{arguments.skip}.txt"
+    count, log = {}, OUT / ("named.txt" if arguments.named else run)
     begin = time.time()
     with open(log, "w") as lines:
         for title, name, tree, where in (named() if arguments.named else sampled(arguments)):

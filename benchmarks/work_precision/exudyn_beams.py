@@ -36,7 +36,8 @@ def beam_system(problem, kind, n):
         held = {"clamp": [1, 1, 1], "pin": [1, 1, 0], "arm": [1, 1, 0]}
     gravity = [0.0, -GRAVITY, 0.0] if p.load == "gravity" else [0.0, 0.0, 0.0]
     made = GenerateBeamElementsAlongLine(mbs, [0.0, 0.0, 0.0], [p.L, 0.0, 0.0], n, template,
-                                         gravity=gravity, groundConstraintsStart=held.get(p.support))
+                                         gravity=gravity,
+                                         groundConstraintsStart=held.get(p.support))
     root, tip = made["nodes"][0], made["nodes"][-1]
     if p.support == "arm":
         _turn(mbs, model, root)

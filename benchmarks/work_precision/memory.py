@@ -7,8 +7,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from work_precision.cases import runs_of, warm_up  # noqa: E402
-from work_precision.micro import SCALED  # noqa: E402
+from work_precision.cases import runs_of, warm_up
+from work_precision.micro import SCALED
 
 
 def peak(case, index, quick):

@@ -6,7 +6,7 @@ computes the table :data:`CONVERGED` of the motions anew (ten minutes).
 """
 
 import sys
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +14,10 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "validation"), str(ROOT / "benchmarks")]
 
-from work_precision import exudyn_beams, ours  # noqa: E402
-from work_precision.problems import GRAVITY, PROBLEMS  # noqa: E402
+from work_precision import exudyn_beams, ours
+from work_precision.problems import GRAVITY, PROBLEMS
 
-import exact  # noqa: E402
+import exact
 
 #: Tip displacements (m) of the two-dimensional body in plane stress, no shear factor, from
 #: independent codes: 1e-6 and 1e-5.
@@ -39,7 +39,7 @@ CONVERGED = {
 }
 
 
-@lru_cache(maxsize=None)
+@cache
 def reference(name, model):
     """Converged tip displacement, shape (2,), of a problem by a model.
 

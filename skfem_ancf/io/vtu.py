@@ -232,7 +232,7 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     return path
 
 
-class replacing:  # noqa: N801
+class replacing:
     """A context with a temporary path beside ``path``, which replaces ``path`` on success."""
 
     def __init__(self, path: StrPath) -> None:

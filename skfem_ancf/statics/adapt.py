@@ -131,8 +131,8 @@ def _solve_for_strain(scene, tol, max_elements, **options):
         if stuck:
             raise ConvergenceError(
                 f"the estimated error of the strain stays at {before[1]:.3g} as elements are "
-                f"added; adapt = {tol:g} is not reached: the sections cannot show this field, use an "
-                "element of higher order", state)
+                f"added; adapt = {tol:g} is not reached: the sections cannot show this field, use "
+                "an element of higher order", state)
         if len(errors) >= max_elements:
             raise _too_few(len(errors), estimate, tol, state)
         scene, _ = refine(scene, _largest(errors, [len(e) for e, _ in parts]))
