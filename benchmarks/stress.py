@@ -17,14 +17,14 @@ import numpy as np
 from scipy.linalg import eigh
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "validation"))
-import exact  # noqa: E402
+import exact
 
-from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF,  # noqa: E402
+from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF,
                         ElementBeamANCFCubic, ElementBeamCable, MeshBeam, ModelWarning,
                         NeoHookean, Scene, StVenantKirchhoff)
-from skfem_ancf.formulations import Formulation, Term  # noqa: E402
-from skfem_ancf.progress import progress_bar  # noqa: E402
-from skfem_ancf.quadrature import gauss  # noqa: E402
+from skfem_ancf.formulations import Formulation, Term
+from skfem_ancf.progress import progress_bar
+from skfem_ancf.quadrature import gauss
 
 NU, WIDTH, G = 0.3, 0.01, 9.81
 
