@@ -331,6 +331,11 @@ class Beam(Frozen):
         """What finds the elements that hold points, a :class:`~skfem_ancf.finder.Finder`."""
         return Finder(self.mesh)
 
+    @cached_property
+    def grids(self) -> dict:
+        """Points of all elements at which fields were asked for last, by the reference points."""
+        return {}
+
     def probe(self, point: ArrayLike) -> tuple[Array, Array]:
         """Coordinate numbers and weights of the position of a material point.
 

@@ -109,6 +109,11 @@ class Path:
                 f"{len(self.bifurcation_points())} bifurcation points, {self.iterations} "
                 f"iterations, relative error {self.error.max():.1g}>")
 
+    def _repr_html_(self):
+        from .visuals.html import path_html
+
+        return path_html(self)
+
     def _state(self, p, message, iterations=0):
         return State(self.system, p.u, p.load, p.force, True, iterations, message, (),
                      p.multipliers)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import logging
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from .beam import select_beam
 from .errors import InputError, NameUnknown, require_flag, teaching
+from .fields import Values, find_field
 from .frozen import Frozen
 from .recovery import actions, recover
 from .resultants import Resultants, resultants
@@ -285,6 +286,40 @@ class State(Frozen):
         at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
         return at.gather([self._stress(part, recover) for part in at.parts])
 
+    def field(self, field: Any, point: ArrayLike, beam: WhichBeam = None,
+              recover: bool = True) -> Array:
+        """Any field at material points.
+
+        Parameters
+        ----------
+        field
+            A name of :data:`skfem_ancf.fields.FIELDS`, as "von_mises", or a function or Field of
+            your own, see :mod:`skfem_ancf.fields`.
+        point
+            One point, shape (2,), or many, shape (2, n) or a list.
+        beam, recover
+            As for :meth:`strain`.
+
+        Returns
+        -------
+        ndarray
+            Shape () or (n,); vectors and tensors have their 2 or 3 components first.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.1), ElementBeamANCF(2),
+        ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
+        >>> state = Scene(beam).clamp("left").point_force((0, -0.1), at=(1, 0)).solve_static()
+        >>> state.field("von_mises", (0.5, 0.05)).round(-1), state.field("tresca", (0.5, 0)).round()
+        (np.float64(300.0), np.float64(30.0))
+        """
+        at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
+        field = find_field(field)
+        return at.gather([field.of(Values(part, self.u, partial(
+            self._recovery_of, part.number) if recover else None)) for part in at.parts])
+
     def _strain(self, part, recover):
         r = self._recovery_of(part.number) if recover else None
         if r is not None:
@@ -441,6 +476,11 @@ class State(Frozen):
 
     # files and pictures
 
+    def _repr_html_(self) -> str:
+        from .visuals.html import state_html
+
+        return state_html(self)
+
     def save(self, filename: StrPath, **options: Any) -> Path:
         """Write the deformed body for ParaView.
 
@@ -459,6 +499,32 @@ class State(Frozen):
         from .io.vtu import save_vtu
 
         return save_vtu(self, filename, **options)
+
+    def to_pyvista(self, **options: Any) -> Any:
+        """The body as a grid of pyvista.
+
+        Parameters
+        ----------
+        **options
+            Those of :func:`skfem_ancf.visuals.pyvista.to_pyvista`.
+        """
+        from .visuals.pyvista import to_pyvista
+
+        return to_pyvista(self, **options)
+
+    def view(self, field: Any = "eps_yy", **options: Any) -> Any:
+        """Put the body into a plotter of pyvista, and return it.
+
+        Parameters
+        ----------
+        field
+            As for :meth:`plot`.
+        **options
+            Those of :func:`skfem_ancf.visuals.pyvista.view`.
+        """
+        from .visuals.pyvista import view
+
+        return view(self, field, **options)
 
     def plot_resultants(self, beam: WhichBeam = None, **options: Any) -> Any:
         """Draw the three diagrams; see :func:`skfem_ancf.visuals.diagrams.plot_resultants`.

@@ -143,6 +143,11 @@ class Scene:
         return (f"<Scene of {len(self.beams)} beam(s), {len(self._fixed)} fixed coordinates, "
                 f"{len(self.loads)} load(s)>")
 
+    def _repr_html_(self):
+        from .visuals.html import scene_html
+
+        return scene_html(self)
+
     @property
     def beams(self) -> tuple[Beam, ...]:
         """The beams."""

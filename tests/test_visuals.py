@@ -12,7 +12,8 @@ from conftest import quarter_arc
 from test_io import affine, bent, turn
 from skfem_ancf import (Beam, ElementBeamANCF, InputError, MeshBeam, MissingExtra, NameUnknown,
                         Scene, StVenantKirchhoff)
-from skfem_ancf.visuals.matplotlib import TITLES, plot_state
+from skfem_ancf.fields import DRAWN, FIELDS
+from skfem_ancf.visuals.matplotlib import plot_state
 
 STEEL = StVenantKirchhoff(E=1e6, nu=0.3)
 
@@ -27,14 +28,15 @@ def state():
     return bent()
 
 
-@pytest.mark.parametrize("field", TITLES)
+@pytest.mark.parametrize("field", DRAWN)
 def test_every_field_is_drawn_and_named(state, field):
     ax = state.plot(field)
-    assert ax.get_title(loc="left") == TITLES[field]
+    assert ax.get_title(loc="left") == FIELDS[field].title
     low, high = drawn(ax).get_clim()
     values = drawn(ax).get_array()
-    assert high == pytest.approx(abs(values).max())
-    assert low == (0.0 if field == "displacement" else -high)
+    start = FIELDS[field].neutral
+    assert high - start == pytest.approx(abs(values - start).max())
+    assert low == pytest.approx(2 * start - high if FIELDS[field].signed else start)
     assert ax.get_aspect() == 1.0
 
 

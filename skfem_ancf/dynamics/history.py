@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import require_index, teaching
+from ..errors import require_index, require_path, teaching
 from ..resultants import over_time
 from ..results import State
 from .base import Motion
@@ -218,6 +218,25 @@ class History:
         self.system.points.find(point, beam)
         return np.array([state.stress(point, beam, recover) for state in self])
 
+    def field(self, field: Any, point: ArrayLike, beam: WhichBeam = None,
+              recover: bool = True) -> Array:
+        """Any field at all instants.
+
+        Parameters
+        ----------
+        field, beam, recover
+            Those of :meth:`State.field <skfem_ancf.results.State.field>`.
+        point
+            One point, shape (2,), or many, shape (2, n) or a list.
+
+        Returns
+        -------
+        ndarray
+            Shape (nt, ...).
+        """
+        self.system.points.find(point, beam)
+        return np.array([state.field(field, point, beam, recover) for state in self])
+
     def resultants(self, at: ArrayLike, beam: WhichBeam = None, recover: bool = True) -> Resultants:
         """Section forces and strains of the axis at all instants.
 
@@ -275,24 +294,67 @@ class History:
     def __getstate__(self):
         return {**vars(self), "_solver": None}
 
-    # files
+    # files and pictures
 
-    def save(self, filename: StrPath, progress: bool | None = None, **options: Any) -> None:
-        """Write a time series for ParaView: a ``.pvd`` and one ``.vtu`` for each instant.
+    def _repr_html_(self):
+        from ..visuals.html import history_html
+
+        return history_html(self)
+
+    def to_pyvista(self, **options: Any) -> Any:
+        """One mesh of pyvista that takes every instant, in place.
+
+        Parameters
+        ----------
+        **options
+            Those of :func:`skfem_ancf.visuals.pyvista.to_pyvista`.
+
+        Returns
+        -------
+        Series
+            Its ``mesh`` is at the first instant, ``update(k)`` puts it at another, see
+            :class:`skfem_ancf.visuals.pyvista.Series`.
+        """
+        from ..visuals.pyvista import Series
+
+        return Series(self, **options)
+
+    def animate(self, filename: StrPath, field: Any = "eps_yy", **options: Any) -> Any:
+        """Write a film; see :func:`skfem_ancf.visuals.animation.animate`.
 
         Parameters
         ----------
         filename
-            Name of the ``.pvd`` file.
+            Ends with .gif or .mp4.
+        field
+            The field that colours the body.
+        **options
+            Those of :func:`skfem_ancf.visuals.animation.animate`.
+        """
+        from ..visuals.animation import animate
+
+        return animate(self, filename, field, **options)
+
+    def save(self, filename: StrPath, progress: bool | None = None, **options: Any) -> None:
+        """Write a time series for ParaView.
+
+        Parameters
+        ----------
+        filename
+            Ends with .pvd, for a list and one .vtu for each instant, or with .vtkhdf, for one file
+            with all of them, in which the cells are stored once.
         progress
             Show a progress bar: True, False, or None for "if it takes long".
         **options
             Those of :func:`skfem_ancf.io.vtu.save_vtu`.
         """
         from ..io.pvd import PvdWriter
+        from ..io.vtkhdf import VtkHdfWriter
         from ..progress import progress_bar
 
-        with PvdWriter(filename, **options) as writer, progress_bar(
+        path = require_path("filename", filename)
+        kind = VtkHdfWriter if path.suffix.lower() == ".vtkhdf" else PvdWriter
+        with kind(path, **options) as writer, progress_bar(
                 progress, total=len(self), desc="files") as bar:
             for k in range(len(self)):
                 writer.add(self.state(k), float(self.t[k]))

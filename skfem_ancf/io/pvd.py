@@ -8,6 +8,7 @@ from xml.sax.saxutils import quoteattr
 
 from ..errors import (InputError, require_finite_scalar, require_like, require_options,
                       require_path, teaching)
+from ..fields import find_fields
 from .vtu import replacing, save_vtu
 
 if TYPE_CHECKING:
@@ -60,7 +61,11 @@ class PvdWriter:
         if self.path.suffix.lower() != ".pvd":
             raise InputError(f"the file name must end with .pvd, got {str(filename)!r}")
         self.options = require_options("PvdWriter", options,
-                                       ("subdivide", "lagrange", "undeformed", "recover"))
+                                       ("subdivide", "lagrange", "undeformed", "recover",
+                                        "fields", "precision"))
+        if "fields" in self.options:
+            find_fields(self.options["fields"])
+        self._rows: list[str] = []
         self.frames: list[tuple[float, str]] = []  # (time, name of the file)
 
     def __enter__(self):
@@ -93,10 +98,9 @@ class PvdWriter:
         name = f"{self.path.stem}_{len(self.frames):05d}.vtu"
         frame = save_vtu(state, self.path.with_name(name), **self.options)
         self.frames.append((t, name))
-        rows = [f'<DataSet timestep="{time!r}" part="0" file={quoteattr(file)}/>'
-                for time, file in self.frames]
+        self._rows.append(f'<DataSet timestep="{t!r}" part="0" file={quoteattr(name)}/>')
         with replacing(self.path) as temporary:
             temporary.write_text("\n".join(
                 ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">',
-                 "<Collection>", *rows, "</Collection>", "</VTKFile>", ""]), encoding="utf-8")
+                 "<Collection>", *self._rows, "</Collection>", "</VTKFile>", ""]), encoding="utf-8")
         return frame

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import (FileError, InputError, require_flag, require_integer, require_like,
-                      require_path, shown, taught)
+                      require_option, require_path, shown, taught)
+from ..fields import find_fields, values_on_grid
 from ..quadrature import tensor
+from .xml import write_vtu
 
 if TYPE_CHECKING:
     from ..beam import Beam
@@ -22,14 +24,14 @@ logger = logging.getLogger(__name__)
 #: What a file may end with: formats that meshio writes as one file with data on points.
 SUFFIXES = (".vtu", ".vtk")
 
+#: Numbers of the fields in files.
+PRECISIONS = {"double": np.float64, "single": np.float32}
+
 #: VTK evaluates Lagrange cells up to this degree.
 MAX_LAGRANGE_DEGREE = 10
 
 #: Subdivisions of an element along or across, and points of a whole body, at most.
 MAX_SUBDIVISION, MAX_POINTS = 1000, 10**8
-
-COMPONENTS = ("xx", "yy", "xy")
-
 
 class BodyFields(NamedTuple):
     """The body of a state on points, in the form that meshio takes.
@@ -41,7 +43,8 @@ class BodyFields(NamedTuple):
     cells
         For each beam its cell type and its cells, as rows of point numbers.
     point_data
-        Fields by name, shape (n,) or (n, 3).
+        Fields by name, shape (n,) or (n, 3): vectors have a third component of zero, tensors
+        are (xx, yy, xy).
     cell_data
         ``beam`` and ``element``: the numbers of both, one array for each beam.
     """
@@ -52,55 +55,14 @@ class BodyFields(NamedTuple):
     cell_data: dict
 
 
-def sample(state: Any, beam: Beam, X: Array, recover: bool = True) -> dict[str, Array]:
-    """The fields of one beam at reference points.
-
-    Parameters
-    ----------
-    state
-        A :class:`~skfem_ancf.results.State`, or anything with its ``u_of``.
-    beam
-        One of its beams.
-    X
-        Reference points (xi, eta) in [0, 1], shape (2, npoints).
-    recover
-        As in :func:`save_vtu`.
-
-    Returns
-    -------
-    dict
-        Arrays of shape (nelements, npoints); ``x`` (stress-free positions) and ``displacement``
-        have shape (2, nelements, npoints). See :func:`save_vtu` for the names.
-    """
-    u = state.u_of(beam)
-    out = {"x": beam.mesh.mapping().F(X), "displacement": beam.displacements(u, X)}
-    recovery = state.recovery(beam) if recover and hasattr(state, "recovery") else None
-    if recovery is None:
-        strain, S = beam.strain(u, X), beam.stress(u, X)
-        H, frame = beam.gradients(u, X)
-        F = frame + H
-    else:
-        strain, S, angle = recovery.fields(X)
-        F = recovery.gradient(strain, angle)
-    with np.errstate(invalid="ignore", divide="ignore"):  # NaN where no such state can exist
-        J = (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) * beam.material.thickness_stretch(strain)
-        sigma = np.einsum("iJ...,JK...,jK...->ij...", F, np.array([[S[0], S[2]], [S[2], S[1]]]),
-                          F, optimize=True) / J
-    for k, (i, j) in enumerate(((0, 0), (1, 1), (0, 1))):
-        out["eps_" + COMPONENTS[k]] = strain[k] if i == j else 0.5 * strain[k]
-        out["S_" + COMPONENTS[k]] = S[k]
-        out["sigma_" + COMPONENTS[k]] = sigma[i, j]
-    return out
-
-
 @taught
 def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool = False,
-                undeformed: bool = False, recover: bool = True) -> BodyFields:
+                undeformed: bool = False, recover: bool = True, fields: Any = None) -> BodyFields:
     """The body of a state on points.
 
     Parameters
     ----------
-    state, subdivide, lagrange, undeformed, recover
+    state, subdivide, lagrange, undeformed, recover, fields
         As for :func:`save_vtu`.
 
     Returns
@@ -126,6 +88,7 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
     lagrange = require_flag("lagrange", lagrange)
     undeformed = require_flag("undeformed", undeformed)
     recover = require_flag("recover", recover)
+    wanted = find_fields(fields)
     total = sum(b.mesh.nelements for b in state.beams) * (m + 1) * (n + 1)
     if total > MAX_POINTS and not lagrange:
         raise InputError(f"subdivide={(m, n)} makes {total} points, more than {MAX_POINTS}")
@@ -137,12 +100,14 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
             X, local = lagrange_cell(beam)
         else:
             X, local = grid(m, n), quads(m, n)
-        fields = sample(state, beam, X, recover)
-        x, u = fields.pop("x"), fields.pop("displacement")
-        points.append(_rows(x if undeformed else x + u))
-        data.setdefault("displacement", []).append(_rows(u))
-        for name, value in fields.items():
-            data.setdefault(name, []).append(value.ravel())
+        values = values_on_grid(state, beam, X, recover)
+        x = values.x if undeformed else values.x + values.u
+        points.append(_rows(x))
+        for field in wanted:
+            value = field.of(values)
+            data.setdefault(field.name, []).append(
+                value if field.components == 1 else _rows(value) if field.components == 2 else
+                value.T)
         ne, npoints = beam.mesh.nelements, X.shape[1]
         start = first + npoints * np.arange(ne)
         cells.append(("VTK_LAGRANGE_QUADRILATERAL" if lagrange else "quad",
@@ -156,7 +121,8 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
 
 @taught
 def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
-             lagrange: bool = False, undeformed: bool = False, recover: bool = True) -> Path:
+             lagrange: bool = False, undeformed: bool = False, recover: bool = True,
+             fields: Any = None, precision: str = "double") -> Path:
     """Write the deformed body of a state for ParaView.
 
     All beams go into one file. Points belong to one element each, since strains and stresses
@@ -196,6 +162,12 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
         Recovered strain and stress (:mod:`skfem_ancf.recovery`) where the state has them; False for
         those of the elements at the points.
 
+    fields
+        Names of :data:`skfem_ancf.fields.FIELDS`, functions or Fields, see
+        :mod:`skfem_ancf.fields`; those of the table by default.
+    precision
+        "double", or "single" for files of half the size.
+
     Returns
     -------
     pathlib.Path
@@ -218,18 +190,25 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     ...     print(state.save(f"{folder}/beam.vtu").name)
     beam.vtu
     """
-    import meshio
-
     path = require_path("filename", filename)
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"the file name must end with one of {', '.join(SUFFIXES)}, got "
                          f"{str(filename)!r}")
-    body = body_fields(state, subdivide, lagrange, undeformed, recover)
-    mesh = meshio.Mesh(body.points, body.cells, body.point_data, body.cell_data)
+    dtype = PRECISIONS[require_option("precision", precision, PRECISIONS)]
+    body = body_fields(state, subdivide, lagrange, undeformed, recover, fields)
     with replacing(path) as temporary:
-        meshio.write(temporary, mesh)
+        if path.suffix.lower() == ".vtu":
+            write_vtu(temporary, body, dtype)
+        else:
+            _write_vtk(temporary, body)
     logger.info("wrote %s: %d points", path, len(body.points))
     return path
+
+
+def _write_vtk(path, body):
+    import meshio
+
+    meshio.write(path, meshio.Mesh(body.points, body.cells, body.point_data, body.cell_data))
 
 
 class replacing:
@@ -273,8 +252,9 @@ def _subdivision(subdivide):
 
 def _rows(x):
     """Vectors (2, nelements, npoints) as rows with a third component of zero."""
-    x = x.reshape(2, -1).T
-    return np.hstack([x, np.zeros((len(x), 1))])
+    out = np.zeros((x[0].size, 3))
+    out[:, :2] = x.reshape(2, -1).T
+    return out
 
 
 def grid(m: int, n: int) -> Array:

@@ -176,6 +176,17 @@ class Material(Frozen):
             f"{type(self).__name__} does not define thickness_stretch(strain), the stretch out of "
             "the plane that makes S_33 zero in plane stress")
 
+    def stress_zz(self, strain: Array) -> Array:
+        """Second Piola-Kirchhoff stress normal to the plane, shape (...): 0 in plane stress.
+
+        Needed for von Mises and Tresca stress in plane strain.
+        """
+        if self.plane == "stress":
+            return np.zeros(np.shape(strain)[1:])
+        raise InputError(
+            f"{type(self).__name__} does not define stress_zz(strain), the stress normal to the "
+            "plane in plane strain, which von Mises and Tresca stress need")
+
     def __repr__(self):
         return (f"{type(self).__name__}(E={self.E:g}, nu={self.nu:g}, density={self.density}, "
                 f"plane={self.plane!r}, shear_correction={self.shear_correction!r})")

@@ -83,6 +83,12 @@ class NeoHookean(Material):
             return super().thickness_stretch(strain)
         return np.exp(0.5 * _evaluated(_thickness, self, np.real(strain), ()))
 
+    def stress_zz(self, strain: Array) -> Array:
+        if self.plane == "stress" or not self._fits("stress_zz"):
+            return super().stress_zz(strain)
+        d = 2.0 * (strain[0] + strain[1]) + 4.0 * strain[0] * strain[1] - strain[2] ** 2
+        return 0.5 * self.lame * np.log1p(d)  # lambda ln J, and C_33 = 1
+
 
 class _Volumetric(NeoHookean):
     """lambda/2 (ln J)^2 alone."""

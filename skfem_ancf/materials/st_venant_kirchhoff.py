@@ -65,3 +65,9 @@ class StVenantKirchhoff(Material):
         if self.plane == "strain" or not self._fits("thickness_stretch"):
             return super().thickness_stretch(strain)
         return np.sqrt(1.0 - 2.0 * self.nu / (1.0 - self.nu) * (strain[0] + strain[1]))
+
+    def stress_zz(self, strain: Array) -> Array:
+        if self.plane == "stress" or not self._fits("stress_zz"):
+            return super().stress_zz(strain)
+        S = self.stress(strain)
+        return self.nu * (S[0] + S[1])

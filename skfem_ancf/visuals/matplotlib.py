@@ -9,7 +9,8 @@ import numpy as np
 from ..errors import (InputError, MissingExtra, require_finite_scalar, require_flag,
                       require_integer, require_like, require_option, require_path, require_positive,
                       shown, taught)
-from ..io.vtu import _subdivision, grid, quads, replacing, sample
+from ..fields import DRAWN, find_field, values_on_grid
+from ..io.vtu import _subdivision, grid, quads, replacing
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -17,17 +18,6 @@ if TYPE_CHECKING:
     from ..path import Path
     from ..types import StrPath, WhichBeam
 
-#: Titles of the fields: the names are those in the files of :func:`~skfem_ancf.io.vtu.save_vtu`.
-TITLES = {
-    "displacement": "displacement, magnitude",
-    "u_x": "displacement $u_x$",
-    "u_y": "displacement $u_y$",
-    **{f"eps_{k}": rf"Green–Lagrange strain $\varepsilon_{{{k}}}$, beam frame"
-       for k in ("xx", "yy", "xy")},
-    **{f"S_{k}": f"second Piola–Kirchhoff stress $S_{{{k}}}$, beam frame"
-       for k in ("xx", "yy", "xy")},
-    **{f"sigma_{k}": rf"Cauchy stress $\sigma_{{{k}}}$, global axes" for k in ("xx", "yy", "xy")},
-}
 
 #: ``thickness="auto"`` draws a section at least this part of the picture high.
 READABLE = 1 / 25
@@ -53,8 +43,9 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     state
         A :class:`~skfem_ancf.results.State`, or anything with its ``beams`` and ``u_of``.
     field
-        A component of strain or stress as named in :func:`~skfem_ancf.io.vtu.save_vtu`, "u_x",
-        "u_y", or "displacement" for its magnitude.
+        A name of :data:`skfem_ancf.fields.FIELDS` with one component, as "S_xx", "von_mises" or
+        "eps_1"; "displacement" for its magnitude; or a function or Field of your own, see
+        :mod:`skfem_ancf.fields`.
     ax
         matplotlib Axes to draw in; a new figure by default, which needs no display.
     thickness
@@ -109,7 +100,7 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.tri import Triangulation
 
-    require_option("field", field, TITLES)
+    field = find_field(field, DRAWN)
     require_like("state", state, "State", "beams", "u_of")
     undeformed = require_flag("undeformed", undeformed)
     recover = require_flag("recover", recover)
@@ -122,7 +113,7 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     outlines = [line for b in bodies for line in b.outline(b.deformed, factor)]
     points = np.concatenate([b.points(b.deformed, factor).reshape(2, -1) for b in bodies], axis=1)
     values = np.concatenate([b.values.ravel() for b in bodies])
-    low, high = _limits(limits, values, signed=field != "displacement")
+    low, high = _limits(limits, values, field)
 
     if ax is None:
         ax = Figure(figsize=_figsize(np.concatenate(ghosts + outlines), colorbar),
@@ -137,14 +128,14 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
         for f, b in zip(first, bodies)])
     triangles = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
     image = ax.tripcolor(Triangulation(*points, triangles=triangles), values, shading="gouraud",
-                         cmap=cmap or ("viridis" if field == "displacement" else "RdYlBu_r"),
+                         cmap=cmap or ("RdYlBu_r" if field.signed else "viridis"),
                          vmin=low, vmax=high, zorder=2)
     ax.add_collection(LineCollection([np.vstack([line, line[:1]]) for line in outlines],
                                      colors=_INK, linewidths=0.5, zorder=3))
     ax.set_aspect("equal")
     ax.margins(0.04)
     ax.autoscale_view()
-    _dress(ax, TITLES[field] if title is None else title, factor)
+    _dress(ax, (field.title or field.name) if title is None else title, factor)
     if colorbar:
         _add_colorbar(ax, image, bool(np.any(values < low)), bool(np.any(values > high)))
     if filename is not None:
@@ -187,16 +178,18 @@ class _Body:
     """One beam on a grid: the deformed and the stress-free place of each point, and the field."""
 
     def __init__(self, state, beam, field, m, n, recover):
-        fields = sample(state, beam, grid(m, n), recover)
+        values = values_on_grid(state, beam, grid(m, n), recover)
         self.n, self.height = n, beam.mesh.height
         self.shape = (2, beam.mesh.nelements, m + 1, n + 1)
         # the axis is at eta = 1/2, which is on the grid only if n is even
         ends = np.array([np.linspace(0, 1, m + 1), np.full(m + 1, 0.5)])
-        x, axis = fields["x"], beam.mesh.mapping().F(ends)
-        u, axis_u = fields["displacement"], beam.displacements(state.u_of(beam), ends)
+        flat = self.shape[:2] + (-1,)
+        x, axis = values.x.reshape(flat), beam.mesh.mapping().F(ends)
+        u, axis_u = values.u.reshape(flat), beam.displacements(state.u_of(beam), ends)
         self.reference, self.deformed = (x, axis), (x + u, axis + axis_u)
-        self.values = (np.hypot(*u) if field == "displacement" else
-                       u["xy".index(field[2])] if field[:2] == "u_" else fields[field])
+        self.values = field.of(values)
+        if field.components > 1:
+            self.values = np.sqrt(np.sum(self.values**2, axis=0))
 
     def points(self, body, factor):
         """Positions (2, nelements, m + 1, n + 1) with the section drawn ``factor`` thicker."""
@@ -232,7 +225,7 @@ def _thickness(thickness, bodies):
     return float(max(1, factor))
 
 
-def _limits(limits, values, signed):
+def _limits(limits, values, field):
     if limits is not None:
         try:
             low, high = limits
@@ -242,8 +235,9 @@ def _limits(limits, values, signed):
         if not low < high:
             raise InputError(f"limits must increase, got {shown(limits)}")
         return low, high
-    size = np.max(np.abs(values[np.isfinite(values)]), initial=0.0) or 1.0
-    return (-size, size) if signed else (0.0, size)
+    start = field.neutral
+    size = np.max(np.abs(values[np.isfinite(values)] - start), initial=0.0) or 1.0
+    return (start - size if field.signed else start), start + size
 
 
 def _add_colorbar(ax, image, below, above):

@@ -1,0 +1,154 @@
+"""A series of states in one temporal VTKHDF file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import (FileError, InputError, MissingExtra, require_finite_scalar, require_like,
+                      require_option, require_options, require_path, teaching)
+from ..fields import find_fields
+from .vtu import PRECISIONS, body_fields
+from .xml import topology
+
+if TYPE_CHECKING:
+    from ..results import State
+    from ..types import StrPath
+
+
+@teaching
+class VtkHdfWriter:
+    """Writes a series into one file, in which the cells are stored once.
+
+    The file appears under its name when the series is closed, as the end of a ``with`` block does.
+
+    Parameters
+    ----------
+    filename
+        Path that ends with .vtkhdf. Missing folders are made.
+    **options
+        Those of :func:`~skfem_ancf.io.vtu.save_vtu`.
+
+    Raises
+    ------
+    InputError
+        If the file name does not end with .vtkhdf.
+    MissingExtra
+        If h5py is not installed.
+
+    References
+    ----------
+    VTK file formats, "VTKHDF", version 2: temporal UnstructuredGrid.
+    """
+
+    def __init__(self, filename: StrPath, **options: Any) -> None:
+        self.path = require_path("filename", filename)
+        if self.path.suffix.lower() != ".vtkhdf":
+            raise InputError(f"the file name must end with .vtkhdf, got {str(filename)!r}")
+        known = ("subdivide", "lagrange", "undeformed", "recover", "fields", "precision")
+        self.options = require_options("VtkHdfWriter", options, known)
+        precision = self.options.pop("precision", "double")
+        self._dtype = PRECISIONS[require_option("precision", precision, PRECISIONS)]
+        find_fields(self.options.get("fields"))
+        try:
+            import h5py
+        except ImportError:
+            raise MissingExtra("h5py", "files") from None
+        self._temporary = self.path.with_name(f".{self.path.stem}.{os.getpid()}.vtkhdf")
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = h5py.File(self._temporary, "w")
+        except OSError as error:
+            raise FileError(f"cannot write {str(self.path)!r}: {error}") from error
+        self._root = self._file.create_group("VTKHDF")
+        self._root.attrs["Version"] = (2, 0)
+        self._root.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
+        self.times: list[float] = []
+
+    def __enter__(self) -> VtkHdfWriter:
+        return self
+
+    def __exit__(self, kind: Any, *_: Any) -> None:
+        if self._file is None:
+            return
+        if self.times:
+            self._steps()
+        self._file.close()
+        self._file = None
+        if kind is None and self.times:
+            os.replace(self._temporary, self.path)
+        else:
+            Path(self._temporary).unlink(missing_ok=True)
+
+    def add(self, state: State, t: float) -> Path:
+        """Append a frame.
+
+        Parameters
+        ----------
+        state
+            A State, or anything with its ``beams`` and ``u_of``.
+        t
+            Its time, later than that of the frame before.
+
+        Returns
+        -------
+        pathlib.Path
+            The file that there will be.
+        """
+        require_like("state", state, "State", "beams", "u_of")
+        t = require_finite_scalar("t", t)
+        if self.times and t <= self.times[-1]:
+            raise InputError(f"the times of the frames must increase: {t!r} after "
+                             f"{self.times[-1]!r}")
+        body = body_fields(state, **self.options)
+        if not self.times:
+            self._begin(body)
+        elif len(body.points) != self._n:
+            raise InputError(f"all frames have the same points: the first has {self._n}, this one "
+                             f"{len(body.points)}")
+        self._append("Points", body.points)
+        for name, values in body.point_data.items():
+            self._append(f"PointData/{name}", values)
+        self.times.append(t)
+        return self.path
+
+    def _begin(self, body):
+        connectivity, offsets, types = topology(body)
+        self._n, root = len(body.points), self._root
+        root["NumberOfPoints"] = np.array([self._n], dtype="i8")
+        root["NumberOfCells"] = np.array([len(types)], dtype="i8")
+        root["NumberOfConnectivityIds"] = np.array([len(connectivity)], dtype="i8")
+        packed = dict(compression="gzip", shuffle=True)
+        root.create_dataset("Connectivity", data=connectivity.astype("i8"), **packed)
+        root.create_dataset("Offsets", data=np.append(0, offsets).astype("i8"), **packed)
+        root.create_dataset("Types", data=types, **packed)
+        for name, parts in body.cell_data.items():
+            root.create_dataset(f"CellData/{name}", data=np.concatenate(parts).astype("i4"),
+                                **packed)
+        for name, values in {"Points": body.points, **{
+                f"PointData/{k}": v for k, v in body.point_data.items()}}.items():
+            root.create_dataset(name, shape=(0,) + values.shape[1:], dtype=self._dtype,
+                                maxshape=(None,) + values.shape[1:], chunks=values.shape,
+                                compression="gzip", compression_opts=4, shuffle=True)
+
+    def _append(self, name, values):
+        data = self._root[name]
+        n = len(data)
+        data.resize(n + len(values), axis=0)
+        data[n:] = values
+
+    def _steps(self):
+        n = len(self.times)
+        steps = self._root.create_group("Steps")
+        steps.attrs["NSteps"] = n
+        steps["Values"] = np.array(self.times)
+        zero, first = np.zeros(n, dtype="i8"), self._n * np.arange(n, dtype="i8")
+        steps["PartOffsets"], steps["NumberOfParts"] = zero, zero + 1
+        steps["PointOffsets"] = first
+        steps["CellOffsets"], steps["ConnectivityIdOffsets"] = zero[:, None], zero[:, None]
+        for group, offsets in (("PointData", first), ("CellData", zero)):
+            for name in self._root[group]:
+                steps[f"{group}Offsets/{name}"] = offsets

@@ -1,0 +1,81 @@
+"""Writes .vtu files: XML with arrays compressed by zlib, appended as bytes."""
+
+from __future__ import annotations
+
+import zlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .vtu import BodyFields
+
+#: Level of zlib: the next ones save little and cost much.
+LEVEL = 4
+
+#: VTK's numbers of the cells.
+CELL_TYPES = {"quad": 9, "VTK_LAGRANGE_QUADRILATERAL": 70}
+
+_NAMES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
+
+
+class _Arrays:
+    """The arrays of a file, one after the other in its appended data."""
+
+    def __init__(self):
+        self.blocks, self._offset = [], 0
+
+    def __call__(self, name, values):
+        """A DataArray element for numbers (n,) or (n, components)."""
+        values = np.ascontiguousarray(values)
+        raw = values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes()
+        data = zlib.compress(raw, LEVEL)
+        block = np.array([1, len(raw), 0, len(data)], dtype="<u4").tobytes() + data
+        components = f'NumberOfComponents="{values.shape[1]}" ' if values.ndim == 2 else ""
+        self.blocks.append(block)
+        self._offset, offset = self._offset + len(block), self._offset
+        return (f'<DataArray type="{_NAMES[values.dtype.str[1:]]}" Name={quoteattr(name)} '
+                f'{components}format="appended" offset="{offset}"/>')
+
+
+def topology(body: BodyFields) -> tuple[Any, Any, Any]:
+    """Connectivity, offsets and types of the cells of a body, for VTK."""
+    connectivity = np.concatenate([cells.ravel() for _, cells in body.cells])
+    sizes = np.concatenate([np.full(len(c), c.shape[1]) for _, c in body.cells])
+    types = np.concatenate([np.full(len(c), CELL_TYPES[kind], np.uint8) for kind, c in body.cells])
+    return connectivity.astype(np.int32), np.cumsum(sizes).astype(np.int32), types
+
+
+def write_vtu(path: Path, body: BodyFields, dtype: Any = np.float64) -> None:
+    """Write a body as a .vtu file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    body
+        The :class:`~skfem_ancf.io.vtu.BodyFields`.
+    dtype
+        Of points and fields: numpy.float64 or numpy.float32.
+    """
+    connectivity, offsets, types = topology(body)
+    array = _Arrays()
+    cell_data = {name: np.concatenate(parts).astype(np.int32)
+                 for name, parts in body.cell_data.items()}
+    rows = [
+        '<?xml version="1.0"?>',
+        '<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian" '
+        'header_type="UInt32" compressor="vtkZLibDataCompressor">',
+        "<UnstructuredGrid>",
+        f'<Piece NumberOfPoints="{len(body.points)}" NumberOfCells="{len(types)}">',
+        "<Points>", array("Points", body.points.astype(dtype)), "</Points>",
+        "<Cells>", array("connectivity", connectivity), array("offsets", offsets),
+        array("types", types), "</Cells>",
+        "<PointData>", *(array(k, v.astype(dtype)) for k, v in body.point_data.items()),
+        "</PointData>",
+        "<CellData>", *(array(k, v) for k, v in cell_data.items()), "</CellData>",
+        "</Piece>", "</UnstructuredGrid>", '<AppendedData encoding="raw">', "_"]
+    Path(path).write_bytes(b"".join([
+        "\n".join(rows).encode(), *array.blocks, b"\n</AppendedData>\n</VTKFile>\n"]))

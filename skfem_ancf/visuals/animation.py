@@ -1,0 +1,245 @@
+"""Films of a motion: .gif by Pillow, .mp4 by imageio."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import (FileError, InputError, MissingExtra, require_flag,
+                      require_integer, require_like, require_option, require_path,
+                      require_positive, taught)
+from ..io.vtu import replacing
+from .matplotlib import _colormap
+from .pyvista import Scenery, _dressed, _look, _unit, new_plotter
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from ..dynamics.history import History
+    from ..types import Array, StrPath
+
+SUFFIXES = (".gif", ".mp4")
+BACKENDS = ("pyvista", "matplotlib")
+
+#: Frames of a film where their number is not given, at most.
+FRAMES = 100
+
+
+@taught
+def animate(history: History, filename: StrPath, field: Any = "eps_yy", *,
+            frames: int | None = None, fps: float | None = None, backend: str | None = None,
+            thickness: Any = "auto", undeformed: bool = True, cmap: Any = None,
+            limits: Any = None, unit: str | None = None, subdivide: tuple[int, int] = (8, 4),
+            recover: bool = True, size: tuple[int, int] = (800, 600)) -> Path:
+    """Write a film of a motion, coloured by a field.
+
+    The colours have one range and the section one factor of thickness in all frames.
+
+    Parameters
+    ----------
+    history
+        A :class:`~skfem_ancf.dynamics.history.History`.
+    filename
+        Ends with .gif, or .mp4 (which needs imageio and imageio-ffmpeg); missing folders are made
+        before anything is drawn.
+    field
+        As for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
+    frames
+        How many instants, evenly chosen; all by default, up to 100.
+    fps
+        Frames per second; by default as fast as the motion, between 5 and 50.
+    backend
+        "pyvista" or "matplotlib"; by default the first that is installed.
+    thickness, undeformed, cmap, limits, subdivide, recover
+        Those of :func:`skfem_ancf.visuals.matplotlib.plot_state`.
+    unit
+        For the colour bar.
+    size
+        Width and height of the film in pixels, shape (2,).
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If the file name ends otherwise, or the history has no instants.
+    MissingExtra
+        If what is needed is not installed.
+    """
+    require_like("history", history, "History", "state", "t")
+    path, undeformed = _file(filename), require_flag("undeformed", undeformed)
+    chosen = _chosen(history, frames)
+    backend = _backend(backend)
+    cmap = _colormap(cmap)
+    fps = _fps(history, chosen, fps)
+    try:
+        width, height = (require_integer("size", k, 16, 10000) for k in size)
+    except (TypeError, ValueError):
+        raise InputError(f"size must be two integers, the pixels of the film, got {size!r}"
+                         ) from None
+    scenery = Scenery([history.state(k) for k in chosen], field, thickness, limits, subdivide,
+                      recover)
+    draw = _by_pyvista if backend == "pyvista" else _by_matplotlib
+    images = draw(scenery, history.t[chosen], (width, height), undeformed, cmap, unit)
+    with replacing(path) as temporary:
+        (_gif if path.suffix.lower() == ".gif" else _mp4)(
+            temporary, images, fps, _colours(scenery, cmap))
+    return path
+
+
+def _file(filename):
+    path = require_path("filename", filename)
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"the file name must end with one of {', '.join(SUFFIXES)}, got "
+                         f"{str(filename)!r}")
+    if path.suffix.lower() == ".mp4":
+        for module in ("imageio", "imageio_ffmpeg"):
+            try:
+                __import__(module)
+            except ImportError:
+                raise MissingExtra(module, "view") from None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot make the folder {str(path.parent)!r}: {error}") from error
+    return path
+
+
+def _chosen(history, frames):
+    n = len(history.t)
+    if n == 0:
+        raise InputError("the history has no instants")
+    frames = min(n, FRAMES) if frames is None else require_integer("frames", frames, 1)
+    return np.unique(np.round(np.linspace(0, n - 1, min(frames, n))).astype(int))
+
+
+def _backend(backend):
+    if backend is not None:
+        return require_option("backend", backend, BACKENDS)
+    for name in BACKENDS:
+        try:
+            __import__(name)
+        except ImportError:
+            continue
+        return name
+    raise MissingExtra("matplotlib", "plot")
+
+
+def _fps(history, chosen, fps):
+    if fps is not None:
+        return require_positive("fps", fps)
+    span = float(history.t[chosen[-1]] - history.t[chosen[0]])
+    return float(np.clip((len(chosen) - 1) / span, 5.0, 50.0)) if span > 0 else 5.0
+
+
+def _by_pyvista(scenery, t, size, undeformed, cmap, unit) -> Iterator[Array]:
+    try:
+        import pyvista
+    except ImportError:
+        raise MissingExtra("pyvista", "view") from None
+    plotter = new_plotter(pyvista, True, size)
+    try:
+        mesh = _dressed(scenery, plotter, cmap, undeformed, unit)
+        clock = plotter.add_text("", position="upper_right", font_size=9, color="#444444")
+        _look(plotter, scenery)
+        for k, time in enumerate(t):
+            mesh.points = scenery.points(k)
+            mesh.point_data[scenery.field.name][:] = scenery.values(k)
+            clock.SetText(3, f"t = {time:.4g}")
+            if k == 0:
+                plotter.show(auto_close=False, interactive=False)
+            plotter.render()
+            yield np.array(plotter.image)
+    finally:
+        plotter.close()
+
+
+def _by_matplotlib(scenery, t, size, undeformed, cmap, unit) -> Iterator[Array]:
+    from .matplotlib import _GHOST, _INK, _MUTED, _figure_class
+
+    Figure = _figure_class()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.tri import Triangulation
+
+    figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, layout="constrained")
+    canvas, ax, field = FigureCanvasAgg(figure), figure.add_subplot(), scenery.field
+    cells = scenery.cells
+    triangles = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
+    every = np.concatenate([scenery.points(k, ghost) for k in range(len(t))
+                            for ghost in (False, True)])
+    low, high = every.min(axis=0), every.max(axis=0)
+    margin = 0.04 * np.max(high - low)
+    if undeformed:
+        x = scenery.points(0, True)
+        ax.tripcolor(Triangulation(x[:, 0], x[:, 1], triangles), np.zeros(len(x)),
+                     cmap=_one_colour(_GHOST), shading="gouraud")
+    x = scenery.points(0)
+    image = ax.tripcolor(Triangulation(x[:, 0], x[:, 1], triangles), scenery.values(0),
+                         shading="gouraud", vmin=scenery.low, vmax=scenery.high,
+                         cmap=cmap or ("RdYlBu_r" if field.signed else "viridis"))
+    ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
+    ax.set_aspect("equal")
+    unit = _unit(field, unit)
+    bar = figure.colorbar(image, ax=ax, location="bottom", shrink=0.6, aspect=45)
+    bar.set_label((field.title or field.name) + (f" ({unit})" if unit else ""), fontsize=8)
+    bar.formatter.set_powerlimits((-3, 4))
+    ax.set_title(scenery.note, loc="left", fontsize=8, color=_MUTED)
+    clock = ax.set_title("", loc="right", fontsize=8, color=_INK)
+    canvas.draw()
+    figure.set_layout_engine("none")
+    for artist in (image, clock):
+        artist.set_animated(True)
+    canvas.draw()
+    background = canvas.copy_from_bbox(figure.bbox)  # all that stays
+    for k, time in enumerate(t):
+        x = scenery.points(k)
+        image._triangulation.x, image._triangulation.y = x[:, 0], x[:, 1]
+        image.set_array(scenery.values(k))
+        clock.set_text(f"t = {time:.4g}")
+        canvas.restore_region(background)
+        for artist in (image, clock):
+            ax.draw_artist(artist)
+        yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def _one_colour(colour):
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap([colour])
+
+
+def _gif(path, images, fps, colours):
+    try:
+        from PIL import Image
+    except ImportError:
+        raise MissingExtra("pillow", "plot") from None
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(colours)
+    frames = [Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE)
+              for image in images]
+    frames[0].save(path, format="GIF", save_all=True, append_images=frames[1:], loop=0,
+                   duration=round(1000 / fps))
+
+
+def _colours(scenery, cmap):
+    """256 colours as bytes: those of the colour map, and greys."""
+    from matplotlib import colormaps
+
+    cmap = cmap or ("RdYlBu_r" if scenery.field.signed else "viridis")
+    shades = (colormaps[cmap] if isinstance(cmap, str) else cmap)(np.linspace(0, 1, 216))
+    greys = np.repeat(np.linspace(0, 1, 40)[:, None], 3, axis=1)
+    return np.round(255 * np.concatenate([shades[:, :3], greys])).astype(np.uint8).tobytes()
+
+
+def _mp4(path, images, fps, _):
+    import imageio.v2
+
+    with imageio.v2.get_writer(path, format="FFMPEG", mode="I", fps=fps,
+                               macro_block_size=2) as writer:
+        for image in images:
+            writer.append_data(image)

@@ -1,0 +1,89 @@
+"""What notebooks show of states, scenes, paths and motions: words, and a picture if they can."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import AncfError
+
+if TYPE_CHECKING:
+    from ..dynamics.history import History
+    from ..path import Path
+    from ..results import State
+    from ..scene import Scene
+
+#: Resolution of the pictures, in dots per inch.
+DPI = 80
+
+
+def _picture(draw):
+    """An img element of the figure of the Axes that ``draw()`` returns; empty without matplotlib.
+
+    A picture that cannot be drawn must not hide the words.
+    """
+    try:
+        figure, data = draw().figure, io.BytesIO()
+        figure.savefig(data, format="png", dpi=DPI, bbox_inches="tight")
+    except AncfError:
+        return ""
+    return f'<img src="data:image/png;base64,{base64.b64encode(data.getvalue()).decode()}"/>'
+
+
+def _words(text):
+    return f"<pre>{html.escape(text)}</pre>"
+
+
+def state_html(state: State) -> str:
+    """The words of a State, and its strain across the section."""
+    field = "eps_yy" if any(np.any(state.u_of(b)) for b in state.beams) else "displacement"
+    return _words(str(state)) + _picture(lambda: state.plot(field))
+
+
+def scene_html(scene: Scene) -> str:
+    """A table of what is in a Scene, and its stress-free body."""
+    rows = [("beam", b) for b in scene.beams]
+    rows += [("support", s) for s in scene.supports]
+    rows += [("joint", j) for j in scene.joints] + [("load", f) for f in scene.loads]
+    table = "".join(f"<tr><td>{kind}</td><td>{html.escape(_short(thing))}</td></tr>"
+                    for kind, thing in rows)
+    return (_words(repr(scene)[1:-1]) + f"<table>{table}</table>"
+            + _picture(lambda: scene.state().plot("displacement", colorbar=False, title="",
+                                                  cmap="Greys")))
+
+
+def _short(thing: Any) -> str:
+    text = " ".join(repr(thing).split())
+    return text if len(text) <= 160 else text[:157] + "..."
+
+
+def path_html(path: Path) -> str:
+    """The words of a Path, and its load against the displacement of the node that moves most."""
+    def draw():
+        state = path.state(len(path) - 1)
+        beam = max(state.beams, key=lambda b: np.max(np.abs(state.u_of(b))))
+        moved = state.u_of(beam).reshape(-1, beam.nd)[:, :2]
+        node, component = np.unravel_index(np.argmax(np.abs(moved)), moved.shape)
+        return path.plot(beam.mesh.p[:, node], int(component), beam)
+
+    return _words(repr(path)[1:-1]) + _picture(draw)
+
+
+def history_html(history: History) -> str:
+    """The words of a History, and its energies over time."""
+    from .matplotlib import _dress, _figure_class
+
+    def draw():
+        ax = _figure_class()(figsize=(5.5, 3.0), layout="constrained").subplots()
+        for name in ("strain", "kinetic", "potential", "total"):
+            ax.plot(history.t, getattr(history, f"{name}_energy"), lw=1.4, label=name)
+        ax.legend(fontsize=8, frameon=False)
+        _dress(ax, "energy", 1.0)
+        ax.set(xlabel="time", ylabel="")
+        return ax
+
+    return _words(repr(history)[1:-1]) + (_picture(draw) if len(history) > 1 else "")

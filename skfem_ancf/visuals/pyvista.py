@@ -1,0 +1,370 @@
+"""States and motions for pyvista: grids with all fields, and views of them."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import (InputError, MissingExtra, require_flag, require_index, require_like,
+                      require_option, require_path, shown, taught)
+from ..fields import DRAWN, FIELDS, Field, find_field, find_fields, values_on_grid
+from ..io.vtu import _subdivision, grid, lagrange_cell, quads, replacing
+from .matplotlib import _Body, _limits, _thickness
+
+if TYPE_CHECKING:
+    from ..dynamics.history import History
+    from ..results import State
+    from ..types import StrPath
+
+#: VTK's numbers of the cells.
+QUAD, LAGRANGE = 9, 70
+
+#: Pictures that a plotter writes.
+PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+
+
+def _pyvista():
+    try:
+        import pyvista
+    except ImportError:
+        raise MissingExtra("pyvista", "view") from None
+    return pyvista
+
+
+def _wanted(fields):
+    return (list(FIELDS.values()) if fields is None else find_fields(fields)), fields is None
+
+
+def _normal(field, values):
+    """The component of a tensor normal to the plane, (n,); NaN where the law does not say it."""
+    material = values.beam.material
+    try:
+        if field.name == "strain":
+            return 0.5 * (material.thickness_stretch(values.strain) ** 2 - 1.0)
+        if field.name == "stress":
+            return (material.nu * values.S[0] * (material.plane == "strain")
+                    if values.beam.is_cable else material.stress_zz(values.strain))
+        return values.sigma_zz
+    except (InputError, NotImplementedError):
+        return np.full(values.n, np.nan)
+
+
+def _arrays(values, wanted, lenient):
+    """Arrays by the names that they have in VTK."""
+    out = {}
+    for field in wanted:
+        try:
+            value = field.of(values)
+        except InputError:
+            if not lenient:
+                raise
+            continue  # a law without a stress normal to the plane
+        name = f"{field.name} ({field.frame} frame)" if field.components > 1 and field.frame else (
+            field.name)
+        if field.components == 2:
+            value = np.array([*value, np.zeros(values.n)]).T
+        elif field.components == 3:
+            xx, yy, xy = value
+            zero = np.zeros(values.n)
+            value = np.array([xx, yy, _normal(field, values), xy, zero, zero]).T
+        out[name] = np.ascontiguousarray(value)
+    return out
+
+
+class _Grid:
+    """The grid of one beam, which takes other states."""
+
+    def __init__(self, beam, subdivide, lagrange):
+        self.beam = beam
+        X, local = lagrange_cell(beam) if lagrange else (grid(*subdivide), quads(*subdivide))
+        self.X, ne = X, beam.mesh.nelements
+        start = X.shape[1] * np.arange(ne)
+        cells = (start[:, None, None] + local).reshape(-1, local.shape[1])
+        self.cells = np.hstack([np.full((len(cells), 1), cells.shape[1]), cells]).ravel()
+        self.types = np.full(len(cells), LAGRANGE if lagrange else QUAD, np.uint8)
+        self.elements = np.repeat(np.arange(ne), len(local))
+
+    def points(self, values, undeformed):
+        x = values.x if undeformed else values.x + values.u
+        return np.array([*x, np.zeros(values.n)]).T
+
+    def make(self, state, wanted, lenient, undeformed, recover):
+        values = values_on_grid(state, self.beam, self.X, recover)
+        made = _pyvista().UnstructuredGrid(self.cells, self.types,
+                                           self.points(values, undeformed))
+        for name, value in _arrays(values, wanted, lenient).items():
+            made.point_data[name] = value
+        made.cell_data["element"] = self.elements
+        return made
+
+    def update(self, made, state, wanted, lenient, undeformed, recover):
+        """Other values in the same arrays."""
+        values = values_on_grid(state, self.beam, self.X, recover)
+        made.points[:] = self.points(values, undeformed)
+        for name, value in _arrays(values, wanted, lenient).items():
+            made.point_data[name][:] = value
+        made.Modified()
+
+
+class Series:
+    """A motion for pyvista: one mesh whose points and fields are those of any instant.
+
+    Attributes
+    ----------
+    mesh
+        The UnstructuredGrid, or the MultiBlock of several beams, now at instant :attr:`k`.
+    t
+        Times, shape (nt,).
+    k : int
+        The instant that the mesh shows.
+    """
+
+    def __init__(self, history: History, **options: Any) -> None:
+        self._history, self.t, self.k = history, history.t, 0
+        if not len(history):
+            raise InputError("the history has no instants")
+        self.mesh, self._update = _make(history.state(0), **options)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        return f"<Series of {len(self)} instants, mesh at t = {self.t[self.k]:g}>"
+
+    def update(self, k: int) -> Any:
+        """Put the mesh at instant ``k``, in the arrays that it has; returns the mesh."""
+        k = require_index("k", k, len(self))
+        self._update(self._history.state(k))
+        self.k = k
+        return self.mesh
+
+
+def _make(state, fields=None, subdivide=(8, 4), lagrange=False, undeformed=False, recover=True):
+    pv = _pyvista()
+    require_like("state", state, "State", "beams", "u_of")
+    wanted, lenient = _wanted(fields)
+    subdivide = _subdivision(subdivide)
+    lagrange = require_flag("lagrange", lagrange)
+    undeformed = require_flag("undeformed", undeformed)
+    options = wanted, lenient, undeformed, require_flag("recover", recover)
+    grids = [_Grid(beam, subdivide, lagrange) for beam in state.beams]
+    blocks = [g.make(state, *options) for g in grids]
+
+    def update(other):
+        for g, block in zip(grids, blocks):
+            g.update(block, other, *options)
+
+    if len(blocks) == 1:
+        return blocks[0], update
+    mesh = pv.MultiBlock()
+    for k, (g, block) in enumerate(zip(grids, blocks)):
+        mesh.append(block, name=f"beam {k}" if g.beam.name is None else g.beam.name)
+    return mesh, update
+
+
+@taught
+def to_pyvista(state: State, fields: Any = None, subdivide: tuple[int, int] = (8, 4),
+               lagrange: bool = False, undeformed: bool = False, recover: bool = True) -> Any:
+    """The body of a state as a grid of pyvista.
+
+    Parameters
+    ----------
+    state
+        A :class:`~skfem_ancf.results.State`.
+    fields
+        Names of :data:`skfem_ancf.fields.FIELDS`, functions or Fields; all of the table by
+        default. Tensors have VTK's six components xx, yy, zz, xy, yz, xz; the name of a vector
+        or tensor says its frame, as "stress (beam frame)".
+    subdivide, lagrange, undeformed, recover
+        Those of :func:`skfem_ancf.io.vtu.save_vtu`.
+
+    Returns
+    -------
+    pyvista.UnstructuredGrid, or pyvista.MultiBlock
+        Of one beam, or of several by their names.
+
+    Raises
+    ------
+    MissingExtra
+        If pyvista is not installed.
+    """
+    return _make(state, fields, subdivide, lagrange, undeformed, recover)[0]
+
+
+def has_display() -> bool:
+    """True in a notebook, and where windows can be opened."""
+    if "ipykernel" in sys.modules or sys.platform in ("win32", "darwin"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+class Scenery:
+    """Bodies of one or more instants with one factor of thickness and one range of colours.
+
+    Parameters
+    ----------
+    states
+        States of the same beams.
+    field, thickness, limits, subdivide, recover
+        Those of :func:`view`.
+    """
+
+    def __init__(self, states: list[State], field: Any, thickness: Any, limits: Any,
+                 subdivide: tuple[int, int], recover: bool) -> None:
+        self.field: Field = find_field(field, DRAWN)
+        m, n = _subdivision(subdivide)
+        self.size, recover = (m, n), require_flag("recover", recover)
+        self.frames = [[_Body(state, beam, self.field, m, n, recover) for beam in state.beams]
+                       for state in states]
+        every = [body for frame in self.frames for body in frame]
+        self.factor = _thickness(thickness, every)
+        self.low, self.high = _limits(limits, np.concatenate([b.values.ravel() for b in every]),
+                                      self.field)
+
+    def points(self, k: int, undeformed: bool = False) -> Any:
+        """Points of frame ``k``, shape (n, 3); those of the stress-free body if ``undeformed``."""
+        x = np.concatenate([
+            b.points(b.reference if undeformed else b.deformed, self.factor).reshape(2, -1)
+            for b in self.frames[k]], axis=1)
+        return np.array([*x, np.zeros(x.shape[1])]).T
+
+    def values(self, k: int) -> Any:
+        """Values of frame ``k``, shape (n,)."""
+        return np.concatenate([b.values.ravel() for b in self.frames[k]])
+
+    @property
+    def cells(self) -> Any:
+        """Quads as rows of points, shape (nc, 4)."""
+        m, n = self.size
+        first = np.cumsum([0] + [b.values.size for b in self.frames[0]])
+        return np.concatenate([
+            (f + np.arange(0, b.values.size, (m + 1) * (n + 1))[:, None, None]
+             + quads(m, n)).reshape(-1, 4) for f, b in zip(first, self.frames[0])])
+
+    @property
+    def note(self) -> str:
+        """What the picture says of the thickness."""
+        return "" if self.factor == 1.0 else f"section drawn {self.factor:g} times as thick"
+
+
+def _dressed(scenery, plotter, cmap, undeformed, unit):
+    """Put frame 0 into a plotter; returns its mesh."""
+    pv, field, cells = _pyvista(), scenery.field, scenery.cells
+    faces = np.hstack([np.full((len(cells), 1), 4), cells]).ravel()
+    if undeformed:
+        ghost = pv.PolyData(scenery.points(0, True) - [0.0, 0.0, 1e-6], faces)
+        plotter.add_mesh(ghost, color="#e2e2e2", lighting=False)
+    mesh = pv.PolyData(scenery.points(0), faces)
+    mesh.point_data[field.name] = scenery.values(0)
+    unit = _unit(field, unit)
+    plotter.add_mesh(
+        mesh, scalars=field.name, clim=(scenery.low, scenery.high), lighting=False,
+        cmap=cmap or ("RdYlBu_r" if field.signed else "viridis"), nan_color="#bbbbbb",
+        scalar_bar_args=dict(title=f"{field.name} ({unit})\n" if unit else f"{field.name}\n",
+                             color="black",
+                             vertical=False, title_font_size=18, label_font_size=14, n_labels=5,
+                             position_x=0.2, width=0.6, height=0.09, fmt="%.3g"))
+    if scenery.note:
+        plotter.add_text(scenery.note, position="upper_left", font_size=9, color="#444444")
+    plotter.set_background("white")
+    return mesh
+
+
+def _unit(field, unit):
+    """What stands in the colour bar: nothing for numbers."""
+    unit = field.unit if unit is None else unit
+    return "" if unit == "1" else unit
+
+
+def _look(plotter, scenery):
+    """From the front, without perspective, at all frames."""
+    plotter.enable_parallel_projection()
+    every = np.concatenate([scenery.points(k, undeformed) for k in range(len(scenery.frames))
+                            for undeformed in (False, True)])
+    low, high = every.min(axis=0), every.max(axis=0)
+    margin = 0.12 * np.max(high - low)
+    low[1] -= margin  # the colour bar
+    plotter.view_xy(bounds=(low[0], high[0], low[1], high[1], 0.0, 0.0))
+
+
+@taught
+def view(state: State, field: Any = "eps_yy", plotter: Any = None, *, thickness: Any = "auto",
+         undeformed: bool = True, cmap: Any = None, limits: Any = None, unit: str | None = None,
+         subdivide: tuple[int, int] = (16, 8), recover: bool = True,
+         off_screen: bool | None = None, window_size: tuple[int, int] = (1000, 700),
+         filename: StrPath | None = None) -> Any:
+    """Put a state into a plotter of pyvista, coloured by a field; nothing is shown yet.
+
+    Parameters
+    ----------
+    state
+        A :class:`~skfem_ancf.results.State`.
+    field
+        As for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
+    plotter
+        A ``pyvista.Plotter`` to draw in; a new one by default.
+    thickness, undeformed, cmap, limits, subdivide, recover
+        Those of :func:`skfem_ancf.visuals.matplotlib.plot_state`.
+    unit
+        For the colour bar, as "Pa"; what the field says by default.
+    off_screen
+        Without a window; by default where there is neither a display nor a notebook.
+    window_size
+        Width and height in pixels.
+    filename
+        Write a picture (.png, .jpg, ...); missing folders are made.
+
+    Returns
+    -------
+    pyvista.Plotter
+        Call its ``show()``, or ``screenshot(...)``.
+
+    Raises
+    ------
+    MissingExtra
+        If pyvista is not installed.
+    """
+    pv = _pyvista()
+    require_like("state", state, "State", "beams", "u_of")
+    path = None if filename is None else _picture(filename)
+    scenery = Scenery([state], field, thickness, limits, subdivide, recover)
+    if plotter is None:
+        plotter = new_plotter(pv, off_screen if path is None else True, window_size)
+    _dressed(scenery, plotter, cmap, require_flag("undeformed", undeformed), unit)
+    _look(plotter, scenery)
+    if path is not None:
+        with replacing(path) as temporary:
+            plotter.screenshot(str(temporary))
+    return plotter
+
+
+def _picture(filename):
+    path = require_path("filename", filename)
+    require_option("kind of picture", path.suffix.lower(), PICTURES)
+    return path
+
+
+def new_plotter(pv: Any, off_screen: bool | None, window_size: tuple[int, int]) -> Any:
+    """A plotter, with a window where there is a display.
+
+    Parameters
+    ----------
+    pv
+        The module pyvista.
+    off_screen
+        As for :func:`view`.
+    window_size
+        As for :func:`view`, shape (2,).
+    """
+    if off_screen is None:
+        off_screen = not has_display()
+    try:
+        width, height = (int(k) for k in window_size)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"window_size must be two numbers of pixels, got {shown(window_size)}"
+                         ) from None
+    return pv.Plotter(off_screen=require_flag("off_screen", off_screen),
+                      window_size=(width, height))

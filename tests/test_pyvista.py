@@ -1,0 +1,254 @@
+"""Grids, views and films: read back, and looked at pixel by pixel."""
+
+import sys
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+pv = pytest.importorskip("pyvista", reason="pyvista is not installed (the extra 'view')")
+
+from conftest import quarter_arc  # noqa: E402
+from test_io import bent  # noqa: E402
+from skfem_ancf import (Beam, ElementBeamANCF, InputError, MeshBeam, MissingExtra,  # noqa: E402
+                        NameUnknown, Scene, StVenantKirchhoff)
+from skfem_ancf.fields import FIELDS  # noqa: E402
+from skfem_ancf.io import body_fields  # noqa: E402
+from skfem_ancf.io.vtkhdf import VtkHdfWriter  # noqa: E402
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
+STEEL = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)
+
+
+@pytest.fixture(scope="module")
+def state():
+    return bent()
+
+
+@pytest.fixture(scope="module")
+def history():
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 7), height=0.01), ElementBeamANCF(3), STEEL,
+                width=0.01)
+    return Scene(beam).pin("left").gravity((0, -9.81)).integrate(0.3, 0.02)
+
+
+def test_grid_holds_all_fields(state):
+    made = state.to_pyvista(subdivide=(3, 2))
+    body = body_fields(state, (3, 2), fields=list(FIELDS))
+    assert_allclose(made.points, body.points, atol=1e-14)
+    assert_array_equal(made.cells.reshape(-1, 5)[:, 1:], body.cells[0][1])
+    for name, field in FIELDS.items():
+        full = name if field.components == 1 else f"{name} ({field.frame} frame)"
+        values = made.point_data[full]
+        if field.components < 3:
+            assert_allclose(values, body.point_data[name], atol=1e-14)
+    assert len(made.point_data) == len(FIELDS)
+
+
+def test_tensors_are_vtks(state):
+    """xx, yy, zz, xy, yz, xz; VTK's filter finds the principal stresses in them."""
+    made = state.to_pyvista()
+    tensor = made.point_data["cauchy_stress (global frame)"]
+    assert tensor.shape[1] == 6
+    assert_allclose(tensor[:, [0, 1, 3]].T, [made["sigma_xx"], made["sigma_yy"], made["sigma_xy"]])
+    assert_array_equal(tensor[:, [2, 4, 5]], 0.0)
+    full = tensor[:, [0, 3, 5, 3, 1, 4, 5, 4, 2]].reshape(-1, 3, 3)
+    vtk = pytest.importorskip("vtk")
+    calculator = vtk.vtkTensorPrincipalInvariants()
+    calculator.SetInputData(made)
+    calculator.Update()
+    found = pv.wrap(calculator.GetOutput()).point_data
+    names = [n for n in found.keys() if "cauchy" in n and "Sigma" in n and "Vector" not in n]
+    largest = np.max([np.asarray(found[n]) for n in names], axis=0)
+    assert_allclose(largest, np.maximum(made["sigma_1"], 0.0), atol=1e-6 * abs(full).max())
+    strain = made.point_data["strain (beam frame)"]
+    assert_allclose(strain[:, 3], made["eps_xy"])
+    thickness = state.beams[0].material.thickness_stretch(
+        np.array([strain[:, 0], strain[:, 1], 2 * strain[:, 3]]))
+    assert_allclose(strain[:, 2], 0.5 * (thickness**2 - 1))
+
+
+def test_lagrange_cells_are_the_body(state):
+    made = state.to_pyvista(lagrange=True, fields="eps_yy")
+    assert set(made.celltypes) == {70} and made.n_cells == 2
+    assert_allclose(made.points, body_fields(state, lagrange=True).points)
+    area = state.to_pyvista(subdivide=(60, 30)).compute_cell_sizes()["Area"].sum()
+    fine = made.tessellate(max_n_subdivide=4) if hasattr(made, "tessellate") else None
+    if fine is not None:
+        assert fine.compute_cell_sizes()["Area"].sum() == pytest.approx(area, rel=1e-2)
+
+
+def test_beams_by_name():
+    a = Beam(MeshBeam.init_line([0, 1], height=0.1), ElementBeamANCF(2), STEEL, 0.1, name="mast")
+    b = Beam(quarter_arc(3), ElementBeamANCF(3), STEEL, 0.1)
+    state = Scene(a, b).clamp("left", beam=0).clamp("left", beam=1).solve_static()
+    blocks = state.to_pyvista(fields=["displacement"])
+    assert blocks.keys() == ["mast", "beam 1"]
+    assert blocks["beam 1"].n_points == 3 * 45
+    assert blocks["mast"].point_data.keys() == ["displacement (global frame)"]
+
+
+def test_series_changes_its_mesh_in_place(history):
+    series = history.to_pyvista(fields=["eps_yy", "displacement"], subdivide=(2, 2))
+    mesh, points = series.mesh, series.mesh.points
+    address = mesh.point_data["eps_yy"].ctypes.data
+    for k in (3, -1, 0):
+        assert series.update(k) is mesh
+        fresh = history.state(k).to_pyvista(fields=["eps_yy", "displacement"], subdivide=(2, 2))
+        assert_array_equal(mesh.points, fresh.points)
+        assert_array_equal(mesh["eps_yy"], fresh["eps_yy"])
+    assert points.ctypes.data == mesh.points.ctypes.data
+    assert mesh.point_data["eps_yy"].ctypes.data == address
+    assert len(series) == len(history) and series.k == 0
+    with pytest.raises(InputError, match="k must be an integer"):
+        series.update(99)
+
+
+def test_view_shows_both_signs(state, tmp_path):
+    plotter = state.view("S_xx", filename=tmp_path / "new" / "view.png", undeformed=False)
+    assert isinstance(plotter, pv.Plotter) and plotter.camera.parallel_projection
+    image = np.asarray(pv.read(tmp_path / "new" / "view.png").active_scalars)[:, :3] / 255
+    assert np.sum((image[:, 0] > 0.6) & (image[:, 2] < 0.3)) > 50  # red: tension
+    assert np.sum((image[:, 2] > 0.5) & (image[:, 0] < 0.4)) > 50  # blue: compression
+    low, high = plotter.mapper.scalar_range
+    assert high == pytest.approx(-low) and "S_xx" in str(plotter.scalar_bars.keys())
+    assert "force / area" in str(plotter.scalar_bars.keys())
+    plotter.close()
+
+
+def test_view_says_that_the_section_is_enlarged(history):
+    plotter = history.state(5).view("von_mises", off_screen=True, unit="Pa")
+    texts = [a.GetText(k) for a in plotter.renderer.actors.values() if hasattr(a, "GetText")
+             for k in range(4) if a.__class__.__name__.startswith(("Corner", "vtkCorner"))]
+    assert any("times as thick" in (t or "") for t in texts)
+    assert plotter.mapper.scalar_range[0] == 0.0
+    assert "(Pa)" in str(plotter.scalar_bars.keys())
+    bounds = plotter.mesh.bounds
+    assert bounds[3] - bounds[2] > 0.01
+    plotter.close()
+    again = history.state(5).view(plotter=(own := pv.Plotter(off_screen=True)))
+    assert again is own
+    own.close()
+
+
+@pytest.mark.parametrize("backend", ["pyvista", "matplotlib"])
+def test_film(history, tmp_path, backend):
+    from PIL import Image
+
+    path = history.animate(tmp_path / "new" / "film.gif", frames=5, backend=backend,
+                           size=(320, 240))
+    images = []
+    with Image.open(path) as film:
+        assert film.n_frames == 5 and film.size == (320, 240)
+        for k in range(5):
+            film.seek(k)
+            images.append(np.asarray(film.convert("RGB")).astype(int))
+    for a, b in zip(images[:-1], images[1:]):
+        assert np.sum(np.abs(a - b).max(axis=2) > 60) > 100  # it moves
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_film_as_mp4(history, tmp_path):
+    pytest.importorskip("imageio")
+    pytest.importorskip("imageio_ffmpeg")
+    path = history.animate(tmp_path / "film.mp4", "von_mises", frames=4, size=(320, 240))
+    assert path.stat().st_size > 1000
+
+
+@pytest.mark.parametrize("options, error, message", [
+    (dict(filename="a.avi"), InputError, r"must end with one of \.gif, \.mp4"),
+    (dict(field="eps_y"), NameUnknown, "did you mean 'eps_yy'"),
+    (dict(frames=0), InputError, "frames must be"),
+    (dict(fps=0), InputError, "fps must be positive"),
+    (dict(backend="vtk"), NameUnknown, "backend"),
+    (dict(size=3), InputError, "size must be"),
+    (dict(cmap="rainbo"), NameUnknown, "colour map"),
+])
+def test_films_that_cannot_be(history, tmp_path, options, error, message):
+    with pytest.raises(error, match=message):
+        history.animate(**{"filename": tmp_path / "a.gif", **options})
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_cannot_be_made_is_said_before_anything_is_drawn(history, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OSError, match="cannot make the folder"):
+        history.animate(tmp_path / "file" / "a.gif", field=lambda v: 1 / 0)
+    with pytest.raises(OSError, match="cannot write"):
+        history.save(tmp_path / "file" / "a.vtkhdf", fields=lambda v: 1 / 0)
+
+
+def test_without_pyvista(state, history, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    for call in (state.to_pyvista, state.view, history.to_pyvista):
+        with pytest.raises(MissingExtra, match=r'pip install "skfem-ancf\[view\]"'):
+            call()
+    assert history.animate(tmp_path / "a.gif", frames=2, size=(320, 240)).is_file()
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_temporal_vtkhdf_reads_back(history, tmp_path, precision):
+    vtkhdf = pytest.importorskip("vtkmodules.vtkIOHDF")
+    pytest.importorskip("h5py")
+    fields = ["eps_yy", "displacement"]
+    history.save(tmp_path / "new" / "a.vtkhdf", fields=fields, subdivide=(2, 2),
+                 precision=precision)
+    assert [p.name for p in (tmp_path / "new").iterdir()] == ["a.vtkhdf"]
+    reader = vtkhdf.vtkHDFReader()
+    reader.SetFileName(str(tmp_path / "new" / "a.vtkhdf"))
+    reader.UpdateInformation()
+    assert reader.GetNumberOfSteps() == len(history)
+    info = reader.GetOutputInformation(0)
+    times = [info.Get(reader.GetExecutive().TIME_STEPS(), k) for k in range(len(history))]
+    assert_array_equal(times, history.t)
+    rtol = 1e-6 if precision == "single" else 1e-14
+    for k in (0, 7, len(history) - 1):
+        reader.UpdateTimeStep(times[k])
+        read = pv.wrap(reader.GetOutput())
+        body = body_fields(history.state(k), (2, 2), fields=fields)
+        assert_allclose(read.points, body.points, atol=rtol)
+        for name in fields:
+            assert_allclose(read.point_data[name], body.point_data[name], atol=rtol)
+        assert_array_equal(read.cells.reshape(-1, 5)[:, 1:], body.cells[0][1])
+        assert_array_equal(read.cell_data["element"], body.cell_data["element"][0])
+
+
+def test_vtkhdf_refuses_and_leaves_nothing_behind(history, state, tmp_path):
+    pytest.importorskip("h5py")
+    with pytest.raises(InputError, match=r"must end with \.vtkhdf"):
+        VtkHdfWriter(tmp_path / "a.h5")
+    with pytest.raises(RuntimeError), VtkHdfWriter(tmp_path / "a.vtkhdf") as series:
+        series.add(history.state(0), 0.0)
+        with pytest.raises(InputError, match="must increase"):
+            series.add(history.state(0), 0.0)
+        with pytest.raises(InputError, match="the same points"):
+            series.add(state, 1.0)
+        raise RuntimeError
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("lagrange", [False, True])
+def test_vtu_is_read_by_vtk(state, tmp_path, lagrange):
+    for precision, tol in (("double", 1e-15), ("single", 1e-6)):
+        path = state.save(tmp_path / f"{precision}.vtu", lagrange=lagrange, precision=precision,
+                          fields=["stress", "S_xx", "displacement"])
+        read, body = pv.read(path), body_fields(state, lagrange=lagrange, fields=[
+            "stress", "S_xx", "displacement"])
+        assert_allclose(read.points, body.points, atol=tol)
+        for name, values in body.point_data.items():
+            assert_allclose(read.point_data[name], values, rtol=10 * tol, atol=tol)
+        assert_array_equal(read.celltypes, 70 if lagrange else 9)
+    size = [(tmp_path / f"{p}.vtu").stat().st_size for p in ("single", "double")]
+    assert size[0] < 0.8 * size[1]
+
+
+def test_notebooks_get_words_and_pictures(state, history, monkeypatch):
+    beam = Beam(MeshBeam.init_line([0, 0.5, 1], height=0.1), ElementBeamANCF(2), STEEL, 0.1)
+    scene = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0))
+    path = scene.continuation(steps=2)
+    for thing, word in ((state, "equilibrium"), (scene, "support"), (path, "limit"),
+                        (history, "instants")):
+        text = thing._repr_html_()
+        assert word in text and "data:image/png;base64," in text and "<State" not in text
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    assert "instants" in history._repr_html_() and "<img" not in history._repr_html_()
