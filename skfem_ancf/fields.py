@@ -111,6 +111,15 @@ class Values(Mapping):
 
     A mapping from the names of :data:`FIELDS` to arrays (n,), or (components, n).
 
+    Parameters
+    ----------
+    part
+        The :class:`~skfem_ancf.points.Part` with the points.
+    u
+        Displacement of the coordinates that the part is numbered by, shape (N,).
+    find
+        Returns the recovered field of the beam, or None; None for the field of the elements.
+
     Attributes
     ----------
     beam
@@ -125,8 +134,8 @@ class Values(Mapping):
         Deformation gradient: derivatives along the axis and across it, in global axes, (2, 2, n).
     frame
         The beam's frame in the stress-free body, ``frame[:, 0]`` along the axis, (2, 2, n).
-    x, u
-        Stress-free positions and displacements, (2, n).
+    x
+        Stress-free positions, (2, n); ``values.u`` are their displacements.
     """
 
     def __init__(self, part: Part, u: Array,

@@ -62,7 +62,7 @@ class PvdWriter:
             raise InputError(f"the file name must end with .pvd, got {str(filename)!r}")
         self.options = require_options("PvdWriter", options,
                                        ("subdivide", "lagrange", "undeformed", "recover",
-                                        "fields", "precision"))
+                                        "fields", "precision", "encoding"))
         if "fields" in self.options:
             find_fields(self.options["fields"])
         self._rows: list[str] = []

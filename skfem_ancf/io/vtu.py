@@ -24,6 +24,8 @@ logger = logging.getLogger(__name__)
 #: What a file may end with: formats that meshio writes as one file with data on points.
 SUFFIXES = (".vtu", ".vtk")
 
+ENCODINGS = ("base64", "raw")
+
 #: Numbers of the fields in files.
 PRECISIONS = {"double": np.float64, "single": np.float32}
 
@@ -122,7 +124,8 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
 @taught
 def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
              lagrange: bool = False, undeformed: bool = False, recover: bool = True,
-             fields: Any = None, precision: str = "double") -> Path:
+             fields: Any = None, precision: str = "double",
+             encoding: str = "base64") -> Path:
     """Write the deformed body of a state for ParaView.
 
     All beams go into one file. Points belong to one element each, since strains and stresses
@@ -167,6 +170,9 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
         :mod:`skfem_ancf.fields`; those of the table by default.
     precision
         "double", or "single" for files of half the size.
+    encoding
+        "base64", or "raw", a quarter smaller: VTK and ParaView read it, meshio 5.3 reads wrong
+        numbers from it.
 
     Returns
     -------
@@ -195,10 +201,11 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
         raise InputError(f"the file name must end with one of {', '.join(SUFFIXES)}, got "
                          f"{str(filename)!r}")
     dtype = PRECISIONS[require_option("precision", precision, PRECISIONS)]
+    raw = require_option("encoding", encoding, ENCODINGS) == "raw"
     body = body_fields(state, subdivide, lagrange, undeformed, recover, fields)
     with replacing(path) as temporary:
         if path.suffix.lower() == ".vtu":
-            write_vtu(temporary, body, dtype)
+            write_vtu(temporary, body, dtype, raw)
         else:
             _write_vtk(temporary, body)
     logger.info("wrote %s: %d points", path, len(body.points))

@@ -1,8 +1,9 @@
-"""Writes .vtu files: XML with arrays compressed by zlib, appended as bytes."""
+"""Writes .vtu files: XML with arrays compressed by zlib, in one appended block."""
 
 from __future__ import annotations
 
 import zlib
+from base64 import b64encode
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
@@ -24,15 +25,16 @@ _NAMES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "u1": 
 class _Arrays:
     """The arrays of a file, one after the other in its appended data."""
 
-    def __init__(self):
-        self.blocks, self._offset = [], 0
+    def __init__(self, raw):
+        self.raw, self.blocks, self._offset = raw, [], 0
 
     def __call__(self, name, values):
         """A DataArray element for numbers (n,) or (n, components)."""
         values = np.ascontiguousarray(values)
         raw = values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes()
         data = zlib.compress(raw, LEVEL)
-        block = np.array([1, len(raw), 0, len(data)], dtype="<u4").tobytes() + data
+        header = np.array([1, len(raw), 0, len(data)], dtype="<u4").tobytes()
+        block = header + data if self.raw else b64encode(header) + b64encode(data)
         components = f'NumberOfComponents="{values.shape[1]}" ' if values.ndim == 2 else ""
         self.blocks.append(block)
         self._offset, offset = self._offset + len(block), self._offset
@@ -48,7 +50,8 @@ def topology(body: BodyFields) -> tuple[Any, Any, Any]:
     return connectivity.astype(np.int32), np.cumsum(sizes).astype(np.int32), types
 
 
-def write_vtu(path: Path, body: BodyFields, dtype: Any = np.float64) -> None:
+def write_vtu(path: Path, body: BodyFields, dtype: Any = np.float64,
+              raw: bool = False) -> None:
     """Write a body as a .vtu file.
 
     Parameters
@@ -59,9 +62,11 @@ def write_vtu(path: Path, body: BodyFields, dtype: Any = np.float64) -> None:
         The :class:`~skfem_ancf.io.vtu.BodyFields`.
     dtype
         Of points and fields: numpy.float64 or numpy.float32.
+    raw
+        Bytes as they are; else in base64.
     """
     connectivity, offsets, types = topology(body)
-    array = _Arrays()
+    array = _Arrays(raw)
     cell_data = {name: np.concatenate(parts).astype(np.int32)
                  for name, parts in body.cell_data.items()}
     rows = [
@@ -76,6 +81,7 @@ def write_vtu(path: Path, body: BodyFields, dtype: Any = np.float64) -> None:
         "<PointData>", *(array(k, v.astype(dtype)) for k, v in body.point_data.items()),
         "</PointData>",
         "<CellData>", *(array(k, v) for k, v in cell_data.items()), "</CellData>",
-        "</Piece>", "</UnstructuredGrid>", '<AppendedData encoding="raw">', "_"]
+        "</Piece>", "</UnstructuredGrid>", 
+        f'<AppendedData encoding="{"raw" if raw else "base64"}">', "_"]
     Path(path).write_bytes(b"".join([
         "\n".join(rows).encode(), *array.blocks, b"\n</AppendedData>\n</VTKFile>\n"]))

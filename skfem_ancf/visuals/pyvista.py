@@ -112,6 +112,13 @@ class _Grid:
 class Series:
     """A motion for pyvista: one mesh whose points and fields are those of any instant.
 
+    Parameters
+    ----------
+    history
+        A :class:`~skfem_ancf.dynamics.history.History`.
+    **options
+        Those of :func:`to_pyvista`.
+
     Attributes
     ----------
     mesh
@@ -225,7 +232,15 @@ class Scenery:
                                       self.field)
 
     def points(self, k: int, undeformed: bool = False) -> Any:
-        """Points of frame ``k``, shape (n, 3); those of the stress-free body if ``undeformed``."""
+        """Points of a frame, shape (n, 3).
+
+        Parameters
+        ----------
+        k
+            The frame.
+        undeformed
+            Those of the stress-free body.
+        """
         x = np.concatenate([
             b.points(b.reference if undeformed else b.deformed, self.factor).reshape(2, -1)
             for b in self.frames[k]], axis=1)
