@@ -100,9 +100,9 @@ class Field:
         except (TypeError, ValueError):
             raise CallbackError(f"the field {self.name!r} must be an array of numbers, got "
                                 f"{shown(out)}") from None
-        if out.shape not in (shape, ()):
+        if out.shape not in (shape, ()) or (out.ndim == 0 and not np.isfinite(out)):
             raise CallbackError(f"the field {self.name!r} must have shape {shape} at {values.n} "
-                                f"points, got {out.shape}")
+                                f"points, got {out if out.ndim == 0 else out.shape}")
         return np.broadcast_to(out, shape)
 
 
