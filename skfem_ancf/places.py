@@ -10,6 +10,8 @@ import numpy as np
 from .errors import AncfError, InputError, MeshError, NameUnknown, require_finite, shown
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import ArrayLike
 
     from .mesh import MeshBeam
@@ -180,16 +182,16 @@ def section_at(mesh: MeshBeam, point: ArrayLike) -> int:
         "node there")
 
 
-def _pair(x):
+def _pair(x: Array) -> str:
     x = np.where(np.abs(x) < 1e-15 * np.max(np.abs(x)), 0.0, x)
     return f"({x[0]:.9g}, {x[1]:.9g})"
 
 
-def _names(mesh):
+def _names(mesh: MeshBeam) -> str:
     return ", ".join(repr(name) for name, facets in (mesh.boundaries or {}).items() if len(facets))
 
 
-def _named(mesh, name):
+def _named(mesh: MeshBeam, name: str) -> Array:
     if name not in (mesh.boundaries or {}):
         raise NameUnknown("boundary", name, mesh.boundaries or {})
     facets = mesh.boundaries[name]
@@ -199,7 +201,7 @@ def _named(mesh, name):
     return facets
 
 
-def _numbered(mesh, facets):
+def _numbered(mesh: MeshBeam, facets: Array) -> Array:
     if facets.dtype.kind not in "iu" or facets.ndim != 1 or not len(facets):
         raise InputError(f"facets are a one-dimensional array of integers that is not empty, got "
                          f"{shown(facets)}; a place may also be {KINDS.rsplit(', or', 1)[0]}")
@@ -213,7 +215,7 @@ def _numbered(mesh, facets):
     return facets
 
 
-def _satisfying(mesh, test):
+def _satisfying(mesh: MeshBeam, test: Callable[[Array], Any]) -> Array:
     x = mesh.mapping().G(np.array([[0.5]]))[:, :, 0]
     try:
         chosen = np.asarray(test(x))

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class _NoBar:
-    def update(self, amount):
+    def update(self, amount: float) -> None:
         """Nothing to show."""
 
 

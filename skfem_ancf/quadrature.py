@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -45,7 +45,7 @@ def tensor(axis: Rule, section: Rule) -> Rule:
     return X, np.outer(wx, wy).ravel()
 
 
-def _rule(name, rule):
+def _rule(name: str, rule: Any) -> Rule:
     """Points and weights of a rule, as arrays."""
     if not isinstance(rule, (tuple, list)) or len(rule) != 2:
         raise InputError(f"{name} must be a pair of points and weights, got {shown(rule)}")

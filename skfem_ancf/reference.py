@@ -125,7 +125,7 @@ def hermite(xi: ArrayLike, derivative: int = 0) -> Array:
 
 
 @lru_cache
-def _hermite_coefficients(m):
+def _hermite_coefficients(m: int) -> Array:
     """Powers of the Hermite polynomials of degree 2 m - 1 on [0, 1]: (2 m, 2 m), columns."""
     conditions = [[polynomial.polyval(x, polynomial.polyder(row, d)) for row in np.eye(2 * m)]
                   for x in (0.0, 1.0) for d in range(m)]

@@ -53,7 +53,7 @@ def sample(function: Callable[[Any], Any], times: ArrayLike, name: str = "functi
     times = require_finite("times", times, (None,))
     what, n = name + "(t={:g})", len(times)
 
-    def one_by_one(times):
+    def one_by_one(times: Array) -> Array:
         return np.array([ask_array(what, shape, function, t) for t in times])
 
     if n > FEW:
@@ -68,7 +68,7 @@ def sample(function: Callable[[Any], Any], times: ArrayLike, name: str = "functi
     return one_by_one(times)
 
 
-def _at_once(function, times):
+def _at_once(function: Callable[[Any], Any], times: Array) -> Array | None:
     try:
         return np.moveaxis(np.asarray(function(times), dtype=float), -1, 0)
     except Exception:  # whatever it is, the function is not made for arrays

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from .beam import Beam
+    from .elements.base import ElementBeam
     from .mesh import MeshBeam
     from .types import Array
 
@@ -120,7 +121,7 @@ def stations_of_vector(beam: Beam, vector: ArrayLike) -> tuple[float, ...] | Non
     return tuple(station_of_node(beam.mesh, int(k)) for k in loaded)
 
 
-def _where(element, value):
+def _where(element: ElementBeam, value: float) -> float | None:
     """Where the function of ``r`` at the right node has a value; it rises from 0 to 1."""
     low, high = 0.0, 1.0
     if not -FLAT <= value <= 1.0 + FLAT:

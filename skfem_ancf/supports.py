@@ -64,7 +64,7 @@ class Support:
                     f"twice, with displacements {before!r} and {self.displacement!r}")
             fixed[self.beam, d] = self.displacement
 
-    def _require_on_axis(self, beam):
+    def _require_on_axis(self, beam: Beam) -> None:
         x = np.asarray(self.boundary, dtype=float)
         axis = np.round(beam.mesh.p[:, beam.section_node(self.boundary)], 12) + 0.0
         if np.hypot(*(x - axis)) > 1e-3 * beam.mesh.height:

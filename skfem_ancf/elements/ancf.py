@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.polynomial import legendre
 from scipy.special import roots_jacobi
@@ -9,14 +11,17 @@ from scipy.special import roots_jacobi
 from ..errors import require_integer, require_option, teaching
 from .base import ElementBeam, SectionFunctions
 
+if TYPE_CHECKING:
+    from ..types import Array
 
-def _chebyshev(n):
+
+def _chebyshev(n: int) -> Array:
     """Both faces, and the zeros of the Chebyshev polynomial T_{n-2} between them."""
     m = n - 2  # sines, not cosines: antisymmetric to the last digit, and 0 in the middle
     return np.concatenate([[-1.0], np.sin(np.arange(1 - m, m, 2) * np.pi / (2 * m)), [1.0]])
 
 
-def _gauss_lobatto(n):
+def _gauss_lobatto(n: int) -> Array:
     """Both faces, and the zeros of P_{n-1}' between them: those of a Jacobi polynomial."""
     inner, _ = roots_jacobi(n - 2, 1.0, 1.0)
     return np.concatenate([[-1.0], 0.5 * (inner - inner[::-1]), [1.0]])
@@ -82,7 +87,7 @@ class ElementBeamANCF(ElementBeam):
         super().__init__(SectionFunctions(np.linalg.inv(legendre.legvander(x, n - 1))), names,
                          functionals, names[:n])
 
-    def _coordinates(self):
+    def _coordinates(self) -> tuple[list[str], list[tuple[float, int, int]]]:
         """Names of the section coordinates of a node, and what they are."""
         return ([f"r_Y{k}" for k in range(len(self.section_points))],
                 [(float(y), 0, 1) for y in self.section_points])

@@ -193,7 +193,7 @@ class ElementBeam(Frozen, Element):
             known[2, 0] = np.array([mesh.p_XY[1], -mesh.p_XY[0]])
         return np.array([known.get(f[1:], zero) for f in self.functionals])
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<{type(self).__name__} of order {self.order}, coordinates {self.dofnames}>"
 
 
@@ -220,6 +220,6 @@ class SectionFunctions(Frozen):
     def number(self) -> int:
         return self._dP.shape[1]
 
-    def __call__(self, eta, k):
+    def __call__(self, eta: Array, k: int) -> tuple[Array, Array]:
         """P_k and its derivative at eta in [-1/2, 1/2]."""
         return legendre.legval(2 * eta, self._P[:, k]), legendre.legval(2 * eta, self._dP[:, k])

@@ -22,7 +22,7 @@ class ElementBeamANCFCubic(ElementBeamANCF):
 
     sections = "cubic"
 
-    def _coordinates(self):
+    def _coordinates(self) -> tuple[list[str], list[tuple[float, int, int]]]:
         names, functionals = super()._coordinates()
         return (names + [name.replace("r_Y", "r_XY") for name in names],
                 functionals + [(eta, 1, m) for eta, _, m in functionals])

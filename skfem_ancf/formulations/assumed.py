@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -93,7 +93,8 @@ class Assumed(Formulation):
                 Term(LinearLaw(coupling), axis, AXIS, samples, mean)]
 
     @staticmethod
-    def _volumetric_apart(whole, element, material):
+    def _volumetric_apart(whole: Term, element: ElementBeam, material: Material
+                          ) -> list[Term] | None:
         """The term in two, the volumetric one with one point along the axis; None if it has none.
 
         The rest alone is positive in every sampled strain: one point adds no zero modes.
@@ -114,7 +115,7 @@ class Assumed(Formulation):
         return total
 
     @staticmethod
-    def _strain_of(term, beam, u, X, tind):
+    def _strain_of(term: Term, beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:
         """What a term takes for the strain at X: that of the middle, or the section's mean."""
         xi = term.axis[0]
         x = X[0] if len(xi) > 1 else 0.0 * X[0] + xi[0]
@@ -135,7 +136,7 @@ class Assumed(Formulation):
         nb = element.nodal_dofs
         chord = (q[nb] - q[0]) / L
 
-        def held(k, slope, value=None):
+        def held(k: Any, slope: int, value: int | None = None) -> Array:
             """1/2 k L |c|^2 for the mean of a slope, less the difference of a value."""
             c = np.zeros((len(tind), 2 * nb))
             c[:, [slope, nb + slope]] = 0.5

@@ -170,5 +170,5 @@ class Formulation(Frozen):
         require_like("element", element, "beam element", "strain_degree", "order")
         return gauss(element.strain_degree + 1), gauss(2 * element.order + 1)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<formulation {self.name!r}>"

@@ -38,7 +38,7 @@ class Vector:
         keep = np.abs(weights) > 1e-14 * np.max(np.abs(weights))
         self.start, self.dofs, self.weights = np.asarray(start), dofs[:, keep], weights[keep]
 
-    def __call__(self, u):
+    def __call__(self, u: Array) -> Array:
         return self.start + u[self.dofs] @ self.weights
 
     def row(self, direction: ArrayLike, n: int) -> Array:
@@ -136,7 +136,7 @@ class Joint(Sealable):
     moving = False
     name: str | None = None
 
-    def __init_subclass__(cls, **options):
+    def __init_subclass__(cls, **options: Any) -> None:
         """Of :meth:`jacobian` and :meth:`entries` the one that a class defines gives the other."""
         super().__init_subclass__(**options)
         if "jacobian" in vars(cls) and "entries" not in vars(cls):
@@ -145,7 +145,7 @@ class Joint(Sealable):
                 rows, columns = np.nonzero(J)
                 return rows, columns, J[rows, columns]
 
-            cls.entries = entries
+            cls.entries = entries  # type: ignore[method-assign]
         elif "entries" in vars(cls) and "jacobian" not in vars(cls):
             def jacobian(self: Joint, u: Array, t: float) -> Array:
                 rows, columns, values = cls.entries(self, u, t)
@@ -153,7 +153,7 @@ class Joint(Sealable):
                 np.add.at(J, (rows, columns), values)
                 return J
 
-            cls.jacobian = jacobian
+            cls.jacobian = jacobian  # type: ignore[method-assign]
 
     def bind(self, scene: Scene) -> None:
         """Find the points and sections in the scene's coordinates.
@@ -284,7 +284,7 @@ class Joint(Sealable):
         np.add.at(J, (rows, where), values)
         return columns, np.broadcast_to(J, (len(times),) + J.shape)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         at = getattr(self, "at", None)
         if isinstance(at, tuple) and len(at) == 2 and at[0] is at[1]:  # given once for both beams
             at = at[0]
@@ -326,7 +326,7 @@ def bind_joint(joint: Joint, scene: Scene) -> Joint:
     return bound
 
 
-def _try(joint, n):
+def _try(joint: Joint, n: int) -> None:
     m, zero = len(joint.equations), np.zeros(n)
     require_finite(f"value(u, t) of {joint!r}", joint.value(zero, 0.0), (m,))
     require_finite(f"jacobian(u, t) of {joint!r}", joint.jacobian(zero, 0.0), (m, n))

@@ -86,7 +86,7 @@ class PrescribedAngle(Joint):
         _, self.d = section(scene, self.beam, self.at)
         self.start = np.arctan2(*self.d.start[::-1])
 
-    def _angle(self, t):
+    def _angle(self, t: float) -> float:
         return ask_number("angle(t={:g})", self.angle, t)
 
     def value(self, u: Array, t: float) -> Array:
@@ -97,7 +97,7 @@ class PrescribedAngle(Joint):
         a = self.start + self._angle(t)
         return gradients([(self.d, (-np.sin(a), np.cos(a)))])
 
-    def _normals(self, times):
+    def _normals(self, times: Array) -> Array:
         a = self.start + sample(self.angle, times, "angle", ())
         return np.array([-np.sin(a), np.cos(a)]).T
 
