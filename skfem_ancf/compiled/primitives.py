@@ -16,45 +16,73 @@ def block(pairs):
 
 
 @jit
-def element_products(A, first, B, out):
-    for i in range(A.shape[0]):
-        for j in range(B.shape[1]):
-            for e in range(B.shape[2]):
-                out[i, j, e] = 0.0
-        for k in range(A.shape[1]):
+def product(A, first, B, out):
+    n = B.shape[1] * B.shape[2]
+    if A.shape[0] == 1:
+        np.dot(A[0], B.reshape(B.shape[0], n), out.reshape(out.shape[0], n))
+        return
+    x, y = np.empty((B.shape[0], B.shape[1])), np.empty((out.shape[0], B.shape[1]))
+    for e in range(B.shape[2]):
+        for k in range(B.shape[0]):
             for j in range(B.shape[1]):
-                for e in range(B.shape[2]):
-                    out[i, j, e] += A[i, k, first + e] * B[k, j, e]
-
-
-@jit
-def turned_element_products(A, first, B, out):
-    for i in range(A.shape[1]):
-        for j in range(B.shape[1]):
-            for e in range(B.shape[2]):
-                out[i, j, e] = 0.0
-        for k in range(A.shape[0]):
+                x[k, j] = B[k, j, e]
+        np.dot(A[first + e], x, y)
+        for k in range(out.shape[0]):
             for j in range(B.shape[1]):
-                for e in range(B.shape[2]):
-                    out[i, j, e] += A[k, i, first + e] * B[k, j, e]
+                out[k, j, e] = y[k, j]
 
 
 @jit
-def own_stress(handle, strain, S):
-    with numba.objmode():
-        laws.own_stress(handle, strain, S)
+def turned_product(A, turned, first, B, out):
+    if turned.shape[0] == 1:
+        product(turned, first, B, out)
+        return
+    y = np.empty((2, out.shape[0]))
+    for e in range(B.shape[2]):
+        y[:] = 0.0
+        for g in range(B.shape[0]):
+            b, c = B[g, 0, e], B[g, 1, e]
+            for k in range(out.shape[0]):
+                y[0, k] += A[first + e, g, k] * b
+                y[1, k] += A[first + e, g, k] * c
+        for k in range(out.shape[0]):
+            out[k, 0, e], out[k, 1, e] = y[0, k], y[1, k]
 
 
 @jit
-def own_moduli(handle, strain, D):
-    with numba.objmode():
-        laws.own_moduli(handle, strain, D)
+def element_tangents(table, pairs, first, M, M_skew, K, K_skew):
+    nb = table.shape[2]
+    H, out = np.empty((table.shape[1], 3 * nb)), np.empty((nb, 3 * nb))
+    for e in range(M.shape[2]):
+        G = table[first + e]
+        H[:] = 0.0
+        for p in range(M.shape[0]):
+            g, h, q = pairs.pairs[0, p], pairs.pairs[1, p], pairs.pairs[2, p]
+            x, y, xy = M[p, 0, e], M[p, 1, e], M[p, 2, e]
+            d = M_skew[q, 0, e] if g != h else 0.0
+            for a in range(nb):
+                H[g, a] += x * G[h, a]
+                H[g, nb + a] += y * G[h, a]
+                H[g, 2 * nb + a] += (xy + d) * G[h, a]
+            if g != h:
+                for a in range(nb):
+                    H[h, a] += x * G[g, a]
+                    H[h, nb + a] += y * G[g, a]
+                    H[h, 2 * nb + a] += (xy - d) * G[g, a]
+        np.dot(G.T, H, out)
+        for n in range(K.shape[0]):
+            a, b = pairs.lower[0, n], pairs.lower[1, n]
+            K[n, 0, e], K[n, 1, e] = out[a, b], out[a, nb + b]
+            K[n, 2, e] = 0.5 * (out[a, 2 * nb + b] + out[b, 2 * nb + a])
+        for n in range(K_skew.shape[0]):
+            a, b = pairs.strictly[0, n], pairs.strictly[1, n]
+            K_skew[n, 0, e] = 0.5 * (out[a, 2 * nb + b] - out[b, 2 * nb + a])
 
 
 @jit
-def own_energy(handle, strain, W):
+def own_evaluate(handle, strain, out):
     with numba.objmode():
-        laws.own_energy(handle, strain, W)
+        laws.own_evaluate(handle, strain, out)
 
 
 @jit

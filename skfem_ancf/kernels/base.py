@@ -1,7 +1,7 @@
 """What all kinds of beams share: blocks of elements, forces and tangents from rows of a table.
 
-The ``table`` has rows G_g of derivatives of the local functions, shape (rows, nb, elements), or
-(rows, nb, 1) where elements share them. A force is ``G^T T`` with what the stresses do on each
+The ``table`` has rows G_g of derivatives of the local functions, shape (elements, rows, nb), or
+(1, rows, nb) where elements share them. A force is ``G^T T`` with what the stresses do on each
 row; a tangent is a sum over pairs of rows
 
     K[(a, i), (b, j)] = sum_{g, h} M[g, h, i, j] G[g, a] G[h, b]
@@ -19,8 +19,12 @@ from ..source import F2, F3, I1, I2, column, lanes, primitive, source
 
 #: Elements of which Python evaluates matrices together; bounds the memory.
 CHUNK = 1024
-#: Fields of a pack whose last axis are the elements, where they have tables of their own.
-BY_ELEMENT = {"table", "frame", "weights", "moduli", "constant", "length0", "kappa0"}
+#: What a kernel finds; given as ``np.int64``, or Numba compiles for each.
+FORCE, TANGENT, MEAN, STRESS, CARRY = range(5)
+#: Fields of a pack whose first axis are the elements, where they have matrices of their own.
+MATRICES = {"table", "constant"}
+#: Those whose last axis are the elements, where they have tables of their own.
+BY_ELEMENT = {"frame", "weights", "moduli", "length0", "kappa0"}
 #: Fields with numbers of elements in a table, and the table.
 PLACES = {"place": "weights", "frame_place": "frame"}
 
@@ -32,36 +36,23 @@ def block(pairs):
 
 
 @primitive("primitives")
-def element_products(A, first, B, out):
-    """out[i, j, e] = sum_k A[i, k, first + e] B[k, j, e]."""
-    np.einsum("ike,kje->ije", A[:, :, first:first + B.shape[2]], B, out=out)
+def product(A, first, B, out):
+    """out[i, j, e] = sum_k A[e, i, k] B[k, j, e], elements from ``first`` on, or of a shared A."""
+    if A.shape[0] == 1:
+        n = B.shape[1] * B.shape[2]
+        np.dot(A[0], B.reshape(-1, n), out.reshape(-1, n))
+    else:
+        out.transpose(2, 0, 1)[...] = A[first:first + B.shape[2]] @ B.transpose(2, 0, 1)
 
 
 @primitive("primitives")
-def turned_element_products(A, first, B, out):
-    """out[i, j, e] = sum_k A[k, i, first + e] B[k, j, e]."""
-    A = A[:, :, first:first + B.shape[2]]
-    if B.shape[1] < 8:
-        np.einsum("kie,kje->ije", A, B, out=out)
+def turned_product(A, turned, first, B, out):
+    """out[i, j, e] = sum_k A[e, k, i] B[k, j, e]; a shared one is given as ``turned`` too."""
+    if turned.shape[0] == 1:
+        product(turned, first, B, out)
     else:
-        out[...] = np.matmul(np.ascontiguousarray(A.transpose(2, 1, 0)),
-                             np.ascontiguousarray(B.transpose(2, 0, 1))).transpose(1, 2, 0)
-
-
-@source
-def shared_product(A, B, out):
-    """out[i, j, e] = sum_k A[i, k, 0] B[k, j, e]."""
-    n = B.shape[1] * B.shape[2]
-    np.dot(A.reshape(A.shape[0], A.shape[1]), B.reshape(B.shape[0], n), out.reshape(len(out), n))
-
-
-@source
-def product(A, first, B, out):
-    """out[i, j, e] = sum_k A[i, k, e] B[k, j, e] for the elements from ``first`` on."""
-    if A.shape[2] == 1:
-        shared_product(A, B, out)
-    else:
-        element_products(A, first, B, out)
+        own = A[first:first + B.shape[2]].transpose(0, 2, 1)
+        out.transpose(2, 0, 1)[...] = own @ B.transpose(2, 0, 1)
 
 
 @source
@@ -79,12 +70,9 @@ def add_force(table, transposed, constant, start, span, first, T, U, f):
     """Add G^T T to f, and C U where a stabilisation is."""
     nb, size = U.shape[0], U.shape[2]
     F, at = np.empty(U.shape, U.dtype), start[first:first + size]
-    if transposed.shape[2] == 1:
-        shared_product(transposed, T, F)
-    else:
-        turned_element_products(table, first, T, F)
+    turned_product(table, transposed, first, T, F)
     force = F.reshape(2 * nb, size)
-    if constant.shape[2] > 0:
+    if constant.shape[0] > 0:
         held = np.empty((2 * nb, 1, size), U.dtype)
         product(constant, first, U.reshape(2 * nb, 1, size), held)
         for k in lanes(2 * nb):
@@ -96,16 +84,15 @@ def add_force(table, transposed, constant, start, span, first, T, U, f):
                 f[column(span[k]) + at[e]] += force[k, e]
 
 
-@source
-def add_held_energy(constant, first, U, total):
-    """Add 1/2 U C U of the stabilisation."""
-    nb, size = U.shape[0], U.shape[2]
-    if constant.shape[2] > 0:
-        V, held = U.reshape(2 * nb, 1, size), np.empty((2 * nb, 1, size), U.dtype)
-        product(constant, first, V, held)
-        for k in range(2 * nb):
-            for e in lanes(size):
-                total[e] += 0.5 * V[k, 0, e] * held[k, 0, e]
+def add_held_energy(pack, u, total):
+    """Add 1/2 u C u of the stabilisation of each element."""
+    nb = pack.table.shape[2]
+    U = np.empty((nb, 2, total.size), u.dtype)
+    load(pack.start, pack.span, 0, u, U)
+    if len(pack.constant):
+        V, held = U.reshape(2 * nb, 1, -1), np.empty((2 * nb, 1, total.size), u.dtype)
+        product(pack.constant, 0, V, held)
+        total += 0.5 * np.sum(V * held, axis=(0, 1))
 
 
 class PairTables(NamedTuple):
@@ -118,11 +105,11 @@ class PairTables(NamedTuple):
         is not used. Shape (3, p).
     symmetric, skew
         ``G_g G_h^T + G_h G_g^T`` (``G_g G_g^T`` for g = h) and ``G_g G_h^T - G_h G_g^T`` of each
-        pair, entries (a, b) with a >= b (a > b), shape (n, p, 1) and (m, p', 1). Not those with
+        pair, entries (a, b) with a >= b (a > b), shape (1, n, p) and (1, m, p'). Not those with
         the position of the right node: a translation moves both nodes, so that its entries are
         minus those of the left one. Made from others they are so exactly; else round-off, of the
         size of the axial stiffness, would resist translations: in a long chain of short elements
-        as much as bending does. Of shape (n, p, 0) where elements have tables of their own.
+        as much as bending does. Of shape (0, ...) where elements have tables of their own.
     lower, strictly
         a and b of the entries of ``symmetric`` and ``skew``, shape (2, n) and (2, m).
     partners, rounds
@@ -130,11 +117,12 @@ class PairTables(NamedTuple):
         that between two ``rounds`` no g comes twice.
     entries, signs, ends
         For each entry (i, j), i >= j, of an element tangent: i - j, j, and its row in the result
-        of ``symmetric`` and in that of ``skew``, (4, k); their signs, (2, k). Up to ``ends[0]``
-        those of one component and the left node, then the right node, then of two components.
-    held, held_skew
-        The stabilisation, as results of ``symmetric`` and ``skew``: (n, 3, 0), (n, 3, 1) or of
-        each element.
+        of ``symmetric`` and in that of ``skew``, (4, k); their signs, (2, k). Up to ``ends[1]``
+        those of one component and the left node, up to ``ends[2]`` the right node, then of two
+        components.
+    held, held_skew, held_place
+        The stabilisation, as results of ``symmetric`` and ``skew``: (3 n, 0, 1 or elements) and
+        (m, ...), and which are an element's.
     """
 
     pairs: I2
@@ -147,113 +135,77 @@ class PairTables(NamedTuple):
     entries: I2
     signs: F2
     ends: I1
-    held: F3
-    held_skew: F3
+    held: F2
+    held_skew: F2
+    held_place: I1
 
 
-@source
+@primitive("primitives")
 def element_tangents(table, pairs, first, M, M_skew, K, K_skew):
     """What the products of G do, for elements with tables of their own: G^T (M G)."""
-    rows, nb, size = table.shape[0], table.shape[1], M.shape[2]
-    own = table[:, :, first:first + size]
-    G, X = np.empty((rows, nb, size)), np.empty((M.shape[0], 4, 1, size))
-    for g in lanes(rows):
-        for a in lanes(nb):
-            for e in lanes(size):
-                G[g, a, e] = own[g, a, e]
-    for e in lanes(size):
-        M_skew[len(M_skew) - 1, 0, e] = 0.0  # of the pairs g = h
-    for p in lanes(M.shape[0]):
-        q = pairs.pairs[2, p]
-        for e in lanes(size):
-            X[p, 0, 0, e], X[p, 1, 0, e] = M[p, 0, e], M[p, 1, e]
-            X[p, 2, 0, e] = M[p, 2, e] + M_skew[q, 0, e]
-            X[p, 3, 0, e] = M[p, 2, e] - M_skew[q, 0, e]
-    H, out = np.zeros((rows, 3, nb, size)), np.empty((nb, 3 * nb, size))
-    for r in range(pairs.rounds.size - 1):
-        for s in lanes(pairs.rounds[r], pairs.rounds[r + 1]):
-            g, h, p, side = (pairs.partners[0, s], pairs.partners[1, s], pairs.partners[2, s],
-                             pairs.partners[3, s])
-            for z in lanes(1):
-                for a in lanes(nb):
-                    for e in lanes(size):
-                        H[g, 0, a, e] += X[p, 0, z, e] * G[h, a, e]
-                        H[g, 1, a, e] += X[p, 1, z, e] * G[h, a, e]
-                        H[g, 2, a, e] += X[p, side, z, e] * G[h, a, e]
-    turned_element_products(table, first, H.reshape(rows, 3 * nb, size), out)
-    out4 = out.reshape(nb, 3, nb, size)
-    for n in lanes(pairs.lower.shape[1]):
-        a, b = pairs.lower[0, n], pairs.lower[1, n]
-        for e in lanes(size):
-            K[n, 0, e], K[n, 1, e] = out4[a, 0, b, e], out4[a, 1, b, e]
-            K[n, 2, e] = 0.5 * (out4[a, 2, b, e] + out4[b, 2, a, e])
-    for m in lanes(pairs.strictly.shape[1]):
-        a, b = pairs.strictly[0, m], pairs.strictly[1, m]
-        for e in lanes(size):
-            K_skew[m, 0, e] = 0.5 * (out4[a, 2, b, e] - out4[b, 2, a, e])
+    nb, size = table.shape[2], M.shape[2]
+    G = np.ascontiguousarray(table[first:first + size].transpose(1, 2, 0))
+    xy, turn = M[:, 2].copy(), np.zeros((len(M), size))
+    off = pairs.pairs[0] != pairs.pairs[1]
+    turn[off] = M_skew[pairs.pairs[2, off], 0]
+    X = np.stack([M[:, 0], M[:, 1], xy + turn, xy - turn], axis=1)[:, :, None]
+    H = np.zeros((len(G), 3, nb, size))
+    for a, b in zip(pairs.rounds[:-1], pairs.rounds[1:]):
+        g, h, p, side = pairs.partners[:, a:b]
+        for c, column_of in enumerate((0, 1, side)):
+            H[g, c] += X[p, column_of] * G[h]
+    out = np.empty((nb, 3 * nb, size))
+    turned_product(table, np.empty((0, 0, 0)), first, H.reshape(len(G), -1, size), out)
+    out = out.reshape(nb, 3, nb, size)
+    (a, b), (c, d) = pairs.lower, pairs.strictly
+    K[:, 0], K[:, 1] = out[a, 0, b], out[a, 1, b]
+    K[:, 2] = 0.5 * (out[a, 2, b] + out[b, 2, a])
+    K_skew[:, 0] = 0.5 * (out[c, 2, d] - out[d, 2, c])
 
 
 @source
 def add_tangent(table, pairs, start, first, M, M_skew, flat, ld, row):
     """Add the tangents of a block of elements to a band matrix, from the factors of its pairs."""
     size = M.shape[2]
-    K = np.empty((pairs.symmetric.shape[0], 3, size))
-    K_skew = np.empty((pairs.skew.shape[0], 1, size))
-    if pairs.symmetric.shape[2] == 1:
-        shared_product(pairs.symmetric, M, K)
-        shared_product(pairs.skew, M_skew, K_skew)
+    K = np.empty((pairs.lower.shape[1], 3, size))
+    K_skew = np.empty((pairs.strictly.shape[1], 1, size))
+    if pairs.symmetric.shape[0] == 1:
+        product(pairs.symmetric, first, M, K)
+        product(pairs.skew, first, M_skew, K_skew)
     else:
         element_tangents(table, pairs, first, M, M_skew, K, K_skew)
-    if pairs.held.shape[2] > 0:
-        add_rows(pairs.held, first, K)
-        add_rows(pairs.held_skew, first, K_skew)
-    where, at = np.empty(size, np.int64), start[first:first + size]
+    rows, skew, where = K.reshape(3 * len(K), size), K_skew.reshape(len(K_skew), size), np.empty(
+        size, np.int64)
+    if pairs.held.shape[1] > 0:
+        own = pairs.held_place[first:first + size]
+        for k in lanes(len(rows)):
+            for e in lanes(size):
+                rows[k, e] += pairs.held[k, own[e]]
+        for k in lanes(len(skew)):
+            for e in lanes(size):
+                skew[k, e] += pairs.held_skew[k, own[e]]
+    at = start[first:first + size]
     for e in lanes(size):
         where[e] = (row + at[e]) * ld
-    # elements have no left node in common
-    scatter_entries(pairs, 0, pairs.ends[0], K, K_skew, where, flat, ld)
-    scatter_entries(pairs, pairs.ends[0], pairs.ends[1], K, K_skew, where, flat, ld)
-    scatter_skew_entries(pairs, pairs.ends[1], pairs.ends[2], K, K_skew, where, flat, ld)
-    scatter_skew_entries(pairs, pairs.ends[2], pairs.ends[3], K, K_skew, where, flat, ld)
-
-
-@source
-def add_rows(held, first, K):
-    """Add a constant part, of all elements or of each."""
-    own = held[:, :, first:first + K.shape[2]]
-    for c in range(K.shape[1]):
-        for n in lanes(len(K)):
-            if held.shape[2] == 1:
-                for e in lanes(K.shape[2]):
-                    K[n, c, e] += column(held[n, c, 0])
+    for part in range(4):  # elements have no left node in common
+        for n in lanes(pairs.ends[part], pairs.ends[part + 1]):
+            to, k = pairs.entries[0, n] + pairs.entries[1, n] * ld, pairs.entries[2, n]
+            m, x, y = pairs.entries[3, n], pairs.signs[0, n], pairs.signs[1, n]
+            if part < 2:
+                for e in lanes(size):
+                    flat[column(to) + where[e]] += column(x) * rows[k, e]
             else:
-                for e in lanes(K.shape[2]):
-                    K[n, c, e] += own[n, c, e]
+                for e in lanes(size):
+                    flat[column(to) + where[e]] += column(x) * rows[k, e] + column(y) * skew[m, e]
 
 
 @source
-def scatter_entries(pairs, begin, end, K, K_skew, where, flat, ld):
-    """Add entries of one component to the band."""
-    size = where.size
-    rows = K.reshape(3 * len(K), size)
-    for n in lanes(begin, end):
-        at, k, sign = (pairs.entries[0, n] + pairs.entries[1, n] * ld, pairs.entries[2, n],
-                       pairs.signs[0, n])
-        for e in lanes(size):
-            flat[column(at) + where[e]] += column(sign) * rows[k, e]
-
-
-@source
-def scatter_skew_entries(pairs, begin, end, K, K_skew, where, flat, ld):
-    """Add entries of two components to the band."""
-    size = where.size
-    rows = K.reshape(3 * len(K), size)
-    for n in lanes(begin, end):
-        at, k, m = (pairs.entries[0, n] + pairs.entries[1, n] * ld, pairs.entries[2, n],
-                    pairs.entries[3, n])
-        x, y = pairs.signs[0, n], pairs.signs[1, n]
-        for e in lanes(size):
-            flat[column(at) + where[e]] += column(x) * rows[k, e] + column(y) * K_skew[m, 0, e]
+def copy_stress(x, y):
+    """Stresses of a block from or into those of all elements."""
+    for c in lanes(x.shape[0]):
+        for p in lanes(x.shape[1]):
+            for e in lanes(x.shape[2]):
+                y[c, p, e] = x[c, p, e]
 
 
 def packed(values, dtype=np.float64):
@@ -272,19 +224,21 @@ def in_rounds(keys):
                          np.int64)
 
 
-def pair_tables(table, pairs, constant):
+def pair_tables(table, pairs, constant, elements):
     """The PairTables of pairs (2, p) of rows, each once, for a table and a stabilisation.
 
     Parameters
     ----------
     table
-        Shape (rows, nb, elements), or (rows, nb, 1) where elements share it.
+        Shape (elements, rows, nb), or (1, rows, nb) where elements share it.
     pairs
         Rows g <= h, shape (2, p).
     constant
-        Element stiffness, shape (2 nb, 2 nb, elements), (2 nb, 2 nb, 1) or (2 nb, 2 nb, 0).
+        Element stiffness, shape (0, 1 or elements, 2 nb, 2 nb).
+    elements
+        Their number.
     """
-    nb, q = table.shape[1], table.shape[1] // 2
+    nb, q = table.shape[2], table.shape[2] // 2
     g, h = pairs
     off = g != h
     number = np.where(off, np.cumsum(off) - 1, np.sum(off))
@@ -294,20 +248,23 @@ def pair_tables(table, pairs, constant):
     n_of, m_of = np.zeros((2, nb, nb), dtype=np.int64)
     n_of[a, b] = n_of[b, a] = np.arange(len(a))
     m_of[c, d] = m_of[d, c] = np.arange(len(c))
-    symmetric, skew = np.zeros((len(a), len(g), 0)), np.zeros((len(c), np.sum(off) + 1, 0))
-    if table.shape[2] == 1:
-        G, H = table[g, :, 0].T, table[h, :, 0].T
-        symmetric = (G[a] * H[b] + off * H[a] * G[b])[:, :, None]
-        skew = np.append((G[c] * H[d] - H[c] * G[d])[:, off], np.zeros((len(c), 1)), axis=1)[..., None]
+    symmetric, skew = np.zeros((0, len(a), len(g))), np.zeros((0, len(c), np.sum(off) + 1))
+    if table.shape[0] == 1:
+        G, H = table[0, g].T, table[0, h].T
+        symmetric = (G[a] * H[b] + off * H[a] * G[b])[None]
+        skew = np.append((G[c] * H[d] - H[c] * G[d])[:, off], np.zeros((len(c), 1)), axis=1)[None]
     both = np.concatenate([[g, h, np.arange(len(g)), np.full(len(g), 2)],
                            np.array([h, g, np.arange(len(g)), np.full(len(g), 3)])[:, off]], axis=1)
     order, rounds = in_rounds(both[0])
-    C = constant.reshape(nb, 2, nb, 2, -1)
-    held = np.stack([C[a, 0, b, 0], C[a, 1, b, 1], 0.5 * (C[a, 0, b, 1] + C[b, 0, a, 1])], axis=1)
-    held_skew = 0.5 * (C[c, 0, d, 1] - C[d, 0, c, 1])[:, None]
+    C = constant.reshape(-1, nb, 2, nb, 2)
+    held = np.stack([C[:, a, 0, b, 0], C[:, a, 1, b, 1],
+                     0.5 * (C[:, a, 0, b, 1] + C[:, b, 0, a, 1])], axis=2)
+    held_skew = 0.5 * (C[:, c, 0, d, 1] - C[:, d, 0, c, 1])
     return PairTables(packed([g, h, number], np.int64), packed(symmetric), packed(skew),
-                      packed([a, b], np.int64), packed([c, d], np.int64), packed(both[:, order], np.int64),
-                      rounds, *_entries(nb, n_of, m_of), packed(held), packed(held_skew))
+                      packed([a, b], np.int64), packed([c, d], np.int64),
+                      packed(both[:, order], np.int64), rounds, *_entries(nb, n_of, m_of),
+                      packed(held.reshape(len(C), 3 * len(a)).T), packed(held_skew.T),
+                      packed(np.arange(elements) * (len(C) > 1), np.int64))
 
 
 def _entries(nb, n_of, m_of):
@@ -323,7 +280,7 @@ def _entries(nb, n_of, m_of):
     order = np.argsort(part, kind="stable")
     entries = np.array([i - j, j, source_row, m_of[a, b]])[:, order]
     return (packed(entries, np.int64), packed(np.array([sign, skew])[:, order]),
-            packed(np.cumsum(np.bincount(part, minlength=4)), np.int64))
+            packed(np.cumsum([0, *np.bincount(part, minlength=4)]), np.int64))
 
 
 def append_square_root(K, u_e, B, CB, stress):
@@ -588,15 +545,19 @@ class Chain:
 
 def apart(pack, elements):
     """A pack of some elements, a slice, each with coordinates of its own."""
-    number, all_elements = len(pack.start[elements]), pack.start.size
+    number, total = len(pack.start[elements]), pack.start.size
     changes = {"start": np.arange(number) * pack.span.size}
     for name, table in pack._asdict().items():
-        if name in BY_ELEMENT and table.shape[-1] == all_elements > 1:
+        if name in MATRICES and len(table) == total > 1:
+            changes[name] = table[elements]
+        elif name in BY_ELEMENT and table.shape[-1] == total > 1:
             changes[name] = np.ascontiguousarray(table[..., elements])
         elif name in PLACES:
             changes[name] = np.arange(number) * min(1, pack._asdict()[PLACES[name]].shape[-1] - 1)
-    if pack.pairs.held.shape[2] == all_elements > 1:
+    held = pack.pairs.held
+    changes["pairs"] = pack.pairs._replace(held_place=pack.pairs.held_place[:number])
+    if held.shape[1] == total > 1:
         changes["pairs"] = pack.pairs._replace(
-            held=np.ascontiguousarray(pack.pairs.held[:, :, elements]),
-            held_skew=np.ascontiguousarray(pack.pairs.held_skew[:, :, elements]))
+            held=packed(held[:, elements]), held_skew=packed(pack.pairs.held_skew[:, elements]),
+            held_place=np.arange(number))
     return pack._replace(**changes)

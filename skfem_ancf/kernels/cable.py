@@ -15,8 +15,9 @@ import numpy as np
 from ..errors import InputError
 from ..quadrature import gauss
 from ..source import F1, F2, F3, I1, lanes, source
-from .base import (Chain, PairTables, Texts, add_force, add_held_energy, add_tangent, block, load,
-                   packed, pair_tables, product)
+from .base import (CARRY, FORCE, MEAN, STRESS, TANGENT, Chain, PairTables, Texts, add_force,
+                   add_held_energy, add_tangent, block, copy_stress, load, packed, pair_tables,
+                   product)
 
 
 class CablePack(NamedTuple):
@@ -25,8 +26,9 @@ class CablePack(NamedTuple):
     Attributes
     ----------
     table, transposed, frame
-        Derivatives of the local functions (rows, nb, 1 or elements), the same as (nb, rows, 1 or
-        0), and a and b in the stress-free state, (rows, 2, 1 or elements).
+        Derivatives of the local functions (1 or elements, rows, nb), those that elements share as
+        (1, nb, rows) too, else (0, ...), and a and b in the stress-free state, (rows, 2, 1 or
+        elements).
     length0, kappa0
         ``|a|`` and the curvature in the stress-free state, (points, 1 or elements).
     weights, place
@@ -36,7 +38,7 @@ class CablePack(NamedTuple):
     stiffness
         E A and E I.
     constant
-        Stabilisation (2 nb, 2 nb, 0, 1 or elements).
+        Stabilisation (0, 1 or elements, 2 nb, 2 nb).
     start, span
         First coordinate of each element, and 0 to 2 nb - 1.
     pairs
@@ -58,41 +60,20 @@ class CablePack(NamedTuple):
     pairs: PairTables
 
 
-class CableWork(NamedTuple):
-    """Of a block of elements: coordinates, a and b with their displacement parts d, and more.
+@source
+def cable_strain(pack, first, d, r, weights, square, kappa, strain):
+    """Strains of the elements from ``first`` on, without cancellation in the extension.
 
-    ``square`` is |a|^2; ``strain`` are eps and kappa - kappa_0.
+    Parameters
+    ----------
+    d
+        Displacement parts of a and b, shape (rows, 2, elements).
+    r, weights, square, kappa, strain
+        Written: a and b, the weights, |a|^2, the curvature, and (eps, kappa - kappa_0).
     """
-
-    U: np.ndarray
-    d: np.ndarray
-    r: np.ndarray
-    T: np.ndarray
-    square: np.ndarray
-    kappa: np.ndarray
-    strain: np.ndarray
-    weights: np.ndarray
-
-
-@source
-def cable_work(pack, size, u):
-    """Work arrays of a block of elements."""
-    rows, n, nb = pack.table.shape[0], pack.weights.shape[0], pack.table.shape[1]
-    return CableWork(np.empty((nb, 2, size), u.dtype), np.empty((rows, 2, size), u.dtype),
-                     np.empty((rows, 2, size), u.dtype), np.empty((rows, 2, size), u.dtype),
-                     np.empty((n, size), u.dtype), np.empty((n, size), u.dtype),
-                     np.empty((2, n, size), u.dtype), np.empty((n, size)))
-
-
-@source
-def cable_strain(pack, first, u, work):
-    """Extension without cancellation, and change of curvature, of the elements from ``first``."""
-    d, r, square, kappa, n = work.d, work.r, work.square, work.kappa, work.square.shape[0]
-    size = work.U.shape[2]
-    load(pack.start, pack.span, first, u, work.U)
-    product(pack.table, first, work.U, d)
+    n, size = square.shape[0], square.shape[1]
     at, at0 = pack.place[first:first + size], pack.frame_place[first:first + size]
-    for g in lanes(d.shape[0]):
+    for g in lanes(r.shape[0]):
         for i in lanes(2):
             for e in lanes(size):
                 r[g, i, e] = pack.frame[g, i, at0[e]] + d[g, i, e]
@@ -102,39 +83,58 @@ def cable_strain(pack, first, u, work):
             a0, a1, da0, da1 = r[p, 0, e], r[p, 1, e], d[p, 0, e], d[p, 1, e]
             s = a0 * a0 + a1 * a1
             k = (a0 * b[p, 1, e] - a1 * b[p, 0, e]) / s
-            work.strain[0, p, e] = (((2.0 * a0 - da0) * da0 + (2.0 * a1 - da1) * da1)
-                                    / (np.sqrt(s) + pack.length0[p, at0[e]]))
-            work.strain[1, p, e] = k - pack.kappa0[p, at0[e]]
-            square[p, e], kappa[p, e] = s, k
-            work.weights[p, e] = pack.weights[p, at[e]]
+            strain[0, p, e] = (((2.0 * a0 - da0) * da0 + (2.0 * a1 - da1) * da1)
+                               / (np.sqrt(s) + pack.length0[p, at0[e]]))
+            strain[1, p, e] = k - pack.kappa0[p, at0[e]]
+            square[p, e], kappa[p, e], weights[p, e] = s, k, pack.weights[p, at[e]]
 
 
 @source
-def add_cable_force(pack, first, work, f):
-    """Add the forces of normal force and moment."""
-    T, r, n = work.T, work.r, work.square.shape[0]
-    b, Tb, EA, EI = r[n:], T[n:], pack.stiffness[0], pack.stiffness[1]
+def cable_rows(stiffness, weights, r, square, kappa, strain, T):
+    """What the mean resultants of two states do on the gradients; both may be the same.
+
+    eps and kappa are not quadratic in the coordinates; their changes are still linear in the
+    step: ``d eps = (a0 + a1) . da / (|a0| + |a1|)`` and, from ``s kappa = a x b``,
+    ``mean(s) d kappa = d(a x b) - mean(kappa) ds``.
+    """
+    n, k = square.shape[1], len(r) - 1
+    b, Tb, EA, EI = r[:, n:], T[n:], stiffness[0], stiffness[1]
     for p in lanes(n):
         for e in lanes(T.shape[2]):
-            a0, a1, s, w = r[p, 0, e], r[p, 1, e], work.square[p, e], work.weights[p, e]
-            M = w * EI * work.strain[1, p, e] / s
-            N = w * EA * work.strain[0, p, e] / np.sqrt(s) - 2.0 * work.kappa[p, e] * M
-            T[p, 0, e], T[p, 1, e] = N * a0 + M * b[p, 1, e], N * a1 - M * b[p, 0, e]
+            s, z, w = square[0, p, e], square[k, p, e], weights[p, e]
+            M = w * EI * (strain[0, 1, p, e] + strain[k, 1, p, e]) / (s + z)
+            N = (w * EA * (strain[0, 0, p, e] + strain[k, 0, p, e]) / (np.sqrt(s) + np.sqrt(z))
+                 - (kappa[0, p, e] + kappa[k, p, e]) * M)
+            a0, a1 = 0.5 * (r[0, p, 0, e] + r[k, p, 0, e]), 0.5 * (r[0, p, 1, e] + r[k, p, 1, e])
+            T[p, 0, e] = N * a0 + 0.5 * M * (b[0, p, 1, e] + b[k, p, 1, e])
+            T[p, 1, e] = N * a1 - 0.5 * M * (b[0, p, 0, e] + b[k, p, 0, e])
             Tb[p, 0, e], Tb[p, 1, e] = -M * a1, M * a0
-    add_force(pack.table, pack.transposed, pack.constant, pack.start, pack.span, first, T, work.U,
-              f)
 
 
 @source
-def cable_factors(pack, work, stress, M, skew):
+def cable_changes(stiffness, r, d, square, kappa, before, out):
+    """Resultants, linearised, after displacement parts d of a and b, from those before."""
+    n = square.shape[0]
+    b, db = r[n:], d[n:]
+    for p in lanes(n):
+        for e in lanes(r.shape[2]):
+            a0, a1, s = r[p, 0, e], r[p, 1, e], square[p, e]
+            along = a0 * d[p, 0, e] + a1 * d[p, 1, e]
+            change = (d[p, 0, e] * b[p, 1, e] - d[p, 1, e] * b[p, 0, e] + a0 * db[p, 1, e]
+                      - a1 * db[p, 0, e] - 2.0 * kappa[p, e] * along)
+            out[0, p, e] = before[0, p, e] + stiffness[0] * along / np.sqrt(s)
+            out[1, p, e] = before[1, p, e] + stiffness[1] * change / s
+
+
+@source
+def cable_factors(stiffness, weights, r, square, kappa, stress, M, skew):
     """Factors of the pairs (a, a), (a, b), (b, b) for N d^2 eps + M d^2 kappa and the stiffness."""
-    r, n = work.r, work.square.shape[0]
-    b, Maa, Mab, Mbb, EA, EI = (r[n:], M[:n], M[n:2 * n], M[2 * n:], pack.stiffness[0],
-                                pack.stiffness[1])
+    n, EA, EI = square.shape[0], stiffness[0], stiffness[1]
+    b, Maa, Mab, Mbb = r[n:], M[:n], M[n:2 * n], M[2 * n:]
     for p in lanes(n):
         for e in lanes(M.shape[2]):
             a0, a1, b0, b1 = r[p, 0, e], r[p, 1, e], b[p, 0, e], b[p, 1, e]
-            s, k, w = work.square[p, e], work.kappa[p, e], work.weights[p, e]
+            s, k, w = square[p, e], kappa[p, e], weights[p, e]
             x, y = w * EA / s, w * EI / (s * s)
             N, m = w * stress[0, p, e] / (s * np.sqrt(s)), 2.0 * w * stress[1, p, e] / (s * s)
             k0, k1, c = b1 - 2.0 * k * a0, -b0 - 2.0 * k * a1, k * s
@@ -152,40 +152,56 @@ def cable_factors(pack, work, stress, M, skew):
 
 
 @source
-def cable_resultants(stiffness, strain, first, out):
-    """Normal force and moment of a block, into those of all elements."""
-    part = out[:, :, first:first + strain.shape[2]]
-    for c in range(2):
-        x = stiffness[c]
-        for p in lanes(strain.shape[1]):
-            for e in lanes(strain.shape[2]):
-                part[c, p, e] = x * strain[c, p, e]
-
-
-@source
-def cable_loop(pack, u, f, tangent, carried, use_carried, stresses, flat, ld, start):
-    """Force into f, and if asked for tangent into the band and stresses (2, points, elements)."""
-    most, elements, n = block(pack.pairs.pairs.shape[1]), pack.start.size, pack.weights.shape[0]
-    work = cable_work(pack, min(most, elements), u)
-    for first in range(0, elements, most):
-        size = min(most, elements - first)
-        if size < work.U.shape[2]:
-            work = cable_work(pack, size, u)
-        cable_strain(pack, first, u, work)
-        add_cable_force(pack, first, work, f)
-        if tangent:
-            cable_resultants(pack.stiffness, work.strain, first, stresses)
-            used = carried if use_carried else stresses
+def cable_evaluate(pack, what, u, v, f, given, use_given, out, flat, ld, start):
+    """As :func:`~skfem_ancf.kernels.section.section_evaluate`; v is u at the end for the mean."""
+    pairs, n, nr, nb = pack.pairs, len(pack.weights), pack.table.shape[1], pack.table.shape[2]
+    most, states = block(pairs.pairs.shape[1]), 2 if what == MEAN else 1
+    for first in range(0, pack.start.size, most):
+        size = min(most, pack.start.size - first)
+        U, d, T = (np.empty((2, nb, 2, size), u.dtype), np.empty((2, nr, 2, size), u.dtype),
+                   np.empty((nr, 2, size), u.dtype))
+        r, square = np.empty((states, nr, 2, size), u.dtype), np.empty((states, n, size), u.dtype)
+        kappa, strain = square.copy(), np.empty((states, 2, n, size), u.dtype)
+        weights, S = np.empty((n, size)), np.empty((2, n, size), u.dtype)
+        for k in range(2 if what == MEAN or what == CARRY else 1):
+            load(pack.start, pack.span, first, v if k else u, U[k])
+            product(pack.table, first, U[k], d[k])
+            if k < states:
+                cable_strain(pack, first, d[k], r[k], weights, square[k], kappa[k], strain[k])
+        if use_given:
+            copy_stress(given[:, :, first:first + size], S)
+        if what == CARRY:
+            cable_changes(pack.stiffness, r[0], d[1], square[0], kappa[0], S, S)
+            copy_stress(S, out[:, :, first:first + size])
+        elif what == TANGENT or what == STRESS:
+            resultants = out[:, :, first:first + size]
+            for c in range(2):
+                for p in lanes(n):
+                    for e in lanes(size):
+                        resultants[c, p, e] = pack.stiffness[c] * strain[0, c, p, e]
+                        if not use_given:
+                            S[c, p, e] = pack.stiffness[c] * strain[0, c, p, e]
+        if what == STRESS or what == CARRY:
+            continue
+        if what == MEAN:
+            for k in lanes(nb):
+                for i in lanes(2):
+                    for e in lanes(size):
+                        U[0, k, i, e] = 0.5 * (U[0, k, i, e] + U[1, k, i, e])
+        cable_rows(pack.stiffness, weights, r, square, kappa, strain, T)
+        add_force(pack.table, pack.transposed, pack.constant, pack.start, pack.span, first, T, U[0],
+                  f)
+        if what == TANGENT:
             M, skew = np.empty((3 * n, 3, size)), np.zeros((n + 1, 1, size))
-            cable_factors(pack, work, used[:, :, first:first + size], M, skew)
-            add_tangent(pack.table, pack.pairs, pack.start, first, M, skew, flat, ld, start)
+            cable_factors(pack.stiffness, weights, r[0], square[0], kappa[0], S, M, skew)
+            add_tangent(pack.table, pairs, pack.start, first, M, skew, flat, ld, start)
 
 
 @source
 def cable_force(pack, u, f):
     """Add the internal force of the displacement u (N,) to f."""
-    none = np.empty((1, 1, 1))
-    cable_loop(pack, u, f, False, none, False, none, none[0, 0], 1, 0)
+    none, zero = np.empty((1, 1, 1)), np.int64(0)
+    cable_evaluate(pack, np.int64(FORCE), u, u, f, none, zero, none, none[0, 0], zero, zero)
 
 
 @source
@@ -194,102 +210,38 @@ def cable_tangent(pack, u, f, carried, use_carried, stresses, flat, ld, start):
 
     The stresses are normal force and moment, shape (2, points, elements).
     """
-    cable_loop(pack, u, f, True, carried, use_carried, stresses, flat, ld, start)
+    cable_evaluate(pack, np.int64(TANGENT), u, u, f, carried, np.int64(use_carried), stresses, flat,
+                   ld, start)
 
 
 @source
 def cable_carry(pack, u, du, before, out):
     """The resultants, linearised, at u + du, from those ``before``: out (2, points, elements)."""
-    most, elements, n = block(pack.pairs.pairs.shape[1]), pack.start.size, pack.weights.shape[0]
-    work = cable_work(pack, min(most, elements), u)
-    for first in range(0, elements, most):
-        size = min(most, elements - first)
-        if size < work.U.shape[2]:
-            work = cable_work(pack, size, u)
-        cable_strain(pack, first, u, work)
-        load(pack.start, pack.span, first, du, work.U)
-        product(pack.table, first, work.U, work.d)
-        x, y = before[:, :, first:first + size], out[:, :, first:first + size]
-        r, b, d, db = work.r, work.r[n:], work.d, work.d[n:]
-        for p in lanes(n):
-            for e in lanes(size):
-                a0, a1, s = r[p, 0, e], r[p, 1, e], work.square[p, e]
-                along = a0 * d[p, 0, e] + a1 * d[p, 1, e]
-                change = (d[p, 0, e] * b[p, 1, e] - d[p, 1, e] * b[p, 0, e] + a0 * db[p, 1, e]
-                          - a1 * db[p, 0, e] - 2.0 * work.kappa[p, e] * along)
-                y[0, p, e] = x[0, p, e] + pack.stiffness[0] * along / np.sqrt(s)
-                y[1, p, e] = x[1, p, e] + pack.stiffness[1] * change / s
+    none, zero = np.empty((1, 1, 1)), np.int64(0)
+    cable_evaluate(pack, np.int64(CARRY), u, du, u, before, np.int64(1), out, none[0, 0], zero, zero)
 
 
 @source
 def cable_stress(pack, u, out):
     """Normal force and moment at u, (2, points, elements)."""
-    most, elements = block(pack.pairs.pairs.shape[1]), pack.start.size
-    work = cable_work(pack, min(most, elements), u)
-    for first in range(0, elements, most):
-        if elements - first < work.U.shape[2]:
-            work = cable_work(pack, elements - first, u)
-        cable_strain(pack, first, u, work)
-        cable_resultants(pack.stiffness, work.strain, first, out)
+    none, zero = np.empty((1, 1, 1)), np.int64(0)
+    cable_evaluate(pack, np.int64(STRESS), u, u, u, none, zero, out, none[0, 0], zero, zero)
 
 
 @source
 def cable_mean(pack, u0, u1, f):
-    """Add a force whose work from u0 to u1 is the change of the energy.
-
-    eps and kappa are not quadratic in the coordinates; their changes are still linear in the
-    step: ``d eps = (a0 + a1) . da / (|a0| + |a1|)`` and, from ``s kappa = a x b``,
-    ``mean(s) d kappa = d(a x b) - mean(kappa) ds``.
-    """
-    most, elements, n = block(pack.pairs.pairs.shape[1]), pack.start.size, pack.weights.shape[0]
-    work = cable_work(pack, min(most, elements), u0)
-    old = cable_work(pack, min(most, elements), u0)
-    EA, EI = pack.stiffness[0], pack.stiffness[1]
-    for first in range(0, elements, most):
-        size = min(most, elements - first)
-        if size < work.U.shape[2]:
-            work, old = cable_work(pack, size, u0), cable_work(pack, size, u0)
-        cable_strain(pack, first, u0, old)
-        cable_strain(pack, first, u1, work)
-        for k in lanes(work.U.shape[0]):
-            for i in lanes(2):
-                for e in lanes(size):
-                    work.U[k, i, e] = 0.5 * (old.U[k, i, e] + work.U[k, i, e])
-        for g in lanes(work.r.shape[0]):
-            for i in lanes(2):
-                for e in lanes(size):
-                    work.r[g, i, e] = 0.5 * (old.r[g, i, e] + work.r[g, i, e])
-        T, a, b, Tb = work.T, work.r, work.r[n:], work.T[n:]
-        for p in lanes(n):
-            for e in lanes(size):
-                s0, s1, w = old.square[p, e], work.square[p, e], work.weights[p, e]
-                mean = 0.5 * (s0 + s1)
-                M = 0.5 * w * EI * (old.strain[1, p, e] + work.strain[1, p, e]) / mean
-                N = (w * EA * (old.strain[0, p, e] + work.strain[0, p, e])
-                     / (np.sqrt(s0) + np.sqrt(s1)) - (old.kappa[p, e] + work.kappa[p, e]) * M)
-                T[p, 0, e] = N * a[p, 0, e] + M * b[p, 1, e]
-                T[p, 1, e] = N * a[p, 1, e] - M * b[p, 0, e]
-                Tb[p, 0, e], Tb[p, 1, e] = -M * a[p, 1, e], M * a[p, 0, e]
-        add_force(pack.table, pack.transposed, pack.constant, pack.start, pack.span, first, T,
-                  work.U, f)
+    """Add a force whose work from u0 to u1 is the change of the energy."""
+    none, zero = np.empty((1, 1, 1)), np.int64(0)
+    cable_evaluate(pack, np.int64(MEAN), u0, u1, f, none, zero, none, none[0, 0], zero, zero)
 
 
-@source
 def cable_energy(pack, u, out):
     """Add the strain energy of each element to out, (elements,)."""
-    most, elements = block(pack.pairs.pairs.shape[1]), pack.start.size
-    work = cable_work(pack, min(most, elements), u)
-    for first in range(0, elements, most):
-        if elements - first < work.U.shape[2]:
-            work = cable_work(pack, elements - first, u)
-        cable_strain(pack, first, u, work)
-        total, strain = out[first:first + work.U.shape[2]], work.strain
-        for p in range(strain.shape[1]):
-            for e in lanes(total.size):
-                total[e] += 0.5 * work.weights[p, e] * (
-                    pack.stiffness[0] * strain[0, p, e] * strain[0, p, e]
-                    + pack.stiffness[1] * strain[1, p, e] * strain[1, p, e])
-        add_held_energy(pack.constant, first, work.U, total)
+    strain = np.empty((2, len(pack.weights), out.size), u.dtype)
+    cable_stress(pack._replace(stiffness=np.ones(2)), u, strain)
+    out += 0.5 * np.einsum("c,pe,cpe,cpe->e", pack.stiffness,
+                           np.broadcast_to(pack.weights, strain.shape[1:]), strain, strain)
+    add_held_energy(pack, u, out)
 
 
 def cross(a, b):
@@ -336,23 +288,24 @@ class CableKernel(Chain):
         xi, w = gauss(n)
         L = mesh.lengths[:1] if self.shared else mesh.lengths
         scale = L ** np.tile(np.arange(element.nodal_dofs), 2)[:, None]
-        table = np.concatenate([element.axis(xi, d).T[:, :, None] * scale / L**d for d in (1, 2)])
+        table = np.concatenate([element.axis(xi, d).T[:, :, None] * scale / L**d for d in (1, 2)]
+                               ).transpose(2, 0, 1)
         frame = self._stress_free(mesh, element, xi, table)
         a, b = frame[:n], frame[n:]
         square = np.sum(a * a, axis=1)
         none = np.zeros((0, 2 * self.nd, 2 * self.nd))
-        constant = (none if self.constant is None else self.constant).transpose(1, 2, 0)
+        constant = none if self.constant is None else self.constant
         p = np.arange(n)
         pairs = np.array([np.concatenate([p, p, n + p]), np.concatenate([p, n + p, n + p])])
         return CablePack(
-            packed(table), packed(table.transpose(1, 0, 2)[:, :, :int(self.shared)]),
+            packed(table), packed(table.transpose(0, 2, 1)[:int(self.shared)]),
             packed(frame), packed(np.sqrt(square)),
             packed((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / square), packed(w[:, None] * L),
             packed(np.arange(ne) * (len(L) > 1), np.int64),
             packed(np.arange(ne) * (frame.shape[2] > 1), np.int64),
             np.array([E * area, E * area * mesh.height**2 / 12.0]), packed(constant),
             packed(mesh.t[0] * self.nd, np.int64), packed(np.arange(2 * self.nd), np.int64),
-            pair_tables(table, pairs, constant))
+            pair_tables(table, pairs, constant, ne))
 
     def _stress_free(self, mesh, element, xi, table):
         """a and b in the stress-free state, (rows, 2, 1 or elements)."""
@@ -363,7 +316,7 @@ class CableKernel(Chain):
         q0 = element.rigid(mesh)
         q0[0] = mesh.p - mesh.p.mean(axis=1, keepdims=True)
         q_e = self.gather(np.ascontiguousarray(q0.transpose(2, 0, 1)).ravel())
-        return np.einsum("gke,eki->gie", np.broadcast_to(table, table.shape[:2] + (len(q_e),)), q_e)
+        return (table @ q_e).transpose(1, 2, 0)
 
     def strain(self, u_e, elements=slice(None)):
         """Extension and change of curvature at the integration points, shape (2, points, ne)."""
@@ -383,8 +336,8 @@ class CableKernel(Chain):
 
     def without_material(self, pack):
         """The pack of a cable without stiffness, for given normal forces and moments."""
-        return pack._replace(stiffness=np.zeros(2), pairs=pack.pairs._replace(
-            held=pack.pairs.held[:, :, :0], held_skew=pack.pairs.held_skew[:, :, :0]))
+        return pack._replace(stiffness=np.zeros(2),
+                             pairs=pack.pairs._replace(held=pack.pairs.held[:, :0]))
 
     # fields
 

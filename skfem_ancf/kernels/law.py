@@ -8,8 +8,7 @@ import numpy as np
 
 from ..materials import LinearLaw, NeoHookean
 from ..materials.base import ShearCorrected
-from ..materials.neo_hookean import (neo_hookean_constants, neo_hookean_energy,
-                                     neo_hookean_moduli, neo_hookean_stress)
+from ..materials.neo_hookean import neo_hookean, neo_hookean_constants
 from ..source import F1, F2, lanes, primitive, source
 from .base import packed
 
@@ -43,98 +42,65 @@ class LawTables(NamedTuple):
 
 
 @primitive("primitives")
-def own_stress(handle, strain, S):
-    """S (3, n, elements) of a law in Python."""
-    S[...] = _LAWS[handle].stress(strain)
-
-
-@primitive("primitives")
-def own_moduli(handle, strain, D):
-    """Moduli (3, 3, n, elements) of a law in Python."""
-    D[...] = _LAWS[handle].moduli(strain)
-
-
-@primitive("primitives")
-def own_energy(handle, strain, W):
-    """Energies (n, elements) of a law in Python."""
-    W[...] = _LAWS[handle].energy(strain)
+def own_evaluate(handle, strain, out):
+    """Stress (3, n, elements), moduli (9, ...) or energy (1, ...) of a law in Python."""
+    law = _LAWS[handle]
+    found = {1: law.energy, 3: law.stress, 9: law.moduli}[len(out)](strain)
+    out[...] = np.reshape(found, out.shape)
 
 
 @source
-def scaled(scale, strain, out):
-    """The strain of the law: with its shear corrected."""
-    for c in range(3):
-        x = scale[c]
-        for p in lanes(strain.shape[1]):
-            for e in lanes(strain.shape[2]):
-                out[c, p, e] = x * strain[c, p, e]
+def law_evaluate(law, strain, out):
+    """Second Piola-Kirchhoff stress, moduli or energy per volume.
 
-
-@source
-def linear_stress(D, strain, S):
-    """S = D eps, shape (3, n, elements)."""
-    for c in range(3):
-        x, y, z = D[c, 0], D[c, 1], D[c, 2]
-        for p in lanes(S.shape[1]):
-            for e in lanes(S.shape[2]):
-                S[c, p, e] = x * strain[0, p, e] + y * strain[1, p, e] + z * strain[2, p, e]
-
-
-@source
-def law_stress(law, strain, S):
-    """Second Piola-Kirchhoff stress (3, n, elements)."""
+    Parameters
+    ----------
+    law
+        LawTables.
+    strain
+        (eps_xx, eps_yy, 2 eps_xy), shape (3, n, elements).
+    out
+        The stress, if of shape (3, n, elements), the moduli (9, ...), (c, d) at 3 c + d, or the
+        energy (1, ...).
+    """
+    n, size = strain.shape[1], strain.shape[2]
     if law.kind == LINEAR:
-        linear_stress(law.D, strain, S)
+        for c in range(3):
+            x, y, z = law.D[c, 0], law.D[c, 1], law.D[c, 2]
+            for p in lanes(n):
+                for e in lanes(size):
+                    S = x * strain[0, p, e] + y * strain[1, p, e] + z * strain[2, p, e]
+                    if len(out) == 3:
+                        out[c, p, e] = S
+                    elif len(out) == 9:
+                        out[3 * c, p, e], out[3 * c + 1, p, e], out[3 * c + 2, p, e] = x, y, z
+                    else:
+                        W = 0.5 * strain[c, p, e] * S
+                        out[0, p, e] = W + (out[0, p, e] if c else 0.0)
         return
     x = np.empty(strain.shape, strain.dtype)
-    scaled(law.scale, strain, x)
+    for c in range(3):  # the strain of the law: with its shear corrected
+        y = law.scale[c]
+        for p in lanes(n):
+            for e in lanes(size):
+                x[c, p, e] = y * strain[c, p, e]
     if law.kind == NEO_HOOKEAN:
-        neo_hookean_stress(law.constants, x, S)
+        neo_hookean(law.constants, x, out)
     else:
-        own_stress(law.handle, x, S)
-    scaled(law.scale, S, S)
+        own_evaluate(law.handle, x, out)
+    for k in range(len(out)):
+        y = 1.0 if len(out) == 1 else law.scale[k // (len(out) // 3)]
+        y *= law.scale[k % 3] if len(out) == 9 else 1.0
+        for p in lanes(n):
+            for e in lanes(size):
+                out[k, p, e] *= y
 
 
 @source
-def law_moduli(law, strain, D):
-    """The stress's derivative by the strain, (3, 3, n, elements), of a law that is not linear."""
-    x = np.empty(strain.shape, strain.dtype)
-    scaled(law.scale, strain, x)
-    if law.kind == NEO_HOOKEAN:
-        neo_hookean_moduli(law.constants, x, D)
-    else:
-        own_moduli(law.handle, x, D)
-    for c in range(3):
-        for d in range(3):
-            y = law.scale[c] * law.scale[d]
-            for p in lanes(D.shape[2]):
-                for e in lanes(D.shape[3]):
-                    D[c, d, p, e] *= y
+def conserve(law, middle, change, S):
+    """Make the stress's product with the change of the strain that of the law's energy.
 
-
-@source
-def law_energy(law, strain, W):
-    """Energy per volume (n, elements)."""
-    x = np.empty(strain.shape, strain.dtype)
-    if law.kind == LINEAR:
-        linear_stress(law.D, strain, x)
-        for p in lanes(W.shape[0]):
-            for e in lanes(W.shape[1]):
-                W[p, e] = 0.5 * (strain[0, p, e] * x[0, p, e] + strain[1, p, e] * x[1, p, e]
-                                 + strain[2, p, e] * x[2, p, e])
-        return
-    scaled(law.scale, strain, x)
-    if law.kind == NEO_HOOKEAN:
-        neo_hookean_energy(law.constants, x, W)
-    else:
-        own_energy(law.handle, x, W)
-
-
-@source
-def mean_stress(law, middle, change, S):
-    """A stress whose product with the change of the strain is that of the law's energy.
-
-    The stress of the middle for a linear law, else the discrete gradient of Gonzalez (2000).
+    The discrete gradient of Gonzalez (2000).
 
     Parameters
     ----------
@@ -143,24 +109,23 @@ def mean_stress(law, middle, change, S):
     middle, change
         Mean of both strains and their difference, shape (3, n, elements).
     S
-        The result.
+        The stress of the mean; changed.
     """
-    law_stress(law, middle, S)
-    if law.kind == LINEAR:
-        return
     n, size = S.shape[1], S.shape[2]
-    x, W = np.empty(S.shape), np.empty((2, n, size))
-    for k in range(2):
-        for c in range(3):
-            for p in lanes(n):
-                for e in lanes(size):
-                    x[c, p, e] = middle[c, p, e] + (k - 0.5) * change[c, p, e]
-        law_energy(law, x, W[k])
+    x, W = np.empty((3, 2 * n, size), S.dtype), np.empty((1, 2 * n, size), S.dtype)
+    before, after, old, new = x[:, :n], x[:, n:], W[0, :n], W[0, n:]
+    for c in range(3):
+        for p in lanes(n):
+            for e in lanes(size):
+                before[c, p, e] = middle[c, p, e] - 0.5 * change[c, p, e]
+                after[c, p, e] = middle[c, p, e] + 0.5 * change[c, p, e]
+    law_evaluate(law, x, W)
     for p in lanes(n):
         for e in lanes(size):
             a, b, c = change[0, p, e], change[1, p, e], change[2, p, e]
             square = a * a + b * b + c * c
-            missing = W[1, p, e] - W[0, p, e] - (S[0, p, e] * a + S[1, p, e] * b + S[2, p, e] * c)
+            missing = (new[p, e] - old[p, e]
+                       - (S[0, p, e] * a + S[1, p, e] * b + S[2, p, e] * c))
             share = missing * (square > 1e-24) / np.maximum(square, 1e-24)
             S[0, p, e] += share * a
             S[1, p, e] += share * b

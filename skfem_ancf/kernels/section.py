@@ -14,10 +14,10 @@ from scipy import sparse
 from ..materials import LinearLaw
 from ..quadrature import tensor
 from ..source import F1, F2, F3, I1, I2, column, lanes, source
-from .base import (Chain, PairTables, Texts, add_force, add_held_energy, add_tangent, apart, block,
-                   in_rounds, load, packed, pair_tables, product)
-from .law import (LINEAR, LawTables, law_energy, law_moduli, law_stress, law_tables, linear_stress,
-                  mean_stress)
+from .base import (CARRY, FORCE, MEAN, STRESS, TANGENT, Chain, PairTables, Texts, add_force,
+                   add_held_energy, add_tangent, apart, block, copy_stress, in_rounds, load, packed,
+                   pair_tables, product)
+from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
 
 
 class SectionPack(NamedTuple):
@@ -26,19 +26,20 @@ class SectionPack(NamedTuple):
     Attributes
     ----------
     table, transposed, frame
-        Derivatives of the local functions (rows, nb, 1 or elements), the same as (nb, rows, 1 or
-        0), and rows of the frame e_1, e_2, (rows, 2, 1 or elements).
+        Derivatives of the local functions (1 or elements, rows, nb), those that elements share as
+        (1, nb, rows) too, else (0, ...), and rows of the frame e_1, e_2, (rows, 2, 1 or elements).
     weights, place
         Of the points of integration, (points, 1 or elements), and which are an element's.
     rows, factors, normal
         g, h and the number of their pair for each sample, (3, samples), c, and the number of
         samples of normal strains, which come first.
-    along_xx, along_yy, along_xy
-        Interpolation along the axis.
+    along, ends
+        Interpolation along the axis of xx, yy and xy, (3, points, samples), the shorter with
+        zeros; and their first samples, the last one behind them, (4,).
     law
         :class:`~skfem_ancf.kernels.law.LawTables`.
     constant
-        Stabilisation (2 nb, 2 nb, 0, 1 or elements).
+        Stabilisation (0, 1 or elements, 2 nb, 2 nb).
     start, span
         First coordinate of each element, and 0 to 2 nb - 1.
     pairs
@@ -61,9 +62,8 @@ class SectionPack(NamedTuple):
     rows: I2
     factors: F1
     normal: int
-    along_xx: F2
-    along_yy: F2
-    along_xy: F2
+    along: F3
+    ends: I1
     law: LawTables
     constant: F3
     start: I1
@@ -77,56 +77,26 @@ class SectionPack(NamedTuple):
     mixing_rounds: I1
 
 
-class SectionWork(NamedTuple):
-    """Work arrays of a block of elements, of which frame and weights are the elements' own."""
-
-    U: np.ndarray
-    d: np.ndarray
-    r: np.ndarray
-    T: np.ndarray
-    samples: np.ndarray
-    strain: np.ndarray
-    stress: np.ndarray
-    frame: np.ndarray
-    weights: np.ndarray
-
-
 @source
-def section_work(pack, first, size, u):
-    """Work arrays for the elements from ``first`` on."""
-    rows, n, nb = pack.table.shape[0], pack.weights.shape[0], pack.table.shape[1]
-    frame, weights = np.empty((rows, 2, size)), np.empty((n, size))
-    work = SectionWork(np.empty((nb, 2, size), u.dtype), np.empty((rows, 2, size), u.dtype),
-                       np.empty((rows, 2, size), u.dtype), np.empty((rows, 2, size), u.dtype),
-                       np.empty((pack.factors.size, size), u.dtype),
-                       np.empty((3, n, size), u.dtype), np.empty((3, n, size), u.dtype),
-                       frame, weights)
-    section_place(pack, first, work)
-    return work
-
-
-@source
-def section_place(pack, first, work):
-    """Frame and weights of the elements from ``first`` on."""
-    at = pack.place[first:first + work.U.shape[2]]
-    for g in lanes(work.frame.shape[0]):
+def set_tables(frame, weights, at, x, r, w):
+    """Frame, the same as the first gradients, and weights of the elements of a block."""
+    for g in lanes(x.shape[0]):
         for i in lanes(2):
             for e in lanes(at.size):
-                work.frame[g, i, e] = pack.frame[g, i, at[e]]
-    for p in lanes(work.weights.shape[0]):
+                x[g, i, e] = frame[g, i, at[e]]
+                r[g, i, e] = frame[g, i, at[e]]
+    for p in lanes(w.shape[0]):
         for e in lanes(at.size):
-            work.weights[p, e] = pack.weights[p, at[e]]
+            w[p, e] = weights[p, at[e]]
 
 
 @source
-def section_open(pack, first, size, u, work):
-    """Work arrays and coordinates of the next block of elements."""
-    if size < work.U.shape[2]:
-        work = section_work(pack, first, size, u)
-    elif first > 0 and pack.frame.shape[2] > 1:
-        section_place(pack, first, work)
-    load(pack.start, pack.span, first, u, work.U)
-    return work
+def add_scaled(c, x, y):
+    """y += c x."""
+    for i in lanes(x.shape[0]):
+        for j in lanes(x.shape[1]):
+            for e in lanes(x.shape[2]):
+                y[i, j, e] += c * x[i, j, e]
 
 
 @source
@@ -140,119 +110,95 @@ def pair_strains(rows, factors, r, d, x, samples):
 
 
 @source
-def section_strain(pack, first, work):
-    """Displacement gradients d, position gradients r, and the strain samples."""
-    d, r = work.d, work.r
-    product(pack.table, first, work.U, d)
-    for g in lanes(d.shape[0]):
-        for i in lanes(2):
-            for e in lanes(d.shape[2]):
-                r[g, i, e] = work.frame[g, i, e] + d[g, i, e]
-    pair_strains(pack.rows, pack.factors, r, d, work.frame, work.samples)
-
-
-@source
-def to_points(L, first, samples, points):
-    """points = L samples, from the sample ``first``; returns the sample after."""
-    n = points.size // L.shape[0]
-    after = first + L.shape[1] * (points.shape[0] // L.shape[0])
-    x, y = points.reshape(L.shape[0], n), samples[first:after].reshape(L.shape[1], n)
-    for i in range(L.shape[0]):
-        for e in lanes(n):
-            x[i, e] = 0.0
-        for k in range(L.shape[1]):
-            c = L[i, k]
-            if c != 0.0:
-                for e in lanes(n):
-                    x[i, e] += c * y[k, e]
-    return after
-
-
-@source
-def to_samples(L, first, w, points, samples):
-    """samples = L^T w points, from the sample ``first``; returns the sample after."""
-    n = points.size // L.shape[0]
-    after = first + L.shape[1] * (points.shape[0] // L.shape[0])
-    x, y = points.reshape(L.shape[0], n), samples[first:after].reshape(L.shape[1], n)
-    weights = w.reshape(L.shape[0], n)
-    for k in range(L.shape[1]):
-        for e in lanes(n):
-            y[k, e] = 0.0
-        for i in range(L.shape[0]):
-            c = L[i, k]
-            if c != 0.0:
-                for e in lanes(n):
-                    y[k, e] += c * weights[i, e] * x[i, e]
-    return after
-
-
-@source
-def strain_points(pack, work):
+def to_points(along, ends, samples, points):
     """Samples of the strain, interpolated to the points of integration."""
-    first = to_points(pack.along_xx, 0, work.samples, work.strain[0])
-    first = to_points(pack.along_yy, first, work.samples, work.strain[1])
-    to_points(pack.along_xy, first, work.samples, work.strain[2])
+    n = points[0].size // along.shape[1]
+    for c in range(3):
+        y = samples[ends[c]:ends[c + 1]].reshape(samples[ends[c]:ends[c + 1]].size // n, n)
+        x = points[c].reshape(along.shape[1], n)
+        for i in range(len(x)):
+            for e in lanes(n):
+                x[i, e] = 0.0
+            for k in range(len(y)):
+                if along[c, i, k] != 0.0:
+                    for e in lanes(n):
+                        x[i, e] += along[c, i, k] * y[k, e]
 
 
 @source
-def stress_samples(pack, work):
-    """The transpose of strain_points, with the weights of the points."""
-    first = to_samples(pack.along_xx, 0, work.weights, work.stress[0], work.samples)
-    first = to_samples(pack.along_yy, first, work.weights, work.stress[1], work.samples)
-    to_samples(pack.along_xy, first, work.weights, work.stress[2], work.samples)
+def to_samples(along, ends, w, points, samples):
+    """The transpose of to_points, with the weights of the points."""
+    n = w.size // along.shape[1]
+    weights = w.reshape(along.shape[1], n)
+    for c in range(3):
+        y = samples[ends[c]:ends[c + 1]].reshape(samples[ends[c]:ends[c + 1]].size // n, n)
+        x = points[c].reshape(along.shape[1], n)
+        for k in range(len(y)):
+            for e in lanes(n):
+                y[k, e] = 0.0
+            for i in range(len(x)):
+                if along[c, i, k] != 0.0:
+                    for e in lanes(n):
+                        y[k, e] += along[c, i, k] * weights[i, e] * x[i, e]
 
 
 @source
-def add_section_force(pack, first, work, f):
-    """Add what the stress samples do on the gradients."""
-    r, T, samples = work.r, work.T, work.samples
+def row_forces(rows, normal, r, samples, T):
+    """What the stress samples do on the gradients."""
     T[:] = 0.0
-    for s in lanes(pack.normal):
-        g = pack.rows[0, s]
+    for s in lanes(normal):
+        g = rows[0, s]
         for i in range(2):
             for e in lanes(r.shape[2]):
                 T[g, i, e] += samples[s, e] * r[g, i, e]
-    for s in lanes(pack.normal, pack.factors.size):
-        g, h = pack.rows[0, s], pack.rows[1, s]
+    for s in lanes(normal, rows.shape[1]):
+        g, h = rows[0, s], rows[1, s]
         for i in range(2):
             for e in lanes(r.shape[2]):
                 T[g, i, e] += samples[s, e] * r[h, i, e]
             for e in lanes(r.shape[2]):
                 T[h, i, e] += samples[s, e] * r[g, i, e]
-    add_force(pack.table, pack.transposed, pack.constant, pack.start, pack.span, first, T, work.U,
-              f)
 
 
 @source
-def section_moduli(pack, first, work, moduli):
-    """The modulus of each term, shape (terms, elements)."""
-    size = moduli.shape[1]
+def tangent_stress(D, strain, S):
+    """S = D eps with the moduli of each point."""
+    for c in range(3):
+        for p in lanes(S.shape[1]):
+            for e in lanes(S.shape[2]):
+                S[c, p, e] = (D[3 * c, p, e] * strain[0, p, e] + D[3 * c + 1, p, e] * strain[1, p, e]
+                              + D[3 * c + 2, p, e] * strain[2, p, e])
+
+
+@source
+def term_moduli(pack, at, D, w, moduli):
+    """The modulus of each term, (terms, elements), of other than linear laws from D at points."""
     if pack.law.kind == LINEAR:
-        at = pack.place[first:first + size]
         for t in lanes(moduli.shape[0]):
-            for e in lanes(size):
+            for e in lanes(at.size):
                 moduli[t, e] = pack.moduli[t, at[e]]
         return
-    n = work.strain.shape[1]
-    D = np.empty((3, 3, n, size))
-    law_moduli(pack.law, work.strain, D)
-    flat, w = D.reshape(9, n, size), work.weights
     for c in lanes(9):
-        for p in lanes(n):
-            for e in lanes(size):
-                flat[c, p, e] *= w[p, e]
+        for p in lanes(len(w)):
+            for e in lanes(w.shape[1]):
+                D[c, p, e] *= w[p, e]
     moduli[:] = 0.0
     for k in range(pack.mixing_rounds.size - 1):
         for m in lanes(pack.mixing_rounds[k], pack.mixing_rounds[k + 1]):
             t, c, p = pack.mixing[0, m], pack.mixing[1, m], pack.mixing[2, m]
             x = pack.parts[m]
-            for e in lanes(size):
-                moduli[t, e] += column(x) * flat[c, p, e]
+            for e in lanes(w.shape[1]):
+                moduli[t, e] += column(x) * D[c, p, e]
 
 
 @source
-def add_material(terms, rounds, moduli, r, M, M_skew):
-    """Add the material part to the factors of the pairs: xx, yy, xy symmetric, and xy skew."""
+def pair_factors(rows, samples, terms, rounds, moduli, r, M, M_skew):
+    """Factors of the pairs: xx, yy, xy symmetric, and xy skew, of the stress and the moduli."""
+    for s in lanes(samples.shape[0]):
+        p = rows[2, s]
+        for e in lanes(samples.shape[1]):
+            M[p, 0, e] += samples[s, e]
+            M[p, 1, e] += samples[s, e]
     for k in range(rounds.size - 1):
         for t in lanes(rounds[k], rounds[k + 1]):
             p, q, g, h = terms[0, t], terms[1, t], terms[2, t], terms[3, t]
@@ -266,67 +212,81 @@ def add_material(terms, rounds, moduli, r, M, M_skew):
 
 
 @source
-def add_geometric(rows, samples, M):
-    """Add the stress to the factors of the pairs, the same for both components."""
-    for s in lanes(samples.shape[0]):
-        p = rows[2, s]
-        for e in lanes(samples.shape[1]):
-            M[p, 0, e] += samples[s, e]
-            M[p, 1, e] += samples[s, e]
+def section_evaluate(pack, what, u, v, f, given, use_given, out, flat, ld, start):
+    """Everything that depends on the strains, block by block.
 
-
-@source
-def add_section_tangent(pack, first, work, carried, use_carried, flat, ld, start):
-    """Add the tangents of a block of elements."""
-    S, size = work.stress, work.U.shape[2]
-    if use_carried:
-        block_of = carried[:, :, first:first + size]
-        for c in lanes(3):
-            for p in lanes(S.shape[1]):
-                for e in lanes(size):
-                    S[c, p, e] = block_of[c, p, e]
-        stress_samples(pack, work)
-    M = np.zeros((pack.pairs.pairs.shape[1], 3, size))
-    M_skew = np.zeros((pack.pairs.skew.shape[1], 1, size))
-    add_geometric(pack.rows, work.samples, M)
-    moduli = np.empty((pack.terms.shape[1], size))
-    section_moduli(pack, first, work, moduli)
-    add_material(pack.terms, pack.rounds, moduli, work.r, M, M_skew)
-    add_tangent(pack.table, pack.pairs, pack.start, first, M, M_skew, flat, ld, start)
-
-
-@source
-def section_store(S, first, out):
-    """Stresses of a block into those of all elements."""
-    block_of = out[:, :, first:first + S.shape[2]]
-    for c in lanes(3):
-        for p in lanes(S.shape[1]):
-            for e in lanes(S.shape[2]):
-                block_of[c, p, e] = S[c, p, e]
-
-
-@source
-def section_loop(pack, u, f, tangent, carried, use_carried, stresses, flat, ld, start):
-    """Force into f, and if asked for tangent into the band and stresses (3, points, elements)."""
-    most, elements = block(pack.pairs.pairs.shape[1]), pack.start.size
-    work = section_work(pack, 0, min(most, elements), u)
-    for first in range(0, elements, most):
-        work = section_open(pack, first, min(most, elements - first), u, work)
-        section_strain(pack, first, work)
-        strain_points(pack, work)
-        law_stress(pack.law, work.strain, work.stress)
-        stress_samples(pack, work)
-        add_section_force(pack, first, work, f)
-        if tangent:
-            section_store(work.stress, first, stresses)
-            add_section_tangent(pack, first, work, carried, use_carried, flat, ld, start)
+    Parameters
+    ----------
+    pack
+        SectionPack.
+    what
+        ``FORCE``, ``TANGENT``, ``MEAN``, ``STRESS`` or ``CARRY``.
+    u, v
+        Displacement, and for the mean and for carried stresses its change, shape (N,).
+    f
+        Force, added to.
+    given, use_given
+        Stresses (3, points, elements): those before, or carried ones for the tangent.
+    out
+        Stresses, written.
+    flat, ld, start
+        Entry (i, j), i >= j, of the tangent is added at ``flat[(start + j) * ld + i - j]``.
+    """
+    table, rows, law, pairs = pack.table, pack.rows, pack.law, pack.pairs
+    n, nr, nb, most = (len(pack.weights), table.shape[1], table.shape[2],
+                       block(pairs.pairs.shape[1]))
+    changes = what == MEAN or what == CARRY
+    shift = 0.5 if what == MEAN else 0.0
+    for first in range(0, pack.start.size, most):
+        size = min(most, pack.start.size - first)
+        at, last = pack.place[first:first + size], first + size
+        U, vectors = np.empty((2, nb, 2, size), u.dtype), np.empty((4, nr, 2, size), u.dtype)
+        x, r, d, T = vectors[0], vectors[1], vectors[2], vectors[3]
+        strains, w = np.empty((3, 3, n, size), u.dtype), np.empty((n, size))
+        strain, change, S = strains[0], strains[1], strains[2]
+        samples = np.empty((rows.shape[1], size), u.dtype)
+        set_tables(pack.frame, pack.weights, at, x, r, w)
+        for part in range(1 + changes):  # the strain is quadratic: its change is a derivative
+            load(pack.start, pack.span, first, v if part else u, U[part])
+            product(table, first, U[part], d)
+            add_scaled(shift if part else 1.0, d, r)
+            pair_strains(rows, pack.factors, r, d, r if part else x, samples)
+            to_points(pack.along, pack.ends, samples, strains[part])
+        if what == MEAN:
+            add_scaled(0.5, change, strain)
+            add_scaled(0.5, U[1], U[0])
+        D = np.empty((9, n, size if what == CARRY or what == TANGENT and law.kind else 0))
+        for k in range(1 if what == CARRY else 0, 2 if D.size > 0 else 1):
+            law_evaluate(law, strain, D if k else S)
+        if what == CARRY:
+            tangent_stress(D, change, S)
+            add_scaled(1.0, given[:, :, first:last], S)
+        elif what == MEAN and law.kind != LINEAR:
+            conserve(law, strain, change, S)
+        if what == TANGENT or what == STRESS or what == CARRY:
+            copy_stress(S, out[:, :, first:last])
+        if what == STRESS or what == CARRY:
+            continue
+        to_samples(pack.along, pack.ends, w, S, samples)
+        row_forces(rows, pack.normal, r, samples, T)
+        add_force(table, pack.transposed, pack.constant, pack.start, pack.span, first, T, U[0], f)
+        if what == TANGENT:
+            if use_given:
+                copy_stress(given[:, :, first:last], S)
+                to_samples(pack.along, pack.ends, w, S, samples)
+            M = np.zeros((pairs.pairs.shape[1], 3, size))
+            M_skew = np.zeros((pairs.skew.shape[2], 1, size))
+            moduli = np.empty((pack.terms.shape[1], size))
+            term_moduli(pack, at, D, w, moduli)
+            pair_factors(rows, samples, pack.terms, pack.rounds, moduli, r, M, M_skew)
+            add_tangent(table, pairs, pack.start, first, M, M_skew, flat, ld, start)
 
 
 @source
 def section_force(pack, u, f):
     """Add the internal force of the displacement u (N,) to f."""
-    none = np.empty((1, 1, 1))
-    section_loop(pack, u, f, False, none, False, none, none[0, 0], 1, 0)
+    none, zero = np.empty((1, 1, 1)), np.int64(0)
+    section_evaluate(pack, np.int64(FORCE), u, u, f, none, zero, none, none[0, 0], zero, zero)
 
 
 @source
@@ -346,123 +306,40 @@ def section_tangent(pack, u, f, carried, use_carried, stresses, flat, ld, start)
     flat, ld, start
         Entry (i, j), i >= j, is added at ``flat[(start + j) * ld + i - j]``.
     """
-    section_loop(pack, u, f, True, carried, use_carried, stresses, flat, ld, start)
+    section_evaluate(pack, np.int64(TANGENT), u, u, f, carried, np.int64(use_carried), stresses,
+                     flat, ld, start)
 
 
 @source
 def section_carry(pack, u, du, before, out):
     """The stresses, linearised, at u + du, from those ``before``: out (3, points, elements)."""
-    most, elements = block(pack.pairs.pairs.shape[1]), pack.start.size
-    work = section_work(pack, 0, min(most, elements), u)
-    for first in range(0, elements, most):
-        size = min(most, elements - first)
-        work = section_open(pack, first, size, u, work)
-        section_strain(pack, first, work)
-        moduli = np.empty((3, 3, 0, 0))
-        if pack.law.kind != LINEAR:
-            strain_points(pack, work)
-            moduli = np.empty((3, 3, work.strain.shape[1], size))
-            law_moduli(pack.law, work.strain, moduli)
-        load(pack.start, pack.span, first, du, work.U)
-        product(pack.table, first, work.U, work.d)
-        pair_strains(pack.rows, pack.factors, work.r, work.d, work.r, work.samples)
-        strain_points(pack, work)
-        if pack.law.kind == LINEAR:
-            linear_stress(pack.law.D, work.strain, work.stress)
-        else:
-            tangent_stress(moduli, work.strain, work.stress)
-        section_store(work.stress, first, out)
-        add_stored(before, first, out, size)
-
-
-@source
-def tangent_stress(moduli, strain, S):
-    """S = D eps with the moduli of each point."""
-    for c in range(3):
-        for p in lanes(S.shape[1]):
-            for e in lanes(S.shape[2]):
-                S[c, p, e] = (moduli[c, 0, p, e] * strain[0, p, e]
-                              + moduli[c, 1, p, e] * strain[1, p, e]
-                              + moduli[c, 2, p, e] * strain[2, p, e])
-
-
-@source
-def add_stored(before, first, out, size):
-    """Add the stresses of a block of elements."""
-    x, y = before[:, :, first:first + size], out[:, :, first:first + size]
-    for c in lanes(out.shape[0]):
-        for p in lanes(out.shape[1]):
-            for e in lanes(size):
-                y[c, p, e] += x[c, p, e]
+    none, zero = np.empty((1, 1, 1)), np.int64(0)
+    section_evaluate(pack, np.int64(CARRY), u, du, u, before, zero, out, none[0, 0], zero, zero)
 
 
 @source
 def section_stress(pack, u, out):
     """The stresses at u, (3, points, elements)."""
-    most, elements = block(pack.pairs.pairs.shape[1]), pack.start.size
-    work = section_work(pack, 0, min(most, elements), u)
-    for first in range(0, elements, most):
-        work = section_open(pack, first, min(most, elements - first), u, work)
-        section_strain(pack, first, work)
-        strain_points(pack, work)
-        law_stress(pack.law, work.strain, work.stress)
-        section_store(work.stress, first, out)
+    none, zero = np.empty((1, 1, 1)), np.int64(0)
+    section_evaluate(pack, np.int64(STRESS), u, u, u, none, zero, out, none[0, 0], zero, zero)
 
 
 @source
 def section_mean(pack, u0, u1, f):
     """Add the force B(middle)^T S whose work from u0 to u1 is the change of the energy."""
-    most, elements = block(pack.pairs.pairs.shape[1]), pack.start.size
-    work = section_work(pack, 0, min(most, elements), u0)
-    for first in range(0, elements, most):
-        work = section_open(pack, first, min(most, elements - first), u0, work)
-        U, d, samples = work.U, work.d, work.samples
-        nb, size = U.shape[0], U.shape[2]
-        half = np.empty((nb, 2, size))
-        load(pack.start, pack.span, first, u1, half)
-        for k in lanes(nb):
-            for i in lanes(2):
-                for e in lanes(size):
-                    half[k, i, e] = 0.5 * (half[k, i, e] - U[k, i, e])
-                    U[k, i, e] += half[k, i, e]
-        # the mean of both strains is the strain of the mean, and half the square of the rest
-        section_strain(pack, first, work)
-        product(pack.table, first, half, d)
-        for s in lanes(pack.factors.size):
-            g, h, c = pack.rows[0, s], pack.rows[1, s], pack.factors[s]
-            for e in lanes(size):
-                samples[s, e] += column(c) * (d[g, 0, e] * d[h, 0, e] + d[g, 1, e] * d[h, 1, e])
-        strain_points(pack, work)
-        if pack.law.kind == LINEAR:
-            linear_stress(pack.law.D, work.strain, work.stress)
-        else:
-            middle = work.strain.copy()
-            for g in lanes(d.shape[0]):
-                for i in lanes(2):
-                    for e in lanes(size):
-                        d[g, i, e] *= 2.0
-            pair_strains(pack.rows, pack.factors, work.r, d, work.r, samples)
-            strain_points(pack, work)
-            mean_stress(pack.law, middle, work.strain, work.stress)
-        stress_samples(pack, work)
-        add_section_force(pack, first, work, f)
+    none, zero = np.empty((1, 1, 1)), np.int64(0)
+    section_evaluate(pack, np.int64(MEAN), u0, u1 - u0, f, none, zero, none, none[0, 0], zero, zero)
 
 
-@source
 def section_energy(pack, u, out):
     """Add the strain energy of each element to out, (elements,)."""
-    most, elements = block(pack.pairs.pairs.shape[1]), pack.start.size
-    work = section_work(pack, 0, min(most, elements), u)
-    for first in range(0, elements, most):
-        work = section_open(pack, first, min(most, elements - first), u, work)
-        section_strain(pack, first, work)
-        strain_points(pack, work)
-        W, total = work.stress[0], out[first:first + work.U.shape[2]]
-        law_energy(pack.law, work.strain, W)
-        for p in range(W.shape[0]):
-            for e in lanes(total.size):
-                total[e] += work.weights[p, e] * W[p, e]
-        add_held_energy(pack.constant, first, work.U, total)
+    strain = np.empty((3, len(pack.weights), out.size), u.dtype)
+    W = np.empty((1,) + strain.shape[1:], u.dtype)
+    law = pack.law._replace(kind=LINEAR, D=np.eye(3))
+    section_stress(pack._replace(law=law), u, strain)
+    law_evaluate(pack.law, strain, W)
+    out += np.sum(pack.weights * W[0], axis=0)
+    add_held_energy(pack, u, out)
 
 
 def beam_gradients(mesh, element, X, tind=None):
@@ -517,10 +394,11 @@ class TermTables:
                                  law_tables(self.law, owner), constant, mesh.t[0])
 
     def _gradients(self, pack, u):
-        work = section_work(pack, 0, pack.start.size, u)
-        load(pack.start, pack.span, 0, u, work.U)
-        section_strain(pack, 0, work)
-        return work.r
+        U = np.empty((pack.table.shape[2], 2, pack.start.size))
+        r = np.empty((pack.table.shape[1],) + U.shape[1:])
+        load(pack.start, pack.span, 0, u, U)
+        product(pack.table, 0, U, r)
+        return pack.frame + r
 
     def inverted(self, pack, u):
         """True if the body is turned inside out at a sample: det F is not positive."""
@@ -543,14 +421,15 @@ def _rows(mesh, element, term, tind):
     for k, xi in enumerate((xi_x, xi_y)):
         X, _ = tensor((xi, np.ones(len(xi))), (eta, np.ones(len(eta))))
         G, frame = beam_gradients(mesh, element, X, tind)
-        tables.append((G[k].transpose(1, 2, 0), frame[k].transpose(1, 2, 0)))
-    G, frame = (np.concatenate(part) for part in zip(*tables))
+        tables.append((G[k], frame[k].transpose(1, 2, 0)))
+    G = np.concatenate([part for part, _ in tables], axis=1)
+    frame = np.concatenate([part for _, part in tables])
 
     def where(name, xi):
         return (np.searchsorted(xi, term.nodes(name))[:, None] * len(eta)
                 + np.arange(len(eta))).ravel()
 
-    n = len(tables[0][0])
+    n = tables[0][0].shape[1]
     xx, yy = where("xx", xi_x), n + where("yy", xi_y)
     xy = where("xy", xi_x), n + where("xy", xi_y)
     return G, frame, ((xx, xx), (yy, yy), xy), xy, xx
@@ -572,7 +451,7 @@ def section_pack(G, frame, weights, rows, along, law, constant, left):
     Parameters
     ----------
     G, frame, weights
-        Tables (rows, nb, 1 or elements), (rows, 2, ...) and (points, ...).
+        Tables (1 or elements, rows, nb), (rows, 2, 1 or elements) and (points, 1 or elements).
     rows
         g and h of the samples of each of xx, yy, xy.
     along
@@ -580,11 +459,11 @@ def section_pack(G, frame, weights, rows, along, law, constant, left):
     law
         LawTables.
     constant
-        Stabilisation (2 nb, 2 nb, 0, 1 or elements).
+        Stabilisation (0, 1 or elements, 2 nb, 2 nb).
     left
         The left node of each element.
     """
-    nb, ne = G.shape[1], len(left)
+    nb, ne, ns = G.shape[2], len(left), weights.shape[0] // len(along[0])
     (g, h), normal = (np.concatenate(part) for part in zip(*rows)), sum(len(x) for x, _ in rows[:2])
     rows = np.array([g, h])
     factors = np.where(g == h, 0.5, 1.0)
@@ -598,7 +477,7 @@ def section_pack(G, frame, weights, rows, along, law, constant, left):
         terms, moduli, mixing = terms[:, keep], moduli[keep], mixing[:0]
     pairs, of = np.unique(np.concatenate([terms[:2], rows], axis=1), axis=1, return_inverse=True)
     of = of.ravel()
-    tables = pair_tables(G, pairs, constant)
+    tables = pair_tables(G, pairs, constant, ne)
     own = of[:terms.shape[1]]
     order, rounds = in_rounds(own)
     terms = np.stack([own, tables.pairs[2, own], terms[2], terms[3]])[:, order]
@@ -609,14 +488,24 @@ def section_pack(G, frame, weights, rows, along, law, constant, left):
     mixing = mixing.tocoo()
     in_order, mixing_rounds = in_rounds(mixing.row)
     summands = np.array([mixing.row, *np.divmod(mixing.col, weights.shape[0])])[:, in_order]
-    shared = G.shape[2] == 1
+    shared = len(G) == 1
     return SectionPack(
-        packed(G), packed(G.transpose(1, 0, 2)[:, :, :1 if shared else 0]), packed(frame),
+        packed(G), packed(G.transpose(0, 2, 1)[:int(shared)]), packed(frame),
         packed(weights), packed(np.zeros(ne) if shared else np.arange(ne), np.int64),
-        packed([*rows, of[terms.shape[1]:]], np.int64), factors, int(normal), *along, law,
+        packed([*rows, of[terms.shape[1]:]], np.int64), factors, int(normal), *_joined(along, ns),
+        law,
         packed(constant), packed(left * nb, np.int64), packed(np.arange(2 * nb), np.int64), tables,
         packed(terms, np.int64), rounds, packed(moduli), packed(summands, np.int64),
         packed(mixing.data[in_order]), mixing_rounds)
+
+
+def _joined(along, ns):
+    """The matrices as one array, and the first of the samples of each, which come ns at a time."""
+    sizes = [L.shape[1] for L in along]
+    out = np.zeros((3, len(along[0]), max(sizes)))
+    for x, L in zip(out, along):
+        x[:, :L.shape[1]] = L
+    return out, packed(np.cumsum([0, *sizes]) * ns, np.int64)
 
 
 def _terms(rows, factors, along, points, D):
@@ -676,8 +565,7 @@ class Kernel(Chain):
         self.tables = []
         for term in formulation.terms(element, material):
             constant = constants.pop() if constants else none
-            self.tables.append(TermTables(mesh, element, term, width, constant.transpose(1, 2, 0),
-                                          self))
+            self.tables.append(TermTables(mesh, element, term, width, constant, self))
         self.packs = [t.pack for t in self.tables]
 
     @property
@@ -725,13 +613,12 @@ class Kernel(Chain):
         strain, D = np.empty((3, n, ne)), np.empty((3, 3, n, ne))
         unit = pack.law._replace(kind=LINEAR, D=np.eye(3))
         section_stress(pack._replace(law=unit), u, strain)
-        law_moduli(pack.law, strain, D)
+        law_evaluate(pack.law, strain, D.reshape(9, n, ne))
         return D * pack.weights
 
     def without_material(self, pack):
         """The pack of a law without stiffness, for given stresses."""
         return pack._replace(terms=packed(pack.terms[:, :0], np.int64),
                              rounds=np.zeros(1, np.int64), moduli=np.zeros((0, pack.start.size)),
-                             law=pack.law._replace(kind=LINEAR), pairs=pack.pairs._replace(
-                                 held=pack.pairs.held[:, :, :0],
-                                 held_skew=pack.pairs.held_skew[:, :, :0]))
+                             law=pack.law._replace(kind=LINEAR),
+                             pairs=pack.pairs._replace(held=pack.pairs.held[:, :0]))

@@ -65,23 +65,24 @@ class NeoHookean(Material):
 
     @property
     def has_texts(self) -> bool:
-        """True if the texts of this module are its energy, stress and moduli."""
+        """True if the text of this module is its energy, stress and moduli."""
         return all(getattr(type(self), name) is getattr(NeoHookean, name)
                    for name in ("energy", "stress", "moduli"))
 
     def energy(self, strain: Array) -> Array:
-        return _evaluated(neo_hookean_energy, self, strain, ())
+        return _evaluated(self, strain, 1)[0]
 
     def stress(self, strain: Array) -> Array:
-        return _evaluated(neo_hookean_stress, self, strain, (3,))
+        return _evaluated(self, strain, 3)
 
     def moduli(self, strain: Array) -> Array:
-        return _evaluated(neo_hookean_moduli, self, strain, (3, 3))
+        found = _evaluated(self, strain, 9)
+        return found.reshape((3, 3) + found.shape[1:])
 
     def thickness_stretch(self, strain: Array) -> Array:
         if not self._fits("thickness_stretch"):
             return super().thickness_stretch(strain)
-        return np.exp(0.5 * _evaluated(_thickness, self, np.real(strain), ()))
+        return np.exp(0.5 * _evaluated(self, np.real(strain), 2)[1])
 
     def stress_zz(self, strain: Array) -> Array:
         if self.plane == "stress" or not self._fits("stress_zz"):
@@ -96,21 +97,18 @@ class _Volumetric(NeoHookean):
     G = 0.0
 
 
-# the texts: strains (3, n, elements) and constants as neo_hookean_constants gives them
-
-
 def neo_hookean_constants(law):
     """Shear modulus, Lame's first parameter, and 1 in plane stress."""
     return np.array([law.G, law.lame, float(law.plane == "stress")])
 
 
-def _evaluated(text, law, strain, shape):
-    """What a text gives for strains of any shape (3, ...)."""
+def _evaluated(law, strain, number):
+    """What the text gives for strains of any shape (3, ...), shape (number, ...)."""
     strain = np.asarray(strain)
     strain = strain.astype(np.result_type(strain, float), copy=False)
-    out = np.empty(shape + (1, strain[0].size), strain.dtype)
-    text(neo_hookean_constants(law), strain.reshape(3, 1, -1), out)
-    return out.reshape(shape + strain.shape[1:])
+    out = np.empty((number, 1, strain[0].size), strain.dtype)
+    neo_hookean(neo_hookean_constants(law), strain.reshape(3, 1, -1), out)
+    return out.reshape((number,) + strain.shape[1:])
 
 
 @primitive("primitives")
@@ -121,87 +119,67 @@ def log1p(x):
 
 
 @source
-def _logarithms(constants, strain, log_det, x):
-    """ln det C in the plane, and x = ln C_33."""
+def neo_hookean(constants, strain, out):
+    """W = G/2 (tr C - 3) - G ln J + lambda/2 (ln J)^2 and its derivatives.
+
+    S = G (I - C^-1) + lambda ln J C^-1; the moduli are condensed with S_33 = 0 in plane stress.
+
+    Parameters
+    ----------
+    constants
+        As :func:`neo_hookean_constants` gives them.
+    strain
+        Shape (3, n, elements).
+    out
+        The stress, if of shape (3, n, elements); the moduli (9, ...), the energy (1, ...), or
+        ln det C and ln C_33, (2, ...).
+    """
     G, lame, plane_stress = constants
-    for p in lanes(strain.shape[1]):
-        for e in lanes(strain.shape[2]):
+    n, size = strain.shape[1], strain.shape[2]
+    log_det, x = np.empty((n, size), strain.dtype), np.empty((n, size), strain.dtype)
+    for p in lanes(n):
+        for e in lanes(size):
             # det C = 1 + ...: log1p keeps the digits of small strains
             log_det[p, e] = log1p(2.0 * (strain[0, p, e] + strain[1, p, e])
                                   + 4.0 * strain[0, p, e] * strain[1, p, e]
                                   - strain[2, p, e] * strain[2, p, e])
             x[p, e] = 0.0 * log_det[p, e]
-    if plane_stress == 0.0:
-        return
-    moved = np.empty(x.shape, np.bool_)
-    for _ in range(60):  # G (C_33 - 1) + lambda ln J = 0, by Newton
-        for p in lanes(x.shape[0]):
-            for e in lanes(x.shape[1]):
+    moved = np.ones((n, size), np.bool_)
+    for k in range(60):  # x = ln C_33: G (C_33 - 1) + lambda ln J = 0, by Newton
+        if plane_stress == 0.0 or not np.any(moved):
+            break
+        for p in lanes(n):
+            for e in lanes(size):
                 change = np.expm1(x[p, e])
                 dx = ((G * change + 0.5 * lame * (log_det[p, e] + x[p, e]))
                       / (G * (change + 1.0) + 0.5 * lame))
                 dx = dx / np.maximum(1.0, np.abs(dx))
                 x[p, e] -= dx
                 moved[p, e] = np.abs(dx) > 1e-14 * (1e-14 + np.abs(x[p, e]))
-        if not np.any(moved):
-            return
-
-
-@source
-def _thickness(constants, strain, x):
-    """ln C_33."""
-    _logarithms(constants, strain, np.empty(x.shape, x.dtype), x)
-
-
-@source
-def neo_hookean_energy(constants, strain, W):
-    """W = G/2 (tr C - 3) - G ln J + lambda/2 (ln J)^2."""
-    G, lame = constants[0], constants[1]
-    log_det, x = np.empty(W.shape, W.dtype), np.empty(W.shape, W.dtype)
-    _logarithms(constants, strain, log_det, x)
-    for p in lanes(W.shape[0]):
-        for e in lanes(W.shape[1]):
-            log_J = 0.5 * (log_det[p, e] + x[p, e])
-            trace = 2.0 * (strain[0, p, e] + strain[1, p, e]) + np.expm1(x[p, e])
-            W[p, e] = 0.5 * G * trace - G * log_J + 0.5 * lame * log_J * log_J
-
-
-@source
-def neo_hookean_stress(constants, strain, S):
-    """S = G (I - C^-1) + lambda ln J C^-1."""
-    G, lame = constants[0], constants[1]
-    log_det, x = np.empty(S[0].shape, S.dtype), np.empty(S[0].shape, S.dtype)
-    _logarithms(constants, strain, log_det, x)
-    for p in lanes(S.shape[1]):
-        for e in lanes(S.shape[2]):
+    for p in lanes(n):
+        for e in lanes(size):
             E1, E2, C12 = strain[0, p, e], strain[1, p, e], strain[2, p, e]
+            log_J = 0.5 * (log_det[p, e] + x[p, e])
             inverse = np.exp(-log_det[p, e])
-            g, m = G * inverse, 0.5 * lame * (log_det[p, e] + x[p, e]) * inverse
-            C11, C22 = 1.0 + 2.0 * E1, 1.0 + 2.0 * E2
-            # det C (I - C^-1), written so that it vanishes without cancellation
-            S[0, p, e] = g * (2.0 * E1 * C22 - C12 * C12) + m * C22
-            S[1, p, e] = g * (2.0 * E2 * C11 - C12 * C12) + m * C11
-            S[2, p, e] = (g - m) * C12
-
-
-@source
-def neo_hookean_moduli(constants, strain, D):
-    """The derivative of the stress, condensed with S_33 = 0 in plane stress."""
-    G, lame, plane_stress = constants
-    shape = strain[0].shape
-    log_det, x = np.empty(shape, strain.dtype), np.empty(shape, strain.dtype)
-    _logarithms(constants, strain, log_det, x)
-    for p in lanes(shape[0]):
-        for e in lanes(shape[1]):
-            inverse = np.exp(-log_det[p, e])
-            a, b = (1.0 + 2.0 * strain[1, p, e]) * inverse, (1.0 + 2.0 * strain[0, p, e]) * inverse
-            c = -strain[2, p, e] * inverse
-            m = G - 0.5 * lame * (log_det[p, e] + x[p, e])
-            # lambda, or 2 m lambda / (2 m + lambda) in plane stress
-            part = 2.0 * m * plane_stress + 1.0 - plane_stress
-            stiff = lame * part / (part + plane_stress * lame)
-            D[0, 0, p, e], D[1, 1, p, e] = (stiff + 2 * m) * a * a, (stiff + 2 * m) * b * b
-            D[2, 2, p, e] = stiff * c * c + m * (a * b + c * c)
-            D[0, 1, p, e] = D[1, 0, p, e] = stiff * a * b + 2 * m * c * c
-            D[0, 2, p, e] = D[2, 0, p, e] = (stiff + 2 * m) * a * c
-            D[1, 2, p, e] = D[2, 1, p, e] = (stiff + 2 * m) * b * c
+            a, b, c = (1.0 + 2.0 * E2) * inverse, (1.0 + 2.0 * E1) * inverse, -C12 * inverse
+            if len(out) == 3:
+                # det C (I - C^-1), written so that it vanishes without cancellation
+                g, m = G * inverse, lame * log_J
+                out[0, p, e] = g * (2.0 * E1 * (1.0 + 2.0 * E2) - C12 * C12) + m * a
+                out[1, p, e] = g * (2.0 * E2 * (1.0 + 2.0 * E1) - C12 * C12) + m * b
+                out[2, p, e] = g * C12 + m * c
+            elif len(out) == 9:
+                m = G - lame * log_J
+                # lambda, or 2 m lambda / (2 m + lambda) in plane stress
+                part = 2.0 * m * plane_stress + 1.0 - plane_stress
+                stiff = lame * part / (part + plane_stress * lame)
+                out[0, p, e], out[4, p, e] = (stiff + 2 * m) * a * a, (stiff + 2 * m) * b * b
+                out[8, p, e] = stiff * c * c + m * (a * b + c * c)
+                out[1, p, e] = out[3, p, e] = stiff * a * b + 2 * m * c * c
+                out[2, p, e] = out[6, p, e] = (stiff + 2 * m) * a * c
+                out[5, p, e] = out[7, p, e] = (stiff + 2 * m) * b * c
+            elif len(out) == 1:
+                trace = 2.0 * (E1 + E2) + np.expm1(x[p, e])
+                out[0, p, e] = 0.5 * G * trace - G * log_J + 0.5 * lame * log_J * log_J
+            else:
+                out[0, p, e], out[1, p, e] = log_det[p, e], x[p, e]
