@@ -168,7 +168,7 @@ def cable_evaluate(pack, what, u, v, f, given, use_given, out, flat, ld, start):
             product(pack.table, first, U[k], d[k])
             if k < states:
                 cable_strain(pack, first, d[k], r[k], weights, square[k], kappa[k], strain[k])
-        if use_given:
+        if use_given or what == CARRY:
             copy_stress(given[:, :, first:first + size], S)
         if what == CARRY:
             cable_changes(pack.stiffness, r[0], d[1], square[0], kappa[0], S, S)

@@ -78,25 +78,24 @@ class SectionPack(NamedTuple):
 
 
 @source
-def set_tables(frame, weights, at, x, r, w):
-    """Frame, the same as the first gradients, and weights of the elements of a block."""
+def set_tables(frame, weights, at, x, w):
+    """Frame and weights of the elements of a block."""
     for g in lanes(x.shape[0]):
         for i in lanes(2):
             for e in lanes(at.size):
                 x[g, i, e] = frame[g, i, at[e]]
-                r[g, i, e] = frame[g, i, at[e]]
     for p in lanes(w.shape[0]):
         for e in lanes(at.size):
             w[p, e] = weights[p, at[e]]
 
 
 @source
-def add_scaled(c, x, y):
-    """y += c x."""
+def add_scaled(c, x, y, out):
+    """out = y + c x."""
     for i in lanes(x.shape[0]):
         for j in lanes(x.shape[1]):
             for e in lanes(x.shape[2]):
-                y[i, j, e] += c * x[i, j, e]
+                out[i, j, e] = y[i, j, e] + c * x[i, j, e]
 
 
 @source
@@ -245,22 +244,22 @@ def section_evaluate(pack, what, u, v, f, given, use_given, out, flat, ld, start
         strains, w = np.empty((3, 3, n, size), u.dtype), np.empty((n, size))
         strain, change, S = strains[0], strains[1], strains[2]
         samples = np.empty((rows.shape[1], size), u.dtype)
-        set_tables(pack.frame, pack.weights, at, x, r, w)
+        set_tables(pack.frame, pack.weights, at, x, w)
         for part in range(1 + changes):  # the strain is quadratic: its change is a derivative
             load(pack.start, pack.span, first, v if part else u, U[part])
             product(table, first, U[part], d)
-            add_scaled(shift if part else 1.0, d, r)
+            add_scaled(shift if part else 1.0, d, r if part else x, r)
             pair_strains(rows, pack.factors, r, d, r if part else x, samples)
             to_points(pack.along, pack.ends, samples, strains[part])
         if what == MEAN:
-            add_scaled(0.5, change, strain)
-            add_scaled(0.5, U[1], U[0])
+            add_scaled(0.5, change, strain, strain)
+            add_scaled(0.5, U[1], U[0], U[0])
         D = np.empty((9, n, size if what == CARRY or what == TANGENT and law.kind else 0))
         for k in range(1 if what == CARRY else 0, 2 if D.size > 0 else 1):
             law_evaluate(law, strain, D if k else S)
         if what == CARRY:
             tangent_stress(D, change, S)
-            add_scaled(1.0, given[:, :, first:last], S)
+            add_scaled(1.0, given[:, :, first:last], S, S)
         elif what == MEAN and law.kind != LINEAR:
             conserve(law, strain, change, S)
         if what == TANGENT or what == STRESS or what == CARRY:

@@ -1,0 +1,180 @@
+"""Kernels: every kind, law and mesh, plain and compiled, against derivatives of the energy."""
+
+import numpy as np
+import pytest
+
+from skfem_ancf import (ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
+                        NeoHookean, StVenantKirchhoff)
+from skfem_ancf.formulations import get_formulation
+from skfem_ancf.kernels import CableKernel, Kernel, cable, law, section
+from skfem_ancf.linalg import BandMatrix
+from skfem_ancf.materials import Material
+from skfem_ancf.switch import compiled_off
+
+STEP = 1e-30
+
+
+class Soft(Material):
+    """A law of one's own: S = D eps + c eps^3, by component."""
+
+    def energy(self, strain):
+        return StVenantKirchhoff(self.E, self.nu).energy(strain) + 0.25e3 * self.E * np.sum(
+            strain**4, axis=0)
+
+    def stress(self, strain):
+        return StVenantKirchhoff(self.E, self.nu).stress(strain) + 1e3 * self.E * strain**3
+
+
+LAWS = {"linear": StVenantKirchhoff, "neo-hookean": NeoHookean, "own": Soft}
+MESHES = {
+    "uniform": lambda: MeshBeam.init_line(np.linspace(0, 1, 41), height=0.05),
+    "one": lambda: MeshBeam.init_line([0, 1], height=0.05),
+    "graded": lambda: MeshBeam.init_line(np.linspace(0, 1, 8) ** 1.5, height=0.05),
+    "curved": lambda: MeshBeam.init_curve(lambda t: np.array([np.sin(t), 1 - np.cos(t)]),
+                                          np.linspace(0, 1.5, 36), height=0.05)}
+KINDS = {
+    **{f"section-{k}": (Kernel, lambda: ElementBeamANCF(2), formulation, name)
+       for k, (formulation, name) in {
+           "linear": ("assumed", "linear"), "neo": ("assumed", "neo-hookean"),
+           "own": ("continuum", "own"), "split": ("strain-split", "linear")}.items()},
+    "section-cubic": (Kernel, lambda: ElementBeamANCFCubic(2), "assumed", "linear"),
+    "section-corrected": (Kernel, lambda: ElementBeamANCF(1), "assumed", "neo-hookean"),
+    "section-shear": (Kernel, lambda: ElementBeamANCF(1), "continuum", "own"),
+    "cable-3": (CableKernel, lambda: ElementBeamCable(3), "assumed", "linear"),
+    "cable-5": (CableKernel, lambda: ElementBeamCable(5), "assumed", "linear")}
+
+
+def kernel(kind, mesh):
+    cls, element, formulation, name = KINDS[kind]
+    mesh, element = MESHES[mesh](), element()
+    mesh = mesh if mesh.is_straight else mesh.with_sections(element.sections)
+    return cls(mesh, element, LAWS[name](2e5, 0.3), 0.02, get_formulation(formulation))
+
+
+def states(k, size=2e-3):
+    rng = np.random.default_rng(1)
+    u = size * rng.standard_normal(k.N)
+    return u, u + size * rng.standard_normal(k.N)
+
+
+def close(a, b, tol=1e-12):
+    size = np.max(np.abs(b))
+    assert np.max(np.abs(a - b)) <= tol * size, np.max(np.abs(a - b)) / size
+
+
+every = pytest.mark.parametrize("mesh", MESHES)
+kinds = pytest.mark.parametrize("kind", KINDS)
+
+
+def dense(k, u, **options):
+    K = BandMatrix(k.N, 2 * k.nd - 1)
+    k.assemble(u, K, 0, np.zeros(k.N), **options)
+    K = K.tocsc().toarray()
+    return np.tril(K) + np.tril(K, -1).T
+
+
+@kinds
+@every
+def test_force_and_tangent_are_derivatives_of_the_energy(kind, mesh):
+    k = kernel(kind, mesh)
+    u, v = states(k)
+    d = v - u
+    if kind.startswith("cable"):
+        h = 1e-4
+        slope = (k.energy(u - 2 * h * d) - 8 * k.energy(u - h * d) + 8 * k.energy(u + h * d)
+                 - k.energy(u + 2 * h * d)) / (12 * h)
+        change = (k.force(u - 2 * h * d) - 8 * k.force(u - h * d) + 8 * k.force(u + h * d)
+                  - k.force(u + 2 * h * d)) / (12 * h)
+        tol = 1e-9
+    else:
+        slope = np.imag(k.energy(u + 1j * STEP * d)) / STEP
+        change = np.imag(k.force(u + 1j * STEP * d)) / STEP
+        tol = 1e-11
+    assert abs(k.force(u) @ d - slope) < tol * np.abs(k.force(u)) @ np.abs(d)
+    K = dense(k, u)
+    close(K @ d, change, tol)
+    tangents, blocks = k.tangents(u), np.zeros_like(K)
+    for e, block in enumerate(tangents):
+        at = k.t[0, e] * k.nd
+        blocks[at:at + 2 * k.nd, at:at + 2 * k.nd] += block
+    close(blocks, K)
+    close(k.scatter(k.forces(u)), k.force(u))
+
+
+@kinds
+@every
+def test_work_of_the_mean_force_is_the_change_of_the_energy(kind, mesh):
+    k = kernel(kind, mesh)
+    u, v = states(k)
+    f = k.mean_force(u, v)
+    work, change = f @ (v - u), k.energy(v) - k.energy(u)
+    assert abs(work - change) < 1e-12 * (np.abs(f) @ np.abs(v - u)) + 1e-13 * k.energy(v)
+
+
+@kinds
+@every
+def test_carried_stresses_and_parts_of_the_tangent(kind, mesh):
+    k = kernel(kind, mesh)
+    u, v = states(k)
+    K = BandMatrix(k.N, 2 * k.nd - 1)
+    found = k.assemble(u, K, 0, np.zeros(k.N))
+    h, rates = 1e-4, []
+    for sign in (1.0, -1.0):  # the mean of both steps has no second-order part
+        rates.append(k.stresses())
+        for pack, S in zip(k.packs, rates[-1]):
+            k.texts.stress(pack, u + sign * h * (v - u), S)
+    for a, b, after, before in zip(found.carry(h * (v - u)), found.stresses, *rates):
+        assert np.max(np.abs(a - b - 0.5 * (after - before))) <= 1e-5 * np.max(np.abs(a - b))
+    B, CB, stress = k.factors(k.gather(u))
+    material = np.einsum("emi,emj->eij", B, CB)
+    close(material, k.tangents(u, geometric=False), 1e-12)
+    close(np.einsum("emi,em->ei", B, stress), k.forces(u).reshape(len(B), -1))
+    close(material + k.geometric(k.gather(u), slice(None), stress), k.tangents(u), 1e-12)
+
+
+def test_a_law_of_ones_own_goes_with_its_kernel():
+    before = len(law._LAWS)
+    k = kernel("section-own", "one")
+    assert len(law._LAWS) == before + 1
+    del k
+    assert len(law._LAWS) == before
+
+
+def test_what_a_law_of_ones_own_raises_is_seen():
+    class Broken(Soft):
+        def stress(self, strain):
+            if np.max(np.abs(strain)) > 0.01:
+                raise ZeroDivisionError("no stress")
+            return super().stress(strain)
+
+    k = Kernel(MESHES["one"](), ElementBeamANCF(2), Broken(2e5, 0.3), 0.02,
+               get_formulation("continuum"))
+    with pytest.raises(ZeroDivisionError, match="no stress"):
+        k.force(np.ones(k.N))
+
+
+@pytest.mark.skipif(compiled_off() is not None, reason="without Numba")
+@kinds
+@every
+def test_compiled_is_plain(kind, mesh):
+    from skfem_ancf.compiled.twin import twin
+
+    k = kernel(kind, mesh)
+    text = section.section_evaluate if k.texts.components == 3 else cable.cable_evaluate
+    compiled = twin(text, True)
+    u, v = states(k)
+    ld, rng = 2 * k.nd + 3, np.random.default_rng(2)
+    for what in range(5):
+        for use_given in (0, 1):
+            sizes, gaps = [], []
+            for pack, given in zip(k.packs, k.stresses()):
+                given += rng.standard_normal(given.shape)
+                found = []
+                for run in (text, compiled):
+                    f, S, flat = np.zeros(k.N), np.zeros_like(given), np.zeros((k.N + 3) * ld)
+                    run(pack, np.int64(what), u, v, f, given, np.int64(use_given), S, flat, ld, 3)
+                    found.append((f, S, flat))
+                gaps.append([np.max(np.abs(a - b)) for a, b in zip(*found)])
+                sizes.append([np.max(np.abs(a)) for a in found[0]])
+            # of the whole beam: a part of a split energy may vanish
+            assert np.all(np.max(gaps, axis=0) <= 2e-13 * np.max(sizes, axis=0))
