@@ -1,5 +1,6 @@
 """Grids, views and films: read back, and looked at pixel by pixel."""
 
+import itertools
 import sys
 
 import numpy as np
@@ -8,13 +9,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 pv = pytest.importorskip("pyvista", reason="pyvista is not installed (the extra 'view')")
 
-from conftest import quarter_arc  # noqa: E402
-from test_io import bent  # noqa: E402
-from skfem_ancf import (Beam, ElementBeamANCF, InputError, MeshBeam, MissingExtra,  # noqa: E402
+from conftest import quarter_arc
+from test_io import bent
+from skfem_ancf import (Beam, ElementBeamANCF, InputError, MeshBeam, MissingExtra,
                         NameUnknown, Scene, StVenantKirchhoff)
-from skfem_ancf.fields import FIELDS  # noqa: E402
-from skfem_ancf.io import body_fields  # noqa: E402
-from skfem_ancf.io.vtkhdf import VtkHdfWriter  # noqa: E402
+from skfem_ancf.fields import FIELDS
+from skfem_ancf.io import body_fields
+from skfem_ancf.io.vtkhdf import VtkHdfWriter
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
 STEEL = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)
@@ -143,7 +144,7 @@ def test_film(history, tmp_path, backend):
         for k in range(5):
             film.seek(k)
             images.append(np.asarray(film.convert("RGB")).astype(int))
-    for a, b in zip(images[:-1], images[1:]):
+    for a, b in itertools.pairwise(images):
         assert np.sum(np.abs(a - b).max(axis=2) > 60) > 100  # it moves
     assert list(path.parent.iterdir()) == [path]
 
