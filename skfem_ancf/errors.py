@@ -11,20 +11,26 @@ import difflib
 import inspect
 import os
 import pickle
+import warnings
+from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
+from threading import RLock
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from .types import Array
 
 Function = TypeVar("Function", bound="Callable[..., Any]")
 Class = TypeVar("Class", bound=type)
+
+#: The filters of warnings belong to all threads: one at a time sets and restores them.
+_FILTERS = RLock()
 
 #: Longest text of a value in a message.
 WIDTH = 80
@@ -510,6 +516,14 @@ def require_function(name: str, value: Any, returns: str) -> Callable[..., Any]:
     if not callable(value):
         raise InputError(f"{name} must be a function {returns}, got {shown(value)}")
     return value
+
+
+@contextmanager
+def warnings_as_errors(category: type[Warning] = Warning) -> Iterator[None]:
+    """Warnings of a kind are raised inside, in this thread while no other changes the filters."""
+    with _FILTERS, warnings.catch_warnings():
+        warnings.simplefilter("error", category)
+        yield
 
 
 def ask(what: str, function: Callable[..., Any], *args: Any) -> Any:

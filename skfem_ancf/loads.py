@@ -7,7 +7,6 @@ again for the same scene on other meshes.
 from __future__ import annotations
 
 import re
-import warnings
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +16,7 @@ from skfem.assembly import LinearForm, asm
 from . import forms
 from .beam import Beam
 from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number, require_finite,
-                     require_function, shown)
+                     require_function, shown, warnings_as_errors)
 from .frozen import Sealable, read_only
 from .kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from .pickling import picklable_form
@@ -370,8 +369,7 @@ def _assembled(form, basis):
     """The vector of a form of the caller's."""
     complex_to_real = getattr(np, "exceptions", np).ComplexWarning
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", complex_to_real)
+        with warnings_as_errors(complex_to_real):
             return asm(form, basis)
     except (KeyError, AttributeError) as error:
         name = re.search("'([^']*)' not found in 'w'|^'([^']*)'$", str(error))

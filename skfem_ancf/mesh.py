@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import json
-import logging
-import warnings
 from contextlib import ExitStack
 from dataclasses import dataclass, fields, replace
-from threading import Lock
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
@@ -17,6 +14,7 @@ from skfem.element import Element
 from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import Mesh2D, MeshQuad
 
+from .curve import Curve, check_curvature, derivative_of
 from .errors import (CallbackError, FileError, InputError, MeshError, NameUnknown, ask, ask_array,
                      require_finite, require_finite_scalar, require_function, require_integer,
                      require_option, require_options, require_path, require_positive, shown,
@@ -26,7 +24,7 @@ from .mapping import MappingBeam
 from .pickling import require_picklable
 from .places import is_point
 from .reference import ElementBeamP1
-import itertools
+from .refinement import halved
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,13 +32,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from .types import Array, StrPath
-
-logger = logging.getLogger(__name__)
-#: The filters of warnings belong to all threads: one at a time sets and restores them.
-_WARNINGS = Lock()
-
-#: Angle of a kink of a curve that is refused; one of a fine polygon is smaller.
-KINK = 1e-2
 
 #: Elements of the largest mesh that :meth:`MeshBeam.refined` makes.
 MAX_ELEMENTS = 2**24
@@ -197,12 +188,12 @@ class MeshBeam(Frozen, Mesh2D):
         what = "of parameters (n,) that returns positions (2, n)"
         require_function("r", r, what)
         if dr is None:
-            dr = _curve_derivative(r, s[0], s[-1])
+            dr = derivative_of(r, s[0], s[-1])
         curve = Curve(r, require_function("dr", dr, what), (s[0], s[-1]))
         p, tangent = curve.nodes(s)
         curve.check(s)
         curve.check_kinks(s)
-        _check_curvature(curve, s, height)
+        check_curvature(curve, s, height)
         return cls._from_nodes(p, tangent, curve.lengths(s[:-1], s[1:]), height, s=s, curve=curve,
                                p_XY=curve.turning(s))
 
@@ -580,78 +571,7 @@ class MeshBeam(Frozen, Mesh2D):
         return point
 
     def _adaptive(self, ix):
-        ix = np.unique(self.normalize_elements(ix))
-        marked = np.zeros(self.nelements, dtype=bool)
-        marked[ix] = True
-        new = self._midpoints(ix)
-        where = self.t[1, ix]
-        fields = {name: np.insert(getattr(self, name), where, new[name], axis=-1)
-                  for name in ("doflocs", "p_X", "p_Y", "p_XY")
-                  if getattr(self, name) is not None}
-        if self.s is not None:
-            fields["s"] = np.insert(self.s, where, new["s"])
-        # children of element e: first[e], and first[e] + 1 if it was marked
-        first = np.arange(self.nelements) + np.concatenate([[0], np.cumsum(marked)[:-1]])
-        parent = np.repeat(np.arange(self.nelements), 1 + marked)
-        node = np.arange(self.p.shape[1]) + np.searchsorted(where, np.arange(self.p.shape[1]),
-                                                            side="right")
-        left = node[self.t[0, parent]]
-        left[first[ix] + 1] += 1
-        lengths = self.lengths[parent]
-        if self.curve is None:
-            lengths = np.where(marked[parent], lengths / 2, lengths)
-        else:
-            lengths[first[ix]], lengths[first[ix] + 1] = new["lengths"]
-        m = replace(self, t=np.array([left, left + 1]), lengths=lengths, _boundaries=None,
-                    _subdomains=None, **fields)
-        m._boundaries = self._refine_tags(self._boundaries, m, first, marked, node)
-        if self._subdomains is not None:
-            m._subdomains = {name: np.nonzero(np.isin(parent, e))[0].astype(np.int32)
-                             for name, e in self._subdomains.items()}
-        return m
-
-    def _midpoints(self, ix):
-        """Position, gradients, parameter and, on a curve, lengths for the middle of elements."""
-        out = {}
-        if self.s is not None:
-            out["s"] = 0.5 * (self.s[self.t[0, ix]] + self.s[self.t[1, ix]])
-        if self.curve is None:
-            middle = np.array([[0.5], [0.5]])
-            mapping = self._mapping()
-            J = mapping.DF(middle, ix)[..., 0]
-            return {**out, "doflocs": mapping.F(middle, ix)[..., 0],
-                    "p_X": J[:, 0] / self.lengths[ix], "p_Y": J[:, 1] / self.height,
-                    "p_XY": mapping.turning(middle, ix)[..., 0] / self.lengths[ix]}
-        a, b = self.s[self.t[:, ix]]
-        p, tangent = self.curve.nodes(out["s"])
-        return {**out, "doflocs": p, "p_X": tangent, "p_Y": np.array([-tangent[1], tangent[0]]),
-                "p_XY": self.curve.turning(out["s"]),
-                "lengths": (self.curve.lengths(a, out["s"]), self.curve.lengths(out["s"], b))}
-
-    def _refine_tags(self, tags, m, first, marked, node):
-        """Boundaries of the refined mesh ``m``: sections move, surfaces pass to the children."""
-        if tags is None:
-            return None
-        n, ne = self.p.shape[1], self.nelements
-        out = {}
-        for name, facets in tags.items():
-            ori = getattr(facets, "ori", None)
-            f = np.asarray(facets)
-            new, source = [], []
-            for k, facet in enumerate(f):
-                if facet < n:
-                    children = [node[facet]]
-                else:
-                    side, e = divmod(facet - n, ne)
-                    start = m.p.shape[1] + side * m.nelements + first[e]
-                    children = [start, start + 1] if marked[e] else [start]
-                new += children
-                source += [k] * len(children)
-            new = np.array(new, dtype=np.int32)
-            order = np.argsort(new, kind="stable")
-            out[name] = (new[order] if ori is None else
-                         OrientedBoundary(new[order], np.asarray(ori)[source][order]))
-        return out
+        return halved(self, np.unique(self.normalize_elements(ix)))
 
     def restrict(self, elements: Any, return_mapping: bool = False, skip_boundaries: bool = False,
                  skip_subdomains: bool = False) -> Any:
@@ -994,143 +914,6 @@ def _satisfying(test, x):
     return np.nonzero(found)[0].astype(np.int32)
 
 
-def _components(value, s):
-    """Two components at parameters s; one may be a constant."""
-    if isinstance(value, (tuple, list)) and len(value) == 2:
-        return [np.broadcast_to(v, s.shape) if np.ndim(v) == 0 else v for v in value]
-    return value
-
-
-def _on_curve(what, function, s):
-    """A function of parameters s (n,) that returns (2, n), asked."""
-    try:
-        return ask_array(what, (2, len(s)), lambda s: _components(function(s), s), s)
-    except CallbackError as error:
-        raise CallbackError(f"{error}; the function takes parameters of shape (n,) and returns "
-                            "positions of shape (2, n): a component that is constant is 0 * s + 1"
-                            ) from error.__cause__
-
-
-class Curve:
-    """A plane curve r(s) with its derivative, on the parameters between ``ends``."""
-
-    def __init__(self, r, derivative, ends):
-        self.r, self.derivative, self.ends = r, derivative, ends
-
-    def __call__(self, s):
-        return _on_curve("r(s)", self.r, s)
-
-    def rate(self, s):
-        """The derivative at parameters ``s``, shape (2, n)."""
-        return _on_curve("the derivative of r", self.derivative, s)
-
-    def nodes(self, s):
-        """Positions and unit tangents at parameters ``s``, both of shape (2, n)."""
-        p, d = self(s), self.rate(s)
-        size = np.hypot(*d)
-        if len(s) and np.min(size) <= 1e-12 * np.max(size):
-            raise MeshError(f"the curve stands still at s = {s[np.argmin(size)]:.9g}: it has no "
-                            "tangent there")
-        return p, d / size
-
-    def turning(self, s):
-        """Derivative of the unit normal by the arc length at parameters ``s``, shape (2, n)."""
-        dt = _differences(lambda x: self.nodes(x)[1], s, *self.ends)
-        return np.array([-dt[1], dt[0]]) / np.hypot(*self.rate(s))
-
-    def lengths(self, a, b):
-        """Arc lengths from parameters ``a`` to ``b``, both of shape (n,)."""
-        d, w = self._at_gauss_points(a, b)
-        return np.hypot(*d) @ w * (b - a)
-
-    def check(self, s):
-        """Raise :class:`MeshError` if the derivative is not that of r between nodes ``s``."""
-        d, w = self._at_gauss_points(s[:-1], s[1:])
-        gap = np.hypot(*(d @ w * np.diff(s) - np.diff(self(s))))
-        length = np.hypot(*d) @ w * np.diff(s)
-        k = int(np.argmax(gap / length))
-        if not gap[k] <= 0.02 * length[k]:
-            raise MeshError(
-                f"r jumps, or its derivative does not fit, between s = {s[k]:.9g} and "
-                f"{s[k + 1]:.9g}: the derivative adds up to a point {gap[k]:.6g} from r")
-
-    def check_kinks(self, s):
-        """Raise :class:`MeshError` if the direction of the curve jumps at a node inside.
-
-        The angle between chords to both sides of a node falls with their length where the curve
-        is smooth; at a kink it stays.
-        """
-        at = s[1:-1]
-        if not len(at):
-            return
-        size, p = np.minimum(np.diff(s)[:-1], np.diff(s)[1:]), self(at)
-        angles = []
-        for part in (1e-3, 2.5e-4):
-            before, after = p - self(at - part * size), self(at + part * size) - p
-            cross = before[0] * after[1] - before[1] * after[0]
-            angles.append(np.arctan2(cross, np.sum(before * after, axis=0)))
-        # far from the origin chords that short have the direction of round-off
-        chord = np.minimum(np.hypot(*before), np.hypot(*after))
-        seen = chord * KINK > 32.0 * np.finfo(float).eps * np.max(np.abs(p))
-        stays = seen & (np.abs(angles[1]) > 0.7 * np.abs(angles[0]))
-        kink = np.where(stays, np.abs(angles[1]), 0.0)
-        k = int(np.argmax(kink))
-        if kink[k] > KINK:
-            raise MeshError(
-                f"the curve has a kink of {np.rad2deg(angles[1][k]):.3g} degrees at s = "
-                f"{at[k]:.9g}: give one beam for each smooth part, and weld them in a scene with "
-                'scene.joint("weld", ...)')
-
-    def _at_gauss_points(self, a, b):
-        x, w = np.polynomial.legendre.leggauss(12)
-        at = a[:, None] + (b - a)[:, None] * (0.5 + 0.5 * x)
-        return np.reshape(self.rate(at.ravel()), (2,) + at.shape), 0.5 * w
-
-    def moved(self, A, shift):
-        """The curve ``A r(s) + shift``."""
-        return Curve(_Moved(self, A, shift), _Moved(self.rate, A, np.zeros(2)), self.ends)
-
-    def functions(self):
-        """Pairs of a description and a function, for those that the curve was given."""
-        r, rate = self.r, self.derivative
-        while isinstance(r, _Moved):
-            r, rate = r.function.r, r.function.derivative
-        items = [("the curve r(s) of the mesh", r)]
-        if not isinstance(rate, (_ComplexStep, _Differences)):
-            items.append(("the derivative dr of the curve of the mesh", rate))
-        return items
-
-
-class _Moved:
-    """``A f(s) + shift`` for a function f of parameters."""
-
-    def __init__(self, function, A, shift):
-        self.function, self.A, self.shift = function, A, shift
-
-    def __call__(self, s):
-        return self.A @ self.function(s) + self.shift[:, None]
-
-
-class _ComplexStep:
-    """The derivative of a function of parameters that takes complex ones."""
-
-    def __init__(self, r):
-        self.r = r
-
-    def __call__(self, s):
-        return np.imag(np.asarray(_components(self.r(s + 1e-30j), s))) / 1e-30
-
-
-class _Differences:
-    """The derivative of a function of parameters on [s0, s1] by differences."""
-
-    def __init__(self, r, s0, s1):
-        self.r, self.ends = r, (s0, s1)
-
-    def __call__(self, s):
-        return _differences(lambda s: _on_curve("r(s)", self.r, s), s, *self.ends)
-
-
 def _radians(angle):
     """An angle as a float; raises InputError where it is likely to be in degrees."""
     angle = require_finite_scalar("angle", angle)
@@ -1138,49 +921,3 @@ def _radians(angle):
         raise InputError(f"an angle is given in radians, at most 2 pi in size, got {angle!r}: for "
                          f"degrees write np.deg2rad({angle:g})")
     return angle
-
-
-def _curve_derivative(r, s0, s1):
-    """The derivative of ``r`` on [s0, s1]: complex step if exact, else sixth-order differences."""
-    differences, complex_step = _Differences(r, s0, s1), _ComplexStep(r)
-    try:
-        probe = s0 + (s1 - s0) * np.linspace(0.0137, 0.991, 24)
-        with _WARNINGS, warnings.catch_warnings():
-            warnings.simplefilter("error")  # among them: the imaginary part is discarded
-            exact, near = complex_step(probe), differences(probe)
-        if exact.shape == near.shape and np.allclose(exact, near, rtol=1e-6,
-                                                     atol=1e-6 * np.max(np.abs(near))):
-            return complex_step
-    except Exception:  # r is the user's: whatever it raises, it has no complex step
-        logger.debug("the curve has no complex step; differences are used", exc_info=True)
-    return differences
-
-
-def _differences(r, s, s0, s1):
-    """Derivative of a function on [s0, s1] by seven-point differences, of sixth order."""
-    d = 1e-3 * (s1 - s0)
-    k = np.arange(-3, 4)
-    c = np.clip(s, s0 + 3 * d, s1 - 3 * d)  # the stencil stays inside
-    values = np.array([np.asarray(r(c + i * d), dtype=np.float64) for i in k])
-    weights = np.array([_lagrange_derivative(k, i, (s - c) / d) for i in range(7)])
-    return np.einsum("is,ijs->js", weights, values) / d
-
-
-def _lagrange_derivative(nodes, i, x):
-    """Derivative at x of the Lagrange polynomial of ``nodes`` that is 1 at nodes[i]."""
-    others = [n for j, n in enumerate(nodes) if j != i]
-    polynomial = np.poly(others) / np.prod([nodes[i] - n for n in others])
-    return np.polyval(np.polyder(polynomial), x)
-
-
-def _check_curvature(curve, s, height):
-    """Raise MeshError where the radius of curvature of the curve is below h/2."""
-    at = np.unique(np.concatenate([np.linspace(a, b, 17) for a, b in itertools.pairwise(s)]))
-    _, tangent = curve.nodes(at)
-    angle = np.unwrap(np.arctan2(tangent[1], tangent[0]))
-    kappa = np.abs(np.diff(angle)) / curve.lengths(at[:-1], at[1:])
-    k = int(np.argmax(kappa))
-    if kappa[k] * height / 2 >= 1.0:
-        raise MeshError(
-            f"the curve folds near s = {at[k]:.6g}: its radius of curvature {1 / kappa[k]:.6g} is "
-            f"below half the height {height / 2:.6g}; use a smaller height or a gentler curve")
