@@ -482,10 +482,8 @@ class Beam(Frozen):
         if self.is_cable:  # S_yy = 0
             _, _, eps, kappa = self._cable_section(u, X, tind)
             e = eps - self.mesh.height * (X[1] - 0.5) * kappa
-            nu = self.material.nu
-            ratio = nu if self.material.plane == "stress" else nu / (1.0 - nu)
             xx = e + 0.5 * e * e
-            return np.array([xx, -ratio * xx, 0.0 * xx])
+            return np.array([xx, -self.material.lateral_ratio * xx, 0.0 * xx])
         return self.sampled_strain(self.formulation.terms(self.element, self.material)[0],
                                    u, X, tind)
 
@@ -540,9 +538,8 @@ class Beam(Frozen):
         """
         strain = self.strain(u, X, tind)
         if self.is_cable:
-            E = self.material.E
-            E = E if self.material.plane == "stress" else E / (1.0 - self.material.nu**2)
-            return np.array([E * strain[0], 0.0 * strain[0], 0.0 * strain[0]])
+            return np.array([self.material.axial_modulus * strain[0], 0.0 * strain[0],
+                             0.0 * strain[0]])
         return self.formulation.stress(self, strain, u, X, tind)
 
     # mass

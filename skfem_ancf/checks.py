@@ -216,7 +216,6 @@ def _deformation(beam, u):
 def _cable_deformation(beam, u):
     eps, kappa = beam.kernel.strain(beam.kernel.gather(u))
     along = 1.0 + eps + 0.5 * beam.mesh.height * np.abs(kappa) * np.array([[[-1.0]], [[1.0]]])
-    material = beam.material
-    ratio = material.nu / (1.0 if material.plane == "stress" else 1.0 - material.nu)
+    ratio = beam.material.lateral_ratio
     across = np.sqrt(np.maximum(1.0 - ratio * (along * along - 1.0), 0.0))  # S_yy = 0
     return along * across, along

@@ -82,6 +82,36 @@ class Material(Frozen):
         """Shear modulus E / (2 (1 + nu))."""
         return self.E / (2.0 * (1.0 + self.nu))
 
+    @property
+    def axial_modulus(self) -> float:
+        """Small stress over strain along a fibre that may get thinner in the plane.
+
+        E in plane stress, and E / (1 - nu^2) in plane strain.
+
+        Examples
+        --------
+        >>> from skfem_ancf import StVenantKirchhoff
+        >>> StVenantKirchhoff(E=3.0, nu=0.5).axial_modulus
+        3.0
+        >>> StVenantKirchhoff(E=3.0, nu=-0.5, plane="strain").axial_modulus
+        4.0
+        """
+        return self.E / (1.0 if self.plane == "stress" else 1.0 - self.nu**2)
+
+    @property
+    def lateral_ratio(self) -> float:
+        """Minus the strain across such a fibre over that along it.
+
+        nu in plane stress, and nu / (1 - nu) in plane strain.
+
+        Examples
+        --------
+        >>> from skfem_ancf import StVenantKirchhoff
+        >>> StVenantKirchhoff(E=3.0, nu=0.2, plane="strain").lateral_ratio
+        0.25
+        """
+        return self.nu / (1.0 if self.plane == "stress" else 1.0 - self.nu)
+
     @taught
     def shear_factor(self, element: ElementBeam) -> float:
         """The factor k_s on the shear modulus for sections of an element."""
