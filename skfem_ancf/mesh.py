@@ -15,7 +15,7 @@ from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import Mesh2D, MeshQuad
 
 from .curve import Curve, check_curvature, derivative_of
-from .errors import (CallbackError, FileError, InputError, MeshError, NameUnknown, ask, ask_array,
+from .errors import (CallbackError, FileError, InputError, MeshError, NameUnknown, ask,
                      require_finite, require_finite_scalar, require_function, require_integer,
                      require_option, require_options, require_path, require_positive, shown,
                      teaching)
