@@ -332,6 +332,11 @@ class Beam(Frozen):
         return Finder(self.mesh)
 
     @cached_property
+    def tables(self) -> dict:
+        """Tables at sections that do not change with the state, see :mod:`skfem_ancf.kept`."""
+        return {}
+
+    @cached_property
     def grids(self) -> dict:
         """Points of all elements at which fields were asked for last, by the reference points."""
         return {}

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .errors import CallbackError, InputError, NameUnknown, ask, require_integer, shown
+from .kept import kept
 from .materials import LinearLaw
 from .points import Part
 
@@ -395,15 +396,10 @@ def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Va
     Values
         Its points are (nelements, npoints), flattened.
     """
-    kept, key = beam.grids, X.tobytes()
-    part = kept.get(key)
-    if part is None:
-        ne = beam.mesh.nelements
-        part = Part(beam, 0, slice(0, beam.N), None, np.repeat(np.arange(ne), X.shape[1]),
-                    np.tile(X, ne))
-        if len(kept) >= GRIDS:
-            kept.pop(next(iter(kept)))
-        kept[key] = part
+    ne = beam.mesh.nelements
+    part = kept(beam.grids, X.tobytes(), lambda: Part(
+        beam, 0, slice(0, beam.N), None, np.repeat(np.arange(ne), X.shape[1]), np.tile(X, ne)),
+        GRIDS)
     find = None
     if recover and hasattr(state, "recovery"):
         def find():

@@ -31,6 +31,7 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_banded
 
 from .formulations.ecm import EnhancedContinuum
+from .kept import kept
 from .materials import LinearLaw
 from .quadrature import gauss, lagrange
 from .section_forces import NotRecovered, SectionForces, Sections, cross
@@ -198,7 +199,9 @@ class _Piece:
         if len(self.s) > FEW:
             return _Spline(self.s, values)(self.s, 1)
         if self._derivative is None:
-            self._derivative = _Spline(self.s, np.eye(len(self.s)))(self.s, 1)
+            s = self.s
+            self._derivative = kept(self.recovery.beam.tables, ("derivative", s.tobytes()),
+                                    lambda: _Spline(s, np.eye(len(s)))(s, 1))
         return self._derivative @ values
 
     def integral(self, values):
@@ -406,11 +409,12 @@ class Recovery:
         self.eta = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, m))
         self.middle = m // 2
         self.eta[self.middle] = 0.5
-        self._to_series = np.linalg.inv(chebvander(2.0 * self.eta - 1.0, m - 1))
-        self.from_bottom = mesh.height * integration(self.eta)
+        self._to_series, self.from_bottom = kept(beam.tables, ("across", m), lambda: (
+            np.linalg.inv(chebvander(2.0 * self.eta - 1.0, m - 1)),
+            mesh.height * integration(self.eta)))
         self.from_axis = self.from_bottom - self.from_bottom[self.middle]
         self.whole = self.from_bottom[-1]
-        self.lengths = self._arc_tables()
+        self.lengths, self._inside = kept(beam.tables, "arc", self._arc_tables)
         self.has_stress = beam.element.carries_shear_parabola and not isinstance(
             beam.formulation, EnhancedContinuum)
         self._u = u
@@ -424,8 +428,8 @@ class Recovery:
         axis = self.beam.mesh.mapping().DF(np.array([x, np.full(8, 0.5)]))[:, 0]
         speed = np.hypot(*axis)
         series = np.linalg.solve(chebvander(2.0 * x - 1.0, 7), speed.T)
-        self._inside = chebint(series, lbnd=-1.0, scl=0.5).T  # (ne, 9): the length from xi = 0
-        return np.append(0.0, np.cumsum(speed @ w))
+        inside = chebint(series, lbnd=-1.0, scl=0.5).T  # (ne, 9): the length from xi = 0
+        return np.append(0.0, np.cumsum(speed @ w)), inside
 
     def arc(self, e: ArrayLike, xi: ArrayLike) -> Array:
         """Arc length along the stress-free axis of places of elements.

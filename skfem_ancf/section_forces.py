@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .errors import AncfError
+from .kept import kept
 from .quadrature import gauss, lagrange
 from .spread import SNAP, station_of_node
 
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 
 #: Points along an element for its loads.
 ALONG = 8
+
+#: Points of sections up to which their tables are kept.
+SMALL = 4096
 
 #: A section force that changes at a node without a load by more than this part of its largest
 #: value: the state is no equilibrium.
@@ -67,16 +71,24 @@ class Sections:
         self.forces, self.e = forces, e
         beam = forces.beam
         self.shape = len(e), len(eta)
-        self.X = np.array([np.broadcast_to(xi[:, None], self.shape),
-                           np.broadcast_to(eta, self.shape)])
+        if len(e) * len(eta) > SMALL:
+            self.X, self._value, self._slope, self.J = self._tables(beam, e, xi, eta)
+        else:
+            key = e.tobytes(), xi.tobytes(), eta.tobytes()
+            self.X, self._value, self._slope, self.J = kept(
+                beam.tables, key, lambda: self._tables(beam, e, xi, eta))
+        self.volume = self.J[0, 0] * self.J[1, 1] - self.J[0, 1] * self.J[1, 0]
+
+    def _tables(self, beam, e, xi, eta):
+        """Reference points, local functions and their slopes, and the derivative of the map."""
+        X = np.array([np.broadcast_to(xi[:, None], self.shape), np.broadcast_to(eta, self.shape)])
         element = beam.element
-        rows = [element.local(self.X, beam.mesh.height, i) for i in range(2 * element.nodal_dofs)]
+        rows = [element.local(X, beam.mesh.height, i) for i in range(2 * element.nodal_dofs)]
         scale = (beam.mesh.lengths[e][:, None] ** np.array([row[3] for row in rows])).T
-        self._value, self._slope = (
+        value, slope = (
             np.array([np.broadcast_to(row[k], self.shape) for row in rows]) * scale[:, :, None]
             for k in (0, 1))
-        self.J = beam.mesh.mapping().DF(self.X, e)
-        self.volume = self.J[0, 0] * self.J[1, 1] - self.J[0, 1] * self.J[1, 0]
+        return X, value, slope, beam.mesh.mapping().DF(X, e)
 
     def field(self, q_e: Array, slope: bool = False) -> Array:
         """A field of element coordinates, or its derivative by xi.

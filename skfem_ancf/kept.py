@@ -1,0 +1,35 @@
+"""Tables that are kept for the next time, a few of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from typing import Any
+
+
+def kept(store: dict, key: Hashable, make: Callable[[], Any], most: int = 32) -> Any:
+    """What is kept under a key, or what ``make()`` returns, which is kept then.
+
+    Parameters
+    ----------
+    store
+        Where it is kept.
+    key
+        What it depends on.
+    make
+        A function without arguments.
+    most
+        How many things are kept; the first of them go.
+
+    Examples
+    --------
+    >>> store = {}
+    >>> [kept(store, k, lambda: k * k, most=2) for k in (1, 2, 1, 3)], list(store)
+    ([1, 4, 1, 9], [2, 3])
+    """
+    found = store.get(key)
+    if found is None:
+        found = make()
+        for old in list(store)[:max(len(store) - most + 1, 0)]:
+            store.pop(old, None)
+        store[key] = found
+    return found
