@@ -42,7 +42,9 @@ def product(A, first, B, out):
         n = B.shape[1] * B.shape[2]
         np.dot(A[0], B.reshape(-1, n), out.reshape(-1, n))
     else:
-        out.transpose(2, 0, 1)[...] = A[first:first + B.shape[2]] @ B.transpose(2, 0, 1)
+        # BLAS takes matrices whose rows are contiguous
+        own = np.ascontiguousarray(B.transpose(2, 0, 1))
+        out.transpose(2, 0, 1)[...] = A[first:first + len(own)] @ own
 
 
 @primitive("primitives")
@@ -51,8 +53,8 @@ def turned_product(A, turned, first, B, out):
     if turned.shape[0] == 1:
         product(turned, first, B, out)
     else:
-        own = A[first:first + B.shape[2]].transpose(0, 2, 1)
-        out.transpose(2, 0, 1)[...] = own @ B.transpose(2, 0, 1)
+        own = np.ascontiguousarray(B.transpose(2, 0, 1))
+        out.transpose(2, 0, 1)[...] = A[first:first + len(own)].transpose(0, 2, 1) @ own
 
 
 @source
@@ -144,19 +146,23 @@ class PairTables(NamedTuple):
 def element_tangents(table, pairs, first, M, M_skew, K, K_skew):
     """What the products of G do, for elements with tables of their own: G^T (M G)."""
     nb, size = table.shape[2], M.shape[2]
-    G = np.ascontiguousarray(table[first:first + size].transpose(1, 2, 0))
     xy, turn = M[:, 2].copy(), np.zeros((len(M), size))
     off = pairs.pairs[0] != pairs.pairs[1]
     turn[off] = M_skew[pairs.pairs[2, off], 0]
     X = np.stack([M[:, 0], M[:, 1], xy + turn, xy - turn], axis=1)[:, :, None]
-    H = np.zeros((len(G), 3, nb, size))
-    for a, b in zip(pairs.rounds[:-1], pairs.rounds[1:]):
-        g, h, p, side = pairs.partners[:, a:b]
-        for c, column_of in enumerate((0, 1, side)):
-            H[g, c] += X[p, column_of] * G[h]
-    out = np.empty((nb, 3 * nb, size))
-    turned_product(table, np.empty((0, 0, 0)), first, H.reshape(len(G), -1, size), out)
-    out = out.reshape(nb, 3, nb, size)
+    out = np.empty((nb, 3, nb, size))
+    for k in range(0, size, 64):  # as many as stay in cache
+        part = slice(k, min(k + 64, size))
+        G = np.ascontiguousarray(table[first:first + size][part].transpose(1, 2, 0))
+        H, x = np.zeros((len(G), 3) + G.shape[1:]), X[..., part]
+        for a, b in zip(pairs.rounds[:-1], pairs.rounds[1:]):
+            g, h, p, side = pairs.partners[:, a:b]
+            rows = slice(None) if len(g) == len(G) else g
+            for c, column_of in enumerate((0, 1, side)):
+                H[rows, c] += x[p, column_of] * G[h]
+        H = np.ascontiguousarray(H.reshape(len(G), 3 * nb, -1).transpose(2, 0, 1))
+        K3 = table[first:first + size][part].transpose(0, 2, 1) @ H
+        out[..., part] = K3.transpose(1, 2, 0).reshape(nb, 3, nb, -1)
     (a, b), (c, d) = pairs.lower, pairs.strictly
     K[:, 0], K[:, 1] = out[a, 0, b], out[a, 1, b]
     K[:, 2] = 0.5 * (out[a, 2, b] + out[b, 2, a])
