@@ -218,7 +218,7 @@ def cable_tangent(pack, u, f, carried, use_carried, stresses, flat, ld, start):
 def cable_carry(pack, u, du, before, out):
     """The resultants, linearised, at u + du, from those ``before``: out (2, points, elements)."""
     none, zero = np.empty((1, 1, 1)), np.int64(0)
-    cable_evaluate(pack, np.int64(CARRY), u, du, u, before, np.int64(1), out, none[0, 0], zero, zero)
+    cable_evaluate(pack, np.int64(CARRY), u, du, u, before, zero + 1, out, none[0, 0], zero, zero)
 
 
 @source

@@ -165,7 +165,8 @@ def tangent_stress(D, strain, S):
     for c in range(3):
         for p in lanes(S.shape[1]):
             for e in lanes(S.shape[2]):
-                S[c, p, e] = (D[3 * c, p, e] * strain[0, p, e] + D[3 * c + 1, p, e] * strain[1, p, e]
+                S[c, p, e] = (D[3 * c, p, e] * strain[0, p, e]
+                              + D[3 * c + 1, p, e] * strain[1, p, e]
                               + D[3 * c + 2, p, e] * strain[2, p, e])
 
 
