@@ -24,6 +24,7 @@ demo: $(VENV)/test.stamp
 	$(PY) demos/cantilever.py
 
 test: $(VENV)/test.stamp
+	$(PY) -m skfem_ancf.compiled
 	$(PY) -m pytest -n 2 $(ARGS)
 
 # what round-off could decide, in other kernels of OpenBLAS and without fused multiply-add;
@@ -32,9 +33,9 @@ GENERIC := compiled locking stability statics
 SCRIPTS := bench fuzz package paper stress
 
 test-settings: $(VENV)/test.stamp
-	OPENBLAS_CORETYPE=Nehalem NUMBA_CPU_NAME=generic \
-	  NUMBA_CACHE_DIR=$(CURDIR)/out/numba-generic \
-	  $(PY) -m pytest -n 2 $(ARGS) $(GENERIC:%=tests/test_%.py)
+	export OPENBLAS_CORETYPE=Nehalem NUMBA_CPU_NAME=generic \
+	  NUMBA_CACHE_DIR=$(CURDIR)/out/numba-generic; \
+	  $(PY) -m skfem_ancf.compiled && $(PY) -m pytest -n 2 $(ARGS) $(GENERIC:%=tests/test_%.py)
 	OPENBLAS_CORETYPE=Haswell SKFEM_ANCF_COMPILED=0 \
 	  $(PY) -m pytest -n 2 $(ARGS) tests $(SCRIPTS:%=--ignore=tests/test_%.py)
 

@@ -193,8 +193,8 @@ class Body:
                                      len(beam.q0) // beam.nd))
         self.constant = (beam.formulation.stabilisation(
             beam.mesh, beam.element, beam.material, beam.width)
-            if not beam.is_cable or (self.nb == 2 and beam.formulation.name == "assumed") else None)
-        if beam.is_cable:
+            if beam.has_sections or (self.nb == 2 and beam.formulation.name == "assumed") else None)
+        if not beam.has_sections:
             self._cable()
         else:
             self.terms = [self._term(t) for t in beam.formulation.terms(beam.element,
@@ -247,7 +247,7 @@ class Body:
         """(..., N)."""
         out = np.zeros_like(u)
         q = self._elements(self.q0 + u)
-        f = self._cable_force(q) if self.beam.is_cable else self._body_force(q)
+        f = self._cable_force(q) if not self.beam.has_sections else self._body_force(q)
         if self.constant is not None:
             du = self._elements(u)
             f = f + np.einsum("eab,...eb->...ea", np.broadcast_to(
@@ -341,7 +341,7 @@ def check(scene, state, tol=1e-5):
     force = internal_force(bodies, system, u)
     for body, s in zip(bodies, system.slices):  # the textbook, as scikit-fem assembles it
         beam = body.beam
-        if beam.formulation.name == "continuum" and not beam.is_cable:
+        if beam.formulation.name == "continuum" and beam.has_sections:
             f = asm(forms.textbook.internal_force(beam.material, beam.width,
                                                   beam.material.shear_factor(beam.element)),
                     beam.basis, r=beam.q0 + u[s])

@@ -108,6 +108,56 @@ def dense_solve(A, b):
     return True
 
 
+@primitive("factors")
+def subtract_rows(J, x, out):
+    """out -= J^T x."""
+    out -= x @ J
+
+
+@primitive("factors")
+def solve_joined(A, J, J1, free, anew, Y, S, b, x):
+    """Change x by multiples of the rows of ``Y = J A^-1`` so that ``J1 x`` becomes what -b was.
+
+    Parameters
+    ----------
+    A
+        With its factors.
+    J, J1
+        Shape (m, n).
+    free
+        The columns of J that are used, as ones and zeros.
+    anew
+        Make Y, shape (m, n), which is else taken as it is.
+    S
+        Becomes ``J1 Y^T``, shape (m, m).
+    b, x
+        Shapes (m,), (n,); b becomes what Y is multiplied by, subtracted from x.
+
+    Returns
+    -------
+    bool
+        False if S is singular.
+    """
+    if anew:
+        solve_many(A, J * free, Y)
+    np.dot(J1, Y.T, out=S)
+    b += J1 @ x
+    if not dense_solve(S, b):
+        return False
+    x -= b @ Y
+    return True
+
+
+def solve_many(A, B, X):
+    """X[k] = A^-1 B[k] for all k."""
+    ab = as_lapack(A)
+    if A.top:
+        X[:] = lapack.dgbtrs(ab, A.width, A.width, B.T, A.pivots)[0].T
+        return
+    y = lapack.dtbtrs(ab, B.T, uplo="L", diag="U")[0] / ab[0][:, None]
+    X[:] = lapack.dtbtrs(ab, y, uplo="L", trans="T", diag="U")[0].T
+
+
 @source
 def copy(a, b):
     """b = a."""

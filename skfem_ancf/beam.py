@@ -10,16 +10,14 @@ from skfem.assembly import Basis, FacetBasis, asm
 from skfem.element import ElementVector
 
 from . import forms
-from .cable import CableKernel
 from .elements import ElementBeam, choose_element
 from .errors import (InputError, MeshError, NameUnknown, require_finite, require_flag,
                      require_integer, require_label, require_like, require_names, require_positive,
                      shown, taught, teaching)
 from .finder import Finder
 from .formulations import COMPONENTS, get_formulation
-from .formulations.ecm import AXIS
 from .frozen import Frozen, read_only
-from .kernel import Kernel
+from .kinematics import KINEMATICS
 from .materials import Material
 from .mesh import MeshBeam
 from .places import as_point, facets_of
@@ -151,11 +149,8 @@ class Beam(Frozen):
         self.formulation = get_formulation(formulation)
         self.name = require_label("name", name)
         self.compiled = require_flag("compiled", compiled)
-        if element.order == 0 and not material.is_hooke:
-            raise InputError(
-                "a cable has Hooke's law of E and nu along its axis and bends with E I: it cannot "
-                f"have the law of {material!r}. Use StVenantKirchhoff, or an element with "
-                "sections, as ElementBeamANCFCubic(2)")
+        self.kinematics = KINEMATICS[element.kinematics]
+        self.kinematics.require_law(material)
         self.nd = 2 * element.nodal_dofs
         self.N = self.nd * mesh.p.shape[1]
 
@@ -211,10 +206,8 @@ class Beam(Frozen):
     def exact_basis(self) -> Basis:
         """A ``Basis`` whose quadrature is exact for products of two coordinates, as in the mass."""
         n = self.element.axis_degree + 1 + (0 if self.mesh.is_straight else 1)
-        if self.is_cable:  # its energy is a line integral, its mass that of the axis
-            return Basis(self.mesh, self.vector_element, quadrature=tensor(gauss(n), AXIS))
         return Basis(self.mesh, self.vector_element,
-                     quadrature=tensor(gauss(n), gauss(self.element.order + 1)))
+                     quadrature=tensor(gauss(n), self.kinematics.section_rule(self.element)))
 
     def facet_basis(self, facets: Place, intorder: int | None = None) -> FacetBasis:
         """A scikit-fem ``FacetBasis`` of the position field at a place, see :meth:`dofs`.
@@ -236,16 +229,13 @@ class Beam(Frozen):
     @cached_property
     def kernel(self) -> Any:
         """The fused evaluation of the strain energy; see :mod:`skfem_ancf.kernel`."""
-        kernel = (CableKernel if self.is_cable else Kernel)(
-            self.mesh, self.element, self.material, self.width, self.formulation)
-        if self.compiled:
-            kernel.compile()
-        return kernel
+        return self.kinematics.kernel(self.mesh, self.element, self.material, self.width,
+                                      self.formulation)
 
     @property
-    def is_cable(self) -> bool:
-        """True if the element has no section of its own."""
-        return self.element.order == 0
+    def has_sections(self) -> bool:
+        """True if points off the axis are linear in the coordinates: not of a cable."""
+        return self.kinematics.has_sections
 
     # coordinates
 
@@ -350,7 +340,7 @@ class Beam(Frozen):
             Shapes (2, n) and (n,): ``q[dofs] @ weights`` is the position.
         """
         e, X = self.locate(point)
-        if self.is_cable and abs(X[1] - 0.5) > 1e-6:
+        if not self.has_sections and abs(X[1] - 0.5) > 1e-6:
             raise InputError(
                 f"the point {tuple(map(float, np.ravel(point)))} is off the axis of a cable, whose "
                 "position there is no linear function of its coordinates: name a point of the "
@@ -388,13 +378,7 @@ class Beam(Frozen):
 
     def section_direction(self, node: int) -> tuple[Array, Array]:
         """Coordinates (2, n) and weights (n,) of the direction 12 / h^3 int Y r dY of a section."""
-        if self.is_cable:  # the tangent, which turns with the section
-            return node * self.nd + 2 + np.arange(2).reshape(2, 1), np.ones(1)
-        eta, w = gauss(self.element.order + 1)
-        h, f = self.mesh.height, self.element.functionals[2:2 + self.element.section.number]
-        c = np.array([12.0 * h ** (f[k][2] - 1) * np.sum(
-            w * (eta - 0.5) * self.element.section(eta - 0.5, k)[0]) for k in range(len(f))])
-        return node * self.nd + 4 + np.arange(2 * len(f)).reshape(-1, 2).T, c
+        return self.kinematics.direction(self, node)
 
     def rigid_motions(self) -> Array:
         """Two translations and the rotation about :attr:`origin`: shape (N, 3)."""
@@ -424,21 +408,7 @@ class Beam(Frozen):
         H, frame
             Shape (2, 2, nelements, npoints) both: H[i, J] = d u_i / d X_J, J along the frame.
         """
-        mapping = self.mesh.mapping()
-        if self.is_cable:
-            frame = mapping.frame(X, tind)
-            tangent, _, eps, kappa = self._cable_section(u, X, tind)
-            strain = self.strain(u, X, tind)
-            normal = np.array([-tangent[1], tangent[0]])
-            Y = self.mesh.height * (X[1] - 0.5)
-            F = np.stack([(1.0 + eps - Y * kappa) * tangent,
-                          np.sqrt(1.0 + 2.0 * strain[1]) * normal], axis=1)
-            return F - frame, frame
-        u_e = self.kernel.gather(u, slice(None) if tind is None else tind)
-        fields = (self.element.gbasis(mapping, X, k, tind)[0] for k in range(u_e.shape[1]))
-        grad = sum(np.einsum("ei,jep->ijep", u_e[:, k], f.grad) for k, f in enumerate(fields))
-        frame = mapping.frame(X, tind)
-        return np.einsum("ijep,jJep->iJep", grad, frame), frame
+        return self.kinematics.gradients(self, u, X, tind)
 
     @_fields
     def displacements(self, u: Array, X: Array, tind: Array | None = None) -> Array:
@@ -455,19 +425,7 @@ class Beam(Frozen):
         ndarray
             Shape (2, nelements, npoints).
         """
-        mapping = self.mesh.mapping()
-        u_e = self.kernel.gather(u, slice(None) if tind is None else tind)
-        out = sum(np.einsum("ei,ep->iep", u_e[:, k],
-                            np.asarray(self.element.gbasis(mapping, X, k, tind)[0]))
-                  for k in range(u_e.shape[1]))
-        if self.is_cable:
-            tangent, tangent0, _, _ = self._cable_section(u, X, tind)
-            turn = tangent - tangent0
-            out = out + self.mesh.height * (X[1] - 0.5) * np.array([-turn[1], turn[0]])
-        return out
-
-    def _cable_section(self, u, X, tind):
-        return self.kernel.section(u, X[0], tind, self.mesh, self.element)
+        return self.kinematics.displacements(self, u, X, tind)
 
     @_fields
     def strain(self, u: Array, X: Array, tind: Array | None = None) -> Array:
@@ -484,13 +442,7 @@ class Beam(Frozen):
         ndarray
             Shape (3, nelements, npoints).
         """
-        if self.is_cable:  # S_yy = 0
-            _, _, eps, kappa = self._cable_section(u, X, tind)
-            e = eps - self.mesh.height * (X[1] - 0.5) * kappa
-            xx = e + 0.5 * e * e
-            return np.array([xx, -self.material.lateral_ratio * xx, 0.0 * xx])
-        return self.sampled_strain(self.formulation.terms(self.element, self.material)[0],
-                                   u, X, tind)
+        return self.kinematics.strain(self, u, X, tind)
 
     def sampled_strain(self, term: Term, u: Array, X: Array, tind: Array | None = None) -> Array:
         """As :meth:`strain`, with the samples along the axis of a term of the formulation.
@@ -541,11 +493,7 @@ class Beam(Frozen):
         ndarray
             Shape (3, nelements, npoints).
         """
-        strain = self.strain(u, X, tind)
-        if self.is_cable:
-            return np.array([self.material.axial_modulus * strain[0], 0.0 * strain[0],
-                             0.0 * strain[0]])
-        return self.formulation.stress(self, strain, u, X, tind)
+        return self.kinematics.stress(self, self.strain(u, X, tind), u, X, tind)
 
     # mass
 
@@ -566,7 +514,7 @@ class Beam(Frozen):
     def _shapes(self):
         """Local functions (nb, ne, np) and volume weights (ne, np); ne = 1 if all are equal."""
         n = self.element.axis_degree + 1 + (0 if self.mesh.is_straight else 1)
-        X, W = tensor(gauss(n), AXIS if self.is_cable else gauss(self.element.order + 1))
+        X, W = tensor(gauss(n), self.kinematics.section_rule(self.element))
         tind = np.array([0]) if self.mesh.is_uniform else None
         mapping = self.mesh.mapping()
         N = np.array([np.asarray(self.element.gbasis(mapping, X, i, tind)[0])

@@ -4,10 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .kernels.cable import (CablePack, cable_carry, cable_force, cable_mean, cable_stress,
-                            cable_tangent)
-from .kernels.section import (SectionPack, section_carry, section_force, section_mean,
-                              section_stress, section_tangent)
+from .band import Band
+from .kernels.cable import CablePack, cable_evaluate
+from .kernels.section import (CARRY, FORCE, MEAN, STRESS, TANGENT, SectionPack, section_evaluate)
 from .source import lanes, primitive, source
 
 #: Kinds of packs, by their number in a table.
@@ -15,7 +14,7 @@ PACKS = SectionPack, CablePack
 SECTION, CABLE = range(2)
 #: Columns of a table: kind, first coordinate and the one behind the last, first stress and the one
 #: behind the last, and the shape of the stresses.
-KIND, FIRST, LAST, STRESS, END, COMPONENTS, POINTS, ELEMENTS = range(8)
+KIND, FIRST, LAST, BEGIN, END, COMPONENTS, POINTS, ELEMENTS = range(8)
 
 
 class Body(NamedTuple):
@@ -28,9 +27,11 @@ class Body(NamedTuple):
 class FlatBody(NamedTuple):
     """The same in three arrays, for compiled code: of one type, whatever the scene is.
 
-    ``where[k, j]`` has offset and shape of field j of pack k, or its value if it is a number.
+    ``where[k, j]`` has offset and shape of field j of pack k, or its value if it is a number;
+    ``address`` is that of the compiled function of :mod:`skfem_ancf.compiled.body`.
     """
 
+    address: int
     floats: np.ndarray
     ints: np.ndarray
     where: np.ndarray
@@ -53,7 +54,8 @@ def body_of(beams, slices):
     """The Body of beams with their slices of the coordinates."""
     packs, rows, at = [], [], 0
     for beam, s in zip(beams, slices):
-        for pack, shape in beam.kernel.packs:
+        for pack in beam.kernel.packs:
+            shape = beam.kernel.texts.components, len(pack.weights), len(pack.start)
             size = int(np.prod(shape))
             packs.append(pack)
             rows.append([PACKS.index(type(pack)), s.start, s.stop, at, at + size, *shape])
@@ -61,13 +63,21 @@ def body_of(beams, slices):
     return Body(tuple(packs), np.array(rows, dtype=np.int64))
 
 
-def flat_body(body):
+def _fields(pack):
+    """The fields of a pack and of those in it, in order."""
+    for value in pack:
+        if isinstance(value, tuple):
+            yield from _fields(value)
+        else:
+            yield value
+
+
+def flat_body(body, address):
     """The FlatBody of a Body."""
-    arrays = {"f": [], "i": []}
-    used = {"f": 0, "i": 0}
-    fields = max(len(kind._fields) for kind in PACKS)
-    where = np.zeros((len(body.packs), fields, 4), dtype=np.int64)
-    for k, pack in enumerate(body.packs):
+    packs = [tuple(_fields(pack)) for pack in body.packs]
+    where = np.zeros((len(packs), max(map(len, packs)), 4), dtype=np.int64)
+    arrays, used = {"f": [], "i": []}, {"f": 0, "i": 0}
+    for k, pack in enumerate(packs):
         for j, value in enumerate(pack):
             if np.ndim(value) == 0:
                 where[k, j, 0] = value
@@ -76,19 +86,24 @@ def flat_body(body):
             where[k, j, 0], where[k, j, 1:1 + value.ndim] = used[kind], value.shape
             arrays[kind].append(value.ravel())
             used[kind] += value.size
-    return FlatBody(np.concatenate(arrays["f"]), np.concatenate(arrays["i"]), where, body.table)
+    return FlatBody(address, np.concatenate(arrays["f"]), np.concatenate(arrays["i"]), where,
+                    body.table)
 
 
+@source
 def stress_size(body):
     """How many numbers the stresses of all integration points are."""
-    return int(body.table[-1, END])
+    size = 0
+    for k in range(body.table.shape[0]):
+        size = body.table[k, END]
+    return size
 
 
 @source
 def _stress(body, k, stresses):
     """The stresses of pack k, shape (components, points, elements), a view."""
     row = body.table[k]
-    return stresses[row[STRESS]:row[END]].reshape(row[COMPONENTS], row[POINTS], row[ELEMENTS])
+    return stresses[row[BEGIN]:row[END]].reshape(row[COMPONENTS], row[POINTS], row[ELEMENTS])
 
 
 @source
@@ -98,67 +113,67 @@ def _clear(x):
 
 
 @source
+def evaluate_body(body, what, u, v, f, given, use_given, out, A):
+    """What :func:`~skfem_ancf.kernels.section.section_evaluate` does, for all beams."""
+    flat = A.flat[A.top:]
+    for k in range(body.table.shape[0]):
+        a, b = body.table[k, FIRST], body.table[k, LAST]
+        old, new = _stress(body, k, given), _stress(body, k, out)
+        if body.table[k, KIND] == SECTION:
+            change = v[a:b] - u[a:b] if what == MEAN else v[a:b]
+            section_evaluate(section_pack(body, k), what, u[a:b], change, f[a:b], old, use_given,
+                             new, flat, A.ld, a)
+        else:
+            cable_evaluate(cable_pack(body, k), what, u[a:b], v[a:b], f[a:b], old, use_given, new,
+                           flat, A.ld, a)
+
+
+@primitive("body")
+def run_kernels(body, what, u, v, f, given, use_given, out, A):
+    """As :func:`evaluate_body`; compiled once, and not anew in each text that calls it."""
+    evaluate_body(body, what, u, v, f, given, use_given, out, A)
+
+
+@source
+def _no_band(x):
+    return Band(x, np.empty(0, np.int64), 1, 0, 0)
+
+
+@source
 def body_force(body, u, f):
     """The internal force."""
     _clear(f)
-    for k in range(body.table.shape[0]):
-        a, b = body.table[k, FIRST], body.table[k, LAST]
-        if body.table[k, KIND] == SECTION:
-            section_force(section_pack(body, k), u[a:b], f[a:b])
-        else:
-            cable_force(cable_pack(body, k), u[a:b], f[a:b])
+    none = np.empty(stress_size(body))
+    run_kernels(body, np.int64(FORCE), u, u, f, none, np.int64(0), none, _no_band(none))
 
 
 @source
 def body_tangent(body, u, f, carried, use_carried, stresses, A):
     """The internal force, the lower half of the tangent, and the stresses.
 
-    The loads complete it: :func:`~skfem_ancf.tables.add_load_stiffness`. The geometric part takes the stresses ``carried`` in place of these if ``use_carried``.
+    The loads complete it: :func:`~skfem_ancf.tables.add_load_stiffness`. The geometric part takes
+    the stresses ``carried`` in place of these if ``use_carried``.
     """
     _clear(f)
     _clear(A.flat)
-    flat = A.flat[A.top:]
-    for k in range(body.table.shape[0]):
-        a, b = body.table[k, FIRST], body.table[k, LAST]
-        old, new = _stress(body, k, carried), _stress(body, k, stresses)
-        if body.table[k, KIND] == SECTION:
-            section_tangent(section_pack(body, k), u[a:b], f[a:b], old, use_carried, new, flat,
-                            A.ld, a)
-        else:
-            cable_tangent(cable_pack(body, k), u[a:b], f[a:b], old, use_carried, new, flat, A.ld,
-                          a)
+    run_kernels(body, np.int64(TANGENT), u, u, f, carried, np.int64(use_carried), stresses, A)
 
 
 @source
 def body_stress(body, u, stresses):
     """The stresses at u."""
-    for k in range(body.table.shape[0]):
-        a, b = body.table[k, FIRST], body.table[k, LAST]
-        if body.table[k, KIND] == SECTION:
-            section_stress(section_pack(body, k), u[a:b], _stress(body, k, stresses))
-        else:
-            cable_stress(cable_pack(body, k), u[a:b], _stress(body, k, stresses))
+    run_kernels(body, np.int64(STRESS), u, u, u, stresses, np.int64(0), stresses, _no_band(u))
 
 
 @source
 def body_carry(body, u, du, stresses, carried):
     """The stresses, linearised, at u + du, from those at u."""
-    for k in range(body.table.shape[0]):
-        a, b = body.table[k, FIRST], body.table[k, LAST]
-        old, new = _stress(body, k, stresses), _stress(body, k, carried)
-        if body.table[k, KIND] == SECTION:
-            section_carry(section_pack(body, k), u[a:b], du[a:b], old, new)
-        else:
-            cable_carry(cable_pack(body, k), u[a:b], du[a:b], old, new)
+    run_kernels(body, np.int64(CARRY), u, du, u, stresses, np.int64(1), carried, _no_band(u))
 
 
 @source
 def body_mean(body, u0, u1, f):
     """The force whose work from u0 to u1 is the change of the strain energy."""
     _clear(f)
-    for k in range(body.table.shape[0]):
-        a, b = body.table[k, FIRST], body.table[k, LAST]
-        if body.table[k, KIND] == SECTION:
-            section_mean(section_pack(body, k), u0[a:b], u1[a:b], f[a:b])
-        else:
-            cable_mean(cable_pack(body, k), u0[a:b], u1[a:b], f[a:b])
+    none = np.empty(stress_size(body))
+    run_kernels(body, np.int64(MEAN), u0, u1, f, none, np.int64(0), none, _no_band(none))

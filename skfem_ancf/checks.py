@@ -63,7 +63,7 @@ def check(state: State) -> Checks:
     values, found = [], []
     for beam in state.beams:
         u = state.u_of(beam)
-        det, stretches = _deformation(beam, u)
+        det, stretches = beam.kinematics.deformation(beam, u)
         values.append((np.min(det), np.min(stretches), np.max(stretches), turning(beam, u)))
         found += _findings(beam, values[-1][1], values[-1][3])
     det, low, high, turn = zip(*values)
@@ -120,11 +120,11 @@ def warn_of(state: State, stacklevel: int) -> None:
 def _findings(beam, stretch, turn):
     who = "" if beam.name is None else f" of beam {beam.name!r}"
     out = []
-    if stretch < COMPRESSED and not beam.is_cable and _is_linear(beam):
+    if stretch < COMPRESSED and beam.has_sections and _is_linear(beam):
         out.append(f"a fibre{who} is compressed to {stretch:.3g} of its length; below "
                    f"{COMPRESSED:.3g} St. Venant-Kirchhoff resists less and less: use NeoHookean, "
                    "or a smaller load")
-    if beam.is_cable and stretch <= 0.0:
+    if not beam.has_sections and stretch <= 0.0:
         out.append(f"the sections{who} overlap: the axis is bent to a radius below half the height")
     limit = turning_limit(beam)
     if turn > limit:
@@ -186,36 +186,4 @@ def shortest(beam: Beam, u: Array) -> float:
     u
         Displacement of its coordinates, shape (N,).
     """
-    kernel, least = beam.kernel, np.inf
-    for part in kernel.chunks():
-        u_e = kernel.gather(u, part)
-        if beam.is_cable:
-            eps, kappa = kernel.strain(u_e, part)
-            least = min(least, np.min(1.0 + eps - 0.5 * beam.mesh.height * np.abs(kappa)))
-        else:
-            least = min(least, kernel.tables[0].part(part).shortest(u_e))
-    return float(least)
-
-
-def _deformation(beam, u):
-    """det F and both principal stretches at the integration points; two arrays."""
-    if beam.is_cable:
-        return _cable_deformation(beam, u)
-    det, stretches = [], []
-    for term in beam.formulation.terms(beam.element, beam.material):
-        H, frame = beam.gradients(u, term.quadrature[0])
-        F = H + frame
-        C = np.einsum("ikep,ijep->kjep", F, F)
-        middle, half = 0.5 * (C[0, 0] + C[1, 1]), 0.5 * (C[0, 0] - C[1, 1])
-        root = np.hypot(half, C[0, 1])
-        stretches.append(np.sqrt(np.maximum([middle - root, middle + root], 0.0)).ravel())
-        det.append((F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]).ravel())
-    return np.concatenate(det), np.concatenate(stretches)
-
-
-def _cable_deformation(beam, u):
-    eps, kappa = beam.kernel.strain(beam.kernel.gather(u))
-    along = 1.0 + eps + 0.5 * beam.mesh.height * np.abs(kappa) * np.array([[[-1.0]], [[1.0]]])
-    ratio = beam.material.lateral_ratio
-    across = np.sqrt(np.maximum(1.0 - ratio * (along * along - 1.0), 0.0))  # S_yy = 0
-    return along * across, along
+    return float(beam.kinematics.shortest(beam, u))

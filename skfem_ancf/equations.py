@@ -66,7 +66,9 @@ class Tables:
 
     @cached_property
     def flat(self):
-        return self.plain._replace(body=flat_body(self.plain.body))
+        from . import compiled
+
+        return self.plain._replace(body=flat_body(self.plain.body, compiled.kernels()))
 
     @property
     def handle(self):

@@ -223,7 +223,7 @@ class Values(Mapping):
         material = self.beam.material
         if material.plane == "stress":
             return np.zeros(self.n)
-        if self.beam.is_cable:  # eps_zz = 0 and S_yy = 0
+        if not self.beam.has_sections:  # eps_zz = 0 and S_yy = 0
             return material.nu * self.S[0] / self._volume
         with np.errstate(invalid="ignore", divide="ignore"):
             return material.stress_zz(self.strain) / self._volume
@@ -232,7 +232,7 @@ class Values(Mapping):
     def energy(self) -> Array:
         """Strain energy per stress-free volume, (n,)."""
         law = self.beam.material.law()
-        if isinstance(law, LinearLaw) or self.beam.is_cable:
+        if isinstance(law, LinearLaw) or not self.beam.has_sections:
             return 0.5 * np.sum(self.strain * self.S, axis=0)
         return law.energy(self.strain)
 

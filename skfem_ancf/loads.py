@@ -450,7 +450,7 @@ class Pressure(Load):
         super().__init__(_the_beam(beam), amplitude)
         self.boundary, self.p = boundary, p
         basis = beam.facet_basis(boundary)
-        if beam.is_cable and np.any(basis.find < beam.mesh.p.shape[1]):
+        if not beam.has_sections and np.any(basis.find < beam.mesh.p.shape[1]):
             raise InputError(
                 f"a pressure at {boundary!r} of a cable would do nothing: its points across the "
                 "section are no coordinates. Use an element with sections, as ElementBeamANCF(2), "

@@ -1,19 +1,175 @@
-"""Where texts run: in plain NumPy, or compiled."""
+"""Where texts run: in plain NumPy, or compiled where that pays."""
 
+from __future__ import annotations
+
+import logging
+import time
+from functools import wraps
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from . import compiled
 from .equations import Tables
+from .kernels.law import OWN
+from .kernels.section import SectionPack
+from .own import PENDING
+from .progress import progress_bar
+from .switch import compiled_off, wanted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+logger = logging.getLogger(__name__)
+
+#: Seconds that compiling takes, about: the kernels, which all texts call, and each text; and
+#: loading what lies on disk.
+COMPILING = {"kernels": 42.0, "equilibrium": 29.0, "steps": 20.0, "evaluate": 6.0}
+LOADING = 0.7
+
+
+def compiling(name: str) -> float:
+    """Seconds that compiling a text takes, about, with the kernels where there are none.
+
+    Parameters
+    ----------
+    name
+        A key of :data:`COMPILING`.
+    """
+    there = compiled.kernels.cache_info().currsize or compiled.on_disk("kernels")
+    return COMPILING[name] + (0.0 if there else COMPILING["kernels"])
+
+
+class Choice(NamedTuple):
+    """Which way a text runs, "plain", "loaded" or "compiled", and why."""
+
+    way: str
+    reason: str
+
+
+class _Clock:
+    """Seconds that plain texts have taken in this process."""
+
+    def __init__(self):
+        self.spent = 0.0
+
+    def timed(self, text):
+        """The text, its time added up."""
+        @wraps(text)
+        def run(*args):
+            begun = time.perf_counter()
+            try:
+                with np.errstate(all="ignore"):  # what overflows is seen in the residual
+                    return text(*args)
+            finally:
+                self.spent += time.perf_counter() - begun
+
+        return run
+
+
+#: Of the process: what it has spent on one scene says that others will follow.
+CLOCK = _Clock()
 
 
 class Machine:
     """Runs the texts of a system.
 
+    A scene begins in NumPy. What is compiled already in this process is used at once; what lies on
+    disk, once NumPy has taken as long as loading it would take; what has to be compiled, once it
+    has taken as long as that: so no run takes more than twice the time of the better choice.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+
     Attributes
     ----------
     tables : Tables
+        The equations.
     """
 
     def __init__(self, system):
         self.tables = Tables(system)
+        self._plain = None
+        if not all(beam.compiled for beam in system.beams):
+            self._plain = "compiled=False"
+        elif any(isinstance(pack, SectionPack) and pack.law.kind == OWN
+                 for pack in self.tables.plain.body.packs):
+            self._plain = "a law of your own"
 
-    def of(self, text):
+    @property
+    def _off(self):
+        if self._plain is not None:
+            return self._plain
+        return compiled.PROBLEMS[0] if compiled.PROBLEMS else compiled_off()
+
+    def choose(self, name: str) -> Choice:
+        """The way of a text for the next call.
+
+        Parameters
+        ----------
+        name
+            A key of :data:`COMPILING`.
+        """
+        if self._off is not None:
+            return Choice("plain", self._off)
+        if name in compiled.LOADED:
+            return Choice("loaded", "compiled code is loaded")
+        seconds = compiling(name)
+        if wanted() == "1":
+            return Choice("compiled", "SKFEM_ANCF_COMPILED=1")
+        if compiled.on_disk(name):
+            if CLOCK.spent >= LOADING:
+                return Choice("compiled", "compiled code lies on disk")
+            return Choice("plain", f"NumPy has taken {CLOCK.spent:.2g} s so far, loading the "
+                          f"compiled code from disk takes about {LOADING:g} s")
+        if CLOCK.spent >= seconds:
+            return Choice("compiled", f"NumPy has taken {CLOCK.spent:.3g} s, compiling takes "
+                          f"about {seconds:g} s")
+        return Choice("plain", f"NumPy has taken {CLOCK.spent:.2g} s so far, compiling would take "
+                      f"about {seconds:g} s; python -m skfem_ancf.compiled does it beforehand")
+
+    def of(self, text: Callable) -> tuple[Callable, Any]:
         """The function of a text, plain or compiled, and the equations that it takes."""
-        return text, self.tables.plain
+        name = text.__name__
+        choice = self.choose(name)
+        if choice.way == "plain":
+            return CLOCK.timed(text), self.tables.plain
+        if choice.way == "loaded":
+            return _passing_on(compiled.LOADED[name]), self.tables.flat
+        try:
+            equations = self.tables.flat
+        except ImportError as error:  # made for another NumPy
+            compiled.PROBLEMS.append(f"Numba cannot be imported: {error}")
+            logger.info(compiled.PROBLEMS[-1])
+            return CLOCK.timed(text), self.tables.plain
+        return lambda *args: _passing_on(_load(text, args))(*args), equations
+
+
+def _passing_on(function):
+    """A compiled function, with the exceptions of Python that it could not pass on."""
+    def run(*args):
+        result = function(*args)
+        if PENDING:
+            error = PENDING[0]
+            PENDING.clear()
+            raise error
+        return result
+
+    return run
+
+
+def _load(text, args):
+    """The compiled function, or None; says so where that takes long."""
+    name = text.__name__
+    if name in compiled.LOADED:
+        return compiled.LOADED[name]
+    if compiled.on_disk(name):
+        return compiled.load(text, args)
+    said = f"compiling once, about {compiling(name):g} s, kept on disk"
+    logger.info("%s: %s", name, said)
+    with progress_bar(None, 1.0, said) as bar:
+        function = compiled.load(text, args)
+        bar.update(1.0)
+    return function

@@ -18,6 +18,10 @@ def handle_of(thing):
     return number
 
 
+#: Exceptions of Python that compiled code cannot pass on, for who called it.
+PENDING: list[BaseException] = []
+
+
 def owner(handle):
     """The object of a handle."""
     return _objects[handle]
@@ -43,7 +47,10 @@ def own_load_stiffness(handle, t, scale, u, flat):
 
 @primitive("own")
 def own_joints(handle, what, t, u, v, out):
-    """Joints that are no tables: 0 Phi, 1 J v, 2 J^T v, 3 J, 4 the second derivative by v, v."""
+    """Joints that are no tables: 0 Phi, 1 J v, 2 J^T v, 3 J, 4 the second derivative by v, v.
+
+    With multipliers and a vector in v, one behind the other, 5 is the second derivative by both.
+    """
     owner(handle).add_own_joints(what, t, u, v, out)
 
 

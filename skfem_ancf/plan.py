@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from .errors import NameUnknown, require_option
-from .switch import compiled_off
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -66,7 +65,7 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
     shared = [b for b in beams if b.kernel.shared]
     add("tables", "constant", "one for all elements of a straight beam with equal elements"
         if len(shared) == len(beams) else "one for each element: curved or unequal elements")
-    poisson = [b for b in beams if b.material.nu != 0 and not b.is_cable]
+    poisson = [b for b in beams if b.material.nu != 0 and b.has_sections]
     if poisson:
         add("Poisson coupling", "computed", "nu = " + ", ".join(
             sorted({f"{b.material.nu:g}" for b in poisson})))
@@ -93,8 +92,10 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         f"{s.m} equations of {len(s.joints)} joint(s)" if s.m else
         "no joints" if not scene.joints else "the joints only fix coordinates")
     bandwidth = s.K.bandwidth
-    if s.m and not dynamic and not s.bordered:
-        solver = f"sparse LU with the multipliers: too many for a border ({s.m})"
+    if s.m and not dynamic and s.machine.tables.plain.border.wide:
+        solver = "sparse LU with the multipliers: " + (
+            "a joint of your own is not quadratic" if s.bordered else
+            f"too many for a border ({s.m})")
     elif not s.symmetric:
         solver = f"banded LU, half bandwidth {bandwidth}: a pressure has no potential"
     else:
@@ -104,26 +105,15 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         solver += ", bordered by the multipliers" + (
             f" and by {springs} springs on beams that joints alone hold" if springs else "")
     add("linear solver", "computed", solver)
-    rules = sorted({(b.element.order, b.kernel.section_points) for b in beams if not b.is_cable})
+    rules = sorted({(b.element.order, b.kernel.section_points) for b in beams if b.has_sections})
     add("section quadrature", "constant" if rules else "skipped",
         "; ".join(f"order {n}: {p} points, exact for degree {2 * p - 1} of {4 * n}"
                   for n, p in rules) or "a cable has EA and EI")
-    compiled = [b for b in beams if b.kernel.compiled is not None]
-    add("compiled kernels", "computed" if compiled else "skipped",
-        f"{len(compiled)} of {len(beams)} beams by Numba" if compiled else
-        compiled_off() or "moduli that vary" if any(b.compiled for b in beams) else
-        "compiled=False")
-    what = "time steps" if dynamic else "iterations"
     if linear:
-        whole, reason = False, "one solve"
-    elif s.structure is None:
-        whole, reason = False, (
-            "a pressure, a load or a joint of your own, or a beam without compiled kernels")
-    elif s.joints and not dynamic and not s.bordered:
-        whole, reason = False, "too many multipliers for a border"
+        add("compiled loop", "skipped", "one solve")
     else:
-        whole, reason = True, f"whole {what} are compiled" + (
-            ", in blocks; a step that fails is taken again in NumPy" if dynamic else "")
-    add("compiled loop", "computed" if whole else "skipped", reason)
+        way, reason = s.machine.choose("steps" if dynamic else "equilibrium")
+        add("compiled loop", "skipped" if way == "plain" else "computed",
+            f"whole {'time steps, in blocks' if dynamic else 'iterations'}: {reason}")
     add("fields", "skipped", "strain and stress are computed where a State is asked for them")
     return Plan(items)

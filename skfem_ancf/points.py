@@ -109,7 +109,7 @@ class Part:
     @cached_property
     def off_axis(self) -> bool:
         """Points of a cable off its axis: their section turns with the tangent."""
-        return self.beam.is_cable and bool(np.any(np.abs(self.X[1] - 0.5) > 1e-12))
+        return not self.beam.has_sections and bool(np.any(np.abs(self.X[1] - 0.5) > 1e-12))
 
     @cached_property
     def dofs(self) -> Array:

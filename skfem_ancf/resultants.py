@@ -227,12 +227,12 @@ def _own(state, beam, e, xi):
     arm = position(X) - position(axis)
     area = beam.width * mesh.height * w
     R, M = P @ area, cross(arm, P) @ area
-    angle, stretch, shear, curvature = (_cable_axis if beam.is_cable else _axis_of_element)(
+    angle, stretch, shear, curvature = (_axis_of_element if beam.has_sections else _cable_axis)(
         beam, u, e, xi)
     t, normal = _directions(angle)
     N, Q = np.sum(R * t, axis=0), np.sum(R * normal, axis=0)
-    if beam.is_cable:
-        EA, EI = beam.kernel.stiffness
+    if not beam.has_sections:
+        EA, EI = beam.kernel.packs[0].stiffness
         N, Q, M = EA * (stretch - 1.0), np.full(len(e), np.nan), EI * curvature
         R = N * t + Q * normal
     return dict(N=N, Q=Q, M=M, curvature=curvature, stretch=stretch, shear=shear, angle=angle,

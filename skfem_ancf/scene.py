@@ -301,7 +301,7 @@ class Scene:
         k = self._number(beam)
         beam = b = self._beams[k]
         require_option("thickness", thickness, ("fixed", "free"))
-        if thickness == "fixed" and not b.is_cable:
+        if thickness == "fixed" and b.has_sections:
             return self._put([Support(k, boundary, tuple(b.element.welded))])
         return self._put([Support(k, boundary, "r")],
                          joints=[get_joint("plane", at=boundary, beam=beam, name="of a clamp")])

@@ -194,7 +194,7 @@ class SectionForces:
         beam, mesh = self.beam, self.beam.mesh
         ne, (x, w) = mesh.nelements, gauss(ALONG)
         e, xi = np.repeat(np.arange(ne), ALONG), np.tile(x, ne)
-        eta, v = (np.array([0.5]), np.ones(1)) if beam.is_cable else gauss(beam.element.order + 1)
+        eta, v = beam.kinematics.section_rule(beam.element)
         inside = Sections(self, e, xi, eta)
         parts = [(inside, beam.width * v * inside.volume * inside.body)]
         for side in (0, 1):
@@ -208,10 +208,7 @@ class SectionForces:
         self._force, self._moment = force.reshape(2, ne, ALONG), moment.reshape(ne, ALONG)
         w = np.tile(w, ne)
         load = sum(at.spread(f * w[:, None]) for at, f in parts)
-        kernel = beam.kernel
-        internal = np.concatenate([
-            kernel.evaluate(kernel.gather(u, part), part, tangent=False).force
-            for part in kernel.chunks()])
+        internal = beam.kernel.forces(u)
         left, right = np.split(internal - load, 2, axis=1)
         q = np.split(self.q, 2, axis=1)
         # of the part of the beam on the right of a section on that on its left

@@ -1,41 +1,60 @@
-"""Whether compiled kernels may be used."""
+"""Whether compiled texts may be used."""
 
 from __future__ import annotations
 
 import os
+import sys
+from importlib.util import find_spec
 
 from .errors import InputError
 
-#: Environment variable: "0" leaves Numba out, as if it were not installed; "1" is the default.
+#: Environment variable: "0" leaves Numba out, as if it were not installed; "1" compiles at once;
+#: "auto", the default, where it pays.
 VARIABLE = "SKFEM_ANCF_COMPILED"
 
 
-def compiled_off() -> str | None:
-    """Why the kernels compiled by Numba are not used, or None where they are.
+def wanted() -> str:
+    """What the environment variable ``SKFEM_ANCF_COMPILED`` says: "0", "1" or "auto".
 
     Raises
     ------
     InputError
-        If the environment variable ``SKFEM_ANCF_COMPILED`` is neither 0 nor 1.
+        If it says anything else.
+    """
+    value = os.environ.get(VARIABLE, "auto")
+    if value not in ("0", "1", "auto"):
+        raise InputError(f"the environment variable {VARIABLE} must be 0 (without Numba), 1 "
+                         f"(compile at once) or auto (where it pays), got {value!r}")
+    return value
+
+
+def compiled_off() -> str | None:
+    """Why nothing is compiled by Numba, or None where it may be.
+
+    Raises
+    ------
+    InputError
+        If the environment variable ``SKFEM_ANCF_COMPILED`` is neither 0, 1 nor auto.
 
     Examples
     --------
     >>> import os
     >>> from skfem_ancf.switch import compiled_off
-    >>> before = os.environ.get("SKFEM_ANCF_COMPILED", "1")
+    >>> before = os.environ.get("SKFEM_ANCF_COMPILED", "auto")
     >>> os.environ["SKFEM_ANCF_COMPILED"] = "0"
     >>> compiled_off()
     'SKFEM_ANCF_COMPILED=0'
     >>> os.environ["SKFEM_ANCF_COMPILED"] = before
     """
-    value = os.environ.get(VARIABLE, "1")
-    if value not in ("0", "1"):
-        raise InputError(f"the environment variable {VARIABLE} must be 0 (without Numba) or 1, "
-                         f"got {value!r}")
-    if value == "0":
+    if wanted() == "0":
         return f"{VARIABLE}=0"
-    try:
-        from numba import config
-    except ImportError as error:  # not installed, or made for another NumPy
-        return f"Numba cannot be imported: {error}"
-    return "NUMBA_DISABLE_JIT is set" if config.DISABLE_JIT else None
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+        return "NUMBA_DISABLE_JIT is set"
+    return None if _installed() else "Numba is not installed: pip install skfem-ancf[fast]"
+
+
+def _installed() -> bool:
+    """True if Numba is there: asked without importing it, which takes longer than a solution."""
+    if "numba" in sys.modules:
+        return sys.modules["numba"] is not None
+    return find_spec("numba") is not None

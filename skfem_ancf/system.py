@@ -10,8 +10,10 @@ from scipy.sparse.linalg import splu
 from .checks import Screen
 from .constraints import Constraints
 from .errors import InputError
+from .evaluation import CARRY, FORCE, MEAN, TANGENT, evaluate
 from .linalg import (INACCURATE, BandMatrix, BorderedMatrix, border, border_negative,
                      columns_product, dense)
+from .machine import Machine
 from .pickling import functions_of, require_picklable
 from .points import Points
 from .rank import determinant_sign, null_basis, sparse_inertia
@@ -131,16 +133,27 @@ class System:
     def internal_force(self, u):
         """The internal force, shape (N,)."""
         self._require_coordinates(u)
-        return np.concatenate([b.kernel.force(u[s]) for b, s in zip(self.beams, self.slices)])
+        return self._evaluate(FORCE, u)
 
-    def strains(self, u):
-        """Strains at the integration points, for :meth:`mean_internal_force`."""
-        return [b.kernel.strains(u[s]) for b, s in zip(self.beams, self.slices)]
-
-    def mean_internal_force(self, u0, u1, strains0):
+    def mean_internal_force(self, u0, u1):
         """The internal force whose work from u0 to u1 is the change of the strain energy."""
-        return np.concatenate([b.kernel.mean_force(u0[s], u1[s], e)
-                               for b, s, e in zip(self.beams, self.slices, strains0)])
+        return self._evaluate(MEAN, u0, u1)
+
+    def _evaluate(self, what, u, v=None, load=1.0, t=None, stresses=None, carried=None,
+                  use_carried=False):
+        """Run :func:`~skfem_ancf.evaluation.evaluate`; returns the force."""
+        tables = self.machine.tables
+        u, v = np.array(u, dtype=float), np.array(u if v is None else v, dtype=float)
+        factors = tables.static_factors(load)
+        if t is not None and self._varying:
+            factors = load * tables.factors(np.array([t]))[0]
+        none = tables.stresses if stresses is None or carried is None else None
+        force = np.zeros(self.N)
+        run, equations = self.machine.of(evaluate)
+        run(equations, what, u, v, factors, np.nan if t is None else float(t), float(load),
+            use_carried, none if stresses is None else stresses,
+            none if carried is None else carried, force)
+        return force
 
     def mean_external_force(self, u0, u1, t0, t1):
         """The loads' mean over a step from u0 to u1."""
@@ -204,12 +217,54 @@ class System:
         return any(b.kernel.inverted(u[s]) for b, s in zip(self.beams, self.slices))
 
     @cached_property
-    def structure(self):
-        """The tables for whole compiled iterations, or None where not all is compiled."""
-        if any(beam.kernel.compiled is None for beam in self.beams):
-            return None
-        from .compiled.structure import structure_of
-        return structure_of(self)
+    def machine(self):
+        """What runs texts on the equations of this system."""
+        return Machine(self)
+
+    # what texts ask of it, see skfem_ancf.own
+
+    def add_own_force(self, t, scale, u, out):
+        for load in self.machine.tables.own_loads:
+            s = self.of(load)
+            out[s] += scale * load.factor(None if np.isnan(t) else t) * load.force(u[s])
+
+    def add_own_mean_force(self, t, u0, u1, out):
+        for load in self.machine.tables.own_loads:
+            s = self.of(load)
+            force = load.force(u1[s]) if np.array_equal(u0[s], u1[s]) else load.mean_force(
+                u0[s], u1[s])
+            out[s] += load.factor(t) * force
+
+    def subtract_own_stiffness(self, t, scale, u, flat):
+        for load in self.machine.tables.own_loads:
+            s = self.of(load)
+            i, j, v = load.stiffness(u[s])
+            keep = np.full(len(v), not self.symmetric) | (np.asarray(i) >= np.asarray(j))
+            factor = scale * load.factor(None if np.isnan(t) else t)
+            at = self.K._position(s.start + np.asarray(i), s.start + np.asarray(j))
+            np.add.at(flat, at[keep], -factor * np.asarray(v)[keep])
+
+    def add_own_joints(self, what, t, u, v, out):
+        if what == 0:
+            out[:] = self.constraint(u, t)
+        elif what == 1:
+            out += self.full_jacobian(u, t) @ v
+        elif what == 2:
+            out += v @ self.full_jacobian(u, t)
+        elif what == 3:
+            out += dense(self.full_jacobian(u, t)).ravel()
+        elif what == 4:
+            out += self.quadratic(u, t, v)
+        else:
+            out += self.curvature_times(u, t, v[:self.m], v[self.m:])
+
+    def solve_own(self, t, u, multipliers, R, phi, du, dm):
+        try:
+            self.factorize(u, t, multipliers)
+            du[:], dm[:] = self.solve(R, phi)
+        except (np.linalg.LinAlgError, RuntimeError):
+            return False
+        return True
 
     @cached_property
     def screen(self):
@@ -303,24 +358,18 @@ class System:
         """
         self._require_coordinates(u)
         self.K.clear()
-        force = np.zeros(self.N)
-        evaluations = []
-        for k, (beam, s) in enumerate(zip(self.beams, self.slices)):
-            evaluations.append((s, beam.kernel.assemble(
-                u[s], self.K, s.start, force[s], None if carried is None else carried[k],
-                geometric)))
-        for item in self._varying:
-            if item.constant:
-                continue
-            i, j, v = item.stiffness(u[self.of(item)])
-            first = self.of(item).start
-            self.K.add(first + i, first + j, -load * item.factor(t) * v)
-        return force, evaluations
+        stresses = self.machine.tables.stresses
+        if not geometric:
+            carried = np.zeros_like(stresses)
+        force = self._evaluate(TANGENT, u, None, load, t, stresses, carried, carried is not None)
+        return force, (u.copy(), stresses)
 
-    @staticmethod
-    def stress_step(evaluations, du):
-        """Stresses carried to ``u + du`` by linearisation, for each beam."""
-        return [assembly.carry(du[s]) for s, assembly in evaluations]
+    def stress_step(self, evaluations, du):
+        """Stresses carried to ``u + du`` by linearisation."""
+        u, stresses = evaluations
+        carried = np.zeros_like(stresses)
+        self._evaluate(CARRY, u, du, stresses=stresses, carried=carried)
+        return carried
 
     def multiply(self, v):
         """The assembled tangent times a vector, before :meth:`factorize`."""

@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .band import mirror
-from .kernels.moments import MomentPack, add_moment_stiffness, add_moments
-from .own import own_force, own_joints, own_load_stiffness
+from .band import copy, mirror
+from .kernels.moments import (MomentPack, add_mean_moments, add_moment_stiffness,
+                              add_moments)
+from .own import own_force, own_joints, own_load_stiffness, own_mean_force
 from .source import lanes, primitive, source
 
 
@@ -71,6 +72,24 @@ def add_triples(out, at, v, x, i, y, j):
     np.add.at(out, at, v * x[i] * y[j])
 
 
+@primitive("scatter")
+def add_entries(J, k, i, v):
+    """J[k, i] += v."""
+    np.add.at(J, (k, i), v)
+
+
+@primitive("scatter")
+def add_weighted_entries(J, k, i, v, x, j):
+    """J[k, i] += v x[j]."""
+    np.add.at(J, (k, i), v * x[j])
+
+
+@primitive("scatter")
+def subtract_from_band(A, i, j, v, x, k):
+    """A[i, j] -= v x[k], of a band matrix."""
+    np.add.at(A.flat, j * A.ld + A.top + i - j, -v * x[k])
+
+
 # joints
 
 
@@ -80,7 +99,7 @@ def constraint(joints, c, g, t, u, phi):
     for k in lanes(phi.size):
         phi[k] = c[k]
     if joints.own > 0:
-        own_joints(joints.own, 0, t, u, u, phi)
+        own_joints(joints.own, np.int64(0), t, u, u, phi)
         return
     add_products(phi, joints.gk, g, u, joints.gi)
     add_triples(phi, joints.hk, 0.5 * joints.hv, u, joints.hi, u, joints.hj)
@@ -90,7 +109,7 @@ def constraint(joints, c, g, t, u, phi):
 def add_constraint_rate(joints, g, t, u, v, out):
     """out += J(u) v."""
     if joints.own > 0:
-        own_joints(joints.own, 1, t, u, v, out)
+        own_joints(joints.own, np.int64(1), t, u, v, out)
         return
     add_products(out, joints.gk, g, v, joints.gi)
     add_triples(out, joints.hk, joints.hv, v, joints.hi, u, joints.hj)
@@ -100,26 +119,35 @@ def add_constraint_rate(joints, g, t, u, v, out):
 def add_joint_force(joints, g, t, u, multipliers, out):
     """out += J(u)^T multipliers."""
     if joints.own > 0:
-        own_joints(joints.own, 2, t, u, multipliers, out)
+        own_joints(joints.own, np.int64(2), t, u, multipliers, out)
         return
     add_products(out, joints.gi, g, multipliers, joints.gk)
     add_triples(out, joints.hi, joints.hv, multipliers, joints.hk, u, joints.hj)
 
 
 @source
+def add_curvature_force(joints, t, u, multipliers, v, out):
+    """out += (sum over k of multipliers[k] H_k) v."""
+    if joints.own > 0:
+        both = np.empty(multipliers.size + v.size)
+        copy(multipliers, both[:multipliers.size])
+        copy(v, both[multipliers.size:])
+        own_joints(joints.own, np.int64(5), t, u, both, out)
+        return
+    add_triples(out, joints.hi, joints.hv, multipliers, joints.hk, v, joints.hj)
+
+
+@source
 def joint_directions(joints, g, t, u, J):
     """J(u), dense, shape (m, N)."""
-    m, N = J.shape
     flat = J.reshape(J.size)
     for i in lanes(flat.size):
         flat[i] = 0.0
     if joints.own > 0:
-        own_joints(joints.own, 3, t, u, u, flat)
+        own_joints(joints.own, np.int64(3), t, u, u, flat)
         return
-    one = np.ones(1)
-    first = np.zeros(joints.gk.size, np.int64)
-    add_products(flat, joints.gk * N + joints.gi, g, one, first)
-    add_products(flat, joints.hk * N + joints.hi, joints.hv, u, joints.hj)
+    add_entries(J, joints.gk, joints.gi, g)
+    add_weighted_entries(J, joints.hk, joints.hi, joints.hv, u, joints.hj)
 
 
 # loads
@@ -144,6 +172,30 @@ def external_force(loads, factors, t, scale, u, out):
 
 
 @source
+def mean_external_force(loads, factors, t, u0, u1, out):
+    """The mean force of all loads from u0 to u1: its work is what their potentials lose.
+
+    From u to u it is the force at u.
+    """
+    for i in lanes(out.size):
+        out[i] = 0.0
+    n = loads.vectors.shape[0]
+    for k in range(n):
+        c, vector = factors[k], loads.vectors[k]
+        for i in lanes(out.size):
+            out[i] += c * vector[i]
+    turning = loads.moments.M.size
+    add_mean_moments(loads.moments, factors[n:n + turning], u0, u1, out)
+    if loads.rows.size > 0:
+        middle = np.empty(out.size)
+        for i in lanes(out.size):
+            middle[i] = 0.5 * (u0[i] + u1[i])
+        add_triples(out, loads.rows, loads.values, factors, loads.which, middle, loads.columns)
+    if loads.own > 0:
+        own_mean_force(loads.own, t, u0, u1, out)
+
+
+@source
 def add_load_stiffness(loads, factors, t, scale, u, A):
     """Subtract the derivative of :func:`external_force` from a band matrix.
 
@@ -154,8 +206,6 @@ def add_load_stiffness(loads, factors, t, scale, u, A):
                          A.ld)
     mirror(A)
     if loads.rows.size > 0:
-        at = loads.columns * A.ld + A.top + loads.rows - loads.columns
-        one = -np.ones(1)
-        add_triples(A.flat, at, loads.values, factors, loads.which, one, 0 * loads.which)
+        subtract_from_band(A, loads.rows, loads.columns, loads.values, factors, loads.which)
     if loads.own > 0:
         own_load_stiffness(loads.own, t, scale, u, A.flat)

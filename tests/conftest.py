@@ -1,5 +1,10 @@
 """Fixtures: every element of the registry, and meshes of every kind."""
 
+import os
+
+# compiled from the first call on: what a test does must not depend on the time that others took
+os.environ.setdefault("SKFEM_ANCF_COMPILED", "1")
+
 import numpy as np
 import pytest
 

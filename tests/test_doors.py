@@ -121,7 +121,6 @@ DOORS = """
         return Scene(beam).clamp("left").gravity((0, -9.81))
 
     one, more, fewer = scene(4), scene(7), scene(2)
-    assert one.beams[0].kernel.compiled is not None
     state = one.solve_static()
     strided = State(one.system, np.repeat(state.u, 2)[::2])
     for same in (state, one.state(state.u), strided):
@@ -312,7 +311,7 @@ def test_a_cable_has_hookes_law(material):
     with pytest.raises(InputError, match="a cable has Hooke's law.*ElementBeamANCFCubic"):
         Beam(line(), ElementBeamCable(3), material, 0.01)
     assert Beam(line(), "auto", material, 0.01).element.order >= 2
-    assert Beam(line(), "auto", MATERIAL, 0.01).is_cable
+    assert not Beam(line(), "auto", MATERIAL, 0.01).has_sections
 
 
 # loads and joints of one's own

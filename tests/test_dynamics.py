@@ -10,13 +10,19 @@ from scipy.integrate import solve_ivp
 import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, MeshBeam, NeoHookean, Scene,
                         StVenantKirchhoff)
-from skfem_ancf.dynamics import (HHT, SCHEMES, EnergyMomentum, GeneralizedAlpha, Motion, Newmark,
-                                 get_scheme)
+from skfem_ancf.band import Band
+from skfem_ancf.body import Body
+from skfem_ancf.dynamics import HHT, SCHEMES, EnergyMomentum, GeneralizedAlpha, Newmark, get_scheme
+from skfem_ancf.dynamics.rates import JointMotion
+from skfem_ancf.dynamics.steps import STATE, Course, Matrices, Rule, steps
 from skfem_ancf.elements import ELEMENTS
+from skfem_ancf.equations import Equations
 from skfem_ancf.errors import ConvergenceError, InputError, NameUnknown, SupportError
 from skfem_ancf.formulations import FORMULATIONS
+from skfem_ancf.kernels.moments import MomentPack
 from skfem_ancf.linalg import BandMatrix
 from skfem_ancf.sampling import sample
+from skfem_ancf.tables import JointTables, LoadTables
 
 from conftest import quarter_arc
 
@@ -113,44 +119,31 @@ def test_order_with_moving_supports_and_joints(scheme):
 # dissipation
 
 
-class Oscillator:
-    """u'' + u = 0 with the interface that the schemes use."""
-
-    N, m, joints = 1, 0, ()
-    fixed = np.zeros(0, dtype=int)
-
-    class mass:
-        @staticmethod
-        def multiply(v):
-            return v
-
-    def external_force(self, u, t=None):
-        return 0.0 * u
-
-    def internal_force(self, u):
-        return 1.0 * u
-
-    def strains(self, u):
-        return None
-
-    def mean_internal_force(self, u0, u1, strains0):
-        return 0.5 * (u0 + u1)
-
-    def mean_external_force(self, u0, u1, t0, t1):
-        return 0.0 * u0
+def oscillator():
+    """u'' + u = 0 as equations, and its matrices."""
+    none, zero, one = np.zeros(0, np.int64), np.zeros(1, np.int64), np.ones(1)
+    moments = MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)), np.zeros((0, 2)),
+                         np.zeros(0))
+    spring = LoadTables(np.zeros((0, 1)), moments, zero, zero, -one, zero, 0)
+    joints = JointTables(none, none, none, np.zeros(0), none, none, 0)
+    M, mass, A = (Band(np.array([1.0, 0.0]), zero, 2, 0, 0) for _ in range(3))
+    equations = Equations(Body((), np.zeros((0, 8), np.int64)), spring, joints, none, one, A, None)
+    return equations, Matrices(M, mass, A)
 
 
 def amplification(scheme, dt):
     """Eigenvalues of a step of size dt of u'' + u = 0."""
+    equations, matrices = oscillator()
+    rule = Rule(int(scheme.conserving), *scheme.parameters, 1e-14, 0.0)
+    course = Course(dt, np.array([[dt, dt]]), np.ones((1, 1)), np.zeros((1, 3, 1)),
+                    JointMotion(np.zeros((1, 3, 0)), np.zeros((1, 4, 0)), 0))
     rows = []
     for u, v, w in np.eye(3):
-        one = np.ones(1)
-        y = Motion(0.0, u * one, v * one, -u * one, w * one, np.zeros(0))
-        step = scheme.begin(Oscillator(), y, dt)
-        at = [step.force(x) - step.acceleration(x) for x in (0 * one, one)]
-        x = at[0] / (at[0] - at[1])
-        new = step.finish(x, step.velocity(x), np.zeros(0), np.zeros(0))
-        rows.append(np.ravel([new.u, new.v, new.algorithmic]))
+        y, new = np.array([[u], [v], [-u], [w]]), np.empty((1, 4, 1))
+        done = steps(equations, matrices, rule, course, np.zeros(STATE), y, np.zeros((2, 0)), new,
+                     np.zeros((1, 2, 0)))
+        assert done == 1
+        rows.append(new[0, [0, 1, 3], 0])
     A = np.array(rows).T
     return np.linalg.eigvals(A if scheme.name != "energy-momentum" else A[:2, :2])
 

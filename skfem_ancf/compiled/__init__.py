@@ -1,12 +1,122 @@
-"""The kernels compiled by Numba, for scenes too small for batched NumPy.
+"""The texts of :mod:`skfem_ancf.source`, compiled by Numba and kept on disk.
 
-Found at run time: without the package numba nothing changes but the speed. The functions repeat
-what :mod:`skfem_ancf.kernel`, :mod:`skfem_ancf.cable`, :mod:`skfem_ancf.statics` and
-:mod:`skfem_ancf.dynamics` say, a block of elements at a time and into the band matrix, and are
-tested against them. What calls them from Python: :class:`CompiledKernel` for one beam,
-:class:`~skfem_ancf.compiled.structure.Structure` for all of a scene.
+Found at run time: without the package numba nothing changes but the speed. Only what Numba cannot
+take from the texts is written here: factors of bands, for which they have LAPACK, and calls of
+Python objects. ``python -m skfem_ancf.compiled`` compiles everything beforehand.
 """
 
-from .kernel import CompiledKernel
+from __future__ import annotations
 
-__all__ = ["CompiledKernel"]
+import hashlib
+import logging
+import os
+import sys
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+logger = logging.getLogger(__name__)
+
+#: Compiled functions that this process has, by the name of their text.
+LOADED: dict = {}
+#: Why Numba cannot be used though it is installed.
+PROBLEMS: list[str] = []
+
+
+@cache
+def stamp() -> str:
+    """Of all texts of the package: a function has parts from other files than its own."""
+    total = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.parent.rglob("*.py")):
+        text = path.read_bytes()
+        if b"@source" in text or path.parent.name == "compiled":
+            total.update(text)
+    return total.hexdigest()[:10]
+
+
+@cache
+def _folder() -> Path:
+    """Where notes are kept of what has been compiled: as Numba keeps its own."""
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    if given:
+        return Path(given)
+    own = Path(__file__).parent / "__pycache__"
+    if os.access(own if own.exists() else own.parent, os.W_OK):
+        return own
+    return Path.home() / ".cache" / "skfem_ancf"
+
+
+@cache
+def _key() -> str:
+    """What compiled code depends on besides the texts."""
+    try:
+        numba = version("numba")
+    except PackageNotFoundError:
+        numba = "none"
+    parts = (stamp(), numba, sys.implementation.cache_tag,
+             os.environ.get("NUMBA_CPU_NAME", ""), os.environ.get("NUMBA_CPU_FEATURES", ""))
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+
+
+def _note_of(name: str) -> Path:
+    return _folder() / f"skfem_ancf-{name}-{_key()}.compiled"
+
+
+def on_disk(name: str) -> bool:
+    """True if a text has been compiled and kept, as far as is known without Numba.
+
+    Parameters
+    ----------
+    name
+        Name of the text.
+    """
+    try:
+        return _note_of(name).exists() and _note_of("kernels").exists()
+    except OSError:
+        return False
+
+
+def note(name: str) -> None:
+    """Note that a text has been compiled; where that cannot be written it is compiled again.
+
+    Parameters
+    ----------
+    name
+        Name of the text.
+    """
+    try:
+        _folder().mkdir(parents=True, exist_ok=True)
+        _note_of(name).touch()
+    except OSError as error:
+        logger.info("no note of compiled code: %s", error)
+
+
+@cache
+def kernels() -> int:
+    """The address of the kernels of all beams; compiles them or takes them from disk."""
+    from .body import address
+
+    found = address()
+    note("kernels")
+    return found
+
+
+def load(text, args):
+    """The compiled function of a text, compiled or taken from disk for arguments like these.
+
+    Parameters
+    ----------
+    text
+        Marked by :func:`~skfem_ancf.source.source`.
+    args
+        What it will be called with.
+
+    Returns
+    -------
+    function
+    """
+    from .twin import compile_for
+
+    LOADED[text.__name__] = compile_for(text, args)
+    note(text.__name__)
+    return LOADED[text.__name__]

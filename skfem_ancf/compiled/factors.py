@@ -130,3 +130,33 @@ def dense_solve(A, b):
             b[j] -= A[j, k] * b[k]
         b[j] /= A[j, j]
     return True
+
+
+@jit
+def subtract_rows(J, x, out):
+    """out -= J^T x."""
+    for k in range(J.shape[0]):
+        for i in range(out.size):
+            out[i] -= J[k, i] * x[k]
+
+
+@jit
+def solve_joined(A, J, J1, free, anew, Y, S, b, x):
+    """Change x by multiples of the rows of ``Y = J A^-1`` so that ``J1 x`` becomes what -b was."""
+    if anew:
+        for k in range(b.size):
+            for i in range(x.size):
+                Y[k, i] = J[k, i] * free[i]
+            solve(A, Y[k])
+    for k in range(b.size):
+        for l in range(b.size):
+            s = 0.0
+            for i in range(x.size):
+                s += J1[k, i] * Y[l, i]
+            S[k, l] = s
+        for i in range(x.size):
+            b[k] += J1[k, i] * x[i]
+    if not dense_solve(S, b):
+        return False
+    subtract_rows(Y, b, x)
+    return True

@@ -4,6 +4,7 @@ import numba
 import numpy as np
 
 from ..kernels import law as laws
+from ..own import PENDING
 from .twin import jit
 
 #: Elements evaluated together: several vectors wide, with the work arrays still in cache.
@@ -82,7 +83,16 @@ def element_tangents(table, pairs, first, M, M_skew, K, K_skew):
 @jit
 def own_evaluate(handle, strain, out):
     with numba.objmode():
+        _kept(handle, strain, out)
+
+
+def _kept(handle, strain, out):
+    """Kernels are called by their address, which no exception passes."""
+    try:
         laws.own_evaluate(handle, strain, out)
+    except BaseException as error:
+        PENDING.append(error)
+        out[...] = np.nan
 
 
 @jit

@@ -1,29 +1,21 @@
 """Compiles the texts that :mod:`skfem_ancf.source` marks."""
 
-import hashlib
+import logging
+import pickle
 from functools import cache
 from importlib import import_module
-from pathlib import Path
 from types import FunctionType
 
-from numba import njit
+from numba import njit, typeof
 
 from ..source import column, lanes
+from . import stamp
+
+logger = logging.getLogger(__name__)
 
 # no "nnan" and "ninf": a strain that is not finite must be seen
-_FAST = {"contract", "reassoc", "nsz", "arcp"}
+FAST = {"contract", "reassoc", "nsz", "arcp"}
 _INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-
-
-@cache
-def stamp():
-    """Of all texts of the package: a function has parts from other files than its own."""
-    total = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.parent.rglob("*.py")):
-        text = path.read_bytes()
-        if b"@source" in text or path.parent.name == "compiled":
-            total.update(text)
-    return total.hexdigest()[:10]
 
 
 @cache
@@ -53,17 +45,64 @@ def twin(function, entry=False):
     for name in _names(function.__code__):
         if hasattr(names.get(name), "twin"):
             names[name] = twin(names[name])
-    text = FunctionType(function.__code__, names, function.__name__, function.__defaults__)
+    if not entry and (function.spliced or _small(function)):
+        return njit(fastmath=FAST, error_model="numpy", inline="always")(named(function, names))
+    return jit(named(function, names), entry)
+
+
+import os
+_S1,_S3=int(os.environ.get("S1","1500")),int(os.environ.get("S3","250"))
+def _small(function):
+    size=len(function.__code__.co_code)
+    n=_sites().get(function.__name__,0)
+    r = (n==1 and size<_S1) or (n<=3 and size<_S3)
+    if os.environ.get("SV"): print("splice" if r else "call  ", function.__name__, size, n)
+    return r
+
+@cache
+def _sites():
+    import dis, sys
+    out={}
+    for m in list(sys.modules.values()):
+        if not getattr(m,"__name__","").startswith("skfem_ancf"): continue
+        for f in vars(m).values():
+            if isinstance(f,FunctionType) and f.__module__==m.__name__ and hasattr(f,"twin"):
+                for i in dis.get_instructions(f.__code__):
+                    if i.opname=="LOAD_GLOBAL": out[i.argval]=out.get(i.argval,0)+1
+    return out
+
+
+def named(function, names=None):
+    """A copy, under a name by which Numba does not find code of other texts on disk."""
+    text = FunctionType(function.__code__, names or function.__globals__, function.__name__,
+                        function.__defaults__)
     text.__module__, text.__doc__ = function.__module__, function.__doc__
-    # Numba keeps it under this name: code of other texts is not found again
     text.__qualname__ = f"{function.__qualname__}_{stamp()}"
-    return jit(text, entry)
+    return text
 
 
 def jit(function, entry=False):
     """Compile a function; ``entry`` as for :func:`twin`."""
-    return njit(fastmath=_FAST, error_model="numpy", **({"cache": True} if entry else _INNER)
-                )(function)
+    options = {"fastmath": FAST, "error_model": "numpy"}
+    if not entry:
+        return njit(**options, **_INNER)(function)
+    try:
+        return njit(cache=True, **options)(function)
+    except RuntimeError as error:  # there is no folder that can be written
+        logger.info("compiled code is not kept: %s", error)
+        return njit(**options)(function)
+
+
+def compile_for(text, args):
+    """The twin of a text, compiled for arguments of these types."""
+    function, types = twin(text, True), tuple(typeof(x) for x in args)
+    try:
+        function.compile(types)
+    except (OSError, EOFError, pickle.PickleError, KeyError, ValueError) as error:
+        logger.info("what was kept of compiled code cannot be used: %s", error)
+        function = njit(fastmath=FAST, error_model="numpy")(function.py_func)
+        function.compile(types)
+    return function
 
 
 def _names(code):

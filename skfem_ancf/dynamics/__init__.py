@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..errors import require_option, taught
-from .base import Motion, Scheme, Step
+from .base import Motion, Scheme
 from .energy_momentum import EnergyMomentum
 from .generalized_alpha import HHT, GeneralizedAlpha, Newmark
 
@@ -28,4 +28,4 @@ def get_scheme(scheme: str | Scheme | type[Scheme]) -> Scheme:
 
 
 __all__ = ["HHT", "SCHEMES", "EnergyMomentum", "GeneralizedAlpha", "Motion", "Newmark", "Scheme",
-           "Step", "get_scheme"]
+           "get_scheme"]

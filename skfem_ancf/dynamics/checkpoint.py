@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-FORMAT = 1
+FORMAT = 2
 #: Times of a motion at which functions of time are compared.
 TIMES = 33
 #: Seconds between two files by default, and the part of the time that writing may take.

@@ -1,13 +1,6 @@
 """The energy-momentum scheme."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-from .base import Motion, Scheme, Step
-
-if TYPE_CHECKING:
-    from ..system import System
+from .base import Scheme
 
 
 class EnergyMomentum(Scheme):
@@ -37,45 +30,8 @@ class EnergyMomentum(Scheme):
 
     name = "energy-momentum"
     tol = 1e-14  # to round-off: what is left in the residual is lost energy
-    couples_velocity = True
-    compiled = True, (0.0, 0.0, 0.25, 0.5)
-
-    def begin(self, system: System, y: Motion, dt: float) -> Step:
-        return _Step(system, y, dt)
+    conserving = True
+    parameters = (0.0, 0.0, 0.5, 1.0)
 
     def __repr__(self):
         return "<EnergyMomentum>"
-
-
-class _Step(Step):
-    def __init__(self, system, y, dt):
-        self.system, self.y, self.dt = system, y, dt
-        self.t, self.joint_time = y.t + dt, y.t + 0.5 * dt
-        self.guess = y.u + dt * y.v + 0.5 * dt * dt * y.acceleration
-        self.mass_factor, self.stiffness_factor = 2.0 / dt**2, 0.5
-        self._strain0 = system.strains(y.u)
-
-    def force(self, u):
-        s, y = self.system, self.y
-        return (s.mean_external_force(y.u, u, y.t, self.t)
-                - s.mean_internal_force(y.u, u, self._strain0))
-
-    def acceleration(self, u):
-        return (u - self.y.u - self.dt * self.y.v) * (2.0 / self.dt**2)
-
-    def support_acceleration(self, v, a):
-        return (v - self.y.v[self.system.fixed]) / self.dt
-
-    def velocity(self, u):
-        return (u - self.y.u) * (2.0 / self.dt) - self.y.v
-
-    def middle(self, u):
-        return 0.5 * (self.y.u + u)
-
-    def finish(self, u, v, multipliers, impulse):
-        y, dt = self.y, self.dt
-        middle, force = (v - y.v) / dt, multipliers + impulse / dt
-        # what acts at the middle of the step, extrapolated to its end from the last two steps
-        ahead = dt / (dt + y.before)
-        return Motion(self.t, u, v, middle + ahead * (middle - y.algorithmic), middle,
-                      force + ahead * (force - y.force), force, dt)

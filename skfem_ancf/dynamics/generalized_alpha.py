@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, require_finite_scalar, taught
-from .base import Motion, Scheme, Step
+from .base import Scheme
 
 if TYPE_CHECKING:
-    from ..system import System
     from ..types import Array
+    from .base import Motion
 
 
 class GeneralizedAlpha(Scheme):
@@ -49,11 +49,8 @@ class GeneralizedAlpha(Scheme):
         self.error_constant = abs(self.beta - 1.0 / 6.0)
 
     @property
-    def compiled(self) -> tuple[bool, tuple[float, ...]]:  # type: ignore[override]
-        return False, (self.alpha_m, self.alpha_f, self.beta, self.gamma)
-
-    def begin(self, system: System, y: Motion, dt: float) -> Step:
-        return _Step(self, system, y, dt)
+    def parameters(self) -> tuple[float, ...]:  # type: ignore[override]
+        return self.alpha_m, self.alpha_f, self.beta, self.gamma
 
     def local_error(self, old: Motion, new: Motion, dt: float) -> Array:
         # the damping of first order that gamma above that of second order causes
@@ -114,35 +111,3 @@ class Newmark(GeneralizedAlpha):
             raise InputError(f"unconditional stability needs 2 beta >= gamma >= 1/2, got "
                              f"beta = {beta!r}, gamma = {gamma!r}")
         self.order = 2 if self.gamma == 0.5 else 1
-
-
-class _Step(Step):
-    def __init__(self, scheme, system, y, dt):
-        self.scheme, self.system, self.y, self.dt = scheme, system, y, dt
-        self.t = self.joint_time = y.t + dt
-        b, g = scheme.beta, scheme.gamma
-        self._u = y.u + dt * y.v + dt * dt * (0.5 - b) * y.algorithmic
-        self._v = y.v + dt * (1.0 - g) * y.algorithmic
-        self.guess = self._u + dt * dt * b * y.algorithmic
-        self.mass_factor = (1.0 - scheme.alpha_m) / ((1.0 - scheme.alpha_f) * b * dt * dt)
-        self.stiffness_factor = 1.0
-        self.acceleration_share = (1.0 - scheme.alpha_f) / (1.0 - scheme.alpha_m)
-
-    def _algorithmic(self, u):
-        return (u - self._u) / (self.scheme.beta * self.dt**2)
-
-    def force(self, u):
-        return self.system.external_force(u, self.t) - self.system.internal_force(u)
-
-    def acceleration(self, u):
-        s, y = self.scheme, self.y
-        a = ((1.0 - s.alpha_m) * self._algorithmic(u) + s.alpha_m * y.algorithmic
-             - s.alpha_f * y.acceleration)
-        return a / (1.0 - s.alpha_f)
-
-    def velocity(self, u):
-        return self._v + self.dt * self.scheme.gamma * self._algorithmic(u)
-
-    def finish(self, u, v, multipliers, impulse):
-        return Motion(self.t, u, v, self.acceleration(u), self._algorithmic(u), multipliers,
-                      before=self.dt)

@@ -105,9 +105,9 @@ class History:
         if self._rows and run.y is not None and self._rows[-1].t == run.y.t:
             self._kept = run.remember()  # of the last instant: the factors too
         self.steps, self.rejected = run.steps, run.rejected
-        solver = run.stepper.solver
-        self.iterations, self.factorizations = solver.iterations, solver.factorizations
-        self.substeps = solver.substeps
+        self.iterations = run.integrator.iterations
+        self.factorizations = run.integrator.factorizations
+        self.substeps = run.integrator.substeps
         self._rows, self._run = [], None
         return self
 

@@ -6,9 +6,13 @@ those of a motion that goes on, nor does a kink at the end of a step spoil those
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+from ..own import own_joints
+from ..source import lanes, source
+from ..tables import add_products, add_triples
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -69,3 +73,69 @@ def step_rates(function: Callable[[Array], Array], times: Array,
     back = [f[PARTS - k:n + 1 - k:PARTS] for k in range(PARTS + 1)]
     return (f[PARTS // 2::PARTS], back[0], np.tensordot(_FIRST, back, 1) / h,
             np.tensordot(_SECOND, back, 1) / h**2)
+
+
+# of joints
+
+
+class JointMotion(NamedTuple):
+    """What of joints depends on time, at one instant; or at many, a row for each.
+
+    Attributes
+    ----------
+    c
+        c of :mod:`skfem_ancf.tables` at the end of a step and its first two rates, shape (3, m).
+    g
+        g there, g when the joints act, and the first two rates of g, shape (4, k).
+    drives
+        1 if a joint moves.
+    """
+
+    c: np.ndarray
+    g: np.ndarray
+    drives: int
+
+
+@source
+def drive_rate(joints, motion, t, dt, u, out):
+    """The rate of Phi at rest, at the end t of a step of dt: c' + g' . u."""
+    c = motion.c[1]
+    for k in lanes(out.size):
+        out[k] = c[k]
+    if joints.own == 0:
+        add_products(out, joints.gk, motion.g[2], u, joints.gi)
+    elif motion.drives > 0:
+        _add_differences(joints, t, dt, u, u, PARTS / dt, 0.0, 0.0, out)
+
+
+@source
+def acceleration_of_joints(joints, motion, t, dt, u, v, out):
+    """The second rate of Phi without accelerations: c'' + v . H v + g'' . u + 2 g' . v."""
+    c, g = motion.c[2], motion.g[2]
+    for k in lanes(out.size):
+        out[k] = c[k]
+    if joints.own == 0:
+        add_triples(out, joints.hk, joints.hv, v, joints.hi, v, joints.hj)
+        add_products(out, joints.gk, motion.g[3], u, joints.gi)
+        add_products(out, joints.gk, g, v, joints.gi)
+        add_products(out, joints.gk, g, v, joints.gi)
+    else:
+        own_joints(joints.own, np.int64(4), t, u, v, out)
+        if motion.drives > 0:
+            _add_differences(joints, t, dt, u, v, 0.0, (PARTS / dt)**2, 2.0 * PARTS / dt, out)
+
+
+@source
+def _add_differences(joints, t, dt, u, v, first, second, along, out):
+    """Of joints of one's own: out += first Phi' + second Phi'' + along (J v)', with factors."""
+    values = np.empty(out.size)
+    for part in range(PARTS + 1):
+        time = t - part * dt / PARTS
+        for k in range(2):
+            c = first * _FIRST[part] + second * _SECOND[part] if k == 0 else along * _FIRST[part]
+            if c != 0.0:
+                for i in lanes(out.size):
+                    values[i] = 0.0
+                own_joints(joints.own, k, time, u, v, values)
+                for i in lanes(out.size):
+                    out[i] += c * values[i]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .base import Motion
-from .blocks import CompiledSteps
+from ..errors import AncfError
+from .base import Motion, Scheme
 from .history import History
 from .integrator import Integrator, StepFailed
 from .stepsize import StepSize
@@ -16,10 +17,11 @@ from .stepsize import StepSize
 if TYPE_CHECKING:
     from ..system import System
     from ..types import Array
-    from .base import Scheme
 
 #: Part of a step up to which an instant is interpolated: a step that short is all round-off.
 CLOSE = 1e-6
+#: Seconds after which a block of steps is to be seen: by a progress bar, and on Ctrl-C.
+SHOWN = 0.2
 #: Part of a step up to which the acceleration is interpolated, for the same reason.
 NEAR = 0.1
 
@@ -56,82 +58,6 @@ class Task:
         return self.t_end - self.t_start
 
 
-class Stepper:
-    """Single steps, compiled where they can be.
-
-    Parameters
-    ----------
-    system, scheme
-        What is integrated, and how.
-    tol
-        Tolerance of the iteration; the scheme's own by default.
-    """
-
-    def __init__(self, system: System, scheme: Scheme, tol: float | None = None) -> None:
-        self.solver = Integrator(system, scheme, tol)
-        self.blocks: Any = None
-        if CompiledSteps.applies(scheme, system):
-            self.blocks = CompiledSteps(self.solver, scheme, system)
-
-    def step(self, y: Motion, dt: float) -> Motion:
-        """One step, in Python where there is no compiled one or it fails; raises StepFailed.
-
-        Parameters
-        ----------
-        y
-            Where it starts.
-        dt
-            Its size.
-        """
-        if self.blocks is not None:
-            done, motion = self.blocks.run(y, dt, 1)
-            if done:
-                return motion(0)
-            self.solver.forget()
-        return self.solver.advance_safely(y, dt)
-
-    def forget(self) -> None:
-        """Make new factors in the next step."""
-        self.solver.forget()
-        if self.blocks is not None:
-            self.blocks.forget()
-
-    @property
-    def _last(self):
-        return self.blocks if self.blocks is not None and self.blocks.ready else self.solver
-
-    @property
-    def ready(self) -> bool:
-        """True if there are factors of an iteration matrix."""
-        return self._last.ready
-
-    def solve(self, b: Array) -> Array:
-        """The inverse of the last iteration matrix times b (N,)."""
-        return self._last.solve(b)
-
-    def mass_factor(self, dt: float) -> float:
-        """Factor of the mass in the iteration matrix."""
-        if self._last is self.solver:
-            return self.solver._coefficients[0]
-        return self.blocks.mass_factor(dt)
-
-    def remember(self) -> dict[str, Any]:
-        """Numbers and arrays from which :meth:`recall` goes on as if there had been no break."""
-        memory = {f"solver.{k}": v for k, v in self.solver.remember().items()}
-        if self.blocks is not None:
-            memory.update({f"blocks.{k}": v for k, v in self.blocks.remember().items()})
-        return memory
-
-    def recall(self, memory: dict[str, Any]) -> None:
-        """Go on with what :meth:`remember` gave."""
-        def part(name):
-            return {k.split(".", 1)[1]: v for k, v in memory.items() if k.startswith(name + ".")}
-
-        self.solver.recall(part("solver"))
-        if self.blocks is not None and "blocks.A" in memory:
-            self.blocks.recall(part("blocks"))
-
-
 class Run:
     """The loop over steps, so that it can stop after any of them and go on.
 
@@ -151,12 +77,13 @@ class Run:
     steps, rejected
         Steps done, and steps that the automatic size took again.
     longest
-        Steps of a compiled block at most, or None.
+        Steps of a block at most, or None.
     """
 
     def __init__(self, system: System, scheme: Scheme, task: Task) -> None:
         self.system, self.scheme, self.task = system, scheme, task
-        self.stepper, self._side = Stepper(system, scheme, task.tol), None
+        self.integrator = Integrator(system, scheme, task.tol)
+        self._side: Integrator | None = None
         self.sizes = None
         if task.dt is None:
             self.sizes = StepSize(system, scheme, task.rtol, task.t_start, task.t_end)
@@ -166,6 +93,7 @@ class Run:
         self.history = History(system, scheme, self)
         self.y: Any = None
         self.longest: int | None = None
+        self._in_blocks, self._pace = type(scheme).step is Scheme.step, 1
         self._limit()
 
     # the start
@@ -178,7 +106,7 @@ class Run:
         u, v
             Of the coordinates, shape (N,).
         """
-        self.y = self.stepper.solver.start(u, v, self.task.t_start, self._first_step())
+        self.y = self.integrator.start(u, v, self.task.t_start, self._first_step())
         self._store_start()
 
     def go_on(self, y: Motion, memory: dict[str, Any] | None = None) -> None:
@@ -194,9 +122,8 @@ class Run:
         self.y = Motion(self.task.t_start, y.u, y.v, y.acceleration, y.algorithmic, y.multipliers,
                         y.force, y.before, y.memory)
         if memory is not None:
-            self.stepper.recall(memory)
-            solver = self.stepper.solver
-            solver.iterations = solver.factorizations = solver.substeps = 0
+            self.integrator.recall(memory)
+            self.integrator.reset()
             if self.sizes is not None and "averages" in memory:
                 self.size = min(float(memory["size"]), self.task.span)
                 self.sizes.recall(memory)
@@ -234,7 +161,7 @@ class Run:
     def _limit(self):
         """Functions of time are asked before a breakpoint in the steps that end there."""
         near = 16 * np.spacing(max(abs(self._begun), abs(self._end)))
-        self.stepper.solver.limit = np.inf if self._last else self._end - near
+        self.integrator.limit = np.inf if self._last else self._end - near
         self._count = 0 if self.sizes else max(1, int(np.ceil(
             (self._end - self._begun) / self.size * (1 - 1e-12))))
         even = abs(self._begun + self._count * self.size - self._end) < 1e-9 * self.size
@@ -248,7 +175,7 @@ class Run:
         if self.sizes is not None:
             self.size = 1e-4 * self.task.span
             self.sizes.begin()
-        return self.stepper.solver.start(y.u, y.v, self._begun, self._first_step())
+        return self.integrator.start(y.u, y.v, self._begun, self._first_step())
 
     # steps
 
@@ -257,23 +184,36 @@ class Run:
         if self.sizes is not None:
             self._automatic()
             return
-        blocks, old = self.stepper.blocks, self.y
-        if blocks is not None and self.n < self._whole:
-            first = self.n - self.n % blocks.longest
-            block = first, min(first + blocks.longest, self._whole)
-            number = block[1] - self.n
-            if self.longest is not None:
-                number = min(number, self.longest - self.n % self.longest)
-            done, motion = blocks.run(old, self.size, number, self._begun, self.n, block)
+        old = self.y
+        if self._in_blocks and self.n < self._whole:
+            done, motion = self._block(old)
             if done:
                 self._store_block(old, done, motion)
                 return
         h = self._end - old.t
         if self.n < self._count - 1 or abs(h - self.size) < 1e-9 * self.size:
             h = self.size
-        new = self.stepper.step(old, h)
+        new = self.integrator.step(old, h)
         new.t = self._time(self.n + 1)
         self._commit(old, new)
+
+    def _block(self, y):
+        """A block of steps of one size, at most as many as take :data:`SHOWN`."""
+        size = self.integrator.longest
+        first = self.n - self.n % size
+        block = first, min(first + size, self._whole)
+        number = min(block[1] - self.n, self._pace)
+        if self.longest is not None:
+            number = min(number, self.longest - self.n % self.longest)
+        begun = perf_counter()
+        try:
+            done, motion = self.integrator.run(y, self.size, number, self._begun, self.n, block)
+        except AncfError:  # of a function of the caller's: go on as far as it goes
+            self._in_blocks = False
+            return 0, None
+        took = perf_counter() - begun
+        self._pace = max(1, min(size, 2 * number, int(SHOWN * number / took)))
+        return done, motion
 
     def _time(self, n):
         """Time after n steps of the segment."""
@@ -288,8 +228,8 @@ class Run:
             h = left
         elif left < 2 * h:
             h = 0.5 * left
-        new = self.stepper.step(y, h)
-        error = self.sizes.error(self.stepper, y, new, h)
+        new = self.integrator.step(y, h)
+        error = self.sizes.error(self.integrator, y, new, h)
         self.size, kept = self.sizes.next(error, h, self.size)
         if not kept:
             self.rejected += 1
@@ -357,14 +297,13 @@ class Run:
         if s < CLOSE:
             return interpolate(old, new, t)
         if self._side is None:
-            self._side = Stepper(self.system, self.scheme, self.task.tol)
-        side, solver = self._side, self.stepper.solver
+            self._side = Integrator(self.system, self.scheme, self.task.tol)
+        side = self._side
         side.forget()
-        side.solver._energy, side.solver.limit = solver._energy, solver.limit
+        side.expect(self.integrator.energy)
+        side.limit = self.integrator.limit
         found = side.step(old, s * h)
-        for name in ("iterations", "factorizations", "substeps"):
-            setattr(solver, name, getattr(solver, name) + getattr(side.solver, name))
-            setattr(side.solver, name, 0)
+        self.integrator.count(side)
         found.t = t
         if s < NEAR:
             smooth = interpolate(old, new, t)
@@ -375,7 +314,7 @@ class Run:
 
     def remember(self) -> dict[str, Any]:
         """Numbers and arrays that, with :attr:`y` and the history, make a Run go on exactly."""
-        memory = self.stepper.remember()
+        memory = self.integrator.remember()
         if self.sizes is not None:
             memory.update(self.sizes.remember())
         memory["size"] = np.array(self.size)
@@ -393,7 +332,7 @@ class Run:
             Numbers and arrays by name.
         """
         self.y = y
-        self.stepper.recall(memory)
+        self.integrator.recall(memory)
         if self.sizes is not None:
             self.sizes.recall(memory)
         self.segment, self.n, self._next, self.steps, self.rejected = map(int, memory["counts"])
@@ -423,4 +362,4 @@ def interpolate(a: Motion, b: Motion, t: float) -> Motion:
                   linear(a.multipliers, b.multipliers), a.force, a.before, a.memory)
 
 
-__all__ = ["Run", "StepFailed", "Stepper", "Task", "interpolate"]
+__all__ = ["Run", "StepFailed", "Task", "interpolate"]

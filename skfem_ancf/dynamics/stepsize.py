@@ -11,7 +11,7 @@ from ..sampling import sample
 if TYPE_CHECKING:
     from ..system import System
     from .base import Motion, Scheme
-    from .run import Stepper
+    from .integrator import Integrator
 
 #: Intervals of the whole motion at whose ends functions of time are asked ahead.
 SAMPLES = 4096
@@ -110,12 +110,12 @@ class StepSize:
         return (np.sqrt(max(de @ self.system.mass.multiply(de), 0.0) / self._mass)
                 / (self.system.size * self.rtol))
 
-    def error(self, stepper: Stepper, old: Motion, new: Motion, dt: float) -> float:
+    def error(self, integrator: Integrator, old: Motion, new: Motion, dt: float) -> float:
         """What a step adds to the error, over what it may add.
 
         Parameters
         ----------
-        stepper
+        integrator
             It has the factors of the last iteration matrix, if any.
         old, new
             Start and end of the step.
@@ -129,8 +129,8 @@ class StepSize:
         """
         s = self.system
         de = self.scheme.local_error(old, new, dt)
-        if stepper.ready:
-            de = stepper.solve(stepper.mass_factor(dt) * s.mass.multiply(de) * s.free)
+        if integrator.ready:
+            de = integrator.solve(integrator.mass_factor() * s.mass.multiply(de) * s.free)
         width = 0.5 * (self.scheme.error_constant * dt**2 * self.span) ** (1.0 / 3.0)
         part = -np.expm1(-dt / width)
         power = self.scheme.order + 1

@@ -59,9 +59,13 @@ class ElementBeam(Frozen, Element):
         Polynomial degree of the Green-Lagrange strain along a straight element.
     carries_shear_parabola : bool
         True if the section functions hold Y^3, so that no shear correction is wanted.
+    kinematics : str
+        How the points of a section follow the coordinates: a name of
+        :data:`skfem_ancf.kinematics.KINEMATICS`.
     """
 
     refdom = RefBeam
+    kinematics = "sections"
     axis_degree = 3
     sections = "linear"
 

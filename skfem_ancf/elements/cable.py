@@ -47,6 +47,7 @@ class ElementBeamCable(ElementBeam):
     """
 
     order = 0
+    kinematics = "cable"
     carries_shear_parabola = False
 
     def __init__(self, degree: int = 3) -> None:

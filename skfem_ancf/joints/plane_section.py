@@ -37,10 +37,8 @@ class PlaneSection(Joint):
         beam = scene.beam(self.beam)
         node = beam.section_node(self.at)
         t = beam.mesh.p_X[:, node]
-        direction = np.array([-t[1], t[0]]) if beam.is_cable else t
+        direction, held = beam.kinematics.plane(beam, t)
         direction = np.where(np.abs(direction) < 1e-14, 0.0, direction)
-        held = [k for k, (_, along, across) in enumerate(beam.element.functionals)
-                if (along, across) == (1, 0) and beam.is_cable or along == 0 and across > 0]
         first = scene.offset(beam) + node * beam.nd
         self.vectors = [Vector(np.zeros(2), np.array([[first + 2 * k], [first + 2 * k + 1]]),
                                np.ones(1)) for k in held]

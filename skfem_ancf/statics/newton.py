@@ -7,15 +7,18 @@ import numpy as np
 
 from ..errors import (ConvergenceError, InputError, Interrupted, require_finite, require_flag,
                       require_integer, require_option, require_positive, taught)
+from ..linalg import INACCURATE
+from ..own import handle_of
 from ..progress import progress_bar
 from . import stability
+from .iteration import (CONVERGED, NOT_CONVERGED, NOT_FINITE, SINGULAR, Rules, Target, Unknowns,
+                        equilibrium)
 
 logger = logging.getLogger(__name__)
 
 #: Iterations in a load step, at most.
 MAX_ITERATIONS = 10000
 METHODS = ("mixed", "newton")
-_NONE = np.zeros(0)
 
 
 @dataclass
@@ -250,100 +253,56 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record, d
     ``start`` is the displacement at load 0 and what was missing there to equilibrium under the
     full load, or None for the stress-free state; the missing part is reduced to nothing.
     """
-    u, multipliers, carried = result.u.copy(), result.multipliers.copy(), None
+    machine, tables = system.machine, system.machine.tables
+    target = _target(system, result, load, start)
     floor = 8.0 * system.work_noise
     # the residual sums the noise of all coordinates, the work that of the strains
-    force_floor = floor * system.noise
-    u0, gap = start
-    full, at = (load, load) if gap is None else (1.0, 1.0)
-    target = system.values(at)
-    if gap is not None:
-        target = u0[system.fixed] + load * (target - u0[system.fixed])
-        gap = (1.0 - load) * gap
-    prescribed = target - u[system.fixed]
-    moving = bool(np.any(prescribed))
-    structure = system.structure
-    if structure is not None and descent is None:
-        found = structure.equilibrium(
-            u, multipliers, full, at,
-            np.zeros(system.N) if gap is None else gap, prescribed, method == "mixed", tol,
-            max_iterations, floor, force_floor)
-        if found is not None and not system.inverted(found[0]):
-            u, multipliers, force, *residuals = found
-            record.force_residuals, record.energy_residuals = (r.tolist() for r in residuals)
-            record.iterations = len(record.energy_residuals)
-            if record.iterations:
-                system.K.take_factors()
-            else:
-                system.K.clear()
-            return u, multipliers, force
-    external = full * system.external_force(u)
-    work = before = reference = np.inf
-    scale, quiet = None, False
-    for k in range(max_iterations + 1):
-        # after the last correction only the residual is wanted, not the tangent
-        last = (k > 1 or k > 0 and quiet) and (
-            work * (min(1.0, work / before) if k > 1 else 1.0) <= tol * reference + floor)
-        if last:
-            force = system.internal_force(u)
-        else:
-            force, evaluations = system.assemble(u, full, carried)
-        if not system.constant_loads:
-            external = full * system.external_force(u)
-        residual = external - force
-        if gap is not None:
-            residual = residual - gap
-        if system.joints:
-            phi = system.constraint(u, at)
-            residual = residual - multipliers @ system.jacobian(u, at)
-            closed = np.max(np.abs(phi)) <= 1e-12 * system.size
-        else:
-            phi, closed = _NONE, True
-        if not last:
-            scale = 1.0 / np.abs(system.K.diagonal())
-        free = residual * system.mask
-        rho = np.sqrt(free @ (free * scale))
-        size = np.sqrt(max(force @ (force * scale), external @ (external * scale)))
-        if not np.isfinite(rho):
-            raise _Failed("the strain is not finite")
-        record.force_residuals.append(float(rho / size) if size > 0 else 0.0)
-        if closed and not moving and (
-                rho <= 1e-3 * tol * size if k == 0 else
-                last and rho <= tol * size + force_floor):
-            if system.inverted(u):
-                raise _Failed("the body is turned inside out")
-            return u, multipliers, force
-        # no more than round-off: of a slender beam that may be a load, the correction tells
-        quiet = k == 0 and rho <= force_floor
-        if k == max_iterations:
+    rules = Rules(int(method == "mixed"), max_iterations, tol, floor, floor * system.noise,
+                  1e-12 * system.size, INACCURATE, 0)
+    solver = None
+    if descent is not None:
+        solver = descent
+    elif tables.plain.border.wide:
+        solver = system
+    while True:
+        if solver is not None:
+            rules = rules._replace(solver=handle_of(solver))
+        x = Unknowns(result.u.copy(), result.multipliers.copy(), np.empty(system.N),
+                     tables.stresses, tables.stresses)
+        residuals = np.zeros((max_iterations + 1, 2))
+        run, equations = machine.of(equilibrium)
+        status, n = run(equations, target, rules, x, residuals)
+        if status != SINGULAR or solver is not None:
             break
-        if last:
-            force, evaluations = system.assemble(u, full, carried)
-        du0 = None
-        if moving:
-            du0 = np.zeros(system.N)
-            du0[system.fixed] = prescribed
-            free = (residual - system.multiply(du0)) * system.free
-            if system.joints:
-                phi = phi + system.full_jacobian(u, at) @ du0
-            moving = False
-        try:
-            system.factorize(u, at, multipliers)
-        except (np.linalg.LinAlgError, RuntimeError):
-            raise _Failed("the tangent is singular") from None
-        du, dm = system.solve(free, -phi)
-        if descent is not None:
-            du, dm = descent.correct(free, du, dm)
-        before, work = work, np.sqrt(abs(free @ du) + abs(phi @ dm))
-        if not np.isfinite(work):
-            raise _Failed("the tangent is singular")
-        if du0 is not None:
-            du += du0
-        if method == "mixed":
-            carried = system.stress_step(evaluations, du)
-        u += du
-        multipliers = multipliers + dm
-        record.iterations += 1
-        reference = np.sqrt(max(abs(external @ u), abs(force @ u)))
-        record.energy_residuals.append(float(work / reference) if reference > 0 else 0.0)
-    raise _Failed(f"no convergence in {max_iterations} iterations")
+        solver = system  # factors with exchanges of rows, or sparse ones
+    record.iterations = n
+    record.force_residuals = residuals[:n + 1, 0].tolist()
+    record.energy_residuals = residuals[:n, 1].tolist()
+    if status != CONVERGED:
+        raise _Failed(_ENDS[status].format(max_iterations))
+    if system.inverted(x.u):
+        raise _Failed("the body is turned inside out")
+    if solver is None:
+        if n:
+            system.K.take_factors()
+        else:
+            system.K.clear()
+    return x.u, x.multipliers, x.force
+
+
+_ENDS = {SINGULAR: "the tangent is singular", NOT_FINITE: "the strain is not finite",
+         NOT_CONVERGED: "no convergence in {} iterations"}
+
+
+def _target(system, result, load, start):
+    """The Target of a load level."""
+    tables, (u0, gap) = system.machine.tables, start
+    full, at = (load, load) if gap is None else (1.0, 1.0)
+    values = system.values(at)
+    if gap is not None:
+        values = u0[system.fixed] + load * (values - u0[system.fixed])
+        gap = (1.0 - load) * gap
+    times = np.array([at])
+    return Target(tables.static_factors(full), full, at, tables.offsets(times)[0],
+                  tables.slopes(times)[0], np.zeros(system.N) if gap is None else gap,
+                  values - result.u[system.fixed])

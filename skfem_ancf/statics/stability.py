@@ -268,6 +268,16 @@ class Descent:
         scale = min(1.0, self.stride * system.size / largest) if largest > 0 else 1.0
         return scale * du, scale * dm
 
+    def solve_own(self, t, u, multipliers, R, phi, du, dm):
+        """Solve for a correction, as :meth:`correct` changes it; False if there is none."""
+        if not self.system.solve_own(t, u, multipliers, R, phi, du, dm):
+            return False
+        try:
+            du[:], dm[:] = self.correct(R, du, dm)
+        except FAILURES:
+            return False
+        return True
+
     def product(self, a: Array, b: Array) -> float:
         """The sum over the nodes of ``a . b``, of displacements of the coordinates.
 

@@ -46,7 +46,7 @@ def _normal(field, values):
             return 0.5 * (material.thickness_stretch(values.strain) ** 2 - 1.0)
         if field.name == "stress":
             return (material.nu * values.S[0] * (material.plane == "strain")
-                    if values.beam.is_cable else material.stress_zz(values.strain))
+                    if not values.beam.has_sections else material.stress_zz(values.strain))
         return values.sigma_zz
     except (InputError, NotImplementedError):
         return np.full(values.n, np.nan)

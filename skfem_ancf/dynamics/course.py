@@ -1,0 +1,90 @@
+"""Functions of time, asked for many steps at once."""
+
+import numpy as np
+
+from .rates import PARTS, JointMotion, step_rates
+from .steps import Course
+
+
+class Courses:
+    """Gives the :class:`~skfem_ancf.dynamics.steps.Course` of a block of steps.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    conserving
+        The equation of motion holds in the middle of a step, not at its end.
+    """
+
+    def __init__(self, system, conserving):
+        self._system, self._conserving = system, conserving
+        self._asked = None, None
+
+    def of(self, start, dt, first, n, block, limit):
+        """For ``n`` steps.
+
+        Parameters
+        ----------
+        start, first
+            The first step begins at ``start + first dt``.
+        block
+            Numbers of steps between which functions are asked at once, so that what they return
+            does not depend on ``first`` and ``n``.
+        limit
+            Time beyond which no function is asked.
+
+        Returns
+        -------
+        Course
+        """
+        key = start, dt, *block, limit
+        if self._asked[0] != key:
+            self._asked = key, self._ask(*key)
+        whole = self._asked[1]
+        if block[1] - block[0] == n:
+            return whole
+        part = slice(first - block[0], first - block[0] + n)
+        joints = whole.joints
+        return whole._replace(
+            times=whole.times[part], factors=_rows(whole.factors, part),
+            supports=_rows(whole.supports, part),
+            joints=JointMotion(_rows(joints.c, part), _rows(joints.g, part), joints.drives))
+
+    def _ask(self, start, dt, first, last, limit):
+        times = start + dt * (first + np.arange(PARTS * (last - first) + 1) / PARTS)
+        times = np.minimum(times, limit)
+        ends = times[PARTS::PARTS]
+        acting = times[PARTS // 2::PARTS] if self._conserving else ends
+        return Course(float(dt), np.stack([ends, acting], axis=1),
+                      self._system.machine.tables.factors(acting), self._supports(times, dt),
+                      self._joints(times, dt))
+
+    def _supports(self, times, dt):
+        s = self._system
+        if not s.moves:
+            return np.zeros((1, 3, s.N))
+        _, *found = step_rates(s.values_at, times, dt)
+        out = np.zeros((len(found[0]), 3, s.N))
+        out[:, :, s.fixed] = np.stack(found, axis=1)
+        return out
+
+    def _joints(self, times, dt):
+        tables = self._system.machine.tables
+        joints, drives = tables.plain.joints, int(tables.motion_varies)
+        c, g = np.zeros((1, 3, self._system.m)), np.zeros((1, 4, len(joints.gk)))
+        if joints.own or not self._system.m:  # asked by the step itself
+            return JointMotion(c, g, drives)
+        c[:, 0], g[:, :2] = tables.offsets(times[:1]), tables.slopes(times[:1])
+        if drives:
+            _, *found = step_rates(tables.offsets, times, dt)
+            c = np.stack(found, axis=1)
+            if tables.turns:
+                middle, end, *found = step_rates(tables.slopes, times, dt)
+                g = np.stack([end, middle if self._conserving else end, *found], axis=1)
+        return JointMotion(c, g, drives)
+
+
+def _rows(x, part):
+    """A part of the rows of an array, or its only one."""
+    return x if len(x) == 1 else x[part]

@@ -1,0 +1,504 @@
+"""Time steps of every scheme, as a text.
+
+A step of size h leads from 0 to 1, with eq. (7)-(9) of Arnold and Bruls (2007)::
+
+    M a_1 + f(u_1) + J^T lambda = Q,   Phi(u_1) = 0
+    u_1 = u_0 + h v_0 + h^2 ((1/2 - beta) w_0 + beta w_1)
+    v_1 = v_0 + h ((1 - gamma) w_0 + gamma w_1)
+    (1 - alpha_m) w_1 + alpha_m w_0 = (1 - alpha_f) a_1 + alpha_f a_0
+
+The energy-momentum scheme solves the same with ``beta = 1/2``, ``gamma = 1`` and no alpha: then
+``w_1`` is the acceleration in the middle of the step, where f and Q are means between 0 and 1, and
+J is that of the middle.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..band import Band, copy, factorize, fix, multiply, solve, solve_joined, subtract_rows
+from ..body import body_force, body_mean, body_stress, body_tangent, stress_size
+from ..source import lanes, source
+from ..tables import (add_curvature_force, add_load_stiffness, constraint, joint_directions,
+                      mean_external_force)
+from .rates import JointMotion, acceleration_of_joints, drive_rate
+
+EPS = 2.2e-16
+#: Iterations of a step at most.
+ITERATIONS = 30
+#: Contraction up to which factors are kept.
+REUSED = 0.1
+#: Contraction expected of new factors, and the least that is expected of any.
+EXPECTED, LEAST = 0.1, 0.01
+#: Growth of a correction, with new factors, beyond which the step is given up.
+DIVERGING = 2.0
+
+#: What a run of steps keeps, in one array: whether there are factors, how many iterations and
+#: factorisations there were, the last contraction, the size of the step before, the largest energy
+#: seen, and why a step has failed; of the step, whether its factors are its own, and the sizes of
+#: the last two corrections, negative where there is none.
+READY, COUNT, FACTORIZED, RATE, BEFORE, ENERGY, FAILURE, FRESH, SIZE, LAST_SIZE = range(10)
+STATE = 10
+#: By the number in ``state[FAILURE]``.
+FAILURES = ("", "the iteration matrix is singular", "the residual is not finite",
+            "the iteration diverges", f"no convergence in {ITERATIONS} iterations",
+            "the joints depend on each other")
+SINGULAR, NOT_FINITE, DIVERGES, NOT_CONVERGED, DEPENDENT = range(1, 6)
+#: What a correction tells.
+GO_ON, DONE, ASTRAY, FAILED = range(4)
+
+
+class Rule(NamedTuple):
+    """A scheme in numbers.
+
+    Attributes
+    ----------
+    conserving
+        1 for the energy-momentum scheme.
+    alpha_m, alpha_f, beta, gamma
+        As above.
+    tol
+        Tolerance of the iteration, relative, in the energy norm.
+    floor
+        Round-off of the strains in that norm.
+    """
+
+    conserving: int
+    alpha_m: float
+    alpha_f: float
+    beta: float
+    gamma: float
+    tol: float
+    floor: float
+
+
+class Matrices(NamedTuple):
+    """The mass matrix, its factors with the supports fixed, and those of the iteration matrix."""
+
+    M: Band
+    mass: Band
+    A: Band
+
+
+class Course(NamedTuple):
+    """Functions of time for a block of steps; arrays of one row where nothing depends on time.
+
+    Attributes
+    ----------
+    dt
+        Size of the steps.
+    times
+        Their ends, and when their equations of motion hold, shape (n, 2).
+    factors
+        Of the loads, shape (n, l).
+    supports
+        Displacement, velocity and acceleration at fixed coordinates, zero elsewhere, shape
+        (n, 3, N).
+    joints
+        A :class:`~skfem_ancf.dynamics.rates.JointMotion`.
+    """
+
+    dt: float
+    times: np.ndarray
+    factors: np.ndarray
+    supports: np.ndarray
+    joints: JointMotion
+
+
+class Step(NamedTuple):
+    """What of the :class:`Course` is that of one step, and what else its equations take.
+
+    Attributes
+    ----------
+    dt, t, acting
+        Its size, its end, and when its equation of motion holds.
+    factors, supports, joints
+        As of the Course, without the first axis.
+    mass_factor, stiffness_factor
+        The iteration matrix is ``mass_factor M + stiffness_factor K``.
+    constant
+        True if the joints' directions are always the same.
+    """
+
+    dt: float
+    t: float
+    acting: float
+    factors: np.ndarray
+    supports: np.ndarray
+    joints: JointMotion
+    mass_factor: float
+    stiffness_factor: float
+    constant: bool
+
+
+class Work(NamedTuple):
+    """Work arrays.
+
+    Attributes
+    ----------
+    y
+        u, v, the acceleration and w at the begin of the step, shape (4, N).
+    x
+        Vectors by the numbers below, shape (13, N).
+    m
+        The same of joints, shape (6, m).
+    J
+        The joints' directions where they act, those at the end of the step, and the solutions with
+        the former, shape (3, m, N).
+    S
+        ``J1 A^-1 J^T``, shape (m, m).
+    stresses
+        Of all beams: those at the begin, and others, shape (2, k).
+    """
+
+    y: np.ndarray
+    x: np.ndarray
+    m: np.ndarray
+    J: np.ndarray
+    S: np.ndarray
+    stresses: np.ndarray
+
+
+#: Displacement and velocity of the iterate; where it began; u_1 - beta h^2 w_1,
+#: v_1 - gamma h w_1, and the part of the acceleration without w_1; the acceleration held by
+#: supports; where the tangent is taken; acceleration, residual, correction, internal force; room.
+U, V, GUESS, BASE, SPEED, REST, HELD, MIDDLE, ACCELERATION, RESIDUAL, DU, FORCE, ROOM = range(13)
+#: Multipliers of the iterate, their correction, how far joints are open, and their impulses; the
+#: multipliers at the begin, and where the step before took them.
+L, DL, PHI, IMPULSE, L0, LAST = range(6)
+
+
+@source
+def steps(e, matrices, rule, course, state, y, multipliers, rows, multiplier_rows):
+    """Take steps; ``rows`` (n, 4, N) and ``multiplier_rows`` (n, 2, m) are y and multipliers.
+
+    Parameters
+    ----------
+    e
+        :class:`~skfem_ancf.equations.Equations`.
+    matrices, rule, course
+        As above.
+    state
+        What is kept from step to step, shape (10,).
+    y
+        u, v, the acceleration and the scheme's acceleration w, shape (4, N).
+    multipliers
+        At the end of the step, and where the last step took them, shape (2, m).
+
+    Returns
+    -------
+    The number of steps done; one that fails is the last.
+    """
+    N, m = y.shape[1], multipliers.shape[1]
+    w = Work(y, np.zeros((13, N)), np.zeros((6, m)), np.zeros((3, m, N)), np.zeros((m, m)),
+             np.zeros((2, stress_size(e.body))))
+    u, f, stresses, joined, yes = w.x[U], w.x[FORCE], w.stresses, m > 0, N > 0
+    copy(multipliers[0], w.m[L0])
+    copy(multipliers[1], w.m[LAST])
+    for n in range(rows.shape[0]):
+        s = _step(e.joints, rule, course, n)
+        rough, wanted = _begin(e.free, matrices.M, rule, s, w, state)
+        told = GO_ON
+        for _ in range(ITERATIONS):
+            if state[READY] == 0.0:
+                # that of an iterate may be far off: turning by a straight predictor stretches
+                body_stress(e.body, y[0], stresses[0])
+                _middle(rule, w)
+                body_tangent(e.body, w.x[MIDDLE], f, stresses[0], yes, stresses[1], matrices.A)
+                if not _factorize(e.loads, e.free, matrices, s, w, state):
+                    return n
+            if rule.conserving > 0:
+                body_mean(e.body, y[0], u, f)
+            else:
+                body_force(e.body, u, f)
+            anew = joined and (not s.constant or state[SIZE] < 0.0)
+            if anew:
+                _directions(e.joints, rule, s, w)
+            _residual(e.loads, e.free, matrices.M, rule, s, w)
+            told = GO_ON
+            if joined and rule.conserving > 0 and not s.constant:
+                told = _velocity(e.joints, e.free, matrices.mass, rule, s, w, state)
+                _add_impulses(e.joints, s, w)
+            if told == GO_ON:
+                told = _correct(e.joints, e.free, matrices.A, s, w, state, anew)
+            if told == GO_ON:
+                told = _judge(state, wanted, rough)
+            if told == ASTRAY:  # by old factors
+                copy(w.x[GUESS], u)
+                copy(w.m[L0], w.m[L])
+            elif told != GO_ON:
+                break
+        if told == DONE:
+            if joined:
+                _directions(e.joints, rule, s, w)
+            told = _velocity(e.joints, e.free, matrices.mass, rule, s, w, state)
+            _accelerations(e.free, rule, s, w, state)
+            if told == GO_ON and joined and rule.conserving == 0:
+                told = _close_acceleration(e.joints, e.free, matrices.mass, rule, s, w, state)
+        elif told != FAILED:
+            told, state[FAILURE] = FAILED, NOT_CONVERGED
+        if told == FAILED:
+            return n
+        _finish(e.free, matrices.M, s, w, state)
+        for k in range(4):
+            copy(y[k], rows[n, k])
+        for k in range(2):
+            copy(w.m[L0 + k], multiplier_rows[n, k])
+    return rows.shape[0]
+
+
+@source
+def _judge(state, wanted, rough):
+    """What the size of a correction tells: of factors that are kept as long as it contracts."""
+    size, before = state[SIZE], state[LAST_SIZE]
+    if not size < 1e300:
+        state[FAILURE] = NOT_FINITE
+        return FAILED
+    if before > 0.0:
+        rate = size / before
+        if rate > 1.0 and size <= 1e3 * rough:
+            return DONE
+        state[RATE] = max(rate, LEAST)  # of one step, used in the next
+        if rate > REUSED and size * min(1.0, rate) > wanted:
+            if state[FRESH] > 0.0 and rate > DIVERGING:
+                state[FAILURE] = DIVERGES
+                return FAILED
+            state[READY] = 0.0
+            return ASTRAY if rate > 1.0 else GO_ON
+    return DONE if size * min(1.0, state[RATE]) <= wanted else GO_ON
+
+
+# one step
+
+
+@source
+def mass_factor(rule, dt):
+    """The factor of the mass in the iteration matrix: da_1 / du_1."""
+    return (1.0 - rule.alpha_m) / ((1.0 - rule.alpha_f) * rule.beta * dt * dt)
+
+
+@source
+def _row(x, n):
+    """Of an array that may have one row for all steps."""
+    return x[n if x.shape[0] > 1 else 0]
+
+
+@source
+def _step(joints, rule, course, n):
+    """The :class:`Step` number n."""
+    c, g = course.joints.c, course.joints.g
+    constant = joints.hk.size == 0 and g.shape[0] == 1 and joints.own == 0
+    return Step(course.dt, course.times[n, 0], course.times[n, 1], _row(course.factors, n),
+                _row(course.supports, n), JointMotion(_row(c, n), _row(g, n), course.joints.drives),
+                mass_factor(rule, course.dt), 0.5 if rule.conserving > 0 else 1.0, constant)
+
+
+@source
+def _begin(free, M, rule, s, w, state):
+    """What does not depend on u_1, and where its iteration begins: by the acceleration at 0.
+
+    Returns the round-off of a correction, and the size of one that is small enough.
+    """
+    h, u, guess = s.dt, w.x[U], w.x[GUESS]
+    base, speed, rest, held = w.x[BASE], w.x[SPEED], w.x[REST], w.x[HELD]
+    u0, v0, a0, w0 = w.y[0], w.y[1], w.y[2], w.y[3]
+    b, c = h * h * (0.5 - rule.beta), h * (1.0 - rule.gamma)
+    p, q = rule.alpha_m / (1.0 - rule.alpha_f), rule.alpha_f / (1.0 - rule.alpha_f)
+    d, a = rule.beta * h * h, a0 if rule.conserving > 0 else w0
+    for i in lanes(u.size):
+        base[i] = u0[i] + h * v0[i] + b * w0[i]
+        speed[i] = v0[i] + c * w0[i]
+        rest[i] = p * w0[i] - q * a0[i]
+        held[i] = s.supports[2, i]
+        u[i] = (base[i] + d * a[i]) * free[i] + s.supports[0, i]
+        guess[i] = u[i]
+    if rule.conserving > 0:  # what the velocity changes by
+        for i in lanes(u.size):
+            held[i] = (s.supports[1, i] - v0[i]) * (1.0 - free[i]) / h
+    copy(w.m[L0], w.m[L])
+    state[FRESH], state[SIZE] = 0.0, -1.0
+    _free_velocity(free, rule, s, w)
+    energy = max(state[ENERGY], _energy(M, w.x[V], w.x[ROOM]))
+    noise = 2.0 * abs(_energy(M, u, w.x[ROOM]))
+    rough = np.sqrt(rule.floor**2 * s.stiffness_factor + EPS * EPS * s.mass_factor * noise)
+    return rough, rule.tol * np.sqrt(energy) + rough
+
+
+@source
+def _middle(rule, w):
+    """Where the tangent and the joints' directions are taken, of the iterate."""
+    u, u0, middle = w.x[U], w.y[0], w.x[MIDDLE]
+    a = 0.5 if rule.conserving > 0 else 0.0
+    for i in lanes(u.size):
+        middle[i] = u[i] + a * (u0[i] - u[i])
+
+
+@source
+def _free_velocity(free, rule, s, w):
+    """v_1 of the iterate, without the joints' part."""
+    u, v, base, speed = w.x[U], w.x[V], w.x[BASE], w.x[SPEED]
+    c = rule.gamma / (rule.beta * s.dt)
+    for i in lanes(u.size):
+        v[i] = (speed[i] + c * (u[i] - base[i])) * free[i] + s.supports[1, i]
+
+
+@source
+def _velocity(joints, free, mass, rule, s, w, state):
+    """v_1 of the iterate, with the joints' impulses; FAILED if these are not determined.
+
+    ``v_1 = v - M^-1 J^T impulse`` with ``d Phi / dt = 0`` at the end of the step.
+    """
+    _free_velocity(free, rule, s, w)
+    anew = w.S.size > 0
+    if anew:
+        drive_rate(joints, s.joints, s.t, s.dt, w.x[U], w.m[IMPULSE])
+        if not solve_joined(mass, w.J[0], w.J[1], free, anew, w.J[2], w.S, w.m[IMPULSE], w.x[V]):
+            state[FAILURE] = DEPENDENT
+            return FAILED
+    return GO_ON
+
+
+@source
+def _energy(M, v, room):
+    """v . M v / 2."""
+    multiply(M, v, room)
+    return 0.5 * np.dot(v, room)
+
+
+# its iteration
+
+
+@source
+def _factorize(loads, free, matrices, s, w, state):
+    """Factors of the iteration matrix, from the body's tangent; False if it has none."""
+    M, A = matrices.M.flat, matrices.A.flat
+    add_load_stiffness(loads, s.factors, s.acting, 1.0, w.x[MIDDLE], matrices.A)
+    for i in lanes(A.size):
+        A[i] = s.mass_factor * M[i] + s.stiffness_factor * A[i]
+    fix(matrices.A, free)
+    state[FACTORIZED] += 1.0
+    if not factorize(matrices.A):
+        state[FAILURE] = SINGULAR
+        return False
+    state[READY], state[RATE], state[FRESH], state[SIZE] = 1.0, EXPECTED, 1.0, -1.0
+    return True
+
+
+@source
+def _directions(joints, rule, s, w):
+    """The joints' directions where they act, and at the end of the step."""
+    _middle(rule, w)
+    joint_directions(joints, s.joints.g[1], s.acting, w.x[MIDDLE], w.J[0])
+    joint_directions(joints, s.joints.g[0], s.t, w.x[U], w.J[1])
+
+
+@source
+def _residual(loads, free, M, rule, s, w):
+    """R = Q - f - M a - J^T lambda."""
+    u, base, rest, held = w.x[U], w.x[BASE], w.x[REST], w.x[HELD]
+    a, R, f, room = w.x[ACCELERATION], w.x[RESIDUAL], w.x[FORCE], w.x[ROOM]
+    for i in lanes(u.size):
+        a[i] = (s.mass_factor * (u[i] - base[i]) + rest[i]) * free[i] + held[i]
+    multiply(M, a, room)
+    mean_external_force(loads, s.factors, s.acting, w.y[0] if rule.conserving > 0 else u, u, R)
+    for i in lanes(u.size):
+        R[i] = R[i] - f[i] - room[i]
+    subtract_rows(w.J[0], w.m[L], R)
+
+
+@source
+def _add_impulses(joints, s, w):
+    """R -= (impulse . Phi'') (v_0 + v_1) / 4: eq. of Gear, Leimkuhler and Gupta (1985)."""
+    v0, v, room, share, impulse = w.y[1], w.x[V], w.x[ROOM], w.m[PHI], w.m[IMPULSE]
+    for i in lanes(v.size):
+        room[i] = v0[i] + v[i]
+    for k in lanes(share.size):
+        share[k] = -0.25 * impulse[k]
+    add_curvature_force(joints, s.acting, w.x[MIDDLE], share, room, w.x[RESIDUAL])
+
+
+@source
+def _correct(joints, free, A, s, w, state, anew):
+    """Correct u and the multipliers; FAILED if these are not determined."""
+    u, R, du, room = w.x[U], w.x[RESIDUAL], w.x[DU], w.x[ROOM]
+    l, dl, phi = w.m[L], w.m[DL], w.m[PHI]
+    state[COUNT] += 1.0
+    for i in lanes(u.size):
+        R[i] *= free[i]
+        du[i] = R[i]
+    solve(A, du)
+    work = abs(np.dot(R, du))
+    if l.size > 0:
+        constraint(joints, s.joints.c[0], s.joints.g[0], s.t, u, phi)
+        copy(phi, dl)
+        if not solve_joined(A, w.J[0], w.J[1], free, anew, w.J[2], w.S, dl, du):
+            state[FAILURE] = DEPENDENT
+            return FAILED
+        for i in lanes(u.size):
+            room[i] = np.abs(R[i] * du[i])
+        work = np.dot(room, free)
+        for k in range(l.size):
+            l[k] += dl[k]
+            work += abs(phi[k] * dl[k])
+    for i in lanes(u.size):
+        u[i] += du[i]
+    state[LAST_SIZE], state[SIZE] = state[SIZE], np.sqrt(work)
+    return GO_ON
+
+
+# its end
+
+
+@source
+def _accelerations(free, rule, s, w, state):
+    """w_1 (in place of the correction) and a_1, and the multipliers at the end of the step."""
+    u, v, base, rest, v0 = w.x[U], w.x[V], w.x[BASE], w.x[REST], w.y[1]
+    a1, w1, w0, given = w.x[ACCELERATION], w.x[DU], w.y[3], s.supports[2]
+    l, impulse, l0, last = w.m[L], w.m[IMPULSE], w.m[L0], w.m[LAST]
+    if rule.conserving > 0:
+        # what acts in the middle of a step, extrapolated to its end from the last two
+        ahead = s.dt / (s.dt + state[BEFORE])
+        for i in lanes(u.size):
+            w1[i] = (v[i] - v0[i]) / s.dt
+            a1[i] = (w1[i] + ahead * (w1[i] - w0[i])) * free[i] + given[i]
+        for k in lanes(l.size):
+            l[k] += impulse[k] / s.dt
+            l0[k] = l[k] + ahead * (l[k] - last[k])
+            last[k] = l[k]
+    else:
+        c = 1.0 / (rule.beta * s.dt * s.dt)
+        for i in lanes(u.size):
+            w1[i] = c * (u[i] - base[i])
+            a1[i] = (s.mass_factor * (u[i] - base[i]) + rest[i]) * free[i] + given[i]
+
+
+@source
+def _close_acceleration(joints, free, mass, rule, s, w, state):
+    """Change accelerations and multipliers so that they meet the joints' second rate too."""
+    a1, w1, l, dl, shared = w.x[ACCELERATION], w.x[DU], w.m[L], w.m[DL], w.m[PHI]
+    l0, last, anew = w.m[L0], w.m[LAST], w.m.size > 0
+    acceleration_of_joints(joints, s.joints, s.t, s.dt, w.x[U], w.x[V], dl)
+    if not solve_joined(mass, w.J[1], w.J[1], free, anew, w.J[2], w.S, dl, a1):
+        state[FAILURE] = DEPENDENT
+        return FAILED
+    share = (1.0 - rule.alpha_f) / (1.0 - rule.alpha_m)
+    for k in lanes(l.size):
+        shared[k] = share * dl[k]
+        l0[k] = l[k] + dl[k]
+        last[k] = l0[k]
+    subtract_rows(w.J[2], shared, w1)
+    return GO_ON
+
+
+@source
+def _finish(free, M, s, w, state):
+    """The end of the step becomes the begin of the next."""
+    u, v, a1, w1, given = w.x[U], w.x[V], w.x[ACCELERATION], w.x[DU], s.supports[2]
+    u0, v0, a0, w0 = w.y[0], w.y[1], w.y[2], w.y[3]
+    for i in lanes(u.size):
+        u0[i] = u[i]
+        v0[i] = v[i]
+        a0[i] = a1[i]
+        w0[i] = w1[i] * free[i] + given[i]
+    state[BEFORE] = s.dt
+    state[ENERGY] = max(state[ENERGY], _energy(M, v, w.x[ROOM]))

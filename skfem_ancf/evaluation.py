@@ -1,0 +1,36 @@
+"""Single evaluations of the equations of a scene, for what is no whole iteration."""
+
+from .body import body_carry, body_force, body_mean, body_stress, body_tangent
+from .source import source
+from .tables import add_load_stiffness
+
+FORCE, TANGENT, CARRY, STRESS, MEAN = range(5)
+
+
+@source
+def evaluate(e, what, u, v, factors, t, scale, use_carried, stresses, carried, f):
+    """Evaluate one thing; one function, so that it is compiled once.
+
+    Parameters
+    ----------
+    e
+        :class:`~skfem_ancf.equations.Equations`.
+    what
+        FORCE: the internal force at u into f. TANGENT: with it the tangent of the residual into
+        ``e.K``, and the stresses; the geometric part takes those ``carried`` if ``use_carried``.
+        CARRY: those carried from u to u + v. STRESS: the stresses at u. MEAN: the force whose work
+        from u to v is the change of the strain energy.
+    factors, t, scale
+        As for :func:`~skfem_ancf.tables.external_force`.
+    """
+    if what == FORCE:
+        body_force(e.body, u, f)
+    elif what == TANGENT:
+        body_tangent(e.body, u, f, carried, use_carried, stresses, e.K)
+        add_load_stiffness(e.loads, factors, t, scale, u, e.K)
+    elif what == CARRY:
+        body_carry(e.body, u, v, stresses, carried)
+    elif what == STRESS:
+        body_stress(e.body, u, stresses)
+    else:
+        body_mean(e.body, u, v, f)

@@ -1,0 +1,184 @@
+"""How the points of a section follow the coordinates: one class for each kind of element.
+
+An element names its kind, ``element.kinematics``; what depends on it is asked here.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .kernels import CableKernel, Kernel
+from .errors import InputError
+from .formulations.ecm import AXIS
+from .quadrature import gauss
+
+
+class Sections:
+    """Points of sections are coordinates of their own: the position is linear in them.
+
+    Attributes
+    ----------
+    kernel
+        Class of the strain energy.
+    has_sections : bool
+        Points off the axis are linear in the coordinates.
+    """
+
+    kernel: Any = Kernel
+    has_sections = True
+
+    @staticmethod
+    def require_law(material):
+        """Any law will do."""
+
+    @staticmethod
+    def section_rule(element):
+        """Points and weights across the section, exact for products of two coordinates."""
+        return gauss(element.order + 1)
+
+    @staticmethod
+    def direction(beam, node):
+        """Coordinates (2, n) and weights (n,) of 12 / h^3 int Y r dY of a section."""
+        eta, w = gauss(beam.element.order + 1)
+        h = beam.mesh.height
+        f = beam.element.functionals[2:2 + beam.element.section.number]
+        c = np.array([12.0 * h ** (f[k][2] - 1) * np.sum(
+            w * (eta - 0.5) * beam.element.section(eta - 0.5, k)[0]) for k in range(len(f))])
+        return node * beam.nd + 4 + np.arange(2 * len(f)).reshape(-1, 2).T, c
+
+    @staticmethod
+    def plane(beam, tangent):
+        """What keeps a section in its plane: its normal, and the coordinates that stay in it."""
+        return tangent, [k for k, (_, along, across) in enumerate(beam.element.functionals)
+                         if along == 0 and across > 0]
+
+    @staticmethod
+    def gradients(beam, u, X, tind):
+        """Displacement gradient in the beam's frame, and the frame."""
+        mapping = beam.mesh.mapping()
+        u_e = beam.kernel.gather(u, slice(None) if tind is None else tind)
+        fields = (beam.element.gbasis(mapping, X, k, tind)[0] for k in range(u_e.shape[1]))
+        grad = sum(np.einsum("ei,jep->ijep", u_e[:, k], f.grad) for k, f in enumerate(fields))
+        frame = mapping.frame(X, tind)
+        return np.einsum("ijep,jJep->iJep", grad, frame), frame
+
+    @staticmethod
+    def displacements(beam, u, X, tind):
+        """Displacement at reference points, shape (2, nelements, npoints)."""
+        mapping = beam.mesh.mapping()
+        u_e = beam.kernel.gather(u, slice(None) if tind is None else tind)
+        return sum(np.einsum("ei,ep->iep", u_e[:, k],
+                             np.asarray(beam.element.gbasis(mapping, X, k, tind)[0]))
+                   for k in range(u_e.shape[1]))
+
+    @staticmethod
+    def strain(beam, u, X, tind):
+        """Green-Lagrange strain of the formulation, shape (3, nelements, npoints)."""
+        term = beam.formulation.terms(beam.element, beam.material)[0]
+        return beam.sampled_strain(term, u, X, tind)
+
+    @staticmethod
+    def stress(beam, strain, u, X, tind):
+        """Second Piola-Kirchhoff stress, shape (3, nelements, npoints)."""
+        return beam.formulation.stress(beam, strain, u, X, tind)
+
+    @staticmethod
+    def shortest(beam, u):
+        """Smallest stretch of the fibres along the axis at the integration points."""
+        return beam.kernel.shortest(u)
+
+    @staticmethod
+    def deformation(beam, u):
+        """det F and both principal stretches at the integration points."""
+        det, stretches = [], []
+        for term in beam.formulation.terms(beam.element, beam.material):
+            H, frame = beam.gradients(u, term.quadrature[0])
+            F = H + frame
+            C = np.einsum("ikep,ijep->kjep", F, F)
+            middle, half = 0.5 * (C[0, 0] + C[1, 1]), 0.5 * (C[0, 0] - C[1, 1])
+            root = np.hypot(half, C[0, 1])
+            stretches.append(np.sqrt(np.maximum([middle - root, middle + root], 0.0)).ravel())
+            det.append((F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]).ravel())
+        return np.concatenate(det), np.concatenate(stretches)
+
+
+class Cable(Sections):
+    """Sections stay normal to the axis, and get thinner so that S_yy = 0."""
+
+    kernel: Any = CableKernel
+    has_sections = False
+
+    @staticmethod
+    def require_law(material):
+        """Hooke's law of E and nu."""
+        if not material.is_hooke:
+            raise InputError(
+                "a cable has Hooke's law of E and nu along its axis and bends with E I: it cannot "
+                f"have the law of {material!r}. Use StVenantKirchhoff, or an element with "
+                "sections, as ElementBeamANCFCubic(2)")
+
+    @staticmethod
+    def section_rule(element):
+        return AXIS
+
+    @staticmethod
+    def direction(beam, node):
+        # the tangent, which turns with the section
+        return node * beam.nd + 2 + np.arange(2).reshape(2, 1), np.ones(1)
+
+    @staticmethod
+    def plane(beam, tangent):
+        return np.array([-tangent[1], tangent[0]]), [1]
+
+    @staticmethod
+    def _section(beam, u, X, tind):
+        return beam.kernel.section(u, X[0], tind, beam.mesh, beam.element)
+
+    @classmethod
+    def gradients(cls, beam, u, X, tind):
+        frame = beam.mesh.mapping().frame(X, tind)
+        tangent, _, eps, kappa = cls._section(beam, u, X, tind)
+        strain = cls.strain(beam, u, X, tind)
+        normal = np.array([-tangent[1], tangent[0]])
+        Y = beam.mesh.height * (X[1] - 0.5)
+        F = np.stack([(1.0 + eps - Y * kappa) * tangent,
+                      np.sqrt(1.0 + 2.0 * strain[1]) * normal], axis=1)
+        return F - frame, frame
+
+    @classmethod
+    def displacements(cls, beam, u, X, tind):
+        tangent, tangent0, _, _ = cls._section(beam, u, X, tind)
+        turn = tangent - tangent0
+        return (Sections.displacements(beam, u, X, tind)
+                + beam.mesh.height * (X[1] - 0.5) * np.array([-turn[1], turn[0]]))
+
+    @classmethod
+    def strain(cls, beam, u, X, tind):
+        _, _, eps, kappa = cls._section(beam, u, X, tind)
+        e = eps - beam.mesh.height * (X[1] - 0.5) * kappa
+        xx = e + 0.5 * e * e
+        return np.array([xx, -beam.material.lateral_ratio * xx, 0.0 * xx])
+
+    @staticmethod
+    def stress(beam, strain, u, X, tind):
+        along = beam.material.axial_modulus * strain[0]
+        return np.array([along, 0.0 * along, 0.0 * along])
+
+    @staticmethod
+    def shortest(beam, u):
+        eps, kappa = beam.kernel.strain(beam.kernel.gather(u))
+        return np.min(1.0 + eps - 0.5 * beam.mesh.height * np.abs(kappa))
+
+    @staticmethod
+    def deformation(beam, u):
+        eps, kappa = beam.kernel.strain(beam.kernel.gather(u))
+        along = 1.0 + eps + 0.5 * beam.mesh.height * np.abs(kappa) * np.array([[[-1.0]], [[1.0]]])
+        across = np.sqrt(np.maximum(
+            1.0 - beam.material.lateral_ratio * (along * along - 1.0), 0.0))  # S_yy = 0
+        return along * across, along
+
+
+#: Classes by the name that elements give.
+KINEMATICS = {"sections": Sections, "cable": Cable}

@@ -1,0 +1,185 @@
+"""Where texts run: NumPy at first, compiled where that pays, and the same either way."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, MeshBeam, Scene,
+                        StVenantKirchhoff, compiled, machine)
+from skfem_ancf.source import lanes, primitive, source
+
+ROOT = Path(__file__).parent.parent
+
+SCRIPT = """
+import sys
+import numpy as np
+from skfem_ancf import *
+beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 17), height=0.01), ElementBeamANCF(3),
+            StVenantKirchhoff(E=2e8, nu=0.3, density=7800), width=0.01)
+state = Scene(beam).clamp("left").gravity((0, -9.81)).solve_static()
+print(state.displacement((1, 0)).tolist(), "numba" in sys.modules)
+"""
+TIP = (-0.74, -0.90)
+
+
+def run(code, tmp_path, **env):
+    """Standard output of a new process, with an empty folder for compiled code."""
+    import os
+
+    variables = {k: v for k, v in os.environ.items() if not k.startswith(("SKFEM", "NUMBA"))}
+    variables.update(NUMBA_CACHE_DIR=str(tmp_path / "numba"), PYTHONPATH=str(ROOT), **env)
+    return subprocess.run([sys.executable, "-c", code], env=variables, check=True,
+                          capture_output=True, text=True).stdout
+
+
+def scene(element=None, flag=True):
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.01),
+                element or ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.3, 7800), width=0.01,
+                compiled=flag)
+    return Scene(beam).clamp("left").gravity((0, -1.0))
+
+
+def test_a_first_solution_imports_no_compiler(tmp_path):
+    tip, imported = run(SCRIPT, tmp_path).strip().rsplit(" ", 1)
+    assert imported == "False"
+    np.testing.assert_allclose(eval(tip), TIP, atol=0.01)
+
+
+@pytest.fixture
+def auto(monkeypatch):
+    """The default rules, nothing loaded, nothing on disk, no time spent."""
+    from skfem_ancf.switch import VARIABLE, compiled_off
+
+    monkeypatch.delenv(VARIABLE, raising=False)
+    if compiled_off() is not None:
+        pytest.skip(compiled_off())
+    loads = []
+
+    def load(text, args):
+        loads.append(text.__name__)
+        compiled.LOADED[text.__name__] = lambda equations, *rest: text(
+            plain, *rest)
+        return compiled.LOADED[text.__name__]
+
+    s = scene()
+    plain = s.system.machine.tables.plain
+    monkeypatch.setattr(compiled, "LOADED", {})
+    monkeypatch.setattr(compiled, "load", load)
+    monkeypatch.setattr(compiled, "on_disk", lambda name: False)
+    monkeypatch.setattr(machine, "CLOCK", machine._Clock())
+    return s, loads
+
+
+def test_compiled_once_numpy_has_taken_as_long(auto, caplog):
+    s, loads = auto
+    caplog.set_level("INFO")
+    s.solve_static()
+    assert not loads and 0.0 < machine.CLOCK.spent < machine.compiling("equilibrium")
+    assert "would take about" in s.plan()["compiled loop"].reason
+    machine.CLOCK.spent = machine.compiling("equilibrium")
+    assert s.plan()["compiled loop"].status == "computed"
+    for _ in range(2):
+        s.solve_static()
+    assert loads.count("equilibrium") == 1
+    assert len([r for r in caplog.records if "compiling once, about" in r.message]) == len(loads)
+
+
+def test_taken_from_disk_once_numpy_has_taken_as_long_as_loading(auto, monkeypatch, caplog):
+    s, loads = auto
+    caplog.set_level("INFO")
+    monkeypatch.setattr(compiled, "on_disk", lambda name: True)
+    s.solve_static()
+    assert not loads
+    machine.CLOCK.spent = machine.LOADING
+    s.solve_static()
+    assert "equilibrium" in loads
+    assert not [r for r in caplog.records if "compiling once" in r.message]
+
+
+def test_a_motion_changes_over_on_its_way(auto):
+    s, loads = auto
+    machine.CLOCK.spent = machine.compiling("steps") - 1e-3
+    history = s.integrate(0.2, 1e-3)
+    assert loads.count("steps") == 1 and len(history) == 201
+
+
+def test_a_broken_numba_costs_nothing_but_speed(auto, monkeypatch):
+    s, _ = auto
+    monkeypatch.setattr(compiled, "PROBLEMS", [])
+
+    def kernels():
+        raise ImportError("made for another NumPy")
+
+    kernels.cache_info = compiled.kernels.cache_info
+    monkeypatch.setattr(compiled, "kernels", kernels)
+    machine.CLOCK.spent = 1e3
+    assert s.solve_static().converged
+    assert "another NumPy" in s.plan()["compiled loop"].reason
+
+
+def test_one_signature_for_every_scene(needs_compiled):
+    for s in (scene(), scene(ElementBeamCable(5)),
+              scene().pressure("top", 0.1), scene().moment("right", 1e-3)):
+        s.solve_static()
+    found = compiled.LOADED.get("equilibrium")
+    assert found is None or len(found.signatures) == 1
+
+
+@pytest.mark.parametrize("damage", ["empty", "noise", "a file in the way"])
+def test_a_cache_that_cannot_be_used_costs_time_only(damage, tmp_path, needs_compiled):
+    """The twin of a small text, with what Numba has kept of it spoilt between two processes."""
+    code = """
+import numpy as np, sys
+sys.path.insert(0, {folder!r})
+from small import double
+from skfem_ancf.compiled.twin import compile_for
+y = np.zeros(3)
+compile_for(double, (np.ones(3), y))(np.ones(3), y)
+print(y.tolist())
+"""
+    (tmp_path / "small.py").write_text(
+        "from skfem_ancf.source import lanes, source\n\n\n@source\ndef double(x, y):\n"
+        "    for i in lanes(x.size):\n        y[i] = 2.0 * x[i]\n")
+    code = code.format(folder=str(tmp_path))
+    folder = tmp_path / "numba"
+    if damage == "a file in the way":
+        folder.write_text("")
+    else:
+        assert run(code, tmp_path).strip() == "[2.0, 2.0, 2.0]"
+        kept = [p for p in folder.rglob("*") if p.is_file() and "double" in p.name]
+        assert kept
+        for path in kept:
+            path.write_bytes(b"" if damage == "empty" else b"\x80 no code")
+    assert run(code, tmp_path).strip() == "[2.0, 2.0, 2.0]"
+
+
+def test_texts_and_twins():
+    """What a text calls is compiled with it: texts, inner ones too, and twins of primitives."""
+    from skfem_ancf.switch import compiled_off
+
+    if compiled_off() is not None:
+        pytest.skip(compiled_off())
+    from skfem_ancf.compiled.twin import compile_for
+
+    x, y, z = np.arange(4.0), np.zeros(4), np.zeros(4)
+    total_of_squares(x, y)
+    compile_for(total_of_squares, (x, z))(x, z)
+    assert y.tolist() == z.tolist() == [14.0, 15.0, 18.0, 23.0]
+    assert primitive("factors")(lambda: None).twin == "factors"
+
+
+@source
+def square(x, y):
+    for i in lanes(x.size):
+        y[i] = x[i] * x[i]
+
+
+@source
+def total_of_squares(x, y):
+    square(x, y)
+    total = np.sum(y)
+    for i in lanes(x.size):
+        y[i] += total
