@@ -28,16 +28,17 @@ test: $(VENV)/test.stamp
 	$(PY) -m pytest -n 2 $(ARGS)
 
 # what round-off could decide, in other kernels of OpenBLAS and without fused multiply-add;
-# the code that Numba compiles for it is kept apart. Then all but the scripts, without Numba.
+# the code that Numba compiles for it is kept apart. Then, without Numba, all that solves.
 GENERIC := compiled locking stability statics
-SCRIPTS := bench fuzz package paper stress
+ONCE := bad_arguments basis bench demos docstrings elements forms fuzz io mapping mesh package \
+  paper places points pyvista readme rooms stress visuals
 
 test-settings: $(VENV)/test.stamp
 	export OPENBLAS_CORETYPE=Nehalem NUMBA_CPU_NAME=generic \
 	  NUMBA_CACHE_DIR=$(CURDIR)/out/numba-generic; \
 	  $(PY) -m skfem_ancf.compiled && $(PY) -m pytest -n 2 $(ARGS) $(GENERIC:%=tests/test_%.py)
 	OPENBLAS_CORETYPE=Haswell SKFEM_ANCF_COMPILED=0 \
-	  $(PY) -m pytest -n 2 $(ARGS) tests $(SCRIPTS:%=--ignore=tests/test_%.py)
+	  $(PY) -m pytest -n 2 $(ARGS) tests $(ONCE:%=--ignore=tests/test_%.py)
 
 # in an environment of its own: nothing else depends on the versions
 LINT := $(VENV)/lint
