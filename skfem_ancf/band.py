@@ -159,6 +159,13 @@ def solve_many(A, B, X):
 
 
 @source
+def clear(x):
+    """x = 0."""
+    for i in lanes(x.size):
+        x[i] = 0.0
+
+
+@source
 def copy(a, b):
     """b = a."""
     for i in lanes(a.size):

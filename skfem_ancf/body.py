@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .band import Band
+from .band import Band, clear
 from .kernels.cable import CablePack, cable_evaluate
 from .kernels.section import (CARRY, FORCE, MEAN, STRESS, TANGENT, SectionPack, section_evaluate)
-from .source import lanes, primitive, source
+from .source import primitive, source
 
 #: Kinds of packs, by their number in a table.
 PACKS = SectionPack, CablePack
@@ -107,12 +107,6 @@ def _stress(body, k, stresses):
 
 
 @source
-def _clear(x):
-    for i in lanes(x.size):
-        x[i] = 0.0
-
-
-@source
 def evaluate_body(body, what, u, v, f, given, use_given, out, A):
     """What :func:`~skfem_ancf.kernels.section.section_evaluate` does, for all beams."""
     flat = A.flat[A.top:]
@@ -142,7 +136,7 @@ def _no_band(x):
 @source
 def body_force(body, u, f):
     """The internal force."""
-    _clear(f)
+    clear(f)
     none = np.empty(stress_size(body))
     run_kernels(body, np.int64(FORCE), u, u, f, none, np.int64(0), none, _no_band(none))
 
@@ -154,8 +148,8 @@ def body_tangent(body, u, f, carried, use_carried, stresses, A):
     The loads complete it: :func:`~skfem_ancf.tables.add_load_stiffness`. The geometric part takes
     the stresses ``carried`` in place of these if ``use_carried``.
     """
-    _clear(f)
-    _clear(A.flat)
+    clear(f)
+    clear(A.flat)
     run_kernels(body, np.int64(TANGENT), u, u, f, carried, np.int64(use_carried), stresses, A)
 
 
@@ -174,6 +168,6 @@ def body_carry(body, u, du, stresses, carried):
 @source
 def body_mean(body, u0, u1, f):
     """The force whose work from u0 to u1 is the change of the strain energy."""
-    _clear(f)
+    clear(f)
     none = np.empty(stress_size(body))
     run_kernels(body, np.int64(MEAN), u0, u1, f, none, np.int64(0), none, _no_band(none))

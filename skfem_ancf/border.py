@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .band import Band, copy, dense_solve, diagonal, factorize, multiply, solve, weighted
+from .band import Band, clear, copy, dense_solve, diagonal, factorize, multiply, solve, weighted
 from .source import lanes, source
 from .tables import add_products
 
@@ -69,8 +69,7 @@ def new_factors(border, A, m, N):
 def add_curvature(joints, border, multipliers, free, A, S):
     """Add the joints' second derivative and the springs to the band, and to S what is not in it."""
     flat, size, value = S.reshape(S.size), np.empty(free.size), np.empty(joints.hk.size)
-    for i in lanes(flat.size):
-        flat[i] = 0.0
+    clear(flat)
     for a in lanes(value.size):
         value[a] = (multipliers[joints.hk[a]] * joints.hv[a] * free[joints.hi[a]]
                     * free[joints.hj[a]])
@@ -122,8 +121,7 @@ def factorize_bordered(f, border, free):
             row[i] *= f.scale[b]
     for a in range(k):
         row = Z[a]
-        for i in lanes(N):
-            row[i] = 0.0
+        clear(row)
         for c in range(k):
             if S[c, a] != 0.0:
                 other = W[c]

@@ -161,7 +161,7 @@ def _passing_on(function):
 
 
 def _load(text, args):
-    """The compiled function, or None; says so where that takes long."""
+    """The compiled function; says so where that takes long."""
     name = text.__name__
     if name in compiled.LOADED:
         return compiled.LOADED[name]

@@ -58,9 +58,3 @@ def own_joints(handle, what, t, u, v, out):
 def own_solve(handle, t, u, multipliers, R, phi, du, dm):
     """Solve with the multipliers by sparse factors; False if there is no solution."""
     return bool(owner(handle).solve_own(t, u, multipliers, R, phi, du, dm))
-
-
-@primitive("own")
-def own_descent(handle, R, du, dm):
-    """Change a correction as a descent wants it."""
-    owner(handle).correct_own(R, du, dm)

@@ -52,13 +52,7 @@ def column(x):
 
 def source(function):
     """Mark a function as a text for both machines; it stays what it is."""
-    function.twin, function.spliced = None, False
-    return function
-
-
-def spliced(function):
-    """As :func:`source`; compiled as a part of what calls it, for a text that is called once."""
-    function.twin, function.spliced = None, True
+    function.twin = None
     return function
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from functools import cache
 from importlib.util import find_spec
 
 from .errors import InputError
@@ -57,4 +58,9 @@ def _installed() -> bool:
     """True if Numba is there: asked without importing it, which takes longer than a solution."""
     if "numba" in sys.modules:
         return sys.modules["numba"] is not None
+    return _found()
+
+
+@cache
+def _found() -> bool:
     return find_spec("numba") is not None

@@ -155,16 +155,6 @@ class System:
             none if carried is None else carried, force)
         return force
 
-    def mean_external_force(self, u0, u1, t0, t1):
-        """The loads' mean over a step from u0 to u1."""
-        if not self._varying:
-            return self.constant_force
-        out = self.constant_force.copy()
-        for load in self._varying:
-            s = self.of(load)
-            out[s] += load.factor(0.5 * (t0 + t1)) * load.mean_force(u0[s], u1[s])
-        return out
-
     def momentum(self, v):
         """Linear momentum of the coordinates' velocities, shape (2,)."""
         p = self.mass.multiply(v)
@@ -270,11 +260,6 @@ class System:
     def screen(self):
         """What tells whether a state may be out of the range of laws and meshes."""
         return Screen(self.beams)
-
-    @property
-    def constant_loads(self):
-        """True if no load depends on displacement or time."""
-        return not self._varying
 
     # mass
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .band import copy, mirror
+from .band import clear, copy, mirror
 from .kernels.moments import (MomentPack, add_mean_moments, add_moment_stiffness,
                               add_moments)
 from .own import own_force, own_joints, own_load_stiffness, own_mean_force
@@ -141,8 +141,7 @@ def add_curvature_force(joints, t, u, multipliers, v, out):
 def joint_directions(joints, g, t, u, J):
     """J(u), dense, shape (m, N)."""
     flat = J.reshape(J.size)
-    for i in lanes(flat.size):
-        flat[i] = 0.0
+    clear(flat)
     if joints.own > 0:
         own_joints(joints.own, np.int64(3), t, u, u, flat)
         return
@@ -154,17 +153,27 @@ def joint_directions(joints, g, t, u, J):
 
 
 @source
-def external_force(loads, factors, t, scale, u, out):
-    """The force of all loads; ``scale`` is on those of one's own, the others have factors."""
-    for i in lanes(out.size):
-        out[i] = 0.0
-    n = loads.vectors.shape[0]
-    for k in range(n):
+def _dead_force(loads, factors, out):
+    """The forces of constant direction."""
+    clear(out)
+    for k in range(loads.vectors.shape[0]):
         c, vector = factors[k], loads.vectors[k]
         for i in lanes(out.size):
             out[i] += c * vector[i]
-    turning = loads.moments.M.size
-    add_moments(loads.moments, factors[n:n + turning], u, out)
+
+
+@source
+def _of_moments(loads, factors):
+    """The factors of the moments, a view."""
+    n = loads.vectors.shape[0]
+    return factors[n:n + loads.moments.M.size]
+
+
+@source
+def external_force(loads, factors, t, scale, u, out):
+    """The force of all loads; ``scale`` is on those of one's own, the others have factors."""
+    _dead_force(loads, factors, out)
+    add_moments(loads.moments, _of_moments(loads, factors), u, out)
     if loads.rows.size > 0:
         add_triples(out, loads.rows, loads.values, factors, loads.which, u, loads.columns)
     if loads.own > 0:
@@ -177,15 +186,8 @@ def mean_external_force(loads, factors, t, u0, u1, out):
 
     From u to u it is the force at u.
     """
-    for i in lanes(out.size):
-        out[i] = 0.0
-    n = loads.vectors.shape[0]
-    for k in range(n):
-        c, vector = factors[k], loads.vectors[k]
-        for i in lanes(out.size):
-            out[i] += c * vector[i]
-    turning = loads.moments.M.size
-    add_mean_moments(loads.moments, factors[n:n + turning], u0, u1, out)
+    _dead_force(loads, factors, out)
+    add_mean_moments(loads.moments, _of_moments(loads, factors), u0, u1, out)
     if loads.rows.size > 0:
         middle = np.empty(out.size)
         for i in lanes(out.size):
@@ -201,9 +203,7 @@ def add_load_stiffness(loads, factors, t, scale, u, A):
 
     Of the matrix the lower half is given; what is symmetric comes first, then the upper half.
     """
-    n = loads.vectors.shape[0]
-    add_moment_stiffness(loads.moments, factors[n:n + loads.moments.M.size], u, A.flat[A.top:],
-                         A.ld)
+    add_moment_stiffness(loads.moments, _of_moments(loads, factors), u, A.flat[A.top:], A.ld)
     mirror(A)
     if loads.rows.size > 0:
         subtract_from_band(A, loads.rows, loads.columns, loads.values, factors, loads.which)

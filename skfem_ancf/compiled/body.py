@@ -10,7 +10,7 @@ from numba.extending import intrinsic
 
 from ..band import Band
 from ..body import FlatBody, evaluate_body
-from .twin import FAST, jit, named, twin
+from .twin import OPTIONS, jit, named, twin
 
 _evaluate = twin(evaluate_body)
 
@@ -32,7 +32,7 @@ _SIGNATURE = types.void(_N, _F, _I, _I, _N, _I, _N, _N, _N, _F, _F, _N, _F, _F, 
 
 def address():
     """Of the compiled function; compiles it or takes it from disk."""
-    return cfunc(_SIGNATURE, cache=True, fastmath=FAST, error_model="numpy")(named(kernels)).address
+    return cfunc(_SIGNATURE, cache=True, **OPTIONS)(named(kernels)).address
 
 
 @intrinsic

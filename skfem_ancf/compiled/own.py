@@ -34,9 +34,3 @@ def own_solve(handle, t, u, multipliers, R, phi, du, dm):
     with objmode(done="boolean"):
         done = own.own_solve(handle, t, u, multipliers, R, phi, du, dm)
     return done
-
-
-@njit
-def own_descent(handle, R, du, dm):
-    with objmode():
-        own.own_descent(handle, R, du, dm)

@@ -14,7 +14,7 @@ from . import stamp
 logger = logging.getLogger(__name__)
 
 # no "nnan" and "ninf": a strain that is not finite must be seen
-FAST = {"contract", "reassoc", "nsz", "arcp"}
+OPTIONS = {"fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
 _INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
@@ -45,31 +45,7 @@ def twin(function, entry=False):
     for name in _names(function.__code__):
         if hasattr(names.get(name), "twin"):
             names[name] = twin(names[name])
-    if not entry and (function.spliced or _small(function)):
-        return njit(fastmath=FAST, error_model="numpy", inline="always")(named(function, names))
     return jit(named(function, names), entry)
-
-
-import os
-_S1,_S3=int(os.environ.get("S1","1500")),int(os.environ.get("S3","250"))
-def _small(function):
-    size=len(function.__code__.co_code)
-    n=_sites().get(function.__name__,0)
-    r = (n==1 and size<_S1) or (n<=3 and size<_S3)
-    if os.environ.get("SV"): print("splice" if r else "call  ", function.__name__, size, n)
-    return r
-
-@cache
-def _sites():
-    import dis, sys
-    out={}
-    for m in list(sys.modules.values()):
-        if not getattr(m,"__name__","").startswith("skfem_ancf"): continue
-        for f in vars(m).values():
-            if isinstance(f,FunctionType) and f.__module__==m.__name__ and hasattr(f,"twin"):
-                for i in dis.get_instructions(f.__code__):
-                    if i.opname=="LOAD_GLOBAL": out[i.argval]=out.get(i.argval,0)+1
-    return out
 
 
 def named(function, names=None):
@@ -83,14 +59,13 @@ def named(function, names=None):
 
 def jit(function, entry=False):
     """Compile a function; ``entry`` as for :func:`twin`."""
-    options = {"fastmath": FAST, "error_model": "numpy"}
     if not entry:
-        return njit(**options, **_INNER)(function)
+        return njit(**OPTIONS, **_INNER)(function)
     try:
-        return njit(cache=True, **options)(function)
+        return njit(cache=True, **OPTIONS)(function)
     except RuntimeError as error:  # there is no folder that can be written
         logger.info("compiled code is not kept: %s", error)
-        return njit(**options)(function)
+        return njit(**OPTIONS)(function)
 
 
 def compile_for(text, args):
@@ -100,7 +75,7 @@ def compile_for(text, args):
         function.compile(types)
     except (OSError, EOFError, pickle.PickleError, KeyError, ValueError) as error:
         logger.info("what was kept of compiled code cannot be used: %s", error)
-        function = njit(fastmath=FAST, error_model="numpy")(function.py_func)
+        function = njit(**OPTIONS)(function.py_func)
         function.compile(types)
     return function
 

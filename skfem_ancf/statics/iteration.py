@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..band import copy, diagonal, factorize, fix, multiply, solve, weighted
+from ..band import clear, copy, diagonal, factorize, fix, multiply, solve, weighted
 from ..body import body_carry, body_force, body_tangent
 from ..border import add_curvature, factorize_bordered, new_factors, solve_bordered
 from ..own import own_solve
@@ -168,8 +168,7 @@ def _tangent(e, target, rules, x, w, k):
 def _residual(e, target, x, w):
     """The residual at free coordinates; returns how far joints are open."""
     external_force(e.loads, target.factors, np.nan, target.scale, x.u, w.load)
-    for i in lanes(x.u.size):
-        w.push[i] = 0.0
+    clear(w.push)
     opening = 0.0
     if w.phi.size > 0:
         constraint(e.joints, target.c, target.g, target.at, x.u, w.phi)
@@ -184,8 +183,7 @@ def _residual(e, target, x, w):
 def _correction(e, target, rules, x, w, f, moving):
     """The correction into w; returns the root of its work, negative if there is none."""
     N, m = x.u.size, w.phi.size
-    for i in lanes(N):
-        w.push[i] = 0.0
+    clear(w.push)
     if moving:  # R = R - K du of the fixed coordinates
         for k in lanes(e.fixed.size):
             w.push[e.fixed[k]] = target.prescribed[k]
