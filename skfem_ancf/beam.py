@@ -143,7 +143,7 @@ class Beam(Frozen):
             if not isinstance(value, kind):
                 raise InputError(f"{argument} must be a {kind.__name__}, got {shown(value)}")
         element = cast("ElementBeam", element)
-        self.mesh: MeshBeam = mesh if mesh.is_straight else mesh.with_sections(element.sections)
+        self.mesh: MeshBeam = element.fitted(mesh)
         self.element, self.material = element, material
         self.width = require_positive("width", width)
         self.formulation = get_formulation(formulation)

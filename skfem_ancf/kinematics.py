@@ -43,10 +43,11 @@ class Sections:
         """Coordinates (2, n) and weights (n,) of 12 / h^3 int Y r dY of a section."""
         eta, w = gauss(beam.element.order + 1)
         h = beam.mesh.height
-        f = beam.element.functionals[2:2 + beam.element.section.number]
+        first = next(k for k, f in enumerate(beam.element.functionals) if f[2] > 0)
+        f = beam.element.functionals[first:first + beam.element.section.number]
         c = np.array([12.0 * h ** (f[k][2] - 1) * np.sum(
             w * (eta - 0.5) * beam.element.section(eta - 0.5, k)[0]) for k in range(len(f))])
-        return node * beam.nd + 4 + np.arange(2 * len(f)).reshape(-1, 2).T, c
+        return node * beam.nd + 2 * first + np.arange(2 * len(f)).reshape(-1, 2).T, c
 
     @staticmethod
     def plane(beam, tangent):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.special import roots_jacobi
 
 from .errors import InputError, require_finite, require_integer, shown, taught
 
@@ -23,6 +24,14 @@ def gauss(n: int) -> Rule:
     n = require_integer("the number of Gauss points n", n, 1, MAX_POINTS)
     x, w = np.polynomial.legendre.leggauss(n)
     return 0.5 * (x + 1.0), 0.5 * w
+
+
+@taught
+def gauss_lobatto(n: int) -> Array:
+    """The n >= 2 Gauss-Lobatto points on [-1, 1], zeros of (1 - x^2) P_{n-1}': antisymmetric."""
+    n = require_integer("the number of Gauss-Lobatto points n", n, 2, MAX_POINTS)
+    inner = roots_jacobi(n - 2, 1.0, 1.0)[0] if n > 2 else np.zeros(0)
+    return np.concatenate([[-1.0], 0.5 * (inner - inner[::-1]), [1.0]])
 
 
 @taught

@@ -453,9 +453,9 @@ class Recovery:
     @cached_property
     def samples(self) -> tuple[Array, Array]:
         """Places along an element, (p,), and its own stress there, (3, ne, p, m)."""
-        beam, (x, _) = self.beam, gauss(2)
-        X = np.array([np.repeat(x, len(self.eta)), np.tile(self.eta, 2)])
-        stress = beam.stress(self._u, X).reshape(3, -1, 2, len(self.eta))
+        beam, x = self.beam, self.beam.element.sampling.places("xx")
+        X = np.array([np.repeat(x, len(self.eta)), np.tile(self.eta, len(x))])
+        stress = beam.stress(self._u, X).reshape(3, -1, len(x), len(self.eta))
         if beam.element.sections == "linear":
             return np.array([0.5]), stress.mean(axis=2, keepdims=True)
         return x, stress

@@ -135,7 +135,7 @@ def _hermite_coefficients(m: int) -> Array:
 def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
     """Functions of degree 2 m - 1 dual to the derivatives 0 ... m-1 at 0, then at 1.
 
-    Shape (2 m,) + xi.shape; m = 2 is :func:`hermite`.
+    Shape (2 m,) + xi.shape; m = 1 is :func:`linear`, m = 2 :func:`hermite`.
 
     Parameters
     ----------
@@ -146,5 +146,7 @@ def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
     derivative
         Number of derivatives.
     """
+    if m < 3 and derivative < 3:
+        return (linear if m == 1 else hermite)(xi, derivative)
     coefficients = polynomial.polyder(_hermite_coefficients(m), derivative)
-    return polynomial.polyval(np.asarray(xi, dtype=np.float64), coefficients)
+    return polynomial.polyval(np.asarray(xi), coefficients)

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import legendre
-from scipy.special import roots_jacobi
 
 from ..errors import require_integer, require_option, teaching
+from ..quadrature import gauss_lobatto
 from .base import ElementBeam, SectionFunctions
 
 if TYPE_CHECKING:
@@ -21,18 +21,12 @@ def _chebyshev(n: int) -> Array:
     return np.concatenate([[-1.0], np.sin(np.arange(1 - m, m, 2) * np.pi / (2 * m)), [1.0]])
 
 
-def _gauss_lobatto(n: int) -> Array:
-    """Both faces, and the zeros of P_{n-1}' between them: those of a Jacobi polynomial."""
-    inner, _ = roots_jacobi(n - 2, 1.0, 1.0)
-    return np.concatenate([[-1.0], 0.5 * (inner - inner[::-1]), [1.0]])
-
-
 #: Largest degree of a section.
 MAX_ORDER = 64
 
 POINT_FAMILIES = {
     "chebyshev": _chebyshev,
-    "gauss-lobatto": _gauss_lobatto,
+    "gauss-lobatto": gauss_lobatto,
     "equispaced": lambda n: np.linspace(-1.0, 1.0, n),
 }
 

@@ -11,7 +11,8 @@ from skfem.element import DiscreteField, Element
 
 from ..errors import MeshError
 from ..frozen import Frozen
-from ..reference import RefBeam, hermite, linear
+from ..reference import RefBeam, hermite_basis
+from .sampling import Held, Sampling, default_sampling, missed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,19 +24,26 @@ if TYPE_CHECKING:
     from ..types import Array
 
 
+#: How sections vary between the nodes that hold 1, 2, ... derivatives along X, the 0th included.
+SECTIONS = ("linear", "cubic", "quintic", "septic")
+
+
 class ElementBeam(Frozen, Element):
     """A scalar beam element; wrap it in scikit-fem's ``ElementVector`` for the position field.
 
-    The local functions are, for each of the two nodes, a cubic Hermite function in xi for the
-    position ``r`` and its slope ``r_X`` on the axis, then ``(1 - xi) P_k(Y)`` or ``xi P_k(Y)``
-    for each section coordinate. A subclass sets :attr:`section` and :attr:`dofnames`.
+    The local functions are, for each of the two nodes, a Hermite function in xi for the position
+    ``r``, its slope ``r_X`` and further derivatives on the axis, then ``(1 - xi) P_k(Y)`` or
+    ``xi P_k(Y)`` for each section coordinate, Hermite functions too where their derivatives along
+    X are coordinates. A subclass says what the coordinates are; all else follows from that, the
+    :attr:`sampling` of the formulation "assumed" included, which it may override.
 
     Parameters
     ----------
     section
         The functions P_k of the section, a :class:`SectionFunctions`.
     names
-        Names of the section coordinates of a node, after ``r`` and ``r_X``.
+        Names of the coordinates of a node after ``r`` and ``r_X``: further derivatives of the
+        axis, then those of all P_k, then their first derivatives along X, and so on.
     functionals
         What these coordinates are, as in the attribute.
     welded
@@ -51,10 +59,10 @@ class ElementBeam(Frozen, Element):
         For each coordinate of a node: eta - 1/2 of the point, and the number of derivatives
         along X and Y that the coordinate is.
     axis_degree : int
-        Polynomial degree along the axis.
+        Polynomial degree of the axis along X.
     sections : str
-        How section coordinates vary between the nodes: "linear", or "cubic" (Hermite, with slopes
-        along X as further coordinates).
+        How section coordinates vary between the nodes: "linear", "cubic" or "quintic" (Hermite,
+        with derivatives along X as further coordinates).
     strain_degree : int
         Polynomial degree of the Green-Lagrange strain along a straight element.
     carries_shear_parabola : bool
@@ -66,8 +74,6 @@ class ElementBeam(Frozen, Element):
 
     refdom = RefBeam
     kinematics = "sections"
-    axis_degree = 3
-    sections = "linear"
 
     def __init__(self, section: SectionFunctions, names: Sequence[str],
                  functionals: Sequence[tuple[float, int, int]], welded: Sequence[str]) -> None:
@@ -77,6 +83,10 @@ class ElementBeam(Frozen, Element):
         self.functionals = ((0.0, 0, 0), (0.0, 1, 0), *functionals)
         self.welded = ["r", *welded]
         self.doflocs = np.array([[xi, 0.5 + f[0]] for xi in (0.0, 1.0) for f in self.functionals])
+        self._along = (sum(across == 0 for _, _, across in self.functionals),
+                       1 + max([a for _, a, across in self.functionals if across > 0], default=0))
+        self.axis_degree = 2 * self._along[0] - 1
+        self.sections = SECTIONS[self._along[1] - 1]
         # stock quadrature takes 2 maxdeg in each direction: exact for the energy, which is of
         # degree 8 along the axis and 4 N across the section
         self.maxdeg = max(self.strain_degree, 2 * self.section.degree)
@@ -88,7 +98,7 @@ class ElementBeam(Frozen, Element):
 
     @property
     def strain_degree(self) -> int:
-        return 4 if self.sections == "linear" else 6
+        return 2 * max(self.axis_degree - 1, 2 * self._along[1] - 1)
 
     @property
     def carries_shear_parabola(self) -> bool:
@@ -116,16 +126,13 @@ class ElementBeam(Frozen, Element):
         node, k = divmod(i, self.nodal_dofs)
         if not 0 <= i < 2 * self.nodal_dofs:
             self._index_error()
-        if k < 2:
-            values, slopes = (hermite(X[0], d)[2 * node + k] for d in (0, 1))
-            return values, slopes, 0.0 * X[1], k
-        _, slope, m = self.functionals[k]
-        P, dP = self.section(X[1] - 0.5, (k - 2) % self.section.number)
-        if self.sections == "cubic":
-            a, da = (hermite(X[0], d)[2 * node + slope] for d in (0, 1))
-        else:
-            a, da = (linear(X[0], d)[node] for d in (0, 1))
-        size = h**m
+        _, slope, power = self.functionals[k]
+        m = self._along[power > 0]
+        a, da = (hermite_basis(m, X[0], d)[m * node + slope] for d in (0, 1))
+        if power == 0:
+            return a, da, 0.0 * X[1], slope
+        P, dP = self.section(X[1] - 0.5, (k - self._along[0]) % self.section.number)
+        size = h**power
         return size * a * P, size * da * P, size * a * dP, slope
 
     def gbasis(self, mapping: MappingBeam, X: Array, i: int,
@@ -157,6 +164,32 @@ class ElementBeam(Frozen, Element):
         return (DiscreteField(value=scale * value, grad=grad),)
 
     @cached_property
+    def sampling(self) -> Sampling:
+        """Where "assumed" evaluates the strain; by default :func:`.sampling.default_sampling`."""
+        return default_sampling(self.axis_degree, 2 * self._along[1] - 1)
+
+    @cached_property
+    def held(self) -> tuple[Held, ...]:
+        """The modes that eps_xx misses there, of the axis and of each section coordinate.
+
+        Their sizes do not lower the order of the error, which is 2 for linear sections. The more
+        derivatives are coordinates, the more may resist and the less c is: for a quintic axis ten
+        times the size of a cubic one costs little and spares the higher modes.
+        """
+        (m, k), N = self._along, self.section.number
+        n = len(self.sampling.places("xx"))
+        size = (1.0, "element") if k == 1 else (10.0 ** (m - 1), "beam")
+        return (*(Held(self._of_both(range(m), w), *size) for w in missed(m, n)),
+                *(Held(self._of_both(range(m + j, m + j + N * k, N), w), 1.0 / N)
+                  for j in range(N) for w in missed(k, n)))
+
+    def _of_both(self, rows: Sequence[int], weights: Array) -> Array:
+        """Weights of some coordinates of both nodes, among zeros for the others."""
+        full = np.zeros((2, self.nodal_dofs))
+        full[:, rows] = weights.reshape(2, -1)
+        return full.ravel()
+
+    @cached_property
     def halving(self) -> Array:
         """The coordinates of the left half of an element of length 1 and height 1 from its own.
 
@@ -169,6 +202,27 @@ class ElementBeam(Frozen, Element):
         i = range(2 * self.nodal_dofs)
         own, child = (np.array([self.local(P, 1.0, k)[0] for k in i]).T for P in (half, X))
         return np.linalg.lstsq(child, own, rcond=None)[0]
+
+    def fitted(self, mesh: MeshBeam) -> MeshBeam:
+        """The mesh that a beam of this element has: a curved one with sections as its own.
+
+        Parameters
+        ----------
+        mesh
+            A MeshBeam.
+
+        Raises
+        ------
+        MeshError
+            If it is curved, and a curved mesh, whose axis is cubic, cannot be the element's.
+        """
+        if mesh.is_straight:
+            return mesh
+        if self.section.number and (self.axis_degree > 3 or self._along[1] > 2):
+            raise MeshError(
+                f"{self!r} is for straight meshes: the axis of a curved one is cubic, its sections "
+                "linear or cubic. Use ElementBeamANCF, ElementBeamANCFCubic or ElementBeamCable(5)")
+        return mesh.with_sections(self.sections)
 
     def rigid(self, mesh: MeshBeam) -> Array:
         """The coordinates of the nodes in the stress-free state, less their positions.

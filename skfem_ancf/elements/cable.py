@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from ..errors import InputError, shown, teaching
 from ..reference import hermite_basis
 from .base import ElementBeam, SectionFunctions
+from .sampling import Held, Sampling, missed
 
 if TYPE_CHECKING:
     from ..types import Array
@@ -54,18 +56,15 @@ class ElementBeamCable(ElementBeam):
         if (isinstance(degree, bool) or not isinstance(degree, (int, np.integer))
                 or degree not in (3, 5, 7)):
             raise InputError(f"the degree of a cable is 3, 5 or 7, got {shown(degree)}")
-        self.axis_degree = int(degree)
-        m = (self.axis_degree + 1) // 2
-        super().__init__(SectionFunctions(np.zeros((1, 0))), [], [], [])
-        self.functionals = tuple((0.0, k, 0) for k in range(m))
-        self.dofnames = ["r"] + ["r_" + "X" * k for k in range(1, m)]
-        self.nodal_dofs = m
-        self.doflocs = np.repeat([[0.0, 0.5], [1.0, 0.5]], m, axis=0)
+        m = (int(degree) + 1) // 2
+        super().__init__(SectionFunctions(np.zeros((1, 0))), ["r_XX", "r_XXX"][:m - 2],
+                         [(0.0, k, 0) for k in range(2, m)], [])
         self.maxdeg = self.axis_degree
 
     @property
     def strain_degree(self) -> int:
-        return 2 * (self.axis_degree - 1)
+        # |r_X| and the curvature are no polynomials: as many points as coordinates of both nodes
+        return self.axis_degree
 
     def axis(self, xi: Array, derivative: int) -> Array:
         """The 2 m Hermite functions of the axis, or a derivative of them by xi.
@@ -84,8 +83,12 @@ class ElementBeamCable(ElementBeam):
         """
         return hermite_basis(self.nodal_dofs, xi, derivative)
 
-    def local(self, X: Array, h: float, i: int) -> tuple[Array, Array, Array, int]:
-        if not 0 <= i < 2 * self.nodal_dofs:
-            self._index_error()
-        value, slope = (self.axis(X[0], d)[i] for d in (0, 1))
-        return value, slope, 0.0 * X[1], i % self.nodal_dofs
+    @cached_property
+    def sampling(self) -> Sampling:
+        return Sampling(self.axis_degree - 1, {})
+
+    @cached_property
+    def held(self) -> tuple[Held, ...]:
+        # the mode that a higher degree misses in one element is held where two meet
+        return () if self.axis_degree > 3 else tuple(
+            Held(w, 300.0, "beam") for w in missed(2, self.sampling.points))

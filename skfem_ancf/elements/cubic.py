@@ -20,8 +20,6 @@ class ElementBeamANCFCubic(ElementBeamANCF):
     ['r', 'r_X', 'r_Y0', 'r_Y1', 'r_XY0', 'r_XY1']
     """
 
-    sections = "cubic"
-
     def _coordinates(self) -> tuple[list[str], list[tuple[float, int, int]]]:
         names, functionals = super()._coordinates()
         return (names + [name.replace("r_Y", "r_XY") for name in names],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,20 +26,24 @@ class Assumed(Formulation):
     """Strain components sampled along the axis where the interpolation can make them vanish.
 
     A cubic axis cannot keep |r_X| constant while it bends, and sections that turn linearly get
-    thinner between two nodes that have turned. Sampled as follows neither is seen, and the error
-    of a mesh does not grow with the slenderness:
+    thinner between two nodes that have turned. Sampled where the interpolation can vanish, and
+    interpolated between, neither is seen, and the error of a mesh does not grow with the
+    slenderness. The element says where, in :attr:`~skfem_ancf.elements.ElementBeam.sampling`:
 
     * linear sections: eps_xx and eps_xy at two Gauss points, eps_yy at the nodes,
     * cubic sections: eps_xx at two Gauss points, eps_xy and eps_yy at xi = 0, 1/2, 1, integrated
       with three Gauss points,
+    * others: :func:`~skfem_ancf.elements.sampling.default_sampling`.
 
-    and interpolated between. What the samples miss, equal slopes at both nodes while the nodes
-    rest, is held by ``1/2 k L |c|^2`` with ``c = (r_X1 + r_X2) / 2 - beta (r_2 - r_1) / L``, and
-    likewise for each pair ``r_Yk``, ``r_XYk`` of cubic sections. The complex number beta, 1 for a
-    straight element, makes c vanish in the stress-free state; c turns with the beam, so the term
-    is objective, quadratic, and its matrix constant. For linear sections k = E I / L^2; for cubic
-    sections k = 10 E I / l^2 (the cubic cable: 300 E I / l^2) for the axis, l the length of the
-    beam, and E I / N for each section coordinate, which keeps the fourth order.
+    What the samples miss, of a cubic axis equal slopes at both nodes while the nodes rest, is held
+    by ``1/2 k L |c|^2``. The element says which combinations c of its coordinates and what k in
+    :attr:`~skfem_ancf.elements.ElementBeam.held`: ``c = (r_X1 + r_X2) / 2 - (r_2 - r_1) / L`` for
+    a cubic axis, and likewise for each pair ``r_Yk``, ``r_XYk`` of cubic sections. Where the
+    stress-free state is curved, c less ``beta (r_2 - r_1) / L``, with the complex number beta that
+    makes it vanish there, is held; it turns with the beam, so the term is objective, quadratic,
+    and its matrix constant. For linear sections k = E I / L^2; for cubic ones k = 10 E I / l^2 (the
+    cubic cable: 300 E I / l^2) for the axis, l the length of the beam, and E I / N for each
+    section coordinate, which keeps their higher order.
 
     Linear sections of order 2 and more in plane strain: eps_yy is continuous from element to
     element, the curvature is not, so their sum cannot vanish at two points of each. The volumetric
@@ -68,18 +72,13 @@ class Assumed(Formulation):
 
     def terms(self, element: ElementBeam, material: Material) -> Sequence[Term]:
         _, section = self.full_rules(element)
-        samples: dict[str, tuple[float, ...]]
-        if element.sections == "linear":
-            axis, samples = gauss(2), {"yy": (0.0, 1.0)}
-        else:
-            nodes = (0.0, 0.5, 1.0)
-            axis, samples = gauss(3), {"xx": tuple(gauss(2)[0]), "yy": nodes, "xy": nodes}
+        sampling = element.sampling
+        axis, samples = gauss(sampling.points), sampling.samples
         require_like("material", material, "Material", "law")
         law = material.law(material.shear_factor(element))
         whole = Term(law, axis, section, samples)
         if element.order > 1:
-            linear = element.sections == "linear"
-            return (linear and self._volumetric_apart(whole, element, material)) or [whole]
+            return self._volumetric_apart(whole, element, material) or [whole]
         if not isinstance(law, LinearLaw):
             return [whole]
         uncoupled, coupling = split_moduli(self.name, material, element)
@@ -99,13 +98,14 @@ class Assumed(Formulation):
 
         The rest alone is positive in every sampled strain: one point adds no zero modes.
         """
-        laws = material.volumetric_split(material.shear_factor(element))
+        volume = element.sampling.volume
+        laws = material.volumetric_split(material.shear_factor(element)) if volume else None
         if laws is None:
             return None
         points = tuple(whole.axis[0])
         samples = {"xx": points, "xy": points, **whole.samples}
         return [Term(laws[0], whole.axis, whole.section, whole.samples),
-                Term(laws[1], gauss(1), whole.section, samples)]
+                Term(laws[1], gauss(volume), whole.section, samples)]
 
     def stress(self, beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
         first, *others = self.terms(beam.element, beam.material)
@@ -126,22 +126,19 @@ class Assumed(Formulation):
                    for y, wi in zip(eta, w))
 
     def stabilisation(self, mesh: MeshBeam, element: ElementBeam, material: Material,
-                      width: float) -> Array:
+                      width: float) -> Array | None:
         tind = np.arange(1 if mesh.is_uniform else mesh.nelements)
         L, EI = mesh.lengths[tind], material.E * width * mesh.height**3 / 12.0
+        per = {"element": L, "beam": np.sum(mesh.lengths), "": 1.0}
         q = element.rigid(mesh)
         q[0] = mesh.p
         q = np.concatenate([q[:, :, end] for end in mesh.t[:, tind]])  # (2 nb, 2, ne)
-
         nb = element.nodal_dofs
         chord = (q[nb] - q[0]) / L
-
-        def held(k: Any, slope: int, value: int | None = None) -> Array:
-            """1/2 k L |c|^2 for the mean of a slope, less the difference of a value."""
-            c = np.zeros((len(tind), 2 * nb))
-            c[:, [slope, nb + slope]] = 0.5
-            if value is not None:
-                c[:, value], c[:, nb + value] = 1.0 / L, -1.0 / L
+        along = np.array([slope for _, slope, _ in 2 * element.functionals])
+        out = None
+        for mode in element.held:
+            c = mode.weights * L[:, None] ** (along - 1)
             start = np.einsum("ek,kie->ie", c, q)
             beta = (start[0] + 1j * start[1]) / (chord[0] + 1j * chord[1])
             beta = np.array([[beta.real, -beta.imag], [beta.imag, beta.real]]).transpose(2, 0, 1)
@@ -149,11 +146,7 @@ class Assumed(Formulation):
             C[:, :, 0] += beta / L[:, None, None]
             C[:, :, nb] -= beta / L[:, None, None]
             C = C.reshape(len(tind), 2, -1)
-            return (self.alpha * k * L)[:, None, None] * (C.transpose(0, 2, 1) @ C)
-
-        if element.sections == "linear" and element.order > 0:
-            return held(EI / L**2, 1)
-        N = element.section.number
-        size = 300.0 if element.order == 0 else 10.0
-        total = held(size * EI / np.sum(mesh.lengths) ** 2, 1)
-        return total + sum(held(EI / N, 2 + N + k, 2 + k) for k in range(N))
+            k = self.alpha * mode.size * EI / per[mode.per] ** 2
+            held = (k * L)[:, None, None] * (C.transpose(0, 2, 1) @ C)
+            out = held if out is None else out + held
+        return out

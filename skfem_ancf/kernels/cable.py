@@ -259,7 +259,7 @@ class CableKernel(Chain):
     width
         Width of the section.
     formulation
-        "assumed" samples at 2 m - 2 Gauss points, any other at 2 m.
+        That of the beam; its first term has the Gauss points along the axis.
     """
 
     texts = Texts(2, cable_force, cable_tangent, cable_carry, cable_stress, cable_mean,
@@ -270,12 +270,10 @@ class CableKernel(Chain):
         if element.axis_degree > 5 and not mesh.is_straight:
             raise InputError(f"a cable of degree {element.axis_degree} needs a straight mesh: use "
                              "degree 5 on a curve")
-        m = element.nodal_dofs
-        # 2 m - 2 points miss one mode of an element: for degree 3 it is stabilised, above it is
-        # held where two elements meet
-        n = 2 * m - 2 + (m > 2 and mesh.nelements == 1) if formulation.name == "assumed" else 2 * m
-        self.constant = (formulation.stabilisation(mesh, element, material, width)
-                         if m == 2 and formulation.name == "assumed" else None)
+        self.constant = formulation.stabilisation(mesh, element, material, width)
+        n = len(formulation.terms(element, material)[0].axis[0])
+        if mesh.nelements == 1 and self.constant is None:
+            n = max(n, element.axis_degree)  # no neighbour holds a mode that fewer points miss
         self.points_number = n
         self.shared = mesh.is_uniform or np.ptp(mesh.lengths) <= 1e-13 * np.max(mesh.lengths)
         self.packs = [self._pack(mesh, element, material, width, n)]
