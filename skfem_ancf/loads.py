@@ -411,7 +411,9 @@ class DeadLoad(Load):
         self._spread = spread
 
     def spread(self, u: Array) -> Spread | None:
-        return self._spread or super().spread(u)
+        if self._spread is None:
+            self._spread = super().spread(u)
+        return self._spread
 
     def bind(self, beam: Beam) -> Load:
         if beam is not self.beam:

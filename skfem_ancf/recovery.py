@@ -22,6 +22,7 @@ beam between two places where its section force jumps:
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
+from copy import copy
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -74,27 +75,33 @@ def integration(nodes: Array) -> Array:
 
 def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[int] = (0, 1, 2),
                      tol: float = 1e-10) -> Array:
-    """The strain (3, ...) whose stress is given, by Newton's method.
+    """The strain whose stress is given, by Newton's method.
 
     Parameters
     ----------
     law
         With ``stress`` and ``moduli``.
     stress
-        Shape (3, ...); only the components ``unknown`` are used.
+        Of a field of n times m points, shape (3, n, m), or of several, shape (3, ..., n, m); only
+        the components ``unknown`` are used.
     strain
-        To start from, shape (3, ...); components that are not in ``unknown`` keep their values.
+        To start from, of the same shape; components that are not in ``unknown`` keep their values.
     unknown
         Components to find.
     tol
-        Largest difference of the stress, relative to its largest value.
+        Largest difference of the stress of a field, relative to its largest value.
+
+    Returns
+    -------
+    ndarray
+        As ``strain``.
 
     Raises
     ------
     NotRecovered
         If there is no such strain.
     """
-    k = list(unknown)
+    k, field = list(unknown), (0, -2, -1)
     strain = np.array(strain, dtype=float)
     if isinstance(law, LinearLaw):
         gap = (stress - law.stress(strain))[k]
@@ -104,28 +111,18 @@ def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[i
         for _ in range(30):
             found = law.stress(strain)
             gap = (stress - found)[k]
-            if not np.all(np.isfinite(gap)):
+            size = np.max(np.abs(gap), axis=field)
+            if not np.all(np.isfinite(size)):
+                left = ~np.isfinite(size)
                 break
-            if np.max(np.abs(gap)) <= tol * max(np.max(np.abs(found)), np.max(np.abs(stress))):
+            left = size > tol * np.maximum(np.max(np.abs(found), axis=field),
+                                           np.max(np.abs(stress), axis=field))
+            if not np.any(left):
                 return strain
             D = np.moveaxis(law.moduli(strain)[np.ix_(k, k)], (0, 1), (-2, -1))
-            strain[k] += np.moveaxis(np.linalg.solve(D, np.moveaxis(gap, 0, -1)[..., None])[..., 0],
-                                     -1, 0)
-    raise NotRecovered("no strain has the stress of the section under this law")
-
-
-class _Spline:
-    """A cubic spline through values (n, ...), of lower degree where n is below 4."""
-
-    def __init__(self, s, values):
-        self.constant = values[0] if len(s) == 1 else None
-        self.spline = None if len(s) == 1 else CubicSpline(s, values)
-
-    def __call__(self, s, derivative=0):
-        if self.spline is not None:
-            return self.spline(s, derivative)
-        out = np.broadcast_to(self.constant, np.shape(s) + self.constant.shape)
-        return out if derivative == 0 else 0.0 * out
+            change = np.linalg.solve(D, np.moveaxis(gap, 0, -1)[..., None])[..., 0]
+            strain[k] += left[..., None, None] * np.moveaxis(change, -1, 0)
+    raise NotRecovered("no strain has the stress of the section under this law", left)
 
 
 def smoothed(s: Array, values: Array, length: float) -> Array:
@@ -136,14 +133,14 @@ def smoothed(s: Array, values: Array, length: float) -> Array:
     s
         Places, increasing, shape (n,).
     values
-        Shape (n, m).
+        Shape (..., n, m).
     length
         Length below which waves are damped.
 
     Returns
     -------
     ndarray
-        Shape (n, m).
+        Shape (..., n, m).
     """
     d = np.diff(s)
     w = 0.5 * (np.append(d, 0.0) + np.append(0.0, d))
@@ -151,20 +148,27 @@ def smoothed(s: Array, values: Array, length: float) -> Array:
     band = np.zeros((3, len(s)))
     band[0, 1:], band[2, :-1] = -c, -c
     band[1] = w + np.append(c, 0.0) + np.append(0.0, c)
-    return solve_banded((1, 1), band, w[:, None] * values)
+    right = np.moveaxis(w[:, None] * values, -2, 0)
+    found = solve_banded((1, 1), band, right.reshape(len(s), -1), overwrite_b=True,
+                         check_finite=False)
+    return np.moveaxis(found.reshape(right.shape), 0, -2)
 
 
 class _Piece:
     """The field between two stations: on sections, at nodes and middles of the elements.
+
+    Arrays of several states have their axis before those of sections and points: "..." below.
 
     Attributes
     ----------
     s
         Arc length of the sections, (n,).
     strain, stress
-        At the sections and the points ``eta``, (3, n, m).
+        At the sections and the points ``eta``, (3, ..., n, m).
     angle
-        Direction of the fibres along the axis, (n, m), in radians.
+        Direction of the fibres along the axis, (..., n, m), in radians.
+    rate
+        At which the sections turn, (..., n).
     """
 
     def __init__(self, recovery, start, end):
@@ -190,28 +194,42 @@ class _Piece:
         self.faces = [Sections(self.forces, self.e, xi, np.array([float(k)])).face(k)[..., 0]
                       / speed for k in (0, 1)]
         r = Sections(self.forces, self.e, xi, np.array([0.5])).field(self.forces.q, slope=True)
-        self.raw_angle = np.unwrap(np.arctan2(r[1, :, 0], r[0, :, 0]))
-        self.phi, self._derivative = self.raw_angle, None
+        self.raw_angle = np.unwrap(np.arctan2(r[1, ..., 0], r[0, ..., 0]))
+        self.phi = self.raw_angle
         self._solve()
 
+    def of(self, k):
+        """The field of one of several states."""
+        one = copy(self)
+        one.strain, one.stress = self.strain[:, k], self.stress[:, k]
+        one.angle, one.rate = self.angle[k], self.rate[k]
+        return one
+
+    @cached_property
+    def _derivative(self):
+        return kept(self.recovery.beam.tables, ("derivative", self.s.tobytes()),
+                    lambda: CubicSpline(self.s, np.eye(len(self.s)))(self.s, 1))
+
+    @cached_property
+    def _line(self):
+        """From values (n,) at the sections to those of the straight line that fits them best."""
+        s = self.s - self.s.mean()
+        return s[:, None] * s / (s @ s) + 1.0 / len(s)
+
     def d_ds(self, values):
-        """The derivative along the axis of values (n, ...), by a cubic spline."""
+        """The derivative along the axis of values (..., n, m), by a cubic spline."""
         if len(self.s) > FEW:
-            return _Spline(self.s, values)(self.s, 1)
-        if self._derivative is None:
-            s = self.s
-            self._derivative = kept(self.recovery.beam.tables, ("derivative", s.tobytes()),
-                                    lambda: _Spline(s, np.eye(len(s)))(s, 1))
+            return CubicSpline(self.s, values, axis=-2)(self.s, 1)
         return self._derivative @ values
 
     def integral(self, values):
-        """The integral over the section, with the width, of values (n, m)."""
+        """The integral over the section, with the width, of values (..., n, m)."""
         return self.recovery.beam.width * (values @ self.recovery.whole)
 
     # step 2
 
     def _strain(self):
-        """The strain (3, n, m) with S_yy, S_xy, and the stretch, or S_xx, as they are."""
+        """The strain (3, ..., n, m) with S_yy, S_xy, and the stretch, or S_xx, as they are."""
         r = self.recovery
         if self.stress_given:
             return strain_of_stress(r.law, self.S, self.eps)
@@ -221,7 +239,7 @@ class _Piece:
         return eps
 
     def _section(self):
-        """r_Y along t and n, and P_1 along t and n; (n, m) each."""
+        """r_Y along t and n, and P_1 along t and n; (..., n, m) each."""
         self.eps = eps = self._strain()
         lam_y = np.sqrt(1.0 + 2.0 * eps[1])
         lean = self.alpha - np.arcsin(np.clip(eps[2] / (self.stretch * lam_y), -1.0, 1.0))
@@ -234,10 +252,11 @@ class _Piece:
         h = self.recovery.beam.mesh.height
         E = self.recovery.modulus
         # short waves would grow from round to round: S_yy holds second derivatives of S_xx
-        self._fed = np.array([0.0 * self.S[0], *(smoothed(self.s, S, 0.5 * h) for S in self.S[1:])])
+        self._fed = np.concatenate([0.0 * self.S[:1], smoothed(self.s, self.S[1:], 0.5 * h)])
         t, n = (np.array([np.cos(self.phi), np.sin(self.phi)]),
                 np.array([-np.sin(self.phi), np.cos(self.phi)]))
         N, self.Q = np.sum(self.R * t, axis=0), np.sum(self.R * n, axis=0)
+        going = np.ones(self.forces.states)
         for _ in range(4):
             self._section()
             x, y = (self.rY @ self.recovery.from_axis.T)
@@ -250,11 +269,12 @@ class _Piece:
             det = K[0, 0] * K[1, 1] - K[0, 1] * K[1, 0]
             a = (K[1, 1] * missing[0] - K[0, 1] * missing[1]) / det
             b = (K[0, 0] * missing[1] - K[1, 0] * missing[0]) / det
-            change = a[:, None] * unit[0] + b[:, None] * unit[1]
+            change = (a[..., None] * unit[0] + b[..., None] * unit[1]) * going[..., None, None]
             self.stretch = self.stretch + change
             if self.stress_given:
                 self.S[0] += E * self.stretch * change
-            if np.max(np.abs(change)) < 1e-12 * np.max(np.abs(self.eps[0])):
+            going = going * (largest(change) >= 1e-12 * largest(self.eps[0]))
+            if not np.any(going):
                 break
 
     # the geometry
@@ -263,17 +283,16 @@ class _Piece:
         """The rate at which sections turn, the angles of fibres and of the frame."""
         r, along = self.recovery, self.g * self.rX[0]
         total = self.rY @ r.whole
-        self.rate = (self.d_ds(total[0]) - (along[:, -1] - along[:, 0])) / total[1]
-        dt, dn = (self.d_ds(component) for component in self.rY)
-        normal = (dn + self.rate[:, None] * self.rY[0]) @ r.from_axis.T
+        self.rate = (self.d_ds(total[0][..., None])[..., 0]
+                     - (along[..., -1] - along[..., 0])) / total[1]
+        dt, dn = self.d_ds(self.rY)
+        normal = (dn + self.rate[..., None] * self.rY[0]) @ r.from_axis.T
         self.alpha = np.arcsin(np.clip(normal / (self.g * self.stretch), -1.0, 1.0))
         turned = (smoothed(self.s, dt, 0.5 * r.beam.mesh.height)
-                  - self.rate[:, None] * self.rY[1]) @ r.from_axis.T
-        self.stretch = (along[:, r.middle, None] + turned) / (self.g * np.cos(self.alpha))
-        phi = np.append(0.0, np.cumsum(np.diff(_Spline(self.s, self.rate).spline.antiderivative()(
-            self.s))))
-        fit = np.polynomial.Polynomial.fit(self.s, self.raw_angle - phi, min(1, len(phi) - 1))
-        self.phi = phi + fit(self.s)
+                  - self.rate[..., None] * self.rY[1]) @ r.from_axis.T
+        self.stretch = (along[..., r.middle, None] + turned) / (self.g * np.cos(self.alpha))
+        phi = CubicSpline(self.s, self.rate, axis=-1).antiderivative()(self.s)
+        self.phi = phi + (self.raw_angle - phi) @ self._line
 
     # step 3
 
@@ -282,41 +301,33 @@ class _Piece:
         r, h = self.recovery, self.recovery.beam.mesh.height
         c, s = np.cos(self.phi), np.sin(self.phi)
 
-        def turned(f):
-            f = np.asarray(f)
-            k = (slice(None),) + (None,) * (f.ndim - 2)
-            return np.array([c[k] * f[0] + s[k] * f[1], -s[k] * f[0] + c[k] * f[1]])
+        def turned(f, c, s):
+            return np.array([c * f[0] + s * f[1], -s * f[0] + c * f[1]])
 
-        rate = self.rate[:, None]
-        dP = np.array([self.d_ds(self.P[0]) - rate * self.P[1],
-                       self.d_ds(self.P[1]) + rate * self.P[0]]) + turned(self.body)
-        bottom, top = (turned(f)[..., None] for f in self.faces)
+        rate = self.rate[..., None]
+        d0, d1 = self.d_ds(self.P)
+        dP = np.array([d0 - rate * self.P[1], d1 + rate * self.P[0]]) + turned(
+            self.body, c[..., None], s[..., None])
+        bottom, top = (turned(f, c, s)[..., None] for f in self.faces)
         P2 = -bottom - dP @ r.from_bottom.T
         P2 = P2 + (top - P2[..., -1:]) * (self.Y / h + 0.5)
         P2 = P2 / self.g
         det = cross(self.rX, self.rY)
-        S = np.array([self.S[0], cross(self.rX, P2) / det, cross(P2, self.rY) / det])
-        self.S = S
+        self.S = np.array([self.S[0], cross(self.rX, P2) / det, cross(P2, self.rY) / det])
         self._shear()
 
     def _shear(self):
         """Add a parabola to S_xy that gives the section its shear force."""
         bubble = 1.0 - (2.0 * self.Y / self.recovery.beam.mesh.height) ** 2
         missing = self.Q - self.integral(self.rX[1] * self.S[0] + self.rY[1] * self.S[2])
-        self.S[2] += (missing / self.integral(self.rY[1] * bubble))[:, None] * bubble
+        self.S[2] += (missing / self.integral(self.rY[1] * bubble))[..., None] * bubble
 
     def _solve(self):
-        self.alpha, self.eps = np.zeros(self.g.shape), np.zeros((3,) + self.g.shape)
-        self.S, self.stretch = np.zeros((3,) + self.g.shape), np.ones(self.g.shape)
+        shape = self.forces.states + self.g.shape
+        self.alpha, self.eps, self.rate = np.zeros(shape), np.zeros((3,) + shape), self.phi
+        self.S, self.stretch = np.zeros((3,) + shape), np.ones(shape)
         self.stress_given = False
-        for _ in range(ROUNDS):
-            before = self.stretch
-            self._balance()
-            self._turn()
-            self._equilibrium()
-            size = np.max(np.abs(self.stretch - 1.0))
-            if np.max(np.abs(self.stretch - before)) <= SETTLED * size:
-                break
+        self._rounds()
         self._balance()
         weight = self._layers()
         if np.any(weight):
@@ -324,8 +335,26 @@ class _Piece:
             self.stress_given = True
             self._balance()
             self._shear()
-        self.stress, self.angle = self.S, self.phi[:, None] + self.alpha
+        self.stress, self.angle = self.S, self.phi[..., None] + self.alpha
         self.strain = strain_of_stress(self.recovery.law, self.S, self.eps)
+
+    def _rounds(self):
+        """Steps 2 and 3 in turn, for each state until its stretch has settled."""
+        settled = np.zeros(self.forces.states, dtype=bool)
+        for _ in range(ROUNDS):
+            before = self.stretch, self.alpha, self.S.copy(), self.phi, self.rate
+            self._balance()
+            self._turn()
+            self._equilibrium()
+            if np.any(settled):
+                self.stretch, self.alpha, self.S, self.phi, self.rate = (
+                    np.where(settled.reshape(settled.shape + (1,) * places), old, new)
+                    for places, old, new in zip((2, 2, 2, 1, 1), before, (
+                        self.stretch, self.alpha, self.S, self.phi, self.rate)))
+            settled = settled | (largest(self.stretch - before[0])
+                                 <= SETTLED * largest(self.stretch - 1.0))
+            if np.all(settled):
+                break
 
     # step 4
 
@@ -345,22 +374,36 @@ class _Piece:
         return weight
 
     def _samples(self):
-        """The elements' stress (3, n, m): from where they are most accurate, splined."""
+        """The elements' stress (3, ..., n, m): from where they are most accurate, splined."""
         r = self.recovery
         at, stress = r.samples
         s = r.arc(np.repeat(self.elements, len(at)), np.tile(at, len(self.elements)))
-        values = np.moveaxis(stress[:, self.elements], 0, 2)  # (elements, p, 3, m)
-        return np.moveaxis(_Spline(s, values.reshape(len(s), 3, -1))(self.s), 1, 0)
+        values = stress[..., self.elements, :, :]
+        values = values.reshape(values.shape[:-3] + (len(s), -1))
+        if len(s) == 1:
+            return np.broadcast_to(values, self.S.shape)
+        return CubicSpline(s, values, axis=-2)(self.s)
+
+
+def largest(values: Array) -> Array:
+    """The largest absolute value of each field (..., n, m), shape (...)."""
+    return np.max(np.abs(values), axis=(-2, -1))
 
 
 class _Table:
-    """Cubic splines along the axis of values (7, n, m) at m points across n sections."""
+    """Cubic splines along the axis of values (7, ..., n, m) at m points across n sections."""
 
     def __init__(self, s, values):
-        spline = CubicSpline(s, np.moveaxis(values, 0, 1))
+        spline = CubicSpline(s, np.moveaxis(values, -2, 0))
         self.starts = spline.x[:-1]
         self._list = self.starts.tolist()
-        self._c = spline.c  # (4, n - 1, 7, m)
+        self._c = spline.c  # (4, n - 1, 7, ..., m)
+
+    def of(self, k):
+        """Those of one of several states."""
+        one = copy(self)
+        one._c = self._c[:, :, :, k]
+        return one
 
     def one(self, s, weights, rows):
         """The rows at one place, for the weights (m,) of the points across."""
@@ -385,14 +428,17 @@ class _Table:
 
 
 class Recovery:
-    """The recovered field of one beam.
+    """The recovered field of one beam, in one state or in several at once.
+
+    What several states have in common is made once, and the sections of all of them are solved
+    together; :meth:`of` is the field of one.
 
     Parameters
     ----------
     forces
         The :class:`~skfem_ancf.section_forces.SectionForces` of the beam.
     u
-        Displacement of its coordinates, shape (N,).
+        Displacement of its coordinates, shape (N,), or (states, N).
 
     Raises
     ------
@@ -419,9 +465,27 @@ class Recovery:
             beam.formulation, EnhancedContinuum)
         self._u = u
         self.pieces = [_Piece(self, a, b) for a, b in zip(forces.cuts[:-1], forces.cuts[1:])]
+        bad = sum(~np.all(np.isfinite(p.strain), axis=(0, -2, -1)) for p in self.pieces)
+        if np.any(bad):
+            raise NotRecovered("the strain is too large: the section has no state of equilibrium",
+                               bad > 0)
         self._tables = [_Table(p.s, np.concatenate(
             [p.strain, p.stress, p.angle[None]])) for p in self.pieces]
         self._cuts = forces.cuts.tolist()
+
+    def of(self, k: int) -> Recovery:
+        """The field of one of several states.
+
+        Parameters
+        ----------
+        k
+            Its number.
+        """
+        one = copy(self)
+        one.forces, one._u = self.forces.of(k), self._u[k]
+        one.pieces = [piece.of(k) for piece in self.pieces]
+        one._tables = [table.of(k) for table in self._tables]
+        return one
 
     def _arc_tables(self):
         x, w = gauss(8)
@@ -452,12 +516,14 @@ class Recovery:
 
     @cached_property
     def samples(self) -> tuple[Array, Array]:
-        """Places along an element, (p,), and its own stress there, (3, ne, p, m)."""
+        """Places along an element, (p,), and its own stress there, (3, ..., ne, p, m)."""
         beam, x = self.beam, self.beam.element.sampling.places("xx")
         X = np.array([np.repeat(x, len(self.eta)), np.tile(self.eta, len(x))])
-        stress = beam.stress(self._u, X).reshape(3, -1, len(x), len(self.eta))
+        stress = beam.stress(self._u, X) if self._u.ndim == 1 else np.stack(
+            [beam.stress(u, X) for u in self._u], axis=1)
+        stress = stress.reshape(stress.shape[:-1] + (len(x), len(self.eta)))
         if beam.element.sections == "linear":
-            return np.array([0.5]), stress.mean(axis=2, keepdims=True)
+            return np.array([0.5]), stress.mean(axis=-2, keepdims=True)
         return x, stress
 
     def fields(self, X: Array, tind: Array | None = None) -> tuple[Array, Array, Array]:
@@ -572,29 +638,60 @@ def actions(state: State) -> list[list[float]]:
     return out
 
 
-def recover(state: State, beam: Beam, stations: Sequence[float]) -> Recovery:
-    """The :class:`Recovery` of one beam of a state.
+def recover(states: Sequence[State], number: int) -> list[Recovery | NotRecovered]:
+    """The recovered fields of one beam in some states of a scene, found together.
 
     Parameters
     ----------
-    state
-        A :class:`~skfem_ancf.results.State`.
-    beam
-        One of its beams.
-    stations
-        Where supports and joints act on it, of :func:`actions`.
+    states
+        Each a :class:`~skfem_ancf.results.State`.
+    number
+        The number of the beam.
 
-    Raises
-    ------
-    NotRecovered
-        If the fields cannot be recovered; the message says why.
+    Returns
+    -------
+    list
+        For each state its Recovery, or the NotRecovered that says why there is none.
     """
-    u, s = state.u_of(beam), state.system.of(beam)
-    loads = [(state.load * load.factor(state.t), load.spread(u)) for load in state.system.loads
-             if load.beam is beam]
-    acceleration = None if state.acceleration is None else state.acceleration[s]
-    with np.errstate(all="ignore"):
-        recovery = Recovery(SectionForces(beam, u, loads, stations, acceleration), u)
-    if not all(np.all(np.isfinite(p.strain)) for p in recovery.pieces):
-        raise NotRecovered("the strain is too large: the section has no state of equilibrium")
-    return recovery
+    loads, alike = [], {}
+    for k, state in enumerate(states):
+        u = state.u_of(number)
+        loads.append([(state.load * load.factor(state.t), load.spread(u))
+                      for load in state.system.loads if load.beam is state.beams[number]])
+        # what acts at other places cuts the beam into other pieces
+        case = [tuple(state.actions[number])]
+        for factor, spread in loads[-1]:
+            case += ([None] if spread is None else [spread.stations] if spread.faces is None
+                     and spread.body is None else [id(spread), factor != 0.0])
+        alike.setdefault(tuple(case), []).append(k)
+    found: dict[int, Recovery | NotRecovered] = {}
+    for same in alike.values():
+        found.update(zip(same, _recover_alike([states[k] for k in same], number,
+                                              [loads[k] for k in same])))
+    return [found[k] for k in range(len(states))]
+
+
+def _recover_alike(states, number, loads):
+    """As :func:`recover`, of states whose loads act at the same places."""
+    first, system = states[0], states[0].system
+    beam, s = first.beams[number], system.of(first.beams[number])
+    try:
+        together = [(np.array([of[k][0] for of in loads]), spread)
+                    for k, (_, spread) in enumerate(loads[0])]
+        u = np.array([state.u[s] for state in states])
+        acceleration = None if first.acceleration is None else np.array(
+            [state.acceleration[s] for state in states])
+        with np.errstate(all="ignore"):
+            found = Recovery(SectionForces(beam, u, together, first.actions[number],
+                                           acceleration), u)
+        return [found.of(k) for k in range(len(states))]
+    except NotRecovered as reason:
+        if reason.which is None or len(states) == 1:
+            return [reason] * len(states)
+        out = []
+        good = [k for k, bad in enumerate(reason.which) if not bad]
+        rest = iter(_recover_alike([states[k] for k in good], number, [loads[k] for k in good])
+                    if good else ())
+        for k, bad in enumerate(reason.which):
+            out += _recover_alike([states[k]], number, [loads[k]]) if bad else [next(rest)]
+        return out

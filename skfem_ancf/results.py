@@ -17,7 +17,7 @@ from .resultants import Resultants, resultants
 from .section_forces import NotRecovered
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
     from numpy.typing import ArrayLike
@@ -130,7 +130,7 @@ class State(Frozen):
                 raise NameUnknown("attribute of State", name, known)
         other = object.__new__(type(self))
         vars(other).update(vars(self), **changes)
-        for name in ("_recoveries", "_actions"):
+        for name in ("_recoveries", "actions", "together"):
             vars(other).pop(name, None)
         if {"u", "multipliers", "system", "load", "t"} & set(changes):
             vars(other).update(_verdict=None, _checks=None)
@@ -342,15 +342,14 @@ class State(Frozen):
         return self._recovery_of(self.beams.index(select_beam(self.beams, beam)))
 
     def _recovery_of(self, k):
-        found = self._recoveries.get(k)
-        if found is None:
-            beam = self.beams[k]
-            try:
-                found = recover(self, beam, self._actions[k])
-            except NotRecovered as reason:
-                logger.info("%r: strain and stress are those of the elements: %s", beam, reason)
-                found = reason
-            self._recoveries[k] = found
+        if k not in self._recoveries:
+            states = [state for state in self.together if k not in state._recoveries]
+            for state, found in zip(states, recover(states, k)):
+                state._recoveries[k] = found
+                if isinstance(found, NotRecovered):
+                    logger.info("%r: strain and stress are those of the elements: %s",
+                                self.beams[k], found)
+        found = self._recoveries[k]
         return None if isinstance(found, NotRecovered) else found
 
     @property
@@ -373,7 +372,16 @@ class State(Frozen):
         return {}
 
     @cached_property
-    def _actions(self):
+    def together(self) -> Sequence[State]:
+        """States of the same scene whose fields are recovered with those of this one."""
+        return (self,)
+
+    @cached_property
+    def actions(self) -> list[list[float]]:
+        """Where supports and joints act on each beam: element + xi, a list a beam."""
+        first = self.together[0]
+        if first is not self and not self.system.joints:
+            return first.actions  # of supports: always the same
         return actions(self)
 
     def resultants(self, at: ArrayLike | None = None, beam: WhichBeam = None,

@@ -7,6 +7,7 @@ of the element between a node and a section gives the force and the moment there
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +36,19 @@ UNBALANCED = 0.02
 
 
 class NotRecovered(AncfError):
-    """The section forces or fields of a beam cannot be recovered; the message says why."""
+    """The section forces or fields of a beam cannot be recovered; the message says why.
+
+    Parameters
+    ----------
+    message
+        Why.
+    which
+        Of several states those of which it is true, shape (states,); None for all.
+    """
+
+    def __init__(self, message: str, which: Array | None = None) -> None:
+        super().__init__(message)
+        self.which = which
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -96,37 +109,42 @@ class Sections:
         Parameters
         ----------
         q_e
-            Coordinates of the elements, shape (ne, nb, 2).
+            Coordinates of the elements, shape (ne, nb, 2), of several states (states, ne, nb, 2).
         slope
             The derivative.
 
         Returns
         -------
         ndarray
-            Shape (2, n, k).
+            Shape (2, n, k), or (2, states, n, k).
         """
-        return np.einsum("bnk,nbi->ink", self._slope if slope else self._value, q_e[self.e],
-                         optimize=True)
+        return np.einsum("bnk,...nbi->i...nk", self._slope if slope else self._value,
+                         q_e[..., self.e, :, :], optimize=True)
 
     def spread(self, values: Array) -> Array:
-        """Element vectors (ne, nb, 2) of forces (2, n, k), summed."""
-        f = self.forces
-        out = np.zeros((f.beam.mesh.nelements,) + f.q.shape[1:])
-        np.add.at(out, self.e, np.einsum("bnk,ink->nbi", self._value, values, optimize=True))
-        return out
+        """Element vectors (..., ne, nb, 2) of forces (2, ..., n, k), summed."""
+        parts = np.einsum("bnk,i...nk->n...bi", self._value, values, optimize=True)
+        out = np.zeros((self.forces.beam.mesh.nelements,) + parts.shape[1:])
+        np.add.at(out, self.e, parts)
+        return np.moveaxis(out, 0, -3)
 
     @cached_property
     def body(self) -> Array:
-        """Force per volume of the stress-free body, inertia included, (2, n, k)."""
+        """Force per volume of the stress-free body, inertia included, (2, ..., n, k)."""
         f = self.forces
-        out = np.broadcast_to(f.body[:, None, None], (2,) + self.shape)
+        out = np.broadcast_to(np.moveaxis(f.body, -1, 0)[..., None, None],
+                              (2,) + f.states + self.shape)
         return out if f.acceleration is None else out - f.beam.density * self.field(f.acceleration)
 
     def face(self, side: int) -> Array:
-        """Force per width and xi on the bottom (0) or top (1), where the points are; (2, n, k)."""
-        f, out = self.forces, np.zeros((2,) + self.shape)
+        """Force per width and xi on the bottom (0) or top (1), where the points are.
+
+        Shape (2, ..., n, k).
+        """
+        f = self.forces
+        out = np.zeros((2,) + f.states + self.shape)
         for factor, load in f.faces:
-            on = factor * load.faces[side][self.e][:, None]
+            on = np.multiply.outer(factor, load.faces[side][self.e])[..., None]
             if not np.any(on):
                 continue
             if load.pressure is not None:
@@ -139,26 +157,28 @@ class Sections:
                     t = np.array([np.broadcast_to(c, self.shape) for c in t(x)])
                 else:
                     t = np.asarray(t, dtype=float)[:, None, None]
-                out += on * t * np.hypot(*self.J[:, 0])
+                out += on * (t * np.hypot(*self.J[:, 0])).reshape(
+                    (2,) + (1,) * len(f.states) + (len(self.e), -1))
         return out
 
 
 class SectionForces:
-    """Force and moment in the sections of one beam.
+    """Force and moment in the sections of one beam, in one state or in several at once.
 
     Parameters
     ----------
     beam
         A :class:`~skfem_ancf.Beam`.
     u
-        Displacement of its coordinates, shape (N,).
+        Displacement of its coordinates, shape (N,), or (states, N): then arrays have the axis of
+        the states before those of places.
     loads
         Pairs of a factor and a :class:`~skfem_ancf.spread.Spread`, or None for a load whose spread
-        is not known.
+        is not known. The factor of several states has shape (states,).
     stations
         Where supports and joints act: element + xi.
     acceleration
-        Of the coordinates, shape (N,), or None.
+        Of the coordinates, shape (N,) or (states, N), or None.
 
     Attributes
     ----------
@@ -171,18 +191,20 @@ class SectionForces:
         If the spread of a load is not known, or the state is no equilibrium.
     """
 
-    def __init__(self, beam: Beam, u: Array, loads: Sequence[tuple[float, Any]],
+    def __init__(self, beam: Beam, u: Array, loads: Sequence[tuple[Any, Any]],
                  stations: Sequence[float] = (), acceleration: Array | None = None) -> None:
         self.beam = beam
         if any(load is None for _, load in loads):
             raise NotRecovered("a load is given by its force on the coordinates only: where it "
                                "acts across the section is not known")
-        self.q = beam.kernel.gather(beam.q0_local + u)
-        self.acceleration = None if acceleration is None else beam.kernel.gather(acceleration)
-        self.body = sum((factor * np.asarray(load.body) for factor, load in loads
-                         if load.body is not None), np.zeros(2))
+        self.states = u.shape[:-1]
+        gather = beam.kernel.gather
+        self.q = _each(gather, beam.q0_local + u)
+        self.acceleration = None if acceleration is None else _each(gather, acceleration)
+        self.body = sum((np.multiply.outer(factor, np.asarray(load.body)) for factor, load in loads
+                         if load.body is not None), np.zeros(self.states + (2,)))
         self.faces = [(factor, load) for factor, load in loads if load.faces is not None
-                      and factor != 0.0 and np.any(load.faces)]
+                      and np.any(factor) and np.any(load.faces)]
         self._loads(u)
         self._cut(loads, stations)
         self._check()
@@ -202,23 +224,37 @@ class SectionForces:
                 face = Sections(self, e, xi, np.array([float(side)]))
                 parts.append((face, beam.width * face.face(side)))
         axis = Sections(self, e, xi, np.array([0.5])).field(self.q)
-        self._r = axis[..., 0].reshape(2, ne, ALONG)
         force = sum(f.sum(axis=-1) for _, f in parts)
         moment = sum(cross(at.field(self.q) - axis, f).sum(axis=-1) for at, f in parts)
-        self._force, self._moment = force.reshape(2, ne, ALONG), moment.reshape(ne, ALONG)
+        self._r, self._force, self._moment = (
+            x.reshape(x.shape[:-1] + (ne, ALONG)) for x in (axis[..., 0], force, moment))
         w = np.tile(w, ne)
         load = sum(at.spread(f * w[:, None]) for at, f in parts)
-        internal = beam.kernel.forces(u)
-        left, right = np.split(internal - load, 2, axis=1)
-        q = np.split(self.q, 2, axis=1)
+        internal = _each(beam.kernel.forces, u)
+        left, right = np.split(internal - load, 2, axis=-2)
+        q = np.split(self.q, 2, axis=-2)
         # of the part of the beam on the right of a section on that on its left
-        self.R = np.array([-left[:, 0], right[:, 0]])  # (2 ends, ne, 2)
-        self.M = np.array([-np.sum(cross(q[0][:, 1:].T, left[:, 1:].T), axis=0),
-                           np.sum(cross(q[1][:, 1:].T, right[:, 1:].T), axis=0)])
-        self.ends = np.array([q[0][:, 0], q[1][:, 0]])
+        self.R = np.array([-left[..., 0, :], right[..., 0, :]])  # (2 ends, ..., ne, 2)
+        self.M = np.array([-_moments(q[0], left), _moments(q[1], right)])
+        self.ends = np.array([q[0][..., 0, :], q[1][..., 0, :]])
+
+    def of(self, k: int) -> SectionForces:
+        """Those of one of several states, of which force and moment can be asked.
+
+        Parameters
+        ----------
+        k
+            Its number.
+        """
+        one = copy(self)
+        one.states, one.q = (), self.q[k]
+        for name in ("R", "M", "ends", "_force", "_r"):
+            setattr(one, name, getattr(self, name)[:, k])
+        one._moment = self._moment[k]
+        return one
 
     def at(self, e: Array, xi: Array, side: Array) -> tuple[Array, Array]:
-        """Force (2, n) and moment (n,) about the axis, of the right part of the beam on the left.
+        """Force and moment about the axis of the right part of the beam on the left.
 
         Parameters
         ----------
@@ -227,6 +263,11 @@ class SectionForces:
         side
             End of the element from which the equilibrium is followed: 0, 1, or 0.5 for the mean
             of both; shape (n,).
+
+        Returns
+        -------
+        force, moment
+            Shapes (2, ..., n) and (..., n).
         """
         x, w = gauss(ALONG)
         inner = lagrange(x, np.outer(xi, x).ravel()).reshape(len(xi), ALONG, ALONG)
@@ -234,11 +275,12 @@ class SectionForces:
         r = Sections(self, e, xi, np.array([0.5])).field(self.q)[..., 0]
         out = []
         for end, weights in ((0, till), (1, till - w)):
-            f, m = self._force[:, e], self._moment[e]
-            arm = self._r[:, e] - r[:, :, None]
-            R = self.R[end][e].T - np.sum(weights * f, axis=-1)
-            M = (self.M[end][e] + cross(self.ends[end][e].T - r, self.R[end][e].T)
+            f, m = self._force[..., e, :], self._moment[..., e, :]
+            arm = self._r[..., e, :] - r[..., None]
+            R, at = (np.moveaxis(x[end][..., e, :], -1, 0) for x in (self.R, self.ends))
+            M = (self.M[end][..., e] + cross(at - r, R)
                  - np.sum(weights * (cross(arm, f) + m), axis=-1))
+            R = R - np.sum(weights * f, axis=-1)
             out.append((R, M))
         (R0, M0), (R1, M1) = out
         return R0 + side * (R1 - R0), M0 + side * (M1 - M0)
@@ -272,8 +314,8 @@ class SectionForces:
                 raise NotRecovered("a load or joint at a point inside of an element acts next to "
                                    "another one, or to a support: put a node at the point")
             near = 0 <= other < t.shape[1] and t[end, e] == t[1 - end, other]
-            self.R[end, e] = self.R[1 - end, other] if near else 0.0
-            self.M[end, e] = self.M[1 - end, other] if near else 0.0
+            self.R[end][..., e, :] = self.R[1 - end][..., other, :] if near else 0.0
+            self.M[end][..., e] = self.M[1 - end][..., other] if near else 0.0
 
     @staticmethod
     def _at_nodes(stations):
@@ -286,20 +328,34 @@ class SectionForces:
         """The section force is continuous, and zero at ends, where nothing acts at a node."""
         mesh = self.beam.mesh
         n = mesh.p.shape[1]
-        R, M = np.zeros((n, 2)), np.zeros(n)
-        R[mesh.t[1]], M[mesh.t[1]] = self.R[1], self.M[1]
-        R[mesh.t[0]] -= self.R[0]
-        M[mesh.t[0]] -= self.M[0]
-        size = np.max(np.abs(self.R)) * mesh.height + np.max(np.abs(self.M))
-        if size == 0.0:
-            raise NotRecovered("the beam carries no load")
+        R, M = np.zeros(self.states + (n, 2)), np.zeros(self.states + (n,))
+        R[..., mesh.t[1], :], M[..., mesh.t[1]] = self.R[1], self.M[1]
+        R[..., mesh.t[0], :] -= self.R[0]
+        M[..., mesh.t[0]] -= self.M[0]
+        size = (np.max(np.abs(self.R), axis=(0, -2, -1)) * mesh.height
+                + np.max(np.abs(self.M), axis=(0, -1)))
+        if np.any(size == 0.0):
+            raise NotRecovered("the beam carries no load", size == 0.0)
         place = np.zeros(n)
         place[mesh.t[0]], place[mesh.t[1]] = np.arange(mesh.nelements), 1.0 + np.arange(
             mesh.nelements)
-        jump = (np.abs(R).max(axis=1) * mesh.height + np.abs(M)) / size
-        jump[np.isin(place, self._acted)] = 0.0
-        k = int(np.argmax(jump))
-        if jump[k] > UNBALANCED:
+        jump = (np.abs(R).max(axis=-1) * mesh.height + np.abs(M)) / size[..., None]
+        jump[..., np.isin(place, self._acted)] = 0.0
+        unbalanced = np.max(jump, axis=-1) > UNBALANCED
+        if np.any(unbalanced):
+            k = np.unravel_index(np.argmax(jump), jump.shape)
             raise NotRecovered(
-                f"the state is no equilibrium under the loads of the scene: at node {k} the "
-                f"section force changes by {jump[k]:.1%} of its largest value")
+                "the state is no equilibrium under the loads of the scene: at node "
+                f"{k[-1]} the section force changes by {jump[k]:.1%} of its largest value",
+                unbalanced)
+
+
+def _each(function, u):
+    """A function of a vector (N,), of one state or of each of several (states, N)."""
+    return function(u) if u.ndim == 1 else np.array([function(x) for x in u])
+
+
+def _moments(q, force):
+    """Moments (..., ne) of element vectors on the coordinates but r, (..., ne, nb, 2) both."""
+    q, force = (np.moveaxis(x[..., 1:, :], -1, 0) for x in (q, force))
+    return np.sum(cross(q, force), axis=-1)

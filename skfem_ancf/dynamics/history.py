@@ -13,7 +13,7 @@ from ..results import State
 from .base import Motion
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from ..system import System
     from ..types import Array, StrPath, WhichBeam
     from .base import Scheme
+
+#: Sections of all states whose fields are recovered at once.
+SECTIONS = 2048
 
 
 @teaching
@@ -138,8 +141,29 @@ class History:
                      acceleration=motion.acceleration, motion=motion,
                      origin=(self.scheme, self._kept if last else None))
 
+    def states(self, instants: Iterable[int] | None = None) -> Iterator[State]:
+        """States one after the other, whose fields are recovered many at once.
+
+        Parameters
+        ----------
+        instants
+            Their numbers, shape (n,); all by default.
+
+        Yields
+        ------
+        State
+        """
+        ks = range(len(self)) if instants is None else list(instants)
+        sections = sum(2 * beam.mesh.nelements + 1 for beam in self.system.beams)
+        size = max(1, SECTIONS // sections)
+        for first in range(0, len(ks), size):
+            states = [self.state(k) for k in ks[first:first + size]]
+            for state in states:
+                vars(state)["together"] = states
+            yield from states
+
     def __iter__(self):
-        return (self.state(k) for k in range(len(self)))
+        return self.states()
 
     # at material points
 
@@ -356,6 +380,6 @@ class History:
         kind = VtkHdfWriter if path.suffix.lower() == ".vtkhdf" else PvdWriter
         with kind(path, **options) as writer, progress_bar(
                 progress, total=len(self), desc="files") as bar:
-            for k in range(len(self)):
-                writer.add(self.state(k), float(self.t[k]))
+            for state in self:
+                writer.add(state, state.t)
                 bar.update(1)

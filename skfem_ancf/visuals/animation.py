@@ -71,7 +71,7 @@ def animate(history: History, filename: StrPath, field: Any = "eps_yy", *,
     MissingExtra
         If what is needed is not installed.
     """
-    require_like("history", history, "History", "state", "t")
+    require_like("history", history, "History", "states", "t")
     path, undeformed = _file(filename), require_flag("undeformed", undeformed)
     chosen = _chosen(history, frames)
     backend = _backend(backend)
@@ -82,7 +82,7 @@ def animate(history: History, filename: StrPath, field: Any = "eps_yy", *,
     except (TypeError, ValueError):
         raise InputError(f"size must be two integers, the pixels of the film, got {size!r}"
                          ) from None
-    scenery = Scenery([history.state(k) for k in chosen], field, thickness, limits, subdivide,
+    scenery = Scenery(list(history.states(chosen)), field, thickness, limits, subdivide,
                       recover)
     draw = _by_pyvista if backend == "pyvista" else _by_matplotlib
     images = draw(scenery, history.t[chosen], (width, height), undeformed, cmap, unit)
@@ -145,12 +145,15 @@ def _by_pyvista(scenery, t, size, undeformed, cmap, unit) -> Iterator[Array]:
     plotter = new_plotter(pyvista, True, size)
     try:
         mesh = _dressed(scenery, plotter, cmap, undeformed, unit)
-        clock = plotter.add_text("", position="upper_right", font_size=9, color="#444444")
+        # at a point: text in a corner is fitted to the window in each frame
+        clock = plotter.add_text("", position=(0.985, 0.955), viewport=True, font_size=9,
+                                 color="#444444")
+        clock.GetTextProperty().SetJustificationToRight()
         _look(plotter, scenery)
         for k, time in enumerate(t):
             mesh.points = scenery.points(k)
             mesh.point_data[scenery.field.name][:] = scenery.values(k)
-            clock.SetText(3, f"t = {time:.4g}")
+            clock.SetInput(f"t = {time:.4g}")
             if k == 0:
                 plotter.show(auto_close=False, interactive=False)
             plotter.render()
