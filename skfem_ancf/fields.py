@@ -168,10 +168,6 @@ class Values(Mapping):
     def _recovery(self):
         return None if self._find is None else self._find()
 
-    @cached_property
-    def _recovered(self):
-        return self._recovery.at(self._part)
-
     @property
     def _own(self):
         return self._u[self._part.coordinates], self._part.at, self._part.e
@@ -179,20 +175,21 @@ class Values(Mapping):
     @cached_property
     def strain(self) -> Array:
         if self._recovery is not None:
-            return self._recovered[:3]
+            return self._recovery.at(self._part, slice(0, 3))
         return self.beam.strain(*self._own)[..., 0]
 
     @cached_property
     def S(self) -> Array:
         if self._recovery is not None:
-            return self._recovered[3:6]
+            return self._recovery.at(self._part, slice(3, 6))
         return self.beam.stress(*self._own)[..., 0]
 
     @cached_property
     def F(self) -> Array:
         if self._recovery is not None:
             with np.errstate(invalid="ignore"):
-                return self._recovery.gradient(self.strain, self._recovered[6])
+                return self._recovery.gradient(self.strain, self._recovery.at(
+                    self._part, slice(6, 7))[0])
         H, frame = self.beam.gradients(*self._own)
         return (H + frame)[..., 0]
 

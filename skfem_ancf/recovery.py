@@ -24,7 +24,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from copy import copy
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebint, chebvander
@@ -43,7 +43,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from .beam import Beam
     from .points import Part
     from .results import State
     from .types import Array, Law
@@ -85,7 +84,7 @@ def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[i
         Of a field of n times m points, shape (3, n, m), or of several, shape (3, ..., n, m); only
         the components ``unknown`` are used.
     strain
-        To start from, of the same shape; components that are not in ``unknown`` keep their values.
+        To start from, shape (3, ..., n, m); components not in ``unknown`` keep their values.
     unknown
         Components to find.
     tol
@@ -653,13 +652,14 @@ def recover(states: Sequence[State], number: int) -> list[Recovery | NotRecovere
     list
         For each state its Recovery, or the NotRecovered that says why there is none.
     """
-    loads, alike = [], {}
+    loads: list[Any] = []
+    alike: dict[Any, list[int]] = {}
     for k, state in enumerate(states):
         u = state.u_of(number)
         loads.append([(state.load * load.factor(state.t), load.spread(u))
                       for load in state.system.loads if load.beam is state.beams[number]])
         # what acts at other places cuts the beam into other pieces
-        case = [tuple(state.actions[number])]
+        case: list[Any] = [tuple(state.actions[number])]
         for factor, spread in loads[-1]:
             case += ([None] if spread is None else [spread.stations] if spread.faces is None
                      and spread.body is None else [id(spread), factor != 0.0])

@@ -149,11 +149,28 @@ def test_film(history, tmp_path, backend):
     assert list(path.parent.iterdir()) == [path]
 
 
-def test_film_as_mp4(history, tmp_path):
-    pytest.importorskip("imageio")
-    pytest.importorskip("imageio_ffmpeg")
-    path = history.animate(tmp_path / "film.mp4", "von_mises", frames=4, size=(320, 240))
-    assert path.stat().st_size > 1000
+@pytest.mark.filterwarnings("ignore::ResourceWarning",  # pipes of imageio's reader
+                            "ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("backend", ["pyvista", "matplotlib"])
+def test_film_as_mp4(history, tmp_path, backend):
+    imageio = pytest.importorskip("imageio.v2", reason="imageio is not there: pip install imageio")
+    pytest.importorskip("imageio_ffmpeg", reason="no ffmpeg: pip install imageio-ffmpeg")
+    path = history.animate(tmp_path / "film.mp4", "von_mises", frames=4, size=(322, 241), fps=10,
+                           backend=backend)
+    with imageio.get_reader(path) as film:
+        images = [np.asarray(image).astype(int) for image in film]
+        assert film.get_meta_data()["fps"] == 10
+    assert len(images) == 4 and images[0].shape == (242, 322, 3)  # even numbers of pixels
+    assert np.sum(np.abs(images[3] - images[0]).max(axis=2) > 60) > 100  # it moves
+    assert images[0].mean() > 150 and np.ptp(images[0], axis=2).max() > 50  # white, with colours
+
+
+@pytest.mark.parametrize("missing", ["imageio", "imageio_ffmpeg"])
+def test_an_mp4_names_the_extra_that_is_missing(history, tmp_path, monkeypatch, missing):
+    monkeypatch.setitem(sys.modules, missing, None)
+    with pytest.raises(MissingExtra, match=r'pip install "skfem-ancf\[view\]"'):
+        history.animate(tmp_path / "new" / "film.mp4", backend="matplotlib")
+    assert not (tmp_path / "new").exists()
 
 
 @pytest.mark.parametrize("options, error, message", [
