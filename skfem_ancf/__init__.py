@@ -2,6 +2,7 @@
 
 from . import forms
 from .beam import Beam, reference_coordinates
+from .damping import KelvinVoigt
 from .dynamics import HHT, EnergyMomentum, GeneralizedAlpha, Newmark
 from .elements import (ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                        ElementBeamPatelShabana)
@@ -17,7 +18,8 @@ __version__ = "0.1.0"
 __all__ = [
     "HHT", "AncfError", "Beam", "CallError", "CallbackError", "ConvergenceError",
     "ElementBeamANCF", "ElementBeamANCFCubic", "ElementBeamCable", "ElementBeamPatelShabana",
-    "EnergyMomentum", "FileError", "GeneralizedAlpha", "InputError", "MeshBeam", "MeshError",
+    "EnergyMomentum", "FileError", "GeneralizedAlpha", "InputError", "KelvinVoigt", "MeshBeam",
+    "MeshError",
     "MissingExtra", "ModelWarning", "NameUnknown", "NeoHookean", "Newmark", "Scene",
     "StVenantKirchhoff", "StabilityWarning", "SupportError", "forms", "reference_coordinates",
 ]

@@ -10,6 +10,7 @@ from skfem.assembly import Basis, FacetBasis, asm
 from skfem.element import ElementVector
 
 from . import forms
+from .damping import KelvinVoigt
 from .elements import ElementBeam, choose_element
 from .errors import (InputError, MeshError, NameUnknown, require_finite, require_flag,
                      require_integer, require_label, require_like, require_names, require_positive,
@@ -114,6 +115,8 @@ class Beam(Frozen):
     fields, tolerance
         For the element "auto": names of section fields that will be looked at, and the relative
         error that the beam theory may have.
+    damping
+        :class:`~skfem_ancf.KelvinVoigt` for a stress that resists the rate of the strain, or None.
 
     Raises
     ------
@@ -135,7 +138,7 @@ class Beam(Frozen):
     def __init__(self, mesh: MeshBeam, element: ElementBeam | str, material: Material, width: float,
                  formulation: str | Formulation | type[Formulation] = "assumed",
                  name: str | None = None, compiled: bool = True, fields: str | Sequence[str] = (),
-                 tolerance: float = 1e-3) -> None:
+                 tolerance: float = 1e-3, damping: KelvinVoigt | None = None) -> None:
         if isinstance(element, str) and element == "auto" and isinstance(mesh, MeshBeam):
             element = choose_element(mesh, material, fields, tolerance)
         for argument, kind, value in (("mesh", MeshBeam, mesh), ("element", ElementBeam, element),
@@ -149,6 +152,10 @@ class Beam(Frozen):
         self.formulation = get_formulation(formulation)
         self.name = require_label("name", name)
         self.compiled = require_flag("compiled", compiled)
+        if damping is not None and not isinstance(damping, KelvinVoigt):
+            raise InputError("damping must be a KelvinVoigt, as KelvinVoigt(1e-4), or None, got "
+                             f"{shown(damping)}")
+        self.damping = damping
         self.kinematics = KINEMATICS[element.kinematics]
         self.kinematics.require_law(material)
         self.nd = 2 * element.nodal_dofs
@@ -180,7 +187,8 @@ class Beam(Frozen):
         >>> beam.width, stiffer.width, stiffer.material.E
         (0.1, 0.2, 2.0)
         """
-        known = ("mesh", "element", "material", "width", "formulation", "name", "compiled")
+        known = ("mesh", "element", "material", "width", "formulation", "name", "compiled",
+                 "damping")
         for name in changes:
             if name not in known + ("fields", "tolerance"):
                 raise NameUnknown("argument of Beam", name, known)

@@ -6,7 +6,8 @@ import numpy as np
 
 from .band import Band, clear
 from .kernels.cable import CablePack, cable_evaluate
-from .kernels.section import (CARRY, FORCE, MEAN, STRESS, TANGENT, SectionPack, section_evaluate)
+from .kernels.section import (CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, SectionPack,
+                              section_evaluate)
 from .source import primitive, source
 
 #: Kinds of packs, by their number in a table.
@@ -61,6 +62,26 @@ def body_of(beams, slices):
             rows.append([PACKS.index(type(pack)), s.start, s.stop, at, at + size, *shape])
             at += size
     return Body(tuple(packs), np.array(rows, dtype=np.int64))
+
+
+def viscous_body_of(body, beams, times):
+    """The Body of what resists the rates of strains; ``body`` itself where nothing does.
+
+    Parameters
+    ----------
+    body, beams
+        What :func:`body_of` has made of the beams; the stresses have the same places.
+    times
+        Retardation time of each beam.
+    """
+    packs, rows, first = [], [], 0
+    for beam, time in zip(beams, times):
+        last = first + len(beam.kernel.packs)
+        if time > 0.0:
+            packs += beam.kernel.viscous_packs(time)
+            rows += list(body.table[first:last])
+        first = last
+    return Body(tuple(packs), np.array(rows)) if packs else body
 
 
 def _fields(pack):
@@ -163,6 +184,13 @@ def body_stress(body, u, stresses):
 def body_carry(body, u, du, stresses, carried):
     """The stresses, linearised, at u + du, from those at u."""
     run_kernels(body, np.int64(CARRY), u, du, u, stresses, np.int64(1), carried, _no_band(u))
+
+
+@source
+def add_viscous_force(body, u, v, f):
+    """Add the force of stresses in proportion to the rates of the strains."""
+    none = np.empty(stress_size(body))
+    run_kernels(body, np.int64(VISCOUS), u, v, f, none, np.int64(0), none, _no_band(none))
 
 
 @source

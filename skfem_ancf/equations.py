@@ -7,7 +7,7 @@ import numpy as np
 from scipy import sparse
 
 from .band import Band
-from .body import body_of, flat_body, stress_size
+from .body import body_of, flat_body, stress_size, viscous_body_of
 from .border import Border
 from .kernels.moments import MomentPack
 from .own import handle_of
@@ -29,6 +29,8 @@ class Equations(NamedTuple):
         Fixed coordinates, and for each one 1 or 0.
     K
         The band for the tangent, work space.
+    viscous
+        As ``body``, of what resists the rates of strains; the same where nothing does.
     """
 
     body: tuple
@@ -38,6 +40,7 @@ class Equations(NamedTuple):
     free: np.ndarray
     K: Band
     border: Border
+    viscous: tuple
 
 
 class Tables:
@@ -60,15 +63,21 @@ class Tables:
         self.motion_varies = any(joint.moving for joint in system.joints)
         self.turns = any(joint.moving and not joint.constant for joint in system.joints)
         joints = self._joints()
-        self.plain = Equations(body_of(system.beams, system.slices), self._load_tables(), joints,
+        body = body_of(system.beams, system.slices)
+        self.plain = Equations(body, self._load_tables(), joints,
                                system.fixed, system.mask, system.K.band,
-                               self._border(joints))
+                               self._border(joints),
+                               viscous_body_of(body, system.beams, system.retardation))
 
     @cached_property
     def flat(self):
         from . import compiled
 
-        return self.plain._replace(body=flat_body(self.plain.body, compiled.kernels()))
+        plain, address = self.plain, compiled.kernels()
+        body = flat_body(plain.body, address)
+        same = plain.viscous is plain.body
+        return plain._replace(body=body,
+                              viscous=body if same else flat_body(plain.viscous, address))
 
     @property
     def handle(self):

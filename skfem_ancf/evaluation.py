@@ -1,10 +1,11 @@
 """Single evaluations of the equations of a scene, for what is no whole iteration."""
 
-from .body import body_carry, body_force, body_mean, body_stress, body_tangent
+from .body import (add_viscous_force, body_carry, body_force, body_mean, body_stress,
+                   body_tangent)
 from .source import source
 from .tables import add_load_stiffness
 
-FORCE, TANGENT, CARRY, STRESS, MEAN = range(5)
+FORCE, TANGENT, CARRY, STRESS, MEAN, VISCOUS = range(6)
 
 
 @source
@@ -19,7 +20,8 @@ def evaluate(e, what, u, v, factors, t, scale, use_carried, stresses, carried, f
         FORCE: the internal force at u into f. TANGENT: with it the tangent of the residual into
         ``e.K``, and the stresses; the geometric part takes those ``carried`` if ``use_carried``.
         CARRY: those carried from u to u + v. STRESS: the stresses at u. MEAN: the force whose work
-        from u to v is the change of the strain energy.
+        from u to v is the change of the strain energy. VISCOUS: that of damped materials at the
+        velocity v.
     factors, t, scale
         As for :func:`~skfem_ancf.tables.external_force`.
     """
@@ -32,5 +34,7 @@ def evaluate(e, what, u, v, factors, t, scale, use_carried, stresses, carried, f
         body_carry(e.body, u, v, stresses, carried)
     elif what == STRESS:
         body_stress(e.body, u, stresses)
-    else:
+    elif what == MEAN:
         body_mean(e.body, u, v, f)
+    else:
+        add_viscous_force(e.viscous, u, v, f)

@@ -82,6 +82,13 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         "each iteration; the last evaluates the force only")
     add("mass", "constant" if dynamic else "skipped",
         "assembled and factorised once" if dynamic else "no inertia in statics")
+    lossy = sum(time > 0.0 for time in s.retardation)
+    kinds = [text for text, there in (
+        (f"{lossy} beam(s) resist the rate of their strain", lossy),
+        ("a part of the mass", s.damping.mass), (f"{len(s.damping.modal)} modes",
+                                                 len(s.damping.modal))) if there]
+    add("damping", "computed" if dynamic and kinds else "skipped", ", ".join(kinds) if dynamic and
+        kinds else "no velocities in statics" if kinds else "there is none")
     dead = [load for load in scene.loads if load.constant and load.amplitude is None]
     rest = len(scene.loads) - len(dead)
     add("dead loads", "constant" if dead else "skipped",

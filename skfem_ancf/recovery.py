@@ -676,6 +676,8 @@ def _recover_alike(states, number, loads):
     first, system = states[0], states[0].system
     beam, s = first.beams[number], system.of(first.beams[number])
     try:
+        if first.t is not None and system.damped:
+            raise NotRecovered("the stress that resists the rate of the strain is not known to it")
         together = [(np.array([of[k][0] for of in loads]), spread)
                     for k, (_, spread) in enumerate(loads[0])]
         u = np.array([state.u[s] for state in states])

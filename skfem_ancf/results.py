@@ -70,7 +70,8 @@ class State(Frozen):
     multipliers
         Of the joints, shape (m,); zero by default.
     t, inertia, acceleration, motion, origin
-        Of an instant of a motion: its time; the force of inertia and the acceleration of the
+        Of an instant of a motion: its time; the force of inertia and damping, and the
+        acceleration of the
         coordinates, shape (N,); its :class:`~skfem_ancf.dynamics.Motion`; its scheme, and what the
         run kept.
     verdict

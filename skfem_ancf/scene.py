@@ -13,6 +13,7 @@ import numpy as np
 from . import eigen
 from .beam import Beam, select_beam
 from .checks import warn_of
+from .damping import Damping
 from .doors import configuration, displacement
 from .dynamics import get_scheme
 from .dynamics.checkpoint import resume
@@ -114,6 +115,7 @@ class Scene:
         self._joints: tuple[tuple[Joint, Joint], ...] = ()
         # number of the beam -> (as given, bound)
         self._velocities: dict[int, tuple[Any, Array]] = {}
+        self._damping: Damping | None = None
         self._system: System | None = None
 
     def __getstate__(self):
@@ -534,6 +536,54 @@ class Scene:
         """
         return self._put(loads=[(self._number(beam), FormLoad(form, boundary, None, amplitude))])
 
+    # damping
+
+    def damping(self, mass: float = 0.0, stiffness: float = 0.0,
+                modal: ArrayLike = ()) -> Scene:
+        """Damping of the whole scene: Rayleigh's, and of modes.
+
+        A mode of the angular frequency omega gets the damping ratio ``mass / (2 omega) + stiffness
+        omega / 2``. It acts in motions; materials may have their own, ``Beam(...,
+        damping=KelvinVoigt(time))``. A second call takes the place of the first.
+
+        Parameters
+        ----------
+        mass
+            Factor on the mass matrix, in 1 / time: a force ``mass M v``, which resists rigid
+            motions too.
+        stiffness
+            Factor on the stiffness, in units of time: that of a material that resists the rate of
+            its strain, see :class:`~skfem_ancf.KelvinVoigt`, with its stiffness in the
+            stress-free state. So it turns with the body and lets rigid motions alone.
+        modal
+            Damping ratios of the lowest modes of the stress-free scene, shape (k,). What resists
+            is a constant matrix: for vibrations about the stress-free state, not for bodies that
+            turn or bend far. Rigid motions, of frequency zero, have no ratio.
+
+        Returns
+        -------
+        Scene
+            Itself.
+
+        Raises
+        ------
+        InputError
+            If a number is negative.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(5),
+        ...                    StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)).clamp("left")
+        >>> history = scene.gravity((0, -9.81)).damping(mass=2.0).integrate(0.05, 1e-3)
+        >>> bool(np.all(np.diff(history.dissipated) > 0))
+        True
+        """
+        with self._lock:
+            self._damping, self._system = Damping(mass, stiffness, modal), None
+        return self
+
     # solution
 
     @property
@@ -544,7 +594,8 @@ class Scene:
                 offsets = np.concatenate([[0], np.cumsum([b.N for b in self._beams])])
                 fixed = np.array([offsets[k] + d for k, d in self._fixed], dtype=int)
                 values = np.array(list(self._fixed.values()), dtype=float)
-                self._system = System(self._beams, self.loads, fixed, values, self.joints)
+                self._system = System(self._beams, self.loads, fixed, values, self.joints,
+                                      self._damping)
             return self._system
 
     def with_beams(self, beams: Sequence[Beam]) -> Scene:
@@ -568,6 +619,7 @@ class Scene:
             raise InputError(f"beams must be a list of {len(self._beams)} Beam(s), got "
                              f"{shown(beams)}")
         scene = Scene(*beams)
+        scene._damping = self._damping
         if len(scene.beams) != len(self._beams):
             raise InputError(f"the scene has {len(self._beams)} beams, got {len(scene.beams)}")
         changed = [a.mesh is not b.mesh for a, b in zip(self._beams, scene.beams)]

@@ -7,16 +7,19 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from . import eigen
 from .checks import Screen
 from .constraints import Constraints
+from .damping import Damping
 from .errors import InputError
-from .evaluation import CARRY, FORCE, MEAN, TANGENT, evaluate
+from .evaluation import CARRY, FORCE, MEAN, TANGENT, VISCOUS, evaluate
 from .linalg import (INACCURATE, BandMatrix, BorderedMatrix, border, border_negative,
                      columns_product, dense)
 from .machine import Machine
 from .pickling import functions_of, require_picklable
 from .points import Points
 from .rank import determinant_sign, null_basis, sparse_inertia
+from .results import State
 
 logger = logging.getLogger(__name__)
 _NONE = np.zeros(0)
@@ -45,10 +48,12 @@ class System:
         Numbers of the fixed coordinates and their displacements at full load.
     joints
         Joints, already bound.
+    damping
+        A :class:`~skfem_ancf.damping.Damping`, or None.
     """
 
-    def __init__(self, beams, loads, fixed, values, joints=()):
-        self._given = tuple(beams), tuple(loads), fixed, values, tuple(joints)
+    def __init__(self, beams, loads, fixed, values, joints=(), damping=None):
+        self._given = tuple(beams), tuple(loads), fixed, values, tuple(joints), damping
         self.beams, self.loads = list(beams), list(loads)
         self.offsets = np.concatenate([[0], np.cumsum([b.N for b in self.beams])])
         self.N = int(self.offsets[-1])
@@ -63,6 +68,10 @@ class System:
                 self.constant_force[self.of(load)] += load.force(None)
             else:
                 self._varying.append(load)
+        self.damping = Damping() if damping is None else damping
+        self.retardation = [self.damping.stiffness + (b.damping.time if b.damping else 0.0)
+                            for b in self.beams]
+        self.viscous = any(time > 0.0 for time in self.retardation)
 
     fixed = _of_constraints("fixed")
     free = _of_constraints("free")
@@ -138,6 +147,30 @@ class System:
     def mean_internal_force(self, u0, u1):
         """The internal force whose work from u0 to u1 is the change of the strain energy."""
         return self._evaluate(MEAN, u0, u1)
+
+    @property
+    def damped(self):
+        """True if something resists velocities."""
+        return self.viscous or bool(self.damping)
+
+    def damping_force(self, u, v):
+        """The force at u that resists the velocity v, shape (N,)."""
+        force = self._evaluate(VISCOUS, u, v) if self.viscous else np.zeros(self.N)
+        if self.damping.mass:
+            force += self.damping.mass * self.mass.multiply(v)
+        return force + (self.damped_modes @ v) @ self.damped_modes
+
+    @cached_property
+    def damped_modes(self):
+        """Rows (k, N): what resists v by damped modes is their product with that of rows and v."""
+        ratios = self.damping.modal
+        if not np.any(ratios):
+            return np.zeros((0, self.N))
+        rest = State(self, np.zeros(self.N), load=0.0)
+        modes = eigen.modes(self, rest, len(ratios))
+        weights = np.sqrt(2.0 * ratios * np.maximum(modes.frequencies, 0.0))
+        rows = np.array([c * self.mass.multiply(shape) for c, shape in zip(weights, modes.shapes)])
+        return np.ascontiguousarray(rows[weights > 0.0])
 
     def _evaluate(self, what, u, v=None, load=1.0, t=None, stresses=None, carried=None,
                   use_carried=False):

@@ -14,8 +14,8 @@ import numpy as np
 from skfem import Basis, ElementVector, LinearForm
 
 from skfem_ancf import (HHT, Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
-                        ElementBeamPatelShabana, EnergyMomentum, GeneralizedAlpha, MeshBeam,
-                        NeoHookean, Newmark, Scene, StVenantKirchhoff, forms,
+                        ElementBeamPatelShabana, EnergyMomentum, GeneralizedAlpha, KelvinVoigt,
+                        MeshBeam, NeoHookean, Newmark, Scene, StVenantKirchhoff, forms,
                         reference_coordinates)
 from skfem_ancf.dynamics import get_scheme
 from skfem_ancf.elements import choose_element
@@ -56,6 +56,8 @@ BAD = {
 TAKES = {
     "number": {k: "a finite number" for k in ("10**30", "-1", "0", "3.5", "1e-320")},
     "positive": {k: "a positive number" for k in ("10**30", "3.5", "1e-320")},
+    "not negative": {k: "zero or a positive number" for k in ("10**30", "0", "3.5", "1e-320")},
+    "ratios": {"[1.0, 2.0, 3.0]": "three ratios", "[99]": "one ratio", "[]": "none"},
     "count": {},
     "index": {k: "an index" for k in ("0", "-1")},
     "vector": {},
@@ -359,6 +361,7 @@ call("Beam", Beam, whole, mesh="other", element="other", material="other", width
      formulation="name", name="label?", compiled="flag")
 call("Beam, auto", Beam, {**whole, "element": "auto", "fields": "S_xx", "tolerance": 1e-3},
      fields="fields", tolerance="positive")
+call("Beam, damped", Beam, {**whole, "damping": KelvinVoigt(1e-3)}, damping="other?")
 call("beam.with_mesh", lambda **k: beam().with_mesh(**k), dict(mesh=mesh()), mesh="other")
 call("beam.nodes", lambda **k: beam().nodes(**k), dict(boundary="left"), boundary="facets")
 call("beam.dofs", lambda **k: beam().dofs(**k), dict(boundary="left", names=["r^1"]),
@@ -401,6 +404,10 @@ def moved(scene, **options):
     return scene.integrate(t_end=0.02, dt=0.01, **options)
 
 
+call("KelvinVoigt", KelvinVoigt, dict(time=1e-3), time="not negative")
+call("scene.damping", lambda **k: moved(clamped().damping(**k)),
+     dict(mass=0.1, stiffness=1e-3, modal=[0.1]), mass="not negative", stiffness="not negative",
+     modal="ratios")
 call("scene.gravity", lambda **k: moved(clamped().gravity(**k)),
      dict(g=(0.0, -1.0), beam=0, amplitude=amplitude), g="vector", beam="beam?",
      amplitude="function?")

@@ -385,7 +385,7 @@ def test_nothing_is_unpickled(tmp_path):
 
 def test_files_of_another_version(unfinished, monkeypatch):
     monkeypatch.setattr(checkpoint, "FORMAT", 99)
-    with pytest.raises(CheckpointError, match="format 2, this version reads 99"):
+    with pytest.raises(CheckpointError, match="format 3, this version reads 99"):
         swinging(False).resume(unfinished)
 
 

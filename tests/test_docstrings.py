@@ -13,7 +13,8 @@ import skfem_ancf
 
 #: Modules that are being rewritten: neither their docstrings nor their annotations are looked at.
 NOT_YET = ("statics.newton", "statics.stability.Descent.solve_own", "dynamics.integrator",
-           "dynamics.course", "dynamics.rates", "dynamics.steps", "system", "curve", "band", "own",
+           "dynamics.course", "dynamics.dampers", "dynamics.rates", "dynamics.steps", "system",
+           "curve", "band", "own",
            "tables", "body", "border", "equations", "evaluation", "machine", "kernels",
            "kinematics", "statics.iteration", "source", "linalg", "materials.neo_hookean",
            "constraints")

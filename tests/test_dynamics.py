@@ -14,6 +14,7 @@ from skfem_ancf.band import Band
 from skfem_ancf.body import Body
 from skfem_ancf.dynamics import HHT, SCHEMES, EnergyMomentum, GeneralizedAlpha, Newmark, get_scheme
 from skfem_ancf.dynamics.rates import JointMotion
+from skfem_ancf.dynamics.dampers import Dampers, Rows
 from skfem_ancf.dynamics.steps import STATE, Course, Matrices, Rule, steps
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.equations import Equations
@@ -127,8 +128,9 @@ def oscillator():
     spring = LoadTables(np.zeros((0, 1)), moments, zero, zero, -one, zero, 0)
     joints = JointTables(none, none, none, np.zeros(0), none, none, 0)
     M, mass, A = (Band(np.array([1.0, 0.0]), zero, 2, 0, 0) for _ in range(3))
-    equations = Equations(Body((), np.zeros((0, 8), np.int64)), spring, joints, none, one, A, None)
-    return equations, Matrices(M, mass, A)
+    body, row = Body((), np.zeros((0, 8), np.int64)), np.zeros((0, 1))
+    equations = Equations(body, spring, joints, none, one, A, None, body)
+    return equations, Matrices(M, mass, A, Rows(row, row, row, row), Dampers(0, 0, 0.0, A, row))
 
 
 def amplification(scheme, dt):
@@ -141,7 +143,7 @@ def amplification(scheme, dt):
     for u, v, w in np.eye(3):
         y, new = np.array([[u], [v], [-u], [w]]), np.empty((1, 4, 1))
         done = steps(equations, matrices, rule, course, np.zeros(STATE), y, np.zeros((2, 0)), new,
-                     np.zeros((1, 2, 0)))
+                     np.zeros((1, 2, 0)), np.zeros(1))
         assert done == 1
         rows.append(new[0, [0, 1, 3], 0])
     A = np.array(rows).T

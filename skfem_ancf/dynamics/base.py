@@ -34,6 +34,8 @@ class Motion:
         Size of the step before; 0 where there is none.
     memory
         What else the scheme keeps for its next step: None, or a dict of numbers and arrays.
+    dissipated
+        The work of damping so far.
     """
 
     t: float
@@ -45,6 +47,7 @@ class Motion:
     force: np.ndarray | None = None
     before: float = 0.0
     memory: dict | None = None
+    dissipated: float = 0.0
 
     def __post_init__(self):
         if self.force is None:

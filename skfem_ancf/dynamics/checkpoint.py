@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-FORMAT = 2
+FORMAT = 3
 #: Times of a motion at which functions of time are compared.
 TIMES = 33
 #: Seconds between two files by default, and the part of the time that writing may take.
@@ -76,8 +76,11 @@ def fingerprint(system: System) -> dict[str, str]:
                                           beam.element.axis_degree, beam.nd)
         parts[f"material {who}"] = _digest(type(beam.material).__name__, *_numbers(beam.material))
         parts[f"width {who}"] = _digest(beam.width)
+        parts[f"damping {who}"] = _digest(beam.damping)
         parts[f"formulation {who}"] = _digest(beam.formulation.name, *_numbers(beam.formulation))
     parts["supports"] = _digest(system.fixed, system.values(1.0, 0.0)[:0], system.given)
+    damping = system.damping
+    parts["damping"] = _digest(damping.mass, damping.stiffness, damping.modal)
     for k, load in enumerate(system.loads):
         u = 1e-3 * load.beam.mesh.height * probe[system.of(load)]
         parts[f"load {k}"] = _digest(type(load).__name__, system.beams.index(load.beam),
@@ -420,6 +423,6 @@ def _restore(run, arrays):
             memories[int(k)][key] = value
     now, *stored = [memory or None for memory in memories]
     run.history.restore(columns, stored)
-    t, *rest, before = (arrays[f"now.{name}"] for name in run.history.COLUMNS)
-    run.recall(Motion(float(t), *rest, float(before), now),
+    t, *rest, before, dissipated = (arrays[f"now.{name}"] for name in run.history.COLUMNS)
+    run.recall(Motion(float(t), *rest, float(before), now, float(dissipated)),
                {k[4:]: v for k, v in arrays.items() if k.startswith("run.")})

@@ -46,6 +46,9 @@ class History:
         Displacement of the coordinates and its rates, shape (nt, N).
     multipliers
         Of the joints, shape (nt, m).
+    dissipated
+        The work of damping since the start, shape (nt,): that of its force with the
+        energy-momentum scheme, the integral of its power by the trapezoidal rule with others.
     steps
         Steps of the motion; the instants may be fewer or more.
     substeps
@@ -57,7 +60,8 @@ class History:
     """
 
     #: What is stored of a Motion.
-    COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before")
+    COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before",
+               "dissipated")
 
     def __init__(self, system: System, scheme: Scheme, run: Any) -> None:
         self.system, self.scheme, self._run = system, scheme, run
@@ -72,7 +76,7 @@ class History:
     def columns(self) -> dict[str, Array]:
         """What was stored, as arrays by their names in :attr:`COLUMNS`."""
         n, N, m = len(self._rows), self.system.N, self.system.m
-        shapes = {"t": (), "before": (), "multipliers": (m,), "force": (m,)}
+        shapes = {"t": (), "before": (), "dissipated": (), "multipliers": (m,), "force": (m,)}
         return {name: np.array([getattr(y, name) for y in self._rows],
                                dtype=float).reshape(n, *shapes.get(name, (N,)))
                 for name in self.COLUMNS}
@@ -88,10 +92,10 @@ class History:
             What the scheme kept at each instant, :attr:`memories`.
         """
         rows = zip(*(columns[name] for name in self.COLUMNS))
-        for (t, *arrays, before), memory in zip(rows, memories):
-            u, v, acceleration, algorithmic, multipliers, force = arrays
-            self._rows.append(Motion(float(t), u, v, acceleration, algorithmic, multipliers, force,
-                                     float(before), memory))
+        for (t, *arrays, before, dissipated), memory in zip(rows, memories):
+            y = Motion(float(t), *arrays, before=float(before), memory=memory)
+            y.dissipated = float(dissipated)
+            self._rows.append(y)
 
     @property
     def memories(self) -> list[Any]:
@@ -103,6 +107,7 @@ class History:
         columns, run = self.columns(), self._run
         self.t, self.u, self.v = columns["t"], columns["u"], columns["v"]
         self.acceleration, self.multipliers = columns["acceleration"], columns["multipliers"]
+        self.dissipated = columns["dissipated"]
         self._others = columns["algorithmic"], columns["force"], columns["before"]
         self._memories = self.memories
         if self._rows and run.y is not None and self._rows[-1].t == run.y.t:
@@ -133,11 +138,14 @@ class History:
         k = require_index("k", k, len(self))
         algorithmic, force, before = (x[k] for x in self._others)
         motion = Motion(float(self.t[k]), self.u[k], self.v[k], self.acceleration[k], algorithmic,
-                        self.multipliers[k], force, float(before), self._memories[k])
-        last = k == len(self) - 1
+                        self.multipliers[k], force, float(before), self._memories[k],
+                        float(self.dissipated[k]))
+        last, inertia = k == len(self) - 1, self.system.mass.multiply(motion.acceleration)
+        if self.system.damped:
+            inertia = inertia + self.system.damping_force(motion.u, motion.v)
         return State(self.system, self.u[k], load=1.0, converged=True, t=motion.t,
                      message=f"t = {motion.t:g}", multipliers=motion.multipliers,
-                     inertia=self.system.mass.multiply(motion.acceleration),
+                     inertia=inertia,
                      acceleration=motion.acceleration, motion=motion,
                      origin=(self.scheme, self._kept if last else None))
 
@@ -302,7 +310,7 @@ class History:
 
     @property
     def total_energy(self) -> Array:
-        """Sum of the three energies, shape (nt,)."""
+        """Sum of the three energies, shape (nt,); with :attr:`dissipated` it stays the same."""
         return self.strain_energy + self.kinetic_energy + self.potential_energy
 
     @cached_property

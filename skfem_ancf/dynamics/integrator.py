@@ -9,8 +9,9 @@ from ..errors import SupportError, require_positive
 from .base import Motion
 from .course import Courses
 from .rates import rates
-from .steps import (BEFORE, COUNT, ENERGY, FACTORIZED, FAILURE, FAILURES, READY, STATE, Matrices,
-                    Rule, mass_factor, steps)
+from .dampers import Dampers, Rows
+from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, READY, STATE,
+                    Matrices, Rule, mass_factor, steps)
 
 logger = logging.getLogger(__name__)
 
@@ -54,7 +55,7 @@ class Integrator:
         self.rule = Rule(int(scheme.conserving), *(float(x) for x in scheme.parameters), self.tol,
                          8.0 * system.stiffness_scale)
         M = system.mass.band
-        self.matrices = Matrices(M, _copy(M), _copy(M))
+        self.matrices = Matrices(M, _copy(M), _copy(M), *_damping(system))
         fix(self.matrices.mass, system.mask)
         if not factorize(self.matrices.mass):
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
@@ -132,6 +133,8 @@ class Integrator:
             rate = -(self._constraint_acceleration(y.u, y.v, t, dt)
                      + s.full_jacobian(y.u, t) @ y.acceleration)
         force = s.external_force(y.u, t) - s.internal_force(y.u) - s.mass.multiply(y.acceleration)
+        if s.damped:
+            force = force - s.damping_force(y.u, y.v)
         acceleration, y.multipliers = s.solve_mass(force, y.u, t, rate)
         y.acceleration = y.acceleration + acceleration
         y.algorithmic, y.force = y.acceleration.copy(), y.multipliers
@@ -169,15 +172,15 @@ class Integrator:
                                   (first, first + n) if block is None else block, self.limit)
         if dt != self._dt:
             self._dt, self._state[READY] = dt, 0.0
-        self._state[BEFORE], self._state[FAILURE] = y.before, 0.0
-        rows, multiplier_rows = np.empty((n, 4, s.N)), np.empty((n, 2, s.m))
+        self._state[[BEFORE, FAILURE, DISSIPATED]] = y.before, 0.0, y.dissipated
+        rows, multiplier_rows, works = np.empty((n, 4, s.N)), np.empty((n, 2, s.m)), np.empty(n)
         now = np.array([y.u, y.v, y.acceleration, y.algorithmic])
         multipliers = np.array([y.multipliers, y.force])
         function, equations = s.machine.of(steps)
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 done = function(equations, self.matrices, self.rule, course, self._state, now,
-                                multipliers, rows, multiplier_rows)
+                                multipliers, rows, multiplier_rows, works)
         except BaseException:  # also Ctrl-C: the motion may go on from y
             self._state[:], self._state[READY] = before, 0.0
             raise
@@ -186,7 +189,8 @@ class Integrator:
 
         def motion(k):
             """After step k, counted from 0."""
-            return Motion(float(course.times[k, 0]), *rows[k], *multiplier_rows[k], before=dt)
+            return Motion(float(course.times[k, 0]), *rows[k], *multiplier_rows[k], before=dt,
+                          dissipated=float(works[k]))
 
         return done, motion
 
@@ -249,6 +253,15 @@ class Integrator:
         self.substeps = int(memory["substeps"])
         if self.ready:
             self.matrices.A.flat[:], self.matrices.A.pivots[:] = memory["A"], memory["pivots"]
+
+
+def _damping(system):
+    """Rows beside the band, and the Dampers of a system."""
+    modes, M = system.damped_modes, system.mass.band
+    k = len(modes)
+    D = M._replace(flat=np.zeros(M.flat.size if system.viscous else 0))
+    return (Rows(modes, np.zeros((k, k)), np.zeros(modes.shape), np.zeros((k, k))),
+            Dampers(int(system.damped), int(system.viscous), system.damping.mass, D, modes))
 
 
 def _copy(A):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -119,8 +119,7 @@ class Run:
         memory
             What its :meth:`remember` gave, or None.
         """
-        self.y = Motion(self.task.t_start, y.u, y.v, y.acceleration, y.algorithmic, y.multipliers,
-                        y.force, y.before, y.memory)
+        self.y = replace(y, t=self.task.t_start)
         if memory is not None:
             self.integrator.recall(memory)
             self.integrator.reset()
@@ -175,7 +174,9 @@ class Run:
         if self.sizes is not None:
             self.size = 1e-4 * self.task.span
             self.sizes.begin()
-        return self.integrator.start(y.u, y.v, self._begun, self._first_step())
+        turned = self.integrator.start(y.u, y.v, self._begun, self._first_step())
+        turned.dissipated = y.dissipated
+        return turned
 
     # steps
 
@@ -359,7 +360,8 @@ def interpolate(a: Motion, b: Motion, t: float) -> Motion:
         return (1 - s) * x + s * y
 
     return Motion(t, u, v, linear(a.acceleration, b.acceleration), a.algorithmic,
-                  linear(a.multipliers, b.multipliers), a.force, a.before, a.memory)
+                  linear(a.multipliers, b.multipliers), a.force, a.before, a.memory,
+                  linear(a.dissipated, b.dissipated))
 
 
 __all__ = ["Run", "StepFailed", "Task", "interpolate"]

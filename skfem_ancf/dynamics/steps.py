@@ -2,25 +2,26 @@
 
 A step of size h leads from 0 to 1, with eq. (7)-(9) of Arnold and Bruls (2007)::
 
-    M a_1 + f(u_1) + J^T lambda = Q,   Phi(u_1) = 0
+    M a_1 + f(u_1) + d(u_1, v_1) + J^T lambda = Q,   Phi(u_1) = 0
     u_1 = u_0 + h v_0 + h^2 ((1/2 - beta) w_0 + beta w_1)
     v_1 = v_0 + h ((1 - gamma) w_0 + gamma w_1)
     (1 - alpha_m) w_1 + alpha_m w_0 = (1 - alpha_f) a_1 + alpha_f a_0
 
 The energy-momentum scheme solves the same with ``beta = 1/2``, ``gamma = 1`` and no alpha: then
-``w_1`` is the acceleration in the middle of the step, where f and Q are means between 0 and 1, and
-J is that of the middle.
+``w_1`` is the acceleration in the middle of the step, where f and Q are means between 0 and 1, d
+is ``d((u_0 + u_1) / 2, (u_1 - u_0) / h)``, whose work is not negative, and J is that of the middle.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from ..band import Band, copy, factorize, fix, multiply, solve, solve_joined, subtract_rows
-from ..body import body_force, body_mean, body_stress, body_tangent, stress_size
+from ..band import Band, copy, factorize, fix, multiply, solve_joined, subtract_rows
+from ..body import (body_carry, body_force, body_mean, body_stress, body_tangent, stress_size)
 from ..source import lanes, source
 from ..tables import (add_curvature_force, add_load_stiffness, constraint, joint_directions,
                       mean_external_force)
+from .dampers import (Dampers, Rows, add_damping, damping_force, factorize_rows, solve_rows)
 from .rates import JointMotion, acceleration_of_joints, drive_rate
 
 EPS = 2.2e-16
@@ -36,9 +37,10 @@ DIVERGING = 2.0
 #: What a run of steps keeps, in one array: whether there are factors, how many iterations and
 #: factorisations there were, the last contraction, the size of the step before, the largest energy
 #: seen, and why a step has failed; of the step, whether its factors are its own, and the sizes of
-#: the last two corrections, negative where there is none.
-READY, COUNT, FACTORIZED, RATE, BEFORE, ENERGY, FAILURE, FRESH, SIZE, LAST_SIZE = range(10)
-STATE = 10
+#: the last two corrections, negative where there is none; the work of damping so far.
+(READY, COUNT, FACTORIZED, RATE, BEFORE, ENERGY, FAILURE, FRESH, SIZE, LAST_SIZE,
+ DISSIPATED) = range(11)
+STATE = 11
 #: By the number in ``state[FAILURE]``.
 FAILURES = ("", "the iteration matrix is singular", "the residual is not finite",
             "the iteration diverges", f"no convergence in {ITERATIONS} iterations",
@@ -73,11 +75,23 @@ class Rule(NamedTuple):
 
 
 class Matrices(NamedTuple):
-    """The mass matrix, its factors with the supports fixed, and those of the iteration matrix."""
+    """The mass matrix, its factors with the supports fixed, and those of the iteration matrix.
+
+    Attributes
+    ----------
+    M, mass, A
+        As said.
+    rows
+        What the iteration matrix has beside its band.
+    dampers
+        What resists velocities.
+    """
 
     M: Band
     mass: Band
     A: Band
+    rows: Rows
+    dampers: Dampers
 
 
 class Course(NamedTuple):
@@ -114,8 +128,8 @@ class Step(NamedTuple):
         Its size, its end, and when its equation of motion holds.
     factors, supports, joints
         As of the Course, without the first axis.
-    mass_factor, stiffness_factor
-        The iteration matrix is ``mass_factor M + stiffness_factor K``.
+    mass_factor, damping_factor, stiffness_factor
+        The iteration matrix is ``mass_factor M + damping_factor D + stiffness_factor K``.
     constant
         True if the joints' directions are always the same.
     """
@@ -127,6 +141,7 @@ class Step(NamedTuple):
     supports: np.ndarray
     joints: JointMotion
     mass_factor: float
+    damping_factor: float
     stiffness_factor: float
     constant: bool
 
@@ -139,7 +154,7 @@ class Work(NamedTuple):
     y
         u, v, the acceleration and w at the begin of the step, shape (4, N).
     x
-        Vectors by the numbers below, shape (13, N).
+        Vectors by the numbers below, shape (15, N).
     m
         The same of joints, shape (6, m).
     J
@@ -148,7 +163,7 @@ class Work(NamedTuple):
     S
         ``J1 A^-1 J^T``, shape (m, m).
     stresses
-        Of all beams: those at the begin, and others, shape (2, k).
+        Of all beams: zero, those at the begin, and others, shape (3, k).
     """
 
     y: np.ndarray
@@ -161,16 +176,21 @@ class Work(NamedTuple):
 
 #: Displacement and velocity of the iterate; where it began; u_1 - beta h^2 w_1,
 #: v_1 - gamma h w_1, and the part of the acceleration without w_1; the acceleration held by
-#: supports; where the tangent is taken; acceleration, residual, correction, internal force; room.
-U, V, GUESS, BASE, SPEED, REST, HELD, MIDDLE, ACCELERATION, RESIDUAL, DU, FORCE, ROOM = range(13)
+#: supports; where the tangent is taken; acceleration, residual, correction, internal force; room;
+#: the damping force, and the velocity that it resists.
+(U, V, GUESS, BASE, SPEED, REST, HELD, MIDDLE, ACCELERATION, RESIDUAL, DU, FORCE, ROOM, DAMPING,
+ PACE) = range(15)
 #: Multipliers of the iterate, their correction, how far joints are open, and their impulses; the
 #: multipliers at the begin, and where the step before took them.
 L, DL, PHI, IMPULSE, L0, LAST = range(6)
 
 
 @source
-def steps(e, matrices, rule, course, state, y, multipliers, rows, multiplier_rows):
-    """Take steps; ``rows`` (n, 4, N) and ``multiplier_rows`` (n, 2, m) are y and multipliers.
+def steps(e, matrices, rule, course, state, y, multipliers, rows, multiplier_rows, works):
+    """Take steps.
+
+    ``rows`` (n, 4, N) and ``multiplier_rows`` (n, 2, m) are y and multipliers after each, ``works``
+    (n,) the work of damping up to there.
 
     Parameters
     ----------
@@ -179,7 +199,7 @@ def steps(e, matrices, rule, course, state, y, multipliers, rows, multiplier_row
     matrices, rule, course
         As above.
     state
-        What is kept from step to step, shape (10,).
+        What is kept from step to step, shape (11,).
     y
         u, v, the acceleration and the scheme's acceleration w, shape (4, N).
     multipliers
@@ -190,27 +210,27 @@ def steps(e, matrices, rule, course, state, y, multipliers, rows, multiplier_row
     The number of steps done; one that fails is the last.
     """
     N, m = y.shape[1], multipliers.shape[1]
-    w = Work(y, np.zeros((13, N)), np.zeros((6, m)), np.zeros((3, m, N)), np.zeros((m, m)),
-             np.zeros((2, stress_size(e.body))))
-    u, f, stresses, joined, yes = w.x[U], w.x[FORCE], w.stresses, m > 0, N > 0
+    w = Work(y, np.zeros((15, N)), np.zeros((6, m)), np.zeros((3, m, N)), np.zeros((m, m)),
+             np.zeros((3, stress_size(e.body))))
+    u, f, joined, damped = w.x[U], w.x[FORCE], m > 0, matrices.dampers.active > 0
     copy(multipliers[0], w.m[L0])
     copy(multipliers[1], w.m[LAST])
+    power = _power(e, matrices, y[0], y[1], w) if damped and rule.conserving == 0 else 0.0
     for n in range(rows.shape[0]):
         s = _step(e.joints, rule, course, n)
         rough, wanted = _begin(e.free, matrices.M, rule, s, w, state)
         told = GO_ON
         for _ in range(ITERATIONS):
             if state[READY] == 0.0:
-                # that of an iterate may be far off: turning by a straight predictor stretches
-                body_stress(e.body, y[0], stresses[0])
-                _middle(rule, w)
-                body_tangent(e.body, w.x[MIDDLE], f, stresses[0], yes, stresses[1], matrices.A)
-                if not _factorize(e.loads, e.free, matrices, s, w, state):
+                _tangent(e, matrices, rule, s, w)
+                if not _factorize(e.free, matrices, state):
                     return n
             if rule.conserving > 0:
                 body_mean(e.body, y[0], u, f)
             else:
                 body_force(e.body, u, f)
+            if damped:
+                _resist(e, matrices, rule, s, w)
             anew = joined and (not s.constant or state[SIZE] < 0.0)
             if anew:
                 _directions(e.joints, rule, s, w)
@@ -220,7 +240,7 @@ def steps(e, matrices, rule, course, state, y, multipliers, rows, multiplier_row
                 told = _velocity(e.joints, e.free, matrices.mass, rule, s, w, state)
                 _add_impulses(e.joints, s, w)
             if told == GO_ON:
-                told = _correct(e.joints, e.free, matrices.A, s, w, state, anew)
+                told = _correct(e.joints, e.free, matrices, s, w, state, anew)
             if told == GO_ON:
                 told = _judge(state, wanted, rough)
             if told == ASTRAY:  # by old factors
@@ -239,6 +259,9 @@ def steps(e, matrices, rule, course, state, y, multipliers, rows, multiplier_row
             told, state[FAILURE] = FAILED, NOT_CONVERGED
         if told == FAILED:
             return n
+        if damped:
+            power = _add_work(e, matrices, rule, s, w, state, power)
+        works[n] = state[DISSIPATED]
         _finish(e.free, matrices.M, s, w, state)
         for k in range(4):
             copy(y[k], rows[n, k])
@@ -278,6 +301,12 @@ def mass_factor(rule, dt):
 
 
 @source
+def damping_factor(rule, dt):
+    """The factor of the damping in the iteration matrix: that of the velocity by u_1."""
+    return (1.0 if rule.conserving > 0 else rule.gamma / rule.beta) / dt
+
+
+@source
 def _row(x, n):
     """Of an array that may have one row for all steps."""
     return x[n if x.shape[0] > 1 else 0]
@@ -290,7 +319,8 @@ def _step(joints, rule, course, n):
     constant = joints.hk.size == 0 and g.shape[0] == 1 and joints.own == 0
     return Step(course.dt, course.times[n, 0], course.times[n, 1], _row(course.factors, n),
                 _row(course.supports, n), JointMotion(_row(c, n), _row(g, n), course.joints.drives),
-                mass_factor(rule, course.dt), 0.5 if rule.conserving > 0 else 1.0, constant)
+                mass_factor(rule, course.dt), damping_factor(rule, course.dt),
+                0.5 if rule.conserving > 0 else 1.0, constant)
 
 
 @source
@@ -369,19 +399,78 @@ def _energy(M, v, room):
 
 
 @source
-def _factorize(loads, free, matrices, s, w, state):
-    """Factors of the iteration matrix, from the body's tangent; False if it has none."""
-    M, A = matrices.M.flat, matrices.A.flat
-    add_load_stiffness(loads, s.factors, s.acting, 1.0, w.x[MIDDLE], matrices.A)
+def _tangent(e, matrices, rule, s, w):
+    """The iteration matrix, with the stresses at the begin of the step.
+
+    Those of an iterate may be far off: turning by a straight predictor stretches.
+    """
+    M, A, dampers, yes = matrices.M.flat, matrices.A.flat, matrices.dampers, w.x.size > 0
+    stresses = w.stresses
+    body_stress(e.body, w.y[0], stresses[1])
+    if dampers.viscous > 0:
+        body_carry(e.viscous, w.y[0], w.y[1], stresses[1], stresses[1])
+    _middle(rule, w)
+    body_tangent(e.body, w.x[MIDDLE], w.x[FORCE], stresses[1], yes, stresses[2], matrices.A)
+    if dampers.active > 0:
+        add_damping(e.viscous, dampers, matrices.M, s.damping_factor / s.stiffness_factor,
+                    w.x[MIDDLE], stresses, w.x[ROOM], matrices.A)
+        for k in range(dampers.modes.shape[0]):
+            matrices.rows.S[k, k] = s.damping_factor
+    add_load_stiffness(e.loads, s.factors, s.acting, 1.0, w.x[MIDDLE], matrices.A)
     for i in lanes(A.size):
         A[i] = s.mass_factor * M[i] + s.stiffness_factor * A[i]
+
+
+@source
+def _factorize(free, matrices, state):
+    """Factors of the iteration matrix; False if it has none."""
     fix(matrices.A, free)
     state[FACTORIZED] += 1.0
     if not factorize(matrices.A):
         state[FAILURE] = SINGULAR
         return False
+    factorize_rows(matrices.A, matrices.rows, free)
     state[READY], state[RATE], state[FRESH], state[SIZE] = 1.0, EXPECTED, 1.0, -1.0
     return True
+
+
+@source
+def _resist(e, matrices, rule, s, w):
+    """Add the damping force of the iterate to the internal one."""
+    u, u0, v, pace, d, f = w.x[U], w.y[0], w.x[V], w.x[PACE], w.x[DAMPING], w.x[FORCE]
+    _middle(rule, w)
+    _free_velocity(e.free, rule, s, w)
+    for i in lanes(u.size):
+        pace[i] = (u[i] - u0[i]) / s.dt if rule.conserving > 0 else v[i]
+    damping_force(e.viscous, matrices.dampers, matrices.M, w.x[MIDDLE], pace, d, w.x[ROOM])
+    for i in lanes(u.size):
+        f[i] += d[i]
+
+
+@source
+def _power(e, matrices, u, v, w):
+    """What damping takes in a unit of time."""
+    damping_force(e.viscous, matrices.dampers, matrices.M, u, v, w.x[DAMPING], w.x[ROOM])
+    return np.dot(w.x[DAMPING], v)
+
+
+@source
+def _add_work(e, matrices, rule, s, w, state, power):
+    """Add what damping has taken in the step; returns its power at the end.
+
+    In the conserving scheme that is the work of its force, else the mean of the powers.
+    """
+    after = 0.0
+    if rule.conserving > 0:
+        u, u0, pace = w.x[U], w.y[0], w.x[PACE]
+        for i in lanes(u.size):
+            pace[i] = u[i] - u0[i]
+        work = np.dot(w.x[DAMPING], pace)
+    else:
+        after = _power(e, matrices, w.x[U], w.x[V], w)
+        work = 0.5 * s.dt * (power + after)
+    state[DISSIPATED] += work
+    return after
 
 
 @source
@@ -418,19 +507,26 @@ def _add_impulses(joints, s, w):
 
 
 @source
-def _correct(joints, free, A, s, w, state, anew):
+def _correct(joints, free, matrices, s, w, state, anew):
     """Correct u and the multipliers; FAILED if these are not determined."""
     u, R, du, room = w.x[U], w.x[RESIDUAL], w.x[DU], w.x[ROOM]
-    l, dl, phi = w.m[L], w.m[DL], w.m[PHI]
+    l, dl, phi, A, rows = w.m[L], w.m[DL], w.m[PHI], matrices.A, matrices.rows
     state[COUNT] += 1.0
     for i in lanes(u.size):
         R[i] *= free[i]
         du[i] = R[i]
-    solve(A, du)
+    solve_rows(A, rows, du)
     work = abs(np.dot(R, du))
     if l.size > 0:
         constraint(joints, s.joints.c[0], s.joints.g[0], s.t, u, phi)
         copy(phi, dl)
+        if anew and rows.P.shape[0] > 0:
+            anew = False
+            for k in range(l.size):
+                row, out = w.J[0, k], w.J[2, k]
+                for i in lanes(u.size):
+                    out[i] = row[i] * free[i]
+                solve_rows(A, rows, out)
         if not solve_joined(A, w.J[0], w.J[1], free, anew, w.J[2], w.S, dl, du):
             state[FAILURE] = DEPENDENT
             return FAILED

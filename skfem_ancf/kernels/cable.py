@@ -15,9 +15,9 @@ import numpy as np
 from ..errors import InputError
 from ..quadrature import gauss
 from ..source import F1, F2, F3, I1, lanes, source
-from .base import (CARRY, FORCE, MEAN, STRESS, TANGENT, Chain, PairTables, Texts, add_force,
-                   add_held_energy, add_tangent, block, copy_stress, load, packed, pair_tables,
-                   product)
+from .base import (CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables, Texts,
+                   add_force, add_held_energy, add_tangent, block, copy_stress, load, packed,
+                   pair_tables, product)
 
 
 class CablePack(NamedTuple):
@@ -163,7 +163,7 @@ def cable_evaluate(pack, what, u, v, f, given, use_given, out, flat, ld, start):
         r, square = np.empty((states, nr, 2, size), u.dtype), np.empty((states, n, size), u.dtype)
         kappa, strain = square.copy(), np.empty((states, 2, n, size), u.dtype)
         weights, S = np.empty((n, size)), np.empty((2, n, size), u.dtype)
-        for k in range(2 if what == MEAN or what == CARRY else 1):
+        for k in range(2 if what == MEAN or what == CARRY or what == VISCOUS else 1):
             load(pack.start, pack.span, first, v if k else u, U[k])
             product(pack.table, first, U[k], d[k])
             if k < states:
@@ -173,6 +173,9 @@ def cable_evaluate(pack, what, u, v, f, given, use_given, out, flat, ld, start):
         if what == CARRY:
             cable_changes(pack.stiffness, r[0], d[1], square[0], kappa[0], S, S)
             copy_stress(S, out[:, :, first:first + size])
+        elif what == VISCOUS:  # rates in place of strains
+            S[:] = 0.0
+            cable_changes(np.ones(2), r[0], d[1], square[0], kappa[0], S, strain[0])
         elif what == TANGENT or what == STRESS:
             resultants = out[:, :, first:first + size]
             for c in range(2):
@@ -331,6 +334,13 @@ class CableKernel(Chain):
         """Weighted stiffnesses at the points, shape (2, 2, points, elements)."""
         n, ne = pack.weights.shape[0], pack.start.size
         return np.diag(pack.stiffness)[:, :, None, None] * np.broadcast_to(pack.weights, (n, ne))
+
+    def viscous_packs(self, time):
+        """The packs with ``time`` times the stiffnesses, without stabilisation."""
+        none = np.zeros((0, 2 * self.nd, 2 * self.nd))
+        return [pack._replace(stiffness=time * pack.stiffness, constant=packed(none),
+                              pairs=pack.pairs._replace(held=packed(pack.pairs.held[:, :0])))
+                for pack in self.packs]
 
     def without_material(self, pack):
         """The pack of a cable without stiffness, for given normal forces and moments."""

@@ -6,6 +6,7 @@ integration, and forces go back the same way. With moduli between samples, which
 interpolation and the weights in them, the tangent is a sum over pairs of rows.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +15,9 @@ from scipy import sparse
 from ..materials import LinearLaw
 from ..quadrature import tensor
 from ..source import F1, F2, F3, I1, I2, column, lanes, source
-from .base import (CARRY, FORCE, MEAN, STRESS, TANGENT, Chain, PairTables, Texts, add_force,
-                   add_held_energy, add_tangent, apart, block, copy_stress, in_rounds, load, packed,
-                   pair_tables, product)
+from .base import (CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables, Texts,
+                   add_force, add_held_energy, add_tangent, apart, block, copy_stress, in_rounds,
+                   load, packed, pair_tables, product)
 from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
 
 
@@ -220,9 +221,11 @@ def section_evaluate(pack, what, u, v, f, given, use_given, out, flat, ld, start
     pack
         SectionPack.
     what
-        ``FORCE``, ``TANGENT``, ``MEAN``, ``STRESS`` or ``CARRY``.
+        ``FORCE``, ``TANGENT``, ``MEAN``, ``STRESS``, ``CARRY``, or ``VISCOUS``: the force of
+        stresses that a linear law has of the rate of the strain.
     u, v
-        Displacement, and for the mean and for carried stresses its change, shape (N,).
+        Displacement, and for the mean and for carried stresses its change, for viscous ones its
+        rate, shape (N,).
     f
         Force, added to.
     given, use_given
@@ -235,7 +238,7 @@ def section_evaluate(pack, what, u, v, f, given, use_given, out, flat, ld, start
     table, rows, law, pairs = pack.table, pack.rows, pack.law, pack.pairs
     n, nr, nb, most = (len(pack.weights), table.shape[1], table.shape[2],
                        block(pairs.pairs.shape[1]))
-    changes = what == MEAN or what == CARRY
+    changes = what == MEAN or what == CARRY or what == VISCOUS
     shift = 0.5 if what == MEAN else 0.0
     for first in range(0, pack.start.size, most):
         size = min(most, pack.start.size - first)
@@ -257,7 +260,7 @@ def section_evaluate(pack, what, u, v, f, given, use_given, out, flat, ld, start
             add_scaled(0.5, U[1], U[0], U[0])
         D = np.empty((9, n, size if what == CARRY or what == TANGENT and law.kind else 0))
         for k in range(1 if what == CARRY else 0, 2 if D.size > 0 else 1):
-            law_evaluate(law, strain, D if k else S)
+            law_evaluate(law, change if what == VISCOUS else strain, D if k else S)
         if what == CARRY:
             tangent_stress(D, change, S)
             add_scaled(1.0, given[:, :, first:last], S, S)
@@ -376,14 +379,14 @@ class TermTables:
 
     Attributes
     ----------
-    law, points, w
-        The law, the points of integration (2, n) and their weights, (1 or elements, n).
+    term, law, points, w
+        The term, its law, the points of integration (2, n) and their weights, (1 or elements, n).
     pack
         :class:`SectionPack`.
     """
 
     def __init__(self, mesh, element, term, width, constant, owner):
-        self.law = term.law
+        self.law, self.term = term.law, term
         self.shared = mesh.is_uniform
         tind = np.array([0]) if self.shared else None
         self.points, W = term.quadrature
@@ -541,6 +544,13 @@ def _terms(rows, factors, along, points, D):
     return terms, mixing
 
 
+def _viscous(pack, time, none):
+    """The pack of a linear law with its moduli times a number, without stabilisation."""
+    return pack._replace(law=pack.law._replace(D=packed(time * pack.law.D)),
+                         moduli=packed(time * pack.moduli), constant=packed(none),
+                         pairs=pack.pairs._replace(held=packed(pack.pairs.held[:, :0])))
+
+
 class Kernel(Chain):
     """Energy, force and tangent of the strain energy of one beam.
 
@@ -562,7 +572,7 @@ class Kernel(Chain):
         self.constant = formulation.stabilisation(mesh, element, material, width)
         none = np.zeros((0, 2 * self.nd, 2 * self.nd))
         constants = [none if self.constant is None else self.constant]
-        self.tables = []
+        self.tables, self._made = [], (mesh, element, width, none)
         for term in formulation.terms(element, material):
             constant = constants.pop() if constants else none
             self.tables.append(TermTables(mesh, element, term, width, constant, self))
@@ -615,6 +625,13 @@ class Kernel(Chain):
         section_stress(pack._replace(law=unit), u, strain)
         law_evaluate(pack.law, strain, D.reshape(9, n, ne))
         return D * pack.weights
+
+    def viscous_packs(self, time):
+        """The packs of a linear law with ``time`` times the moduli at no strain."""
+        mesh, element, width, none = self._made
+        return [_viscous(t.pack, time, none) if t.pack.law.kind == LINEAR else TermTables(
+            mesh, element, replace(t.term, law=LinearLaw(time * t.law.moduli(np.zeros(3)))), width,
+            none, self).pack for t in self.tables]
 
     def without_material(self, pack):
         """The pack of a law without stiffness, for given stresses."""

@@ -1,0 +1,119 @@
+"""What resists velocities, as texts: of materials, of the mass, and of modes."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..band import Band, dense_solve, multiply, solve, subtract_rows
+from ..body import add_viscous_force, body_tangent
+from ..source import lanes, source
+
+
+class Rows(NamedTuple):
+    """A matrix ``A + P^T S P`` with few rows P beside its band.
+
+    Attributes
+    ----------
+    P, S
+        Rows (k, N), and what is between them, (k, k).
+    Z, H
+        ``P A^-1`` at free coordinates, and ``1 + S P Z^T``: made with the factors of A.
+    """
+
+    P: np.ndarray
+    S: np.ndarray
+    Z: np.ndarray
+    H: np.ndarray
+
+
+class Dampers(NamedTuple):
+    """What resists velocities.
+
+    Attributes
+    ----------
+    active, viscous
+        1 if there is any; 1 if a material does.
+    mass
+        The force of the mass is ``mass M v``.
+    D
+        Room for the band matrix of the others.
+    modes
+        That of modes is ``modes^T (modes v)``; shape (k, N).
+    """
+
+    active: int
+    viscous: int
+    mass: float
+    D: Band
+    modes: np.ndarray
+
+
+@source
+def damping_force(viscous, dampers, M, u, v, out, room):
+    """The force at u that resists the velocity v; ``viscous`` are its bodies."""
+    for i in lanes(out.size):
+        out[i] = 0.0
+    if dampers.viscous > 0:
+        add_viscous_force(viscous, u, v, out)
+    if dampers.mass > 0.0:
+        multiply(M, v, room)
+        for i in lanes(out.size):
+            out[i] += dampers.mass * room[i]
+    for k in range(dampers.modes.shape[0]):
+        row = dampers.modes[k]
+        size = np.dot(row, v)
+        for i in lanes(out.size):
+            out[i] += size * row[i]
+
+
+@source
+def add_damping(viscous, dampers, M, factor, u, stresses, room, A):
+    """Add the derivative of :func:`damping_force` by v, times a factor, to a symmetric band.
+
+    That of the modes is left out. ``stresses`` (3, n) is room, of which the first row is zero.
+    """
+    if dampers.viscous > 0:
+        yes = dampers.viscous > 0
+        body_tangent(viscous, u, room, stresses[0], yes, stresses[2], dampers.D)
+        for i in lanes(A.flat.size):
+            A.flat[i] += factor * dampers.D.flat[i]
+    if dampers.mass > 0.0:
+        for i in lanes(A.flat.size):
+            A.flat[i] += factor * dampers.mass * M.flat[i]
+
+
+@source
+def factorize_rows(A, rows, free):
+    """Make Z and H with the factors of A."""
+    P, S, Z, H = rows.P, rows.S, rows.Z, rows.H
+    k = P.shape[0]
+    G = np.empty((k, k))
+    for a in range(k):
+        row, out = P[a], Z[a]
+        for i in lanes(free.size):
+            out[i] = row[i] * free[i]
+        solve(A, out)
+    for a in range(k):
+        for b in range(k):
+            G[a, b] = np.dot(P[a], Z[b])
+    for a in range(k):
+        for b in range(k):
+            H[a, b] = 1.0 if a == b else 0.0
+            for c in range(k):
+                H[a, b] += S[a, c] * G[c, b]
+
+
+@source
+def solve_rows(A, rows, x):
+    """Solve in place with the factors of A and the rows, by Sherman, Morrison and Woodbury."""
+    solve(A, x)
+    k = rows.P.shape[0]
+    if k > 0:
+        y, z, H = np.empty(k), np.zeros(k), rows.H.copy()
+        for a in range(k):
+            y[a] = np.dot(rows.P[a], x)
+        for a in range(k):
+            for c in range(k):
+                z[a] += rows.S[a, c] * y[c]
+        dense_solve(H, z)
+        subtract_rows(rows.Z, z, x)

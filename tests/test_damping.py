@@ -1,0 +1,346 @@
+"""Damping: what it takes, where it leads, and that nothing is lost besides."""
+
+import pickle
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+
+from skfem_ancf import (HHT, Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
+                        EnergyMomentum, GeneralizedAlpha, InputError,
+                        KelvinVoigt, MeshBeam, NeoHookean, Newmark, Scene, StVenantKirchhoff)
+from skfem_ancf.dynamics import SCHEMES
+from skfem_ancf.errors import CheckpointError
+from skfem_ancf.materials import Material
+
+
+class Fibres(Material):
+    """A law of one's own: Hooke's without coupling, stiffening."""
+
+    def energy(self, strain):
+        W = 0.5 * self.E * np.sum(strain**2, axis=0)
+        return W + W**2 / self.E
+
+    def stress(self, strain):
+        W = 0.5 * self.E * np.sum(strain**2, axis=0)
+        return self.E * strain * (1.0 + 2.0 * W / self.E)
+
+
+STEEL = StVenantKirchhoff(2e8, 0.3, 7800.0)
+BODIES = {
+    "sections": lambda: (ElementBeamANCF(2), STEEL),
+    "cubic": lambda: (ElementBeamANCFCubic(2), STEEL),
+    "cable": lambda: (ElementBeamCable(5), STEEL),
+    "stabilised cable": lambda: (ElementBeamCable(), STEEL),
+    "neo-hookean": lambda: (ElementBeamANCF(2), NeoHookean(2e8, 0.3, 7800.0)),
+    "own law": lambda: (ElementBeamANCF(2), Fibres(2e8, 0.3, 7800.0)),
+}
+
+
+def beam_of(body="sections", time=2e-3, ne=4, h=0.01, **options):
+    element, material = BODIES[body]()
+    return Beam(MeshBeam.init_line(np.linspace(0, 1, ne + 1), h), element, material, h,
+                damping=KelvinVoigt(time), **options)
+
+
+# the force
+
+
+@pytest.mark.parametrize("formulation", ["assumed", "continuum", "ecm", "strain-split"])
+@pytest.mark.parametrize("body", BODIES)
+def test_force_is_the_rate_of_the_elastic_one_at_rest(body, formulation):
+    """At u = 0 the law is linear: d = time K v, without the stabilisation."""
+    if formulation in ("ecm", "strain-split") and body in ("neo-hookean", "own law"):
+        pytest.skip("the formulation is of linear laws")
+    beam = beam_of(body, 0.5, formulation=formulation)
+    system, v = Scene(beam).system, np.random.default_rng(0).standard_normal(beam.N)
+    system.assemble(np.zeros(beam.N))
+    held = np.zeros(beam.N)
+    if beam.kernel.constant is not None:
+        C, v_e = beam.kernel.constant, beam.kernel.gather(v)
+        held = beam.kernel.scatter(np.einsum(
+            "eij,ej->ei", np.broadcast_to(C, (beam.mesh.nelements, *C.shape[1:])),
+            v_e.reshape(len(v_e), -1)).reshape(v_e.shape))
+    expected = 0.5 * (system.multiply(v) - held)
+    assert_allclose(system.damping_force(np.zeros(beam.N), v), expected, rtol=0,
+                    atol=1e-11 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_force_far_from_rest_takes_power_and_is_objective(body):
+    rng = np.random.default_rng(1)
+    beam = beam_of(body)
+    system = Scene(beam).system
+    u = 1e-3 * rng.standard_normal(beam.N)
+    powers = [v @ system.damping_force(u, v) for v in rng.standard_normal((20, beam.N))]
+    assert min(powers) > 0.0
+    # a body that is bent, spins and flies: no force at all
+    q = (beam.q0_local + u).reshape(-1, 2)
+    spin = 7.0 * np.stack([-q[:, 1], q[:, 0]], axis=1)
+    spin.reshape(-1, beam.nd)[:, :2] += [3.0, -4.0]
+    force = system.damping_force(u, spin.ravel())
+    stretched = system.damping_force(u, q.ravel())
+    assert np.abs(force).max() < 1e-12 * np.abs(stretched).max()
+
+
+def test_rates_of_a_fibre_by_hand():
+    """A bar pulled at a rate: the power is time E (d eps / dt)^2 of its volume."""
+    E, time, A, L, stretch, rate = 5.0, 0.3, 0.04, 2.0, 1.4, 0.7
+    beam = Beam(MeshBeam.init_line([0, L], 0.2), ElementBeamANCF(1), StVenantKirchhoff(E, 0.0), 0.2,
+                damping=KelvinVoigt(time))
+    u, v = np.zeros((2, 2, 3, 2))  # node; r, r_X, r_Y; component
+    u[1, 0, 0], u[:, 1, 0] = (stretch - 1) * L, stretch - 1
+    v[1, 0, 0], v[:, 1, 0] = rate * L, rate
+    d = Scene(beam).system.damping_force(u.ravel(), v.ravel())
+    power = E * time * (stretch * rate) ** 2 * A * L  # eps = (stretch^2 - 1) / 2
+    assert_allclose(d @ v.ravel(), power, rtol=1e-13)
+
+
+# energy
+
+
+def hinged(body, damping):
+    """Two beams, one of them damped, that swing on a hinge."""
+    element, material = BODIES[body]()
+    first = Beam(MeshBeam.init_line(np.linspace(0, 0.5, 3), 0.01), element, material, 0.01,
+                 damping=KelvinVoigt(damping))
+    second = Beam(MeshBeam.init_line(np.linspace(0.5, 1, 3), 0.01), element, material, 0.01)
+    scene = Scene(first, second).pin("left", beam=0).gravity((0, -9.81))
+    scene.joint("hinge", beams=(0, 1), at=(0.5, 0))
+    return scene
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_balance_to_round_off(body):
+    history = Scene(beam_of(body)).pin("left").gravity((0, -9.81)).integrate(0.1, 2e-3)
+    assert np.all(np.diff(history.dissipated) >= 0.0) and history.dissipated[-1] > 1e-4
+    assert np.ptp(history.total_energy + history.dissipated) < 1e-12 * history.kinetic_energy.max()
+
+
+@pytest.mark.parametrize("extra", [dict(), dict(mass=3.0), dict(stiffness=1e-3),
+                                   dict(modal=[0.1, 0.05])], ids=str)
+def test_balance_with_joints_and_all_kinds_at_once(extra):
+    scene = hinged("sections", 1e-3).damping(**extra)
+    history = scene.integrate(0.1, 2e-3)
+    assert history.dissipated[-1] > 0.0
+    assert np.ptp(history.total_energy + history.dissipated) < 2e-12 * history.kinetic_energy.max()
+    for scheme in SCHEMES:  # the others: to their order
+        gaps = []
+        for dt in (2e-3, 1e-3):
+            history = scene.integrate(0.05, dt, scheme=scheme)
+            gaps.append(np.ptp(history.total_energy + history.dissipated))
+        assert gaps[1] < 0.35 * gaps[0] or gaps[1] < 1e-10
+
+
+def test_spinning_and_flying_lose_nothing():
+    beam = beam_of("sections", 0.1)
+    scene = Scene(beam).initial_velocity(lambda x: np.array([1.0 - 0 * x[0], 2.0 + 0 * x[1]]))
+    assert scene.integrate(0.1, 2e-3).dissipated[-1] < 1e-20
+    scene = Scene(beam).damping(mass=2.0).initial_velocity(
+        lambda x: np.array([1.0 - 0 * x[0], 2.0 + 0 * x[1]]))
+    history = scene.integrate(0.5, 1e-3)
+    assert_allclose(history.velocity((0.5, 0))[-1], np.exp(-1.0) * np.array([1, 2]), rtol=1e-6)
+
+
+# order
+
+
+def smooth(damping):
+    beam = Beam(MeshBeam.init_line([0, 1], 0.5), ElementBeamANCF(1),
+                StVenantKirchhoff(1e3, 0.3, 1000.0), 0.1, damping=KelvinVoigt(damping))
+    scene = Scene(beam).clamp("left").gravity((0, -3.0), amplitude=lambda t: np.sin(1.5 * t) ** 2)
+    return scene.damping(mass=0.3, modal=[0.1])
+
+
+@pytest.fixture(scope="module")
+def by_scipy():
+    scene = smooth(0.1)
+    s, free = scene.system, np.nonzero(scene.system.free)[0]
+    M = np.linalg.inv(s.mass.tocsc()[free][:, free].toarray())
+
+    def rate(t, y):
+        u, v = np.zeros((2, s.N))
+        u[free], v[free] = y.reshape(2, -1)
+        force = s.external_force(u, t) - s.internal_force(u) - s.damping_force(u, v)
+        return np.append(v[free], M @ force[free])
+
+    run = solve_ivp(rate, (0, 1.0), np.zeros(2 * len(free)), "DOP853", rtol=1e-10, atol=1e-12)
+    out = np.zeros((2, s.N))
+    out[:, free] = run.y[:, -1].reshape(2, -1)
+    return out
+
+
+@pytest.mark.parametrize("scheme", [EnergyMomentum(), GeneralizedAlpha(0.0), GeneralizedAlpha(0.9),
+                                    HHT(0.1), Newmark(), Newmark(0.36, 0.6)], ids=repr)
+def test_every_scheme_keeps_its_order(scheme, by_scipy):
+    runs = [smooth(0.1).integrate(1.0, 1.0 / n, scheme=scheme) for n in (80, 160)]
+    for k, exact in enumerate(by_scipy):
+        errors = [np.abs((run.u, run.v)[k][-1] - exact).max() for run in runs]
+        assert np.log2(errors[0] / errors[1]) == pytest.approx(scheme.order, abs=0.12)
+    works = [run.dissipated[-1] for run in runs]
+    assert works[1] == pytest.approx(works[0], rel=0.05)
+
+
+def test_automatic_steps_and_instants_between_them():
+    scene = hinged("sections", 1e-3)
+    history = scene.integrate(0.1, "auto", rtol=1e-5)
+    assert np.ptp(history.total_energy + history.dissipated) < 1e-11 * history.kinetic_energy.max()
+    times = np.array([0.0, 0.0333, 0.0871, 0.1])
+    some = scene.integrate(0.1, 2e-3, t_eval=times, breakpoints=[0.05])
+    assert np.ptp(some.total_energy + some.dissipated) < 1e-11 * history.kinetic_energy.max()
+    assert np.all(np.diff(some.dissipated) > 0.0)
+
+
+# theory
+
+
+def decay(scene, k, omega, periods=3, parts=168):
+    """Damping ratio of mode k: the coefficients of q_{n+1} = a q_n + b q_{n-1}.
+
+    The scheme's is smaller by (omega dt)^2 / 4.
+    """
+    modes = scene.modes(k + 1)
+    shape, dt = modes.shapes[k], 2 * np.pi / omega / parts
+    scene.initial_velocity(1e-6 * omega * shape)
+    u = scene.integrate(periods * parts * dt, dt).u
+    q = (u @ scene.system.mass.multiply(shape))[::parts // 6]
+    (_, b), *_ = np.linalg.lstsq(np.stack([q[1:-1], q[:-2]], axis=1), q[2:], rcond=None)
+    return -0.5 * np.log(-b) / (omega * dt * (parts // 6))
+
+
+ROOTS = np.array([1.875104068711961, 4.694091132974175, 7.854757438237613])
+EULER = ROOTS**2 * np.sqrt(2e8 * 0.01**2 / 12 / 7800)  # angular frequencies of the cantilever
+
+
+@pytest.mark.parametrize("k", [0, 1, 2])
+def test_logarithmic_decrement_of_a_material(k):
+    """Kelvin-Voigt: zeta = time omega / 2 of the Euler-Bernoulli cantilever."""
+    scene = Scene(beam_of("cable", 1e-4, ne=8)).clamp("left")
+    assert decay(scene, k, EULER[k]) == pytest.approx(0.5e-4 * EULER[k], rel=1e-3)
+
+
+@pytest.mark.parametrize("k", [0, 1, 2])
+def test_logarithmic_decrement_of_rayleigh_and_modal_damping(k):
+    plain = beam_of("cable", 0.0, ne=8)
+    scene = Scene(plain).clamp("left").damping(mass=0.4, stiffness=1e-4)
+    zeta = 0.2 / EULER[k] + 0.5e-4 * EULER[k]
+    assert decay(scene, k, EULER[k]) == pytest.approx(zeta, rel=1e-3)
+    scene = Scene(plain).clamp("left").damping(modal=[0.01, 0.04, 0.02])
+    assert decay(scene, k, EULER[k]) == pytest.approx((0.01, 0.04, 0.02)[k], rel=2e-3)
+
+
+@pytest.mark.parametrize("scheme, left", [("energy-momentum", 1e-6), ("generalized-alpha", 1e-10)])
+def test_a_swinging_beam_comes_to_rest_at_its_static_solution(scheme, left):
+    """What its steps do not resolve the energy-momentum scheme keeps, as the midpoint rule does."""
+    scene = Scene(beam_of("sections", 0.02, ne=8)).clamp("left").gravity((0, -9.81))
+    scene.damping(mass=5.0)
+    static = scene.solve_static()
+    history = scene.integrate(6.0, 0.02, scheme=scheme)
+    assert history.kinetic_energy[-1] < left * history.kinetic_energy.max()
+    assert_allclose(history.displacement((1, 0))[-1], static.displacement((1, 0)), rtol=1e-5)
+    # reactions of an instant have the damping in them
+    start = scene.integrate(0.02, 1e-3, scheme="generalized-alpha").state(10)
+    total = start.reactions("left").force + [0, -9.81 * scene.beams[0].total_mass]
+    balance = (scene.system.momentum(start.acceleration)
+               + 5.0 * scene.system.momentum(start.v))
+    assert_allclose(total, balance, rtol=0, atol=1e-8 * np.abs(total).max())
+
+
+# what there is besides
+
+
+def test_statics_and_modes_are_those_without_damping():
+    damped, plain = (Scene(beam_of(time=x, ne=8)).clamp("left") for x in (2e-3, 0.0))
+    damped.damping(1.0, 1.0, [0.1])
+    for scene in (damped, plain):
+        scene.gravity((0, -9.81))
+    assert np.array_equal(damped.solve_static().u, plain.solve_static().u)
+    assert np.array_equal(damped.modes(2).frequencies, plain.modes(2).frequencies)
+    assert damped.plan()["damping"].status == plain.plan("dynamic")["damping"].status == "skipped"
+    assert damped.plan("dynamic")["damping"].status == "computed"
+    assert plain.integrate(0.01, 1e-3).dissipated.tolist() == [0.0] * 11
+
+
+def test_damping_of_a_scene_without_damping_costs_nothing(monkeypatch):
+    from skfem_ancf.dynamics import dampers, steps
+
+    def fail(*args):
+        raise AssertionError("asked for")
+
+    for module in (dampers, steps):
+        monkeypatch.setattr(module, "damping_force", fail)
+    monkeypatch.setenv("SKFEM_ANCF_COMPILED", "0")
+    scene = Scene(beam_of(time=0.0)).clamp("left").gravity((0, -9.81))
+    scene.integrate(0.01, 1e-3)
+    assert scene.system.machine.tables.plain.viscous is scene.system.machine.tables.plain.body
+
+
+def test_copies_files_and_other_meshes(tmp_path):
+    scene = hinged("sections", 1e-3).damping(mass=0.5, modal=[0.1])
+    history = scene.integrate(0.06, 1e-3)
+    again = pickle.loads(pickle.dumps(scene))
+    assert np.array_equal(again.integrate(0.06, 1e-3).dissipated, history.dissipated)
+    path = tmp_path / "run.npz"
+    half = scene.integrate(0.03, 1e-3)
+    rest = scene.integrate(0.06, 1e-3, start=half.state(-1))
+    assert_allclose(rest.dissipated[-1], history.dissipated[-1], rtol=1e-9)
+    scene.integrate(0.06, 1e-3, checkpoint=path, every=7)
+    assert np.array_equal(scene.resume(path).dissipated, history.dissipated)
+    other = hinged("sections", 1e-3).damping(mass=0.6, modal=[0.1])
+    with pytest.raises(CheckpointError, match="damping"):
+        other.resume(path)
+    finer = scene.with_beams([b.with_mesh(b.mesh.refined()) for b in scene.beams])
+    assert finer.beams[0].damping.time == 1e-3
+    assert finer.integrate(0.06, 1e-3).dissipated[-1] == pytest.approx(history.dissipated[-1],
+                                                                      rel=0.2)
+    assert beam_of().replace(width=0.02).damping.time == 2e-3
+
+
+def test_an_interrupted_run_goes_on_bit_for_bit(tmp_path, monkeypatch):
+    from skfem_ancf.dynamics.checkpoint import Checkpoint
+    scene, path = hinged("cable", 1e-3), tmp_path / "run.npz"
+    whole = scene.integrate(0.03, 1e-3, scheme="generalized-alpha")
+    update = Checkpoint.update
+
+    def stop(self):
+        update(self)
+        if self.run.steps >= 14:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Checkpoint, "update", stop)
+    with pytest.raises(KeyboardInterrupt):
+        scene.integrate(0.03, 1e-3, scheme="generalized-alpha", checkpoint=path, every=7)
+    monkeypatch.undo()
+    again = scene.resume(path)
+    assert np.array_equal(again.u, whole.u)
+    assert np.array_equal(again.dissipated, whole.dissipated)
+
+
+@pytest.mark.parametrize("make", [
+    lambda: KelvinVoigt(-1e-4), lambda: KelvinVoigt("soft"), lambda: KelvinVoigt(np.nan),
+    lambda: Scene(beam_of()).damping(mass=-1.0), lambda: Scene(beam_of()).damping(stiffness=-1.0),
+    lambda: Scene(beam_of()).damping(modal=[0.1, -0.1]),
+    lambda: Scene(beam_of()).damping(modal=0.1),
+    lambda: beam_of().replace(damping=1e-4)])
+def test_bad_values(make):
+    with pytest.raises(InputError):
+        make()
+
+
+def test_fields_of_an_instant_are_those_of_the_elements():
+    """Recovery knows no viscous stress: it is left out, and said."""
+    history = Scene(beam_of(time=1e-2)).clamp("left").gravity((0, -9.81)).integrate(0.02, 1e-3)
+    assert "rate of the strain" in history.state(-1).recovered[0]
+
+
+@pytest.mark.parametrize("body", ["sections", "cable", "neo-hookean"])
+def test_compiled_steps_are_the_same(needs_compiled, body, monkeypatch):
+    runs = []
+    for way in ("0", "1"):
+        monkeypatch.setenv("SKFEM_ANCF_COMPILED", way)
+        scene = hinged(body, 1e-3).damping(mass=0.5, modal=[0.1, 0.2])
+        runs.append([scene.integrate(0.02, 1e-3, scheme=s) for s in ("energy-momentum", "hht")])
+    for plain, fast in zip(*runs):
+        assert_allclose(fast.u, plain.u, rtol=0, atol=1e-10)
+        assert_allclose(fast.dissipated, plain.dissipated, rtol=1e-7, atol=1e-15)
