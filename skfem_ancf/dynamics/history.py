@@ -93,9 +93,9 @@ class History:
         """
         rows = zip(*(columns[name] for name in self.COLUMNS))
         for (t, *arrays, before, dissipated), memory in zip(rows, memories):
-            y = Motion(float(t), *arrays, before=float(before), memory=memory)
-            y.dissipated = float(dissipated)
-            self._rows.append(y)
+            u, v, acceleration, algorithmic, multipliers, force = arrays
+            self._rows.append(Motion(float(t), u, v, acceleration, algorithmic, multipliers, force,
+                                     float(before), memory, float(dissipated)))
 
     @property
     def memories(self) -> list[Any]:
