@@ -5,12 +5,17 @@ Else entry (i, j) at ``j * ld + top + i - j``, LAPACK's storage for ``gbtrf``, w
 its place.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.linalg import blas, lapack
 
 from .source import lanes, primitive, source
+
+if TYPE_CHECKING:
+    from .types import Array
 
 #: A pivot that small beside what it came from is round-off.
 LOST = 1e-13
@@ -26,7 +31,7 @@ class Band(NamedTuple):
     top: int
 
 
-def as_lapack(A):
+def as_lapack(A: Band) -> Array:
     """A view of LAPACK's band storage, shape (rows, n)."""
     ab = A.flat.reshape(-1, A.ld).T
     return ab if A.top else ab[:A.width + 1]
@@ -148,8 +153,16 @@ def solve_joined(A, J, J1, free, anew, Y, S, b, x):
     return True
 
 
-def solve_many(A, B, X):
-    """X[k] = A^-1 B[k] for all k."""
+def solve_many(A: Band, B: Array, X: Array) -> None:
+    """X[k] = A^-1 B[k] for all k.
+
+    Parameters
+    ----------
+    A
+        A matrix that :func:`factorize` has factorised.
+    B, X
+        Right-hand sides and solutions, shape (m, N).
+    """
     ab = as_lapack(A)
     if A.top:
         X[:] = lapack.dgbtrs(ab, A.width, A.width, B.T, A.pivots)[0].T

@@ -63,8 +63,8 @@ def check(state: State) -> Checks:
     values, found = [], []
     for beam in state.beams:
         u = state.u_of(beam)
-        det, stretches = beam.kinematics.deformation(beam, u)
-        values.append((np.min(det), np.min(stretches), np.max(stretches), turning(beam, u)))
+        ratio, stretches = beam.kinematics.deformation(beam, u)
+        values.append((np.min(ratio), np.min(stretches), np.max(stretches), turning(beam, u)))
         found += _findings(beam, values[-1][1], values[-1][3])
     det, low, high, turn = zip(*values)
     return Checks(float(min(det)), float(min(low)), float(max(high)), float(max(turn)),

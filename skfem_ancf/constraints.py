@@ -1,6 +1,9 @@
 """What holds a scene: fixed coordinates, and equations of joints with multipliers."""
 
+from __future__ import annotations
+
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
@@ -8,6 +11,13 @@ from scipy import sparse
 from .errors import SupportError, shown
 from .joints.base import same_joint
 from .rank import first_dependent, null_space, unit_rows
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .beam import Beam
+    from .joints.base import Joint
+    from .types import Array
 
 #: Columns of a border above which sparse LU is faster.
 WIDE_BORDER = 96
@@ -26,7 +36,7 @@ class Constraints:
     size
         Length of all beams together.
     fixed, values
-        Numbers of the fixed coordinates and their displacements at full load.
+        Numbers of the fixed coordinates and their displacements at full load, shape (n,).
     joints
         Joints, already bound.
 
@@ -37,14 +47,15 @@ class Constraints:
     N, m : int
         Number of coordinates and of multipliers.
     fixed
-        Numbers of the coordinates that supports and joints fix.
+        Numbers of the coordinates that supports and joints fix, shape (n,).
     given
-        Their displacements at full load, without what joints prescribe.
+        Their displacements at full load, without what joints prescribe, shape (n,).
     free, mask
         For each coordinate whether it is free, as truth values and as 1 or 0; shape (N,).
     """
 
-    def __init__(self, beams, slices, size, fixed, values, joints):
+    def __init__(self, beams: Sequence[Beam], slices: Sequence[slice], size: float, fixed: Array,
+                 values: Array, joints: Sequence[Joint]) -> None:
         self.beams, self.slices, self.size = beams, slices, size
         self.N = slices[-1].stop
         self._supported = False
@@ -80,7 +91,7 @@ class Constraints:
         self.mask = self.free.astype(float)
         self.m = sum(len(joint.equations) for joint in self.joints)
 
-    def describe_dof(self, k):
+    def describe_dof(self, k: int) -> str:
         """What coordinate number k is, in words."""
         b = int(np.searchsorted([s.start for s in self.slices], k, side="right")) - 1
         beam, k = self.beams[b], k - self.slices[b].start
@@ -89,15 +100,28 @@ class Constraints:
 
     # fixed coordinates
 
-    def values(self, load, t=None):
-        """Displacements of the fixed coordinates at a load factor and a time."""
+    def values(self, load: float, t: float | None = None) -> Array:
+        """Displacements of the fixed coordinates at a load factor and a time.
+
+        Parameters
+        ----------
+        load
+            Factor on the prescribed displacements.
+        t
+            Time, for those that are functions of it; the load factor if None.
+
+        Returns
+        -------
+        ndarray
+            Shape (nfixed,).
+        """
         values = load * self.given + self._held
         for joint, first, factors in self._moving:
             phi = joint.offset(np.array([load if t is None else t]), self.N)[0]
             values[first:first + len(factors)] = -phi / factors
         return values
 
-    def values_at(self, times):
+    def values_at(self, times: Array) -> Array:
         """Displacements of the fixed coordinates at full load, at times (n,): (n, nfixed)."""
         values = np.tile(self.given + self._held, (len(times), 1))
         for joint, first, factors in self._moving:
@@ -105,27 +129,38 @@ class Constraints:
         return values
 
     @property
-    def moves(self):
+    def moves(self) -> bool:
         """True if a fixed coordinate has a displacement that is not zero, now or later."""
         return bool(self._moving) or bool(np.any(self.given + self._held))
 
     # equations of joints
 
-    def constraint(self, u, t):
-        """Phi of the joints with multipliers, shape (m,)."""
+    def constraint(self, u: Array, t: float) -> Array:
+        """Phi of the joints with multipliers, shape (m,).
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the coordinates, shape (N,), and time.
+        """
         if not self.joints:
             return np.zeros(0)
         return np.concatenate([joint.value(u, t) for joint in self.joints])
 
     @property
-    def drives(self):
+    def drives(self) -> bool:
         """True if a joint with multipliers depends on time."""
         return any(joint.moving for joint in self.joints)
 
-    def full_jacobian(self, u, t):
+    def full_jacobian(self, u: Array, t: float) -> Array | sparse.csr_array:
         """Derivative of :meth:`constraint` by all coordinates, shape (m, N).
 
         Sparse where the multipliers are too many for a border.
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the coordinates, shape (N,), and time.
         """
         if not self.bordered:
             return self.sparse_jacobian(u, t)
@@ -134,8 +169,14 @@ class Constraints:
         np.add.at(J, (rows, columns), values)
         return J
 
-    def sparse_jacobian(self, u, t):
-        """As :meth:`full_jacobian`, as a scipy.sparse array in CSR format."""
+    def sparse_jacobian(self, u: Array, t: float) -> sparse.csr_array:
+        """As :meth:`full_jacobian`, as a scipy.sparse array in CSR format.
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the coordinates, shape (N,), and time.
+        """
         rows, columns, values = self._entries(u, t)
         return sparse.csr_array((values, (rows, columns)), shape=(self.m, self.N))
 
@@ -148,17 +189,32 @@ class Constraints:
             first += len(joint.equations)
         return tuple(np.concatenate(column) for column in zip(*parts))
 
-    def jacobian(self, u, t):
-        """As :meth:`full_jacobian`, zero at fixed coordinates."""
-        J = self.full_jacobian(u, t)
+    def jacobian(self, u: Array, t: float) -> Array | sparse.csr_array:
+        """As :meth:`full_jacobian`, zero at fixed coordinates.
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the coordinates, shape (N,), and time.
+        """
         if not self.bordered:
-            J.data *= self.mask[J.indices]
-            return J
+            rows = self.sparse_jacobian(u, t)
+            rows.data *= self.mask[rows.indices]
+            return rows
+        J = self.full_jacobian(u, t)
         J[:, self.fixed] = 0.0
         return J
 
-    def quadratic(self, u, t, v):
-        """The second derivative of :meth:`constraint` in the direction v, shape (m,)."""
+    def quadratic(self, u: Array, t: float, v: Array) -> Array:
+        """The second derivative of :meth:`constraint` in the direction v, shape (m,).
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the coordinates, shape (N,), and time.
+        v
+            Direction, shape (N,).
+        """
         out = []
         for joint in self.joints:
             for unit in np.eye(len(joint.equations)):
@@ -166,13 +222,30 @@ class Constraints:
                 out.append(0.0 if second is None else second[2] @ (v[second[0]] * v[second[1]]))
         return np.array(out)
 
-    def curvature(self, u, t, multipliers):
-        """sum_k multipliers[k] d^2 Phi_k / du^2 at free coordinates, sparse, shape (N, N)."""
+    def curvature(self, u: Array, t: float, multipliers: Array) -> sparse.csr_matrix:
+        """sum_k multipliers[k] d^2 Phi_k / du^2 at free coordinates, sparse, shape (N, N).
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the coordinates, shape (N,), and time.
+        multipliers
+            Of the equations, shape (m,).
+        """
         i, j, v = self.curvature_entries(u, t, multipliers)
         return sparse.csr_matrix((v, (i, j)), shape=(self.N, self.N))
 
-    def curvature_entries(self, u, t, multipliers):
-        """Rows, columns and values of :meth:`curvature`."""
+    def curvature_entries(self, u: Array, t: float | None,
+                          multipliers: Array) -> tuple[Array, Array, Array]:
+        """Rows, columns and values of :meth:`curvature`.
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the coordinates, shape (N,), and time.
+        multipliers
+            Of the equations, shape (m,).
+        """
         i, j, v = self._curvature(u, t, multipliers)
         return i, j, v * (self.free[i] & self.free[j])
 
@@ -183,20 +256,45 @@ class Constraints:
         parts = [(none, none, np.zeros(0))] + [part for part in parts if part is not None]
         return tuple(np.concatenate(column) for column in zip(*parts))
 
-    def curvature_times(self, u, t, multipliers, v):
-        """:meth:`curvature` times a vector (N,)."""
+    def curvature_times(self, u: Array, t: float, multipliers: Array, v: Array) -> Array:
+        """:meth:`curvature` times a vector (N,).
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the coordinates, shape (N,), and time.
+        multipliers
+            Of the equations, shape (m,).
+        v
+            Vector, shape (N,).
+        """
         i, j, values = self._curvature(u, t, multipliers)
         return np.bincount(i, values * v[j], self.N)
 
-    def multipliers_of(self, multipliers):
+    def multipliers_of(self, multipliers: Array) -> list[Array]:
         """The multipliers joint by joint: a list in the order of :attr:`joints`."""
         if not self.joints:
             return []
         ends = np.cumsum([len(joint.equations) for joint in self.joints])[:-1]
         return np.split(multipliers, ends)
 
-    def joint_force(self, joint, multipliers, reaction):
-        """What a joint does to its first beam, in the order of ``joint.equations``."""
+    def joint_force(self, joint: Joint, multipliers: Array, reaction: Array) -> Array:
+        """What a joint does to its first beam, in the order of ``joint.equations``.
+
+        Parameters
+        ----------
+        joint
+            One of the scene's, as it was given.
+        multipliers
+            Of the equations, shape (m,).
+        reaction
+            Force of the supports on the coordinates, shape (N,).
+
+        Returns
+        -------
+        ndarray
+            A number for each equation.
+        """
         for known, part in zip(self.joints, self.multipliers_of(multipliers)):
             if same_joint(known, joint):
                 return -part
@@ -207,7 +305,7 @@ class Constraints:
 
     # what is held
 
-    def require_independent_joints(self):
+    def require_independent_joints(self) -> None:
         """Raise SupportError if joints repeat or contradict each other or the supports."""
         if not self.joints:
             return
@@ -223,12 +321,12 @@ class Constraints:
                            "joints before it hold already: remove one of them")
 
     @cached_property
-    def springs(self):
+    def springs(self) -> Array:
         """Coordinates that hold the beams which their own supports leave free to move.
 
         The positions of two nodes far apart, for each such beam.
         """
-        out = []
+        found: list[int] = []
         for beam, s in zip(self.beams, self.slices):
             held = np.flatnonzero(~self.free[s])
             motions = unit_rows(beam.rigid_motions()[held] / [1.0, 1.0, self.size])
@@ -236,16 +334,16 @@ class Constraints:
                 continue
             p = beam.mesh.p
             far = int(np.argmax(np.sum((p - p[:, :1]) ** 2, axis=0)))
-            out += [s.start + node * beam.nd + k for node in (0, far) for k in range(2)]
-        out = np.array(out, dtype=int)
+            found += [s.start + node * beam.nd + k for node in (0, far) for k in range(2)]
+        out = np.array(found, dtype=int)
         return out[self.free[out]]
 
     @property
-    def bordered(self):
+    def bordered(self) -> bool:
         """True if the multipliers are few enough for a border about the band matrix."""
         return self.m + len(self.springs) <= WIDE_BORDER
 
-    def free_rigid_motions(self):
+    def free_rigid_motions(self) -> list[str]:
         """Descriptions of the rigid motions that nothing holds, one string each."""
         sizes = [float(beam.mesh.lengths.sum()) for beam in self.beams]
         values = np.concatenate([beam.rigid_motions() / [1.0, 1.0, size]
@@ -275,7 +373,7 @@ class Constraints:
                 parts.append(f"rotation about ({x[0]:.4g}, {x[1]:.4g}){who}")
         return " with ".join(parts)
 
-    def require_supports(self):
+    def require_supports(self) -> None:
         """Raise SupportError if a rigid motion is free, or joints are not independent."""
         if self._supported:  # nothing of it changes in the life of a system
             return

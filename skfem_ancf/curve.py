@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import itertools
 import logging
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .errors import CallbackError, MeshError, ask_array, warnings_as_errors
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .types import Array
 
 logger = logging.getLogger(__name__)
 
@@ -33,19 +39,28 @@ def _on_curve(what, function, s):
 
 
 class Curve:
-    """A plane curve r(s) with its derivative, on the parameters between ``ends``."""
+    """A plane curve r(s) with its derivative.
 
-    def __init__(self, r, derivative, ends):
+    Parameters
+    ----------
+    r, derivative
+        Functions of parameters (n,) that return (2, n).
+    ends
+        The parameters between which they are defined.
+    """
+
+    def __init__(self, r: Callable[[Array], Any], derivative: Callable[[Array], Any],
+                 ends: tuple[float, float]) -> None:
         self.r, self.derivative, self.ends = r, derivative, ends
 
     def __call__(self, s):
         return _on_curve("r(s)", self.r, s)
 
-    def rate(self, s):
+    def rate(self, s: Array) -> Array:
         """The derivative at parameters ``s``, shape (2, n)."""
         return _on_curve("the derivative of r", self.derivative, s)
 
-    def nodes(self, s):
+    def nodes(self, s: Array) -> tuple[Array, Array]:
         """Positions and unit tangents at parameters ``s``, both of shape (2, n)."""
         p, d = self(s), self.rate(s)
         size = np.hypot(*d)
@@ -54,17 +69,23 @@ class Curve:
                             "tangent there")
         return p, d / size
 
-    def turning(self, s):
+    def turning(self, s: Array) -> Array:
         """Derivative of the unit normal by the arc length at parameters ``s``, shape (2, n)."""
         dt = _differences(lambda x: self.nodes(x)[1], s, *self.ends)
         return np.array([-dt[1], dt[0]]) / np.hypot(*self.rate(s))
 
-    def lengths(self, a, b):
-        """Arc lengths from parameters ``a`` to ``b``, both of shape (n,)."""
+    def lengths(self, a: Array, b: Array) -> Array:
+        """Arc lengths from parameters ``a`` to ``b``, both of shape (n,).
+
+        Parameters
+        ----------
+        a, b
+            Parameters where the pieces begin and end, shapes (n,).
+        """
         d, w = self._at_gauss_points(a, b)
         return np.hypot(*d) @ w * (b - a)
 
-    def check(self, s):
+    def check(self, s: Array) -> None:
         """Raise :class:`MeshError` if the derivative is not that of r between nodes ``s``."""
         d, w = self._at_gauss_points(s[:-1], s[1:])
         gap = np.hypot(*(d @ w * np.diff(s) - np.diff(self(s))))
@@ -75,7 +96,7 @@ class Curve:
                 f"r jumps, or its derivative does not fit, between s = {s[k]:.9g} and "
                 f"{s[k + 1]:.9g}: the derivative adds up to a point {gap[k]:.6g} from r")
 
-    def check_kinks(self, s):
+    def check_kinks(self, s: Array) -> None:
         """Raise :class:`MeshError` if the direction of the curve jumps at a node inside.
 
         The angle between chords to both sides of a node falls with their length where the curve
@@ -107,11 +128,17 @@ class Curve:
         at = a[:, None] + (b - a)[:, None] * (0.5 + 0.5 * x)
         return np.reshape(self.rate(at.ravel()), (2,) + at.shape), 0.5 * w
 
-    def moved(self, A, shift):
-        """The curve ``A r(s) + shift``."""
+    def moved(self, A: Array, shift: Array) -> Curve:
+        """The curve ``A r(s) + shift``.
+
+        Parameters
+        ----------
+        A, shift
+            Shapes (2, 2) and (2,).
+        """
         return Curve(_Moved(self, A, shift), _Moved(self.rate, A, np.zeros(2)), self.ends)
 
-    def functions(self):
+    def functions(self) -> list[tuple[str, Callable[[Array], Any]]]:
         """Pairs of a description and a function, for those that the curve was given."""
         r, rate = self.r, self.derivative
         while isinstance(r, _Moved):
@@ -152,8 +179,16 @@ class _Differences:
         return _differences(lambda s: _on_curve("r(s)", self.r, s), s, *self.ends)
 
 
-def derivative_of(r, s0, s1):
-    """The derivative of ``r`` on [s0, s1]: complex step if exact, else sixth-order differences."""
+def derivative_of(r: Callable[[Array], Any], s0: float, s1: float) -> Callable[[Array], Array]:
+    """The derivative of ``r`` on [s0, s1]: complex step if exact, else sixth-order differences.
+
+    Parameters
+    ----------
+    r
+        Function of parameters (n,) that returns (2, n).
+    s0, s1
+        The ends of the parameters.
+    """
     differences, complex_step = _Differences(r, s0, s1), _ComplexStep(r)
     try:
         probe = s0 + (s1 - s0) * np.linspace(0.0137, 0.991, 24)
@@ -184,8 +219,18 @@ def _lagrange_derivative(nodes, i, x):
     return np.polyval(np.polyder(polynomial), x)
 
 
-def check_curvature(curve, s, height):
-    """Raise MeshError where the radius of curvature of the curve is below h/2."""
+def check_curvature(curve: Curve, s: Array, height: float) -> None:
+    """Raise MeshError where the radius of curvature of the curve is below h/2.
+
+    Parameters
+    ----------
+    curve
+        The curve.
+    s
+        Parameters of the nodes, shape (n,).
+    height
+        Height of the section.
+    """
     at = np.unique(np.concatenate([np.linspace(a, b, 17) for a, b in itertools.pairwise(s)]))
     _, tangent = curve.nodes(at)
     angle = np.unwrap(np.arctan2(tangent[1], tangent[0]))

@@ -5,7 +5,7 @@ An element names its kind, ``element.kinematics``; what depends on it is asked h
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +13,12 @@ from .kernels import CableKernel, Kernel
 from .errors import InputError
 from .formulations.ecm import AXIS
 from .quadrature import gauss
+
+if TYPE_CHECKING:
+    from .beam import Beam
+    from .elements.base import ElementBeam
+    from .materials.base import Material
+    from .types import Array, Rule
 
 
 class Sections:
@@ -30,17 +36,25 @@ class Sections:
     has_sections = True
 
     @staticmethod
-    def require_law(material):
+    def require_law(material: Material) -> None:
         """Any law will do."""
 
     @staticmethod
-    def section_rule(element):
+    def section_rule(element: ElementBeam) -> Rule:
         """Points and weights across the section, exact for products of two coordinates."""
         return gauss(element.order + 1)
 
     @staticmethod
-    def direction(beam, node):
-        """Coordinates (2, n) and weights (n,) of 12 / h^3 int Y r dY of a section."""
+    def direction(beam: Beam, node: int) -> tuple[Array, Array]:
+        """Coordinates (2, n) and weights (n,) of 12 / h^3 int Y r dY of a section.
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+        node
+            Its number.
+        """
         eta, w = gauss(beam.element.order + 1)
         h = beam.mesh.height
         first = next(k for k, f in enumerate(beam.element.functionals) if f[2] > 0)
@@ -50,14 +64,31 @@ class Sections:
         return node * beam.nd + 2 * first + np.arange(2 * len(f)).reshape(-1, 2).T, c
 
     @staticmethod
-    def plane(beam, tangent):
-        """What keeps a section in its plane: its normal, and the coordinates that stay in it."""
+    def plane(beam: Beam, tangent: Array) -> tuple[Array, list[int]]:
+        """What keeps a section in its plane: its normal, and the coordinates that stay in it.
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+        tangent
+            Of the axis, shape (2,).
+        """
         return tangent, [k for k, (_, along, across) in enumerate(beam.element.functionals)
                          if along == 0 and across > 0]
 
     @staticmethod
-    def gradients(beam, u, X, tind):
-        """Displacement gradient in the beam's frame, and the frame."""
+    def gradients(beam: Beam, u: Array, X: Array, tind: Array | None) -> tuple[Array, Array]:
+        """Displacement gradient in the beam's frame, and the frame.
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+        u, X, tind
+            As for :meth:`Beam.gradients <skfem_ancf.Beam.gradients>`, shapes (N,), (2, npoints) or
+            (2, nelements, npoints), and (nelements,).
+        """
         mapping = beam.mesh.mapping()
         u_e = beam.kernel.gather(u, slice(None) if tind is None else tind)
         fields = (beam.element.gbasis(mapping, X, k, tind)[0] for k in range(u_e.shape[1]))
@@ -66,8 +97,17 @@ class Sections:
         return np.einsum("ijep,jJep->iJep", grad, frame), frame
 
     @staticmethod
-    def displacements(beam, u, X, tind):
-        """Displacement at reference points, shape (2, nelements, npoints)."""
+    def displacements(beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:
+        """Displacement at reference points, shape (2, nelements, npoints).
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+        u, X, tind
+            As for :meth:`Beam.gradients <skfem_ancf.Beam.gradients>`, shapes (N,), (2, npoints) or
+            (2, nelements, npoints), and (nelements,).
+        """
         mapping = beam.mesh.mapping()
         u_e = beam.kernel.gather(u, slice(None) if tind is None else tind)
         return sum(np.einsum("ei,ep->iep", u_e[:, k],
@@ -75,24 +115,60 @@ class Sections:
                    for k in range(u_e.shape[1]))
 
     @staticmethod
-    def strain(beam, u, X, tind):
-        """Green-Lagrange strain of the formulation, shape (3, nelements, npoints)."""
+    def strain(beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:
+        """Green-Lagrange strain of the formulation, shape (3, nelements, npoints).
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+        u, X, tind
+            As for :meth:`Beam.gradients <skfem_ancf.Beam.gradients>`, shapes (N,), (2, npoints) or
+            (2, nelements, npoints), and (nelements,).
+        """
         term = beam.formulation.terms(beam.element, beam.material)[0]
         return beam.sampled_strain(term, u, X, tind)
 
     @staticmethod
-    def stress(beam, strain, u, X, tind):
-        """Second Piola-Kirchhoff stress, shape (3, nelements, npoints)."""
+    def stress(beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
+        """Second Piola-Kirchhoff stress, shape (3, nelements, npoints).
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+        strain
+            What :meth:`strain` returns, shape (3, nelements, npoints).
+        u, X, tind
+            As for :meth:`Beam.gradients <skfem_ancf.Beam.gradients>`, shapes (N,), (2, npoints) or
+            (2, nelements, npoints), and (nelements,).
+        """
         return beam.formulation.stress(beam, strain, u, X, tind)
 
     @staticmethod
-    def shortest(beam, u):
-        """Smallest stretch of the fibres along the axis at the integration points."""
+    def shortest(beam: Beam, u: Array) -> float:
+        """Smallest stretch of the fibres along the axis at the integration points.
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+        u
+            Displacement of the coordinates, shape (N,).
+        """
         return beam.kernel.shortest(u)
 
     @staticmethod
-    def deformation(beam, u):
-        """det F and both principal stretches at the integration points."""
+    def deformation(beam: Beam, u: Array) -> tuple[Array, Array]:
+        """det F and both principal stretches at the integration points.
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+        u
+            Displacement of the coordinates, shape (N,).
+        """
         det, stretches = [], []
         for term in beam.formulation.terms(beam.element, beam.material):
             H, frame = beam.gradients(u, term.quadrature[0])
@@ -112,7 +188,7 @@ class Cable(Sections):
     has_sections = False
 
     @staticmethod
-    def require_law(material):
+    def require_law(material: Material) -> None:
         """Hooke's law of E and nu."""
         if not material.is_hooke:
             raise InputError(
@@ -121,16 +197,16 @@ class Cable(Sections):
                 "sections, as ElementBeamANCFCubic(2)")
 
     @staticmethod
-    def section_rule(element):
+    def section_rule(element: ElementBeam) -> Rule:
         return AXIS
 
     @staticmethod
-    def direction(beam, node):
+    def direction(beam: Beam, node: int) -> tuple[Array, Array]:
         # the tangent, which turns with the section
         return node * beam.nd + 2 + np.arange(2).reshape(2, 1), np.ones(1)
 
     @staticmethod
-    def plane(beam, tangent):
+    def plane(beam: Beam, tangent: Array) -> tuple[Array, list[int]]:
         return np.array([-tangent[1], tangent[0]]), [1]
 
     @staticmethod
@@ -138,7 +214,7 @@ class Cable(Sections):
         return beam.kernel.section(u, X[0], tind, beam.mesh, beam.element)
 
     @classmethod
-    def gradients(cls, beam, u, X, tind):
+    def gradients(cls, beam: Beam, u: Array, X: Array, tind: Array | None) -> tuple[Array, Array]:
         frame = beam.mesh.mapping().frame(X, tind)
         tangent, _, eps, kappa = cls._section(beam, u, X, tind)
         strain = cls.strain(beam, u, X, tind)
@@ -149,31 +225,31 @@ class Cable(Sections):
         return F - frame, frame
 
     @classmethod
-    def displacements(cls, beam, u, X, tind):
+    def displacements(cls, beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:
         tangent, tangent0, _, _ = cls._section(beam, u, X, tind)
         turn = tangent - tangent0
         return (Sections.displacements(beam, u, X, tind)
                 + beam.mesh.height * (X[1] - 0.5) * np.array([-turn[1], turn[0]]))
 
     @classmethod
-    def strain(cls, beam, u, X, tind):
+    def strain(cls, beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:
         _, _, eps, kappa = cls._section(beam, u, X, tind)
         e = eps - beam.mesh.height * (X[1] - 0.5) * kappa
         xx = e + 0.5 * e * e
         return np.array([xx, -beam.material.lateral_ratio * xx, 0.0 * xx])
 
     @staticmethod
-    def stress(beam, strain, u, X, tind):
+    def stress(beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
         along = beam.material.axial_modulus * strain[0]
         return np.array([along, 0.0 * along, 0.0 * along])
 
     @staticmethod
-    def shortest(beam, u):
+    def shortest(beam: Beam, u: Array) -> float:
         eps, kappa = beam.kernel.strain(beam.kernel.gather(u))
         return np.min(1.0 + eps - 0.5 * beam.mesh.height * np.abs(kappa))
 
     @staticmethod
-    def deformation(beam, u):
+    def deformation(beam: Beam, u: Array) -> tuple[Array, Array]:
         eps, kappa = beam.kernel.strain(beam.kernel.gather(u))
         along = 1.0 + eps + 0.5 * beam.mesh.height * np.abs(kappa) * np.array([[[-1.0]], [[1.0]]])
         across = np.sqrt(np.maximum(

@@ -30,7 +30,7 @@ GROWTH = 1e2
 COLUMNS = 64
 
 
-def dense(A):
+def dense(A: Any) -> Array:
     """A sparse or dense matrix as a dense one in C order."""
     return A.toarray(order="C") if issparse(A) else np.ascontiguousarray(A)
 

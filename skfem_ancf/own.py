@@ -5,13 +5,15 @@ An object is known by a handle, a positive number: compiled code can hold one, a
 
 import weakref
 from itertools import count
+from typing import Any
 
 from .source import primitive
 
-_numbers, _objects = count(1), weakref.WeakValueDictionary()
+_numbers = count(1)
+_objects: weakref.WeakValueDictionary[int, Any] = weakref.WeakValueDictionary()
 
 
-def handle_of(thing):
+def handle_of(thing: Any) -> int:
     """A number by which texts call an object as long as it lives."""
     number = next(_numbers)
     _objects[number] = thing
@@ -22,7 +24,7 @@ def handle_of(thing):
 PENDING: list[BaseException] = []
 
 
-def owner(handle):
+def owner(handle: int) -> Any:
     """The object of a handle."""
     return _objects[handle]
 

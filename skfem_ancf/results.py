@@ -189,7 +189,7 @@ class State(Frozen):
     @property
     def beams(self) -> tuple[Beam, ...]:
         """The beams of the scene."""
-        return self.system.beams
+        return tuple(self.system.beams)
 
     @property
     def q(self) -> Array:

@@ -21,12 +21,19 @@ Rules of such a text, where ``e`` is an index of lanes:
 * ``out[at[e]] += x[e]`` needs ``at`` without repetitions.
 """
 
-from typing import Annotated
+from collections.abc import Callable
+from typing import Annotated, Any, TypeAlias, TypeVar
 
 import numpy as np
 
 #: Arrays in the fields of named tuples: of floats or integers, with so many axes, contiguous.
-F1, F2, F3, I1, I2 = (Annotated[np.ndarray, kind] for kind in ("f1", "f2", "f3", "i1", "i2"))
+F1: TypeAlias = Annotated[np.ndarray, "f1"]
+F2: TypeAlias = Annotated[np.ndarray, "f2"]
+F3: TypeAlias = Annotated[np.ndarray, "f3"]
+I1: TypeAlias = Annotated[np.ndarray, "i1"]
+I2: TypeAlias = Annotated[np.ndarray, "i2"]
+
+_Text = TypeVar("_Text", bound=Callable[..., Any])
 
 
 def lanes(*ends):
@@ -50,13 +57,13 @@ def column(x):
     return x[:, None]
 
 
-def source(function):
+def source(function: _Text) -> _Text:
     """Mark a function as a text for both machines; it stays what it is."""
-    function.twin = None
+    vars(function)["twin"] = None
     return function
 
 
-def primitive(module):
+def primitive(module: str) -> Callable[[_Text], _Text]:
     """Mark a plain function whose compiled twin is another: that of its name in a module.
 
     For what a library does better than a text: LAPACK, and calls of Python functions.
@@ -66,11 +73,12 @@ def primitive(module):
     module
         Name of a module in :mod:`skfem_ancf.compiled`.
     """
-    def mark(function):
-        function.twin = module
+    def mark(function: _Text) -> _Text:
+        vars(function)["twin"] = module
         return function
 
     return mark
 
 
-lanes.twin = column.twin = "jit"
+for _text in (lanes, column):
+    vars(_text)["twin"] = "jit"

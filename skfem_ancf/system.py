@@ -1,7 +1,10 @@
 """A scene in numbers: free coordinates, loads, joints, residual, tangent and its solution."""
 
+from __future__ import annotations
+
 import logging
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
@@ -21,14 +24,25 @@ from .points import Points
 from .rank import determinant_sign, null_basis, sparse_inertia
 from .results import State
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .beam import Beam
+    from .joints.base import Joint
+    from .linalg import Inertia
+    from .loads import Load
+    from .types import Array
+
 logger = logging.getLogger(__name__)
 _NONE = np.zeros(0)
 
 
-def _of_constraints(name):
+def _of_constraints(name: str) -> Any:
     """What the constraints have by this name, as an attribute of the system."""
-    return property(lambda self: getattr(self.constraints, name),
-                    doc=f"See :class:`~skfem_ancf.constraints.Constraints`, ``{name}``.")
+    def get(self: System) -> Any:
+        return getattr(self.constraints, name)
+
+    return property(get, doc=f"See :class:`~skfem_ancf.constraints.Constraints`, ``{name}``.")
 
 
 class System:
@@ -45,14 +59,15 @@ class System:
     loads
         The loads of all beams.
     fixed, values
-        Numbers of the fixed coordinates and their displacements at full load.
+        Numbers of the fixed coordinates and their displacements at full load, shape (n,).
     joints
         Joints, already bound.
     damping
         A :class:`~skfem_ancf.damping.Damping`, or None.
     """
 
-    def __init__(self, beams, loads, fixed, values, joints=(), damping=None):
+    def __init__(self, beams: Sequence[Beam], loads: Sequence[Load], fixed: Array, values: Array,
+                 joints: Sequence[Joint] = (), damping: Damping | None = None) -> None:
         self._given = tuple(beams), tuple(loads), fixed, values, tuple(joints), damping
         self.beams, self.loads = list(beams), list(loads)
         self.offsets = np.concatenate([[0], np.cumsum([b.N for b in self.beams])])
@@ -62,10 +77,12 @@ class System:
         self.size = float(sum(b.mesh.lengths.sum() for b in self.beams))
         self.constraints = Constraints(self.beams, self.slices, self.size, fixed, values, joints)
         self.symmetric = all(load.symmetric for load in self.loads)
-        self.constant_force, self._varying = np.zeros(self.N), []
+        self.constant_force = np.zeros(self.N)
+        self._varying: list[Any] = []
         for load in self.loads:
             if load.constant and load.amplitude is None:
-                self.constant_force[self.of(load)] += load.force(None)
+                s = self.of(load)
+                self.constant_force[s] += load.force(np.zeros(s.stop - s.start))
             else:
                 self._varying.append(load)
         self.damping = Damping() if damping is None else damping
@@ -100,7 +117,7 @@ class System:
     require_supports = _of_constraints("require_supports")
 
     @cached_property
-    def points(self):
+    def points(self) -> Points:
         """What finds material points, a :class:`~skfem_ancf.points.Points`."""
         return Points(self.beams, self.slices)
 
@@ -118,14 +135,22 @@ class System:
     def __deepcopy__(self, memo):
         return self  # it is the same equations, however many states have them
 
-    def of(self, load_or_beam):
+    def of(self, load_or_beam: Load | Beam) -> slice:
         """The slice of the coordinates that a load or a beam has."""
         return self.slices[self._index[id(getattr(load_or_beam, "beam", load_or_beam))]]
 
     # forces and energies
 
-    def external_force(self, u, t=None):
-        """The force of all loads at full size, shape (N,); at time ``t`` if it is given."""
+    def external_force(self, u: Array, t: float | None = None) -> Array:
+        """The force of all loads at full size, shape (N,); at time ``t`` if it is given.
+
+        Parameters
+        ----------
+        u
+            Displacement, shape (N,).
+        t
+            Time; None for full size.
+        """
         if not self._varying:
             return self.constant_force
         out = self.constant_force.copy()
@@ -139,29 +164,41 @@ class System:
             raise InputError(f"the displacement of the scene's coordinates has shape ({self.N},), "
                              f"got {u.shape}; the state of another mesh?")
 
-    def internal_force(self, u):
+    def internal_force(self, u: Array) -> Array:
         """The internal force, shape (N,)."""
         self._require_coordinates(u)
         return self._evaluate(FORCE, u)
 
-    def mean_internal_force(self, u0, u1):
-        """The internal force whose work from u0 to u1 is the change of the strain energy."""
+    def mean_internal_force(self, u0: Array, u1: Array) -> Array:
+        """The internal force whose work from u0 to u1 is the change of the strain energy.
+
+        Parameters
+        ----------
+        u0, u1
+            Displacements, shape (N,).
+        """
         return self._evaluate(MEAN, u0, u1)
 
     @property
-    def damped(self):
+    def damped(self) -> bool:
         """True if something resists velocities."""
         return self.viscous or bool(self.damping)
 
-    def damping_force(self, u, v):
-        """The force at u that resists the velocity v, shape (N,)."""
+    def damping_force(self, u: Array, v: Array) -> Array:
+        """The force at u that resists the velocity v, shape (N,).
+
+        Parameters
+        ----------
+        u, v
+            Displacement and velocity, shape (N,).
+        """
         force = self._evaluate(VISCOUS, u, v) if self.viscous else np.zeros(self.N)
         if self.damping.mass:
             force += self.damping.mass * self.mass.multiply(v)
         return force + (self.damped_modes @ v) @ self.damped_modes
 
     @cached_property
-    def damped_modes(self):
+    def damped_modes(self) -> Array:
         """Rows (k, N): what resists v by damped modes is their product with that of rows and v."""
         ratios = self.damping.modal
         if not np.any(ratios):
@@ -188,7 +225,7 @@ class System:
             none if carried is None else carried, force)
         return force
 
-    def momentum(self, v):
+    def momentum(self, v: Array) -> Array:
         """Linear momentum of the coordinates' velocities, shape (2,)."""
         p = self.mass.multiply(v)
         total = np.zeros(2)
@@ -196,31 +233,45 @@ class System:
             total += p[s].reshape(-1, beam.nd)[:, :2].sum(axis=0)
         return total
 
-    def angular_momentum(self, u, v):
-        """Angular momentum about the origin."""
+    def angular_momentum(self, u: Array, v: Array) -> float:
+        """Angular momentum about the origin.
+
+        Parameters
+        ----------
+        u, v
+            Displacement and velocity, shape (N,).
+        """
         p, total = self.mass.multiply(v), 0.0
         for beam, s in zip(self.beams, self.slices):
             q, pb = (beam.q0 + u[s]).reshape(-1, 2), p[s].reshape(-1, 2)
             total += np.sum(q[:, 0] * pb[:, 1] - q[:, 1] * pb[:, 0])
         return float(total)
 
-    def strain_energy(self, u):
+    def strain_energy(self, u: Array) -> float:
         """Strain energy of all beams."""
         return float(sum(b.kernel.energy(u[s]) for b, s in zip(self.beams, self.slices)))
 
-    def load_potential(self, u, t=None):
-        """Potential of the loads; loads without one count as zero."""
+    def load_potential(self, u: Array, t: float | None = None) -> float:
+        """Potential of the loads; loads without one count as zero.
+
+        Parameters
+        ----------
+        u
+            Displacement, shape (N,).
+        t
+            Time; None for full size.
+        """
         return float(sum(load.factor(t) * (load.potential(u[self.of(load)]) or 0.0)
                          for load in self.loads))
 
     @cached_property
-    def stiffness_scale(self):
+    def stiffness_scale(self) -> float:
         """eps times the square root of modulus times volume: the round-off of strains of 1."""
         total = sum(b.kernel.volume * b.material.E for b in self.beams)
         return np.finfo(float).eps * np.sqrt(total)
 
     @cached_property
-    def work_noise(self):
+    def work_noise(self) -> float:
         """Round-off of a correction's work, as a square root.
 
         A displacement of the scene's size is known to eps times that size, its gradient in an
@@ -231,34 +282,61 @@ class System:
         return np.finfo(float).eps * self.size * np.sqrt(total)
 
     @cached_property
-    def noise(self):
+    def noise(self) -> float:
         """How much larger the round-off of a residual is than that of the strains."""
         return np.sqrt(max(b.nd for b in self.beams))
 
-    def inverted(self, u):
+    def inverted(self, u: Array) -> bool:
         """True if a body is turned inside out somewhere."""
         return any(b.kernel.inverted(u[s]) for b, s in zip(self.beams, self.slices))
 
     @cached_property
-    def machine(self):
+    def machine(self) -> Machine:
         """What runs texts on the equations of this system."""
         return Machine(self)
 
     # what texts ask of it, see skfem_ancf.own
 
-    def add_own_force(self, t, scale, u, out):
+    def add_own_force(self, t: float, scale: float, u: Array, out: Array) -> None:
+        """Add the force of the loads that no text knows.
+
+        Parameters
+        ----------
+        t, scale
+            Time, nan for none, and a factor.
+        u, out
+            Displacement, and what is added to, shape (N,).
+        """
         for load in self.machine.tables.own_loads:
             s = self.of(load)
             out[s] += scale * load.factor(None if np.isnan(t) else t) * load.force(u[s])
 
-    def add_own_mean_force(self, t, u0, u1, out):
+    def add_own_mean_force(self, t: float, u0: Array, u1: Array, out: Array) -> None:
+        """As :meth:`add_own_force`, of their mean force.
+
+        Parameters
+        ----------
+        t
+            Time.
+        u0, u1, out
+            Displacements, and what is added to, shape (N,).
+        """
         for load in self.machine.tables.own_loads:
             s = self.of(load)
             force = load.force(u1[s]) if np.array_equal(u0[s], u1[s]) else load.mean_force(
                 u0[s], u1[s])
             out[s] += load.factor(t) * force
 
-    def subtract_own_stiffness(self, t, scale, u, flat):
+    def subtract_own_stiffness(self, t: float, scale: float, u: Array, flat: Array) -> None:
+        """Subtract the derivative of :meth:`add_own_force` from the numbers of a band matrix.
+
+        Parameters
+        ----------
+        t, scale, u
+            As there; u of shape (N,).
+        flat
+            The numbers of the matrix, shape (n,).
+        """
         for load in self.machine.tables.own_loads:
             s = self.of(load)
             i, j, v = load.stiffness(u[s])
@@ -267,7 +345,19 @@ class System:
             at = self.K._position(s.start + np.asarray(i), s.start + np.asarray(j))
             np.add.at(flat, at[keep], -factor * np.asarray(v)[keep])
 
-    def add_own_joints(self, what, t, u, v, out):
+    def add_own_joints(self, what: int, t: float, u: Array, v: Array, out: Array) -> None:
+        """What joints that no text knows do.
+
+        Parameters
+        ----------
+        what
+            0: Phi. 1: J v. 2: J^T v, v of shape (m,). 3: J. 4: the second derivative of Phi in the
+            direction v. 5: (sum_k l_k H_k) w, v of l and w, shape (m + N,).
+        t, u, v
+            Time, displacement (N,) and a vector, (N,) where no other shape is said.
+        out
+            What is set, or added to, shape (m,), (N,) or (m N,).
+        """
         if what == 0:
             out[:] = self.constraint(u, t)
         elif what == 1:
@@ -281,7 +371,19 @@ class System:
         else:
             out += self.curvature_times(u, t, v[:self.m], v[self.m:])
 
-    def solve_own(self, t, u, multipliers, R, phi, du, dm):
+    def solve_own(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
+                  dm: Array) -> bool:
+        """Factorise and solve where no border about the band will do; False if that fails.
+
+        Parameters
+        ----------
+        t, u, multipliers
+            Time, and where the joints are linearised, shapes (N,) and (m,).
+        R, phi
+            Right-hand sides, shapes (N,) and (m,).
+        du, dm
+            The solution, shapes (N,) and (m,).
+        """
         try:
             self.factorize(u, t, multipliers)
             du[:], dm[:] = self.solve(R, phi)
@@ -290,14 +392,14 @@ class System:
         return True
 
     @cached_property
-    def screen(self):
+    def screen(self) -> Screen:
         """What tells whether a state may be out of the range of laws and meshes."""
         return Screen(self.beams)
 
     # mass
 
     @cached_property
-    def mass(self):
+    def mass(self) -> BandMatrix:
         """The mass matrix, a :class:`~skfem_ancf.linalg.BandMatrix`; assembled once."""
         M = self.new_band()
         for beam, offset in zip(self.beams, self.offsets):
@@ -306,13 +408,14 @@ class System:
         return M
 
     @cached_property
-    def mass_factors(self):
+    def mass_factors(self) -> BandMatrix:
         """The factors of the mass matrix with its supports fixed; made once."""
         M = self.new_band().combine(1.0, self.mass, 0.0, self.mass)
         M.fix(self.fixed_positions)
         return M.factorize()
 
-    def solve_mass(self, b, u=None, t=0.0, rate=None):
+    def solve_mass(self, b: Array, u: Array | None = None, t: float = 0.0,
+                   rate: Array | None = None) -> tuple[Array, Array]:
         """x and l with M x + J^T l = b at free coordinates and J x = rate; x is zero at fixed ones.
 
         Parameters
@@ -320,7 +423,7 @@ class System:
         b
             Shape (N,); its fixed coordinates are ignored.
         u, t
-            Where J is taken.
+            Where J is taken, shape (N,), and when.
         rate
             Shape (m,).
         """
@@ -334,26 +437,28 @@ class System:
 
     # tangent
 
-    def new_band(self):
+    def new_band(self) -> BandMatrix:
         """An empty band matrix of the scene."""
         return BandMatrix(self.N, self.bandwidth, self.symmetric)
 
     @property
-    def bandwidth(self):
+    def bandwidth(self) -> int:
         """Subdiagonals of the tangent and of the mass matrix."""
         return max(2 * b.nd for b in self.beams) - 1
 
     @cached_property
-    def K(self):
+    def K(self) -> BandMatrix:
         """The tangent, filled by :meth:`assemble`."""
         return self.new_band()
 
     @cached_property
-    def fixed_positions(self):
+    def fixed_positions(self) -> Any:
         """Where the fixed rows and columns are stored."""
         return self.K.fixed_positions(self.fixed)
 
-    def assemble(self, u, load=1.0, carried=None, geometric=True, t=None):
+    def assemble(self, u: Array, load: float = 1.0, carried: Array | None = None,
+                 geometric: bool = True, t: float | None = None) -> tuple[Array,
+                 tuple[Array, Array]]:
         """Internal force, and the tangent of the residual into :attr:`K`.
 
         Parameters
@@ -363,7 +468,7 @@ class System:
         load
             Factor on the loads, which may have a stiffness.
         carried
-            Stresses for the geometric part, as :meth:`stress_step` returns them.
+            Stresses (n,) for the geometric part, as :meth:`stress_step` returns them.
         geometric
             Include the geometric part.
         t
@@ -382,19 +487,35 @@ class System:
         force = self._evaluate(TANGENT, u, None, load, t, stresses, carried, carried is not None)
         return force, (u.copy(), stresses)
 
-    def stress_step(self, evaluations, du):
-        """Stresses carried to ``u + du`` by linearisation."""
+    def stress_step(self, evaluations: tuple[Array, Array], du: Array) -> Array:
+        """Stresses carried to ``u + du`` by linearisation.
+
+        Parameters
+        ----------
+        evaluations
+            What :meth:`assemble` returned.
+        du
+            Increment of the displacement, shape (N,).
+        """
         u, stresses = evaluations
         carried = np.zeros_like(stresses)
         self._evaluate(CARRY, u, du, stresses=stresses, carried=carried)
         return carried
 
-    def multiply(self, v):
+    def multiply(self, v: Array) -> Array:
         """The assembled tangent times a vector, before :meth:`factorize`."""
         return self.K.multiply(v)
 
-    def factorize(self, u=None, t=0.0, multipliers=None):
-        """Fix the supports in the tangent and factorise it, with the joints where there are any."""
+    def factorize(self, u: Any = None, t: float = 0.0, multipliers: Any = None) -> None:
+        """Fix the supports in the tangent and factorise it, with the joints where there are any.
+
+        Parameters
+        ----------
+        u, t
+            Where the joints are linearised, shape (N,), and when.
+        multipliers
+            Theirs, shape (m,).
+        """
         self.K.fix(self.fixed_positions)
         if not self.joints:
             self.K.factorize()
@@ -407,7 +528,7 @@ class System:
         else:
             self._sparse = self._sparse_factors(self._whole())
 
-    def inertia(self):
+    def inertia(self) -> Inertia:
         """Signs of the eigenvalues of the tangent that :meth:`factorize` has factorised.
 
         Of the free coordinates, and with joints on the tangent space of their equations: how many
@@ -443,7 +564,7 @@ class System:
         K = self._reduced()
         return sparse_inertia(0.5 * (K + K.T))
 
-    def stays(self, u, t, multipliers):
+    def stays(self, u: Array, t: float | None, multipliers: Array) -> bool:
         """True if the factors left by an iteration say that no direction gives way.
 
         Those of its last tangent, which is that of the solution but for the last correction.
@@ -451,7 +572,7 @@ class System:
         Parameters
         ----------
         u, t, multipliers
-            The solution.
+            The solution: shape (N,), time, shape (m,).
         """
         K = self.K
         if not K.definite or (self.joints and not self.bordered):
@@ -465,7 +586,7 @@ class System:
                            0.5 * K.factored_diagonal(self.springs))
         return border_negative(0, columns_product(K, picked, J), S, self.m)[0] == 0
 
-    def determinant_sign(self):
+    def determinant_sign(self) -> int:
         """The sign of the determinant of what :meth:`inertia` counts: 1 or -1.
 
         -1 is an odd number of negative eigenvalues, of a tangent that is not symmetric too.
@@ -491,7 +612,7 @@ class System:
         J = sparse.csr_matrix(self._J * self._weight)
         return splu(sparse.bmat([[K, J.T], [J, None]], format="csc"))
 
-    def solve(self, residual, phi=None):
+    def solve(self, residual: Array, phi: Any = None) -> tuple[Array, Array]:
         """Solve with the factors.
 
         Parameters

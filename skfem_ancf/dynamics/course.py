@@ -1,9 +1,16 @@
 """Functions of time, asked for many steps at once."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from .rates import PARTS, JointMotion, step_rates
 from .steps import Course
+
+if TYPE_CHECKING:
+    from ..system import System
 
 
 class Courses:
@@ -17,17 +24,20 @@ class Courses:
         The equation of motion holds in the middle of a step, not at its end.
     """
 
-    def __init__(self, system, conserving):
+    def __init__(self, system: System, conserving: bool) -> None:
         self._system, self._conserving = system, conserving
-        self._asked = None, None
+        self._asked: Any = None, None
 
-    def of(self, start, dt, first, n, block, limit):
-        """For ``n`` steps.
+    def of(self, start: float, dt: float, first: int, n: int, block: tuple[int, int],
+           limit: float) -> Course:
+        """For some steps.
 
         Parameters
         ----------
         start, first
             The first step begins at ``start + first dt``.
+        dt, n
+            Size and number of the steps.
         block
             Numbers of steps between which functions are asked at once, so that what they return
             does not depend on ``first`` and ``n``.
@@ -41,7 +51,7 @@ class Courses:
         key = start, dt, *block, limit
         if self._asked[0] != key:
             self._asked = key, self._ask(*key)
-        whole = self._asked[1]
+        whole: Course = self._asked[1]
         if block[1] - block[0] == n:
             return whole
         part = slice(first - block[0], first - block[0] + n)

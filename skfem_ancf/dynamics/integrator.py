@@ -1,6 +1,9 @@
 """Takes time steps: many at once, one, or its halves where it fails."""
 
+from __future__ import annotations
+
 import logging
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +15,13 @@ from .rates import rates
 from .dampers import Dampers, Rows
 from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, READY, STATE,
                     Matrices, Rule, mass_factor, steps)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..system import System
+    from ..types import Array
+    from .base import Scheme
 
 logger = logging.getLogger(__name__)
 
@@ -49,10 +59,11 @@ class Integrator:
         Steps of a block at most.
     """
 
-    def __init__(self, system, scheme, tol=None):
+    def __init__(self, system: System, scheme: Scheme, tol: float | None = None) -> None:
         self.system, self.scheme, self.limit = system, scheme, np.inf
         self.tol = scheme.tol if tol is None else require_positive("tol", tol)
-        self.rule = Rule(int(scheme.conserving), *(float(x) for x in scheme.parameters), self.tol,
+        alpha_m, alpha_f, beta, gamma = map(float, scheme.parameters)
+        self.rule = Rule(int(scheme.conserving), alpha_m, alpha_f, beta, gamma, self.tol,
                          8.0 * system.stiffness_scale)
         M = system.mass.band
         self.matrices = Matrices(M, _copy(M), _copy(M), *_damping(system))
@@ -64,22 +75,22 @@ class Integrator:
         self.longest = int(np.clip(STORED // (4 * system.N), 1, BLOCK))
 
     @property
-    def iterations(self):
+    def iterations(self) -> int:
         """Residuals solved for."""
         return int(self._state[COUNT])
 
     @property
-    def factorizations(self):
+    def factorizations(self) -> int:
         """Tangents factorised."""
         return int(self._state[FACTORIZED])
 
-    def count(self, other):
+    def count(self, other: Integrator) -> None:
         """Add the counts of another, which begins from zero."""
         self._state[[COUNT, FACTORIZED]] += other._state[[COUNT, FACTORIZED]]
         self.substeps += other.substeps
         other.reset()
 
-    def reset(self):
+    def reset(self) -> None:
         """Count from zero."""
         self._state[[COUNT, FACTORIZED]], self.substeps = 0.0, 0
 
@@ -113,13 +124,21 @@ class Integrator:
                     + 2.0 * self._rates(lambda t: s.full_jacobian(u, t) @ v, t, dt)[0])
         return rate
 
-    def start(self, u, v, t, dt):
+    def start(self, u: Array, v: Array, t: float, dt: float) -> Motion:
         """The Motion at the start, with consistent velocity, acceleration and multipliers.
 
         Where motions are given as functions of time, their rates are those in a step dt ahead.
+
+        Parameters
+        ----------
+        u, v
+            Displacement and velocity, shape (N,).
+        t, dt
+            Time, and the step in which functions of time are asked.
         """
         s = self.system
-        y = Motion(t, u.copy(), v.copy(), np.zeros(s.N), None, np.zeros(s.m))
+        y = Motion(t, u.copy(), v.copy(), np.zeros(s.N), np.zeros(s.N),
+                   np.zeros(s.m))
         y.u[s.fixed] = s.values(1.0, t)
         gap = np.max(np.abs(s.constraint(y.u, t)), initial=0.0)
         if gap > 1e-8 * s.size:
@@ -138,25 +157,28 @@ class Integrator:
         acceleration, y.multipliers = s.solve_mass(force, y.u, t, rate)
         y.acceleration = y.acceleration + acceleration
         y.algorithmic, y.force = y.acceleration.copy(), y.multipliers
-        self.expect(max(0.5 * y.v @ s.mass.multiply(y.v), s.strain_energy(y.u)))
+        self.expect(max(float(0.5 * y.v @ s.mass.multiply(y.v)), s.strain_energy(y.u)))
         return y
 
-    def expect(self, energy):
+    def expect(self, energy: float) -> None:
         """The iteration's tolerance is relative to the largest energy of the motion."""
         self._state[ENERGY] = max(self._state[ENERGY], energy)
 
     @property
-    def energy(self):
+    def energy(self) -> float:
         """The largest energy seen."""
         return self._state[ENERGY]
 
     # steps
 
-    def run(self, y, dt, n, start=None, first=0, block=None):
+    def run(self, y: Motion, dt: float, n: int, start: float | None = None, first: int = 0,
+            block: tuple[int, int] | None = None) -> tuple[int, Callable[[int], Motion]]:
         """Up to ``n`` steps from the Motion ``y``; fewer where one fails.
 
         Parameters
         ----------
+        y, dt, n
+            Where the motion is, and size and number of the steps.
         start, first
             ``y`` is at ``start + first dt``.
         block
@@ -194,15 +216,29 @@ class Integrator:
 
         return done, motion
 
-    def take(self, y, dt):
-        """One step from the Motion ``y``; raises StepFailed."""
+    def take(self, y: Motion, dt: float) -> Motion:
+        """One step from the Motion ``y``; raises StepFailed.
+
+        Parameters
+        ----------
+        y, dt
+            Where the motion is, and the size of the step.
+        """
         done, motion = self.run(y, dt, 1)
         if not done:
             raise StepFailed(FAILURES[int(self._state[FAILURE])])
         return motion(0)
 
-    def step(self, y, dt, depth=0):
-        """One step, in two halves where it does not converge; raises StepFailed."""
+    def step(self, y: Motion, dt: float, depth: int = 0) -> Motion:
+        """One step, in two halves where it does not converge; raises StepFailed.
+
+        Parameters
+        ----------
+        y, dt
+            Where the motion is, and the size of the step.
+        depth
+            How often it is halved already.
+        """
         fresh = not self.ready or dt != self._dt
         try:
             return self.scheme.step(self, y, dt)
@@ -219,27 +255,27 @@ class Integrator:
     # factors
 
     @property
-    def ready(self):
+    def ready(self) -> bool:
         """True if there are factors of an iteration matrix."""
         return self._state[READY] != 0.0
 
-    def solve(self, b):
+    def solve(self, b: Array) -> Array:
         """The inverse of the last iteration matrix times b (N,)."""
         x = b.copy()
         solve(self.matrices.A, x)
         return x
 
-    def mass_factor(self):
+    def mass_factor(self) -> float:
         """Factor of the mass in the last iteration matrix."""
         return mass_factor(self.rule, self._dt)
 
-    def forget(self):
+    def forget(self) -> None:
         """Make new factors in the next step."""
         self._state[READY] = 0.0
 
     # what a motion goes on with
 
-    def remember(self):
+    def remember(self) -> dict[str, Array]:
         """Numbers and arrays from which :meth:`recall` goes on as if there had been no break."""
         memory = {"state": self._state.copy(), "dt": np.array(self._dt),
                   "substeps": np.array(self.substeps)}
@@ -247,7 +283,7 @@ class Integrator:
             memory.update(A=self.matrices.A.flat.copy(), pivots=self.matrices.A.pivots.copy())
         return memory
 
-    def recall(self, memory):
+    def recall(self, memory: dict[str, Array]) -> None:
         """Go on with what :meth:`remember` gave."""
         self._state[:], self._dt = memory["state"], float(memory["dt"])
         self.substeps = int(memory["substeps"])

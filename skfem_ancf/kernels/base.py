@@ -10,12 +10,18 @@ and where elements share G its products are constants: a matrix product for a wh
 elements. The parts symmetric and skew in (a, b) need each pair of rows once.
 """
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..errors import InputError
 from ..source import F2, F3, I1, I2, column, lanes, primitive, source
+from ..types import Array
+
+if TYPE_CHECKING:
+    from ..elements.base import ElementBeam
+    from ..linalg import BandMatrix
+    from ..mesh import MeshBeam
 
 #: Elements of which Python evaluates matrices together; bounds the memory.
 CHUNK = 1024
@@ -86,8 +92,16 @@ def add_force(table, transposed, constant, start, span, first, T, U, f):
                 f[column(span[k]) + at[e]] += force[k, e]
 
 
-def add_held_energy(pack, u, total):
-    """Add 1/2 u C u of the stabilisation of each element."""
+def add_held_energy(pack: Any, u: Array, total: Array) -> None:
+    """Add 1/2 u C u of the stabilisation of each element.
+
+    Parameters
+    ----------
+    pack
+        The tables, of a :class:`Chain`.
+    u, total
+        Displacement of the coordinates, shape (N,), and energies, shape (elements,).
+    """
     nb = pack.table.shape[2]
     U = np.empty((nb, 2, total.size), u.dtype)
     load(pack.start, pack.span, 0, u, U)
@@ -214,12 +228,20 @@ def copy_stress(x, y):
                 y[c, p, e] = x[c, p, e]
 
 
-def packed(values, dtype=np.float64):
-    """An array as compiled code takes it: contiguous and writable, of one type."""
+def packed(values: Any, dtype: Any = np.float64) -> Array:
+    """An array as compiled code takes it: contiguous and writable, of one type.
+
+    Parameters
+    ----------
+    values
+        Numbers, of any shape (...).
+    dtype
+        Their type.
+    """
     return np.require(values, dtype, ["C", "W"])
 
 
-def in_rounds(keys):
+def in_rounds(keys: Array) -> tuple[Array, Array]:
     """An order in which no key comes twice between two ``rounds``: (order, rounds)."""
     order = np.argsort(keys, kind="stable")
     first = np.searchsorted(keys[order], keys[order])
@@ -230,7 +252,7 @@ def in_rounds(keys):
                          np.int64)
 
 
-def pair_tables(table, pairs, constant, elements):
+def pair_tables(table: Array, pairs: Array, constant: Array, elements: int) -> PairTables:
     """The PairTables of pairs (2, p) of rows, each once, for a table and a stabilisation.
 
     Parameters
@@ -266,9 +288,10 @@ def pair_tables(table, pairs, constant, elements):
     held = np.stack([C[:, a, 0, b, 0], C[:, a, 1, b, 1],
                      0.5 * (C[:, a, 0, b, 1] + C[:, b, 0, a, 1])], axis=2)
     held_skew = 0.5 * (C[:, c, 0, d, 1] - C[:, d, 0, c, 1])
+    entries, signs, ends = _entries(nb, n_of, m_of)
     return PairTables(packed([g, h, number], np.int64), packed(symmetric), packed(skew),
                       packed([a, b], np.int64), packed([c, d], np.int64),
-                      packed(both[:, order], np.int64), rounds, *_entries(nb, n_of, m_of),
+                      packed(both[:, order], np.int64), rounds, entries, signs, ends,
                       packed(held.reshape(len(C), 3 * len(a)).T), packed(held_skew.T),
                       packed(np.arange(elements) * (len(C) > 1), np.int64))
 
@@ -289,8 +312,19 @@ def _entries(nb, n_of, m_of):
             packed(np.cumsum([0, *np.bincount(part, minlength=4)]), np.int64))
 
 
-def append_square_root(K, u_e, B, CB, stress):
-    """Rows R with R^T R = K, a constant and semidefinite element stiffness, and R u."""
+def append_square_root(K: Array, u_e: Array, B: list[Array], CB: list[Array],
+                       stress: list[Array]) -> None:
+    """Rows R with R^T R = K, a constant and semidefinite element stiffness, and R u.
+
+    Parameters
+    ----------
+    K
+        Element stiffness, shape (ne, 2 nb, 2 nb) or (1, ...).
+    u_e
+        Displacements of the coordinates of these elements, shape (ne, nb, 2).
+    B, CB, stress
+        Lists that R (twice) and R u are appended to.
+    """
     values, V = np.linalg.eigh(K)
     keep = np.max(values / values[:, -1:], axis=0) > 1e-12
     R = (np.sqrt(values[:, None, keep]) * V[:, :, keep]).transpose(0, 2, 1)
@@ -315,16 +349,23 @@ class Texts(NamedTuple):
 class Assembly:
     """What :meth:`Chain.assemble` found.
 
+    Parameters
+    ----------
+    kernel
+        The :class:`Chain`.
+    u
+        Displacement of its coordinates, shape (N,).
+
     Attributes
     ----------
     stresses
         Of each pack, shape (components, points, elements).
     """
 
-    def __init__(self, kernel, u, stresses):
+    def __init__(self, kernel: "Chain", u: Array, stresses: list[Array]) -> None:
         self._kernel, self._u, self.stresses = kernel, u.copy(), stresses
 
-    def carry(self, du):
+    def carry(self, du: Array) -> list[Array]:
         """Stresses at ``u + du``, linearised: one array a pack."""
         out = [np.empty_like(S) for S in self.stresses]
         for pack, before, after in zip(self._kernel.packs, self.stresses, out):
@@ -335,6 +376,11 @@ class Assembly:
 class Chain:
     """Elements of a chain of nodes: gathering, scattering, and the calls of the texts.
 
+    Parameters
+    ----------
+    mesh, element
+        The body and a scalar beam element.
+
     Attributes
     ----------
     packs
@@ -343,21 +389,41 @@ class Chain:
         The stabilisation, shape (elements, 2 nb, 2 nb) or (1, ...), or None.
     """
 
-    texts = None
+    texts: Any = None
+    packs: list[Any]
+    constant: Array | None
 
-    def __init__(self, mesh, element):
+    def __init__(self, mesh: "MeshBeam", element: "ElementBeam") -> None:
         self.nd = 2 * element.nodal_dofs
         self.t = mesh.t
         self.N = self.nd * mesh.p.shape[1]
 
-    def gather(self, u, elements=slice(None)):
-        """Element values (ne, nb, 2) of a coordinate vector (N,)."""
+    def gather(self, u: Array, elements: Any = slice(None)) -> Array:
+        """Element values (ne, nb, 2) of a coordinate vector (N,).
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (N,).
+        elements
+            A slice or numbers of elements.
+        """
         nodes = u.reshape(-1, self.nd)
         t = self.t[:, elements]
         return np.concatenate([nodes[t[0]], nodes[t[1]]], axis=1).reshape(t.shape[1], self.nd, 2)
 
-    def scatter(self, force, elements=slice(None), out=None):
-        """Add element vectors (ne, nb, 2) into a coordinate vector (N,)."""
+    def scatter(self, force: Array, elements: Any = slice(None), out: Array | None = None) -> Array:
+        """Add element vectors (ne, nb, 2) into a coordinate vector (N,).
+
+        Parameters
+        ----------
+        force
+            Of each element, shape (ne, nb, 2).
+        elements
+            A slice or numbers of elements.
+        out
+            What is added to, shape (N,); zeros by default.
+        """
         out = np.zeros(self.N, dtype=force.dtype) if out is None else out
         nodes, t = out.reshape(-1, self.nd), self.t[:, elements]
         parts = force.reshape(t.shape[1], 2, self.nd)
@@ -365,7 +431,7 @@ class Chain:
         nodes[t[1]] += parts[:, 1]
         return out
 
-    def checked(self, u):
+    def checked(self, u: Array) -> Array:
         """A coordinate vector as compiled code takes it: float64, (N,), contiguous, writeable.
 
         Complex numbers stay: NumPy takes them.
@@ -382,29 +448,29 @@ class Chain:
             return u
         return u if u.dtype == np.complex128 else np.array(u, dtype=np.float64)
 
-    def chunks(self):
+    def chunks(self) -> list[slice]:
         """Slices of the elements of which matrices are evaluated together."""
         return [slice(k, k + CHUNK) for k in range(0, self.t.shape[1], CHUNK)]
 
-    def stresses(self):
+    def stresses(self) -> list[Array]:
         """Room for the stresses of each pack, shape (components, points, elements)."""
         return [np.zeros((self.texts.components, pack.weights.shape[0], pack.start.size))
                 for pack in self.packs]
 
-    def apart(self, elements=slice(None)):
+    def apart(self, elements: slice = slice(None)) -> list[Any]:
         """The packs of some elements, each with coordinates of its own."""
         return [apart(pack, elements) for pack in self.packs]
 
-    def assemble(self, u, K, start, force, carried=None, geometric=True):
+    def assemble(self, u: Array, K: "BandMatrix", start: int, force: Array,
+                 carried: list[Array] | None = None, geometric: bool = True) -> Assembly:
         """Add the tangent to a band matrix and the internal force to a vector.
 
         Parameters
         ----------
         u
             Coordinate displacement, shape (N,).
-        K
-            A :class:`~skfem_ancf.linalg.BandMatrix`, and ``start`` the row of the first
-            coordinate in it.
+        K, start
+            A :class:`~skfem_ancf.linalg.BandMatrix`, and the row of the first coordinate in it.
         force
             Shape (N,); added to.
         carried
@@ -419,7 +485,7 @@ class Chain:
         """
         u, stresses = self.checked(u), self.stresses()
         given = carried is not None or not geometric
-        used = carried if geometric and given else self.stresses()
+        used = carried if geometric and carried is not None else self.stresses()
         if K.symmetric:
             for pack, S, C in zip(self.packs, stresses, used):
                 self.texts.tangent(pack, u, force, C, given, S, K._flat, K._ld, start)
@@ -433,7 +499,7 @@ class Chain:
             K.add_elements(tangents, start, self.nd, self.t[0, part])
         return Assembly(self, u, stresses)
 
-    def force(self, u):
+    def force(self, u: Array) -> Array:
         """Internal force of a coordinate displacement (N,), shape (N,)."""
         u = self.checked(u)
         out = np.zeros(self.N, dtype=u.dtype)
@@ -441,18 +507,24 @@ class Chain:
             self.texts.force(pack, u, out)
         return out
 
-    def mean_force(self, u0, u1):
-        """A force whose work from u0 to u1 is the change of the energy, shape (N,)."""
+    def mean_force(self, u0: Array, u1: Array) -> Array:
+        """A force whose work from u0 to u1 is the change of the energy, shape (N,).
+
+        Parameters
+        ----------
+        u0, u1
+            Displacements of the coordinates, shape (N,).
+        """
         u0, u1, out = self.checked(u0), self.checked(u1), np.zeros(self.N)
         for pack in self.packs:
             self.texts.mean(pack, u0, u1, out)
         return out
 
-    def energy(self, u):
+    def energy(self, u: Array) -> Any:
         """Strain energy of a coordinate displacement (N,)."""
         return np.sum(self.energies(u))
 
-    def energies(self, u):
+    def energies(self, u: Array) -> Array:
         """Strain energy of each element, shape (ne,)."""
         u = self.checked(u)
         out = np.zeros(self.t.shape[1], dtype=u.dtype)
@@ -460,27 +532,54 @@ class Chain:
             self.texts.energy(pack, u, out)
         return out
 
-    def forces(self, u):
+    def forces(self, u: Array) -> Array:
         """Element forces (ne, nb, 2) of a coordinate displacement (N,)."""
         return self.element_forces(self.gather(self.checked(u)))
 
-    def tangents(self, u, geometric=True):
-        """Element tangents (ne, 2 nb, 2 nb) of a coordinate displacement (N,)."""
+    def tangents(self, u: Array, geometric: bool = True) -> Array:
+        """Element tangents (ne, 2 nb, 2 nb) of a coordinate displacement (N,).
+
+        Parameters
+        ----------
+        u
+            Displacement, shape (N,).
+        geometric
+            Include the geometric part.
+        """
         u = self.checked(u)
         carried = None if geometric else self.stresses()
         return np.concatenate([self.element_tangents(
             self.gather(u, part), part, carried and [C[:, :, part] for C in carried])
             for part in self.chunks()])
 
-    def element_forces(self, u_e, elements=slice(None)):
-        """Forces (ne, nb, 2) of the displacements (ne, nb, 2) of a slice of elements."""
+    def element_forces(self, u_e: Array, elements: slice = slice(None)) -> Array:
+        """Forces (ne, nb, 2) of the displacements (ne, nb, 2) of a slice of elements.
+
+        Parameters
+        ----------
+        u_e
+            Displacements of the coordinates of these elements, shape (ne, nb, 2).
+        elements
+            A slice of the elements.
+        """
         out = np.zeros(u_e.size, dtype=u_e.dtype)
         for pack in self.apart(elements):
             self.texts.force(pack, u_e.ravel(), out)
         return out.reshape(u_e.shape)
 
-    def element_tangents(self, u_e, elements=slice(None), carried=None):
-        """Tangents (ne, 2 nb, 2 nb) of the displacements (ne, nb, 2) of a slice of elements."""
+    def element_tangents(self, u_e: Array, elements: slice = slice(None),
+                         carried: list[Array] | None = None) -> Array:
+        """Tangents (ne, 2 nb, 2 nb) of the displacements (ne, nb, 2) of a slice of elements.
+
+        Parameters
+        ----------
+        u_e
+            Displacements of the coordinates of these elements, shape (ne, nb, 2).
+        elements
+            A slice of the elements.
+        carried
+            Stresses of each pack for the geometric part; those of the displacement if None.
+        """
         return self._tangents_of(self.apart(elements), u_e, carried)
 
     def _tangents_of(self, packs, u_e, carried=None):
@@ -495,7 +594,7 @@ class Chain:
         out[:, i, j] = out[:, j, i] = flat[:, j, i - j]
         return out
 
-    def factors(self, u_e, elements=slice(None)):
+    def factors(self, u_e: Array, elements: slice = slice(None)) -> tuple[Array, Array, Array]:
         """The material part of the element tangents as ``B^T (C B)``: in B nothing cancels.
 
         Parameters
@@ -514,7 +613,9 @@ class Chain:
             Weighted stresses, shape (ne, m): ``B^T stress`` is the internal force.
         """
         ne, u = len(u_e), u_e.ravel()
-        B, CB, stress = [], [], []
+        B: list[Array] = []
+        CB: list[Array] = []
+        stress: list[Array] = []
         for pack in self.apart(elements):
             S = np.empty((self.texts.components, pack.weights.shape[0], ne))
             rows = np.empty((2 * self.nd,) + S.shape)
@@ -531,10 +632,21 @@ class Chain:
         if self.constant is not None:
             K = self.constant[elements] if len(self.constant) > 1 else self.constant
             append_square_root(K, u_e, B, CB, stress)
-        return tuple(np.concatenate(part, axis=1) for part in (B, CB, stress))
+        return (np.concatenate(B, axis=1), np.concatenate(CB, axis=1),
+                np.concatenate(stress, axis=1))
 
-    def geometric(self, u_e, elements, stress):
-        """The geometric part (ne, 2 nb, 2 nb) of the element tangents for weighted stresses."""
+    def geometric(self, u_e: Array, elements: slice, stress: Array) -> Array:
+        """The geometric part (ne, 2 nb, 2 nb) of the element tangents for weighted stresses.
+
+        Parameters
+        ----------
+        u_e
+            Displacements of the coordinates of these elements, shape (ne, nb, 2).
+        elements
+            A slice of the elements.
+        stress
+            Weighted stresses as :meth:`factors` returns them, shape (ne, m).
+        """
         packs, carried, first = [], [], 0
         for pack in self.apart(elements):
             shape = self.texts.components, pack.weights.shape[0], len(u_e)
@@ -544,13 +656,49 @@ class Chain:
             first += shape[0] * shape[1]
         return self._tangents_of(packs, u_e, carried)
 
-    def inverted(self, u):
+    def strain_increment(self, pack: Any, u: Array, du: Array, out: Array) -> None:
+        """The strain's derivative in the direction du, (components, points, elements).
+
+        Parameters
+        ----------
+        pack
+            One of the :attr:`packs`.
+        u, du, out
+            Displacement and direction, shape (N,), and the result.
+        """
+        raise NotImplementedError
+
+    def weighted_moduli(self, pack: Any, u: Array) -> Array:
+        """Weighted moduli at the points, shape (components, components, points, elements).
+
+        Parameters
+        ----------
+        pack
+            One of the :attr:`packs`.
+        u
+            Displacement, shape (N,).
+        """
+        raise NotImplementedError
+
+    def without_material(self, pack: Any) -> Any:
+        """The pack of a law without stiffness, for given stresses."""
+        raise NotImplementedError
+
+    def inverted(self, u: Array) -> bool:
         """True if the body is turned inside out somewhere: no deformation of a real one."""
         return False
 
 
-def apart(pack, elements):
-    """A pack of some elements, a slice, each with coordinates of its own."""
+def apart(pack: Any, elements: slice) -> Any:
+    """A pack of some elements, a slice, each with coordinates of its own.
+
+    Parameters
+    ----------
+    pack
+        The tables, of a :class:`Chain`.
+    elements
+        A slice of the elements.
+    """
     number, total = len(pack.start[elements]), pack.start.size
     changes = {"start": np.arange(number) * pack.span.size}
     for name, table in pack._asdict().items():

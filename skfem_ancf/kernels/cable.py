@@ -8,16 +8,23 @@ the mode of equal slopes that this leaves is stabilised.
 Rows of the table are those of d/dX, then of d^2/dX^2, at the points: ``a = r'``, ``b = r''``.
 """
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..errors import InputError
 from ..quadrature import gauss
 from ..source import F1, F2, F3, I1, lanes, source
+from ..types import Array
 from .base import (CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables, Texts,
                    add_force, add_held_energy, add_tangent, block, copy_stress, load, packed,
                    pair_tables, product)
+
+if TYPE_CHECKING:
+    from ..elements.cable import ElementBeamCable
+    from ..formulations.base import Formulation
+    from ..materials.base import Material
+    from ..mesh import MeshBeam
 
 
 class CablePack(NamedTuple):
@@ -238,8 +245,16 @@ def cable_mean(pack, u0, u1, f):
     cable_evaluate(pack, np.int64(MEAN), u0, u1, f, none, zero, none, none[0, 0], zero, zero)
 
 
-def cable_energy(pack, u, out):
-    """Add the strain energy of each element to out, (elements,)."""
+def cable_energy(pack: CablePack, u: Array, out: Array) -> None:
+    """Add the strain energy of each element to out, (elements,).
+
+    Parameters
+    ----------
+    pack
+        The tables.
+    u, out
+        Displacement, shape (N,), and energies that are added to, shape (elements,).
+    """
     strain = np.empty((2, len(pack.weights), out.size), u.dtype)
     cable_stress(pack._replace(stiffness=np.ones(2)), u, strain)
     out += 0.5 * np.einsum("c,pe,cpe,cpe->e", pack.stiffness,
@@ -247,8 +262,14 @@ def cable_energy(pack, u, out):
     add_held_energy(pack, u, out)
 
 
-def cross(a, b):
-    """The out-of-plane component of a x b, along the last axis."""
+def cross(a: Array, b: Array) -> Array:
+    """The out-of-plane component of a x b, along the last axis.
+
+    Parameters
+    ----------
+    a, b
+        Shape (..., 2).
+    """
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
@@ -268,7 +289,8 @@ class CableKernel(Chain):
     texts = Texts(2, cable_force, cable_tangent, cable_carry, cable_stress, cable_mean,
                   cable_energy)
 
-    def __init__(self, mesh, element, material, width, formulation):
+    def __init__(self, mesh: "MeshBeam", element: "ElementBeamCable", material: "Material",
+                 width: float, formulation: "Formulation") -> None:
         super().__init__(mesh, element)
         if element.axis_degree > 5 and not mesh.is_straight:
             raise InputError(f"a cable of degree {element.axis_degree} needs a straight mesh: use "
@@ -319,37 +341,62 @@ class CableKernel(Chain):
         q_e = self.gather(np.ascontiguousarray(q0.transpose(2, 0, 1)).ravel())
         return (table @ q_e).transpose(1, 2, 0)
 
-    def strain(self, u_e, elements=slice(None)):
-        """Extension and change of curvature at the integration points, shape (2, points, ne)."""
+    def strain(self, u_e: Array, elements: slice = slice(None)) -> Array:
+        """Extension and change of curvature at the integration points, shape (2, points, ne).
+
+        Parameters
+        ----------
+        u_e
+            Displacements of the coordinates of these elements, shape (ne, nb, 2).
+        elements
+            A slice of the elements.
+        """
         pack, = self.apart(elements)
         out = np.empty((2, self.points_number, len(u_e)))
         cable_stress(pack._replace(stiffness=np.ones(2)), u_e.ravel(), out)
         return out
 
-    def strain_increment(self, pack, u, du, out):
-        """The strain's derivative in the direction du, (2, points, elements)."""
+    def strain_increment(self, pack: CablePack, u: Array, du: Array, out: Array) -> None:
+        """The strain's derivative in the direction du, (2, points, elements).
+
+        Parameters
+        ----------
+        pack
+            The tables.
+        u, du, out
+            Displacement and direction, shape (N,), and the result.
+        """
         cable_carry(pack._replace(stiffness=np.ones(2)), u, du, np.zeros_like(out), out)
 
-    def weighted_moduli(self, pack, u):
-        """Weighted stiffnesses at the points, shape (2, 2, points, elements)."""
+    def weighted_moduli(self, pack: CablePack, u: Array) -> Array:
+        """Weighted stiffnesses at the points, shape (2, 2, points, elements).
+
+        Parameters
+        ----------
+        pack
+            The tables.
+        u
+            Displacement, shape (N,).
+        """
         n, ne = pack.weights.shape[0], pack.start.size
         return np.diag(pack.stiffness)[:, :, None, None] * np.broadcast_to(pack.weights, (n, ne))
 
-    def viscous_packs(self, time):
+    def viscous_packs(self, time: float) -> list[CablePack]:
         """The packs with ``time`` times the stiffnesses, without stabilisation."""
         none = np.zeros((0, 2 * self.nd, 2 * self.nd))
         return [pack._replace(stiffness=time * pack.stiffness, constant=packed(none),
                               pairs=pack.pairs._replace(held=packed(pack.pairs.held[:, :0])))
                 for pack in self.packs]
 
-    def without_material(self, pack):
+    def without_material(self, pack: CablePack) -> CablePack:
         """The pack of a cable without stiffness, for given normal forces and moments."""
         return pack._replace(stiffness=np.zeros(2),
                              pairs=pack.pairs._replace(held=pack.pairs.held[:, :0]))
 
     # fields
 
-    def section(self, u, xi, tind, mesh, element):
+    def section(self, u: Array, xi: Array, tind: Array | None, mesh: "MeshBeam",
+                element: "ElementBeamCable") -> tuple[Array, Array, Array, Array]:
         """Tangent, stretch and curvature at points xi of elements: for the fields of the body.
 
         Returns
@@ -358,6 +405,14 @@ class CableKernel(Chain):
             Unit tangents now and in the stress-free state, shape (2, ne, np).
         eps, kappa
             Extension and change of curvature, shape (ne, np).
+
+        Parameters
+        ----------
+        u, xi, tind
+            Displacement, shape (N,), points on [0, 1], shape (np,) or (ne, np), and elements, shape
+            (ne,), or None for all.
+        mesh, element
+            Those of the kernel.
         """
         t = self.t if tind is None else self.t[:, tind]
         L = (mesh.lengths if tind is None else mesh.lengths[tind])

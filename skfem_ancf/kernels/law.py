@@ -2,7 +2,7 @@
 
 import weakref
 from itertools import count
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,8 @@ from .base import packed
 #: Kinds of laws: constant moduli, a law with texts, and any other.
 LINEAR, NEO_HOOKEAN, OWN = 0, 1, 2
 
-_LAWS = {}  # by handle, as long as a kernel has them: compiled code holds no Python objects
+#: By handle, as long as a kernel has them: compiled code holds no Python objects.
+_LAWS: dict[int, Any] = {}
 _handles = count(1)
 
 
@@ -132,8 +133,16 @@ def conserve(law, middle, change, S):
             S[2, p, e] += share * c
 
 
-def law_tables(law, owner):
-    """The LawTables of a law; one in Python is kept as long as its ``owner`` lives."""
+def law_tables(law: Any, owner: Any) -> LawTables:
+    """The LawTables of a law; one in Python is kept as long as its ``owner`` lives.
+
+    Parameters
+    ----------
+    law
+        Of a material: an object with ``energy``, ``stress`` and ``moduli``.
+    owner
+        What asks it.
+    """
     none, one = np.zeros((3, 3)), np.ones(3)
     if isinstance(law, LinearLaw):
         return LawTables(LINEAR, 0, packed(law.D), np.zeros(3), one)

@@ -7,7 +7,7 @@ interpolation and the weights in them, the tangent is a sum over pairs of rows.
 """
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -15,10 +15,17 @@ from scipy import sparse
 from ..materials import LinearLaw
 from ..quadrature import tensor
 from ..source import F1, F2, F3, I1, I2, column, lanes, source
+from ..types import Array
 from .base import (CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables, Texts,
                    add_force, add_held_energy, add_tangent, apart, block, copy_stress, in_rounds,
                    load, packed, pair_tables, product)
 from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
+
+if TYPE_CHECKING:
+    from ..elements.base import ElementBeam
+    from ..formulations.base import Formulation, Term
+    from ..materials.base import Material
+    from ..mesh import MeshBeam
 
 
 class SectionPack(NamedTuple):
@@ -334,8 +341,16 @@ def section_mean(pack, u0, u1, f):
     section_evaluate(pack, np.int64(MEAN), u0, u1 - u0, f, none, zero, none, none[0, 0], zero, zero)
 
 
-def section_energy(pack, u, out):
-    """Add the strain energy of each element to out, (elements,)."""
+def section_energy(pack: SectionPack, u: Array, out: Array) -> None:
+    """Add the strain energy of each element to out, (elements,).
+
+    Parameters
+    ----------
+    pack
+        The tables.
+    u, out
+        Displacement, shape (N,), and energies that are added to, shape (elements,).
+    """
     strain = np.empty((3, len(pack.weights), out.size), u.dtype)
     W = np.empty((1,) + strain.shape[1:], u.dtype)
     law = pack.law._replace(kind=LINEAR, D=np.eye(3))
@@ -345,7 +360,8 @@ def section_energy(pack, u, out):
     add_held_energy(pack, u, out)
 
 
-def beam_gradients(mesh, element, X, tind=None):
+def beam_gradients(mesh: "MeshBeam", element: "ElementBeam", X: Array,
+                   tind: Array | None = None) -> tuple[Array, Array]:
     """Derivatives of the local functions along the axis and across the section.
 
     Parameters
@@ -377,6 +393,15 @@ def beam_gradients(mesh, element, X, tind=None):
 class TermTables:
     """The tables of one :class:`~skfem_ancf.formulations.Term` on a mesh and element.
 
+    Parameters
+    ----------
+    mesh, element, term, width
+        The body, a scalar beam element, the term, and the width of the section.
+    constant
+        Stabilisation of each element, shape (0, 1 or elements, 2 nb, 2 nb).
+    owner
+        What is kept alive as long as a law of one's own is asked.
+
     Attributes
     ----------
     term, law, points, w
@@ -385,7 +410,8 @@ class TermTables:
         :class:`SectionPack`.
     """
 
-    def __init__(self, mesh, element, term, width, constant, owner):
+    def __init__(self, mesh: "MeshBeam", element: "ElementBeam", term: "Term", width: float,
+                 constant: Array, owner: Any) -> None:
         self.law, self.term = term.law, term
         self.shared = mesh.is_uniform
         tind = np.array([0]) if self.shared else None
@@ -403,14 +429,30 @@ class TermTables:
         product(pack.table, 0, U, r)
         return pack.frame + r
 
-    def inverted(self, pack, u):
-        """True if the body is turned inside out at a sample: det F is not positive."""
+    def inverted(self, pack: SectionPack, u: Array) -> bool:
+        """True if the body is turned inside out at a sample: det F is not positive.
+
+        Parameters
+        ----------
+        pack
+            The tables.
+        u
+            Displacement, shape (N,).
+        """
         r = self._gradients(pack, u)
         rx, ry = r[self._sheared[0]], r[self._sheared[1]]
         return not np.all(rx[:, 0] * ry[:, 1] > rx[:, 1] * ry[:, 0])
 
-    def shortest(self, pack, u):
-        """Smallest stretch of the fibres along the axis, where eps_xx is sampled."""
+    def shortest(self, pack: SectionPack, u: Array) -> Any:
+        """Smallest stretch of the fibres along the axis, where eps_xx is sampled.
+
+        Parameters
+        ----------
+        pack
+            The tables.
+        u
+            Displacement, shape (N,).
+        """
         rx = self._gradients(pack, u)[self._along]
         return np.sqrt(np.min(np.sum(rx * rx, axis=1)))
 
@@ -448,7 +490,8 @@ def _interpolation(term):
     return out
 
 
-def section_pack(G, frame, weights, rows, along, law, constant, left):
+def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[Array],
+                 law: LawTables, constant: Array, left: Array) -> SectionPack:
     """The SectionPack of one term.
 
     Parameters
@@ -492,11 +535,11 @@ def section_pack(G, frame, weights, rows, along, law, constant, left):
     in_order, mixing_rounds = in_rounds(mixing.row)
     summands = np.array([mixing.row, *np.divmod(mixing.col, weights.shape[0])])[:, in_order]
     shared = len(G) == 1
+    joined, ends = _joined(along, ns)
     return SectionPack(
         packed(G), packed(G.transpose(0, 2, 1)[:int(shared)]), packed(frame),
         packed(weights), packed(np.zeros(ne) if shared else np.arange(ne), np.int64),
-        packed([*rows, of[terms.shape[1]:]], np.int64), factors, int(normal), *_joined(along, ns),
-        law,
+        packed([*rows, of[terms.shape[1]:]], np.int64), factors, int(normal), joined, ends, law,
         packed(constant), packed(left * nb, np.int64), packed(np.arange(2 * nb), np.int64), tables,
         packed(terms, np.int64), rounds, packed(moduli), packed(summands, np.int64),
         packed(mixing.data[in_order]), mixing_rounds)
@@ -567,7 +610,8 @@ class Kernel(Chain):
     texts = Texts(3, section_force, section_tangent, section_carry, section_stress, section_mean,
                   section_energy)
 
-    def __init__(self, mesh, element, material, width, formulation):
+    def __init__(self, mesh: "MeshBeam", element: "ElementBeam", material: "Material", width: float,
+                 formulation: "Formulation") -> None:
         super().__init__(mesh, element)
         self.constant = formulation.stabilisation(mesh, element, material, width)
         none = np.zeros((0, 2 * self.nd, 2 * self.nd))
@@ -579,44 +623,60 @@ class Kernel(Chain):
         self.packs = [t.pack for t in self.tables]
 
     @property
-    def shared(self):
+    def shared(self) -> bool:
         """One table serves all elements."""
         return self.tables[0].shared
 
     @property
-    def points_number(self):
+    def points_number(self) -> int:
         """Integration points of an element."""
         return sum(t.w.shape[1] for t in self.tables)
 
     @property
-    def section_points(self):
+    def section_points(self) -> int:
         """Integration points across the section, of the first term."""
         return self.tables[0].section_points
 
     @property
-    def volume(self):
+    def volume(self) -> float:
         """Volume of the body, by the rule of the first term."""
         t = self.tables[0]
         return float(np.sum(t.w)) * (self.t.shape[1] if t.shared else 1)
 
-    def inverted(self, u):
+    def inverted(self, u: Array) -> bool:
         first = self.tables[0]
         return any(first.inverted(apart(first.pack, part), self.gather(u, part).ravel())
                    for part in self.chunks())
 
-    def shortest(self, u):
+    def shortest(self, u: Array) -> Any:
         """Smallest stretch of the fibres along the axis, where eps_xx is sampled."""
         first = self.tables[0]
         return min(first.shortest(apart(first.pack, part), self.gather(u, part).ravel())
                    for part in self.chunks())
 
-    def strain_increment(self, pack, u, du, out):
-        """The strain's derivative in the direction du, (3, points, elements)."""
+    def strain_increment(self, pack: SectionPack, u: Array, du: Array, out: Array) -> None:
+        """The strain's derivative in the direction du, (3, points, elements).
+
+        Parameters
+        ----------
+        pack
+            The tables.
+        u, du, out
+            Displacement and direction, shape (N,), and the result.
+        """
         unit = pack.law._replace(kind=LINEAR, D=np.eye(3))
         section_carry(pack._replace(law=unit), u, du, np.zeros_like(out), out)
 
-    def weighted_moduli(self, pack, u):
-        """w D at the points of integration, shape (3, 3, points, elements)."""
+    def weighted_moduli(self, pack: SectionPack, u: Array) -> Array:
+        """w D at the points of integration, shape (3, 3, points, elements).
+
+        Parameters
+        ----------
+        pack
+            The tables.
+        u
+            Displacement, shape (N,).
+        """
         n, ne = pack.weights.shape[0], pack.start.size
         if pack.law.kind == LINEAR:
             return np.broadcast_to(pack.law.D[:, :, None, None] * pack.weights, (3, 3, n, ne))
@@ -626,14 +686,14 @@ class Kernel(Chain):
         law_evaluate(pack.law, strain, D.reshape(9, n, ne))
         return D * pack.weights
 
-    def viscous_packs(self, time):
+    def viscous_packs(self, time: float) -> list[SectionPack]:
         """The packs of a linear law with ``time`` times the moduli at no strain."""
         mesh, element, width, none = self._made
         return [_viscous(t.pack, time, none) if t.pack.law.kind == LINEAR else TermTables(
             mesh, element, replace(t.term, law=LinearLaw(time * t.law.moduli(np.zeros(3)))), width,
             none, self).pack for t in self.tables]
 
-    def without_material(self, pack):
+    def without_material(self, pack: SectionPack) -> SectionPack:
         """The pack of a law without stiffness, for given stresses."""
         return pack._replace(terms=packed(pack.terms[:, :0], np.int64),
                              rounds=np.zeros(1, np.int64), moduli=np.zeros((0, pack.start.size)),

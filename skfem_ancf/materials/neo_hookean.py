@@ -97,7 +97,7 @@ class _Volumetric(NeoHookean):
     G = 0.0
 
 
-def neo_hookean_constants(law):
+def neo_hookean_constants(law: Material) -> Array:
     """Shear modulus, Lame's first parameter, and 1 in plane stress."""
     return np.array([law.G, law.lame, float(law.plane == "stress")])
 

@@ -223,4 +223,4 @@ def _solved(e, target, rules, x, w, f):
     if not factorize_bordered(f, e.border, e.free):
         return False
     error = solve_bordered(f, e.border, w.R, w.phi, w.du, w.dm)
-    return 0.0 <= error and error <= rules.inaccurate
+    return 0.0 <= error <= rules.inaccurate

@@ -1,7 +1,10 @@
 """Newton's method with automatic load steps, and the mixed integration point iteration."""
 
+from __future__ import annotations
+
 import logging
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +16,10 @@ from ..progress import progress_bar
 from . import stability
 from .iteration import (CONVERGED, NOT_CONVERGED, NOT_FINITE, SINGULAR, Rules, Target, Unknowns,
                         equilibrium)
+
+if TYPE_CHECKING:
+    from ..system import System
+    from ..types import Array
 
 logger = logging.getLogger(__name__)
 
@@ -44,13 +51,29 @@ class LoadStep:
 
 @dataclass
 class StaticResult:
-    """What the iteration found: displacement and multipliers, the load reached, and how."""
+    """What the iteration found.
 
-    u: np.ndarray
-    multipliers: np.ndarray
+    Attributes
+    ----------
+    u, multipliers, force
+        Displacement (N,), multipliers (m,) and internal force (N,).
+    load
+        The load factor reached.
+    steps
+        A :class:`LoadStep` for each load step.
+    converged, message
+        Whether full load was reached, and in words how.
+    rejected
+        Load steps that were given up.
+    unstable, doubt
+        Whether the equilibrium gives way in some direction, and what could not be told.
+    """
+
+    u: Array
+    multipliers: Array
     load: float
-    force: np.ndarray
-    steps: list
+    force: Array
+    steps: list[LoadStep]
     converged: bool
     message: str
     rejected: int = 0
@@ -58,14 +81,15 @@ class StaticResult:
     doubt: str = ""
 
     @property
-    def iterations(self):
+    def iterations(self) -> int:
         """Linear systems solved in the converged steps."""
         return sum(step.iterations for step in self.steps)
 
 
 @taught
-def solve_static(system, u=None, method="mixed", tol=1e-8, max_iterations=30, first_step=1.0,
-                 min_step=1e-4, progress=None, stable=True):
+def solve_static(system: System, u: Array | None = None, method: str = "mixed", tol: float = 1e-8,
+                 max_iterations: int = 30, first_step: float = 1.0, min_step: float = 1e-4,
+                 progress: bool | None = None, stable: bool = True) -> StaticResult:
     """Find the equilibrium at full load.
 
     The load is applied in steps: the first is ``first_step`` of it, a step that fails is cut to a
@@ -197,7 +221,6 @@ class _Unstable(_Failed):
 
 def _step(system, result, load, options, record, stable):
     """One load step: a stable equilibrium if that is wanted."""
-    origin = options[0]
     found = _iterate(system, result, load, *options, record)
     if not stable or result.unstable:
         return found

@@ -268,8 +268,16 @@ class Descent:
         scale = min(1.0, self.stride * system.size / largest) if largest > 0 else 1.0
         return scale * du, scale * dm
 
-    def solve_own(self, t, u, multipliers, R, phi, du, dm):
-        """Solve for a correction, as :meth:`correct` changes it; False if there is none."""
+    def solve_own(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
+                  dm: Array) -> bool:
+        """Solve for a correction, as :meth:`correct` changes it; False if there is none.
+
+        Parameters
+        ----------
+        t, u, multipliers, R, phi, du, dm
+            As for :meth:`System.solve_own <skfem_ancf.system.System.solve_own>`, shapes (N,) and
+            (m,).
+        """
         if not self.system.solve_own(t, u, multipliers, R, phi, du, dm):
             return False
         try:

@@ -140,14 +140,15 @@ def _fps(history, chosen, fps):
     return float(np.clip((len(chosen) - 1) / span, 5.0, 50.0)) if span > 0 else 5.0
 
 
-def _by_pyvista(scenery, t, size, undeformed, cmap, unit) -> Iterator[Array]:
+def _by_pyvista(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: Any,
+                unit: str | None) -> Iterator[Array]:
     try:
         import pyvista
     except ImportError:
         raise MissingExtra("pyvista", "view") from None
     # drawn finer and averaged: without a graphics card half the time of VTK's smooth edges
     fine = 2 if max(size) <= LARGEST else 1
-    plotter = new_plotter(pyvista, True, [fine * k for k in size])
+    plotter = new_plotter(pyvista, True, (fine * size[0], fine * size[1]))
     try:
         if fine > 1:
             plotter.disable_anti_aliasing()
@@ -184,7 +185,8 @@ def _picture_of(plotter, fine):
     return np.asarray(image.reduce(fine) if fine > 1 else image)
 
 
-def _by_matplotlib(scenery, t, size, undeformed, cmap, unit) -> Iterator[Array]:
+def _by_matplotlib(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: Any,
+                   unit: str | None) -> Iterator[Array]:
     from .matplotlib import _GHOST, _INK, _MUTED, _figure_class
 
     Figure = _figure_class()

@@ -100,20 +100,20 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.tri import Triangulation
 
-    field = find_field(field, DRAWN)
+    drawn = find_field(field, DRAWN)
     require_like("state", state, "State", "beams", "u_of")
     undeformed = require_flag("undeformed", undeformed)
     recover = require_flag("recover", recover)
     colorbar, cmap = require_flag("colorbar", colorbar), _colormap(cmap)
     filename, dpi = _page(ax, title, filename, dpi)
     m, n = _subdivision(subdivide)
-    bodies = [_Body(state, beam, field, m, n, recover) for beam in state.beams]
+    bodies = [_Body(state, beam, drawn, m, n, recover) for beam in state.beams]
     factor = _thickness(thickness, bodies)
     ghosts = [line for b in bodies for line in b.outline(b.reference, factor)] if undeformed else []
     outlines = [line for b in bodies for line in b.outline(b.deformed, factor)]
     points = np.concatenate([b.points(b.deformed, factor).reshape(2, -1) for b in bodies], axis=1)
     values = np.concatenate([b.values.ravel() for b in bodies])
-    low, high = _limits(limits, values, field)
+    low, high = _limits(limits, values, drawn)
 
     if ax is None:
         ax = Figure(figsize=_figsize(np.concatenate(ghosts + outlines), colorbar),
@@ -128,14 +128,14 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
         for f, b in zip(first, bodies)])
     triangles = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
     image = ax.tripcolor(Triangulation(*points, triangles=triangles), values, shading="gouraud",
-                         cmap=cmap or ("RdYlBu_r" if field.signed else "viridis"),
+                         cmap=cmap or ("RdYlBu_r" if drawn.signed else "viridis"),
                          vmin=low, vmax=high, zorder=2)
     ax.add_collection(LineCollection([np.vstack([line, line[:1]]) for line in outlines],
                                      colors=_INK, linewidths=0.5, zorder=3))
     ax.set_aspect("equal")
     ax.margins(0.04)
     ax.autoscale_view()
-    _dress(ax, (field.title or field.name) if title is None else title, factor)
+    _dress(ax, (drawn.title or drawn.name) if title is None else title, factor)
     if colorbar:
         _add_colorbar(ax, image, bool(np.any(values < low)), bool(np.any(values > high)))
     if filename is not None:
