@@ -5,10 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from .band import Band, clear
+from .kernels.base import Destination
 from .kernels.cable import CablePack, cable_evaluate
 from .kernels.section import (CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, SectionPack,
                               section_evaluate)
-from .source import primitive, source
+from .source import primitive, room, shaped, source, thin
 
 #: Kinds of packs, by their number in a table.
 PACKS = SectionPack, CablePack
@@ -111,36 +112,33 @@ def flat_body(body, address):
                     body.table)
 
 
-@source
 def stress_size(body):
     """How many numbers the stresses of all integration points are."""
-    size = 0
-    for k in range(body.table.shape[0]):
-        size = body.table[k, END]
-    return size
+    return int(np.max(body.table[:, END], initial=0))
 
 
 @source
 def _stress(body, k, stresses):
-    """The stresses of pack k, shape (components, points, elements), a view."""
+    """The stresses of pack k, shape (components, points, elements), a view; or of none."""
     row = body.table[k]
-    return stresses[row[BEGIN]:row[END]].reshape(row[COMPONENTS], row[POINTS], row[ELEMENTS])
+    if stresses.size == 0:
+        return shaped(stresses, (np.int64(0), row[POINTS], row[ELEMENTS]))
+    return shaped(stresses[row[BEGIN]:row[END]], (row[COMPONENTS], row[POINTS], row[ELEMENTS]))
 
 
-@source
+@thin
 def evaluate_body(body, what, u, v, f, given, use_given, out, A):
     """What :func:`~skfem_ancf.kernels.section.section_evaluate` does, for all beams."""
-    flat = A.flat[A.top:]
     for k in range(body.table.shape[0]):
         a, b = body.table[k, FIRST], body.table[k, LAST]
         old, new = _stress(body, k, given), _stress(body, k, out)
+        to = Destination(A.flat[A.top:], A.ld, a)
         if body.table[k, KIND] == SECTION:
-            change = v[a:b] - u[a:b] if what == MEAN else v[a:b]
-            section_evaluate(section_pack(body, k), what, u[a:b], change, f[a:b], old, use_given,
-                             new, flat, A.ld, a)
+            section_evaluate(section_pack(body, k), what, u[a:b], v[a:b], f[a:b], old, use_given,
+                             new, to)
         else:
             cable_evaluate(cable_pack(body, k), what, u[a:b], v[a:b], f[a:b], old, use_given, new,
-                           flat, A.ld, a)
+                           to)
 
 
 @primitive("body")
@@ -150,16 +148,16 @@ def run_kernels(body, what, u, v, f, given, use_given, out, A):
 
 
 @source
-def _no_band(x):
-    return Band(x, np.empty(0, np.int64), 1, 0, 0)
+def _no_band(body, x):
+    return Band(x, room(0, body.table), 1, 0, 0)
 
 
 @source
 def body_force(body, u, f):
     """The internal force."""
     clear(f)
-    none = np.empty(stress_size(body))
-    run_kernels(body, np.int64(FORCE), u, u, f, none, np.int64(0), none, _no_band(none))
+    none = f[:0]
+    run_kernels(body, np.int64(FORCE), u, u, f, none, np.int64(0), none, _no_band(body, none))
 
 
 @source
@@ -177,25 +175,25 @@ def body_tangent(body, u, f, carried, use_carried, stresses, A):
 @source
 def body_stress(body, u, stresses):
     """The stresses at u."""
-    run_kernels(body, np.int64(STRESS), u, u, u, stresses, np.int64(0), stresses, _no_band(u))
+    run_kernels(body, np.int64(STRESS), u, u, u, stresses, np.int64(0), stresses, _no_band(body, u))
 
 
 @source
 def body_carry(body, u, du, stresses, carried):
     """The stresses, linearised, at u + du, from those at u."""
-    run_kernels(body, np.int64(CARRY), u, du, u, stresses, np.int64(1), carried, _no_band(u))
+    run_kernels(body, np.int64(CARRY), u, du, u, stresses, np.int64(1), carried, _no_band(body, u))
 
 
 @source
 def add_viscous_force(body, u, v, f):
     """Add the force of stresses in proportion to the rates of the strains."""
-    none = np.empty(stress_size(body))
-    run_kernels(body, np.int64(VISCOUS), u, v, f, none, np.int64(0), none, _no_band(none))
+    none = f[:0]
+    run_kernels(body, np.int64(VISCOUS), u, v, f, none, np.int64(0), none, _no_band(body, none))
 
 
 @source
 def body_mean(body, u0, u1, f):
     """The force whose work from u0 to u1 is the change of the strain energy."""
     clear(f)
-    none = np.empty(stress_size(body))
-    run_kernels(body, np.int64(MEAN), u0, u1, f, none, np.int64(0), none, _no_band(none))
+    none = f[:0]
+    run_kernels(body, np.int64(MEAN), u0, u1, f, none, np.int64(0), none, _no_band(body, none))

@@ -52,15 +52,21 @@ class Factors(NamedTuple):
     scale: np.ndarray
 
 
-@source
-def new_factors(border, A, m, N):
-    """Room for the factors of A with m multipliers; none where there is no border to make."""
+def new_factors(border: Border, A: Band, m: int, N: int) -> Factors:
+    """Room for the factors of A with m multipliers; none where there is no border to make.
+
+    Parameters
+    ----------
+    border, A
+        The Border and a band matrix.
+    m, N
+        Numbers of multipliers and of coordinates.
+    """
     if border.wide > 0 or m == 0:
-        m, N, k = 0, 0, 0
+        m, N, k, n = 0, 0, 0, 0
     else:
-        k = border.picked.size
-    room = A.flat.size if m > 0 else 0
-    before = Band(np.empty(room), np.empty(0, np.int64), A.ld, A.width, A.top)
+        k, n = border.picked.size, A.flat.size
+    before = A._replace(flat=np.empty(n), pivots=np.empty(0, np.int64))
     return Factors(before, A, np.zeros((m, N)), np.zeros((k, k)), np.zeros((k + m, N)),
                    np.zeros((k + m, k + m)), np.ones(m))
 

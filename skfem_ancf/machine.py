@@ -91,7 +91,7 @@ class Machine:
 
     def __init__(self, system):
         self.tables = Tables(system)
-        self._plain = None
+        self._plain, self._rooms = None, {}
         if not all(beam.compiled for beam in system.beams):
             self._plain = "compiled=False"
         elif any(isinstance(pack, SectionPack) and pack.law.kind == OWN
@@ -129,6 +129,18 @@ class Machine:
                           f"about {seconds:g} s")
         return Choice("plain", f"NumPy has taken {CLOCK.spent:.2g} s so far, compiling would take "
                       f"about {seconds:g} s; python -m skfem_ancf.compiled does it beforehand")
+
+    def room(self, make: Callable, *sizes: int) -> Any:
+        """Work arrays of a text, made once.
+
+        Parameters
+        ----------
+        make
+            A function of :class:`~skfem_ancf.equations.Equations` and ``sizes``.
+        """
+        if make.__name__ not in self._rooms:
+            self._rooms[make.__name__] = make(self.tables.plain, *sizes)
+        return self._rooms[make.__name__]
 
     def of(self, text: Callable) -> tuple[Callable, Any]:
         """The function of a text, plain or compiled, and the equations that it takes."""

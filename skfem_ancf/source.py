@@ -63,6 +63,16 @@ def source(function: _Text) -> _Text:
     return function
 
 
+def thin(function: _Text) -> _Text:
+    """As :func:`source`, for a text that does little but call others.
+
+    It is compiled as a part of what calls it: what a function calls is compiled again with it,
+    once for each level.
+    """
+    vars(function).update(twin=None, thin=True)
+    return function
+
+
 def primitive(module: str) -> Callable[[_Text], _Text]:
     """Mark a plain function whose compiled twin is another: that of its name in a module.
 
@@ -78,6 +88,28 @@ def primitive(module: str) -> Callable[[_Text], _Text]:
         return function
 
     return mark
+
+
+@primitive("views")
+def borrowed(x):
+    """Arrays, or tuples of arrays, of which others take care: that of arguments, the caller."""
+    return x
+
+
+@primitive("views")
+def room(shape, like):
+    """An array without values, of the kind of ``like``; it ends with the function that asks.
+
+    Compiled, it lies on the stack: ask once in a function and not in a loop, return no part of it,
+    and let what may grow with a scene be asked elsewhere.
+    """
+    return np.empty(shape, like.dtype)
+
+
+@primitive("views")
+def shaped(x, shape):
+    """A contiguous array in another shape, as a view."""
+    return x.reshape(shape)
 
 
 for _text in (lanes, column):

@@ -15,7 +15,7 @@ from skfem_ancf.body import Body
 from skfem_ancf.dynamics import HHT, SCHEMES, EnergyMomentum, GeneralizedAlpha, Newmark, get_scheme
 from skfem_ancf.dynamics.rates import JointMotion
 from skfem_ancf.dynamics.dampers import Dampers, Rows
-from skfem_ancf.dynamics.steps import STATE, Course, Matrices, Rule, steps
+from skfem_ancf.dynamics.steps import STATE, Course, Matrices, Rule, room_for_steps, steps
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.equations import Equations
 from skfem_ancf.errors import ConvergenceError, InputError, NameUnknown, SupportError
@@ -141,8 +141,9 @@ def amplification(scheme, dt):
                     JointMotion(np.zeros((1, 3, 0)), np.zeros((1, 4, 0)), 0))
     rows = []
     for u, v, w in np.eye(3):
-        y, new = np.array([[u], [v], [-u], [w]]), np.empty((1, 4, 1))
-        done = steps(equations, matrices, rule, course, np.zeros(STATE), y, np.zeros((2, 0)), new,
+        work, new = room_for_steps(1, 0, 0), np.empty((1, 4, 1))
+        work.y[:, 0] = u, v, -u, w
+        done = steps(equations, matrices, rule, course, np.zeros(STATE), work, new,
                      np.zeros((1, 2, 0)), np.zeros(1))
         assert done == 1
         rows.append(new[0, [0, 1, 3], 0])

@@ -7,6 +7,7 @@ from skfem_ancf import (ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         NeoHookean, StVenantKirchhoff)
 from skfem_ancf.formulations import get_formulation
 from skfem_ancf.kernels import CableKernel, Kernel, cable, law, section
+from skfem_ancf.kernels.base import Destination
 from skfem_ancf.linalg import BandMatrix
 from skfem_ancf.materials import Material
 from skfem_ancf.switch import compiled_off
@@ -172,7 +173,8 @@ def test_compiled_is_plain(kind, mesh):
                 found = []
                 for run in (text, compiled):
                     f, S, flat = np.zeros(k.N), np.zeros_like(given), np.zeros((k.N + 3) * ld)
-                    run(pack, np.int64(what), u, v, f, given, np.int64(use_given), S, flat, ld, 3)
+                    run(pack, np.int64(what), u, v, f, given, np.int64(use_given), S,
+                        Destination(flat, ld, 3))
                     found.append((f, S, flat))
                 gaps.append([np.max(np.abs(a - b)) for a, b in zip(*found)])
                 sizes.append([np.max(np.abs(a)) for a in found[0]])

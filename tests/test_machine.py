@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, MeshBeam, Scene,
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, EnergyMomentum, MeshBeam, Scene,
                         StVenantKirchhoff, compiled, machine)
 from skfem_ancf.source import lanes, primitive, source
 
@@ -120,12 +120,29 @@ def test_a_broken_numba_costs_nothing_but_speed(auto, monkeypatch):
     assert "another NumPy" in s.plan()["compiled loop"].reason
 
 
-def test_one_signature_for_every_scene(needs_compiled):
-    for s in (scene(), scene(ElementBeamCable(5)),
+def test_one_signature_for_every_scene(needs_compiled, monkeypatch):
+    from numba import typeof
+
+    def recorded(name, function):
+        def run(*args):
+            types.setdefault(name, set()).add(tuple(typeof(x) for x in args))
+            return function(*args)
+
+        return run
+
+    types = {}
+    scene().solve_static(), scene().integrate(1e-3, 1e-3)  # compiled
+    monkeypatch.setattr(compiled, "LOADED", {name: recorded(name, function) for name, function
+                                             in compiled.LOADED.items()})
+    two = scene()
+    two = Scene(*two.beams, Beam(MeshBeam.init_line([0.0, 1.0], 0.1), ElementBeamCable(3),
+                                 StVenantKirchhoff(1e6, 0.3, 1e3), width=0.1))
+    for s in (scene(), scene(ElementBeamCable(5)), two.clamp("left", 0).clamp("left", 1),
               scene().pressure("top", 0.1), scene().moment("right", 1e-3)):
-        s.solve_static()
-    found = compiled.LOADED.get("equilibrium")
-    assert found is None or len(found.signatures) == 1
+        s.solve_static(), s.integrate(1e-3, 1e-3), s.integrate(1e-3, 1e-3, EnergyMomentum())
+    s.system.internal_force(np.zeros(s.system.N))
+    assert set(types) == {"equilibrium", "steps", "evaluate"}
+    assert all(len(found) == 1 for found in types.values())
 
 
 @pytest.mark.parametrize("damage", ["empty", "noise", "a file in the way"])

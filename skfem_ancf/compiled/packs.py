@@ -6,24 +6,22 @@ import numpy as np
 
 from ..body import CablePack, SectionPack
 from .twin import jit
+from .views import view
 
 
 @jit
 def view1(data, where, k, j):
-    a, n = where[k, j, 0], where[k, j, 1]
-    return data[a:a + n]
+    return view(data, where[k, j, 0], where[k, j, 1])
 
 
 @jit
 def view2(data, where, k, j):
-    a, n, m = where[k, j, 0], where[k, j, 1], where[k, j, 2]
-    return data[a:a + n * m].reshape(n, m)
+    return view(data, where[k, j, 0], (where[k, j, 1], where[k, j, 2]))
 
 
 @jit
 def view3(data, where, k, j):
-    a, n, m, l = where[k, j, 0], where[k, j, 1], where[k, j, 2], where[k, j, 3]
-    return data[a:a + n * m * l].reshape(n, m, l)
+    return view(data, where[k, j, 0], (where[k, j, 1], where[k, j, 2], where[k, j, 3]))
 
 
 #: Where the letters of an annotation are found.

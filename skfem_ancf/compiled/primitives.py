@@ -6,23 +6,25 @@ import numpy as np
 from ..kernels import law as laws
 from ..own import PENDING
 from .twin import jit
+from .views import room, shaped
 
-#: Elements evaluated together: several vectors wide, with the work arrays still in cache.
-BLOCK = 32
+#: Elements evaluated together: several vectors wide, with the work arrays still in cache; of
+#: elements with many pairs fewer, as these lie on the stack.
+BLOCK, PAIRS = 32, 4096
 
 
 @jit
 def block(pairs):
-    return BLOCK
+    return max(1, min(BLOCK, PAIRS // pairs))
 
 
 @jit
 def product(A, first, B, out):
     n = B.shape[1] * B.shape[2]
     if A.shape[0] == 1:
-        np.dot(A[0], B.reshape(B.shape[0], n), out.reshape(out.shape[0], n))
+        np.dot(A[0], shaped(B, (B.shape[0], n)), shaped(out, (out.shape[0], n)))
         return
-    x, y = np.empty((B.shape[0], B.shape[1])), np.empty((out.shape[0], B.shape[1]))
+    x, y = room((B.shape[0], B.shape[1]), B), room((out.shape[0], B.shape[1]), B)
     for e in range(B.shape[2]):
         for k in range(B.shape[0]):
             for j in range(B.shape[1]):
@@ -38,7 +40,7 @@ def turned_product(A, turned, first, B, out):
     if turned.shape[0] == 1:
         product(turned, first, B, out)
         return
-    y = np.empty((2, out.shape[0]))
+    y = room((2, out.shape[0]), B)
     for e in range(B.shape[2]):
         y[:] = 0.0
         for g in range(B.shape[0]):
@@ -53,7 +55,7 @@ def turned_product(A, turned, first, B, out):
 @jit
 def element_tangents(table, pairs, first, M, M_skew, K, K_skew):
     nb = table.shape[2]
-    H, out = np.empty((table.shape[1], 3 * nb)), np.empty((nb, 3 * nb))
+    H, out = room((table.shape[1], 3 * nb), M), room((nb, 3 * nb), M)
     for e in range(M.shape[2]):
         G = table[first + e]
         H[:] = 0.0

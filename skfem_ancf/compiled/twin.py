@@ -45,6 +45,8 @@ def twin(function, entry=False):
     for name in _names(function.__code__):
         if hasattr(names.get(name), "twin"):
             names[name] = twin(names[name])
+    if hasattr(function, "thin") and not entry:
+        return njit(inline="always", **OPTIONS)(named(function, names))
     return jit(named(function, names), entry)
 
 
@@ -69,15 +71,16 @@ def jit(function, entry=False):
 
 
 def compile_for(text, args):
-    """The twin of a text, compiled for arguments of these types."""
+    """The twin of a text for arguments of these types, which it does not look at again.
+
+    Numba would compare some sixty arrays at each call, which takes longer than small scenes do.
+    """
     function, types = twin(text, True), tuple(typeof(x) for x in args)
     try:
-        function.compile(types)
+        return function.compile(types)
     except (OSError, EOFError, pickle.PickleError, KeyError, ValueError) as error:
         logger.info("what was kept of compiled code cannot be used: %s", error)
-        function = njit(**OPTIONS)(function.py_func)
-        function.compile(types)
-    return function
+        return njit(**OPTIONS)(function.py_func).compile(types)
 
 
 def _names(code):

@@ -13,8 +13,8 @@ from .base import Motion
 from .course import Courses
 from .rates import rates
 from .dampers import Dampers, Rows
-from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, READY, STATE,
-                    Matrices, Rule, mass_factor, steps)
+from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, L0, LAST,
+                    READY, STATE, Matrices, Rule, mass_factor, room_for_steps, steps)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -70,6 +70,7 @@ class Integrator:
         fix(self.matrices.mass, system.mask)
         if not factorize(self.matrices.mass):
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
+        self._work = room_for_steps(system.N, system.m, system.machine.tables.stresses.size)
         self._courses = Courses(system, scheme.conserving)
         self._state, self._dt, self.substeps = np.zeros(STATE), np.nan, 0
         self.longest = int(np.clip(STORED // (4 * system.N), 1, BLOCK))
@@ -196,13 +197,14 @@ class Integrator:
             self._dt, self._state[READY] = dt, 0.0
         self._state[[BEFORE, FAILURE, DISSIPATED]] = y.before, 0.0, y.dissipated
         rows, multiplier_rows, works = np.empty((n, 4, s.N)), np.empty((n, 2, s.m)), np.empty(n)
-        now = np.array([y.u, y.v, y.acceleration, y.algorithmic])
-        multipliers = np.array([y.multipliers, y.force])
+        work, joints = self._work, self._work.m
+        work.y[:] = y.u, y.v, y.acceleration, y.algorithmic
+        joints[L0], joints[LAST] = y.multipliers, y.force
         function, equations = s.machine.of(steps)
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-                done = function(equations, self.matrices, self.rule, course, self._state, now,
-                                multipliers, rows, multiplier_rows, works)
+                done = function(equations, self.matrices, self.rule, course, self._state, work,
+                                rows, multiplier_rows, works)
         except BaseException:  # also Ctrl-C: the motion may go on from y
             self._state[:], self._state[READY] = before, 0.0
             raise

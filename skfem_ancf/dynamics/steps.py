@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..band import Band, copy, factorize, fix, multiply, solve_joined, subtract_rows
-from ..body import (body_carry, body_force, body_mean, body_stress, body_tangent, stress_size)
-from ..source import lanes, source
+from ..body import body_carry, body_force, body_mean, body_stress, body_tangent
+from ..source import borrowed, lanes, source, thin
 from ..tables import (add_curvature_force, add_load_stiffness, constraint, joint_directions,
                       mean_external_force)
 from .dampers import (Dampers, Rows, add_damping, damping_force, factorize_rows, solve_rows)
@@ -174,6 +174,20 @@ class Work(NamedTuple):
     stresses: np.ndarray
 
 
+def room_for_steps(N: int, m: int, stresses: int) -> Work:
+    """The :class:`Work` of steps.
+
+    Parameters
+    ----------
+    N, m
+        Numbers of coordinates and of equations of joints.
+    stresses
+        Number of the stresses of all beams.
+    """
+    return Work(np.zeros((4, N)), np.zeros((15, N)), np.zeros((6, m)), np.zeros((3, m, N)),
+                np.zeros((m, m)), np.zeros((3, stresses)))
+
+
 #: Displacement and velocity of the iterate; where it began; u_1 - beta h^2 w_1,
 #: v_1 - gamma h w_1, and the part of the acceleration without w_1; the acceleration held by
 #: supports; where the tangent is taken; acceleration, residual, correction, internal force; room;
@@ -186,11 +200,8 @@ L, DL, PHI, IMPULSE, L0, LAST = range(6)
 
 
 @source
-def steps(e, matrices, rule, course, state, y, multipliers, rows, multiplier_rows, works):
-    """Take steps.
-
-    ``rows`` (n, 4, N) and ``multiplier_rows`` (n, 2, m) are y and multipliers after each, ``works``
-    (n,) the work of damping up to there.
+def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
+    """Take steps from ``w.y`` and the multipliers in ``w.m`` on.
 
     Parameters
     ----------
@@ -200,21 +211,21 @@ def steps(e, matrices, rule, course, state, y, multipliers, rows, multiplier_row
         As above.
     state
         What is kept from step to step, shape (11,).
-    y
-        u, v, the acceleration and the scheme's acceleration w, shape (4, N).
-    multipliers
-        At the end of the step, and where the last step took them, shape (2, m).
+    w
+        :class:`Work`.
+    rows, multiplier_rows, works
+        Written: of each step u, v, the acceleration and the scheme's acceleration w, shape
+        (n, 4, N), the multipliers at its end and where it took them, (n, 2, m), and the work of
+        damping up to its end, (n,).
 
     Returns
     -------
     The number of steps done; one that fails is the last.
     """
-    N, m = y.shape[1], multipliers.shape[1]
-    w = Work(y, np.zeros((15, N)), np.zeros((6, m)), np.zeros((3, m, N)), np.zeros((m, m)),
-             np.zeros((3, stress_size(e.body))))
-    u, f, joined, damped = w.x[U], w.x[FORCE], m > 0, matrices.dampers.active > 0
-    copy(multipliers[0], w.m[L0])
-    copy(multipliers[1], w.m[LAST])
+    e, matrices, course, state, w = (borrowed(e), borrowed(matrices), borrowed(course),
+                                     borrowed(state), borrowed(w))
+    m, y, u, f = w.m.shape[1], w.y, w.x[U], w.x[FORCE]
+    joined, damped = m > 0, matrices.dampers.active > 0
     power = _power(e, matrices, y[0], y[1], w) if damped and rule.conserving == 0 else 0.0
     for n in range(rows.shape[0]):
         s = _step(e.joints, rule, course, n)
@@ -270,7 +281,7 @@ def steps(e, matrices, rule, course, state, y, multipliers, rows, multiplier_row
     return rows.shape[0]
 
 
-@source
+@thin
 def _judge(state, wanted, rough):
     """What the size of a correction tells: of factors that are kept as long as it contracts."""
     size, before = state[SIZE], state[LAST_SIZE]
@@ -312,7 +323,7 @@ def _row(x, n):
     return x[n if x.shape[0] > 1 else 0]
 
 
-@source
+@thin
 def _step(joints, rule, course, n):
     """The :class:`Step` number n."""
     c, g = course.joints.c, course.joints.g
@@ -323,7 +334,7 @@ def _step(joints, rule, course, n):
                 0.5 if rule.conserving > 0 else 1.0, constant)
 
 
-@source
+@thin
 def _begin(free, M, rule, s, w, state):
     """What does not depend on u_1, and where its iteration begins: by the acceleration at 0.
 
@@ -398,7 +409,7 @@ def _energy(M, v, room):
 # its iteration
 
 
-@source
+@thin
 def _tangent(e, matrices, rule, s, w):
     """The iteration matrix, with the stresses at the begin of the step.
 
@@ -421,7 +432,7 @@ def _tangent(e, matrices, rule, s, w):
         A[i] = s.mass_factor * M[i] + s.stiffness_factor * A[i]
 
 
-@source
+@thin
 def _factorize(free, matrices, state):
     """Factors of the iteration matrix; False if it has none."""
     fix(matrices.A, free)
@@ -434,7 +445,7 @@ def _factorize(free, matrices, state):
     return True
 
 
-@source
+@thin
 def _resist(e, matrices, rule, s, w):
     """Add the damping force of the iterate to the internal one."""
     u, u0, v, pace, d, f = w.x[U], w.y[0], w.x[V], w.x[PACE], w.x[DAMPING], w.x[FORCE]
@@ -481,7 +492,7 @@ def _directions(joints, rule, s, w):
     joint_directions(joints, s.joints.g[0], s.t, w.x[U], w.J[1])
 
 
-@source
+@thin
 def _residual(loads, free, M, rule, s, w):
     """R = Q - f - M a - J^T lambda."""
     u, base, rest, held = w.x[U], w.x[BASE], w.x[REST], w.x[HELD]
@@ -495,7 +506,7 @@ def _residual(loads, free, M, rule, s, w):
     subtract_rows(w.J[0], w.m[L], R)
 
 
-@source
+@thin
 def _add_impulses(joints, s, w):
     """R -= (impulse . Phi'') (v_0 + v_1) / 4: eq. of Gear, Leimkuhler and Gupta (1985)."""
     v0, v, room, share, impulse = w.y[1], w.x[V], w.x[ROOM], w.m[PHI], w.m[IMPULSE]
@@ -506,7 +517,7 @@ def _add_impulses(joints, s, w):
     add_curvature_force(joints, s.acting, w.x[MIDDLE], share, room, w.x[RESIDUAL])
 
 
-@source
+@thin
 def _correct(joints, free, matrices, s, w, state, anew):
     """Correct u and the multipliers; FAILED if these are not determined."""
     u, R, du, room = w.x[U], w.x[RESIDUAL], w.x[DU], w.x[ROOM]
@@ -545,7 +556,7 @@ def _correct(joints, free, matrices, s, w, state, anew):
 # its end
 
 
-@source
+@thin
 def _accelerations(free, rule, s, w, state):
     """w_1 (in place of the correction) and a_1, and the multipliers at the end of the step."""
     u, v, base, rest, v0 = w.x[U], w.x[V], w.x[BASE], w.x[REST], w.y[1]
@@ -568,7 +579,7 @@ def _accelerations(free, rule, s, w, state):
             a1[i] = (s.mass_factor * (u[i] - base[i]) + rest[i]) * free[i] + given[i]
 
 
-@source
+@thin
 def _close_acceleration(joints, free, mass, rule, s, w, state):
     """Change accelerations and multipliers so that they meet the joints' second rate too."""
     a1, w1, l, dl, shared = w.x[ACCELERATION], w.x[DU], w.m[L], w.m[DL], w.m[PHI]
@@ -586,7 +597,7 @@ def _close_acceleration(joints, free, mass, rule, s, w, state):
     return GO_ON
 
 
-@source
+@thin
 def _finish(free, M, s, w, state):
     """The end of the step becomes the begin of the next."""
     u, v, a1, w1, given = w.x[U], w.x[V], w.x[ACCELERATION], w.x[DU], s.supports[2]

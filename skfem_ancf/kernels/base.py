@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..source import F2, F3, I1, I2, column, lanes, primitive, source
+from ..source import F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
 from ..types import Array
 
 if TYPE_CHECKING:
@@ -33,6 +33,25 @@ MATRICES = {"table", "constant"}
 BY_ELEMENT = {"frame", "weights", "moduli", "length0", "kappa0"}
 #: Fields with numbers of elements in a table, and the table.
 PLACES = {"place": "weights", "frame_place": "frame"}
+
+
+class Destination(NamedTuple):
+    """Entry (i, j), i >= j, of a tangent is added at ``flat[(start + j) * ld + i - j]``."""
+
+    flat: np.ndarray
+    ld: int
+    start: int
+
+
+@source
+def nowhere(x):
+    """The Destination of no tangent."""
+    return Destination(x, np.int64(0), np.int64(0))
+
+
+def no_stresses(pack: Any) -> Array:
+    """The stresses of no component, shape (0, points, elements)."""
+    return np.empty((0, len(pack.weights), pack.start.size))
 
 
 @primitive("primitives")
@@ -67,7 +86,7 @@ def turned_product(A, turned, first, B, out):
 def load(start, span, first, u, U):
     """The coordinates (nb, 2, elements) of the elements from ``first`` on."""
     at = start[first:first + U.shape[2]]
-    coordinates = U.reshape(span.size, at.size)
+    coordinates = shaped(U, (span.size, at.size))
     for k in lanes(span.size):
         for e in lanes(at.size):
             coordinates[k, e] = u[column(span[k]) + at[e]]
@@ -77,12 +96,12 @@ def load(start, span, first, u, U):
 def add_force(table, transposed, constant, start, span, first, T, U, f):
     """Add G^T T to f, and C U where a stabilisation is."""
     nb, size = U.shape[0], U.shape[2]
-    F, at = np.empty(U.shape, U.dtype), start[first:first + size]
+    F, at = room(U.shape, U), start[first:first + size]
     turned_product(table, transposed, first, T, F)
-    force = F.reshape(2 * nb, size)
+    force = shaped(F, (2 * nb, size))
     if constant.shape[0] > 0:
-        held = np.empty((2 * nb, 1, size), U.dtype)
-        product(constant, first, U.reshape(2 * nb, 1, size), held)
+        held = room((2 * nb, 1, size), U)
+        product(constant, first, shaped(U, (2 * nb, 1, size)), held)
         for k in lanes(2 * nb):
             for e in lanes(size):
                 force[k, e] += held[k, 0, e]
@@ -184,18 +203,18 @@ def element_tangents(table, pairs, first, M, M_skew, K, K_skew):
 
 
 @source
-def add_tangent(table, pairs, start, first, M, M_skew, flat, ld, row):
+def add_tangent(table, pairs, start, first, M, M_skew, to):
     """Add the tangents of a block of elements to a band matrix, from the factors of its pairs."""
     size = M.shape[2]
-    K = np.empty((pairs.lower.shape[1], 3, size))
-    K_skew = np.empty((pairs.strictly.shape[1], 1, size))
+    K = room((pairs.lower.shape[1], 3, size), M)
+    K_skew = room((pairs.strictly.shape[1], 1, size), M)
     if pairs.symmetric.shape[0] == 1:
         product(pairs.symmetric, first, M, K)
         product(pairs.skew, first, M_skew, K_skew)
     else:
         element_tangents(table, pairs, first, M, M_skew, K, K_skew)
-    rows, skew, where = K.reshape(3 * len(K), size), K_skew.reshape(len(K_skew), size), np.empty(
-        size, np.int64)
+    rows, skew = shaped(K, (3 * len(K), size)), shaped(K_skew, (len(K_skew), size))
+    where = room(size, start)
     if pairs.held.shape[1] > 0:
         own = pairs.held_place[first:first + size]
         for k in lanes(len(rows)):
@@ -206,17 +225,18 @@ def add_tangent(table, pairs, start, first, M, M_skew, flat, ld, row):
                 skew[k, e] += pairs.held_skew[k, own[e]]
     at = start[first:first + size]
     for e in lanes(size):
-        where[e] = (row + at[e]) * ld
+        where[e] = (to.start + at[e]) * to.ld
     for part in range(4):  # elements have no left node in common
         for n in lanes(pairs.ends[part], pairs.ends[part + 1]):
-            to, k = pairs.entries[0, n] + pairs.entries[1, n] * ld, pairs.entries[2, n]
+            below, k = pairs.entries[0, n] + pairs.entries[1, n] * to.ld, pairs.entries[2, n]
             m, x, y = pairs.entries[3, n], pairs.signs[0, n], pairs.signs[1, n]
             if part < 2:
                 for e in lanes(size):
-                    flat[column(to) + where[e]] += column(x) * rows[k, e]
+                    to.flat[column(below) + where[e]] += column(x) * rows[k, e]
             else:
                 for e in lanes(size):
-                    flat[column(to) + where[e]] += column(x) * rows[k, e] + column(y) * skew[m, e]
+                    to.flat[column(below) + where[e]] += (column(x) * rows[k, e]
+                                                          + column(y) * skew[m, e])
 
 
 @source

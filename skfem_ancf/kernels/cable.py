@@ -14,11 +14,11 @@ import numpy as np
 
 from ..errors import InputError
 from ..quadrature import gauss
-from ..source import F1, F2, F3, I1, lanes, source
+from ..source import F1, F2, F3, I1, lanes, room, source, thin
 from ..types import Array
-from .base import (CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables, Texts,
-                   add_force, add_held_energy, add_tangent, block, copy_stress, load, packed,
-                   pair_tables, product)
+from .base import (CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, Chain, Destination, PairTables,
+                   Texts, add_force, add_held_energy, add_tangent, block, copy_stress, load,
+                   no_stresses, nowhere, packed, pair_tables, product)
 
 if TYPE_CHECKING:
     from ..elements.cable import ElementBeamCable
@@ -158,60 +158,66 @@ def cable_factors(stiffness, weights, r, square, kappa, stress, M, skew):
             Mbb[p, 2, e] = -y * a0 * a1
 
 
-@source
-def cable_evaluate(pack, what, u, v, f, given, use_given, out, flat, ld, start):
-    """As :func:`~skfem_ancf.kernels.section.section_evaluate`; v is u at the end for the mean."""
-    pairs, n, nr, nb = pack.pairs, len(pack.weights), pack.table.shape[1], pack.table.shape[2]
-    most, states = block(pairs.pairs.shape[1]), 2 if what == MEAN else 1
+@thin
+def cable_evaluate(pack, what, u, v, f, given, use_given, out, to):
+    """As :func:`~skfem_ancf.kernels.section.section_evaluate`."""
+    most = block(pack.pairs.pairs.shape[1])
     for first in range(0, pack.start.size, most):
-        size = min(most, pack.start.size - first)
-        U, d, T = (np.empty((2, nb, 2, size), u.dtype), np.empty((2, nr, 2, size), u.dtype),
-                   np.empty((nr, 2, size), u.dtype))
-        r, square = np.empty((states, nr, 2, size), u.dtype), np.empty((states, n, size), u.dtype)
-        kappa, strain = square.copy(), np.empty((states, 2, n, size), u.dtype)
-        weights, S = np.empty((n, size)), np.empty((2, n, size), u.dtype)
-        for k in range(2 if what == MEAN or what == CARRY or what == VISCOUS else 1):
-            load(pack.start, pack.span, first, v if k else u, U[k])
-            product(pack.table, first, U[k], d[k])
-            if k < states:
-                cable_strain(pack, first, d[k], r[k], weights, square[k], kappa[k], strain[k])
-        if use_given or what == CARRY:
-            copy_stress(given[:, :, first:first + size], S)
-        if what == CARRY:
-            cable_changes(pack.stiffness, r[0], d[1], square[0], kappa[0], S, S)
-            copy_stress(S, out[:, :, first:first + size])
-        elif what == VISCOUS:  # rates in place of strains
-            S[:] = 0.0
-            cable_changes(np.ones(2), r[0], d[1], square[0], kappa[0], S, strain[0])
-        elif what == TANGENT or what == STRESS:
-            resultants = out[:, :, first:first + size]
-            for c in range(2):
-                for p in lanes(n):
-                    for e in lanes(size):
-                        resultants[c, p, e] = pack.stiffness[c] * strain[0, c, p, e]
-                        if not use_given:
-                            S[c, p, e] = pack.stiffness[c] * strain[0, c, p, e]
-        if what == STRESS or what == CARRY:
-            continue
-        if what == MEAN:
-            for k in lanes(nb):
-                for i in lanes(2):
-                    for e in lanes(size):
-                        U[0, k, i, e] = 0.5 * (U[0, k, i, e] + U[1, k, i, e])
-        cable_rows(pack.stiffness, weights, r, square, kappa, strain, T)
-        add_force(pack.table, pack.transposed, pack.constant, pack.start, pack.span, first, T, U[0],
-                  f)
-        if what == TANGENT:
-            M, skew = np.empty((3 * n, 3, size)), np.zeros((n + 1, 1, size))
-            cable_factors(pack.stiffness, weights, r[0], square[0], kappa[0], S, M, skew)
-            add_tangent(pack.table, pairs, pack.start, first, M, skew, flat, ld, start)
+        last = min(first + most, pack.start.size)
+        _evaluate(pack, what, first, u, v, f, given[:, :, first:last], use_given,
+                  out[:, :, first:last], to)
+
+
+@source
+def _evaluate(pack, what, first, u, v, f, given, use_given, out, to):
+    """The same for the elements from ``first`` on, whose stresses are given."""
+    n, nr, nb, size = len(pack.weights), pack.table.shape[1], pack.table.shape[2], out.shape[2]
+    states = 2 if what == MEAN else 1
+    U, d, T = room((2, nb, 2, size), u), room((2, nr, 2, size), u), room((nr, 2, size), u)
+    r, square, kappa = room((2, nr, 2, size), u), room((2, n, size), u), room((2, n, size), u)
+    strain, S = room((2, 2, n, size), u), room((2, n, size), u)
+    weights, one = room((n, size), pack.weights), room(2, pack.weights)
+    for k in range(2 if what == MEAN or what == CARRY or what == VISCOUS else 1):
+        load(pack.start, pack.span, first, v if k else u, U[k])
+        product(pack.table, first, U[k], d[k])
+        if k < states:
+            cable_strain(pack, first, d[k], r[k], weights, square[k], kappa[k], strain[k])
+    if what == CARRY:
+        copy_stress(given, S)
+        cable_changes(pack.stiffness, r[0], d[1], square[0], kappa[0], S, strain[0])
+        copy_stress(strain[0], out)
+        return
+    if what == VISCOUS:  # rates in place of strains
+        S[:], one[:] = 0.0, 1.0
+        cable_changes(one, r[0], d[1], square[0], kappa[0], S, strain[0])
+    if what == TANGENT or what == STRESS:
+        for c in range(2):
+            for p in lanes(n):
+                for e in lanes(size):
+                    out[c, p, e] = pack.stiffness[c] * strain[0, c, p, e]
+    if what == STRESS:
+        return
+    if what == MEAN:
+        for k in lanes(nb):
+            for i in lanes(2):
+                for e in lanes(size):
+                    U[0, k, i, e] = 0.5 * (U[0, k, i, e] + U[1, k, i, e])
+    cable_rows(pack.stiffness, weights, r[:states], square[:states], kappa[:states],
+               strain[:states], T)
+    add_force(pack.table, pack.transposed, pack.constant, pack.start, pack.span, first, T, U[0], f)
+    if what == TANGENT:
+        M, skew = room((3 * n, 3, size), weights), room((n + 1, 1, size), weights)
+        copy_stress(given if use_given else out, S)
+        skew[n:] = 0.0
+        cable_factors(pack.stiffness, weights, r[0], square[0], kappa[0], S, M, skew)
+        add_tangent(pack.table, pack.pairs, pack.start, first, M, skew, to)
 
 
 @source
 def cable_force(pack, u, f):
     """Add the internal force of the displacement u (N,) to f."""
-    none, zero = np.empty((1, 1, 1)), np.int64(0)
-    cable_evaluate(pack, np.int64(FORCE), u, u, f, none, zero, none, none[0, 0], zero, zero)
+    none = no_stresses(pack)
+    cable_evaluate(pack, np.int64(FORCE), u, u, f, none, np.int64(0), none, nowhere(f))
 
 
 @source
@@ -220,29 +226,27 @@ def cable_tangent(pack, u, f, carried, use_carried, stresses, flat, ld, start):
 
     The stresses are normal force and moment, shape (2, points, elements).
     """
-    cable_evaluate(pack, np.int64(TANGENT), u, u, f, carried, np.int64(use_carried), stresses, flat,
-                   ld, start)
+    cable_evaluate(pack, np.int64(TANGENT), u, u, f, carried, np.int64(use_carried), stresses,
+                   Destination(flat, ld, start))
 
 
 @source
 def cable_carry(pack, u, du, before, out):
     """The resultants, linearised, at u + du, from those ``before``: out (2, points, elements)."""
-    none, zero = np.empty((1, 1, 1)), np.int64(0)
-    cable_evaluate(pack, np.int64(CARRY), u, du, u, before, zero + 1, out, none[0, 0], zero, zero)
+    cable_evaluate(pack, np.int64(CARRY), u, du, u, before, np.int64(0), out, nowhere(u))
 
 
 @source
 def cable_stress(pack, u, out):
     """Normal force and moment at u, (2, points, elements)."""
-    none, zero = np.empty((1, 1, 1)), np.int64(0)
-    cable_evaluate(pack, np.int64(STRESS), u, u, u, none, zero, out, none[0, 0], zero, zero)
+    cable_evaluate(pack, np.int64(STRESS), u, u, u, out, np.int64(0), out, nowhere(u))
 
 
 @source
 def cable_mean(pack, u0, u1, f):
     """Add a force whose work from u0 to u1 is the change of the energy."""
-    none, zero = np.empty((1, 1, 1)), np.int64(0)
-    cable_evaluate(pack, np.int64(MEAN), u0, u1, f, none, zero, none, none[0, 0], zero, zero)
+    none = no_stresses(pack)
+    cable_evaluate(pack, np.int64(MEAN), u0, u1, f, none, np.int64(0), none, nowhere(f))
 
 
 def cable_energy(pack: CablePack, u: Array, out: Array) -> None:

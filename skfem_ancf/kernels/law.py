@@ -9,7 +9,7 @@ import numpy as np
 from ..materials import LinearLaw, NeoHookean
 from ..materials.base import ShearCorrected
 from ..materials.neo_hookean import neo_hookean, neo_hookean_constants
-from ..source import F1, F2, lanes, primitive, source
+from ..source import F1, F2, lanes, primitive, room, source
 from .base import packed
 
 #: Kinds of laws: constant moduli, a law with texts, and any other.
@@ -79,7 +79,7 @@ def law_evaluate(law, strain, out):
                         W = 0.5 * strain[c, p, e] * S
                         out[0, p, e] = W + (out[0, p, e] if c else 0.0)
         return
-    x = np.empty(strain.shape, strain.dtype)
+    x = room(strain.shape, strain)
     for c in range(3):  # the strain of the law: with its shear corrected
         y = law.scale[c]
         for p in lanes(n):
@@ -113,7 +113,7 @@ def conserve(law, middle, change, S):
         The stress of the mean; changed.
     """
     n, size = S.shape[1], S.shape[2]
-    x, W = np.empty((3, 2 * n, size), S.dtype), np.empty((1, 2 * n, size), S.dtype)
+    x, W = room((3, 2 * n, size), S), room((1, 2 * n, size), S)
     before, after, old, new = x[:, :n], x[:, n:], W[0, :n], W[0, n:]
     for c in range(3):
         for p in lanes(n):

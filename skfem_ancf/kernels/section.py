@@ -14,11 +14,11 @@ from scipy import sparse
 
 from ..materials import LinearLaw
 from ..quadrature import tensor
-from ..source import F1, F2, F3, I1, I2, column, lanes, source
+from ..source import F1, F2, F3, I1, I2, column, lanes, room, shaped, source, thin
 from ..types import Array
-from .base import (CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables, Texts,
-                   add_force, add_held_energy, add_tangent, apart, block, copy_stress, in_rounds,
-                   load, packed, pair_tables, product)
+from .base import (CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, Chain, Destination, PairTables,
+                   Texts, add_force, add_held_energy, add_tangent, apart, block, copy_stress,
+                   in_rounds, load, no_stresses, nowhere, packed, pair_tables, product)
 from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
 
 if TYPE_CHECKING:
@@ -117,12 +117,18 @@ def pair_strains(rows, factors, r, d, x, samples):
 
 
 @source
+def _of_component(ends, c, samples, n):
+    """The samples of a component, those along the axis first, a view."""
+    part = samples[ends[c]:ends[c + 1]]
+    return shaped(part, (part.size // n, n))
+
+
+@source
 def to_points(along, ends, samples, points):
     """Samples of the strain, interpolated to the points of integration."""
     n = points[0].size // along.shape[1]
     for c in range(3):
-        y = samples[ends[c]:ends[c + 1]].reshape(samples[ends[c]:ends[c + 1]].size // n, n)
-        x = points[c].reshape(along.shape[1], n)
+        x, y = shaped(points[c], (along.shape[1], n)), _of_component(ends, c, samples, n)
         for i in range(len(x)):
             for e in lanes(n):
                 x[i, e] = 0.0
@@ -136,10 +142,9 @@ def to_points(along, ends, samples, points):
 def to_samples(along, ends, w, points, samples):
     """The transpose of to_points, with the weights of the points."""
     n = w.size // along.shape[1]
-    weights = w.reshape(along.shape[1], n)
+    weights = shaped(w, (along.shape[1], n))
     for c in range(3):
-        y = samples[ends[c]:ends[c + 1]].reshape(samples[ends[c]:ends[c + 1]].size // n, n)
-        x = points[c].reshape(along.shape[1], n)
+        x, y = shaped(points[c], (along.shape[1], n)), _of_component(ends, c, samples, n)
         for k in range(len(y)):
             for e in lanes(n):
                 y[k, e] = 0.0
@@ -219,8 +224,8 @@ def pair_factors(rows, samples, terms, rounds, moduli, r, M, M_skew):
                 M_skew[q, 0, e] += 0.5 * (x - y)
 
 
-@source
-def section_evaluate(pack, what, u, v, f, given, use_given, out, flat, ld, start):
+@thin
+def section_evaluate(pack, what, u, v, f, given, use_given, out, to):
     """Everything that depends on the strains, block by block.
 
     Parameters
@@ -231,72 +236,88 @@ def section_evaluate(pack, what, u, v, f, given, use_given, out, flat, ld, start
         ``FORCE``, ``TANGENT``, ``MEAN``, ``STRESS``, ``CARRY``, or ``VISCOUS``: the force of
         stresses that a linear law has of the rate of the strain.
     u, v
-        Displacement, and for the mean and for carried stresses its change, for viscous ones its
-        rate, shape (N,).
+        Displacement, and at the end for the mean, its change for carried stresses, its rate for
+        viscous ones, shape (N,).
     f
         Force, added to.
     given, use_given
         Stresses (3, points, elements): those before, or carried ones for the tangent.
     out
         Stresses, written.
-    flat, ld, start
-        Entry (i, j), i >= j, of the tangent is added at ``flat[(start + j) * ld + i - j]``.
+    to
+        The :class:`~skfem_ancf.kernels.base.Destination` of the tangent, added to.
     """
-    table, rows, law, pairs = pack.table, pack.rows, pack.law, pack.pairs
-    n, nr, nb, most = (len(pack.weights), table.shape[1], table.shape[2],
-                       block(pairs.pairs.shape[1]))
+    most = block(pack.pairs.pairs.shape[1])
+    for first in range(0, pack.start.size, most):
+        last = min(first + most, pack.start.size)
+        _evaluate(pack, what, first, u, v, f, given[:, :, first:last], use_given,
+                  out[:, :, first:last], to)
+
+
+@source
+def _evaluate(pack, what, first, u, v, f, given, use_given, out, to):
+    """The same for the elements from ``first`` on, whose stresses are given."""
+    table, rows, law = pack.table, pack.rows, pack.law
+    n, nr, nb, size = len(pack.weights), table.shape[1], table.shape[2], out.shape[2]
     changes = what == MEAN or what == CARRY or what == VISCOUS
     shift = 0.5 if what == MEAN else 0.0
-    for first in range(0, pack.start.size, most):
-        size = min(most, pack.start.size - first)
-        at, last = pack.place[first:first + size], first + size
-        U, vectors = np.empty((2, nb, 2, size), u.dtype), np.empty((4, nr, 2, size), u.dtype)
-        x, r, d, T = vectors[0], vectors[1], vectors[2], vectors[3]
-        strains, w = np.empty((3, 3, n, size), u.dtype), np.empty((n, size))
-        strain, change, S = strains[0], strains[1], strains[2]
-        samples = np.empty((rows.shape[1], size), u.dtype)
-        set_tables(pack.frame, pack.weights, at, x, w)
-        for part in range(1 + changes):  # the strain is quadratic: its change is a derivative
-            load(pack.start, pack.span, first, v if part else u, U[part])
-            product(table, first, U[part], d)
-            add_scaled(shift if part else 1.0, d, r if part else x, r)
-            pair_strains(rows, pack.factors, r, d, r if part else x, samples)
-            to_points(pack.along, pack.ends, samples, strains[part])
-        if what == MEAN:
-            add_scaled(0.5, change, strain, strain)
-            add_scaled(0.5, U[1], U[0], U[0])
-        D = np.empty((9, n, size if what == CARRY or what == TANGENT and law.kind else 0))
-        for k in range(1 if what == CARRY else 0, 2 if D.size > 0 else 1):
-            law_evaluate(law, change if what == VISCOUS else strain, D if k else S)
-        if what == CARRY:
-            tangent_stress(D, change, S)
-            add_scaled(1.0, given[:, :, first:last], S, S)
-        elif what == MEAN and law.kind != LINEAR:
-            conserve(law, strain, change, S)
-        if what == TANGENT or what == STRESS or what == CARRY:
-            copy_stress(S, out[:, :, first:last])
-        if what == STRESS or what == CARRY:
-            continue
-        to_samples(pack.along, pack.ends, w, S, samples)
-        row_forces(rows, pack.normal, r, samples, T)
-        add_force(table, pack.transposed, pack.constant, pack.start, pack.span, first, T, U[0], f)
-        if what == TANGENT:
-            if use_given:
-                copy_stress(given[:, :, first:last], S)
-                to_samples(pack.along, pack.ends, w, S, samples)
-            M = np.zeros((pairs.pairs.shape[1], 3, size))
-            M_skew = np.zeros((pairs.skew.shape[2], 1, size))
-            moduli = np.empty((pack.terms.shape[1], size))
-            term_moduli(pack, at, D, w, moduli)
-            pair_factors(rows, samples, pack.terms, pack.rounds, moduli, r, M, M_skew)
-            add_tangent(table, pairs, pack.start, first, M, M_skew, flat, ld, start)
+    at = pack.place[first:first + size]
+    U, vectors = room((2, nb, 2, size), u), room((4, nr, 2, size), u)
+    x, r, d, T = vectors[0], vectors[1], vectors[2], vectors[3]
+    strains, w = room((3, 3, n, size), u), room((n, size), pack.weights)
+    strain, change, S = strains[0], strains[1], strains[2]
+    samples = room((rows.shape[1], size), u)
+    set_tables(pack.frame, pack.weights, at, x, w)
+    for part in range(1 + changes):  # the strain is quadratic: its change is a derivative
+        load(pack.start, pack.span, first, v if part else u, U[part])
+        if part and what == MEAN:
+            add_scaled(-1.0, U[0], U[1], U[1])
+        product(table, first, U[part], d)
+        add_scaled(shift if part else 1.0, d, r if part else x, r)
+        pair_strains(rows, pack.factors, r, d, r if part else x, samples)
+        to_points(pack.along, pack.ends, samples, strains[part])
+    if what == MEAN:
+        add_scaled(0.5, change, strain, strain)
+        add_scaled(0.5, U[1], U[0], U[0])
+    D = room((9, n, size if what == CARRY or what == TANGENT and law.kind else 0), w)
+    for k in range(1 if what == CARRY else 0, 2 if D.size > 0 else 1):
+        law_evaluate(law, change if what == VISCOUS else strain, D if k else S)
+    if what == CARRY:
+        tangent_stress(D, change, S)
+        add_scaled(1.0, given, S, S)
+    elif what == MEAN and law.kind != LINEAR:
+        conserve(law, strain, change, S)
+    if what == TANGENT or what == STRESS or what == CARRY:
+        copy_stress(S, out)
+    if what == STRESS or what == CARRY:
+        return
+    to_samples(pack.along, pack.ends, w, S, samples)
+    row_forces(rows, pack.normal, r, samples, T)
+    add_force(table, pack.transposed, pack.constant, pack.start, pack.span, first, T, U[0], f)
+    if what == TANGENT:
+        if use_given:
+            copy_stress(given, S)
+            to_samples(pack.along, pack.ends, w, S, samples)
+        _add_tangent(pack, first, at, samples, D, w, r, to)
+
+
+@thin
+def _add_tangent(pack, first, at, samples, D, w, r, to):
+    """The tangent of stresses at the samples and of moduli at the points."""
+    pairs, size = pack.pairs, r.shape[2]
+    M, M_skew = room((pairs.pairs.shape[1], 3, size), r), room((pairs.skew.shape[2], 1, size), r)
+    moduli = room((pack.terms.shape[1], size), r)
+    M[:], M_skew[:] = 0.0, 0.0
+    term_moduli(pack, at, D, w, moduli)
+    pair_factors(pack.rows, samples, pack.terms, pack.rounds, moduli, r, M, M_skew)
+    add_tangent(pack.table, pairs, pack.start, first, M, M_skew, to)
 
 
 @source
 def section_force(pack, u, f):
     """Add the internal force of the displacement u (N,) to f."""
-    none, zero = np.empty((1, 1, 1)), np.int64(0)
-    section_evaluate(pack, np.int64(FORCE), u, u, f, none, zero, none, none[0, 0], zero, zero)
+    none = no_stresses(pack)
+    section_evaluate(pack, np.int64(FORCE), u, u, f, none, np.int64(0), none, nowhere(f))
 
 
 @source
@@ -317,28 +338,26 @@ def section_tangent(pack, u, f, carried, use_carried, stresses, flat, ld, start)
         Entry (i, j), i >= j, is added at ``flat[(start + j) * ld + i - j]``.
     """
     section_evaluate(pack, np.int64(TANGENT), u, u, f, carried, np.int64(use_carried), stresses,
-                     flat, ld, start)
+                     Destination(flat, ld, start))
 
 
 @source
 def section_carry(pack, u, du, before, out):
     """The stresses, linearised, at u + du, from those ``before``: out (3, points, elements)."""
-    none, zero = np.empty((1, 1, 1)), np.int64(0)
-    section_evaluate(pack, np.int64(CARRY), u, du, u, before, zero, out, none[0, 0], zero, zero)
+    section_evaluate(pack, np.int64(CARRY), u, du, u, before, np.int64(0), out, nowhere(u))
 
 
 @source
 def section_stress(pack, u, out):
     """The stresses at u, (3, points, elements)."""
-    none, zero = np.empty((1, 1, 1)), np.int64(0)
-    section_evaluate(pack, np.int64(STRESS), u, u, u, none, zero, out, none[0, 0], zero, zero)
+    section_evaluate(pack, np.int64(STRESS), u, u, u, out, np.int64(0), out, nowhere(u))
 
 
 @source
 def section_mean(pack, u0, u1, f):
     """Add the force B(middle)^T S whose work from u0 to u1 is the change of the energy."""
-    none, zero = np.empty((1, 1, 1)), np.int64(0)
-    section_evaluate(pack, np.int64(MEAN), u0, u1 - u0, f, none, zero, none, none[0, 0], zero, zero)
+    none = no_stresses(pack)
+    section_evaluate(pack, np.int64(MEAN), u0, u1, f, none, np.int64(0), none, nowhere(f))
 
 
 def section_energy(pack: SectionPack, u: Array, out: Array) -> None:

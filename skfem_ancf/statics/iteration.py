@@ -1,16 +1,21 @@
 """The iteration to equilibrium: Newton's method, mixed or not, as a text."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..band import clear, copy, diagonal, factorize, fix, multiply, solve, weighted
 from ..body import body_carry, body_force, body_tangent
-from ..border import add_curvature, factorize_bordered, new_factors, solve_bordered
+from ..border import (Factors, add_curvature, factorize_bordered, new_factors, solve_bordered)
 from ..own import own_solve
-from ..source import lanes, source
+from ..source import borrowed, lanes, source, thin
 from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
                       external_force, joint_directions)
+
+if TYPE_CHECKING:
+    from ..equations import Equations
 
 #: How an iteration ends.
 CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
@@ -87,17 +92,34 @@ class Work(NamedTuple):
     push: np.ndarray
     phi: np.ndarray
     dm: np.ndarray
+    factors: Factors
+
+
+def room_for_iterations(e: Equations, m: int) -> Work:
+    """The :class:`Work` of a scene.
+
+    Parameters
+    ----------
+    e
+        :class:`~skfem_ancf.equations.Equations`.
+    m
+        Number of multipliers.
+    """
+    N = e.free.size
+    R, du, scale, load, push = np.empty((5, N))
+    return Work(R, du, scale, load, push, np.zeros(m), np.zeros(m),
+                new_factors(e.border, e.K, m, N))
 
 
 @source
-def equilibrium(e, target, rules, x, record):
+def equilibrium(e, target, rules, x, w, record):
     """Iterate to equilibrium from x, in place.
 
     Parameters
     ----------
     e
         :class:`~skfem_ancf.equations.Equations`.
-    target, rules, x
+    target, rules, x, w
         As above.
     record
         Takes the residuals of each iteration, shape (iterations + 1, 2).
@@ -107,10 +129,9 @@ def equilibrium(e, target, rules, x, record):
     status, number
         How it ends, and the number of linear systems solved.
     """
+    e, target, x, w = borrowed(e), borrowed(target), borrowed(x), borrowed(w)
     N, m = x.u.size, x.multipliers.size
-    w = Work(np.empty(N), np.empty(N), np.empty(N), np.empty(N), np.empty(N), np.zeros(m),
-             np.zeros(m))
-    factors = new_factors(e.border, e.K, m, N)
+    clear(w.dm)
     work = before = reference = np.inf
     quiet, moving = False, np.any(target.prescribed != 0.0)
     for k in range(rules.iterations + 1):
@@ -139,7 +160,7 @@ def equilibrium(e, target, rules, x, record):
             break
         if last:
             _tangent(e, target, rules, x, w, k)
-        before, work = work, _correction(e, target, rules, x, w, factors, moving)
+        before, work = work, _correction(e, target, rules, x, w, moving)
         if not (0.0 <= work < 1e300):
             return SINGULAR, k
         moving = False
@@ -164,7 +185,7 @@ def _tangent(e, target, rules, x, w, k):
         w.scale[i] = 1.0 / np.abs(w.scale[i])
 
 
-@source
+@thin
 def _residual(e, target, x, w):
     """The residual at free coordinates; returns how far joints are open."""
     external_force(e.loads, target.factors, np.nan, target.scale, x.u, w.load)
@@ -179,8 +200,8 @@ def _residual(e, target, x, w):
     return opening
 
 
-@source
-def _correction(e, target, rules, x, w, f, moving):
+@thin
+def _correction(e, target, rules, x, w, moving):
     """The correction into w; returns the root of its work, negative if there is none."""
     N, m = x.u.size, w.phi.size
     clear(w.push)
@@ -195,7 +216,7 @@ def _correction(e, target, rules, x, w, f, moving):
     for k in lanes(m):
         w.phi[k] = -w.phi[k]
     fix(e.K, e.free)
-    if not _solved(e, target, rules, x, w, f):
+    if not _solved(e, target, rules, x, w):
         return -1.0
     work = np.sqrt(abs(np.dot(w.R, w.du)) + abs(np.dot(w.phi, w.dm)))
     for i in lanes(N):
@@ -203,8 +224,8 @@ def _correction(e, target, rules, x, w, f, moving):
     return work
 
 
-@source
-def _solved(e, target, rules, x, w, f):
+@thin
+def _solved(e, target, rules, x, w):
     """Solve for the correction; False if the matrix is singular."""
     if rules.solver > 0:
         return own_solve(rules.solver, target.at, x.u, x.multipliers, w.R, w.phi, w.du, w.dm)
@@ -214,6 +235,7 @@ def _solved(e, target, rules, x, w, f):
             return False
         solve(e.K, w.du)
         return True
+    f = w.factors
     joint_directions(e.joints, target.g, target.at, x.u, f.J)
     for k in range(w.phi.size):
         row = f.J[k]

@@ -15,7 +15,7 @@ from ..own import handle_of
 from ..progress import progress_bar
 from . import stability
 from .iteration import (CONVERGED, NOT_CONVERGED, NOT_FINITE, SINGULAR, Rules, Target, Unknowns,
-                        equilibrium)
+                        equilibrium, room_for_iterations)
 
 if TYPE_CHECKING:
     from ..system import System
@@ -282,7 +282,7 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record, d
     # the residual sums the noise of all coordinates, the work that of the strains
     rules = Rules(int(method == "mixed"), max_iterations, tol, floor, floor * system.noise,
                   1e-12 * system.size, INACCURATE, 0)
-    solver = None
+    room, solver = machine.room(room_for_iterations, system.m), None
     if descent is not None:
         solver = descent
     elif tables.plain.border.wide:
@@ -294,7 +294,7 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record, d
                      tables.stresses, tables.stresses)
         residuals = np.zeros((max_iterations + 1, 2))
         run, equations = machine.of(equilibrium)
-        status, n = run(equations, target, rules, x, residuals)
+        status, n = run(equations, target, rules, x, room, residuals)
         if status != SINGULAR or solver is not None:
             break
         solver = system  # factors with exchanges of rows, or sparse ones
