@@ -24,7 +24,7 @@ logger = logging.getLogger(__name__)
 
 #: Seconds that compiling takes, about: the kernels, which all texts call, and each text; and
 #: loading what lies on disk.
-COMPILING = {"kernels": 42.0, "equilibrium": 29.0, "steps": 20.0, "evaluate": 6.0}
+COMPILING = {"kernels": 15.0, "equilibrium": 10.0, "steps": 9.0, "evaluate": 2.0}
 LOADING = 0.7
 
 
