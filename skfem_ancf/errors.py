@@ -399,27 +399,6 @@ def require_label(name: str, value: object) -> str | None:
     return value
 
 
-def require_kind(name: str, value: Any, kind: type | tuple[type, ...], hint: str = "") -> Any:
-    """Return ``value`` if it is of a class, or of one of several, or raise InputError.
-
-    Parameters
-    ----------
-    name
-        What messages call it.
-    value
-        What was given.
-    kind
-        The class, or a tuple of classes.
-    hint
-        What else to say in the message.
-    """
-    if not isinstance(value, kind):
-        kinds = kind if isinstance(kind, tuple) else (kind,)
-        raise InputError(f"{name} must be a {' or '.join(k.__name__ for k in kinds)}"
-                         f"{hint and f' ({hint})'}, got {shown(value)}")
-    return value
-
-
 def require_like(name: str, value: Any, kind: str, *attributes: str) -> Any:
     """Return ``value`` if it has what is asked of a kind of object, or raise InputError.
 

@@ -488,9 +488,6 @@ class MeshBeam(Frozen, Mesh2D):
 
     # refinement
 
-    def _uniform(self):
-        return self._adaptive(np.arange(self.nelements))
-
     def refined(self, times_or_ix: Any = 1) -> MeshBeam:
         """A finer mesh: new nodes on the curve, numbered along the axis; names are kept.
 
