@@ -488,6 +488,9 @@ class MeshBeam(Frozen, Mesh2D):
 
     # refinement
 
+    def _uniform(self):  # scikit-fem's finder of elements on surfaces calls it
+        return self._adaptive(np.arange(self.nelements))
+
     def refined(self, times_or_ix: Any = 1) -> MeshBeam:
         """A finer mesh: new nodes on the curve, numbered along the axis; names are kept.
 

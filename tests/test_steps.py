@@ -84,6 +84,64 @@ def test_same_iterations_in_numpy_and_compiled(seed, needs_compiled):
     assert np.abs(slow.u).max() > 1e-3
 
 
+def random_static_scene(seed, flag):
+    """A scene of :func:`random_scene`, and what holds both beams."""
+    rng = np.random.default_rng(1000 + seed)
+    beams = []
+    for name, origin, angle in (("arm", (0, 0), 0.0), ("forearm", (1, 0), 1.1)):
+        element = ELEMENTS[rng.integers(len(ELEMENTS))]
+        law = NeoHookean if element.order and rng.random() < 0.2 else StVenantKirchhoff
+        mesh = MeshBeam.init_line(np.linspace(0, 1, 3 + rng.integers(4)), 0.02 + 0.03 * rng.random(),
+                                  origin=origin, angle=angle)
+        beams.append(Beam(mesh, element, law(1e6, 0.3, 200.0), 0.1, name=name, compiled=flag))
+    scene = Scene(*beams).gravity((0, -9.81)).clamp("left", beam="arm")
+    joint = (None, "hinge", "weld", "line")[rng.integers(4)]
+    if joint is None or rng.random() < 0.5:
+        scene.clamp("right", beam="forearm")
+    elif joint == "hinge":
+        scene.pin("right", beam="forearm")
+    if joint in ("hinge", "weld"):
+        scene.joint(joint, **JOINTS[joint])
+    elif joint == "line":
+        scene.joint("weld", **JOINTS["weld"])
+        scene.joint("line", **JOINTS["line"])
+    if rng.random() < 0.5:
+        scene.moment("right", 2e-3, beam="arm")
+    if rng.random() < 0.4 and beams[0].element.order:
+        scene.pressure("top", 20.0, beam="arm")
+    if rng.random() < 0.4:
+        scene.add(Spring(beam="forearm"))
+    return scene, ("mixed", "newton")[rng.integers(2)]
+
+
+def counts(state):
+    """The ends of the load steps, and the iterations in each."""
+    return [(step.load, step.iterations) for step in state.steps]
+
+
+@pytest.mark.filterwarnings("ignore::skfem_ancf.ModelWarning")  # of coarse meshes
+@pytest.mark.parametrize("seed", range(16))
+def test_same_iterations_in_statics(seed, needs_compiled):
+    found = []
+    for flag in (False, True):
+        scene, method = random_static_scene(seed, flag)
+        found.append(scene.solve_static(method=method))
+    slow, fast = found
+    assert "equilibrium" in compiled.LOADED
+    assert counts(fast) == counts(slow) and slow.iterations >= 3
+    assert_allclose(fast.u, slow.u, rtol=0, atol=1e-9)
+    assert np.abs(slow.u).max() > 1e-3
+
+
+@pytest.mark.filterwarnings("ignore::skfem_ancf.ModelWarning")
+def test_the_counts_tell_other_rules():
+    """A rule that is off in one of both runs would be seen: counts follow the tolerance."""
+    seen = {tol: [counts(scene.solve_static(method=method, tol=tol)) for scene, method in
+                  (random_static_scene(seed, False) for seed in range(6))]
+            for tol in (1e-8, 1e-5)}
+    assert sum(a != b for a, b in zip(*seen.values())) >= 3
+
+
 @pytest.mark.parametrize("flag", [False, True])
 def test_a_step_that_fails_is_cut_the_same(flag):
     """A step much longer than the fast turn of a free beam: it is halved."""
