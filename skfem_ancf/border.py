@@ -110,11 +110,18 @@ def factorize_bordered(f, border, free):
 
     ``f.J`` must be zero at fixed coordinates.
     """
-    J, Z, H, S = f.J, f.Z, f.H, f.S
-    k, m, N = S.shape[0], J.shape[0], free.size
     copy(f.after.flat, f.before.flat)
     if not factorize(f.after):
         return False
+    join(f, border, free)
+    return True
+
+
+@source
+def join(f, border, free):
+    """Z, H and the scale of the multipliers, by the factors of the band."""
+    J, Z, H, S = f.J, f.Z, f.H, f.S
+    k, m, N = S.shape[0], J.shape[0], free.size
     W = np.zeros((k, N))
     for a in range(k):
         W[a, border.picked[a]] = 1.0
@@ -140,7 +147,6 @@ def factorize_bordered(f, border, free):
             H[k + a, b] = f.scale[a] * np.dot(J[a], Z[b])
     for a in range(k):
         H[a, a] += 1.0
-    return True
 
 
 @source

@@ -1,11 +1,11 @@
-"""Banded matrices of chains of elements, over LAPACK, and their borders."""
+"""Banded matrices of chains of elements, over LAPACK."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import blas, eigh, lapack, lu_solve
+from scipy.linalg import blas, eigh, lapack
 from scipy.sparse import coo_matrix, issparse
 
 from .band import Band, solve
@@ -26,8 +26,6 @@ SINGULAR = 4.0 * np.finfo(float).eps
 SMALL = 1e-7
 #: Growth of the entries of a matrix of unit diagonal at which a pivot block is made larger.
 GROWTH = 1e2
-#: Columns of a border that are solved for together where only the inertia is wanted.
-COLUMNS = 64
 
 
 def dense(A: Any) -> Array:
@@ -230,6 +228,22 @@ class BandMatrix:
         return lapack.dgbtrs(self._factor[1], self.bandwidth, self.bandwidth, b,
                              self._factor[2])[0]
 
+    @property
+    def factors(self) -> Band:
+        """The factors as texts take them, see :mod:`skfem_ancf.band`."""
+        if self._factor is None:
+            self.factorize()
+        if self._factor[0] == "ldl":
+            return self.band
+        if self._factor[0] == "pb":
+            c, lower = self._factor[1], np.zeros((self.n, self._ld))
+            lower[:, 0] = c[0] ** 2
+            lower[:, 1:-1] = (c[1:] / c[0]).T
+            return Band(lower.ravel(), self.band.pivots, self._ld, self.bandwidth, 0)
+        _, lu, pivots = self._factor
+        return Band(np.ascontiguousarray(lu.T).ravel(), pivots, len(lu), self.bandwidth,
+                    2 * self.bandwidth)
+
     def take_factors(self) -> None:
         """Note that the entries have been replaced by factors, of :mod:`skfem_ancf.band`."""
         self._factor = ("ldl",) if self.symmetric else ("gb", self.ab, self.band.pivots)
@@ -365,241 +379,3 @@ class BandMatrix:
             i, j, v = (np.concatenate([i, j[off]]), np.concatenate([j, i[off]]),
                        np.concatenate([v, v[off]]))
         return coo_matrix((v, (i, j)), shape=(self.n, self.n)).tocsc()
-
-
-def hold(K: BandMatrix, i: Array, j: Array, values: Array, springs: Array) -> tuple[Array, Array]:
-    """Add entries and springs to a band matrix, and factorise it.
-
-    Parameters
-    ----------
-    K, i, j, values, springs
-        As for :class:`BorderedMatrix`: the matrix, entries of shapes (k,), coordinates (s,).
-
-    Returns
-    -------
-    picked, S
-        The matrix with its entries and without springs is ``K + P^T S P``; the rows of P pick the
-        coordinates ``picked``: springs, and what lies outside of the band.
-    """
-    inside = np.abs(i - j) <= K.bandwidth
-    K.add(i[inside], j[inside], values[inside])
-    diagonal = np.abs(K.diagonal())
-    stiffness = diagonal[springs]
-    stiffness[stiffness == 0.0] = np.mean(diagonal)
-    K.add(springs, springs, stiffness)
-    K.factorize()
-    return border(K.bandwidth, i, j, values, springs, stiffness)
-
-
-def border(bandwidth: int, i: Array, j: Array, values: Array, springs: Array,
-           stiffness: Array) -> tuple[Array, Array]:
-    """What :func:`hold` returns, of springs of a given stiffness.
-
-    Parameters
-    ----------
-    bandwidth
-        Of the matrix.
-    i, j, values, springs
-        As for :class:`BorderedMatrix`, shapes (k,) and (s,).
-    stiffness
-        Of the springs, shape (s,).
-    """
-    outside = np.abs(i - j) > bandwidth
-    i, j, values = i[outside], j[outside], values[outside]
-    far, where = np.unique(np.append(i, j), return_inverse=True)
-    picked, ns = np.append(springs, far), len(springs)
-    S = np.zeros((len(picked), len(picked)))
-    S[np.arange(ns), np.arange(ns)] = -stiffness
-    np.add.at(S, (ns + where[:len(i)], ns + where[len(i):]), values)
-    return picked, S
-
-
-def border_inertia(K: BandMatrix, picked: Array, S: Array, J: Array) -> Inertia:
-    """The :class:`Inertia` of ``K + P^T S P`` on the null space of J.
-
-    By Haynsworth: with ``S = V L V^T`` and ``C = [P^T V, J^T]`` the matrix
-    ``[K, C; C^T, -L^-1 (+) 0]`` has as many negative eigenvalues as K and
-    ``-(L^-1 (+) 0) - C^T K^-1 C`` together, and as ``-L^-1`` and the bordered matrix together; the
-    latter has one more for each row of J than the matrix on its null space.
-
-    Parameters
-    ----------
-    K : BandMatrix
-        Symmetric, held by springs.
-    picked, S
-        What :func:`hold` returned, shapes (k,) and (k, k); S symmetric.
-    J
-        Shape (m, n).
-    """
-    negative, smallest = border_negative(K.negative(), columns_product(K, picked, J), S, len(J))
-    if negative == 0 and smallest > SMALL and K.positive_definite:
-        return Inertia(0, False)
-
-    def of(shift):
-        beside = K.shifted(shift)
-        return border_negative(beside.negative(), columns_product(beside, picked, J), S, len(J))[0]
-
-    return beside_zero(of)
-
-
-def columns_product(K: BandMatrix, picked: Array, J: Array) -> Array:
-    """C K^-1 C^T of a factorised band matrix.
-
-    Parameters
-    ----------
-    K : BandMatrix
-        With factors.
-    picked
-        Coordinates that the first rows of C pick, shape (k,).
-    J
-        The other rows of C, shape (m, n).
-
-    Returns
-    -------
-    ndarray
-        Shape (k + m, k + m).
-    """
-    k = len(picked)
-    C = np.zeros((k + len(J), K.n))
-    C[np.arange(k), picked] = 1.0
-    C[k:] = J
-    out = np.empty((len(C), len(C)))
-    for first in range(0, len(C), COLUMNS):
-        some = slice(first, first + COLUMNS)
-        Z = K.solve(np.asfortranarray(C[some].T))
-        out[:k, some], out[k:, some] = Z[picked], J @ Z
-    return out
-
-
-def border_negative(held: int, product: Array, S: Array, m: int) -> tuple[int, float]:
-    """The number of negative eigenvalues, and the smallest eigenvalue of the border, scaled.
-
-    Parameters
-    ----------
-    held
-        The number of negative eigenvalues of the band matrix.
-    product
-        What :func:`columns_product` returned, shape (k + m, k + m).
-    S, m
-        As for :func:`border_inertia`, shape (k, k), and the number of rows of J.
-    """
-    n = len(S)
-    size = 1.0 / np.sqrt(np.abs(np.diag(product)[:n]))
-    size[~np.isfinite(size)] = 1.0
-    values, V = np.linalg.eigh(S / (size[:, None] * size))
-    keep = np.abs(values) > SINGULAR * np.max(np.abs(values), initial=0.0)
-    values, V = values[keep], size[:, None] * V[:, keep]
-    k = len(values)
-    G = np.empty((k + m, k + m))
-    G[:k, :k] = V.T @ product[:n, :n] @ V
-    G[np.arange(k), np.arange(k)] += 1.0 / values
-    G[k:, :k] = product[n:, :n] @ V
-    G[:k, k:] = G[k:, :k].T
-    G[k:, k:] = product[n:, n:]
-    size = np.sqrt(np.abs(np.diag(G)))
-    size[size == 0.0] = 1.0
-    mu = np.linalg.eigvalsh(0.5 * (G + G.T) / (size[:, None] * size))
-    negative = held + int(np.sum(mu > 0.0)) - int(np.sum(values > 0.0)) - m
-    return negative, float(np.min(np.abs(mu), initial=1.0))
-
-
-class BorderedMatrix:
-    """Solves ``[A, J^T; J, 0] [x; l] = [b; c]`` by the factors of a band matrix.
-
-    ``A`` is the band matrix plus a few entries outside of its band. Coordinates in ``springs``
-    are held by springs before the band is factorised, and let go in the border, because a beam
-    that only joints hold has a singular matrix of its own.
-
-    Parameters
-    ----------
-    K : BandMatrix
-        With its supports fixed. Springs, and the entries that lie in the band, are added to it.
-    J
-        Shape (m, n), dense and small.
-    i, j, values
-        Entries to add to K, of both halves where it is symmetric, shapes (k,).
-    springs
-        Coordinates to hold, shape (s,).
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If the matrix is singular.
-    """
-
-    def __init__(self, K: BandMatrix, J: Array, i: Array, j: Array, values: Array,
-                 springs: Array) -> None:
-        self._picked, self._S = hold(K, i, j, values, springs)
-        self._K, self._J = K, J
-        k = len(self._picked)
-        columns = np.zeros((K.n, k + len(J)), order="F")
-        columns[self._picked, np.arange(k)] = 1.0
-        columns[:, k:] = J.T
-        Z = K.solve(columns)
-        # equations of joints have units of their own: scale them to a unit diagonal
-        size = np.abs(np.einsum("kn,nk->k", J, Z[:, k:]))
-        self._scale = 1.0 / np.sqrt(np.where(size > 0, size, 1.0))
-        Z[:, k:] *= self._scale
-        Z[:, :k] = Z[:, :k] @ self._S
-        H = np.vstack([Z[self._picked], self._scale[:, None] * (J @ Z)])
-        H[np.arange(k), np.arange(k)] += 1.0
-        if not np.all(np.isfinite(H)):
-            raise np.linalg.LinAlgError("the matrix is singular")
-        self._Z = Z
-        lu, pivots, info = lapack.dgetrf(H)
-        if info != 0:
-            raise np.linalg.LinAlgError("the matrix is singular")
-        self._H = lu, pivots
-
-    def inertia(self) -> Inertia:
-        """The :class:`Inertia` of A where J x = 0; of its symmetric part if K is not symmetric."""
-        K = self._K if self._K.symmetric else self._K.symmetric_part()
-        return border_inertia(K, self._picked, self._S, self._J)
-
-    def determinant_sign(self) -> int:
-        """The sign of the determinant of A where J x = 0: 1 or -1."""
-        lu, pivots = self._H
-        exchanges = int(np.sum(pivots != np.arange(len(pivots))))
-        odd = (exchanges + int(np.sum(np.diag(lu) < 0.0))) % 2
-        return self._K.determinant_sign() * (-1 if odd else 1)
-
-    def tocsc(self) -> csc_matrix:
-        """A as a scipy.sparse array in CSC format."""
-        rows = np.broadcast_to(self._picked[:, None], self._S.shape)
-        S = coo_matrix((self._S.ravel(), (rows.ravel(), rows.T.ravel())),
-                       (self._K.n, self._K.n))
-        return self._K.tocsc() + S.tocsc()
-
-    def _once(self, b, c):
-        x = self._K.solve(b)
-        k = len(self._picked)
-        y = lu_solve(self._H, np.append(x[self._picked], self._scale * (self._J @ x - c)),
-                     check_finite=False)
-        return x - self._Z @ y, self._scale * y[k:]
-
-    def _multiply(self, x):
-        out = self._K.multiply(x)
-        np.add.at(out, self._picked, self._S @ x[self._picked])
-        return out
-
-    def solve(self, b: Array, c: Array) -> tuple[Array, Array, float]:
-        """The solution, and how large the correction by one refinement was, relative to x.
-
-        Parameters
-        ----------
-        b
-            Shape (n,).
-        c
-            Shape (m,).
-
-        Returns
-        -------
-        x, l, correction
-            Shapes (n,) and (m,), and a number.
-        """
-        x, l = self._once(b, c)
-        dx, dl = self._once(b - self._multiply(x) - l @ self._J, c - self._J @ x)
-        weight = np.abs(self._K.diagonal())
-        size = weight @ (x * x)
-        error = np.sqrt(weight @ (dx * dx) / size) if size > 0 else 0.0
-        return x + dx, l + dl, float(error)

@@ -11,13 +11,13 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from . import eigen
+from .bordered import BorderedMatrix, border, border_negative, columns_product
 from .checks import Screen
 from .constraints import Constraints
 from .damping import Damping
 from .errors import InputError
 from .evaluation import CARRY, FORCE, MEAN, TANGENT, VISCOUS, evaluate
-from .linalg import (INACCURATE, BandMatrix, BorderedMatrix, border, border_negative,
-                     columns_product, dense)
+from .linalg import INACCURATE, BandMatrix, dense
 from .machine import Machine
 from .pickling import functions_of, require_picklable
 from .points import Points

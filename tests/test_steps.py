@@ -91,8 +91,8 @@ def random_static_scene(seed, flag):
     for name, origin, angle in (("arm", (0, 0), 0.0), ("forearm", (1, 0), 1.1)):
         element = ELEMENTS[rng.integers(len(ELEMENTS))]
         law = NeoHookean if element.order and rng.random() < 0.2 else StVenantKirchhoff
-        mesh = MeshBeam.init_line(np.linspace(0, 1, 3 + rng.integers(4)), 0.02 + 0.03 * rng.random(),
-                                  origin=origin, angle=angle)
+        mesh = MeshBeam.init_line(np.linspace(0, 1, 3 + rng.integers(4)),
+                                  0.02 + 0.03 * rng.random(), origin=origin, angle=angle)
         beams.append(Beam(mesh, element, law(1e6, 0.3, 200.0), 0.1, name=name, compiled=flag))
     scene = Scene(*beams).gravity((0, -9.81)).clamp("left", beam="arm")
     joint = (None, "hinge", "weld", "line")[rng.integers(4)]
