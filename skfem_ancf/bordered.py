@@ -228,4 +228,7 @@ class BorderedMatrix:
             Shapes (n,) and (m,), and a number.
         """
         x, l = np.empty(len(b)), np.empty(len(c))
-        return x, l, float(solve_bordered(self._f, self._border, b, c, x, l))
+        error = float(solve_bordered(self._f, self._border, b, c, x, l))
+        if error < 0.0:
+            raise np.linalg.LinAlgError("the matrix is singular")
+        return x, l, error
