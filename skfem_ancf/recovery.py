@@ -54,6 +54,9 @@ ACROSS = 7
 #: they end.
 ROUNDS, SETTLED = 6, 1e-7
 
+#: Iterations of the balance of a section in a round, and at most after the last one.
+BALANCE, BALANCE_AT_END = 2, 10
+
 #: Sections up to which the derivative along the axis is a matrix.
 FEW = 128
 
@@ -246,18 +249,18 @@ class _Piece:
         self.rX = self.stretch * np.array([np.cos(self.alpha), np.sin(self.alpha)])
         self.P = self.rX * self.S[0] + self.rY * self.S[2]
 
-    def _balance(self):
+    def _balance(self, times=BALANCE_AT_END):
         """Change S_xx linearly in Y until the section has its normal force and moment."""
         h = self.recovery.beam.mesh.height
-        E = self.recovery.modulus
         # short waves would grow from round to round: S_yy holds second derivatives of S_xx
         self._fed = np.concatenate([0.0 * self.S[:1], smoothed(self.s, self.S[1:], 0.5 * h)])
         t, n = (np.array([np.cos(self.phi), np.sin(self.phi)]),
                 np.array([-np.sin(self.phi), np.cos(self.phi)]))
         N, self.Q = np.sum(self.R * t, axis=0), np.sum(self.R * n, axis=0)
         going = np.ones(self.forces.states)
-        for _ in range(4):
+        for _ in range(times):
             self._section()
+            E = self.recovery.modulus(self.eps)
             x, y = (self.rY @ self.recovery.from_axis.T)
             missing = np.array([N - self.integral(self.P[0]),
                                 self.M - self.integral(x * self.P[1] - y * self.P[0])])
@@ -342,7 +345,7 @@ class _Piece:
         settled = np.zeros(self.forces.states, dtype=bool)
         for _ in range(ROUNDS):
             before = self.stretch, self.alpha, self.S.copy(), self.phi, self.rate
-            self._balance()
+            self._balance(BALANCE)
             self._turn()
             self._equilibrium()
             if np.any(settled):
@@ -449,7 +452,6 @@ class Recovery:
         self.forces, self.beam = forces, forces.beam
         beam, mesh = self.beam, self.beam.mesh
         self.law = beam.material.law()
-        self.modulus = 1.0 / np.linalg.inv(self.law.moduli(np.zeros(3)))[0, 0]
         m = max(ACROSS, 2 * beam.element.order + 1)
         self.eta = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, m))
         self.middle = m // 2
@@ -471,6 +473,14 @@ class Recovery:
         self._tables = [_Table(p.s, np.concatenate(
             [p.strain, p.stress, p.angle[None]])) for p in self.pieces]
         self._cuts = forces.cuts.tolist()
+
+    def modulus(self, strain: Array) -> Array:
+        """Change of S_xx with eps_xx while S_yy and S_xy stay, at strains (3, ...)."""
+        law = self.law
+        D = law.D if isinstance(law, LinearLaw) else law.moduli(strain)
+        det = D[1, 1] * D[2, 2] - D[1, 2] * D[2, 1]
+        return D[0, 0] - (D[0, 1] * (D[1, 0] * D[2, 2] - D[1, 2] * D[2, 0])
+                          + D[0, 2] * (D[1, 1] * D[2, 0] - D[1, 0] * D[2, 1])) / det
 
     def of(self, k: int) -> Recovery:
         """The field of one of several states.

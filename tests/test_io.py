@@ -249,6 +249,25 @@ def test_series_lists_its_frames_after_each(state, tmp_path):
     assert len(list(series.path.parent.iterdir())) == 4
 
 
+def test_a_motion_that_fails_lists_what_there_is(state, tmp_path):
+    times = np.arange(5.0)
+
+    def frames():
+        for t in times:
+            yield state.replace(t=t)
+        raise KeyError("lost")
+
+    done = []
+    with pytest.raises(KeyError), PvdWriter(tmp_path / "run.pvd", subdivide=(1, 1)) as series:
+        series.extend(frames(), lambda: done.append(len(list(tmp_path.iterdir()))))
+    assert done == [2, 3, 4, 5, 6]
+    rows = list(ET.parse(series.path).getroot().find("Collection"))
+    assert [float(r.get("timestep")) for r in rows] == list(times)
+    first, last = (meshio.read(tmp_path / rows[k].get("file")) for k in (0, -1))
+    assert np.array_equal(first.cells[0].data, last.cells[0].data)
+    assert np.array_equal(first.cell_data["element"][0], last.cell_data["element"][0])
+
+
 def test_series_refuses_bad_names_and_times(state, tmp_path):
     with pytest.raises(InputError, match=r"must end with \.pvd"):
         PvdWriter(tmp_path / "run.vtu")

@@ -388,6 +388,4 @@ class History:
         kind = VtkHdfWriter if path.suffix.lower() == ".vtkhdf" else PvdWriter
         with kind(path, **options) as writer, progress_bar(
                 progress, total=len(self), desc="files") as bar:
-            for state in self:
-                writer.add(state, state.t)
-                bar.update(1)
+            writer.extend(self, lambda: bar.update(1))

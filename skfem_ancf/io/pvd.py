@@ -9,14 +9,18 @@ from xml.sax.saxutils import quoteattr
 from ..errors import (InputError, require_finite_scalar, require_like, require_options,
                       require_path, teaching)
 from ..fields import find_fields
-from .vtu import replacing, save_vtu
+from .vtu import replacing, save_frame
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
     from pathlib import Path
 
     from ..types import StrPath
 
 logger = logging.getLogger(__name__)
+
+#: Frames of a motion after which the list is written again.
+LISTED = 64
 
 
 @teaching
@@ -66,6 +70,7 @@ class PvdWriter:
         if "fields" in self.options:
             find_fields(self.options["fields"])
         self._rows: list[str] = []
+        self._packed: dict[str, Any] = {}
         self.frames: list[tuple[float, str]] = []  # (time, name of the file)
 
     def __enter__(self):
@@ -90,17 +95,44 @@ class PvdWriter:
         pathlib.Path
             The frame's file.
         """
+        frame = self._frame(state, t)
+        self._list()
+        return frame
+
+    def extend(self, states: Iterable[Any], done: Callable[[], Any] = lambda: None) -> None:
+        """Write the frames of a motion; the list is complete at the end, and now and then before.
+
+        Parameters
+        ----------
+        states
+            Each a State with a time ``t``.
+        done
+            Called after each of them.
+        """
+        try:
+            for state in states:
+                self._frame(state, state.t)
+                if len(self.frames) % LISTED == 1:
+                    self._list()
+                done()
+        finally:
+            if self.frames:
+                self._list()
+
+    def _frame(self, state, t):
         require_like("state", state, "State", "beams", "u_of")
         t = require_finite_scalar("t", t)
         if self.frames and t <= self.frames[-1][0]:
             raise InputError(f"the times of the frames must increase: {t!r} after "
                              f"{self.frames[-1][0]!r}")
         name = f"{self.path.stem}_{len(self.frames):05d}.vtu"
-        frame = save_vtu(state, self.path.with_name(name), **self.options)
+        frame = save_frame(state, self.path.with_name(name), self._packed, **self.options)
         self.frames.append((t, name))
         self._rows.append(f'<DataSet timestep="{t!r}" part="0" file={quoteattr(name)}/>')
+        return frame
+
+    def _list(self):
         with replacing(self.path) as temporary:
             temporary.write_text("\n".join(
                 ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">',
                  "<Collection>", *self._rows, "</Collection>", "</VTKFile>", ""]), encoding="utf-8")
-        return frame

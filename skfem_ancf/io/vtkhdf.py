@@ -15,6 +15,8 @@ from .vtu import PRECISIONS, body_fields
 from .xml import topology
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
     from ..results import State
     from ..types import StrPath
 
@@ -82,6 +84,20 @@ class VtkHdfWriter:
             os.replace(self._temporary, self.path)
         else:
             Path(self._temporary).unlink(missing_ok=True)
+
+    def extend(self, states: Iterable[Any], done: Callable[[], Any] = lambda: None) -> None:
+        """Append the frames of a motion.
+
+        Parameters
+        ----------
+        states
+            Each a State with a time ``t``.
+        done
+            Called after each of them.
+        """
+        for state in states:
+            self.add(state, state.t)
+            done()
 
     def add(self, state: State, t: float) -> Path:
         """Append a frame.

@@ -196,16 +196,33 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     ...     print(state.save(f"{folder}/beam.vtu").name)
     beam.vtu
     """
+    return save_frame(state, filename, {}, precision, encoding, subdivide=subdivide,
+                      lagrange=lagrange, undeformed=undeformed, recover=recover, fields=fields)
+
+
+def save_frame(state: Any, filename: StrPath, packed: dict, precision: str = "double",
+               encoding: str = "base64", **options: Any) -> Path:
+    """As :func:`save_vtu`, for the next frame of a series.
+
+    Parameters
+    ----------
+    state, filename, precision, encoding
+        As for :func:`save_vtu`.
+    packed
+        What does not change from frame to frame, see :func:`skfem_ancf.io.xml.write_vtu`.
+    **options
+        Those of :func:`body_fields`.
+    """
     path = require_path("filename", filename)
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"the file name must end with one of {', '.join(SUFFIXES)}, got "
                          f"{str(filename)!r}")
     dtype = PRECISIONS[require_option("precision", precision, PRECISIONS)]
     raw = require_option("encoding", encoding, ENCODINGS) == "raw"
-    body = body_fields(state, subdivide, lagrange, undeformed, recover, fields)
+    body = body_fields(state, **options)
     with replacing(path) as temporary:
         if path.suffix.lower() == ".vtu":
-            write_vtu(temporary, body, dtype, raw)
+            write_vtu(temporary, body, dtype, raw, packed)
         else:
             _write_vtk(temporary, body)
     logger.info("wrote %s: %d points", path, len(body.points))

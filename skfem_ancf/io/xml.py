@@ -25,16 +25,22 @@ _NAMES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "u1": 
 class _Arrays:
     """The arrays of a file, one after the other in its appended data."""
 
-    def __init__(self, raw):
-        self.raw, self.blocks, self._offset = raw, [], 0
+    def __init__(self, raw, packed):
+        self.raw, self.packed, self.blocks, self._offset = raw, packed, [], 0
 
-    def __call__(self, name, values):
-        """A DataArray element for numbers (n,) or (n, components)."""
-        values = np.ascontiguousarray(values)
-        raw = values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes()
+    def _block(self, raw):
         data = zlib.compress(raw, LEVEL)
         header = np.array([1, len(raw), 0, len(data)], dtype="<u4").tobytes()
-        block = header + data if self.raw else b64encode(header) + b64encode(data)
+        return header + data if self.raw else b64encode(header) + b64encode(data)
+
+    def __call__(self, name, values, same=False):
+        """A DataArray element for numbers (n,) or (n, components), mostly the same as before."""
+        values = np.ascontiguousarray(values)
+        raw = values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes()
+        before = self.packed.get(name, (None, None)) if same else (None, None)
+        block = before[1] if before[0] == raw else self._block(raw)
+        if same:
+            self.packed[name] = raw, block
         components = f'NumberOfComponents="{values.shape[1]}" ' if values.ndim == 2 else ""
         self.blocks.append(block)
         self._offset, offset = self._offset + len(block), self._offset
@@ -51,7 +57,7 @@ def topology(body: BodyFields) -> tuple[Any, Any, Any]:
 
 
 def write_vtu(path: Path, body: BodyFields, dtype: Any = np.float64,
-              raw: bool = False) -> None:
+              raw: bool = False, packed: dict | None = None) -> None:
     """Write a body as a .vtu file.
 
     Parameters
@@ -64,9 +70,12 @@ def write_vtu(path: Path, body: BodyFields, dtype: Any = np.float64,
         Of points and fields: numpy.float64 or numpy.float32.
     raw
         Bytes as they are; else in base64.
+    packed
+        Arrays of cells of the frame before in the same encoding, used if they are the same; those
+        of this one are put there.
     """
     connectivity, offsets, types = topology(body)
-    array = _Arrays(raw)
+    array = _Arrays(raw, {} if packed is None else packed)
     cell_data = {name: np.concatenate(parts).astype(np.int32)
                  for name, parts in body.cell_data.items()}
     rows = [
@@ -76,11 +85,11 @@ def write_vtu(path: Path, body: BodyFields, dtype: Any = np.float64,
         "<UnstructuredGrid>",
         f'<Piece NumberOfPoints="{len(body.points)}" NumberOfCells="{len(types)}">',
         "<Points>", array("Points", body.points.astype(dtype)), "</Points>",
-        "<Cells>", array("connectivity", connectivity), array("offsets", offsets),
-        array("types", types), "</Cells>",
+        "<Cells>", array("connectivity", connectivity, True), array("offsets", offsets, True),
+        array("types", types, True), "</Cells>",
         "<PointData>", *(array(k, v.astype(dtype)) for k, v in body.point_data.items()),
         "</PointData>",
-        "<CellData>", *(array(k, v) for k, v in cell_data.items()), "</CellData>",
+        "<CellData>", *(array(k, v, True) for k, v in cell_data.items()), "</CellData>",
         "</Piece>", "</UnstructuredGrid>", 
         f'<AppendedData encoding="{"raw" if raw else "base64"}">', "_"]
     Path(path).write_bytes(b"".join([
