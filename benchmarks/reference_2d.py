@@ -1,14 +1,16 @@
-"""Two cantilevers as two-dimensional bodies: the fields that recovered ones are measured against.
+"""Three cantilevers as two-dimensional bodies: the fields that recovered ones are measured against.
 
     python benchmarks/reference_2d.py
 
-solves them with stock scikit-fem (quads of order 4, total Lagrangian, St. Venant-Kirchhoff, plane
-stress; nothing of skfem_ancf is imported) on two meshes, and writes the strain of the finer one at
+solves them with stock scikit-fem (quads of order 4, total Lagrangian, St. Venant-Kirchhoff in plane
+stress or neo-Hookean in plane strain; nothing of skfem_ancf is imported) on two meshes, and writes the strain of the finer one at
 some points to tests/data/reference_2d.npz, with the largest difference of the two meshes.
 
 * "gravity": length 1, height and width 0.01, E = 2e8, nu = 0.3, density 7800, under its own weight;
 * "thick": length 2, height 0.5, width 0.1, E = 2.07e11, nu = 0.3, 62.5e6 N down, spread evenly over
-  the end.
+  the end;
+* "rubber": length 1, height and width 0.1, neo-Hookean, plane strain, E = 1e6, nu = 0.3, 15 N down,
+  spread evenly over the end: the strain reaches 0.1.
 
 The face x = 0 is welded. Points "inside" are further than the height from both ends, points "weld"
 within it of the weld, but away from its corners, where the exact strain is infinite.
@@ -25,6 +27,8 @@ CASES = {
     "gravity": dict(length=1.0, height=0.01, E=2e8, nu=0.3, body=(0.0, -7800 * 9.81), end=(0, 0)),
     "thick": dict(length=2.0, height=0.5, E=2.07e11, nu=0.3, body=(0, 0),
                   end=(0.0, -62.5e6 / (0.5 * 0.1))),
+    "rubber": dict(length=1.0, height=0.1, E=1e6, nu=0.3, body=(0, 0), end=(0.0, -15 / 0.01),
+                   neo_hookean=True),
 }
 FILE = Path(__file__).parents[1] / "tests" / "data" / "reference_2d.npz"
 WELD = np.array([0.1, 0.2, 0.35, 0.5, 0.7])  # distances from the weld, in heights
@@ -54,9 +58,36 @@ def mesh(case, n, m, levels):
     return MeshQuad.init_tensor(x, y)
 
 
-def moduli(E, nu):
-    """Lame's first parameter of plane stress, and the shear modulus."""
-    return E * nu / (1 - nu**2), E / (2 * (1 + nu))
+def saint_venant_kirchhoff(E, nu):
+    """Stress of a strain, and its change, in plane stress."""
+    lame, G = E * nu / (1 - nu**2), E / (2 * (1 + nu))
+
+    def stress(e):
+        return lame * (e[0, 0] + e[1, 1]) * eye(1.0 + 0 * e[0, 0], 2) + 2 * G * e
+
+    return stress, lambda e, de: stress(de)
+
+
+def neo_hookean(E, nu):
+    """S = G (I - C^-1) + lambda ln J C^-1 in plane strain, and its change."""
+    lame, G = E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
+
+    def parts(e):
+        one = eye(1.0 + 0 * e[0, 0], 2)
+        C = one + 2 * e
+        d = C[0, 0] * C[1, 1] - C[0, 1] * C[1, 0]
+        return one, np.array([[C[1, 1], -C[0, 1]], [-C[1, 0], C[0, 0]]]) / d, 0.5 * np.log(d)
+
+    def stress(e):
+        one, inverse, log_J = parts(e)
+        return G * (one - inverse) + lame * log_J * inverse
+
+    def change(e, de):
+        _, inverse, log_J = parts(e)
+        return (lame * ddot(inverse, de) * inverse
+                + 2 * (G - lame * log_J) * mul(mul(inverse, de), inverse))
+
+    return stress, change
 
 
 def green_lagrange(H):
@@ -65,19 +96,17 @@ def green_lagrange(H):
 
 def solve_body(case, m, element, start=None, steps=1):
     """The displacement of the body by Newton's method."""
-    lame, G = moduli(case["E"], case["nu"])
+    law = neo_hookean if case.get("neo_hookean") else saint_venant_kirchhoff
+    stress, change = law(case["E"], case["nu"])
     basis = Basis(m, ElementVector(element), intorder=10)
     end = FacetBasis(m, basis.elem, facets=m.facets_satisfying(
         lambda x: np.isclose(x[0], case["length"])), intorder=10)
-
-    def stress(e):
-        return lame * (e[0, 0] + e[1, 1]) * eye(1.0 + 0 * e[0, 0], 2) + 2 * G * e
 
     @BilinearForm
     def tangent(u, v, w):
         F = grad(w.u) + eye(1.0 + 0 * w.u.grad[0, 0], 2)
         du, dv = (0.5 * (mul(transpose(F), grad(f)) + mul(transpose(grad(f)), F)) for f in (u, v))
-        return ddot(stress(du), dv) + ddot(w.S, mul(transpose(grad(u)), grad(v)))
+        return ddot(change(green_lagrange(w.u.grad), du), dv) + ddot(w.S, mul(transpose(grad(u)), grad(v)))
 
     @LinearForm
     def residual(v, w):
@@ -139,7 +168,7 @@ def reference(name, sizes):
 
 def main():
     data = {}
-    for name, (n, m) in (("thick", (16, 4)), ("gravity", (96, 2))):
+    for name, (n, m) in (("rubber", (24, 4)), ("thick", (16, 4)), ("gravity", (96, 2))):
         results, data[name + "_tip"] = reference(name, [
             (ElementQuad2(), (n // 2, m, 0)), (ElementQuadP(4), (n, m, 2)),
             (ElementQuadP(4), (n * 3 // 2, m * 3 // 2, 3))])

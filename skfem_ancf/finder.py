@@ -116,8 +116,9 @@ class Finder:
         far = distance > 0.75 * mesh.height + np.max(mesh.lengths)
         X, outside = np.full(x.shape, 0.5), np.full(x.shape[1], np.inf)
         todo = np.nonzero(~far)[0]
+        xi = (near % SAMPLES + 0.5) / SAMPLES
         for _ in range(3):
-            X[:, todo] = self.mapping.invF(x[:, todo, None], tind=e[todo])[..., 0]
+            X[:, todo] = self.mapping.invF(x[:, todo, None], e[todo], xi=xi[todo, None])[..., 0]
             outside[todo] = self._outside(X[:, todo], noise)
             # a point of the section between two elements is one of the left
             other = np.where(X[0, todo] <= noise, self._before[e[todo]],
@@ -125,7 +126,7 @@ class Finder:
             todo, other = todo[other >= 0], other[other >= 0]
             if not len(todo):
                 break
-            e[todo] = other
+            e[todo], xi[todo] = other, 0.5
         else:
             X[:, todo] = self.mapping.invF(x[:, todo, None], tind=e[todo])[..., 0]
             outside[todo] = self._outside(X[:, todo], noise)

@@ -12,6 +12,8 @@ from .errors import MeshError
 from .reference import hermite, linear
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from .mesh import MeshBeam
     from .types import Array
 
@@ -19,6 +21,15 @@ _FACET_POINTS = (  # the point of the reference cell at X on facet bottom, right
     lambda s: (s, 0.0 * s), lambda s: (1.0 + 0.0 * s, s),
     lambda s: (s, 1.0 + 0.0 * s), lambda s: (0.0 * s, s),
 )
+
+
+def _polynomial(coefficients, xi):
+    """A polynomial, its lowest coefficient first, and its derivative, by Horner's rule."""
+    value, slope = coefficients[-1], 0.0
+    for c in coefficients[-2::-1]:
+        slope = value + xi * slope
+        value = c + xi * value
+    return value, slope
 
 
 class MappingBeam(Mapping):
@@ -165,7 +176,20 @@ class MappingBeam(Mapping):
         e1 = e1 / np.sqrt(e1[0] ** 2 + e1[1] ** 2)
         return np.stack([e1, np.array([-e1[1], e1[0]])], 1)
 
-    def invF(self, x: Array, tind: Array | None = None, max_iterations: int = 30) -> Array:
+    @cached_property
+    def _powers(self):
+        """Axis from the first node, and director, as polynomials of xi: 4 and 2 or 4 of (2, ne)."""
+        axis, director = self._all_coefficients
+        axis = axis - axis[:, :1] * np.array([1.0, 0.0, 1.0, 0.0])[:, None]
+        zero = np.zeros(1)
+        cubic = [hermite(zero, d) / (1, 1, 2)[d] for d in range(3)]
+        cubic.append(hermite(zero + 1.0) - sum(cubic))  # what is left at xi = 1
+        few = cubic if self.mesh.sections == "cubic" else [linear(zero), linear(zero, 1)]
+        return [[self._sum(c, f)[..., 0] for f in functions]
+                for c, functions in ((axis, cubic), (director, few))]
+
+    def invF(self, x: Array, tind: Array | None = None, max_iterations: int = 30,
+             xi: ArrayLike = 0.5) -> Array:
         """The reference points of points of the body, by Newton's method; outside the cell too.
 
         Parameters
@@ -176,17 +200,29 @@ class MappingBeam(Mapping):
             Elements, shape (nelements,), or None for all.
         max_iterations
             Corrections at most.
+        xi
+            To start from, of any shape that fits (nelements, npoints).
 
         Returns
         -------
         ndarray
             Shape (2, nelements, npoints).
         """
-        X = np.full(x.shape, 0.5)
+        first = self._all_coefficients[0][:, 0]
+        axis, director = ([c[:, :, None] if tind is None else np.take(c, tind, axis=1)[:, :, None]
+                           for c in powers] for powers in self._powers)
+        x = x - (first if tind is None else np.take(first, tind, axis=1))[:, :, None]
+        X = np.empty(x.shape)
+        X[0], X[1] = xi, 0.5
         for _ in range(max_iterations):
-            dX = np.einsum("ijep,jep->iep", self.invDF(X, tind), x - self.F(X, tind))
-            X = X + np.clip(dX, -1.0, 1.0)
-            if not np.any(np.abs(dX) > 1e-14 * (1.0 + np.abs(X))):
+            (r, r_xi), (n, n_xi) = _polynomial(axis, X[0]), _polynomial(director, X[0])
+            Y = X[1] - 0.5
+            gap, a = x - r - Y * n, r_xi + Y * n_xi
+            dX = np.stack([gap[0] * n[1] - gap[1] * n[0], a[0] * gap[1] - a[1] * gap[0]])
+            dX /= a[0] * n[1] - a[1] * n[0]
+            X += np.clip(dX, -1.0, 1.0)
+            # the square of the last correction is left
+            if not np.any(np.abs(dX) > 1e-8 * (1.0 + np.abs(X))):
                 break
         return X
 
