@@ -3,8 +3,9 @@
     python benchmarks/reference_2d.py
 
 solves them with stock scikit-fem (quads of order 4, total Lagrangian, St. Venant-Kirchhoff in plane
-stress or neo-Hookean in plane strain; nothing of skfem_ancf is imported) on two meshes, and writes the strain of the finer one at
-some points to tests/data/reference_2d.npz, with the largest difference of the two meshes.
+stress or neo-Hookean in plane strain; nothing of skfem_ancf is imported) on two meshes, and writes
+the strain of the finer one at some points to tests/data/reference_2d.npz, with the largest
+difference of the two meshes.
 
 * "gravity": length 1, height and width 0.01, E = 2e8, nu = 0.3, density 7800, under its own weight;
 * "thick": length 2, height 0.5, width 0.1, E = 2.07e11, nu = 0.3, 62.5e6 N down, spread evenly over
@@ -106,7 +107,8 @@ def solve_body(case, m, element, start=None, steps=1):
     def tangent(u, v, w):
         F = grad(w.u) + eye(1.0 + 0 * w.u.grad[0, 0], 2)
         du, dv = (0.5 * (mul(transpose(F), grad(f)) + mul(transpose(grad(f)), F)) for f in (u, v))
-        return ddot(change(green_lagrange(w.u.grad), du), dv) + ddot(w.S, mul(transpose(grad(u)), grad(v)))
+        dS = change(green_lagrange(w.u.grad), du)
+        return ddot(dS, dv) + ddot(w.S, mul(transpose(grad(u)), grad(v)))
 
     @LinearForm
     def residual(v, w):

@@ -16,13 +16,14 @@ from .errors import (InputError, MeshError, NameUnknown, require_finite, require
                      require_integer, require_label, require_like, require_names, require_positive,
                      shown, taught, teaching)
 from .finder import Finder
-from .formulations import COMPONENTS, get_formulation
+from .formulations import get_formulation
 from .frozen import Frozen, read_only
 from .kinematics import KINEMATICS
 from .materials import Material
 from .mesh import MeshBeam
 from .places import as_point, facets_of
 from .quadrature import gauss, tensor
+from .strains import ElementStrain
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
 
     from .formulations.base import Formulation, Term
     from .types import Array, Place, WhichBeam
+
+#: Points whose strains are evaluated at once.
+STRAINS = 4096
 
 
 @taught
@@ -209,7 +213,7 @@ class Beam(Frozen):
     def basis(self) -> Basis:
         """A scikit-fem ``Basis`` of the position field with the formulation's quadrature."""
         return Basis(self.mesh, self.vector_element,
-                     quadrature=self.formulation.terms(self.element, self.material)[0].quadrature)
+                     quadrature=self.terms[0].quadrature)
 
     def exact_basis(self) -> Basis:
         """A ``Basis`` whose quadrature is exact for products of two coordinates, as in the mass."""
@@ -239,6 +243,11 @@ class Beam(Frozen):
         """The fused evaluation of the strain energy; see :mod:`skfem_ancf.kernel`."""
         return self.kinematics.kernel(self.mesh, self.element, self.material, self.width,
                                       self.formulation)
+
+    @cached_property
+    def terms(self) -> Sequence[Term]:
+        """The terms of the strain energy, of the formulation for this element and material."""
+        return self.formulation.terms(self.element, self.material)
 
     @property
     def has_sections(self) -> bool:
@@ -468,23 +477,12 @@ class Beam(Frozen):
         ndarray
             Shape (3, nelements, npoints).
         """
-        def component(k, X):
-            H, e = self.gradients(u, X, tind)
-            F = e + H
-            if k < 2:
-                return 0.5 * np.sum((F[:, k] + e[:, k]) * H[:, k], axis=0)
-            return np.sum(F[:, 0] * H[:, 1] + H[:, 0] * e[:, 1], axis=0)
-
-        out = []
-        for k, name in enumerate(COMPONENTS):
-            weights = term.interpolation(name, np.ravel(X[0]))
-            if weights is None:
-                out.append(component(k, X))
-                continue
-            weights = weights.reshape(X[0].shape + (-1,))
-            out.append(sum(weights[..., j] * component(k, np.array([0.0 * X[0] + xi, X[1]]))
-                           for j, xi in enumerate(term.nodes(name))))
-        return np.array(out)
+        tind = np.arange(self.mesh.nelements) if tind is None else tind
+        u_e, size = self.kernel.gather(u, tind), max(1, STRAINS // X.shape[-1])
+        parts = [slice(first, first + size) for first in range(0, len(tind), size)]
+        return np.concatenate([
+            ElementStrain(self, term, X[:, part] if X.ndim == 3 else X, tind[part])(u_e[part])
+            for part in parts or [slice(0, 0)]], axis=1)
 
     @_fields
     def stress(self, u: Array, X: Array, tind: Array | None = None) -> Array:

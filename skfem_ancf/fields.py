@@ -176,13 +176,13 @@ class Values(Mapping):
     def strain(self) -> Array:
         if self._recovery is not None:
             return self._recovery.at(self._part, slice(0, 3))
-        return self.beam.strain(*self._own)[..., 0]
+        return self._part.strain(self._u)
 
     @cached_property
     def S(self) -> Array:
         if self._recovery is not None:
             return self._recovery.at(self._part, slice(3, 6))
-        return self.beam.stress(*self._own)[..., 0]
+        return self._part.stress(self._u)
 
     @cached_property
     def F(self) -> Array:

@@ -13,6 +13,7 @@ from .kernels import CableKernel, Kernel
 from .errors import InputError
 from .formulations.ecm import AXIS
 from .quadrature import gauss
+from .strains import ElementStrain, slopes
 
 if TYPE_CHECKING:
     from .beam import Beam
@@ -89,12 +90,9 @@ class Sections:
             As for :meth:`Beam.gradients <skfem_ancf.Beam.gradients>`, shapes (N,), (2, npoints) or
             (2, nelements, npoints), and (nelements,).
         """
-        mapping = beam.mesh.mapping()
         u_e = beam.kernel.gather(u, slice(None) if tind is None else tind)
-        fields = (beam.element.gbasis(mapping, X, k, tind)[0] for k in range(u_e.shape[1]))
-        grad = sum(np.einsum("ei,jep->ijep", u_e[:, k], f.grad) for k, f in enumerate(fields))
-        frame = mapping.frame(X, tind)
-        return np.einsum("ijep,jJep->iJep", grad, frame), frame
+        table, frame = slopes(beam, X, tind)
+        return np.einsum("ebi,bJep->iJep", u_e, table), frame
 
     @staticmethod
     def displacements(beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:
@@ -126,8 +124,21 @@ class Sections:
             As for :meth:`Beam.gradients <skfem_ancf.Beam.gradients>`, shapes (N,), (2, npoints) or
             (2, nelements, npoints), and (nelements,).
         """
-        term = beam.formulation.terms(beam.element, beam.material)[0]
-        return beam.sampled_strain(term, u, X, tind)
+        return beam.sampled_strain(beam.terms[0], u, X, tind)
+
+    @staticmethod
+    def strain_table(beam: Beam, X: Array, tind: Array) -> ElementStrain | None:
+        """What gives it at the same points in many states, or None.
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+        X, tind
+            As for :meth:`Beam.gradients <skfem_ancf.Beam.gradients>`, shapes (2, npoints) or
+            (2, nelements, npoints), and (nelements,).
+        """
+        return ElementStrain(beam, beam.terms[0], X, tind)
 
     @staticmethod
     def stress(beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
@@ -170,7 +181,7 @@ class Sections:
             Displacement of the coordinates, shape (N,).
         """
         det, stretches = [], []
-        for term in beam.formulation.terms(beam.element, beam.material):
+        for term in beam.terms:
             H, frame = beam.gradients(u, term.quadrature[0])
             F = H + frame
             C = np.einsum("ikep,ijep->kjep", F, F)
@@ -230,6 +241,10 @@ class Cable(Sections):
         turn = tangent - tangent0
         return (Sections.displacements(beam, u, X, tind)
                 + beam.mesh.height * (X[1] - 0.5) * np.array([-turn[1], turn[0]]))
+
+    @staticmethod
+    def strain_table(beam: Beam, X: Array, tind: Array) -> None:
+        return None
 
     @classmethod
     def strain(cls, beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 #: Points that a scene remembers, at most, and calls.
 REMEMBERED_POINTS, REMEMBERED = 2**16, 1024
 
+#: Points of which it is kept how the strain of their elements depends on the coordinates, at most.
+TABLED = 2**12
+
 
 def is_many(points: Any) -> bool:
     """True for an array of two dimensions, and for a list or tuple of points."""
@@ -178,6 +181,35 @@ class Part:
             out += self._lever * _turned(
                 (rate - t * np.sum(t * rate, axis=-2, keepdims=True)) / size)
         return out
+
+    def strain(self, u: Array) -> Array:
+        """The strain of the elements (eps_xx, eps_yy, 2 eps_xy), shape (3, n).
+
+        Parameters
+        ----------
+        u
+            Coordinates of the scene, shape (N,).
+        """
+        table = self._strain_table if len(self.e) <= TABLED else None
+        if table is None:
+            return self.beam.strain(u[self.coordinates], self.at, self.e)[..., 0]
+        return table(np.moveaxis(u[self.dofs], -1, 0))[..., 0]
+
+    @cached_property
+    def _strain_table(self):
+        return self.beam.kinematics.strain_table(self.beam, self.at, self.e)
+
+    def stress(self, u: Array) -> Array:
+        """The stress of the elements (S_xx, S_yy, S_xy), shape (3, n).
+
+        Parameters
+        ----------
+        u
+            Coordinates of the scene, shape (N,).
+        """
+        beam = self.beam
+        return beam.kinematics.stress(beam, self.strain(u)[..., None], u[self.coordinates], self.at,
+                                      self.e)[..., 0]
 
     @cached_property
     def _lever(self):

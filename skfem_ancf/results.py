@@ -325,13 +325,13 @@ class State(Frozen):
         r = self._recovery_of(part.number) if recover else None
         if r is not None:
             return r.at(part, slice(0, 3))
-        return part.beam.strain(self.u[part.coordinates], part.at, part.e)[..., 0]
+        return part.strain(self.u)
 
     def _stress(self, part, recover):
         r = self._recovery_of(part.number) if recover else None
         if r is not None:
             return r.at(part, slice(3, 6))
-        return part.beam.stress(self.u[part.coordinates], part.at, part.e)[..., 0]
+        return part.stress(self.u)
 
     # recovered fields
 

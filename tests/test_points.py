@@ -217,3 +217,42 @@ def test_forms_of_points():
     assert_array_equal(as_points([(1, 2), (3, 4)]), [[1, 3], [2, 4]])
     assert_array_equal(as_points(np.array([[1, 2], [3, 4]])), [[1, 2], [3, 4]])
     assert as_points([1, 2]).shape == (2,)
+
+
+@pytest.mark.parametrize("plane", ["stress", "strain"])
+@pytest.mark.parametrize("formulation", ["assumed", "continuum", "ecm"])
+@pytest.mark.parametrize("mesh", [LINE, quarter_arc(height=0.1)], ids=["straight", "arc"])
+def test_strain_of_the_elements_at_few_and_at_many_points(mesh, formulation, plane, monkeypatch):
+    """Tables of few points, blocks of many, and the derivative of the displacement agree."""
+    material = StVenantKirchhoff(E=1e6, nu=0.3, plane=plane)
+    beam = Beam(mesh, ElementBeamANCF(2), material, 0.1, formulation=formulation)
+    state = Scene(beam).clamp("left").point_force((2, -3), at=mesh.p[:, -1]).solve_static()
+    e, X, x = inside(mesh)
+    few = [state.strain(x, recover=False), state.stress(x, recover=False)]
+    monkeypatch.setattr(points, "TABLED", 0)
+    monkeypatch.setattr("skfem_ancf.beam.STRAINS", 7)
+    many = [state.strain(x, recover=False), state.stress(x, recover=False)]
+    assert_allclose(few, many, rtol=1e-10, atol=1e-13 * np.abs(few[1]).max())
+    if formulation == "continuum":  # r(X + d) - r(X) by differences, in the frame of the beam
+        d = 1e-6
+        X = np.clip(X, 0.1, 0.9)
+        frame = mesh.mapping().frame(X[:, :, None], e)[..., 0]
+        at = mesh.mapping().F(X[:, :, None], e)[..., 0]
+        F = [(state.position(at + d * frame[:, k]) - state.position(at - d * frame[:, k])) / (2 * d)
+             for k in (0, 1)]
+        exact = [0.5 * (np.sum(F[0]**2, 0) - 1), 0.5 * (np.sum(F[1]**2, 0) - 1),
+                 0.5 * np.sum(F[0] * F[1], 0)]
+        assert_allclose(state.strain(at, recover=False), exact, atol=1e-8)
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e7])
+def test_points_far_from_the_origin_are_found_on_curves(offset):
+    near = quarter_arc(height=0.1)
+    mesh = near.translated((offset, -offset))
+    e, X, _ = inside(near, n=200)
+    X = 0.02 + 0.96 * X
+    found, at, outside = Beam(mesh, ElementBeamANCF(2), STEEL, 0.1).finder(
+        mesh.mapping().F(X[:, :, None], e)[..., 0])
+    assert_array_equal(found, e)
+    assert np.all(outside == 0)
+    assert_allclose(at, X, atol=1e-11 + 1e-14 * offset)

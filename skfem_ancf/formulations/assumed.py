@@ -108,7 +108,7 @@ class Assumed(Formulation):
                 Term(laws[1], gauss(volume), whole.section, samples)]
 
     def stress(self, beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
-        first, *others = self.terms(beam.element, beam.material)
+        first, *others = beam.terms
         total = first.law.stress(strain)
         for term in others:
             total = total + term.law.stress(self._strain_of(term, beam, u, X, tind))
