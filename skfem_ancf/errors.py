@@ -369,6 +369,21 @@ def require_option(kind: str, name: object, known: Iterable[str]) -> str:
     return name
 
 
+def require_text(name: str, value: Any) -> Any:
+    """A text, or None.
+
+    Parameters
+    ----------
+    name
+        Of the argument, for the message.
+    value
+        What was given.
+    """
+    if value is not None and not isinstance(value, str):
+        raise InputError(f"{name} must be a text, got {shown(value)}")
+    return value
+
+
 def require_flag(name: str, value: object) -> bool:
     """Return True or False, or raise :class:`InputError` if it is neither.
 

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import CallbackError, InputError, NameUnknown, ask, require_integer, shown
+from .errors import (CallbackError, InputError, NameUnknown, ask, require_finite_scalar,
+                     require_flag, require_integer, require_text, shown)
 from .kept import kept
 from .materials import LinearLaw
 from .points import Part
@@ -85,6 +86,11 @@ class Field:
             raise InputError("the function of a field takes Values and returns an array, got "
                              f"{shown(self.function)}")
         require_integer("components", self.components, 1, 3)
+        for name in ("title", "unit", "frame"):
+            if require_text(name, getattr(self, name)) is None:
+                raise InputError(f"{name} must be a text, got None")
+        require_flag("signed", self.signed)
+        require_finite_scalar("neutral", self.neutral)
 
     def label(self) -> str:
         """Title and unit."""

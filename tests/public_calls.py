@@ -20,7 +20,9 @@ from skfem_ancf import (HHT, Beam, ElementBeamANCF, ElementBeamANCFCubic, Elemen
 from skfem_ancf.dynamics import get_scheme
 from skfem_ancf.elements import choose_element
 from skfem_ancf.formulations import Assumed, Continuum, get_formulation
+from skfem_ancf.fields import Field
 from skfem_ancf.io import PvdWriter, body_fields, save_vtu
+from skfem_ancf.io.vtkhdf import VtkHdfWriter
 from skfem_ancf.loads import Weight
 from skfem_ancf.quadrature import gauss, lagrange, tensor
 from skfem_ancf.sampling import sample
@@ -75,6 +77,8 @@ TAKES = {
     "coordinates": {"[]": "no coordinate"},
     "fields": {"[]": "no field"},
     "function": {"float class": "a function of a number"},
+    "drawn": {"[]": "none"},
+    "components": {},
     "title": {k: "any text" for k in ("'text'", "'1.0'", "''")},
     "other": {},
     "file": {},
@@ -93,7 +97,7 @@ WORDS = {
     "boundary": "place|point|facet|function", "facets": "place|point|boundary|function",
     "fields": "field", "dr": "derivative", "factors": "factor|body", "filename": "file|read|write",
     "shear_correction": "shear correction", "t_start": "t_eval", "radius": "joints",
-    "t_end": "times", "adapt": "max_elements",
+    "t_end": "times", "adapt": "max_elements", "function": "function|the field 'f'",
 }
 
 
@@ -180,6 +184,11 @@ def state():
 @lru_cache(None)
 def history():
     return loaded_once().integrate(t_end=0.02, dt=0.01)
+
+
+def add_to_vtkhdf(**arguments):
+    with VtkHdfWriter("s.vtkhdf", subdivide=(1, 1)) as writer:
+        writer.add(**arguments)
 
 
 @lru_cache(None)
@@ -543,6 +552,36 @@ call("history.state", lambda **k: history().state(**k), dict(k=0), k="index")
 for _name in ("displacement", "position", "velocity"):
     call(f"history.{_name}", lambda _name=_name, **k: getattr(history(), _name)(**k),
          dict(point=(1.0, 0.0), beam=0), point="vector", beam="beam?")
+for _name in ("strain", "stress"):
+    call(f"history.{_name}", lambda _name=_name, **k: getattr(history(), _name)(**k),
+         dict(point=(1.0, 0.0), beam=0, recover=False), point="vector", beam="beam?",
+         recover="flag")
+for _name, _make in (("state", state), ("history", history)):
+    call(f"{_name}.field", lambda _make=_make, **k: _make().field(**k),
+         dict(field="S_xx", point=(1.0, 0.0), beam=0, recover=False), field="name",
+         point="vector", beam="beam?", recover="flag")
+call("state.resultants", lambda **k: state().resultants(**k),
+     dict(at=(0.5, 0.0), beam=0, recover=True), at="vector?", beam="beam?", recover="flag")
+call("history.resultants", lambda **k: history().resultants(**k),
+     dict(at=(0.5, 0.0), beam=0, recover=True), at="vector", beam="beam?", recover="flag")
+call("history.states", lambda **k: list(history().states(**k)), dict(instants=[0, -1]),
+     {"instants": {"[]": "none", "None": "all"}}, instants="other")
+call("Field", lambda **k: state().field(Field(**k), (0.5, 0.0)),
+     dict(name="f", function=lambda v: v["S_xx"], title="t", unit="Pa", signed=True, components=1,
+          frame="beam", neutral=0.0),
+     name="label", function="other", title="title", unit="title", signed="flag",
+     components="components", frame="title", neutral="number")
+call("VtkHdfWriter", lambda **k: VtkHdfWriter(**k).__exit__(None), dict(
+    filename="s.vtkhdf", subdivide=(1, 1), fields=["S_xx"], precision="single", lagrange=False,
+    undeformed=False, recover=False), filename="file", precision="name")
+call("VtkHdfWriter.add", lambda **k: add_to_vtkhdf(**k), dict(state=state(), t=0.0),
+     state="other", t="number")
+for _name, _call, _file in (
+        ("save_vtu, fields", lambda **k: save_vtu(state(), "s.vtu", **k), "s.vtu"),
+        ("history.save, vtkhdf", lambda **k: history().save("h.vtkhdf", **k), "h.vtkhdf")):
+    call(_name, _call, dict(fields=["S_xx"], precision="single", subdivide=(1, 1), recover=False),
+         {"fields": {"None": "the usual ones"}}, fields="drawn", precision="name",
+         subdivide="other", recover="flag")
 call("history.joint_force", lambda joint=None, **k: jointed()[2].joint_force(
     jointed()[0] if isinstance(joint, str) and joint == "its own" else joint, **k),
      dict(joint="its own"), joint="other")
@@ -563,6 +602,31 @@ call("state.plot", lambda **k: state().plot(**k), drawing, {"limits": {"[True, F
      field="name", ax="other?", thickness="positive", undeformed="flag", colorbar="flag",
      cmap="name?", limits="other?", title="title?", subdivide="other", filename="file?",
      dpi="positive")
+film = dict(filename="f.gif", field="S_xx", frames=2, fps=5.0, backend="matplotlib", thickness=1.0,
+            undeformed=True, cmap="viridis", limits=(-1.0, 1.0), unit="Pa", subdivide=(1, 1),
+            recover=False, size=(320, 240))
+call("history.animate", lambda **k: history().animate(**k), film,
+     {"limits": {"[True, False]": ""}, "frames": {"10**30": "all", "10**400": "all"}},
+     filename="file",
+     field="name", frames="count?", fps="positive?", backend="name?", thickness="positive",
+     undeformed="flag", cmap="name?", limits="other?", unit="title?", subdivide="other",
+     recover="flag", size="other")
+call("state.view", lambda **k: state().view(**k).close(),
+     dict(field="S_xx", plotter=None, thickness=1.0, undeformed=True, cmap="viridis",
+          limits=(-1.0, 1.0), unit="Pa", subdivide=(1, 1), recover=False, off_screen=True,
+          window_size=(100, 100)), {"off_screen": {"None": "decide"}}, field="name",
+     plotter="other?", thickness="positive", undeformed="flag", cmap="name?", limits="other?",
+     unit="title?", subdivide="other", recover="flag", window_size="other", filename="file?")
+for _name, _make in (("state", state), ("history", history)):
+    call(f"{_name}.to_pyvista", lambda _make=_make, **k: _make().to_pyvista(**k),
+         dict(fields=["S_xx"], subdivide=(1, 1), lagrange=False, undeformed=False, recover=False),
+         {"fields": {"None": "all of them"}}, fields="drawn", subdivide="other", lagrange="flag",
+         undeformed="flag", recover="flag")
+call("series.update", lambda **k: history().to_pyvista(fields="S_xx").update(**k), dict(k=1),
+     k="index")
+call("state.plot_resultants", lambda **k: state().plot_resultants(**k),
+     dict(beam=0, title="title", recover=True, dpi=50), beam="beam?", axes="other?",
+     title="title?", recover="flag", filename="file?", dpi="positive")
 call("path.plot", lambda **k: path().plot(**k), dict(point=(1.0, 0.0), component=1, beam=0),
      {"component": {"0": "the first"}}, point="vector", component="index", beam="beam?",
      title="title?", filename="file?", dpi="positive")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import require_index, require_path, teaching
+from ..errors import InputError, require_index, require_path, shown, teaching
 from ..resultants import over_time
 from ..results import State
 from .base import Motion
@@ -157,11 +157,14 @@ class History:
         instants
             Their numbers, shape (n,); all by default.
 
-        Yields
-        ------
-        State
+        Returns
+        -------
+        iterator of State
         """
-        ks = range(len(self)) if instants is None else list(instants)
+        return self._states(range(len(self)) if instants is None else [
+            require_index("instants", k, len(self)) for k in _numbers(instants)])
+
+    def _states(self, ks):
         sections = sum(2 * beam.mesh.nelements + 1 for beam in self.system.beams)
         size = max(1, SECTIONS // sections)
         for first in range(0, len(ks), size):
@@ -389,3 +392,9 @@ class History:
         with kind(path, **options) as writer, progress_bar(
                 progress, total=len(self), desc="files") as bar:
             writer.extend(self, lambda: bar.update(1))
+
+
+def _numbers(instants):
+    if isinstance(instants, (str, bytes, dict, set)) or not hasattr(instants, "__iter__"):
+        raise InputError(f"instants must be a list of their numbers, got {shown(instants)}")
+    return instants

@@ -141,6 +141,7 @@ class VtkHdfWriter:
         root.create_dataset("Connectivity", data=connectivity.astype("i8"), **packed)
         root.create_dataset("Offsets", data=np.append(0, offsets).astype("i8"), **packed)
         root.create_dataset("Types", data=types, **packed)
+        root.create_group("PointData")
         for name, parts in body.cell_data.items():
             root.create_dataset(f"CellData/{name}", data=np.concatenate(parts).astype("i4"),
                                 **packed)

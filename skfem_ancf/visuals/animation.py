@@ -8,10 +8,10 @@ import numpy as np
 
 from ..errors import (FileError, InputError, MissingExtra, require_flag,
                       require_integer, require_like, require_option, require_path,
-                      require_positive, taught)
+                      require_positive, require_text, taught)
 from ..io.vtu import replacing
 from .matplotlib import _colormap
-from .pyvista import Scenery, _dressed, _look, _unit, new_plotter
+from .pyvista import Scenery, _dressed, _look, _unit, new_plotter, pixels
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".gif", ".mp4")
 BACKENDS = ("pyvista", "matplotlib")
+
+#: Frames per second, least and most.
+FPS = (0.01, 1000)
 
 #: Frames of a film where their number is not given, at most.
 FRAMES = 100
@@ -80,15 +83,11 @@ def animate(history: History, filename: StrPath, field: Any = "eps_yy", *,
     backend = _backend(backend)
     cmap = _colormap(cmap)
     fps = _fps(history, chosen, fps)
-    try:
-        width, height = (require_integer("size", k, 16, 10000) for k in size)
-    except (TypeError, ValueError):
-        raise InputError(f"size must be two integers, the pixels of the film, got {size!r}"
-                         ) from None
+    size, unit = pixels("size", size), require_text("unit", unit)
     scenery = Scenery(list(history.states(chosen)), field, thickness, limits, subdivide,
                       recover)
     draw = _by_pyvista if backend == "pyvista" else _by_matplotlib
-    images = draw(scenery, history.t[chosen], (width, height), undeformed, cmap, unit)
+    images = draw(scenery, history.t[chosen], size, undeformed, cmap, unit)
     with replacing(path) as temporary:
         (_gif if path.suffix.lower() == ".gif" else _mp4)(
             temporary, images, fps, _colours(scenery, cmap))
@@ -135,7 +134,10 @@ def _backend(backend):
 
 def _fps(history, chosen, fps):
     if fps is not None:
-        return require_positive("fps", fps)
+        fps = require_positive("fps", fps)
+        if not FPS[0] <= fps <= FPS[1]:
+            raise InputError(f"fps must lie between {FPS[0]} and {FPS[1]}, got {fps!r}")
+        return fps
     span = float(history.t[chosen[-1]] - history.t[chosen[0]])
     return float(np.clip((len(chosen) - 1) / span, 5.0, 50.0)) if span > 0 else 5.0
 

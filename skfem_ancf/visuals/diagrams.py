@@ -67,9 +67,12 @@ def plot_resultants(state: State, beam: WhichBeam = None, axes: Any = None, *,
     filename, dpi = _page(None, title, filename, dpi)
     if axes is None:
         axes = Figure(figsize=(6.0, 5.4), layout="constrained").subplots(3, 1, sharex=True)
-    axes = list(np.ravel(axes))
+    axes = [axes] if not isinstance(axes, (list, tuple, np.ndarray)) else list(
+        np.array(axes, dtype=object).ravel())
     if len(axes) != 3:
         raise InputError(f"axes must be three matplotlib Axes, got {len(axes)}")
+    for ax in axes:
+        require_like("axes", ax, "matplotlib Axes", "plot", "fill_between")
     several = len(beams) > 1
     for b in beams:
         found = state.resultants(beam=b, recover=recover)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import (InputError, MissingExtra, require_finite_scalar, require_flag,
                       require_integer, require_like, require_option, require_path, require_positive,
-                      shown, taught)
+                      require_text, shown, taught)
 from ..fields import DRAWN, find_field, values_on_grid
 from ..io.vtu import _subdivision, grid, quads, replacing
 
@@ -160,8 +160,7 @@ def _page(ax, title, filename, dpi):
 
     if ax is not None:
         require_like("ax", ax, "matplotlib Axes", "tripcolor", "figure")
-    if title is not None and not isinstance(title, str):
-        raise InputError(f"title must be a text, got {shown(title)}")
+    require_text("title", title)
     dpi = require_positive("dpi", dpi)
     if not 1.0 <= dpi <= MAX_DPI:
         raise InputError(f"dpi must lie between 1 and {MAX_DPI}, got {dpi!r}")

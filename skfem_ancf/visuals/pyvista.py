@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import (InputError, MissingExtra, require_flag, require_index, require_like,
-                      require_option, require_path, shown, taught)
+from ..errors import (InputError, MissingExtra, require_flag, require_index, require_integer,
+                      require_like, require_path, require_text, shown, taught)
 from ..fields import DRAWN, FIELDS, Field, find_field, find_fields, values_on_grid
 from ..io.vtu import _subdivision, grid, lagrange_cell, quads, replacing
-from .matplotlib import _Body, _limits, _thickness
+from .matplotlib import _Body, _colormap, _limits, _thickness
 
 if TYPE_CHECKING:
     from ..dynamics.history import History
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 #: VTK's numbers of the cells.
 QUAD, LAGRANGE = 9, 70
+
+#: Width and height of a picture, least and largest.
+PIXELS = (100, 10000)
 
 #: Pictures that a plotter writes.
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
@@ -345,6 +348,9 @@ def view(state: State, field: Any = "eps_yy", plotter: Any = None, *, thickness:
     pv = _pyvista()
     require_like("state", state, "State", "beams", "u_of")
     path = None if filename is None else _picture(filename)
+    if plotter is not None:
+        require_like("plotter", plotter, "pyvista Plotter", "add_mesh", "screenshot")
+    cmap, unit = _colormap(cmap), require_text("unit", unit)
     scenery = Scenery([state], field, thickness, limits, subdivide, recover)
     if plotter is None:
         plotter = new_plotter(pv, off_screen if path is None else True, window_size)
@@ -358,7 +364,9 @@ def view(state: State, field: Any = "eps_yy", plotter: Any = None, *, thickness:
 
 def _picture(filename):
     path = require_path("filename", filename)
-    require_option("kind of picture", path.suffix.lower(), PICTURES)
+    if path.suffix.lower() not in PICTURES:
+        raise InputError(f"the file name must end with one of {', '.join(PICTURES)}, got "
+                         f"{str(filename)!r}")
     return path
 
 
@@ -376,10 +384,23 @@ def new_plotter(pv: Any, off_screen: bool | None, window_size: tuple[int, int]) 
     """
     if off_screen is None:
         off_screen = not has_display()
-    try:
-        width, height = (int(k) for k in window_size)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"window_size must be two numbers of pixels, got {shown(window_size)}"
-                         ) from None
     return pv.Plotter(off_screen=require_flag("off_screen", off_screen),
-                      window_size=(width, height))
+                      window_size=pixels("window_size", window_size))
+
+
+def pixels(name: str, size: Any) -> tuple[int, int]:
+    """Width and height of a picture in pixels.
+
+    Parameters
+    ----------
+    name
+        Of the argument, for the message.
+    size
+        Two integers, shape (2,).
+    """
+    try:
+        width, height = (require_integer(name, k, *PIXELS) for k in size)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be two integers from {PIXELS[0]} to {PIXELS[1]}, the width "
+                         f"and height in pixels, got {shown(size)}") from None
+    return width, height
