@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .errors import (CallbackError, InputError, NameUnknown, ask, require_finite_scalar,
-                     require_flag, require_integer, require_text, shown)
+                     require_flag, require_integer, require_text, shown, teaching)
 from .kept import kept
 from .materials import LinearLaw
 from .points import Part
@@ -33,6 +33,7 @@ COMPONENTS = ("xx", "yy", "xy")
 GRIDS = 4
 
 
+@teaching
 @dataclass(frozen=True)
 class Field:
     """A field on the body.

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import (InputError, MissingExtra, require_flag, require_index, require_integer,
-                      require_like, require_path, require_text, shown, taught)
+                      require_like, require_options, require_path, require_text, shown, taught,
+                      teaching)
 from ..fields import DRAWN, FIELDS, Field, find_field, find_fields, values_on_grid
 from ..io.vtu import _subdivision, grid, lagrange_cell, quads, replacing
 from .matplotlib import _Body, _colormap, _limits, _thickness
@@ -112,6 +113,7 @@ class _Grid:
         made.Modified()
 
 
+@teaching
 class Series:
     """A motion for pyvista: one mesh whose points and fields are those of any instant.
 
@@ -133,6 +135,8 @@ class Series:
     """
 
     def __init__(self, history: History, **options: Any) -> None:
+        options = require_options("to_pyvista", options, (
+            "fields", "subdivide", "lagrange", "undeformed", "recover"))
         self._history, self.t, self.k = history, history.t, 0
         if not len(history):
             raise InputError("the history has no instants")
