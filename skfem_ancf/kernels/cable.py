@@ -403,13 +403,6 @@ class CableKernel(Chain):
                 element: "ElementBeamCable") -> tuple[Array, Array, Array, Array]:
         """Tangent, stretch and curvature at points xi of elements: for the fields of the body.
 
-        Returns
-        -------
-        tangent, tangent0
-            Unit tangents now and in the stress-free state, shape (2, ne, np).
-        eps, kappa
-            Extension and change of curvature, shape (ne, np).
-
         Parameters
         ----------
         u, xi, tind
@@ -417,6 +410,13 @@ class CableKernel(Chain):
             (ne,), or None for all.
         mesh, element
             Those of the kernel.
+
+        Returns
+        -------
+        tangent, tangent0
+            Unit tangents now and in the stress-free state, shape (2, ne, np).
+        eps, kappa
+            Extension and change of curvature, shape (ne, np).
         """
         t = self.t if tind is None else self.t[:, tind]
         L = (mesh.lengths if tind is None else mesh.lengths[tind])
@@ -430,9 +430,15 @@ class CableKernel(Chain):
         q = np.moveaxis(q, -1, 0)
         q_e = np.concatenate([q[t[0]], q[t[1]]], axis=1)
         a0, b0 = G1 @ q_e, (0.0 if mesh.is_straight else 1.0) * (G2 @ q_e)
-        a, b = a0 + G1 @ u_e, b0 + G2 @ u_e
-        s0, s = np.sum(a0**2, axis=-1), np.sum(a**2, axis=-1)
-        eps = np.sum((a + a0) * (a - a0), axis=-1) / (np.sqrt(s) + np.sqrt(s0))
-        tangent, tangent0 = (np.moveaxis(x / np.sqrt(y)[..., None], -1, 0)
-                             for x, y in ((a, s), (a0, s0)))
-        return tangent, tangent0, eps, cross(a, b) / s - cross(a0, b0) / s0
+        d = np.concatenate([G1 @ u_e, G2 @ u_e], axis=1).transpose(1, 2, 0)
+        frame, (n, ne) = np.concatenate([a0, b0], axis=1).transpose(1, 2, 0), a0.shape[1::-1]
+        square0, each = np.sum(a0 * a0, axis=-1), np.arange(ne)
+        pack = self.packs[0]._replace(
+            frame=frame, length0=np.sqrt(square0).T, kappa0=(cross(a0, b0) / square0).T,
+            weights=np.ones((n, ne)), place=each, frame_place=each)
+        r, strain, (weights, square, kappa) = np.empty(d.shape), np.empty((2, n, ne)), np.empty(
+            (3, n, ne))
+        cable_strain(pack, 0, d, r, weights, square, kappa, strain)
+        tangent = (r[:n] / np.sqrt(square)[:, None]).transpose(1, 2, 0)
+        tangent0 = np.moveaxis(a0 / np.sqrt(square0)[..., None], -1, 0)
+        return tangent, tangent0, strain[0].T, strain[1].T

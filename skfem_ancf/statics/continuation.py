@@ -11,6 +11,8 @@ from ..errors import (CallbackError, ConvergenceError, InputError, Interrupted, 
                       require_function, require_integer, require_positive, shown, taught)
 from ..progress import progress_bar
 from .critical import find_critical
+from .iteration import reference_work, settled
+from .newton import rules_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -85,7 +87,7 @@ class Tracer:
     """
 
     def __init__(self, system: System, tol: float, max_iterations: int) -> None:
-        self.system, self.tol, self.max_iterations = system, tol, max_iterations
+        self.system, self.rules = system, rules_of(system, "mixed", tol, max_iterations)
         weights = np.zeros(system.N)
         for beam, s in zip(system.beams, system.slices):
             weights[s].reshape(-1, beam.nd)[:, :2] = 1.0
@@ -200,8 +202,8 @@ class Tracer:
         u, m, load = start.u, start.multipliers, start.load
         _, evaluations = system.assemble(u, load)
         du, dm, dl = first
-        step, floor, work, reference = np.zeros(system.N), 8.0 * system.work_noise, np.inf, 0.0
-        for k in range(1, self.max_iterations + 1):
+        step, work, rules = np.zeros(system.N), np.inf, self.rules
+        for k in range(1, rules.iterations + 1):
             carried = system.stress_step(evaluations, du)
             u, m, load, step = u + du, m + dm, load + dl, step + du
             with np.errstate(over="ignore", invalid="ignore"):
@@ -212,10 +214,10 @@ class Tracer:
             residual, phi = load * external - force, system.constraint(u, load)
             if system.joints:
                 residual = residual - m @ system.jacobian(u, load)
-            closed = np.max(np.abs(phi), initial=0.0) <= 1e-12 * system.size
-            reference = np.sqrt(max(abs(load * external @ u), abs(force @ u),
-                                    abs(external @ step * dl)))
-            if closed and work <= self.tol * reference + floor:
+            closed = np.max(np.abs(phi), initial=0.0) <= rules.closed
+            reference = max(reference_work(force, load * external, u),
+                            np.sqrt(abs(external @ step * dl)))
+            if closed and settled(work, reference, rules):
                 return Point(u, m, load, force, start.arc + ds,
                              work / reference if reference > 0 else 0.0, k)
             drive, gap = self._drive(external, u, load)
@@ -232,7 +234,7 @@ class Tracer:
                 raise Failed("the iteration leaves the path")
             work = np.sqrt(abs((residual * system.free) @ du) + abs(phi @ dm)
                            + abs(dl * (external @ du)))
-        raise Failed(f"no convergence in {self.max_iterations} iterations")
+        raise Failed(f"no convergence in {rules.iterations} iterations")
 
 
 @taught

@@ -137,7 +137,7 @@ def equilibrium(e, target, rules, x, w, record):
     for k in range(rules.iterations + 1):
         # after the last correction only the residual is wanted, not the tangent
         part = min(1.0, work / before) if k > 1 else 1.0
-        last = (k > 1 or (k > 0 and quiet)) and work * part <= rules.tol * reference + rules.floor
+        last = (k > 1 or (k > 0 and quiet)) and settled(work * part, reference, rules)
         if last:
             body_force(e.body, x.u, x.force)
         else:
@@ -170,9 +170,21 @@ def equilibrium(e, target, rules, x, w, record):
             x.u[i] += w.du[i]
         for i in lanes(m):
             x.multipliers[i] += w.dm[i]
-        reference = np.sqrt(max(abs(np.dot(x.force, x.u)), abs(np.dot(w.load, x.u))))
+        reference = reference_work(x.force, w.load, x.u)
         record[k, 1] = work / reference if reference > 0.0 else 0.0
     return NOT_CONVERGED, rules.iterations
+
+
+@source
+def reference_work(force, load, u):
+    """The root of the work that corrections are compared with: that of the forces on the way."""
+    return np.sqrt(max(abs(np.dot(force, u)), abs(np.dot(load, u))))
+
+
+@source
+def settled(work, reference, rules):
+    """True if a correction's work, as a root, is as small as is asked, or round-off."""
+    return work <= rules.tol * reference + rules.floor
 
 
 @source

@@ -278,10 +278,7 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record, d
     """
     machine, tables = system.machine, system.machine.tables
     target = _target(system, result, load, start)
-    floor = 8.0 * system.work_noise
-    # the residual sums the noise of all coordinates, the work that of the strains
-    rules = Rules(int(method == "mixed"), max_iterations, tol, floor, floor * system.noise,
-                  1e-12 * system.size, INACCURATE, 0)
+    rules = rules_of(system, method, tol, max_iterations)
     room, solver = machine.room(room_for_iterations, system.m), None
     if descent is not None:
         solver = descent
@@ -311,6 +308,22 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record, d
         else:
             system.K.clear()
     return x.u, x.multipliers, x.force
+
+
+def rules_of(system: System, method: str, tol: float, max_iterations: int) -> Rules:
+    """When an iteration of a system has converged.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    method, tol, max_iterations
+        As for :func:`solve_static`.
+    """
+    floor = 8.0 * system.work_noise
+    # the residual sums the noise of all coordinates, the work that of the strains
+    return Rules(int(method == "mixed"), max_iterations, tol, floor, floor * system.noise,
+                 1e-12 * system.size, INACCURATE, 0)
 
 
 _ENDS = {SINGULAR: "the tangent is singular", NOT_FINITE: "the strain is not finite",
