@@ -10,8 +10,8 @@ from ..errors import (FileError, InputError, MissingExtra, require_flag,
                       require_integer, require_like, require_option, require_path,
                       require_positive, require_text, taught)
 from ..io.vtu import replacing
-from .matplotlib import _colormap
-from .pyvista import Scenery, _dressed, _look, _unit, new_plotter, pixels
+from .matplotlib import _colormap, unit_of
+from .pyvista import Scenery, _dressed, _look, new_plotter, pixels
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -213,7 +213,7 @@ def _by_matplotlib(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: An
                          cmap=cmap or ("RdYlBu_r" if field.signed else "viridis"))
     ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
     ax.set_aspect("equal")
-    unit = _unit(field, unit)
+    unit = unit_of(field, unit)
     bar = figure.colorbar(image, ax=ax, location="bottom", shrink=0.6, aspect=45)
     bar.set_label((field.title or field.name) + (f" ({unit})" if unit else ""), fontsize=8)
     bar.formatter.set_powerlimits((-3, 4))

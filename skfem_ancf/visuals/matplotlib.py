@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import (InputError, MissingExtra, require_finite_scalar, require_flag,
                       require_integer, require_like, require_option, require_path, require_positive,
                       require_text, shown, taught)
-from ..fields import DRAWN, find_field, values_on_grid
+from ..fields import DRAWN, Field, find_field, values_on_grid
 from ..io.vtu import _subdivision, grid, quads, replacing
 
 if TYPE_CHECKING:
@@ -137,7 +137,8 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     ax.autoscale_view()
     _dress(ax, (drawn.title or drawn.name) if title is None else title, factor)
     if colorbar:
-        _add_colorbar(ax, image, bool(np.any(values < low)), bool(np.any(values > high)))
+        _add_colorbar(ax, image, bool(np.any(values < low)), bool(np.any(values > high)),
+                      unit_of(drawn))
     if filename is not None:
         with replacing(filename) as temporary:
             ax.figure.savefig(temporary, dpi=dpi, bbox_inches="tight")
@@ -239,7 +240,21 @@ def _limits(limits, values, field):
     return (start - size if field.signed else start), start + size
 
 
-def _add_colorbar(ax, image, below, above):
+def unit_of(field: Field, unit: str | None = None) -> str:
+    """What a colour bar says of the unit: nothing for numbers.
+
+    Parameters
+    ----------
+    field
+        A :class:`~skfem_ancf.fields.Field`.
+    unit
+        To say in place of its own.
+    """
+    unit = field.unit if unit is None else unit
+    return "" if unit == "1" else unit
+
+
+def _add_colorbar(ax, image, below, above, unit):
     """A bar as high as the picture, or below a flat one."""
     (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
     flat = (y1 - y0) < 0.35 * (x1 - x0)
@@ -250,6 +265,7 @@ def _add_colorbar(ax, image, below, above):
         bar = ax.figure.colorbar(image, cax=ax.inset_axes([1.03, 0.0, 0.03, 1.0]),
                                  extend=_EXTEND[below, above])
     bar.outline.set_visible(False)
+    bar.set_label(unit, fontsize=8, color=_MUTED)
     bar.ax.tick_params(labelsize=8, color=_MUTED, labelcolor=_INK)
     bar.formatter.set_powerlimits((-3, 4))
     bar.formatter.set_useMathText(True)

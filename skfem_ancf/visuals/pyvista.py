@@ -13,7 +13,7 @@ from ..errors import (InputError, MissingExtra, require_flag, require_index, req
                       teaching)
 from ..fields import DRAWN, FIELDS, Field, find_field, find_fields, values_on_grid
 from ..io.vtu import _subdivision, grid, lagrange_cell, quads, replacing
-from .matplotlib import _Body, _colormap, _limits, _thickness
+from .matplotlib import _Body, _colormap, _limits, _thickness, unit_of
 
 if TYPE_CHECKING:
     from ..dynamics.history import History
@@ -281,7 +281,7 @@ def _dressed(scenery, plotter, cmap, undeformed, unit):
         plotter.add_mesh(ghost, color="#e2e2e2", lighting=False)
     mesh = pv.PolyData(scenery.points(0), faces)
     mesh.point_data[field.name] = scenery.values(0)
-    unit = _unit(field, unit)
+    unit = unit_of(field, unit)
     plotter.add_mesh(
         mesh, scalars=field.name, clim=(scenery.low, scenery.high), lighting=False,
         cmap=cmap or ("RdYlBu_r" if field.signed else "viridis"), nan_color="#bbbbbb",
@@ -295,20 +295,14 @@ def _dressed(scenery, plotter, cmap, undeformed, unit):
     return mesh
 
 
-def _unit(field, unit):
-    """What stands in the colour bar: nothing for numbers."""
-    unit = field.unit if unit is None else unit
-    return "" if unit == "1" else unit
-
-
 def _look(plotter, scenery):
     """From the front, without perspective, at all frames."""
     plotter.enable_parallel_projection()
     every = np.concatenate([scenery.points(k, undeformed) for k in range(len(scenery.frames))
                             for undeformed in (False, True)])
     low, high = every.min(axis=0), every.max(axis=0)
-    margin = 0.12 * np.max(high - low)
-    low[1] -= margin  # the colour bar
+    width, height = plotter.window_size
+    low[1] -= 0.25 * max(high[1] - low[1], (high[0] - low[0]) * height / width)  # the colour bar
     plotter.view_xy(bounds=(low[0], high[0], low[1], high[1], 0.0, 0.0))
 
 
