@@ -133,7 +133,7 @@ def equilibrium(e, target, rules, x, w, record):
     N, m = x.u.size, x.multipliers.size
     clear(w.dm)
     work = before = reference = np.inf
-    quiet, moving = False, np.any(target.prescribed != 0.0)
+    quiet, moving = False, np.dot(target.prescribed, target.prescribed) > 0.0
     for k in range(rules.iterations + 1):
         # after the last correction only the residual is wanted, not the tangent
         part = min(1.0, work / before) if k > 1 else 1.0
@@ -206,7 +206,8 @@ def _residual(e, target, x, w):
     if w.phi.size > 0:
         constraint(e.joints, target.c, target.g, target.at, x.u, w.phi)
         add_joint_force(e.joints, target.g, target.at, x.u, x.multipliers, w.push)
-        opening = np.max(np.abs(w.phi))
+        for k in range(w.phi.size):
+            opening = max(opening, abs(w.phi[k]))
     for i in lanes(x.u.size):
         w.R[i] = (w.load[i] - x.force[i] - target.gap[i] - w.push[i]) * e.free[i]
     return opening
