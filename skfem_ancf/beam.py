@@ -380,8 +380,7 @@ class Beam(Frozen):
             Shapes (2, n) and (n,).
         """
         mapping, tind = self.mesh.mapping(), np.array([e])
-        weights = np.array([self.element.gbasis(mapping, X[:, None], i, tind)[0][0, 0]
-                            for i in range(2 * self.element.nodal_dofs)])
+        weights = self.element.functions(mapping, X[:, None], tind)[0][:, 0, 0]
         first = self.mesh.t[0, e] * self.nd
         return first + np.arange(2 * self.nd).reshape(-1, 2).T, weights
 
@@ -523,9 +522,7 @@ class Beam(Frozen):
         X, W = tensor(gauss(n), self.kinematics.section_rule(self.element))
         tind = np.array([0]) if self.mesh.is_uniform else None
         mapping = self.mesh.mapping()
-        N = np.array([np.asarray(self.element.gbasis(mapping, X, i, tind)[0])
-                      for i in range(2 * self.element.nodal_dofs)])
-        return N, self.width * W * mapping.detDF(X, tind)
+        return self.element.functions(mapping, X, tind)[0], self.width * W * mapping.detDF(X, tind)
 
     def mass_elements(self, elements: slice = slice(None)) -> Array:
         """Element mass matrices of a slice of the elements, shape (n, 2 nd, 2 nd)."""

@@ -321,16 +321,24 @@ class Constraints:
                            "joints before it hold already: remove one of them")
 
     @cached_property
+    def _standing(self) -> list[bool]:
+        """Of each beam, whether its own supports hold it."""
+        found = []
+        for beam, s in zip(self.beams, self.slices):
+            held = np.flatnonzero(~self.free[s])
+            motions = unit_rows(beam.rigid_motions()[held] / [1.0, 1.0, self.size])
+            found.append(len(motions) > 0 and np.linalg.matrix_rank(motions, 1e-9) == 3)
+        return found
+
+    @cached_property
     def springs(self) -> Array:
         """Coordinates that hold the beams which their own supports leave free to move.
 
         The positions of two nodes far apart, for each such beam.
         """
         found: list[int] = []
-        for beam, s in zip(self.beams, self.slices):
-            held = np.flatnonzero(~self.free[s])
-            motions = unit_rows(beam.rigid_motions()[held] / [1.0, 1.0, self.size])
-            if len(motions) and np.linalg.matrix_rank(motions, 1e-9) == 3:
+        for beam, s, stands in zip(self.beams, self.slices, self._standing):
+            if stands:
                 continue
             p = beam.mesh.p
             far = int(np.argmax(np.sum((p - p[:, :1]) ** 2, axis=0)))
@@ -345,6 +353,8 @@ class Constraints:
 
     def free_rigid_motions(self) -> list[str]:
         """Descriptions of the rigid motions that nothing holds, one string each."""
+        if all(self._standing):
+            return []
         sizes = [float(beam.mesh.lengths.sum()) for beam in self.beams]
         values = np.concatenate([beam.rigid_motions() / [1.0, 1.0, size]
                                  for beam, size in zip(self.beams, sizes)])

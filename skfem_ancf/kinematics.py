@@ -13,7 +13,7 @@ from .kernels import CableKernel, Kernel
 from .errors import InputError
 from .formulations.ecm import AXIS
 from .quadrature import gauss
-from .strains import ElementStrain, slopes
+from .strains import ElementStrain
 
 if TYPE_CHECKING:
     from .beam import Beam
@@ -91,7 +91,7 @@ class Sections:
             (2, nelements, npoints), and (nelements,).
         """
         u_e = beam.kernel.gather(u, slice(None) if tind is None else tind)
-        table, frame = slopes(beam, X, tind)
+        table, frame = beam.element.slopes(beam.mesh.mapping(), X, tind)
         return np.einsum("ebi,bJep->iJep", u_e, table), frame
 
     @staticmethod
@@ -108,9 +108,8 @@ class Sections:
         """
         mapping = beam.mesh.mapping()
         u_e = beam.kernel.gather(u, slice(None) if tind is None else tind)
-        return sum(np.einsum("ei,ep->iep", u_e[:, k],
-                             np.asarray(beam.element.gbasis(mapping, X, k, tind)[0]))
-                   for k in range(u_e.shape[1]))
+        functions = beam.element.functions(mapping, X, tind)[0]
+        return np.einsum("eki,kep->iep", u_e, functions, optimize=True)
 
     @staticmethod
     def strain(beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:

@@ -123,8 +123,8 @@ class Part:
 
     def _table(self, derivative):
         element, mesh = self.beam.element, self.beam.mesh
-        rows = [element.local(self.X, mesh.height, i) for i in range(2 * element.nodal_dofs)]
-        return np.array([row[derivative] * mesh.lengths[self.e] ** row[3] for row in rows])
+        rows = element.local(self.X, mesh.height)
+        return rows[derivative] * mesh.lengths[self.e] ** rows[3][:, None]
 
     @cached_property
     def weights(self) -> Array:

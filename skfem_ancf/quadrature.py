@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +22,12 @@ MAX_POINTS = 1000
 @taught
 def gauss(n: int) -> Rule:
     """The n-point Gauss rule on [0, 1], exact to degree 2 n - 1: points (n,) and weights (n,)."""
-    n = require_integer("the number of Gauss points n", n, 1, MAX_POINTS)
+    x, w = _gauss(require_integer("the number of Gauss points n", n, 1, MAX_POINTS))
+    return x.copy(), w.copy()
+
+
+@lru_cache(64)
+def _gauss(n: int) -> Rule:
     x, w = np.polynomial.legendre.leggauss(n)
     return 0.5 * (x + 1.0), 0.5 * w
 
@@ -30,6 +36,11 @@ def gauss(n: int) -> Rule:
 def gauss_lobatto(n: int) -> Array:
     """The n >= 2 Gauss-Lobatto points on [-1, 1], zeros of (1 - x^2) P_{n-1}': antisymmetric."""
     n = require_integer("the number of Gauss-Lobatto points n", n, 2, MAX_POINTS)
+    return _lobatto(n).copy()
+
+
+@lru_cache(64)
+def _lobatto(n: int) -> Array:
     inner = roots_jacobi(n - 2, 1.0, 1.0)[0] if n > 2 else np.zeros(0)
     return np.concatenate([[-1.0], 0.5 * (inner - inner[::-1]), [1.0]])
 

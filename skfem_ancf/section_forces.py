@@ -97,11 +97,9 @@ class Sections:
         """Reference points, local functions and their slopes, and the derivative of the map."""
         X = np.array([np.broadcast_to(xi[:, None], self.shape), np.broadcast_to(eta, self.shape)])
         element = beam.element
-        rows = [element.local(X, beam.mesh.height, i) for i in range(2 * element.nodal_dofs)]
-        scale = (beam.mesh.lengths[e][:, None] ** np.array([row[3] for row in rows])).T
-        value, slope = (
-            np.array([np.broadcast_to(row[k], self.shape) for row in rows]) * scale[:, :, None]
-            for k in (0, 1))
+        value, slope, _, powers = element.local(X, beam.mesh.height)
+        scale = (beam.mesh.lengths[e][:, None] ** powers).T[:, :, None]
+        value, slope = value * scale, slope * scale
         return X, value, slope, beam.mesh.mapping().DF(X, e)
 
     def field(self, q_e: Array, slope: bool = False) -> Array:

@@ -14,34 +14,6 @@ if TYPE_CHECKING:
     from .types import Array
 
 
-def slopes(beam: Beam, X: Array, tind: Array | None = None) -> tuple[Array, Array]:
-    """Derivatives of the local functions in the beam's frame, and the frame.
-
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam` with sections.
-    X
-        Reference points, (2, npoints) or (2, nelements, npoints).
-    tind
-        Elements, shape (nelements,), or None for all.
-
-    Returns
-    -------
-    slopes, frame
-        Shapes (nb, 2, nelements, npoints) and (2, 2, nelements, npoints).
-    """
-    mesh, element, mapping = beam.mesh, beam.element, beam.mesh.mapping()
-    frame = mapping.frame(X, tind)
-    along, across = np.einsum("kjep,jJep->kJep", mapping.invDF(X, tind), frame)
-    lengths = (mesh.lengths if tind is None else mesh.lengths[tind])[:, None]
-    out = []
-    for i in range(2 * element.nodal_dofs):
-        _, d_xi, d_eta, power = element.local(X, mesh.height, i)
-        out.append(lengths**power * (along * d_xi + across * d_eta))
-    return np.array(out), frame
-
-
 class ElementStrain:
     """The strain of a term of a formulation at points: interpolated samples.
 
@@ -72,7 +44,8 @@ class ElementStrain:
                 places.setdefault(key, np.array([0.0 * X[0] + xi, X[1]]))
                 part.append((list(places).index(key), w.T))
             self._parts.append(part)
-        tables = [slopes(beam, at, tind) for at in places.values()]
+        mapping = beam.mesh.mapping()
+        tables = [beam.element.slopes(mapping, at, tind) for at in places.values()]
         self._slopes = np.array([table for table, _ in tables])  # (places, nb, 2, ne, np)
         self._frame = np.stack([frame for _, frame in tables], axis=2)  # (2, 2, places, ne, np)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -104,8 +104,22 @@ class ElementBeam(Frozen, Element):
     def carries_shear_parabola(self) -> bool:
         return self.section.degree >= 3
 
-    def local(self, X: Array, h: float, i: int) -> tuple[Array, Array, Array, int]:
-        """Local function i on the reference cell, its derivatives, and its power of the length.
+    @cached_property
+    def _factors(self) -> Array:
+        """Of all local functions: row of the axis functions, or -1, of those along X that a
+        section function has, its number, the power of h, and that of the length."""
+        m, n = self._along
+        rows = []
+        for node in (0, 1):
+            for k, (_, slope, power) in enumerate(self.functionals):
+                of = m * node + slope if power == 0 else -1
+                rows.append((of, n * node + slope, (k - m) % max(self.section.number, 1), power,
+                             slope))
+        return np.array(rows).T
+
+    def local(self, X: Array, h: float, i: int | slice = slice(None)
+              ) -> tuple[Array, Array, Array, Any]:
+        """Local functions on the reference cell, their derivatives, and their power of the length.
 
         Parameters
         ----------
@@ -114,26 +128,31 @@ class ElementBeam(Frozen, Element):
         h
             Height of the section.
         i
-            Number of the local function, 0 to 2 nodal_dofs - 1.
+            Number of the local function, 0 to 2 nodal_dofs - 1, or a slice of them.
 
         Returns
         -------
         value, d_xi, d_eta
-            Arrays of shape X.shape[1:].
+            Arrays of shape X.shape[1:], or (n,) + X.shape[1:] of a slice.
         slope
-            The power of L that the function takes: how many derivatives along X its coordinate is.
+            The power of L that a function takes: how many derivatives along X its coordinate is.
         """
-        node, k = divmod(i, self.nodal_dofs)
-        if not 0 <= i < 2 * self.nodal_dofs:
-            self._index_error()
-        _, slope, power = self.functionals[k]
-        m = self._along[power > 0]
-        a, da = (hermite_basis(m, X[0], d)[m * node + slope] for d in (0, 1))
-        if power == 0:
-            return a, da, 0.0 * X[1], slope
-        P, dP = self.section(X[1] - 0.5, (k - self._along[0]) % self.section.number)
-        size = h**power
-        return size * a * P, size * da * P, size * a * dP, slope
+        if not isinstance(i, slice):
+            if not 0 <= i < 2 * self.nodal_dofs:
+                self._index_error()
+            value, d_xi, d_eta, (slope,) = self.local(X, h, slice(i, i + 1))
+            return value[0], d_xi[0], d_eta[0], int(slope)
+        axis, along, number, power, slope = self._factors[:, i]
+        out = np.zeros((3, len(axis)) + np.shape(X)[1:], np.result_type(X, float))
+        of_axis, of_section = axis >= 0, axis < 0
+        for d in (0, 1):
+            out[d, of_axis] = hermite_basis(self._along[0], X[0], d)[axis[of_axis]]
+        if np.any(of_section):
+            S, dS = (hermite_basis(self._along[1], X[0], d)[along[of_section]] for d in (0, 1))
+            P, dP = (values[number[of_section]] for values in self.section(X[1] - 0.5))
+            h = (h**power[of_section]).reshape((-1,) + (1,) * (S.ndim - 1))
+            out[:, of_section] = h * S * P, h * dS * P, h * S * dP
+        return out[0], out[1], out[2], slope
 
     def gbasis(self, mapping: MappingBeam, X: Array, i: int,
                tind: Array | None = None) -> tuple[DiscreteField, ...]:
@@ -155,13 +174,57 @@ class ElementBeam(Frozen, Element):
         tuple of DiscreteField
             One field: value (nelements, npoints) and grad (2, nelements, npoints).
         """
+        if not 0 <= i < 2 * self.nodal_dofs:
+            self._index_error()
+        value, grad = self.functions(mapping, X, tind, slice(i, i + 1))
+        return (DiscreteField(value=value[0], grad=grad[0]),)
+
+    def functions(self, mapping: MappingBeam, X: Array, tind: Array | None = None,
+                  which: slice = slice(None)) -> tuple[Array, Array]:
+        """All local functions on the body, with their gradients.
+
+        Parameters
+        ----------
+        mapping, X, tind
+            As for :meth:`gbasis`, shapes (2, npoints) or (2, nelements, npoints), and
+            (nelements,).
+        which
+            Some of them.
+
+        Returns
+        -------
+        value, grad
+            Shapes (n, nelements, npoints) and (n, 2, nelements, npoints).
+        """
         mesh = mapping.mesh
-        value, d_xi, d_eta, slope = self.local(X, mesh.height, i)
+        value, d_xi, d_eta, slope = self.local(X, mesh.height, which)
+        if np.ndim(X) == 2:  # the same points of all elements
+            value, d_xi, d_eta = value[:, None], d_xi[:, None], d_eta[:, None]
         lengths = mesh.lengths if tind is None else mesh.lengths[tind]
-        scale = lengths[:, None] ** slope
+        scale = lengths[:, None] ** slope[:, None, None]
         invDF = mapping.invDF(X, tind)
-        grad = scale * (invDF[0] * d_xi + invDF[1] * d_eta)
-        return (DiscreteField(value=scale * value, grad=grad),)
+        grad = scale[:, None] * (invDF[0] * d_xi[:, None] + invDF[1] * d_eta[:, None])
+        return scale * value, grad
+
+    def slopes(self, mapping: MappingBeam, X: Array, tind: Array | None = None
+               ) -> tuple[Array, Array]:
+        """Derivatives of all local functions along the axis and across it, and the beam's frame.
+
+        Parameters
+        ----------
+        mapping, X, tind
+            As for :meth:`gbasis`, shapes (2, npoints) or (2, nelements, npoints), and
+            (nelements,).
+
+        Returns
+        -------
+        slopes, frame
+            Shapes (n, 2, nelements, npoints) and (2, 2, nelements, npoints), see
+            :meth:`MappingBeam.frame <skfem_ancf.mapping.MappingBeam.frame>`.
+        """
+        frame = mapping.frame(X, tind)
+        grad = self.functions(mapping, X, tind)[1]
+        return np.einsum("kjep,jJep->kJep", grad, frame), frame
 
     @cached_property
     def sampling(self) -> Sampling:
@@ -199,8 +262,7 @@ class ElementBeam(Frozen, Element):
         n = self.axis_degree + 1, max(self.order, 1) + 1
         X = np.array(np.meshgrid(np.linspace(0, 1, n[0]), np.linspace(0, 1, n[1]))).reshape(2, -1)
         half = np.array([0.5 * X[0], X[1]])
-        i = range(2 * self.nodal_dofs)
-        own, child = (np.array([self.local(P, 1.0, k)[0] for k in i]).T for P in (half, X))
+        own, child = (self.local(P, 1.0)[0].T for P in (half, X))
         return np.linalg.lstsq(child, own, rcond=None)[0]
 
     def fitted(self, mesh: MeshBeam) -> MeshBeam:
@@ -278,6 +340,6 @@ class SectionFunctions(Frozen):
     def number(self) -> int:
         return self._dP.shape[1]
 
-    def __call__(self, eta: Array, k: int) -> tuple[Array, Array]:
-        """P_k and its derivative at eta in [-1/2, 1/2]."""
+    def __call__(self, eta: Array, k: int | slice = slice(None)) -> tuple[Array, Array]:
+        """P_k and its derivative at eta in [-1/2, 1/2]; of all k, shape (n,) + eta.shape."""
         return legendre.legval(2 * eta, self._P[:, k]), legendre.legval(2 * eta, self._dP[:, k])

@@ -10,6 +10,7 @@ and where elements share G its products are constants: a matrix product for a wh
 elements. The parts symmetric and skew in (a, b) need each pair of rows once.
 """
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -286,34 +287,70 @@ def pair_tables(table: Array, pairs: Array, constant: Array, elements: int) -> P
     elements
         Their number.
     """
-    nb, q = table.shape[2], table.shape[2] // 2
-    g, h = pairs
-    off = g != h
-    number = np.where(off, np.cumsum(off) - 1, np.sum(off))
-    kept = np.delete(np.arange(nb), q)
-    a, b = (kept[k] for k in np.tril_indices(nb - 1))
-    c, d = a[a > b], b[a > b]
-    n_of, m_of = np.zeros((2, nb, nb), dtype=np.int64)
-    n_of[a, b] = n_of[b, a] = np.arange(len(a))
-    m_of[c, d] = m_of[d, c] = np.arange(len(c))
+    nb, (g, h), places = table.shape[2], pairs, _places(table.shape[2])
+    off, number, partners, rounds = _partners(Content(pairs))
+    (a, b), (c, d) = places.lower, places.strictly
     symmetric, skew = np.zeros((0, len(a), len(g))), np.zeros((0, len(c), np.sum(off) + 1))
     if table.shape[0] == 1:
         G, H = table[0, g].T, table[0, h].T
         symmetric = (G[a] * H[b] + off * H[a] * G[b])[None]
         skew = np.append((G[c] * H[d] - H[c] * G[d])[:, off], np.zeros((len(c), 1)), axis=1)[None]
-    both = np.concatenate([[g, h, np.arange(len(g)), np.full(len(g), 2)],
-                           np.array([h, g, np.arange(len(g)), np.full(len(g), 3)])[:, off]], axis=1)
-    order, rounds = in_rounds(both[0])
     C = constant.reshape(-1, nb, 2, nb, 2)
     held = np.stack([C[:, a, 0, b, 0], C[:, a, 1, b, 1],
                      0.5 * (C[:, a, 0, b, 1] + C[:, b, 0, a, 1])], axis=2)
     held_skew = 0.5 * (C[:, c, 0, d, 1] - C[:, d, 0, c, 1])
-    entries, signs, ends = _entries(nb, n_of, m_of)
     return PairTables(packed([g, h, number], np.int64), packed(symmetric), packed(skew),
-                      packed([a, b], np.int64), packed([c, d], np.int64),
-                      packed(both[:, order], np.int64), rounds, entries, signs, ends,
+                      places.lower, places.strictly, partners, rounds, places.entries,
+                      places.signs, places.ends,
                       packed(held.reshape(len(C), 3 * len(a)).T), packed(held_skew.T),
                       packed(np.arange(elements) * (len(C) > 1), np.int64))
+
+
+class Content:
+    """Arrays as the key of a cache: equal where they have the same numbers."""
+
+    def __init__(self, *arrays: Array) -> None:
+        self.arrays = arrays
+        self._key = tuple((x.shape, x.dtype.char, x.tobytes()) for x in arrays)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Content) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+
+@lru_cache(64)
+def _partners(content):
+    """Which pairs are of two rows, their numbers, and the ``partners`` and ``rounds``."""
+    (g, h), = content.arrays
+    off, n = g != h, np.arange(len(g))
+    number = np.where(off, np.cumsum(off) - 1, np.sum(off))
+    both = np.concatenate([[g, h, n, np.full(len(g), 2)],
+                           np.array([h, g, n, np.full(len(g), 3)])[:, off]], axis=1)
+    order, rounds = in_rounds(both[0])
+    return off, number, packed(both[:, order], np.int64), rounds
+
+
+class _Places(NamedTuple):
+    """The fields of :class:`PairTables` that depend on the number of local functions only."""
+
+    lower: I2
+    strictly: I2
+    entries: I2
+    signs: F2
+    ends: I1
+
+
+@lru_cache(64)
+def _places(nb):
+    kept = np.delete(np.arange(nb), nb // 2)
+    a, b = (kept[k] for k in np.tril_indices(nb - 1))
+    c, d = a[a > b], b[a > b]
+    n_of, m_of = np.zeros((2, nb, nb), dtype=np.int64)
+    n_of[a, b] = n_of[b, a] = np.arange(len(a))
+    m_of[c, d] = m_of[d, c] = np.arange(len(c))
+    return _Places(packed([a, b], np.int64), packed([c, d], np.int64), *_entries(nb, n_of, m_of))
 
 
 def _entries(nb, n_of, m_of):

@@ -7,6 +7,7 @@ interpolation and the weights in them, the tangent is a sum over pairs of rows.
 """
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -16,9 +17,9 @@ from ..materials import LinearLaw
 from ..quadrature import tensor
 from ..source import F1, F2, F3, I1, I2, column, lanes, room, shaped, source, thin
 from ..types import Array
-from .base import (CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, Chain, Destination, PairTables,
-                   Texts, add_force, add_held_energy, add_tangent, apart, block, copy_stress,
-                   in_rounds, load, no_stresses, nowhere, packed, pair_tables, product)
+from .base import (CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, Chain, Content, Destination,
+                   PairTables, Texts, add_force, add_held_energy, add_tangent, apart, block,
+                   copy_stress, in_rounds, load, no_stresses, nowhere, packed, pair_tables, product)
 from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
 
 if TYPE_CHECKING:
@@ -399,14 +400,11 @@ def beam_gradients(mesh: "MeshBeam", element: "ElementBeam", X: Array,
     frame : ndarray
         The beam's frame, transposed to (2, nelements, npoints, 2): e_1 and e_2.
     """
-    mapping = mesh.mapping()
-    frame = mapping.frame(X, tind)
-    grad = np.array([element.gbasis(mapping, X, i, tind)[0].grad
-                     for i in range(2 * element.nodal_dofs)])
-    G = np.einsum("jkep,ijep->kepi", frame, grad, optimize=True)
+    slopes, frame = element.slopes(mesh.mapping(), X, tind)
+    G = np.ascontiguousarray(slopes.transpose(1, 2, 3, 0))
     # the positions of both nodes together are a translation: exactly, or round-off resists it
     G[..., element.nodal_dofs] = -G[..., 0]
-    return np.ascontiguousarray(G), np.ascontiguousarray(np.moveaxis(frame, 0, -1))
+    return G, np.ascontiguousarray(np.moveaxis(frame, 0, -1))
 
 
 class TermTables:
@@ -532,16 +530,15 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
     (g, h), normal = (np.concatenate(part) for part in zip(*rows)), sum(len(x) for x, _ in rows[:2])
     rows = np.array([g, h])
     factors = np.where(g == h, 0.5, 1.0)
-    terms, mixing = _terms(rows, factors, along, weights.shape[0],
-                           law.D if law.kind == LINEAR else np.ones((3, 3)))
+    coupled = law.D != 0.0 if law.kind == LINEAR else np.ones((3, 3), bool)
+    terms, mixing = _terms(Content(rows, coupled, *along), weights.shape[0])
     moduli = np.zeros((terms.shape[1], 1))
     if law.kind == LINEAR:
         D = np.kron(law.D.reshape(9, 1), weights)
         moduli = mixing @ D
         keep = np.any(np.abs(moduli) > 1e-14 * (abs(mixing) @ np.abs(D)), axis=1)  # else orthogonal
         terms, moduli, mixing = terms[:, keep], moduli[keep], mixing[:0]
-    pairs, of = np.unique(np.concatenate([terms[:2], rows], axis=1), axis=1, return_inverse=True)
-    of = of.ravel()
+    pairs, of = _pairs(Content(terms[:2], rows))
     tables = pair_tables(G, pairs, constant, ne)
     own = of[:terms.shape[1]]
     order, rounds = in_rounds(own)
@@ -573,8 +570,23 @@ def _joined(along, ns):
     return out, packed(np.cumsum([0, *sizes]) * ns, np.int64)
 
 
-def _terms(rows, factors, along, points, D):
+@lru_cache(64)
+def _pairs(content):
+    """The different columns of arrays (2, n) side by side, and which of them each is."""
+    pairs, of = np.unique(np.concatenate(content.arrays, axis=1), axis=1, return_inverse=True)
+    return pairs, of.ravel()
+
+
+@lru_cache(64)
+def _terms(content, points):
     """Terms ``M[g, h] += modulus r_k r_l`` and how their moduli come from those at the points.
+
+    Parameters
+    ----------
+    content
+        Rows g and h of the samples, which strains the law couples, and the interpolations.
+    points
+        Number of points of integration.
 
     Returns
     -------
@@ -583,9 +595,10 @@ def _terms(rows, factors, along, points, D):
     mixing : sparse matrix
         Moduli of the terms from ``w D`` at the points, shape (n, 9 points): (c, d) of D first.
     """
-    ns = points // len(along[0])
+    rows, coupled, *along = content.arrays
+    factors, ns = np.where(rows[0] == rows[1], 0.5, 1.0), points // len(along[0])
     j, start, found = np.arange(ns), np.cumsum([0] + [L.shape[1] * ns for L in along]), []
-    for c, d in np.argwhere(D):
+    for c, d in np.argwhere(coupled):
         both = along[c][:, :, None] * along[d][:, None, :]  # interpolated to the same point
         i, k, m = (x[:, None] * ns + j for x in np.nonzero(both))
         found.append((start[c] + k, start[d] + m, (3 * c + d) * points + i,
