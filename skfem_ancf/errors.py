@@ -474,7 +474,7 @@ def require_options(what: str, options: dict[str, Any], known: Iterable[str]) ->
     return options
 
 
-def require_path(name: str, value: Any) -> Path:
+def require_path(name: str, value: Any, suffixes: Sequence[str] = ()) -> Path:
     """Return a file name as a ``pathlib.Path``, or raise :class:`InputError`.
 
     Parameters
@@ -483,14 +483,21 @@ def require_path(name: str, value: Any) -> Path:
         What messages call it.
     value
         A text that is not empty, or a ``pathlib.Path``.
+    suffixes
+        What it may end with, as ".vtu", in capitals too; anything if none are given.
     """
     if not isinstance(value, (str, os.PathLike)) or not os.fspath(value) or (
             "\0" in str(os.fspath(value))):
         raise InputError(f"{name} must be the path of a file, got {shown(value)}")
     try:
-        return Path(value)
+        path = Path(value)
     except TypeError:
         raise InputError(f"{name} must be the path of a file, got {shown(value)}") from None
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise InputError("the file name must end with "
+                         f"{'one of ' if len(suffixes) > 1 else ''}{', '.join(suffixes)}, got "
+                         f"{str(value)!r}")
+    return path
 
 
 # functions of the caller's

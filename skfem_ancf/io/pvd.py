@@ -6,10 +6,9 @@ import logging
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
-from ..errors import (InputError, require_finite_scalar, require_like, require_options,
-                      require_path, teaching)
+from ..errors import require_options, require_path, teaching
 from ..fields import find_fields
-from .vtu import replacing, save_frame
+from .vtu import replacing, require_next, save_frame
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -61,9 +60,7 @@ class PvdWriter:
     """
 
     def __init__(self, filename: StrPath, **options: Any) -> None:
-        self.path = require_path("filename", filename)
-        if self.path.suffix.lower() != ".pvd":
-            raise InputError(f"the file name must end with .pvd, got {str(filename)!r}")
+        self.path = require_path("filename", filename, (".pvd",))
         self.options = require_options("PvdWriter", options,
                                        ("subdivide", "lagrange", "undeformed", "recover",
                                         "fields", "precision", "encoding"))
@@ -120,11 +117,7 @@ class PvdWriter:
                 self._list()
 
     def _frame(self, state, t):
-        require_like("state", state, "State", "beams", "u_of")
-        t = require_finite_scalar("t", t)
-        if self.frames and t <= self.frames[-1][0]:
-            raise InputError(f"the times of the frames must increase: {t!r} after "
-                             f"{self.frames[-1][0]!r}")
+        t = require_next(state, t, self.frames[-1][0] if self.frames else None)
         name = f"{self.path.stem}_{len(self.frames):05d}.vtu"
         frame = save_frame(state, self.path.with_name(name), self._packed, **self.options)
         self.frames.append((t, name))

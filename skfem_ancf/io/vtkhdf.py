@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import (FileError, InputError, MissingExtra, require_finite_scalar, require_like,
-                      require_option, require_options, require_path, teaching)
+from ..errors import (FileError, InputError, MissingExtra, require_option, require_options,
+                      require_path, teaching)
 from ..fields import find_fields
-from .vtu import PRECISIONS, body_fields
+from .vtu import PRECISIONS, body_fields, require_next
 from .xml import topology
 
 if TYPE_CHECKING:
@@ -47,9 +47,7 @@ class VtkHdfWriter:
     """
 
     def __init__(self, filename: StrPath, **options: Any) -> None:
-        self.path = require_path("filename", filename)
-        if self.path.suffix.lower() != ".vtkhdf":
-            raise InputError(f"the file name must end with .vtkhdf, got {str(filename)!r}")
+        self.path = require_path("filename", filename, (".vtkhdf",))
         known = ("subdivide", "lagrange", "undeformed", "recover", "fields", "precision")
         self.options = require_options("VtkHdfWriter", options, known)
         precision = self.options.pop("precision", "double")
@@ -114,11 +112,7 @@ class VtkHdfWriter:
         pathlib.Path
             The file that there will be.
         """
-        require_like("state", state, "State", "beams", "u_of")
-        t = require_finite_scalar("t", t)
-        if self.times and t <= self.times[-1]:
-            raise InputError(f"the times of the frames must increase: {t!r} after "
-                             f"{self.times[-1]!r}")
+        t = require_next(state, t, self.times[-1] if self.times else None)
         body = body_fields(state, **self.options)
         if not self.times:
             self._begin(body)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import (FileError, InputError, require_flag, require_integer, require_like,
-                      require_option, require_path, shown, taught)
+from ..errors import (FileError, InputError, require_finite_scalar, require_flag,
+                      require_integer, require_like, require_option, require_path, shown, taught)
 from ..fields import find_fields, values_on_grid
 from ..quadrature import tensor
 from .xml import write_vtu
@@ -213,10 +213,7 @@ def save_frame(state: Any, filename: StrPath, packed: dict, precision: str = "do
     **options
         Those of :func:`body_fields`.
     """
-    path = require_path("filename", filename)
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"the file name must end with one of {', '.join(SUFFIXES)}, got "
-                         f"{str(filename)!r}")
+    path = require_path("filename", filename, SUFFIXES)
     dtype = PRECISIONS[require_option("precision", precision, PRECISIONS)]
     raw = require_option("encoding", encoding, ENCODINGS) == "raw"
     body = body_fields(state, **options)
@@ -233,6 +230,25 @@ def _write_vtk(path, body):
     import meshio
 
     meshio.write(path, meshio.Mesh(body.points, body.cells, body.point_data, body.cell_data))
+
+
+def require_next(state: Any, t: Any, before: float | None) -> float:
+    """The time of the next frame of a series, or raise :class:`InputError`.
+
+    Parameters
+    ----------
+    state
+        The frame.
+    t
+        Its time.
+    before
+        That of the frame before, or None.
+    """
+    require_like("state", state, "State", "beams", "u_of")
+    t = require_finite_scalar("t", t)
+    if before is not None and t <= before:
+        raise InputError(f"the times of the frames must increase: {t!r} after {before!r}")
+    return t
 
 
 class replacing:

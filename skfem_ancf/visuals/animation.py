@@ -95,10 +95,7 @@ def animate(history: History, filename: StrPath, field: Any = "eps_yy", *,
 
 
 def _file(filename):
-    path = require_path("filename", filename)
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"the file name must end with one of {', '.join(SUFFIXES)}, got "
-                         f"{str(filename)!r}")
+    path = require_path("filename", filename, SUFFIXES)
     if path.suffix.lower() == ".mp4":
         for module in ("imageio", "imageio_ffmpeg"):
             try:

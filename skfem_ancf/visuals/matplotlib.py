@@ -166,11 +166,8 @@ def _page(ax, title, filename, dpi):
     if not 1.0 <= dpi <= MAX_DPI:
         raise InputError(f"dpi must lie between 1 and {MAX_DPI}, got {dpi!r}")
     if filename is not None:
-        filename = require_path("filename", filename)
         known = sorted(FigureCanvasBase.get_supported_filetypes())
-        if filename.suffix[1:].lower() not in known:
-            raise InputError(f"the file name must end with one of .{', .'.join(known)}, got "
-                             f"{str(filename)!r}")
+        filename = require_path("filename", filename, [f".{kind}" for kind in known])
     return filename, dpi
 
 

@@ -345,7 +345,7 @@ def view(state: State, field: Any = "eps_yy", plotter: Any = None, *, thickness:
     """
     pv = _pyvista()
     require_like("state", state, "State", "beams", "u_of")
-    path = None if filename is None else _picture(filename)
+    path = None if filename is None else require_path("filename", filename, PICTURES)
     if plotter is not None:
         require_like("plotter", plotter, "pyvista Plotter", "add_mesh", "screenshot")
     cmap, unit = _colormap(cmap), require_text("unit", unit)
@@ -358,14 +358,6 @@ def view(state: State, field: Any = "eps_yy", plotter: Any = None, *, thickness:
         with replacing(path) as temporary:
             plotter.screenshot(str(temporary))
     return plotter
-
-
-def _picture(filename):
-    path = require_path("filename", filename)
-    if path.suffix.lower() not in PICTURES:
-        raise InputError(f"the file name must end with one of {', '.join(PICTURES)}, got "
-                         f"{str(filename)!r}")
-    return path
 
 
 def new_plotter(pv: Any, off_screen: bool | None, window_size: tuple[int, int]) -> Any:
