@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
@@ -13,7 +13,7 @@ from .joints.base import same_joint
 from .rank import first_dependent, null_space, unit_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from .beam import Beam
     from .joints.base import Joint
@@ -39,6 +39,8 @@ class Constraints:
         Numbers of the fixed coordinates and their displacements at full load, shape (n,).
     joints
         Joints, already bound.
+    stiffness
+        A function that returns that of force elements in the stress-free state, sparse, (N, N).
 
     Attributes
     ----------
@@ -55,8 +57,8 @@ class Constraints:
     """
 
     def __init__(self, beams: Sequence[Beam], slices: Sequence[slice], size: float, fixed: Array,
-                 values: Array, joints: Sequence[Joint]) -> None:
-        self.beams, self.slices, self.size = beams, slices, size
+                 values: Array, joints: Sequence[Joint], stiffness: Callable[[], Any]) -> None:
+        self.beams, self.slices, self.size, self._stiffness = beams, slices, size, stiffness
         self.N = slices[-1].stop
         self._supported = False
         self._eliminate(fixed, values, joints)
@@ -362,8 +364,11 @@ class Constraints:
         motions = sparse.csr_array(
             (values.ravel(), (3 * of_beam[:, None] + np.arange(3)).ravel(),
              3 * np.arange(self.N + 1)), shape=(self.N, 3 * len(self.beams)))
+        pushed = self._stiffness() @ motions
+        size = abs(pushed).max(axis=1).toarray().ravel() if pushed.nnz else np.zeros(self.N)
         held = sparse.vstack([motions[self.fixed],
-                              self.sparse_jacobian(np.zeros(self.N), 0.0) @ motions])
+                              self.sparse_jacobian(np.zeros(self.N), 0.0) @ motions,
+                              pushed[size > 1e-9 * size.max(initial=0.0)]])
         return [self._describe(v, sizes) for v in null_space(unit_rows(held))]
 
     def _describe(self, v, sizes):

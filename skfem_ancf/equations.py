@@ -9,6 +9,7 @@ from scipy import sparse
 from .band import Band
 from .body import body_of, flat_body, stress_size, viscous_body_of
 from .border import Border
+from .forces.texts import ForceTables
 from .kernels.moments import MomentPack
 from .own import handle_of
 from .sampling import sample
@@ -29,6 +30,8 @@ class Equations(NamedTuple):
         Fixed coordinates, and for each one 1 or 0.
     K
         The band for the tangent, work space.
+    forces
+        :class:`~skfem_ancf.forces.texts.ForceTables`.
     viscous
         As ``body``, of what resists the rates of strains; the same where nothing does.
     """
@@ -41,6 +44,7 @@ class Equations(NamedTuple):
     K: Band
     border: Border
     viscous: tuple
+    forces: ForceTables
 
 
 class Tables:
@@ -67,7 +71,8 @@ class Tables:
         self.plain = Equations(body, self._load_tables(), joints,
                                system.fixed, system.mask, system.K.band,
                                self._border(joints),
-                               viscous_body_of(body, system.beams, system.retardation))
+                               viscous_body_of(body, system.beams, system.retardation),
+                               self._forces())
 
     @cached_property
     def flat(self):
@@ -78,6 +83,10 @@ class Tables:
         same = plain.viscous is plain.body
         return plain._replace(body=body,
                               viscous=body if same else flat_body(plain.viscous, address))
+
+    def _forces(self):
+        s = self.system
+        return s.forces.tables(s.K._position, s.symmetric, self.handle if s.forces.own else 0)
 
     @property
     def handle(self):
@@ -195,8 +204,8 @@ class Tables:
 
     def _border(self, joints):
         s, none = self.system, np.zeros(0, dtype=np.int64)
-        if not s.joints or not s.bordered or joints.own:
-            return Border(none, 0, none, none, none, none, int(bool(s.joints)))
+        if not s.joints or not s.bordered or joints.own or s.forces.far:
+            return Border(none, 0, none, none, none, none, int(s.coupled))
         i, j, ns = joints.hi, joints.hj, len(s.springs)
         outside = np.abs(i - j) > s.bandwidth
         far = np.unique(np.append(i[outside], j[outside]))

@@ -1,7 +1,10 @@
 """Single evaluations of the equations of a scene, for what is no whole iteration."""
 
+import numpy as np
+
 from .body import (add_viscous_force, body_carry, body_force, body_mean, body_stress,
                    body_tangent)
+from .forces.texts import add_elastic_force, add_element_tangent
 from .source import source
 from .tables import add_load_stiffness
 
@@ -25,16 +28,21 @@ def evaluate(e, what, u, v, factors, t, scale, use_carried, stresses, carried, f
     factors, t, scale
         As for :func:`~skfem_ancf.tables.external_force`.
     """
+    at = scale if np.isnan(t) else t  # the time of a motion, in statics the load factor
     if what == FORCE:
         body_force(e.body, u, f)
+        add_elastic_force(e.forces, at, u, u, f)
     elif what == TANGENT:
         body_tangent(e.body, u, f, carried, use_carried, stresses, e.K)
+        add_elastic_force(e.forces, at, u, u, f)
         add_load_stiffness(e.loads, factors, t, scale, u, e.K)
+        add_element_tangent(e.forces, at, u, e.K)
     elif what == CARRY:
         body_carry(e.body, u, v, stresses, carried)
     elif what == STRESS:
         body_stress(e.body, u, stresses)
     elif what == MEAN:
         body_mean(e.body, u, v, f)
+        add_elastic_force(e.forces, at, u, v, f)
     else:
         add_viscous_force(e.viscous, u, v, f)

@@ -57,6 +57,12 @@ def own_joints(handle, what, t, u, v, out):
 
 
 @primitive("own")
+def own_elements(handle, what, t, factor, a, b, out):
+    """Force elements of one's own, see :meth:`skfem_ancf.forces.system.Forces.add_own`."""
+    owner(handle).forces.add_own(what, t, factor, a, b, out)
+
+
+@primitive("own")
 def own_solve(handle, t, u, multipliers, R, phi, du, dm):
     """Solve with the multipliers by sparse factors; False if there is no solution."""
     return bool(owner(handle).solve_own(t, u, multipliers, R, phi, du, dm))

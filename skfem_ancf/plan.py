@@ -82,13 +82,8 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         "each iteration; the last evaluates the force only")
     add("mass", "constant" if dynamic else "skipped",
         "assembled and factorised once" if dynamic else "no inertia in statics")
-    lossy = sum(time > 0.0 for time in s.retardation)
-    kinds = [text for text, there in (
-        (f"{lossy} beam(s) resist the rate of their strain", lossy),
-        ("a part of the mass", s.damping.mass), (f"{len(s.damping.modal)} modes",
-                                                 len(s.damping.modal))) if there]
-    add("damping", "computed" if dynamic and kinds else "skipped", ", ".join(kinds) if dynamic and
-        kinds else "no velocities in statics" if kinds else "there is none")
+    for item in (_damping(s, dynamic), _elements(s)):
+        add(*item)
     dead = [load for load in scene.loads if load.constant and load.amplitude is None]
     rest = len(scene.loads) - len(dead)
     add("dead loads", "constant" if dead else "skipped",
@@ -99,12 +94,14 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         f"{s.m} equations of {len(s.joints)} joint(s)" if s.m else
         "no joints" if not scene.joints else "the joints only fix coordinates")
     bandwidth = s.K.bandwidth
-    if s.m and not dynamic and s.machine.tables.plain.border.wide:
+    if not dynamic and s.forces.far:
+        solver = "banded with a border of the points that force elements couple"
+    elif s.m and not dynamic and s.machine.tables.plain.border.wide:
         solver = "sparse LU with the multipliers: " + (
             "a joint of your own is not quadratic" if s.bordered else
             f"too many for a border ({s.m})")
     elif not s.symmetric:
-        solver = f"banded LU, half bandwidth {bandwidth}: a pressure has no potential"
+        solver = f"banded LU, half bandwidth {bandwidth}: a force has no potential"
     else:
         solver = f"banded Cholesky, half bandwidth {bandwidth}"
     if s.m and (dynamic or s.bordered):
@@ -124,3 +121,28 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
             f"whole {'time steps, in blocks' if dynamic else 'iterations'}: {reason}")
     add("fields", "skipped", "strain and stress are computed where a State is asked for them")
     return Plan(items)
+
+
+def _damping(s, dynamic):
+    """Term, status and reason of what resists velocities."""
+    lossy = sum(time > 0.0 for time in s.retardation)
+    kinds = [text for text, there in (
+        (f"{lossy} beam(s) resist the rate of their strain", lossy),
+        ("dashpots, drag or force elements of your own", s.forces.resists),
+        ("a part of the mass", s.damping.mass),
+        (f"{len(s.damping.modal)} modes", len(s.damping.modal))) if there]
+    if not kinds:
+        return "damping", "skipped", "there is none"
+    return ("damping", "computed", ", ".join(kinds)) if dynamic else (
+        "damping", "skipped", "no velocities in statics")
+
+
+def _elements(s):
+    """Term, status and reason of force elements."""
+    forces = s.forces
+    if not forces.elements:
+        return "force elements", "skipped", "no springs, no masses"
+    return "force elements", "computed", (
+        f"{len(forces.elements)}: {len(forces.parts)} in tables, {len(forces.own)} of your own, "
+        f"{len(forces.masses)} in the mass" + (", some couple points far apart" if forces.far else
+                                               ""))

@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebint, chebvander
+from scipy import sparse
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_banded
 
@@ -632,7 +633,8 @@ def actions(state: State) -> list[list[float]]:
     t = state.load if state.t is None else state.t
     held = np.zeros(system.N)
     held[system.fixed] = 1.0
-    J, out = system.sparse_jacobian(state.u, t).tocsc(), []
+    J = sparse.vstack([system.sparse_jacobian(state.u, t), system.forces.acting_rows()]).tocsc()
+    out: list[list[float]] = []
     for beam, s in zip(system.beams, system.slices):
         nodes = np.nonzero(np.any(held[s].reshape(-1, beam.nd) != 0, axis=1))[0]
         stations = [station_of_node(beam.mesh, int(k)) for k in nodes]
@@ -688,6 +690,8 @@ def _recover_alike(states, number, loads):
     try:
         if first.t is not None and system.damped:
             raise NotRecovered("the stress that resists the rate of the strain is not known to it")
+        if any(element.distributed for element in system.forces.elements):
+            raise NotRecovered("how a foundation acts along the beam is not known to it")
         together = [(np.array([of[k][0] for of in loads]), spread)
                     for k, (_, spread) in enumerate(loads[0])]
         u = np.array([state.u[s] for state in states])

@@ -439,7 +439,7 @@ class State(Frozen):
     def internal_force(self) -> Array:
         """Internal force on all coordinates, shape (N,)."""
         if self._force is None:
-            self._force = self.system.internal_force(self.u)
+            self._force = self.system.internal_force(self.u, self.t, self.load)
         return self._force
 
     def reactions(self, boundary: Place, beam: WhichBeam = None) -> Reaction:

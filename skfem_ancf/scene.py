@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from . import eigen
+from .axial import FollowerForce, LineLoad
 from .beam import Beam, select_beam
 from .checks import warn_of
 from .damping import Damping
@@ -18,6 +19,8 @@ from .doors import configuration, displacement
 from .dynamics import get_scheme
 from .dynamics.checkpoint import resume
 from .dynamics.integrate import follow, integrate
+from .forces import (Drag, ForceElement, Foundation, PointMass, Spring, TorsionalSpring,
+                     bind_force)
 from .errors import (ConvergenceError, InputError, Interrupted, StabilityWarning, ask_field,
                      require_finite, require_finite_scalar, require_option, shown, taught, teaching)
 from .joints import Joint, bind_joint, get_joint
@@ -115,12 +118,14 @@ class Scene:
         self._joints: tuple[tuple[Joint, Joint], ...] = ()
         # number of the beam -> (as given, bound)
         self._velocities: dict[int, tuple[Any, Array]] = {}
+        self._elements: tuple[tuple[ForceElement, ForceElement], ...] = ()
         self._damping: Damping | None = None
         self._system: System | None = None
 
     def __getstate__(self):
         """What was given and bound: the equations are built again."""
-        given = [*(load for _, load, _ in self._loads), *(joint for joint, _ in self._joints)]
+        given = [*(load for _, load, _ in self._loads), *(joint for joint, _ in self._joints),
+                 *(element for element, _ in self._elements)]
         require_picklable([*functions_of([*self._supports, *given]), *(
             (f"the initial velocity of beam {k}", v) for k, (v, _) in self._velocities.items()
             if callable(v))])
@@ -170,6 +175,14 @@ class Scene:
         """The joints, bound to the beams: a tuple of :class:`~skfem_ancf.joints.Joint`."""
         return _Things(bound for _, bound in self._joints)
 
+    @property
+    def elements(self) -> tuple[ForceElement, ...]:
+        """The force elements, bound to the beams: springs, foundations, masses, those of your own.
+
+        A tuple of :class:`~skfem_ancf.forces.ForceElement`.
+        """
+        return _Things(bound for _, bound in self._elements)
+
     def beam(self, beam: WhichBeam = None) -> Beam:
         """The Beam meant by a Beam, a name, a number, or None where there is only one."""
         return self._beams[self._number(beam)]
@@ -198,7 +211,7 @@ class Scene:
 
     # what it is made of
 
-    def _put(self, supports=(), loads=(), joints=(), velocities=()):
+    def _put(self, supports=(), loads=(), joints=(), velocities=(), elements=()):
         """Bind everything, then keep it: what fails leaves the scene as it was.
 
         Loads come as (number of the beam, load), velocities as (number of the beam, v).
@@ -211,10 +224,13 @@ class Scene:
             bound = [bind_joint(joint, self) for joint in joints]
             joints = tuple(zip(map(self._portable, joints), bound))
             velocities = {k: (v, self._bind_velocity(k, v)) for k, v in velocities}
+            bound = [bind_force(element, self) for element in elements]
+            elements = tuple(zip(map(self._portable, elements), bound))
             self._fixed, self._supports = fixed, self._supports + tuple(supports)
             self._loads, self._joints = self._loads + loads, self._joints + joints
+            self._elements = self._elements + elements
             self._velocities = {**self._velocities, **velocities}
-            if supports or loads or joints:
+            if supports or loads or joints or elements:
                 self._system = None
         return self
 
@@ -232,13 +248,14 @@ class Scene:
         joint._seal()
         return joint
 
-    def add(self, thing: Load | Joint) -> Scene:
-        """Add a load or a joint, of the package's or of your own.
+    def add(self, thing: Load | Joint | ForceElement) -> Scene:
+        """Add a load, a joint or a force element, of the package's or of your own.
 
         Parameters
         ----------
         thing
-            A :class:`~skfem_ancf.loads.Load` or a :class:`~skfem_ancf.joints.Joint`. The scene
+            A :class:`~skfem_ancf.loads.Load`, a :class:`~skfem_ancf.joints.Joint` or a
+            :class:`~skfem_ancf.forces.ForceElement`. The scene
             keeps it as it is now, and binds a copy to its beams; on another mesh, as for
             ``solve_static(adapt=...)``, it is bound again.
 
@@ -271,8 +288,11 @@ class Scene:
             return self._put(joints=[thing])
         if isinstance(thing, Load):
             return self._put(loads=[(self._number(thing.beam), thing)])
-        raise InputError(f"a scene takes a Load or a Joint, got {shown(thing)}: derive yours from "
-                         "skfem_ancf.loads.Load or skfem_ancf.joints.Joint")
+        if isinstance(thing, ForceElement):
+            return self._put(elements=[thing])
+        raise InputError(f"a scene takes a Load or a Joint or a ForceElement, got {shown(thing)}: "
+                         "derive yours from skfem_ancf.loads.Load, skfem_ancf.joints.Joint or "
+                         "skfem_ancf.forces.ForceElement")
 
     # supports
 
@@ -441,6 +461,49 @@ class Scene:
         """
         return self._put(loads=[(self._number(beam), PointForce(force, at, None, amplitude))])
 
+    def follower_force(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
+                       amplitude: TimeFunction = None) -> Scene:
+        """A force on a material point that turns with the tangent of the axis there.
+
+        Parameters
+        ----------
+        force
+            The force in the stress-free state, shape (2,).
+        at
+            The point: its place (x, y) in the stress-free body, shape (2,).
+        beam
+            The beam, its name or its number, in a scene of several.
+        amplitude
+            A function of time by which the force is multiplied in a motion.
+
+        Returns
+        -------
+        Scene
+            Itself.
+        """
+        return self._put(loads=[(self._number(beam), FollowerForce(force, at, None, amplitude))])
+
+    def line_load(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
+                  amplitude: TimeFunction = None) -> Scene:
+        """A dead force per length of the axis.
+
+        Parameters
+        ----------
+        force
+            Force per length of the stress-free axis: constant, shape (2,), or a function of the
+            points x (2, ...) of the axis that returns (2, ...).
+        beam
+            The beam, its name or its number, in a scene of several.
+        amplitude
+            A function of time by which the force is multiplied in a motion.
+
+        Returns
+        -------
+        Scene
+            Itself.
+        """
+        return self._put(loads=[(self._number(beam), LineLoad(force, None, amplitude))])
+
     def traction(self, boundary: Place, t: ArrayLike | Callable[[Array], Array],
                  beam: WhichBeam = None, amplitude: TimeFunction = None) -> Scene:
         """A dead traction on a surface, per area of the stress-free body.
@@ -536,6 +599,133 @@ class Scene:
         """
         return self._put(loads=[(self._number(beam), FormLoad(form, boundary, None, amplitude))])
 
+    # force elements
+
+    def spring(self, k: float, between: Sequence[Any], damping: float = 0.0,
+               length: float | None = None) -> Scene:
+        """A spring between two points, with a dashpot along the same line.
+
+        Parameters
+        ----------
+        k
+            Stiffness (force per length), zero or positive.
+        between
+            Two places, each (x, y): the material point there, or the point of the ground where no
+            beam is; or (beam, (x, y)) with a Beam, a name or a number; or ("ground", (x, y)).
+        damping
+            Force per velocity, zero or positive.
+        length
+            Length without force; that of the stress-free state by default.
+
+        Returns
+        -------
+        Scene
+            Itself.
+
+        Raises
+        ------
+        InputError
+            If a number is negative, no end is a point of a beam, or both are at one place.
+        """
+        return self._put(elements=[Spring(k, between, damping, length)])
+
+    def torsional_spring(self, k: float, at: Place, damping: float = 0.0, beam: WhichBeam = None,
+                         other: Any = None, angle: float = 0.0) -> Scene:
+        """A moment against the angle by which a section turns, with a dashpot.
+
+        Parameters
+        ----------
+        k
+            Moment per angle, zero or positive. The angle is taken in (-pi, pi] about ``angle``.
+        at
+            A place that is one section, as "right" or the point of a node.
+        damping
+            Moment per angular velocity, zero or positive.
+        beam
+            The beam, its name or its number, in a scene of several.
+        other
+            The section to which it is joined, as (beam, place); None for the ground.
+        angle
+            The angle without moment, from the stress-free state.
+
+        Returns
+        -------
+        Scene
+            Itself.
+        """
+        return self._put(elements=[TorsionalSpring(k, at, damping, beam, other, angle)])
+
+    def foundation(self, k: float, side: Place = "bottom", one_sided: bool = False,
+                   damping: float = 0.0, beam: WhichBeam = None) -> Scene:
+        """Winkler's foundation: springs along the normal of a side in the stress-free state.
+
+        Parameters
+        ----------
+        k
+            Force per area of the side and displacement, zero or positive.
+        side
+            A place of the boundary, as for :meth:`clamp`; of a cable the axis below it is held.
+        one_sided
+            It pushes and does not pull.
+        damping
+            Force per area and velocity, zero or positive.
+        beam
+            The beam, its name or its number, in a scene of several.
+
+        Returns
+        -------
+        Scene
+            Itself.
+        """
+        return self._put(elements=[Foundation(k, side, one_sided, damping, beam)])
+
+    def drag(self, density: float, normal: float, tangential: float = 0.0,
+             beam: WhichBeam = None) -> Scene:
+        """A force against the velocity of the axis, quadratic in it.
+
+        ``density width / 2 (normal |v_n| v_n + tangential |v_t| v_t)`` per length of the
+        stress-free axis.
+
+        Parameters
+        ----------
+        density
+            Mass per volume of what is around, at rest; zero or positive.
+        normal, tangential
+            Coefficients across and along the axis, zero or positive.
+        beam
+            The beam, its name or its number; None for all.
+
+        Returns
+        -------
+        Scene
+            Itself.
+        """
+        beams = range(len(self._beams)) if beam is None else [self._number(beam)]
+        return self._put(elements=[Drag(density, normal, tangential, k) for k in beams])
+
+    def point_mass(self, mass: float, at: ArrayLike, inertia: float = 0.0,
+                   beam: WhichBeam = None) -> Scene:
+        """A mass on a material point; gravity on its beam acts on it too.
+
+        Parameters
+        ----------
+        mass
+            Zero or positive.
+        at
+            The point: its place (x, y) in the stress-free body, shape (2,).
+        inertia
+            Moment of inertia about the point of what turns with the section of a node, zero or
+            positive.
+        beam
+            The beam, its name or its number, in a scene of several.
+
+        Returns
+        -------
+        Scene
+            Itself.
+        """
+        return self._put(elements=[PointMass(mass, at, inertia, beam)])
+
     # damping
 
     def damping(self, mass: float = 0.0, stiffness: float = 0.0,
@@ -594,9 +784,17 @@ class Scene:
                 offsets = np.concatenate([[0], np.cumsum([b.N for b in self._beams])])
                 fixed = np.array([offsets[k] + d for k, d in self._fixed], dtype=int)
                 values = np.array(list(self._fixed.values()), dtype=float)
-                self._system = System(self._beams, self.loads, fixed, values, self.joints,
-                                      self._damping)
+                self._system = System(self._beams, [*self.loads, *self._weights()], fixed, values,
+                                      self.joints, self._damping, self.elements)
             return self._system
+
+    def _weights(self):
+        """Loads by which gravity acts on point masses."""
+        masses = [x for x in self.elements if isinstance(x, PointMass) and x.mass]
+        return [bind_load(PointForce(mass.mass * load.g, mass.at, None, load.amplitude),
+                          self._beams[k])
+                for k, load, _ in self._loads if isinstance(load, Weight)
+                for mass in masses if self._number(mass.beam) == k]
 
     def with_beams(self, beams: Sequence[Beam]) -> Scene:
         """The same supports, loads, joints and velocities on other beams.
@@ -626,7 +824,7 @@ class Scene:
 
         def require_portable(thing, moved):
             for name, value in vars(thing).items():
-                if moved and name in ("boundary", "at") and not on_other_mesh(value):
+                if moved and name in ("boundary", "at", "side") and not on_other_mesh(value):
                     raise InputError(f"{thing!r} is at facets given by numbers, {value!r}, and "
                                      "cannot be put on another mesh: give names or functions")
 
@@ -636,13 +834,16 @@ class Scene:
             require_portable(load, changed[k])
         for joint, _ in self._joints:
             require_portable(joint, any(changed))
+        for element, _ in self._elements:
+            require_portable(element, any(changed))
         for k, (v, _) in self._velocities.items():
             if changed[k] and not callable(v):
                 raise InputError("initial_velocity was given by coordinates and cannot be put on "
                                  "another mesh: give names or functions")
         return scene._put(self._supports, [(k, load) for k, load, _ in self._loads],
                           [joint for joint, _ in self._joints],
-                          [(k, v) for k, (v, _) in self._velocities.items()])
+                          [(k, v) for k, (v, _) in self._velocities.items()],
+                          [element for element, _ in self._elements])
 
     @_alone
     def plan(self, kind: str = "static") -> Plan:
@@ -680,10 +881,11 @@ class Scene:
         system = self.system
         system.require_supports()
         zero, none = np.zeros(system.N), np.zeros(system.m)
-        system.assemble(zero, 1.0, geometric=False)
+        force, _ = system.assemble(zero, 1.0, geometric=False)
         du0 = np.zeros(system.N)
         du0[system.fixed] = system.values(1.0)
-        load, phi = system.external_force(zero), -system.constraint(zero, 1.0)
+        load = system.external_force(zero) - force
+        phi = -system.constraint(zero, 1.0)
         if np.any(du0):
             load = load - system.multiply(du0)
             phi = phi - system.full_jacobian(zero, 1.0) @ du0

@@ -17,6 +17,8 @@ from .constraints import Constraints
 from .damping import Damping
 from .errors import InputError
 from .evaluation import CARRY, FORCE, MEAN, TANGENT, VISCOUS, evaluate
+from .forces.system import Forces
+from .forces.texts import add_resisting_force
 from .linalg import INACCURATE, BandMatrix, dense
 from .machine import Machine
 from .pickling import functions_of, require_picklable
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .beam import Beam
+    from .forces.base import ForceElement
     from .joints.base import Joint
     from .linalg import Inertia
     from .loads import Load
@@ -64,19 +67,25 @@ class System:
         Joints, already bound.
     damping
         A :class:`~skfem_ancf.damping.Damping`, or None.
+    elements
+        Force elements, already bound.
     """
 
     def __init__(self, beams: Sequence[Beam], loads: Sequence[Load], fixed: Array, values: Array,
-                 joints: Sequence[Joint] = (), damping: Damping | None = None) -> None:
-        self._given = tuple(beams), tuple(loads), fixed, values, tuple(joints), damping
+                 joints: Sequence[Joint] = (), damping: Damping | None = None,
+                 elements: Sequence[ForceElement] = ()) -> None:
+        self._given = (tuple(beams), tuple(loads), fixed, values, tuple(joints), damping,
+                       tuple(elements))
         self.beams, self.loads = list(beams), list(loads)
         self.offsets = np.concatenate([[0], np.cumsum([b.N for b in self.beams])])
         self.N = int(self.offsets[-1])
         self.slices = [slice(int(a), int(b)) for a, b in zip(self.offsets[:-1], self.offsets[1:])]
         self._index = {id(b): k for k, b in enumerate(self.beams)}
         self.size = float(sum(b.mesh.lengths.sum() for b in self.beams))
-        self.constraints = Constraints(self.beams, self.slices, self.size, fixed, values, joints)
-        self.symmetric = all(load.symmetric for load in self.loads)
+        self.constraints = Constraints(self.beams, self.slices, self.size, fixed, values, joints,
+                                       self._held_by_elements)
+        self.forces = Forces(elements, self.N, self.bandwidth)
+        self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
         self.constant_force = np.zeros(self.N)
         self._varying: list[Any] = []
         for load in self.loads:
@@ -116,6 +125,12 @@ class System:
     require_independent_joints = _of_constraints("require_independent_joints")
     require_supports = _of_constraints("require_supports")
 
+    def _held_by_elements(self):
+        """The stiffness of force elements in the stress-free state, sparse."""
+        zero = np.zeros(self.N)
+        i, j, v = self.forces.entries(self.machine.tables.plain.forces, 0.0, zero, zero, 0.0)
+        return sparse.csr_array((v, (i, j)), shape=(self.N, self.N))
+
     @cached_property
     def points(self) -> Points:
         """What finds material points, a :class:`~skfem_ancf.points.Points`."""
@@ -123,7 +138,7 @@ class System:
 
     def __getstate__(self):
         """What it was made of: work arrays and factors are made again."""
-        require_picklable(functions_of([*self.loads, *self.all_joints]))
+        require_picklable(functions_of([*self.loads, *self.all_joints, *self.forces.elements]))
         return self._given
 
     def __setstate__(self, given):
@@ -164,35 +179,50 @@ class System:
             raise InputError(f"the displacement of the scene's coordinates has shape ({self.N},), "
                              f"got {u.shape}; the state of another mesh?")
 
-    def internal_force(self, u: Array) -> Array:
-        """The internal force, shape (N,)."""
-        self._require_coordinates(u)
-        return self._evaluate(FORCE, u)
+    def internal_force(self, u: Array, t: float | None = None, load: float = 1.0) -> Array:
+        """The force of beams and force elements, shape (N,).
 
-    def mean_internal_force(self, u0: Array, u1: Array) -> Array:
+        Parameters
+        ----------
+        u
+            Displacement, shape (N,).
+        t, load
+            Time, for force elements; in statics the load factor in place of it.
+        """
+        self._require_coordinates(u)
+        return self._evaluate(FORCE, u, load=load, t=t)
+
+    def mean_internal_force(self, u0: Array, u1: Array, t: float | None = None) -> Array:
         """The internal force whose work from u0 to u1 is the change of the strain energy.
 
         Parameters
         ----------
         u0, u1
             Displacements, shape (N,).
+        t
+            Time, for force elements.
         """
-        return self._evaluate(MEAN, u0, u1)
+        return self._evaluate(MEAN, u0, u1, t=t)
 
     @property
     def damped(self) -> bool:
         """True if something resists velocities."""
-        return self.viscous or bool(self.damping)
+        return self.viscous or bool(self.damping) or self.forces.resists
 
-    def damping_force(self, u: Array, v: Array) -> Array:
+    def damping_force(self, u: Array, v: Array, t: float | None = None) -> Array:
         """The force at u that resists the velocity v, shape (N,).
 
         Parameters
         ----------
         u, v
             Displacement and velocity, shape (N,).
+        t
+            Time, for force elements.
         """
         force = self._evaluate(VISCOUS, u, v) if self.viscous else np.zeros(self.N)
+        if self.forces.resists:
+            add_resisting_force(self.machine.tables.plain.forces, 0.0 if t is None else t, u, v,
+                                force)
         if self.damping.mass:
             force += self.damping.mass * self.mass.multiply(v)
         return force + (self.damped_modes @ v) @ self.damped_modes
@@ -215,7 +245,7 @@ class System:
         tables = self.machine.tables
         u, v = np.array(u, dtype=float), np.array(u if v is None else v, dtype=float)
         factors = tables.static_factors(load)
-        if t is not None and self._varying:
+        if what == TANGENT and t is not None and self._varying:
             factors = load * tables.factors(np.array([t]))[0]
         none = tables.stresses if stresses is None or carried is None else None
         force = np.zeros(self.N)
@@ -248,8 +278,11 @@ class System:
         return float(total)
 
     def strain_energy(self, u: Array) -> float:
-        """Strain energy of all beams."""
-        return float(sum(b.kernel.energy(u[s]) for b, s in zip(self.beams, self.slices)))
+        """Strain energy of all beams, and the potential of force elements."""
+        energy = sum(b.kernel.energy(u[s]) for b, s in zip(self.beams, self.slices))
+        if self.forces.elements:
+            energy += self.forces.potential(self.machine.tables.plain.forces, u)
+        return float(energy)
 
     def load_potential(self, u: Array, t: float | None = None) -> float:
         """Potential of the loads; loads without one count as zero.
@@ -405,6 +438,8 @@ class System:
         for beam, offset in zip(self.beams, self.offsets):
             for part in beam.kernel.chunks():
                 M.add_elements(beam.mass_elements(part), int(offset), beam.nd, beam.mesh.t[0, part])
+        for mass in self.forces.masses:
+            M.add(*mass.mass_entries())
         return M
 
     @cached_property
@@ -481,6 +516,7 @@ class System:
         """
         self._require_coordinates(u)
         self.K.clear()
+        self._assembled = np.array(u), float(load if t is None else t)
         stresses = self.machine.tables.stresses
         if not geometric:
             carried = np.zeros_like(stresses)
@@ -504,7 +540,11 @@ class System:
 
     def multiply(self, v: Array) -> Array:
         """The assembled tangent times a vector, before :meth:`factorize`."""
-        return self.K.multiply(v)
+        out = self.K.multiply(v)
+        if self.forces.far:
+            i, j, values = self._far_entries()
+            out = out + np.bincount(i, values * v[j], self.N)
+        return out
 
     def factorize(self, u: Any = None, t: float = 0.0, multipliers: Any = None) -> None:
         """Fix the supports in the tangent and factorise it, with the joints where there are any.
@@ -517,16 +557,33 @@ class System:
             Theirs, shape (m,).
         """
         self.K.fix(self.fixed_positions)
-        if not self.joints:
+        if not self.coupled:
             self.K.factorize()
             return
+        if u is not None:
+            self._assembled = np.array(u), float(t)
         self._J = self.jacobian(u, t)
-        i, j, v = self.constraints.curvature_entries(u, t, multipliers)
+        i, j, v = (np.append(a, b) for a, b in zip(
+            self.constraints.curvature_entries(u, t, multipliers), self._far_entries()))
         self._outside, self._sparse = (i, j, v), None
         if self.bordered:
             self._factors = BorderedMatrix(self.K, self._J, i, j, v, self.springs)
         else:
             self._sparse = self._sparse_factors(self._whole())
+
+    @property
+    def coupled(self) -> bool:
+        """True if the equations have more than a band: multipliers, or elements far apart."""
+        return bool(self.joints) or self.forces.far
+
+    def _far_entries(self):
+        """What force elements have outside of the band, at free coordinates, where it was made."""
+        i, j, w, place = self.forces.far_entries()
+        if not len(i):
+            return i, j, w
+        u, t = self._assembled
+        D = self.forces.stiffness(self.machine.tables.plain.forces, t, u, 0.0 * u, 0.0)
+        return i, j, w * D[place] * (self.free[i] & self.free[j])
 
     def inertia(self) -> Inertia:
         """Signs of the eigenvalues of the tangent that :meth:`factorize` has factorised.
@@ -556,7 +613,7 @@ class System:
         >>> system.inertia()
         Inertia(negative=1, singular=False)
         """
-        if not self.joints:
+        if not self.coupled:
             K = self.K if self.symmetric else self.K.symmetric_part()
             return K.inertia()
         if self.bordered:
@@ -575,7 +632,7 @@ class System:
             The solution: shape (N,), time, shape (m,).
         """
         K = self.K
-        if not K.definite or (self.joints and not self.bordered):
+        if not K.definite or self.forces.far or (self.joints and not self.bordered):
             return False
         if not self.joints:
             return True
@@ -591,7 +648,7 @@ class System:
 
         -1 is an odd number of negative eigenvalues, of a tangent that is not symmetric too.
         """
-        if not self.joints:
+        if not self.coupled:
             return self.K.determinant_sign()
         if self.bordered:
             return self._factors.determinant_sign()
@@ -628,8 +685,9 @@ class System:
             The increments; the second is empty without joints.
         """
         b = residual * self.mask
-        if not self.joints:
+        if not self.coupled:
             return self.K.solve(b), _NONE
+        phi = _NONE if phi is None else phi
         if self._sparse is None:
             x, multipliers, error = self._factors.solve(b, phi)
             if error < INACCURATE:

@@ -17,6 +17,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from .errors import ConvergenceError, SupportError
+from .forces.texts import add_elastic_force
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -62,7 +63,21 @@ class StrainTangent:
 
     def _set_stress(self, stress, multipliers):
         self.stress, self.multipliers = stress, multipliers
-        self.S = self.geometric(stress, multipliers, self._at[1])
+        self.S = self.geometric(stress, multipliers, self._at[1]) + self._elements()
+
+    def _elements(self):
+        """The derivative of the force elements, at free coordinates."""
+        u, system = self._at[0], self.system
+        i, j, v = system.forces.entries(system.machine.tables.plain.forces, self._at[3], u, 0.0 * u,
+                                        0.0)
+        K = sparse.csr_matrix((v, (i, j)), shape=(system.N, system.N))
+        return K[self.free][:, self.free]
+
+    def _element_force(self):
+        system, force = self.system, np.zeros(self.system.N)
+        u = np.array(self._at[0], dtype=float)
+        add_elastic_force(system.machine.tables.plain.forces, self._at[3], u, u, force)
+        return force[self.free]
 
     def geometric(self, stress: Array, multipliers: Array, load: float) -> csr_matrix:
         """The part of the tangent due to stresses, multipliers and loads.
@@ -106,7 +121,8 @@ class StrainTangent:
         system, u = self.system, self._at[0]
         du = np.zeros(system.N)
         du[system.fixed] = system.values(load)
-        rest = load * system.external_force(u)[self.free] - self.B.T @ (self._rows[1] @ du)
+        rest = (load * system.external_force(u)[self.free] - self._element_force()
+                - self.B.T @ (self._rows[1] @ du))
         gap = -system.constraint(u + du, load)
         x, multipliers = Inverse(self).solve_both(rest[:, None], gap[:, None])
         du[self.free] = x[:, 0]
@@ -127,7 +143,7 @@ class StrainTangent:
         """
         u, load, t, _ = self._at
         rest = (load * self.system.external_force(u, t)[self.free] - self.B.T @ self.stress
-                - self.J.T @ self.multipliers)
+                - self.J.T @ self.multipliers - self._element_force())
         if not np.any(u) or not np.any(rest):
             return
         du, dm = Inverse(self, M, shift).solve_both(rest[:, None], accepted=ROUGH)

@@ -98,6 +98,7 @@ WORDS = {
     "fields": "field", "dr": "derivative", "factors": "factor|body", "filename": "file|read|write",
     "shear_correction": "shear correction", "t_start": "t_eval", "radius": "joints",
     "t_end": "times", "adapt": "max_elements", "function": "function|the field 'f'",
+    "side": "place|facet|boundary|point", "between": "point of a spring", "other": "beam|place",
 }
 
 
@@ -417,6 +418,27 @@ call("KelvinVoigt", KelvinVoigt, dict(time=1e-3), time="not negative")
 call("scene.damping", lambda **k: moved(clamped().damping(**k)),
      dict(mass=0.1, stiffness=1e-3, modal=[0.1]), mass="not negative", stiffness="not negative",
      modal="ratios")
+ends = dict(between=((1.0, 0.0), (1.0, 0.5)), k=1.0, damping=0.1)
+call("scene.spring", lambda **k: moved(clamped().spring(**k)), {**ends, "length": 0.4},
+     k="not negative", between="other", damping="not negative", length="not negative?")
+call("scene.torsional_spring", lambda **k: moved(clamped().torsional_spring(**k)),
+     dict(k=1.0, at="right", damping=0.1, beam=0, other=None, angle=0.1), k="not negative",
+     at="facets", damping="not negative", beam="beam?", other="other?", angle="number")
+call("scene.foundation", lambda **k: moved(clamped().foundation(**k)),
+     dict(k=1.0, side="bottom", one_sided=True, damping=0.1, beam=0), k="not negative",
+     side="facets", one_sided="flag", damping="not negative", beam="beam?")
+call("scene.drag", lambda **k: moved(clamped().drag(**k)),
+     dict(density=1.0, normal=1.0, tangential=0.1, beam=0), density="not negative",
+     normal="not negative", tangential="not negative", beam="beam?")
+call("scene.point_mass", lambda **k: moved(clamped().point_mass(**k)),
+     dict(mass=1.0, at=(1.0, 0.0), inertia=0.1, beam=0), mass="not negative", at="vector",
+     inertia="not negative", beam="beam?")
+call("scene.follower_force", lambda **k: moved(clamped().follower_force(**k)),
+     dict(force=(0.0, -0.1), at=(1.0, 0.0), beam=0, amplitude=amplitude), force="vector",
+     at="vector", beam="beam?", amplitude="function?")
+call("scene.line_load", lambda **k: moved(clamped().line_load(**k)),
+     dict(force=(0.0, -0.1), beam=0, amplitude=amplitude), force="vector", beam="beam?",
+     amplitude="function?")
 call("scene.gravity", lambda **k: moved(clamped().gravity(**k)),
      dict(g=(0.0, -1.0), beam=0, amplitude=amplitude), g="vector", beam="beam?",
      amplitude="function?")

@@ -15,6 +15,7 @@ from skfem_ancf.body import Body
 from skfem_ancf.dynamics import HHT, SCHEMES, EnergyMomentum, GeneralizedAlpha, Newmark, get_scheme
 from skfem_ancf.dynamics.rates import JointMotion
 from skfem_ancf.dynamics.dampers import Dampers, Rows
+from skfem_ancf.forces.system import Forces
 from skfem_ancf.dynamics.steps import STATE, Course, Matrices, Rule, room_for_steps, steps
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.equations import Equations
@@ -129,8 +130,9 @@ def oscillator():
     joints = JointTables(none, none, none, np.zeros(0), none, none, 0)
     M, mass, A = (Band(np.array([1.0, 0.0]), zero, 2, 0, 0) for _ in range(3))
     body, row = Body((), np.zeros((0, 8), np.int64)), np.zeros((0, 1))
-    equations = Equations(body, spring, joints, none, one, A, None, body)
-    return equations, Matrices(M, mass, A, Rows(row, row, row, row), Dampers(0, 0, 0.0, A, row))
+    forces = Forces([], 1, 0).tables(lambda i, j: i, True, 0)
+    equations = Equations(body, spring, joints, none, one, A, None, body, forces)
+    return equations, Matrices(M, mass, A, Rows(row, row, row, row), Dampers(0, 0, 0, 0.0, A, row))
 
 
 def amplification(scheme, dt):

@@ -30,6 +30,12 @@ def own_joints(handle, what, t, u, v, out):
 
 
 @njit
+def own_elements(handle, what, t, factor, a, b, out):
+    with objmode():
+        own.own_elements(handle, what, t, factor, a, b, out)
+
+
+@njit
 def own_solve(handle, t, u, multipliers, R, phi, du, dm):
     with objmode(done="boolean"):
         done = own.own_solve(handle, t, u, multipliers, R, phi, du, dm)

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..errors import (CheckpointError, CheckpointWarning, InputError, MissingExtra, require_integer,
                       require_path, shown)
+from ..forces.system import Forces
 from .base import Motion
 from .run import Run, Task
 
@@ -90,6 +91,17 @@ def fingerprint(system: System) -> dict[str, str]:
                                      for a in joint.entries(u, 0.0)]
         J += [] if joint.moving else [joint.value(0.0 * probe, 0.0)]
         parts[f"joint {k}"] = _digest(type(joint).__name__, joint.equations, joint.moving, *J)
+    for k, element in enumerate(system.forces.elements):
+        alone = Forces([element], system.N, system.bandwidth)
+        tables = alone.tables(lambda i, j: i, False, 0)
+        values = [alone.stiffness(tables, 0.0, 1e-3 * probe, probe, c) for c in (0.0, 1.0)]
+        for place in alone.own:
+            x = np.array([one.start for one in place.links])
+            values.append(np.array(place.force(x, 0.0 * x, 0.0)))
+        for mass in alone.masses:
+            values += mass.mass_entries()
+        parts[f"force element {k}"] = _digest(type(element).__name__, tables.numbers, tables.start,
+                                              tables.of, tables.weight, *values)
     return parts
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..band import Band, dense_solve, multiply, solve, subtract_rows
 from ..body import add_viscous_force, body_tangent
+from ..forces.texts import add_resisting_force
 from ..source import lanes, source
 
 
@@ -31,8 +32,8 @@ class Dampers(NamedTuple):
 
     Attributes
     ----------
-    active, viscous
-        1 if there is any; 1 if a material does.
+    active, viscous, elements
+        1 if there is any; 1 if a material does; 1 if a force element does.
     mass
         The force of the mass is ``mass M v``.
     D
@@ -43,18 +44,21 @@ class Dampers(NamedTuple):
 
     active: int
     viscous: int
+    elements: int
     mass: float
     D: Band
     modes: np.ndarray
 
 
 @source
-def damping_force(viscous, dampers, M, u, v, out, room):
-    """The force at u that resists the velocity v; ``viscous`` are its bodies."""
+def damping_force(e, dampers, M, t, u, v, out, room):
+    """The force at u that resists the velocity v, of the equations e."""
     for i in lanes(out.size):
         out[i] = 0.0
     if dampers.viscous > 0:
-        add_viscous_force(viscous, u, v, out)
+        add_viscous_force(e.viscous, u, v, out)
+    if dampers.elements > 0:
+        add_resisting_force(e.forces, t, u, v, out)
     if dampers.mass > 0.0:
         multiply(M, v, room)
         for i in lanes(out.size):

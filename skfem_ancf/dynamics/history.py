@@ -142,7 +142,7 @@ class History:
                         float(self.dissipated[k]))
         last, inertia = k == len(self) - 1, self.system.mass.multiply(motion.acceleration)
         if self.system.damped:
-            inertia = inertia + self.system.damping_force(motion.u, motion.v)
+            inertia = inertia + self.system.damping_force(motion.u, motion.v, motion.t)
         return State(self.system, self.u[k], load=1.0, converged=True, t=motion.t,
                      message=f"t = {motion.t:g}", multipliers=motion.multipliers,
                      inertia=inertia,
@@ -298,7 +298,7 @@ class History:
 
     @cached_property
     def strain_energy(self) -> Array:
-        """Strain energy, shape (nt,)."""
+        """Strain energy, with the potential of force elements, shape (nt,)."""
         return np.array([self.system.strain_energy(u) for u in self.u])
 
     @cached_property

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..band import Band, factorize, fix, solve
-from ..errors import SupportError, require_positive
+from ..errors import InputError, SupportError, require_positive, shown
 from .base import Motion
 from .course import Courses
 from .rates import rates
@@ -69,6 +69,9 @@ class Integrator:
         self.matrices = Matrices(M, _copy(M), _copy(M), *_damping(system))
         fix(self.matrices.mass, system.mask)
         if not factorize(self.matrices.mass):
+            if system.forces.masses:
+                raise InputError("the mass matrix is singular to round-off: a mass or an inertia "
+                                 f"of {shown(system.forces.masses)} is too large beside the beams")
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
         self._work = room_for_steps(system.N, system.m, system.machine.tables.stresses.size)
         self._courses = Courses(system, scheme.conserving)
@@ -152,9 +155,10 @@ class Integrator:
                                      -self._constraint_rate(y.u, y.v, t, dt))[0]
             rate = -(self._constraint_acceleration(y.u, y.v, t, dt)
                      + s.full_jacobian(y.u, t) @ y.acceleration)
-        force = s.external_force(y.u, t) - s.internal_force(y.u) - s.mass.multiply(y.acceleration)
+        force = (s.external_force(y.u, t) - s.internal_force(y.u, t)
+                 - s.mass.multiply(y.acceleration))
         if s.damped:
-            force = force - s.damping_force(y.u, y.v)
+            force = force - s.damping_force(y.u, y.v, t)
         acceleration, y.multipliers = s.solve_mass(force, y.u, t, rate)
         y.acceleration = y.acceleration + acceleration
         y.algorithmic, y.force = y.acceleration.copy(), y.multipliers
@@ -296,10 +300,12 @@ class Integrator:
 def _damping(system):
     """Rows beside the band, and the Dampers of a system."""
     modes, M = system.damped_modes, system.mass.band
-    k = len(modes)
+    rows = np.concatenate([modes, system.forces.far_rows()])
+    k = len(rows)
     D = M._replace(flat=np.zeros(M.flat.size if system.viscous else 0))
-    return (Rows(modes, np.zeros((k, k)), np.zeros(modes.shape), np.zeros((k, k))),
-            Dampers(int(system.damped), int(system.viscous), system.damping.mass, D, modes))
+    return (Rows(rows, np.zeros((k, k)), np.zeros(rows.shape), np.zeros((k, k))),
+            Dampers(int(system.damped), int(system.viscous), int(system.forces.resists),
+                    system.damping.mass, D, modes))
 
 
 def _copy(A):

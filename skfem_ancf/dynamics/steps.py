@@ -18,9 +18,10 @@ import numpy as np
 
 from ..band import Band, copy, factorize, fix, multiply, solve_joined, subtract_rows
 from ..body import body_carry, body_force, body_mean, body_stress, body_tangent
+from ..forces.texts import add_elastic_force, element_stiffness
 from ..source import borrowed, lanes, source, thin
-from ..tables import (add_curvature_force, add_load_stiffness, constraint, joint_directions,
-                      mean_external_force)
+from ..tables import (add_curvature_force, add_load_stiffness, add_products, constraint,
+                      joint_directions, mean_external_force)
 from .dampers import (Dampers, Rows, add_damping, damping_force, factorize_rows, solve_rows)
 from .rates import JointMotion, acceleration_of_joints, drive_rate
 
@@ -225,8 +226,9 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
     e, matrices, course, state, w = (borrowed(e), borrowed(matrices), borrowed(course),
                                      borrowed(state), borrowed(w))
     m, y, u, f = w.m.shape[1], w.y, w.x[U], w.x[FORCE]
-    joined, damped = m > 0, matrices.dampers.active > 0
-    power = _power(e, matrices, y[0], y[1], w) if damped and rule.conserving == 0 else 0.0
+    joined, damped, power = m > 0, matrices.dampers.active > 0, 0.0
+    if damped and rule.conserving == 0:
+        power = _power(e, matrices, course.times[0, 0] - course.dt, y[0], y[1], w)
     for n in range(rows.shape[0]):
         s = _step(e.joints, rule, course, n)
         rough, wanted = _begin(e.free, matrices.M, rule, s, w, state)
@@ -240,6 +242,7 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
                 body_mean(e.body, y[0], u, f)
             else:
                 body_force(e.body, u, f)
+            add_elastic_force(e.forces, s.acting, y[0] if rule.conserving > 0 else u, u, f)
             if damped:
                 _resist(e, matrices, rule, s, w)
             anew = joined and (not s.constant or state[SIZE] < 0.0)
@@ -428,8 +431,25 @@ def _tangent(e, matrices, rule, s, w):
         for k in range(dampers.modes.shape[0]):
             matrices.rows.S[k, k] = s.damping_factor
     add_load_stiffness(e.loads, s.factors, s.acting, 1.0, w.x[MIDDLE], matrices.A)
+    _add_elements(e.forces, matrices, s, w)
     for i in lanes(A.size):
         A[i] = s.mass_factor * M[i] + s.stiffness_factor * A[i]
+
+
+@source
+def _add_elements(forces, matrices, s, w):
+    """Add the derivatives of force elements to the band, and to what is beside it."""
+    if forces.start.size > 0:
+        D, modes, S = np.empty(forces.size), matrices.dampers.modes.shape[0], matrices.rows.S
+        element_stiffness(forces, s.acting, w.x[MIDDLE], w.y[1],
+                          s.damping_factor / s.stiffness_factor, D)
+        add_products(matrices.A.flat, forces.band_at, forces.band_weight, D, forces.band_of)
+        k = S.shape[0] - modes
+        between = np.zeros(k * k)
+        add_products(between, forces.row_at, np.ones(forces.row_at.size), D, forces.row_of)
+        for a in range(k):
+            for b in range(k):
+                S[modes + a, modes + b] = s.stiffness_factor * between[a * k + b]
 
 
 @thin
@@ -453,15 +473,15 @@ def _resist(e, matrices, rule, s, w):
     _free_velocity(e.free, rule, s, w)
     for i in lanes(u.size):
         pace[i] = (u[i] - u0[i]) / s.dt if rule.conserving > 0 else v[i]
-    damping_force(e.viscous, matrices.dampers, matrices.M, w.x[MIDDLE], pace, d, w.x[ROOM])
+    damping_force(e, matrices.dampers, matrices.M, s.acting, w.x[MIDDLE], pace, d, w.x[ROOM])
     for i in lanes(u.size):
         f[i] += d[i]
 
 
 @source
-def _power(e, matrices, u, v, w):
+def _power(e, matrices, t, u, v, w):
     """What damping takes in a unit of time."""
-    damping_force(e.viscous, matrices.dampers, matrices.M, u, v, w.x[DAMPING], w.x[ROOM])
+    damping_force(e, matrices.dampers, matrices.M, t, u, v, w.x[DAMPING], w.x[ROOM])
     return np.dot(w.x[DAMPING], v)
 
 
@@ -478,7 +498,7 @@ def _add_work(e, matrices, rule, s, w, state, power):
             pace[i] = u[i] - u0[i]
         work = np.dot(w.x[DAMPING], pace)
     else:
-        after = _power(e, matrices, w.x[U], w.x[V], w)
+        after = _power(e, matrices, s.t, w.x[U], w.x[V], w)
         work = 0.5 * s.dt * (power + after)
     state[DISSIPATED] += work
     return after

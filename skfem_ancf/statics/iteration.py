@@ -9,6 +9,7 @@ import numpy as np
 from ..band import clear, copy, diagonal, factorize, fix, multiply, solve, weighted
 from ..body import body_carry, body_force, body_tangent
 from ..border import (Factors, add_curvature, factorize_bordered, new_factors, solve_bordered)
+from ..forces.texts import add_elastic_force, add_element_tangent
 from ..own import own_solve
 from ..source import borrowed, lanes, source, thin
 from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
@@ -140,6 +141,7 @@ def equilibrium(e, target, rules, x, w, record):
         last = (k > 1 or (k > 0 and quiet)) and settled(work * part, reference, rules)
         if last:
             body_force(e.body, x.u, x.force)
+            add_elastic_force(e.forces, target.at, x.u, x.u, x.force)
         else:
             _tangent(e, target, rules, x, w, k)
         opening = _residual(e, target, x, w)
@@ -191,7 +193,9 @@ def settled(work, reference, rules):
 def _tangent(e, target, rules, x, w, k):
     """The internal force, the tangent, and 1 / its diagonal."""
     body_tangent(e.body, x.u, x.force, x.carried, rules.mixed > 0 and k > 0, x.stresses, e.K)
+    add_elastic_force(e.forces, target.at, x.u, x.u, x.force)
     add_load_stiffness(e.loads, target.factors, np.nan, target.scale, x.u, e.K)
+    add_element_tangent(e.forces, target.at, x.u, e.K)
     diagonal(e.K, w.scale)
     for i in lanes(x.u.size):
         w.scale[i] = 1.0 / np.abs(w.scale[i])

@@ -1,0 +1,122 @@
+"""Loads on the axis of a beam: those that turn with it, and those along its length."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from .errors import ask_field, require_finite
+from .kernels.section import beam_gradients
+from .loads import DeadLoad, Load
+from .quadrature import gauss
+from .spread import Spread
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
+
+    from .beam import Beam
+    from .types import Array, TimeFunction, WhichBeam
+
+
+class FollowerForce(Load):
+    """A force on a material point that turns with the tangent of the axis there.
+
+    It has no potential: what is loaded by it may flutter.
+
+    Parameters
+    ----------
+    force
+        The force in the stress-free state, shape (2,).
+    at
+        The point: its place (x, y) in the stress-free body, shape (2,).
+    beam, amplitude
+        As for :class:`~skfem_ancf.loads.Load`.
+    """
+
+    constant = False
+    symmetric = False
+    # of a bound one: the point, its coordinates, weights of its place and of the tangent
+    _station: float
+    _dofs: Any
+    _weights: Any
+    _slopes: Any
+    _start: Any
+    _turn: Any
+
+    def __init__(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, amplitude)
+        self.total, self.at = require_finite("force", force, (2,)), at
+
+    def bind(self, beam: Beam) -> Load:
+        bound = cast("FollowerForce", super().bind(beam))
+        e, X = beam.locate(self.at)
+        bound._station = e + float(X[0])
+        bound._dofs, bound._weights = beam.probe(self.at)
+        slopes, frame = beam_gradients(beam.mesh, beam.element, np.array([X[:1], [0.5]]),
+                                       np.array([e]))
+        bound._slopes, bound._start = slopes[0, 0, 0], frame[0, 0, 0]
+        # the force is a matrix times the unit tangent
+        (x, y), n = self.total, bound._start / np.hypot(*bound._start)
+        a, b = x * n[0] + y * n[1], x * n[1] - y * n[0]
+        bound._turn = np.array([[a, b], [-b, a]])
+        return bound
+
+    def _tangent(self, u):
+        return self._start + u[self._dofs] @ self._slopes
+
+    def force(self, u: Array) -> Array:
+        d = self._tangent(u)
+        out = np.zeros(self.beam.N)
+        np.add.at(out, self._dofs, np.outer(self._turn @ d / np.hypot(*d), self._weights))
+        return out
+
+    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
+        d = self._tangent(u)
+        size = np.hypot(*d)
+        D = self._turn @ (np.eye(2) - np.outer(d, d) / size**2) / size
+        values = np.einsum("ij,k,l->ikjl", D, self._weights, self._slopes)
+        rows = np.broadcast_to(self._dofs[:, :, None, None], values.shape)
+        columns = np.broadcast_to(self._dofs[None, None], values.shape)
+        return rows.ravel(), columns.ravel(), values.ravel()
+
+    def spread(self, u: Array) -> Spread:
+        return Spread(stations=(self._station,))
+
+
+class LineLoad(Load):
+    """A dead force per length of the stress-free axis.
+
+    Parameters
+    ----------
+    force
+        Force per length, shape (2,), or a function of the points x (2, ...) of the stress-free
+        axis that returns (2, ...).
+    beam, amplitude
+        As for :class:`~skfem_ancf.loads.Load`.
+    """
+
+    def __init__(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, amplitude)
+        self.per_length = force if callable(force) else require_finite("force", force, (2,))
+
+    def bind(self, beam: Beam) -> Load:
+        mesh, mapping = beam.mesh, beam.mesh.mapping()
+        xi, w = gauss(beam.element.axis_degree + 5)
+        X = np.array([xi, 0.5 + 0.0 * xi])
+        lengths = np.sqrt(np.sum(mapping.DF(X)[:, 0] ** 2, axis=0)) * w
+        x = np.asarray(mapping.F(X))
+        given = self.per_length
+        values = (ask_field("force(x)", given, x) if callable(given) else
+                  np.broadcast_to(given[:, None, None], x.shape))
+        vector = np.zeros(beam.N)
+        for e in range(mesh.nelements):
+            for k, point in enumerate(X.T):
+                dofs, weights = beam.probe_reference(e, point)
+                np.add.at(vector, dofs, np.outer(lengths[e, k] * values[:, e, k], weights))
+        body = None if callable(given) else Spread(body=given / (beam.width * mesh.height))
+        return DeadLoad(beam, vector, self.amplitude, body)

@@ -1,0 +1,10 @@
+"""Force elements: springs, dashpots, foundations, drag, masses, and those of one's own."""
+
+from ..joints.base import point, section
+from .base import ForceElement, bind_force
+from .distributed import Drag, Foundation
+from .masses import PointMass
+from .springs import Spring, TorsionalSpring
+
+__all__ = ["Drag", "ForceElement", "Foundation", "PointMass", "Spring", "TorsionalSpring",
+           "bind_force", "point", "section"]

@@ -1,0 +1,275 @@
+"""What every force element shares: points of beams, what it does there, and derivatives."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+from uuid import uuid4
+
+import numpy as np
+
+from ..errors import AncfError, InputError, require_finite, shown, warnings_as_errors
+from ..frozen import Sealable
+from ..joints.base import Vector
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..scene import Scene
+    from ..types import Array
+
+#: Relative step of differences, where a force takes no complex numbers.
+STEP = 1e-6
+_COMPLEX = getattr(np, "exceptions", np).ComplexWarning
+
+
+class Link(NamedTuple):
+    """A plane vector ``start + u[dofs] @ weights``, perhaps constant.
+
+    Attributes
+    ----------
+    start
+        Shape (2,).
+    dofs, weights
+        Shapes (2, k) and (k,).
+    """
+
+    start: Any
+    dofs: Any = np.zeros((2, 0), dtype=int)
+    weights: Any = np.zeros(0)
+
+
+def link(vector: Vector | Link) -> Link:
+    """A Vector of joints as a :class:`Link`."""
+    return Link(np.asarray(vector.start, dtype=float), vector.dofs, vector.weights)
+
+
+def difference(a: Vector | Link, b: Vector | Link) -> Link:
+    """The Link of b - a.
+
+    Parameters
+    ----------
+    a, b
+        Vectors or Links.
+    """
+    return Link(np.asarray(b.start, dtype=float) - a.start,
+                np.concatenate([a.dofs, b.dofs], axis=1), np.append(-a.weights, b.weights))
+
+
+class Part(NamedTuple):
+    """An element of a kind that texts know.
+
+    Attributes
+    ----------
+    kind
+        Of :mod:`skfem_ancf.forces.texts`.
+    d, e
+        Its two Links.
+    numbers
+        Its five numbers.
+    """
+
+    kind: int
+    d: Link
+    e: Link
+    numbers: tuple[float, ...]
+
+
+class ForceElement(Sealable):
+    """A force on points and sections of beams, of their places, velocities and time.
+
+    An element of your own is a subclass that defines :meth:`bind` and :meth:`force`, and perhaps
+    :meth:`potential`, :meth:`stiffness` and :meth:`resistance`; :meth:`skfem_ancf.Scene.add` takes
+    it. It works in statics, where velocities are zero and time is the load factor, in motions, in
+    natural frequencies, and in compiled loops, which call it. It is not scaled with the loads.
+
+    The energy-momentum scheme keeps the energy if there is a :meth:`potential`; the work of what
+    depends on velocities is in ``history.dissipated``.
+
+    Attributes
+    ----------
+    symmetric : bool
+        The derivative of the force by the places is symmetric: it has a potential.
+    distributed : bool
+        It acts all along a beam, not on a few points.
+    links
+        What :meth:`bind` has returned, once it is bound.
+
+    Examples
+    --------
+    A spring to the ground that hardens, with a dashpot:
+
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+    >>> from skfem_ancf.forces import ForceElement, point
+    >>> class Hardening(ForceElement):
+    ...     def __init__(self, k, c, at):
+    ...         self.k, self.c, self.at = k, c, at
+    ...     def bind(self, scene):
+    ...         return [point(scene, None, self.at)]
+    ...     def force(self, x, v, t):
+    ...         d = x[0] - np.array(self.at)
+    ...         return -np.array([self.k * (1.0 + d @ d) * d + self.c * v[0]])
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.01), ElementBeamANCF(2),
+    ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)
+    >>> scene = Scene(beam).clamp("left").gravity((0, -9.81)).add(Hardening(10.0, 1.0, (1, 0)))
+    >>> tip = scene.solve_static().displacement((1, 0))
+    >>> history = scene.integrate(t_end=0.02, dt=1e-3)
+    >>> bool(-0.3 < tip[1] < -0.2), bool(history.dissipated[-1] > 0)
+    (True, True)
+    """
+
+    symmetric = True
+    distributed = False
+    links: Any = ()
+
+    def bind(self, scene: Scene) -> Sequence[Vector | Link]:
+        """The points and sections on which it acts, found in the scene's coordinates.
+
+        Parameters
+        ----------
+        scene
+            Has ``beam(which)``, the Beam meant by a Beam, a name, a number or None,
+            ``offset(which)``, the number of its first coordinate, and ``N``.
+
+        Returns
+        -------
+        list
+            What :func:`skfem_ancf.forces.point` and :func:`skfem_ancf.forces.section` return.
+        """
+        raise NotImplementedError
+
+    def force(self, x: Array, v: Array, t: float) -> Array:
+        """The force on each point; on the direction of a section what works on its change.
+
+        Parameters
+        ----------
+        x, v
+            Places and velocities of the points, shape (n, 2) each.
+        t
+            Time; in statics the load factor.
+
+        Returns
+        -------
+        ndarray
+            Shape (n, 2).
+        """
+        raise NotImplementedError
+
+    def potential(self, x: Array) -> float | None:
+        """The potential of the force without velocities; None if there is none.
+
+        Parameters
+        ----------
+        x
+            Places of the points, shape (n, 2).
+        """
+        return None
+
+    def stiffness(self, x: Array, v: Array, t: float) -> Array:
+        """Derivative of the force by the places; by a complex step or differences by default.
+
+        Parameters
+        ----------
+        x, v, t
+            As for :meth:`force`, shapes (n, 2), (n, 2) and ().
+
+        Returns
+        -------
+        ndarray
+            Shape (n, 2, n, 2), the derivative's last.
+        """
+        return _derivative(lambda y: self.force(y, v, t), x)
+
+    def resistance(self, x: Array, v: Array, t: float) -> Array:
+        """Derivative of the force by the velocities, as :meth:`stiffness`.
+
+        Parameters
+        ----------
+        x, v, t
+            As for :meth:`force`, shapes (n, 2), (n, 2) and ().
+
+        Returns
+        -------
+        ndarray
+            Shape (n, 2, n, 2).
+        """
+        return _derivative(lambda w: self.force(x, w, t), v)
+
+    def parts(self) -> list[Part] | None:
+        """Of what the texts know, once it is bound; None for an element of your own."""
+        return None
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}>"
+
+
+def _derivative(function, x):
+    """Of shape (n, 2, n, 2): by complex steps where those agree with differences."""
+    n, scale = len(x), max(1.0, float(np.abs(x).max(initial=0.0)))
+    out, units = np.empty((n, 2, n, 2)), np.eye(2 * n).reshape(2 * n, n, 2)
+    for k, unit in enumerate(units):
+        step = STEP * scale
+        rough = (np.asarray(function(x + step * unit)) - function(x - step * unit)) / (2 * step)
+        value = rough
+        try:
+            with warnings_as_errors(_COMPLEX):
+                found = np.imag(function(x + 1e-30j * unit)) / 1e-30
+            if np.allclose(found, rough, rtol=1e-4, atol=1e-4 * np.abs(rough).max(initial=0.0)):
+                value = found
+        except (TypeError, ValueError, _COMPLEX):
+            pass
+        out[:, :, k // 2, k % 2] = value
+    return out
+
+
+def bind_force(element: ForceElement, scene: Scene) -> ForceElement:
+    """A copy of a force element, bound to a scene and tried there.
+
+    Parameters
+    ----------
+    element
+        A :class:`ForceElement`.
+    scene
+        The :class:`~skfem_ancf.Scene`.
+
+    Raises
+    ------
+    InputError
+        If the element does not keep to the interface of :class:`ForceElement`.
+    """
+    vars(element).setdefault("_key", uuid4().hex)  # by which it is known again
+    bound = element._unsealed()
+    own = element.parts.__func__ is ForceElement.parts  # type: ignore[attr-defined]
+    try:
+        bound.links = _links(element, bound.bind(scene))
+        if own:
+            _try(bound)
+    except AncfError:
+        raise
+    except Exception as error:
+        if not own:
+            raise
+        raise InputError(  # it is the user's: it may raise anything
+            f"{element!r} fails in the stress-free state: {type(error).__name__}: {error}; a force "
+            "element defines bind(scene), which returns a list of points, and force(x, v, t) of "
+            "shape (points, 2)") from error
+    bound._seal()
+    return bound
+
+
+def _links(element, links):
+    if not isinstance(links, (list, tuple)) or not links or not all(
+            isinstance(x, (Vector, Link)) for x in links):
+        raise InputError(f"bind(scene) of {element!r} must return a list of points and sections, "
+                         "as [point(scene, None, (1, 0))] with skfem_ancf.forces.point, got "
+                         f"{shown(links)}")
+    return [link(x) for x in links]
+
+
+def _try(bound):
+    x = np.array([x.start for x in bound.links])
+    n, zero = len(x), np.zeros_like(x)
+    require_finite(f"force(x, v, t) of {bound!r}", bound.force(x, zero, 0.0), (n, 2))
+    for name in ("stiffness", "resistance"):
+        require_finite(f"{name}(x, v, t) of {bound!r}", getattr(bound, name)(x, zero, 0.0),
+                       (n, 2, n, 2))

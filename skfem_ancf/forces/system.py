@@ -1,0 +1,286 @@
+"""The force elements of a scene in its equations: their tables, and elements of one's own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .base import Part
+from .masses import PointMass
+from .texts import (NUMBERS, TORSION, ForceTables, element_stiffness, potential, vectors_of)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..types import Array
+    from .base import ForceElement, Link
+
+#: Kinds that the texts know.
+KINDS = 4
+
+
+class Forces:
+    """The force elements of a scene.
+
+    Parameters
+    ----------
+    elements
+        Force elements, bound.
+    N, bandwidth
+        Coordinates of the scene, and subdiagonals of its band.
+
+    Attributes
+    ----------
+    elements, own
+        All, and those that are no tables.
+    far
+        True if one couples coordinates that are not in the band.
+    symmetric
+        True if all have symmetric derivatives.
+    masses
+        Those that add to the mass.
+    resists
+        True if velocities may cause a force.
+    """
+
+    def __init__(self, elements: Sequence[ForceElement], N: int, bandwidth: int) -> None:
+        self.elements, self._N = list(elements), N
+        parts: list[Part] = []
+        self.own = []
+        for element in self.elements:
+            found = element.parts()
+            if found is None:
+                self.own.append(element)
+            else:
+                parts += found
+        self.parts = sorted(parts, key=lambda part: part.kind)
+        n = len(self.parts)
+        vectors = [[part.d, part.e] for part in self.parts]
+        own = [element.links for element in self.own]
+        # links, numbers of their components, and where the derivatives by them are
+        blocks: list[tuple[list[Link], Array, Array]] = []
+        for k, pair in enumerate(vectors):
+            rows = k + n * np.arange(4)
+            blocks.append((pair, rows, k + n * np.arange(16).reshape(4, 4)))
+        row, at = 4 * n, 16 * n
+        self._slices = []
+        for links in own:
+            m = 2 * len(links)
+            self._slices.append((slice(row, row + m), slice(at, at + m * m)))
+            blocks.append((links, row + np.arange(m), at + np.arange(m * m).reshape(m, m)))
+            row, at = row + m, at + m * m
+        self._blocks, self.rows, self.size = blocks, row, at
+        self._couplings = [self._coupling(k) for k in range(len(blocks))]
+        self._far = [bool(np.any(np.abs(i - j) > bandwidth)) for i, j, _, _ in self._couplings]
+        self.far, self.symmetric = any(self._far), all(e.symmetric for e in self.elements)
+        self.masses = [element for element in self.elements if isinstance(element, PointMass)]
+        self.resists = bool(self.own) or any(_resists(part) for part in self.parts)
+
+    def _coupling(self, k):
+        """Rows, columns, weights and places of the derivatives that element k adds."""
+        links, _, places = self._blocks[k]
+        dofs = [link.dofs[c] for link in links for c in range(2)]
+        weights = [link.weights for link in links for _ in range(2)]
+        known = k >= len(self.parts)
+        used = range(len(dofs)) if known or self.parts[k].kind == TORSION else range(2)
+        out: list[list[Any]] = [[], [], [], []]
+        for i in used:
+            for j in used:
+                a, b = dofs[i], dofs[j]
+                out[0].append(np.repeat(a, len(b)))
+                out[1].append(np.tile(b, len(a)))
+                out[2].append(np.outer(weights[i], weights[j]).ravel())
+                out[3].append(np.full(len(a) * len(b), places[i, j]))
+        return tuple(np.concatenate(column) for column in out)
+
+    def _entries(self, far):
+        """Rows, columns, weights and places of near elements, or of far ones."""
+        none = np.zeros(0, dtype=np.int64)
+        found = [(none, none, np.zeros(0), none)] + [
+            c for c, other in zip(self._couplings, self._far) if other == far]
+        return tuple(np.concatenate(column) for column in zip(*found))
+
+    def tables(self, position: Any, symmetric: bool, handle: int) -> ForceTables:
+        """What texts take.
+
+        Parameters
+        ----------
+        position
+            Where an entry (i, j) is in the band.
+        symmetric
+            The band has its lower half only.
+        handle
+            What finds elements of one's own.
+        """
+        at, of, weight, start = [], [], [], np.zeros(self.rows)
+        for links, rows, _ in self._blocks:
+            for k, one in enumerate(links):
+                for c in range(2):
+                    row = rows[2 * k + c]
+                    start[row] = one.start[c]
+                    at.append(np.full(len(one.weights), row))
+                    of.append(one.dofs[c])
+                    weight.append(one.weights)
+        i, j, w, place = self._entries(False)
+        keep = (i >= j) | (not symmetric)
+        kinds = np.array([part.kind for part in self.parts], dtype=np.int64)
+        numbers = np.array([part.numbers for part in self.parts]).reshape(-1, NUMBERS)
+        rows, columns, places = self._between_rows()
+        between = len(self.far_rows())
+        return ForceTables(
+            start, _ints(at), _ints(of), np.concatenate([np.zeros(0), *weight]), len(self.parts),
+            np.searchsorted(kinds, np.arange(KINDS + 1)).astype(np.int64),
+            np.ascontiguousarray(numbers.T).ravel(), self.size,
+            position(i[keep], j[keep]).astype(np.int64), place[keep].astype(np.int64), w[keep],
+            (rows * between + columns).astype(np.int64), places.astype(np.int64),
+            handle if self.own else 0)
+
+    def acting_rows(self) -> Array:
+        """The derivatives of the places where elements act on few points, shape (k, N)."""
+        return self._derivatives([one for element in self.elements if not element.distributed
+                                  for one in element.links])
+
+    # elements that couple what is far apart
+
+    def _far_blocks(self):
+        for block, far in zip(self._blocks, self._far):
+            if far:
+                yield block
+
+    def far_rows(self) -> Array:
+        """The derivatives of far elements' vectors by the coordinates, shape (k, N)."""
+        return self._derivatives([one for links, _, _ in self._far_blocks() for one in links])
+
+    def _derivatives(self, links):
+        out = np.zeros((2 * len(links), self._N))
+        for k, row in enumerate(out):
+            one = links[k // 2]
+            np.add.at(row, one.dofs[k % 2], one.weights)
+        return out
+
+    def _between_rows(self):
+        """Row, column and place of the derivatives between those rows."""
+        found, first = [np.zeros((3, 0), dtype=np.int64)], 0
+        for _, rows, places in self._far_blocks():
+            m = len(rows)
+            a, b = np.divmod(np.arange(m * m), m)
+            found.append(np.array([first + a, first + b, places.ravel()]))
+            first += m
+        return np.concatenate(found, axis=1)
+
+    def far_entries(self) -> tuple[Array, Array, Array, Array]:
+        """Rows, columns, weights and places of what is not in the band; shapes (k,)."""
+        return self._entries(True)
+
+    # values
+
+    def vectors(self, tables: ForceTables, u: Array) -> Array:
+        """The vectors' numbers at u.
+
+        Parameters
+        ----------
+        tables
+            Those of :meth:`tables`.
+        u
+            Displacement of the coordinates, shape (N,).
+        """
+        y = np.empty(self.rows)
+        vectors_of(tables, u, 1.0, y)
+        return y
+
+    def potential(self, tables: ForceTables, u: Array) -> float:
+        """The potential of all elements; those without one count as zero.
+
+        Parameters
+        ----------
+        tables
+            Those of :meth:`tables`.
+        u
+            Displacement of the coordinates, shape (N,).
+        """
+        y = self.vectors(tables, u)
+        return potential(tables, y) + sum(
+            element.potential(y[rows].reshape(-1, 2)) or 0.0
+            for element, (rows, _) in zip(self.own, self._slices))
+
+    def stiffness(self, tables: ForceTables, t: float, u: Array, v: Array,
+                  factor: float) -> Array:
+        """The derivatives by the vectors, shape (size,).
+
+        Parameters
+        ----------
+        tables
+            Those of :meth:`tables`.
+        t, u, v, factor
+            Time, displacement and velocity, shape (N,), and the factor on derivatives by
+            velocities.
+        """
+        D = np.zeros(self.size)
+        element_stiffness(tables, t, u, v, factor, D)
+        return D
+
+    def entries(self, tables: ForceTables, t: float, u: Array, v: Array,
+                factor: float) -> tuple[Array, Array, Array]:
+        """The same by the coordinates: rows, columns and values.
+
+        Parameters
+        ----------
+        tables, t, u, v, factor
+            As for :meth:`stiffness`; u and v of shape (N,).
+        """
+        D = self.stiffness(tables, t, u, v, factor)
+        near, far = self._entries(False), self._entries(True)
+        i, j, w, place = (np.append(a, b) for a, b in zip(near, far))
+        return i, j, w * D[place]
+
+    def add_own(self, what: int, t: float, factor: float, a: Array, b: Array,
+                out: Array) -> None:
+        """Elements of one's own: what :func:`skfem_ancf.own.own_elements` is asked.
+
+        Parameters
+        ----------
+        what
+            0: the mean force without velocity between places a and b. 1: what the velocities b
+            add to the force at a. 2: the derivatives by places, and by velocities with a factor.
+        t, factor
+            Time, and that factor.
+        a, b
+            Of all vectors, shape (rows,).
+        out
+            Added to, shape (rows,) or (size,): what resists, as an internal force.
+        """
+        for element, (rows, places) in zip(self.own, self._slices):
+            x, y = a[rows].reshape(-1, 2), b[rows].reshape(-1, 2)
+            if what == 0:
+                out[rows] -= _mean_force(element, x, y, t).ravel()
+            elif what == 1:
+                if np.any(y):
+                    out[rows] -= (element.force(x, y, t) - element.force(x, 0.0 * y, t)).ravel()
+            else:
+                found = np.array(element.stiffness(x, y, t))
+                if factor != 0.0:
+                    found = found + factor * element.resistance(x, y, t)
+                out[places] -= found.ravel()
+
+
+def _mean_force(element, x, y, t):
+    """At the middle, corrected so that its work is what the potential loses: Gonzalez (1996)."""
+    zero, d = 0.0 * x, y - x
+    force = np.asarray(element.force(0.5 * (x + y), zero, t), dtype=float)
+    square = np.sum(d * d)
+    before = element.potential(x) if square > 0.0 else None
+    if before is None:
+        return force
+    missing = before - element.potential(y) - np.sum(force * d)
+    return force + missing / square * d
+
+
+def _resists(part):
+    """True if a part has a damping."""
+    k, c, damping = part.numbers[:3]
+    return {0: damping, 1: c, 2: c, 3: k or c}[part.kind] > 0.0
+
+
+def _ints(parts):
+    return np.concatenate([np.zeros(0, dtype=np.int64), *parts]).astype(np.int64)

@@ -1,0 +1,321 @@
+"""Force elements as tables, and what they do, as texts.
+
+An element has vectors that depend affinely on the coordinates: places of points, differences of
+them, directions of sections. Elements of the kinds below have two, ``d`` and ``e``, four numbers
+that are rows of arrays (4, n), elements of one kind side by side; behind them in one array are
+those of elements of one's own. Forces are those that resist, as internal forces do.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..own import own_elements
+from ..source import lanes, source
+from ..tables import add_products
+
+#: Kinds of elements.
+SPRING, TORSION, FOUNDATION, DRAG = range(4)
+#: Numbers of an element. Spring: stiffness, length without force, damping. Torsion: stiffness,
+#: damping, cosine and sine of the angle without moment. Foundation: stiffness, damping, normal,
+#: and 1 if it only pushes. Drag: factors of squares of normal and tangential velocity.
+NUMBERS = 5
+TINY = 1e-200
+
+
+class ForceTables(NamedTuple):
+    """The force elements of a scene.
+
+    Attributes
+    ----------
+    start
+        The vectors in the stress-free state, all numbers of them.
+    at, of, weight
+        Which of them grows with which coordinate, and how.
+    number, ends
+        Of elements of the kinds above, and where the kinds begin and end among them.
+    numbers
+        Their numbers, those of one name side by side, shape (5 n,).
+    size
+        Of the derivative by the vectors: 16 n, and what elements of one's own have.
+    band_at, band_of, band_weight
+        Where in the tangent's band each derivative goes.
+    row_at, row_of
+        Where it goes between the rows of elements that couple what is far apart.
+    own
+        Handle of what has elements of one's own; 0 for none.
+    """
+
+    start: np.ndarray
+    at: np.ndarray
+    of: np.ndarray
+    weight: np.ndarray
+    number: int
+    ends: np.ndarray
+    numbers: np.ndarray
+    size: int
+    band_at: np.ndarray
+    band_of: np.ndarray
+    band_weight: np.ndarray
+    row_at: np.ndarray
+    row_of: np.ndarray
+    own: int
+
+
+@source
+def vectors_of(tables, u, factor, out):
+    """factor times the vectors in the stress-free state, and what u adds to them."""
+    for k in lanes(out.size):
+        out[k] = factor * tables.start[k]
+    add_products(out, tables.at, tables.weight, u, tables.of)
+
+
+@source
+def _part(tables, kind, rows, x):
+    """The rows of the elements of one kind, a view of a flat array."""
+    n = tables.number
+    return x[:rows * n].reshape(rows, n)[:, tables.ends[kind]:tables.ends[kind + 1]]
+
+
+@source
+def add_elastic_force(tables, t, u0, u1, f):
+    """Add the force without velocity whose work from u0 to u1 is the change of the potential."""
+    size = tables.start.size
+    if size == 0:
+        return
+    y0, y1, F = np.empty(size), np.empty(size), np.zeros(size)
+    vectors_of(tables, u0, 1.0, y0)
+    vectors_of(tables, u1, 1.0, y1)
+    elastic(tables, y0, y1, F)
+    if tables.own > 0:
+        own_elements(tables.own, np.int64(0), t, 0.0, y0, y1, F)
+    add_products(f, tables.of, tables.weight, F, tables.at)
+
+
+@source
+def add_resisting_force(tables, t, u, v, f):
+    """Add the part of the force that velocities cause."""
+    size = tables.start.size
+    if size == 0:
+        return
+    y, w, G = np.empty(size), np.empty(size), np.zeros(size)
+    vectors_of(tables, u, 1.0, y)
+    vectors_of(tables, v, 0.0, w)
+    resisting(tables, y, w, G)
+    if tables.own > 0:
+        own_elements(tables.own, np.int64(1), t, 0.0, y, w, G)
+    add_products(f, tables.of, tables.weight, G, tables.at)
+
+
+@source
+def element_stiffness(tables, t, u, v, factor, D):
+    """The derivative by the vectors and, with a factor, by their velocities, shape (size,)."""
+    size = tables.start.size
+    y, w = np.empty(size), np.empty(size)
+    vectors_of(tables, u, 1.0, y)
+    vectors_of(tables, v, 0.0, w)
+    derivatives(tables, y, w, factor, D)
+    if tables.own > 0:
+        own_elements(tables.own, np.int64(2), t, factor, y, w, D)
+
+
+@source
+def add_element_tangent(tables, t, u, A):
+    """Add the derivative of :func:`add_elastic_force` to a band matrix, for near elements."""
+    if tables.start.size > 0:
+        D, v = np.empty(tables.size), np.zeros(u.size)
+        element_stiffness(tables, t, u, v, 0.0, D)
+        add_products(A.flat, tables.band_at, tables.band_weight, D, tables.band_of)
+
+
+# the kinds
+
+
+@source
+def elastic(tables, y0, y1, F):
+    """The forces of the kinds, means between two states; both may be the same."""
+    p, a, b, f = (_part(tables, SPRING, NUMBERS, tables.numbers), _part(tables, SPRING, 4, y0),
+                  _part(tables, SPRING, 4, y1), _part(tables, SPRING, 4, F))
+    for e in lanes(p.shape[1]):  # V = k (l - L)^2 / 2, and (V1 - V0) / (l1^2 - l0^2) (d0 + d1)
+        length = (np.sqrt(a[0, e] * a[0, e] + a[1, e] * a[1, e])
+                  + np.sqrt(b[0, e] * b[0, e] + b[1, e] * b[1, e]))
+        c = 0.5 * p[0, e] * (1.0 - 2.0 * p[1, e] / np.maximum(length, TINY))
+        f[0, e], f[1, e] = c * (a[0, e] + b[0, e]), c * (a[1, e] + b[1, e])
+    p, a, b, f = (_part(tables, TORSION, NUMBERS, tables.numbers), _part(tables, TORSION, 4, y0),
+                  _part(tables, TORSION, 4, y1), _part(tables, TORSION, 4, F))
+    g, turn = np.empty(a.shape), np.empty((3, a.shape[1]))
+    turned(p, a, turn[0])
+    turned(p, b, turn[1])
+    mean_turning(a, b, g)
+    for i in lanes(4):
+        for e in lanes(p.shape[1]):
+            f[i, e] = 0.5 * p[0, e] * (turn[0, e] + turn[1, e]) * g[i, e]
+    p, a, b, f = (_part(tables, FOUNDATION, NUMBERS, tables.numbers),
+                  _part(tables, FOUNDATION, 4, y0), _part(tables, FOUNDATION, 4, y1),
+                  _part(tables, FOUNDATION, 4, F))
+    for e in lanes(p.shape[1]):
+        s0, s1 = pressed(p[2, e], p[3, e], a[0, e], a[1, e]), pressed(p[2, e], p[3, e], b[0, e],
+                                                                      b[1, e])
+        p0 = s0 * (1.0 - p[4, e] * (s0 < 0.0))
+        p1 = s1 * (1.0 - p[4, e] * (s1 < 0.0))
+        same = np.abs(s1 - s0) < TINY
+        share = (p1 - p0) / (s1 - s0 + same) * (1.0 - same) + same * (
+            1.0 - p[4, e] * (s0 + s1 < 0.0))
+        c = 0.5 * p[0, e] * (p0 + p1) * share
+        f[0, e], f[1, e] = c * p[2, e], c * p[3, e]
+
+
+@source
+def pressed(nx, ny, x, y):
+    """How far a point has moved along a normal."""
+    return nx * x + ny * y
+
+
+@source
+def turned(p, y, out):
+    """The angle from e to d, less that without a moment, in (-pi, pi]."""
+    for e in lanes(out.size):
+        cross = y[2, e] * y[1, e] - y[3, e] * y[0, e]
+        dot = y[0, e] * y[2, e] + y[1, e] * y[3, e]
+        out[e] = np.arctan2(p[2, e] * cross - p[3, e] * dot, p[2, e] * dot + p[3, e] * cross)
+
+
+@source
+def turning(y, g):
+    """The derivative of the angle from e to d by both."""
+    for e in lanes(g.shape[1]):
+        d, s = y[0, e] ** 2 + y[1, e] ** 2, y[2, e] ** 2 + y[3, e] ** 2
+        g[0, e], g[1, e] = -y[1, e] / d, y[0, e] / d
+        g[2, e], g[3, e] = y[3, e] / s, -y[2, e] / s
+
+
+@source
+def mean_turning(a, b, g):
+    """A mean of it, whose product with the change of both is the change of the angle exactly.
+
+    The discrete gradient of Gonzalez (1996).
+    """
+    middle = np.empty(a.shape)
+    for i in lanes(4):
+        for e in lanes(a.shape[1]):
+            middle[i, e] = 0.5 * (a[i, e] + b[i, e])
+    turning(middle, g)
+    for e in lanes(a.shape[1]):
+        angle = (np.arctan2(a[0, e] * b[1, e] - a[1, e] * b[0, e],
+                            a[0, e] * b[0, e] + a[1, e] * b[1, e])
+                 - np.arctan2(a[2, e] * b[3, e] - a[3, e] * b[2, e],
+                              a[2, e] * b[2, e] + a[3, e] * b[3, e]))
+        x0, x1, x2, x3 = (b[0, e] - a[0, e], b[1, e] - a[1, e], b[2, e] - a[2, e],
+                          b[3, e] - a[3, e])
+        square = x0 * x0 + x1 * x1 + x2 * x2 + x3 * x3
+        missing = angle - (g[0, e] * x0 + g[1, e] * x1 + g[2, e] * x2 + g[3, e] * x3)
+        c = missing * (square > TINY) / np.maximum(square, TINY)
+        g[0, e] += c * x0
+        g[1, e] += c * x1
+        g[2, e] += c * x2
+        g[3, e] += c * x3
+
+
+@source
+def resisting(tables, y, w, G):
+    """The forces of the kinds that resist velocities w."""
+    p, d, v, f = (_part(tables, SPRING, NUMBERS, tables.numbers), _part(tables, SPRING, 4, y),
+                  _part(tables, SPRING, 4, w), _part(tables, SPRING, 4, G))
+    for e in lanes(p.shape[1]):
+        square = d[0, e] * d[0, e] + d[1, e] * d[1, e]
+        c = p[2, e] * (d[0, e] * v[0, e] + d[1, e] * v[1, e]) / np.maximum(square, TINY)
+        f[0, e], f[1, e] = c * d[0, e], c * d[1, e]
+    p, d, v, f = (_part(tables, TORSION, NUMBERS, tables.numbers), _part(tables, TORSION, 4, y),
+                  _part(tables, TORSION, 4, w), _part(tables, TORSION, 4, G))
+    g = np.empty(d.shape)
+    turning(d, g)
+    for e in lanes(p.shape[1]):
+        c = p[1, e] * (g[0, e] * v[0, e] + g[1, e] * v[1, e] + g[2, e] * v[2, e]
+                       + g[3, e] * v[3, e])
+        f[0, e], f[1, e], f[2, e], f[3, e] = c * g[0, e], c * g[1, e], c * g[2, e], c * g[3, e]
+    p, d, v, f = (_part(tables, FOUNDATION, NUMBERS, tables.numbers),
+                  _part(tables, FOUNDATION, 4, y), _part(tables, FOUNDATION, 4, w),
+                  _part(tables, FOUNDATION, 4, G))
+    for e in lanes(p.shape[1]):
+        apart = pressed(p[2, e], p[3, e], d[0, e], d[1, e]) < 0.0
+        c = p[1, e] * (1.0 - p[4, e] * apart) * pressed(p[2, e], p[3, e], v[0, e], v[1, e])
+        f[0, e], f[1, e] = c * p[2, e], c * p[3, e]
+    p, d, v, f = (_part(tables, DRAG, NUMBERS, tables.numbers), _part(tables, DRAG, 4, y),
+                  _part(tables, DRAG, 4, w), _part(tables, DRAG, 4, G))
+    for e in lanes(p.shape[1]):
+        size = np.sqrt(d[2, e] * d[2, e] + d[3, e] * d[3, e])
+        x, z = d[2, e] / size, d[3, e] / size
+        along, across = v[0, e] * x + v[1, e] * z, v[1, e] * x - v[0, e] * z
+        q, r = p[1, e] * np.abs(along) * along, p[0, e] * np.abs(across) * across
+        f[0, e], f[1, e] = q * x - r * z, q * z + r * x
+
+
+@source
+def derivatives(tables, y, w, factor, D):
+    """Their derivatives, those of ``resisting`` by w with a factor; (i, j) at 4 i + j."""
+    for k in lanes(D.size):
+        D[k] = 0.0
+    p, d, s = (_part(tables, SPRING, NUMBERS, tables.numbers), _part(tables, SPRING, 4, y),
+               _part(tables, SPRING, 16, D))
+    for e in lanes(p.shape[1]):
+        square = np.maximum(d[0, e] * d[0, e] + d[1, e] * d[1, e], TINY)
+        k = p[0, e] * p[1, e] / np.sqrt(square)
+        c = (k + factor * p[2, e]) / square
+        s[0, e] = p[0, e] - k + c * d[0, e] * d[0, e]
+        s[5, e] = p[0, e] - k + c * d[1, e] * d[1, e]
+        s[1, e] = c * d[0, e] * d[1, e]
+        s[4, e] = c * d[0, e] * d[1, e]
+    p, d, s = (_part(tables, TORSION, NUMBERS, tables.numbers), _part(tables, TORSION, 4, y),
+               _part(tables, TORSION, 16, D))
+    g, turn = np.empty(d.shape), np.empty(d.shape[1])
+    turning(d, g)
+    turned(p, d, turn)
+    for i in range(4):
+        for j in range(4):
+            for e in lanes(p.shape[1]):
+                s[4 * i + j, e] = (p[0, e] + factor * p[1, e]) * g[i, e] * g[j, e]
+    for k in range(2):  # the second derivative of the angle of d, and minus that of e
+        for e in lanes(p.shape[1]):
+            x, z = d[2 * k, e], d[2 * k + 1, e]
+            c = (1.0 - 2.0 * k) * p[0, e] * turn[e] / (x * x + z * z) ** 2
+            s[10 * k, e] += 2.0 * c * x * z
+            s[10 * k + 5, e] -= 2.0 * c * x * z
+            s[10 * k + 1, e] += c * (z * z - x * x)
+            s[10 * k + 4, e] += c * (z * z - x * x)
+    p, d, s = (_part(tables, FOUNDATION, NUMBERS, tables.numbers),
+               _part(tables, FOUNDATION, 4, y), _part(tables, FOUNDATION, 16, D))
+    for e in lanes(p.shape[1]):
+        apart = pressed(p[2, e], p[3, e], d[0, e], d[1, e]) < 0.0
+        c = (p[0, e] + factor * p[1, e]) * (1.0 - p[4, e] * apart)
+        s[0, e], s[5, e] = c * p[2, e] * p[2, e], c * p[3, e] * p[3, e]
+        s[1, e], s[4, e] = c * p[2, e] * p[3, e], c * p[2, e] * p[3, e]
+    p, d, v, s = (_part(tables, DRAG, NUMBERS, tables.numbers), _part(tables, DRAG, 4, y),
+                  _part(tables, DRAG, 4, w), _part(tables, DRAG, 16, D))
+    for e in lanes(p.shape[1]):
+        size = np.sqrt(d[2, e] * d[2, e] + d[3, e] * d[3, e])
+        x, z = d[2, e] / size, d[3, e] / size
+        q = 2.0 * factor * p[1, e] * np.abs(v[0, e] * x + v[1, e] * z)
+        r = 2.0 * factor * p[0, e] * np.abs(v[1, e] * x - v[0, e] * z)
+        s[0, e], s[5, e] = q * x * x + r * z * z, q * z * z + r * x * x
+        s[1, e], s[4, e] = (q - r) * x * z, (q - r) * x * z
+
+
+def potential(tables: ForceTables, y: np.ndarray) -> float:
+    """The potential of the kinds.
+
+    Parameters
+    ----------
+    tables
+        As of :class:`ForceTables`.
+    y
+        The vectors, shape (rows,).
+    """
+    p, d = _part(tables, SPRING, NUMBERS, tables.numbers), _part(tables, SPRING, 4, y)
+    total = 0.5 * np.sum(p[0] * (np.hypot(d[0], d[1]) - p[1]) ** 2)
+    p, d = _part(tables, TORSION, NUMBERS, tables.numbers), _part(tables, TORSION, 4, y)
+    angle = np.empty(p.shape[1])
+    turned(p, d, angle)
+    total += 0.5 * np.sum(p[0] * angle**2)
+    p, d = _part(tables, FOUNDATION, NUMBERS, tables.numbers), _part(tables, FOUNDATION, 4, y)
+    s = pressed(p[2], p[3], d[0], d[1])
+    return float(total + 0.5 * np.sum(p[0] * s**2 * (1.0 - p[4] * (s < 0.0))))
