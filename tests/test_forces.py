@@ -503,6 +503,7 @@ def test_a_point_of_two_beams_has_to_be_named():
     assert len(scene.spring(1.0, ((1, (1, 0)), (1, 1))).elements) == 1
 
 
+@pytest.mark.filterwarnings("ignore::skfem_ancf.ModelWarning")
 @pytest.mark.parametrize("name", ["all", "far apart", "one-sided"])
 def test_compiled_is_the_same(needs_compiled, name, monkeypatch):
     runs = []
