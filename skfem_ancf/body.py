@@ -1,6 +1,7 @@
 """Forces, tangents and stresses of all beams of a scene."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from .kernels.cable import CablePack, cable_evaluate
 from .kernels.section import (CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, SectionPack,
                               section_evaluate)
 from .source import primitive, room, shaped, source, thin
+
+if TYPE_CHECKING:
+    from .beam import Beam
 
 #: Kinds of packs, by their number in a table.
 PACKS = SectionPack, CablePack
@@ -52,8 +56,14 @@ def cable_pack(body, k):
     return body.packs[k]
 
 
-def body_of(beams, slices):
-    """The Body of beams with their slices of the coordinates."""
+def body_of(beams: Sequence["Beam"], slices: Sequence[slice]) -> "Body":
+    """The Body of beams with their slices of the coordinates.
+
+    Parameters
+    ----------
+    beams, slices
+        The beams, and the coordinates of each.
+    """
     packs, rows, at = [], [], 0
     for beam, s in zip(beams, slices):
         for pack in beam.kernel.packs:
@@ -65,7 +75,7 @@ def body_of(beams, slices):
     return Body(tuple(packs), np.array(rows, dtype=np.int64))
 
 
-def viscous_body_of(body, beams, times):
+def viscous_body_of(body: "Body", beams: Sequence["Beam"], times: Sequence[float]) -> "Body":
     """The Body of what resists the rates of strains; ``body`` itself where nothing does.
 
     Parameters
@@ -94,11 +104,20 @@ def _fields(pack):
             yield value
 
 
-def flat_body(body, address):
-    """The FlatBody of a Body."""
+def flat_body(body: "Body", address: int) -> "FlatBody":
+    """The FlatBody of a Body.
+
+    Parameters
+    ----------
+    body
+        The Body.
+    address
+        Of the compiled kernels.
+    """
     packs = [tuple(_fields(pack)) for pack in body.packs]
     where = np.zeros((len(packs), max(map(len, packs)), 4), dtype=np.int64)
-    arrays, used = {"f": [], "i": []}, {"f": 0, "i": 0}
+    arrays: dict[str, list] = {"f": [], "i": []}
+    used = {"f": 0, "i": 0}
     for k, pack in enumerate(packs):
         for j, value in enumerate(pack):
             if np.ndim(value) == 0:
@@ -112,7 +131,7 @@ def flat_body(body, address):
                     body.table)
 
 
-def stress_size(body):
+def stress_size(body: "Body") -> int:
     """How many numbers the stresses of all integration points are."""
     return int(np.max(body.table[:, END], initial=0))
 

@@ -1,7 +1,7 @@
 """The equations of a scene as tables that texts take."""
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -14,6 +14,11 @@ from .kernels.moments import MomentPack
 from .own import handle_of
 from .sampling import sample
 from .tables import JointTables, LoadTables
+from .types import Array
+
+if TYPE_CHECKING:
+    from .loads import Load
+    from .system import System
 
 
 class Equations(NamedTuple):
@@ -36,19 +41,24 @@ class Equations(NamedTuple):
         As ``body``, of what resists the rates of strains; the same where nothing does.
     """
 
-    body: tuple
+    body: Any
     loads: LoadTables
     joints: JointTables
     fixed: np.ndarray
     free: np.ndarray
     K: Band
     border: Border
-    viscous: tuple
+    viscous: Any
     forces: ForceTables
 
 
 class Tables:
     """The tables of a system, and what of them depends on time.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
 
     Attributes
     ----------
@@ -58,10 +68,11 @@ class Tables:
         A joint moves with time; its derivative in the stress-free state does.
     """
 
-    def __init__(self, system):
+    def __init__(self, system: "System") -> None:
         self.system = system
-        self._own_handle = None
-        self._loads = [[], [], [], []]  # of the constant kind, moments, linear ones, others
+        self._own_handle: int | None = None
+        # of the constant kind, moments, linear ones, others
+        self._loads: list[list[Any]] = [[], [], [], []]
         for load in system.loads:
             self._loads[_kind(load)].append(load)
         self.motion_varies = any(joint.moving for joint in system.joints)
@@ -75,7 +86,7 @@ class Tables:
                                self._forces())
 
     @cached_property
-    def flat(self):
+    def flat(self) -> Equations:
         from . import compiled
 
         plain, address = self.plain, compiled.kernels()
@@ -89,14 +100,14 @@ class Tables:
         return s.forces.tables(s.K._position, s.symmetric, self.handle if s.forces.own else 0)
 
     @property
-    def handle(self):
+    def handle(self) -> int:
         """What texts know the system by."""
         if self._own_handle is None:
             self._own_handle = handle_of(self.system)
         return self._own_handle
 
     @property
-    def stresses(self):
+    def stresses(self) -> Array:
         """Room for the stresses of all beams."""
         return np.zeros(stress_size(self.plain.body))
 
@@ -132,11 +143,11 @@ class Tables:
         return MomentPack(dofs, c, start, np.array([load.M for load in turning], dtype=float))
 
     @property
-    def own_loads(self):
+    def own_loads(self) -> list["Load"]:
         """Loads that are no tables."""
         return self._loads[3]
 
-    def factors(self, times):
+    def factors(self, times: Array) -> Array:
         """Factors of the loads, shape (n, k); of one row where none has an amplitude."""
         _, turning, linear, _ = self._loads
         columns = [None, *self._rows, *linear, *turning, *linear]
@@ -146,7 +157,7 @@ class Tables:
                          sample(load.amplitude, times).reshape(len(times)) for load in columns],
                         axis=1)
 
-    def static_factors(self, scale):
+    def static_factors(self, scale: float) -> Array:
         """Factors of the loads in statics, where an amplitude counts as one; shape (k,)."""
         loads = self.plain.loads
         return np.full(len(loads.vectors) + len(loads.moments.M) + len(self._loads[2]), scale)
@@ -191,12 +202,12 @@ class Tables:
                 return False
         return True
 
-    def offsets(self, times):
+    def offsets(self, times: Array) -> Array:
         """c of all joints at the times, shape (n, m)."""
         s = self.system
         return np.hstack([np.zeros((len(times), 0))] + [j.offset(times, s.N) for j in s.joints])
 
-    def slopes(self, times):
+    def slopes(self, times: Array) -> Array:
         """g of all joints at the times, shape (n, k)."""
         s = self.system
         return np.hstack([np.zeros((len(times), 0))] + [

@@ -20,6 +20,8 @@ from .switch import compiled_off, wanted
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from .system import System
+
 logger = logging.getLogger(__name__)
 
 #: Seconds that compiling takes, about: the kernels, which all texts call, and each text; and
@@ -89,9 +91,10 @@ class Machine:
         The equations.
     """
 
-    def __init__(self, system):
+    def __init__(self, system: System) -> None:
         self.tables = Tables(system)
-        self._plain, self._rooms = None, {}
+        self._plain: str | None = None
+        self._rooms: dict[str, Any] = {}
         if not all(beam.compiled for beam in system.beams):
             self._plain = "compiled=False"
         elif any(isinstance(pack, SectionPack) and pack.law.kind == OWN
@@ -136,7 +139,9 @@ class Machine:
         Parameters
         ----------
         make
-            A function of :class:`~skfem_ancf.equations.Equations` and ``sizes``.
+            A function of :class:`~skfem_ancf.equations.Equations` and the sizes.
+        *sizes
+            Numbers that the arrays depend on.
         """
         if make.__name__ not in self._rooms:
             self._rooms[make.__name__] = make(self.tables.plain, *sizes)

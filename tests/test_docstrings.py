@@ -13,7 +13,7 @@ import skfem_ancf
 
 #: Not looked at: twins of texts, which have the text's name and arguments; and where arrays of
 #: equations are packed for them.
-OTHERS = ("compiled", "equations", "body", "machine")
+OTHERS = ("compiled",)
 
 #: Annotations of arrays, whose shapes are to be said.
 ARRAYS = ("Array", "ArrayLike")

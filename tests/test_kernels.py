@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from skfem_ancf import (ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
-                        NeoHookean, StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
+                        NeoHookean, Scene, StVenantKirchhoff)
+from skfem_ancf.compiled import load
+from skfem_ancf.evaluation import CARRY, FORCE, MEAN, STRESS, TANGENT, evaluate
 from skfem_ancf.formulations import get_formulation
-from skfem_ancf.kernels import CableKernel, Kernel, cable, law, section
-from skfem_ancf.kernels.base import Destination
+from skfem_ancf.kernels import CableKernel, Kernel, law
 from skfem_ancf.linalg import BandMatrix
 from skfem_ancf.materials import Material
 from skfem_ancf.switch import compiled_off
@@ -158,25 +159,23 @@ def test_what_a_law_of_ones_own_raises_is_seen():
 @kinds
 @every
 def test_compiled_is_plain(kind, mesh):
-    from skfem_ancf.compiled.twin import twin
-
-    k = kernel(kind, mesh)
-    text = section.section_evaluate if k.texts.components == 3 else cable.cable_evaluate
-    compiled = twin(text, True)
-    u, v = states(k)
-    ld, rng = 2 * k.nd + 3, np.random.default_rng(2)
-    for what in range(5):
-        for use_given in (0, 1):
-            sizes, gaps = [], []
-            for pack, given in zip(k.packs, k.stresses()):
-                given += rng.standard_normal(given.shape)
-                found = []
-                for run in (text, compiled):
-                    f, S, flat = np.zeros(k.N), np.zeros_like(given), np.zeros((k.N + 3) * ld)
-                    run(pack, np.int64(what), u, v, f, given, np.int64(use_given), S,
-                        Destination(flat, ld, 3))
-                    found.append((f, S, flat))
-                gaps.append([np.max(np.abs(a - b)) for a, b in zip(*found)])
-                sizes.append([np.max(np.abs(a)) for a in found[0]])
-            # of the whole beam: a part of a split energy may vanish
-            assert np.all(np.max(gaps, axis=0) <= 2e-13 * np.max(sizes, axis=0))
+    """All that is asked of kernels, through the function that is compiled for scenes anyway."""
+    _, element, formulation, name = KINDS[kind]
+    system = Scene(Beam(MESHES[mesh](), element(), LAWS[name](2e5, 0.3), 0.02, formulation)).system
+    tables, n = system.machine.tables, len(system.machine.tables.stresses)
+    u, v = states(system)
+    before, rng = np.zeros((2, n)), np.random.default_rng(2)
+    for what in (FORCE, TANGENT, CARRY, STRESS, MEAN):
+        for use_carried in (False, True):
+            stresses, carried = before + rng.standard_normal((2, n))
+            found = []
+            for compiled, e in ((False, tables.plain), (True, tables.flat)):
+                e.K.flat[:] = 0.0
+                f, S, C = np.zeros(system.N), stresses.copy(), carried.copy()
+                args = (e, what, u, v, tables.static_factors(1.0), np.nan, 1.0, use_carried, S, C,
+                        f)
+                (load(evaluate, args) if compiled else evaluate)(*args)
+                found.append((f, S, C, e.K.flat.copy()))
+            assert any(np.any(x) for x in found[0])
+            for a, b in zip(*found):
+                assert np.max(np.abs(a - b)) <= 2e-13 * np.max(np.abs(a))
