@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 DENSE = 600  # free coordinates up to which the dense solver is used
 WINDOW = 1e-8  # smallest over largest eigenvalue of an inverse that is taken from it
 ORTHOGONAL = 1e-5  # scalar product of two shapes of unit mass
+SLOW = 1e-6  # a velocity at which what is quadratic in it can be left out
 REAL = 1e-7  # imaginary over absolute value of an eigenvalue that counts as real
 
 
@@ -61,6 +62,36 @@ class Modes:
     def stable(self) -> bool:
         """True if none of these motions grows."""
         return not self.flutter and bool(np.all(self.frequencies >= 0.0))
+
+    @property
+    def damping_ratios(self) -> np.ndarray:
+        """The damping ratio of each motion, shape (k,): what it decays with over its frequency.
+
+        ``shape . D shape / (2 omega)`` with what resists small velocities: exact for Rayleigh's
+        and modal damping and damped materials of one kind, of first order in the ratios where
+        damping joins motions of different shape. NaN where a motion does not oscillate.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import (Beam, ElementBeamCable, KelvinVoigt, MeshBeam, Scene,
+        ...                         StVenantKirchhoff)
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(5),
+        ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01, damping=KelvinVoigt(1e-3))
+        >>> modes = Scene(beam).clamp("left").modes(2)
+        >>> bool(np.allclose(modes.damping_ratios, 0.5e-3 * modes.frequencies))
+        True
+        """
+        state, system = self.state, self.state.system
+        if not system.damped:
+            return np.zeros(len(self.shapes))
+        out = np.full(len(self.shapes), np.nan)
+        for k, (omega, shape) in enumerate(zip(self.frequencies, self.shapes)):
+            if np.iscomplexobj(shape) or not omega.real > 0.0:
+                continue
+            force = system.damping_force(np.array(state.u), SLOW * shape, state.t) / SLOW
+            out[k] = shape @ force / (2.0 * omega.real)
+        return out
 
     def mode(self, i: int, amplitude: float) -> State:
         """The state displaced along a shape, to plot or save; along the real part of a complex one.

@@ -247,6 +247,19 @@ def test_a_swinging_beam_comes_to_rest_at_its_static_solution(scheme, left):
     assert_allclose(total, balance, rtol=0, atol=1e-8 * np.abs(total).max())
 
 
+def test_damping_ratios_of_modes():
+    scene = Scene(beam_of("cable", 1e-4, ne=8)).clamp("left").damping(mass=0.4, modal=[0, 0.03])
+    modes = scene.modes(3)
+    expected = 0.2 / modes.frequencies + 0.5e-4 * modes.frequencies + [0, 0.03, 0]
+    assert_allclose(modes.damping_ratios, expected, rtol=1e-8)
+    assert_allclose(modes.frequencies, EULER, rtol=1e-3)
+    free = Scene(beam_of("cable", 0.0)).clamp("left")
+    assert free.modes(2).damping_ratios.tolist() == [0.0, 0.0]
+    dashpot = free.spring(0.0, ((1, 0), (1, 1)), damping=0.1).drag(10.0, 1.0).modes(1)
+    assert_allclose(dashpot.damping_ratios[0], 0.1 * dashpot.shapes[0].reshape(-1, 6)[-1, 1]**2
+                    / (2 * dashpot.frequencies[0]), rtol=1e-5)
+
+
 # what there is besides
 
 

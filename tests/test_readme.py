@@ -42,6 +42,7 @@ def test_recipes_do_what_they_say(tmp_path, monkeypatch):
     assert abs(names["formulation"] / linear - 1) < 0.2
     assert abs(names["load"] / (5.0 / (3 * E * I)) - 1) < 0.02
     assert abs(names["joint"]) < 1e-12 and abs(names["level"].displacement((1, 0))[1]) > 1e-5
+    assert abs(names["pulled"] / (-0.1 / 0.5**2 / (3 * E * I)) - 1) < 0.02
     newmark = names["pendulum"].integrate(0.05, 1e-3, "newmark").displacement((1, 0))[-1, 1]
     assert 0 < abs(names["scheme"] / newmark - 1) < 1e-2
 
