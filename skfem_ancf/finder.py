@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from .errors import MeshError
 
@@ -101,7 +101,7 @@ class Finder:
     @cached_property
     def _tree(self):
         samples = np.array([(np.arange(SAMPLES) + 0.5) / SAMPLES, np.full(SAMPLES, 0.5)])
-        return cKDTree(self.mapping.F(samples).reshape(2, -1).T)
+        return scipy.spatial.cKDTree(self.mapping.F(samples).reshape(2, -1).T)
 
     def _candidates(self, x):
         k = min(CANDIDATES, SAMPLES * self.mesh.nelements)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
+import scipy
 from numpy import ndarray
-from scipy.spatial import cKDTree
 from skfem.element import Element
 from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import Mesh2D, MeshQuad
@@ -453,7 +453,7 @@ class MeshBeam(Frozen, Mesh2D):
         """
         mapping = self._mapping() if mapping is None else mapping
         samples = np.array([(np.arange(4) + 0.5) / 4, np.full(4, 0.5)])
-        tree = cKDTree(mapping.F(samples).reshape(2, -1).T)
+        tree = scipy.spatial.cKDTree(mapping.F(samples).reshape(2, -1).T)
         k = min(6, 4 * self.nelements)
         # points of an exact curve may lie a little outside its cubic elements
         allowed = 1e-6 if self.is_straight else 1e-3

@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.special import roots_jacobi
+import scipy
 
 from .errors import InputError, require_finite, require_integer, shown, taught
 
@@ -41,7 +41,7 @@ def gauss_lobatto(n: int) -> Array:
 
 @lru_cache(64)
 def _lobatto(n: int) -> Array:
-    inner = roots_jacobi(n - 2, 1.0, 1.0)[0] if n > 2 else np.zeros(0)
+    inner = scipy.special.roots_jacobi(n - 2, 1.0, 1.0)[0] if n > 2 else np.zeros(0)
     return np.concatenate([[-1.0], 0.5 * (inner - inner[::-1]), [1.0]])
 
 

@@ -27,9 +27,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 from numpy.polynomial.chebyshev import chebint, chebvander
 from scipy import sparse
-from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_banded
 
 from .formulations.ecm import EnhancedContinuum
@@ -211,7 +211,7 @@ class _Piece:
     @cached_property
     def _derivative(self):
         return kept(self.recovery.beam.tables, ("derivative", self.s.tobytes()),
-                    lambda: CubicSpline(self.s, np.eye(len(self.s)))(self.s, 1))
+                    lambda: scipy.interpolate.CubicSpline(self.s, np.eye(len(self.s)))(self.s, 1))
 
     @cached_property
     def _line(self):
@@ -222,7 +222,7 @@ class _Piece:
     def d_ds(self, values):
         """The derivative along the axis of values (..., n, m), by a cubic spline."""
         if len(self.s) > FEW:
-            return CubicSpline(self.s, values, axis=-2)(self.s, 1)
+            return scipy.interpolate.CubicSpline(self.s, values, axis=-2)(self.s, 1)
         return self._derivative @ values
 
     def integral(self, values):
@@ -294,7 +294,7 @@ class _Piece:
         turned = (smoothed(self.s, dt, 0.5 * r.beam.mesh.height)
                   - self.rate[..., None] * self.rY[1]) @ r.from_axis.T
         self.stretch = (along[..., r.middle, None] + turned) / (self.g * np.cos(self.alpha))
-        phi = CubicSpline(self.s, self.rate, axis=-1).antiderivative()(self.s)
+        phi = scipy.interpolate.CubicSpline(self.s, self.rate, axis=-1).antiderivative()(self.s)
         self.phi = phi + (self.raw_angle - phi) @ self._line
 
     # step 3
@@ -385,7 +385,7 @@ class _Piece:
         values = values.reshape(values.shape[:-3] + (len(s), -1))
         if len(s) == 1:
             return np.broadcast_to(values, self.S.shape)
-        return CubicSpline(s, values, axis=-2)(self.s)
+        return scipy.interpolate.CubicSpline(s, values, axis=-2)(self.s)
 
 
 def largest(values: Array) -> Array:
@@ -397,7 +397,7 @@ class _Table:
     """Cubic splines along the axis of values (7, ..., n, m) at m points across n sections."""
 
     def __init__(self, s, values):
-        spline = CubicSpline(s, np.moveaxis(values, -2, 0))
+        spline = scipy.interpolate.CubicSpline(s, np.moveaxis(values, -2, 0))
         self.starts = spline.x[:-1]
         self._list = self.starts.tolist()
         self._c = spline.c  # (4, n - 1, 7, ..., m)

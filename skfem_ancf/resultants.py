@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from .quadrature import gauss
 from .section_forces import Sections, cross
@@ -206,7 +206,8 @@ def _axis(recovery, piece):
     # not the derivative of the angle, which is fitted to that of the elements
     start = (piece.g[:, 0] - piece.g[:, -1]) / recovery.beam.mesh.height
     curvature = piece.rate - start - piece.d_ds(shear)
-    return CubicSpline(piece.s, np.array([phi, stretch[:, middle], shear, curvature]).T)
+    values = np.array([phi, stretch[:, middle], shear, curvature])
+    return scipy.interpolate.CubicSpline(piece.s, values.T)
 
 
 def _own(state, beam, e, xi):
