@@ -156,7 +156,7 @@ def test_what_a_law_of_ones_own_raises_is_seen():
 
 
 @pytest.mark.skipif(compiled_off() is not None, reason="without Numba")
-@kinds
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if KINDS[kind][3] != "own"])  # in NumPy
 @every
 def test_compiled_is_plain(kind, mesh):
     """All that is asked of kernels, through the function that is compiled for scenes anyway."""

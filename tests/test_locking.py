@@ -13,7 +13,7 @@ from skfem_ancf.formulations import Assumed, Formulation, Term
 from skfem_ancf.materials import Material
 from skfem_ancf.quadrature import gauss
 
-ORDERS = (1, 2, 3, 4, 5, 6)
+ORDERS = (1, 2, 3, 6)
 PLANES = ("stress", "strain")
 SLENDER = (1e2, 1e3, 1e4, 1e5, 1e6)
 NU, WIDTH = 0.3, 0.01
@@ -295,8 +295,8 @@ def test_a_free_beam_has_three_zero_modes(name, shape):
             Beam(quarter(2, 0.1), element, soft(0.1), WIDTH, formulation="assumed").kernel
         return
     for plane in PLANES:
-        for n in (1, 2, 4):
-            for slenderness in (10.0, *SLENDER):
+        for n in (1, 3):
+            for slenderness in (10.0, 1e3, 1e6):
                 h = 1.0 / slenderness
                 w = scaled_eigenvalues(Beam(shape(n, h), element, soft(h, plane), WIDTH,
                                             formulation="assumed"))
