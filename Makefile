@@ -28,13 +28,14 @@ test: $(VENV)/test.stamp
 	$(PY) -m pytest -n 2 $(ARGS)
 
 # what round-off could decide, in other kernels of OpenBLAS and without fused multiply-add;
-# the code that Numba compiles for it is kept apart. Then, without Numba, all that solves.
-GENERIC := compiled locking stability statics
+# the code that Numba compiles for it is kept apart, and checks every index. Then, without Numba,
+# all that solves.
+GENERIC := compiled doors locking stability statics
 ONCE := bad_arguments basis bench demos docstrings elements forms fuzz io mapping mesh package \
   paper places points pyvista readme rooms stress visuals
 
 test-settings: $(VENV)/test.stamp
-	export OPENBLAS_CORETYPE=Nehalem NUMBA_CPU_NAME=generic \
+	export OPENBLAS_CORETYPE=Nehalem NUMBA_CPU_NAME=generic NUMBA_BOUNDSCHECK=1 \
 	  NUMBA_CACHE_DIR=$(CURDIR)/out/numba-generic; \
 	  $(PY) -m skfem_ancf.compiled && $(PY) -m pytest -n 2 $(ARGS) $(GENERIC:%=tests/test_%.py)
 	OPENBLAS_CORETYPE=Haswell SKFEM_ANCF_COMPILED=0 \

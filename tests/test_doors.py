@@ -1,8 +1,5 @@
 """Doors: states of other meshes, objects that do not change, laws and loads of one's own."""
 
-import os
-import subprocess
-import sys
 import textwrap
 
 import numpy as np
@@ -138,16 +135,13 @@ DOORS = """
                      lambda: State(one.system, wrong.u).internal_force):
             with pytest.raises(InputError):
                 call()
-    print("as it should be")
 """
 
 
-def test_doors_with_bounds_checked(needs_compiled, tmp_path):
-    """The compiled code checks every index: what passes the doors reads its own memory only."""
-    environment = {**os.environ, "NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
-    done = subprocess.run([sys.executable, "-c", textwrap.dedent(DOORS)], env=environment,
-                          capture_output=True, text=True, check=False)
-    assert done.returncode == 0 and "as it should be" in done.stdout, done.stderr
+@pytest.mark.filterwarnings("ignore::skfem_ancf.ModelWarning")  # of a coarse mesh
+def test_what_passes_the_doors():
+    """Its own memory only is read: with ``make test-settings`` compiled code checks each index."""
+    exec(textwrap.dedent(DOORS), {})
 
 
 # what does not change
