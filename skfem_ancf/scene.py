@@ -1096,7 +1096,8 @@ class Scene:
             starts with the scene's :meth:`initial_velocity`.
         **options
             Those of :func:`skfem_ancf.dynamics.integrate.integrate`: ``t_eval``, ``tol``,
-            ``rtol``, ``t_start``, ``breakpoints``, ``checkpoint``, ``every``, ``progress``.
+            ``rtol``, ``t_start``, ``breakpoints``, ``checkpoint``, ``every``, ``progress``,
+            ``until``.
 
         Returns
         -------

@@ -529,6 +529,8 @@ call("scene.integrate", lambda **k: loaded_once().integrate(**k), motion,
      {"t_eval": {"[]": "no time"}},
      dt="positive", scheme="name", start="other?", t_eval="increasing?",
      tol="positive?", t_start="number?", progress="progress")
+call("scene.integrate, until", lambda **k: loaded_once().integrate(t_end=0.02, dt=0.01, **k),
+     dict(until=lambda state: state.displacement((1.0, 0.0))[1] + 1.0), until="function?")
 call("scene.integrate, t_end", lambda t_end: clamped().integrate(t_end=t_end, dt=0.5),
      dict(t_end=1.0), t_end="positive")
 call("scene.integrate, auto",

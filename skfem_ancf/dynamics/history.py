@@ -49,6 +49,8 @@ class History:
     dissipated
         The work of damping since the start, shape (nt,): that of its force with the
         energy-momentum scheme, the integral of its power by the trapezoidal rule with others.
+    event
+        The time at which ``integrate(until=...)`` has ended it; None if nothing did.
     steps
         Steps of the motion; the instants may be fewer or more.
     substeps
@@ -72,6 +74,11 @@ class History:
     def append(self, y: Motion) -> None:
         """Store an instant."""
         self._rows.append(y)
+
+    def end(self, y: Motion) -> None:
+        """Store the last instant, if it is not stored."""
+        if not self._rows or self._rows[-1].t < y.t:
+            self._rows.append(y)
 
     def columns(self) -> dict[str, Array]:
         """What was stored, as arrays by their names in :attr:`COLUMNS`."""
@@ -107,7 +114,7 @@ class History:
         columns, run = self.columns(), self._run
         self.t, self.u, self.v = columns["t"], columns["u"], columns["v"]
         self.acceleration, self.multipliers = columns["acceleration"], columns["multipliers"]
-        self.dissipated = columns["dissipated"]
+        self.dissipated, self.event = columns["dissipated"], run.event
         self._others = columns["algorithmic"], columns["force"], columns["before"]
         self._memories = self.memories
         if self._rows and run.y is not None and self._rows[-1].t == run.y.t:
@@ -140,14 +147,25 @@ class History:
         motion = Motion(float(self.t[k]), self.u[k], self.v[k], self.acceleration[k], algorithmic,
                         self.multipliers[k], force, float(before), self._memories[k],
                         float(self.dissipated[k]))
-        last, inertia = k == len(self) - 1, self.system.mass.multiply(motion.acceleration)
+        return self.instant(motion, self._kept if k == len(self) - 1 else None)
+
+    def instant(self, motion: Motion, kept: Any = None) -> State:
+        """A Motion of this system as a State.
+
+        Parameters
+        ----------
+        motion
+            The :class:`~skfem_ancf.dynamics.base.Motion`.
+        kept
+            What its run kept there, or None.
+        """
+        inertia = self.system.mass.multiply(motion.acceleration)
         if self.system.damped:
             inertia = inertia + self.system.damping_force(motion.u, motion.v, motion.t)
-        return State(self.system, self.u[k], load=1.0, converged=True, t=motion.t,
+        return State(self.system, motion.u, load=1.0, converged=True, t=motion.t,
                      message=f"t = {motion.t:g}", multipliers=motion.multipliers,
-                     inertia=inertia,
-                     acceleration=motion.acceleration, motion=motion,
-                     origin=(self.scheme, self._kept if last else None))
+                     inertia=inertia, acceleration=motion.acceleration, motion=motion,
+                     origin=(self.scheme, kept))
 
     def states(self, instants: Iterable[int] | None = None) -> Iterator[State]:
         """States one after the other, whose fields are recovered many at once.

@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import (AncfError, ConvergenceError, InputError, Interrupted, require_finite,
-                      require_finite_scalar, require_positive, shown, taught)
+                      require_finite_scalar, require_function, require_positive, shown, taught)
 from ..progress import progress_bar
 from .checkpoint import Checkpoint, same_problem
 from .integrator import Integrator, StepFailed
 from .run import Run, Task
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import ArrayLike
 
     from ..results import State
@@ -32,7 +34,8 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
               v: Array | None = None, t_start: float | None = None, t_eval: ArrayLike | None = None,
               tol: float | None = None, rtol: float = 1e-5, progress: bool | None = None,
               start: State | None = None, breakpoints: ArrayLike = (),
-              checkpoint: StrPath | None = None, every: int | None = None) -> History:
+              checkpoint: StrPath | None = None, every: int | None = None,
+              until: Callable[[State], float] | None = None) -> History:
     """Integrate the equation of motion.
 
     Parameters
@@ -76,6 +79,11 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     every
         Steps between two checkpoints; by default a minute, and so that writing takes less than a
         twentieth of the time.
+    until
+        A function of the State at an instant that returns a number: the motion ends where it
+        changes its sign, at an instant within a step that is found as those of ``t_eval``.
+        ``history.event`` is its time, None if there was none up to ``t_end``. It is asked after
+        each step, so that two changes within one are not seen. Not with ``checkpoint``.
 
     Returns
     -------
@@ -98,6 +106,11 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     task = _task(t_start, t_end, dt, t_eval, tol, rtol, breakpoints)
     system.require_independent_joints()
     run = Run(system, scheme, task)
+    if until is not None:
+        if checkpoint is not None:
+            raise InputError("a checkpoint cannot keep the function until(state): leave out "
+                             "checkpoint=, or integrate in parts, start=history.state(-1)")
+        run.until = require_function("until", until, "of a State that returns a number")
     file = None if checkpoint is None else Checkpoint(checkpoint, every, run)
     zero = np.zeros(system.N)
     if u is None and start is not None:

@@ -7,14 +7,18 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.optimize import brentq
 
-from ..errors import AncfError
+from ..errors import AncfError, ask_number
 from .base import Motion, Scheme
 from .history import History
 from .integrator import Integrator, StepFailed
 from .stepsize import StepSize
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..results import State
     from ..system import System
     from ..types import Array
 
@@ -24,6 +28,8 @@ CLOSE = 1e-6
 SHOWN = 0.2
 #: Part of a step up to which the acceleration is interpolated, for the same reason.
 NEAR = 0.1
+#: Part of a step to which an event is found.
+EXACT = 1e-10
 
 
 @dataclass
@@ -78,6 +84,10 @@ class Run:
         Steps done, and steps that the automatic size took again.
     longest
         Steps of a block at most, or None.
+    until
+        A function of a State whose change of sign ends the motion, or None.
+    event
+        The time at which it did, or None.
     """
 
     def __init__(self, system: System, scheme: Scheme, task: Task) -> None:
@@ -93,6 +103,9 @@ class Run:
         self.history = History(system, scheme, self)
         self.y: Any = None
         self.longest: int | None = None
+        self.until: Callable[[State], float] | None = None
+        self.event: float | None = None
+        self._value: float | None = None
         self._in_blocks, self._pace = type(scheme).step is Scheme.step, 1
         self._limit()
 
@@ -155,7 +168,7 @@ class Run:
     @property
     def done(self) -> bool:
         """True at the end of the motion."""
-        return self._last and self.y.t >= self._end
+        return self.event is not None or (self._last and self.y.t >= self._end)
 
     def _limit(self):
         """Functions of time are asked before a breakpoint in the steps that end there."""
@@ -186,7 +199,7 @@ class Run:
             self._automatic()
             return
         old = self.y
-        if self._in_blocks and self.n < self._whole:
+        if self._in_blocks and self.until is None and self.n < self._whole:
             done, motion = self._block(old)
             if done:
                 self._store_block(old, done, motion)
@@ -241,12 +254,29 @@ class Run:
 
     def _commit(self, old, new):
         """A step is done."""
-        if new.t >= self._end and not self._last:
+        if self.until is not None:
+            new = self._look(old, new)
+        if self.event is None and new.t >= self._end and not self._last:
             new = self._turn(new)
         else:
             self.n += 1
         self._store(old, new)
         self.y, self.steps = new, self.steps + 1
+
+    def _look(self, old, new):
+        """The end of a step, or the instant in it at which the event is."""
+        before = self._asked(old) if self._value is None else self._value
+        self._value = self._asked(new)
+        if before == 0.0 or before * self._value > 0.0:
+            return new
+        root = brentq(lambda t: self._asked(self._between(old, new, t)), old.t, new.t,
+                      xtol=EXACT * (new.t - old.t))
+        new = self._between(old, new, root)
+        self.event = new.t
+        return new
+
+    def _asked(self, y):
+        return ask_number("until(state)", self.until, self.history.instant(y))
 
     # storage
 
@@ -264,6 +294,8 @@ class Run:
         while self._wanted() <= until:
             self.history.append(self._between(old, new, float(self._wanted())))
             self._next += 1
+        if self.event is not None:
+            self.history.end(new)
 
     def _store_block(self, y, done, motion):
         """The same for a block of steps, of which only those that hold a time to store are made."""
