@@ -206,7 +206,7 @@ MOTIONS = dict(angle=st.floats(-20.0, 20.0),
                shift=st.tuples(st.floats(-10.0, 10.0), st.floats(-10.0, 10.0)))
 
 
-@pytest.mark.parametrize("element", ELEMENTS)
+@pytest.mark.parametrize("element", [name for name in ELEMENTS if name[-1] not in "789"])
 @pytest.mark.parametrize("formulation, law", CASES)
 @settings(max_examples=5, deadline=None)
 @given(**MOTIONS)
