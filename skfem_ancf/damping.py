@@ -2,32 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .errors import InputError, require_finite, require_finite_scalar, shown, teaching
+from .errors import InputError, require_finite, require_not_negative, shown, teaching
 from .frozen import Frozen
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-
-def require_not_negative(name: str, value: Any) -> float:
-    """A finite number that is zero or positive; raises InputError.
-
-    Parameters
-    ----------
-    name
-        What the message calls it.
-    value
-        What was given.
-    """
-    number = require_finite_scalar(name, value)
-    if number < 0.0:
-        raise InputError(f"{name} must be zero or positive, got {number!r}: negative damping, mass "
-                         "or stiffness would feed energy in")
-    return number
 
 
 @teaching

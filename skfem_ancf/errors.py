@@ -236,6 +236,23 @@ def require_positive(name: str, value: object, unit: str = "") -> float:
     return value
 
 
+def require_not_negative(name: str, value: Any) -> float:
+    """A finite number that is zero or positive; raises InputError.
+
+    Parameters
+    ----------
+    name
+        What the message calls it.
+    value
+        What was given.
+    """
+    number = require_finite_scalar(name, value)
+    if number < 0.0:
+        raise InputError(f"{name} must be zero or positive, got {number!r}: negative damping, mass "
+                         "or stiffness would feed energy in")
+    return number
+
+
 def require_finite_scalar(name: str, value: Any) -> float:
     """Return ``value`` as a float, or raise :class:`InputError` if it is no finite real number.
 

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..damping import require_not_negative
-from ..errors import require_flag, teaching
+from ..errors import require_flag, require_not_negative, teaching
 from ..kernels.section import beam_gradients
 from ..quadrature import gauss
 from .base import ForceElement, Link, Part

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..damping import require_not_negative
-from ..errors import InputError, require_finite, shown, teaching
+from ..errors import InputError, require_finite, require_not_negative, shown, teaching
 from ..joints.base import point, section
 from .base import ForceElement, Link, Part, link
 

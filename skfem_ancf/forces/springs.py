@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..damping import require_not_negative
-from ..errors import InputError, MeshError, require_finite, shown, teaching
+from ..errors import InputError, MeshError, require_finite, require_not_negative, shown, teaching
 from ..joints.base import Vector, point, section
 from ..places import is_point
 from .base import ForceElement, Link, Part, difference, link
