@@ -109,7 +109,11 @@ class Tables:
     @property
     def stresses(self) -> Array:
         """Room for the stresses of all beams."""
-        return np.zeros(stress_size(self.plain.body))
+        return np.zeros(self._stress_size)
+
+    @cached_property
+    def _stress_size(self):
+        return stress_size(self.plain.body)
 
     # loads
 
@@ -205,11 +209,15 @@ class Tables:
     def offsets(self, times: Array) -> Array:
         """c of all joints at the times, shape (n, m)."""
         s = self.system
+        if not s.joints:
+            return np.zeros((len(times), 0))
         return np.hstack([np.zeros((len(times), 0))] + [j.offset(times, s.N) for j in s.joints])
 
     def slopes(self, times: Array) -> Array:
         """g of all joints at the times, shape (n, k)."""
         s = self.system
+        if not s.joints:
+            return np.zeros((len(times), 0))
         return np.hstack([np.zeros((len(times), 0))] + [
             j.slope(times, s.N)[1].reshape(len(times), -1) for j in s.joints])
 
