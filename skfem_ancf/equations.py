@@ -89,11 +89,12 @@ class Tables:
     def flat(self) -> Equations:
         from . import compiled
 
-        plain, address = self.plain, compiled.kernels()
-        body = flat_body(plain.body, address)
+        plain, addresses = self.plain, compiled.kernels()
+        body = flat_body(plain.body, addresses["kernels"])
         same = plain.viscous is plain.body
-        return plain._replace(body=body,
-                              viscous=body if same else flat_body(plain.viscous, address))
+        return plain._replace(
+            body=body, viscous=body if same else flat_body(plain.viscous, addresses["kernels"]),
+            forces=plain.forces._replace(address=addresses["elements"]))
 
     def _forces(self):
         s = self.system

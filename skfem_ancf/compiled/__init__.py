@@ -12,11 +12,14 @@ import logging
 import os
 import sys
 from functools import cache
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 logger = logging.getLogger(__name__)
 
+#: What is compiled apart from the texts that call it, and the module that does so.
+ADDRESSES = {"kernels": "body", "elements": "elements"}
 #: Compiled functions that this process has, by the name of their text.
 LOADED: dict = {}
 #: Why Numba cannot be used though it is installed.
@@ -71,7 +74,7 @@ def on_disk(name: str) -> bool:
         Name of the text.
     """
     try:
-        return _note_of(name).exists() and _note_of("kernels").exists()
+        return all(_note_of(part).exists() for part in (name, *ADDRESSES))
     except OSError:
         return False
 
@@ -92,12 +95,12 @@ def note(name: str) -> None:
 
 
 @cache
-def kernels() -> int:
-    """The address of the kernels of all beams; compiles them or takes them from disk."""
-    from .body import address
-
-    found = address()
-    note("kernels")
+def kernels() -> dict[str, int]:
+    """The addresses of what all texts call; compiles it or takes it from disk."""
+    found = {}
+    for name, module in ADDRESSES.items():
+        found[name] = import_module(f".{module}", __package__).address()
+        note(name)
     return found
 
 

@@ -4,12 +4,11 @@ Numba compiles what a function calls anew with each that calls it; the kernels a
 code. Behind an address they are compiled once.
 """
 
-from llvmlite import ir
 from numba import carray, cfunc, types
-from numba.extending import intrinsic
 
 from ..band import Band
 from ..body import FlatBody, evaluate_body
+from .calls import call
 from .twin import OPTIONS, jit, named, twin
 
 _evaluate = twin(evaluate_body)
@@ -35,24 +34,9 @@ def address():
     return cfunc(_SIGNATURE, cache=True, **OPTIONS)(named(kernels)).address
 
 
-@intrinsic
-def _call(typing, address, arguments):
-    """Call a C function of an address with integers, some of which are addresses."""
-    count = len(arguments)
-
-    def generate(context, builder, signature, args):
-        word = ir.IntType(64)
-        function = builder.inttoptr(args[0], ir.FunctionType(ir.VoidType(), [word] * count
-                                                             ).as_pointer())
-        builder.call(function, [builder.extract_value(args[1], k) for k in range(count)])
-        return context.get_dummy_value()
-
-    return types.void(address, arguments), generate
-
-
 @jit
 def run_kernels(body, what, u, v, f, given, use_given, out, A):
-    _call(body.address, (
+    call(body.address, (
         what, body.floats.ctypes.data, body.ints.ctypes.data, body.where.ctypes.data,
         body.where.shape[1], body.table.ctypes.data, body.table.shape[0], body.floats.size,
         body.ints.size, u.ctypes.data, v.ctypes.data, u.size, f.ctypes.data, given.ctypes.data,

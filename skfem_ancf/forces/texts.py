@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..own import own_elements
-from ..source import lanes, source
+from ..source import lanes, primitive, shaped, source
 from ..tables import add_products
 
 #: Kinds of elements.
@@ -21,6 +21,14 @@ SPRING, TORSION, FOUNDATION, DRAG = range(4)
 #: and 1 if it only pushes. Drag: factors of squares of normal and tangential velocity.
 NUMBERS = 5
 TINY = 1e-200
+
+
+class Kinds(NamedTuple):
+    """Of the elements of the kinds above: their number, where each begins, and their numbers."""
+
+    number: int
+    ends: np.ndarray
+    numbers: np.ndarray
 
 
 class ForceTables(NamedTuple):
@@ -44,6 +52,8 @@ class ForceTables(NamedTuple):
         Where it goes between the rows of elements that couple what is far apart.
     own
         Handle of what has elements of one's own; 0 for none.
+    address
+        That of the compiled function of :mod:`skfem_ancf.compiled.elements`; 0 for plain texts.
     """
 
     start: np.ndarray
@@ -60,6 +70,7 @@ class ForceTables(NamedTuple):
     row_at: np.ndarray
     row_of: np.ndarray
     own: int
+    address: int = 0
 
 
 @source
@@ -71,10 +82,20 @@ def vectors_of(tables, u, factor, out):
 
 
 @source
-def _part(tables, kind, rows, x):
+def _part(kinds, kind, rows, x):
     """The rows of the elements of one kind, a view of a flat array."""
-    n = tables.number
-    return x[:rows * n].reshape(rows, n)[:, tables.ends[kind]:tables.ends[kind + 1]]
+    n = kinds.number
+    return shaped(x[:rows * n], (rows, n))[:, kinds.ends[kind]:kinds.ends[kind + 1]]
+
+
+#: What is asked of the kinds.
+ELASTIC, RESISTING, DERIVATIVES = range(3)
+
+
+@primitive("elements")
+def run_kinds(tables, what, y, w, factor, out):
+    """As :func:`of_kinds`; compiled once, and not anew in each text that calls it."""
+    of_kinds(Kinds(tables.number, tables.ends, tables.numbers), what, y, w, factor, out)
 
 
 @source
@@ -86,7 +107,7 @@ def add_elastic_force(tables, t, u0, u1, f):
     y0, y1, F = np.empty(size), np.empty(size), np.zeros(size)
     vectors_of(tables, u0, 1.0, y0)
     vectors_of(tables, u1, 1.0, y1)
-    elastic(tables, y0, y1, F)
+    run_kinds(tables, np.int64(ELASTIC), y0, y1, 0.0, F)
     if tables.own > 0:
         own_elements(tables.own, np.int64(0), t, 0.0, y0, y1, F)
     add_products(f, tables.of, tables.weight, F, tables.at)
@@ -101,7 +122,7 @@ def add_resisting_force(tables, t, u, v, f):
     y, w, G = np.empty(size), np.empty(size), np.zeros(size)
     vectors_of(tables, u, 1.0, y)
     vectors_of(tables, v, 0.0, w)
-    resisting(tables, y, w, G)
+    run_kinds(tables, np.int64(RESISTING), y, w, 0.0, G)
     if tables.own > 0:
         own_elements(tables.own, np.int64(1), t, 0.0, y, w, G)
     add_products(f, tables.of, tables.weight, G, tables.at)
@@ -114,7 +135,7 @@ def element_stiffness(tables, t, u, v, factor, D):
     y, w = np.empty(size), np.empty(size)
     vectors_of(tables, u, 1.0, y)
     vectors_of(tables, v, 0.0, w)
-    derivatives(tables, y, w, factor, D)
+    run_kinds(tables, np.int64(DERIVATIVES), y, w, factor, D)
     if tables.own > 0:
         own_elements(tables.own, np.int64(2), t, factor, y, w, D)
 
@@ -132,17 +153,28 @@ def add_element_tangent(tables, t, u, A):
 
 
 @source
-def elastic(tables, y0, y1, F):
+def of_kinds(kinds, what, y, w, factor, out):
+    """What is asked of all kinds, from their vectors y, and those at the end or their rates w."""
+    if what == ELASTIC:
+        elastic(kinds, y, w, out)
+    elif what == RESISTING:
+        resisting(kinds, y, w, out)
+    else:
+        derivatives(kinds, y, w, factor, out)
+
+
+@source
+def elastic(kinds, y0, y1, F):
     """The forces of the kinds, means between two states; both may be the same."""
-    p, a, b, f = (_part(tables, SPRING, NUMBERS, tables.numbers), _part(tables, SPRING, 4, y0),
-                  _part(tables, SPRING, 4, y1), _part(tables, SPRING, 4, F))
+    p, a, b, f = (_part(kinds, SPRING, NUMBERS, kinds.numbers), _part(kinds, SPRING, 4, y0),
+                  _part(kinds, SPRING, 4, y1), _part(kinds, SPRING, 4, F))
     for e in lanes(p.shape[1]):  # V = k (l - L)^2 / 2, and (V1 - V0) / (l1^2 - l0^2) (d0 + d1)
         length = (np.sqrt(a[0, e] * a[0, e] + a[1, e] * a[1, e])
                   + np.sqrt(b[0, e] * b[0, e] + b[1, e] * b[1, e]))
         c = 0.5 * p[0, e] * (1.0 - 2.0 * p[1, e] / np.maximum(length, TINY))
         f[0, e], f[1, e] = c * (a[0, e] + b[0, e]), c * (a[1, e] + b[1, e])
-    p, a, b, f = (_part(tables, TORSION, NUMBERS, tables.numbers), _part(tables, TORSION, 4, y0),
-                  _part(tables, TORSION, 4, y1), _part(tables, TORSION, 4, F))
+    p, a, b, f = (_part(kinds, TORSION, NUMBERS, kinds.numbers), _part(kinds, TORSION, 4, y0),
+                  _part(kinds, TORSION, 4, y1), _part(kinds, TORSION, 4, F))
     g, turn = np.empty(a.shape), np.empty((3, a.shape[1]))
     turned(p, a, turn[0])
     turned(p, b, turn[1])
@@ -150,9 +182,9 @@ def elastic(tables, y0, y1, F):
     for i in lanes(4):
         for e in lanes(p.shape[1]):
             f[i, e] = 0.5 * p[0, e] * (turn[0, e] + turn[1, e]) * g[i, e]
-    p, a, b, f = (_part(tables, FOUNDATION, NUMBERS, tables.numbers),
-                  _part(tables, FOUNDATION, 4, y0), _part(tables, FOUNDATION, 4, y1),
-                  _part(tables, FOUNDATION, 4, F))
+    p, a, b, f = (_part(kinds, FOUNDATION, NUMBERS, kinds.numbers),
+                  _part(kinds, FOUNDATION, 4, y0), _part(kinds, FOUNDATION, 4, y1),
+                  _part(kinds, FOUNDATION, 4, F))
     for e in lanes(p.shape[1]):
         s0, s1 = pressed(p[2, e], p[3, e], a[0, e], a[1, e]), pressed(p[2, e], p[3, e], b[0, e],
                                                                       b[1, e])
@@ -217,31 +249,31 @@ def mean_turning(a, b, g):
 
 
 @source
-def resisting(tables, y, w, G):
+def resisting(kinds, y, w, G):
     """The forces of the kinds that resist velocities w."""
-    p, d, v, f = (_part(tables, SPRING, NUMBERS, tables.numbers), _part(tables, SPRING, 4, y),
-                  _part(tables, SPRING, 4, w), _part(tables, SPRING, 4, G))
+    p, d, v, f = (_part(kinds, SPRING, NUMBERS, kinds.numbers), _part(kinds, SPRING, 4, y),
+                  _part(kinds, SPRING, 4, w), _part(kinds, SPRING, 4, G))
     for e in lanes(p.shape[1]):
         square = d[0, e] * d[0, e] + d[1, e] * d[1, e]
         c = p[2, e] * (d[0, e] * v[0, e] + d[1, e] * v[1, e]) / np.maximum(square, TINY)
         f[0, e], f[1, e] = c * d[0, e], c * d[1, e]
-    p, d, v, f = (_part(tables, TORSION, NUMBERS, tables.numbers), _part(tables, TORSION, 4, y),
-                  _part(tables, TORSION, 4, w), _part(tables, TORSION, 4, G))
+    p, d, v, f = (_part(kinds, TORSION, NUMBERS, kinds.numbers), _part(kinds, TORSION, 4, y),
+                  _part(kinds, TORSION, 4, w), _part(kinds, TORSION, 4, G))
     g = np.empty(d.shape)
     turning(d, g)
     for e in lanes(p.shape[1]):
         c = p[1, e] * (g[0, e] * v[0, e] + g[1, e] * v[1, e] + g[2, e] * v[2, e]
                        + g[3, e] * v[3, e])
         f[0, e], f[1, e], f[2, e], f[3, e] = c * g[0, e], c * g[1, e], c * g[2, e], c * g[3, e]
-    p, d, v, f = (_part(tables, FOUNDATION, NUMBERS, tables.numbers),
-                  _part(tables, FOUNDATION, 4, y), _part(tables, FOUNDATION, 4, w),
-                  _part(tables, FOUNDATION, 4, G))
+    p, d, v, f = (_part(kinds, FOUNDATION, NUMBERS, kinds.numbers),
+                  _part(kinds, FOUNDATION, 4, y), _part(kinds, FOUNDATION, 4, w),
+                  _part(kinds, FOUNDATION, 4, G))
     for e in lanes(p.shape[1]):
         apart = pressed(p[2, e], p[3, e], d[0, e], d[1, e]) < 0.0
         c = p[1, e] * (1.0 - p[4, e] * apart) * pressed(p[2, e], p[3, e], v[0, e], v[1, e])
         f[0, e], f[1, e] = c * p[2, e], c * p[3, e]
-    p, d, v, f = (_part(tables, DRAG, NUMBERS, tables.numbers), _part(tables, DRAG, 4, y),
-                  _part(tables, DRAG, 4, w), _part(tables, DRAG, 4, G))
+    p, d, v, f = (_part(kinds, DRAG, NUMBERS, kinds.numbers), _part(kinds, DRAG, 4, y),
+                  _part(kinds, DRAG, 4, w), _part(kinds, DRAG, 4, G))
     for e in lanes(p.shape[1]):
         size = np.sqrt(d[2, e] * d[2, e] + d[3, e] * d[3, e])
         x, z = d[2, e] / size, d[3, e] / size
@@ -251,12 +283,12 @@ def resisting(tables, y, w, G):
 
 
 @source
-def derivatives(tables, y, w, factor, D):
+def derivatives(kinds, y, w, factor, D):
     """Their derivatives, those of ``resisting`` by w with a factor; (i, j) at 4 i + j."""
     for k in lanes(D.size):
         D[k] = 0.0
-    p, d, s = (_part(tables, SPRING, NUMBERS, tables.numbers), _part(tables, SPRING, 4, y),
-               _part(tables, SPRING, 16, D))
+    p, d, s = (_part(kinds, SPRING, NUMBERS, kinds.numbers), _part(kinds, SPRING, 4, y),
+               _part(kinds, SPRING, 16, D))
     for e in lanes(p.shape[1]):
         square = np.maximum(d[0, e] * d[0, e] + d[1, e] * d[1, e], TINY)
         k = p[0, e] * p[1, e] / np.sqrt(square)
@@ -265,8 +297,8 @@ def derivatives(tables, y, w, factor, D):
         s[5, e] = p[0, e] - k + c * d[1, e] * d[1, e]
         s[1, e] = c * d[0, e] * d[1, e]
         s[4, e] = c * d[0, e] * d[1, e]
-    p, d, s = (_part(tables, TORSION, NUMBERS, tables.numbers), _part(tables, TORSION, 4, y),
-               _part(tables, TORSION, 16, D))
+    p, d, s = (_part(kinds, TORSION, NUMBERS, kinds.numbers), _part(kinds, TORSION, 4, y),
+               _part(kinds, TORSION, 16, D))
     g, turn = np.empty(d.shape), np.empty(d.shape[1])
     turning(d, g)
     turned(p, d, turn)
@@ -282,15 +314,15 @@ def derivatives(tables, y, w, factor, D):
             s[10 * k + 5, e] -= 2.0 * c * x * z
             s[10 * k + 1, e] += c * (z * z - x * x)
             s[10 * k + 4, e] += c * (z * z - x * x)
-    p, d, s = (_part(tables, FOUNDATION, NUMBERS, tables.numbers),
-               _part(tables, FOUNDATION, 4, y), _part(tables, FOUNDATION, 16, D))
+    p, d, s = (_part(kinds, FOUNDATION, NUMBERS, kinds.numbers),
+               _part(kinds, FOUNDATION, 4, y), _part(kinds, FOUNDATION, 16, D))
     for e in lanes(p.shape[1]):
         apart = pressed(p[2, e], p[3, e], d[0, e], d[1, e]) < 0.0
         c = (p[0, e] + factor * p[1, e]) * (1.0 - p[4, e] * apart)
         s[0, e], s[5, e] = c * p[2, e] * p[2, e], c * p[3, e] * p[3, e]
         s[1, e], s[4, e] = c * p[2, e] * p[3, e], c * p[2, e] * p[3, e]
-    p, d, v, s = (_part(tables, DRAG, NUMBERS, tables.numbers), _part(tables, DRAG, 4, y),
-                  _part(tables, DRAG, 4, w), _part(tables, DRAG, 16, D))
+    p, d, v, s = (_part(kinds, DRAG, NUMBERS, kinds.numbers), _part(kinds, DRAG, 4, y),
+                  _part(kinds, DRAG, 4, w), _part(kinds, DRAG, 16, D))
     for e in lanes(p.shape[1]):
         size = np.sqrt(d[2, e] * d[2, e] + d[3, e] * d[3, e])
         x, z = d[2, e] / size, d[3, e] / size
