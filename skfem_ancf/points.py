@@ -193,6 +193,8 @@ class Part:
         table = self._strain_table if len(self.e) <= TABLED else None
         if table is None:
             return self.beam.strain(u[self.coordinates], self.at, self.e)[..., 0]
+        if len(self.e) == 1:
+            return table.one(u[self.one[0]])[:, None]
         return table(np.moveaxis(u[self.dofs], -1, 0))[..., 0]
 
     @cached_property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -66,3 +67,27 @@ class ElementStrain:
         (xx, yy), both = sum((e + 0.5 * H) * H), (e[:, 0] + H[:, 0]) * H[:, 1] + H[:, 0] * e[:, 1]
         return np.array([sum(weight * values[at] for at, weight in part)
                          for values, part in zip((xx, yy, both[0] + both[1]), self._parts)])
+
+    @cached_property
+    def _single(self):
+        """Of one point: slopes (nb, 2 places), frame (places, 2, 2), weights (3, 4 places)."""
+        slopes, frame = self._slopes[..., 0, 0], self._frame[..., 0, 0]
+        weights = np.zeros((3, len(slopes), 2, 2))
+        for (row, J, K), part in zip(((0, 0, 0), (1, 1, 1), (2, 0, 1)), self._parts):
+            for at, weight in part:
+                weights[row, at, J, K] += np.ravel(weight)[0]
+        weights[2] += weights[2].swapaxes(-1, -2)  # both products of the shear
+        return (np.ascontiguousarray(slopes.transpose(1, 0, 2)).reshape(slopes.shape[1], -1),
+                np.ascontiguousarray(frame.transpose(2, 1, 0)), weights.reshape(3, -1))
+
+    def one(self, u_e: Array) -> Array:
+        """As calling it, (3,), where there is one point.
+
+        Parameters
+        ----------
+        u_e
+            Displacements of the coordinates of its element, shape (2, nb).
+        """
+        slopes, frame, weights = self._single
+        H = (u_e @ slopes).T.reshape(-1, 2, 2)  # places, along which it is derived, component
+        return weights @ ((frame + 0.5 * H) @ H.swapaxes(-1, -2)).ravel()

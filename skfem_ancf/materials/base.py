@@ -324,7 +324,8 @@ class LinearLaw:
         return 0.5 * np.sum(strain * self.stress(strain), axis=0)
 
     def stress(self, strain: Array) -> Array:
-        return np.tensordot(self.D, strain, 1)
+        strain = np.asarray(strain)
+        return (self.D @ strain.reshape(3, -1)).reshape(strain.shape)
 
     def moduli(self, strain: Array) -> Array:
         shape = np.shape(strain)[1:]
