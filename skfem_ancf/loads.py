@@ -431,6 +431,8 @@ class DeadLoad(Load):
 class Pressure(Load):
     """A pressure that stays normal to the deformed surface: linear in the position in the plane.
 
+    The surface of a cable is its axis, wherever across the section the place is.
+
     Parameters
     ----------
     beam

@@ -531,6 +531,9 @@ class Scene:
                  amplitude: TimeFunction = None) -> Scene:
         """A pressure on a surface that stays normal to it as it deforms.
 
+        On the bottom and the top of a cable it acts on its axis, as long as that is: on a curve
+        of radius R its resultant is off by h / (2 R) of it.
+
         Parameters
         ----------
         boundary
