@@ -480,7 +480,8 @@ class Beam(Frozen):
         u_e, size = self.kernel.gather(u, tind), max(1, STRAINS // X.shape[-1])
         parts = [slice(first, first + size) for first in range(0, len(tind), size)]
         return np.concatenate([
-            ElementStrain(self, term, X[:, part] if X.ndim == 3 else X, tind[part])(u_e[part])
+            ElementStrain(self, term, X[:, part] if X.ndim == 3 else X, tind[part]).once(
+                u_e[part])
             for part in parts or [slice(0, 0)]], axis=1)
 
     @_fields

@@ -91,8 +91,7 @@ class Sections:
             (2, nelements, npoints), and (nelements,).
         """
         u_e = beam.kernel.gather(u, slice(None) if tind is None else tind)
-        table, frame = beam.element.slopes(beam.mesh.mapping(), X, tind)
-        return np.einsum("ebi,bJep->iJep", u_e, table), frame
+        return beam.element.gradients(beam.mesh.mapping(), X, tind, u_e)
 
     @staticmethod
     def displacements(beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:

@@ -45,10 +45,14 @@ class ElementStrain:
                 places.setdefault(key, np.array([0.0 * X[0] + xi, X[1]]))
                 part.append((list(places).index(key), w.T))
             self._parts.append(part)
-        mapping = beam.mesh.mapping()
-        tables = [beam.element.slopes(mapping, at, tind) for at in places.values()]
-        self._slopes = np.array([table for table, _ in tables])  # (places, nb, 2, ne, np)
-        self._frame = np.stack([frame for _, frame in tables], axis=2)  # (2, 2, places, ne, np)
+        self._beam, self._places, self._tind = beam, list(places.values()), tind
+
+    @cached_property
+    def _tables(self):
+        """Slopes, (places, nb, 2, ne, np), and frame, (2, 2, places, ne, np)."""
+        beam = self._beam
+        tables = [beam.element.slopes(beam.mesh.mapping(), at, self._tind) for at in self._places]
+        return np.array([table for table, _ in tables]), np.stack([f for _, f in tables], axis=2)
 
     def __call__(self, u_e: Array) -> Array:
         """The strain (eps_xx, eps_yy, 2 eps_xy).
@@ -63,7 +67,23 @@ class ElementStrain:
         ndarray
             Shape (3, nelements, npoints).
         """
-        H, e = np.einsum("ebi,qbJep->iJqep", u_e, self._slopes), self._frame
+        slopes, frame = self._tables
+        return self._of(np.einsum("ebi,qbJep->iJqep", u_e, slopes), frame)
+
+    def once(self, u_e: Array) -> Array:
+        """As calling it, for a single state: no table is made.
+
+        Parameters
+        ----------
+        u_e
+            As for a call, shape (nelements, nb, 2).
+        """
+        beam = self._beam
+        found = [beam.element.gradients(beam.mesh.mapping(), at, self._tind, u_e)
+                 for at in self._places]
+        return self._of(*(np.stack(parts, axis=2) for parts in zip(*found)))
+
+    def _of(self, H, e):
         (xx, yy), both = sum((e + 0.5 * H) * H), (e[:, 0] + H[:, 0]) * H[:, 1] + H[:, 0] * e[:, 1]
         return np.array([sum(weight * values[at] for at, weight in part)
                          for values, part in zip((xx, yy, both[0] + both[1]), self._parts)])
@@ -71,7 +91,7 @@ class ElementStrain:
     @cached_property
     def _single(self):
         """Of one point: slopes (nb, 2 places), frame (places, 2, 2), weights (3, 4 places)."""
-        slopes, frame = self._slopes[..., 0, 0], self._frame[..., 0, 0]
+        slopes, frame = (table[..., 0, 0] for table in self._tables)
         weights = np.zeros((3, len(slopes), 2, 2))
         for (row, J, K), part in zip(((0, 0, 0), (1, 1, 1), (2, 0, 1)), self._parts):
             for at, weight in part:

@@ -151,7 +151,8 @@ class ElementBeam(Frozen, Element):
             S, dS = (hermite_basis(self._along[1], X[0], d)[along[of_section]] for d in (0, 1))
             P, dP = (values[number[of_section]] for values in self.section(X[1] - 0.5))
             h = (h**power[of_section]).reshape((-1,) + (1,) * (S.ndim - 1))
-            out[:, of_section] = h * S * P, h * dS * P, h * S * dP
+            S, dS = h * S, h * dS
+            out[:, of_section] = S * P, dS * P, S * dP
         return out[0], out[1], out[2], slope
 
     def gbasis(self, mapping: MappingBeam, X: Array, i: int,
@@ -200,11 +201,16 @@ class ElementBeam(Frozen, Element):
         value, d_xi, d_eta, slope = self.local(X, mesh.height, which)
         if np.ndim(X) == 2:  # the same points of all elements
             value, d_xi, d_eta = value[:, None], d_xi[:, None], d_eta[:, None]
-        lengths = mesh.lengths if tind is None else mesh.lengths[tind]
-        scale = lengths[:, None] ** slope[:, None, None]
+        scale = self._scale(mesh, slope, tind)[:, :, None]
         invDF = mapping.invDF(X, tind)
         grad = scale[:, None] * (invDF[0] * d_xi[:, None] + invDF[1] * d_eta[:, None])
         return scale * value, grad
+
+    @staticmethod
+    def _scale(mesh, slope, tind):
+        """The lengths of elements to the powers of local functions, shape (n, nelements)."""
+        lengths = mesh.lengths if tind is None else mesh.lengths[tind]
+        return np.array([lengths**k for k in range(np.max(slope, initial=0) + 1)])[slope]
 
     def slopes(self, mapping: MappingBeam, X: Array, tind: Array | None = None
                ) -> tuple[Array, Array]:
@@ -225,6 +231,31 @@ class ElementBeam(Frozen, Element):
         frame = mapping.frame(X, tind)
         grad = self.functions(mapping, X, tind)[1]
         return np.einsum("kjep,jJep->kJep", grad, frame), frame
+
+    def gradients(self, mapping: MappingBeam, X: Array, tind: Array | None, u_e: Array
+                  ) -> tuple[Array, Array]:
+        """Derivatives of a displacement along the axis and across it, and the beam's frame.
+
+        Parameters
+        ----------
+        mapping, X, tind
+            As for :meth:`gbasis`, shapes (2, npoints) or (2, nelements, npoints), and
+            (nelements,).
+        u_e
+            Coordinates of the elements, shape (nelements, n, 2).
+
+        Returns
+        -------
+        H, frame
+            Shape (2, 2, nelements, npoints) both.
+        """
+        mesh, points = mapping.mesh, "bp" if np.ndim(X) == 2 else "bep"
+        _, d_xi, d_eta, slope = self.local(X, mesh.height)
+        u = np.multiply(u_e.T, self._scale(mesh, slope, tind), order="C")
+        r_xi, r_eta = (np.einsum(f"ibe,{points}->iep", u, d) for d in (d_xi, d_eta))
+        frame = mapping.frame(X, tind)
+        along, across = np.einsum("Ijep,jJep->IJep", mapping.invDF(X, tind), frame)
+        return r_xi[:, None] * along + r_eta[:, None] * across, frame
 
     @cached_property
     def sampling(self) -> Sampling:
