@@ -337,3 +337,14 @@ def test_pressure_on_an_end_of_a_cable_is_refused():
     assert not scene.loads
     total = scene.pressure("top", 25.0).loads[0].force(np.zeros(beam.N)).reshape(-1, 2, 2)[:, 0]
     assert np.allclose(total.sum(axis=0), (0.0, -2.5))
+
+
+@pytest.mark.parametrize("place, sign", [("top", 1.0), ("bottom", -1.0)])
+def test_pressure_on_a_curved_cable_acts_on_its_axis(place, sign):
+    """The resultant is that of the chord of the axis; the face is longer or shorter."""
+    mesh = wave(h=0.2)
+    beam = Beam(mesh, ElementBeamCable(3), StVenantKirchhoff(1e6, 0.3), 0.1)
+    load = Scene(beam).clamp("left").pressure(place, 25.0).loads[0]
+    x, y = mesh.p[:, -1] - mesh.p[:, 0]
+    total = load.force(np.zeros(beam.N)).reshape(-1, 2, 2)[:, 0].sum(axis=0)
+    np.testing.assert_allclose(total, sign * 2.5 * np.array([y, -x]), rtol=1e-12)
