@@ -207,7 +207,7 @@ class ElementBeam(Frozen, Element):
         return scale * value, grad
 
     @staticmethod
-    def _scale(mesh, slope, tind):
+    def _scale(mesh: MeshBeam, slope: Array, tind: Array | None) -> Array:
         """The lengths of elements to the powers of local functions, shape (n, nelements)."""
         lengths = mesh.lengths if tind is None else mesh.lengths[tind]
         return np.array([lengths**k for k in range(np.max(slope, initial=0) + 1)])[slope]
