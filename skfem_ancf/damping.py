@@ -62,7 +62,7 @@ class Damping(Frozen):
     stiffness
         A retardation time that is added to that of every beam.
     modal
-        Damping ratios of the lowest modes, shape (k,).
+        Damping ratios of the lowest modes that are no rigid motions, shape (k,).
     """
 
     def __init__(self, mass: float = 0.0, stiffness: float = 0.0,

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 DENSE = 600  # free coordinates up to which the dense solver is used
 WINDOW = 1e-8  # smallest over largest eigenvalue of an inverse that is taken from it
 ORTHOGONAL = 1e-5  # scalar product of two shapes of unit mass
+ROUND_OFF = 1e-7  # of the frequency of a rigid motion, over that of the slowest bending
 SLOW = 1e-6  # a velocity at which what is quadratic in it can be left out
 REAL = 1e-7  # imaginary over absolute value of an eigenvalue that counts as real
 
@@ -86,8 +87,9 @@ class Modes:
         if not system.damped:
             return np.zeros(len(self.shapes))
         out = np.full(len(self.shapes), np.nan)
+        rigid = ROUND_OFF * np.sqrt(_bending_eigenvalue(system))
         for k, (omega, shape) in enumerate(zip(self.frequencies, self.shapes)):
-            if np.iscomplexobj(shape) or not omega.real > 0.0:
+            if np.iscomplexobj(shape) or not omega.real > rigid:
                 continue
             force = system.damping_force(np.array(state.u), SLOW * shape, state.t) / SLOW
             out[k] = shape @ force / (2.0 * omega.real)

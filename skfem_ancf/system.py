@@ -234,9 +234,11 @@ class System:
         if not np.any(ratios):
             return np.zeros((0, self.N))
         rest = State(self, np.zeros(self.N), load=0.0)
-        modes = eigen.modes(self, rest, len(ratios))
-        weights = np.sqrt(2.0 * ratios * np.maximum(modes.frequencies, 0.0))
-        rows = np.array([c * self.mass.multiply(shape) for c, shape in zip(weights, modes.shapes)])
+        rigid = len(self.free_rigid_motions())  # they have no ratio, and are not counted
+        modes = eigen.modes(self, rest, rigid + len(ratios))
+        weights = np.sqrt(2.0 * ratios * np.maximum(modes.frequencies[rigid:], 0.0))
+        rows = np.array([c * self.mass.multiply(shape)
+                         for c, shape in zip(weights, modes.shapes[rigid:])])
         return np.ascontiguousarray(rows[weights > 0.0])
 
     def _evaluate(self, what, u, v=None, load=1.0, t=None, stresses=None, carried=None,

@@ -260,6 +260,17 @@ def test_damping_ratios_of_modes():
                     / (2 * dashpot.frequencies[0]), rtol=1e-5)
 
 
+@pytest.mark.parametrize("hold", [None, "pin"])
+def test_modal_damping_does_not_count_rigid_motions(hold):
+    scene = Scene(beam_of("cable", 0.0)).damping(modal=[0.1, 0.05])
+    if hold:
+        scene.pin("left")
+    rigid = 1 if hold else 3
+    ratios = scene.modes(rigid + 3).damping_ratios
+    assert np.all(np.isnan(ratios[:rigid]))
+    assert_allclose(ratios[rigid:], [0.1, 0.05, 0.0], rtol=1e-8, atol=1e-12)
+
+
 # what there is besides
 
 
