@@ -63,6 +63,23 @@ def test_from_every_file_bit_for_bit(name, build, tmp_path, monkeypatch):
         assert_identical(scene.resume(copy), whole)
 
 
+@pytest.mark.parametrize("name", ["equal steps", "automatic"])
+def test_what_is_beside_the_band_is_kept(name, tmp_path, monkeypatch):
+    """Damped modes, and a spring between points far apart: rows of the iteration matrix."""
+    def build():
+        scene = swinging().damping(modal=[0.05, 0.05])
+        X = scene.beams[0].mesh.p[:, [0, -1]].T
+        return scene.spring(5.0, [(0, 0.7 * X[0] + 0.3 * X[1]), (0, X[1])], damping=0.1)
+
+    path = tmp_path / "run.npz"
+    copies = stages(monkeypatch, path)
+    whole = build().integrate(0.1, checkpoint=path, **OPTIONS[name])
+    for copy in copies[::2]:
+        again = build().resume(copy)
+        assert_identical(again, whole)
+        assert np.array_equal(again.dissipated, whole.dissipated)
+
+
 @pytest.mark.parametrize("suffix", [".npz", ".h5"])
 @pytest.mark.parametrize("scheme", [cls() for cls in SCHEMES.values()]
                          + [GeneralizedAlpha(0.3), Newmark(0.36, 0.6)], ids=repr)

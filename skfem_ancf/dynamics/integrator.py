@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..band import Band, factorize, fix, solve
+from ..band import Band, factorize, fix
 from ..errors import InputError, SupportError, require_positive, shown
 from .base import Motion
 from .course import Courses
 from .rates import rates
-from .dampers import Dampers, Rows
+from .dampers import Dampers, Rows, solve_rows
 from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, L0, LAST,
                     READY, STATE, Matrices, Rule, mass_factor, room_for_steps, steps)
 
@@ -268,7 +268,7 @@ class Integrator:
     def solve(self, b: Array) -> Array:
         """The inverse of the last iteration matrix times b (N,)."""
         x = b.copy()
-        solve(self.matrices.A, x)
+        solve_rows(self.matrices.A, self.matrices.rows, x)
         return x
 
     def mass_factor(self) -> float:
@@ -286,7 +286,7 @@ class Integrator:
         memory = {"state": self._state.copy(), "dt": np.array(self._dt),
                   "substeps": np.array(self.substeps)}
         if self.ready:
-            memory.update(A=self.matrices.A.flat.copy(), pivots=self.matrices.A.pivots.copy())
+            memory.update({name: array.copy() for name, array in self._factors().items()})
         return memory
 
     def recall(self, memory: dict[str, Array]) -> None:
@@ -294,7 +294,13 @@ class Integrator:
         self._state[:], self._dt = memory["state"], float(memory["dt"])
         self.substeps = int(memory["substeps"])
         if self.ready:
-            self.matrices.A.flat[:], self.matrices.A.pivots[:] = memory["A"], memory["pivots"]
+            for name, array in self._factors().items():
+                array[...] = memory[name]
+
+    def _factors(self):
+        A, rows = self.matrices.A, self.matrices.rows
+        beside = {"S": rows.S, "Z": rows.Z, "H": rows.H} if len(rows.P) else {}
+        return {"A": A.flat, "pivots": A.pivots, **beside}
 
 
 def _damping(system):
