@@ -67,3 +67,17 @@ def test_what_is_no_event(tmp_path):
     with pytest.raises(CallbackError, match="until") as caught:
         falling().integrate(0.1, 0.01, until=lambda state: "text")
     assert len(caught.value.state) == 1
+
+
+def test_what_a_breakpoint_changes_at_once_is_an_event_there():
+    """An acceleration jumps at a breakpoint, to another sign or within its sign."""
+    beam = Beam(MeshBeam.init_line([0, 0.5, 1], 0.01), ElementBeamCable(5),
+                StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)
+    for after, event in ((-3.0, 0.005), (3.0, None)):
+        scene = Scene(beam).gravity((0, -1.0), amplitude=lambda t, after=after: np.where(
+            np.asarray(t) < 0.005, 1.0, after))
+        for scheme in ("energy-momentum", "hht"):
+            history = scene.integrate(0.01, 1e-3, scheme=scheme, breakpoints=[0.005],
+                                      until=lambda state: state.acceleration[1])
+            assert history.event == event
+            assert history.t[-1] == pytest.approx(event or 0.01)

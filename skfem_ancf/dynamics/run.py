@@ -258,6 +258,8 @@ class Run:
             new = self._look(old, new)
         if self.event is None and new.t >= self._end and not self._last:
             new = self._turn(new)
+            if self.until is not None:
+                self._look_beyond(new)
         else:
             self.n += 1
         self._store(old, new)
@@ -274,6 +276,12 @@ class Run:
         new = self._between(old, new, root)
         self.event = new.t
         return new
+
+    def _look_beyond(self, new):
+        """What a breakpoint changes at once is an event there."""
+        before, self._value = self._value, self._asked(new)
+        if before * self._value < 0.0:
+            self.event = new.t
 
     def _asked(self, y):
         return ask_number("until(state)", self.until, self.history.instant(y))
