@@ -124,6 +124,11 @@ def functions(system: System, t_start: float, t_end: float) -> dict[str, Array]:
     for k, joint in enumerate(system.all_joints):
         if joint.moving:
             found[f"motion of joint {k}"] = np.asarray(joint.offset(times, system.N), dtype=float)
+    for k, element in enumerate(system.forces.elements):
+        if element in system.forces.own:
+            x = np.array([one.start for one in element.links])
+            found[f"force of element {k}"] = np.array([
+                np.ravel(element.force(x, 0.0 * x, t)) for t in times], dtype=float)
     return found
 
 
@@ -145,10 +150,12 @@ def same_problem(system: System, start: State, t: float) -> bool:
     if len(u) != system.N or fingerprint(other) != fingerprint(system):
         return False
     now, then = np.array([t]), np.array([start.t])
-    return all(np.array_equal(a, b) for a, b in (
-        (system.external_force(u, t), other.external_force(u, start.t)),
-        (system.values_at(now), other.values_at(then)),
-        (system.constraint(u, t), other.constraint(u, start.t))))
+    pairs = [(system.external_force(u, t), other.external_force(u, start.t)),
+             (system.values_at(now), other.values_at(then)),
+             (system.constraint(u, t), other.constraint(u, start.t))]
+    if system.forces.own:  # which may depend on time
+        pairs.append((system.internal_force(u, t), other.internal_force(u, start.t)))
+    return all(np.array_equal(a, b) for a, b in pairs)
 
 
 # schemes as text

@@ -344,9 +344,6 @@ class History:
         """Angular momentum about the origin of the coordinates, shape (nt,)."""
         return np.array([self.system.angular_momentum(u, v) for u, v in zip(self.u, self.v)])
 
-    def __getstate__(self):
-        return {**vars(self), "_solver": None}
-
     # files and pictures
 
     def _repr_html_(self):
