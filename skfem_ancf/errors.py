@@ -236,7 +236,7 @@ def require_positive(name: str, value: object, unit: str = "") -> float:
     return value
 
 
-def require_not_negative(name: str, value: Any) -> float:
+def require_not_negative(name: str, value: Any, energy: bool = True) -> float:
     """A finite number that is zero or positive; raises InputError.
 
     Parameters
@@ -245,11 +245,13 @@ def require_not_negative(name: str, value: Any) -> float:
         What the message calls it.
     value
         What was given.
+    energy
+        It would feed energy in if it were negative.
     """
     number = require_finite_scalar(name, value)
     if number < 0.0:
-        raise InputError(f"{name} must be zero or positive, got {number!r}: negative damping, mass "
-                         "or stiffness would feed energy in")
+        why = ": negative damping, mass or stiffness would feed energy in" if energy else ""
+        raise InputError(f"{name} must be zero or positive, got {number!r}{why}")
     return number
 
 

@@ -239,8 +239,10 @@ class Scene:
         def numbered(value):
             if isinstance(value, Beam):
                 return self._number(value)
-            return (tuple(map(numbered, value)) if isinstance(value, (tuple, list))
-                    and any(isinstance(v, Beam) for v in value) else value)
+            if not isinstance(value, (tuple, list)):
+                return value
+            inner = [numbered(v) for v in value]
+            return value if all(a is b for a, b in zip(inner, value)) else tuple(inner)
 
         joint = joint._unsealed()
         for name, value in vars(joint).items():
@@ -751,7 +753,8 @@ class Scene:
         modal
             Damping ratios of the lowest modes of the stress-free scene, shape (k,). What resists
             is a constant matrix: for vibrations about the stress-free state, not for bodies that
-            turn or bend far. Rigid motions, of frequency zero, have no ratio.
+            turn or bend far. Rigid motions, of frequency zero, have no ratio and are not counted:
+            of a free beam the first ratio is that of its first bending.
 
         Returns
         -------

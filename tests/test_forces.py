@@ -9,8 +9,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from skfem_ancf import (HHT, Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
-                        EnergyMomentum, GeneralizedAlpha, InputError, MeshBeam, MeshError, Newmark,
-                        Scene, StVenantKirchhoff, SupportError)
+                        EnergyMomentum, GeneralizedAlpha, InputError, MeshBeam, MeshError,
+                        ModelWarning, Newmark, Scene, StVenantKirchhoff, SupportError)
 from skfem_ancf.errors import CheckpointError
 from skfem_ancf.forces import ForceElement, point, section
 from skfem_ancf.forces.texts import add_elastic_force, add_resisting_force
@@ -53,6 +53,8 @@ class Own(ForceElement):
 
 class Wind(ForceElement):
     """Depends on place, velocity and time; takes no complex numbers."""
+
+    symmetric = False
 
     def __init__(self, size):
         self.size = size
@@ -446,6 +448,56 @@ def test_base_excitation_by_a_moving_support_moves_what_springs_hold():
     assert history.dissipated[-1] > 0.0
 
 
+class Listed(ForceElement):
+    """Returns lists in place of arrays."""
+
+    def bind(self, scene):
+        return [point(scene, None, (1, 0))]
+
+    def force(self, x, v, t):
+        return [[-2.0 * v[0, 0], -10.0 * x[0, 1] - 2.0 * v[0, 1]]]
+
+
+def test_lists_are_arrays():
+    history = weighing().add(Listed()).integrate(0.01, 1e-3)
+    assert history.dissipated[-1] > 0.0
+
+
+def test_springs_between_beams_named_by_themselves_go_to_other_meshes():
+    left, right = beam_of(), beam_of(x0=1.5)
+    scene = Scene(left, right).clamp("left", beam=0).clamp("right", beam=1)
+    scene.spring(5.0, ((left, (1, 0)), (right, (1.5, 0))), length=0.3)
+    finer = scene.with_beams([b.with_mesh(b.mesh.refined()) for b in scene.beams])
+    assert_allclose(finer.solve_static().displacement((1, 0)),
+                    scene.solve_static().displacement((1, 0)), atol=1e-6)
+
+
+def test_a_torsional_spring_beyond_half_a_turn_says_so():
+    scene = Scene(beam_of()).pin("left").torsional_spring(1e-6, "left")
+    scene.initial_velocity(lambda x: np.array([0 * x[0], 6.0 * x[0]]))
+    with pytest.warns(ModelWarning, match="half a turn"):
+        scene.integrate(0.7, 5e-3)
+    scene.integrate(0.4, 5e-3)
+
+
+class Skew(Listed):
+    def force(self, x, v, t):
+        return np.array([[3.0 * x[0, 1], -10.0 * x[0, 1]]])
+
+
+class Doubled(Listed):
+    def force(self, x, v, t):
+        return np.array([[0.0, -10.0 * x[0, 1]]])
+
+    def potential(self, x):
+        return 10.0 * x[0, 1] ** 2
+
+
+class Pushed(Doubled):
+    def force(self, x, v, t):
+        return np.array([[np.sin(t), -20.0 * x[0, 1]]])
+
+
 class Wrong(ForceElement):
     def __init__(self, links=None, force=None):
         self.given, self.value = links, force
@@ -469,6 +521,7 @@ BAD = {
     "torsion, damping": lambda s: s.torsional_spring(1.0, "left", damping=-1.0),
     "no section": lambda s: s.torsional_spring(1.0, (0.6, 0)),
     "other": lambda s: s.torsional_spring(1.0, "left", other="right"),
+    "whole turns": lambda s: s.torsional_spring(1.0, "left", angle=7.0),
     "foundation": lambda s: s.foundation(-1.0),
     "foundation, side": lambda s: s.foundation(1.0, side="below"),
     "foundation, flag": lambda s: s.foundation(1.0, one_sided="yes"),
@@ -484,6 +537,9 @@ BAD = {
     "own, shape": lambda s: s.add(Wrong(force=np.zeros(3))),
     "own, nan": lambda s: s.add(Wrong(force=np.full((1, 2), np.nan))),
     "own, None": lambda s: s.add(Wrong()),
+    "own, not symmetric": lambda s: s.add(Skew()),
+    "own, potential of another force": lambda s: s.add(Doubled()),
+    "own, potential and time": lambda s: s.add(Pushed()),
     "own, nothing": lambda s: s.add(ForceElement()),
 }
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import (AncfError, ConvergenceError, InputError, Interrupted, require_finite,
-                      require_finite_scalar, require_function, require_positive, shown, taught)
+from ..errors import (AncfError, ConvergenceError, InputError, Interrupted, ModelWarning,
+                      require_finite, require_finite_scalar, require_function, require_positive,
+                      shown, taught)
 from ..progress import progress_bar
 from .checkpoint import Checkpoint, same_problem
 from .integrator import Integrator, StepFailed
@@ -206,7 +208,18 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
     except KeyboardInterrupt:
         raise Interrupted(f"stopped at t = {run.y.t:.6g} of {task.t_end:.6g}; the exception's "
                           "state is the History up to there", history.close()) from None
-    return history.close()
+    _warn_of_turns(history.close())
+    return history
+
+
+def _warn_of_turns(history):
+    """Give a ModelWarning where a torsional spring has passed the angle up to which it is one."""
+    turns = history.system.forces.turns(history.u)
+    jumps = np.nonzero(np.any(np.abs(np.diff(turns, axis=1)) > 1.5 * np.pi, axis=0))[0]
+    if len(jumps):
+        warnings.warn(f"at t = {history.t[jumps[0] + 1]:.6g} a torsional spring has turned by more "
+                      "than half a turn: its angle is taken in (-pi, pi], so that its moment "
+                      "jumps there and the energy is not kept", ModelWarning, stacklevel=5)
 
 
 __all__ = ["Integrator", "integrate"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
-from uuid import uuid4
 
 import numpy as np
 
@@ -19,6 +18,8 @@ if TYPE_CHECKING:
 
 #: Relative step of differences, where a force takes no complex numbers.
 STEP = 1e-6
+#: Where an element of one's own is tried besides the stress-free state: off by so much.
+ASIDE = 0.01
 _COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
 
@@ -88,7 +89,8 @@ class ForceElement(Sealable):
     Attributes
     ----------
     symmetric : bool
-        The derivative of the force by the places is symmetric: it has a potential.
+        The derivative of the force by the places is symmetric: it has a potential. Where it is
+        not, say so in the class: tangents keep their other half then, and modes may be complex.
     distributed : bool
         It acts all along a beam, not on a few points.
     links
@@ -237,7 +239,6 @@ def bind_force(element: ForceElement, scene: Scene) -> ForceElement:
     InputError
         If the element does not keep to the interface of :class:`ForceElement`.
     """
-    vars(element).setdefault("_key", uuid4().hex)  # by which it is known again
     bound = element._unsealed()
     own = element.parts.__func__ is ForceElement.parts  # type: ignore[attr-defined]
     try:
@@ -273,3 +274,28 @@ def _try(bound):
     for name in ("stiffness", "resistance"):
         require_finite(f"{name}(x, v, t) of {bound!r}", getattr(bound, name)(x, zero, 0.0),
                        (n, 2, n, 2))
+    # where nothing is zero by chance, as it may be in the stress-free state
+    y = x + ASIDE * max(1.0, float(np.abs(x).max())) * np.cos(np.arange(2.0 * n)).reshape(n, 2)
+    K = np.reshape(bound.stiffness(y, zero, 0.0), (2 * n, 2 * n))
+    if bound.symmetric and not np.allclose(K, K.T, rtol=0.0, atol=1e-4 * np.abs(K).max()):
+        raise InputError(f"the derivative of force(x, v, t) of {bound!r} by the places is not "
+                         "symmetric: it has no potential. Say so in its class: symmetric = False")
+    if bound.potential(y) is not None:
+        _require_potential(bound, y)
+
+
+def _require_potential(bound, x):
+    """Raise InputError unless the force without velocities is minus the slope of the potential."""
+    step, zero = STEP * max(1.0, float(np.abs(x).max())), np.zeros_like(x)
+    units = step * np.eye(x.size).reshape(-1, *x.shape)
+    slope = [(bound.potential(x + d) - bound.potential(x - d)) / (2.0 * step) for d in units]
+    slope = require_finite(f"the slope of potential(x) of {bound!r}", slope, (x.size,))
+    noise = 1e-15 * abs(bound.potential(x)) / step
+    for t in (0.0, ASIDE):
+        force = np.ravel(bound.force(x, zero, t))
+        if not np.allclose(-slope, force, rtol=0.0, atol=1e-3 * np.abs(force).max() + 10.0 * noise):
+            raise InputError(
+                f"potential(x) of {bound!r} does not fit its force: at x = {shown(x.tolist())} and "
+                f"t = {t:g} the force is {shown(force.tolist())}, minus the slope of the potential "
+                f"{shown((-slope).tolist())}. Without potential(x), as for a force that depends on "
+                "time, the energy balance is that of the scheme")

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, MeshError, require_finite, require_not_negative, shown, teaching
+from ..errors import (InputError, MeshError, require_finite, require_finite_scalar,
+                      require_not_negative, shown, teaching)
 from ..joints.base import Vector, point, section
 from ..places import is_point
 from .base import ForceElement, Link, Part, difference, link
@@ -71,7 +72,7 @@ class Spring(ForceElement):
                  length: float | None = None) -> None:
         self.k = require_not_negative("k", k)
         self.damping = require_not_negative("damping", damping)
-        self.length = None if length is None else require_not_negative("length", length)
+        self.length = None if length is None else require_not_negative("length", length, False)
         if not isinstance(between, (tuple, list)) or len(between) != 2:
             raise InputError("between must be two places, as ((1, 0), (1, 0.5)), got "
                              f"{shown(between)}")
@@ -119,7 +120,7 @@ class TorsionalSpring(ForceElement):
     other
         The other section as (beam, place); None for the ground.
     angle
-        The angle without moment.
+        The angle without moment, in [-pi, pi].
     """
 
     def __init__(self, k: float, at: Place, damping: float = 0.0, beam: WhichBeam = None,
@@ -131,7 +132,11 @@ class TorsionalSpring(ForceElement):
             raise InputError("other must be a section of another beam, as (1, 'left'), got "
                              f"{shown(other)}")
         self.other = None if other is None else tuple(other)
-        self.angle = float(require_finite("angle", angle, ()))
+        self.angle = require_finite_scalar("angle", angle)
+        if abs(self.angle) > np.pi:
+            raise InputError(f"angle must lie in [-pi, pi], got {self.angle!r}: the angle of a "
+                             "section is known up to whole turns only. Of a spring wound by "
+                             "more, add the moment of the turns, 2 pi k each, by scene.moment")
 
     def bind(self, scene: Scene) -> list[Link]:
         self._d = link(section(scene, self.beam, self.at)[1])

@@ -8,7 +8,8 @@ import numpy as np
 
 from .base import Part
 from .masses import PointMass
-from .texts import (NUMBERS, TORSION, ForceTables, element_stiffness, potential, vectors_of)
+from .texts import (NUMBERS, TORSION, ForceTables, element_stiffness, potential, turned,
+                    vectors_of)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -204,6 +205,27 @@ class Forces:
             element.potential(y[rows].reshape(-1, 2)) or 0.0
             for element, (rows, _) in zip(self.own, self._slices))
 
+    def turns(self, u: Array) -> Array:
+        """The angles of springs of sections, in (-pi, pi] about those without moment.
+
+        Parameters
+        ----------
+        u
+            Displacements of the coordinates, shape (n, N).
+
+        Returns
+        -------
+        ndarray
+            Shape (k, n).
+        """
+        springs = [part for part in self.parts if part.kind == TORSION and part.numbers[0] > 0.0]
+        out = np.empty((len(springs), len(u)))
+        for row, part in zip(out, springs):
+            y = [(one.start + u[:, one.dofs] @ one.weights).T for one in (part.d, part.e)]
+            turned(np.repeat(np.reshape(part.numbers, (-1, 1)), len(u), axis=1),
+                   np.concatenate(y), row)
+        return out
+
     def stiffness(self, tables: ForceTables, t: float, u: Array, v: Array,
                   factor: float) -> Array:
         """The derivatives by the vectors, shape (size,).
@@ -256,11 +278,12 @@ class Forces:
                 out[rows] -= _mean_force(element, x, y, t).ravel()
             elif what == 1:
                 if np.any(y):
-                    out[rows] -= (element.force(x, y, t) - element.force(x, 0.0 * y, t)).ravel()
+                    out[rows] -= np.ravel(np.asarray(element.force(x, y, t))
+                                          - element.force(x, 0.0 * y, t))
             else:
                 found = np.array(element.stiffness(x, y, t))
                 if factor != 0.0:
-                    found = found + factor * element.resistance(x, y, t)
+                    found = found + factor * np.asarray(element.resistance(x, y, t))
                 out[places] -= found.ravel()
 
 

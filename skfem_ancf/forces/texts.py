@@ -175,7 +175,7 @@ def elastic(kinds, y0, y1, F):
         f[0, e], f[1, e] = c * (a[0, e] + b[0, e]), c * (a[1, e] + b[1, e])
     p, a, b, f = (_part(kinds, TORSION, NUMBERS, kinds.numbers), _part(kinds, TORSION, 4, y0),
                   _part(kinds, TORSION, 4, y1), _part(kinds, TORSION, 4, F))
-    g, turn = np.empty(a.shape), np.empty((3, a.shape[1]))
+    g, turn = np.empty(a.shape), np.empty((2, a.shape[1]))
     turned(p, a, turn[0])
     turned(p, b, turn[1])
     mean_turning(a, b, g)
