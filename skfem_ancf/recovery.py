@@ -688,8 +688,10 @@ def _recover_alike(states, number, loads):
     first, system = states[0], states[0].system
     beam, s = first.beams[number], system.of(first.beams[number])
     try:
-        if first.t is not None and system.damped:
+        if first.t is not None and system.viscous:
             raise NotRecovered("the stress that resists the rate of the strain is not known to it")
+        if first.t is not None and system.damping:
+            raise NotRecovered("how the damping of the scene acts is not known to it")
         if any(element.distributed for element in system.forces.elements):
             raise NotRecovered("how a foundation acts along the beam is not known to it")
         together = [(np.array([of[k][0] for of in loads]), spread)

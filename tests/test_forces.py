@@ -438,6 +438,18 @@ def test_plan_and_recovered_fields():
     assert abs(float(jump)) > 0.3 * np.hypot(*pull)
 
 
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_recovered_shear_force_jumps_by_the_force_of_a_dashpot(element):
+    scene = weighing(element).spring(0.0, ((0.6, 0), (0.6, 1)), damping=5.0)
+    state = scene.integrate(0.1, 1e-3, scheme="hht").state(-1)
+    assert state.recovered == {0: ""}
+    d = [0.6, 1.0] - state.position((0.6, 0))
+    force = 5.0 * state.velocity((0.6, 0)) @ d / np.hypot(*d)
+    jump = state.resultants((0.5999, 0)).Q - state.resultants((0.6001, 0)).Q
+    assert abs(force) > 1.0
+    assert_allclose(jump, -force, rtol=5e-3)
+
+
 def test_base_excitation_by_a_moving_support_moves_what_springs_hold():
     """A support that follows a function of time, which is what base excitation is here."""
     beam = beam_of("cable", 2)
