@@ -10,7 +10,9 @@ from .band import Band
 from .body import body_of, flat_body, stress_size, viscous_body_of
 from .border import Border
 from .forces.texts import ForceTables
+from .kernels.law import text_of
 from .kernels.moments import MomentPack
+from .kernels.section import SectionPack
 from .own import handle_of
 from .sampling import sample
 from .tables import JointTables, LoadTables
@@ -90,7 +92,7 @@ class Tables:
         from . import compiled
 
         plain, addresses = self.plain, compiled.kernels()
-        body = flat_body(plain.body, addresses["kernels"])
+        body = flat_body(_with_laws(plain.body, compiled.law), addresses["kernels"])
         same = plain.viscous is plain.body
         return plain._replace(
             body=body, viscous=body if same else flat_body(plain.viscous, addresses["kernels"]),
@@ -235,6 +237,14 @@ class Tables:
         row, column = (ns + np.searchsorted(far, x[out]) for x in (i, j))
         return Border(picked, ns, s.K._position(i[stored], j[stored]), stored,
                       row * len(picked) + column, out, 0)
+
+
+def _with_laws(body, address):
+    """A Body whose laws have the addresses of their texts."""
+    packs = [pack._replace(law=pack.law._replace(address=address(text_of(pack.law))))
+             if isinstance(pack, SectionPack) and text_of(pack.law) is not None else pack
+             for pack in body.packs]
+    return body._replace(packs=tuple(packs))
 
 
 def _kind(load):

@@ -99,7 +99,7 @@ class Machine:
             self._plain = "compiled=False"
         elif any(isinstance(pack, SectionPack) and pack.law.kind == OWN
                  for pack in self.tables.plain.body.packs):
-            self._plain = "a law of your own"
+            self._plain = "a law of your own without a text, see TextMaterial"
 
     @property
     def _off(self):
@@ -153,14 +153,18 @@ class Machine:
         choice = self.choose(name)
         if choice.way == "plain":
             return CLOCK.timed(text), self.tables.plain
-        if choice.way == "loaded":
-            return _passing_on(compiled.LOADED[name]), self.tables.flat
         try:
             equations = self.tables.flat
         except ImportError as error:  # made for another NumPy
             compiled.PROBLEMS.append(f"Numba cannot be imported: {error}")
             logger.info(compiled.PROBLEMS[-1])
             return CLOCK.timed(text), self.tables.plain
+        except compiled.TextProblem as error:
+            self._plain = str(error)
+            logger.info(self._plain)
+            return CLOCK.timed(text), self.tables.plain
+        if choice.way == "loaded":
+            return _passing_on(compiled.LOADED[name]), equations
         return lambda *args: _passing_on(_load(text, args))(*args), equations
 
 

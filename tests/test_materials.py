@@ -6,12 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from skfem_ancf import (Beam, ElementBeamANCF, InputError, MeshBeam, NameUnknown, NeoHookean, Scene,
-                        StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCF, EnergyMomentum, InputError, MeshBeam, NameUnknown,
+                        NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.forms import green_lagrange
-from skfem_ancf.materials import MATERIALS, Material
+from skfem_ancf.materials import MATERIALS, Material, TextMaterial
 from skfem_ancf.materials.base import ShearCorrected
+from skfem_ancf.materials.base import hooke as hooke_matrix
+from skfem_ancf.source import lanes, source
 
 STEP = 1e-30
 E, NU = 2.1e11, 0.3
@@ -279,6 +281,90 @@ def test_law_of_the_users_own(plane, method, law, hooke):
     # quadratic convergence of Newton's method with moduli by the complex step
     if method == "newton":
         assert state.steps[-1].force_residuals[-1] < 1e-9 < state.steps[-1].force_residuals[-3]
+
+
+class StiffeningText(TextMaterial):
+    """The energy of Stiffening, as a text."""
+
+    @property
+    def constants(self):
+        return np.append(hooke_matrix(self.E, self.nu, self.plane).ravel(), 2.0 / self.E)
+
+    @staticmethod
+    @source
+    def text(constants, strain, out):
+        D, c = constants[:9].reshape(3, 3), constants[9]
+        for p in lanes(strain.shape[1]):
+            for e in lanes(strain.shape[2]):
+                x, y, z = strain[0, p, e], strain[1, p, e], strain[2, p, e]
+                S = (D[0, 0] * x + D[0, 1] * y + D[0, 2] * z,
+                     D[1, 0] * x + D[1, 1] * y + D[1, 2] * z,
+                     D[2, 0] * x + D[2, 1] * y + D[2, 2] * z)
+                W = 0.5 * (S[0] * x + S[1] * y + S[2] * z)
+                if len(out) == 1:
+                    out[0, p, e] = W + 0.5 * c * W * W
+                for i in range(3):
+                    if len(out) == 3:
+                        out[i, p, e] = S[i] * (1.0 + c * W)
+                    elif len(out) == 9:
+                        for j in range(3):
+                            out[3 * i + j, p, e] = D[i, j] * (1.0 + c * W) + c * S[i] * S[j]
+
+
+class Squared(Material):
+    """The same in Python."""
+
+    def energy(self, strain):
+        D = hooke_matrix(self.E, self.nu, self.plane)
+        W = 0.5 * np.einsum("ij,i...,j...->...", D, strain, strain)
+        return W + W**2 / self.E
+
+    def stress(self, strain):
+        S = np.tensordot(hooke_matrix(self.E, self.nu, self.plane), strain, 1)
+        return S * (1.0 + np.sum(strain * S, axis=0) / self.E)
+
+
+@pytest.mark.parametrize("plane", ["stress", "strain"])
+def test_a_text_is_the_law_it_says(plane):
+    text, python = (cls(E, NU, plane=plane) for cls in (StiffeningText, Squared))
+    for name in ("energy", "stress", "moduli"):
+        mine, other = getattr(text, name)(STRAINS), getattr(python, name)(STRAINS)
+        assert_allclose(mine, other, rtol=1e-12, atol=1e-13 * np.abs(other).max())
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamANCF(3)], ids=repr)
+def test_scenes_take_texts(element):
+    found = []
+    for cls in (StiffeningText, Squared):
+        beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.1), element, cls(50.0, NU, 1.0), 0.1)
+        scene = Scene(beam).clamp("left").point_force((0.1, -0.01), at=(1, 0))
+        state, motion = scene.solve_static(), scene.integrate(0.1, 0.01, EnergyMomentum())
+        free = scene.integrate(0.3, 0.01, EnergyMomentum(), start=state)
+        assert np.ptp(free.total_energy) < 1e-12
+        found.append((state.u, motion.u[-1]))
+    for mine, other in zip(*found):
+        assert_allclose(mine, other, atol=1e-9 * np.abs(other).max())
+
+
+def test_the_text_of_the_users_own_is_compiled(needs_compiled):
+    beam = Beam(MeshBeam.init_line([0, 0.5, 1], 0.1), ElementBeamANCF(2),
+                StiffeningText(50.0, NU, 1.0), 0.1)
+    scene = Scene(beam).clamp("left").gravity((0, -0.01))
+    scene.solve_static()
+    assert "whole iterations" in scene.plan()["compiled loop"].reason
+
+
+def test_a_text_that_numba_does_not_take_runs_in_numpy(needs_compiled):
+    class Odd(StiffeningText):
+        @staticmethod
+        @source
+        def text(constants, strain, out):
+            StiffeningText.text(constants, strain, out)  # a class in compiled code
+
+    beam = Beam(MeshBeam.init_line([0, 0.5, 1], 0.1), ElementBeamANCF(2), Odd(50.0, NU, 1.0), 0.1)
+    scene = Scene(beam).clamp("left").gravity((0, -0.01))
+    assert scene.solve_static().converged
+    assert "Odd.text cannot be compiled" in scene.plan()["compiled loop"].reason
 
 
 @pytest.mark.parametrize("law", [StVenantKirchhoff, NeoHookean])

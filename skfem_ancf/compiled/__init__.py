@@ -104,6 +104,29 @@ def kernels() -> dict[str, int]:
     return found
 
 
+class TextProblem(Exception):
+    """A text of a user's own that Numba cannot compile."""
+
+
+def law(text) -> int:
+    """The address of the text of a law; compiles it.
+
+    Raises
+    ------
+    TextProblem
+        If Numba does not take it.
+    """
+    from numba.core.errors import NumbaError
+
+    from .laws import address
+
+    try:
+        return address(text)
+    except NumbaError as error:
+        name = f"{text.__module__}.{text.__qualname__}"
+        raise TextProblem(f"{name} cannot be compiled: {str(error).splitlines()[0]}") from error
+
+
 def load(text, args):
     """The compiled function of a text, compiled or taken from disk for arguments like these.
 

@@ -13,11 +13,16 @@ def multiply(A, x, y):
     for i in range(n):
         y[i] = 0.0
     for j in range(n):
-        at = j * ld
-        y[j] += flat[at] * x[j]
-        for k in range(1, min(A.width, n - 1 - j) + 1):
-            y[j + k] += flat[at + k] * x[j]
-            y[j] += (flat[at + k * ld - k] if A.top > 0 else flat[at + k]) * x[j + k]
+        at, last, s, xj = j * ld, min(A.width, n - 1 - j), 0.0, x[j]
+        for k in range(1, last + 1):
+            y[j + k] += flat[at + k] * xj
+        if A.top > 0:
+            for i in range(j - min(A.width, j), j + 1):
+                y[i] += flat[at - j + i] * xj
+            continue
+        for k in range(last + 1):
+            s += flat[at + k] * x[j + k]
+        y[j] += s
 
 
 @jit
@@ -81,10 +86,11 @@ def _exchanging(A):
 @jit
 def solve(A, x):
     """Solve in place with the factors."""
-    flat, ld, top, n = A.flat, A.ld, A.top, x.size
+    flat, ld, top, n, reach = A.flat, A.ld, A.top, x.size, A.width
     for j in range(n):
         if top > 0:
             p = A.pivots[j]
+            reach = max(reach, A.width + p - j)  # of U: as far as rows were exchanged
             x[j], x[p] = x[p], x[j]
         at, xj = j * ld + top, x[j]
         for k in range(1, min(A.width, n - 1 - j) + 1):
@@ -93,8 +99,9 @@ def solve(A, x):
         for j in range(n - 1, -1, -1):
             at = j * ld + top
             x[j] /= flat[at]
-            for k in range(1, min(top, j) + 1):
-                x[j - k] -= flat[at - k] * x[j]
+            xj = x[j]
+            for i in range(j - min(reach, j), j):
+                x[i] -= flat[at - j + i] * xj
         return
     for j in range(n - 1, -1, -1):
         at = j * ld

@@ -6,14 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..materials import LinearLaw, NeoHookean
+from ..materials import LinearLaw, TextMaterial
 from ..materials.base import ShearCorrected
-from ..materials.neo_hookean import neo_hookean, neo_hookean_constants
 from ..source import F1, F2, lanes, primitive, room, source
 from .base import packed
 
 #: Kinds of laws: constant moduli, a law with texts, and any other.
-LINEAR, NEO_HOOKEAN, OWN = 0, 1, 2
+LINEAR, TEXT, OWN = 0, 1, 2
 
 #: By handle, as long as a kernel has them: compiled code holds no Python objects.
 _LAWS: dict[int, Any] = {}
@@ -26,7 +25,9 @@ class LawTables(NamedTuple):
     Attributes
     ----------
     kind, handle
-        One of :data:`LINEAR`, :data:`NEO_HOOKEAN`, :data:`OWN`, and what finds an own law.
+        One of :data:`LINEAR`, :data:`TEXT`, :data:`OWN`, and what finds the law of the latter two.
+    address
+        That of the compiled text; 0 for the plain one.
     D
         Constant moduli, shape (3, 3).
     constants
@@ -37,6 +38,7 @@ class LawTables(NamedTuple):
 
     kind: int
     handle: int
+    address: int
     D: F2
     constants: F1
     scale: F1
@@ -48,6 +50,17 @@ def own_evaluate(handle, strain, out):
     law = _LAWS[handle]
     found = {1: law.energy, 3: law.stress, 9: law.moduli}[len(out)](strain)
     out[...] = np.reshape(found, out.shape)
+
+
+@primitive("laws")
+def run_text(law, strain, out):
+    """Energy, stress or moduli of a law with a text; compiled, by its address."""
+    _LAWS[law.handle].text(law.constants, strain, out)
+
+
+def text_of(law: LawTables) -> Any:
+    """The text of a law, None for one without."""
+    return _LAWS[law.handle].text if law.kind == TEXT else None
 
 
 @source
@@ -85,8 +98,8 @@ def law_evaluate(law, strain, out):
         for p in lanes(n):
             for e in lanes(size):
                 x[c, p, e] = y * strain[c, p, e]
-    if law.kind == NEO_HOOKEAN:
-        neo_hookean(law.constants, x, out)
+    if law.kind == TEXT:
+        run_text(law, x, out)
     else:
         own_evaluate(law.handle, x, out)
     for k in range(len(out)):
@@ -145,11 +158,11 @@ def law_tables(law: Any, owner: Any) -> LawTables:
     """
     none, one = np.zeros((3, 3)), np.ones(3)
     if isinstance(law, LinearLaw):
-        return LawTables(LINEAR, 0, packed(law.D), np.zeros(3), one)
+        return LawTables(LINEAR, 0, 0, packed(law.D), np.zeros(3), one)
     base, scale = (law.base, law.scale) if type(law) is ShearCorrected else (law, one)
-    if isinstance(base, NeoHookean) and base.has_texts:
-        return LawTables(NEO_HOOKEAN, 0, none, neo_hookean_constants(base), packed(scale))
-    handle = next(_handles)
+    handle, kind, constants = next(_handles), OWN, np.zeros(3)
+    if isinstance(base, TextMaterial) and base.has_text:
+        kind, constants = TEXT, packed(base.constants)
     _LAWS[handle] = base
     weakref.finalize(owner, _LAWS.pop, handle, None)
-    return LawTables(OWN, handle, none, np.zeros(3), packed(scale))
+    return LawTables(kind, handle, 0, none, constants, packed(scale))

@@ -8,107 +8,10 @@ import numpy as np
 
 from ..errors import InputError, taught
 from ..source import lanes, primitive, source
-from .base import Material
+from .text import TextMaterial
 
 if TYPE_CHECKING:
     from ..types import Array, Law
-
-
-class NeoHookean(Material):
-    """W = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2.
-
-    For small strains it agrees with Hooke's law of the same ``E`` and ``nu``. Unlike
-    St. Venant-Kirchhoff it resists compression to zero volume. In plane stress the stretch out
-    of the plane follows from S_33 = 0. Parameters and errors are those of
-    :class:`~skfem_ancf.materials.base.Material`, except that ``nu`` stays below 1/2.
-
-    Parameters
-    ----------
-    E
-        Young's modulus (force per area), positive.
-    nu
-        Poisson ratio, in (-1, 1/2).
-    density
-        Mass per volume in the stress-free state, positive, or None.
-    plane
-        "stress" or "strain".
-    shear_correction
-        "auto", "paper" or a positive number, see :class:`~skfem_ancf.materials.base.Material`.
-
-    References
-    ----------
-    Simo, Pister (1984); Bonet, Wood, "Nonlinear continuum mechanics for finite element
-    analysis", 2nd ed. (2008), section 6.4.3.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from skfem_ancf import NeoHookean
-    >>> law = NeoHookean(E=1.0, nu=0.3)
-    >>> float(round(law.stress(np.array([1e-9, 0.0, 0.0]))[0] / 1e-9, 6))  # 1 / (1 - nu^2)
-    1.098901
-    """
-
-    @taught
-    def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
-                 shear_correction: str | float = "auto") -> None:
-        super().__init__(E, nu, density, plane, shear_correction)
-        if self.nu == 0.5:
-            raise InputError("the compressible neo-Hookean law needs nu below 0.5, got 0.5")
-
-    def volumetric_split(self, k_s: float = 1.0) -> tuple[Law, Law] | None:
-        # a subclass may have changed the law
-        if type(self) is not NeoHookean or self.plane == "stress" or self.nu == 0.0:
-            return None
-        rest = NeoHookean(2.0 * self.G, 0.0, plane=self.plane)
-        return rest.law(k_s), _Volumetric(self.E, self.nu, plane=self.plane).law(k_s)
-
-    @property
-    def has_texts(self) -> bool:
-        """True if the text of this module is its energy, stress and moduli."""
-        return all(getattr(type(self), name) is getattr(NeoHookean, name)
-                   for name in ("energy", "stress", "moduli"))
-
-    def energy(self, strain: Array) -> Array:
-        return _evaluated(self, strain, 1)[0]
-
-    def stress(self, strain: Array) -> Array:
-        return _evaluated(self, strain, 3)
-
-    def moduli(self, strain: Array) -> Array:
-        found = _evaluated(self, strain, 9)
-        return found.reshape((3, 3) + found.shape[1:])
-
-    def thickness_stretch(self, strain: Array) -> Array:
-        if not self._fits("thickness_stretch"):
-            return super().thickness_stretch(strain)
-        return np.exp(0.5 * _evaluated(self, np.real(strain), 2)[1])
-
-    def stress_zz(self, strain: Array) -> Array:
-        if self.plane == "stress" or not self._fits("stress_zz"):
-            return super().stress_zz(strain)
-        d = 2.0 * (strain[0] + strain[1]) + 4.0 * strain[0] * strain[1] - strain[2] ** 2
-        return 0.5 * self.lame * np.log1p(d)  # lambda ln J, and C_33 = 1
-
-
-class _Volumetric(NeoHookean):
-    """lambda/2 (ln J)^2 alone."""
-
-    G = 0.0
-
-
-def neo_hookean_constants(law: Material) -> Array:
-    """Shear modulus, Lame's first parameter, and 1 in plane stress."""
-    return np.array([law.G, law.lame, float(law.plane == "stress")])
-
-
-def _evaluated(law, strain, number):
-    """What the text gives for strains of any shape (3, ...), shape (number, ...)."""
-    strain = np.asarray(strain)
-    strain = strain.astype(np.result_type(strain, float), copy=False)
-    out = np.empty((number, 1, strain[0].size), strain.dtype)
-    neo_hookean(neo_hookean_constants(law), strain.reshape(3, 1, -1), out)
-    return out.reshape((number,) + strain.shape[1:])
 
 
 @primitive("primitives")
@@ -119,7 +22,7 @@ def log1p(x):
 
 
 @source
-def neo_hookean(constants, strain, out):
+def neo_hookean(constants: Array, strain: Array, out: Array) -> None:
     """W = G/2 (tr C - 3) - G ln J + lambda/2 (ln J)^2 and its derivatives.
 
     S = G (I - C^-1) + lambda ln J C^-1; the moduli are condensed with S_33 = 0 in plane stress.
@@ -127,7 +30,7 @@ def neo_hookean(constants, strain, out):
     Parameters
     ----------
     constants
-        As :func:`neo_hookean_constants` gives them.
+        :attr:`NeoHookean.constants`, shape (3,).
     strain
         Shape (3, n, elements).
     out
@@ -183,3 +86,77 @@ def neo_hookean(constants, strain, out):
                 out[0, p, e] = 0.5 * G * trace - G * log_J + 0.5 * lame * log_J * log_J
             else:
                 out[0, p, e], out[1, p, e] = log_det[p, e], x[p, e]
+
+
+class NeoHookean(TextMaterial):
+    """W = mu/2 (tr C - 3) - mu ln J + lambda/2 (ln J)^2.
+
+    For small strains it agrees with Hooke's law of the same ``E`` and ``nu``. Unlike
+    St. Venant-Kirchhoff it resists compression to zero volume. In plane stress the stretch out
+    of the plane follows from S_33 = 0. Parameters and errors are those of
+    :class:`~skfem_ancf.materials.base.Material`, except that ``nu`` stays below 1/2.
+
+    Parameters
+    ----------
+    E
+        Young's modulus (force per area), positive.
+    nu
+        Poisson ratio, in (-1, 1/2).
+    density
+        Mass per volume in the stress-free state, positive, or None.
+    plane
+        "stress" or "strain".
+    shear_correction
+        "auto", "paper" or a positive number, see :class:`~skfem_ancf.materials.base.Material`.
+
+    References
+    ----------
+    Simo, Pister (1984); Bonet, Wood, "Nonlinear continuum mechanics for finite element
+    analysis", 2nd ed. (2008), section 6.4.3.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem_ancf import NeoHookean
+    >>> law = NeoHookean(E=1.0, nu=0.3)
+    >>> float(round(law.stress(np.array([1e-9, 0.0, 0.0]))[0] / 1e-9, 6))  # 1 / (1 - nu^2)
+    1.098901
+    """
+
+    text = staticmethod(neo_hookean)
+
+    @taught
+    def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
+                 shear_correction: str | float = "auto") -> None:
+        super().__init__(E, nu, density, plane, shear_correction)
+        if self.nu == 0.5:
+            raise InputError("the compressible neo-Hookean law needs nu below 0.5, got 0.5")
+
+    def volumetric_split(self, k_s: float = 1.0) -> tuple[Law, Law] | None:
+        # a subclass may have changed the law
+        if type(self) is not NeoHookean or self.plane == "stress" or self.nu == 0.0:
+            return None
+        rest = NeoHookean(2.0 * self.G, 0.0, plane=self.plane)
+        return rest.law(k_s), _Volumetric(self.E, self.nu, plane=self.plane).law(k_s)
+
+    @property
+    def constants(self) -> Array:
+        """Shear modulus, Lame's first parameter, and 1 in plane stress."""
+        return np.array([self.G, self.lame, float(self.plane == "stress")])
+
+    def thickness_stretch(self, strain: Array) -> Array:
+        if not self._fits("thickness_stretch"):
+            return super().thickness_stretch(strain)
+        return np.exp(0.5 * self.evaluated(np.real(strain), 2)[1])
+
+    def stress_zz(self, strain: Array) -> Array:
+        if self.plane == "stress" or not self._fits("stress_zz"):
+            return super().stress_zz(strain)
+        d = 2.0 * (strain[0] + strain[1]) + 4.0 * strain[0] * strain[1] - strain[2] ** 2
+        return 0.5 * self.lame * np.log1p(d)  # lambda ln J, and C_33 = 1
+
+
+class _Volumetric(NeoHookean):
+    """lambda/2 (ln J)^2 alone."""
+
+    G = 0.0
