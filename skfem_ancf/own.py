@@ -20,10 +20,6 @@ def handle_of(thing: Any) -> int:
     return number
 
 
-#: Exceptions of Python that compiled code cannot pass on, for who called it.
-PENDING: list[BaseException] = []
-
-
 def owner(handle: int) -> Any:
     """The object of a handle."""
     return _objects[handle]

@@ -4,12 +4,12 @@ Numba compiles what a function calls anew with each that calls it; the kernels a
 code. Behind an address they are compiled once.
 """
 
-from numba import carray, cfunc, types
+from numba import carray, types
 
 from ..band import Band
 from ..body import FlatBody, evaluate_body
 from .calls import call
-from .twin import OPTIONS, jit, named, twin
+from .twin import address_of, jit, named, twin
 
 _evaluate = twin(evaluate_body)
 
@@ -31,7 +31,7 @@ _SIGNATURE = types.void(_N, _F, _I, _I, _N, _I, _N, _N, _N, _F, _F, _N, _F, _F, 
 
 def address():
     """Of the compiled function; compiles it or takes it from disk."""
-    return cfunc(_SIGNATURE, cache=True, **OPTIONS)(named(kernels)).address
+    return address_of(named(kernels), _SIGNATURE)
 
 
 @jit

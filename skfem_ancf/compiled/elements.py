@@ -1,10 +1,10 @@
 """The kinds of force elements behind one address, as the kernels in :mod:`.body`."""
 
-from numba import carray, cfunc, types
+from numba import carray, types
 
 from ..forces.texts import Kinds, of_kinds
 from .calls import call
-from .twin import OPTIONS, jit, named, twin
+from .twin import address_of, jit, named, twin
 from .views import room
 
 _of_kinds = twin(of_kinds)
@@ -23,7 +23,7 @@ _SIGNATURE = types.void(_N, _N, _I, _N, _F, _N, _F, _F, _N, _F, _F, _N)
 
 def address():
     """Of the compiled function; compiles it or takes it from disk."""
-    return cfunc(_SIGNATURE, cache=True, **OPTIONS)(named(elements)).address
+    return address_of(named(elements), _SIGNATURE)
 
 
 @jit

@@ -2,10 +2,10 @@
 
 from functools import cache
 
-from numba import carray, cfunc, types
+from numba import carray, types
 
 from .calls import call
-from .twin import OPTIONS, jit, named, twin
+from .twin import address_of, jit, named, twin
 
 
 def law(constants, number, strain, points, elements, out, rows):
@@ -19,18 +19,15 @@ _SIGNATURE = types.void(_F, _N, _F, _N, _N, _F, _N)
 
 
 @cache
-def _compiled(text):
-    """The text of another package is compiled in each process: what it calls may have changed."""
-    names = {"carray": carray, "text": twin(text)}
-    function = named(law, names)
+def address(text):
+    """Of the compiled text.
+
+    That of another package is compiled in each process: what it calls may have changed.
+    """
+    function = named(law, {"carray": carray, "text": twin(text)})
     function.__qualname__ = f"{function.__qualname__}_{text.__module__}_{text.__qualname__}"
     ours = str(text.__module__).startswith(__package__.split(".")[0] + ".")
-    return cfunc(_SIGNATURE, cache=ours, **OPTIONS)(function)
-
-
-def address(text):
-    """Of the compiled text."""
-    return _compiled(text).address
+    return address_of(function, _SIGNATURE, ours)
 
 
 @jit

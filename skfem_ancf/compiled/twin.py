@@ -6,7 +6,7 @@ from functools import cache
 from importlib import import_module
 from types import FunctionType
 
-from numba import njit, typeof
+from numba import cfunc, njit, typeof
 
 from ..source import column, lanes
 from . import stamp
@@ -15,6 +15,8 @@ logger = logging.getLogger(__name__)
 
 # no "nnan" and "ninf": a strain that is not finite must be seen
 OPTIONS = {"fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
+#: What reading a cache raises that holds something else.
+_SPOILT = OSError, EOFError, pickle.PickleError, KeyError, ValueError
 _INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
@@ -70,6 +72,16 @@ def jit(function, entry=False):
         return njit(**OPTIONS)(function)
 
 
+def address_of(function, signature, kept=True):
+    """The address of a function compiled as one of C, ``kept`` on disk."""
+    if kept:
+        try:
+            return cfunc(signature, cache=True, **OPTIONS)(function).address
+        except (RuntimeError, *_SPOILT) as error:  # no folder to write to, or what is in it
+            logger.info("compiled code is not kept: %s", error)
+    return cfunc(signature, **OPTIONS)(function).address
+
+
 def compile_for(text, args):
     """The twin of a text for arguments of these types, which it does not look at again.
 
@@ -78,7 +90,7 @@ def compile_for(text, args):
     function, types = twin(text, True), tuple(typeof(x) for x in args)
     try:
         return function.compile(types)
-    except (OSError, EOFError, pickle.PickleError, KeyError, ValueError) as error:
+    except _SPOILT as error:
         logger.info("what was kept of compiled code cannot be used: %s", error)
         return njit(**OPTIONS)(function.py_func).compile(types)
 
