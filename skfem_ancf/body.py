@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .band import Band, clear
-from .kernels.base import Destination
+from .kernels.base import CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, Destination
 from .kernels.cable import CablePack, cable_evaluate
-from .kernels.section import (CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, SectionPack,
-                              section_evaluate)
+from .kernels.section import SectionPack, section_evaluate
 from .source import primitive, room, shaped, source, thin
 
 if TYPE_CHECKING:

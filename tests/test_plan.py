@@ -14,7 +14,7 @@ from skfem_ancf.beam import Beam as BeamClass
 from skfem_ancf import compiled
 from skfem_ancf import body
 from skfem_ancf.dynamics import steps
-from skfem_ancf.kernels.section import FORCE, TANGENT
+from skfem_ancf.kernels.base import FORCE, TANGENT
 from skfem_ancf.statics import iteration
 from skfem_ancf.linalg import BandMatrix
 from skfem_ancf.strains import ElementStrain

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..own import own_elements
-from ..source import lanes, primitive, shaped, source
+from ..source import lanes, primitive, shaped, source, thin
 from ..tables import add_products
 
 #: Kinds of elements.
@@ -99,33 +99,36 @@ def run_kinds(tables, what, y, w, factor, out):
 
 
 @source
-def add_elastic_force(tables, t, u0, u1, f):
-    """Add the force without velocity whose work from u0 to u1 is the change of the potential."""
-    size = tables.start.size
-    if size == 0:
-        return
-    y0, y1, F = np.empty(size), np.empty(size), np.zeros(size)
-    vectors_of(tables, u0, 1.0, y0)
-    vectors_of(tables, u1, 1.0, y1)
-    run_kinds(tables, np.int64(ELASTIC), y0, y1, 0.0, F)
+def _evaluate(tables, what, t, factor, y, w, out):
+    """What is asked, of the kinds and of elements of one's own."""
+    run_kinds(tables, what, y, w, factor, out)
     if tables.own > 0:
-        own_elements(tables.own, np.int64(0), t, 0.0, y0, y1, F)
-    add_products(f, tables.of, tables.weight, F, tables.at)
+        own_elements(tables.own, what, t, factor, y, w, out)
 
 
 @source
-def add_resisting_force(tables, t, u, v, f):
-    """Add the part of the force that velocities cause."""
+def _add_force(tables, what, t, u, v, start, f):
+    """Add a force of the vectors at u, and of those at v or, without their start, their rates."""
     size = tables.start.size
     if size == 0:
         return
-    y, w, G = np.empty(size), np.empty(size), np.zeros(size)
+    y, w, F = np.empty(size), np.empty(size), np.zeros(size)
     vectors_of(tables, u, 1.0, y)
-    vectors_of(tables, v, 0.0, w)
-    run_kinds(tables, np.int64(RESISTING), y, w, 0.0, G)
-    if tables.own > 0:
-        own_elements(tables.own, np.int64(1), t, 0.0, y, w, G)
-    add_products(f, tables.of, tables.weight, G, tables.at)
+    vectors_of(tables, v, start, w)
+    _evaluate(tables, what, t, 0.0, y, w, F)
+    add_products(f, tables.of, tables.weight, F, tables.at)
+
+
+@thin
+def add_elastic_force(tables, t, u0, u1, f):
+    """Add the force without velocity whose work from u0 to u1 is the change of the potential."""
+    _add_force(tables, np.int64(ELASTIC), t, u0, u1, 1.0, f)
+
+
+@thin
+def add_resisting_force(tables, t, u, v, f):
+    """Add the part of the force that velocities cause."""
+    _add_force(tables, np.int64(RESISTING), t, u, v, 0.0, f)
 
 
 @source
@@ -135,9 +138,7 @@ def element_stiffness(tables, t, u, v, factor, D):
     y, w = np.empty(size), np.empty(size)
     vectors_of(tables, u, 1.0, y)
     vectors_of(tables, v, 0.0, w)
-    run_kinds(tables, np.int64(DERIVATIVES), y, w, factor, D)
-    if tables.own > 0:
-        own_elements(tables.own, np.int64(2), t, factor, y, w, D)
+    _evaluate(tables, np.int64(DERIVATIVES), t, factor, y, w, D)
 
 
 @source

@@ -392,15 +392,95 @@ def append_square_root(K: Array, u_e: Array, B: list[Array], CB: list[Array],
 
 
 class Texts(NamedTuple):
-    """The texts of a kind of beams; ``components`` is the number of its strains."""
+    """The texts of a kind of beams.
+
+    Attributes
+    ----------
+    components
+        Number of its strains.
+    evaluate
+        A text as :func:`~skfem_ancf.kernels.section.section_evaluate`.
+    strain_energy
+        A function of a pack, u (N,) and energies (elements,), to which it adds.
+    """
 
     components: int
-    force: object
-    tangent: object
-    carry: object
-    stress: object
-    mean: object
-    energy: object
+    evaluate: Any
+    strain_energy: Any
+
+    def force(self, pack: Any, u: Array, f: Array) -> None:
+        """Add the internal force of a displacement.
+
+        Parameters
+        ----------
+        pack
+            The tables.
+        u, f
+            Displacement and force, shape (N,).
+        """
+        none = no_stresses(pack)
+        self.evaluate(pack, FORCE, u, u, f, none, 0, none, nowhere(f))
+
+    def tangent(self, pack: Any, u: Array, f: Array, carried: Array, use_carried: bool,
+                stresses: Array, to: Destination) -> None:
+        """Add the internal force to f and the tangent to a band matrix.
+
+        Parameters
+        ----------
+        pack
+            The tables.
+        u, f
+            Displacement and force, shape (N,).
+        carried, use_carried
+            Stresses (components, points, elements) for the geometric part in place of those of
+            the strain.
+        stresses
+            Second Piola-Kirchhoff stresses, or resultants, of the same shape; written.
+        to
+            Where the tangent is added.
+        """
+        self.evaluate(pack, TANGENT, u, u, f, carried, use_carried, stresses, to)
+
+    def carry(self, pack: Any, u: Array, du: Array, before: Array, out: Array) -> None:
+        """The stresses, linearised, at u + du, from those before.
+
+        Parameters
+        ----------
+        pack
+            The tables.
+        u, du
+            Displacement and its change, shape (N,).
+        before, out
+            Stresses, shape (components, points, elements).
+        """
+        self.evaluate(pack, CARRY, u, du, u, before, 0, out, nowhere(u))
+
+    def stress(self, pack: Any, u: Array, out: Array) -> None:
+        """The stresses at u.
+
+        Parameters
+        ----------
+        pack
+            The tables.
+        u
+            Displacement, shape (N,).
+        out
+            Stresses, shape (components, points, elements).
+        """
+        self.evaluate(pack, STRESS, u, u, u, out, 0, out, nowhere(u))
+
+    def mean(self, pack: Any, u0: Array, u1: Array, f: Array) -> None:
+        """Add the force B(middle)^T S whose work from u0 to u1 is the change of the energy.
+
+        Parameters
+        ----------
+        pack
+            The tables.
+        u0, u1, f
+            Displacements and force, shape (N,).
+        """
+        none = no_stresses(pack)
+        self.evaluate(pack, MEAN, u0, u1, f, none, 0, none, nowhere(f))
 
 
 class Assembly:
@@ -545,7 +625,8 @@ class Chain:
         used = carried if geometric and carried is not None else self.stresses()
         if K.symmetric:
             for pack, S, C in zip(self.packs, stresses, used):
-                self.texts.tangent(pack, u, force, C, given, S, K._flat, K._ld, start)
+                self.texts.tangent(pack, u, force, C, given, S,
+                                   Destination(K._flat, K._ld, start))
             return Assembly(self, u, stresses)
         force += self.force(u)
         for pack, S in zip(self.packs, stresses):
@@ -586,7 +667,7 @@ class Chain:
         u = self.checked(u)
         out = np.zeros(self.t.shape[1], dtype=u.dtype)
         for pack in self.packs:
-            self.texts.energy(pack, u, out)
+            self.texts.strain_energy(pack, u, out)
         return out
 
     def forces(self, u: Array) -> Array:
@@ -645,7 +726,7 @@ class Chain:
         for k, pack in enumerate(packs):
             S = np.zeros((self.texts.components, pack.weights.shape[0], ne))
             self.texts.tangent(pack, u, force, S if carried is None else carried[k],
-                               carried is not None, S, flat.reshape(-1), n + 1, 0)
+                               carried is not None, S, Destination(flat.reshape(-1), n + 1, 0))
         i, j = np.tril_indices(n)
         out = np.empty((ne, n, n))
         out[:, i, j] = out[:, j, i] = flat[:, j, i - j]

@@ -16,9 +16,9 @@ from ..errors import InputError
 from ..quadrature import gauss
 from ..source import F1, F2, F3, I1, lanes, room, source, thin
 from ..types import Array
-from .base import (CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, Chain, Destination, PairTables,
+from .base import (CARRY, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
                    Texts, add_force, add_held_energy, add_tangent, block, copy_stress, load,
-                   no_stresses, nowhere, packed, pair_tables, product)
+                   packed, pair_tables, product)
 
 if TYPE_CHECKING:
     from ..elements.cable import ElementBeamCable
@@ -213,42 +213,6 @@ def _evaluate(pack, what, first, u, v, f, given, use_given, out, to):
         add_tangent(pack.table, pack.pairs, pack.start, first, M, skew, to)
 
 
-@source
-def cable_force(pack, u, f):
-    """Add the internal force of the displacement u (N,) to f."""
-    none = no_stresses(pack)
-    cable_evaluate(pack, np.int64(FORCE), u, u, f, none, np.int64(0), none, nowhere(f))
-
-
-@source
-def cable_tangent(pack, u, f, carried, use_carried, stresses, flat, ld, start):
-    """Add force and tangent, see :func:`~skfem_ancf.kernels.section.section_tangent`.
-
-    The stresses are normal force and moment, shape (2, points, elements).
-    """
-    cable_evaluate(pack, np.int64(TANGENT), u, u, f, carried, np.int64(use_carried), stresses,
-                   Destination(flat, ld, start))
-
-
-@source
-def cable_carry(pack, u, du, before, out):
-    """The resultants, linearised, at u + du, from those ``before``: out (2, points, elements)."""
-    cable_evaluate(pack, np.int64(CARRY), u, du, u, before, np.int64(0), out, nowhere(u))
-
-
-@source
-def cable_stress(pack, u, out):
-    """Normal force and moment at u, (2, points, elements)."""
-    cable_evaluate(pack, np.int64(STRESS), u, u, u, out, np.int64(0), out, nowhere(u))
-
-
-@source
-def cable_mean(pack, u0, u1, f):
-    """Add a force whose work from u0 to u1 is the change of the energy."""
-    none = no_stresses(pack)
-    cable_evaluate(pack, np.int64(MEAN), u0, u1, f, none, np.int64(0), none, nowhere(f))
-
-
 def cable_energy(pack: CablePack, u: Array, out: Array) -> None:
     """Add the strain energy of each element to out, (elements,).
 
@@ -260,10 +224,13 @@ def cable_energy(pack: CablePack, u: Array, out: Array) -> None:
         Displacement, shape (N,), and energies that are added to, shape (elements,).
     """
     strain = np.empty((2, len(pack.weights), out.size), u.dtype)
-    cable_stress(pack._replace(stiffness=np.ones(2)), u, strain)
+    CABLES.stress(pack._replace(stiffness=np.ones(2)), u, strain)
     out += 0.5 * np.einsum("c,pe,cpe,cpe->e", pack.stiffness,
                            np.broadcast_to(pack.weights, strain.shape[1:]), strain, strain)
     add_held_energy(pack, u, out)
+
+
+CABLES = Texts(2, cable_evaluate, cable_energy)
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -290,8 +257,7 @@ class CableKernel(Chain):
         That of the beam; its first term has the Gauss points along the axis.
     """
 
-    texts = Texts(2, cable_force, cable_tangent, cable_carry, cable_stress, cable_mean,
-                  cable_energy)
+    texts = CABLES
 
     def __init__(self, mesh: "MeshBeam", element: "ElementBeamCable", material: "Material",
                  width: float, formulation: "Formulation") -> None:
@@ -357,7 +323,7 @@ class CableKernel(Chain):
         """
         pack, = self.apart(elements)
         out = np.empty((2, self.points_number, len(u_e)))
-        cable_stress(pack._replace(stiffness=np.ones(2)), u_e.ravel(), out)
+        CABLES.stress(pack._replace(stiffness=np.ones(2)), u_e.ravel(), out)
         return out
 
     def strain_increment(self, pack: CablePack, u: Array, du: Array, out: Array) -> None:
@@ -370,7 +336,7 @@ class CableKernel(Chain):
         u, du, out
             Displacement and direction, shape (N,), and the result.
         """
-        cable_carry(pack._replace(stiffness=np.ones(2)), u, du, np.zeros_like(out), out)
+        CABLES.carry(pack._replace(stiffness=np.ones(2)), u, du, np.zeros_like(out), out)
 
     def weighted_moduli(self, pack: CablePack, u: Array) -> Array:
         """Weighted stiffnesses at the points, shape (2, 2, points, elements).

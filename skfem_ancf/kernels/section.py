@@ -17,9 +17,9 @@ from ..materials import LinearLaw
 from ..quadrature import tensor
 from ..source import F1, F2, F3, I1, I2, column, lanes, room, shaped, source, thin
 from ..types import Array
-from .base import (CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, Chain, Content, Destination,
-                   PairTables, Texts, add_force, add_held_energy, add_tangent, apart, block,
-                   copy_stress, in_rounds, load, no_stresses, nowhere, packed, pair_tables, product)
+from .base import (CARRY, MEAN, STRESS, TANGENT, VISCOUS, Chain, Content, PairTables, Texts,
+                   add_force, add_held_energy, add_tangent, apart, block, copy_stress, in_rounds,
+                   load, packed, pair_tables, product)
 from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
 
 if TYPE_CHECKING:
@@ -314,53 +314,6 @@ def _add_tangent(pack, first, at, samples, D, w, r, to):
     add_tangent(pack.table, pairs, pack.start, first, M, M_skew, to)
 
 
-@source
-def section_force(pack, u, f):
-    """Add the internal force of the displacement u (N,) to f."""
-    none = no_stresses(pack)
-    section_evaluate(pack, np.int64(FORCE), u, u, f, none, np.int64(0), none, nowhere(f))
-
-
-@source
-def section_tangent(pack, u, f, carried, use_carried, stresses, flat, ld, start):
-    """Add the internal force to f and the tangent to a band matrix.
-
-    Parameters
-    ----------
-    pack
-        SectionPack.
-    u, f
-        Displacement and force, shape (N,).
-    carried, use_carried
-        Stresses (3, points, elements) for the geometric part in place of those of the strain.
-    stresses
-        Second Piola-Kirchhoff stresses, shape (3, points, elements); written.
-    flat, ld, start
-        Entry (i, j), i >= j, is added at ``flat[(start + j) * ld + i - j]``.
-    """
-    section_evaluate(pack, np.int64(TANGENT), u, u, f, carried, np.int64(use_carried), stresses,
-                     Destination(flat, ld, start))
-
-
-@source
-def section_carry(pack, u, du, before, out):
-    """The stresses, linearised, at u + du, from those ``before``: out (3, points, elements)."""
-    section_evaluate(pack, np.int64(CARRY), u, du, u, before, np.int64(0), out, nowhere(u))
-
-
-@source
-def section_stress(pack, u, out):
-    """The stresses at u, (3, points, elements)."""
-    section_evaluate(pack, np.int64(STRESS), u, u, u, out, np.int64(0), out, nowhere(u))
-
-
-@source
-def section_mean(pack, u0, u1, f):
-    """Add the force B(middle)^T S whose work from u0 to u1 is the change of the energy."""
-    none = no_stresses(pack)
-    section_evaluate(pack, np.int64(MEAN), u0, u1, f, none, np.int64(0), none, nowhere(f))
-
-
 def section_energy(pack: SectionPack, u: Array, out: Array) -> None:
     """Add the strain energy of each element to out, (elements,).
 
@@ -374,10 +327,13 @@ def section_energy(pack: SectionPack, u: Array, out: Array) -> None:
     strain = np.empty((3, len(pack.weights), out.size), u.dtype)
     W = np.empty((1,) + strain.shape[1:], u.dtype)
     law = pack.law._replace(kind=LINEAR, D=np.eye(3))
-    section_stress(pack._replace(law=law), u, strain)
+    SECTIONS.stress(pack._replace(law=law), u, strain)
     law_evaluate(pack.law, strain, W)
     out += np.sum(pack.weights * W[0], axis=0)
     add_held_energy(pack, u, out)
+
+
+SECTIONS = Texts(3, section_evaluate, section_energy)
 
 
 def beam_gradients(mesh: "MeshBeam", element: "ElementBeam", X: Array,
@@ -639,8 +595,7 @@ class Kernel(Chain):
         A :class:`~skfem_ancf.formulations.Formulation`.
     """
 
-    texts = Texts(3, section_force, section_tangent, section_carry, section_stress, section_mean,
-                  section_energy)
+    texts = SECTIONS
 
     def __init__(self, mesh: "MeshBeam", element: "ElementBeam", material: "Material", width: float,
                  formulation: "Formulation") -> None:
@@ -697,7 +652,7 @@ class Kernel(Chain):
             Displacement and direction, shape (N,), and the result.
         """
         unit = pack.law._replace(kind=LINEAR, D=np.eye(3))
-        section_carry(pack._replace(law=unit), u, du, np.zeros_like(out), out)
+        SECTIONS.carry(pack._replace(law=unit), u, du, np.zeros_like(out), out)
 
     def weighted_moduli(self, pack: SectionPack, u: Array) -> Array:
         """w D at the points of integration, shape (3, 3, points, elements).
@@ -714,7 +669,7 @@ class Kernel(Chain):
             return np.broadcast_to(pack.law.D[:, :, None, None] * pack.weights, (3, 3, n, ne))
         strain, D = np.empty((3, n, ne)), np.empty((3, 3, n, ne))
         unit = pack.law._replace(kind=LINEAR, D=np.eye(3))
-        section_stress(pack._replace(law=unit), u, strain)
+        SECTIONS.stress(pack._replace(law=unit), u, strain)
         law_evaluate(pack.law, strain, D.reshape(9, n, ne))
         return D * pack.weights
 
