@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.linalg import blas, lapack
 
-from .source import lanes, primitive, source
+from .source import F1, I1, by_place, lanes, primitive, source
 
 if TYPE_CHECKING:
     from .types import Array
@@ -21,11 +21,12 @@ if TYPE_CHECKING:
 LOST = 1e-13
 
 
+@by_place
 class Band(NamedTuple):
     """A band matrix: its entries, the exchanges of ``gbtrf``, and its layout."""
 
-    flat: np.ndarray
-    pivots: np.ndarray
+    flat: F1
+    pivots: I1
     ld: int
     width: int
     top: int

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .band import Band, clear
+from .band import clear
 from .kernels.base import CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, Destination
 from .kernels.cable import CablePack, cable_evaluate
 from .kernels.section import SectionPack, section_evaluate
-from .source import primitive, room, shaped, source, thin
+from .source import I1, I2, primitive, shaped, source
 
 if TYPE_CHECKING:
     from .beam import Beam
@@ -26,21 +26,22 @@ class Body(NamedTuple):
     """The beams of a scene, for the plain texts: packs, and a table with a row for each."""
 
     packs: tuple
-    table: np.ndarray
+    table: I2
 
 
 class FlatBody(NamedTuple):
-    """The same in three arrays, for compiled code: of one type, whatever the scene is.
+    """The same for compiled code, of one type, whatever the scene is.
 
-    ``where[k, j]`` has offset and shape of field j of pack k, or its value if it is a number;
-    ``address`` is that of the compiled function of :mod:`skfem_ancf.compiled.body`.
+    Attributes
+    ----------
+    packs
+        Addresses of the packs' words, see :mod:`skfem_ancf.compiled.records`.
+    table
+        As of the Body.
     """
 
-    address: int
-    floats: np.ndarray
-    ints: np.ndarray
-    where: np.ndarray
-    table: np.ndarray
+    packs: I1
+    table: I2
 
 
 @primitive("packs")
@@ -94,42 +95,6 @@ def viscous_body_of(body: "Body", beams: Sequence["Beam"], times: Sequence[float
     return Body(tuple(packs), np.array(rows)) if packs else body
 
 
-def _fields(pack):
-    """The fields of a pack and of those in it, in order."""
-    for value in pack:
-        if isinstance(value, tuple):
-            yield from _fields(value)
-        else:
-            yield value
-
-
-def flat_body(body: "Body", address: int) -> "FlatBody":
-    """The FlatBody of a Body.
-
-    Parameters
-    ----------
-    body
-        The Body.
-    address
-        Of the compiled kernels.
-    """
-    packs = [tuple(_fields(pack)) for pack in body.packs]
-    where = np.zeros((len(packs), max(map(len, packs)), 4), dtype=np.int64)
-    arrays: dict[str, list] = {"f": [], "i": []}
-    used = {"f": 0, "i": 0}
-    for k, pack in enumerate(packs):
-        for j, value in enumerate(pack):
-            if np.ndim(value) == 0:
-                where[k, j, 0] = value
-                continue
-            kind = value.dtype.kind
-            where[k, j, 0], where[k, j, 1:1 + value.ndim] = used[kind], value.shape
-            arrays[kind].append(value.ravel())
-            used[kind] += value.size
-    return FlatBody(address, np.concatenate(arrays["f"]), np.concatenate(arrays["i"]), where,
-                    body.table)
-
-
 def stress_size(body: "Body") -> int:
     """How many numbers the stresses of all integration points are."""
     return int(np.max(body.table[:, END], initial=0))
@@ -144,30 +109,21 @@ def _stress(body, k, stresses):
     return shaped(stresses[row[BEGIN]:row[END]], (row[COMPONENTS], row[POINTS], row[ELEMENTS]))
 
 
-@thin
-def evaluate_body(body, what, u, v, f, given, use_given, out, A):
-    """What :func:`~skfem_ancf.kernels.section.section_evaluate` does, for all beams."""
+@source
+def evaluate_body(body, what, u, v, f, given, use_given, out, flat, ld):
+    """What :func:`~skfem_ancf.kernels.section.section_evaluate` does, for all beams.
+
+    The tangent goes to an array in which columns begin every ``ld`` entries.
+    """
     for k in range(body.table.shape[0]):
         a, b = body.table[k, FIRST], body.table[k, LAST]
-        old, new = _stress(body, k, given), _stress(body, k, out)
-        to = Destination(A.flat[A.top:], A.ld, a)
+        old = _stress(body, k, given if use_given > 0 else given[:0])
+        new = _stress(body, k, out)
+        to = Destination(flat, ld, a)
         if body.table[k, KIND] == SECTION:
-            section_evaluate(section_pack(body, k), what, u[a:b], v[a:b], f[a:b], old, use_given,
-                             new, to)
+            section_evaluate(section_pack(body, k), what, u[a:b], v[a:b], f[a:b], old, new, to)
         else:
-            cable_evaluate(cable_pack(body, k), what, u[a:b], v[a:b], f[a:b], old, use_given, new,
-                           to)
-
-
-@primitive("body")
-def run_kernels(body, what, u, v, f, given, use_given, out, A):
-    """As :func:`evaluate_body`; compiled once, and not anew in each text that calls it."""
-    evaluate_body(body, what, u, v, f, given, use_given, out, A)
-
-
-@source
-def _no_band(body, x):
-    return Band(x, room(0, body.table), 1, 0, 0)
+            cable_evaluate(cable_pack(body, k), what, u[a:b], v[a:b], f[a:b], old, new, to)
 
 
 @source
@@ -175,7 +131,7 @@ def body_force(body, u, f):
     """The internal force."""
     clear(f)
     none = f[:0]
-    run_kernels(body, np.int64(FORCE), u, u, f, none, np.int64(0), none, _no_band(body, none))
+    evaluate_body(body, np.int64(FORCE), u, u, f, none, np.int64(0), none, none, np.int64(0))
 
 
 @source
@@ -187,26 +143,29 @@ def body_tangent(body, u, f, carried, use_carried, stresses, A):
     """
     clear(f)
     clear(A.flat)
-    run_kernels(body, np.int64(TANGENT), u, u, f, carried, np.int64(use_carried), stresses, A)
+    evaluate_body(body, np.int64(TANGENT), u, u, f, carried, np.int64(use_carried), stresses,
+                  A.flat[A.top:], A.ld)
 
 
 @source
 def body_stress(body, u, stresses):
     """The stresses at u."""
-    run_kernels(body, np.int64(STRESS), u, u, u, stresses, np.int64(0), stresses, _no_band(body, u))
+    evaluate_body(body, np.int64(STRESS), u, u, u, stresses, np.int64(0), stresses,
+                  u, np.int64(0))
 
 
 @source
 def body_carry(body, u, du, stresses, carried):
     """The stresses, linearised, at u + du, from those at u."""
-    run_kernels(body, np.int64(CARRY), u, du, u, stresses, np.int64(1), carried, _no_band(body, u))
+    evaluate_body(body, np.int64(CARRY), u, du, u, stresses, np.int64(1), carried,
+                  u, np.int64(0))
 
 
 @source
 def add_viscous_force(body, u, v, f):
     """Add the force of stresses in proportion to the rates of the strains."""
     none = f[:0]
-    run_kernels(body, np.int64(VISCOUS), u, v, f, none, np.int64(0), none, _no_band(body, none))
+    evaluate_body(body, np.int64(VISCOUS), u, v, f, none, np.int64(0), none, none, np.int64(0))
 
 
 @source
@@ -214,4 +173,4 @@ def body_mean(body, u0, u1, f):
     """The force whose work from u0 to u1 is the change of the strain energy."""
     clear(f)
     none = f[:0]
-    run_kernels(body, np.int64(MEAN), u0, u1, f, none, np.int64(0), none, _no_band(body, none))
+    evaluate_body(body, np.int64(MEAN), u0, u1, f, none, np.int64(0), none, none, np.int64(0))

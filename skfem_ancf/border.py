@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .band import Band, clear, copy, dense_solve, diagonal, factorize, multiply, solve, weighted
-from .source import lanes, source
+from .source import F1, F2, I1, lanes, source
 from .tables import add_products
 
 
@@ -31,12 +31,12 @@ class Border(NamedTuple):
         1 if sparse factors are used in its place.
     """
 
-    picked: np.ndarray
+    picked: I1
     springs: int
-    inside_at: np.ndarray
-    inside_of: np.ndarray
-    outside_at: np.ndarray
-    outside_of: np.ndarray
+    inside_at: I1
+    inside_of: I1
+    outside_at: I1
+    outside_of: I1
     wide: int
 
 
@@ -45,11 +45,11 @@ class Factors(NamedTuple):
 
     before: Band
     after: Band
-    J: np.ndarray
-    S: np.ndarray
-    Z: np.ndarray
-    H: np.ndarray
-    scale: np.ndarray
+    J: F2
+    S: F2
+    Z: F2
+    H: F2
+    scale: F1
 
 
 def new_factors(border: Border, A: Band, m: int, N: int) -> Factors:

@@ -7,14 +7,16 @@ import numpy as np
 from scipy import sparse
 
 from .band import Band
-from .body import body_of, flat_body, stress_size, viscous_body_of
+from .body import FlatBody, body_of, stress_size, viscous_body_of
 from .border import Border
+from .compiled.words import Words
 from .forces.texts import ForceTables
 from .kernels.law import text_of
 from .kernels.moments import MomentPack
 from .kernels.section import SectionPack
 from .own import handle_of
 from .sampling import sample
+from .source import F1, I1, by_place
 from .tables import JointTables, LoadTables
 from .types import Array
 
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
     from .system import System
 
 
+@by_place
 class Equations(NamedTuple):
     """A scene for texts.
 
@@ -46,8 +49,8 @@ class Equations(NamedTuple):
     body: Any
     loads: LoadTables
     joints: JointTables
-    fixed: np.ndarray
-    free: np.ndarray
+    fixed: I1
+    free: F1
     K: Band
     border: Border
     viscous: Any
@@ -73,6 +76,7 @@ class Tables:
     def __init__(self, system: "System") -> None:
         self.system = system
         self._own_handle: int | None = None
+        self._words: list[Words] = []
         # of the constant kind, moments, linear ones, others
         self._loads: list[list[Any]] = [[], [], [], []]
         for load in system.loads:
@@ -92,11 +96,18 @@ class Tables:
         from . import compiled
 
         plain, addresses = self.plain, compiled.kernels()
-        body = flat_body(_with_laws(plain.body, compiled.law), addresses["kernels"])
+        body = self._flat(_with_laws(plain.body, compiled.law), addresses)
         same = plain.viscous is plain.body
         return plain._replace(
-            body=body, viscous=body if same else flat_body(plain.viscous, addresses["kernels"]),
+            body=body, viscous=body if same else self._flat(plain.viscous, addresses),
             forces=plain.forces._replace(address=addresses["elements"]))
+
+    def _flat(self, body, addresses):
+        """The FlatBody of a Body."""
+        words = [Words(pack._replace(address=addresses[type(pack).__name__]))
+                 for pack in body.packs]
+        self._words += words  # it has their places only
+        return FlatBody(np.array([x.address for x in words], dtype=np.int64), body.table)
 
     def _forces(self):
         s = self.system

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from . import compiled
+from .compiled.words import Kept
 from .equations import Tables
 from .kernels.law import OWN
 from .kernels.section import SectionPack
@@ -37,7 +38,7 @@ def compiling(name: str) -> float:
     name
         A key of :data:`COMPILING`.
     """
-    there = compiled.kernels.cache_info().currsize or compiled.on_disk("kernels")
+    there = compiled.kernels.cache_info().currsize or compiled.on_disk()
     return COMPILING[name] + (0.0 if there else COMPILING["kernels"])
 
 
@@ -94,6 +95,7 @@ class Machine:
         self.tables = Tables(system)
         self._plain: str | None = None
         self._rooms: dict[str, Any] = {}
+        self._kept = Kept()
         if not all(beam.compiled for beam in system.beams):
             self._plain = "compiled=False"
         elif any(isinstance(pack, SectionPack) and pack.law.kind == OWN
@@ -162,9 +164,10 @@ class Machine:
             self._plain = str(error)
             logger.info(self._plain)
             return CLOCK.timed(text), self.tables.plain
-        if choice.way == "loaded":
-            return compiled.LOADED[name], equations
-        return lambda *args: _load(text, args)(*args), equations
+        def run(*args):
+            return _load(text, args)(*(self._kept(x) for x in args))
+
+        return run, equations
 
 
 def _load(text, args):

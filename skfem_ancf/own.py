@@ -62,3 +62,14 @@ def own_elements(handle, what, t, factor, a, b, out):
 def own_solve(handle, t, u, multipliers, R, phi, du, dm):
     """Solve with the multipliers by sparse factors; False if there is no solution."""
     return bool(owner(handle).solve_own(t, u, multipliers, R, phi, du, dm))
+
+
+#: The same of one signature, by number, for compiled code: a handle, what is asked, a time, a
+#: factor and three arrays.
+QUESTIONS = (
+    lambda handle, what, t, scale, u, _, out: own_force(handle, t, scale, u, out),
+    lambda handle, what, t, _, u0, u1, out: own_mean_force(handle, t, u0, u1, out),
+    lambda handle, what, t, scale, u, _, flat: own_load_stiffness(handle, t, scale, u, flat),
+    lambda handle, what, t, _, u, v, out: own_joints(handle, what, t, u, v, out),
+    own_elements,
+)

@@ -32,8 +32,19 @@ F2: TypeAlias = Annotated[np.ndarray, "f2"]
 F3: TypeAlias = Annotated[np.ndarray, "f3"]
 I1: TypeAlias = Annotated[np.ndarray, "i1"]
 I2: TypeAlias = Annotated[np.ndarray, "i2"]
+I3: TypeAlias = Annotated[np.ndarray, "i3"]
 
 _Text = TypeVar("_Text", bound=Callable[..., Any])
+_Tuple = TypeVar("_Tuple", bound=type)
+
+
+def by_place(kind: _Tuple) -> _Tuple:
+    """Mark a class of named tuples that a scene keeps: compiled code is given their place.
+
+    Those of a single call are given by value.
+    """
+    kind.by_place = True  # type: ignore[attr-defined]
+    return kind
 
 
 def lanes(*ends):

@@ -11,7 +11,7 @@ from .band import clear, copy, mirror
 from .kernels.moments import (MomentPack, add_mean_moments, add_moment_stiffness,
                               add_moments)
 from .own import own_force, own_joints, own_load_stiffness, own_mean_force
-from .source import lanes, primitive, source
+from .source import F1, F2, I1, lanes, primitive, source
 
 
 class JointTables(NamedTuple):
@@ -27,12 +27,12 @@ class JointTables(NamedTuple):
         Handle of what has joints that are not quadratic, see :mod:`skfem_ancf.own`; 0 for none.
     """
 
-    hk: np.ndarray
-    hi: np.ndarray
-    hj: np.ndarray
-    hv: np.ndarray
-    gk: np.ndarray
-    gi: np.ndarray
+    hk: I1
+    hi: I1
+    hj: I1
+    hv: F1
+    gk: I1
+    gi: I1
     own: int
 
 
@@ -51,12 +51,12 @@ class LoadTables(NamedTuple):
         Handle of what has loads of other kinds; 0 for none.
     """
 
-    vectors: np.ndarray
+    vectors: F2
     moments: MomentPack
-    rows: np.ndarray
-    columns: np.ndarray
-    values: np.ndarray
-    which: np.ndarray
+    rows: I1
+    columns: I1
+    values: F1
+    which: I1
     own: int
 
 

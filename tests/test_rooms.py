@@ -13,7 +13,7 @@ MOST_LINES, MOST_ARGUMENTS = 80, 10
 #: Functions that are larger, and why.
 LARGER = {
     "evaluation.py::evaluate": "one function for all that is asked, so that it is compiled once",
-    "compiled/body.py::kernels": "a function of C: arrays are addresses and sizes",
+    "compiled/blocks.py::block": "a function of C: arrays are addresses and sizes",
     "compiled/elements.py::elements": "a function of C: arrays are addresses and sizes",
     "dynamics/integrate.py::integrate": "options of a user, each with a default, by keyword",
     "results.py::State.__init__": "a record: what a solution is, and where it has it from",

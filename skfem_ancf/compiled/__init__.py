@@ -19,7 +19,7 @@ from pathlib import Path
 logger = logging.getLogger(__name__)
 
 #: What is compiled apart from the texts that call it, and the module that does so.
-ADDRESSES = {"kernels": "body", "elements": "elements"}
+ADDRESSES = {"SectionPack": "blocks", "CablePack": "blocks", "elements": "elements"}
 #: Compiled functions that this process has, by the name of their text.
 LOADED: dict = {}
 #: Why Numba cannot be used though it is installed.
@@ -65,16 +65,16 @@ def _note_of(name: str) -> Path:
     return _folder() / f"skfem_ancf-{name}-{_key()}.compiled"
 
 
-def on_disk(name: str) -> bool:
-    """True if a text has been compiled and kept, as far as is known without Numba.
+def on_disk(*names: str) -> bool:
+    """True if texts, and what they call, are compiled and kept, as far as is known without Numba.
 
     Parameters
     ----------
-    name
-        Name of the text.
+    *names
+        Names of texts.
     """
     try:
-        return all(_note_of(part).exists() for part in (name, *ADDRESSES))
+        return all(_note_of(part).exists() for part in (*names, *ADDRESSES))
     except OSError:
         return False
 
@@ -99,7 +99,7 @@ def kernels() -> dict[str, int]:
     """The addresses of what all texts call; compiles it or takes it from disk."""
     found = {}
     for name, module in ADDRESSES.items():
-        found[name] = import_module(f".{module}", __package__).address()
+        found[name] = import_module(f".{module}", __package__).address(name)
         note(name)
     return found
 

@@ -21,7 +21,7 @@ _F, _I, _N = types.CPointer(types.float64), types.CPointer(types.int64), types.i
 _SIGNATURE = types.void(_N, _N, _I, _N, _F, _N, _F, _F, _N, _F, _F, _N)
 
 
-def address():
+def address(name):
     """Of the compiled function; compiles it or takes it from disk."""
     return address_of(named(elements), _SIGNATURE)
 

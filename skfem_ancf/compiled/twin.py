@@ -10,6 +10,8 @@ from numba import cfunc, njit, typeof
 
 from ..source import column, lanes
 from . import stamp
+from .records import record_type
+from .words import Words
 
 logger = logging.getLogger(__name__)
 
@@ -85,14 +87,28 @@ def address_of(function, signature, kept=True):
 def compile_for(text, args):
     """The twin of a text for arguments of these types, which it does not look at again.
 
-    Numba would compare some sixty arrays at each call, which takes longer than small scenes do.
+    Numba would compare them at each call, which takes longer than small scenes do. Named tuples
+    marked ``by_place`` are given by the address of their words.
     """
-    function, types = twin(text, True), tuple(typeof(x) for x in args)
+    function, types = twin(text, True), tuple(type_of(x) for x in args)
     try:
-        return function.compile(types)
+        entry = function.compile(types)
     except _SPOILT as error:
         logger.info("what was kept of compiled code cannot be used: %s", error)
-        return njit(**OPTIONS)(function.py_func).compile(types)
+        entry = njit(**OPTIONS)(function.py_func).compile(types)
+
+    def run(*args):
+        args = [Words(x) if hasattr(x, "by_place") else x for x in args]
+        return entry(*(x.address if isinstance(x, Words) else x for x in args))
+
+    return run
+
+
+def type_of(x):
+    """The type of an argument, marked tuples as records."""
+    if isinstance(x, Words):
+        x = x.of
+    return record_type(type(x), x) if hasattr(x, "by_place") else typeof(x)
 
 
 def _names(code):

@@ -35,7 +35,7 @@ def borrowed(typing, x):
     return x(x), generate
 
 
-def _array(context, builder, kind, pointer, shape):
+def array_at(context, builder, kind, pointer, shape):
     """A contiguous array at a pointer."""
     array = context.make_array(kind)(context, builder)
     size = _WORD(context.get_abi_sizeof(context.get_data_type(kind.dtype)))
@@ -74,7 +74,7 @@ def room(typing, shape, like):
             count = builder.mul(count, n)
         pointer = builder.alloca(context.get_data_type(like.dtype), count)
         pointer.align = _ALIGNED
-        return _array(context, builder, found, pointer, sizes)
+        return array_at(context, builder, found, pointer, sizes)
 
     return found(shape, like), generate
 
@@ -86,20 +86,8 @@ def shaped(typing, x, shape):
 
     def generate(context, builder, signature, args):
         array = context.make_array(x)(context, builder, args[0])
-        return _array(context, builder, found, array.data,
+        return array_at(context, builder, found, array.data,
                       _sizes(context, builder, shape, args[1]))
 
     return found(x, shape), generate
 
-
-@intrinsic
-def view(typing, data, at, shape):
-    """A part of a one-dimensional array, from a place on."""
-    found = _kind(data, shape)
-
-    def generate(context, builder, signature, args):
-        array = context.make_array(data)(context, builder, args[0])
-        pointer = builder.gep(array.data, [args[1]])
-        return _array(context, builder, found, pointer, _sizes(context, builder, shape, args[2]))
-
-    return found(data, types.int64, shape), generate

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .rates import PARTS, JointMotion, step_rates
+from .rates import PARTS, JointMotions, step_rates
 from .steps import Course
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class Courses:
         return whole._replace(
             times=whole.times[part], factors=_rows(whole.factors, part),
             supports=_rows(whole.supports, part),
-            joints=JointMotion(_rows(joints.c, part), _rows(joints.g, part), joints.drives))
+            joints=JointMotions(_rows(joints.c, part), _rows(joints.g, part), joints.drives))
 
     def _ask(self, start, dt, first, last, limit):
         times = start + dt * (first + np.arange(PARTS * (last - first) + 1) / PARTS)
@@ -84,7 +84,7 @@ class Courses:
         joints, drives = tables.plain.joints, int(tables.motion_varies)
         c, g = np.zeros((1, 3, self._system.m)), np.zeros((1, 4, len(joints.gk)))
         if joints.own or not self._system.m:  # asked by the step itself
-            return JointMotion(c, g, drives)
+            return JointMotions(c, g, drives)
         c[:, 0], g[:, :2] = tables.offsets(times[:1]), tables.slopes(times[:1])
         if drives:
             _, *found = step_rates(tables.offsets, times, dt)
@@ -92,7 +92,7 @@ class Courses:
             if tables.turns:
                 middle, end, *found = step_rates(tables.slopes, times, dt)
                 g = np.stack([end, middle if self._conserving else end, *found], axis=1)
-        return JointMotion(c, g, drives)
+        return JointMotions(c, g, drives)
 
 
 def _rows(x, part):

@@ -7,7 +7,7 @@ import numpy as np
 from ..band import Band, dense_solve, multiply, solve, subtract_rows
 from ..body import add_viscous_force, body_tangent
 from ..forces.texts import add_resisting_force
-from ..source import lanes, source
+from ..source import F2, lanes, source
 
 
 class Rows(NamedTuple):
@@ -21,10 +21,10 @@ class Rows(NamedTuple):
         ``P A^-1`` at free coordinates, and ``1 + S P Z^T``: made with the factors of A.
     """
 
-    P: np.ndarray
-    S: np.ndarray
-    Z: np.ndarray
-    H: np.ndarray
+    P: F2
+    S: F2
+    Z: F2
+    H: F2
 
 
 class Dampers(NamedTuple):
@@ -47,7 +47,7 @@ class Dampers(NamedTuple):
     elements: int
     mass: float
     D: Band
-    modes: np.ndarray
+    modes: F2
 
 
 @source

@@ -13,8 +13,8 @@ from .base import Motion
 from .course import Courses
 from .rates import rates
 from .dampers import Dampers, Rows, solve_rows
-from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, L0, LAST,
-                    READY, STATE, Matrices, Rule, mass_factor, room_for_steps, steps)
+from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, READY,
+                    STATE, Matrices, Rule, mass_factor, room_for_steps, steps)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -201,9 +201,9 @@ class Integrator:
             self._dt, self._state[READY] = dt, 0.0
         self._state[[BEFORE, FAILURE, DISSIPATED]] = y.before, 0.0, y.dissipated
         rows, multiplier_rows, works = np.empty((n, 4, s.N)), np.empty((n, 2, s.m)), np.empty(n)
-        work, joints = self._work, self._work.m
+        work = self._work
         work.y[:] = y.u, y.v, y.acceleration, y.algorithmic
-        joints[L0], joints[LAST] = y.multipliers, y.force
+        work.m.l0[:], work.m.last[:] = y.multipliers, y.force
         function, equations = s.machine.of(steps)
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):

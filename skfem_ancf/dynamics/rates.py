@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..own import own_joints
-from ..source import lanes, source
+from ..source import F2, F3, lanes, source
 from ..tables import add_products, add_triples
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def step_rates(function: Callable[[Array], Array], times: Array,
 
 
 class JointMotion(NamedTuple):
-    """What of joints depends on time, at one instant; or at many, a row for each.
+    """What of joints depends on time, at one instant.
 
     Attributes
     ----------
@@ -91,8 +91,16 @@ class JointMotion(NamedTuple):
         1 if a joint moves.
     """
 
-    c: np.ndarray
-    g: np.ndarray
+    c: F2
+    g: F2
+    drives: int
+
+
+class JointMotions(NamedTuple):
+    """The same at many instants, a row for each, or one row for all."""
+
+    c: F3
+    g: F3
     drives: int
 
 

@@ -19,11 +19,11 @@ import numpy as np
 from ..band import Band, copy, factorize, fix, multiply, solve_joined, subtract_rows
 from ..body import body_carry, body_force, body_mean, body_stress, body_tangent
 from ..forces.texts import add_elastic_force, element_stiffness
-from ..source import borrowed, lanes, source, thin
+from ..source import F1, F2, F3, borrowed, by_place, lanes, source, thin
 from ..tables import (add_curvature_force, add_load_stiffness, add_products, constraint,
                       joint_directions, mean_external_force)
 from .dampers import (Dampers, Rows, add_damping, damping_force, factorize_rows, solve_rows)
-from .rates import JointMotion, acceleration_of_joints, drive_rate
+from .rates import JointMotion, JointMotions, acceleration_of_joints, drive_rate
 
 EPS = 2.2e-16
 #: Iterations of a step at most.
@@ -75,6 +75,7 @@ class Rule(NamedTuple):
     floor: float
 
 
+@by_place
 class Matrices(NamedTuple):
     """The mass matrix, its factors with the supports fixed, and those of the iteration matrix.
 
@@ -110,14 +111,14 @@ class Course(NamedTuple):
         Displacement, velocity and acceleration at fixed coordinates, zero elsewhere, shape
         (n, 3, N).
     joints
-        A :class:`~skfem_ancf.dynamics.rates.JointMotion`.
+        A :class:`~skfem_ancf.dynamics.rates.JointMotions`.
     """
 
     dt: float
-    times: np.ndarray
-    factors: np.ndarray
-    supports: np.ndarray
-    joints: JointMotion
+    times: F2
+    factors: F2
+    supports: F3
+    joints: JointMotions
 
 
 class Step(NamedTuple):
@@ -147,6 +148,62 @@ class Step(NamedTuple):
     constant: bool
 
 
+class Vectors(NamedTuple):
+    """Work arrays, all of shape (N,).
+
+    Attributes
+    ----------
+    u, v, guess
+        Displacement and velocity of the iterate, and where it began.
+    base, speed, rest
+        ``u_1 - beta h^2 w_1``, ``v_1 - gamma h w_1``, and the part of the acceleration without w_1.
+    held, middle
+        The acceleration held by supports; where the tangent is taken.
+    acceleration, residual, du, force, room
+        The first four as said; room.
+    damping, pace
+        The damping force, and the velocity that it resists.
+    """
+
+    u: F1
+    v: F1
+    guess: F1
+    base: F1
+    speed: F1
+    rest: F1
+    held: F1
+    middle: F1
+    acceleration: F1
+    residual: F1
+    du: F1
+    force: F1
+    room: F1
+    damping: F1
+    pace: F1
+
+
+class Shares(NamedTuple):
+    """Of joints, all of shape (m,).
+
+    Attributes
+    ----------
+    l, dl
+        Multipliers of the iterate, and their correction.
+    phi, impulse
+        How far joints are open, and their impulses.
+    l0, last
+        The multipliers at the begin, and where the step before took them.
+    """
+
+    l: F1
+    dl: F1
+    phi: F1
+    impulse: F1
+    l0: F1
+    last: F1
+
+
+@by_place
 class Work(NamedTuple):
     """Work arrays.
 
@@ -154,10 +211,8 @@ class Work(NamedTuple):
     ----------
     y
         u, v, the acceleration and w at the begin of the step, shape (4, N).
-    x
-        Vectors by the numbers below, shape (15, N).
-    m
-        The same of joints, shape (6, m).
+    x, m
+        As above.
     J
         The joints' directions where they act, those at the end of the step, and the solutions with
         the former, shape (3, m, N).
@@ -167,12 +222,12 @@ class Work(NamedTuple):
         Of all beams: zero, those at the begin, and others, shape (3, k).
     """
 
-    y: np.ndarray
-    x: np.ndarray
-    m: np.ndarray
-    J: np.ndarray
-    S: np.ndarray
-    stresses: np.ndarray
+    y: F2
+    x: Vectors
+    m: Shares
+    J: F3
+    S: F2
+    stresses: F2
 
 
 def room_for_steps(N: int, m: int, stresses: int) -> Work:
@@ -185,19 +240,9 @@ def room_for_steps(N: int, m: int, stresses: int) -> Work:
     stresses
         Number of the stresses of all beams.
     """
-    return Work(np.zeros((4, N)), np.zeros((15, N)), np.zeros((6, m)), np.zeros((3, m, N)),
+    x, shares = np.zeros((len(Vectors._fields), N)), np.zeros((len(Shares._fields), m))
+    return Work(np.zeros((4, N)), Vectors(*x), Shares(*shares), np.zeros((3, m, N)),
                 np.zeros((m, m)), np.zeros((3, stresses)))
-
-
-#: Displacement and velocity of the iterate; where it began; u_1 - beta h^2 w_1,
-#: v_1 - gamma h w_1, and the part of the acceleration without w_1; the acceleration held by
-#: supports; where the tangent is taken; acceleration, residual, correction, internal force; room;
-#: the damping force, and the velocity that it resists.
-(U, V, GUESS, BASE, SPEED, REST, HELD, MIDDLE, ACCELERATION, RESIDUAL, DU, FORCE, ROOM, DAMPING,
- PACE) = range(15)
-#: Multipliers of the iterate, their correction, how far joints are open, and their impulses; the
-#: multipliers at the begin, and where the step before took them.
-L, DL, PHI, IMPULSE, L0, LAST = range(6)
 
 
 @source
@@ -223,9 +268,8 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
     -------
     The number of steps done; one that fails is the last.
     """
-    e, matrices, course, state, w = (borrowed(e), borrowed(matrices), borrowed(course),
-                                     borrowed(state), borrowed(w))
-    m, y, u, f = w.m.shape[1], w.y, w.x[U], w.x[FORCE]
+    course, state = borrowed(course), borrowed(state)
+    m, y, u, f = w.m.l.size, w.y, w.x.u, w.x.force
     joined, damped, power = m > 0, matrices.dampers.active > 0, 0.0
     if damped and rule.conserving == 0:
         power = _power(e, matrices, course.times[0, 0] - course.dt, y[0], y[1], w)
@@ -258,8 +302,8 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
             if told == GO_ON:
                 told = _judge(state, wanted, rough)
             if told == ASTRAY:  # by old factors
-                copy(w.x[GUESS], u)
-                copy(w.m[L0], w.m[L])
+                copy(w.x.guess, u)
+                copy(w.m.l0, w.m.l)
             elif told != GO_ON:
                 break
         if told == DONE:
@@ -279,8 +323,8 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
         _finish(e.free, matrices.M, s, w, state)
         for k in range(4):
             copy(y[k], rows[n, k])
-        for k in range(2):
-            copy(w.m[L0 + k], multiplier_rows[n, k])
+        copy(w.m.l0, multiplier_rows[n, 0])
+        copy(w.m.last, multiplier_rows[n, 1])
     return rows.shape[0]
 
 
@@ -343,8 +387,8 @@ def _begin(free, M, rule, s, w, state):
 
     Returns the round-off of a correction, and the size of one that is small enough.
     """
-    h, u, guess = s.dt, w.x[U], w.x[GUESS]
-    base, speed, rest, held = w.x[BASE], w.x[SPEED], w.x[REST], w.x[HELD]
+    h, u, guess = s.dt, w.x.u, w.x.guess
+    base, speed, rest, held = w.x.base, w.x.speed, w.x.rest, w.x.held
     u0, v0, a0, w0 = w.y[0], w.y[1], w.y[2], w.y[3]
     b, c = h * h * (0.5 - rule.beta), h * (1.0 - rule.gamma)
     p, q = rule.alpha_m / (1.0 - rule.alpha_f), rule.alpha_f / (1.0 - rule.alpha_f)
@@ -359,11 +403,11 @@ def _begin(free, M, rule, s, w, state):
     if rule.conserving > 0:  # what the velocity changes by
         for i in lanes(u.size):
             held[i] = (s.supports[1, i] - v0[i]) * (1.0 - free[i]) / h
-    copy(w.m[L0], w.m[L])
+    copy(w.m.l0, w.m.l)
     state[FRESH], state[SIZE] = 0.0, -1.0
     _free_velocity(free, rule, s, w)
-    energy = max(state[ENERGY], _energy(M, w.x[V], w.x[ROOM]))
-    noise = 2.0 * abs(_energy(M, u, w.x[ROOM]))
+    energy = max(state[ENERGY], _energy(M, w.x.v, w.x.room))
+    noise = 2.0 * abs(_energy(M, u, w.x.room))
     rough = np.sqrt(rule.floor**2 * s.stiffness_factor + EPS * EPS * s.mass_factor * noise)
     return rough, rule.tol * np.sqrt(energy) + rough
 
@@ -371,7 +415,7 @@ def _begin(free, M, rule, s, w, state):
 @source
 def _middle(rule, w):
     """Where the tangent and the joints' directions are taken, of the iterate."""
-    u, u0, middle = w.x[U], w.y[0], w.x[MIDDLE]
+    u, u0, middle = w.x.u, w.y[0], w.x.middle
     a = 0.5 if rule.conserving > 0 else 0.0
     for i in lanes(u.size):
         middle[i] = u[i] + a * (u0[i] - u[i])
@@ -380,7 +424,7 @@ def _middle(rule, w):
 @source
 def _free_velocity(free, rule, s, w):
     """v_1 of the iterate, without the joints' part."""
-    u, v, base, speed = w.x[U], w.x[V], w.x[BASE], w.x[SPEED]
+    u, v, base, speed = w.x.u, w.x.v, w.x.base, w.x.speed
     c = rule.gamma / (rule.beta * s.dt)
     for i in lanes(u.size):
         v[i] = (speed[i] + c * (u[i] - base[i])) * free[i] + s.supports[1, i]
@@ -395,8 +439,8 @@ def _velocity(joints, free, mass, rule, s, w, state):
     _free_velocity(free, rule, s, w)
     anew = w.S.size > 0
     if anew:
-        drive_rate(joints, s.joints, s.t, s.dt, w.x[U], w.m[IMPULSE])
-        if not solve_joined(mass, w.J[0], w.J[1], free, anew, w.J[2], w.S, w.m[IMPULSE], w.x[V]):
+        drive_rate(joints, s.joints, s.t, s.dt, w.x.u, w.m.impulse)
+        if not solve_joined(mass, w.J[0], w.J[1], free, anew, w.J[2], w.S, w.m.impulse, w.x.v):
             state[FAILURE] = DEPENDENT
             return FAILED
     return GO_ON
@@ -418,19 +462,19 @@ def _tangent(e, matrices, rule, s, w):
 
     Those of an iterate may be far off: turning by a straight predictor stretches.
     """
-    M, A, dampers, yes = matrices.M.flat, matrices.A.flat, matrices.dampers, w.x.size > 0
+    M, A, dampers, yes = matrices.M.flat, matrices.A.flat, matrices.dampers, w.x.u.size > 0
     stresses = w.stresses
     body_stress(e.body, w.y[0], stresses[1])
     if dampers.viscous > 0:
         body_carry(e.viscous, w.y[0], w.y[1], stresses[1], stresses[1])
     _middle(rule, w)
-    body_tangent(e.body, w.x[MIDDLE], w.x[FORCE], stresses[1], yes, stresses[2], matrices.A)
+    body_tangent(e.body, w.x.middle, w.x.force, stresses[1], yes, stresses[2], matrices.A)
     if dampers.active > 0:
         add_damping(e.viscous, dampers, matrices.M, s.damping_factor / s.stiffness_factor,
-                    w.x[MIDDLE], stresses, w.x[ROOM], matrices.A)
+                    w.x.middle, stresses, w.x.room, matrices.A)
         for k in range(dampers.modes.shape[0]):
             matrices.rows.S[k, k] = s.damping_factor
-    add_load_stiffness(e.loads, s.factors, s.acting, 1.0, w.x[MIDDLE], matrices.A)
+    add_load_stiffness(e.loads, s.factors, s.acting, 1.0, w.x.middle, matrices.A)
     _add_elements(e.forces, matrices, s, w)
     for i in lanes(A.size):
         A[i] = s.mass_factor * M[i] + s.stiffness_factor * A[i]
@@ -441,7 +485,7 @@ def _add_elements(forces, matrices, s, w):
     """Add the derivatives of force elements to the band, and to what is beside it."""
     if forces.start.size > 0:
         D, modes, S = np.empty(forces.size), matrices.dampers.modes.shape[0], matrices.rows.S
-        element_stiffness(forces, s.acting, w.x[MIDDLE], w.y[1],
+        element_stiffness(forces, s.acting, w.x.middle, w.y[1],
                           s.damping_factor / s.stiffness_factor, D)
         add_products(matrices.A.flat, forces.band_at, forces.band_weight, D, forces.band_of)
         k = S.shape[0] - modes
@@ -468,12 +512,12 @@ def _factorize(free, matrices, state):
 @thin
 def _resist(e, matrices, rule, s, w):
     """Add the damping force of the iterate to the internal one."""
-    u, u0, v, pace, d, f = w.x[U], w.y[0], w.x[V], w.x[PACE], w.x[DAMPING], w.x[FORCE]
+    u, u0, v, pace, d, f = w.x.u, w.y[0], w.x.v, w.x.pace, w.x.damping, w.x.force
     _middle(rule, w)
     _free_velocity(e.free, rule, s, w)
     for i in lanes(u.size):
         pace[i] = (u[i] - u0[i]) / s.dt if rule.conserving > 0 else v[i]
-    damping_force(e, matrices.dampers, matrices.M, s.acting, w.x[MIDDLE], pace, d, w.x[ROOM])
+    damping_force(e, matrices.dampers, matrices.M, s.acting, w.x.middle, pace, d, w.x.room)
     for i in lanes(u.size):
         f[i] += d[i]
 
@@ -481,8 +525,8 @@ def _resist(e, matrices, rule, s, w):
 @source
 def _power(e, matrices, t, u, v, w):
     """What damping takes in a unit of time."""
-    damping_force(e, matrices.dampers, matrices.M, t, u, v, w.x[DAMPING], w.x[ROOM])
-    return np.dot(w.x[DAMPING], v)
+    damping_force(e, matrices.dampers, matrices.M, t, u, v, w.x.damping, w.x.room)
+    return np.dot(w.x.damping, v)
 
 
 @source
@@ -493,12 +537,12 @@ def _add_work(e, matrices, rule, s, w, state, power):
     """
     after = 0.0
     if rule.conserving > 0:
-        u, u0, pace = w.x[U], w.y[0], w.x[PACE]
+        u, u0, pace = w.x.u, w.y[0], w.x.pace
         for i in lanes(u.size):
             pace[i] = u[i] - u0[i]
-        work = np.dot(w.x[DAMPING], pace)
+        work = np.dot(w.x.damping, pace)
     else:
-        after = _power(e, matrices, s.t, w.x[U], w.x[V], w)
+        after = _power(e, matrices, s.t, w.x.u, w.x.v, w)
         work = 0.5 * s.dt * (power + after)
     state[DISSIPATED] += work
     return after
@@ -508,40 +552,40 @@ def _add_work(e, matrices, rule, s, w, state, power):
 def _directions(joints, rule, s, w):
     """The joints' directions where they act, and at the end of the step."""
     _middle(rule, w)
-    joint_directions(joints, s.joints.g[1], s.acting, w.x[MIDDLE], w.J[0])
-    joint_directions(joints, s.joints.g[0], s.t, w.x[U], w.J[1])
+    joint_directions(joints, s.joints.g[1], s.acting, w.x.middle, w.J[0])
+    joint_directions(joints, s.joints.g[0], s.t, w.x.u, w.J[1])
 
 
 @thin
 def _residual(loads, free, M, rule, s, w):
     """R = Q - f - M a - J^T lambda."""
-    u, base, rest, held = w.x[U], w.x[BASE], w.x[REST], w.x[HELD]
-    a, R, f, room = w.x[ACCELERATION], w.x[RESIDUAL], w.x[FORCE], w.x[ROOM]
+    u, base, rest, held = w.x.u, w.x.base, w.x.rest, w.x.held
+    a, R, f, room = w.x.acceleration, w.x.residual, w.x.force, w.x.room
     for i in lanes(u.size):
         a[i] = (s.mass_factor * (u[i] - base[i]) + rest[i]) * free[i] + held[i]
     multiply(M, a, room)
     mean_external_force(loads, s.factors, s.acting, w.y[0] if rule.conserving > 0 else u, u, R)
     for i in lanes(u.size):
         R[i] = R[i] - f[i] - room[i]
-    subtract_rows(w.J[0], w.m[L], R)
+    subtract_rows(w.J[0], w.m.l, R)
 
 
 @thin
 def _add_impulses(joints, s, w):
     """R -= (impulse . Phi'') (v_0 + v_1) / 4: eq. of Gear, Leimkuhler and Gupta (1985)."""
-    v0, v, room, share, impulse = w.y[1], w.x[V], w.x[ROOM], w.m[PHI], w.m[IMPULSE]
+    v0, v, room, share, impulse = w.y[1], w.x.v, w.x.room, w.m.phi, w.m.impulse
     for i in lanes(v.size):
         room[i] = v0[i] + v[i]
     for k in lanes(share.size):
         share[k] = -0.25 * impulse[k]
-    add_curvature_force(joints, s.acting, w.x[MIDDLE], share, room, w.x[RESIDUAL])
+    add_curvature_force(joints, s.acting, w.x.middle, share, room, w.x.residual)
 
 
 @thin
 def _correct(joints, free, matrices, s, w, state, anew):
     """Correct u and the multipliers; FAILED if these are not determined."""
-    u, R, du, room = w.x[U], w.x[RESIDUAL], w.x[DU], w.x[ROOM]
-    l, dl, phi, A, rows = w.m[L], w.m[DL], w.m[PHI], matrices.A, matrices.rows
+    u, R, du, room = w.x.u, w.x.residual, w.x.du, w.x.room
+    l, dl, phi, A, rows = w.m.l, w.m.dl, w.m.phi, matrices.A, matrices.rows
     state[COUNT] += 1.0
     for i in lanes(u.size):
         R[i] *= free[i]
@@ -579,9 +623,9 @@ def _correct(joints, free, matrices, s, w, state, anew):
 @thin
 def _accelerations(free, rule, s, w, state):
     """w_1 (in place of the correction) and a_1, and the multipliers at the end of the step."""
-    u, v, base, rest, v0 = w.x[U], w.x[V], w.x[BASE], w.x[REST], w.y[1]
-    a1, w1, w0, given = w.x[ACCELERATION], w.x[DU], w.y[3], s.supports[2]
-    l, impulse, l0, last = w.m[L], w.m[IMPULSE], w.m[L0], w.m[LAST]
+    u, v, base, rest, v0 = w.x.u, w.x.v, w.x.base, w.x.rest, w.y[1]
+    a1, w1, w0, given = w.x.acceleration, w.x.du, w.y[3], s.supports[2]
+    l, impulse, l0, last = w.m.l, w.m.impulse, w.m.l0, w.m.last
     if rule.conserving > 0:
         # what acts in the middle of a step, extrapolated to its end from the last two
         ahead = s.dt / (s.dt + state[BEFORE])
@@ -602,9 +646,9 @@ def _accelerations(free, rule, s, w, state):
 @thin
 def _close_acceleration(joints, free, mass, rule, s, w, state):
     """Change accelerations and multipliers so that they meet the joints' second rate too."""
-    a1, w1, l, dl, shared = w.x[ACCELERATION], w.x[DU], w.m[L], w.m[DL], w.m[PHI]
-    l0, last, anew = w.m[L0], w.m[LAST], w.m.size > 0
-    acceleration_of_joints(joints, s.joints, s.t, s.dt, w.x[U], w.x[V], dl)
+    a1, w1, l, dl, shared = w.x.acceleration, w.x.du, w.m.l, w.m.dl, w.m.phi
+    l0, last, anew = w.m.l0, w.m.last, w.m.l.size > 0
+    acceleration_of_joints(joints, s.joints, s.t, s.dt, w.x.u, w.x.v, dl)
     if not solve_joined(mass, w.J[1], w.J[1], free, anew, w.J[2], w.S, dl, a1):
         state[FAILURE] = DEPENDENT
         return FAILED
@@ -620,7 +664,7 @@ def _close_acceleration(joints, free, mass, rule, s, w, state):
 @thin
 def _finish(free, M, s, w, state):
     """The end of the step becomes the begin of the next."""
-    u, v, a1, w1, given = w.x[U], w.x[V], w.x[ACCELERATION], w.x[DU], s.supports[2]
+    u, v, a1, w1, given = w.x.u, w.x.v, w.x.acceleration, w.x.du, s.supports[2]
     u0, v0, a0, w0 = w.y[0], w.y[1], w.y[2], w.y[3]
     for i in lanes(u.size):
         u0[i] = u[i]
@@ -628,4 +672,4 @@ def _finish(free, M, s, w, state):
         a0[i] = a1[i]
         w0[i] = w1[i] * free[i] + given[i]
     state[BEFORE] = s.dt
-    state[ENERGY] = max(state[ENERGY], _energy(M, v, w.x[ROOM]))
+    state[ENERGY] = max(state[ENERGY], _energy(M, v, w.x.room))

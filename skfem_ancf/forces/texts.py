@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..own import own_elements
-from ..source import lanes, primitive, shaped, source, thin
+from ..source import F1, I1, lanes, primitive, shaped, source, thin
 from ..tables import add_products
 
 #: Kinds of elements.
-SPRING, TORSION, FOUNDATION, DRAG = range(4)
+SPRING, TORSION, FOUNDATION, DRAG = map(np.int64, range(4))  # Numba compiles for each int
 #: Numbers of an element. Spring: stiffness, length without force, damping. Torsion: stiffness,
 #: damping, cosine and sine of the angle without moment. Foundation: stiffness, damping, normal,
 #: and 1 if it only pushes. Drag: factors of squares of normal and tangential velocity.
@@ -27,8 +27,8 @@ class Kinds(NamedTuple):
     """Of the elements of the kinds above: their number, where each begins, and their numbers."""
 
     number: int
-    ends: np.ndarray
-    numbers: np.ndarray
+    ends: I1
+    numbers: F1
 
 
 class ForceTables(NamedTuple):
@@ -56,19 +56,19 @@ class ForceTables(NamedTuple):
         That of the compiled function of :mod:`skfem_ancf.compiled.elements`; 0 for plain texts.
     """
 
-    start: np.ndarray
-    at: np.ndarray
-    of: np.ndarray
-    weight: np.ndarray
+    start: F1
+    at: I1
+    of: I1
+    weight: F1
     number: int
-    ends: np.ndarray
-    numbers: np.ndarray
+    ends: I1
+    numbers: F1
     size: int
-    band_at: np.ndarray
-    band_of: np.ndarray
-    band_weight: np.ndarray
-    row_at: np.ndarray
-    row_of: np.ndarray
+    band_at: I1
+    band_of: I1
+    band_weight: F1
+    row_at: I1
+    row_of: I1
     own: int
     address: int = 0
 
@@ -153,7 +153,7 @@ def add_element_tangent(tables, t, u, A):
 # the kinds
 
 
-@source
+@thin
 def of_kinds(kinds, what, y, w, factor, out):
     """What is asked of all kinds, from their vectors y, and those at the end or their rates w."""
     if what == ELASTIC:

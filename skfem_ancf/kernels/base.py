@@ -419,7 +419,7 @@ class Texts(NamedTuple):
             Displacement and force, shape (N,).
         """
         none = no_stresses(pack)
-        self.evaluate(pack, FORCE, u, u, f, none, 0, none, nowhere(f))
+        self.evaluate(pack, FORCE, u, u, f, none, none, nowhere(f))
 
     def tangent(self, pack: Any, u: Array, f: Array, carried: Array, use_carried: bool,
                 stresses: Array, to: Destination) -> None:
@@ -439,7 +439,8 @@ class Texts(NamedTuple):
         to
             Where the tangent is added.
         """
-        self.evaluate(pack, TANGENT, u, u, f, carried, use_carried, stresses, to)
+        given = carried if use_carried else no_stresses(pack)
+        self.evaluate(pack, TANGENT, u, u, f, given, stresses, to)
 
     def carry(self, pack: Any, u: Array, du: Array, before: Array, out: Array) -> None:
         """The stresses, linearised, at u + du, from those before.
@@ -453,7 +454,7 @@ class Texts(NamedTuple):
         before, out
             Stresses, shape (components, points, elements).
         """
-        self.evaluate(pack, CARRY, u, du, u, before, 0, out, nowhere(u))
+        self.evaluate(pack, CARRY, u, du, u, before, out, nowhere(u))
 
     def stress(self, pack: Any, u: Array, out: Array) -> None:
         """The stresses at u.
@@ -467,7 +468,7 @@ class Texts(NamedTuple):
         out
             Stresses, shape (components, points, elements).
         """
-        self.evaluate(pack, STRESS, u, u, u, out, 0, out, nowhere(u))
+        self.evaluate(pack, STRESS, u, u, u, no_stresses(pack), out, nowhere(u))
 
     def mean(self, pack: Any, u0: Array, u1: Array, f: Array) -> None:
         """Add the force B(middle)^T S whose work from u0 to u1 is the change of the energy.
@@ -480,7 +481,7 @@ class Texts(NamedTuple):
             Displacements and force, shape (N,).
         """
         none = no_stresses(pack)
-        self.evaluate(pack, MEAN, u0, u1, f, none, 0, none, nowhere(f))
+        self.evaluate(pack, MEAN, u0, u1, f, none, none, nowhere(f))
 
 
 class Assembly:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..quadrature import gauss
-from ..source import F1, F2, F3, I1, lanes, room, source, thin
+from ..source import F1, F2, F3, I1, lanes, primitive, room, source, thin
 from ..types import Array
 from .base import (CARRY, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
                    Texts, add_force, add_held_energy, add_tangent, block, copy_stress, load,
@@ -50,6 +50,8 @@ class CablePack(NamedTuple):
         First coordinate of each element, and 0 to 2 nb - 1.
     pairs
         :class:`~skfem_ancf.kernels.base.PairTables` of (a, a), (a, b) and (b, b) of each point.
+    address
+        That of the compiled :func:`cable_block`; 0 for the plain one.
     """
 
     table: F3
@@ -65,6 +67,7 @@ class CablePack(NamedTuple):
     start: I1
     span: I1
     pairs: PairTables
+    address: int = 0
 
 
 @source
@@ -159,18 +162,24 @@ def cable_factors(stiffness, weights, r, square, kappa, stress, M, skew):
 
 
 @thin
-def cable_evaluate(pack, what, u, v, f, given, use_given, out, to):
+def cable_evaluate(pack, what, u, v, f, given, out, to):
     """As :func:`~skfem_ancf.kernels.section.section_evaluate`."""
     most = block(pack.pairs.pairs.shape[1])
     for first in range(0, pack.start.size, most):
         last = min(first + most, pack.start.size)
-        _evaluate(pack, what, first, u, v, f, given[:, :, first:last], use_given,
-                  out[:, :, first:last], to)
+        run_cable(pack, what, first, last, u, v, f, given, out, to)
 
 
-@source
-def _evaluate(pack, what, first, u, v, f, given, use_given, out, to):
-    """The same for the elements from ``first`` on, whose stresses are given."""
+@primitive("blocks")
+def run_cable(pack, what, first, last, u, v, f, given, out, to):
+    """As :func:`cable_block`; compiled once, and not anew in each text that calls it."""
+    cable_block(pack, what, first, last, u, v, f, given, out, to)
+
+
+@thin
+def cable_block(pack, what, first, last, u, v, f, given, out, to):
+    """As :func:`cable_evaluate`, for the elements from ``first`` to ``last``."""
+    given, out = given[:, :, first:last], out[:, :, first:last]
     n, nr, nb, size = len(pack.weights), pack.table.shape[1], pack.table.shape[2], out.shape[2]
     states = 2 if what == MEAN else 1
     U, d, T = room((2, nb, 2, size), u), room((2, nr, 2, size), u), room((nr, 2, size), u)
@@ -207,7 +216,7 @@ def _evaluate(pack, what, first, u, v, f, given, use_given, out, to):
     add_force(pack.table, pack.transposed, pack.constant, pack.start, pack.span, first, T, U[0], f)
     if what == TANGENT:
         M, skew = room((3 * n, 3, size), weights), room((n + 1, 1, size), weights)
-        copy_stress(given if use_given else out, S)
+        copy_stress(given if given.shape[0] > 0 else out, S)
         skew[n:] = 0.0
         cable_factors(pack.stiffness, weights, r[0], square[0], kappa[0], S, M, skew)
         add_tangent(pack.table, pack.pairs, pack.start, first, M, skew, to)

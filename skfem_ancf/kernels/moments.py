@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..source import source
+from ..source import F1, F2, I3, source
 
 
 class MomentPack(NamedTuple):
@@ -21,10 +21,10 @@ class MomentPack(NamedTuple):
         Sizes, counterclockwise.
     """
 
-    dofs: np.ndarray
-    c: np.ndarray
-    start: np.ndarray
-    M: np.ndarray
+    dofs: I3
+    c: F2
+    start: F2
+    M: F1
 
 
 @source

@@ -15,7 +15,7 @@ from scipy import sparse
 
 from ..materials import LinearLaw
 from ..quadrature import tensor
-from ..source import F1, F2, F3, I1, I2, column, lanes, room, shaped, source, thin
+from ..source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped, source, thin
 from ..types import Array
 from .base import (CARRY, MEAN, STRESS, TANGENT, VISCOUS, Chain, Content, PairTables, Texts,
                    add_force, add_held_energy, add_tangent, apart, block, copy_stress, in_rounds,
@@ -61,6 +61,8 @@ class SectionPack(NamedTuple):
     mixing, parts, mixing_rounds
         Of other laws: the term, the modulus (c, d) as 3 c + d and the point of each summand of a
         modulus, (3, m), and its factor, (m,).
+    address
+        That of the compiled :func:`section_block`; 0 for the plain one.
     """
 
     table: F3
@@ -84,6 +86,7 @@ class SectionPack(NamedTuple):
     mixing: I2
     parts: F1
     mixing_rounds: I1
+    address: int = 0
 
 
 @source
@@ -226,7 +229,7 @@ def pair_factors(rows, samples, terms, rounds, moduli, r, M, M_skew):
 
 
 @thin
-def section_evaluate(pack, what, u, v, f, given, use_given, out, to):
+def section_evaluate(pack, what, u, v, f, given, out, to):
     """Everything that depends on the strains, block by block.
 
     Parameters
@@ -241,8 +244,9 @@ def section_evaluate(pack, what, u, v, f, given, use_given, out, to):
         viscous ones, shape (N,).
     f
         Force, added to.
-    given, use_given
-        Stresses (3, points, elements): those before, or carried ones for the tangent.
+    given
+        Stresses (3, points, elements): those before, or carried ones for the tangent, or of no
+        component (0, ...).
     out
         Stresses, written.
     to
@@ -251,14 +255,20 @@ def section_evaluate(pack, what, u, v, f, given, use_given, out, to):
     most = block(pack.pairs.pairs.shape[1])
     for first in range(0, pack.start.size, most):
         last = min(first + most, pack.start.size)
-        _evaluate(pack, what, first, u, v, f, given[:, :, first:last], use_given,
-                  out[:, :, first:last], to)
+        run_section(pack, what, first, last, u, v, f, given, out, to)
 
 
-@source
-def _evaluate(pack, what, first, u, v, f, given, use_given, out, to):
-    """The same for the elements from ``first`` on, whose stresses are given."""
+@primitive("blocks")
+def run_section(pack, what, first, last, u, v, f, given, out, to):
+    """As :func:`section_block`; compiled once, and not anew in each text that calls it."""
+    section_block(pack, what, first, last, u, v, f, given, out, to)
+
+
+@thin
+def section_block(pack, what, first, last, u, v, f, given, out, to):
+    """As :func:`section_evaluate`, for the elements from ``first`` to ``last``."""
     table, rows, law = pack.table, pack.rows, pack.law
+    given, out = given[:, :, first:last], out[:, :, first:last]
     n, nr, nb, size = len(pack.weights), table.shape[1], table.shape[2], out.shape[2]
     changes = what == MEAN or what == CARRY or what == VISCOUS
     shift = 0.5 if what == MEAN else 0.0
@@ -296,7 +306,7 @@ def _evaluate(pack, what, first, u, v, f, given, use_given, out, to):
     row_forces(rows, pack.normal, r, samples, T)
     add_force(table, pack.transposed, pack.constant, pack.start, pack.span, first, T, U[0], f)
     if what == TANGENT:
-        if use_given:
+        if given.shape[0] > 0:
             copy_stress(given, S)
             to_samples(pack.along, pack.ends, w, S, samples)
         _add_tangent(pack, first, at, samples, D, w, r, to)

@@ -11,7 +11,7 @@ from ..body import body_carry, body_force, body_tangent
 from ..border import (Factors, add_curvature, factorize_bordered, new_factors, solve_bordered)
 from ..forces.texts import add_elastic_force, add_element_tangent
 from ..own import own_solve
-from ..source import borrowed, lanes, source, thin
+from ..source import F1, borrowed, by_place, lanes, source, thin
 from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
                       external_force, joint_directions)
 
@@ -37,13 +37,13 @@ class Target(NamedTuple):
         By how much the fixed coordinates have to change.
     """
 
-    factors: np.ndarray
+    factors: F1
     scale: float
     at: float
-    c: np.ndarray
-    g: np.ndarray
-    gap: np.ndarray
-    prescribed: np.ndarray
+    c: F1
+    g: F1
+    gap: F1
+    prescribed: F1
 
 
 class Rules(NamedTuple):
@@ -76,23 +76,24 @@ class Rules(NamedTuple):
 class Unknowns(NamedTuple):
     """What is found: displacement, multipliers, internal force, stresses and those carried."""
 
-    u: np.ndarray
-    multipliers: np.ndarray
-    force: np.ndarray
-    stresses: np.ndarray
-    carried: np.ndarray
+    u: F1
+    multipliers: F1
+    force: F1
+    stresses: F1
+    carried: F1
 
 
+@by_place
 class Work(NamedTuple):
     """Work arrays: residual, correction, 1 / diagonal, loads, joints' opening and correction."""
 
-    R: np.ndarray
-    du: np.ndarray
-    scale: np.ndarray
-    load: np.ndarray
-    push: np.ndarray
-    phi: np.ndarray
-    dm: np.ndarray
+    R: F1
+    du: F1
+    scale: F1
+    load: F1
+    push: F1
+    phi: F1
+    dm: F1
     factors: Factors
 
 
@@ -130,7 +131,7 @@ def equilibrium(e, target, rules, x, w, record):
     status, number
         How it ends, and the number of linear systems solved.
     """
-    e, target, x, w = borrowed(e), borrowed(target), borrowed(x), borrowed(w)
+    target, x = borrowed(target), borrowed(x)
     N, m = x.u.size, x.multipliers.size
     clear(w.dm)
     work = before = reference = np.inf

@@ -1,0 +1,94 @@
+"""The numbers of named tuples as words of one array, for :mod:`skfem_ancf.compiled.records`."""
+
+from __future__ import annotations
+
+import struct
+from functools import cache
+from typing import get_type_hints
+
+import numpy as np
+
+_NUMBER, _WORD = struct.Struct("d"), struct.Struct("q")
+
+
+@cache
+def hints(kind):
+    """What the fields of a class are: letter and axes of an array, a number's type, or another."""
+    found = []
+    for hint in get_type_hints(kind, include_extras=True).values():
+        code = getattr(hint, "__metadata__", [None])[0]
+        found.append((code[0], int(code[1])) if code else hint)
+    return tuple(found)
+
+
+class Words:
+    """The words of a named tuple; it and they live as long as this.
+
+    Parameters
+    ----------
+    x
+        Of a class whose annotations say what its fields are: arrays as ``F1``, ``I2``, ...,
+        ``int``, ``float``, or another such tuple.
+
+    Attributes
+    ----------
+    of, words, address
+        x, an array, and its place.
+
+    Raises
+    ------
+    TypeError
+        If an array is not what its annotation says, or not contiguous.
+    """
+
+    __slots__ = "address", "of", "words"
+
+    def __init__(self, x):
+        found: list[int] = []
+        _fill(x, found)
+        self.of, self.words = x, np.array(found, dtype=np.int64)
+        self.address = _address(self.words)
+
+
+def _address(x):
+    return x.__array_interface__["data"][0]
+
+
+def _fill(x, out):
+    for value, hint in zip(x, hints(type(x))):
+        if isinstance(hint, tuple):
+            if (value.dtype.kind, value.ndim) != hint or value.itemsize != 8 or not (
+                    value.flags.c_contiguous):
+                raise TypeError(f"{type(x).__name__} takes contiguous arrays of {hint[0]}8 with "
+                                f"{hint[1]} axes, not {value.dtype} with {value.ndim}")
+            out.append(_address(value))
+            out.extend(value.shape)
+        elif hint is int:
+            out.append(int(value))
+        elif hint is float:
+            out.append(_WORD.unpack(_NUMBER.pack(value))[0])
+        else:
+            _fill(value, out)
+
+
+class Kept:
+    """The Words of tuples, of the last few kept for those that are given again."""
+
+    def __init__(self):
+        self._found = {}
+
+    def __call__(self, x):
+        """Words of a tuple that a scene keeps, and anything else as it is."""
+        if not hasattr(x, "by_place"):
+            return x
+        found = self._found.pop(id(x), None)
+        if found is None or found.of is not x:
+            found = Words(x)
+        self._found[id(x)] = found
+        if len(self._found) > LAST:
+            del self._found[next(iter(self._found))]
+        return found
+
+
+#: How many.
+LAST = 8
