@@ -23,6 +23,7 @@ from .materials import Material
 from .mesh import MeshBeam
 from .places import as_point, facets_of
 from .quadrature import gauss, tensor
+from .series import Series
 from .strains import ElementStrain
 
 if TYPE_CHECKING:
@@ -33,9 +34,6 @@ if TYPE_CHECKING:
 
     from .formulations.base import Formulation, Term
     from .types import Array, Place, WhichBeam
-
-#: Points whose strains are evaluated at once.
-STRAINS = 4096
 
 
 @taught
@@ -272,6 +270,11 @@ class Beam(Frozen):
         return read_only(_coordinates(self.mesh, self.element,
                                       self.mesh.p - self.origin[:, None]))
 
+    @cached_property
+    def rows(self) -> Array:
+        """Of the first element, the numbers of both components of all coordinates, (2, nb)."""
+        return np.ascontiguousarray(np.arange(2 * self.nd).reshape(-1, 2).T)
+
     @property
     def dofnames(self) -> list[str]:
         """Names of the coordinates of a node, as scikit-fem gives them: r^1, r^2, r_X^1, ..."""
@@ -477,12 +480,25 @@ class Beam(Frozen):
             Shape (3, nelements, npoints).
         """
         tind = np.arange(self.mesh.nelements) if tind is None else tind
-        u_e, size = self.kernel.gather(u, tind), max(1, STRAINS // X.shape[-1])
-        parts = [slice(first, first + size) for first in range(0, len(tind), size)]
-        return np.concatenate([
-            ElementStrain(self, term, X[:, part] if X.ndim == 3 else X, tind[part]).once(
-                u_e[part])
-            for part in parts or [slice(0, 0)]], axis=1)
+        shape = len(tind), X.shape[-1]
+        points = X.reshape(2, -1) if X.ndim == 3 else np.tile(X, shape[0])
+        return self.strain_of(term)(u, np.repeat(tind, shape[1]), points).reshape(3, *shape)
+
+    def strain_of(self, term: Term) -> ElementStrain:
+        """The strain of a term of the formulation: an :class:`~.strains.ElementStrain`, kept."""
+        found = self._strains.get(id(term))
+        if found is None:
+            found = self._strains[id(term)] = ElementStrain(self, term)
+        return found
+
+    @cached_property
+    def _strains(self):
+        return {}
+
+    @cached_property
+    def series(self) -> Series:
+        """The local functions of the elements as a :class:`~skfem_ancf.series.Series`."""
+        return Series(self.element, self.mesh.height)
 
     @_fields
     def stress(self, u: Array, X: Array, tind: Array | None = None) -> Array:

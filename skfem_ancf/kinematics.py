@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .kernels import CableKernel, Kernel
+from .kernels.cable import CableSections
 from .errors import InputError
 from .formulations.ecm import AXIS
 from .quadrature import gauss
-from .strains import ElementStrain
 
 if TYPE_CHECKING:
     from .beam import Beam
@@ -125,18 +125,32 @@ class Sections:
         return beam.sampled_strain(beam.terms[0], u, X, tind)
 
     @staticmethod
-    def strain_table(beam: Beam, X: Array, tind: Array) -> ElementStrain | None:
-        """What gives it at the same points in many states, or None.
+    def strain_at(beam: Beam, u: Array, e: Array, X: Array) -> Array:
+        """As :meth:`strain`, at points each in an element of its own, shape (3, n).
 
         Parameters
         ----------
         beam
             A :class:`~skfem_ancf.Beam`.
-        X, tind
-            As for :meth:`Beam.gradients <skfem_ancf.Beam.gradients>`, shapes (2, npoints) or
-            (2, nelements, npoints), and (nelements,).
+        u
+            Displacement of its coordinates, shape (N,).
+        e, X
+            Elements (n,) and reference points (2, n).
         """
-        return ElementStrain(beam, beam.terms[0], X, tind)
+        return beam.strain_of(beam.terms[0])(u, e, X)
+
+    @staticmethod
+    def strain_of_point(beam: Beam, e: int, xi: float, eta: float) -> Any:
+        """A function from the coordinates (2, nb) of an element to the strain at a point, (3,).
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+        e, xi, eta
+            Element and reference point.
+        """
+        return beam.strain_of(beam.terms[0]).at(e, xi, eta)
 
     @staticmethod
     def stress(beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
@@ -240,16 +254,26 @@ class Cable(Sections):
         return (Sections.displacements(beam, u, X, tind)
                 + beam.mesh.height * (X[1] - 0.5) * np.array([-turn[1], turn[0]]))
 
-    @staticmethod
-    def strain_table(beam: Beam, X: Array, tind: Array) -> None:
-        return None
-
     @classmethod
     def strain(cls, beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:
-        _, _, eps, kappa = cls._section(beam, u, X, tind)
-        e = eps - beam.mesh.height * (X[1] - 0.5) * kappa
+        return cls._strain_of(beam, beam.mesh.height * (X[1] - 0.5), *cls._section(
+            beam, u, X, tind)[2:])
+
+    @staticmethod
+    def _strain_of(beam, Y, eps, kappa):
+        e = eps - Y * kappa
         xx = e + 0.5 * e * e
         return np.array([xx, -beam.material.lateral_ratio * xx, 0.0 * xx])
+
+    @classmethod
+    def strain_at(cls, beam: Beam, u: Array, e: Array, X: Array) -> Array:
+        return cls.strain(beam, u, X[:, :, None], e)[..., 0]
+
+    @classmethod
+    def strain_of_point(cls, beam: Beam, e: int, xi: float, eta: float) -> Any:
+        at = CableSections(beam.kernel, np.array([[xi]]), np.array([e]), beam.mesh, beam.element)
+        Y = beam.mesh.height * (eta - 0.5)
+        return lambda u_e: cls._strain_of(beam, Y, *at(u_e.T[None])[1])[:, 0, 0]
 
     @staticmethod
     def stress(beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from skfem.mapping import Mapping
@@ -12,15 +12,36 @@ from .errors import MeshError
 from .reference import hermite, linear
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike
 
     from .mesh import MeshBeam
     from .types import Array
 
+#: Corrections of Newton's method that are small enough.
+CLOSE = 1e-8
+
 _FACET_POINTS = (  # the point of the reference cell at X on facet bottom, right, top, left
     lambda s: (s, 0.0 * s), lambda s: (1.0 + 0.0 * s, s),
     lambda s: (s, 1.0 + 0.0 * s), lambda s: (0.0 * s, s),
 )
+
+
+def cross(a: Array, b: Array) -> Array:
+    """The out-of-plane component of a x b of vectors (2, ...).
+
+    Parameters
+    ----------
+    a, b
+        Vectors, shape (2, ...).
+
+    Returns
+    -------
+    ndarray
+        Shape (...).
+    """
+    return a[0] * b[1] - a[1] * b[0]
 
 
 def _polynomial(coefficients, xi):
@@ -30,6 +51,29 @@ def _polynomial(coefficients, xi):
         slope = value + xi * slope
         value = c + xi * value
     return value, slope
+
+
+def correction(axis: Any, director: Any, gap: Sequence[Any], xi: Any, eta: Any
+               ) -> tuple[Any, Any]:
+    """What Newton's method adds to the reference point of a point of the body.
+
+    Parameters
+    ----------
+    axis, director
+        For each component the coefficients of both as polynomials of xi, the lowest first: numbers
+        or arrays (...). The axis begins at zero.
+    gap
+        The point seen from where the axis begins, two components.
+    xi, eta
+        The reference point so far.
+    """
+    (x, dx), (y, dy) = (_polynomial(c, xi) for c in axis)
+    (nx, dnx), (ny, dny) = (_polynomial(c, xi) for c in director)
+    Y = eta - 0.5
+    x, y = gap[0] - x - Y * nx, gap[1] - y - Y * ny
+    ax, ay = dx + Y * dnx, dy + Y * dny
+    det = ax * ny - ay * nx
+    return (x * ny - y * nx) / det, (ax * y - ay * x) / det
 
 
 class MappingBeam(Mapping):
@@ -178,14 +222,14 @@ class MappingBeam(Mapping):
 
     @cached_property
     def _powers(self):
-        """Axis from the first node, and director, as polynomials of xi: 4 and 2 or 4 of (2, ne)."""
+        """Axis from the first node, and director, as polynomials of xi, (2, 4 and 2 or 4, ne)."""
         axis, director = self._all_coefficients
         axis = axis - axis[:, :1] * np.array([1.0, 0.0, 1.0, 0.0])[:, None]
         zero = np.zeros(1)
         cubic = [hermite(zero, d) / (1, 1, 2)[d] for d in range(3)]
         cubic.append(hermite(zero + 1.0) - sum(cubic))  # what is left at xi = 1
         few = cubic if self.mesh.sections == "cubic" else [linear(zero), linear(zero, 1)]
-        return [[self._sum(c, f)[..., 0] for f in functions]
+        return [np.stack([self._sum(c, f)[..., 0] for f in functions], 1)
                 for c, functions in ((axis, cubic), (director, few))]
 
     def invF(self, x: Array, tind: Array | None = None, max_iterations: int = 30,
@@ -209,22 +253,78 @@ class MappingBeam(Mapping):
             Shape (2, nelements, npoints).
         """
         first = self._all_coefficients[0][:, 0]
-        axis, director = ([c[:, :, None] if tind is None else np.take(c, tind, axis=1)[:, :, None]
-                           for c in powers] for powers in self._powers)
-        x = x - (first if tind is None else np.take(first, tind, axis=1))[:, :, None]
+        axis, director = (c[..., None] if tind is None else np.take(c, tind, axis=2)[..., None]
+                          for c in self._powers)
+        gap = x - (first if tind is None else np.take(first, tind, axis=1))[:, :, None]
         X = np.empty(x.shape)
         X[0], X[1] = xi, 0.5
         for _ in range(max_iterations):
-            (r, r_xi), (n, n_xi) = _polynomial(axis, X[0]), _polynomial(director, X[0])
-            Y = X[1] - 0.5
-            gap, a = x - r - Y * n, r_xi + Y * n_xi
-            dX = np.stack([gap[0] * n[1] - gap[1] * n[0], a[0] * gap[1] - a[1] * gap[0]])
-            dX /= a[0] * n[1] - a[1] * n[0]
+            dX = np.array(correction(axis, director, gap, *X))
             X += np.clip(dX, -1.0, 1.0)
             # the square of the last correction is left
-            if not np.any(np.abs(dX) > 1e-8 * (1.0 + np.abs(X))):
+            if not np.any(np.abs(dX) > CLOSE * (1.0 + np.abs(X))):
                 break
         return X
+
+    def find_in(self, e: int, x: float, y: float, xi: float) -> tuple[float, float] | None:
+        """The reference point of one point, as :meth:`invF` says; None if it is far outside.
+
+        Parameters
+        ----------
+        e
+            The element.
+        x, y
+            The point.
+        xi
+            To start from.
+        """
+        (x0, y0), axis, director = self._numbers(e)
+        gap, eta = (x - x0, y - y0), 0.5
+        for _ in range(8):
+            try:
+                d, f = correction(axis, director, gap, xi, eta)
+            except ZeroDivisionError:
+                return None
+            xi, eta = xi + d, eta + f
+            if not (abs(d) <= 1.0 and abs(f) <= 1.0):
+                return None
+            if abs(d) <= CLOSE * (1.0 + abs(xi)) and abs(f) <= CLOSE * (1.0 + abs(eta)):
+                return xi, eta
+        return None
+
+    def derivatives(self, e: Any, xi: Any, eta: Any) -> tuple[Any, Any, Any]:
+        """The derivatives of the map by xi and eta, and the tangent of the axis.
+
+        Parameters
+        ----------
+        e, xi, eta
+            Element and reference point: numbers, or elements (n,) and arrays (..., n).
+
+        Returns
+        -------
+        tuple
+            Three vectors, each a pair of numbers or arrays.
+        """
+        if isinstance(e, int):
+            _, axis, director = self._numbers(e)
+        else:
+            axis, director = (c[:, :, e] for c in self._powers)
+        dx, dy = (_polynomial(c, xi)[1] for c in axis)
+        (nx, dnx), (ny, dny) = (_polynomial(c, xi) for c in director)
+        Y, size = eta - 0.5, (dx * dx + dy * dy) ** 0.5
+        return (dx + Y * dnx, dy + Y * dny), (nx, ny), (dx / size, dy / size)
+
+    def _numbers(self, e):
+        """Of one element: where its axis begins, and the polynomials of its components."""
+        found = self._known.get(e)
+        if found is None:
+            axis, director = (c[..., e].tolist() for c in self._powers)
+            found = self._known[e] = self._all_coefficients[0][:, 0, e].tolist(), axis, director
+        return found
+
+    @cached_property
+    def _known(self):
+        return {}
 
     def _facet_elements(self, find):
         """One element of each facet, and the local number of the facet in it."""

@@ -23,11 +23,14 @@ if TYPE_CHECKING:
     from .mesh import MeshBeam
     from .types import Array, WhichBeam
 
+#: Types of numbers of which nothing has to be asked.
+PLAIN = (float, int, np.float64)
+
+#: Coordinates beyond which a point is looked at before it is looked for.
+HUGE = 1e300
+
 #: Points that a scene remembers, at most, and calls.
 REMEMBERED_POINTS, REMEMBERED = 2**16, 1024
-
-#: Points of which it is kept how the strain of their elements depends on the coordinates, at most.
-TABLED = 2**12
 
 
 def is_many(points: Any) -> bool:
@@ -81,6 +84,11 @@ def _ragged(p):
 class Part:
     """Points in one beam.
 
+    Parameters
+    ----------
+    place
+        Of a single point: element and reference point; then e and X may be left out.
+
     Attributes
     ----------
     beam, number
@@ -91,13 +99,34 @@ class Part:
         Which of the points they are, (n,), or None for all.
     e, X
         Elements (n,) and reference points (2, n).
+    n : int
+        How many.
     """
 
-    def __init__(self, beam: Beam, number: int, coordinates: slice, index: Array | None, e: Array,
-                 X: Array) -> None:
+    def __init__(self, beam: Beam, number: int, coordinates: slice, index: Array | None,
+                 e: Array | None = None, X: Array | None = None,
+                 place: tuple[int, float, float] | None = None) -> None:
         self.beam, self.number, self.coordinates, self.index = beam, number, coordinates, index
-        self.e, self.X = e, X
+        self.n = 1 if e is None else len(e)
         self.tables: dict[Any, Any] = {}  # of others, that depend on the beam and the points only
+        known = vars(self)
+        if e is not None:
+            known["e"], known["X"] = e, X
+        if place is not None:
+            known["place"] = place
+
+    @cached_property
+    def e(self) -> Array:
+        return np.array([self.place[0]])
+
+    @cached_property
+    def X(self) -> Array:
+        return np.array([[self.place[1]], [self.place[2]]])
+
+    @cached_property
+    def place(self) -> tuple[int, float, float]:
+        """Element and reference point of a single point."""
+        return int(self.e[0]), float(self.X[0, 0]), float(self.X[1, 0])
 
     @cached_property
     def at(self) -> Array:
@@ -107,12 +136,19 @@ class Part:
     @cached_property
     def start(self) -> Array:
         """Positions in the stress-free body, (2, n)."""
+        if self.n == 1 and not self.off_axis:
+            beam, (dofs, weights) = self.beam, self.one
+            return (beam.origin + beam.q0_local[dofs - self.coordinates.start] @ weights)[:, None]
         return self.beam.mesh.mapping().F(self.at, self.e)[..., 0]
 
     @cached_property
     def off_axis(self) -> bool:
         """Points of a cable off its axis: their section turns with the tangent."""
-        return not self.beam.has_sections and bool(np.any(np.abs(self.X[1] - 0.5) > 1e-12))
+        if self.beam.has_sections:
+            return False
+        if self.n == 1:
+            return abs(self.place[2] - 0.5) > 1e-12
+        return bool(np.any(np.abs(self.X[1] - 0.5) > 1e-12))
 
     @cached_property
     def dofs(self) -> Array:
@@ -121,25 +157,33 @@ class Part:
         first = self.coordinates.start + beam.mesh.t[0, self.e] * beam.nd
         return first + np.arange(2 * beam.nd).reshape(-1, 2, 1)
 
-    def _table(self, derivative):
-        element, mesh = self.beam.element, self.beam.mesh
-        rows = element.local(self.X, mesh.height)
-        return rows[derivative] * mesh.lengths[self.e] ** rows[3][:, None]
+    def _table(self, table):
+        series = self.beam.series
+        if self.n == 1:
+            e, xi, eta = self.place
+            return series.at(table, xi, eta)[:, None] * series.scale(self.beam, e)[:, None]
+        return series.values(table, self.X) * series.scale(self.beam, self.e)
 
     @cached_property
     def weights(self) -> Array:
         """Of these coordinates in the position, (nb, n)."""
-        return self._table(0)
+        return self._table(self.beam.series.value)
 
     @cached_property
     def slopes(self) -> Array:
         """Of these coordinates in the derivative of the position by xi, (nb, n)."""
-        return self._table(1)
+        return self._table(self.beam.series.along)
 
     @cached_property
     def one(self) -> tuple[Array, Array]:
         """Coordinates (2, nb) and weights (nb,) of a single point on which it depends linearly."""
-        return np.ascontiguousarray(self.dofs[:, :, 0].T), np.ascontiguousarray(self.weights[:, 0])
+        return self._one_dofs, self.weights[:, 0]
+
+    @cached_property
+    def _one_dofs(self):
+        beam = self.beam
+        first = self.coordinates.start + beam.mesh.t[0, self.place[0]] * beam.nd
+        return first + beam.rows
 
     def combine(self, weights: Array, u: Array) -> Array:
         """The sum of weighted coordinates of the scene at each point.
@@ -156,6 +200,8 @@ class Part:
         ndarray
             Shape (..., 2, n).
         """
+        if self.n == 1:
+            return (u[..., self.one[0]] @ weights[:, 0])[..., None]
         return sum(w * u[..., d] for w, d in zip(weights, self.dofs))
 
     def displacement(self, u: Array) -> Array:
@@ -190,16 +236,14 @@ class Part:
         u
             Coordinates of the scene, shape (N,).
         """
-        table = self._strain_table if len(self.e) <= TABLED else None
-        if table is None:
-            return self.beam.strain(u[self.coordinates], self.at, self.e)[..., 0]
-        if len(self.e) == 1:
-            return table.one(u[self.one[0]])[:, None]
-        return table(np.moveaxis(u[self.dofs], -1, 0))[..., 0]
+        beam = self.beam
+        if self.n > 1:
+            return beam.kinematics.strain_at(beam, u[self.coordinates], self.e, self.X)
+        return self._strain_at(u[self._one_dofs])[:, None]
 
     @cached_property
-    def _strain_table(self):
-        return self.beam.kinematics.strain_table(self.beam, self.at, self.e)
+    def _strain_at(self):
+        return self.beam.kinematics.strain_of_point(self.beam, *self.place)
 
     def stress(self, u: Array) -> Array:
         """The stress of the elements (S_xx, S_yy, S_xy), shape (3, n).
@@ -220,6 +264,8 @@ class Part:
     @cached_property
     def _start_slope(self):
         q0 = self.beam.q0_local
+        if self.n == 1:
+            return q0[self.one[0] - self.coordinates.start] @ self.slopes
         return sum(w * q0[d - self.coordinates.start] for w, d in zip(self.slopes, self.dofs))
 
     @cached_property
@@ -324,8 +370,8 @@ class Points:
             If a point is in none of the beams.
         """
         name = beam if beam is None or isinstance(beam, (str, int)) else id(beam)
-        if (type(points) is tuple and len(points) == 2 and type(points[0]) is float
-                and type(points[1]) is float):
+        if (type(points) is tuple and len(points) == 2 and type(points[0]) in PLAIN
+                and type(points[1]) in PLAIN):
             key: Any = points, name, type(beam)
         else:
             one = beam is not None or len(self.beams) == 1
@@ -347,6 +393,10 @@ class Points:
             self._held -= known.popitem(last=False)[1].n
 
     def _find(self, points, beam):
+        if type(points) is tuple or points.ndim == 1:
+            found = self._find_one(*points, beam)
+            if found is not None:
+                return found
         if beam is not None or len(self.beams) == 1:
             beam = select_beam(self.beams, beam)
             x = as_points(points, beam.mesh)
@@ -375,3 +425,17 @@ class Points:
         if len(parts) == 1:
             parts[0].index = None
         return Located(one, x.shape[1], parts)
+
+    def _find_one(self, x, y, beam):
+        """A single point, or None where the general search has to say."""
+        if not abs(x) + abs(y) < HUGE:
+            return None
+        x, y = float(x), float(y)
+        for b in self.beams if beam is None else (select_beam(self.beams, beam),):
+            place = b.finder.one(x, y)
+            if place:
+                k = self.beams.index(b)
+                return Located(True, 1, [Part(b, k, self.slices[k], None, place=place)])
+            if place is None:
+                return None
+        return None

@@ -37,6 +37,7 @@ from .kept import kept
 from .materials import LinearLaw
 from .quadrature import gauss, lagrange
 from .section_forces import NotRecovered, SectionForces, Sections, cross
+from .series import chebyshev
 from .spread import SNAP, station_of_node, stations_of_vector
 
 if TYPE_CHECKING:
@@ -569,14 +570,29 @@ class Recovery:
             A slice of the seven rows.
         """
         places = part.tables.get("recovery")
-        if places is None:
-            places = part.tables["recovery"] = self._places(part.e, *part.X)
-        if len(part.e) > 1:
+        if part.n > 1:
+            if places is None:
+                places = part.tables["recovery"] = self._places(part.e, *part.X)
             return self._values(places, rows)
+        if places is None:
+            places = part.tables["recovery"] = self._place(*part.place)
         station, end, s, weights = places
-        find = bisect_left if end[0] else bisect_right
-        piece = min(max(find(self._cuts, station[0]) - 1, 0), len(self._tables) - 1)
-        return self._tables[piece].one(s[0], weights[0], rows)[:, None]
+        find = bisect_left if end else bisect_right
+        piece = min(max(find(self._cuts, station) - 1, 0), len(self._tables) - 1)
+        return self._tables[piece].one(s, weights, rows)[:, None]
+
+    def _place(self, e, xi, eta):
+        """As :meth:`_places`, of one point."""
+        end = xi > 1.0 - SNAP
+        station = e + (1.0 if end else 0.0 if xi < SNAP else xi)
+        return (station, end, self._arc_of_one(e, xi),
+                chebyshev(eta, len(self.eta)) @ self._to_series)
+
+    def _arc_of_one(self, e, xi):
+        start, end = self.lengths[e:e + 2].tolist()
+        if self.beam.mesh.is_straight:
+            return start + xi * (end - start)
+        return start + float(chebyshev(xi, 9) @ self._inside[e])
 
     def _places(self, e, xi, eta):
         """What evaluation at points (n,) needs and does not change with the state.

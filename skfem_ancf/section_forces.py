@@ -15,6 +15,7 @@ import numpy as np
 
 from .errors import AncfError
 from .kept import kept
+from .mapping import cross
 from .quadrature import gauss, lagrange
 from .spread import SNAP, station_of_node
 
@@ -50,22 +51,6 @@ class NotRecovered(AncfError):
     def __init__(self, message: str, which: Array | None = None) -> None:
         super().__init__(message)
         self.which = which
-
-
-def cross(a: Array, b: Array) -> Array:
-    """The out-of-plane component of a x b of vectors (2, ...).
-
-    Parameters
-    ----------
-    a, b
-        Vectors, shape (2, ...).
-
-    Returns
-    -------
-    ndarray
-        Shape (...).
-    """
-    return a[0] * b[1] - a[1] * b[0]
 
 
 class Sections:

@@ -78,6 +78,19 @@ def test_finder_finds_the_point_again(mesh):
     # between two elements: the left one
     nodes = mesh.p[:, mesh.t[0, 1:]]
     assert_array_equal(finder.Finder(mesh)(nodes)[0], np.arange(mesh.nelements - 1))
+    find, known = finder.Finder(mesh), 0
+    corners = mesh.mapping().F(np.array([[0.0, 0.0, 1.0, 1.0], [0.0, 1.0, 0.0, 1.0]]))
+    away = x + 3.0 * np.max(np.abs(mesh.p)) + 9.0
+    for p in np.hstack([x, nodes, corners.reshape(2, -1), away]).T:
+        (e,), (X,), (outside,) = (np.array(part).T for part in find(p[:, None]))
+        one = find.one(*p.tolist())
+        known += bool(one)
+        if one is False:
+            assert outside > find.allowed
+        elif one is not None:
+            assert one[0] == e and outside == 0
+            assert_allclose(one[1:], X, atol=1e-12)
+    assert known > 290 and find.one(*away[:, 0].tolist()) is False
 
 
 def test_gaps_and_parts_at_other_places():
@@ -100,7 +113,8 @@ def test_points_of_several_beams():
     x = np.hstack([xa, xb])[:, order]
     for name in METHODS:
         parts = [getattr(state, name)(xa, beam="a"), getattr(state, name)(xb, beam="b")]
-        assert_array_equal(getattr(state, name)(x), np.hstack(parts)[:, order])
+        assert_allclose(getattr(state, name)(x), np.hstack(parts)[:, order], rtol=1e-13,
+                        atol=1e-15 * np.abs(parts[0]).max())
     with pytest.raises(MeshError, match=r"outside the body \(20 of 20 points are\)"):
         state.strain(xb, beam="a")
     with pytest.raises(MeshError, match=r"none of the 2 beams .1 of 2 points are.; 'a': the body "
@@ -155,16 +169,16 @@ def test_no_points_and_one_of_many():
 def test_points_are_found_once_and_not_all_are_kept(monkeypatch):
     state = bent(LINE, ElementBeamANCF(2))
     asked = []
-    find = finder.Finder.__call__
-    monkeypatch.setattr(finder.Finder, "__call__",
-                        lambda self, x: asked.append(x.shape[1]) or find(self, x))
+    find = points.Points._find
+    monkeypatch.setattr(points.Points, "_find", lambda self, x, beam: asked.append(
+        np.size(x) // 2) or find(self, x, beam))
     x = inside(LINE)[2]
     for _ in range(3):
         for name in METHODS:
             getattr(state, name)(x)
             getattr(state, name)((0.5, 0.0))
             getattr(state, name)((0.5, 0))
-    assert sorted(asked) == [1, 1, 40]  # (0.5, 0.0), its array, and x
+    assert sorted(asked) == [1, 40]
     monkeypatch.setattr(points, "REMEMBERED_POINTS", 60)
     for k in range(10):
         state.displacement(x + 1e-9 * k)
@@ -223,14 +237,13 @@ def test_forms_of_points():
 @pytest.mark.parametrize("formulation", ["assumed", "continuum", "ecm"])
 @pytest.mark.parametrize("mesh", [LINE, quarter_arc(height=0.1)], ids=["straight", "arc"])
 def test_strain_of_the_elements_at_few_and_at_many_points(mesh, formulation, plane, monkeypatch):
-    """Tables of few points, blocks of many, and the derivative of the displacement agree."""
+    """Single points, blocks of many, and the derivative of the displacement agree."""
     material = StVenantKirchhoff(E=1e6, nu=0.3, plane=plane)
     beam = Beam(mesh, ElementBeamANCF(2), material, 0.1, formulation=formulation)
     state = Scene(beam).clamp("left").point_force((2, -3), at=mesh.p[:, -1]).solve_static()
     e, X, x = inside(mesh)
-    few = [state.strain(x, recover=False), state.stress(x, recover=False)]
-    monkeypatch.setattr(points, "TABLED", 0)
-    monkeypatch.setattr("skfem_ancf.beam.STRAINS", 7)
+    few = [np.array([ask(p, recover=False) for p in x.T]).T for ask in (state.strain, state.stress)]
+    monkeypatch.setattr("skfem_ancf.strains.CHUNK", 7)
     many = [state.strain(x, recover=False), state.stress(x, recover=False)]
     assert_allclose(few, many, rtol=1e-10, atol=1e-13 * np.abs(few[1]).max())
     if formulation == "continuum":  # r(X + d) - r(X) by differences, in the frame of the beam

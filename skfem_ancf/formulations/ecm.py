@@ -75,6 +75,9 @@ class EnhancedContinuum(Formulation):
         return terms
 
     def stress(self, beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
-        uncoupled, coupling = split_moduli(self.name, beam.material, beam.element)
-        on_axis = beam.strain(u, np.array([X[0], 0.0 * X[1] + 0.5]), tind)
-        return np.tensordot(uncoupled, strain, 1) + np.tensordot(coupling, on_axis, 1)
+        first, *coupling = beam.terms
+        out = first.law.stress(strain)
+        if coupling:
+            axis = np.array([X[0], 0.0 * X[1] + 0.5])
+            out = out + coupling[0].law.stress(beam.kinematics.strain(beam, u, axis, tind))
+        return out

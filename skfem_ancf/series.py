@@ -1,0 +1,119 @@
+"""Local functions of an element in products of Chebyshev polynomials: their values at any points
+follow from a table by products of matrices.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.polynomial.chebyshev import chebder, chebvander
+
+if TYPE_CHECKING:
+    from .beam import Beam
+    from .elements.base import ElementBeam
+    from .types import Array
+
+
+def chebyshev(x: Any, n: int) -> Array:
+    """The polynomials T_0 ... T_(n-1) of 2 x - 1.
+
+    Parameters
+    ----------
+    x
+        A number, or an array of shape (k,), on [0, 1].
+    n
+        How many.
+
+    Returns
+    -------
+    ndarray
+        Shape (n,), or (n, k).
+
+    Examples
+    --------
+    >>> chebyshev(0.75, 3).tolist()
+    [1.0, 0.5, -0.5]
+    """
+    z = 2.0 * x - 1.0
+    out = [1.0 + 0.0 * z, z]
+    while len(out) < n:
+        out.append(2.0 * z * out[-1] - out[-2])
+    return np.array(out[:n])
+
+
+class Series:
+    """The local functions of an element of length 1 as ``sum c_ij T_i(2 xi - 1) T_j(2 eta - 1)``.
+
+    Parameters
+    ----------
+    element
+        A beam element.
+    h
+        Height of the section.
+
+    Attributes
+    ----------
+    value, along, across
+        Coefficients c of the functions and of their derivatives by xi and by eta, shape
+        (nb, p, m) each.
+    power
+        The power of the length that each takes, (nb,).
+    """
+
+    def __init__(self, element: ElementBeam, h: float) -> None:
+        p = max(element.axis_degree, 3 if element.sections == "cubic" else 1) + 1
+        m = max(element.order, 1) + 1
+        x, y = (0.5 - 0.5 * np.cos(np.pi * (np.arange(n) + 0.5) / n) for n in (p, m))
+        values, _, _, self.power = element.local(
+            np.array([np.repeat(x, m), np.tile(y, p)]), h)
+        Vx, Vy = (np.linalg.inv(chebvander(2.0 * z - 1.0, len(z) - 1)) for z in (x, y))
+        self.value = Vx @ values.reshape(-1, p, m) @ Vy.T
+        self.along, self.across = np.zeros((2, *self.value.shape))
+        self.along[:, :-1] = 2.0 * chebder(self.value, axis=1)
+        self.across[:, :, :-1] = 2.0 * chebder(self.value, axis=2)
+
+    def at(self, table: Array, xi: float, eta: float) -> Array:
+        """The values at one point, shape (nb,).
+
+        Parameters
+        ----------
+        table
+            One of the attributes, shape (nb, p, m).
+        xi, eta
+            The reference point.
+        """
+        return table @ chebyshev(eta, table.shape[2]) @ chebyshev(xi, table.shape[1])
+
+    def values(self, table: Array, X: Array) -> Array:
+        """The values at many points, shape (nb, n).
+
+        Parameters
+        ----------
+        table
+            One of the attributes, shape (nb, p, m).
+        X
+            Reference points, shape (2, n).
+        """
+        _, p, m = table.shape
+        products = chebyshev(X[0], p)[:, None] * chebyshev(X[1], m)
+        return table.reshape(-1, p * m) @ products.reshape(p * m, -1)
+
+    def scale(self, beam: Beam, e: Any) -> Array:
+        """The powers of the lengths of elements e that the functions take.
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+        e
+            A number, or numbers of shape (n,).
+
+        Returns
+        -------
+        ndarray
+            Shape (nb,), or (nb, n).
+        """
+        if np.ndim(e):
+            return beam.mesh.lengths[e] ** self.power[:, None]
+        return beam.mesh.lengths[e] ** self.power
