@@ -11,7 +11,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from skfem.assembly import LinearForm, asm
+from skfem.assembly import FacetBasis, LinearForm, asm
+from skfem.assembly.form.form import FormExtraParams
+from skfem.element import DiscreteField
 
 from . import forms
 from .beam import Beam
@@ -20,7 +22,7 @@ from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number
 from .frozen import Sealable, read_only
 from .kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from .pickling import picklable_form
-from .spread import Spread, on_facets, stations_of_vector
+from .spread import BODY, Sampled, Spread, facets_along, on_facets, stations_of_vector
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -362,7 +364,41 @@ class FormLoad(Load):
     def bind(self, beam: Beam) -> Load:
         basis = (beam.exact_basis() if self.boundary is None else
                  beam.facet_basis(self.boundary))
-        return DeadLoad(beam, _assembled(self.form, basis), self.amplitude)
+        vector = _assembled(self.form, basis)
+        return DeadLoad(beam, vector, self.amplitude, _density(self.form, basis, beam, vector))
+
+
+def _density(form, basis, beam, vector):
+    """How the force of a form is spread, from its values for constant test functions.
+
+    None if these do not give its vector again: then it acts on derivatives.
+    """
+    parameters = FormExtraParams(basis.default_parameters())
+    shape = basis.dx.shape
+    try:
+        with warnings_as_errors():
+            f = np.array([np.broadcast_to(form.form(_constant(i, shape), parameters), shape)
+                          for i in range(2)])
+    except Exception:  # the form is the user's: it may ask for what a constant has not
+        return None
+    again = asm(LinearForm(lambda v, w: f[0] * v[0] + f[1] * v[1]), basis)
+    if np.max(np.abs(again - vector)) > 1e-10 * np.max(np.abs(vector)):
+        return None
+    if isinstance(basis, FacetBasis):
+        groups, stations = facets_along(beam.mesh, basis)
+        per_xi = f * basis.dx / basis.W
+        return Spread(stations=stations, sampled=tuple(
+            Sampled(g.where, g.elements, g.xi, per_xi[:, g.chosen]) for g in groups))
+    xi, eta = (np.unique(np.round(x, 14)) for x in basis.X)
+    values = (f / beam.width).reshape(*f.shape[:2], len(xi), len(eta))
+    return Spread(sampled=(Sampled(BODY, np.arange(shape[0]), xi, values, eta),))
+
+
+def _constant(i, shape):
+    """A test function that is the unit vector i."""
+    value = np.zeros((2, *shape))
+    value[i] = 1.0
+    return DiscreteField(value=value, grad=np.zeros((2, 2, *shape)))
 
 
 def _assembled(form, basis):

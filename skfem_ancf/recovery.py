@@ -36,15 +36,17 @@ from .formulations.ecm import EnhancedContinuum
 from .kept import kept
 from .materials import LinearLaw
 from .quadrature import gauss, lagrange
-from .section_forces import NotRecovered, SectionForces, Sections, cross
+from .mapping import cross
+from .section_forces import NotRecovered, SectionForces, Sections, viscous_forces
 from .series import chebyshev
-from .spread import SNAP, station_of_node, stations_of_vector
+from .spread import AXIS, SNAP, Sampled, station_of_node, stations_of_vector
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike
 
+    from .beam import Beam
     from .points import Part
     from .results import State
     from .types import Array, Law
@@ -189,18 +191,36 @@ class _Piece:
         self.xi = xi = np.append(np.stack([a, 0.5 * (a + b)], 1).ravel(), b[-1])
         self.s = recovery.arc(self.e, xi)
         self.R, self.M = self.forces.at(self.e, xi, np.append(np.repeat(side, 2), side[-1]))
+        self.Rv = self.Mv = None
+        if self.forces.viscous is not None:
+            self.Rv, self.Mv = self._viscous()
+            self.R, self.M = self.R - self.Rv, self.M - self.Mv
         eta, h = recovery.eta, mesh.height
         self.Y = h * (eta - 0.5)
         sections = Sections(self.forces, self.e, xi, eta)
         speed = np.hypot(*sections.J[:, 0, :, len(eta) // 2])
         self.g = sections.volume / (speed[:, None] * h)
-        self.body = self.g * sections.body
+        self.body = self.g * (sections.body + self._axis_load())
         self.faces = [Sections(self.forces, self.e, xi, np.array([float(k)])).face(k)[..., 0]
                       / speed for k in (0, 1)]
         r = Sections(self.forces, self.e, xi, np.array([0.5])).field(self.forces.q, slope=True)
         self.raw_angle = np.unwrap(np.arctan2(r[1, ..., 0], r[0, ..., 0]))
         self.phi = self.raw_angle
         self._solve()
+
+    def _axis_load(self):
+        """A load of the axis as a force per volume, the same across the section; or 0."""
+        axis = Sections(self.forces, self.e, self.xi, np.array([0.5]))
+        return axis.sampled(AXIS) / (self.recovery.beam.width * axis.volume)
+
+    def _viscous(self):
+        """The part of force and moment that resists the rate of the strain, splined."""
+        at = self.elements
+        s = self.recovery.arc(at, np.full(len(at), 0.5))
+        R, M = (x[..., at] for x in self.forces.viscous_middles())
+        if len(s) == 1:
+            return R + 0.0 * self.R, M + 0.0 * self.M
+        return tuple(scipy.interpolate.CubicSpline(s, x, axis=-1)(self.s) for x in (R, M))
 
     def of(self, k):
         """The field of one of several states."""
@@ -308,21 +328,49 @@ class _Piece:
         def turned(f, c, s):
             return np.array([c * f[0] + s * f[1], -s * f[0] + c * f[1]])
 
-        rate = self.rate[..., None]
-        d0, d1 = self.d_ds(self.P)
-        dP = np.array([d0 - rate * self.P[1], d1 + rate * self.P[0]]) + turned(
+        rate, viscous = self.rate[..., None], self._viscous_stress()
+        P = self.P + self.rX * viscous[0] + self.rY * viscous[1]
+        d0, d1 = self.d_ds(P)
+        dP = np.array([d0 - rate * P[1], d1 + rate * P[0]]) + turned(
             self.body, c[..., None], s[..., None])
         bottom, top = (turned(f, c, s)[..., None] for f in self.faces)
         P2 = -bottom - dP @ r.from_bottom.T
         P2 = P2 + (top - P2[..., -1:]) * (self.Y / h + 0.5)
         P2 = P2 / self.g
         det = cross(self.rX, self.rY)
-        self.S = np.array([self.S[0], cross(self.rX, P2) / det, cross(P2, self.rY) / det])
+        self.S = np.array([self.S[0], cross(self.rX, P2) / det,
+                           cross(P2, self.rY) / det - viscous[1]])
         self._shear()
+
+    def _viscous_stress(self):
+        """S_xx and S_xy that resist the rate of the strain: linear in Y, and a parabola.
+
+        Those of the section's own force and moment of this part.
+        """
+        if self.Rv is None:
+            return 0.0, 0.0
+        t, n = (np.array([np.cos(self.phi), np.sin(self.phi)]),
+                np.array([-np.sin(self.phi), np.cos(self.phi)]))
+        N, Q = np.sum(self.Rv * t, axis=0), np.sum(self.Rv * n, axis=0)
+        (x, y), (a, b) = self.rY @ self.recovery.from_axis.T, self.rX
+        units = np.array([1.0 + 0.0 * y, y / self.recovery.beam.mesh.height]) / self.g
+        K = np.array([[self.integral(a * unit), self.integral((x * b - y * a) * unit)]
+                      for unit in units])
+        det = K[0, 0] * K[1, 1] - K[0, 1] * K[1, 0]
+        first = (K[1, 1] * N - K[1, 0] * self.Mv) / det
+        second = (K[0, 0] * self.Mv - K[0, 1] * N) / det
+        S = first[..., None] * units[0] + second[..., None] * units[1]
+        bubble = self._bubble
+        missing = Q - self.integral(b * S)
+        return S, (missing / self.integral(self.rY[1] * bubble))[..., None] * bubble
+
+    @property
+    def _bubble(self):
+        return 1.0 - (2.0 * self.Y / self.recovery.beam.mesh.height) ** 2
 
     def _shear(self):
         """Add a parabola to S_xy that gives the section its shear force."""
-        bubble = 1.0 - (2.0 * self.Y / self.recovery.beam.mesh.height) ** 2
+        bubble = self._bubble
         missing = self.Q - self.integral(self.rX[1] * self.S[0] + self.rY[1] * self.S[2])
         self.S[2] += (missing / self.integral(self.rY[1] * bubble))[..., None] * bubble
 
@@ -665,6 +713,45 @@ def actions(state: State) -> list[list[float]]:
     return out
 
 
+def distributed(states: Sequence[State], beam: Beam) -> tuple[list[Sampled], list[float]]:
+    """What force elements that act all along a beam do there, and the stations of other parts.
+
+    Parameters
+    ----------
+    states
+        States of one scene.
+    beam
+        One of its beams.
+
+    Raises
+    ------
+    NotRecovered
+        If a force element does not say where it acts.
+    """
+    system = states[0].system
+    sampled: list[Sampled] = []
+    stations: list[float] = []
+    elements = [e for e in system.forces.elements if e.distributed]
+    if not elements:
+        return sampled, stations
+    force = -np.array([system.part_forces(state.u, state.v) for state in states])
+    for element in elements:
+        if element.along is None:
+            raise NotRecovered(f"how {element!r} acts along the beam is not known to it")
+        where, facets, at = element.along
+        if where is not beam:
+            continue
+        stations += at
+        rows = system.forces.rows_of(element)
+        for group in facets:
+            w = np.linalg.solve(np.vander(group.xi, increasing=True).T,
+                                1.0 / np.arange(1, len(group.xi) + 1))  # of its own rule
+            values = force[:, :, rows.reshape(-1, len(w))[group.chosen]] / w
+            sampled.append(Sampled(group.where, group.elements, group.xi,
+                                   values.swapaxes(0, 1)))
+    return sampled, stations
+
+
 def recover(states: Sequence[State], number: int) -> list[Recovery | NotRecovered]:
     """The recovered fields of one beam in some states of a scene, found together.
 
@@ -689,8 +776,8 @@ def recover(states: Sequence[State], number: int) -> list[Recovery | NotRecovere
         # what acts at other places cuts the beam into other pieces
         case: list[Any] = [tuple(state.actions[number])]
         for factor, spread in loads[-1]:
-            case += ([None] if spread is None else [spread.stations] if spread.faces is None
-                     and spread.body is None else [id(spread), factor != 0.0])
+            case += ([None] if spread is None else [spread.stations] if spread.acts_at_stations
+                     else [id(spread), factor != 0.0])
         alike.setdefault(tuple(case), []).append(k)
     found: dict[int, Recovery | NotRecovered] = {}
     for same in alike.values():
@@ -704,20 +791,19 @@ def _recover_alike(states, number, loads):
     first, system = states[0], states[0].system
     beam, s = first.beams[number], system.of(first.beams[number])
     try:
-        if first.t is not None and system.viscous:
-            raise NotRecovered("the stress that resists the rate of the strain is not known to it")
-        if first.t is not None and system.damping:
-            raise NotRecovered("how the damping of the scene acts is not known to it")
-        if any(element.distributed for element in system.forces.elements):
-            raise NotRecovered("how a foundation acts along the beam is not known to it")
         together = [(np.array([of[k][0] for of in loads]), spread)
                     for k, (_, spread) in enumerate(loads[0])]
         u = np.array([state.u[s] for state in states])
+        sampled, stations = distributed(states, beam)
         acceleration = None if first.acceleration is None else np.array(
-            [state.acceleration[s] for state in states])
+            [(state.acceleration + system.damping_acceleration(state.v))[s] for state in states])
+        time = system.retardation[number]
+        viscous = None if first.t is None or time == 0.0 else np.array(
+            [viscous_forces(beam, state.u[s], state.v[s], time) for state in states])
         with np.errstate(all="ignore"):
-            found = Recovery(SectionForces(beam, u, together, first.actions[number],
-                                           acceleration), u)
+            found = Recovery(SectionForces(
+                beam, u, together, [*first.actions[number], *stations], acceleration, sampled,
+                viscous), u)
         return [found.of(k) for k in range(len(states))]
     except NotRecovered as reason:
         if reason.which is None or len(states) == 1:

@@ -15,14 +15,16 @@ import numpy as np
 
 from .errors import AncfError
 from .kept import kept
+from .kernels.base import apart
 from .mapping import cross
 from .quadrature import gauss, lagrange
-from .spread import SNAP, station_of_node
+from .spread import AXIS, BODY, SNAP, station_of_node
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .beam import Beam
+    from .spread import Sampled
     from .types import Array
 
 #: Points along an element for its loads.
@@ -117,8 +119,15 @@ class Sections:
         """Force per volume of the stress-free body, inertia included, (2, ..., n, k)."""
         f = self.forces
         out = np.broadcast_to(np.moveaxis(f.body, -1, 0)[..., None, None],
-                              (2,) + f.states + self.shape)
+                              (2,) + f.states + self.shape) + self.sampled(BODY)
         return out if f.acceleration is None else out - f.beam.density * self.field(f.acceleration)
+
+    def sampled(self, where: int) -> Any:
+        """The sum of :class:`~skfem_ancf.spread.Sampled` densities there, (2, ..., n, k); or 0."""
+        xi, eta = self.X[0, :, 0], self.X[1, 0]
+        return sum(s.at(self.e, xi, eta, self.forces.beam.mesh.nelements)
+                   .reshape((2,) + self.forces.states + (len(xi), -1))
+                   for s in self.forces.sampled if s.where == where)
 
     def face(self, side: int) -> Array:
         """Force per width and xi on the bottom (0) or top (1), where the points are.
@@ -126,7 +135,7 @@ class Sections:
         Shape (2, ..., n, k).
         """
         f = self.forces
-        out = np.zeros((2,) + f.states + self.shape)
+        out = np.zeros((2,) + f.states + self.shape) + self.sampled(side) / f.beam.width
         for factor, load in f.faces:
             on = np.multiply.outer(factor, load.faces[side][self.e])[..., None]
             if not np.any(on):
@@ -163,6 +172,11 @@ class SectionForces:
         Where supports and joints act: element + xi.
     acceleration
         Of the coordinates, shape (N,) or (states, N), or None.
+    sampled
+        Densities of force besides, :class:`~skfem_ancf.spread.Sampled`.
+    viscous
+        Forces of elements that resist the rate of the strain, shape (ne, nb, 2) or
+        (states, ne, nb, 2), or None.
 
     Attributes
     ----------
@@ -176,7 +190,8 @@ class SectionForces:
     """
 
     def __init__(self, beam: Beam, u: Array, loads: Sequence[tuple[Any, Any]],
-                 stations: Sequence[float] = (), acceleration: Array | None = None) -> None:
+                 stations: Sequence[float] = (), acceleration: Array | None = None,
+                 sampled: Sequence[Sampled] = (), viscous: Array | None = None) -> None:
         self.beam = beam
         if any(load is None for _, load in loads):
             raise NotRecovered("a load is given by its force on the coordinates only: where it "
@@ -189,6 +204,9 @@ class SectionForces:
                          if load.body is not None), np.zeros(self.states + (2,)))
         self.faces = [(factor, load) for factor, load in loads if load.faces is not None
                       and np.any(factor) and np.any(load.faces)]
+        self.sampled = [*sampled, *(s.times(factor) for factor, load in loads
+                                    for s in load.sampled)]
+        self.viscous = viscous
         self._loads(u)
         self._cut(loads, stations)
         self._check()
@@ -204,10 +222,14 @@ class SectionForces:
         inside = Sections(self, e, xi, eta)
         parts = [(inside, beam.width * v * inside.volume * inside.body)]
         for side in (0, 1):
-            if any(np.any(load.faces[side]) for _, load in self.faces):
+            if any(np.any(load.faces[side]) for _, load in self.faces) or any(
+                    s.where == side for s in self.sampled):
                 face = Sections(self, e, xi, np.array([float(side)]))
                 parts.append((face, beam.width * face.face(side)))
-        axis = Sections(self, e, xi, np.array([0.5])).field(self.q)
+        middle = Sections(self, e, xi, np.array([0.5]))
+        axis = middle.field(self.q)
+        if any(s.where == AXIS for s in self.sampled):
+            parts.append((middle, middle.sampled(AXIS)))
         force = sum(f.sum(axis=-1) for _, f in parts)
         moment = sum(cross(at.field(self.q) - axis, f).sum(axis=-1) for at, f in parts)
         self._r, self._force, self._moment = (
@@ -215,12 +237,25 @@ class SectionForces:
         w = np.tile(w, ne)
         load = sum(at.spread(f * w[:, None]) for at, f in parts)
         internal = _each(beam.kernel.forces, u)
+        if self.viscous is not None:
+            internal = internal + self.viscous
         left, right = np.split(internal - load, 2, axis=-2)
         q = np.split(self.q, 2, axis=-2)
         # of the part of the beam on the right of a section on that on its left
         self.R = np.array([-left[..., 0, :], right[..., 0, :]])  # (2 ends, ..., ne, 2)
         self.M = np.array([-_moments(q[0], left), _moments(q[1], right)])
         self.ends = np.array([q[0][..., 0, :], q[1][..., 0, :]])
+
+    def viscous_middles(self) -> tuple[Array, Array]:
+        """The part of force and moment that resists the rate of the strain, in the middle of
+        elements, where it is most accurate: shapes (2, ..., ne) and (..., ne).
+        """
+        left, _ = np.split(np.asarray(self.viscous), 2, axis=-2)
+        q, _ = np.split(self.q, 2, axis=-2)
+        ne = self.beam.mesh.nelements
+        r = Sections(self, np.arange(ne), np.full(ne, 0.5), np.array([0.5])).field(self.q)[..., 0]
+        R = -np.moveaxis(left[..., 0, :], -1, 0)
+        return R, cross(np.moveaxis(q[..., 0, :], -1, 0) - r, R) - _moments(q, left)
 
     def of(self, k: int) -> SectionForces:
         """Those of one of several states, of which force and moment can be asked.
@@ -281,6 +316,8 @@ class SectionForces:
         for _, load in self.faces:
             for face in load.faces:
                 stations += list(np.nonzero(face[1:] != face[:-1])[0] + 1.0)
+        for s in self.sampled:
+            stations += list(s.changes(mesh.nelements))
         cuts = np.concatenate([stations, gaps, [0.0, mesh.nelements]])
         self.cuts = np.unique(self._at_nodes(cuts))
         for station in self._acted[self._acted % 1.0 != 0]:
@@ -344,3 +381,23 @@ def _moments(q, force):
     """Moments (..., ne) of element vectors on the coordinates but r, (..., ne, nb, 2) both."""
     q, force = (np.moveaxis(x[..., 1:, :], -1, 0) for x in (q, force))
     return np.sum(cross(q, force), axis=-1)
+
+
+def viscous_forces(beam: Beam, u: Array, v: Array, time: float) -> Array:
+    """Forces of the elements of a beam that resist the rate of the strain, shape (ne, nb, 2).
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    u, v
+        Displacement of its coordinates and its rate, shape (N,).
+    time
+        The retardation time.
+    """
+    kernel = beam.kernel
+    u, v = kernel.gather(u).ravel(), kernel.gather(v).ravel()
+    out = np.zeros(u.size)
+    for pack in kernel.viscous_packs(time):
+        kernel.texts.viscous(apart(pack, slice(None)), u, v, out)
+    return out.reshape(beam.mesh.nelements, -1, 2)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+
+from .quadrature import lagrange
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,6 +24,109 @@ SNAP = 1e-6
 
 #: A function of ``r`` that differs from 0 or 1 by less is that at a node, where it is flat.
 FLAT = 1e-11
+
+
+#: Where a :class:`Sampled` density acts; the first two are also numbers of faces.
+BOTTOM, TOP, AXIS, BODY = range(4)
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """A density of force, by its values at points of elements: a polynomial between them.
+
+    Attributes
+    ----------
+    where
+        BOTTOM or TOP, a face; AXIS; or BODY.
+    elements
+        Those on which it acts, numbers (n,).
+    xi, eta
+        Points along an element and, of a body, across it; shapes (p,) and (q,).
+    values
+        Force per xi, shape (2, ..., n, p); of a body per volume, shape (2, ..., n, p, q).
+    """
+
+    where: int
+    elements: Array
+    xi: Array
+    values: Array
+    eta: Array | None = None
+
+    def times(self, factor: Any) -> Sampled:
+        """The density times a number, or each of several, shape (...)."""
+        return replace(self, values=np.moveaxis(np.multiply.outer(factor, self.values),
+                                                np.ndim(factor), 0))
+
+    def at(self, e: Array, xi: Array, eta: Array, nelements: int) -> Array:
+        """The density on sections.
+
+        Parameters
+        ----------
+        e, xi
+            Sections, shapes (n,).
+        eta
+            Points across them, shape (k,).
+        nelements
+            How many elements there are.
+
+        Returns
+        -------
+        ndarray
+            Shape (2, ..., n, k); of a face or the axis k = 1.
+        """
+        row = np.full(nelements, -1)
+        row[self.elements] = np.arange(len(self.elements))
+        along = lagrange(self.xi, xi) * (row[e] >= 0)[:, None]
+        if self.eta is None:
+            return np.einsum("...np,np->...n", self.values[..., row[e], :], along)[..., None]
+        return np.einsum("...npq,np,kq->...nk", self.values[..., row[e], :, :], along,
+                         lagrange(self.eta, eta))
+
+    def changes(self, nelements: int) -> Array:
+        """Stations between elements on which it acts and those on which it does not."""
+        on = np.isin(np.arange(nelements), self.elements)
+        return np.nonzero(on[1:] != on[:-1])[0] + 1.0
+
+
+class Facets(NamedTuple):
+    """Facets of one kind: where they are, as for :class:`Sampled`.
+
+    Attributes
+    ----------
+    where
+        BOTTOM, TOP or AXIS.
+    chosen
+        Which of the facets they are, numbers (n,).
+    elements
+        Their elements, (n,).
+    xi
+        Points along each, (p,).
+    """
+
+    where: int
+    chosen: Array
+    elements: Array
+    xi: Array
+
+
+def facets_along(mesh: MeshBeam, basis: Any) -> tuple[list[Facets], tuple[float, ...]]:
+    """The facets of a FacetBasis along a beam, and the stations of those across it.
+
+    Parameters
+    ----------
+    mesh
+        A :class:`~skfem_ancf.MeshBeam`.
+    basis
+        Its FacetBasis.
+    """
+    n, ne, find = mesh.p.shape[1], mesh.nelements, np.asarray(basis.find)
+    found = []
+    for side in (BOTTOM, TOP):
+        chosen = np.nonzero((find >= n + side * ne) & (find < n + (side + 1) * ne))[0]
+        if len(chosen):
+            found.append(Facets(side, chosen, find[chosen] - n - side * ne,
+                                np.asarray(basis.X[0]).ravel()))
+    return found, tuple(station_of_node(mesh, int(k)) for k in find[find < n])
 
 
 @dataclass(frozen=True)
@@ -41,6 +146,8 @@ class Spread:
         Force per deformed area, normal to the faces, or None.
     stations
         Where it acts on a section or a point: element + xi.
+    sampled
+        Densities that are known at points.
     """
 
     body: Array | None = None
@@ -48,6 +155,12 @@ class Spread:
     traction: Array | Callable[[Array], Array] | None = None
     pressure: float | None = None
     stations: tuple[float, ...] = ()
+    sampled: tuple[Sampled, ...] = ()
+
+    @property
+    def acts_at_stations(self) -> bool:
+        """True if it is nowhere spread."""
+        return self.faces is None and self.body is None and not self.sampled
 
 
 def on_facets(mesh: MeshBeam, facets: ArrayLike, **how: Any) -> Spread:

@@ -227,6 +227,33 @@ class System:
             force += self.damping.mass * self.mass.multiply(v)
         return force + (self.damped_modes @ v) @ self.damped_modes
 
+    def damping_acceleration(self, v: Array) -> Array:
+        """The acceleration whose inertia is the damping of the mass and of modes, shape (N,).
+
+        Parameters
+        ----------
+        v
+            Rate of the coordinates, shape (N,).
+        """
+        return self.damping.mass * v + (self.damped_modes @ v) @ self._damped_shapes
+
+    @cached_property
+    def _damped_shapes(self):
+        """The modes whose products with the mass are :attr:`damped_modes`."""
+        if not len(self.damped_modes):
+            return self.damped_modes
+        return splu(self.mass.tocsc()).solve(self.damped_modes.T).T
+
+    def part_forces(self, u: Array, v: Array) -> Array:
+        """What resists on the points of force elements that are no own ones, shape (2, parts).
+
+        Parameters
+        ----------
+        u, v
+            Displacement of the coordinates and its rate, shape (N,).
+        """
+        return self.forces.part_forces(self.machine.tables.plain.forces, u, v)
+
     @cached_property
     def damped_modes(self) -> Array:
         """Rows (k, N): what resists v by damped modes is their product with that of rows and v."""

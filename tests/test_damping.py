@@ -352,12 +352,6 @@ def test_bad_values(make):
         make()
 
 
-def test_fields_of_an_instant_are_those_of_the_elements():
-    """Recovery knows no viscous stress: it is left out, and said."""
-    history = Scene(beam_of(time=1e-2)).clamp("left").gravity((0, -9.81)).integrate(0.02, 1e-3)
-    assert "rate of the strain" in history.state(-1).recovered[0]
-
-
 @pytest.mark.parametrize("body", ["sections", "cable", "neo-hookean"])
 def test_compiled_steps_are_the_same(needs_compiled, body, monkeypatch):
     runs = []

@@ -13,7 +13,9 @@ from ..joints.base import Vector
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from ..beam import Beam
     from ..scene import Scene
+    from ..spread import Facets
     from ..types import Array
 
 #: Relative step of differences, where a force takes no complex numbers.
@@ -93,6 +95,9 @@ class ForceElement(Sealable):
         not, say so in the class: tangents keep their other half then, and modes may be complex.
     distributed : bool
         It acts all along a beam, not on a few points.
+    along
+        Of such a one, bound: the beam, where its parts are, and stations, as
+        :func:`skfem_ancf.spread.facets_along` returns them; None if that is not known.
     links
         What :meth:`bind` has returned, once it is bound.
 
@@ -122,6 +127,7 @@ class ForceElement(Sealable):
 
     symmetric = True
     distributed = False
+    along: tuple[Beam, list[Facets], tuple[float, ...]] | None = None
     links: Any = ()
 
     def bind(self, scene: Scene) -> Sequence[Vector | Link]:

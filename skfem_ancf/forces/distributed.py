@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import require_flag, require_not_negative, teaching
 from ..kernels.section import beam_gradients
 from ..quadrature import gauss
+from ..spread import AXIS, Facets, facets_along
 from .base import ForceElement, Link, Part
 from .texts import DRAG, FOUNDATION
 
@@ -52,6 +53,7 @@ class Foundation(ForceElement):
         X = beam.mesh.mapping().invF(np.asarray(basis.global_coordinates()), basis.tind)
         if not beam.has_sections:
             X[1] = 0.5
+        self.along = beam, *facets_along(beam.mesh, basis)
         self._at = []
         for e, points, dx, n in zip(basis.tind, X.transpose(1, 2, 0), areas,
                                     normals.transpose(1, 2, 0)):
@@ -108,6 +110,8 @@ class Drag(ForceElement):
         X = np.array([xi, 0.5 + 0.0 * xi])
         length = np.sqrt(np.sum(mapping.DF(X)[:, 0] ** 2, axis=0))  # of the axis, by xi
         slopes, frame = beam_gradients(mesh, beam.element, X)
+        every = np.arange(mesh.nelements)
+        self.along = beam, [Facets(AXIS, every, every, xi)], ()
         self._at, self._width = [], beam.width
         for e in range(mesh.nelements):
             for k, x in enumerate(X.T):

@@ -8,8 +8,8 @@ import numpy as np
 
 from .base import Part
 from .masses import PointMass
-from .texts import (NUMBERS, TORSION, ForceTables, element_stiffness, potential, turned,
-                    vectors_of)
+from .texts import (ELASTIC, NUMBERS, RESISTING, TORSION, ForceTables, element_stiffness,
+                    potential, run_kinds, turned, vectors_of)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,7 +55,8 @@ class Forces:
                 self.own.append(element)
             else:
                 parts += found
-        self.parts = sorted(parts, key=lambda part: part.kind)
+        order = sorted(range(len(parts)), key=lambda k: parts[k].kind)
+        self.parts, self._place = [parts[k] for k in order], np.argsort(order)
         n = len(self.parts)
         vectors = [[part.d, part.e] for part in self.parts]
         own = [element.links for element in self.own]
@@ -204,6 +205,34 @@ class Forces:
         return potential(tables, y) + sum(
             element.potential(y[rows].reshape(-1, 2)) or 0.0
             for element, (rows, _) in zip(self.own, self._slices))
+
+    def rows_of(self, element: ForceElement) -> Array:
+        """Where the parts of an element are among all, in its own order; shape (n,)."""
+        first = 0
+        for other in self.elements:
+            n = len(other.parts() or ())
+            if other is element:
+                return self._place[first:first + n]
+            first += n
+        return self._place[:0]
+
+    def part_forces(self, tables: ForceTables, u: Array, v: Array) -> Array:
+        """What resists on the first vector of each part, shape (2, parts).
+
+        Parameters
+        ----------
+        tables
+            Those of :meth:`tables`.
+        u, v
+            Displacement of the coordinates and its rate, shape (N,).
+        """
+        y, w, out = self.vectors(tables, u), np.empty(self.rows), np.zeros(self.rows)
+        vectors_of(tables, v, 0.0, w)
+        run_kinds(tables, np.int64(ELASTIC), y, y, 0.0, out)
+        resisting = np.zeros(self.rows)
+        run_kinds(tables, np.int64(RESISTING), y, w, 0.0, resisting)
+        n = len(self.parts)
+        return (out + resisting)[:2 * n].reshape(2, n)
 
     def turns(self, u: Array) -> Array:
         """The angles of springs of sections, in (-pi, pi] about those without moment.
