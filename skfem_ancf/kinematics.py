@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .kernels import CableKernel, Kernel
-from .kernels.cable import CableSections
+from .kernels.along import CableSections
 from .errors import InputError
 from .formulations.ecm import AXIS
 from .quadrature import gauss
@@ -234,7 +234,9 @@ class Cable(Sections):
 
     @staticmethod
     def _section(beam, u, X, tind):
-        return beam.kernel.section(u, X[0], tind, beam.mesh, beam.element)
+        at = CableSections(beam.kernel, X[0], tind, beam.mesh, beam.element)
+        tangent, strain = at(beam.kernel.gather(u, slice(None) if tind is None else tind))
+        return tangent, at.tangent0, *strain
 
     @classmethod
     def gradients(cls, beam: Beam, u: Array, X: Array, tind: Array | None) -> tuple[Array, Array]:

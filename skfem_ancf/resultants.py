@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
+from .kernels.along import CableSections
 from .quadrature import gauss
-from .section_forces import Sections, cross
+from .mapping import cross
+from .section_forces import Sections
 from .spread import SNAP
 
 if TYPE_CHECKING:
@@ -241,7 +243,8 @@ def _own(state, beam, e, xi):
 
 
 def _cable_axis(beam, u, e, xi):
-    tangent, _, eps, kappa = beam.kernel.section(u, xi[:, None], e, beam.mesh, beam.element)
+    at = CableSections(beam.kernel, xi[:, None], e, beam.mesh, beam.element)
+    tangent, (eps, kappa) = at(beam.kernel.gather(u, e))
     t = tangent[..., 0]
     return np.arctan2(t[1], t[0]), 1.0 + eps[:, 0], 0.0 * xi, kappa[:, 0]
 

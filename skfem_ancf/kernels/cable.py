@@ -393,26 +393,11 @@ class CableKernel(Chain):
         eps, kappa
             Extension and change of curvature, shape (ne, np).
         """
-        at = CableSections(self, xi, tind, mesh, element)
-        tangent, strain = at(self.gather(u, slice(None) if tind is None else tind))
-        return tangent, at.tangent0, strain[0], strain[1]
-
-
-class CableSections:
-    """Sections of a cable: what of their strain does not depend on the state.
-
-    Parameters
-    ----------
-    kernel, xi, tind, mesh, element
-        As for :meth:`CableKernel.section`, xi of shape (np,) or (ne, np), tind (ne,) or None.
-    """
-
-    def __init__(self, kernel: CableKernel, xi: Array, tind: Array | None, mesh: "MeshBeam",
-                 element: "ElementBeamCable") -> None:
-        t = kernel.t if tind is None else kernel.t[:, tind]
+        t = self.t if tind is None else self.t[:, tind]
         L = (mesh.lengths if tind is None else mesh.lengths[tind])
         xi = np.broadcast_to(xi, (t.shape[1],) + np.shape(xi)[-1:])
         scale = L[:, None] ** np.tile(np.arange(element.nodal_dofs), 2)
+        u_e = self.gather(u, slice(None) if tind is None else tind)
         G1, G2 = (np.moveaxis(element.axis(xi, d), 0, -1) * scale[:, None, :]
                   / L[:, None, None] ** d for d in (1, 2))
         q = element.rigid(mesh)
@@ -420,25 +405,15 @@ class CableSections:
         q = np.moveaxis(q, -1, 0)
         q_e = np.concatenate([q[t[0]], q[t[1]]], axis=1)
         a0, b0 = G1 @ q_e, (0.0 if mesh.is_straight else 1.0) * (G2 @ q_e)
+        d = np.concatenate([G1 @ u_e, G2 @ u_e], axis=1).transpose(1, 2, 0)
         frame, (n, ne) = np.concatenate([a0, b0], axis=1).transpose(1, 2, 0), a0.shape[1::-1]
         square0, each = np.sum(a0 * a0, axis=-1), np.arange(ne)
-        self._pack = kernel.packs[0]._replace(
+        pack = self.packs[0]._replace(
             frame=frame, length0=np.sqrt(square0).T, kappa0=(cross(a0, b0) / square0).T,
             weights=np.ones((n, ne)), place=each, frame_place=each)
-        self._slopes, self._shape = np.concatenate([G1, G2], axis=1), (n, ne)
-        self.tangent0 = np.moveaxis(a0 / np.sqrt(square0)[..., None], -1, 0)
-
-    def __call__(self, u_e: Array) -> tuple[Array, Array]:
-        """Unit tangents (2, ne, np), and extension and change of curvature, (2, ne, np).
-
-        Parameters
-        ----------
-        u_e
-            Displacements of the coordinates of the elements, shape (ne, nb, 2).
-        """
-        d, (n, ne) = (self._slopes @ u_e).transpose(1, 2, 0), self._shape
-        r, strain = np.empty(d.shape), np.empty((2, n, ne))
-        weights, square, kappa = np.empty((3, n, ne))
-        cable_strain(self._pack, 0, d, r, weights, square, kappa, strain)
+        r, strain, (weights, square, kappa) = np.empty(d.shape), np.empty((2, n, ne)), np.empty(
+            (3, n, ne))
+        cable_strain(pack, 0, d, r, weights, square, kappa, strain)
         tangent = (r[:n] / np.sqrt(square)[:, None]).transpose(1, 2, 0)
-        return tangent, strain.swapaxes(1, 2)
+        tangent0 = np.moveaxis(a0 / np.sqrt(square0)[..., None], -1, 0)
+        return tangent, tangent0, strain[0].T, strain[1].T
