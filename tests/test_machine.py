@@ -68,7 +68,7 @@ def auto(monkeypatch):
     plain = s.system.machine.tables.plain
     monkeypatch.setattr(compiled, "LOADED", {})
     monkeypatch.setattr(compiled, "load", load)
-    monkeypatch.setattr(compiled, "on_disk", lambda name: False)
+    monkeypatch.setattr(compiled, "on_disk", lambda *names: False)
     monkeypatch.setattr(machine, "CLOCK", machine._Clock())
     return s, loads
 
@@ -90,7 +90,7 @@ def test_compiled_once_numpy_has_taken_as_long(auto, caplog):
 def test_taken_from_disk_once_numpy_has_taken_as_long_as_loading(auto, monkeypatch, caplog):
     s, loads = auto
     caplog.set_level("INFO")
-    monkeypatch.setattr(compiled, "on_disk", lambda name: True)
+    monkeypatch.setattr(compiled, "on_disk", lambda *names: True)
     s.solve_static()
     assert not loads
     machine.CLOCK.spent = machine.LOADING
