@@ -58,6 +58,7 @@ class _Clock:
     def timed(self, text):
         """The text, its time added up."""
         @wraps(text)
+
         def run(*args):
             begun = time.perf_counter()
             try:
@@ -164,8 +165,15 @@ class Machine:
             self._plain = str(error)
             logger.info(self._plain)
             return CLOCK.timed(text), self.tables.plain
+
         def run(*args):
-            return _load(text, args)(*(self._kept(x) for x in args))
+            try:
+                function = _load(text, args)
+            except Exception as error:  # of a Numba that is not as those that are known
+                compiled.PROBLEMS.append(f"{text.__name__} cannot be compiled: {error!r}")
+                logger.warning("%s; it runs in NumPy", compiled.PROBLEMS[-1])
+                return CLOCK.timed(text)(self.tables.plain, *args[1:])
+            return function(*(self._kept(x) for x in args))
 
         return run, equations
 

@@ -74,16 +74,6 @@ def source(function: _Text) -> _Text:
     return function
 
 
-def thin(function: _Text) -> _Text:
-    """As :func:`source`, for a text that does little but call others.
-
-    It is compiled as a part of what calls it: what a function calls is compiled again with it,
-    once for each level.
-    """
-    vars(function).update(twin=None, thin=True)
-    return function
-
-
 def primitive(module: str) -> Callable[[_Text], _Text]:
     """Mark a plain function whose compiled twin is another: that of its name in a module.
 

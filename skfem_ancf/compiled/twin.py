@@ -11,6 +11,7 @@ from numba import cfunc, njit, typeof
 from ..source import column, lanes
 from . import stamp
 from .records import record_type
+from .together import Entry, Text
 from .words import Words
 
 logger = logging.getLogger(__name__)
@@ -19,7 +20,6 @@ logger = logging.getLogger(__name__)
 OPTIONS = {"fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
 #: What reading a cache raises that holds something else.
 _SPOILT = OSError, EOFError, pickle.PickleError, KeyError, ValueError
-_INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 @cache
@@ -49,8 +49,6 @@ def twin(function, entry=False):
     for name in _names(function.__code__):
         if hasattr(names.get(name), "twin"):
             names[name] = twin(names[name])
-    if hasattr(function, "thin") and not entry:
-        return njit(inline="always", **OPTIONS)(named(function, names))
     return jit(named(function, names), entry)
 
 
@@ -66,22 +64,22 @@ def named(function, names=None):
 def jit(function, entry=False):
     """Compile a function; ``entry`` as for :func:`twin`."""
     if not entry:
-        return njit(**OPTIONS, **_INNER)(function)
+        return Text(function, OPTIONS)
     try:
-        return njit(cache=True, **OPTIONS)(function)
+        return njit(cache=True, pipeline_class=Entry, **OPTIONS)(function)
     except RuntimeError as error:  # there is no folder that can be written
         logger.info("compiled code is not kept: %s", error)
-        return njit(**OPTIONS)(function)
+        return njit(pipeline_class=Entry, **OPTIONS)(function)
 
 
 def address_of(function, signature, kept=True):
     """The address of a function compiled as one of C, ``kept`` on disk."""
     if kept:
         try:
-            return cfunc(signature, cache=True, **OPTIONS)(function).address
+            return cfunc(signature, cache=True, pipeline_class=Entry, **OPTIONS)(function).address
         except (RuntimeError, *_SPOILT) as error:  # no folder to write to, or what is in it
             logger.info("compiled code is not kept: %s", error)
-    return cfunc(signature, **OPTIONS)(function).address
+    return cfunc(signature, pipeline_class=Entry, **OPTIONS)(function).address
 
 
 def compile_for(text, args):
@@ -95,7 +93,7 @@ def compile_for(text, args):
         entry = function.compile(types)
     except _SPOILT as error:
         logger.info("what was kept of compiled code cannot be used: %s", error)
-        entry = njit(**OPTIONS)(function.py_func).compile(types)
+        entry = njit(pipeline_class=Entry, **OPTIONS)(function.py_func).compile(types)
 
     def run(*args):
         args = [Words(x) if hasattr(x, "by_place") else x for x in args]
@@ -119,6 +117,6 @@ def _names(code):
     yield from code.co_names
 
 
-@njit(inline="always")
+@jit
 def _one(x):
     return x

@@ -19,7 +19,7 @@ import numpy as np
 from ..band import Band, copy, factorize, fix, multiply, solve_joined, subtract_rows
 from ..body import body_carry, body_force, body_mean, body_stress, body_tangent
 from ..forces.texts import add_elastic_force, element_stiffness
-from ..source import F1, F2, F3, borrowed, by_place, lanes, source, thin
+from ..source import F1, F2, F3, borrowed, by_place, lanes, source
 from ..tables import (add_curvature_force, add_load_stiffness, add_products, constraint,
                       joint_directions, mean_external_force)
 from .dampers import (Dampers, Rows, add_damping, damping_force, factorize_rows, solve_rows)
@@ -328,7 +328,7 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
     return rows.shape[0]
 
 
-@thin
+@source
 def _judge(state, wanted, rough):
     """What the size of a correction tells: of factors that are kept as long as it contracts."""
     size, before = state[SIZE], state[LAST_SIZE]
@@ -370,7 +370,7 @@ def _row(x, n):
     return x[n if x.shape[0] > 1 else 0]
 
 
-@thin
+@source
 def _step(joints, rule, course, n):
     """The :class:`Step` number n."""
     c, g = course.joints.c, course.joints.g
@@ -381,7 +381,7 @@ def _step(joints, rule, course, n):
                 0.5 if rule.conserving > 0 else 1.0, constant)
 
 
-@thin
+@source
 def _begin(free, M, rule, s, w, state):
     """What does not depend on u_1, and where its iteration begins: by the acceleration at 0.
 
@@ -456,7 +456,7 @@ def _energy(M, v, room):
 # its iteration
 
 
-@thin
+@source
 def _tangent(e, matrices, rule, s, w):
     """The iteration matrix, with the stresses at the begin of the step.
 
@@ -496,7 +496,7 @@ def _add_elements(forces, matrices, s, w):
                 S[modes + a, modes + b] = s.stiffness_factor * between[a * k + b]
 
 
-@thin
+@source
 def _factorize(free, matrices, state):
     """Factors of the iteration matrix; False if it has none."""
     fix(matrices.A, free)
@@ -509,7 +509,7 @@ def _factorize(free, matrices, state):
     return True
 
 
-@thin
+@source
 def _resist(e, matrices, rule, s, w):
     """Add the damping force of the iterate to the internal one."""
     u, u0, v, pace, d, f = w.x.u, w.y[0], w.x.v, w.x.pace, w.x.damping, w.x.force
@@ -556,7 +556,7 @@ def _directions(joints, rule, s, w):
     joint_directions(joints, s.joints.g[0], s.t, w.x.u, w.J[1])
 
 
-@thin
+@source
 def _residual(loads, free, M, rule, s, w):
     """R = Q - f - M a - J^T lambda."""
     u, base, rest, held = w.x.u, w.x.base, w.x.rest, w.x.held
@@ -570,7 +570,7 @@ def _residual(loads, free, M, rule, s, w):
     subtract_rows(w.J[0], w.m.l, R)
 
 
-@thin
+@source
 def _add_impulses(joints, s, w):
     """R -= (impulse . Phi'') (v_0 + v_1) / 4: eq. of Gear, Leimkuhler and Gupta (1985)."""
     v0, v, room, share, impulse = w.y[1], w.x.v, w.x.room, w.m.phi, w.m.impulse
@@ -581,7 +581,7 @@ def _add_impulses(joints, s, w):
     add_curvature_force(joints, s.acting, w.x.middle, share, room, w.x.residual)
 
 
-@thin
+@source
 def _correct(joints, free, matrices, s, w, state, anew):
     """Correct u and the multipliers; FAILED if these are not determined."""
     u, R, du, room = w.x.u, w.x.residual, w.x.du, w.x.room
@@ -620,7 +620,7 @@ def _correct(joints, free, matrices, s, w, state, anew):
 # its end
 
 
-@thin
+@source
 def _accelerations(free, rule, s, w, state):
     """w_1 (in place of the correction) and a_1, and the multipliers at the end of the step."""
     u, v, base, rest, v0 = w.x.u, w.x.v, w.x.base, w.x.rest, w.y[1]
@@ -643,7 +643,7 @@ def _accelerations(free, rule, s, w, state):
             a1[i] = (s.mass_factor * (u[i] - base[i]) + rest[i]) * free[i] + given[i]
 
 
-@thin
+@source
 def _close_acceleration(joints, free, mass, rule, s, w, state):
     """Change accelerations and multipliers so that they meet the joints' second rate too."""
     a1, w1, l, dl, shared = w.x.acceleration, w.x.du, w.m.l, w.m.dl, w.m.phi
@@ -661,7 +661,7 @@ def _close_acceleration(joints, free, mass, rule, s, w, state):
     return GO_ON
 
 
-@thin
+@source
 def _finish(free, M, s, w, state):
     """The end of the step becomes the begin of the next."""
     u, v, a1, w1, given = w.x.u, w.x.v, w.x.acceleration, w.x.du, s.supports[2]

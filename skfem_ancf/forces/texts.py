@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..own import own_elements
-from ..source import F1, I1, lanes, primitive, shaped, source, thin
+from ..source import F1, I1, lanes, primitive, shaped, source
 from ..tables import add_products
 
 #: Kinds of elements.
@@ -119,13 +119,13 @@ def _add_force(tables, what, t, u, v, start, f):
     add_products(f, tables.of, tables.weight, F, tables.at)
 
 
-@thin
+@source
 def add_elastic_force(tables, t, u0, u1, f):
     """Add the force without velocity whose work from u0 to u1 is the change of the potential."""
     _add_force(tables, np.int64(ELASTIC), t, u0, u1, 1.0, f)
 
 
-@thin
+@source
 def add_resisting_force(tables, t, u, v, f):
     """Add the part of the force that velocities cause."""
     _add_force(tables, np.int64(RESISTING), t, u, v, 0.0, f)
@@ -153,7 +153,7 @@ def add_element_tangent(tables, t, u, A):
 # the kinds
 
 
-@thin
+@source
 def of_kinds(kinds, what, y, w, factor, out):
     """What is asked of all kinds, from their vectors y, and those at the end or their rates w."""
     if what == ELASTIC:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..quadrature import gauss
-from ..source import F1, F2, F3, I1, lanes, primitive, room, source, thin
+from ..source import F1, F2, F3, I1, lanes, primitive, room, source
 from ..types import Array
 from .base import (CARRY, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
                    Texts, add_force, add_held_energy, add_tangent, block, copy_stress, load,
@@ -161,7 +161,7 @@ def cable_factors(stiffness, weights, r, square, kappa, stress, M, skew):
             Mbb[p, 2, e] = -y * a0 * a1
 
 
-@thin
+@source
 def cable_evaluate(pack, what, u, v, f, given, out, to):
     """As :func:`~skfem_ancf.kernels.section.section_evaluate`."""
     most = block(pack.pairs.pairs.shape[1])
@@ -176,7 +176,7 @@ def run_cable(pack, what, first, last, u, v, f, given, out, to):
     cable_block(pack, what, first, last, u, v, f, given, out, to)
 
 
-@thin
+@source
 def cable_block(pack, what, first, last, u, v, f, given, out, to):
     """As :func:`cable_evaluate`, for the elements from ``first`` to ``last``."""
     given, out = given[:, :, first:last], out[:, :, first:last]

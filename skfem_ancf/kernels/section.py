@@ -15,7 +15,7 @@ from scipy import sparse
 
 from ..materials import LinearLaw
 from ..quadrature import tensor
-from ..source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped, source, thin
+from ..source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
 from ..types import Array
 from .base import (CARRY, MEAN, STRESS, TANGENT, VISCOUS, Chain, Content, PairTables, Texts,
                    add_force, add_held_energy, add_tangent, apart, block, copy_stress, in_rounds,
@@ -228,7 +228,7 @@ def pair_factors(rows, samples, terms, rounds, moduli, r, M, M_skew):
                 M_skew[q, 0, e] += 0.5 * (x - y)
 
 
-@thin
+@source
 def section_evaluate(pack, what, u, v, f, given, out, to):
     """Everything that depends on the strains, block by block.
 
@@ -264,7 +264,7 @@ def run_section(pack, what, first, last, u, v, f, given, out, to):
     section_block(pack, what, first, last, u, v, f, given, out, to)
 
 
-@thin
+@source
 def section_block(pack, what, first, last, u, v, f, given, out, to):
     """As :func:`section_evaluate`, for the elements from ``first`` to ``last``."""
     table, rows, law = pack.table, pack.rows, pack.law
@@ -312,7 +312,7 @@ def section_block(pack, what, first, last, u, v, f, given, out, to):
         _add_tangent(pack, first, at, samples, D, w, r, to)
 
 
-@thin
+@source
 def _add_tangent(pack, first, at, samples, D, w, r, to):
     """The tangent of stresses at the samples and of moduli at the points."""
     pairs, size = pack.pairs, r.shape[2]

@@ -11,7 +11,7 @@ from ..body import body_carry, body_force, body_tangent
 from ..border import (Factors, add_curvature, factorize_bordered, new_factors, solve_bordered)
 from ..forces.texts import add_elastic_force, add_element_tangent
 from ..own import own_solve
-from ..source import F1, borrowed, by_place, lanes, source, thin
+from ..source import F1, borrowed, by_place, lanes, source
 from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
                       external_force, joint_directions)
 
@@ -202,7 +202,7 @@ def _tangent(e, target, rules, x, w, k):
         w.scale[i] = 1.0 / np.abs(w.scale[i])
 
 
-@thin
+@source
 def _residual(e, target, x, w):
     """The residual at free coordinates; returns how far joints are open."""
     external_force(e.loads, target.factors, np.nan, target.scale, x.u, w.load)
@@ -218,7 +218,7 @@ def _residual(e, target, x, w):
     return opening
 
 
-@thin
+@source
 def _correction(e, target, rules, x, w, moving):
     """The correction into w; returns the root of its work, negative if there is none."""
     N, m = x.u.size, w.phi.size
@@ -242,7 +242,7 @@ def _correction(e, target, rules, x, w, moving):
     return work
 
 
-@thin
+@source
 def _solved(e, target, rules, x, w):
     """Solve for the correction; False if the matrix is singular."""
     if rules.solver > 0:
