@@ -120,6 +120,23 @@ def test_a_broken_numba_costs_nothing_but_speed(auto, monkeypatch):
     assert "another NumPy" in s.plan()["compiled loop"].reason
 
 
+def test_what_cannot_be_compiled_runs_in_numpy(auto, monkeypatch, caplog):
+    """A Numba that is not as those that are known: said once, and nothing is lost."""
+    s, _ = auto
+    monkeypatch.setattr(compiled, "PROBLEMS", [])
+
+    def load(text, args):
+        raise AttributeError("Numba has changed")
+
+    monkeypatch.setattr(compiled, "load", load)
+    machine.CLOCK.spent = 1e3
+    for _ in range(2):
+        assert s.solve_static().converged
+    said = [r.message for r in caplog.records if "runs in NumPy" in r.message]
+    assert len(said) == 1 and "Numba has changed" in said[0]
+    assert "Numba has changed" in s.plan()["compiled loop"].reason
+
+
 def test_one_signature_for_every_scene(needs_compiled, monkeypatch):
     from skfem_ancf.compiled.twin import type_of
 
@@ -186,6 +203,46 @@ def test_texts_and_twins():
     compile_for(total_of_squares, (x, z))(x, z)
     assert y.tolist() == z.tolist() == [14.0, 15.0, 18.0, 23.0]
     assert primitive("factors")(lambda: None).twin == "factors"
+
+
+def test_what_two_entries_call_is_lowered_once(monkeypatch):
+    from skfem_ancf.switch import compiled_off
+
+    if compiled_off() is not None:
+        pytest.skip(compiled_off())
+    from skfem_ancf.compiled import together, twin
+
+    lowered = []
+    compile_extra = together.compiler.compile_extra
+    monkeypatch.setattr(together.compiler, "compile_extra", lambda *args, **options: (
+        lowered.append(args[2].__name__), compile_extra(*args, **options))[1])
+    njit = twin.njit
+    monkeypatch.setattr(twin, "njit", lambda cache=False, **options: njit(**options))
+    x, y, z = np.arange(4.0), np.zeros(4), np.zeros(4)
+    twin.compile_for(sum_of_cubes, (x, y))(x, y)
+    twin.compile_for(total_of_cubes, (x, z))(x, z)
+    assert y[0] == 36.0 and z.tolist() == [36.0, 37.0, 44.0, 63.0]
+    assert [name for name in lowered if name == "cube"] == ["cube"]
+
+
+@source
+def cube(x, y):
+    for i in lanes(x.size):
+        y[i] = x[i] * x[i] * x[i]
+
+
+@source
+def sum_of_cubes(x, y):
+    cube(x, y)
+    y[0] = np.sum(y)
+
+
+@source
+def total_of_cubes(x, y):
+    cube(x, y)
+    total = np.sum(y)
+    for i in lanes(x.size):
+        y[i] += total
 
 
 @source
