@@ -11,6 +11,7 @@ from .errors import (AncfError, CallbackError, CallError, ConvergenceError, File
                      SupportError)
 from .materials import NeoHookean, StVenantKirchhoff
 from .mesh import MeshBeam
+from .rigid import RigidBody
 from .scene import Scene
 
 __version__ = "0.1.0"
@@ -20,6 +21,7 @@ __all__ = [
     "ElementBeamANCF", "ElementBeamANCFCubic", "ElementBeamCable", "ElementBeamPatelShabana",
     "EnergyMomentum", "FileError", "GeneralizedAlpha", "InputError", "KelvinVoigt", "MeshBeam",
     "MeshError",
-    "MissingExtra", "ModelWarning", "NameUnknown", "NeoHookean", "Newmark", "Scene",
+    "MissingExtra", "ModelWarning", "NameUnknown", "NeoHookean", "Newmark", "RigidBody",
+    "Scene",
     "StVenantKirchhoff", "StabilityWarning", "SupportError", "forms", "reference_coordinates",
 ]

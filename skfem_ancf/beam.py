@@ -23,6 +23,7 @@ from .materials import Material
 from .mesh import MeshBeam
 from .places import as_point, facets_of
 from .quadrature import gauss, tensor
+from .rigid import RigidBody
 from .series import Series
 from .strains import ElementStrain
 
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
     from .formulations.base import Formulation, Term
-    from .types import Array, Place, WhichBeam
+    from .types import Array, Place, WhichMember
 
 
 @taught
@@ -399,6 +400,11 @@ class Beam(Frozen):
         """Coordinates (2, n) and weights (n,) of the direction 12 / h^3 int Y r dY of a section."""
         return self.kinematics.direction(self, node)
 
+    @property
+    def size(self) -> float:
+        """Length of its axis."""
+        return float(self.mesh.lengths.sum())
+
     def rigid_motions(self) -> Array:
         """Two translations and the rotation about :attr:`origin`: shape (N, 3)."""
         q = self.q0_local.reshape(-1, self.nd // 2, 2)
@@ -564,7 +570,7 @@ class Beam(Frozen):
         return asm(forms.mass(self.density, self.width), self.exact_basis())
 
 
-def select_beam(beams: Sequence[Beam], beam: WhichBeam) -> Beam:
+def select_beam(beams: Sequence[Beam], beam: WhichMember) -> Beam:
     """The beam meant by a Beam, a name, a number, or None where there is only one.
 
     Parameters
@@ -593,4 +599,34 @@ def select_beam(beams: Sequence[Beam], beam: WhichBeam) -> Beam:
     known = [b.name if b.name is not None else k for k, b in enumerate(beams)]
     if beam is None:
         raise InputError(f"the scene has {len(beams)} beams: say which with beam=, one of {known}")
+    if isinstance(beam, RigidBody):
+        raise InputError(f"this is asked of beams, got {shown(beam)}; beams are {known}")
     raise NameUnknown("beam", beam, known)
+
+
+def select_member(beams: Sequence[Beam], bodies: Sequence[RigidBody],
+                  which: WhichMember) -> Beam | RigidBody:
+    """As :func:`select_beam`, of beams and of rigid bodies, which are numbered behind them.
+
+    Parameters
+    ----------
+    beams, bodies
+        Those of a scene.
+    which
+        A Beam or a RigidBody, its name or its number; None for the only beam.
+
+    Raises
+    ------
+    NameUnknown
+        If there is none, or None is given and there are several beams.
+    """
+    if which is None or not bodies:
+        return select_beam(beams, which)
+    members = *beams, *bodies
+    if isinstance(which, RigidBody):
+        found = [b for b in bodies if b is which]
+        if found:
+            return found[0]
+        raise NameUnknown("rigid body", which, [b.name or len(beams) + k
+                                                for k, b in enumerate(bodies)])
+    return select_beam(members, which)  # type: ignore[arg-type]

@@ -22,8 +22,9 @@ class Border(NamedTuple):
 
     Attributes
     ----------
-    picked, springs
-        Coordinates picked; the first of them, so many, are held by springs.
+    picked, springs, loose
+        Coordinates picked; the first of them, so many, are held by springs, of which the last have
+        no stiffness of their own.
     inside_at, inside_of, outside_at, outside_of
         Where the second derivatives of joints go: their places in the band and in S, and which
         of :class:`~skfem_ancf.tables.JointTables` they are.
@@ -33,6 +34,7 @@ class Border(NamedTuple):
 
     picked: I1
     springs: int
+    loose: int
     inside_at: I1
     inside_of: I1
     outside_at: I1
@@ -88,8 +90,8 @@ def add_curvature(joints, border, multipliers, free, A, S):
     for k in range(border.springs):
         at = border.picked[k]
         stiffness = abs(size[at])
-        if stiffness == 0.0:
-            stiffness = mean
+        if stiffness == 0.0 or k >= border.springs - border.loose:
+            stiffness += mean
         A.flat[at * A.ld + A.top] += stiffness
         S[k, k] = -stiffness
 

@@ -22,13 +22,15 @@ if TYPE_CHECKING:
 COLUMNS = 64
 
 
-def hold(K: BandMatrix, i: Array, j: Array, values: Array, springs: Array) -> tuple[Array, Array]:
+def hold(K: BandMatrix, i: Array, j: Array, values: Array, springs: Array,
+         loose: int = 0) -> tuple[Array, Array]:
     """Add entries and springs to a band matrix, and factorise it.
 
     Parameters
     ----------
-    K, i, j, values, springs
-        As for :class:`BorderedMatrix`: the matrix, entries of shapes (k,), coordinates (s,).
+    K, i, j, values, springs, loose
+        As for :class:`BorderedMatrix`: the matrix, entries of shapes (k,), coordinates (s,), and
+        how many of them are loose.
 
     Returns
     -------
@@ -40,7 +42,8 @@ def hold(K: BandMatrix, i: Array, j: Array, values: Array, springs: Array) -> tu
     K.add(i[inside], j[inside], values[inside])
     diagonal = np.abs(K.diagonal())
     stiffness = diagonal[springs]
-    stiffness[stiffness == 0.0] = np.mean(diagonal)
+    loosely = np.arange(len(springs)) >= len(springs) - loose
+    stiffness[loosely | (stiffness == 0.0)] += np.mean(diagonal)
     K.add(springs, springs, stiffness)
     K.factorize()
     return border(K.bandwidth, i, j, values, springs, stiffness)
@@ -175,6 +178,8 @@ class BorderedMatrix:
         Entries to add to K, of both halves where it is symmetric, shapes (k,).
     springs
         Coordinates to hold, shape (s,).
+    loose
+        How many of the last of them have no stiffness of their own.
 
     Raises
     ------
@@ -183,11 +188,11 @@ class BorderedMatrix:
     """
 
     def __init__(self, K: BandMatrix, J: Array, i: Array, j: Array, values: Array,
-                 springs: Array) -> None:
-        picked, S = hold(K, i, j, values, springs)
+                 springs: Array, loose: int = 0) -> None:
+        picked, S = hold(K, i, j, values, springs, loose)
         none, (m, n), k = np.zeros(0, np.int64), J.shape, len(picked)
         self._K, self._J = K, J
-        self._border = Border(picked, len(springs), none, none, none, none, 0)
+        self._border = Border(picked, len(springs), loose, none, none, none, none, 0)
         self._f = Factors(K.band, K.factors, np.array(J), S, np.zeros((k + m, n)),
                           np.zeros((k + m, k + m)), np.ones(m))
         join(self._f, self._border, np.ones(n))

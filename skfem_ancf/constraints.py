@@ -9,14 +9,14 @@ import numpy as np
 from scipy import sparse
 
 from .errors import SupportError, shown
-from .joints.base import same_joint
+from .joints.base import Joint, same_joint
 from .rank import first_dependent, null_space, unit_rows
+from .rigid import RigidBody
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from .beam import Beam
-    from .joints.base import Joint
     from .types import Array
 
 #: Columns of a border above which sparse LU is faster.
@@ -31,8 +31,8 @@ class Constraints:
 
     Parameters
     ----------
-    beams, slices
-        The beams, in order, and the coordinates of each.
+    members, slices
+        The beams and behind them the rigid bodies, in order, and the coordinates of each.
     size
         Length of all beams together.
     fixed, values
@@ -56,9 +56,10 @@ class Constraints:
         For each coordinate whether it is free, as truth values and as 1 or 0; shape (N,).
     """
 
-    def __init__(self, beams: Sequence[Beam], slices: Sequence[slice], size: float, fixed: Array,
-                 values: Array, joints: Sequence[Joint], stiffness: Callable[[], Any]) -> None:
-        self.beams, self.slices, self.size, self._stiffness = beams, slices, size, stiffness
+    def __init__(self, members: Sequence[Beam | RigidBody], slices: Sequence[slice], size: float,
+                 fixed: Array, values: Array, joints: Sequence[Joint],
+                 stiffness: Callable[[], Any]) -> None:
+        self.members, self.slices, self.size, self._stiffness = members, slices, size, stiffness
         self.N = slices[-1].stop
         self._supported = False
         self._eliminate(fixed, values, joints)
@@ -96,9 +97,16 @@ class Constraints:
     def describe_dof(self, k: int) -> str:
         """What coordinate number k is, in words."""
         b = int(np.searchsorted([s.start for s in self.slices], k, side="right")) - 1
-        beam, k = self.beams[b], k - self.slices[b].start
-        who = "" if len(self.beams) == 1 else f" of beam {beam.name or b}"
-        return f"{beam.dofnames[k % beam.nd]} of node {k // beam.nd}{who}"
+        member, k = self.members[b], k - self.slices[b].start
+        node = "" if isinstance(member, RigidBody) else f" of node {k // member.nd}"
+        return f"{member.dofnames[k % member.nd]}{node}{self._who(b)}"
+
+    def _who(self, k):
+        """Which beam or body is number k, for messages."""
+        member = self.members[k]
+        if isinstance(member, RigidBody):
+            return f" of the rigid body {member.name or k}"
+        return "" if len(self.members) == 1 else f" of beam {member.name or k}"
 
     # fixed coordinates
 
@@ -273,6 +281,35 @@ class Constraints:
         i, j, values = self._curvature(u, t, multipliers)
         return np.bincount(i, values * v[j], self.N)
 
+    @cached_property
+    def _limited(self) -> list[Joint]:
+        """Joints that may be lost."""
+        return [joint for joint in self.joints if type(joint).lost is not Joint.lost]
+
+    def lost(self, u: Array) -> str:
+        """Which joint cannot hold in a converged state, and why; "" if all can.
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (N,).
+        """
+        return next(filter(None, (joint.lost(u) for joint in self._limited)), "")
+
+    def first_lost(self, rows: Array) -> tuple[int, str]:
+        """How many states one after the other joints can hold, and why not the next one.
+
+        Parameters
+        ----------
+        rows
+            Displacements of the coordinates, shape (n, N).
+        """
+        for k, u in enumerate(rows if self._limited else ()):
+            text = self.lost(u)
+            if text:
+                return k, text
+        return len(rows), ""
+
     def multipliers_of(self, multipliers: Array) -> list[Array]:
         """The multipliers joint by joint: a list in the order of :attr:`joints`."""
         if not self.joints:
@@ -324,9 +361,9 @@ class Constraints:
 
     @cached_property
     def _standing(self) -> list[bool]:
-        """Of each beam, whether its own supports hold it."""
+        """Of each beam and body, whether its own supports hold it."""
         found = []
-        for beam, s in zip(self.beams, self.slices):
+        for beam, s in zip(self.members, self.slices):
             held = np.flatnonzero(~self.free[s])
             motions = unit_rows(beam.rigid_motions()[held] / [1.0, 1.0, self.size])
             found.append(len(motions) > 0 and np.linalg.matrix_rank(motions, 1e-9) == 3)
@@ -336,10 +373,14 @@ class Constraints:
     def springs(self) -> Array:
         """Coordinates that hold the beams which their own supports leave free to move.
 
-        The positions of two nodes far apart, for each such beam.
+        The positions of two nodes far apart, for each such beam; all coordinates of rigid bodies,
+        which have no stiffness of their own, come last.
         """
         found: list[int] = []
-        for beam, s, stands in zip(self.beams, self.slices, self._standing):
+        for beam, s, stands in zip(self.members, self.slices, self._standing):
+            if isinstance(beam, RigidBody):
+                found += range(s.start, s.stop)
+                continue
             if stands:
                 continue
             p = beam.mesh.p
@@ -347,6 +388,12 @@ class Constraints:
             found += [s.start + node * beam.nd + k for node in (0, far) for k in range(2)]
         out = np.array(found, dtype=int)
         return out[self.free[out]]
+
+    @cached_property
+    def loose(self) -> int:
+        """How many of the last of :attr:`springs` are coordinates of rigid bodies."""
+        return sum(int(np.sum(self.free[s])) for member, s in zip(self.members, self.slices)
+                   if isinstance(member, RigidBody))
 
     @property
     def bordered(self) -> bool:
@@ -357,13 +404,13 @@ class Constraints:
         """Descriptions of the rigid motions that nothing holds, one string each."""
         if all(self._standing):
             return []
-        sizes = [float(beam.mesh.lengths.sum()) for beam in self.beams]
-        values = np.concatenate([beam.rigid_motions() / [1.0, 1.0, size]
-                                 for beam, size in zip(self.beams, sizes)])
-        of_beam = np.repeat(np.arange(len(self.beams)), [b.N for b in self.beams])
+        sizes = [member.size for member in self.members]
+        values = np.concatenate([member.rigid_motions() / [1.0, 1.0, size]
+                                 for member, size in zip(self.members, sizes)])
+        of_member = np.repeat(np.arange(len(sizes)), [b.N for b in self.members])
         motions = sparse.csr_array(
-            (values.ravel(), (3 * of_beam[:, None] + np.arange(3)).ravel(),
-             3 * np.arange(self.N + 1)), shape=(self.N, 3 * len(self.beams)))
+            (values.ravel(), (3 * of_member[:, None] + np.arange(3)).ravel(),
+             3 * np.arange(self.N + 1)), shape=(self.N, 3 * len(sizes)))
         pushed = self._stiffness() @ motions
         size = abs(pushed).max(axis=1).toarray().ravel() if pushed.nnz else np.zeros(self.N)
         held = sparse.vstack([motions[self.fixed],
@@ -373,9 +420,9 @@ class Constraints:
 
     def _describe(self, v, sizes):
         parts = []
-        for k, beam in enumerate(self.beams):
+        for k, beam in enumerate(self.members):
             a, b, c = v[3 * k:3 * k + 3]
-            who = "" if len(self.beams) == 1 else f" of beam {beam.name or k}"
+            who = self._who(k)
             if max(abs(a), abs(b), abs(c)) < 1e-8:
                 continue
             if abs(c) < 1e-8:

@@ -82,6 +82,10 @@ def displacement(system: System, state: State, name: str = "start") -> Array:
                 raise InputError(
                     f"{name} is a state of another mesh{who}: {why}. Its coordinates mean "
                     "something else here; where they do not, scene.state(other.u) takes them over")
+    places = [[(tuple(b.position), b.angle) for b in s.bodies] for s in (other, system)]
+    if places[0] != places[1]:
+        raise InputError(f"{name} is a state of other rigid bodies: at (position, angle) "
+                         f"{places[0]} there, {places[1]} in the scene")
     return np.array(require_finite(f"{name}.u", state.u, (system.N,)))
 
 

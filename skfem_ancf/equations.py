@@ -238,7 +238,7 @@ class Tables:
     def _border(self, joints):
         s, none = self.system, np.zeros(0, dtype=np.int64)
         if not s.joints or not s.bordered or joints.own or s.forces.far:
-            return Border(none, 0, none, none, none, none, int(s.coupled))
+            return Border(none, 0, 0, none, none, none, none, int(s.coupled))
         i, j, ns = joints.hi, joints.hj, len(s.springs)
         outside = np.abs(i - j) > s.bandwidth
         far = np.unique(np.append(i[outside], j[outside]))
@@ -246,7 +246,7 @@ class Tables:
         out, = np.nonzero(outside)
         stored, = np.nonzero(~outside & ((i >= j) | (not s.symmetric)))
         row, column = (ns + np.searchsorted(far, x[out]) for x in (i, j))
-        return Border(picked, ns, s.K._position(i[stored], j[stored]), stored,
+        return Border(picked, ns, s.loose, s.K._position(i[stored], j[stored]), stored,
                       row * len(picked) + column, out, 0)
 
 

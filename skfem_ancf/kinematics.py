@@ -65,6 +65,24 @@ class Sections:
         return node * beam.nd + 2 * first + np.arange(2 * len(f)).reshape(-1, 2).T, c
 
     @staticmethod
+    def direction_weights(beam: Beam, e: int, xi: float) -> Array:
+        """Weights (nb,) of an element's local functions in the direction of a section inside it.
+
+        Of the same integral as :meth:`direction`; of a cable those of the tangent of its axis.
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+        e, xi
+            The element, and where in it the section is, from 0 to 1.
+        """
+        eta, w = gauss(beam.element.order + 1)
+        rows = beam.element.local(np.array([xi + 0.0 * eta, eta]), beam.mesh.height)
+        return 12.0 / beam.mesh.height * (
+            rows[0] @ (w * (eta - 0.5))) * beam.mesh.lengths[e] ** rows[3]
+
+    @staticmethod
     def plane(beam: Beam, tangent: Array) -> tuple[Array, list[int]]:
         """What keeps a section in its plane: its normal, and the coordinates that stay in it.
 
@@ -227,6 +245,11 @@ class Cable(Sections):
     def direction(beam: Beam, node: int) -> tuple[Array, Array]:
         # the tangent, which turns with the section
         return node * beam.nd + 2 + np.arange(2).reshape(2, 1), np.ones(1)
+
+    @staticmethod
+    def direction_weights(beam: Beam, e: int, xi: float) -> Array:
+        rows = beam.element.local(np.array([[xi], [0.5]]), beam.mesh.height)
+        return rows[1][:, 0] * beam.mesh.lengths[e] ** (rows[3] - 1.0)
 
     @staticmethod
     def plane(beam: Beam, tangent: Array) -> tuple[Array, list[int]]:

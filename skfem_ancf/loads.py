@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from skfem.assembly import FacetBasis, LinearForm, asm
@@ -22,6 +22,7 @@ from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number
 from .frozen import Sealable, read_only
 from .kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from .pickling import picklable_form
+from .rigid import RigidBody
 from .spread import BODY, Sampled, Spread, facets_along, on_facets, stations_of_vector
 
 if TYPE_CHECKING:
@@ -71,6 +72,8 @@ class Load(Sealable):
         The derivative of the force is symmetric: the load has a potential.
     linear : bool
         The force is linear in the displacement, but for a constant: it is assembled once.
+    for_bodies : bool
+        It may act on a :class:`~skfem_ancf.RigidBody` too.
 
     Examples
     --------
@@ -108,6 +111,7 @@ class Load(Sealable):
     beam: Any
     linear = False
     turning = False
+    for_bodies = False
 
     def __init__(self, beam: WhichBeam = None, amplitude: TimeFunction = None) -> None:
         self.beam, self.amplitude = beam, amplitude
@@ -191,7 +195,7 @@ class Load(Sealable):
         return f"<{type(self).__name__} on {self.beam!r}>"
 
 
-def bind_load(load: Load, beam: Beam) -> Load:
+def bind_load(load: Load, beam: Beam | RigidBody) -> Load:
     """A load on a beam, tried there: what it returns fits the beam.
 
     Parameters
@@ -199,7 +203,7 @@ def bind_load(load: Load, beam: Beam) -> Load:
     load
         A :class:`Load`, as it was given.
     beam
-        The :class:`~skfem_ancf.Beam` it acts on.
+        The :class:`~skfem_ancf.Beam` or :class:`~skfem_ancf.RigidBody` it acts on.
 
     Returns
     -------
@@ -211,7 +215,10 @@ def bind_load(load: Load, beam: Beam) -> Load:
     InputError
         If the load does not keep to the interface of :class:`Load`.
     """
-    bound = load.bind(beam)
+    if isinstance(beam, RigidBody) and not load.for_bodies:
+        raise InputError(f"{type(load).__name__} acts on beams and not on {beam!r}: a rigid body "
+                         "takes scene.gravity, scene.point_force, scene.moment, springs and joints")
+    bound = load.bind(cast("Beam", beam))
     if type(bound) in (DeadLoad, Pressure, EndMoment):
         bound._seal()
         return bound
@@ -271,14 +278,16 @@ class Weight(Load):
         As for :class:`Load`.
     """
 
+    for_bodies = True
+
     def __init__(self, g: ArrayLike, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
         super().__init__(beam, amplitude)
         self.g = require_finite("g", g, (2,))
 
-    def bind(self, beam: Beam) -> Load:
-        return DeadLoad(beam, beam.weight(self.g), self.amplitude,
-                        Spread(body=beam.density * self.g))
+    def bind(self, beam: Beam | RigidBody) -> Load:
+        spread = None if isinstance(beam, RigidBody) else Spread(body=beam.density * self.g)
+        return DeadLoad(beam, beam.weight(self.g), self.amplitude, spread)
 
 
 class PointForce(Load):
@@ -294,15 +303,19 @@ class PointForce(Load):
         As for :class:`Load`.
     """
 
+    for_bodies = True
+
     def __init__(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
         super().__init__(beam, amplitude)
         self.total, self.at = require_finite("force", force, (2,)), at
 
-    def bind(self, beam: Beam) -> Load:
+    def bind(self, beam: Beam | RigidBody) -> Load:
         dofs, weights = beam.probe(self.at)
         vector = np.zeros(beam.N)
-        np.add.at(vector, dofs, np.outer(self.total, weights))
+        np.add.at(vector, dofs, self.total[:, None] * weights)
+        if isinstance(beam, RigidBody):
+            return DeadLoad(beam, vector, self.amplitude)
         e, X = beam.locate(self.at)
         return DeadLoad(beam, vector, self.amplitude, Spread(stations=(e + float(X[0]),)))
 
@@ -440,9 +453,11 @@ class DeadLoad(Load):
         How it is spread over the body, a :class:`~skfem_ancf.spread.Spread`; None to find out.
     """
 
-    def __init__(self, beam: Beam, vector: ArrayLike, amplitude: TimeFunction = None,
+    for_bodies = True
+
+    def __init__(self, beam: Beam | RigidBody, vector: ArrayLike, amplitude: TimeFunction = None,
                  spread: Spread | None = None) -> None:
-        super().__init__(_the_beam(beam), amplitude)
+        super().__init__(_the_beam(beam, self.for_bodies), amplitude)
         self.vector = read_only(require_finite("the load", vector, (beam.N,)))
         self._spread = spread
 
@@ -522,10 +537,10 @@ class EndMoment(Load):
     Parameters
     ----------
     beam
-        A :class:`~skfem_ancf.Beam`.
+        A :class:`~skfem_ancf.Beam` or a :class:`~skfem_ancf.RigidBody`.
     boundary
         A place that is one section, see :func:`skfem_ancf.places.facets_of`; or the number of a
-        node.
+        node. None, or a point, of a rigid body.
     M
         The moment, counterclockwise.
     amplitude
@@ -534,14 +549,15 @@ class EndMoment(Load):
 
     constant = False
     turning = True
+    for_bodies = True
 
-    def __init__(self, beam: Beam, boundary: Place | int, M: float,
+    def __init__(self, beam: Beam | RigidBody, boundary: Place | int | None, M: float,
                  amplitude: TimeFunction = None) -> None:
-        super().__init__(_the_beam(beam), amplitude)
+        super().__init__(_the_beam(beam, self.for_bodies), amplitude)
         self.M, self.boundary = M, boundary
         if isinstance(boundary, (int, np.integer)):
             self.boundary = np.array([boundary])
-        self.node = beam.section_node(self.boundary)
+        self.node = beam.section_node(cast("Place", self.boundary))
         self.dofs, self.c = beam.section_direction(self.node)
 
     def bind(self, beam: Beam) -> Load:
@@ -598,7 +614,7 @@ class EndMoment(Load):
         return -self.M * self.angle(u)
 
 
-def _the_beam(beam):
-    if not isinstance(beam, Beam):
+def _the_beam(beam, bodies=False):
+    if not isinstance(beam, Beam) and not (bodies and isinstance(beam, RigidBody)):
         raise InputError(f"this load acts on a Beam, got {shown(beam)}")
     return beam

@@ -82,7 +82,7 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         "each iteration; the last evaluates the force only")
     add("mass", "constant" if dynamic else "skipped",
         "assembled and factorised once" if dynamic else "no inertia in statics")
-    for item in (_damping(s, dynamic), _elements(s)):
+    for item in (_bodies(s), _damping(s, dynamic), _elements(s)):
         add(*item)
     dead = [load for load in scene.loads if load.constant and load.amplitude is None]
     rest = len(scene.loads) - len(dead)
@@ -135,6 +135,14 @@ def _damping(s, dynamic):
         return "damping", "skipped", "there is none"
     return ("damping", "computed", ", ".join(kinds)) if dynamic else (
         "damping", "skipped", "no velocities in statics")
+
+
+def _bodies(s):
+    """Term, status and reason of rigid bodies."""
+    if not s.bodies:
+        return "rigid bodies", "skipped", "there are none"
+    return "rigid bodies", "computed", (f"{len(s.bodies)}: 4 coordinates each, a constant mass, a "
+                                        "multiplier for the length of the director")
 
 
 def _elements(s):

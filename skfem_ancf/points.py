@@ -12,16 +12,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .beam import select_beam
-from .errors import MeshError, require_finite, shown
+from .beam import select_beam, select_member
+from .errors import InputError, MeshError, require_finite, shown
 from .places import as_point
+from .rigid import RigidBody
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .beam import Beam
     from .mesh import MeshBeam
-    from .types import Array, WhichBeam
+    from .system import System
+    from .types import Array, WhichMember
 
 #: Types of numbers of which nothing has to be asked.
 PLAIN = (float, int, np.float64)
@@ -282,6 +284,51 @@ def _turned(t):
     return np.stack([-t[..., 1, :], t[..., 0, :]], -2)
 
 
+class BodyPart:
+    """Points of one rigid body.
+
+    Attributes
+    ----------
+    body
+        The :class:`~skfem_ancf.RigidBody`.
+    coordinates : slice
+        Those of the body in its scene.
+    index
+        Which of the points they are, (n,), or None for all.
+    start
+        Positions at the start, (2, n).
+    """
+
+    off_axis = True  # not of one table of weights for both components
+
+    def __init__(self, body: RigidBody, coordinates: slice, index: Array | None,
+                 start: Array) -> None:
+        self.body, self.coordinates, self.index, self.start = body, coordinates, index, start
+        self._frame = body.local(start)
+
+    def displacement(self, u: Array) -> Array:
+        """Displacements (..., 2, n) for coordinates ``u`` (..., N) of the scene."""
+        x, y, c, s = np.moveaxis(u[..., self.coordinates, None], -2, 0)
+        a, b = self._frame
+        return np.stack([x + a * c - b * s, y + a * s + b * c], axis=-2)
+
+    def velocity(self, u: Array, v: Array) -> Array:
+        """Velocities (..., 2, n).
+
+        Parameters
+        ----------
+        u, v
+            Displacement of the coordinates of the scene and its rate, shapes (..., N).
+        """
+        return self.displacement(v)
+
+    @property
+    def number(self) -> int:
+        """Raises InputError: a rigid body has no fields."""
+        raise InputError(f"{self.body!r} has no strain, stress or section forces: ask for points "
+                         "of beams")
+
+
 class Located:
     """Points of a scene.
 
@@ -291,11 +338,11 @@ class Located:
         They were given as a single point.
     n : int
         How many.
-    parts : list of Part
-        Those of each beam that has some.
+    parts : list of Part and BodyPart
+        Those of each beam and body that has some.
     """
 
-    def __init__(self, one: bool, n: int, parts: list[Part]) -> None:
+    def __init__(self, one: bool, n: int, parts: Sequence[Any]) -> None:
         self.one, self.n, self.parts = one, n, parts
 
     def gather(self, values: Sequence[Array]) -> Array:
@@ -342,23 +389,28 @@ class Points:
     Parameters
     ----------
     beams, slices
-        The beams, and their coordinates in the scene.
+        The beams, and the coordinates in the scene of them and of the bodies behind them.
+    bodies
+        Rigid bodies.
     """
 
-    def __init__(self, beams: Sequence[Beam], slices: Sequence[slice]) -> None:
-        self.beams, self.slices = list(beams), slices
+    def __init__(self, beams: Sequence[Beam], slices: Sequence[slice],
+                 bodies: Sequence[RigidBody] = ()) -> None:
+        self.beams, self.slices, self.bodies = list(beams), slices, list(bodies)
         self._known: OrderedDict[Any, Located] = OrderedDict()
         self._held = 0
 
-    def find(self, points: Any, beam: WhichBeam = None) -> Located:
+    def find(self, points: Any, beam: WhichMember = None) -> Located:
         """Where points are.
 
         Parameters
         ----------
         points
-            One point, shape (2,), or many, shape (2, n) or a list, see :func:`as_points`.
+            One point, shape (2,), or many, shape (2, n) or a list, see :func:`as_points`; a
+            RigidBody for its centre of mass.
         beam
-            The beam that they are in, its name or number; found for each if it is not given.
+            The beam or rigid body that they are in, its name or number; found for each if it is not
+            given.
 
         Returns
         -------
@@ -369,12 +421,16 @@ class Points:
         MeshError
             If a point is in none of the beams.
         """
+        if self.bodies:
+            found = self._of_body(points, beam)
+            if found is not None:
+                return found
         name = beam if beam is None or isinstance(beam, (str, int)) else id(beam)
         if (type(points) is tuple and len(points) == 2 and type(points[0]) in PLAIN
                 and type(points[1]) in PLAIN):
             key: Any = points, name, type(beam)
         else:
-            one = beam is not None or len(self.beams) == 1
+            one = beam is not None or self._alone
             points = as_points(points, select_beam(self.beams, beam).mesh if one else None)
             key = points.tobytes(), points.ndim, name, type(beam)
         found = self._known.get(key)
@@ -392,12 +448,33 @@ class Points:
         while known and (len(known) > REMEMBERED or self._held > REMEMBERED_POINTS):
             self._held -= known.popitem(last=False)[1].n
 
+    @property
+    def _alone(self):
+        return len(self.beams) == 1 and not self.bodies
+
+    def _of_body(self, points, beam):
+        """Located of a body that is named; None if none is."""
+        if isinstance(points, RigidBody):
+            points, beam = points.position, points
+        elif beam is None:
+            return None
+        body = select_member(self.beams, self.bodies, beam)
+        if not isinstance(body, RigidBody):
+            return None
+        x = as_points(body.position if points is None else points)
+        start = np.reshape(x, (2, -1))
+        return Located(x.ndim == 1, start.shape[1],
+                       [BodyPart(body, self._coordinates(body), None, start)])
+
+    def _coordinates(self, body):
+        return self.slices[len(self.beams) + [b is body for b in self.bodies].index(True)]
+
     def _find(self, points, beam):
         if type(points) is tuple or points.ndim == 1:
             found = self._find_one(*points, beam)
             if found is not None:
                 return found
-        if beam is not None or len(self.beams) == 1:
+        if beam is not None or self._alone:
             beam = select_beam(self.beams, beam)
             x = as_points(points, beam.mesh)
             e, X, outside = beam.finder(np.reshape(x, (2, -1)))
@@ -407,12 +484,17 @@ class Points:
             return Located(x.ndim == 1, len(e), [Part(beam, k, self.slices[k], None, e, X)])
         x = as_points(points)
         one, x = x.ndim == 1, np.reshape(x, (2, -1))
-        left, parts = np.arange(x.shape[1]), []
+        left, parts = np.arange(x.shape[1]), list[Any]()
         for k, candidate in enumerate(self.beams):
             e, X, outside = candidate.finder(x[:, left])
             on = outside <= candidate.finder.allowed
             if np.any(on) or not x.size:
                 parts.append(Part(candidate, k, self.slices[k], left[on], e[on], X[:, on]))
+                left = left[~on]
+        for body in self.bodies:
+            on = body.contains(x[:, left])
+            if np.any(on):
+                parts.append(BodyPart(body, self._coordinates(body), left[on], x[:, left[on]]))
                 left = left[~on]
         if len(left):
             p = (float(c) for c in x[:, left[0]])
@@ -439,3 +521,20 @@ class Points:
             if place is None:
                 return None
         return None
+
+
+def require_body(system: System, which: WhichMember) -> RigidBody:
+    """The rigid body meant by itself, its name or its number; raises InputError of a beam.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    which
+        The RigidBody, its name or its number.
+    """
+    body = None if which is None else select_member(system.beams, system.bodies, which)
+    if not isinstance(body, RigidBody):
+        raise InputError(f"this is asked of rigid bodies, got {shown(which)}; those of the scene "
+                         f"are {system.bodies}")
+    return body

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .beam import select_beam
+from .beam import select_beam, select_member
 from .errors import InputError, NameUnknown, require_flag, teaching
 from .fields import Values, find_field
 from .frozen import Frozen
+from .points import require_body
 from .recovery import actions, recover
 from .resultants import Resultants, resultants
 from .section_forces import NotRecovered
@@ -26,9 +27,10 @@ if TYPE_CHECKING:
     from .checks import Checks
     from .joints.base import Joint
     from .recovery import Recovery
+    from .rigid import RigidBody
     from .statics.stability import Verdict
     from .system import System
-    from .types import Array, Place, StrPath, WhichBeam
+    from .types import Array, Place, StrPath, WhichBeam, WhichMember
 
 logger = logging.getLogger(__name__)
 
@@ -194,29 +196,57 @@ class State(Frozen):
     @property
     def q(self) -> Array:
         """Absolute coordinates, beam after beam, shape (N,)."""
-        return np.concatenate([b.q0 for b in self.beams]) + self.u
+        return np.concatenate([b.q0 for b in self.system.members]) + self.u
 
     @property
     def v(self) -> Array:
         """Velocity of the coordinates, shape (N,); zero where there is no motion."""
         return np.zeros_like(self.u) if self._motion is None else self._motion.v
 
-    def u_of(self, beam: WhichBeam) -> Array:
-        """Coordinate displacements of one beam."""
-        return self.u[self.system.of(select_beam(self.beams, beam))]
+    @property
+    def bodies(self) -> tuple[RigidBody, ...]:
+        """The rigid bodies of the scene."""
+        return tuple(self.system.bodies)
+
+    def u_of(self, beam: WhichMember) -> Array:
+        """Coordinate displacements of one beam or rigid body."""
+        return self.u[self.system.of(select_member(self.beams, self.system.bodies, beam))]
+
+    def angle(self, body: WhichMember) -> float:
+        """The angle of a rigid body, in radians, no more than pi from that of the start.
+
+        Parameters
+        ----------
+        body
+            The RigidBody, its name or its number.
+        """
+        found = require_body(self.system, body)
+        return float(found.angle_at(self.u[self.system.of(found)]))
+
+    def angular_velocity(self, body: WhichMember) -> float:
+        """The angular velocity of a rigid body, counterclockwise; zero where there is no motion.
+
+        Parameters
+        ----------
+        body
+            The RigidBody, its name or its number.
+        """
+        found = require_body(self.system, body)
+        s = self.system.of(found)
+        return float(found.angular_velocity(self.u[s], self.v[s]))
 
     # at material points
 
-    def displacement(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
+    def displacement(self, point: Any, beam: WhichMember = None) -> Array:
         """Displacement of material points.
 
         Parameters
         ----------
         point
             A material point, named by its place (x, y) in the stress-free body, or many: an array
-            (2, n), or a list of points.
+            (2, n), or a list of points; a RigidBody for its centre of mass.
         beam
-            The beam, its name or its number; found for each point if it is not given.
+            The beam or rigid body, its name or its number; found for each point if it is not given.
 
         Returns
         -------
@@ -230,7 +260,7 @@ class State(Frozen):
         """
         return self.system.points.find(point, beam).displacement(self.u)
 
-    def position(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
+    def position(self, point: Any, beam: WhichMember = None) -> Array:
         """Position of material points, (2,) or (2, n); parameters are those of
         :meth:`displacement`.
 
@@ -244,7 +274,7 @@ class State(Frozen):
         at = self.system.points.find(point, beam)
         return at.start + at.displacement(self.u)
 
-    def velocity(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
+    def velocity(self, point: Any, beam: WhichMember = None) -> Array:
         """Velocity of material points, (2,) or (2, n); zero where there is no motion.
 
         Parameters are those of :meth:`displacement`.
@@ -442,7 +472,7 @@ class State(Frozen):
             self._force = self.system.internal_force(self.u, self.t, self.load)
         return self._force
 
-    def reactions(self, boundary: Place, beam: WhichBeam = None) -> Reaction:
+    def reactions(self, boundary: Place | None, beam: WhichMember = None) -> Reaction:
         """What the supports at a boundary do to the beam: force, moment, and by coordinate.
 
         Parameters
@@ -456,17 +486,17 @@ class State(Frozen):
         -------
         Reaction
         """
-        beam = select_beam(self.beams, beam)
-        s = self.system.of(beam)
+        member: Any = select_member(self.beams, self.system.bodies, beam)
+        s = self.system.of(member)
         total = np.where(self.system.free, 0.0, self._support_force())
-        nodes = beam.nodes(boundary)
-        forces = total[s].reshape(-1, beam.nd // 2, 2)[nodes]
-        q = (beam.q0_local + self.u[s]).reshape(-1, beam.nd // 2, 2)[nodes]
+        nodes = member.nodes(boundary)
+        forces = total[s].reshape(-1, member.nd // 2, 2)[nodes]
+        q = (member.q0_local + self.u[s]).reshape(-1, member.nd // 2, 2)[nodes]
         arm = q.copy()
         arm[:, 0] -= q[0, 0]
         moment = np.sum(arm[..., 0] * forces[..., 1] - arm[..., 1] * forces[..., 0])
-        by_name = dict(zip(beam.dofnames, forces.sum(axis=0).ravel()))
-        held = set(np.nonzero(~self.system.free[s].reshape(-1, beam.nd)[nodes].all(axis=0))[0])
+        by_name = dict(zip(member.dofnames, forces.sum(axis=0).ravel()))
+        held = set(np.nonzero(~self.system.free[s].reshape(-1, member.nd)[nodes].all(axis=0))[0])
         names = {n: float(v) for k, (n, v) in enumerate(by_name.items()) if k in held}
         return Reaction(forces[:, 0].sum(axis=0), float(moment), names)
 

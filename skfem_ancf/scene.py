@@ -6,13 +6,13 @@ import warnings
 from copy import copy
 from functools import cached_property, wraps
 from threading import RLock
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import eigen
 from .axial import FollowerForce, LineLoad
-from .beam import Beam, select_beam
+from .beam import Beam, select_member
 from .checks import warn_of
 from .damping import Damping
 from .doors import configuration, displacement
@@ -24,12 +24,14 @@ from .forces import (Drag, ForceElement, Foundation, PointMass, Spring, Torsiona
 from .errors import (ConvergenceError, InputError, Interrupted, StabilityWarning, ask_field,
                      require_finite, require_finite_scalar, require_option, shown, taught, teaching)
 from .joints import Joint, bind_joint, get_joint
+from .joints.base import members_at, named_place
 from .loads import EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight, bind_load
 from .path import CriticalPoint, Path
 from .pickling import functions_of, require_picklable
 from .places import on_other_mesh
 from .plan import make_plan
 from .results import State
+from .rigid import RigidBody, on_body
 from .statics import continuation, newton
 from .statics.adapt import solve_adaptive
 from .statics.stability import verdict_of_factors
@@ -46,7 +48,7 @@ if TYPE_CHECKING:
     from .dynamics.history import History
     from .eigen import Buckling, Modes
     from .plan import Plan
-    from .types import Array, Place, StrPath, TimeFunction, WhichBeam
+    from .types import Array, Place, StrPath, TimeFunction, WhichBeam, WhichMember
 
 
 def _alone(method):
@@ -73,16 +75,18 @@ class _Things(tuple):
 
 @teaching
 class Scene:
-    """Beams with supports and loads.
+    """Beams and rigid bodies with supports and loads.
 
     Methods that add a support or a load return the scene, so that they can be chained. In a
-    scene of several beams they take ``beam=``: a Beam, its name or its number. Loads take
-    ``amplitude=``: a function of time by which they are multiplied in :meth:`integrate`.
+    scene of several beams they take ``beam=``: a Beam, its name or its number; many take a
+    RigidBody there, too. Loads take ``amplitude=``: a function of time by which they are multiplied
+    in :meth:`integrate`.
 
     Parameters
     ----------
     *beams
-        One or more :class:`~skfem_ancf.Beam`.
+        One or more :class:`~skfem_ancf.Beam`, and :class:`~skfem_ancf.RigidBody` among them. Bodies
+        are numbered behind the beams.
 
     Examples
     --------
@@ -96,19 +100,20 @@ class Scene:
     (True, True)
     """
 
-    def __init__(self, *beams: Beam | Sequence[Beam]) -> None:
+    def __init__(self, *beams: Beam | RigidBody | Sequence[Beam | RigidBody]) -> None:
         if len(beams) == 1 and isinstance(beams[0], (list, tuple)):
             beams = tuple(beams[0])
-        if not beams:
-            raise InputError("a scene needs at least one beam")
         for b in beams:
-            if not isinstance(b, Beam):
-                raise InputError(f"a scene is made of Beams, got {shown(b)}")
+            if not isinstance(b, (Beam, RigidBody)):
+                raise InputError(f"a scene is made of Beams and RigidBodies, got {shown(b)}")
+        if not any(isinstance(b, Beam) for b in beams):
+            raise InputError("a scene needs at least one beam")
         names = [b.name for b in beams if b.name is not None]  # type: ignore[union-attr]
         if len(set(names)) < len(names) or len(set(map(id, beams))) < len(beams):
             raise InputError(f"the beams of a scene must be different, and so must their names: "
                              f"{names}")
-        self._beams: tuple[Beam, ...] = cast("tuple[Beam, ...]", beams)
+        self._beams = tuple(b for b in beams if isinstance(b, Beam))
+        self._bodies = tuple(b for b in beams if isinstance(b, RigidBody))
         self._lock = RLock()
         self._supports: tuple[Support, ...] = ()
         # (number of the beam, coordinate) -> displacement
@@ -147,8 +152,9 @@ class Scene:
         return copy(self)
 
     def __repr__(self):
-        return (f"<Scene of {len(self.beams)} beam(s), {len(self._fixed)} fixed coordinates, "
-                f"{len(self.loads)} load(s)>")
+        bodies = f"{len(self._bodies)} rigid bodies, " if self._bodies else ""
+        return (f"<Scene of {len(self.beams)} beam(s), {bodies}{len(self._fixed)} fixed "
+                f"coordinates, {len(self.loads)} load(s)>")
 
     def _repr_html_(self):
         from .visuals.html import scene_html
@@ -159,6 +165,16 @@ class Scene:
     def beams(self) -> tuple[Beam, ...]:
         """The beams."""
         return self._beams
+
+    @property
+    def bodies(self) -> tuple[RigidBody, ...]:
+        """The rigid bodies."""
+        return self._bodies
+
+    @property
+    def members(self) -> tuple[Beam | RigidBody, ...]:
+        """The beams, and behind them the rigid bodies: in the order of their numbers."""
+        return *self._beams, *self._bodies
 
     @property
     def supports(self) -> tuple[Support, ...]:
@@ -183,31 +199,38 @@ class Scene:
         """
         return _Things(bound for _, bound in self._elements)
 
-    def beam(self, beam: WhichBeam = None) -> Beam:
-        """The Beam meant by a Beam, a name, a number, or None where there is only one."""
-        return self._beams[self._number(beam)]
+    def beam(self, beam: WhichMember = None) -> Any:
+        """The Beam or RigidBody meant by itself, a name, a number, or None for the only beam."""
+        return self.members[self._number(beam)]
 
     @cached_property
     def _places(self) -> dict:
         """Number and first coordinate of each beam, by the identity of the object."""
-        first = np.cumsum([0] + [b.N for b in self._beams]).tolist()
-        return {id(b): (k, n) for k, (b, n) in enumerate(zip(self._beams, first))}
+        first = np.cumsum([0] + [b.N for b in self.members]).tolist()
+        return {id(b): (k, n) for k, (b, n) in enumerate(zip(self.members, first))}
 
     def _number(self, beam):
         if isinstance(beam, Beam):  # without asking all the others
             found = self._places.get(id(beam))
             if found is not None:
                 return found[0]
-        return self._places[id(select_beam(self._beams, beam))][0]
+        return self._places[id(select_member(self._beams, self._bodies, beam))][0]
 
-    def offset(self, beam: WhichBeam) -> int:
-        """Number of the first coordinate of a beam among those of the scene."""
+    def _number_of_beam(self, beam):
+        """As :meth:`_number`; raises InputError of a rigid body."""
+        k = self._number(beam)
+        if k >= len(self._beams):
+            raise InputError(f"this is asked of beams, got {self.members[k]!r}")
+        return k
+
+    def offset(self, beam: WhichMember) -> int:
+        """Number of the first coordinate of a beam or body among those of the scene."""
         return self._places[id(self.beam(beam))][1]
 
     @cached_property
     def N(self) -> int:
         """Number of coordinates of the scene."""
-        return sum(b.N for b in self.beams)
+        return sum(b.N for b in self.members)
 
     # what it is made of
 
@@ -219,8 +242,8 @@ class Scene:
         with self._lock:
             fixed = dict(self._fixed)
             for support in supports:
-                support.bind(self._beams[support.beam], fixed)
-            loads = tuple((k, load, bind_load(load, self._beams[k])) for k, load in loads)
+                support.bind(self.members[support.beam], fixed)
+            loads = tuple((k, load, bind_load(load, self.members[k])) for k, load in loads)
             bound = [bind_joint(joint, self) for joint in joints]
             joints = tuple(zip(map(self._portable, joints), bound))
             velocities = {k: (v, self._bind_velocity(k, v)) for k, v in velocities}
@@ -237,7 +260,7 @@ class Scene:
     def _portable(self, joint):
         """A copy of a joint as it was given, with beams by number: it fits other meshes."""
         def numbered(value):
-            if isinstance(value, Beam):
+            if isinstance(value, (Beam, RigidBody)):
                 return self._number(value)
             if not isinstance(value, (tuple, list)):
                 return value
@@ -307,7 +330,7 @@ class Scene:
             A place: the name of a boundary; a point (x, y) of the stress-free body, which means
             the section of a node; a function of the points x that returns truth values; or
             numbers of facets as an array of integers. See
-            :func:`skfem_ancf.places.facets_of`.
+            :func:`skfem_ancf.places.facets_of`. A RigidBody is held fast as a whole.
         beam
             The beam, its name or its number, in a scene of several.
         thickness
@@ -322,9 +345,12 @@ class Scene:
         Scene
             Itself.
         """
+        boundary, beam = on_body(boundary, beam)
         k = self._number(beam)
-        beam = b = self._beams[k]
+        beam = b = self.members[k]
         require_option("thickness", thickness, ("fixed", "free"))
+        if isinstance(b, RigidBody):
+            return self._put([Support(k, boundary)])
         if thickness == "fixed" and b.has_sections:
             return self._put([Support(k, boundary, tuple(b.element.welded))])
         return self._put([Support(k, boundary, "r")],
@@ -336,16 +362,23 @@ class Scene:
         Parameters
         ----------
         boundary
-            A place, as for :meth:`clamp`.
+            A place, as for :meth:`clamp`; of a rigid body a point, or None for its centre of mass.
         beam
-            The beam, its name or its number, in a scene of several.
+            The beam, its name or its number, in a scene of several; or a RigidBody.
 
         Returns
         -------
         Scene
             Itself.
         """
-        return self._put([Support(self._number(beam), boundary, "r", on_axis=True)])
+        boundary, beam = on_body(boundary, beam)
+        k = self._number(beam)
+        member = self.members[k]
+        if isinstance(member, RigidBody):
+            at = tuple(map(float, member.place(boundary)))
+            return self._put(joints=[get_joint("hinge", beams=("ground", k), at=at,
+                                               name="of a pin")])
+        return self._put([Support(k, boundary, "r", on_axis=True)])
 
     def fix(self, boundary: Place, names: str | Sequence[str] | None = None,
             displacement: float = 0.0, beam: WhichBeam = None) -> Scene:
@@ -387,13 +420,16 @@ class Scene:
         joint
             A name from :data:`skfem_ancf.joints.JOINTS` with its options, or a Joint:
 
-            * ``"hinge", beams=(a, b), at=point``: two beams share a point,
-            * ``"weld", beams=(a, b), at=("right", "left")``: two end sections keep their angle,
+            * ``"hinge", beams=(a, b), at=point``: two beams share a point, see :meth:`hinge`,
+            * ``"weld", beams=(a, b), at=("right", "left")``: two sections keep their angle, see
+              :meth:`weld`,
             * ``"line", at=point, direction=(1, 0)``: a point slides on a line,
             * ``"circle", at=point, center=(0, 0)``: a point slides on a circle,
             * ``"position", at=point, r=function``: a point follows ``r(t)``,
             * ``"angle", at="left", angle=function``: a section turns by ``angle(t)``,
-            * ``"plane", at="left"``: a section stays in its plane.
+            * ``"plane", at="left"``: a section stays in its plane,
+            * ``"sleeve", at=(a, point), on=b``, ``"slot", at=(a, point), on=body, direction=d``:
+              a point slides along a beam, along a line of a body, see :meth:`slider`.
         **options
             Arguments of the joint's class, where it is given by its name.
 
@@ -417,18 +453,140 @@ class Scene:
         self._put(joints=[get_joint(joint, **options)])
         return self._joints[-1][1]
 
+    def hinge(self, *places: Any, name: str | None = None) -> Joint:
+        """Join material points of beams and rigid bodies: they stay together, and may turn.
+
+        Parameters
+        ----------
+        *places
+            One point (x, y), at which two beams or bodies or more meet; or a place for each of
+            them: (beam, (x, y)) with a Beam, a RigidBody, a name or a number, (beam, "right"), a
+            point that only one of them has, ("ground", (x, y)), or a RigidBody for its centre of
+            mass.
+        name
+            What messages call the joint.
+
+        Returns
+        -------
+        Joint
+            A :class:`~skfem_ancf.joints.Hinge`; ask a State or History for its force with
+            ``joint_force(joint)``.
+
+        Raises
+        ------
+        InputError
+            If a place is of no beam and no body, or of several.
+
+        Examples
+        --------
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> a, b = (Beam(MeshBeam.init_line([0, 1, 2], 0.1, origin=origin, angle=angle),
+        ...              ElementBeamCable(), StVenantKirchhoff(1e6, 0.3), width=0.1)
+        ...         for origin, angle in (((0, 0), 0.0), ((1, 0), 1.5707963267948966)))
+        >>> scene = Scene(a, b).clamp("left", a).clamp("right", b)
+        >>> scene.hinge((1, 0)).equations
+        ('force along x', 'force along y')
+        """
+        beams, at = self._joined(places)
+        return self.joint("hinge", beams=beams, at=at, name=name)
+
+    def weld(self, *places: Any, name: str | None = None, apart: bool = False) -> Joint:
+        """Join beams and rigid bodies: points stay together, and sections keep their angles.
+
+        The point of a beam may be anywhere, inside of an element too: so the end of one is welded
+        to the middle of another, or several meet in one point.
+
+        Parameters
+        ----------
+        *places
+            As for :meth:`hinge`; (beam, "right") is the axis at that end.
+        name
+            What messages call the joint.
+        apart
+            Allow that the points are apart in the stress-free state: the weld draws them together.
+
+        Returns
+        -------
+        Joint
+            A :class:`~skfem_ancf.joints.Weld`.
+
+        Raises
+        ------
+        InputError
+            If a place is of no beam and no body, or of several, or the points are apart.
+        """
+        beams, at = self._joined(places)
+        return self.joint("weld", beams=beams, at=at, name=name, apart=apart)
+
+    def slider(self, at: Any, on: WhichMember, direction: ArrayLike | None = None,
+               angle: bool = False, name: str | None = None) -> Joint:
+        """A material point slides along the axis of a beam, or along a line of a rigid body.
+
+        Parameters
+        ----------
+        at
+            The point: (x, y) if one beam or body alone has it, (beam, (x, y)) with a Beam, a
+            RigidBody, a name or a number, ("ground", (x, y)), a RigidBody for its centre of mass.
+        on
+            The beam, along whose axis it slides, however far that bends; or a RigidBody or
+            "ground".
+        direction
+            Direction of the line of a body or the ground in the state of the start, shape (2,).
+        angle
+            Keep the angle between the section at the point and the axis or the line: a sleeve that
+            carries a moment.
+        name
+            What messages call the joint.
+
+        Returns
+        -------
+        Joint
+            A :class:`~skfem_ancf.joints.Sleeve`, whose ``distance(state.u)`` says where along the
+            axis the point is, or a :class:`~skfem_ancf.joints.Slot`.
+
+        Raises
+        ------
+        InputError
+            If the point is not on the axis.
+        ConvergenceError
+            When solving, if the point leaves the beam at an end.
+        """
+        at = tuple(named_place(self, at))
+        ground = isinstance(on, str) and on == "ground"
+        if ground or isinstance(self.beam(on), RigidBody):
+            if direction is None:
+                raise InputError(f"a slider on {shown(on)} needs the direction of its line")
+            return self.joint("slot", at=at, on=on, direction=direction, angle=angle, name=name)
+        if direction is not None:
+            raise InputError("a slider on a beam moves along its axis: give no direction")
+        return self.joint("sleeve", at=at, on=on, angle=angle, name=name)
+
+    def _joined(self, places):
+        """Beams and places of a joint."""
+        if len(places) == 1:
+            at = require_finite("the point of a joint", places[0], (2,))
+            found = members_at(self, at)
+            if len(found) < 2:
+                names = [self.members[k].name or k for k in found]
+                raise InputError(f"a joint at {shown(places[0])} needs two beams or rigid bodies "
+                                 f"there, found {names}: name a place of each, as "
+                                 "(beam, (x, y)) or ('ground', (x, y))")
+            return found, tuple(map(float, at))
+        pairs = [named_place(self, place) for place in places]
+        return [which for which, _ in pairs], [at for _, at in pairs]
+
     # loads
 
     def gravity(self, g: ArrayLike, beam: WhichBeam = None,
                 amplitude: TimeFunction = None) -> Scene:
-        """Weight of every beam, or of one.
+        """Weight of every beam and rigid body, or of one.
 
         Parameters
         ----------
         g
             Acceleration, shape (2,), as ``(0, -9.81)``.
         beam
-            The beam, its name or its number; None for all.
+            The beam or the rigid body, its name or its number; None for all.
         amplitude
             A function of time by which the force is multiplied in a motion.
 
@@ -438,7 +596,7 @@ class Scene:
             Itself.
         """
         load = Weight(g, None, amplitude)
-        beams = range(len(self._beams)) if beam is None else [self._number(beam)]
+        beams = range(len(self.members)) if beam is None else [self._number(beam)]
         return self._put(loads=[(k, load) for k in beams])
 
     def point_force(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
@@ -450,9 +608,10 @@ class Scene:
         force
             The force, shape (2,).
         at
-            The point: its place (x, y) in the stress-free body.
+            The point: its place (x, y) in the stress-free body; of a rigid body also None, for its
+            centre of mass.
         beam
-            The beam, its name or its number, in a scene of several.
+            The beam, its name or its number, in a scene of several; or a RigidBody.
         amplitude
             A function of time by which the force is multiplied in a motion.
 
@@ -461,6 +620,7 @@ class Scene:
         Scene
             Itself.
         """
+        at, beam = on_body(at, beam)
         return self._put(loads=[(self._number(beam), PointForce(force, at, None, amplitude))])
 
     def follower_force(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
@@ -552,18 +712,18 @@ class Scene:
         Scene
             Itself.
         """
-        k = self._number(beam)
+        k = self._number_of_beam(beam)
         load = Pressure(self._beams[k], boundary, require_finite_scalar("p", p), amplitude)
         return self._put(loads=[(k, load)])
 
     def moment(self, boundary: Place, M: float, beam: WhichBeam = None,
                amplitude: TimeFunction = None) -> Scene:
-        """A moment on an end section, that turns with it.
+        """A moment on an end section, that turns with it, or on a rigid body.
 
         Parameters
         ----------
         boundary
-            A place that is one section, as "right" or the point of a node.
+            A place that is one section, as "right" or the point of a node; or a RigidBody.
         M
             The moment (force times length), counterclockwise.
         beam
@@ -576,9 +736,10 @@ class Scene:
         Scene
             Itself.
         """
+        boundary, beam = on_body(boundary, beam)
         k = self._number(beam)
-        self._beams[k].section_node(boundary)
-        load = EndMoment(self._beams[k], boundary, require_finite_scalar("M", M), amplitude)
+        self.members[k].section_node(boundary)
+        load = EndMoment(self.members[k], boundary, require_finite_scalar("M", M), amplitude)
         return self._put(loads=[(k, load)])
 
     def load(self, form: LinearForm, boundary: Place | None = None, beam: WhichBeam = None,
@@ -787,23 +948,23 @@ class Scene:
         """The discrete equations, built when first asked for."""
         with self._lock:
             if self._system is None:
-                offsets = np.concatenate([[0], np.cumsum([b.N for b in self._beams])])
+                offsets = np.concatenate([[0], np.cumsum([b.N for b in self.members])])
                 fixed = np.array([offsets[k] + d for k, d in self._fixed], dtype=int)
                 values = np.array(list(self._fixed.values()), dtype=float)
                 self._system = System(self._beams, [*self.loads, *self._weights()], fixed, values,
-                                      self.joints, self._damping, self.elements)
+                                      self.joints, self._damping, self.elements, self._bodies)
             return self._system
 
     def _weights(self):
         """Loads by which gravity acts on point masses."""
         masses = [x for x in self.elements if isinstance(x, PointMass) and x.mass]
-        return [bind_load(PointForce(mass.mass * load.g, mass.at, None, load.amplitude),
-                          self._beams[k])
+        return [bind_load(PointForce(mass.mass * load.g, tuple(mass.at), None, load.amplitude),
+                          self.members[k])
                 for k, load, _ in self._loads if isinstance(load, Weight)
                 for mass in masses if self._number(mass.beam) == k]
 
     def with_beams(self, beams: Sequence[Beam]) -> Scene:
-        """The same supports, loads, joints and velocities on other beams.
+        """The same supports, loads, joints, velocities and rigid bodies on other beams.
 
         Parameters
         ----------
@@ -822,11 +983,12 @@ class Scene:
         if not isinstance(beams, (list, tuple)) or len(beams) != len(self._beams):
             raise InputError(f"beams must be a list of {len(self._beams)} Beam(s), got "
                              f"{shown(beams)}")
-        scene = Scene(*beams)
+        scene = Scene(*beams, *self._bodies)
         scene._damping = self._damping
         if len(scene.beams) != len(self._beams):
             raise InputError(f"the scene has {len(self._beams)} beams, got {len(scene.beams)}")
         changed = [a.mesh is not b.mesh for a, b in zip(self._beams, scene.beams)]
+        changed += [False] * len(self._bodies)
 
         def require_portable(thing, moved):
             for name, value in vars(thing).items():
@@ -1064,9 +1226,10 @@ class Scene:
         ----------
         v
             Velocities of the coordinates, shape (beam.N,), or a function of the points x, shape
-            (2, ...), of the stress-free body that returns velocities (2, ...).
+            (2, ...), of the stress-free body that returns velocities (2, ...). Of a rigid body the
+            function is asked at its centre of mass and beside it.
         beam
-            The beam, its name or its number, in a scene of several.
+            The beam, its name or its number, in a scene of several; or a RigidBody.
 
         Returns
         -------
@@ -1076,8 +1239,10 @@ class Scene:
         return self._put(velocities=[(self._number(beam), v)])
 
     def _bind_velocity(self, k, v):
-        beam = self._beams[k]
-        if callable(v):
+        beam = self.members[k]
+        if callable(v) and isinstance(beam, RigidBody):
+            v = beam.velocity_of(lambda x: ask_field("v(x)", v, x))
+        elif callable(v):
             basis = beam.exact_basis()
             v = basis.project(ask_field("v(x)", v, np.asarray(basis.global_coordinates())))
         return require_finite("v", v, (beam.N,))
@@ -1127,7 +1292,7 @@ class Scene:
         True
         """
         velocity = np.concatenate([self._velocities[k][1] if k in self._velocities else
-                                   np.zeros(b.N) for k, b in enumerate(self._beams)])
+                                   np.zeros(b.N) for k, b in enumerate(self.members)])
         u = None if start is None else displacement(self.system, start)
         return integrate(self.system, t_end, dt, get_scheme(scheme), u, velocity, start=start,
                          **options)

@@ -19,6 +19,7 @@ from .errors import InputError
 from .evaluation import CARRY, FORCE, MEAN, TANGENT, VISCOUS, evaluate
 from .forces.system import Forces
 from .forces.texts import add_resisting_force
+from .joints.director import UnitDirector
 from .linalg import INACCURATE, BandMatrix, dense
 from .machine import Machine
 from .pickling import functions_of, require_picklable
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from .joints.base import Joint
     from .linalg import Inertia
     from .loads import Load
+    from .rigid import RigidBody
     from .types import Array
 
 logger = logging.getLogger(__name__)
@@ -69,21 +71,25 @@ class System:
         A :class:`~skfem_ancf.damping.Damping`, or None.
     elements
         Force elements, already bound.
+    bodies
+        Rigid bodies, whose coordinates come behind those of the beams.
     """
 
     def __init__(self, beams: Sequence[Beam], loads: Sequence[Load], fixed: Array, values: Array,
                  joints: Sequence[Joint] = (), damping: Damping | None = None,
-                 elements: Sequence[ForceElement] = ()) -> None:
+                 elements: Sequence[ForceElement] = (),
+                 bodies: Sequence[RigidBody] = ()) -> None:
         self._given = (tuple(beams), tuple(loads), fixed, values, tuple(joints), damping,
-                       tuple(elements))
-        self.beams, self.loads = list(beams), list(loads)
-        self.offsets = np.concatenate([[0], np.cumsum([b.N for b in self.beams])])
+                       tuple(elements), tuple(bodies))
+        self.beams, self.bodies, self.loads = list(beams), list(bodies), list(loads)
+        self.members: list[Beam | RigidBody] = [*beams, *bodies]
+        self.offsets = np.concatenate([[0], np.cumsum([b.N for b in self.members])])
         self.N = int(self.offsets[-1])
         self.slices = [slice(int(a), int(b)) for a, b in zip(self.offsets[:-1], self.offsets[1:])]
-        self._index = {id(b): k for k, b in enumerate(self.beams)}
-        self.size = float(sum(b.mesh.lengths.sum() for b in self.beams))
-        self.constraints = Constraints(self.beams, self.slices, self.size, fixed, values, joints,
-                                       self._held_by_elements)
+        self._index = {id(b): k for k, b in enumerate(self.members)}
+        self.size = float(sum(b.size for b in self.beams))
+        self.constraints = Constraints(self.members, self.slices, self.size, fixed, values,
+                                       [*self._directors(fixed), *joints], self._held_by_elements)
         self.forces = Forces(elements, self.N, self.bandwidth)
         self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
         self.constant_force = np.zeros(self.N)
@@ -116,14 +122,22 @@ class System:
     jacobian = _of_constraints("jacobian")
     quadratic = _of_constraints("quadratic")
     curvature = _of_constraints("curvature")
+    lost = _of_constraints("lost")
+    first_lost = _of_constraints("first_lost")
     curvature_times = _of_constraints("curvature_times")
     multipliers_of = _of_constraints("multipliers_of")
     joint_force = _of_constraints("joint_force")
     springs = _of_constraints("springs")
+    loose = _of_constraints("loose")
     bordered = _of_constraints("bordered")
     free_rigid_motions = _of_constraints("free_rigid_motions")
     require_independent_joints = _of_constraints("require_independent_joints")
     require_supports = _of_constraints("require_supports")
+
+    def _directors(self, fixed):
+        """The conditions of the bodies' directors, but of those that are held fast."""
+        return [UnitDirector(body, self.of(body).start) for body in self.bodies
+                if len(np.intersect1d(fixed, self.of(body).start + np.arange(2, 4))) < 2]
 
     def _held_by_elements(self):
         """The stiffness of force elements in the stress-free state, sparse."""
@@ -134,7 +148,7 @@ class System:
     @cached_property
     def points(self) -> Points:
         """What finds material points, a :class:`~skfem_ancf.points.Points`."""
-        return Points(self.beams, self.slices)
+        return Points(self.beams, self.slices, self.bodies)
 
     def __getstate__(self):
         """What it was made of: work arrays and factors are made again."""
@@ -150,8 +164,8 @@ class System:
     def __deepcopy__(self, memo):
         return self  # it is the same equations, however many states have them
 
-    def of(self, load_or_beam: Load | Beam) -> slice:
-        """The slice of the coordinates that a load or a beam has."""
+    def of(self, load_or_beam: Load | Beam | RigidBody) -> slice:
+        """The slice of the coordinates that a load, a beam or a rigid body has."""
         return self.slices[self._index[id(getattr(load_or_beam, "beam", load_or_beam))]]
 
     # forces and energies
@@ -288,7 +302,7 @@ class System:
         """Linear momentum of the coordinates' velocities, shape (2,)."""
         p = self.mass.multiply(v)
         total = np.zeros(2)
-        for beam, s in zip(self.beams, self.slices):  # a unit translation moves every r by one
+        for beam, s in zip(self.members, self.slices):  # a unit translation moves every r by one
             total += p[s].reshape(-1, beam.nd)[:, :2].sum(axis=0)
         return total
 
@@ -301,7 +315,7 @@ class System:
             Displacement and velocity, shape (N,).
         """
         p, total = self.mass.multiply(v), 0.0
-        for beam, s in zip(self.beams, self.slices):
+        for beam, s in zip(self.members, self.slices):
             q, pb = (beam.q0 + u[s]).reshape(-1, 2), p[s].reshape(-1, 2)
             total += np.sum(q[:, 0] * pb[:, 1] - q[:, 1] * pb[:, 0])
         return float(total)
@@ -469,6 +483,9 @@ class System:
                 M.add_elements(beam.mass_elements(part), int(offset), beam.nd, beam.mesh.t[0, part])
         for mass in self.forces.masses:
             M.add(*mass.mass_entries())
+        for body in self.bodies:
+            i, j, values = body.mass_entries()
+            M.add(self.of(body).start + i, self.of(body).start + j, values)
         return M
 
     @cached_property
@@ -596,7 +613,7 @@ class System:
             self.constraints.curvature_entries(u, t, multipliers), self._far_entries()))
         self._outside, self._sparse = (i, j, v), None
         if self.bordered:
-            self._factors = BorderedMatrix(self.K, self._J, i, j, v, self.springs)
+            self._factors = BorderedMatrix(self.K, self._J, i, j, v, self.springs, self.loose)
         else:
             self._sparse = self._sparse_factors(self._whole())
 
@@ -661,7 +678,8 @@ class System:
             The solution: shape (N,), time, shape (m,).
         """
         K = self.K
-        if not K.definite or self.forces.far or (self.joints and not self.bordered):
+        if (not K.definite or self.forces.far or self.bodies
+                or (self.joints and not self.bordered)):
             return False
         if not self.joints:
             return True

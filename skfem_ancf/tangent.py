@@ -54,6 +54,9 @@ class StrainTangent:
         self.system, self.free = system, np.nonzero(system.free)[0]
         self._at = u, load, t, load if t is None else t
         parts = [_beam_rows(beam, u[s]) for beam, s in zip(system.beams, system.slices)]
+        rigid = system.N - sum(beam.N for beam in system.beams)
+        if rigid:  # whose coordinates no strain depends on
+            parts.append((*2 * [sparse.csr_matrix((0, rigid))], np.zeros(0)))
         self._rows = [sparse.block_diag([part[k] for part in parts], format="csr")
                       for k in range(2)]
         self.B, self.CB = (rows[:, self.free] for rows in self._rows)
@@ -101,6 +104,9 @@ class StrainTangent:
         for beam, s in zip(self.system.beams, self.system.slices):
             part, first = _beam_geometric(beam, u[s], stress, first)
             S.append(part)
+        rigid = self.system.N - sum(part.shape[0] for part in S)
+        if rigid:
+            S.append(sparse.csr_matrix((rigid, rigid)))
         S = (sparse.block_diag(S, format="csr") + load_stiffness(self.system, u, load, t)
              + self.system.curvature(u, time, multipliers))
         return S[self.free][:, self.free]

@@ -15,7 +15,7 @@ from skfem import Basis, ElementVector, LinearForm
 
 from skfem_ancf import (HHT, Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana, EnergyMomentum, GeneralizedAlpha, KelvinVoigt,
-                        MeshBeam, NeoHookean, Newmark, Scene, StVenantKirchhoff, forms,
+                        MeshBeam, NeoHookean, Newmark, RigidBody, Scene, StVenantKirchhoff, forms,
                         reference_coordinates)
 from skfem_ancf.dynamics import get_scheme
 from skfem_ancf.elements import choose_element
@@ -89,7 +89,7 @@ _OPTIONAL = {"None": "the default"}
 #: What messages call an argument, where that is not its name: regular expressions.
 WORDS = {
     "doflocs": "nodes", "diffs": "shift", "x": "points|nodes", "y": "points", "s": "nodes",
-    "test": "function", "data": "dictionary", "beams": "[Bb]eam", "thing": "Load or a Joint",
+    "test": "function", "data": "dictionary", "thing": "Load or a Joint",
     "k": "number of modes|index", "cmap": "colour map", "names": "coordinate",
     "form": "[Ff]orm|load",
     "times_or_ix": "refinements|elements|subdomain|function", "tind": "elements|subdomain|function",
@@ -99,6 +99,7 @@ WORDS = {
     "shear_correction": "shear correction", "t_start": "t_eval", "radius": "joints",
     "t_end": "times", "adapt": "max_elements", "function": "function|the field 'f'",
     "side": "place|facet|boundary|point", "between": "point of a spring", "other": "beam|place",
+    "first": "point|beam", "second": "point|beam", "body": "rigid bod|beam", "beams": "[Bb]eam",
 }
 
 
@@ -439,6 +440,24 @@ call("scene.follower_force", lambda **k: moved(clamped().follower_force(**k)),
 call("scene.line_load", lambda **k: moved(clamped().line_load(**k)),
      dict(force=(0.0, -0.1), beam=0, amplitude=amplitude), force="vector", beam="beam?",
      amplitude="function?")
+call("RigidBody", lambda **k: moved(Scene(beam(), RigidBody(**k)).clamp("left")),
+     dict(mass=1.0, inertia=0.1, position=(0.0, 2.0), angle=0.1, name="b",
+          outline=[(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]),
+     mass="positive", inertia="positive", position="vector", angle="number", name="label?",
+     outline="other?")
+call("body.replace", lambda mass: RigidBody(1.0, 1.0).replace(mass=mass), dict(mass=2.0),
+     mass="positive")
+call("scene.hinge", lambda first, second, name: moved(
+    Scene(beam(), RigidBody(1.0, 1.0, (1.0, 0.0))).clamp("left").hinge(first, second, name=name)
+    and clamped()), dict(first=(0, (1.0, 0.0)), second=(1, (1.0, 0.0)), name="h"),
+     first="other", second="other", name="label?")
+call("scene.weld", lambda first, second, name, apart: moved(
+    Scene(beam(), RigidBody(1.0, 1.0, (1.0, 0.0))).clamp("left").weld(
+        first, second, name=name, apart=apart) and clamped()),
+     dict(first=(0, "right"), second=(1, (1.0, 0.0)), name="w", apart=True),
+     first="other", second="other", name="label?", apart="flag")
+call("state.angle", lambda **k: Scene(beam(), RigidBody(1.0, 1.0)).state().angle(**k),
+     dict(body=1), body="other")
 call("scene.gravity", lambda **k: moved(clamped().gravity(**k)),
      dict(g=(0.0, -1.0), beam=0, amplitude=amplitude), g="vector", beam="beam?",
      amplitude="function?")

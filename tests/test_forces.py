@@ -529,7 +529,7 @@ BAD = {
     "outside": lambda s: s.spring(1.0, ((0, (2, 0)), (1, 1))),
     "torsion": lambda s: s.torsional_spring(-1.0, "left"),
     "torsion, damping": lambda s: s.torsional_spring(1.0, "left", damping=-1.0),
-    "no section": lambda s: s.torsional_spring(1.0, (0.6, 0)),
+    "no section": lambda s: s.torsional_spring(1.0, (2.6, 0)),
     "other": lambda s: s.torsional_spring(1.0, "left", other="right"),
     "whole turns": lambda s: s.torsional_spring(1.0, "left", angle=7.0),
     "foundation": lambda s: s.foundation(-1.0),

@@ -43,7 +43,12 @@ CASES = {
     "position": dict(beam="arm", at=(0.4, -0.03), r=lambda t: (0.4 + np.sin(t), t * t - 0.03)),
     "angle": dict(beam="forearm", at="right", angle=lambda t: np.sin(3 * t)),
     "plane": dict(beam="forearm", at="left"),
+    "sleeve": dict(at=("ground", (1.2, 0.45)), on="forearm", angle=True),
+    "slot": dict(at=("arm", (0.3, 0.02)), on="ground", direction=(1, 2), angle=True),
 }
+
+#: Joints whose equations are not quadratic in the coordinates, and a step of differences for them.
+CURVED, STEP = (JOINTS["sleeve"],), 1e-4
 
 
 def test_every_joint_has_a_case():
@@ -66,9 +71,11 @@ def test_jacobian_is_the_derivative(joint):
     joint, scene = joint
     rng = np.random.default_rng(0)
     u, v, t = 0.3 * rng.standard_normal(scene.N), rng.standard_normal(scene.N), 0.7
-    # Phi is quadratic at most: central differences are exact
-    along = 0.5 * (joint.value(u + v, t) - joint.value(u - v, t))
-    assert np.allclose(joint.jacobian(u, t) @ v, along, rtol=0, atol=1e-12)
+    h, tol = 1.0, 1e-12  # Phi is quadratic at most: central differences are exact
+    if type(joint) in CURVED:
+        u, h, tol = 0.03 * u, STEP, 1e-5
+    along = 0.5 / h * (joint.value(u + h * v, t) - joint.value(u - h * v, t))
+    assert np.allclose(joint.jacobian(u, t) @ v, along, rtol=0, atol=tol)
     assert np.linalg.matrix_rank(joint.jacobian(u, t)) == len(joint.equations)
 
 
@@ -77,13 +84,16 @@ def test_curvature_is_the_derivative_of_the_jacobian(joint):
     rng = np.random.default_rng(1)
     u, v, t = 0.3 * rng.standard_normal(scene.N), rng.standard_normal(scene.N), 0.7
     multipliers = rng.standard_normal(len(joint.equations))
-    along = 0.5 * multipliers @ (joint.jacobian(u + v, t) - joint.jacobian(u - v, t))
+    h, tol = 1.0, 1e-12
+    if type(joint) in CURVED:
+        u, h, tol = 0.03 * u, STEP, 1e-4
+    along = 0.5 / h * multipliers @ (joint.jacobian(u + h * v, t) - joint.jacobian(u - h * v, t))
     second = joint.curvature(u, t, multipliers)
     C = np.zeros((scene.N, scene.N))
     if second is not None:
         np.add.at(C, (second[0], second[1]), second[2])
     assert np.allclose(C, C.T, rtol=0, atol=1e-14)
-    assert np.allclose(C @ v, along, rtol=0, atol=1e-12)
+    assert np.allclose(C @ v, along, rtol=0, atol=tol)
     assert joint.constant == (not np.any(joint.jacobian(u + v, t + 0.1) - joint.jacobian(u, t)))
     assert joint.moving == bool(np.any(joint.value(u, t + 0.1) - joint.value(u, t)))
 
@@ -170,7 +180,8 @@ def test_energy_momentum_with_every_joint(name):
         scene.initial_velocity(lambda x: np.array([1 - 2 * x[1], 2 * x[0]]), beam=beam)
     history = scene.integrate(0.4, 0.01)
     assert history.strain_energy.max() > 1e-2
-    assert np.ptp(history.total_energy) < 1e-10
+    exact = type(joint) not in CURVED  # else of second order in the step, which is large here
+    assert np.ptp(history.total_energy) < (1e-10 if exact else 0.05 * history.strain_energy.max())
     for k in range(len(history)):
         J = joint.jacobian(history.u[k], 0.0)
         assert np.abs(joint.value(history.u[k], 0.0)).max() < 1e-13

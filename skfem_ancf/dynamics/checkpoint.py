@@ -79,12 +79,15 @@ def fingerprint(system: System) -> dict[str, str]:
         parts[f"width {who}"] = _digest(beam.width)
         parts[f"damping {who}"] = _digest(beam.damping)
         parts[f"formulation {who}"] = _digest(beam.formulation.name, *_numbers(beam.formulation))
+    for k, body in enumerate(system.bodies):
+        parts[f"rigid body {body.name or k}"] = _digest(body.mass, body.inertia, body.q0)
     parts["supports"] = _digest(system.fixed, system.values(1.0, 0.0)[:0], system.given)
     damping = system.damping
     parts["damping"] = _digest(damping.mass, damping.stiffness, damping.modal)
     for k, load in enumerate(system.loads):
-        u = 1e-3 * load.beam.mesh.height * probe[system.of(load)]
-        parts[f"load {k}"] = _digest(type(load).__name__, system.beams.index(load.beam),
+        size = load.beam.size if load.beam in system.bodies else load.beam.mesh.height
+        u = 1e-3 * size * probe[system.of(load)]
+        parts[f"load {k}"] = _digest(type(load).__name__, system.members.index(load.beam),
                                      load.amplitude is None, load.force(0.0 * u), load.force(u))
     for k, joint in enumerate(system.all_joints):
         J = [] if joint.moving else [a for u in (0.0 * probe, probe)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, require_index, require_path, shown, teaching
+from ..points import require_body
 from ..resultants import over_time
 from ..results import State
 from .base import Motion
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from ..joints.base import Joint
     from ..resultants import Resultants
     from ..system import System
-    from ..types import Array, StrPath, WhichBeam
+    from ..types import Array, StrPath, WhichBeam, WhichMember
     from .base import Scheme
 
 #: Sections of all states whose fields are recovered at once.
@@ -196,7 +197,7 @@ class History:
 
     # at material points
 
-    def displacement(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
+    def displacement(self, point: Any, beam: WhichMember = None) -> Array:
         """Displacement of material points at all instants.
 
         Parameters
@@ -212,7 +213,7 @@ class History:
         """
         return self.system.points.find(point, beam).displacement(self.u)
 
-    def position(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
+    def position(self, point: Any, beam: WhichMember = None) -> Array:
         """Position of material points at all instants, (nt, 2) or (nt, 2, n).
 
         Parameters
@@ -225,7 +226,7 @@ class History:
         at = self.system.points.find(point, beam)
         return at.start + at.displacement(self.u)
 
-    def velocity(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
+    def velocity(self, point: Any, beam: WhichMember = None) -> Array:
         """Velocity of material points at all instants, (nt, 2) or (nt, 2, n).
 
         Parameters
@@ -236,6 +237,29 @@ class History:
             The beam, its name or its number; found if it is not given.
         """
         return self.system.points.find(point, beam).velocity(self.u, self.v)
+
+    def angle(self, body: WhichMember) -> Array:
+        """The angle of a rigid body at all instants, in radians, shape (nt,); turns are counted.
+
+        Parameters
+        ----------
+        body
+            The RigidBody, its name or its number.
+        """
+        found = require_body(self.system, body)
+        return np.unwrap(found.angle_at(self.u[:, self.system.of(found)]))
+
+    def angular_velocity(self, body: WhichMember) -> Array:
+        """The angular velocity of a rigid body at all instants, counterclockwise, shape (nt,).
+
+        Parameters
+        ----------
+        body
+            The RigidBody, its name or its number.
+        """
+        found = require_body(self.system, body)
+        s = self.system.of(found)
+        return found.angular_velocity(self.u[:, s], self.v[:, s])
 
     def strain(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True) -> Array:
         """Strain (eps_xx, eps_yy, eps_xy) at all instants, (nt, 3) or (nt, 3, n).

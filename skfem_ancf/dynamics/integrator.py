@@ -75,7 +75,7 @@ class Integrator:
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
         self._work = room_for_steps(system.N, system.m, system.machine.tables.stresses.size)
         self._courses = Courses(system, scheme.conserving)
-        self._state, self._dt, self.substeps = np.zeros(STATE), np.nan, 0
+        self._state, self._dt, self.substeps, self._lost = np.zeros(STATE), np.nan, 0, ""
         self.longest = int(np.clip(STORED // (4 * system.N), 1, BLOCK))
 
     @property
@@ -212,6 +212,7 @@ class Integrator:
         except BaseException:  # also Ctrl-C: the motion may go on from y
             self._state[:], self._state[READY] = before, 0.0
             raise
+        done, self._lost = s.first_lost(rows[:done, 0])
         if done < n:
             self._state[READY] = 0.0
 
@@ -232,7 +233,7 @@ class Integrator:
         """
         done, motion = self.run(y, dt, 1)
         if not done:
-            raise StepFailed(FAILURES[int(self._state[FAILURE])])
+            raise StepFailed(self._lost or FAILURES[int(self._state[FAILURE])])
         return motion(0)
 
     def step(self, y: Motion, dt: float, depth: int = 0) -> Motion:

@@ -60,7 +60,7 @@ class StepSize:
                  t_end: float) -> None:
         self.system, self.scheme, self.rtol = system, scheme, rtol
         self.span = t_end - t_start
-        self._mass = sum(b.total_mass for b in system.beams)
+        self._mass = sum(b.total_mass for b in system.members)
         self._averages = self._new = np.zeros((2, system.N))
         self.times = np.linspace(t_start, t_end, SAMPLES + 1)
         self._values = self._sample()

@@ -26,24 +26,25 @@ _COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
 
 class Link(NamedTuple):
-    """A plane vector ``start + u[dofs] @ weights``, perhaps constant.
+    """A plane vector ``start + sum(u[dofs] * weights, axis=1)``, perhaps constant.
 
     Attributes
     ----------
     start
         Shape (2,).
     dofs, weights
-        Shapes (2, k) and (k,).
+        Shape (2, k) both; weights (k,) are those of both components.
     """
 
     start: Any
     dofs: Any = np.zeros((2, 0), dtype=int)
-    weights: Any = np.zeros(0)
+    weights: Any = np.zeros((2, 0))
 
 
 def link(vector: Vector | Link) -> Link:
     """A Vector of joints as a :class:`Link`."""
-    return Link(np.asarray(vector.start, dtype=float), vector.dofs, vector.weights)
+    return Link(np.asarray(vector.start, dtype=float), vector.dofs,
+                np.broadcast_to(vector.weights, np.shape(vector.dofs)))
 
 
 def difference(a: Vector | Link, b: Vector | Link) -> Link:
@@ -55,7 +56,8 @@ def difference(a: Vector | Link, b: Vector | Link) -> Link:
         Vectors or Links.
     """
     return Link(np.asarray(b.start, dtype=float) - a.start,
-                np.concatenate([a.dofs, b.dofs], axis=1), np.append(-a.weights, b.weights))
+                np.concatenate([a.dofs, b.dofs], axis=1),
+                np.concatenate([-link(a).weights, link(b).weights], axis=1))
 
 
 class Part(NamedTuple):

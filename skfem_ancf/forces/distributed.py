@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..beam import select_beam
 from ..errors import require_flag, require_not_negative, teaching
 from ..kernels.section import beam_gradients
 from ..quadrature import gauss
 from ..spread import AXIS, Facets, facets_along
-from .base import ForceElement, Link, Part
+from .base import ForceElement, Link, Part, link
 from .texts import DRAG, FOUNDATION
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ class Foundation(ForceElement):
         self.beam = beam
 
     def bind(self, scene: Scene) -> list[Link]:
-        beam, first = scene.beam(self.beam), scene.offset(self.beam)
+        beam, first = select_beam(scene.beams, self.beam), scene.offset(self.beam)
         basis = beam.facet_basis(self.side)
         normals, areas = np.asarray(basis.normals), beam.width * basis.dx
         X = beam.mesh.mapping().invF(np.asarray(basis.global_coordinates()), basis.tind)
@@ -59,7 +60,8 @@ class Foundation(ForceElement):
                                     normals.transpose(1, 2, 0)):
             for x, area, normal in zip(points, dx, n):
                 dofs, weights = beam.probe_reference(int(e), x)
-                self._at.append((Link(np.zeros(2), dofs + first, weights), float(area), normal))
+                self._at.append((link(Link(np.zeros(2), dofs + first, weights)), float(area),
+                                 normal))
         return [place for place, _, _ in self._at]
 
     def parts(self) -> list[Part]:
@@ -104,7 +106,7 @@ class Drag(ForceElement):
         self.beam = beam
 
     def bind(self, scene: Scene) -> list[Link]:
-        beam, first = scene.beam(self.beam), scene.offset(self.beam)
+        beam, first = select_beam(scene.beams, self.beam), scene.offset(self.beam)
         mesh, mapping = beam.mesh, beam.mesh.mapping()
         xi, w = gauss(beam.element.axis_degree + 1)
         X = np.array([xi, 0.5 + 0.0 * xi])
@@ -116,8 +118,8 @@ class Drag(ForceElement):
         for e in range(mesh.nelements):
             for k, x in enumerate(X.T):
                 dofs, weights = beam.probe_reference(e, x)
-                place = Link(np.zeros(2), dofs + first, weights)
-                slope = Link(frame[0, e, k], dofs + first, slopes[0, e, k])
+                place = link(Link(np.zeros(2), dofs + first, weights))
+                slope = link(Link(frame[0, e, k], dofs + first, slopes[0, e, k]))
                 self._at.append((place, slope, float(w[k] * length[e, k])))
         return [place for place, _, _ in self._at]
 

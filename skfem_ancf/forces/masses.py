@@ -56,10 +56,10 @@ class PointMass(ForceElement):
         """What it adds to the mass matrix: rows, columns and values, shapes (k,)."""
         rows, columns, values = [], [], []
         for size, place in self._masses:
-            for dofs in place.dofs:
+            for dofs, weights in zip(place.dofs, place.weights):
                 rows.append(np.repeat(dofs, len(dofs)))
                 columns.append(np.tile(dofs, len(dofs)))
-                values.append(size * np.outer(place.weights, place.weights).ravel())
+                values.append(size * np.outer(weights, weights).ravel())
         return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
 
     def __repr__(self) -> str:

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import (InputError, MeshError, require_finite, require_finite_scalar,
+from ..errors import (InputError, require_finite_scalar,
                       require_not_negative, shown, teaching)
-from ..joints.base import Vector, point, section
-from ..places import is_point
+from ..joints.base import GROUND, Vector, named_place, point, section
+from ..rigid import RigidBody, on_body
 from .base import ForceElement, Link, Part, difference, link
 from .texts import SPRING, TORSION
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..types import Place, WhichBeam
 
 
-def end_of(scene: Scene, place: Any) -> Vector | Link:
+def end_of(scene: Scene, place: Any) -> Vector:
     """A material point, or one of the ground.
 
     Parameters
@@ -26,27 +26,11 @@ def end_of(scene: Scene, place: Any) -> Vector | Link:
     scene
         What :meth:`ForceElement.bind` was given.
     place
-        (x, y): the material point there, or the point of the ground where no beam is; or
-        (beam, (x, y)); or ("ground", (x, y)).
+        (x, y): the material point there, or the point of the ground where no beam and no rigid
+        body is; a RigidBody, for its centre of mass; (beam, (x, y)); or ("ground", (x, y)).
     """
-    if isinstance(place, (tuple, list)) and len(place) == 2 and not is_point(place):
-        which, at = place
-        if which == "ground":
-            return Link(np.array(require_finite("a point of the ground", at, (2,))))
-        return point(scene, which, at)
-    at = require_finite("a point of a spring", place, (2,))
-    found = []
-    for k, beam in enumerate(scene.beams):
-        try:
-            beam.locate(at)
-        except MeshError:
-            continue
-        found.append(k)
-    if len(found) > 1:
-        names = [scene.beams[k].name or k for k in found]
-        raise InputError(f"the point {shown(place)} is one of the beams {names}: say which, as "
-                         f"({names[0]!r}, {shown(place)})")
-    return point(scene, found[0], at) if found else Link(np.array(at))
+    which, at = named_place(scene, place, GROUND)
+    return point(scene, which, at)
 
 
 @teaching
@@ -61,7 +45,7 @@ class Spring(ForceElement):
         Stiffness (force per length), zero or positive.
     between
         Two places, each (x, y): the material point there, or the point of the ground where no beam
-        is; or (beam, (x, y)) with a Beam, a name or a number; or ("ground", (x, y)).
+        is; or (beam, (x, y)) with a Beam, a RigidBody, a name or a number; or ("ground", (x, y)).
     damping
         Force per velocity, zero or positive.
     length
@@ -76,13 +60,14 @@ class Spring(ForceElement):
         if not isinstance(between, (tuple, list)) or len(between) != 2:
             raise InputError("between must be two places, as ((1, 0), (1, 0.5)), got "
                              f"{shown(between)}")
-        self.between = tuple(between)
+        self.between = tuple((place, None) if isinstance(place, RigidBody) else place
+                             for place in between)
 
     def bind(self, scene: Scene) -> list[Link]:
         a, b = (end_of(scene, place) for place in self.between)
         if not a.weights.size and not b.weights.size:
             raise InputError(f"neither end of the spring between {shown(self.between)} is a point "
-                             "of a beam: both would be of the ground")
+                             "of a beam or a rigid body: both would be of the ground")
         self._link = difference(a, b)
         distance = float(np.hypot(*self._link.start))
         if distance == 0.0 and self.length != 0.0:
@@ -112,7 +97,7 @@ class TorsionalSpring(ForceElement):
     k
         Moment per angle, zero or positive.
     at
-        A place that is one section of a beam.
+        A place that is one section of a beam, or a point through which it goes; or a RigidBody.
     damping
         Moment per angular velocity, zero or positive.
     beam
@@ -127,7 +112,7 @@ class TorsionalSpring(ForceElement):
                  other: Any = None, angle: float = 0.0) -> None:
         self.k = require_not_negative("k", k)
         self.damping = require_not_negative("damping", damping)
-        self.at, self.beam = at, beam
+        self.at, self.beam = on_body(at, beam)
         if other is not None and (not isinstance(other, (tuple, list)) or len(other) != 2):
             raise InputError("other must be a section of another beam, as (1, 'left'), got "
                              f"{shown(other)}")
@@ -140,7 +125,7 @@ class TorsionalSpring(ForceElement):
 
     def bind(self, scene: Scene) -> list[Link]:
         self._d = link(section(scene, self.beam, self.at)[1])
-        self._e = Link(self._d.start) if self.other is None else link(
+        self._e = link(Link(self._d.start)) if self.other is None else link(
             section(scene, *self.other)[1])
         d, e = self._d.start, self._e.start
         self._start = float(np.arctan2(e[0] * d[1] - e[1] * d[0], d @ e)) + self.angle

@@ -83,7 +83,7 @@ class Forces:
         """Rows, columns, weights and places of the derivatives that element k adds."""
         links, _, places = self._blocks[k]
         dofs = [link.dofs[c] for link in links for c in range(2)]
-        weights = [link.weights for link in links for _ in range(2)]
+        weights = [row for link in links for row in link.weights]
         known = k >= len(self.parts)
         used = range(len(dofs)) if known or self.parts[k].kind == TORSION else range(2)
         out: list[list[Any]] = [[], [], [], []]
@@ -121,9 +121,9 @@ class Forces:
                 for c in range(2):
                     row = rows[2 * k + c]
                     start[row] = one.start[c]
-                    at.append(np.full(len(one.weights), row))
+                    at.append(np.full(len(one.weights[c]), row))
                     of.append(one.dofs[c])
-                    weight.append(one.weights)
+                    weight.append(one.weights[c])
         i, j, w, place = self._entries(False)
         keep = (i >= j) | (not symmetric)
         kinds = np.array([part.kind for part in self.parts], dtype=np.int64)
@@ -158,7 +158,7 @@ class Forces:
         out = np.zeros((2 * len(links), self._N))
         for k, row in enumerate(out):
             one = links[k // 2]
-            np.add.at(row, one.dofs[k % 2], one.weights)
+            np.add.at(row, one.dofs[k % 2], one.weights[k % 2])
         return out
 
     def _between_rows(self):
@@ -250,7 +250,8 @@ class Forces:
         springs = [part for part in self.parts if part.kind == TORSION and part.numbers[0] > 0.0]
         out = np.empty((len(springs), len(u)))
         for row, part in zip(out, springs):
-            y = [(one.start + u[:, one.dofs] @ one.weights).T for one in (part.d, part.e)]
+            y = [(one.start + np.sum(u[:, one.dofs] * one.weights, axis=2)).T
+                 for one in (part.d, part.e)]
             turned(np.repeat(np.reshape(part.numbers, (-1, 1)), len(u), axis=1),
                    np.concatenate(y), row)
         return out

@@ -43,7 +43,8 @@ class BodyFields(NamedTuple):
     points
         Positions, shape (n, 3); elements do not share points.
     cells
-        For each beam its cell type and its cells, as rows of point numbers.
+        For each beam its cell type and its cells, as rows of point numbers; for each rigid body its
+        outline.
     point_data
         Fields by name, shape (n,) or (n, 3): vectors have a third component of zero, tensors
         are (xx, yy, xy).
@@ -117,6 +118,18 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
         numbers["beam"].append(np.full(ne * len(local), b))
         numbers["element"].append(np.repeat(np.arange(ne), len(local)))
         first += ne * npoints
+    for k, body in enumerate(getattr(state, "bodies", ())):
+        start = body.outline_at(np.zeros(4))
+        u = body.outline_at(state.u_of(body)) - start
+        n = u.shape[1]
+        points.append(_rows(start if undeformed else start + u))
+        for name, parts in data.items():
+            parts.append(_rows(u) if name == "displacement" else
+                         np.full((n, *parts[0].shape[1:]), np.nan))
+        cells.append(("polygon", first + np.arange(n)[None]))
+        numbers["beam"].append(np.array([len(state.beams) + k]))
+        numbers["element"].append(np.zeros(1, dtype=int))
+        first += n
     return BodyFields(np.concatenate(points), cells,
                       {name: np.concatenate(v) for name, v in data.items()}, numbers)
 
@@ -144,7 +157,8 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
                                    has no thickness left.
     =============================  ==========================================================
 
-    ``beam`` and ``element``, on cells, are the numbers of both.
+    ``beam`` and ``element``, on cells, are the numbers of both. A rigid body is the polygon of its
+    outline, numbered behind the beams, without strain and stress (NaN).
 
     Parameters
     ----------

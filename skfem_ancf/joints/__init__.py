@@ -10,6 +10,7 @@ from .guides import OnCircle, OnLine
 from .hinge import Hinge
 from .plane_section import PlaneSection
 from .prescribed import PrescribedAngle, PrescribedPosition
+from .sliders import Sleeve, Slot
 from .weld import Weld
 
 #: The joints by name.
@@ -21,6 +22,8 @@ JOINTS = {
     "position": PrescribedPosition,
     "angle": PrescribedAngle,
     "plane": PlaneSection,
+    "sleeve": Sleeve,
+    "slot": Slot,
 }
 
 
@@ -45,4 +48,4 @@ def get_joint(joint: str | Joint, **options: Any) -> Joint:
 
 
 __all__ = ["JOINTS", "Hinge", "Joint", "OnCircle", "OnLine", "PlaneSection", "PrescribedAngle",
-           "PrescribedPosition", "Weld", "bind_joint", "get_joint"]
+           "PrescribedPosition", "Sleeve", "Slot", "Weld", "bind_joint", "get_joint"]

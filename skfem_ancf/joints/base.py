@@ -7,22 +7,26 @@ from uuid import uuid4
 
 import numpy as np
 
-from ..errors import AncfError, InputError, require_finite, shown
+from ..errors import AncfError, InputError, MeshError, require_finite, shown
 from ..frozen import Sealable
 from ..loads import require_entries
-from ..places import is_point
+from ..places import as_point, is_place, is_point
+from ..rigid import RigidBody
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike
 
     from ..scene import Scene
-    from ..types import Array, Place, WhichBeam
+    from ..types import Array, WhichMember
 
 
 class Vector:
-    """A plane vector that depends affinely on the coordinates: ``start + u[dofs] @ weights``.
+    """A plane vector that depends affinely on the coordinates.
 
-    The position of a material point and the direction of a section are such vectors.
+    ``start + sum(u[dofs] * weights, axis=1)``: the position of a material point, the direction of a
+    section and that of a rigid body are such vectors, and so is a point of the ground.
 
     Parameters
     ----------
@@ -31,15 +35,17 @@ class Vector:
     dofs
         Numbers of the coordinates of both components, shape (2, n).
     weights
-        Their weights, shape (n,).
+        Their weights, shape (2, n), or (n,) if they are those of both components.
     """
 
     def __init__(self, start: ArrayLike, dofs: Array, weights: Array) -> None:
-        keep = np.abs(weights) > 1e-14 * np.max(np.abs(weights))
-        self.start, self.dofs, self.weights = np.asarray(start), dofs[:, keep], weights[keep]
+        weights = np.broadcast_to(weights, np.shape(dofs))
+        size = np.max(np.abs(weights), axis=0, initial=0.0)
+        keep = size > 1e-14 * np.max(size, initial=0.0)
+        self.start, self.dofs, self.weights = np.asarray(start), dofs[:, keep], weights[:, keep]
 
     def __call__(self, u: Array) -> Array:
-        return self.start + u[self.dofs] @ self.weights
+        return self.start + np.sum(u[self.dofs] * self.weights, axis=1)
 
     def row(self, direction: ArrayLike, n: int) -> Array:
         """The derivative of ``direction . vector`` by the coordinates, as a dense row (n,).
@@ -57,7 +63,7 @@ class Vector:
             Shape (n,).
         """
         out = np.zeros(n)
-        np.add.at(out, self.dofs, np.outer(np.asarray(direction), self.weights))
+        np.add.at(out, self.dofs, np.asarray(direction)[:, None] * self.weights)
         return out
 
     def entries(self, direction: ArrayLike) -> tuple[Array, Array]:
@@ -73,7 +79,7 @@ class Vector:
         columns, values
             Shapes (k,).
         """
-        return self.dofs.ravel(), np.outer(np.asarray(direction), self.weights).ravel()
+        return self.dofs.ravel(), (np.asarray(direction)[:, None] * self.weights).ravel()
 
 
 def gradients(*equations: list) -> tuple[Array, Array, Array]:
@@ -240,6 +246,16 @@ class Joint(Sealable):
         """
         return None
 
+    def lost(self, u: Array) -> str:
+        """Why the joint cannot hold in a converged state, in words; "" if it can.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        """
+        return ""
+
     def offset(self, times: Array, N: int) -> Array:
         """Phi of the stress-free state at several times.
 
@@ -286,7 +302,7 @@ class Joint(Sealable):
 
     def __repr__(self) -> str:
         at = getattr(self, "at", None)
-        if isinstance(at, tuple) and len(at) == 2 and at[0] is at[1]:  # given once for both beams
+        if isinstance(at, tuple) and len(at) > 1 and all(x is at[0] for x in at):  # given once
             at = at[0]
         parts = [type(self).__name__, self.name, None if at is None else f"at {shown(at)}"]
         return f"<{' '.join(part for part in parts if part)}>"
@@ -347,7 +363,85 @@ def same_joint(a: Joint, b: Joint) -> bool:
                       and getattr(a, "_key", None) == getattr(b, "_key", None))
 
 
-def point(scene: Scene, beam: WhichBeam, at: ArrayLike) -> Vector:
+#: What a joint or a spring calls the ground in the place of a beam.
+GROUND = "ground"
+
+
+def _fixed(value: Array) -> Vector:
+    """A Vector that does not move."""
+    return Vector(value, np.zeros((2, 0), dtype=int), np.zeros((2, 0)))
+
+
+def members_at(scene: Scene, at: ArrayLike) -> list[int]:
+    """Numbers of the beams that have a material point at a place, and of bodies around it.
+
+    Parameters
+    ----------
+    scene
+        What :meth:`Joint.bind` was given.
+    at
+        The place (x, y) in the stress-free state, shape (2,).
+    """
+    found = []
+    for k, member in enumerate(scene.members):
+        if isinstance(member, RigidBody):
+            if member.contains(np.reshape(at, (2, 1)))[0]:
+                found.append(k)
+            continue
+        try:
+            member.locate(at)
+        except MeshError:
+            continue
+        found.append(k)
+    return found
+
+
+def named_place(scene: Scene, place: Any, where_none_is: str | None = None) -> tuple[Any, Any]:
+    """Which beam or body a place is of, and the place there.
+
+    Parameters
+    ----------
+    scene
+        What :meth:`Joint.bind` was given.
+    place
+        (x, y): the material point there; (beam, (x, y)), or another place of a beam; a RigidBody,
+        for its centre of mass; ("ground", (x, y)).
+    where_none_is
+        Whose a point is where no beam and no body is: "ground", or None to raise InputError.
+
+    Returns
+    -------
+    which, at
+        As :func:`point` takes them.
+
+    Raises
+    ------
+    InputError
+        If there is no beam and no body, or more than one.
+    """
+    if isinstance(place, RigidBody):
+        return place, None
+    if isinstance(place, (tuple, list)) and len(place) == 2 and not is_point(place):
+        which, at = place
+        if isinstance(which, str) and which == GROUND:
+            at = tuple(map(float, require_finite("a point of the ground", at, (2,))))
+        elif isinstance(at, np.ndarray):
+            at = tuple(at.tolist())
+        return which, at
+    at = require_finite("a point of a spring or a joint", place, (2,))
+    found = members_at(scene, at)
+    if len(found) > 1:
+        names = [scene.members[k].name or k for k in found]
+        raise InputError(f"the point {shown(place)} is one of the beams {names}: say which, as "
+                         f"({names[0]!r}, {shown(place)})")
+    if not found and where_none_is is None:
+        raise InputError(f"no beam and no rigid body is at the point {shown(place)}: for one of "
+                         f"the ground write ('ground', {shown(place)}), for one outside of the "
+                         "outline of a rigid body (body, (x, y))")
+    return (found[0] if found else where_none_is), tuple(map(float, at))
+
+
+def point(scene: Scene, beam: WhichMember, at: Any) -> Vector:
     """The position of a material point, as a :class:`Vector`.
 
     Parameters
@@ -355,59 +449,116 @@ def point(scene: Scene, beam: WhichBeam, at: ArrayLike) -> Vector:
     scene
         What :meth:`Joint.bind` was given.
     beam
-        The beam, its name or its number.
+        The beam or rigid body, its name or its number; "ground" for a point of the ground.
     at
-        The point: its place (x, y) in the stress-free body.
+        The point: its place (x, y) in the stress-free state, shape (2,); None for the centre of
+        mass of a rigid body.
     """
-    beam = scene.beam(beam)
-    e, X = beam.locate(at)
-    dofs, weights = beam.probe(at)
-    start = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
-    return Vector(start, dofs + scene.offset(beam), weights)
+    if isinstance(beam, str) and beam == GROUND:
+        return _fixed(np.array(as_point(at)))
+    member = scene.beam(beam)
+    dofs, weights = member.probe(at)
+    if isinstance(member, RigidBody):
+        start = member.place(at)
+    else:
+        e, X = member.locate(at)
+        start = member.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
+    return Vector(start, dofs + scene.offset(member), weights)
 
 
-def section(scene: Scene, beam: WhichBeam, boundary: Place) -> tuple[Vector, Vector]:
-    """Axis position and direction of a section, as two :class:`Vector`.
+def section(scene: Scene, beam: WhichMember, place: Any) -> tuple[Vector, Vector]:
+    """Position and direction of a section, as two :class:`Vector`.
 
     Parameters
     ----------
     scene
         What :meth:`Joint.bind` was given.
     beam
-        The beam, its name or its number.
-    boundary
-        A place that is one section.
+        The beam or rigid body, its name or its number; "ground" for the ground.
+    place
+        A place that is one section, whose position is that of its axis; or a material point (x, y),
+        at which the section through it may lie inside an element. Of a cable the position is that
+        of the axis, and the direction that of its tangent. Of a rigid body a point, or None for its
+        centre of mass.
     """
-    beam = scene.beam(beam)
-    node = beam.section_node(boundary)
-    dofs, weights = beam.section_direction(node)
+    if isinstance(beam, str) and beam == GROUND:
+        return point(scene, beam, place), _fixed(np.array([1.0, 0.0]))
+    member = scene.beam(beam)
+    first = scene.offset(member)
+    if isinstance(member, RigidBody):
+        dofs, weights = member.section_direction(member.section_node(place))
+        return point(scene, member, place), Vector(member.q0[dofs] @ weights, dofs + first, weights)
+    try:
+        node = member.section_node(place)
+    except MeshError:
+        if not is_point(place):
+            raise
+        return _inner_section(scene, member, place)
+    dofs, weights = member.section_direction(node)
+    direction = Vector(member.q0_local[dofs] @ weights, dofs + first, weights)
+    if is_point(place) and member.has_sections:
+        return point(scene, member, place), direction
+    first += node * member.nd
+    return (Vector(member.mesh.p[:, node], np.array([[first], [first + 1]]), np.ones(1)), direction)
+
+
+def _inner_section(scene: Scene, beam: Any, at: Any) -> tuple[Vector, Vector]:
+    """As :func:`section`, for a section inside an element."""
+    e, X = beam.locate(at)
+    if not beam.has_sections:
+        X = np.array([X[0], 0.5])
+        at = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
+    dofs, _ = beam.probe_reference(e, X)
+    weights = beam.kinematics.direction_weights(beam, e, float(X[0]))
     direction = Vector(beam.q0_local[dofs] @ weights, dofs + scene.offset(beam), weights)
-    first = scene.offset(beam) + node * beam.nd
-    return (Vector(beam.mesh.p[:, node], np.array([[first], [first + 1]]), np.ones(1)), direction)
+    return point(scene, beam, at), direction
 
 
-def pair(value: Any, what: str) -> tuple[Any, Any]:
-    """A point as a pair: given once for both beams, or once for each.
+def each(value: Any, what: str, n: int) -> tuple[Any, ...]:
+    """A place for each of several beams: given once for all of them, or once for each.
 
     Parameters
     ----------
     value
-        One point, or a tuple or list of two.
+        One place, or a tuple or list of n.
     what
-        What it is, for the message where it is None.
+        What it is, for messages.
+    n
+        How many beams there are.
     """
     if value is None:
         raise InputError(f"a joint needs {what}")
-    if isinstance(value, (tuple, list)) and len(value) == 2 and not is_point(value):
+    if is_place(value):
+        return (value,) * n
+    if isinstance(value, (tuple, list)) and len(value) == n:
         return tuple(value)
-    return value, value
+    raise InputError(f"a joint of {n} beams needs {what}, one for all of them or one for each, as "
+                     f"at=('right', 'left'), got {shown(value)}")
 
 
-def both(beams: Any) -> tuple[Any, Any]:
-    """The two beams of a joint."""
-    if not isinstance(beams, (tuple, list)) or len(beams) != 2:
-        raise InputError(f"beams must be two beams, by Beam, name or number, got {shown(beams)}")
+def several(beams: Any) -> tuple[Any, ...]:
+    """The beams and bodies of a joint, two at least."""
+    if not isinstance(beams, (tuple, list)) or len(beams) < 2:
+        raise InputError("beams must be two beams or rigid bodies or more, by Beam, RigidBody, "
+                         f"name or number, or 'ground', got {shown(beams)}")
+    if all(isinstance(b, str) and b == GROUND for b in beams):
+        raise InputError(f"a joint holds a beam or a rigid body, got {shown(beams)}")
     return tuple(beams)
+
+
+def equations_of(names: Sequence[str], n: int) -> tuple[str, ...]:
+    """Names of the equations between the first of n beams and each of the others.
+
+    Parameters
+    ----------
+    names
+        Those between two beams.
+    n
+        How many beams there are.
+    """
+    if n == 2:
+        return tuple(names)
+    return tuple(f"{name}, from number {k}" for k in range(1, n) for name in names)
 
 
 def cross_terms(a: Vector, b: Vector, Q: Array) -> tuple[Array, Array, Array]:
@@ -426,7 +577,7 @@ def cross_terms(a: Vector, b: Vector, Q: Array) -> tuple[Array, Array, Array]:
         Shapes (k,), of a symmetric matrix.
     """
     J = np.array([[0.0, 1.0], [-1.0, 0.0]]) @ Q  # a x c = a^T [[0, 1], [-1, 0]] c
-    values = np.einsum("ij,k,l->ikjl", J, a.weights, b.weights)
+    values = np.einsum("ij,ik,jl->ikjl", J, a.weights, b.weights)
     rows = np.broadcast_to(a.dofs[:, :, None, None], values.shape).ravel()
     cols = np.broadcast_to(b.dofs[None, None], values.shape).ravel()
     values = values.ravel()

@@ -101,6 +101,6 @@ class OnCircle(Joint):
 
     def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
         w = self.r.weights
-        values = np.broadcast_to(np.outer(w, w) * multipliers[0] / self.R, (2, len(w), len(w)))
+        values = np.einsum("ik,il->ikl", w, w) * (multipliers[0] / self.R)
         rows = np.broadcast_to(self.r.dofs[:, :, None], values.shape)
         return rows.ravel(), rows.transpose(0, 2, 1).ravel(), values.ravel()

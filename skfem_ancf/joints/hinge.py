@@ -1,4 +1,4 @@
-"""Two beams share a point and turn freely about it."""
+"""Two beams or more share a point and turn freely about it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import require_label, teaching
-from .base import Joint, both, gradients, pair, point
+from .base import Joint, each, equations_of, gradients, point, several
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 @teaching
 class Hinge(Joint):
-    """r_a = r_b for a material point of each of two beams.
+    """r_a = r_b for a material point of each of two beams, and of a third, and so on.
 
     Parameters
     ----------
     beams
-        Two beams, by Beam, name or number.
+        Two or more, each a Beam or a RigidBody, its name or its number, or "ground".
     at
         The point, its place (x, y) in the stress-free bodies; or one point for each beam, if they
-        are apart.
+        are apart. None is the centre of mass of a rigid body.
     name
         What messages call the joint.
 
@@ -36,18 +36,21 @@ class Hinge(Joint):
     formulation", Archive of Applied Mechanics (2024).
     """
 
-    equations = ("force along x", "force along y")
-
     def __init__(self, beams: Sequence[Any], at: Any, name: str | None = None) -> None:
-        self.beams, self.at = both(beams), pair(at, "the point at=")
+        self.beams = several(beams)
+        self.at = each(at, "the point at=", len(self.beams))
         self.name = require_label("name", name)
+        self.equations = equations_of(("force along x", "force along y"), len(self.beams))
 
     def bind(self, scene: Scene) -> None:
-        self.a, self.b = (point(scene, beam, at) for beam, at in zip(self.beams, self.at))
-        self.found = gradients(*([(self.a, e), (self.b, -e)] for e in np.eye(2)))
+        self.points = [point(scene, beam, at) for beam, at in zip(self.beams, self.at)]
+        first = self.points[0]
+        self.found = gradients(*([(first, e), (other, -e)]
+                                 for other in self.points[1:] for e in np.eye(2)))
 
     def value(self, u: Array, t: float) -> Array:
-        return self.a(u) - self.b(u)
+        first = self.points[0](u)
+        return np.concatenate([first - other(u) for other in self.points[1:]])
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         return self.found

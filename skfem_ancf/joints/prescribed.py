@@ -105,5 +105,5 @@ class PrescribedAngle(Joint):
         return self._normals(times) @ self.d.start[:, None]
 
     def slope(self, times: Array, N: int) -> tuple[Array, Array]:
-        values = self._normals(times)[:, :, None] * self.d.weights
+        values = self._normals(times)[:, :, None] * self.d.weights[None]
         return self.d.dofs.ravel(), values.reshape(len(times), 1, -1)

@@ -1,4 +1,4 @@
-"""Two end sections are welded at the angle they have in the stress-free state."""
+"""Sections of two beams or more are welded at the angles they have in the stress-free state."""
 
 from __future__ import annotations
 
@@ -6,85 +6,94 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, require_flag, require_label, shown, teaching
-from ..places import is_place
-from .base import Joint, both, cross_terms, gradients, rotation, section
+from ..errors import InputError, require_flag, require_label, teaching
+from .base import (GROUND, Joint, cross_terms, each, equations_of, gradients, rotation, section,
+                   several)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ..scene import Scene
     from ..types import Array
+    from .base import Vector
 
 
 @teaching
 class Weld(Joint):
-    """The axis points coincide, and the directions of the two sections keep their angle.
+    """The points coincide, and the directions of the sections through them keep their angles.
 
-    The direction of a section is the best straight line through its face, so the face may still
-    warp and change its thickness.
+    The direction of a section is the best straight line through it, so it may still warp and change
+    its thickness; that of a cable is its tangent.
 
     Parameters
     ----------
     beams
-        Two beams, by Beam, name or number.
+        Two or more, each a Beam or a RigidBody, its name or its number, or "ground".
     at
-        The section of each beam, as ``("right", "left")``; or one place for both, as the point of
-        the axis ``(1, 0)`` that they share.
+        The section of each beam, as ``("right", "left")``, or a material point (x, y), inside of an
+        element too; or one place for all, as the point ``(1, 0)`` that they share.
     name
         What messages call the joint.
     apart
-        Allow that the sections are apart in the stress-free state: the weld draws them together.
+        Allow that the points are apart in the stress-free state: the weld draws them together.
 
     Raises
     ------
     InputError
-        If the sections are apart.
+        If the points are apart.
     """
 
-    equations = ("force along x", "force along y", "moment")
     constant = False
 
     def __init__(self, beams: Sequence[Any], at: Any, name: str | None = None,
                  apart: bool = False) -> None:
-        self.beams, self.name = both(beams), require_label("name", name)
+        self.beams, self.name = several(beams), require_label("name", name)
         self.apart = require_flag("apart", apart)
-        if is_place(at):
-            at = at, at
-        if not isinstance(at, (tuple, list)) or len(at) != 2:
-            raise InputError("a weld needs the section of each of its two beams, as "
-                             f"at=('right', 'left'), or one point of both axes, got {shown(at)}")
-        self.at = tuple(at)
+        self.at = each(at, "the section of each beam", len(self.beams))
+        self.equations = equations_of(("force along x", "force along y", "moment"),
+                                      len(self.beams))
 
     def bind(self, scene: Scene) -> None:
-        (self.a, self.da), (self.b, self.db) = (
+        (self.a, self.da), *others = (
             section(scene, beam, at) for beam, at in zip(self.beams, self.at))
-        gap = self.b.start - self.a.start
-        if not self.apart and np.hypot(*gap) > 1e-6 * min(
-                scene.beam(beam).mesh.lengths.sum() for beam in self.beams):
+        self.pairs = []
+        for b, db in others:
+            self._require_together(scene, b)
+            angle = np.arctan2(*self.da.start[::-1]) - np.arctan2(*db.start[::-1])
+            self.pairs.append((b, db, rotation(angle)))
+
+    def _require_together(self, scene: Scene, b: Vector) -> None:
+        gap = b.start - self.a.start
+        beams = [scene.beam(beam) for beam in self.beams if not _is_ground(beam)]
+        if not self.apart and np.hypot(*gap) > 1e-6 * min(beam.size for beam in beams):
             raise InputError(
                 f"the sections to weld are {np.hypot(*gap):.6g} apart, one at "
                 f"({self.a.start[0]:.6g}, {self.a.start[1]:.6g}), the other at "
-                f"({self.b.start[0]:.6g}, {self.b.start[1]:.6g}): name sections that meet, move a "
+                f"({b.start[0]:.6g}, {b.start[1]:.6g}): name sections that meet, move a "
                 f"mesh by mesh.translated(({0 - gap[0]:.6g}, {0 - gap[1]:.6g})), or weld with "
                 "apart=True to draw them together")
-        angle = np.arctan2(*self.da.start[::-1]) - np.arctan2(*self.db.start[::-1])
-        self.Q = rotation(angle)
-        rows, columns, self.values = gradients(
-            *([(self.a, e), (self.b, -e)] for e in np.eye(2)))
-        turning = np.append(self.da.dofs.ravel(), self.db.dofs.ravel())
-        self.places = (np.append(rows, np.full(len(turning), 2)), np.append(columns, turning))
 
     def value(self, u: Array, t: float) -> Array:
-        d, e = self.da(u), self.Q @ self.db(u)
-        return np.append(self.a(u) - self.b(u), e[0] * d[1] - e[1] * d[0])
+        a, d, out = self.a(u), self.da(u), []
+        for b, db, Q in self.pairs:
+            e = Q @ db(u)
+            out += [*(a - b(u)), e[0] * d[1] - e[1] * d[0]]
+        return np.array(out)
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        d, e = self.da(u), self.Q @ self.db(u)
-        turn = ((-e[1], e[0]) * self.da.weights[:, None],
-                (d[1], -d[0]) @ self.Q * self.db.weights[:, None])
-        return *self.places, np.concatenate([self.values, *(part.T.ravel() for part in turn)])
+        d = self.da(u)
+        equations: list[list[Any]] = []
+        for b, db, Q in self.pairs:
+            e = Q @ db(u)
+            equations += [[(self.a, n), (b, -n)] for n in np.eye(2)]
+            equations.append([(self.da, (-e[1], e[0])), (db, (d[1], -d[0]) @ Q)])
+        return gradients(*equations)
 
     def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
-        i, j, v = cross_terms(self.da, self.db, self.Q)
-        return i, j, -multipliers[2] * v
+        i, j, v = zip(*(cross_terms(self.da, db, Q) for _, db, Q in self.pairs))
+        return (np.concatenate(i), np.concatenate(j),
+                np.concatenate([-m * x for m, x in zip(multipliers[2::3], v)]))
+
+
+def _is_ground(beam: Any) -> bool:
+    return isinstance(beam, str) and beam == GROUND

@@ -190,9 +190,9 @@ def refine(scene: Scene, marked: Sequence[ArrayLike]) -> tuple[Scene, Callable[[
              for b, m in zip(scene.beams, marked)]
 
     def prolong(u):
-        parts = np.split(u, np.cumsum([b.N for b in scene.beams])[:-1])
-        return np.concatenate([_prolong(a, b, m, v)
-                               for a, b, m, v in zip(scene.beams, beams, marked, parts)])
+        parts = np.split(u, np.cumsum([b.N for b in scene.beams]))  # the last of rigid bodies
+        return np.concatenate([*(_prolong(a, b, m, v) for a, b, m, v in zip(
+            scene.beams, beams, marked, parts)), parts[-1]])
 
     return scene.with_beams(beams), prolong
 

@@ -89,7 +89,7 @@ class Tracer:
     def __init__(self, system: System, tol: float, max_iterations: int) -> None:
         self.system, self.rules = system, rules_of(system, "mixed", tol, max_iterations)
         weights = np.zeros(system.N)
-        for beam, s in zip(system.beams, system.slices):
+        for beam, s in zip(system.members, system.slices):
             weights[s].reshape(-1, beam.nd)[:, :2] = 1.0
         self.weights = weights / (0.5 * weights.sum() * system.size**2)
         self.unit = system.values(1.0) - system.values(0.0)

@@ -18,6 +18,9 @@ from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, 
 if TYPE_CHECKING:
     from ..equations import Equations
 
+#: Stiffness that a coordinate is taken to have in norms at least, over the mean: that of a rigid
+#: body has none of its own.
+SMALLEST = 1e-14
 #: How an iteration ends.
 CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
 
@@ -199,7 +202,10 @@ def _tangent(e, target, rules, x, w, k):
     add_element_tangent(e.forces, target.at, x.u, e.K)
     diagonal(e.K, w.scale)
     for i in lanes(x.u.size):
-        w.scale[i] = 1.0 / np.abs(w.scale[i])
+        w.scale[i] = np.abs(w.scale[i])
+    least = SMALLEST * np.mean(w.scale)
+    for i in lanes(x.u.size):
+        w.scale[i] = 1.0 / (w.scale[i] + least)
 
 
 @source

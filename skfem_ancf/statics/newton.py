@@ -302,6 +302,8 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record, d
         raise _Failed(_ENDS[status].format(max_iterations))
     if system.inverted(x.u):
         raise _Failed("the body is turned inside out")
+    if system.lost(x.u):
+        raise _Failed(system.lost(x.u))
     if solver is None:
         if n:
             system.K.take_factors()

@@ -434,6 +434,6 @@ def potential(system: System, u: Array, load: float) -> float:
 def position_weights(system: System) -> Array:
     """One at the positions of the nodes, zero at other coordinates, shape (N,)."""
     weights = np.zeros(system.N)
-    for beam, s in zip(system.beams, system.slices):
+    for beam, s in zip(system.members, system.slices):
         weights[s].reshape(-1, beam.nd)[:, :2] = 1.0
     return weights

@@ -186,10 +186,11 @@ def _picture_of(plotter, fine):
 
 def _by_matplotlib(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: Any,
                    unit: str | None) -> Iterator[Array]:
-    from .matplotlib import _GHOST, _INK, _MUTED, _figure_class
+    from .matplotlib import _GHOST, _INK, _MUTED, _RIGID, _figure_class
 
     Figure = _figure_class()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.collections import PolyCollection
     from matplotlib.tri import Triangulation
 
     figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, layout="constrained")
@@ -208,6 +209,7 @@ def _by_matplotlib(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: An
     image = ax.tripcolor(Triangulation(x[:, 0], x[:, 1], triangles), scenery.values(0),
                          shading="gouraud", vmin=scenery.low, vmax=scenery.high,
                          cmap=cmap or ("RdYlBu_r" if field.signed else "viridis"))
+    rigid = ax.add_collection(PolyCollection(scenery.outlines(0), facecolor=_RIGID, edgecolor=_INK))
     ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
     ax.set_aspect("equal")
     unit = unit_of(field, unit)
@@ -218,7 +220,7 @@ def _by_matplotlib(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: An
     clock = ax.set_title("", loc="right", fontsize=8, color=_INK)
     canvas.draw()
     figure.set_layout_engine("none")
-    for artist in (image, clock):
+    for artist in (rigid, image, clock):
         artist.set_animated(True)
     canvas.draw()
     background = canvas.copy_from_bbox(figure.bbox)  # all that stays
@@ -226,9 +228,10 @@ def _by_matplotlib(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: An
         x = scenery.points(k)
         image._triangulation.x, image._triangulation.y = x[:, 0], x[:, 1]
         image.set_array(scenery.values(k))
+        rigid.set_verts(scenery.outlines(k))
         clock.set_text(f"t = {time:.4g}")
         canvas.restore_region(background)
-        for artist in (image, clock):
+        for artist in (rigid, image, clock):
             ax.draw_artist(artist)
         yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 

@@ -47,6 +47,7 @@ def state_html(state: State) -> str:
 def scene_html(scene: Scene) -> str:
     """A table of what is in a Scene, and its stress-free body."""
     rows: list[tuple[str, object]] = [("beam", b) for b in scene.beams]
+    rows += [("rigid body", b) for b in scene.bodies]
     rows += [("support", s) for s in scene.supports]
     rows += [("joint", j) for j in scene.joints] + [("load", f) for f in scene.loads]
     table = "".join(f"<tr><td>{kind}</td><td>{html.escape(_short(thing))}</td></tr>"

@@ -27,7 +27,7 @@ MAX_DPI = 2400
 
 _EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max",
            (True, True): "both"}
-_INK, _MUTED, _GHOST = "#222222", "#666666", "#d9d9d9"
+_INK, _MUTED, _GHOST, _RIGID = "#222222", "#666666", "#d9d9d9", "#bbbbbb"
 
 
 @taught
@@ -111,16 +111,20 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     factor = _thickness(thickness, bodies)
     ghosts = [line for b in bodies for line in b.outline(b.reference, factor)] if undeformed else []
     outlines = [line for b in bodies for line in b.outline(b.deformed, factor)]
+    rigid = [b.outline_at(state.u_of(b)).T for b in getattr(state, "bodies", ())]
     points = np.concatenate([b.points(b.deformed, factor).reshape(2, -1) for b in bodies], axis=1)
     values = np.concatenate([b.values.ravel() for b in bodies])
     low, high = _limits(limits, values, drawn)
 
     if ax is None:
-        ax = Figure(figsize=_figsize(np.concatenate(ghosts + outlines), colorbar),
+        ax = Figure(figsize=_figsize(np.concatenate(ghosts + outlines + rigid), colorbar),
                     layout="constrained").add_subplot()
     if ghosts:
         ax.add_collection(PolyCollection(ghosts, facecolor=_GHOST, edgecolor=_GHOST, linewidth=0.5,
                                          zorder=1), autolim=True)
+    if rigid:
+        ax.add_collection(PolyCollection(rigid, facecolor=_RIGID, edgecolor=_INK, linewidth=0.5,
+                                         zorder=1.5), autolim=True)
     patches = quads(m, n)
     first = np.concatenate([[0], np.cumsum([b.values.size for b in bodies])])
     cells = np.concatenate([

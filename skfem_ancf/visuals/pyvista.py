@@ -18,10 +18,11 @@ from .matplotlib import _Body, _colormap, _limits, _thickness, unit_of
 if TYPE_CHECKING:
     from ..dynamics.history import History
     from ..results import State
-    from ..types import StrPath
+    from ..rigid import RigidBody
+    from ..types import Array, StrPath
 
 #: VTK's numbers of the cells.
-QUAD, LAGRANGE = 9, 70
+POLYGON, QUAD, LAGRANGE = 7, 9, 70
 
 #: Width and height of a picture, least and largest.
 PIXELS = (100, 10000)
@@ -113,6 +114,38 @@ class _Grid:
         made.Modified()
 
 
+class _RigidGrid:
+    """The outline of one rigid body, which takes other states."""
+
+    def __init__(self, body):
+        self.beam, n = body, body.outline.shape[1]
+        self.cells, self.types = np.append(n, np.arange(n)), np.array([POLYGON], np.uint8)
+
+    def points(self, state, undeformed):
+        return outline_points(self.beam, np.zeros(4) if undeformed else state.u_of(self.beam))
+
+    def make(self, state, wanted, lenient, undeformed, recover):
+        return _pyvista().UnstructuredGrid(self.cells, self.types, self.points(state, undeformed))
+
+    def update(self, made, state, wanted, lenient, undeformed, recover):
+        made.points[:] = self.points(state, undeformed)
+        made.Modified()
+
+
+def outline_points(body: RigidBody, u: Array) -> Array:
+    """The corners of a rigid body's outline, shape (n, 3).
+
+    Parameters
+    ----------
+    body
+        A :class:`~skfem_ancf.RigidBody`.
+    u
+        Displacement of its coordinates, shape (4,).
+    """
+    x = body.outline_at(u)
+    return np.array([*x, np.zeros(x.shape[1])]).T
+
+
 @teaching
 class Series:
     """A motion for pyvista: one mesh whose points and fields are those of any instant.
@@ -164,7 +197,8 @@ def _make(state, fields=None, subdivide=(8, 4), lagrange=False, undeformed=False
     lagrange = require_flag("lagrange", lagrange)
     undeformed = require_flag("undeformed", undeformed)
     options = wanted, lenient, undeformed, require_flag("recover", recover)
-    grids = [_Grid(beam, subdivide, lagrange) for beam in state.beams]
+    grids: list[Any] = [_Grid(beam, subdivide, lagrange) for beam in state.beams]
+    grids += [_RigidGrid(body) for body in getattr(state, "bodies", ())]
     blocks = [g.make(state, *options) for g in grids]
 
     def update(other):
@@ -175,7 +209,8 @@ def _make(state, fields=None, subdivide=(8, 4), lagrange=False, undeformed=False
         return blocks[0], update
     mesh = pv.MultiBlock()
     for k, (g, block) in enumerate(zip(grids, blocks)):
-        mesh.append(block, name=f"beam {k}" if g.beam.name is None else g.beam.name)
+        kind = "body" if isinstance(g, _RigidGrid) else "beam"
+        mesh.append(block, name=f"{kind} {k}" if g.beam.name is None else g.beam.name)
     return mesh, update
 
 
@@ -198,7 +233,7 @@ def to_pyvista(state: State, fields: Any = None, subdivide: tuple[int, int] = (8
     Returns
     -------
     pyvista.UnstructuredGrid, or pyvista.MultiBlock
-        Of one beam, or of several by their names.
+        Of one beam, or of several and of the outlines of rigid bodies by their names.
 
     Raises
     ------
@@ -233,6 +268,8 @@ class Scenery:
         self.size, recover = (m, n), require_flag("recover", recover)
         self.frames = [[_Body(state, beam, self.field, m, n, recover) for beam in state.beams]
                        for state in states]
+        self.rigid = [[(body, state.u_of(body)) for body in getattr(state, "bodies", ())]
+                      for state in states]
         every = [body for frame in self.frames for body in frame]
         self.factor = _thickness(thickness, every)
         self.low, self.high = _limits(limits, np.concatenate([b.values.ravel() for b in every]),
@@ -251,11 +288,17 @@ class Scenery:
         x = np.concatenate([
             b.points(b.reference if undeformed else b.deformed, self.factor).reshape(2, -1)
             for b in self.frames[k]], axis=1)
-        return np.array([*x, np.zeros(x.shape[1])]).T
+        return np.concatenate([np.array([*x, np.zeros(x.shape[1])]).T, *(
+            outline_points(body, 0.0 * u if undeformed else u) for body, u in self.rigid[k])])
 
     def values(self, k: int) -> Any:
-        """Values of frame ``k``, shape (n,)."""
-        return np.concatenate([b.values.ravel() for b in self.frames[k]])
+        """Values of frame ``k``, shape (n,); NaN on rigid bodies."""
+        return np.concatenate([b.values.ravel() for b in self.frames[k]] + [
+            np.full(body.outline.shape[1], np.nan) for body, _ in self.rigid[k]])
+
+    def outlines(self, k: int) -> list[Any]:
+        """Corners of the rigid bodies of frame ``k``, shapes (n, 2)."""
+        return [body.outline_at(u).T for body, u in self.rigid[k]]
 
     @property
     def cells(self) -> Any:
@@ -267,6 +310,17 @@ class Scenery:
              + quads(m, n)).reshape(-1, 4) for f, b in zip(first, self.frames[0])])
 
     @property
+    def faces(self) -> Any:
+        """Quads, and outlines of rigid bodies: the number of corners and the points of each."""
+        cells, at = self.cells, sum(b.values.size for b in self.frames[0])
+        parts = [np.hstack([np.full((len(cells), 1), 4), cells]).ravel()]
+        for body, _ in self.rigid[0]:
+            corners = body.outline.shape[1]
+            parts.append(np.append(corners, at + np.arange(corners)))
+            at += corners
+        return np.concatenate(parts)
+
+    @property
     def note(self) -> str:
         """What the picture says of the thickness."""
         return "" if self.factor == 1.0 else f"section drawn {self.factor:g} times as thick"
@@ -274,8 +328,7 @@ class Scenery:
 
 def _dressed(scenery, plotter, cmap, undeformed, unit):
     """Put frame 0 into a plotter; returns its mesh."""
-    pv, field, cells = _pyvista(), scenery.field, scenery.cells
-    faces = np.hstack([np.full((len(cells), 1), 4), cells]).ravel()
+    pv, field, faces = _pyvista(), scenery.field, scenery.faces
     if undeformed:
         ghost = pv.PolyData(scenery.points(0, True) - [0.0, 0.0, 1e-6], faces)
         plotter.add_mesh(ghost, color="#e2e2e2", lighting=False)

@@ -1,0 +1,120 @@
+"""The axis of a beam as a curve of its coordinates, and the point of it that is nearest to another.
+
+A point of the axis has the parameter s: the number of its element, and where in it, from 0 to 1.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ..beam import Beam
+    from ..types import Array
+
+#: Points of an element among which the nearest is looked for first.
+SAMPLES = 5
+#: Iterations for the nearest point.
+ITERATIONS = 40
+
+
+class Axis:
+    """The axis of a beam: a polynomial of s in each element.
+
+    Parameters
+    ----------
+    beam
+        The :class:`~skfem_ancf.Beam`.
+    first
+        Number of its first coordinate in the scene.
+    """
+
+    def __init__(self, beam: Beam, first: int) -> None:
+        self.beam, self.first, degree = beam, first, beam.element.axis_degree
+        xi = np.linspace(0.0, 1.0, degree + 1)
+        rows = beam.element.local(np.array([xi, np.full(degree + 1, 0.5)]), beam.mesh.height)
+        powers = np.linalg.solve(np.vander(xi, increasing=True), rows[0].T).T
+        self._used = np.flatnonzero(np.max(np.abs(powers), axis=1) > 1e-13)
+        self._slope = np.broadcast_to(rows[3], len(powers))[self._used]
+        #: coefficients of the functions, and of their derivatives by s: (4, nb, degree + 1)
+        self._powers = np.zeros((4, len(self._used), degree + 1))
+        self._powers[0] = powers[self._used]
+        for k in range(1, 4):
+            self._powers[k, :, :-1] = self._powers[k - 1, :, 1:] * np.arange(1, degree + 1)
+        self._start = np.asarray(beam.q0)
+        x = np.linspace(0.0, 1.0, SAMPLES)
+        self._samples = self._powers[0] @ x ** np.arange(degree + 1)[:, None]
+        elements = np.arange(beam.mesh.nelements)
+        self._all = self._local(elements)
+        self._scales = beam.mesh.lengths[:, None] ** self._slope
+
+    def _local(self, e: Any) -> Array:
+        """Coordinates of elements, (..., 2, nb)."""
+        first = np.asarray(self.beam.mesh.t[0, e] * self.beam.nd)
+        return first[..., None, None] + 2 * self._used + np.arange(2)[:, None]
+
+    def element(self, s: float) -> int:
+        """The element of a parameter: the nearest one beyond the ends."""
+        return int(np.clip(np.floor(s), 0, self.beam.mesh.nelements - 1))
+
+    def weights(self, s: float) -> tuple[Array, Array]:
+        """Coordinates of the scene, and their weights in the axis and its derivatives by s.
+
+        Parameters
+        ----------
+        s
+            The parameter; beyond an end the curve of the last element goes on.
+
+        Returns
+        -------
+        dofs, weights
+            Shapes (2, nb) and (4, nb): of the position and its first three derivatives.
+        """
+        e = self.element(s)
+        xi = (s - e) ** np.arange(self._powers.shape[2])
+        return self.first + self._local(e), (self._powers @ xi) * self._scales[e]
+
+    def at(self, u: Array, s: float) -> Array:
+        """The position and its first three derivatives by s, shape (4, 2).
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        s
+            The parameter.
+        """
+        dofs, weights = self.weights(s)
+        return weights @ (self._start[dofs - self.first] + u[dofs]).T
+
+    def nearest(self, u: Array, p: Array) -> float:
+        """The parameter of the point of the axis that is nearest to a point.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        p
+            The point, shape (2,).
+        """
+        q = self._start[self._all] + u[self.first + self._all]
+        x = np.einsum("eck,ek,ks->ecs", q, self._scales, self._samples)
+        gap = np.sum((x - p[:, None]) ** 2, axis=1)
+        e, k = np.unravel_index(int(np.argmin(gap)), gap.shape)
+        s, n = float(e + k / (SAMPLES - 1)), self.beam.mesh.nelements
+        for _ in range(ITERATIONS):
+            c, d, dd, _ = self.at(u, s)
+            gap, size = c - p, float(d @ d)
+            slope = size + float(gap @ dd)
+            step = -float(gap @ d) / (slope if slope > 0.1 * size else size)
+            inside = float(np.clip(s + np.clip(step, -0.5, 0.5), -0.5, n + 0.5))
+            done, s = abs(inside - s) <= 1e-15 * n, inside
+            if done:
+                break
+        return s
+
+    def length(self, s: float) -> float:
+        """Length of the stress-free axis from its start to a parameter."""
+        e = self.element(s)
+        return float(np.sum(self.beam.mesh.lengths[:e]) + (s - e) * self.beam.mesh.lengths[e])

@@ -1,0 +1,301 @@
+"""A point slides along the axis of a beam, or along a straight line of a rigid body."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError, require_finite, require_flag, require_label, shown, teaching
+from ..beam import select_beam
+from .axis import Axis
+from .base import (Joint, Vector, cross_terms, gradients, named_place, point, rotation, section)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+    from ..scene import Scene
+    from ..types import Array, WhichBeam, WhichMember
+
+#: How far beyond an end of a beam a sleeve may be, in elements.
+BEYOND = 1e-6
+
+
+def _cross(a: Array, b: Array) -> Any:
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def _crossed(a: Array, B: Array) -> Array:
+    """a x b for each column b of a matrix."""
+    return a[0] * B[1] - a[1] * B[0]
+
+
+def _pairs(A: Array, B: Array) -> Array:
+    """a_i x b_j of the columns of two matrices, made symmetric."""
+    M = np.outer(A[0], B[1]) - np.outer(A[1], B[0])
+    return M + M.T
+
+
+def _dots(A: Array, B: Array) -> Array:
+    """a_i . b_j of the columns of two matrices, made symmetric."""
+    M = A.T @ B
+    return M + M.T
+
+
+@teaching
+class Sleeve(Joint):
+    """A material point slides along the axis of a beam.
+
+    With the point p and the point c(s) of the axis that is nearest to it, ``c'(s) . (p - c(s)) =
+    0``, the equation is ``c'(s) x (p - c(s)) = 0``, c' the derivative by the length of the
+    stress-free axis. So s is no coordinate, and the multiplier is the force normal to the axis over
+    its stretch. With ``angle`` the direction of the point's section keeps its angle with c'.
+
+    Parameters
+    ----------
+    at
+        The point: (beam, (x, y)) with a Beam, a RigidBody, a name or a number, or
+        ("ground", (x, y)); a RigidBody for its centre of mass.
+    on
+        The beam along which it slides, its name or its number.
+    angle
+        Keep the angle: a sleeve that carries a moment.
+    name
+        What messages call the joint.
+
+    Raises
+    ------
+    InputError
+        If the point is not on the axis in the stress-free state.
+
+    References
+    ----------
+    Hong, Ren: "Modeling of sliding joint on one-dimensional flexible medium", Multibody System
+    Dynamics 26 (2011), who have s as a coordinate.
+    """
+
+    constant = False
+    #: of the last displacement: the parameter, and derivatives
+    _known: dict[str, Any]
+
+    def __init__(self, at: Any, on: WhichBeam, angle: bool = False,
+                 name: str | None = None) -> None:
+        self.at, self.on, self.angle = at, on, require_flag("angle", angle)
+        self.name = require_label("name", name)
+        self.equations = ("force normal to the axis",) + ("moment",) * self.angle
+
+    def bind(self, scene: Scene) -> None:
+        which, at = named_place(scene, self.at)
+        beam = select_beam(scene.beams, self.on)
+        if scene.members and which != "ground" and scene.beam(which) is beam:
+            raise InputError(f"{self!r}: a point of {beam!r} cannot slide along the beam itself")
+        self.axis = Axis(beam, scene.offset(beam))
+        zero = np.zeros(scene.N)
+        self._known = {}
+        if self.angle:
+            self.p, self.d = section(scene, which, at)
+        else:
+            self.p = self.d = point(scene, which, at)
+        s = self.axis.nearest(zero, self.p.start)
+        gap = np.hypot(*(self.p.start - self.axis.at(zero, s)[0]))
+        if gap > 1e-6 * beam.size or self._outside(s):
+            raise InputError(f"{self!r}: the point ({self.p.start[0]:.6g}, {self.p.start[1]:.6g}) "
+                             f"is {gap:.6g} off the axis of {beam!r}: name one that is on it")
+        tangent = self.axis.at(zero, s)[1]
+        turn = np.arctan2(*self.d.start[::-1]) - np.arctan2(*tangent[::-1])
+        self.Q = rotation(turn)
+
+    def __repr__(self) -> str:
+        return f"<Sleeve {f'{self.name} ' if self.name else ''}at {shown(self.at)}>"
+
+    def _outside(self, s: float) -> bool:
+        return not -BEYOND <= s <= self.axis.beam.mesh.nelements + BEYOND
+
+    def distance(self, u: Array) -> float:
+        """Where the point is: the length of the stress-free axis from its left end.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        """
+        return self.axis.length(self._parameter(np.asarray(u)))
+
+    def lost(self, u: Array) -> str:
+        """Why the joint does not hold any more, in words; "" if it does.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        """
+        s = self._parameter(u)
+        if not self._outside(s):
+            return ""
+        end = "left" if s < 0 else "right"
+        beam = self.axis.beam
+        return (f"{self!r} has left the beam {beam.name or ''!r} at its {end} end: "
+                "stop before, with until=, hold it by a spring or a support, or lengthen the beam")
+
+    def _parameter(self, u: Array) -> float:
+        known = self._known
+        if not known or not np.array_equal(known["u"], u):
+            known = self._known = {"u": u.copy(), "s": self.axis.nearest(u, self.p(u))}
+        return float(known["s"])
+
+    def _terms(self, u: Array) -> tuple[Any, ...]:
+        """Coordinates, position and derivatives of the axis, and what depends on coordinates."""
+        s = self._parameter(u)
+        dofs, weights = self.axis.weights(s)
+        e = self.axis.element(s)
+        # by the length of the stress-free axis
+        weights = weights / self.axis.beam.mesh.lengths[e] ** np.arange(4)[:, None]
+        c = self.axis.at(u, s) / self.axis.beam.mesh.lengths[e] ** np.arange(4)[:, None]
+        columns = np.concatenate([self.p.dofs.ravel(), self.d.dofs.ravel(), dofs.ravel()])
+        P, D, C = (np.zeros((2, len(columns))) for _ in range(3))
+        n, m = self.p.dofs.shape[1], self.d.dofs.shape[1]
+        at, parts = 0, ((P, self.p.weights, n), (D, self.d.weights, m))
+        for matrix, rows, size in parts:
+            for k in range(2):
+                matrix[k, at:at + size] = rows[k]
+                at += size
+        nb, Cs = weights.shape[1], []
+        for row in weights:
+            C = np.zeros((2, len(columns)))
+            C[0, at:at + nb] = C[1, at + nb:] = row
+            Cs.append(C)
+        return columns, c, self.p(u) - c[0], P - Cs[0], Cs, D
+
+    def value(self, u: Array, t: float) -> Array:
+        s = self._parameter(u)
+        c, d = self.axis.at(u, s)[:2]
+        d = d / self.axis.beam.mesh.lengths[self.axis.element(s)]
+        out = [_cross(d, self.p(u) - c)]
+        if self.angle:
+            out.append(_cross(self.d(u), self.Q @ d))
+        return np.array(out)
+
+    def _slopes(self, u: Array) -> tuple[Any, ...]:
+        """The derivatives of the equations and of s, and what they are made of."""
+        self._parameter(u)
+        if "slopes" not in self._known:
+            self._known["slopes"] = self._differentiate(u)
+        return self._known["slopes"]
+
+    def _differentiate(self, u: Array) -> tuple[Any, ...]:
+        columns, c, e, E, C, D = self._terms(u)
+        Gs = c[2] @ e - c[1] @ c[1]
+        s_y = -(c[1] @ E + e @ C[1]) / Gs
+        first = [(_cross(c[2], e), _crossed(c[1], E) - _crossed(e, C[1]))]
+        if self.angle:
+            d, Q = self.d(u), self.Q
+            first.append((_cross(d, Q @ c[2]), _crossed(d, Q @ C[1]) - _crossed(Q @ c[1], D)))
+        return columns, c, e, E, C, D, Gs, s_y, first
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        columns, *_, s_y, first = self._slopes(u)
+        rows = [slope + by_s * s_y for by_s, slope in first]
+        k = len(rows)
+        return (np.repeat(np.arange(k), len(columns)), np.tile(columns, k), np.concatenate(rows))
+
+    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
+        columns, c, e, E, C, D, Gs, s_y, first = self._slopes(u)
+
+        def mixed(row: Array) -> Array:
+            M = np.outer(row, s_y)
+            return M + M.T
+
+        # of c'(s) . (p - c(s)) = 0
+        s_yy = -(_dots(C[1], E) + mixed(c[2] @ E + e @ C[2] - 2.0 * c[1] @ C[1])
+                 + (c[3] @ e - 3.0 * c[1] @ c[2]) * np.outer(s_y, s_y)) / Gs
+        H = multipliers[0] * (
+            _pairs(C[1], E) + mixed(_crossed(c[2], E) - _crossed(e, C[2]))
+            + (_cross(c[3], e) - _cross(c[2], c[1])) * np.outer(s_y, s_y) + first[0][0] * s_yy)
+        if self.angle:
+            d, Q = self.d(u), self.Q
+            H = H + multipliers[1] * (
+                _pairs(D, Q @ C[1]) + mixed(_crossed(d, Q @ C[2]) - _crossed(Q @ c[2], D))
+                + _cross(d, Q @ c[3]) * np.outer(s_y, s_y) + first[1][0] * s_yy)
+        n = len(columns)
+        return np.repeat(columns, n), np.tile(columns, n), H.ravel()
+
+
+@teaching
+class Slot(Joint):
+    """A material point slides along a straight line of a rigid body, or of the ground.
+
+    ``e x (p - b) = 0``, with a point b of the body and a direction e that turns with it.
+
+    Parameters
+    ----------
+    at
+        The point: (beam, (x, y)) with a Beam, a RigidBody, a name or a number; a RigidBody for its
+        centre of mass.
+    on
+        The body, its name or its number, or "ground".
+    direction
+        Direction of the line in the state of the start, shape (2,).
+    through
+        A point of the line there, shape (2,); the material point by default.
+    angle
+        Keep the angle between the point's section and the line: a moment is carried.
+    name
+        What messages call the joint.
+    """
+
+    constant = False
+
+    def __init__(self, at: Any, on: WhichMember, direction: ArrayLike,
+                 through: ArrayLike | None = None, angle: bool = False,
+                 name: str | None = None) -> None:
+        d = require_finite("direction", direction, (2,))
+        if not np.any(d):
+            raise InputError("the direction of the line must not be zero")
+        self.direction = d / np.hypot(*d)
+        self.through = None if through is None else require_finite("through", through, (2,))
+        self.at, self.on, self.angle = at, on, require_flag("angle", angle)
+        self.name = require_label("name", name)
+        self.equations = ("force normal to the line",) + ("moment",) * self.angle
+
+    def __repr__(self) -> str:
+        return f"<Slot {f'{self.name} ' if self.name else ''}at {shown(self.at)}>"
+
+    def bind(self, scene: Scene) -> None:
+        which, at = named_place(scene, self.at)
+        self.p, d = section(scene, which, at) if self.angle else (
+            point(scene, which, at), None)
+        through = self.p.start if self.through is None else self.through
+        b, self.e = section(scene, self.on, tuple(map(float, through)))
+        self.constant = not self.e.dofs.size
+        self.w = Vector(self.p.start - b.start, np.hstack([self.p.dofs, b.dofs]),
+                        np.hstack([self.p.weights, -b.weights]))
+        if not self.w.dofs.size:
+            raise InputError(f"{self!r}: the point and the line are both of the ground")
+        gap = _cross(self.direction, self.w.start)
+        size = min(beam.size for beam in scene.beams)
+        if abs(gap) > 1e-6 * size:
+            raise InputError(f"{self!r}: the point ({self.p.start[0]:.6g}, {self.p.start[1]:.6g}) "
+                             f"is {abs(gap):.6g} off the line: give another through=")
+        angle = np.arctan2(*self.direction[::-1]) - np.arctan2(*self.e.start[::-1])
+        self.pairs: Sequence[tuple[Vector, Array]] = [(self.w, rotation(angle))]
+        if d is not None:
+            angle = np.arctan2(*d.start[::-1]) - np.arctan2(*self.e.start[::-1])
+            self.pairs = [*self.pairs, (d, rotation(angle))]
+
+    def value(self, u: Array, t: float) -> Array:
+        e = self.e(u)
+        return np.array([_cross(Q @ e, a(u)) for a, Q in self.pairs])
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        e, equations = self.e(u), []
+        for vector, Q in self.pairs:
+            f, a = Q @ e, vector(u)
+            equations.append([(vector, (-f[1], f[0])), (self.e, (a[1], -a[0]) @ Q)])
+        return gradients(*equations)
+
+    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
+        i, j, v = zip(*(cross_terms(vector, self.e, Q) for vector, Q in self.pairs))
+        return (np.concatenate(i), np.concatenate(j),
+                np.concatenate([-m * x for m, x in zip(multipliers, v)]))

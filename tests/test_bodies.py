@@ -1,0 +1,517 @@
+"""Rigid bodies: pendulums, masses on beams, frequencies, stability, files, and what is refused."""
+
+import pickle
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, KelvinVoigt, MeshBeam,
+                        MeshError, NameUnknown, RigidBody, Scene, StVenantKirchhoff, SupportError)
+from skfem_ancf.dynamics import SCHEMES
+from skfem_ancf.errors import CheckpointError, ImmutableError
+
+G = 9.81
+EI = 1e4 * 0.1**4 / 12
+
+
+def beam_of(n=4, length=1.0, element=None, E=1e4, density=1.0, h=0.1, name=None, damping=None):
+    mesh = MeshBeam.init_line(np.linspace(0, length, n + 1), h)
+    return Beam(mesh, element or ElementBeamCable(5),
+                StVenantKirchhoff(E, 0.0, density), width=h, name=name, damping=damping)
+
+
+def pendulum(mass=2.0, inertia=0.1, arm=0.6):
+    """A body that hangs from a pin, beside a beam that stays at rest."""
+    body = RigidBody(mass, inertia, position=(0, -arm), name="bob")
+    scene = Scene(body, beam_of(2)).clamp("left").gravity((0, -G), beam="bob")
+    return scene.pin((0, 0), body), body, mass * G * arm / (inertia + mass * arm**2)
+
+
+def spun(scene, body, rate):
+    """With an angular velocity about the origin."""
+    return scene.initial_velocity(lambda x: rate * np.array([-x[1], x[0]]), beam=body)
+
+
+# motion
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_pendulum_swings_as_it_should(scheme):
+    scene, body, stiffness = pendulum()
+    exact = solve_ivp(lambda t, y: [y[1], -stiffness * np.sin(y[0])], (0, 1), [0, 4.0], rtol=1e-11,
+                      atol=1e-11).y[:, -1]
+    errors = []
+    for dt in (0.02, 0.01):
+        history = spun(scene, body, 4.0).integrate(1.0, dt, scheme=scheme)
+        errors.append(abs(history.angle(body)[-1] - exact[0]))
+        point = history.position((0, 0), body)
+        assert np.abs(point).max() < 1e-12
+        r = history.position(body)
+        assert_allclose(np.hypot(*r.T), 0.6, rtol=0, atol=1e-9)
+    assert errors[1] < 2e-3 and np.log2(errors[0] / errors[1]) > 0.9
+    if scheme == "energy-momentum":
+        assert np.ptp(history.total_energy) < 1e-11
+        assert abs(history.angular_velocity("bob")[-1] - exact[1]) < 5e-3
+
+
+def test_turns_are_counted():
+    scene, body, stiffness = pendulum()
+    history = spun(scene, body, 14.0).integrate(2.0, 5e-3)
+    exact = solve_ivp(lambda t, y: [y[1], -stiffness * np.sin(y[0])], (0, 2), [0, 14.0], rtol=1e-10,
+                      atol=1e-10).y[0, -1]
+    assert exact > 6 * np.pi
+    assert abs(history.angle(body)[-1] - exact) < 2e-2
+    assert abs(history.state(200).angle(body)) <= np.pi
+    assert np.ptp(history.total_energy) < 1e-9
+
+
+def test_a_thrown_body_keeps_its_momenta():
+    body = RigidBody(3.0, 0.7, position=(1, 2), angle=0.4)
+    scene = Scene(beam_of(2), body).clamp("left")
+    scene.initial_velocity(lambda x: np.array([2.0 - 5.0 * (x[1] - 2.0), 1.0 + 5.0 * (x[0] - 1.0)]),
+                           beam=body)
+    history = scene.integrate(1.0, 0.02)
+    assert_allclose(history.momentum[:, 0], 6.0, rtol=1e-11)
+    assert_allclose(history.angular_momentum, 0.7 * 5.0 + 3.0 * (1 * 1 - 2 * 2), rtol=1e-11)
+    assert_allclose(history.kinetic_energy, 0.5 * 3 * 5 + 0.5 * 0.7 * 25, rtol=1e-11)
+    assert_allclose(history.position(body)[-1], (3.0, 3.0), atol=1e-11)
+    assert_allclose(history.angle(body)[-1], 0.4 + 5.0, rtol=1e-3)
+    assert_allclose(history.velocity((1.3, 2.0), body)[0], (2.0, 1.0 + 1.5), atol=1e-12)
+
+
+def test_a_moment_turns_a_body():
+    body = RigidBody(1.0, 0.5, position=(0, 2))
+    scene = Scene(beam_of(2), body).clamp("left").moment(body, 3.0)
+    history = scene.integrate(0.5, 1e-3)
+    assert_allclose(history.angle(body)[-1], 0.5 * 3.0 / 0.5 * 0.25, rtol=1e-5)
+    assert_allclose(history.position(body), np.tile((0, 2), (len(history), 1)), atol=1e-12)
+    assert np.ptp(history.total_energy) < 1e-10
+
+
+def test_a_prescribed_angle():
+    body = RigidBody(1.0, 0.5, position=(0.1, 2))
+    scene = Scene(beam_of(2), body).clamp("left").pin((0, 2), body)
+    joint = scene.joint("angle", at=None, beam=body, angle=lambda t: 3 * t * t)
+    history = scene.integrate(1.0, 5e-3, scheme="generalized-alpha")
+    assert_allclose(history.angle(body), 3 * history.t**2, atol=1e-9)
+    moment = history.joint_force(joint)[-1, 0]  # J about the pin
+    assert_allclose(moment, 6.0 * (0.5 + 0.01), rtol=1e-3)
+
+
+def test_a_body_is_as_a_point_mass_where_its_centre_is():
+    """The same mass and inertia as a force element of its own."""
+    runs = []
+    for rigid in (True, False):
+        beam = beam_of(4, name="beam", damping=KelvinVoigt(1e-3))
+        body = RigidBody(0.02, 1e-4, position=(1, 0))
+        scene = Scene(beam, body) if rigid else Scene(beam)
+        scene.clamp("left", beam).gravity((0, -G))
+        if rigid:
+            scene.weld((1, 0))
+        else:
+            scene.point_mass(0.02, at=(1, 0), inertia=1e-4)
+        static = scene.solve_static()
+        history = scene.integrate(0.3, 2e-3)
+        runs.append((static.displacement((1, 0), "beam"), history.displacement((1, 0), "beam"),
+                     history.dissipated[-1], scene.modes(3, static).frequencies))
+    for a, b in zip(*runs):
+        # the section's direction of the point mass is no unit vector: it may stretch
+        assert_allclose(a, b, rtol=3e-3, atol=3e-4)
+
+
+def frequency_with_body(m, J, c):
+    """The lowest of an Euler-Bernoulli cantilever (length 1, EI, rho A = 0.01) with a body."""
+    rhoA = 0.01
+
+    def determinant(w):
+        k = (w * w * rhoA / EI) ** 0.25
+        C, S, Ch, Sh = np.cos(k), np.sin(k), np.cosh(k), np.sinh(k)
+        # w(x) = a (cosh - cos) + b (sinh - sin); at x = 1 shear and moment of the body
+        f = [np.array([Ch - C, k * (Sh + S), k**2 * (Ch + C), k**3 * (Sh - S)]),
+             np.array([Sh - S, k * (Ch - C), k**2 * (Sh + S), k**3 * (Ch + C)])]
+        rows = []
+        for y, dy, ddy, dddy in f:
+            acc = -w * w * (y + c * dy)
+            rows.append([-EI * dddy + m * acc, EI * ddy + J * (-w * w * dy) + c * m * acc])
+        return np.linalg.det(np.array(rows))
+
+    grid = np.linspace(0.05, 40.0, 4000)
+    values = [determinant(w) for w in grid]
+    k = int(np.flatnonzero(np.diff(np.sign(values)))[0])
+    return brentq(determinant, grid[k], grid[k + 1])
+
+
+@pytest.mark.parametrize("m, J, c", [(0.01, 1e-5, 0.0), (0.02, 5e-4, 0.3)])
+def test_frequency_of_a_cantilever_with_a_body(m, J, c):
+    """The tip mass equal to the beam's own; and one that is off the end."""
+    E = EI * 12 / 0.01**4
+    beam = beam_of(16, E=E, h=0.01, density=100.0)  # of rotary inertia 1e-5 of the translation
+    body = RigidBody(m, J, position=(1 + c, 0))
+    scene = Scene(beam, body).clamp("left")
+    scene.weld((beam, "right"), (body, (1, 0)))
+    assert_allclose(scene.modes(1).frequencies[0], frequency_with_body(m, J, c), rtol=1e-4)
+
+
+def test_frequencies_of_two_bodies_on_springs():
+    """Carts on a line between springs: of the matrix [[2, -1], [-1, 1]]."""
+    a, b = RigidBody(2.0, 1.0, (2, 3), name="a"), RigidBody(2.0, 1.0, (4, 3), name="b")
+    scene = Scene(beam_of(2), a, b).clamp("left")
+    for body in (a, b):
+        scene.joint("line", at=None, beam=body, direction=(1, 0))
+        scene.joint("angle", at=None, beam=body, angle=lambda t: 0.0)
+    scene.spring(50.0, (("ground", (0, 3)), a)).spring(50.0, (a, "b" and b))
+    known = np.sqrt(50.0 / 2.0 * np.linalg.eigvalsh([[2.0, -1.0], [-1.0, 1.0]]))
+    slow = scene.modes(4).frequencies
+    assert all(np.min(np.abs(slow - w)) < 1e-6 * w for w in known)
+
+
+# statics and stability
+
+def test_a_body_off_the_end_of_a_cantilever():
+    """It hangs by its own frame: force and moment at the end are those of its weight."""
+    beam, body = beam_of(8, E=1e8), RigidBody(0.5, 0.01, position=(1.2, 0.1))
+    scene = Scene(beam, body).clamp("left").gravity((0, -G), beam=body)
+    weld = scene.weld((beam, "right"), (body, (1, 0)))
+    state = scene.solve_static()
+    d = state.displacement((1, 0), beam)
+    arm = state.position(body)[0] - 1.0 - d[0]
+    force = state.joint_force(weld)
+    assert_allclose(force[:2], (0, -0.5 * G), atol=1e-9)
+    root = state.reactions("left", beam)
+    assert_allclose(root.moment, 0.5 * G * state.position(body)[0], rtol=1e-9)
+    slope = state.angle(body)
+    M, F, I = 0.5 * G * arm, 0.5 * G, 1e8 * 0.1**4 / 12
+    assert_allclose(slope, -(F / 2 + M) / I, rtol=1e-4)
+    assert_allclose(d[1], -(F / 3 + M / 2) / I, rtol=1e-4)
+
+
+@pytest.mark.parametrize("ratio, stable", [(0.9, True), (1.1, False)])
+def test_an_inverted_pendulum_on_a_spring(ratio, stable):
+    """Stable as long as m g l is below the stiffness of the spring."""
+    body = RigidBody(2.0, 0.1, position=(0, 0.5))
+    scene = Scene(beam_of(2), body).clamp("left").gravity((0, -G), beam=body).pin((0, 0), body)
+    scene.torsional_spring(2.0 * G * 0.5 / ratio, body)
+    state = scene.solve_static(stable=False)
+    assert (state.stability == "stable") == stable
+    assert state.negative_pivots == (not stable)
+    frequency = scene.modes(1, state).frequencies[0]
+    square = (2.0 * G * 0.5 / ratio - 2.0 * G * 0.5) / (0.1 + 2.0 * 0.25)
+    assert_allclose(frequency * abs(frequency), square, rtol=1e-8)
+    if not stable:
+        with pytest.warns(match="loses its stability"):
+            fallen = scene.solve_static()
+        theta = brentq(lambda x: x / np.sin(x) - ratio, 0.1, 2.0)
+        assert_allclose(abs(fallen.angle(body)), theta, rtol=1e-6)
+
+
+def test_buckling_with_a_body_between_column_and_load():
+    """A rigid link of length a on a clamped column: tan(k) k a = 1 - ... by its own equation."""
+    beam, body = beam_of(16, E=1e8, h=0.01), RigidBody(1.0, 1.0, position=(1.25, 0))
+    I, a = 1e8 * 0.01**4 / 12, 0.5
+    scene = Scene(beam, body).clamp("left").point_force((-1, 0), (1.5, 0), body)
+    scene.weld((beam, "right"), (body, (1, 0)))
+    # w'' + k^2 w = k^2 (w(1) + a w'(1)): k a tan k = 1
+    k = brentq(lambda k: k * a * np.tan(k) - 1.0, 0.1, 1.5)
+    assert_allclose(scene.buckling().factors[0], k * k * I, rtol=1e-4)
+
+
+def test_a_free_body_is_said_to_be_free():
+    body = RigidBody(1.0, 1.0, position=(3, 0), name="loose")
+    scene = Scene(beam_of(2), body).clamp("left").gravity((0, -1))
+    with pytest.raises(SupportError, match="translation along .*of the rigid body loose"):
+        scene.solve_static()
+    with pytest.raises(SupportError, match=r"rotation about \(2, 0\) of the rigid body loose"):
+        scene.pin((2, 0), body).solve_static()
+    assert scene.torsional_spring(1.0, body).solve_static().converged
+
+
+def test_clamped_pinned_and_fixed_bodies():
+    body = RigidBody(1.0, 1.0, position=(3, 0), angle=0.3)
+    scene = Scene(beam_of(2), body).clamp("left").clamp(body).point_force((2, 3), (4, 1), body)
+    reaction = scene.solve_static().reactions(None, body)
+    assert_allclose(reaction.force, (-2, -3))
+    assert_allclose(reaction.moment, -(1 * 3 - 1 * 2))
+    history = scene.integrate(0.1, 0.01)
+    assert np.abs(history.displacement(body)).max() == 0
+    lifted = Scene(beam_of(2), body).clamp("left").fix(None, "r^2", 0.5, body)
+    lifted.fix(None, "r^1", beam=body).torsional_spring(1.0, body).moment(body, 0.2)
+    state = lifted.solve_static()
+    assert_allclose(state.position(body), (3, 0.5))
+    assert_allclose(state.angle(body), 0.3 + 0.2)
+
+
+def test_many_bodies_are_solved_by_sparse_factors():
+    """A chain of thirty links hangs down: more multipliers than a border takes."""
+    links = [RigidBody(1.0, 0.01, position=(0, -k - 0.5), name=f"link {k}") for k in range(30)]
+    scene = Scene(beam_of(2), *links).clamp("left").gravity((0, -G)).pin((0, 0), links[0])
+    joints = [scene.hinge((a, (0, -k - 1)), (b, (0, -k - 1)))
+              for k, (a, b) in enumerate(pairwise(links))]
+    for link in links:
+        scene.torsional_spring(0.1, link)
+    scene.point_force((40.0, 0.0), (0, -30), links[-1])
+    assert not scene.system.bordered
+    state = scene.solve_static()
+    assert_allclose(state.joint_force(joints[0])[1], -29 * G, rtol=1e-8)
+    # without the springs each link has tan(angle) = 40 / (weight below)
+    below = 29.5 - np.arange(30)
+    angles = [state.angle(link) for link in links]
+    assert_allclose(angles, np.arctan(40.0 / (below * G)), rtol=2e-2)
+
+
+# what else a scene does
+
+def mechanism():
+    """A crank with a spring, a beam on it, and a body that hangs on its end."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 4), 0.05), ElementBeamANCF(2),
+                StVenantKirchhoff(1e6, 0.3, 100.0), width=0.05, name="beam")
+    crank = RigidBody(0.3, 0.01, position=(-0.1, 0), angle=0.2, name="crank")
+    bob = RigidBody(0.2, 0.002, position=(1.1, -0.1), name="bob",
+                    outline=[(-0.1, -0.1), (0.1, -0.1), (0.0, 0.2)])
+    scene = Scene(crank, beam, bob).gravity((0, -G)).pin((-0.2, 0), crank)
+    scene.weld((crank, (0, 0)), (beam, "left"))
+    scene.hinge((beam, (1, 0)), (bob, (1, 0)))
+    scene.torsional_spring(8.0, crank).torsional_spring(0.5, bob)
+    return scene.spring(3.0, (("ground", (1.1, -1)), bob), damping=0.1)
+
+
+def test_order_of_beams_and_bodies():
+    scene = mechanism()
+    assert [b.name for b in scene.members] == ["beam", "crank", "bob"]
+    assert scene.beam(0) is scene.beams[0] and scene.beam("bob") is scene.beam(2)
+    assert scene.beam() is scene.beams[0]
+    assert scene.N == scene.beams[0].N + 8 and scene.offset("crank") == scene.beams[0].N
+    assert "2 rigid bodies" in repr(scene)
+    plan = scene.plan()
+    assert plan["rigid bodies"].status == "computed" and "2:" in plan["rigid bodies"].reason
+
+
+def test_states_and_motions_with_bodies_can_be_pickled():
+    scene = mechanism()
+    state, history = scene.solve_static(), scene.integrate(0.05, 0.01)
+    again = pickle.loads(pickle.dumps(scene))
+    assert_allclose(again.solve_static().u, state.u, rtol=0, atol=1e-13)
+    for thing in (state, history):
+        other = pickle.loads(pickle.dumps(thing))
+        assert np.array_equal(other.u, thing.u)
+        assert np.array_equal(other.position((1, 0), beam="bob"), thing.position((1, 0), "bob"))
+        assert np.array_equal(other.angle("crank"), thing.angle("crank"))
+    body = scene.bodies[0]
+    assert pickle.loads(pickle.dumps(body)).angle == body.angle
+
+
+def test_a_run_with_bodies_goes_on_from_its_checkpoint(tmp_path):
+    scene = mechanism()
+    whole = scene.integrate(0.2, 0.01)
+    part = scene.integrate(0.1, 0.01)
+    joined = scene.integrate(0.2, 0.01, start=part.state(len(part) - 1))
+    assert_allclose(joined.u[-1], whole.u[-1], rtol=0, atol=1e-10)
+    path = tmp_path / "run.npz"
+    scene.integrate(0.2, 0.01, checkpoint=path, every=5)
+    assert np.array_equal(scene.resume(path).u, whole.u)
+    other = Scene(*(b.replace(mass=0.31) if b.name == "crank" else b for b in scene.members))
+    with pytest.raises(CheckpointError, match="rigid body crank"):
+        other.resume(path)
+
+
+def test_a_start_of_other_bodies_is_refused():
+    scene = mechanism()
+    other = Scene(scene.beams[0], scene.bodies[0], RigidBody(1.0, 1.0, (0, 5)))
+    with pytest.raises(InputError, match="other rigid bodies"):
+        scene.solve_static(start=other.state())
+
+
+def test_finer_meshes_keep_the_bodies():
+    scene = mechanism()
+    state = scene.solve_static(adapt=1e-3)
+    assert state.beams[0].mesh.nelements > 3
+    fine = MeshBeam.init_line(np.linspace(0, 1, 49), 0.05)
+    fine = scene.with_beams([scene.beams[0].with_mesh(fine)]).solve_static()
+    assert_allclose(state.angle("crank"), fine.angle("crank"), rtol=3e-3)
+    assert state.error_estimate["displacement"] <= 1e-3
+
+
+def test_automatic_steps_with_bodies():
+    scene, body, stiffness = pendulum()
+    history = spun(scene, body, 4.0).integrate(1.0, "auto", rtol=1e-5)
+    exact = solve_ivp(lambda t, y: [y[1], -stiffness * np.sin(y[0])], (0, 1), [0, 4.0], rtol=1e-11,
+                      atol=1e-11).y[0, -1]
+    assert abs(history.angle(body)[-1] - exact) < 1e-3
+
+
+def test_energy_of_a_mechanism():
+    history = mechanism().integrate(0.5, 5e-3)
+    total = history.total_energy + history.dissipated
+    assert np.ptp(total) < 1e-10 * np.ptp(history.kinetic_energy)
+    assert history.dissipated[-1] > 0
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+def test_compiled_is_the_same(needs_compiled, monkeypatch, scheme):
+    runs = []
+    for way in ("0", "1"):
+        monkeypatch.setenv("SKFEM_ANCF_COMPILED", way)
+        scene = mechanism()
+        runs.append([scene.solve_static().u, scene.integrate(0.1, 5e-3, scheme=scheme).u])
+    for plain, fast in zip(*runs):
+        assert_allclose(fast, plain, rtol=0, atol=1e-9)
+
+
+def test_points_of_bodies_are_found():
+    scene = mechanism()
+    state = scene.solve_static()
+    bob = scene.bodies[1]
+    assert bob.contains(np.array([[1.1, 1.1, 1.3], [-0.1, 0.09, 0.0]])).tolist() == [
+        True, True, False]
+    many = np.array([[0.5, 1.1, -0.1], [0.0, -0.15, 0.0]])  # of all three
+    found = state.position(many)
+    assert_allclose(found[:, 1], state.position((1.1, -0.15), bob))
+    assert_allclose(found[:, 0], state.position((0.5, 0), "beam"))
+    turn = state.angle(bob)
+    assert_allclose(state.position((1.1, -0.15), bob) - state.position(bob),
+                    0.05 * np.array([np.sin(turn), -np.cos(turn)]), atol=1e-12)
+    assert_allclose(state.position((1.0, 0.0), "beam"), state.position((1.0, 0.0), bob), atol=1e-12)
+    with pytest.raises(MeshError, match="none of the 1 beams"):
+        state.position((5.0, 5.0))
+    with pytest.raises(InputError, match="no strain"):
+        state.strain((1.1, -0.1))
+
+
+def test_the_default_outline_is_a_plate_of_that_mass_and_inertia():
+    x = RigidBody(6.0, 4.0).outline
+    side = np.ptp(x[0])
+    assert_allclose(6.0 * side**2 / 6.0, 4.0)
+    assert_allclose(np.ptp(x[1]), side)
+
+
+# files and pictures
+
+def test_files_hold_the_outlines(tmp_path):
+    meshio = pytest.importorskip("meshio")
+    scene = mechanism()
+    state = scene.solve_static()
+    for lagrange in (False, True):
+        found = meshio.read(state.save(tmp_path / "s.vtu", lagrange=lagrange))
+        polygons = [cells.data for cells in found.cells if cells.type in ("polygon", "polygon4",
+                                                                          "quad", "triangle")]
+        corners = [found.points[rows[-1]] for rows in polygons]
+        bob = next(x for x in corners if len(x) == 3)
+        assert_allclose(bob[:, :2].T, scene.bodies[1].outline_at(state.u_of("bob")), atol=1e-12)
+        moved = next(rows[-1] for rows in polygons if len(rows[-1]) == 3)
+        assert_allclose(found.point_data["displacement"][moved][:, :2].T,
+                        state.displacement(bob_start(scene), "bob"), atol=1e-12)
+        assert np.all(np.isnan(found.point_data["eps_xx"][moved]))
+    history = scene.integrate(0.02, 0.01)
+    history.save(tmp_path / "run.pvd")
+    assert len(list(tmp_path.rglob("*.vtu"))) > 2
+
+
+def bob_start(scene):
+    return scene.bodies[1].outline_at(np.zeros(4))
+
+
+def test_hdf_files_hold_the_outlines(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    history = mechanism().integrate(0.02, 0.01)
+    history.save(tmp_path / "run.vtkhdf")
+    with h5py.File(tmp_path / "run.vtkhdf") as file:
+        assert file["VTKHDF/Types"][()].tolist().count(7) == 2
+
+
+def test_pictures_show_the_outlines():
+    pytest.importorskip("matplotlib")
+    scene = mechanism()
+    state = scene.solve_static()
+    axes = state.plot("displacement")
+    paths = [path.vertices[:-1] for c in axes.collections for path in c.get_paths()]
+    want = scene.bodies[1].outline_at(state.u_of("bob")).T
+    assert any(p.shape == want.shape and np.allclose(p, want) for p in paths)
+    assert "rigid body" in scene._repr_html_() and "crank" in scene._repr_html_()
+
+
+def test_pyvista_shows_the_outlines():
+    pytest.importorskip("pyvista")
+    scene = mechanism()
+    history = scene.integrate(0.02, 0.01)
+    series = history.to_pyvista()
+    assert series.mesh.keys() == ["beam", "crank", "bob"]
+    series.update(2)
+    assert_allclose(series.mesh["bob"].points[:, :2].T,
+                    scene.bodies[1].outline_at(history.state(2).u_of("bob")), atol=1e-6)
+    plotter = history.state(1).view("displacement", off_screen=True)
+    assert plotter.mesh.n_points > 0
+
+
+def test_films_show_the_outlines(tmp_path):
+    pytest.importorskip("matplotlib")
+    pytest.importorskip("PIL")
+    history = mechanism().integrate(0.02, 0.01)
+    history.animate(tmp_path / "film.gif", "displacement")
+    assert (tmp_path / "film.gif").stat().st_size > 0
+
+
+# what is refused
+
+@pytest.mark.parametrize("options, what", [
+    (dict(mass=-1.0), "mass"), (dict(mass=0.0), "mass"), (dict(mass=np.nan), "mass"),
+    (dict(inertia=-1.0), "inertia"), (dict(inertia=0), "inertia"), (dict(inertia="1"), "inertia"),
+    (dict(position=(1, 2, 3)), "position"), (dict(position=(1, np.nan)), "position"),
+    (dict(angle=np.inf), "angle"), (dict(name=3), "name"), (dict(outline=[(0, 0), (1, 0)]), "out"),
+    (dict(outline=[[0, 1, 1], [0, 0, np.nan]]), "outline"), (dict(outline=np.zeros((2, 4))), "out"),
+])
+def test_bad_bodies(options, what):
+    with pytest.raises(InputError, match=what):
+        RigidBody(**{"mass": 1.0, "inertia": 1.0, **options})
+
+
+def test_a_body_does_not_change():
+    body = RigidBody(1.0, 2.0)
+    with pytest.raises(ImmutableError):
+        body.mass = 3.0
+    assert body.replace(mass=3.0).mass == 3.0 and body.replace(mass=3.0).inertia == 2.0
+    with pytest.raises(NameUnknown):
+        body.replace(weight=3.0)
+
+
+BAD = {
+    "no beam": lambda s, b: Scene(b),
+    "twice": lambda s, b: Scene(beam_of(), b, b),
+    "same names": lambda s, b: Scene(beam_of(name="bob"), b),
+    "a boundary": lambda s, b: s.clamp("left", b),
+    "pin at a name": lambda s, b: s.pin("left", b),
+    "a coordinate": lambda s, b: s.fix(None, "r_X", beam=b),
+    "another body": lambda s, b: s.clamp(RigidBody(1.0, 1.0)),
+    "an unknown name": lambda s, b: s.pin((0, 0), "crank"),
+    "an unknown number": lambda s, b: s.pin((0, 0), 7),
+    "traction": lambda s, b: s.traction("left", (1, 0), b),
+    "pressure": lambda s, b: s.pressure("top", 1.0, b),
+    "line load": lambda s, b: s.line_load((1, 0), b),
+    "follower": lambda s, b: s.follower_force((1, 0), (0, 0), b),
+    "foundation": lambda s, b: s.foundation(1.0, beam=b),
+    "drag": lambda s, b: s.drag(1.0, 1.0, beam=b),
+    "nowhere": lambda s, b: s.hinge((9, 9), (8, 8)),
+    "alone": lambda s, b: s.hinge((0.5, 0)),
+    "one place": lambda s, b: s.weld(b),
+    "nothing": lambda s, b: s.weld(),
+    "ground to ground": lambda s, b: s.hinge(("ground", (0, 0)), ("ground", (0, 0))),
+    "apart": lambda s, b: s.weld((0, (1, 0)), (b, (1, 1))),
+    "a word": lambda s, b: s.hinge((b, "left"), (0, "left")),
+    "ambiguous": lambda s, b: s.hinge((1, 0), (0, 0)),
+    "moment": lambda s, b: s.moment("left", 1.0, b),
+    "velocities": lambda s, b: s.initial_velocity([1.0, 2.0], b),
+    "angle of a beam": lambda s, b: s.state().angle(0),
+    "angle of nothing": lambda s, b: s.state().angle(None),
+    "strain of a body": lambda s, b: s.state().strain((1, 0), b),
+    "resultants of a body": lambda s, b: s.state().resultants((1, 0), b),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_calls(name):
+    body = RigidBody(1.0, 0.01, (1, 0), name="bob")
+    scene = Scene(beam_of(), body)
+    with pytest.raises(InputError):
+        BAD[name](scene, body)
+    assert not scene.loads and not scene.joints and not scene.elements
