@@ -150,7 +150,8 @@ def _elements(s):
     forces = s.forces
     if not forces.elements:
         return "force elements", "skipped", "no springs, no masses"
+    ours = sum(type(element).__module__.startswith(__package__) for element in forces.own)
     return "force elements", "computed", (
-        f"{len(forces.elements)}: {len(forces.parts)} in tables, {len(forces.own)} of your own, "
-        f"{len(forces.masses)} in the mass" + (", some couple points far apart" if forces.far else
+        f"{len(forces.elements)}: {len(forces.parts)} in tables, {len(forces.own) - ours} of your "
+        f"own, {ours} by functions asked in Python, {len(forces.masses)} in the mass" + (", some couple points far apart" if forces.far else
                                                ""))

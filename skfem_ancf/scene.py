@@ -767,19 +767,20 @@ class Scene:
 
     # force elements
 
-    def spring(self, k: float, between: Sequence[Any], damping: float = 0.0,
+    def spring(self, k: Any, between: Sequence[Any], damping: Any = 0.0,
                length: float | None = None) -> Scene:
         """A spring between two points, with a dashpot along the same line.
 
         Parameters
         ----------
         k
-            Stiffness (force per length), zero or positive.
+            Stiffness (force per length), zero or positive; or a function of the elongation that
+            returns the force, positive in tension; or a pair of that and its potential.
         between
             Two places, each (x, y): the material point there, or the point of the ground where no
             beam is; or (beam, (x, y)) with a Beam, a name or a number; or ("ground", (x, y)).
         damping
-            Force per velocity, zero or positive.
+            Force per velocity, zero or positive; or a function of the rate of the length.
         length
             Length without force; that of the stress-free state by default.
 
@@ -795,18 +796,19 @@ class Scene:
         """
         return self._put(elements=[Spring(k, between, damping, length)])
 
-    def torsional_spring(self, k: float, at: Place, damping: float = 0.0, beam: WhichBeam = None,
+    def torsional_spring(self, k: Any, at: Place, damping: Any = 0.0, beam: WhichBeam = None,
                          other: Any = None, angle: float = 0.0) -> Scene:
         """A moment against the angle by which a section turns, with a dashpot.
 
         Parameters
         ----------
         k
-            Moment per angle, zero or positive. The angle is taken in (-pi, pi] about ``angle``.
+            Moment per angle, zero or positive; or a function of the angle that returns the moment;
+            or a pair of that and its potential. The angle is taken in (-pi, pi] about ``angle``.
         at
             A place that is one section, as "right" or the point of a node.
         damping
-            Moment per angular velocity, zero or positive.
+            Moment per angular velocity, zero or positive; or a function of it.
         beam
             The beam, its name or its number, in a scene of several.
         other

@@ -175,6 +175,18 @@ class ForceElement(Sealable):
         """
         return None
 
+    def gain(self, x: Array, y: Array) -> float | None:
+        """The potential at y less that at x; None if there is none.
+
+        Parameters
+        ----------
+        x, y
+            Places of the points at the start and the end of a step, shape (n, 2) each.
+        """
+        before = self.potential(x)
+        after = None if before is None else self.potential(y)
+        return None if before is None or after is None else after - before
+
     def stiffness(self, x: Array, v: Array, t: float) -> Array:
         """Derivative of the force by the places; by a complex step or differences by default.
 
@@ -251,7 +263,7 @@ def bind_force(element: ForceElement, scene: Scene) -> ForceElement:
     own = element.parts.__func__ is ForceElement.parts  # type: ignore[attr-defined]
     try:
         bound.links = _links(element, bound.bind(scene))
-        if own:
+        if bound.parts() is None:
             _try(bound)
     except AncfError:
         raise

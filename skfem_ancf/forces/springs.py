@@ -6,16 +6,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import (InputError, require_finite_scalar,
-                      require_not_negative, shown, teaching)
+from ..errors import InputError, require_finite_scalar, require_not_negative, shown, teaching
 from ..joints.base import GROUND, Vector, named_place, point, section
 from ..rigid import RigidBody, on_body
 from .base import ForceElement, Link, Part, difference, link
-from .texts import SPRING, TORSION
+from .laws import Law, force_of, number_or_law, potential_of, said, slope_of, work_of
+from .texts import SPRING, TINY, TORSION, turned, turning
 
 if TYPE_CHECKING:
     from ..scene import Scene
-    from ..types import Place, WhichBeam
+    from ..types import Array, Place, WhichBeam
+
+#: Rate beside which the step of a difference of a dashpot's law is small.
+STILL = 1e-3
 
 
 def end_of(scene: Scene, place: Any) -> Vector:
@@ -37,25 +40,27 @@ def end_of(scene: Scene, place: Any) -> Vector:
 class Spring(ForceElement):
     """A spring between two points, with a dashpot along the same line.
 
-    Its force is ``k (l - length) + damping dl / dt`` of the distance l.
+    Its force is ``k (l - length) + damping dl / dt`` of the distance l, or
+    ``k(l - length) + damping(dl / dt)`` where these are functions.
 
     Parameters
     ----------
     k
-        Stiffness (force per length), zero or positive.
+        Stiffness (force per length), zero or positive; or a function of the elongation that returns
+        the force, positive in tension; or such a function and its potential.
     between
         Two places, each (x, y): the material point there, or the point of the ground where no beam
         is; or (beam, (x, y)) with a Beam, a RigidBody, a name or a number; or ("ground", (x, y)).
     damping
-        Force per velocity, zero or positive.
+        Force per velocity, zero or positive; or a function of the rate that returns the force.
     length
         Length without force; that of the stress-free state by default.
     """
 
-    def __init__(self, k: float, between: Any, damping: float = 0.0,
+    def __init__(self, k: Any, between: Any, damping: Any = 0.0,
                  length: float | None = None) -> None:
-        self.k = require_not_negative("k", k)
-        self.damping = require_not_negative("damping", damping)
+        self.k = number_or_law("k", k, "elongation")
+        self.damping = number_or_law("damping", damping, "rate")
         self.length = None if length is None else require_not_negative("length", length, False)
         if not isinstance(between, (tuple, list)) or len(between) != 2:
             raise InputError("between must be two places, as ((1, 0), (1, 0.5)), got "
@@ -77,12 +82,42 @@ class Spring(ForceElement):
         self._length = distance if self.length is None else self.length
         return [self._link]
 
-    def parts(self) -> list[Part]:
+    def parts(self) -> list[Part] | None:
+        if isinstance(self.k, Law) or isinstance(self.damping, Law):
+            return None
         return [Part(SPRING, self._link, Link(np.zeros(2)),
                      (self.k, self._length, self.damping, 0.0, 0.0))]
 
+    def _along(self, x):
+        """Its length, at least a little, and its direction."""
+        length = max(float(np.hypot(*x[0])), TINY)
+        return length, x[0] / length
+
+    def force(self, x: Array, v: Array, t: float) -> Array:
+        length, n = self._along(x)
+        return -(force_of(self.k, length - self._length) + force_of(self.damping, v[0] @ n)) * n[
+            None]
+
+    def potential(self, x: Array) -> float:
+        return potential_of(self.k, self._along(x)[0] - self._length)
+
+    def gain(self, x: Array, y: Array) -> float:
+        return work_of(self.k, *(self._along(z)[0] - self._length for z in (x, y)))
+
+    def stiffness(self, x: Array, v: Array, t: float) -> Array:
+        length, n = self._along(x)
+        s, along = length - self._length, np.outer(n, n)
+        K = slope_of(self.k, s, self._length) * along + force_of(self.k, s) / length * (
+            np.eye(2) - along)
+        return -K.reshape(1, 2, 1, 2)
+
+    def resistance(self, x: Array, v: Array, t: float) -> Array:
+        _, n = self._along(x)
+        c = slope_of(self.damping, float(v[0] @ n), STILL)
+        return -c * np.outer(n, n).reshape(1, 2, 1, 2)
+
     def __repr__(self) -> str:
-        return f"<Spring {self.k:g} between {shown(self.between)}>"
+        return f"<Spring {said(self.k)} between {shown(self.between)}>"
 
 
 @teaching
@@ -90,16 +125,18 @@ class TorsionalSpring(ForceElement):
     """A moment against the angle by which a section turns, with a dashpot.
 
     The moment is ``k (phi - angle) + damping dphi / dt``, phi the angle from the stress-free state,
-    to the ground or to another section, taken in (-pi, pi] about ``angle``.
+    to the ground or to another section, taken in (-pi, pi] about ``angle``; or
+    ``k(phi - angle) + damping(dphi / dt)`` where these are functions.
 
     Parameters
     ----------
     k
-        Moment per angle, zero or positive.
+        Moment per angle, zero or positive; or a function of the angle that returns the moment; or
+        such a function and its potential.
     at
         A place that is one section of a beam, or a point through which it goes; or a RigidBody.
     damping
-        Moment per angular velocity, zero or positive.
+        Moment per angular velocity, zero or positive; or a function of it.
     beam
         The beam, its name or its number, in a scene of several.
     other
@@ -108,10 +145,10 @@ class TorsionalSpring(ForceElement):
         The angle without moment, in [-pi, pi].
     """
 
-    def __init__(self, k: float, at: Place, damping: float = 0.0, beam: WhichBeam = None,
+    def __init__(self, k: Any, at: Place, damping: Any = 0.0, beam: WhichBeam = None,
                  other: Any = None, angle: float = 0.0) -> None:
-        self.k = require_not_negative("k", k)
-        self.damping = require_not_negative("damping", damping)
+        self.k = number_or_law("k", k, "angle")
+        self.damping = number_or_law("damping", damping, "angular rate")
         self.at, self.beam = on_body(at, beam)
         if other is not None and (not isinstance(other, (tuple, list)) or len(other) != 2):
             raise InputError("other must be a section of another beam, as (1, 'left'), got "
@@ -131,9 +168,41 @@ class TorsionalSpring(ForceElement):
         self._start = float(np.arctan2(e[0] * d[1] - e[1] * d[0], d @ e)) + self.angle
         return [self._d, self._e]
 
-    def parts(self) -> list[Part]:
+    def parts(self) -> list[Part] | None:
+        if isinstance(self.k, Law) or isinstance(self.damping, Law):
+            return None
         return [Part(TORSION, self._d, self._e, (self.k, self.damping, np.cos(self._start),
                                                  np.sin(self._start), 0.0))]
 
+    def _angle(self, x):
+        """The angle at directions d and e, (2, 2)."""
+        p = np.array([0.0, 0.0, np.cos(self._start), np.sin(self._start)])[:, None]
+        out = np.empty(1)
+        turned(p, x.reshape(4, 1), out)
+        return float(out[0])
+
+    @staticmethod
+    def _turning(x):
+        """The derivative of the angle by both directions, (2, 2)."""
+        out = np.empty((4, 1))
+        turning(x.reshape(4, 1), out)
+        return out.reshape(2, 2)
+
+    def force(self, x: Array, v: Array, t: float) -> Array:
+        g = self._turning(np.asarray(x))
+        return -(force_of(self.k, self._angle(x)) + force_of(
+            self.damping, float(np.sum(g * v)))) * g
+
+    def potential(self, x: Array) -> float:
+        return potential_of(self.k, self._angle(x))
+
+    def gain(self, x: Array, y: Array) -> float:
+        return work_of(self.k, self._angle(x), self._angle(y))
+
+    def resistance(self, x: Array, v: Array, t: float) -> Array:
+        g = self._turning(np.asarray(x))
+        c = slope_of(self.damping, float(np.sum(g * v)), STILL)
+        return -c * np.multiply.outer(g, g)
+
     def __repr__(self) -> str:
-        return f"<TorsionalSpring {self.k:g} at {shown(self.at)}>"
+        return f"<TorsionalSpring {said(self.k)} at {shown(self.at)}>"

@@ -322,11 +322,10 @@ def _mean_force(element, x, y, t):
     zero, d = 0.0 * x, y - x
     force = np.asarray(element.force(0.5 * (x + y), zero, t), dtype=float)
     square = np.sum(d * d)
-    before = element.potential(x) if square > 0.0 else None
-    if before is None:
+    gain = element.gain(x, y) if square > 0.0 else None
+    if gain is None:
         return force
-    missing = before - element.potential(y) - np.sum(force * d)
-    return force + missing / square * d
+    return force - (gain + np.sum(force * d)) / square * d
 
 
 def _resists(part):
