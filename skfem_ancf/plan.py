@@ -153,5 +153,5 @@ def _elements(s):
     ours = sum(type(element).__module__.startswith(__package__) for element in forces.own)
     return "force elements", "computed", (
         f"{len(forces.elements)}: {len(forces.parts)} in tables, {len(forces.own) - ours} of your "
-        f"own, {ours} by functions asked in Python, {len(forces.masses)} in the mass" + (", some couple points far apart" if forces.far else
-                                               ""))
+        f"own, {ours} by functions asked in Python, {len(forces.masses)} in the mass"
+        + (", some couple points far apart" if forces.far else ""))

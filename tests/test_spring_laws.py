@@ -36,6 +36,7 @@ def wound(a):
     return 0.4 * a + 0.3 * a**3
 
 
+LAWS = [hardening, (hardening, hardening_potential)]
 ELEMENTS = {"sections": ElementBeamANCF(2), "cable": ElementBeamCable(3)}
 
 
@@ -77,7 +78,7 @@ def test_a_rigid_bar_on_a_hardening_spring_at_rest():
     assert_allclose(state.position((1, 0)), tip, atol=1e-6)
 
 
-@pytest.mark.parametrize("law", [hardening, (hardening, hardening_potential)], ids=["force", "both"])
+@pytest.mark.parametrize("law", LAWS, ids=["force", "both"])
 def test_a_rigid_pendulum_with_a_hardening_torsional_spring(law):
     """Against SciPy: J phi'' = -M(phi) - c phi' |phi'| - m g / 2 cos(phi)."""
     scene = Scene(beam_of(modulus=2e13)).pin("left").gravity((0, -G))
@@ -94,7 +95,7 @@ def test_a_rigid_pendulum_with_a_hardening_torsional_spring(law):
     assert_allclose(np.arctan2(tip[:, 1], tip[:, 0]), exact.y[0], atol=2e-3 * np.ptp(exact.y[0]))
 
 
-@pytest.mark.parametrize("law", [hardening, (hardening, hardening_potential)], ids=["force", "both"])
+@pytest.mark.parametrize("law", LAWS, ids=["force", "both"])
 @pytest.mark.parametrize("element", list(ELEMENTS))
 def test_energy_is_kept(element, law):
     scene = Scene(beam_of(ELEMENTS[element])).pin("left").gravity((0, -G))

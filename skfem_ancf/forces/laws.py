@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.integrate import quad
 
-from ..errors import (InputError, ask_number, require_function, require_not_negative, shown)
+from ..errors import InputError, ask_number, require_function, require_not_negative, shown
 from ..quadrature import gauss
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class Law:
 
     def __init__(self, name: str, given: Any, of: str = "elongation") -> None:
         pair = given if isinstance(given, (tuple, list)) else (given,)
-        if not 1 <= len(pair) <= 2:
+        if not 1 <= len(pair) <= 2 or any(isinstance(part, type) for part in pair):
             raise InputError(f"{name} must be a number, a function of the {of}, or a function and "
                              f"its potential, got {shown(given)}")
         what = f"of the {of} that returns a number"
