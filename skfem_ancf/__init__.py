@@ -13,6 +13,7 @@ from .materials import NeoHookean, StVenantKirchhoff
 from .mesh import MeshBeam
 from .rigid import RigidBody
 from .scene import Scene
+from .sections import Section
 
 __version__ = "0.1.0"
 
@@ -22,6 +23,6 @@ __all__ = [
     "EnergyMomentum", "FileError", "GeneralizedAlpha", "InputError", "KelvinVoigt", "MeshBeam",
     "MeshError",
     "MissingExtra", "ModelWarning", "NameUnknown", "NeoHookean", "Newmark", "RigidBody",
-    "Scene",
+    "Scene", "Section",
     "StVenantKirchhoff", "StabilityWarning", "SupportError", "forms", "reference_coordinates",
 ]

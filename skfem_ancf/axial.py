@@ -10,7 +10,7 @@ from .errors import ask_field, require_finite
 from .kernels.section import beam_gradients
 from .loads import DeadLoad, Load
 from .quadrature import gauss
-from .spread import Spread
+from .spread import AXIS, Sampled, Spread
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -118,5 +118,6 @@ class LineLoad(Load):
             for k, point in enumerate(X.T):
                 dofs, weights = beam.probe_reference(e, point)
                 np.add.at(vector, dofs, np.outer(lengths[e, k] * values[:, e, k], weights))
-        body = None if callable(given) else Spread(body=given / (beam.width * mesh.height))
-        return DeadLoad(beam, vector, self.amplitude, body)
+        spread = Spread(sampled=(Sampled(AXIS, np.arange(mesh.nelements), xi,
+                                         values * (lengths / w)),))
+        return DeadLoad(beam, vector, self.amplitude, spread)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from functools import cached_property, wraps
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy import sparse
 from skfem.assembly import Basis, FacetBasis, asm
 from skfem.element import ElementVector
 
@@ -13,8 +14,8 @@ from . import forms
 from .damping import KelvinVoigt
 from .elements import ElementBeam, choose_element
 from .errors import (InputError, MeshError, NameUnknown, require_finite, require_flag,
-                     require_integer, require_label, require_like, require_names, require_positive,
-                     shown, taught, teaching)
+                     require_integer, require_label, require_like, require_names, shown, taught,
+                     teaching)
 from .finder import Finder
 from .formulations import get_formulation
 from .frozen import Frozen, read_only
@@ -24,16 +25,18 @@ from .mesh import MeshBeam
 from .places import as_point, facets_of
 from .quadrature import gauss, tensor
 from .rigid import RigidBody
+from .sections import Across, Rectangle, Section
 from .series import Series
-from .strains import ElementStrain
+from .strains import ElementStrain, TaperedStrain
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike
     from scipy.sparse import csr_matrix
 
     from .formulations.base import Formulation, Term
+    from .inertia import Inertia
     from .types import Array, Place, WhichMember
 
 
@@ -104,9 +107,11 @@ class Beam(Frozen):
         carries ``fields`` within ``tolerance``, see
         :func:`skfem_ancf.elements.choose.choose_element`.
     material
-        A material, for example :class:`~skfem_ancf.StVenantKirchhoff`.
+        A material, for example :class:`~skfem_ancf.StVenantKirchhoff`; None if the section has
+        materials of its own.
     width
-        Width of the section, positive.
+        Width of a full section: a positive number, or a function of material coordinates x, the
+        parameter of the axis, and y, the distance from it, arrays of one shape.
     formulation
         How the strain is sampled and integrated: a name from
         :data:`skfem_ancf.formulations.FORMULATIONS`, or a formulation.
@@ -120,6 +125,8 @@ class Beam(Frozen):
         error that the beam theory may have.
     damping
         :class:`~skfem_ancf.KelvinVoigt` for a stress that resists the rate of the strain, or None.
+    section
+        A :class:`~skfem_ancf.Section` in place of the width.
 
     Raises
     ------
@@ -138,20 +145,29 @@ class Beam(Frozen):
     (170, 0.78)
     """
 
-    def __init__(self, mesh: MeshBeam, element: ElementBeam | str, material: Material, width: float,
+    def __init__(self, mesh: MeshBeam, element: ElementBeam | str,
+                 material: Material | None = None,
+                 width: float | Callable[..., ArrayLike] | None = None,
                  formulation: str | Formulation | type[Formulation] = "assumed",
                  name: str | None = None, compiled: bool = True, fields: str | Sequence[str] = (),
-                 tolerance: float = 1e-3, damping: KelvinVoigt | None = None) -> None:
-        if isinstance(element, str) and element == "auto" and isinstance(mesh, MeshBeam):
-            element = choose_element(mesh, material, fields, tolerance)
-        for argument, kind, value in (("mesh", MeshBeam, mesh), ("element", ElementBeam, element),
-                                      ("material", Material, material)):
-            if not isinstance(value, kind):
-                raise InputError(f"{argument} must be a {kind.__name__}, got {shown(value)}")
-        element = cast("ElementBeam", element)
+                 tolerance: float = 1e-3, damping: KelvinVoigt | None = None,
+                 section: Section | None = None) -> None:
+        if not isinstance(mesh, MeshBeam):
+            raise InputError(f"mesh must be a MeshBeam, got {shown(mesh)}")
+        self.section, self._given = _section(section, width), material
+        if (material is None) != self.section.has_materials or not isinstance(
+                material, (Material, type(None))):
+            raise InputError(f"material must be None, for {self.section!r} has its own, got "
+                             f"{shown(material)}" if self.section.has_materials else
+                             f"material must be a Material, got {shown(material)}")
+        self.material: Material = material or self.section.slabs(mesh, None)[0].material
+        if isinstance(element, str) and element == "auto":
+            element = choose_element(mesh, self.material, fields, tolerance)
+        if not isinstance(element, ElementBeam):
+            raise InputError(f"element must be a ElementBeam, got {shown(element)}")
         self.mesh: MeshBeam = element.fitted(mesh)
-        self.element, self.material = element, material
-        self.width = require_positive("width", width)
+        self.element, self.width = element, getattr(self.section, "width", None)
+        self.across = Across(self.mesh, element, self.section, material)
         self.formulation = get_formulation(formulation)
         self.name = require_label("name", name)
         self.compiled = require_flag("compiled", compiled)
@@ -160,7 +176,8 @@ class Beam(Frozen):
                              f"{shown(damping)}")
         self.damping = damping
         self.kinematics = KINEMATICS[element.kinematics]
-        self.kinematics.require_law(material)
+        for slab in self.across.slabs:
+            self.kinematics.require_law(slab.material)
         self.nd = 2 * element.nodal_dofs
         self.N = self.nd * mesh.p.shape[1]
 
@@ -191,11 +208,14 @@ class Beam(Frozen):
         (0.1, 0.2, 2.0)
         """
         known = ("mesh", "element", "material", "width", "formulation", "name", "compiled",
-                 "damping")
+                 "damping", "section")
         for name in changes:
             if name not in known + ("fields", "tolerance"):
                 raise NameUnknown("argument of Beam", name, known)
-        return type(self)(**{**{name: getattr(self, name) for name in known}, **changes})
+        given = {name: getattr(self, name) for name in known} | {"material": self._given}
+        given["width" if "section" in changes or not isinstance(self.section, Rectangle) else
+              "section"] = None
+        return type(self)(**{**given, **changes})
 
     def with_mesh(self, mesh: MeshBeam) -> Beam:
         """The same beam on another mesh."""
@@ -211,6 +231,8 @@ class Beam(Frozen):
     @cached_property
     def basis(self) -> Basis:
         """A scikit-fem ``Basis`` of the position field with the formulation's quadrature."""
+        if len(self.across.slabs) > 1:
+            return self.exact_basis()
         return Basis(self.mesh, self.vector_element,
                      quadrature=self.terms[0].quadrature)
 
@@ -237,16 +259,55 @@ class Beam(Frozen):
         return FacetBasis(self.mesh, self.vector_element, facets=facets_of(self.mesh, facets),
                           intorder=order if intorder is None else intorder)
 
+    def loaded_parts(self, facets: Place, intorder: int | None = None
+                     ) -> list[tuple[FacetBasis, Any]]:
+        """Bases of the parts of a place of one width, with the width at their points.
+
+        Parameters
+        ----------
+        facets, intorder
+            As for :meth:`facet_basis`.
+
+        Returns
+        -------
+        list
+            Pairs of a ``FacetBasis`` and its width: a number, or of the shape of its ``dx``.
+        """
+        if self.across.plain:
+            return [(self.facet_basis(facets, intorder), self.across.slabs[0].width)]
+        mesh, found = self.mesh, np.asarray(facets_of(self.mesh, facets))
+        n, ne, out = mesh.p.shape[1], mesh.nelements, []
+        for side, first in enumerate((n, n + ne)):
+            on = found[(found >= first) & (found < first + ne)]
+            if len(on):
+                basis = self.facet_basis(on, intorder)
+                tind, X = mesh.mapping().facet_points(basis.X, basis.find)
+                out.append((basis, self.across.face(side, X, tind) + 0.0 * basis.dx))
+        ends = found[found < n]
+        for slab, (eta, w) in self.across.rules(self.element.order + 3) if len(ends) else ():
+            basis = FacetBasis(mesh, self.vector_element, facets=ends, quadrature=(eta[None], w))
+            tind, X = mesh.mapping().facet_points(basis.X, basis.find)
+            out.append((basis, self.across.breadth(slab, X, tind) + 0.0 * basis.dx))
+        return out
+
     @cached_property
     def kernel(self) -> Any:
         """The fused evaluation of the strain energy; see :mod:`skfem_ancf.kernel`."""
-        return self.kinematics.kernel(self.mesh, self.element, self.material, self.width,
-                                      self.formulation)
+        return self.kinematics.kernel(self.across, self.formulation)
 
     @cached_property
     def terms(self) -> Sequence[Term]:
-        """The terms of the strain energy, of the formulation for this element and material."""
-        return self.formulation.terms(self.element, self.material)
+        """The terms of the strain energy, of the formulation for each material of the section."""
+        return [term for _, terms in self.across.terms(self.formulation) for term in terms]
+
+    @cached_property
+    def layers(self) -> Sequence[Beam]:
+        """The beam as if it were of one material, for each slab of its section."""
+        if self.across.plain:
+            return [self]
+        return [self.replace(material=slab.material, section=Rectangle(1.0),
+                             element=self.element.measured(slab.measure, self.across.shear))
+                for slab in self.across.slabs]
 
     @property
     def has_sections(self) -> bool:
@@ -490,11 +551,12 @@ class Beam(Frozen):
         points = X.reshape(2, -1) if X.ndim == 3 else np.tile(X, shape[0])
         return self.strain_of(term)(u, np.repeat(tind, shape[1]), points).reshape(3, *shape)
 
-    def strain_of(self, term: Term) -> ElementStrain:
+    def strain_of(self, term: Term) -> ElementStrain | TaperedStrain:
         """The strain of a term of the formulation: an :class:`~.strains.ElementStrain`, kept."""
         found = self._strains.get(id(term))
         if found is None:
-            found = self._strains[id(term)] = ElementStrain(self, term)
+            kind = ElementStrain if self.mesh.heights is None else TaperedStrain
+            found = self._strains[id(term)] = kind(self, term)
         return found
 
     @cached_property
@@ -528,46 +590,55 @@ class Beam(Frozen):
     @property
     def total_mass(self) -> float:
         """Mass of the beam."""
-        volume = float(np.sum(self._shapes[1]))
-        return self.density * volume * (self.mesh.nelements if self.mesh.is_uniform else 1)
+        mass = float(np.sum(self.inertia.mass))
+        return mass * (self.mesh.nelements if self.across.uniform else 1)
 
     @property
     def density(self) -> float:
-        """Density of the material; raises InputError if the material has none."""
-        if self.material.density is None:
-            raise InputError(f"{self.material!r} has no density: give one to use mass or gravity")
-        return self.material.density
+        """Density of the material, its mean if it varies; raises InputError if it has none."""
+        slab = self.across.slabs[0]
+        if len(self.across.slabs) == 1 and not callable(slab.density):
+            return self.across.density(slab, np.zeros((2, 0)))
+        return self.total_mass / self.kernel.volume
 
     @cached_property
-    def _shapes(self):
-        """Local functions (nb, ne, np) and volume weights (ne, np); ne = 1 if all are equal."""
-        n = self.element.axis_degree + 1 + (0 if self.mesh.is_straight else 1)
-        X, W = tensor(gauss(n), self.kinematics.section_rule(self.element))
-        tind = np.array([0]) if self.mesh.is_uniform else None
-        mapping = self.mesh.mapping()
-        return self.element.functions(mapping, X, tind)[0], self.width * W * mapping.detDF(X, tind)
+    def inertia(self) -> Inertia:
+        """Local functions and masses at points, :class:`~skfem_ancf.inertia.Inertia`."""
+        return self.kinematics.inertia(self)
 
     def mass_elements(self, elements: slice = slice(None)) -> Array:
         """Element mass matrices of a slice of the elements, shape (n, 2 nd, 2 nd)."""
-        N, dV = self._shapes
-        if not self.mesh.is_uniform:
-            N, dV = N[:, elements], dV[elements]
-        scalar = self.density * np.einsum("iep,jep,ep->eij", N, N, dV, optimize=True)
-        full = np.einsum("eij,ab->eiajb", scalar, np.eye(2)).reshape(-1, 2 * self.nd, 2 * self.nd)
         n = len(range(*elements.indices(self.mesh.nelements)))
-        return np.repeat(full, n, axis=0) if self.mesh.is_uniform else full
+        full = self.inertia.matrices(slice(None) if self.across.uniform else elements)
+        return np.repeat(full, n, axis=0) if self.across.uniform else full
 
     def weight(self, g: ArrayLike) -> Array:
         """The dead load of an acceleration ``g`` (2,), shape (N,)."""
         g = require_finite("g", g, (2,))
-        N, dV = self._shapes
-        mean = self.density * np.einsum("iep,ep->ei", N, dV)
-        load = np.broadcast_to(mean[:, :, None] * g, (self.mesh.nelements,) + mean.shape[1:] + (2,))
-        return self.kernel.scatter(np.ascontiguousarray(load))
+        load = self.inertia.weights(g)
+        return self.kernel.scatter(np.ascontiguousarray(np.broadcast_to(
+            load, (self.mesh.nelements,) + load.shape[1:])))
 
     def mass(self) -> csr_matrix:
         """The mass matrix, constant, sparse, shape (N, N)."""
-        return asm(forms.mass(self.density, self.width), self.exact_basis())
+        if self.across.simple:
+            return asm(forms.mass(self.density, self.across.slabs[0].width), self.exact_basis())
+        dofs = self.basis.element_dofs.T
+        rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
+        return sparse.coo_matrix((self.mass_elements().ravel(), (rows.ravel(), columns.ravel())),
+                                 shape=(self.N, self.N)).tocsr()
+
+
+def _section(section, width):
+    """What was given as a section, or a rectangle of a width."""
+    if section is None:
+        return Rectangle(width)
+    if width is not None:
+        raise InputError(f"give a width or a section, not both: got {shown(width)} and {section!r}")
+    if not isinstance(section, Section):
+        raise InputError('section must be a Section, as Section.profile("I", width=0.05, '
+                         f"web=0.005, flange=0.008), got {shown(section)}")
+    return section
 
 
 def select_beam(beams: Sequence[Beam], beam: WhichMember) -> Beam:

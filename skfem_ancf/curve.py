@@ -219,7 +219,7 @@ def _lagrange_derivative(nodes, i, x):
     return np.polyval(np.polyder(polynomial), x)
 
 
-def check_curvature(curve: Curve, s: Array, height: float) -> None:
+def check_curvature(curve: Curve, s: Array, height: float | Array) -> None:
     """Raise MeshError where the radius of curvature of the curve is below h/2.
 
     Parameters
@@ -229,14 +229,15 @@ def check_curvature(curve: Curve, s: Array, height: float) -> None:
     s
         Parameters of the nodes, shape (n,).
     height
-        Height of the section.
+        Height of the section, or the largest between two nodes, shape (n - 1,).
     """
     at = np.unique(np.concatenate([np.linspace(a, b, 17) for a, b in itertools.pairwise(s)]))
     _, tangent = curve.nodes(at)
     angle = np.unwrap(np.arctan2(tangent[1], tangent[0]))
     kappa = np.abs(np.diff(angle)) / curve.lengths(at[:-1], at[1:])
-    k = int(np.argmax(kappa))
-    if kappa[k] * height / 2 >= 1.0:
+    height = np.repeat(np.broadcast_to(height, len(s) - 1), 16)
+    k = int(np.argmax(kappa * height))
+    if kappa[k] * height[k] / 2 >= 1.0:
         raise MeshError(
             f"the curve folds near s = {at[k]:.6g}: its radius of curvature {1 / kappa[k]:.6g} is "
-            f"below half the height {height / 2:.6g}; use a smaller height or a gentler curve")
+            f"below half the height {height[k] / 2:.6g}; use a smaller height or a gentler curve")

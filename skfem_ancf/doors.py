@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .system import System
     from .types import Array
 
-_GEOMETRY = ("p", "t", "p_X", "p_Y", "p_XY", "lengths")
+_GEOMETRY = ("p", "t", "p_X", "p_Y", "p_XY", "lengths", "heights")
 
 
 def difference(a: Beam, b: Beam) -> str | None:

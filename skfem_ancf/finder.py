@@ -110,7 +110,11 @@ class Finder:
             e -= 1  # of the section between two elements, or in a gap
             if along - right[e] > noise * lengths[e]:
                 return None
-        return e, (along - left[e]) / lengths[e], (dx * y - dy * x) / height + 0.5
+        xi = (along - left[e]) / lengths[e]
+        if self.mesh.heights is not None:
+            at = np.array([[min(max(xi, 0.0), 1.0)]])
+            height = float(self.mapping.height(at, np.array([e]))[0][0, 0])
+        return e, xi, (dx * y - dy * x) / height + 0.5
 
     def _one_near(self, x, y, noise):
         sx, sy = self._samples
@@ -158,8 +162,9 @@ class Finder:
         e = np.minimum(e, mesh.nelements - 1)
         before = np.maximum(e - 1, 0)  # in a gap: the nearer element
         e = np.where(along - ends[1, before] < ends[0, e] - along, before, e)
-        X = np.array([(along - ends[0, e]) / mesh.lengths[e],
-                      (d[0] * x[1] - d[1] * x[0]) / mesh.height + 0.5])
+        xi = (along - ends[0, e]) / mesh.lengths[e]
+        height = self.mapping.height(np.clip(xi, 0.0, 1.0)[:, None], e)[0]
+        X = np.array([xi, (d[0] * x[1] - d[1] * x[0]) / np.ravel(height) + 0.5])
         outside = self._outside(X, noise)
         outside[outside > 1.0] = np.inf
         return e, X, outside

@@ -355,8 +355,14 @@ def gravity(density: float, g: ArrayLike, width: float = 1.0) -> LinearForm:
     return weight
 
 
+def _widths(width):
+    """A positive width, or widths at the points of a basis."""
+    return require_finite("width", width, (None, None)) if isinstance(
+        width, np.ndarray) else require_positive("width", width)
+
+
 @taught
-def traction(t: ArrayLike | Callable[[Array], Array], width: float = 1.0) -> LinearForm:
+def traction(t: ArrayLike | Callable[[Array], Array], width: float | Array = 1.0) -> LinearForm:
     """Dead traction ``int t . v dA`` for a ``FacetBasis``, a ``LinearForm``.
 
     Parameters
@@ -365,9 +371,10 @@ def traction(t: ArrayLike | Callable[[Array], Array], width: float = 1.0) -> Lin
         Force per area of the stress-free body, shape (2,), or a function of the points x (2, ...)
         that returns (2, ...).
     width
-        Width of the section, positive.
+        Width of the section, positive, or widths at the points of the basis, shape (nfacets,
+        npoints).
     """
-    width = require_positive("width", width)
+    width = _widths(width)
     if not callable(t):
         t = require_finite("t", t, (2,))
 
@@ -380,13 +387,19 @@ def traction(t: ArrayLike | Callable[[Array], Array], width: float = 1.0) -> Lin
 
 
 @taught
-def pressure(width: float = 1.0) -> BilinearForm:
+def pressure(width: float | Array = 1.0) -> BilinearForm:
     """Follower pressure of 1 as ``int -n . v da``, linear in the position: a ``BilinearForm``.
 
     On the deformed facet ``n da`` is the derivative of the position along the facet, turned by
     -90 degrees. The matrix times the coordinates is the force.
+
+    Parameters
+    ----------
+    width
+        Width of the section, positive, or widths at the points of the basis, shape (nfacets,
+        npoints).
     """
-    width = require_positive("width", width)
+    width = _widths(width)
 
     @BilinearForm
     def follower(u, v, w):
@@ -468,7 +481,8 @@ class _Own:
         same = (isinstance(basis, CellBasis) and basis.N == self.beam.N
                 and type(other_element) is type(element)
                 and np.array_equal(other_element.doflocs, element.doflocs)
-                and np.array_equal(basis.mesh.p, mesh.p) and basis.mesh.height == mesh.height)
+                and np.array_equal(basis.mesh.p, mesh.p) and basis.mesh.height == mesh.height
+                and np.array_equal(basis.mesh.heights, mesh.heights))
         if not same:
             raise InputError(f"this is a form of {self.beam!r}: assemble it on "
                              f"Basis(beam.mesh, ElementVector(beam.element)), not on {basis!r}")

@@ -5,10 +5,12 @@ An element names its kind, ``element.kinematics``; what depends on it is asked h
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .inertia import of_cable, of_sections
 from .kernels import CableKernel, Kernel
 from .kernels.along import CableSections
 from .errors import InputError
@@ -18,6 +20,7 @@ from .quadrature import gauss
 if TYPE_CHECKING:
     from .beam import Beam
     from .elements.base import ElementBeam
+    from .inertia import Inertia
     from .materials.base import Material
     from .types import Array, Rule
 
@@ -46,6 +49,17 @@ class Sections:
         return gauss(element.order + 1)
 
     @staticmethod
+    def inertia(beam: Beam) -> Inertia:
+        """Its masses at points.
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+        """
+        return of_sections(beam)
+
+    @staticmethod
     def direction(beam: Beam, node: int) -> tuple[Array, Array]:
         """Coordinates (2, n) and weights (n,) of 12 / h^3 int Y r dY of a section.
 
@@ -57,7 +71,7 @@ class Sections:
             Its number.
         """
         eta, w = gauss(beam.element.order + 1)
-        h = beam.mesh.height
+        h = beam.mesh.node_height(node)
         first = next(k for k, f in enumerate(beam.element.functionals) if f[2] > 0)
         f = beam.element.functionals[first:first + beam.element.section.number]
         c = np.array([12.0 * h ** (f[k][2] - 1) * np.sum(
@@ -184,7 +198,9 @@ class Sections:
             As for :meth:`Beam.gradients <skfem_ancf.Beam.gradients>`, shapes (N,), (2, npoints) or
             (2, nelements, npoints), and (nelements,).
         """
-        return beam.formulation.stress(beam, strain, u, X, tind)
+        return beam.across.of_slabs(X, strain, [
+            partial(layer.formulation.stress, layer, strain, u, X, tind)
+            for layer in beam.layers], tind)
 
     @staticmethod
     def shortest(beam: Beam, u: Array) -> float:
@@ -242,6 +258,10 @@ class Cable(Sections):
         return AXIS
 
     @staticmethod
+    def inertia(beam: Beam) -> Inertia:
+        return of_cable(beam)
+
+    @staticmethod
     def direction(beam: Beam, node: int) -> tuple[Array, Array]:
         # the tangent, which turns with the section
         return node * beam.nd + 2 + np.arange(2).reshape(2, 1), np.ones(1)
@@ -267,7 +287,7 @@ class Cable(Sections):
         tangent, _, eps, kappa = cls._section(beam, u, X, tind)
         strain = cls.strain(beam, u, X, tind)
         normal = np.array([-tangent[1], tangent[0]])
-        Y = beam.mesh.height * (X[1] - 0.5)
+        Y = beam.mesh.mapping().offset(X, tind)
         F = np.stack([(1.0 + eps - Y * kappa) * tangent,
                       np.sqrt(1.0 + 2.0 * strain[1]) * normal], axis=1)
         return F - frame, frame
@@ -277,18 +297,19 @@ class Cable(Sections):
         tangent, tangent0, _, _ = cls._section(beam, u, X, tind)
         turn = tangent - tangent0
         return (Sections.displacements(beam, u, X, tind)
-                + beam.mesh.height * (X[1] - 0.5) * np.array([-turn[1], turn[0]]))
+                + beam.mesh.mapping().offset(X, tind) * np.array([-turn[1], turn[0]]))
 
     @classmethod
     def strain(cls, beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:
-        return cls._strain_of(beam, beam.mesh.height * (X[1] - 0.5), *cls._section(
-            beam, u, X, tind)[2:])
+        return cls._strain_of(beam, beam.mesh.mapping().offset(X, tind), beam.across.which(X),
+                              *cls._section(beam, u, X, tind)[2:])
 
     @staticmethod
-    def _strain_of(beam, Y, eps, kappa):
+    def _strain_of(beam, Y, which, eps, kappa):
         e = eps - Y * kappa
         xx = e + 0.5 * e * e
-        return np.array([xx, -beam.material.lateral_ratio * xx, 0.0 * xx])
+        ratios = np.array([slab.material.lateral_ratio for slab in beam.across.slabs])
+        return np.array([xx, -ratios[which] * xx, 0.0 * xx])
 
     @classmethod
     def strain_at(cls, beam: Beam, u: Array, e: Array, X: Array) -> Array:
@@ -297,25 +318,30 @@ class Cable(Sections):
     @classmethod
     def strain_of_point(cls, beam: Beam, e: int, xi: float, eta: float) -> Any:
         at = CableSections(beam.kernel, np.array([[xi]]), np.array([e]), beam.mesh, beam.element)
-        Y = beam.mesh.height * (eta - 0.5)
-        return lambda u_e: cls._strain_of(beam, Y, *at(u_e.T[None])[1])[:, 0, 0]
+        X = np.array([[[xi]], [[eta]]])
+        Y, which = beam.mesh.mapping().offset(X, np.array([e])), beam.across.which(X)
+        return lambda u_e: cls._strain_of(beam, Y, which, *at(u_e.T[None])[1])[:, 0, 0]
 
     @staticmethod
     def stress(beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
-        along = beam.material.axial_modulus * strain[0]
-        return np.array([along, 0.0 * along, 0.0 * along])
+        def along(material):
+            S = material.axial_modulus * strain[0]
+            return np.array([S, 0.0 * S, 0.0 * S])
+
+        return beam.across.of_slabs(X, strain, [partial(along, slab.material)
+                                                for slab in beam.across.slabs], tind)
 
     @staticmethod
     def shortest(beam: Beam, u: Array) -> float:
-        eps, kappa = beam.kernel.strain(beam.kernel.gather(u))
-        return np.min(1.0 + eps - 0.5 * beam.mesh.height * np.abs(kappa))
+        eps, outer = beam.kernel.outer_strain(u)
+        return np.min(1.0 + eps - outer)
 
     @staticmethod
     def deformation(beam: Beam, u: Array) -> tuple[Array, Array]:
-        eps, kappa = beam.kernel.strain(beam.kernel.gather(u))
-        along = 1.0 + eps + 0.5 * beam.mesh.height * np.abs(kappa) * np.array([[[-1.0]], [[1.0]]])
-        across = np.sqrt(np.maximum(
-            1.0 - beam.material.lateral_ratio * (along * along - 1.0), 0.0))  # S_yy = 0
+        eps, outer = beam.kernel.outer_strain(u)
+        along = 1.0 + eps + outer * np.array([[[-1.0]], [[1.0]]])
+        ratio = beam.across.slabs[0].material.lateral_ratio
+        across = np.sqrt(np.maximum(1.0 - ratio * (along * along - 1.0), 0.0))  # S_yy = 0
         return along * across, along
 
 

@@ -22,6 +22,7 @@ from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number
 from .frozen import Sealable, read_only
 from .kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from .pickling import picklable_form
+from .places import facets_of
 from .rigid import RigidBody
 from .spread import BODY, Sampled, Spread, facets_along, on_facets, stations_of_vector
 
@@ -286,7 +287,7 @@ class Weight(Load):
         self.g = require_finite("g", g, (2,))
 
     def bind(self, beam: Beam | RigidBody) -> Load:
-        spread = None if isinstance(beam, RigidBody) else Spread(body=beam.density * self.g)
+        spread = None if isinstance(beam, RigidBody) else Spread(gravity=self.g)
         return DeadLoad(beam, beam.weight(self.g), self.amplitude, spread)
 
 
@@ -340,12 +341,14 @@ class Traction(Load):
         self.boundary, self.t = boundary, t if callable(t) else require_finite("t", t, (2,))
 
     def bind(self, beam: Beam) -> Load:
-        t = self.t
-        basis = beam.facet_basis(self.boundary, intorder=12 if callable(t) else None)
-        if callable(t):
-            ask_field("t(x)", t, np.asarray(basis.global_coordinates()))
-        return DeadLoad(beam, asm(forms.traction(t, beam.width), basis), self.amplitude,
-                        on_facets(beam.mesh, basis.find, traction=t))
+        t, vector = self.t, np.zeros(beam.N)
+        parts = beam.loaded_parts(self.boundary, intorder=12 if callable(t) else None)
+        for basis, width in parts:
+            if callable(t):
+                ask_field("t(x)", t, np.asarray(basis.global_coordinates()))
+            vector += asm(forms.traction(t, width), basis)
+        return DeadLoad(beam, vector, self.amplitude, on_facets(
+            beam.mesh, np.unique(np.concatenate([basis.find for basis, _ in parts])), traction=t))
 
 
 class FormLoad(Load):
@@ -402,8 +405,10 @@ def _density(form, basis, beam, vector):
         per_xi = f * basis.dx / basis.W
         return Spread(stations=stations, sampled=tuple(
             Sampled(g.where, g.elements, g.xi, per_xi[:, g.chosen]) for g in groups))
+    if not beam.across.plain:
+        return None
     xi, eta = (np.unique(np.round(x, 14)) for x in basis.X)
-    values = (f / beam.width).reshape(*f.shape[:2], len(xi), len(eta))
+    values = (f / beam.across.slabs[0].width).reshape(*f.shape[:2], len(xi), len(eta))
     return Spread(sampled=(Sampled(BODY, np.arange(shape[0]), xi, values, eta),))
 
 
@@ -504,15 +509,16 @@ class Pressure(Load):
                  amplitude: TimeFunction = None) -> None:
         super().__init__(_the_beam(beam), amplitude)
         self.boundary, self.p = boundary, p
-        basis = beam.facet_basis(boundary)
-        if not beam.has_sections and np.any(basis.find < beam.mesh.p.shape[1]):
+        facets = np.asarray(facets_of(beam.mesh, boundary))
+        if not beam.has_sections and np.any(facets < beam.mesh.p.shape[1]):
             raise InputError(
                 f"a pressure at {boundary!r} of a cable would do nothing: its points across the "
                 "section are no coordinates. Use an element with sections, as ElementBeamANCF(2), "
                 "or for a force of constant direction scene.traction or scene.point_force")
-        self.matrix = (p * asm(forms.pressure(beam.width), basis)).tocoo()
+        self.matrix = sum(p * asm(forms.pressure(width), basis)
+                          for basis, width in beam.loaded_parts(facets)).tocoo()
         self._rows = self.matrix.tocsr()
-        self._spread = on_facets(beam.mesh, basis.find, pressure=p)
+        self._spread = on_facets(beam.mesh, facets, pressure=p)
 
     def spread(self, u: Array) -> Spread | None:
         return self._spread

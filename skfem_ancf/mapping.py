@@ -10,6 +10,7 @@ from skfem.mapping import Mapping
 
 from .errors import MeshError
 from .reference import hermite, linear
+from .taper import powers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -83,7 +84,8 @@ class MappingBeam(Mapping):
     Hermite functions H_i, nodal positions and tangents x_i and section directors n_1, n_2.
     Every ANCF element of order 1 or more contains this map, so the stress-free state, and
     any rigid motion of it, is represented exactly. On a mesh with ``sections="cubic"``, for
-    elements whose sections are cubic too, the directors are interpolated by H_i as well.
+    elements whose sections are cubic too, the directors are interpolated by H_i as well. The
+    height h of a tapered beam is cubic in xi.
 
     Parameters
     ----------
@@ -113,6 +115,53 @@ class MappingBeam(Mapping):
         """The functions of xi that interpolate the section director."""
         return (hermite if self.mesh.sections == "cubic" else linear)(xi, derivative)
 
+    @cached_property
+    def _heights(self):
+        """Coefficients of the heights of a tapered beam, relative to the largest."""
+        return powers(self.mesh.heights) / self.mesh.height
+
+    def height(self, xi: Array, tind: Array | None = None) -> tuple[Any, Any]:
+        """The height of the section and its derivative by xi.
+
+        Parameters
+        ----------
+        xi
+            Places along the elements, shape (npoints,) or (nelements, npoints).
+        tind
+            Elements, shape (nelements,), or None for all.
+
+        Returns
+        -------
+        h, rate
+            Shape (nelements, npoints) both; numbers where the height is constant.
+        """
+        if self.mesh.heights is None:
+            return self.mesh.height, 0.0
+        g, rate = self._relative(xi, tind)
+        return self.mesh.height * g, self.mesh.height * rate
+
+    def _relative(self, xi, tind):
+        """The height over the largest, and its derivative, (ne, np); 1 and 0 where constant."""
+        if self.mesh.heights is None:
+            return 1.0, 0.0
+        c = self._heights if tind is None else self._heights[:, tind]
+        return _polynomial(c[:, :, None], np.asarray(xi))
+
+    def offset(self, X: Array, tind: Array | None = None) -> Any:
+        """Distance Y of reference points from the axis.
+
+        Parameters
+        ----------
+        X, tind
+            As for :meth:`F`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
+
+        Returns
+        -------
+        ndarray
+            Shape (nelements, npoints), or as ``X[1]`` where the height is constant.
+        """
+        return self.height(X[0], tind)[0] * (X[1] - 0.5)
+
     @staticmethod
     def _sum(coefficients, functions):
         """Combine (2, n, ne) coefficients with functions (n, np) or (n, ne, np)."""
@@ -137,7 +186,10 @@ class MappingBeam(Mapping):
         """
         axis, director = self._coefficients(tind)
         xi, eta = X
-        return self._sum(axis, hermite(xi)) + self._sum(director, (eta - 0.5) * self._director(xi))
+        across = self._sum(director, (eta - 0.5) * self._director(xi))
+        if self.mesh.heights is not None:
+            across *= self._relative(xi, tind)[0]
+        return self._sum(axis, hermite(xi)) + across
 
     def DF(self, X: Array, tind: Array | None = None) -> Array:
         """The Jacobian: derivatives of :meth:`F` by xi and eta.
@@ -155,8 +207,11 @@ class MappingBeam(Mapping):
         axis, director = self._coefficients(tind)
         xi, eta = X
         turning = self._sum(director, (eta - 0.5) * self._director(xi, 1))
-        return np.stack([self._sum(axis, hermite(xi, 1)) + turning,
-                         self._sum(director, self._director(xi))], 1)
+        across = self._sum(director, self._director(xi))
+        if self.mesh.heights is not None:
+            g, rate = self._relative(xi, tind)
+            turning, across = g * turning + (eta - 0.5) * rate * across, g * across
+        return np.stack([self._sum(axis, hermite(xi, 1)) + turning, across], 1)
 
     def detDF(self, X: Array, tind: Array | None = None) -> Array:
         """The determinant of :meth:`DF`.
@@ -229,8 +284,14 @@ class MappingBeam(Mapping):
         cubic = [hermite(zero, d) / (1, 1, 2)[d] for d in range(3)]
         cubic.append(hermite(zero + 1.0) - sum(cubic))  # what is left at xi = 1
         few = cubic if self.mesh.sections == "cubic" else [linear(zero), linear(zero, 1)]
-        return [np.stack([self._sum(c, f)[..., 0] for f in functions], 1)
-                for c, functions in ((axis, cubic), (director, few))]
+        axis, director = (np.stack([self._sum(c, f)[..., 0] for f in functions], 1)
+                          for c, functions in ((axis, cubic), (director, few)))
+        if self.mesh.heights is None:
+            return [axis, director]
+        product = np.zeros((2, director.shape[1] + 3, axis.shape[2]))
+        for k, g in enumerate(self._heights):  # the product of two polynomials
+            product[:, k:k + director.shape[1]] += g * director
+        return [axis, product]
 
     def invF(self, x: Array, tind: Array | None = None, max_iterations: int = 30,
              xi: ArrayLike = 0.5) -> Array:

@@ -25,6 +25,7 @@ from .pickling import require_picklable
 from .places import is_point
 from .reference import ElementBeamP1
 from .refinement import halved
+from .taper import Scaled, heights_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -58,7 +59,12 @@ class MeshBeam(Frozen, Mesh2D):
     t
         Left and right node of each element, shape (2, nelements).
     height
-        Height h of the section.
+        Height h of the section; of a tapered beam the largest.
+    heights
+        Of a tapered beam the heights at xi = 0, 1/3, 2/3 and 1 of each element, shape
+        (4, nelements), between which they are cubic; else None.
+    taper
+        The function of the axis' parameter that :meth:`refined` takes them from, or None.
     p_X, p_Y
         Derivative of the position along the axis and across the section at the nodes, shape
         (2, nvertices): the unit tangent and the unit normal on a given curve.
@@ -94,12 +100,14 @@ class MeshBeam(Frozen, Mesh2D):
     curve: Curve | None = None
     p_XY: ndarray | None = None
     sections: str = "linear"
+    heights: ndarray | None = None
+    taper: Callable[[Array], ArrayLike] | None = None
 
     # construction
 
     @classmethod
-    def init_line(cls, x: ArrayLike, height: float, origin: ArrayLike = (0.0, 0.0),
-                  angle: float = 0.0) -> MeshBeam:
+    def init_line(cls, x: ArrayLike, height: float | Callable[[Array], ArrayLike],
+                  origin: ArrayLike = (0.0, 0.0), angle: float = 0.0) -> MeshBeam:
         """A straight beam.
 
         Parameters
@@ -107,7 +115,8 @@ class MeshBeam(Frozen, Mesh2D):
         x
             Increasing positions of the nodes along the axis, shape (n,), n >= 2.
         height
-            Height of the section.
+            Height of the section: a number, or of a tapered beam a function of ``x`` (n,) that
+            returns heights (n,), with kinks at nodes only.
         origin
             The point, shape (2,), from which ``x`` is measured.
         angle
@@ -117,7 +126,8 @@ class MeshBeam(Frozen, Mesh2D):
         Raises
         ------
         MeshError
-            If an element has no length or the nodes are not increasing.
+            If an element has no length, the nodes are not increasing, or a height of a function
+            is not positive.
         InputError
             If ``height`` is not positive or a value is not finite.
 
@@ -126,9 +136,10 @@ class MeshBeam(Frozen, Mesh2D):
         >>> mesh = MeshBeam.init_line([0, 1, 3], height=0.2)
         >>> mesh.lengths.tolist()
         [1.0, 2.0]
+        >>> MeshBeam.init_line([0, 1, 3], height=lambda x: 0.3 - 0.05 * x).heights[0].tolist()
+        [0.3, 0.25]
         """
         x = require_finite("x", x, (None,))
-        height = require_positive("height", height)
         origin = require_finite("origin", origin, (2,))
         angle = _radians(angle)
         if len(x) < 2:
@@ -143,7 +154,8 @@ class MeshBeam(Frozen, Mesh2D):
                                np.diff(x), height, s=x)
 
     @classmethod
-    def init_curve(cls, r: Callable[[Array], ArrayLike], s: ArrayLike, height: float,
+    def init_curve(cls, r: Callable[[Array], ArrayLike], s: ArrayLike,
+                   height: float | Callable[[Array], ArrayLike],
                    dr: Callable[[Array], ArrayLike] | None = None) -> MeshBeam:
         """A beam that is curved in its stress-free state.
 
@@ -154,7 +166,8 @@ class MeshBeam(Frozen, Mesh2D):
         s
             Increasing parameters of the nodes, shape (n,), n >= 2. They need not be arc lengths.
         height
-            Height of the section.
+            Height of the section: a number, or a function of parameters ``s`` (n,) that returns
+            heights (n,), with kinks at nodes only.
         dr
             Optional derivative of ``r``. If None it is found by the complex step where ``r``
             allows it, else by differences.
@@ -178,7 +191,6 @@ class MeshBeam(Frozen, Mesh2D):
         True
         """
         s = require_finite("s", s, (None,))
-        height = require_positive("height", height)
         if len(s) < 2:
             raise MeshError(f"a beam needs at least two nodes, got {len(s)}")
         if not np.all(np.diff(s) > 0):
@@ -193,16 +205,20 @@ class MeshBeam(Frozen, Mesh2D):
         p, tangent = curve.nodes(s)
         curve.check(s)
         curve.check_kinks(s)
-        check_curvature(curve, s, height)
+        largest, heights, _ = heights_of(height, s, np.array([np.arange(len(s) - 1), np.arange(
+            1, len(s))]))
+        check_curvature(curve, s, largest if heights is None else np.max(heights, axis=0))
         return cls._from_nodes(p, tangent, curve.lengths(s[:-1], s[1:]), height, s=s, curve=curve,
                                p_XY=curve.turning(s))
 
     @classmethod
     def _from_nodes(cls, p, tangent, lengths, height, s=None, curve=None, p_XY=None):
         n = p.shape[1]
-        mesh = cls(p, np.array([np.arange(n - 1), np.arange(1, n)]), height=height, p_X=tangent,
+        t = np.array([np.arange(n - 1), np.arange(1, n)])
+        height, heights, taper = heights_of(height, s, t)
+        mesh = cls(p, t, height=height, p_X=tangent,
                    p_Y=np.array([0.0 - tangent[1], tangent[0]]), lengths=lengths, s=s, curve=curve,
-                   p_XY=np.zeros(p.shape) if p_XY is None else p_XY)
+                   p_XY=np.zeros(p.shape) if p_XY is None else p_XY, heights=heights, taper=taper)
         mesh._boundaries = mesh._build_default_tags()
         return mesh
 
@@ -227,6 +243,10 @@ class MeshBeam(Frozen, Mesh2D):
                 "or init_curve. For a picture of a Basis take quad = mesh.to_meshquad() and "
                 "quad.plot(basis.probes(quad.p) @ y), not basis.plot or basis.refinterp")
         self.height = require_positive("height", self.height)
+        if self.heights is not None:
+            self.heights = require_finite("heights", self.heights, (4, shape[1]))
+            if not np.all(self.heights > 0.0):
+                raise MeshError(f"heights must be positive, got {np.min(self.heights):.6g}")
         t = self.t
         if not (np.array_equal(t[1], t[0] + 1) and np.all(np.diff(t[0]) > 0)):
             raise MeshError("the nodes of a MeshBeam are numbered along its axis: element k joins "
@@ -285,7 +305,7 @@ class MeshBeam(Frozen, Mesh2D):
         return self if sections == self.sections else replace(self, sections=sections)
 
     def replace(self, **changes: Any) -> MeshBeam:
-        """The mesh with another ``height``, or without its ``curve``.
+        """The mesh with another ``height``, a number or a function, or without its ``curve``.
 
         Positions, tangents and lengths depend on each other: for others use :meth:`init_line`,
         :meth:`init_curve`, :meth:`refined`, :meth:`translated`, :meth:`rotated`, :meth:`scaled`.
@@ -304,7 +324,35 @@ class MeshBeam(Frozen, Mesh2D):
             if name not in ("height", "curve"):
                 raise NameUnknown("attribute that may be replaced alone", name,
                                   ("height", "curve"))
+        if "height" in changes:
+            names = ("height", "heights", "taper")
+            changes |= zip(names, heights_of(changes["height"], self.parameters, self.t))
         return replace(self, **changes)
+
+    def node_height(self, node: int) -> float:
+        """The height of the section of a node.
+
+        Parameters
+        ----------
+        node
+            Its number.
+        """
+        if self.heights is None:
+            return self.height
+        end = int(node in self.t[1])
+        return float(self.heights[3 * end, np.nonzero(self.t[end] == node)[0][0]])
+
+    @property
+    def parameters(self) -> Array:
+        """Parameter of each node on the axis, shape (nvertices,): ``s``, or lengths from its start.
+        """
+        if self.s is not None:
+            return self.s
+        out = np.zeros(self.p.shape[1])
+        gaps = np.hypot(*np.diff(self.p))
+        gaps[self.t[0]] = self.lengths
+        out[1:] = np.cumsum(gaps)
+        return out
 
     def __setattr__(self, name, value):
         if name in ("_boundaries", "_subdomains") and value is not None:
@@ -314,6 +362,8 @@ class MeshBeam(Frozen, Mesh2D):
     def __getstate__(self):
         if self.curve is not None:
             require_picklable(self.curve.functions())
+        if self.taper is not None:
+            require_picklable([("the function height(x) of the mesh", self.taper)])
         names = {field.name for field in fields(self)}
         return {name: value for name, value in vars(self).items() if name in names}
 
@@ -438,11 +488,11 @@ class MeshBeam(Frozen, Mesh2D):
 
     @property
     def is_uniform(self) -> bool:
-        """True if every element is straight and of the same length: one table serves them all."""
+        """True if every element is straight, of the same length and height: one table for all."""
         if not hasattr(self, "_is_uniform"):
             # the round-off of the nodes' positions is no difference in length
             noise = 8 * np.finfo(float).eps * np.max(np.abs(self.p))
-            self._is_uniform = self.is_straight and bool(
+            self._is_uniform = self.is_straight and self.heights is None and bool(
                 np.ptp(self.lengths) <= 1e-13 * np.max(self.lengths) + noise)
         return self._is_uniform
 
@@ -601,6 +651,8 @@ class MeshBeam(Frozen, Mesh2D):
         m = type(self)(self.p[:, nodes], renumber[self.t[:, elements]], height=self.height,
                      p_X=self.p_X[:, nodes], p_Y=self.p_Y[:, nodes],
                      lengths=self.lengths[elements], curve=self.curve, sections=self.sections,
+                     heights=None if self.heights is None else self.heights[:, elements],
+                     taper=self.taper,
                      p_XY=None if self.p_XY is None else self.p_XY[:, nodes],
                      s=None if self.s is None else self.s[nodes])
         if self._subdomains is not None and not skip_subdomains:
@@ -626,7 +678,9 @@ class MeshBeam(Frozen, Mesh2D):
         return replace(self, doflocs=scale * rotation @ self.p + shift[:, None],
                        p_X=rotation @ self.p_X, p_Y=rotation @ self.p_Y, curve=curve,
                        p_XY=None if self.p_XY is None else rotation @ self.p_XY / scale,
-                       lengths=scale * self.lengths, height=scale * self.height)
+                       lengths=scale * self.lengths, height=scale * self.height,
+                       heights=None if self.heights is None else scale * self.heights,
+                       taper=None if self.taper is None else Scaled(self.taper, scale))
 
     def translated(self, diffs: ArrayLike) -> MeshBeam:
         """The mesh moved by a vector.
@@ -726,22 +780,27 @@ class MeshBeam(Frozen, Mesh2D):
         **kwargs
             Those of :meth:`skfem.Mesh.draw`.
         """
-        return self.to_meshquad(1 if self.is_straight else 8, 1).draw(visuals, **kwargs)
+        return self._outline().draw(visuals, **kwargs)
 
     def _repr_svg_(self):
-        return self.to_meshquad(1 if self.is_straight else 8, 1)._repr_svg_()
+        return self._outline()._repr_svg_()
+
+    def _outline(self):
+        return self.to_meshquad(1 if self.is_straight and self.heights is None else 8, 1)
 
     def __repr__(self):
         kind = "straight" if self.is_straight else "curved"
-        return (super().__repr__() + f"\n  Height, length: {self.height:.6g}, "
+        height = f"{self.height:.6g}" if self.heights is None else (
+            f"{np.min(self.heights):.6g} to {self.height:.6g}")
+        return (super().__repr__() + f"\n  Height, length: {height}, "
                 f"{self.lengths.sum():.6g} ({kind})")
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything but the function ``curve``, as lists."""
+        """Everything but the functions ``curve`` and ``taper``, as lists."""
         out = super().to_dict()
         out["orientations"] = {k: v.ori.tolist() for k, v in (self.boundaries or {}).items()
                                if getattr(v, "ori", None) is not None}
-        for name in ("p_X", "p_Y", "p_XY", "lengths", "s"):
+        for name in ("p_X", "p_Y", "p_XY", "lengths", "s", "heights"):
             value = getattr(self, name)
             out[name] = None if value is None else value.T.tolist()
         return {**out, "height": self.height, "sections": self.sections}
@@ -771,7 +830,7 @@ class MeshBeam(Frozen, Mesh2D):
     @classmethod
     def _from_dict(cls, data):
         data = {"boundaries": None, "subdomains": None, **data}
-        for name in ("p_X", "p_Y", "p_XY"):
+        for name in ("p_X", "p_Y", "p_XY", "heights"):
             if data.get(name) is not None:
                 data[name] = np.ascontiguousarray(np.array(data[name]).T)
         for name in ("lengths", "s"):
@@ -787,13 +846,14 @@ class MeshBeam(Frozen, Mesh2D):
         return mesh
 
     def save_npz(self, filename: StrPath) -> None:
-        """Save everything but the function ``curve``; read it with :meth:`load_npz`."""
+        """Save all but the functions ``curve`` and ``taper``; read it with :meth:`load_npz`."""
         filename = require_path("filename", filename)
         tags = {f"b_{k}": v for k, v in (self.boundaries or {}).items()}
         tags |= {f"o_{k}": v.ori for k, v in (self.boundaries or {}).items()
                  if getattr(v, "ori", None) is not None}
         tags |= {f"s_{k}": v for k, v in (self.subdomains or {}).items()}
-        s = {name: getattr(self, name) for name in ("s", "p_XY") if getattr(self, name) is not None}
+        s = {name: getattr(self, name) for name in ("s", "p_XY", "heights")
+             if getattr(self, name) is not None}
         try:
             np.savez(filename, doflocs=self.doflocs, t=self.t, height=self.height, p_X=self.p_X,
                      p_Y=self.p_Y, lengths=self.lengths, sections=self.sections, **s, **tags)
@@ -833,7 +893,8 @@ class MeshBeam(Frozen, Mesh2D):
             return cls(data["doflocs"], data["t"], tags or None, parts or None,
                        height=float(data["height"]), p_X=data["p_X"], p_Y=data["p_Y"],
                        lengths=data["lengths"], sections=str(data["sections"]),
-                       **{name: data[name] for name in ("s", "p_XY") if name in data.files})
+                       **{name: data[name] for name in ("s", "p_XY", "heights")
+                          if name in data.files})
 
     def save(self, filename: StrPath, point_data: dict[str, Any] | None = None,
              cell_data: dict[str, Any] | None = None, **kwargs: Any) -> None:

@@ -160,11 +160,14 @@ class Part:
         return first + np.arange(2 * beam.nd).reshape(-1, 2, 1)
 
     def _table(self, table):
-        series = self.beam.series
+        beam, series = self.beam, self.beam.series
+        if beam.mesh.heights is not None:  # no polynomial of xi that elements share
+            rows = beam.element.of_mesh(beam.mesh.mapping(), self.at, self.e)
+            return rows[int(table is series.along)][..., 0] * series.scale(beam, self.e)
         if self.n == 1:
             e, xi, eta = self.place
-            return series.at(table, xi, eta)[:, None] * series.scale(self.beam, e)[:, None]
-        return series.values(table, self.X) * series.scale(self.beam, self.e)
+            return series.at(table, xi, eta)[:, None] * series.scale(beam, e)[:, None]
+        return series.values(table, self.X) * series.scale(beam, self.e)
 
     @cached_property
     def weights(self) -> Array:
@@ -261,7 +264,7 @@ class Part:
 
     @cached_property
     def _lever(self):
-        return self.beam.mesh.height * (self.X[1] - 0.5)
+        return np.ravel(self.beam.mesh.mapping().offset(self.at, self.e))
 
     @cached_property
     def _start_slope(self):

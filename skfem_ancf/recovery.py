@@ -195,14 +195,20 @@ class _Piece:
         if self.forces.viscous is not None:
             self.Rv, self.Mv = self._viscous()
             self.R, self.M = self.R - self.Rv, self.M - self.Mv
-        eta, h = recovery.eta, mesh.height
-        self.Y = h * (eta - 0.5)
+        eta, across = recovery.eta, recovery.beam.across
         sections = Sections(self.forces, self.e, xi, eta)
         speed = np.hypot(*sections.J[:, 0, :, len(eta) // 2])
+        h, slope = mesh.mapping().height(sections.X[0], self.e)
+        self.Y, self.lean = h * (eta - 0.5), slope / speed[:, None] * (eta - 0.5)
+        self.h, self.swell = h / mesh.height, slope / (speed[:, None] * h)
+        slab, = across.slabs
+        self.width = across.breadth(slab, sections.X, self.e)
+        self.grade = across.grade(slab, sections.X, self.e)
         self.g = sections.volume / (speed[:, None] * h)
         self.body = self.g * (sections.body + self._axis_load())
-        self.faces = [Sections(self.forces, self.e, xi, np.array([float(k)])).face(k)[..., 0]
-                      / speed for k in (0, 1)]
+        at_faces = [Sections(self.forces, self.e, xi, np.array([float(k)])) for k in (0, 1)]
+        self.faces = [(across.face(k, at.X, self.e) * at.face(k))[..., 0] / speed
+                      for k, at in enumerate(at_faces)]
         r = Sections(self.forces, self.e, xi, np.array([0.5])).field(self.forces.q, slope=True)
         self.raw_angle = np.unwrap(np.arctan2(r[1, ..., 0], r[0, ..., 0]))
         self.phi = self.raw_angle
@@ -211,7 +217,8 @@ class _Piece:
     def _axis_load(self):
         """A load of the axis as a force per volume, the same across the section; or 0."""
         axis = Sections(self.forces, self.e, self.xi, np.array([0.5]))
-        return axis.sampled(AXIS) / (self.recovery.beam.width * axis.volume)
+        area = self.recovery.beam.across.moments(axis.X[0], self.e, "area")[0]
+        return axis.sampled(AXIS) / (area * np.hypot(*axis.J[:, 0]))
 
     def _viscous(self):
         """The part of force and moment that resists the rate of the strain, splined."""
@@ -248,7 +255,22 @@ class _Piece:
 
     def integral(self, values):
         """The integral over the section, with the width, of values (..., n, m)."""
-        return self.recovery.beam.width * (values @ self.recovery.whole)
+        return (self.width * self.h * values) @ self.recovery.whole
+
+    def from_bottom(self, values):
+        """The integral from the bottom to each point of values (..., n, m)."""
+        return self.h * (values @ self.recovery.from_bottom.T)
+
+    def from_axis(self, values):
+        """The integral from the axis to each point of values (..., n, m)."""
+        return self.h * (values @ self.recovery.from_axis.T)
+
+    def slope_from_axis(self, values, d_ds):
+        """The integral from the axis of the derivative along it, at the same distance from it.
+
+        Values and their derivative are those of (..., n, m) points at the same parts of the height.
+        """
+        return self.from_axis(d_ds + self.swell * values) - self.lean * values
 
     # step 2
 
@@ -256,10 +278,10 @@ class _Piece:
         """The strain (3, ..., n, m) with S_yy, S_xy, and the stretch, or S_xx, as they are."""
         r = self.recovery
         if self.stress_given:
-            return strain_of_stress(r.law, self.S, self.eps)
+            return strain_of_stress(r.law, self.S / self.grade, self.eps)
         self.eps[0] = 0.5 * (self.stretch**2 - 1.0)
-        eps = strain_of_stress(r.law, self._fed, self.eps, (1, 2))
-        self.S[0] = r.law.stress(eps)[0]
+        eps = strain_of_stress(r.law, self._fed / self.grade, self.eps, (1, 2))
+        self.S[0] = self.grade * r.law.stress(eps)[0]
         return eps
 
     def _section(self):
@@ -282,8 +304,8 @@ class _Piece:
         going = np.ones(self.forces.states)
         for _ in range(times):
             self._section()
-            E = self.recovery.modulus(self.eps)
-            x, y = (self.rY @ self.recovery.from_axis.T)
+            E = self.grade * self.recovery.modulus(self.eps)
+            x, y = self.from_axis(self.rY)
             missing = np.array([N - self.integral(self.P[0]),
                                 self.M - self.integral(x * self.P[1] - y * self.P[0])])
             unit = np.array([1.0 + 0.0 * y, y / h]) / self.g
@@ -306,14 +328,16 @@ class _Piece:
     def _turn(self):
         """The rate at which sections turn, the angles of fibres and of the frame."""
         r, along = self.recovery, self.g * self.rX[0]
-        total = self.rY @ r.whole
+        total = (self.h * self.rY) @ r.whole
+        with_faces = along + self.lean * self.rY[0]
         self.rate = (self.d_ds(total[0][..., None])[..., 0]
-                     - (along[..., -1] - along[..., 0])) / total[1]
+                     - (with_faces[..., -1] - with_faces[..., 0])) / total[1]
         dt, dn = self.d_ds(self.rY)
-        normal = (dn + self.rate[..., None] * self.rY[0]) @ r.from_axis.T
+        normal = (self.slope_from_axis(self.rY[1], dn)
+                  + self.from_axis(self.rate[..., None] * self.rY[0]))
         self.alpha = np.arcsin(np.clip(normal / (self.g * self.stretch), -1.0, 1.0))
-        turned = (smoothed(self.s, dt, 0.5 * r.beam.mesh.height)
-                  - self.rate[..., None] * self.rY[1]) @ r.from_axis.T
+        turned = (self.slope_from_axis(self.rY[0], smoothed(self.s, dt, 0.5 * r.beam.mesh.height))
+                  - self.from_axis(self.rate[..., None] * self.rY[1]))
         self.stretch = (along[..., r.middle, None] + turned) / (self.g * np.cos(self.alpha))
         phi = scipy.interpolate.CubicSpline(self.s, self.rate, axis=-1).antiderivative()(self.s)
         self.phi = phi + (self.raw_angle - phi) @ self._line
@@ -322,21 +346,20 @@ class _Piece:
 
     def _equilibrium(self):
         """S_xy and S_yy from div P + b = 0 and the loads of the faces."""
-        r, h = self.recovery, self.recovery.beam.mesh.height
         c, s = np.cos(self.phi), np.sin(self.phi)
 
         def turned(f, c, s):
             return np.array([c * f[0] + s * f[1], -s * f[0] + c * f[1]])
 
         rate, viscous = self.rate[..., None], self._viscous_stress()
-        P = self.P + self.rX * viscous[0] + self.rY * viscous[1]
+        P = self.width * (self.P + self.rX * viscous[0] + self.rY * viscous[1])
         d0, d1 = self.d_ds(P)
-        dP = np.array([d0 - rate * P[1], d1 + rate * P[0]]) + turned(
+        dP = np.array([d0 - rate * P[1], d1 + rate * P[0]]) + self.width * turned(
             self.body, c[..., None], s[..., None])
         bottom, top = (turned(f, c, s)[..., None] for f in self.faces)
-        P2 = -bottom - dP @ r.from_bottom.T
-        P2 = P2 + (top - P2[..., -1:]) * (self.Y / h + 0.5)
-        P2 = P2 / self.g
+        P2 = -bottom - self.from_bottom(dP + self.swell * P)  # with what leaves oblique faces
+        P2 = P2 + (top - P2[..., -1:]) * self.recovery.eta + self.lean * P
+        P2 = P2 / (self.g * self.width)
         det = cross(self.rX, self.rY)
         self.S = np.array([self.S[0], cross(self.rX, P2) / det,
                            cross(P2, self.rY) / det - viscous[1]])
@@ -352,7 +375,7 @@ class _Piece:
         t, n = (np.array([np.cos(self.phi), np.sin(self.phi)]),
                 np.array([-np.sin(self.phi), np.cos(self.phi)]))
         N, Q = np.sum(self.Rv * t, axis=0), np.sum(self.Rv * n, axis=0)
-        (x, y), (a, b) = self.rY @ self.recovery.from_axis.T, self.rX
+        (x, y), (a, b) = self.from_axis(self.rY), self.rX
         units = np.array([1.0 + 0.0 * y, y / self.recovery.beam.mesh.height]) / self.g
         K = np.array([[self.integral(a * unit), self.integral((x * b - y * a) * unit)]
                       for unit in units])
@@ -366,7 +389,7 @@ class _Piece:
 
     @property
     def _bubble(self):
-        return 1.0 - (2.0 * self.Y / self.recovery.beam.mesh.height) ** 2
+        return 1.0 - (2.0 * self.recovery.eta - 1.0) ** 2
 
     def _shear(self):
         """Add a parabola to S_xy that gives the section its shear force."""
@@ -388,7 +411,7 @@ class _Piece:
             self._balance()
             self._shear()
         self.stress, self.angle = self.S, self.phi[..., None] + self.alpha
-        self.strain = strain_of_stress(self.recovery.law, self.S, self.eps)
+        self.strain = strain_of_stress(self.recovery.law, self.S / self.grade, self.eps)
 
     def _rounds(self):
         """Steps 2 and 3 in turn, for each state until its stretch has settled."""
@@ -412,13 +435,14 @@ class _Piece:
 
     def _layers(self):
         """How much of the elements' own stress each section takes, (n,): near ends that is fine."""
-        r, h = self.recovery, self.recovery.beam.mesh.height
+        r = self.recovery
         if not r.has_stress:
             return np.zeros(len(self.s))
         lengths = np.diff(r.lengths)[self.e]
         weight = np.zeros(len(self.s))
-        for end in (self.s[0], self.s[-1]):
-            x = np.abs(self.s - end) / h
+        for k in (0, -1):
+            h = np.max(np.broadcast_to(r.beam.mesh.height * self.h, self.g.shape)[k])
+            x = np.abs(self.s - self.s[k]) / h
             size = np.max(lengths[x <= LAYER]) / h
             fine = np.clip((COARSE - size) / (COARSE - FINE), 0.0, 1.0)
             z = np.clip((LAYER - x) / (LAYER - INNER), 0.0, 1.0)
@@ -501,7 +525,9 @@ class Recovery:
     def __init__(self, forces: SectionForces, u: Array) -> None:
         self.forces, self.beam = forces, forces.beam
         beam, mesh = self.beam, self.beam.mesh
-        self.law = beam.material.law()
+        if len(beam.across.slabs) > 1 or beam.across.slabs[0].face is not None:
+            raise NotRecovered("stress that jumps across the section is not known to it")
+        self.law = beam.across.slabs[0].material.law()
         m = max(ACROSS, 2 * beam.element.order + 1)
         self.eta = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, m))
         self.middle = m // 2

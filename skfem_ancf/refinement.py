@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from skfem.generic_utils import OrientedBoundary
 
+from .taper import halved as halved_heights
+from .taper import heights_of
+
 if TYPE_CHECKING:
     from .mesh import MeshBeam
     from .types import Array
@@ -50,6 +53,10 @@ def halved(mesh: MeshBeam, ix: Array) -> MeshBeam:
     else:
         lengths[first[ix]], lengths[first[ix] + 1] = new["lengths"]
     fields.update(t=np.array([left, left + 1]), _boundaries=None, _subdomains=None)
+    if mesh.taper is not None and mesh.s is not None:
+        fields["heights"] = heights_of(mesh.taper, fields["s"], fields["t"])[1]
+    elif mesh.heights is not None:
+        fields["heights"] = halved_heights(mesh.heights, marked)
     m = replace(mesh, lengths=lengths, **fields)
     m._boundaries = _refined_names(mesh, m, first, marked, node)
     if mesh._subdomains is not None:
@@ -68,7 +75,8 @@ def _midpoints(mesh, ix):
         mapping = mesh._mapping()
         J = mapping.DF(middle, ix)[..., 0]
         return {**out, "doflocs": mapping.F(middle, ix)[..., 0],
-                "p_X": J[:, 0] / mesh.lengths[ix], "p_Y": J[:, 1] / mesh.height,
+                "p_X": J[:, 0] / mesh.lengths[ix],
+                "p_Y": J[:, 1] / np.ravel(mapping.height(middle[0], ix)[0]),
                 "p_XY": mapping.turning(middle, ix)[..., 0] / mesh.lengths[ix]}
     a, b = mesh.s[mesh.t[:, ix]]
     p, tangent = mesh.curve.nodes(out["s"])

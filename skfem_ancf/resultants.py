@@ -202,11 +202,11 @@ def _axis(recovery, piece):
     lam_y = np.sqrt(1.0 + 2.0 * eps[1])
     across = piece.angle + np.arccos(np.clip(eps[2] / (stretch * lam_y), -1.0, 1.0))
     r_Y = lam_y * _directions(across)[0]
-    d = (r_Y @ recovery.from_axis.T * piece.Y) @ recovery.whole
+    d = (piece.from_axis(r_Y) * piece.Y) @ recovery.whole
     normal = np.unwrap(np.arctan2(d[1], d[0])) - 0.5 * np.pi
     shear = (phi - normal + np.pi) % (2.0 * np.pi) - np.pi
     # not the derivative of the angle, which is fitted to that of the elements
-    start = (piece.g[:, 0] - piece.g[:, -1]) / recovery.beam.mesh.height
+    start = (piece.g[:, 0] - piece.g[:, -1]) / (piece.Y[..., -1] - piece.Y[..., 0])
     curvature = piece.rate - start - piece.d_ds(shear)
     values = np.array([phi, stretch[:, middle], shear, curvature])
     return scipy.interpolate.CubicSpline(piece.s, values.T)
@@ -214,32 +214,42 @@ def _axis(recovery, piece):
 
 def _own(state, beam, e, xi):
     """From the stress of the elements, integrated across the section."""
-    u, mesh, n = state.u_of(beam), beam.mesh, max(beam.element.order, 1) + 1
-    eta, w = gauss(n + 1)
+    u, mapping = state.u_of(beam), beam.mesh.mapping()
+    eta, area = _rule(beam, e, xi)
     X = np.array([np.repeat(xi[:, None], len(eta), 1), np.repeat(eta[None], len(xi), 0)])
     S = beam.stress(u, X, e)
     H, frame = beam.gradients(u, X, e)
     F = H + frame
     P = F[:, 0] * S[0] + F[:, 1] * S[2]
     axis = np.array([xi, 0.5 + 0.0 * xi])[:, :, None]
-    mapping = mesh.mapping()
 
     def position(points):
         return mapping.F(points, e) + beam.displacements(u, points, e)
 
     arm = position(X) - position(axis)
-    area = beam.width * mesh.height * w
-    R, M = P @ area, cross(arm, P) @ area
+    R, M = np.sum(P * area, axis=-1), np.sum(cross(arm, P) * area, axis=-1)
     angle, stretch, shear, curvature = (_axis_of_element if beam.has_sections else _cable_axis)(
         beam, u, e, xi)
     t, normal = _directions(angle)
     N, Q = np.sum(R * t, axis=0), np.sum(R * normal, axis=0)
     if not beam.has_sections:
-        EA, EI = beam.kernel.packs[0].stiffness
-        N, Q, M = EA * (stretch - 1.0), np.full(len(e), np.nan), EI * curvature
+        EA, ES, EI = beam.across.moments(xi[:, None], e)[..., 0]
+        N, M = EA * (stretch - 1.0) - ES * curvature, EI * curvature - ES * (stretch - 1.0)
+        Q = np.full(len(e), np.nan)
         R = N * t + Q * normal
     return dict(N=N, Q=Q, M=M, curvature=curvature, stretch=stretch, shear=shear, angle=angle,
                 force=R)
+
+
+def _rule(beam, e, xi):
+    """Points across the sections, (m,), and what of their areas these stand for, (n, m)."""
+    points, areas = [], []
+    for slab, (eta, w) in beam.across.rules(max(beam.element.order, 1) + 2):
+        X = np.array([np.repeat(xi[:, None], len(eta), 1), np.repeat(eta[None], len(xi), 0)])
+        height = beam.mesh.mapping().height(X[0], e)[0]
+        points.append(eta)
+        areas.append(beam.across.breadth(slab, X, e) * height * w + 0.0 * X[0])
+    return np.concatenate(points), np.concatenate(areas, axis=1)
 
 
 def _cable_axis(beam, u, e, xi):

@@ -8,12 +8,13 @@ of the element between a node and a section gives the force and the moment there
 from __future__ import annotations
 
 from copy import copy
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .errors import AncfError
+from .formulations.ecm import AXIS as WHOLE
 from .kept import kept
 from .kernels.base import VISCOUS, apart, no_stresses, nowhere
 from .mapping import cross
@@ -84,7 +85,7 @@ class Sections:
         """Reference points, local functions and their slopes, and the derivative of the map."""
         X = np.array([np.broadcast_to(xi[:, None], self.shape), np.broadcast_to(eta, self.shape)])
         element = beam.element
-        value, slope, _, powers = element.local(X, beam.mesh.height)
+        value, slope, _, powers = element.of_mesh(beam.mesh.mapping(), X, e)
         scale = (beam.mesh.lengths[e][:, None] ** powers).T[:, :, None]
         value, slope = value * scale, slope * scale
         return X, value, slope, beam.mesh.mapping().DF(X, e)
@@ -118,9 +119,20 @@ class Sections:
     def body(self) -> Array:
         """Force per volume of the stress-free body, inertia included, (2, ..., n, k)."""
         f = self.forces
-        out = np.broadcast_to(np.moveaxis(f.body, -1, 0)[..., None, None],
-                              (2,) + f.states + self.shape) + self.sampled(BODY)
-        return out if f.acceleration is None else out - f.beam.density * self.field(f.acceleration)
+        body, gravity = (np.moveaxis(x, -1, 0)[..., None, None] for x in f.spread)
+        out = np.broadcast_to(body, (2,) + f.states + self.shape) + self.sampled(BODY)
+        if f.acceleration is not None:
+            gravity = gravity - self.field(f.acceleration)
+        return out + self.density * gravity if np.any(gravity) else out
+
+    @cached_property
+    def density(self) -> Array:
+        """Mass per volume, (n, k)."""
+        across = self.forces.beam.across
+        zero = np.zeros(self.shape)
+        return across.of_slabs(self.X, zero, [
+            partial(across.density, slab, self.X, self.e) for slab in across.slabs], self.e,
+            graded=False) + zero
 
     def sampled(self, where: int) -> Any:
         """The sum of :class:`~skfem_ancf.spread.Sampled` densities there, (2, ..., n, k); or 0."""
@@ -135,7 +147,9 @@ class Sections:
         Shape (2, ..., n, k).
         """
         f = self.forces
-        out = np.zeros((2,) + f.states + self.shape) + self.sampled(side) / f.beam.width
+        out = np.zeros((2,) + f.states + self.shape) 
+        if any(s.where == side for s in f.sampled):
+            out += self.sampled(side) / f.beam.across.face(side, self.X, self.e)
         for factor, load in f.faces:
             on = np.multiply.outer(factor, load.faces[side][self.e])[..., None]
             if not np.any(on):
@@ -200,8 +214,10 @@ class SectionForces:
         gather = beam.kernel.gather
         self.q = _each(gather, beam.q0_local + u)
         self.acceleration = None if acceleration is None else _each(gather, acceleration)
-        self.body = sum((np.multiply.outer(factor, np.asarray(load.body)) for factor, load in loads
-                         if load.body is not None), np.zeros(self.states + (2,)))
+        #: Force per volume and per mass, (..., 2) each.
+        self.spread = [sum((np.multiply.outer(factor, np.asarray(getattr(load, name)))
+                            for factor, load in loads if getattr(load, name) is not None),
+                           np.zeros(self.states + (2,))) for name in ("body", "gravity")]
         self.faces = [(factor, load) for factor, load in loads if load.faces is not None
                       and np.any(factor) and np.any(load.faces)]
         self.sampled = [*sampled, *(s.times(factor) for factor, load in loads
@@ -218,14 +234,31 @@ class SectionForces:
         beam, mesh = self.beam, self.beam.mesh
         ne, (x, w) = mesh.nelements, gauss(ALONG)
         e, xi = np.repeat(np.arange(ne), ALONG), np.tile(x, ne)
-        eta, v = beam.kinematics.section_rule(beam.element)
-        inside = Sections(self, e, xi, eta)
-        parts = [(inside, beam.width * v * inside.volume * inside.body)]
+        parts = []
+        for slab, (eta, v) in beam.across.rules(beam.element.order + 1, inertia=True):
+            whole = not beam.has_sections
+            if whole:
+                eta, v = WHOLE
+            inside = Sections(self, e, xi, eta)
+            size = beam.across.breadth(slab, inside.X, e, whole) * v * inside.volume
+            parts.append((inside, size * inside.body))
         for side in (0, 1):
             if any(np.any(load.faces[side]) for _, load in self.faces) or any(
                     s.where == side for s in self.sampled):
                 face = Sections(self, e, xi, np.array([float(side)]))
-                parts.append((face, beam.width * face.face(side)))
+        parts = []
+        for slab, (eta, v) in beam.across.rules(beam.element.order + 1, inertia=True):
+            whole = not beam.has_sections
+            if whole:
+                eta, v = WHOLE
+            inside = Sections(self, e, xi, eta)
+            size = beam.across.breadth(slab, inside.X, e, whole) * v * inside.volume
+            parts.append((inside, size * inside.body))
+        for side in (0, 1):
+            if any(np.any(load.faces[side]) for _, load in self.faces) or any(
+                    s.where == side for s in self.sampled):
+                face = Sections(self, e, xi, np.array([float(side)]))
+                parts.append((face, beam.across.face(side, face.X, e) * face.face(side)))
         middle = Sections(self, e, xi, np.array([0.5]))
         axis = middle.field(self.q)
         if any(s.where == AXIS for s in self.sampled):

@@ -137,6 +137,8 @@ class Spread:
     ----------
     body
         Force per volume of the stress-free body, shape (2,), or None.
+    gravity
+        Force per mass, shape (2,), or None.
     faces
         For the bottom and the top the elements whose faces are loaded, two arrays (nelements,) of
         truth values, or None.
@@ -151,6 +153,7 @@ class Spread:
     """
 
     body: Array | None = None
+    gravity: Array | None = None
     faces: tuple[Array, ...] | None = None
     traction: Array | Callable[[Array], Array] | None = None
     pressure: float | None = None
@@ -160,7 +163,7 @@ class Spread:
     @property
     def acts_at_stations(self) -> bool:
         """True if it is nowhere spread."""
-        return self.faces is None and self.body is None and not self.sampled
+        return self.faces is self.body is self.gravity is None and not self.sampled
 
 
 def on_facets(mesh: MeshBeam, facets: ArrayLike, **how: Any) -> Spread:

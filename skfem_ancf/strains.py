@@ -52,6 +52,67 @@ class PointStrain(NamedTuple):
         return self.weights @ ((self.frame + 0.5 * H) @ H.swapaxes(-1, -2)).ravel()
 
 
+class TaperedStrain:
+    """As :class:`ElementStrain`, of a tapered beam: its local functions are none of all elements.
+
+    Parameters
+    ----------
+    beam, term
+        As for :class:`ElementStrain`.
+    """
+
+    def __init__(self, beam: Beam, term: Term) -> None:
+        self.beam, self.term = beam, term
+
+    def __call__(self, u: Array, e: Array, X: Array) -> Array:
+        """(eps_xx, eps_yy, 2 eps_xy) at points.
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates of the beam, shape (N,).
+        e, X
+            Elements (n,) and reference points (2, n).
+
+        Returns
+        -------
+        ndarray
+            Shape (3, n).
+        """
+        return self._of(self.beam.kernel.gather(u, e), e, X)
+
+    def at(self, e: int, xi: float, eta: float) -> Callable[[Array], Array]:
+        """What gives the strain at one point in many states.
+
+        Parameters
+        ----------
+        e, xi, eta
+            Element and reference point.
+        """
+        at, X = np.array([e]), np.array([[xi], [eta]])
+        return lambda u_e: self._of(u_e.T[None], at, X)[:, 0]
+
+    def _of(self, u_e, e, X):
+        found: dict[Any, Array] = {}
+
+        def products(xi):
+            key = None if xi is None else float(xi)
+            if key not in found:
+                at = X if xi is None else np.array([0.0 * X[0] + xi, X[1]])
+                H, g = (part[..., 0] for part in self.beam.element.gradients(
+                    self.beam.mesh.mapping(), at[:, :, None], e, u_e))
+                C = np.einsum("iJn,iKn->JKn", g + 0.5 * H, H)
+                found[key] = np.array([C[0, 0], C[1, 1], C[0, 1] + C[1, 0]])
+            return found[key]
+
+        out = []
+        for row, name in enumerate(COMPONENTS):
+            weights = self.term.interpolation(name, X[0])
+            out.append(products(None)[row] if weights is None else sum(
+                w * products(xi)[row] for xi, w in zip(self.term.nodes(name), weights.T)))
+        return np.array(out)
+
+
 class ElementStrain:
     """The strain of a term of a formulation: interpolated samples.
 

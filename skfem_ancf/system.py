@@ -343,7 +343,7 @@ class System:
     @cached_property
     def stiffness_scale(self) -> float:
         """eps times the square root of modulus times volume: the round-off of strains of 1."""
-        total = sum(b.kernel.volume * b.material.E for b in self.beams)
+        total = sum(b.kernel.scale for b in self.beams)
         return np.finfo(float).eps * np.sqrt(total)
 
     @cached_property
@@ -353,7 +353,7 @@ class System:
         A displacement of the scene's size is known to eps times that size, its gradient in an
         element to that over the element's length.
         """
-        total = sum(b.material.E * b.width * b.mesh.height * np.sum(1.0 / b.mesh.lengths)
+        total = sum(b.kernel.scale / np.sum(b.mesh.lengths) * np.sum(1.0 / b.mesh.lengths)
                     for b in self.beams)
         return np.finfo(float).eps * self.size * np.sqrt(total)
 

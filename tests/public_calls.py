@@ -58,6 +58,9 @@ BAD = {
 TAKES = {
     "number": {k: "a finite number" for k in ("10**30", "-1", "0", "3.5", "1e-320")},
     "positive": {k: "a positive number" for k in ("10**30", "3.5", "1e-320")},
+    "graded": {k: "a positive number, or a function that beams ask" for k in (
+        "10**30", "3.5", "1e-320", "returns text", "returns None", "returns nan",
+        "returns complex", "returns (3, 3)", "raises", "takes nothing")},
     "not negative": {k: "zero or a positive number" for k in ("10**30", "0", "3.5", "1e-320")},
     "ratios": {"[1.0, 2.0, 3.0]": "three ratios", "[99]": "one ratio", "[]": "none"},
     "count": {},
@@ -329,7 +332,7 @@ call("sample", sample, dict(function=lambda t: 2.0 * t, times=np.array([0.0, 1.0
      function="function", times="numbers")
 law = dict(E=1e6, nu=0.3, density=1.0, plane="stress", shear_correction="auto")
 for _law in (StVenantKirchhoff, NeoHookean):
-    call(_law.__name__, _law, law, E="positive", nu="number", density="positive?", plane="name",
+    call(_law.__name__, _law, law, E="graded", nu="number", density="graded?", plane="name",
          shear_correction="positive")
     call(f"{_law.__name__}.law", _law(1e6, 0.3).law, dict(k_s=0.9), k_s="positive")
 call("material.shear_factor", lambda **k: steel().shear_factor(**k),

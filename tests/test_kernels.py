@@ -11,6 +11,7 @@ from skfem_ancf.formulations import get_formulation
 from skfem_ancf.kernels import CableKernel, Kernel, law
 from skfem_ancf.linalg import BandMatrix
 from skfem_ancf.materials import Material
+from skfem_ancf.sections import Across, Rectangle
 from skfem_ancf.switch import compiled_off
 
 STEP = 1e-30
@@ -50,7 +51,8 @@ def kernel(kind, mesh):
     cls, element, formulation, name = KINDS[kind]
     mesh, element = MESHES[mesh](), element()
     mesh = mesh if mesh.is_straight else mesh.with_sections(element.sections)
-    return cls(mesh, element, LAWS[name](2e5, 0.3), 0.02, get_formulation(formulation))
+    across = Across(mesh, element, Rectangle(0.02), LAWS[name](2e5, 0.3))
+    return cls(across, get_formulation(formulation))
 
 
 def states(k, size=2e-3):
@@ -149,7 +151,7 @@ def test_what_a_law_of_ones_own_raises_is_seen():
                 raise ZeroDivisionError("no stress")
             return super().stress(strain)
 
-    k = Kernel(MESHES["one"](), ElementBeamANCF(2), Broken(2e5, 0.3), 0.02,
+    k = Kernel(Across(MESHES["one"](), ElementBeamANCF(2), Rectangle(0.02), Broken(2e5, 0.3)),
                get_formulation("continuum"))
     with pytest.raises(ZeroDivisionError, match="no stress"):
         k.force(np.ones(k.N))

@@ -72,7 +72,7 @@ def fingerprint(system: System) -> dict[str, str]:
     for k, beam in enumerate(system.beams):
         mesh, who = beam.mesh, f"of beam {beam.name or k}"
         parts[f"mesh {who}"] = _digest(mesh.p, mesh.t, mesh.height, mesh.lengths, mesh.sections,
-                                       beam.q0)
+                                       beam.q0, *([] if mesh.heights is None else [mesh.heights]))
         parts[f"element {who}"] = _digest(type(beam.element).__name__, beam.element.order,
                                           beam.element.axis_degree, beam.nd)
         parts[f"material {who}"] = _digest(type(beam.material).__name__, *_numbers(beam.material))

@@ -11,6 +11,7 @@ from skfem.element import DiscreteField, Element
 
 from ..errors import MeshError
 from ..frozen import Frozen
+from ..quadrature import gauss
 from ..reference import RefBeam, hermite_basis
 from .sampling import Held, Sampling, default_sampling, missed
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
     from ..mapping import MappingBeam
     from ..mesh import MeshBeam
-    from ..types import Array
+    from ..types import Array, Rule
 
 
 #: How sections vary between the nodes that hold 1, 2, ... derivatives along X, the 0th included.
@@ -74,6 +75,9 @@ class ElementBeam(Frozen, Element):
 
     refdom = RefBeam
     kinematics = "sections"
+    #: Shear factor of a section that is no rectangle of one material, else None.
+    shear: float | None = None
+    _measure: Any = None
 
     def __init__(self, section: SectionFunctions, names: Sequence[str],
                  functionals: Sequence[tuple[float, int, int]], welded: Sequence[str]) -> None:
@@ -90,6 +94,30 @@ class ElementBeam(Frozen, Element):
         # stock quadrature takes 2 maxdeg in each direction: exact for the energy, which is of
         # degree 8 along the axis and 4 N across the section
         self.maxdeg = max(self.strain_degree, 2 * self.section.degree)
+
+    def measured(self, measure: Any, shear: float | None = None) -> ElementBeam:
+        """The same element for a section whose rules a measure gives, for formulations.
+
+        Parameters
+        ----------
+        measure
+            With ``gauss(n)``, as of :mod:`skfem_ancf.sections.measure`.
+        shear
+            What :func:`skfem_ancf.sections.shear.shear_factor` gives for the section.
+        """
+        other = object.__new__(type(self))
+        other.__dict__.update(vars(self), _measure=measure, shear=shear)
+        return other
+
+    def across(self, n: int) -> Rule:
+        """Points eta and weights across the section, n of them; those of Gauss unless it is known.
+
+        Parameters
+        ----------
+        n
+            Number of points.
+        """
+        return gauss(n) if self._measure is None else self._measure.gauss(n)
 
     @property
     def order(self) -> int:
@@ -117,8 +145,8 @@ class ElementBeam(Frozen, Element):
                              slope))
         return np.array(rows).T
 
-    def local(self, X: Array, h: float, i: int | slice = slice(None)
-              ) -> tuple[Array, Array, Array, Any]:
+    def local(self, X: Array, h: float | Array, i: int | slice = slice(None),
+              rate: float | Array = 0.0) -> tuple[Array, Array, Array, Any]:
         """Local functions on the reference cell, their derivatives, and their power of the length.
 
         Parameters
@@ -126,9 +154,11 @@ class ElementBeam(Frozen, Element):
         X
             Reference points, shape (2, npoints) or (2, nelements, npoints).
         h
-            Height of the section.
+            Height of the section; of a tapered one at each point, shape X.shape[1:].
         i
             Number of the local function, 0 to 2 nodal_dofs - 1, or a slice of them.
+        rate
+            Derivative of the height by xi, of the same shape.
 
         Returns
         -------
@@ -140,7 +170,7 @@ class ElementBeam(Frozen, Element):
         if not isinstance(i, slice):
             if not 0 <= i < 2 * self.nodal_dofs:
                 self._index_error()
-            value, d_xi, d_eta, (slope,) = self.local(X, h, slice(i, i + 1))
+            value, d_xi, d_eta, (slope,) = self.local(X, h, slice(i, i + 1), rate)
             return value[0], d_xi[0], d_eta[0], int(slope)
         axis, along, number, power, slope = self._factors[:, i]
         out = np.zeros((3, len(axis)) + np.shape(X)[1:], np.result_type(X, float))
@@ -150,8 +180,10 @@ class ElementBeam(Frozen, Element):
         if np.any(of_section):
             S, dS = (hermite_basis(self._along[1], X[0], d)[along[of_section]] for d in (0, 1))
             P, dP = (values[number[of_section]] for values in self.section(X[1] - 0.5))
-            h = (h**power[of_section]).reshape((-1,) + (1,) * (S.ndim - 1))
-            S, dS = h * S, h * dS
+            p = power[of_section].reshape((-1,) + (1,) * (S.ndim - 1))
+            S, dS = h**p * S, h**p * dS
+            if np.ndim(h):  # h^p P(Y / h) of a height that varies
+                dS += p * rate / h * S
             out[:, of_section] = S * P, dS * P, S * dP
         return out[0], out[1], out[2], slope
 
@@ -198,13 +230,32 @@ class ElementBeam(Frozen, Element):
             Shapes (n, nelements, npoints) and (n, 2, nelements, npoints).
         """
         mesh = mapping.mesh
-        value, d_xi, d_eta, slope = self.local(X, mesh.height, which)
-        if np.ndim(X) == 2:  # the same points of all elements
+        value, d_xi, d_eta, slope = self.of_mesh(mapping, X, tind, which)
+        if value.ndim == 2:  # the same points of all elements
             value, d_xi, d_eta = value[:, None], d_xi[:, None], d_eta[:, None]
         scale = self._scale(mesh, slope, tind)[:, :, None]
         invDF = mapping.invDF(X, tind)
         grad = scale[:, None] * (invDF[0] * d_xi[:, None] + invDF[1] * d_eta[:, None])
         return scale * value, grad
+
+    def of_mesh(self, mapping: MappingBeam, X: Array, tind: Array | None = None,
+                i: int | slice = slice(None)) -> tuple[Array, Array, Array, Any]:
+        """As :meth:`local`, with the heights of a mesh.
+
+        Parameters
+        ----------
+        mapping, X, tind, i
+            As for :meth:`gbasis`, shapes (2, npoints) or (2, nelements, npoints), and
+            (nelements,).
+
+        Returns
+        -------
+        value, d_xi, d_eta, slope
+            Of a tapered mesh with the axis of the elements: (n, nelements, npoints).
+        """
+        h, rate = mapping.height(X[0], tind)
+        return self.local(np.broadcast_to(np.reshape(X, (2, -1) + np.shape(X)[-1:]),
+                                          (2,) + np.shape(h)) if np.ndim(h) else X, h, i, rate)
 
     @staticmethod
     def _scale(mesh: MeshBeam, slope: Array, tind: Array | None) -> Array:
@@ -249,8 +300,9 @@ class ElementBeam(Frozen, Element):
         H, frame
             Shape (2, 2, nelements, npoints) both.
         """
-        mesh, points = mapping.mesh, "bp" if np.ndim(X) == 2 else "bep"
-        _, d_xi, d_eta, slope = self.local(X, mesh.height)
+        mesh = mapping.mesh
+        _, d_xi, d_eta, slope = self.of_mesh(mapping, X, tind)
+        points = "bp" if d_xi.ndim == 2 else "bep"
         u = np.multiply(u_e.T, self._scale(mesh, slope, tind), order="C")
         r_xi, r_eta = (np.einsum(f"ibe,{points}->iep", u, d) for d in (d_xi, d_eta))
         frame = mapping.frame(X, tind)

@@ -49,19 +49,19 @@ class Foundation(ForceElement):
 
     def bind(self, scene: Scene) -> list[Link]:
         beam, first = select_beam(scene.beams, self.beam), scene.offset(self.beam)
-        basis = beam.facet_basis(self.side)
-        normals, areas = np.asarray(basis.normals), beam.width * basis.dx
-        X = beam.mesh.mapping().invF(np.asarray(basis.global_coordinates()), basis.tind)
-        if not beam.has_sections:
-            X[1] = 0.5
-        self.along = beam, *facets_along(beam.mesh, basis)
-        self._at = []
-        for e, points, dx, n in zip(basis.tind, X.transpose(1, 2, 0), areas,
-                                    normals.transpose(1, 2, 0)):
-            for x, area, normal in zip(points, dx, n):
-                dofs, weights = beam.probe_reference(int(e), x)
-                self._at.append((link(Link(np.zeros(2), dofs + first, weights)), float(area),
-                                 normal))
+        self._at, parts = [], beam.loaded_parts(self.side)
+        self.along = (beam, *facets_along(beam.mesh, parts[0][0])) if len(parts) == 1 else None
+        for basis, width in parts:
+            normals, areas = np.asarray(basis.normals), width * basis.dx
+            X = beam.mesh.mapping().invF(np.asarray(basis.global_coordinates()), basis.tind)
+            if not beam.has_sections:
+                X[1] = 0.5
+            for e, points, dx, n in zip(basis.tind, X.transpose(1, 2, 0), areas,
+                                        normals.transpose(1, 2, 0)):
+                for x, area, normal in zip(points, dx, n):
+                    dofs, weights = beam.probe_reference(int(e), x)
+                    self._at.append((link(Link(np.zeros(2), dofs + first, weights)), float(area),
+                                     normal))
         return [place for place, _, _ in self._at]
 
     def parts(self) -> list[Part]:
@@ -114,7 +114,8 @@ class Drag(ForceElement):
         slopes, frame = beam_gradients(mesh, beam.element, X)
         every = np.arange(mesh.nelements)
         self.along = beam, [Facets(AXIS, every, every, xi)], ()
-        self._at, self._width = [], beam.width
+        length = length * beam.across.outline(X)
+        self._at = []
         for e in range(mesh.nelements):
             for k, x in enumerate(X.T):
                 dofs, weights = beam.probe_reference(e, x)
@@ -124,7 +125,7 @@ class Drag(ForceElement):
         return [place for place, _, _ in self._at]
 
     def parts(self) -> list[Part]:
-        q = 0.5 * self.density * self._width
+        q = 0.5 * self.density
         return [Part(DRAG, place, slope, (q * self.normal * ds, q * self.tangential * ds, 0.0, 0.0,
                                           0.0)) for place, slope, ds in self._at]
 

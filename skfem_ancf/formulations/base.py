@@ -165,10 +165,14 @@ class Formulation(Frozen):
         """Rules along the axis and across the section that integrate the energy exactly.
 
         That is of twice the degree of the strain: ``element.strain_degree`` along the axis of a
-        straight element, and 2 N across the section, for St. Venant-Kirchhoff.
+        straight element, and 2 N across the section, for St. Venant-Kirchhoff. Across a section
+        that is no rectangle they have its width, and across several materials they are those of
+        one of them: a formulation is asked for each.
         """
         require_like("element", element, "beam element", "strain_degree", "order")
-        return gauss(element.strain_degree + 1), gauss(2 * element.order + 1)
+        n = 2 * element.order + 1
+        return gauss(element.strain_degree + 1), (
+            element.across(n) if hasattr(element, "across") else gauss(n))
 
     def __repr__(self) -> str:
         return f"<formulation {self.name!r}>"

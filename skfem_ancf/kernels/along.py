@@ -41,7 +41,7 @@ class CableSections:
         square0, each = np.sum(a0 * a0, axis=-1), np.arange(ne)
         self._pack = kernel.packs[0]._replace(
             frame=frame, length0=np.sqrt(square0).T, kappa0=(cross(a0, b0) / square0).T,
-            weights=np.ones((n, ne)), place=each, frame_place=each)
+            weights=np.ones((n, ne)), stiffness=np.ones((3, n, ne)), place=each, frame_place=each)
         self._slopes, self._shape = np.concatenate([G1, G2], axis=1), (n, ne)
         self.tangent0 = np.moveaxis(a0 / np.sqrt(square0)[..., None], -1, 0)
 
@@ -56,6 +56,7 @@ class CableSections:
         d, (n, ne) = (self._slopes @ u_e).transpose(1, 2, 0), self._shape
         r, strain = np.empty(d.shape), np.empty((2, n, ne))
         weights, square, kappa = np.empty((3, n, ne))
-        cable_strain(self._pack, 0, d, r, weights, square, kappa, strain)
+        stiffness = np.empty((3, n, ne))
+        cable_strain(self._pack, 0, d, r, weights, stiffness, square, kappa, strain)
         tangent = (r[:n] / np.sqrt(square)[:, None]).transpose(1, 2, 0)
         return tangent, strain.swapaxes(1, 2)

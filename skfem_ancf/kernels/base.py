@@ -31,7 +31,7 @@ FORCE, TANGENT, MEAN, STRESS, CARRY, VISCOUS = range(6)
 #: Fields of a pack whose first axis are the elements, where they have matrices of their own.
 MATRICES = {"table", "constant"}
 #: Those whose last axis are the elements, where they have tables of their own.
-BY_ELEMENT = {"frame", "weights", "moduli", "length0", "kappa0"}
+BY_ELEMENT = {"frame", "weights", "stiffness", "moduli", "length0", "kappa0"}
 #: Fields with numbers of elements in a table, and the table.
 PLACES = {"place": "weights", "frame_place": "frame"}
 

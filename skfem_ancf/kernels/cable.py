@@ -1,9 +1,10 @@
 """The strain energy of the shear-rigid cable.
 
-``U = 1/2 int E A eps^2 + E I (kappa - kappa_0)^2 ds`` with ``eps = |r'| - 1`` and the material
-curvature ``kappa = r' x r'' / |r'|^2``, the rate at which the tangent turns along the stress-free
-axis. Both are sampled at 2 m - 2 Gauss points of an axis of degree 2 m - 1; for the cubic axis
-the mode of equal slopes that this leaves is stabilised.
+``U = 1/2 int E A eps^2 - 2 E S eps k + E I k^2 ds`` with ``eps = |r'| - 1``, the change ``k`` of
+the material curvature ``kappa = r' x r'' / |r'|^2``, the rate at which the tangent turns along the
+stress-free axis, and the first moment S of the section about it. Both are sampled at 2 m - 2 Gauss
+points of an axis of degree 2 m - 1; for the cubic axis the mode of equal slopes that this leaves is
+stabilised.
 
 Rows of the table are those of d/dX, then of d^2/dX^2, at the points: ``a = r'``, ``b = r''``.
 """
@@ -14,7 +15,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..quadrature import gauss
-from ..source import F1, F2, F3, I1, lanes, primitive, room, source
+from ..source import F2, F3, I1, lanes, primitive, room, source
 from ..types import Array
 from .base import (CARRY, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
                    Texts, add_force, add_held_energy, add_tangent, block, copy_stress, load,
@@ -23,8 +24,8 @@ from .base import (CARRY, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
 if TYPE_CHECKING:
     from ..elements.cable import ElementBeamCable
     from ..formulations.base import Formulation
-    from ..materials.base import Material
     from ..mesh import MeshBeam
+    from ..sections import Across
 
 
 class CablePack(NamedTuple):
@@ -43,7 +44,7 @@ class CablePack(NamedTuple):
     frame_place
         The same for the stress-free state.
     stiffness
-        E A and E I.
+        E A, E I and - E S at the points of integration, (3, points, 1 or elements), as the weights.
     constant
         Stabilisation (0, 1 or elements, 2 nb, 2 nb).
     start, span
@@ -62,7 +63,7 @@ class CablePack(NamedTuple):
     weights: F2
     place: I1
     frame_place: I1
-    stiffness: F1
+    stiffness: F3
     constant: F3
     start: I1
     span: I1
@@ -71,15 +72,16 @@ class CablePack(NamedTuple):
 
 
 @source
-def cable_strain(pack, first, d, r, weights, square, kappa, strain):
+def cable_strain(pack, first, d, r, weights, stiffness, square, kappa, strain):
     """Strains of the elements from ``first`` on, without cancellation in the extension.
 
     Parameters
     ----------
     d
         Displacement parts of a and b, shape (rows, 2, elements).
-    r, weights, square, kappa, strain
-        Written: a and b, the weights, |a|^2, the curvature, and (eps, kappa - kappa_0).
+    r, weights, stiffness, square, kappa, strain
+        Written: a and b, the weights and stiffnesses of the points, |a|^2, the curvature, and (eps,
+        kappa - kappa_0).
     """
     n, size = square.shape[0], square.shape[1]
     at, at0 = pack.place[first:first + size], pack.frame_place[first:first + size]
@@ -97,6 +99,10 @@ def cable_strain(pack, first, d, r, weights, square, kappa, strain):
                                / (np.sqrt(s) + pack.length0[p, at0[e]]))
             strain[1, p, e] = k - pack.kappa0[p, at0[e]]
             square[p, e], kappa[p, e], weights[p, e] = s, k, pack.weights[p, at[e]]
+    for c in lanes(3):
+        for p in lanes(n):
+            for e in lanes(size):
+                stiffness[c, p, e] = pack.stiffness[c, p, at[e]]
 
 
 @source
@@ -108,12 +114,14 @@ def cable_rows(stiffness, weights, r, square, kappa, strain, T):
     ``mean(s) d kappa = d(a x b) - mean(kappa) ds``.
     """
     n, k = square.shape[1], len(r) - 1
-    b, Tb, EA, EI = r[:, n:], T[n:], stiffness[0], stiffness[1]
+    b, Tb = r[:, n:], T[n:]
     for p in lanes(n):
         for e in lanes(T.shape[2]):
+            EA, EI, C = stiffness[0, p, e], stiffness[1, p, e], stiffness[2, p, e]
             s, z, w = square[0, p, e], square[k, p, e], weights[p, e]
-            M = w * EI * (strain[0, 1, p, e] + strain[k, 1, p, e]) / (s + z)
-            N = (w * EA * (strain[0, 0, p, e] + strain[k, 0, p, e]) / (np.sqrt(s) + np.sqrt(z))
+            x, y = strain[0, 0, p, e] + strain[k, 0, p, e], strain[0, 1, p, e] + strain[k, 1, p, e]
+            M = w * (EI * y + C * x) / (s + z)
+            N = (w * (EA * x + C * y) / (np.sqrt(s) + np.sqrt(z))
                  - (kappa[0, p, e] + kappa[k, p, e]) * M)
             a0, a1 = 0.5 * (r[0, p, 0, e] + r[k, p, 0, e]), 0.5 * (r[0, p, 1, e] + r[k, p, 1, e])
             T[p, 0, e] = N * a0 + 0.5 * M * (b[0, p, 1, e] + b[k, p, 1, e])
@@ -132,29 +140,35 @@ def cable_changes(stiffness, r, d, square, kappa, before, out):
             along = a0 * d[p, 0, e] + a1 * d[p, 1, e]
             change = (d[p, 0, e] * b[p, 1, e] - d[p, 1, e] * b[p, 0, e] + a0 * db[p, 1, e]
                       - a1 * db[p, 0, e] - 2.0 * kappa[p, e] * along)
-            out[0, p, e] = before[0, p, e] + stiffness[0] * along / np.sqrt(s)
-            out[1, p, e] = before[1, p, e] + stiffness[1] * change / s
+            x, y = along / np.sqrt(s), change / s
+            out[0, p, e] = before[0, p, e] + stiffness[0, p, e] * x + stiffness[2, p, e] * y
+            out[1, p, e] = before[1, p, e] + stiffness[1, p, e] * y + stiffness[2, p, e] * x
 
 
 @source
 def cable_factors(stiffness, weights, r, square, kappa, stress, M, skew):
     """Factors of the pairs (a, a), (a, b), (b, b) for N d^2 eps + M d^2 kappa and the stiffness."""
-    n, EA, EI = square.shape[0], stiffness[0], stiffness[1]
+    n = square.shape[0]
     b, Maa, Mab, Mbb = r[n:], M[:n], M[n:2 * n], M[2 * n:]
     for p in lanes(n):
         for e in lanes(M.shape[2]):
             a0, a1, b0, b1 = r[p, 0, e], r[p, 1, e], b[p, 0, e], b[p, 1, e]
             s, k, w = square[p, e], kappa[p, e], weights[p, e]
-            x, y = w * EA / s, w * EI / (s * s)
+            x, y = w * stiffness[0, p, e] / s, w * stiffness[1, p, e] / (s * s)
+            z = w * stiffness[2, p, e] / (s * np.sqrt(s))
             N, m = w * stress[0, p, e] / (s * np.sqrt(s)), 2.0 * w * stress[1, p, e] / (s * s)
             k0, k1, c = b1 - 2.0 * k * a0, -b0 - 2.0 * k * a1, k * s
             q = 4.0 * k * m  # derivatives of eps by a: a / |a|; of kappa: k / s by a, (-a1, a0) / s
-            Maa[p, 0, e] = (x + q) * a0 * a0 + y * k0 * k0 + N * a1 * a1 - m * (2.0 * b1 * a0 + c)
-            Maa[p, 1, e] = (x + q) * a1 * a1 + y * k1 * k1 + N * a0 * a0 + m * (2.0 * b0 * a1 - c)
-            Maa[p, 2, e] = (x + q - N) * a0 * a1 + y * k0 * k1 - m * (b1 * a1 - b0 * a0)
-            Mab[p, 0, e] = (m * a0 - y * k0) * a1
-            Mab[p, 1, e] = (y * k1 - m * a1) * a0
-            ab, ba = y * k0 * a0 - m * a0 * a0, m * a1 * a1 - y * k1 * a1
+            Maa[p, 0, e] = ((x + q) * a0 * a0 + (y * k0 + 2.0 * z * a0) * k0 + N * a1 * a1
+                            - m * (2.0 * b1 * a0 + c))
+            Maa[p, 1, e] = ((x + q) * a1 * a1 + (y * k1 + 2.0 * z * a1) * k1 + N * a0 * a0
+                            + m * (2.0 * b0 * a1 - c))
+            Maa[p, 2, e] = ((x + q - N) * a0 * a1 + y * k0 * k1 + z * (a0 * k1 + a1 * k0)
+                            - m * (b1 * a1 - b0 * a0))
+            y0, y1 = y * k0 + z * a0, y * k1 + z * a1
+            Mab[p, 0, e] = (m * a0 - y0) * a1
+            Mab[p, 1, e] = (y1 - m * a1) * a0
+            ab, ba = y0 * a0 - m * a0 * a0, m * a1 * a1 - y1 * a1
             Mab[p, 2, e] = 0.5 * (ab + ba)
             skew[p, 0, e] = 0.5 * (ab - ba) + 0.5 * m * s
             Mbb[p, 0, e], Mbb[p, 1, e] = y * a1 * a1, y * a0 * a0
@@ -185,25 +199,28 @@ def cable_block(pack, what, first, last, u, v, f, given, out, to):
     U, d, T = room((2, nb, 2, size), u), room((2, nr, 2, size), u), room((nr, 2, size), u)
     r, square, kappa = room((2, nr, 2, size), u), room((2, n, size), u), room((2, n, size), u)
     strain, S = room((2, 2, n, size), u), room((2, n, size), u)
-    weights, one = room((n, size), pack.weights), room(2, pack.weights)
+    weights, stiffness = room((n, size), pack.weights), room((3, n, size), pack.weights)
+    one = room((3, n, size), pack.weights)
     for k in range(2 if what == MEAN or what == CARRY or what == VISCOUS else 1):
         load(pack.start, pack.span, first, v if k else u, U[k])
         product(pack.table, first, U[k], d[k])
         if k < states:
-            cable_strain(pack, first, d[k], r[k], weights, square[k], kappa[k], strain[k])
+            cable_strain(pack, first, d[k], r[k], weights, stiffness, square[k], kappa[k],
+                         strain[k])
     if what == CARRY:
         copy_stress(given, S)
-        cable_changes(pack.stiffness, r[0], d[1], square[0], kappa[0], S, strain[0])
+        cable_changes(stiffness, r[0], d[1], square[0], kappa[0], S, strain[0])
         copy_stress(strain[0], out)
         return
     if what == VISCOUS:  # rates in place of strains
-        S[:], one[:] = 0.0, 1.0
+        S[:], one[:2], one[2:] = 0.0, 1.0, 0.0
         cable_changes(one, r[0], d[1], square[0], kappa[0], S, strain[0])
     if what == TANGENT or what == STRESS:
         for c in range(2):
             for p in lanes(n):
                 for e in lanes(size):
-                    out[c, p, e] = pack.stiffness[c] * strain[0, c, p, e]
+                    out[c, p, e] = (stiffness[c, p, e] * strain[0, c, p, e]
+                                    + stiffness[2, p, e] * strain[0, 1 - c, p, e])
     if what == STRESS:
         return
     if what == MEAN:
@@ -211,14 +228,14 @@ def cable_block(pack, what, first, last, u, v, f, given, out, to):
             for i in lanes(2):
                 for e in lanes(size):
                     U[0, k, i, e] = 0.5 * (U[0, k, i, e] + U[1, k, i, e])
-    cable_rows(pack.stiffness, weights, r[:states], square[:states], kappa[:states],
+    cable_rows(stiffness, weights, r[:states], square[:states], kappa[:states],
                strain[:states], T)
     add_force(pack.table, pack.transposed, pack.constant, pack.start, pack.span, first, T, U[0], f)
     if what == TANGENT:
         M, skew = room((3 * n, 3, size), weights), room((n + 1, 1, size), weights)
         copy_stress(given if given.shape[0] > 0 else out, S)
         skew[n:] = 0.0
-        cable_factors(pack.stiffness, weights, r[0], square[0], kappa[0], S, M, skew)
+        cable_factors(stiffness, weights, r[0], square[0], kappa[0], S, M, skew)
         add_tangent(pack.table, pack.pairs, pack.start, first, M, skew, to)
 
 
@@ -233,13 +250,22 @@ def cable_energy(pack: CablePack, u: Array, out: Array) -> None:
         Displacement, shape (N,), and energies that are added to, shape (elements,).
     """
     strain = np.empty((2, len(pack.weights), out.size), u.dtype)
-    CABLES.stress(pack._replace(stiffness=np.ones(2)), u, strain)
-    out += 0.5 * np.einsum("c,pe,cpe,cpe->e", pack.stiffness,
-                           np.broadcast_to(pack.weights, strain.shape[1:]), strain, strain)
+    CABLES.stress(_unit(pack), u, strain)
+    EA, EI, C = pack.stiffness
+    eps, kappa = strain
+    out += 0.5 * np.sum(pack.weights * (EA * eps * eps + EI * kappa * kappa + 2.0 * C * eps * kappa
+                                        ), axis=0)
     add_held_energy(pack, u, out)
 
 
 CABLES = Texts(2, cable_evaluate, cable_energy)
+
+
+def _unit(pack):
+    """The pack whose resultants are the strains."""
+    one = np.ones_like(pack.stiffness)
+    one[2] = 0.0
+    return pack._replace(stiffness=one)
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -258,37 +284,58 @@ class CableKernel(Chain):
 
     Parameters
     ----------
-    mesh, element, material
-        The body, an ``ElementBeamCable`` and a material, of which E and nu are used.
-    width
-        Width of the section.
+    across
+        A body with its section, a :class:`~skfem_ancf.sections.Across`, of an
+        ``ElementBeamCable``.
     formulation
         That of the beam; its first term has the Gauss points along the axis.
     """
 
     texts = CABLES
 
-    def __init__(self, mesh: "MeshBeam", element: "ElementBeamCable", material: "Material",
-                 width: float, formulation: "Formulation") -> None:
+    def __init__(self, across: "Across", formulation: "Formulation") -> None:
+        mesh, element = across.mesh, across.element
         super().__init__(mesh, element)
         if element.axis_degree > 5 and not mesh.is_straight:
             raise InputError(f"a cable of degree {element.axis_degree} needs a straight mesh: use "
                              "degree 5 on a curve")
-        self.constant = formulation.stabilisation(mesh, element, material, width)
-        n = len(formulation.terms(element, material)[0].axis[0])
+        self.constant = across.stabilisation(formulation)
+        n = len(formulation.terms(element, across.slabs[0].material)[0].axis[0])
         if mesh.nelements == 1 and self.constant is None:
             n = max(n, element.axis_degree)  # no neighbour holds a mode that fewer points miss
         self.points_number = n
         self.shared = mesh.is_uniform or np.ptp(mesh.lengths) <= 1e-13 * np.max(mesh.lengths)
-        self.packs = [self._pack(mesh, element, material, width, n)]
-        self.volume = float(np.sum(self.packs[0].weights)) * (
-            mesh.nelements if self.shared else 1) * width * mesh.height
+        self._across, self._xi = across, gauss(n)[0]
+        self.packs = [self._pack(mesh, element, across, n)]
 
-    def _pack(self, mesh, element, material, width, n):
-        E = material.E / (1.0 if material.plane == "stress" else 1.0 - material.nu**2)
-        area, ne = width * mesh.height, mesh.nelements
+    @property
+    def scale(self) -> float:
+        """Modulus times volume."""
+        pack, = self.packs
+        return float(np.sum(np.broadcast_to(pack.weights * pack.stiffness[0],
+                                            (len(pack.weights), pack.start.size))))
+
+    def outer_strain(self, u: Array) -> tuple[Array, Array]:
+        """Extension of the axis, and what bending adds to it at a face; both (points, elements).
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (N,).
+        """
+        eps, kappa = self.strain(self.gather(u))
+        h = self._across.mesh.mapping().height(self._xi)[0]
+        return eps, 0.5 * np.transpose(h) * np.abs(kappa)
+
+    def _pack(self, mesh, element, across, n):
+        ne = mesh.nelements
         xi, w = gauss(n)
         L = mesh.lengths[:1] if self.shared else mesh.lengths
+        few = self.shared and across.constant
+        EA, ES, EI = np.swapaxes(across.moments(xi, np.zeros(1, int) if few else None), 1, 2)
+        weights = np.broadcast_to(w[:, None] * L, EA.shape if self.shared else (n, ne))
+        area = across.moments(xi, what="area")[0]
+        self.volume = float(np.sum(area.T * w[:, None] * mesh.lengths))
         scale = L ** np.tile(np.arange(element.nodal_dofs), 2)[:, None]
         table = np.concatenate([element.axis(xi, d).T[:, :, None] * scale / L**d for d in (1, 2)]
                                ).transpose(2, 0, 1)
@@ -302,10 +349,10 @@ class CableKernel(Chain):
         return CablePack(
             packed(table), packed(table.transpose(0, 2, 1)[:int(self.shared)]),
             packed(frame), packed(np.sqrt(square)),
-            packed((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / square), packed(w[:, None] * L),
-            packed(np.arange(ne) * (len(L) > 1), np.int64),
+            packed((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / square), packed(weights),
+            packed(np.arange(ne) * (not few), np.int64),
             packed(np.arange(ne) * (frame.shape[2] > 1), np.int64),
-            np.array([E * area, E * area * mesh.height**2 / 12.0]), packed(constant),
+            packed([EA, EI, -ES]), packed(constant),
             packed(mesh.t[0] * self.nd, np.int64), packed(np.arange(2 * self.nd), np.int64),
             pair_tables(table, pairs, constant, ne))
 
@@ -332,7 +379,7 @@ class CableKernel(Chain):
         """
         pack, = self.apart(elements)
         out = np.empty((2, self.points_number, len(u_e)))
-        CABLES.stress(pack._replace(stiffness=np.ones(2)), u_e.ravel(), out)
+        CABLES.stress(_unit(pack), u_e.ravel(), out)
         return out
 
     def strain_increment(self, pack: CablePack, u: Array, du: Array, out: Array) -> None:
@@ -345,7 +392,7 @@ class CableKernel(Chain):
         u, du, out
             Displacement and direction, shape (N,), and the result.
         """
-        CABLES.carry(pack._replace(stiffness=np.ones(2)), u, du, np.zeros_like(out), out)
+        CABLES.carry(_unit(pack), u, du, np.zeros_like(out), out)
 
     def weighted_moduli(self, pack: CablePack, u: Array) -> Array:
         """Weighted stiffnesses at the points, shape (2, 2, points, elements).
@@ -358,7 +405,8 @@ class CableKernel(Chain):
             Displacement, shape (N,).
         """
         n, ne = pack.weights.shape[0], pack.start.size
-        return np.diag(pack.stiffness)[:, :, None, None] * np.broadcast_to(pack.weights, (n, ne))
+        EA, EI, C = pack.stiffness
+        return np.array([[EA, C], [C, EI]]) * np.broadcast_to(pack.weights, (n, ne))
 
     def viscous_packs(self, time: float) -> list[CablePack]:
         """The packs with ``time`` times the stiffnesses, without stabilisation."""
@@ -369,7 +417,7 @@ class CableKernel(Chain):
 
     def without_material(self, pack: CablePack) -> CablePack:
         """The pack of a cable without stiffness, for given normal forces and moments."""
-        return pack._replace(stiffness=np.zeros(2),
+        return pack._replace(stiffness=np.zeros_like(pack.stiffness),
                              pairs=pack.pairs._replace(held=pack.pairs.held[:, :0]))
 
     # fields
@@ -410,10 +458,10 @@ class CableKernel(Chain):
         square0, each = np.sum(a0 * a0, axis=-1), np.arange(ne)
         pack = self.packs[0]._replace(
             frame=frame, length0=np.sqrt(square0).T, kappa0=(cross(a0, b0) / square0).T,
-            weights=np.ones((n, ne)), place=each, frame_place=each)
-        r, strain, (weights, square, kappa) = np.empty(d.shape), np.empty((2, n, ne)), np.empty(
-            (3, n, ne))
-        cable_strain(pack, 0, d, r, weights, square, kappa, strain)
+            weights=np.ones((n, ne)), stiffness=np.ones((3, n, ne)), place=each, frame_place=each)
+        r, strain, stiffness = np.empty(d.shape), np.empty((2, n, ne)), np.empty((3, n, ne))
+        weights, square, kappa = np.empty((3, n, ne))
+        cable_strain(pack, 0, d, r, weights, stiffness, square, kappa, strain)
         tangent = (r[:n] / np.sqrt(square)[:, None]).transpose(1, 2, 0)
         tangent0 = np.moveaxis(a0 / np.sqrt(square0)[..., None], -1, 0)
         return tangent, tangent0, strain[0].T, strain[1].T

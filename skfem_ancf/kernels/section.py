@@ -25,8 +25,8 @@ from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
 if TYPE_CHECKING:
     from ..elements.base import ElementBeam
     from ..formulations.base import Formulation, Term
-    from ..materials.base import Material
     from ..mesh import MeshBeam
+    from ..sections import Across, Slab
 
 
 class SectionPack(NamedTuple):
@@ -378,8 +378,8 @@ class TermTables:
 
     Parameters
     ----------
-    mesh, element, term, width
-        The body, a scalar beam element, the term, and the width of the section.
+    across, slab, term
+        The section on its mesh, one of its slabs, and a term of it.
     constant
         Stabilisation of each element, shape (0, 1 or elements, 2 nb, 2 nb).
     owner
@@ -393,16 +393,18 @@ class TermTables:
         :class:`SectionPack`.
     """
 
-    def __init__(self, mesh: "MeshBeam", element: "ElementBeam", term: "Term", width: float,
-                 constant: Array, owner: Any) -> None:
-        self.law, self.term = term.law, term
-        self.shared = mesh.is_uniform
+    def __init__(self, across: "Across", slab: "Slab", term: "Term", constant: Array,
+                 owner: Any) -> None:
+        self.law, self.term, self.slab, mesh = term.law, term, slab, across.mesh
+        self.shared = across.uniform
         tind = np.array([0]) if self.shared else None
         self.points, W = term.quadrature
-        self.w = width * W * mesh.mapping().detDF(self.points, tind)
         self.section_points = len(term.section[0])
-        G, frame, rows, self._sheared, self._along = _rows(mesh, element, term, tind)
-        self.pack = section_pack(G, frame, self.w.T, rows, _interpolation(term),
+        whole = self.section_points == 1
+        self.w = across.volume(slab, self.points, W, tind, whole)
+        G, frame, rows, self._sheared, self._along = _rows(mesh, across.element, term, tind)
+        weights = self.w * across.grade(slab, self.points, tind, whole)
+        self.pack = section_pack(G, frame, weights.T, rows, _interpolation(term),
                                  law_tables(self.law, owner), constant, mesh.t[0])
 
     def _gradients(self, pack, u):
@@ -597,27 +599,28 @@ class Kernel(Chain):
 
     Parameters
     ----------
-    mesh, element, material
-        The body, a scalar beam element and a material.
-    width
-        Width of the section.
+    across
+        A body with its section, a :class:`~skfem_ancf.sections.Across`.
     formulation
         A :class:`~skfem_ancf.formulations.Formulation`.
     """
 
     texts = SECTIONS
 
-    def __init__(self, mesh: "MeshBeam", element: "ElementBeam", material: "Material", width: float,
-                 formulation: "Formulation") -> None:
-        super().__init__(mesh, element)
-        self.constant = formulation.stabilisation(mesh, element, material, width)
+    def __init__(self, across: "Across", formulation: "Formulation") -> None:
+        super().__init__(across.mesh, across.element)
+        self.constant = across.stabilisation(formulation)
         none = np.zeros((0, 2 * self.nd, 2 * self.nd))
         constants = [none if self.constant is None else self.constant]
-        self.tables, self._made = [], (mesh, element, width, none)
-        for term in formulation.terms(element, material):
-            constant = constants.pop() if constants else none
-            self.tables.append(TermTables(mesh, element, term, width, constant, self))
+        self.tables, self._across = [], across
+        for slab, terms in across.terms(formulation):
+            for term in terms:
+                constant = constants.pop() if constants else none
+                self.tables.append(TermTables(across, slab, term, constant, self))
         self.packs = [t.pack for t in self.tables]
+        slabs = [id(t.slab) for t in self.tables]
+        #: The tables of the first term of each slab.
+        self.firsts = [t for k, t in enumerate(self.tables) if id(t.slab) not in slabs[:k]]
 
     @property
     def shared(self) -> bool:
@@ -631,25 +634,28 @@ class Kernel(Chain):
 
     @property
     def section_points(self) -> int:
-        """Integration points across the section, of the first term."""
-        return self.tables[0].section_points
+        """Integration points across the section, of the first terms."""
+        return sum(t.section_points for t in self.firsts)
 
     @property
     def volume(self) -> float:
-        """Volume of the body, by the rule of the first term."""
-        t = self.tables[0]
-        return float(np.sum(t.w)) * (self.t.shape[1] if t.shared else 1)
+        """Volume of the body, by the rules of the first terms."""
+        return sum(float(np.sum(t.w)) * (self.t.shape[1] if t.shared else 1) for t in self.firsts)
+
+    @property
+    def scale(self) -> float:
+        """Modulus times volume."""
+        return sum(float(np.sum(t.pack.weights)) * t.slab.material.E * (
+            self.t.shape[1] if t.shared else 1) for t in self.firsts)
 
     def inverted(self, u: Array) -> bool:
-        first = self.tables[0]
         return any(first.inverted(apart(first.pack, part), self.gather(u, part).ravel())
-                   for part in self.chunks())
+                   for part in self.chunks() for first in self.firsts)
 
     def shortest(self, u: Array) -> Any:
         """Smallest stretch of the fibres along the axis, where eps_xx is sampled."""
-        first = self.tables[0]
         return min(first.shortest(apart(first.pack, part), self.gather(u, part).ravel())
-                   for part in self.chunks())
+                   for part in self.chunks() for first in self.firsts)
 
     def strain_increment(self, pack: SectionPack, u: Array, du: Array, out: Array) -> None:
         """The strain's derivative in the direction du, (3, points, elements).
@@ -685,9 +691,9 @@ class Kernel(Chain):
 
     def viscous_packs(self, time: float) -> list[SectionPack]:
         """The packs of a linear law with ``time`` times the moduli at no strain."""
-        mesh, element, width, none = self._made
+        none = np.zeros((0, 2 * self.nd, 2 * self.nd))
         return [_viscous(t.pack, time, none) if t.pack.law.kind == LINEAR else TermTables(
-            mesh, element, replace(t.term, law=LinearLaw(time * t.law.moduli(np.zeros(3)))), width,
+            self._across, t.slab, replace(t.term, law=LinearLaw(time * t.law.moduli(np.zeros(3)))),
             none, self).pack for t in self.tables]
 
     def without_material(self, pack: SectionPack) -> SectionPack:

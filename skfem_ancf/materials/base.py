@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import (InputError, require_finite_scalar, require_like, require_option,
-                      require_positive, taught)
+                      require_positive, shown, taught)
 from ..frozen import Frozen, rebuilt
+from ..pickling import require_picklable
 from ..quadrature import gauss
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import ArrayLike
 
     from ..elements.base import ElementBeam
@@ -39,18 +42,21 @@ class Material(Frozen):
     Parameters
     ----------
     E
-        Young's modulus (force per area), positive.
+        Young's modulus (force per area), positive: a number, or a function of material coordinates
+        (x, y), of the parameter of the axis and the distance from it. The energy is proportional
+        to it.
     nu
         Poisson ratio, in (-1, 1/2), or 1/2 itself in plane stress.
     density
-        Mass per volume in the stress-free state, positive; None if neither mass nor gravity is
-        asked for.
+        Mass per volume in the stress-free state, positive: a number or a function of (x, y) too;
+        None if neither mass nor gravity is asked for.
     plane
         "stress" or "strain".
     shear_correction
         "auto": ``10 (1 + nu) / (12 + 11 nu)`` where the section cannot carry the shear parabola
-        (order 1, 2 and Patel-Shabana), else 1. "paper": that number at every order. Or a
-        positive number.
+        (order 1, 2 and Patel-Shabana), else 1; of profiles and layers what
+        :func:`skfem_ancf.sections.shear.shear_factor` says. "paper": that number at every order. Or
+        a positive number.
 
     Raises
     ------
@@ -63,9 +69,9 @@ class Material(Frozen):
     @taught
     def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
                  shear_correction: str | float = "auto") -> None:
-        self.E = require_positive("E", E)
+        self.E = _number_or_function("E", E)
         self.nu = require_finite_scalar("nu", nu)
-        self.density = None if density is None else require_positive("density", density)
+        self.density = None if density is None else _number_or_function("density", density)
         self.plane = require_option("plane", plane, PLANES)
         if not (-1.0 < self.nu < 0.5 or (self.nu == 0.5 and plane == "stress")):
             raise InputError(
@@ -77,6 +83,23 @@ class Material(Frozen):
                                                    ("auto", "paper"))
         else:
             self.shear_correction = require_positive("shear_correction", shear_correction)
+
+    @property
+    def graded(self) -> bool:
+        """True if the modulus or the density is a function of material coordinates."""
+        return callable(self.E) or callable(self.density)
+
+    def reference(self) -> tuple[Material, Callable[..., Any] | None]:
+        """This material with the modulus 1, and the modulus as a function (x, y).
+
+        Of a modulus that is a number itself and None.
+        """
+        return (self.replace(E=1.0), self.E) if callable(self.E) else (self, None)
+
+    def __getstate__(self):
+        require_picklable([(f"the {what} of {self!r}", f) for what, f in (
+            ("modulus E(x, y)", self.E), ("density(x, y)", self.density)) if callable(f)])
+        return super().__getstate__()
 
     @property
     def G(self) -> float:
@@ -119,9 +142,13 @@ class Material(Frozen):
         require_like("element", element, "beam element", "carries_shear_parabola")
         if isinstance(self.shear_correction, float):
             return self.shear_correction
+        rectangle = 10.0 * (1.0 + self.nu) / (12.0 + 11.0 * self.nu)
+        shape = getattr(element, "shear", None)
+        if self.shear_correction == "auto" and shape is not None:
+            return shape if element.carries_shear_parabola else 1.2 * rectangle * shape
         if self.shear_correction == "auto" and element.carries_shear_parabola:
             return 1.0
-        return 10.0 * (1.0 + self.nu) / (12.0 + 11.0 * self.nu)
+        return rectangle
 
     def replace(self, **changes: Any) -> Material:
         """A copy with some arguments of its constructor changed, as ``replace(E=2e8)``.
@@ -143,11 +170,17 @@ class Material(Frozen):
     def law(self, k_s: float = 1.0) -> Law:
         """The law with its shear corrected: a function of (eps_xx, eps_yy, sqrt(k_s) 2 eps_xy)."""
         k_s = require_positive("k_s", k_s)
+        self._require_number()
         if not self._fits("stress", "energy"):
             raise InputError(f"{type(self).__name__} overrides energy and not stress, with which "
                              "beams are solved: define stress(strain), its derivative, too")
         law = self if self._fits("energy") and self._fits("moduli") else OverriddenLaw(self)
         return law if k_s == 1.0 else ShearCorrected(law, k_s)
+
+    def _require_number(self):
+        if callable(self.E):
+            raise InputError(f"the modulus E of {self!r} is a function of material coordinates: "
+                             "only a Beam knows where it is asked. Use replace(E=number)")
 
     def _fits(self, name, other="stress"):
         """False if ``other`` was overridden in a subclass of the class that defines a method."""
@@ -219,8 +252,15 @@ class Material(Frozen):
             "plane in plane strain, which von Mises and Tresca stress need")
 
     def __repr__(self):
-        return (f"{type(self).__name__}(E={self.E:g}, nu={self.nu:g}, density={self.density}, "
+        E = shown(self.E) if callable(self.E) else f"{self.E:g}"
+        return (f"{type(self).__name__}(E={E}, nu={self.nu:g}, density={self.density}, "
                 f"plane={self.plane!r}, shear_correction={self.shear_correction!r})")
+
+
+def _number_or_function(name, value):
+    """A positive number, or a function of material coordinates, which beams ask."""
+    return value if callable(value) and not isinstance(value, type) else require_positive(
+        name, value)
 
 
 def hooke(E: float, nu: float, plane: str) -> Array:

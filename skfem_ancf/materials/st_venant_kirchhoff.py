@@ -33,6 +33,7 @@ class StVenantKirchhoff(Material):
     @property
     def D(self) -> Array:
         """Moduli without shear correction, shape (3, 3)."""
+        self._require_number()
         return hooke(self.E, self.nu, self.plane)
 
     @taught

@@ -163,12 +163,15 @@ def strain_error(state: State, beam: Beam) -> tuple[Array, ...]:
         k = list(state.beams).index(beam)
         raise InputError('the goal "strain" needs recovered fields, which this scene has not: '
                          f"{list(state.recovered.values())[k]}")
-    X, W = tensor(gauss(5), gauss(2 * max(beam.element.order, 1) + 1))
-    dV = beam.width * W * beam.mesh.mapping().detDF(X)
-    strain = recovery.fields(X)[0]
-    gap = strain - beam.strain(state.u_of(beam), X)
     weights = np.array([1.0, 1.0, 0.5])  # eps_xy twice, from its double
-    return tuple(np.einsum("k,kep,ep->e", weights, f * f, dV) for f in (gap, strain))
+    out = np.zeros((2, beam.mesh.nelements))
+    for slab, rule in beam.across.rules(2 * max(beam.element.order, 1) + 1):
+        X, W = tensor(gauss(5), rule)
+        dV = beam.across.volume(slab, X, W)
+        strain = recovery.fields(X)[0]
+        gap = strain - beam.strain(state.u_of(beam), X)
+        out += [np.einsum("k,kep,ep->e", weights, f * f, dV) for f in (gap, strain)]
+    return tuple(out)
 
 
 def refine(scene: Scene, marked: Sequence[ArrayLike]) -> tuple[Scene, Callable[[Array], Array]]:

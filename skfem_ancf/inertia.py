@@ -1,0 +1,129 @@
+"""The mass of a beam: local functions and masses at points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from .quadrature import gauss, tensor
+
+if TYPE_CHECKING:
+    from .beam import Beam
+    from .types import Array
+
+#: Points along an element more, where the height is a cubic or something varies.
+MORE = 4
+
+#: Turns a vector by 90 degrees.
+TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
+
+
+class Inertia(NamedTuple):
+    """Masses at points of the elements, of one where all are equal.
+
+    A cable may have more than the mass of its axis: its points off it move with ``v + Y v_X``, the
+    latter turned by 90 degrees, as long as the axis hardly stretches.
+
+    Attributes
+    ----------
+    functions
+        Local functions at points, shape (nb, nelements, npoints).
+    mass
+        Mass of the points, shape (nelements, npoints).
+    slopes
+        Derivatives of the functions along the axis, of the same shape, or None.
+    moments
+        Masses times Y and Y^2, shape (2, nelements, npoints), or None.
+    """
+
+    functions: Array
+    mass: Array
+    slopes: Array | None = None
+    moments: Any = None
+
+    def matrices(self, elements: Any) -> Array:
+        """Mass matrices, shape (n, 2 nb, 2 nb).
+
+        Parameters
+        ----------
+        elements
+            A slice.
+        """
+        N, m = self.functions[:, elements], self.mass[elements]
+        size = 2 * len(N)
+
+        def product(A, B, weights, turn):
+            scalar = np.einsum("iep,jep,ep->eij", A, B, weights, optimize=True)
+            return np.einsum("eij,ab->eiajb", scalar, turn).reshape(-1, size, size)
+
+        out = product(N, N, m, np.eye(2))
+        if self.slopes is not None:
+            S, (first, second) = self.slopes[:, elements], self.moments[:, elements]
+            coupling = product(N, S, first, TURN)
+            out = out + product(S, S, second, np.eye(2)) + coupling + coupling.transpose(0, 2, 1)
+        return out
+
+    def weights(self, g: Array) -> Array:
+        """Forces of an acceleration, shape (nelements, nb, 2).
+
+        Parameters
+        ----------
+        g
+            Acceleration, shape (2,).
+        """
+        out = np.einsum("iep,ep->ei", self.functions, self.mass)[:, :, None] * g
+        if self.slopes is not None:
+            out = out + np.einsum("iep,ep->ei", self.slopes, self.moments[0])[:, :, None] * (
+                g @ TURN)
+        return out
+
+
+def points_along(beam: Beam) -> int:
+    """Gauss points along an element for products of two coordinates.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    """
+    more = (0 if beam.mesh.is_straight else 1) + (0 if beam.across.constant else MORE)
+    return beam.element.axis_degree + 1 + more
+
+
+def of_sections(beam: Beam) -> Inertia:
+    """The Inertia of a beam with sections.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    """
+    across, axis = beam.across, gauss(points_along(beam))
+    tind = np.array([0]) if across.uniform else None
+    parts = []
+    for slab, rule in across.rules(beam.element.order + 1, inertia=True):
+        X, W = tensor(axis, rule)
+        parts.append((beam.element.functions(beam.mesh.mapping(), X, tind)[0],
+                      across.density(slab, X, tind) * across.volume(slab, X, W, tind)))
+    return Inertia(*(np.concatenate(part, axis=-1) for part in zip(*parts)))
+
+
+def of_cable(beam: Beam) -> Inertia:
+    """The Inertia of a cable; without that of turning if its section is a plain rectangle.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    """
+    across, mapping = beam.across, beam.mesh.mapping()
+    xi, w = gauss(points_along(beam))
+    tind = np.array([0]) if across.uniform else None
+    X = np.array([xi, 0.5 + 0.0 * xi])
+    N = beam.element.functions(mapping, X, tind)[0]
+    h = mapping.height(xi, tind)[0]
+    mass, *moments = across.moments(xi, tind, "mass") * w * mapping.detDF(X, tind) / h
+    if across.simple:
+        return Inertia(N, mass)
+    return Inertia(N, mass, beam.element.slopes(mapping, X, tind)[0][:, 0], np.array(moments))

@@ -1,0 +1,383 @@
+"""Profiles, layers and numbers: against beam theory, and scikit-fem's Q2 elements in the plane."""
+
+import pickle
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from skfem import (Basis, BilinearForm, ElementQuad2, ElementVector, FacetBasis, LinearForm,
+                   MeshQuad, asm, condense, solve)
+from skfem.helpers import sym_grad
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
+                        MeshBeam, NameUnknown, NeoHookean, Scene, Section, StVenantKirchhoff)
+from skfem_ancf.errors import CallError
+from skfem_ancf.materials.base import hooke
+from skfem_ancf.quadrature import gauss
+from skfem_ancf.sections.measure import Piece, Weighted
+
+H = 0.1
+STEEL = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)
+PLAIN = StVenantKirchhoff(E=2e8, nu=0.0, density=7800)
+BRASS = StVenantKirchhoff(E=1e8, nu=0.35, density=8500)
+FOAM = StVenantKirchhoff(E=2e6, nu=0.3, density=100)
+PROFILES = {
+    "I": (Section.profile("I", width=0.06, web=0.01, flange=0.015), 0.0025,
+          (0.06 * H**3 - 0.05 * 0.07**3) / 12),
+    "box": (Section.profile("box", width=0.06, wall=0.01), 0.0028,
+            (0.06 * H**3 - 0.04 * 0.08**3) / 12),
+    "tube": (Section.profile("tube", wall=0.01), np.pi * 9e-4, np.pi * (0.05**4 - 0.04**4) / 4),
+    "circle": (Section.profile("circle"), np.pi * 0.0025, np.pi * 0.05**4 / 4),
+    "rectangle": (Section.profile("rectangle", width=0.03), 0.003, 0.03 * H**3 / 12),
+}
+profiles = pytest.mark.parametrize("section, area, second", PROFILES.values(), ids=PROFILES)
+ELEMENTS = {"order 1": ElementBeamANCF(1), "order 2": ElementBeamANCF(2),
+            "order 3": ElementBeamANCF(3), "cubic": ElementBeamANCFCubic(2),
+            "quintic cable": ElementBeamCable(5)}
+every = pytest.mark.parametrize("element", ELEMENTS.values(), ids=ELEMENTS)
+
+
+def line(n=16, h=H, L=1.0):
+    return MeshBeam.init_line(np.linspace(0, L, n + 1), height=h)
+
+
+def cantilever(beam, force=None, moment=None):
+    scene = Scene(beam).clamp("left")
+    if force is not None:
+        scene.point_force(force, at=(float(beam.mesh.p[0, -1]), 0.0))
+    if moment is not None:
+        scene.moment("right", moment)
+    return scene.solve_static()
+
+
+def plane(pieces, length, force, n=(80, 4)):
+    """Displacement and stress at points of a clamped body of linear elasticity, pulled at x = L.
+
+    pieces: (bottom, top, material, width), from the bottom; force: the whole of it.
+    """
+    y = np.concatenate([np.linspace(a, b, n[1] + 1)[:-1] for a, b, _, _ in pieces]
+                       + [[pieces[-1][1]]])
+    mesh = MeshQuad.init_tensor(np.linspace(0, length, n[0] + 1), y).with_boundaries(
+        {"left": lambda x: x[0] == 0, "right": lambda x: np.isclose(x[0], length)})
+    basis = Basis(mesh, ElementVector(ElementQuad2()))
+
+    def at(y, of):
+        which = np.clip(np.searchsorted([p[1] for p in pieces], y), 0, len(pieces) - 1)
+        return np.array([of(p) for p in pieces])[which]
+
+    middle = mesh.p[1][mesh.t].mean(axis=0)
+
+    def voigt(u):
+        e = sym_grad(u)
+        return np.array([e[0, 0], e[1, 1], 2 * e[0, 1]])
+
+    D = np.array([[at(middle, lambda p, i=i, j=j: p[3] * hooke(p[2].E, p[2].nu, "stress")[i, j])
+                   for j in range(3)] for i in range(3)])
+
+    @BilinearForm
+    def stiffness(u, v, w):
+        return np.sum(voigt(v) * np.einsum("ije,jeq->ieq", D, voigt(u)), axis=0)
+
+    area = sum((b - a) * width for a, b, _, width in pieces)
+
+    @LinearForm
+    def load(v, w):
+        b = at(w.x[1], lambda p: p[3])
+        return b / area * (force[0] * v[0] + force[1] * v[1])
+
+    K = asm(stiffness, basis)
+    f = asm(load, FacetBasis(mesh, ElementVector(ElementQuad2()), facets="right", intorder=6))
+    u = solve(*condense(K, f, D=basis.get_dofs("left")))
+    return mesh, basis, u
+
+
+def axis_tip(basis, u, length):
+    return (basis.probes(np.array([[length - 1e-12], [0.0]])) @ u).reshape(2)
+
+
+def test_rules_of_a_width_with_jumps_and_round_ends():
+    """Moments of an I and of a circle to high degree, with few points."""
+    jumps = Weighted([Piece(0.0, 0.2, 3.0), Piece(0.2, 0.9, 0.5), Piece(0.9, 1.0, 2.0)])
+    x, w = jumps.gauss(6)
+    total = 0.6 + 0.35 + 0.2
+    for k in range(12):
+        exact = (3.0 * 0.2**(k + 1) + 0.5 * (0.9**(k + 1) - 0.2**(k + 1))
+                 + 2.0 * (1 - 0.9**(k + 1))) / (k + 1)
+        assert total * np.sum(w * x**k) == pytest.approx(exact, rel=1e-13)
+    round_, = Section.profile("circle").slabs(line(h=2.0), STEEL)
+    x, w = round_.measure.gauss(5)
+    # int_{-1}^{1} 2 sqrt(1 - y^2) y^{2 k} dy
+    for k, exact in enumerate(np.pi * np.array([1, 1 / 4, 1 / 8, 5 / 64, 7 / 128])):
+        assert np.pi * np.sum(w * (2 * x - 1) ** (2 * k)) == pytest.approx(exact, rel=1e-13)
+    assert_allclose(Weighted([Piece(0.0, 1.0, 2.0)]).gauss(7)[0], gauss(7)[0], atol=1e-14)
+
+
+@every
+@profiles
+def test_mass_bending_and_extension_of_profiles(element, section, area, second):
+    beam = Beam(line(), element, PLAIN, section=section)
+    assert beam.total_mass == pytest.approx(7800 * area, rel=1e-12)
+    spin = np.stack([-beam.q0.reshape(-1, 2)[:, 1], beam.q0.reshape(-1, 2)[:, 0]], 1).ravel()
+    assert spin @ (beam.mass() @ spin) == pytest.approx(7800 * (area / 3 + second), rel=1e-12)
+    state = cantilever(beam, moment=1.0)
+    # the moment's traction is linear in Y, not that of the width: there is a boundary layer
+    assert state.displacement((1, 0))[1] == pytest.approx(0.5 / (2e8 * second), rel=2e-3)
+    found = state.resultants((0.5, 0.0), recover=False)
+    assert found.M == pytest.approx(1.0, rel=1e-4) and abs(found.N) < 1e-3
+    pulled = Scene(beam).clamp("left").traction("right", (1.0 / area, 0.0)).solve_static()
+    assert pulled.displacement((1, 0))[0] == pytest.approx(1.0 / (2e8 * area), rel=1e-5)
+
+
+@pytest.mark.parametrize("name", ["I", "box", "tube"])
+@pytest.mark.parametrize("ratio", [30.0, 1e3, 1e4])
+def test_slender_profiles_are_beams(name, ratio):
+    """Deflection against P L^3 / 3 E I; the shear of the rest falls with (h / L)^2."""
+    section, _, second = PROFILES[name]
+    L = H * ratio
+    P = 1e-3 * 2e8 * second / L**2
+    for element in (ElementBeamANCFCubic(2), ElementBeamCable(5)):
+        state = cantilever(Beam(line(32, L=L), element, PLAIN, section=section), (0.0, -P))
+        error = -state.displacement((L, 0))[1] / (P * L**3 / (3 * 2e8 * second)) - 1
+        # with a small rotation of 5e-4
+        assert abs(error) < 2e-6 + 10.0 / ratio**2
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamANCFCubic(2),
+                                     ElementBeamANCFCubic(3), ElementBeamANCFCubic(5)])
+@pytest.mark.parametrize("length, pieces, section", [
+    (0.5, [(-0.05, -0.035, PLAIN, 0.06), (-0.035, 0.035, PLAIN, 0.01), (0.035, 0.05, PLAIN, 0.06)],
+     PROFILES["I"][0]),
+    (0.5, [(-0.05, 0.035, PLAIN, 0.01), (0.035, 0.05, PLAIN, 0.06)],
+     Section.profile("T", width=0.06, web=0.01, flange=0.015)),
+])
+def test_short_profiles_shear_as_the_plane_body(element, length, pieces, section):
+    """Tip of the body whose width depends on Y, plane stress: bending, shear and their coupling."""
+    P = 1e-2
+    _, basis, u = plane(pieces, length, (0.0, -P))
+    wanted = axis_tip(basis, u, length)
+    beam = Beam(line(40, L=length), element, PLAIN, section=section)
+    found = cantilever(beam, (0.0, -P)).displacement((length, 0.0))
+    assert_allclose(found[1], wanted[1], rtol=6e-3)  # the load is on the axis
+    if abs(wanted[0]) > 1e-12:
+        assert_allclose(found[0], wanted[0], rtol=1e-2)
+
+
+def test_extension_and_bending_of_a_T_are_coupled():
+    """Moment and force on the axis: [EA, -ES; -ES, EI] times strain and curvature."""
+    section = Section.profile("T", width=0.06, web=0.01, flange=0.015)
+    a, b = 0.06 * 0.015, 0.01 * 0.085
+    S = a * 0.0425 - b * 0.0075
+    second = 0.06 * 0.015**3 / 12 + a * 0.0425**2 + 0.01 * 0.085**3 / 12 + b * 0.0075**2
+    K = 2e8 * np.array([[a + b, -S], [-S, second]])
+    for element in (ElementBeamANCF(2), ElementBeamANCFCubic(1), ElementBeamCable(3),
+                    ElementBeamCable(5)):
+        beam = Beam(line(L=5.0), element, PLAIN, section=section)
+        scene = Scene(beam).clamp("left").moment("right", 3e-4)
+        N, M = 2e-3, 3e-4
+        if beam.has_sections:  # a traction acts at the centroid, a point force on the axis alone
+            scene.traction("right", (N / (a + b), 0.0))
+            M -= N * S / (a + b)
+        else:
+            scene.point_force((N, 0.0), at=(5.0, 0.0))
+        state, (eps, kappa) = scene.solve_static(), np.linalg.solve(K, [N, M])
+        # boundary layers of the length H
+        assert_allclose(state.displacement((5.0, 0.0)), [5.0 * eps, 12.5 * kappa], rtol=1e-2)
+        own = state.resultants((2.5, 0.0), recover=False)
+        assert_allclose([own.N, own.M], [N, M], rtol=5e-3)
+        # the weight acts at the centroid: on a beam that stands it bends
+        up = beam.weight((1.0, 0.0)) @ np.stack(
+            [-beam.q0.reshape(-1, 2)[:, 1], beam.q0.reshape(-1, 2)[:, 0]], 1).ravel()
+        assert up == pytest.approx(-7800 * 5.0 * S, rel=1e-10)
+
+
+SANDWICH = Section.layers((0.01, STEEL), (0.08, FOAM), (0.01, STEEL), width=0.02)
+BIMETAL = Section.layers((0.04, STEEL), (0.06, BRASS), width=0.02)
+
+
+def composite(section, h=H):
+    """EA, ES, EI about the axis, layer by layer."""
+    y, out = -0.5 * h, np.zeros(3)
+    for thickness, law, b in section.parts:
+        z = y + thickness
+        out += law.E * b * np.array([z - y, (z**2 - y**2) / 2, (z**3 - y**3) / 3])
+        y = z
+    return out
+
+
+@every
+@pytest.mark.parametrize("section", [SANDWICH, BIMETAL], ids=["sandwich", "bimetal"])
+def test_slender_layers_are_composite_beams(element, section):
+    laws = [(t, law.replace(nu=0.0), b) for t, law, b in section.parts]
+    section = Section.layers(*laws)
+    EA, ES, EI = composite(section)
+    for ratio in (1e2, 1e4):
+        L = H * ratio
+        mesh = line(32, L=L)
+        M = 1e-3 * EI / L
+        state = cantilever(Beam(mesh, element, section=section), moment=M)
+        kappa = M / (EI - ES**2 / EA)
+        assert_allclose(state.displacement((L, 0.0))[1], kappa * L**2 / 2,
+                        rtol=2e-5 + 0.05 / ratio)
+        assert_allclose(state.displacement((L, 0.0))[0], ES / EA * kappa * L,
+                        atol=1e-3 * H * 1e-3 + (kappa * L) ** 2 * L)
+
+
+def test_a_sandwich_shears_as_the_plane_body_and_its_stress_jumps():
+    P, L = 1e-3, 1.0
+    pieces, y = [], -0.05
+    for thickness, law, b in SANDWICH.parts:
+        pieces.append((y, y + thickness, law, b))
+        y += thickness
+    _, basis, u = plane(pieces, L, (0.0, -P), n=(120, 4))
+    wanted = axis_tip(basis, u, L)[1]
+    for element, error in ((ElementBeamANCFCubic(2), 0.03), (ElementBeamANCFCubic(5), 0.03)):
+        beam = Beam(line(60), element, section=SANDWICH)
+        state = cantilever(beam, (0.0, -P))
+        assert state.displacement((L, 0.0))[1] == pytest.approx(wanted, rel=error)
+        Y = np.array([-0.0499, -0.0401, -0.0399, 0.0, 0.0399, 0.0401, 0.0499])
+        x = np.array([0.5 + 0.0 * Y, Y])
+        sxx = _plane_stress(basis, u, x, pieces)[0]
+        found = beam.stress(state.u, *_reference(beam, x))[0, :, 0]
+        assert_allclose(found, sxx, atol=0.03 * np.abs(sxx).max())
+
+
+def _reference(beam, x):
+    e, X = zip(*(beam.locate(p) for p in x.T))
+    return np.array(X).T[:, :, None], np.array(e)
+
+
+def _plane_stress(basis, u, x, pieces):
+    """Stress of the plane body at points, by the elements that hold them."""
+    cells = basis.mesh.element_finder()(*x)
+    X = basis.mapping.invF(x[:, :, None], tind=cells)
+    grads = sum(u[basis.element_dofs[k, cells]][None, None, :, None] * basis.elem.gbasis(
+        basis.mapping, X, k, tind=cells)[0].grad for k in range(basis.Nbfun))[..., 0]
+    e = np.array([grads[0, 0], grads[1, 1], grads[0, 1] + grads[1, 0]])
+    D = np.array([hooke(p[2].E, p[2].nu, "stress") for y in x[1] for p in pieces
+                  if p[0] <= y < p[1]])
+    return np.einsum("nij,jn->in", D, e)
+
+
+@pytest.mark.parametrize("section", [SANDWICH, BIMETAL, PROFILES["I"][0]])
+@pytest.mark.parametrize("formulation", ["assumed", "continuum", "ecm"])
+def test_tangents_are_derivatives_and_rigid_motion_strains_nothing(section, formulation):
+    material = None if section.has_materials else STEEL
+    beam = Beam(line(4), ElementBeamANCF(2), material, formulation=formulation, section=section)
+    k = beam.kernel
+    u, du = 1e-3 * np.random.default_rng(1).standard_normal((2, beam.N))
+    K = k.tangents(u)
+    change = np.imag(k.force(u + 1e-30j * du)) / 1e-30
+    gather = k.gather(du).reshape(4, -1)
+    assert_allclose(k.scatter(np.einsum("eij,ej->ei", K, gather).reshape(4, -1, 2)), change,
+                    atol=1e-11 * np.abs(change).max())
+    q, c, s = beam.q0_local.reshape(-1, 2), np.cos(2.0), np.sin(2.0)
+    turned = (q @ np.array([[c, s], [-s, c]]) - q).ravel()
+    assert np.abs(k.force(turned)).max() < 1e-9 * np.abs(K).max()
+
+
+def test_graded_moduli_and_densities():
+    """E and rho as functions of (x, y): against integrals over the section."""
+    law = StVenantKirchhoff(E=lambda x, y: 1e8 * (1 + x) * np.exp(10 * y), nu=0.0,
+                            density=lambda x, y: 1000.0 * (1 + 2 * x + y))
+    y, w = gauss(20)
+    y, w = H * (y - 0.5), H * w
+    EA, ES, EI = (0.02 * np.sum(w * 1e8 * np.exp(10 * y) * y**k) for k in range(3))
+    x, v = gauss(20)
+    bent = np.sum(v * (1 - x) / (1 + x)) / (EI - ES**2 / EA)
+    for element in (ElementBeamANCF(2), ElementBeamANCFCubic(2), ElementBeamCable(5)):
+        beam = Beam(line(), element, law, width=0.02)
+        assert beam.total_mass == pytest.approx(1000 * 0.02 * H * 2, rel=1e-12)
+        state = cantilever(beam, moment=0.1)
+        assert state.displacement((1, 0))[1] == pytest.approx(0.1 * bent, rel=1e-3)
+        S = beam.stress(state.u, np.array([[0.5], [0.9]]), np.array([8]))[0, 0, 0]
+        eps = beam.strain(state.u, np.array([[0.5], [0.9]]), np.array([8]))[0, 0, 0]
+        E = law.E(0.5 * (mesh_x(beam, 8) + mesh_x(beam, 9)), 0.04)
+        assert S == pytest.approx(E * eps, rel=1e-9)
+    soft = NeoHookean(E=law.E, nu=0.3)
+    assert Beam(line(4), ElementBeamANCF(2), soft, width=0.02).kernel.energy(
+        1e-3 * np.ones(40)) >= 0
+
+
+def mesh_x(beam, node):
+    return float(beam.mesh.p[0, node])
+
+
+@every
+def test_sections_by_their_numbers(element):
+    """Bending, extension and shear are those given, and so are mass and rotary inertia."""
+    EA, EI, GA = 1e6, 40.0, 2e5
+    section = Section.numbers(EA=EA, EI=EI, GA=GA, rhoA=3.0, rhoI=0.01)
+    beam = Beam(line(64, h=0.02), element, section=section)
+    pulled = Scene(beam).clamp("left").traction("right", (1e-3 / 0.02, 0.0)).solve_static()
+    assert pulled.displacement((1, 0))[0] == pytest.approx(1e-3 / EA, rel=1e-5)
+    tip = cantilever(beam, (0.0, 1e-3)).displacement((1, 0))[1]
+    sheared = 1.0 / GA if beam.has_sections else 0.0
+    assert tip == pytest.approx(1e-3 * (1 / (3 * EI) + sheared), rel=1e-4)
+    spin = np.stack([-beam.q0.reshape(-1, 2)[:, 1], beam.q0.reshape(-1, 2)[:, 0]], 1).ravel()
+    assert spin @ (beam.mass() @ spin) == pytest.approx(3.0 / 3 + 0.01, rel=1e-12)
+
+
+def test_modes_of_a_tube_and_of_a_bimetal_strip():
+    """First frequency of a slender cantilever: 3.516 sqrt(EI / rho A) / L^2."""
+    L = 10.0
+    section, area, second = PROFILES["tube"]
+    EA, ES, EI = composite(BIMETAL)
+    mass = 0.02 * (0.04 * 7800 + 0.06 * 8500)
+    for beam, ratio in (
+            (Beam(line(24, L=L), ElementBeamANCFCubic(2), PLAIN, section=section),
+             2e8 * second / (7800 * area)),
+            (Beam(line(24, L=L), ElementBeamCable(5), section=BIMETAL), (EI - ES**2 / EA) / mass)):
+        modes = Scene(beam).clamp("left").modes(2)
+        assert modes.frequencies[0] == pytest.approx(
+            1.8751040687**2 * np.sqrt(ratio) / L**2, rel=1e-3)
+
+
+def test_motion_conserves_energy():
+    for section, material in ((SANDWICH, None), (PROFILES["I"][0], STEEL)):
+        beam = Beam(line(4), ElementBeamANCF(2), material, section=section)
+        history = Scene(beam).pin("left").gravity((0, -9.81)).integrate(
+            t_end=0.05, dt=1e-3, scheme="energy-momentum")
+        assert np.ptp(history.total_energy) < 1e-9 * max(np.ptp(history.kinetic_energy), 1e-3)
+
+
+@pytest.mark.parametrize("make, kind, words", [
+    (lambda: Section.profile("J", width=1), NameUnknown, "profile"),
+    (lambda: Section.profile("I", width=1), CallError, "web"),
+    (lambda: Section.profile("I", width=0.01, web=0.02, flange=0.01), InputError, "wider"),
+    (lambda: Section.profile("tube", wall=-1.0), InputError, "positive"),
+    (lambda: Section.layers(), InputError, "pairs"),
+    (lambda: Section.layers((0.1, 3.0), width=1.0), InputError, "layer 0"),
+    (lambda: Section.layers((-0.1, STEEL), width=1.0), InputError, "thickness of layer 0"),
+    (lambda: Section.layers((0.1, STEEL)), InputError, "width of layer 0"),
+    (lambda: Section.layers((0.1, STEEL), (0.1, STEEL.replace(plane="strain")), width=1.0),
+     InputError, "plane"),
+    (lambda: Section.numbers(EA=1.0, EI=0.0), InputError, "EI"),
+    (lambda: Section.numbers(EA=1.0, EI=1.0, rhoI=1.0), InputError, "rhoA"),
+    (lambda: Beam(line(), ElementBeamANCF(2), STEEL, 0.1, section=PROFILES["I"][0]), InputError,
+     "not both"),
+    (lambda: Beam(line(), ElementBeamANCF(2), section=PROFILES["I"][0]), InputError, "material"),
+    (lambda: Beam(line(), ElementBeamANCF(2), STEEL, section=BIMETAL), InputError, "its own"),
+    (lambda: Beam(line(h=0.2), ElementBeamANCF(2), section=BIMETAL), InputError, "must fill it"),
+    (lambda: Beam(line(h=0.03), ElementBeamANCF(2), STEEL, section=PROFILES["I"][0]), InputError,
+     "does not fit"),
+    (lambda: Beam(line(), ElementBeamANCF(2), STEEL, section="I"), InputError, "Section.profile"),
+    (lambda: Beam(line(), ElementBeamCable(3), section=Section.layers(
+        (H, NeoHookean(1e6, 0.3)), width=1.0)), InputError, "Hooke"),
+    (lambda: Scene(Beam(line(), ElementBeamANCF(2), STEEL, section=PROFILES["circle"][0])
+                   ).pressure("top", 1.0), InputError, "line_load"),
+    (lambda: StVenantKirchhoff(E=lambda x, y: 1.0 + x, nu=0.3).law(), InputError, "Beam knows"),
+])
+def test_errors_teach(make, kind, words):
+    with pytest.raises(kind, match=words):
+        make()
+
+
+def test_beams_with_sections_are_replaced_pickled_and_refined():
+    beam = Beam(line(), ElementBeamANCF(2), section=BIMETAL, name="strip")
+    other = pickle.loads(pickle.dumps(beam.replace(name="other")))
+    assert other.total_mass == beam.total_mass and other.section.has_materials
+    assert beam.with_mesh(beam.mesh.refined()).total_mass == pytest.approx(beam.total_mass)
+    plain = beam.replace(section=None, material=STEEL, width=0.02)
+    assert plain.width == 0.02
+    profile = plain.replace(section=PROFILES["I"][0])
+    assert profile.width is None and profile.replace(material=BRASS).material is BRASS
