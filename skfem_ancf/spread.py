@@ -163,7 +163,8 @@ class Spread:
     @property
     def acts_at_stations(self) -> bool:
         """True if it is nowhere spread."""
-        return self.faces is self.body is self.gravity is None and not self.sampled
+        return not self.sampled and all(
+            x is None for x in (self.faces, self.body, self.gravity))
 
 
 def on_facets(mesh: MeshBeam, facets: ArrayLike, **how: Any) -> Spread:

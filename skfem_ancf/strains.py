@@ -14,6 +14,8 @@ from .mapping import cross
 from .series import chebyshev
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from .beam import Beam
     from .formulations.base import Term
     from .types import Array
@@ -93,7 +95,7 @@ class TaperedStrain:
         return lambda u_e: self._of(u_e.T[None], at, X)[:, 0]
 
     def _of(self, u_e, e, X):
-        found: dict[Any, Array] = {}
+        found = {}
 
         def products(xi):
             key = None if xi is None else float(xi)
