@@ -92,9 +92,10 @@ class Sections:
             The element, and where in it the section is, from 0 to 1.
         """
         eta, w = gauss(beam.element.order + 1)
-        rows = beam.element.local(np.array([xi + 0.0 * eta, eta]), beam.mesh.height)
-        return 12.0 / beam.mesh.height * (
-            rows[0] @ (w * (eta - 0.5))) * beam.mesh.lengths[e] ** rows[3]
+        mapping = beam.mesh.mapping()
+        h = float(np.ravel(mapping.height(np.array([xi]), np.array([e]))[0])[0])
+        rows = beam.element.local(np.array([xi + 0.0 * eta, eta]), h)
+        return 12.0 / h * (rows[0] @ (w * (eta - 0.5))) * beam.mesh.lengths[e] ** rows[3]
 
     @staticmethod
     def plane(beam: Beam, tangent: Array) -> tuple[Array, list[int]]:
