@@ -11,7 +11,7 @@ from .body import FlatBody, body_of, stress_size, viscous_body_of
 from .border import Border
 from .compiled.words import Words
 from .forces.texts import ForceTables
-from .kernels.law import text_of
+from .kernels.law import text_of, with_text
 from .kernels.moments import MomentPack
 from .kernels.section import SectionPack
 from .own import handle_of
@@ -252,10 +252,14 @@ class Tables:
 
 def _with_laws(body, address):
     """A Body whose laws have the addresses of their texts."""
-    packs = [pack._replace(law=pack.law._replace(address=address(text_of(pack.law))))
-             if isinstance(pack, SectionPack) and text_of(pack.law) is not None else pack
-             for pack in body.packs]
-    return body._replace(packs=tuple(packs))
+    def addressed(pack):
+        if not isinstance(pack, SectionPack):
+            return pack
+        law = with_text(pack.law)
+        text = text_of(law)
+        return pack._replace(law=law if text is None else law._replace(address=address(text)))
+
+    return body._replace(packs=tuple(map(addressed, body.packs)))
 
 
 def _kind(load):

@@ -12,8 +12,9 @@ import numpy as np
 from . import compiled
 from .compiled.words import Kept
 from .equations import Tables
-from .kernels.law import OWN
+from .kernels.law import with_text
 from .kernels.section import SectionPack
+from .materials.followed import NotFollowed
 from .progress import progress_bar
 from .switch import compiled_off, wanted
 
@@ -95,13 +96,11 @@ class Machine:
     def __init__(self, system: System) -> None:
         self.tables = Tables(system)
         self._plain: str | None = None
+        self._followed = False
         self._rooms: dict[str, Any] = {}
         self._kept = Kept()
         if not all(beam.compiled for beam in system.beams):
             self._plain = "compiled=False"
-        elif any(isinstance(pack, SectionPack) and pack.law.kind == OWN
-                 for pack in self.tables.plain.body.packs):
-            self._plain = "a law of your own without a text, see TextMaterial"
 
     @property
     def _off(self):
@@ -117,6 +116,23 @@ class Machine:
         name
             A key of :data:`COMPILING`.
         """
+        choice = self._chosen(name)
+        if choice.way != "plain" and not self._followed:
+            self._follow()
+        return choice if self._plain is None else Choice("plain", self._plain)
+
+    def _follow(self):
+        """Make texts of laws in Python."""
+        self._followed = True
+        try:
+            for pack in self.tables.plain.body.packs:
+                if isinstance(pack, SectionPack):
+                    with_text(pack.law)
+        except NotFollowed as error:
+            self._plain = (f"a law of your own cannot be compiled: {error}; see "
+                           "skfem_ancf.materials.TextMaterial")
+
+    def _chosen(self, name):
         if self._off is not None:
             return Choice("plain", self._off)
         if name in compiled.LOADED:

@@ -110,7 +110,7 @@ def test_same_with_every_law_under_pressure(law, scheme):
     for scene in both(mesh, ElementBeamANCF(2), "assumed", law(1.0, 0.3, 1.0)):
         scene = scene.clamp("left").pressure("top", 1e-5)
         results.append((scene.solve_static(), scene.integrate(2.0, 0.1, scheme, tol=1e-12)))
-    assert ("plain" in ways(scene)) == (law is Stiffening)
+    assert "plain" not in ways(scene)
     (a, b), (c, d) = results
     assert a.iterations == c.iterations and np.abs(a.u).max() > 1e-3
     assert_allclose(c.u, a.u, rtol=0, atol=1e-10 * np.abs(a.u).max())
@@ -254,7 +254,7 @@ def test_a_joint_that_is_not_quadratic_is_asked_by_the_steps(flag, scheme):
             d, w = self.r(u) - self.center, self.r.weights
             s = np.hypot(*d)
             H = (np.eye(2) - np.outer(d, d) / s**2) / s * multipliers[0]
-            values = np.einsum("ij,k,l->ikjl", H, w, w)
+            values = np.einsum("ij,ik,jl->ikjl", H, w, w)
             rows = np.broadcast_to(self.r.dofs[:, :, None, None], values.shape)
             columns = np.broadcast_to(self.r.dofs[None, None], values.shape)
             return rows.ravel(), columns.ravel(), values.ravel()

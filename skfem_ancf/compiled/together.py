@@ -7,6 +7,7 @@ Numba does, but share the module of the entry, which is optimised once.
 
 from __future__ import annotations
 
+from itertools import count
 from typing import Any, NamedTuple
 
 from numba import types
@@ -63,6 +64,7 @@ class _Made(NamedTuple):
 
 #: The entries that are being compiled, the innermost last.
 _OPEN: list[_Open] = []
+_numbers = count()
 
 
 class Text:
@@ -76,6 +78,7 @@ class Text:
 
     def __init__(self, function, options):
         self.function, self.options, self.made = function, options, {}
+        self.number = next(_numbers)
 
     def of(self, args):
         """Signature and key for types of arguments, in the entry that is being compiled."""
@@ -108,7 +111,7 @@ class TextType(types.Callable):
 
     def __init__(self, text):
         self.text = text
-        super().__init__(f"text({text.function.__module__}.{text.function.__qualname__})")
+        super().__init__(f"text({text.function.__qualname__}, {text.number})")  # one by its name
 
     def get_call_type(self, context, args, kws):
         return self.text.of(tuple(types.unliteral(x) for x in args)).signature

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..materials import LinearLaw, TextMaterial
 from ..materials.base import ShearCorrected
+from ..materials.followed import NotFollowed, follow
 from ..source import F1, F2, lanes, primitive, room, source
 from .base import packed
 
@@ -16,6 +17,8 @@ LINEAR, TEXT, OWN = 0, 1, 2
 
 #: By handle, as long as a kernel has them: compiled code holds no Python objects.
 _LAWS: dict[int, Any] = {}
+#: What has come of following those in Python.
+_FOLLOWED: dict[int, Any] = {}
 _handles = count(1)
 
 
@@ -58,9 +61,32 @@ def run_text(law, strain, out):
     _LAWS[law.handle].text(law.constants, strain, out)
 
 
+def with_text(law: LawTables) -> LawTables:
+    """The tables of a law with a text, if it can be made of one in Python.
+
+    Raises
+    ------
+    NotFollowed
+        If it cannot.
+    """
+    if law.kind != OWN:
+        return law
+    if law.handle not in _FOLLOWED:
+        try:
+            _FOLLOWED[law.handle] = follow(_LAWS[law.handle])
+        except NotFollowed as error:
+            _FOLLOWED[law.handle] = error
+    found = _FOLLOWED[law.handle]
+    if isinstance(found, NotFollowed):
+        raise found
+    return law._replace(kind=TEXT, constants=packed(found.constants))
+
+
 def text_of(law: LawTables) -> Any:
     """The text of a law, None for one without."""
-    return _LAWS[law.handle].text if law.kind == TEXT else None
+    if law.kind != TEXT:
+        return None
+    return _FOLLOWED[law.handle].text if law.handle in _FOLLOWED else _LAWS[law.handle].text
 
 
 @source
@@ -164,5 +190,6 @@ def law_tables(law: Any, owner: Any) -> LawTables:
     if isinstance(base, TextMaterial) and base.has_text:
         kind, constants = TEXT, packed(base.constants)
     _LAWS[handle] = base
-    weakref.finalize(owner, _LAWS.pop, handle, None)
+    for known in (_LAWS, _FOLLOWED):
+        weakref.finalize(owner, known.pop, handle, None)
     return LawTables(kind, handle, 0, none, constants, packed(scale))
