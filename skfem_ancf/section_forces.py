@@ -16,7 +16,7 @@ import numpy as np
 from .errors import AncfError
 from .formulations.ecm import AXIS as WHOLE
 from .kept import kept
-from .kernels.base import VISCOUS, apart, no_stresses, nowhere
+from .kernels.base import apart
 from .mapping import cross
 from .quadrature import gauss, lagrange
 from .spread import AXIS, BODY, SNAP, station_of_node
@@ -432,7 +432,5 @@ def viscous_forces(beam: Beam, u: Array, v: Array, time: float) -> Array:
     u, v = kernel.gather(u).ravel(), kernel.gather(v).ravel()
     out = np.zeros(u.size)
     for pack in kernel.viscous_packs(time):
-        pack = apart(pack, slice(None))
-        none = no_stresses(pack)
-        kernel.texts.evaluate(pack, VISCOUS, u, v, out, none, 0, none, nowhere(out))
+        kernel.texts.viscous(apart(pack, slice(None)), u, v, out)
     return out.reshape(beam.mesh.nelements, -1, 2)

@@ -421,6 +421,19 @@ class Texts(NamedTuple):
         none = no_stresses(pack)
         self.evaluate(pack, FORCE, u, u, f, none, none, nowhere(f))
 
+    def viscous(self, pack: Any, u: Array, v: Array, f: Array) -> None:
+        """Add the force of stresses in proportion to the rates of the strains.
+
+        Parameters
+        ----------
+        pack
+            The tables, those of ``viscous_packs``.
+        u, v, f
+            Displacement, its rate and force, shape (N,).
+        """
+        none = no_stresses(pack)
+        self.evaluate(pack, VISCOUS, u, v, f, none, none, nowhere(f))
+
     def tangent(self, pack: Any, u: Array, f: Array, carried: Array, use_carried: bool,
                 stresses: Array, to: Destination) -> None:
         """Add the internal force to f and the tangent to a band matrix.
