@@ -154,4 +154,5 @@ def _elements(s):
     return "force elements", "computed", (
         f"{len(forces.elements)}: {len(forces.parts)} in tables, {len(forces.own) - ours} of your "
         f"own, {ours} by functions asked in Python, {len(forces.masses)} in the mass"
+        + (f", {len(forces.sampled)} sampled" if forces.sampled else "")
         + (", some couple points far apart" if forces.far else ""))

@@ -19,7 +19,7 @@ from .doors import configuration, displacement
 from .dynamics import get_scheme
 from .dynamics.checkpoint import resume
 from .dynamics.integrate import follow, integrate
-from .forces import (Drag, ForceElement, Foundation, PointMass, Spring, TorsionalSpring,
+from .forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring, TorsionalSpring,
                      bind_force)
 from .errors import (ConvergenceError, InputError, Interrupted, StabilityWarning, ask_field,
                      require_finite, require_finite_scalar, require_option, shown, taught, teaching)
@@ -39,7 +39,7 @@ from .supports import Support
 from .system import System
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import ArrayLike
     from skfem.assembly import LinearForm
@@ -822,6 +822,61 @@ class Scene:
             Itself.
         """
         return self._put(elements=[TorsionalSpring(k, at, damping, beam, other, angle)])
+
+    def control(self, law: Callable[..., Any], at: Any, kind: str = "force", other: Any = None,
+                points: Mapping[str, Any] | None = None,
+                sections: Mapping[str, Any] | None = None, dt: float | None = None,
+                beam: WhichBeam = None) -> Scene:
+        """A force or a moment as a function of time and of what is measured: a controller, a motor.
+
+        Parameters
+        ----------
+        law
+            A function ``law(t, name=..., ...)`` of the time, in statics the load factor, and of
+            what is measured. It returns the force (2,), or the moment, counterclockwise.
+        at
+            Where it acts: a point as for :meth:`spring`, or for a moment a section as for
+            :meth:`torsional_spring`, or (beam, place).
+        kind
+            "force" or "moment".
+        other
+            Where the opposite acts, as ``at``; None for the ground.
+        points
+            Names and places of points whose ``position`` and ``velocity`` (2,) the law is told.
+        sections
+            Names and places of sections whose ``angle`` from the stress-free state, in (-pi, pi],
+            and ``rate`` it is told.
+        dt
+            Time between two samples: the law is asked at the start of a motion and every ``dt``
+            from there, and its value is held; None to ask it at every time, in each iteration.
+        beam
+            The beam, its name or its number, in a scene of several, of places that name none.
+
+        Returns
+        -------
+        Scene
+            Itself.
+
+        Raises
+        ------
+        InputError
+            If a place is not known, or the law does not return what it should at the start.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> arm = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.05), ElementBeamCable(3),
+        ...            StVenantKirchhoff(2e11, 0.3, 7800), width=0.05)
+        >>> scene = Scene(arm).pin("left").control(
+        ...     lambda t, joint: 4000.0 * (0.2 - joint.angle) - 300.0 * joint.rate, at="left",
+        ...     kind="moment", sections={"joint": "left"})
+        >>> history = scene.integrate(0.4, 5e-3, scheme="generalized-alpha")
+        >>> x, y = history.position((1, 0))[-1]
+        >>> bool(abs(np.arctan2(y, x) - 0.2) < 0.01)
+        True
+        """
+        return self._put(elements=[Control(law, at, kind, other, points, sections, dt, beam)])
 
     def foundation(self, k: float, side: Place = "bottom", one_sided: bool = False,
                    damping: float = 0.0, beam: WhichBeam = None) -> Scene:

@@ -258,6 +258,19 @@ class System:
             return self.damped_modes
         return splu(self.mass.tocsc()).solve(self.damped_modes.T).T
 
+    def sample(self, u: Array, v: Array, t: float, first: bool) -> None:
+        """Ask controls whose law is asked now and then, if it is their time.
+
+        Parameters
+        ----------
+        u, v, t
+            Displacement of the coordinates and its rate, shape (N,), and time.
+        first
+            A motion begins.
+        """
+        if self.forces.sampled:
+            self.forces.sample(self.machine.tables.plain.forces, u, v, t, first)
+
     def part_forces(self, u: Array, v: Array) -> Array:
         """What resists on the points of force elements that are no own ones, shape (2, parts).
 

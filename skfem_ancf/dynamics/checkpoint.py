@@ -95,7 +95,7 @@ def fingerprint(system: System) -> dict[str, str]:
         J += [] if joint.moving else [joint.value(0.0 * probe, 0.0)]
         parts[f"joint {k}"] = _digest(type(joint).__name__, joint.equations, joint.moving, *J)
     for k, element in enumerate(system.forces.elements):
-        alone = Forces([element], system.N, system.bandwidth)
+        alone = Forces([element.unheld()], system.N, system.bandwidth)
         tables = alone.tables(lambda i, j: i, False, 0)
         values = [alone.stiffness(tables, 0.0, 1e-3 * probe, probe, c) for c in (0.0, 1.0)]
         for place in alone.own:
@@ -131,7 +131,7 @@ def functions(system: System, t_start: float, t_end: float) -> dict[str, Array]:
         if element in system.forces.own:
             x = np.array([one.start for one in element.links])
             found[f"force of element {k}"] = np.array([
-                np.ravel(element.force(x, 0.0 * x, t)) for t in times], dtype=float)
+                np.ravel(element.unheld().force(x, 0.0 * x, t)) for t in times], dtype=float)
     return found
 
 

@@ -105,7 +105,8 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     motion = None if start is None else start._motion
     if t_start is None:
         t_start = 0.0 if motion is None else motion.t
-    task = _task(t_start, t_end, dt, t_eval, tol, rtol, breakpoints)
+    task = _task(t_start, t_end, dt, t_eval, tol, rtol, [
+        *np.atleast_1d(breakpoints), *_samples(system, t_start, t_end)])
     system.require_independent_joints()
     run = Run(system, scheme, task)
     if until is not None:
@@ -125,6 +126,18 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     if file is not None:
         file.begin()
     return follow(run, file, progress)
+
+
+def _samples(system, t_start, t_end):
+    """The times at which controls are asked that hold what they say."""
+    start = require_finite_scalar("t_start", t_start)
+    span = require_positive("t_end - t_start", require_finite_scalar("t_end", t_end) - start)
+    found = []
+    for control in system.forces.sampled:
+        if span / control.dt > MAX_STEPS:
+            raise InputError(f"dt of {control!r} is too small for a motion of {span:g}")
+        found += (start + control.dt * np.arange(1, np.ceil(span / control.dt))).tolist()
+    return found
 
 
 def _task(t_start, t_end, dt, t_eval, tol, rtol, breakpoints):
@@ -169,8 +182,8 @@ def _require_step(t_start, t_end, step):
 def _goes_on(system, scheme, start, t):
     """True if an instant is one of the same motion: same scheme, same scene."""
     made_by, _ = start._origin
-    return (type(made_by) is type(scheme) and repr(vars(made_by)) == repr(vars(scheme))
-            and same_problem(system, start, t))
+    return (not system.forces.sampled and type(made_by) is type(scheme)
+            and repr(vars(made_by)) == repr(vars(scheme)) and same_problem(system, start, t))
 
 
 def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = None) -> History:

@@ -119,6 +119,7 @@ class Run:
         u, v
             Of the coordinates, shape (N,).
         """
+        self.system.sample(u, v, self.task.t_start, True)
         self.y = self.integrator.start(u, v, self.task.t_start, self._first_step())
         self._store_start()
 
@@ -187,6 +188,7 @@ class Run:
         if self.sizes is not None:
             self.size = 1e-4 * self.task.span
             self.sizes.begin()
+        self.system.sample(y.u, y.v, self._begun, False)
         turned = self.integrator.start(y.u, y.v, self._begun, self._first_step())
         turned.dissipated = y.dissipated
         return turned
@@ -359,6 +361,8 @@ class Run:
         if self.sizes is not None:
             memory.update(self.sizes.remember())
         memory["size"] = np.array(self.size)
+        for k, control in enumerate(self.system.forces.sampled):
+            memory[f"held {k}"] = control.held
         memory["counts"] = np.array([self.segment, self.n, self._next, self.steps, self.rejected])
         return memory
 
@@ -376,6 +380,8 @@ class Run:
         self.integrator.recall(memory)
         if self.sizes is not None:
             self.sizes.recall(memory)
+        for k, control in enumerate(self.system.forces.sampled):
+            control.hold(memory[f"held {k}"])
         self.segment, self.n, self._next, self.steps, self.rejected = map(int, memory["counts"])
         self.size = float(memory["size"])
         self._limit()

@@ -2,9 +2,10 @@
 
 from ..joints.base import point, section
 from .base import ForceElement, bind_force
+from .control import Control
 from .distributed import Drag, Foundation
 from .masses import PointMass
 from .springs import Spring, TorsionalSpring
 
-__all__ = ["Drag", "ForceElement", "Foundation", "PointMass", "Spring", "TorsionalSpring",
-           "bind_force", "point", "section"]
+__all__ = ["Control", "Drag", "ForceElement", "Foundation", "PointMass", "Spring",
+           "TorsionalSpring", "bind_force", "point", "section"]

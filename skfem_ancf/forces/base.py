@@ -11,7 +11,7 @@ from ..frozen import Sealable
 from ..joints.base import Vector
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from ..beam import Beam
     from ..scene import Scene
@@ -217,6 +217,10 @@ class ForceElement(Sealable):
         """
         return _derivative(lambda w: self.force(x, w, t), v)
 
+    def unheld(self) -> ForceElement:
+        """Itself as it is at the start of a motion: without what it has kept of one."""
+        return self
+
     def parts(self) -> list[Part] | None:
         """Of what the texts know, once it is bound; None for an element of your own."""
         return None
@@ -225,22 +229,37 @@ class ForceElement(Sealable):
         return f"<{type(self).__name__}>"
 
 
+def differences(function: Callable[[Array], Any], x: Array) -> Array:
+    """The derivative of a function of places by differences, shape (n, 2, n, 2).
+
+    Parameters
+    ----------
+    function
+        From (n, 2) to (n, 2).
+    x
+        Where, shape (n, 2).
+    """
+    n = len(x)
+    out, units = np.zeros((n, 2, n, 2)), np.eye(2 * n).reshape(2 * n, n, 2)
+    step = STEP * max(1.0, float(np.abs(x).max(initial=0.0)))
+    for k in range(2 * n):
+        out[:, :, k // 2, k % 2] = (np.asarray(function(x + step * units[k]))
+                                    - function(x - step * units[k])) / (2 * step)
+    return out
+
+
 def _derivative(function, x):
-    """Of shape (n, 2, n, 2): by complex steps where those agree with differences."""
-    n, scale = len(x), max(1.0, float(np.abs(x).max(initial=0.0)))
-    out, units = np.empty((n, 2, n, 2)), np.eye(2 * n).reshape(2 * n, n, 2)
-    for k, unit in enumerate(units):
-        step = STEP * scale
-        rough = (np.asarray(function(x + step * unit)) - function(x - step * unit)) / (2 * step)
-        value = rough
+    """As :func:`differences`, by complex steps where those agree."""
+    out = differences(function, x)
+    for k, unit in enumerate(np.eye(x.size).reshape(-1, *x.shape)):
+        rough = out[:, :, k // 2, k % 2]
         try:
             with warnings_as_errors(_COMPLEX):
                 found = np.imag(function(x + 1e-30j * unit)) / 1e-30
             if np.allclose(found, rough, rtol=1e-4, atol=1e-4 * np.abs(rough).max(initial=0.0)):
-                value = found
+                out[:, :, k // 2, k % 2] = found
         except (TypeError, ValueError, _COMPLEX):
             pass
-        out[:, :, k // 2, k % 2] = value
     return out
 
 

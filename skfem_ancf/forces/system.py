@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .base import Part
+from .control import Control
 from .masses import PointMass
 from .texts import (ELASTIC, NUMBERS, RESISTING, TORSION, ForceTables, element_stiffness,
                     potential, run_kinds, turned, vectors_of)
@@ -205,6 +206,29 @@ class Forces:
         return potential(tables, y) + sum(
             element.potential(y[rows].reshape(-1, 2)) or 0.0
             for element, (rows, _) in zip(self.own, self._slices))
+
+    @property
+    def sampled(self) -> list[Control]:
+        """Controls whose law is asked now and then, and its value held."""
+        return [e for e in self.own if isinstance(e, Control) and e.dt is not None]
+
+    def sample(self, tables: ForceTables, u: Array, v: Array, t: float, first: bool) -> None:
+        """Ask sampled controls whose time it is.
+
+        Parameters
+        ----------
+        tables
+            Those of :meth:`tables`.
+        u, v, t
+            Displacement of the coordinates and its rate, shape (N,), and time.
+        first
+            A motion begins.
+        """
+        y, w = self.vectors(tables, u), np.empty(self.rows)
+        vectors_of(tables, v, 0.0, w)
+        for element, (rows, _) in zip(self.own, self._slices):
+            if isinstance(element, Control):
+                element.sample(y[rows].reshape(-1, 2), w[rows].reshape(-1, 2), t, first)
 
     def rows_of(self, element: ForceElement) -> Array:
         """Where the parts of an element are among all, in its own order; shape (n,)."""
