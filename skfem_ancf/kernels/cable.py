@@ -22,9 +22,7 @@ from .base import (CARRY, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
                    packed, pair_tables, product)
 
 if TYPE_CHECKING:
-    from ..elements.cable import ElementBeamCable
     from ..formulations.base import Formulation
-    from ..mesh import MeshBeam
     from ..sections import Across
 
 
