@@ -175,10 +175,24 @@ class Tables:
                          sample(load.amplitude, times).reshape(len(times)) for load in columns],
                         axis=1)
 
-    def static_factors(self, scale: float) -> Array:
-        """Factors of the loads in statics, where an amplitude counts as one; shape (k,)."""
-        loads = self.plain.loads
-        return np.full(len(loads.vectors) + len(loads.moments.M) + len(self._loads[2]), scale)
+    def static_factors(self, scale: float, before: float | None = None) -> Array:
+        """Factors of the loads in statics, where an amplitude counts as one; shape (k,).
+
+        Parameters
+        ----------
+        scale
+            The load factor.
+        before
+            That of the state to start from, for the first tangent: the stiffness of a stress-free
+            strain belongs to the stress that it causes, which is not yet there.
+        """
+        _, turning, linear, _ = self._loads
+        columns = [None, *self._rows, *linear, *turning, *linear]
+        out = scale * np.array([1.0 if load is None else load.at_rest for load in columns])
+        for k, load in enumerate(linear):
+            if before is not None and load.symmetric:
+                out[len(out) - len(linear) + k] = before * load.at_rest
+        return out
 
     # joints
 

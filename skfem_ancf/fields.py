@@ -147,8 +147,9 @@ class Values(Mapping):
     """
 
     def __init__(self, part: Part, u: Array,
-                 find: Callable[[], Recovery | None] | None = None) -> None:
-        self._part, self._u, self._find = part, u, find
+                 find: Callable[[], Recovery | None] | None = None,
+                 eigen: Callable[[Part], Any] | None = None) -> None:
+        self._part, self._u, self._find, self._eigen = part, u, find, eigen
         self.beam, self.n = part.beam, len(part.e)
         self._known: dict[str, Array] = {}
 
@@ -189,7 +190,8 @@ class Values(Mapping):
     def S(self) -> Array:
         if self._recovery is not None:
             return self._recovery.at(self._part, slice(3, 6))
-        return self._part.stress(self._u)
+        S = self._part.stress(self._u)
+        return S if self._eigen is None else S - self._eigen(self._part)
 
     @cached_property
     def F(self) -> Array:
@@ -408,4 +410,4 @@ def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Va
     if recover and hasattr(state, "recovery"):
         def find():
             return state.recovery(beam)
-    return Values(part, state.u_of(beam), find)
+    return Values(part, state.u_of(beam), find, getattr(state, "eigen_stress", None))

@@ -112,6 +112,8 @@ class Load(Sealable):
     beam: Any
     linear = False
     turning = False
+    #: The factor in statics.
+    at_rest = 1.0
     for_bodies = False
 
     def __init__(self, beam: WhichBeam = None, amplitude: TimeFunction = None) -> None:
@@ -147,7 +149,7 @@ class Load(Sealable):
 
     def factor(self, t: float | None) -> float:
         """The amplitude at time ``t``; 1 without one, or in statics, where ``t`` is None."""
-        return 1.0 if self.amplitude is None or t is None else self.amplitude(t)
+        return self.at_rest if t is None else 1.0 if self.amplitude is None else self.amplitude(t)
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
         """A mean of the force between two displacements whose work is exact if it can be.

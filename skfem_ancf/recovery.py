@@ -205,6 +205,8 @@ class _Piece:
         self.width = across.breadth(slab, sections.X, self.e)
         self.grade = across.grade(slab, sections.X, self.e)
         self.g = sections.volume / (speed[:, None] * h)
+        self.E0 = sum(np.moveaxis(np.multiply.outer(factor, eigen.strain_at(sections.X, self.e)),
+                                  np.ndim(factor), 0) for factor, eigen in self.forces.eigen)
         self.body = self.g * (sections.body + self._axis_load())
         at_faces = [Sections(self.forces, self.e, xi, np.array([float(k)])) for k in (0, 1)]
         self.faces = [(across.face(k, at.X, self.e) * at.face(k))[..., 0] / speed
@@ -278,11 +280,11 @@ class _Piece:
         """The strain (3, ..., n, m) with S_yy, S_xy, and the stretch, or S_xx, as they are."""
         r = self.recovery
         if self.stress_given:
-            return strain_of_stress(r.law, self.S / self.grade, self.eps)
+            return self.E0 + strain_of_stress(r.law, self.S / self.grade, self.eps - self.E0)
         self.eps[0] = 0.5 * (self.stretch**2 - 1.0)
-        eps = strain_of_stress(r.law, self._fed / self.grade, self.eps, (1, 2))
+        eps = strain_of_stress(r.law, self._fed / self.grade, self.eps - self.E0, (1, 2))
         self.S[0] = self.grade * r.law.stress(eps)[0]
-        return eps
+        return eps + self.E0
 
     def _section(self):
         """r_Y along t and n, and P_1 along t and n; (..., n, m) each."""
@@ -304,7 +306,7 @@ class _Piece:
         going = np.ones(self.forces.states)
         for _ in range(times):
             self._section()
-            E = self.grade * self.recovery.modulus(self.eps)
+            E = self.grade * self.recovery.modulus(self.eps - self.E0)
             x, y = self.from_axis(self.rY)
             missing = np.array([N - self.integral(self.P[0]),
                                 self.M - self.integral(x * self.P[1] - y * self.P[0])])
@@ -411,7 +413,8 @@ class _Piece:
             self._balance()
             self._shear()
         self.stress, self.angle = self.S, self.phi[..., None] + self.alpha
-        self.strain = strain_of_stress(self.recovery.law, self.S / self.grade, self.eps)
+        self.strain = self.E0 + strain_of_stress(self.recovery.law, self.S / self.grade,
+                                                 self.eps - self.E0)
 
     def _rounds(self):
         """Steps 2 and 3 in turn, for each state until its stretch has settled."""
@@ -606,6 +609,9 @@ class Recovery:
         X = np.array([np.repeat(x, len(self.eta)), np.tile(self.eta, len(x))])
         stress = beam.stress(self._u, X) if self._u.ndim == 1 else np.stack(
             [beam.stress(u, X) for u in self._u], axis=1)
+        for factor, eigen in self.forces.eigen:
+            S0 = eigen.stress_at(X, np.arange(beam.mesh.nelements))
+            stress = stress - np.moveaxis(np.multiply.outer(factor, S0), np.ndim(factor), 0)
         stress = stress.reshape(stress.shape[:-1] + (len(x), len(self.eta)))
         if beam.element.sections == "linear":
             return np.array([0.5]), stress.mean(axis=-2, keepdims=True)

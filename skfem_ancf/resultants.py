@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 
 from .kernels.along import CableSections
+from .eigenstrain import EigenStrain
 from .quadrature import gauss
 from .mapping import cross
 from .section_forces import Sections
@@ -217,7 +218,9 @@ def _own(state, beam, e, xi):
     u, mapping = state.u_of(beam), beam.mesh.mapping()
     eta, area = _rule(beam, e, xi)
     X = np.array([np.repeat(xi[:, None], len(eta), 1), np.repeat(eta[None], len(xi), 0)])
-    S = beam.stress(u, X, e)
+    S, eigen = beam.stress(u, X, e), _eigen(state, beam)
+    for factor, load in eigen:
+        S = S - factor * load.stress_at(X, e)
     H, frame = beam.gradients(u, X, e)
     F = H + frame
     P = F[:, 0] * S[0] + F[:, 1] * S[2]
@@ -235,10 +238,20 @@ def _own(state, beam, e, xi):
     if not beam.has_sections:
         EA, ES, EI = beam.across.moments(xi[:, None], e)[..., 0]
         N, M = EA * (stretch - 1.0) - ES * curvature, EI * curvature - ES * (stretch - 1.0)
+        for factor, load in eigen:
+            S0 = factor * load.stress_at(X, e)[0] * area
+            Y = beam.mesh.mapping().offset(X, e)
+            N, M = N - np.sum(S0, axis=-1), M + np.sum(S0 * Y, axis=-1)
         Q = np.full(len(e), np.nan)
         R = N * t + Q * normal
     return dict(N=N, Q=Q, M=M, curvature=curvature, stretch=stretch, shear=shear, angle=angle,
                 force=R)
+
+
+def _eigen(state, beam):
+    """Factors and loads of stress-free strains on a beam."""
+    return [(state.load * load.factor(state.t), load) for load in state.system.loads
+            if isinstance(load, EigenStrain) and load.beam is beam]
 
 
 def _rule(beam, e, xi):

@@ -10,6 +10,7 @@ import numpy as np
 
 from .beam import select_beam, select_member
 from .errors import InputError, NameUnknown, require_flag, teaching
+from .eigenstrain import EigenStrain
 from .fields import Values, find_field
 from .frozen import Frozen
 from .points import require_body
@@ -349,7 +350,25 @@ class State(Frozen):
         at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
         field = find_field(field)
         return at.gather([field.of(Values(part, self.u, partial(
-            self._recovery_of, part.number) if recover else None)) for part in at.parts])
+            self._recovery_of, part.number) if recover else None, self.eigen_stress))
+            for part in at.parts])
+
+    def eigen_stress(self, part: Part) -> Any:
+        """What the stress of the elements is less by at points, for stress-free strains.
+
+        Parameters
+        ----------
+        part
+            A :class:`~skfem_ancf.points.Part`.
+
+        Returns
+        -------
+        ndarray
+            Shape (3, n), or 0.
+        """
+        return sum(self.load * load.factor(self.t) * load.stress_at(part.at, part.e)[..., 0]
+                   for load in self.system.loads
+                   if isinstance(load, EigenStrain) and load.beam is part.beam)
 
     def _strain(self, part, recover):
         r = self._recovery_of(part.number) if recover else None
@@ -361,7 +380,7 @@ class State(Frozen):
         r = self._recovery_of(part.number) if recover else None
         if r is not None:
             return r.at(part, slice(3, 6))
-        return part.stress(self.u)
+        return part.stress(self.u) - self.eigen_stress(part)
 
     # recovered fields
 

@@ -19,6 +19,7 @@ from .doors import configuration, displacement
 from .dynamics import get_scheme
 from .dynamics.checkpoint import resume
 from .dynamics.integrate import follow, integrate
+from .eigenstrain import EigenStrain, Temperature, products, takes_time
 from .forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring, TorsionalSpring,
                      bind_force)
 from .errors import (ConvergenceError, InputError, Interrupted, StabilityWarning, ask_field,
@@ -715,6 +716,89 @@ class Scene:
         k = self._number_of_beam(beam)
         load = Pressure(self._beams[k], boundary, require_finite_scalar("p", p), amplitude)
         return self._put(loads=[(k, load)])
+
+    def temperature(self, change: float | Callable[..., ArrayLike], beam: WhichBeam = None,
+                    amplitude: TimeFunction = None) -> Scene:
+        """A change of the temperature: materials expand by their ``thermal_expansion``.
+
+        Parameters
+        ----------
+        change
+            In degrees from the stress-free state: a number, or a function of material coordinates
+            x, the parameter of the axis, and y, the distance from it, arrays of one shape; or of
+            (x, y, t).
+        beam
+            The beam, its name or its number, in a scene of several.
+        amplitude
+            A function of time by which it is multiplied in a motion.
+
+        Returns
+        -------
+        Scene
+            Itself.
+
+        Raises
+        ------
+        InputError
+            If no material of the beam expands.
+
+        Examples
+        --------
+        >>> from skfem_ancf import (Beam, ElementBeamANCFCubic, MeshBeam, Scene, Section,
+        ...                         StVenantKirchhoff)
+        >>> steel = StVenantKirchhoff(E=2e11, nu=0.3, thermal_expansion=12e-6)
+        >>> brass = StVenantKirchhoff(E=1e11, nu=0.3, thermal_expansion=19e-6)
+        >>> strip = Section.layers((0.001, steel), (0.001, brass), width=0.01)
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 0.2, 9), height=0.002),
+        ...             ElementBeamANCFCubic(2), section=strip)
+        >>> state = Scene(beam).clamp("left").temperature(100.0).solve_static()
+        >>> float(round(state.displacement((0.2, 0.0))[1], 4))  # brass is at the top
+        -0.0102
+        """
+        k, at = self._number(beam), self._beams[self._number(beam)]
+        if not takes_time(change):
+            return self._put(loads=[(k, Temperature(change, None, amplitude))])
+        return self._put(loads=[(k, Temperature(f, None, _both(c, amplitude)))
+                                for f, c in products("the temperature", change, at)])
+
+    def eigenstrain(self, xx: Any = None, yy: Any = None, xy: Any = None, beam: WhichBeam = None,
+                    amplitude: TimeFunction = None) -> Scene:
+        """A strain that the body would have without stress: of growth, muscles, drying, voltage.
+
+        The stress is that of what the strain is more: of E - E0. In the beam's frame; of a cable
+        ``xx`` alone acts.
+
+        Parameters
+        ----------
+        xx, yy, xy
+            eps_xx, eps_yy and eps_xy: numbers, or functions of material coordinates (x, y), arrays
+            of one shape, or of (x, y, t).
+        beam
+            The beam, its name or its number, in a scene of several.
+        amplitude
+            A function of time by which it is multiplied in a motion.
+
+        Returns
+        -------
+        Scene
+            Itself.
+
+        Raises
+        ------
+        InputError
+            If the stress of a material is not linear in the strain, or a function of (x, y, t) is
+            no sum of few products of one of (x, y) and one of t.
+        """
+        k, at, loads, given = self._number(beam), self._beams[self._number(beam)], [], {}
+        for name, value in (("xx", xx), ("yy", yy), ("xy", xy)):
+            if takes_time(value):
+                loads += [EigenStrain(**{name: f}, amplitude=_both(c, amplitude))
+                          for f, c in products(f"eps_{name}", value, at)]
+            else:
+                given[name] = value
+        if not loads or any(value is not None for value in given.values()):
+            loads.append(EigenStrain(**given, amplitude=amplitude))
+        return self._put(loads=[(k, load) for load in loads])
 
     def moment(self, boundary: Place, M: float, beam: WhichBeam = None,
                amplitude: TimeFunction = None) -> Scene:
@@ -1458,6 +1542,20 @@ class Scene:
         return State(self.system, result.u, result.load, result.force, result.converged,
                      result.iterations, result.message, result.steps, result.multipliers,
                      doubt=result.doubt)
+
+
+class _Product:
+    """The product of two functions of time."""
+
+    def __init__(self, a, b):
+        self.a, self.b = a, b
+
+    def __call__(self, t):
+        return self.a(t) * self.b(t)
+
+
+def _both(coefficient, amplitude):
+    return coefficient if amplitude is None else _Product(coefficient, amplitude)
 
 
 def _branch(point, system):

@@ -223,6 +223,7 @@ class SectionForces:
         self.sampled = [*sampled, *(s.times(factor) for factor, load in loads
                                     for s in load.sampled)]
         self.viscous = viscous
+        self.eigen = [(factor, load.eigen) for factor, load in loads if load.eigen is not None]
         self._loads(u)
         self._cut(loads, stations)
         self._check()
@@ -272,6 +273,9 @@ class SectionForces:
         internal = _each(beam.kernel.forces, u)
         if self.viscous is not None:
             internal = internal + self.viscous
+        for factor, eigen in self.eigen:
+            internal = internal - np.reshape(factor, (*np.shape(factor), 1, 1, 1)) * _each(
+                eigen.element_forces, u)
         left, right = np.split(internal - load, 2, axis=-2)
         q = np.split(self.q, 2, axis=-2)
         # of the part of the beam on the right of a section on that on its left

@@ -150,6 +150,9 @@ class Spread:
         Where it acts on a section or a point: element + xi.
     sampled
         Densities that are known at points.
+    eigen
+        A stress-free strain in place of a force: an
+        :class:`~skfem_ancf.eigenstrain.EigenStrain`, or None.
     """
 
     body: Array | None = None
@@ -159,12 +162,13 @@ class Spread:
     pressure: float | None = None
     stations: tuple[float, ...] = ()
     sampled: tuple[Sampled, ...] = ()
+    eigen: Any = None
 
     @property
     def acts_at_stations(self) -> bool:
         """True if it is nowhere spread."""
         return not self.sampled and all(
-            x is None for x in (self.faces, self.body, self.gravity))
+            x is None for x in (self.faces, self.body, self.gravity, self.eigen))
 
 
 def on_facets(mesh: MeshBeam, facets: ArrayLike, **how: Any) -> Spread:

@@ -15,6 +15,7 @@ from .bordered import BorderedMatrix, border, border_negative, columns_product
 from .checks import Screen
 from .constraints import Constraints
 from .damping import Damping
+from .eigenstrain import EigenStrain
 from .errors import InputError
 from .evaluation import CARRY, FORCE, MEAN, TANGENT, VISCOUS, evaluate
 from .forces.system import Forces
@@ -422,15 +423,18 @@ class System:
         Parameters
         ----------
         t, scale, u
-            As there; u of shape (N,).
+            As there; u of shape (N,). An infinite time is that of the first tangent in statics,
+            when the stress that a stress-free strain causes is not yet there.
         flat
             The numbers of the matrix, shape (n,).
         """
         for load in self.machine.tables.own_loads:
             s = self.of(load)
+            if np.isinf(t) and isinstance(load, EigenStrain):
+                continue
             i, j, v = load.stiffness(u[s])
             keep = np.full(len(v), not self.symmetric) | (np.asarray(i) >= np.asarray(j))
-            factor = scale * load.factor(None if np.isnan(t) else t)
+            factor = scale * load.factor(t if np.isfinite(t) else None)
             at = self.K._position(s.start + np.asarray(i), s.start + np.asarray(j))
             np.add.at(flat, at[keep], -factor * np.asarray(v)[keep])
 

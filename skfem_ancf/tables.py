@@ -86,8 +86,9 @@ def add_weighted_entries(J, k, i, v, x, j):
 
 @primitive("scatter")
 def subtract_from_band(A, i, j, v, x, k):
-    """A[i, j] -= v x[k], of a band matrix."""
-    np.add.at(A.flat, j * A.ld + A.top + i - j, -v * x[k])
+    """A[i, j] -= v x[k], of a band matrix; of the lower half alone where that is all there is."""
+    there = np.nonzero((i >= j) | (A.top > 0))[0]
+    np.add.at(A.flat, (j * A.ld + A.top + i - j)[there], (-v * x[k])[there])
 
 
 # joints

@@ -33,6 +33,7 @@ def add_weighted_entries(J, k, i, v, x, j):
 
 @jit
 def subtract_from_band(A, i, j, v, x, k):
-    """A[i, j] -= v x[k]."""
+    """A[i, j] -= v x[k], of the lower half alone where that is all there is."""
     for a in range(i.size):
-        A.flat[j[a] * A.ld + A.top + i[a] - j[a]] -= v[a] * x[k[a]]
+        if i[a] >= j[a] or A.top > 0:
+            A.flat[j[a] * A.ld + A.top + i[a] - j[a]] -= v[a] * x[k[a]]

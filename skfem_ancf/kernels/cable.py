@@ -303,7 +303,7 @@ class CableKernel(Chain):
             n = max(n, element.axis_degree)  # no neighbour holds a mode that fewer points miss
         self.points_number = n
         self.shared = mesh.is_uniform or np.ptp(mesh.lengths) <= 1e-13 * np.max(mesh.lengths)
-        self._across, self._xi = across, gauss(n)[0]
+        self._across, self.points = across, gauss(n)[0]
         self.packs = [self._pack(mesh, element, across, n)]
 
     @property
@@ -322,7 +322,7 @@ class CableKernel(Chain):
             Displacement of the coordinates, shape (N,).
         """
         eps, kappa = self.strain(self.gather(u))
-        h = self._across.mesh.mapping().height(self._xi)[0]
+        h = self._across.mesh.mapping().height(self.points)[0]
         return eps, 0.5 * np.transpose(h) * np.abs(kappa)
 
     def _pack(self, mesh, element, across, n):

@@ -59,6 +59,8 @@ class Material(Frozen):
         (order 1, 2 and Patel-Shabana), else 1; of profiles and layers what
         :func:`skfem_ancf.sections.shear.shear_factor` says. "paper": that number at every order. Or
         a positive number.
+    thermal_expansion
+        Strain for a degree of temperature, see :meth:`skfem_ancf.Scene.temperature`.
 
     Raises
     ------
@@ -70,7 +72,7 @@ class Material(Frozen):
 
     @taught
     def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
-                 shear_correction: str | float = "auto") -> None:
+                 shear_correction: str | float = "auto", thermal_expansion: float = 0.0) -> None:
         self.E = _number_or_function("E", E)
         self.nu = require_finite_scalar("nu", nu)
         self.density = None if density is None else _number_or_function("density", density)
@@ -85,6 +87,7 @@ class Material(Frozen):
                                                    ("auto", "paper"))
         else:
             self.shear_correction = require_positive("shear_correction", shear_correction)
+        self.thermal_expansion = require_finite_scalar("thermal_expansion", thermal_expansion)
 
     @property
     def graded(self) -> bool:
@@ -166,7 +169,8 @@ class Material(Frozen):
         >>> StVenantKirchhoff(E=1.0, nu=0.3).replace(E=2.0).E
         2.0
         """
-        return rebuilt(self, changes, ("E", "nu", "density", "plane", "shear_correction"))
+        return rebuilt(self, changes, ("E", "nu", "density", "plane", "shear_correction",
+                                       "thermal_expansion"))
 
     @taught
     def law(self, k_s: float = 1.0) -> Law:

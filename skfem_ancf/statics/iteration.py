@@ -30,8 +30,8 @@ class Target(NamedTuple):
 
     Attributes
     ----------
-    factors, scale
-        Of the tables of loads, and of loads of one's own.
+    factors, before, scale
+        Of the tables of loads, the same for the first tangent, and of loads of one's own.
     at, c, g
         Time of the joints, and their tables at it.
     gap
@@ -41,6 +41,7 @@ class Target(NamedTuple):
     """
 
     factors: F1
+    before: F1
     scale: float
     at: float
     c: F1
@@ -198,7 +199,8 @@ def _tangent(e, target, rules, x, w, k):
     """The internal force, the tangent, and 1 / its diagonal."""
     body_tangent(e.body, x.u, x.force, x.carried, rules.mixed > 0 and k > 0, x.stresses, e.K)
     add_elastic_force(e.forces, target.at, x.u, x.u, x.force)
-    add_load_stiffness(e.loads, target.factors, np.nan, target.scale, x.u, e.K)
+    factors, t = (target.factors, np.nan) if k > 0 else (target.before, np.inf)
+    add_load_stiffness(e.loads, factors, t, target.scale, x.u, e.K)
     add_element_tangent(e.forces, target.at, x.u, e.K)
     diagonal(e.K, w.scale)
     for i in lanes(x.u.size):

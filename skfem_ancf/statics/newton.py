@@ -341,6 +341,7 @@ def _target(system, result, load, start):
         values = u0[system.fixed] + load * (values - u0[system.fixed])
         gap = (1.0 - load) * gap
     times = np.array([at])
-    return Target(tables.static_factors(full), full, at, tables.offsets(times)[0],
+    before = full if gap is not None else result.load
+    return Target(tables.static_factors(full), tables.static_factors(full, before), full, at, tables.offsets(times)[0],
                   tables.slopes(times)[0], np.zeros(system.N) if gap is None else gap,
                   values - result.u[system.fixed])

@@ -1,0 +1,412 @@
+"""Strains that a body would have without stress: of temperature, growth, muscles.
+
+The potential energy is W(E - E0). For stress linear in the strain this is W(E) less the work of
+``S0 = D E0`` in the strain, which is a load: the body is pushed apart by stresses S0. They enter at
+the points of integration, E0 sampled and interpolated there as the formulation does E.
+"""
+
+from __future__ import annotations
+
+import inspect
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from scipy import sparse
+
+from .errors import CallbackError, InputError, ask_array, require_function, shown
+from .formulations import COMPONENTS
+from .kernels.base import Destination
+from .kernels.law import LINEAR
+from .loads import Load
+from .spread import Spread
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .beam import Beam
+    from .sections import Slab
+    from .types import Array, TimeFunction, WhichBeam
+
+#: Products of a function of place and one of time that a function of both may be.
+MOST = 8
+
+#: How well they have to give it, relative to its largest value.
+CLOSE = 1e-9
+
+
+class EigenStrain(Load):
+    """A stress-free strain: the elastic strain is what is left of E.
+
+    It is given in the beam's frame, along the axis and across it. Of a cable only ``xx`` acts: its
+    mean stretches the axis, and its slope across bends it.
+
+    Parameters
+    ----------
+    xx, yy, xy
+        eps_xx, eps_yy and eps_xy (not twice that): numbers, or functions of material coordinates x,
+        the parameter of the axis, and y, the distance from it, arrays of one shape. None for zero.
+    beam, amplitude
+        As for :class:`~skfem_ancf.loads.Load`.
+    """
+
+    constant = False
+    linear = True
+    # of a bound one: a matrix for each element, with sections
+    _elements: Any = None
+    _packs: Any = None
+    _spread: Any = None
+
+    def __init__(self, xx: Any = None, yy: Any = None, xy: Any = None, beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, amplitude)
+        self.xx, self.yy, self.xy = (_number_or_function(f"eps_{name}", f) for name, f in (
+            ("xx", xx), ("yy", yy), ("xy", xy)))
+
+    def of_slab(self, slab: Slab, x: Array, y: Array) -> Array:
+        """(eps_xx, eps_yy, 2 eps_xy) of a slab of a section at material coordinates.
+
+        Parameters
+        ----------
+        slab
+            A :class:`~skfem_ancf.sections.Slab`.
+        x, y
+            Coordinates, shape (...).
+
+        Returns
+        -------
+        ndarray
+            Shape (3, ...).
+        """
+        factors = 1.0, 1.0, 2.0
+        return np.array([c * _asked(f"eps_{name}", f, x, y) for c, name, f in zip(
+            factors, COMPONENTS, (self.xx, self.yy, self.xy))])
+
+    # the load
+
+    def bind(self, beam: Beam) -> Load:
+        bound = cast("EigenStrain", super().bind(beam))
+        bound._spread = Spread(eigen=bound)
+        if beam.has_sections:
+            K = _pushed_apart(beam, self)
+            bound._elements, bound.linear = K, True
+            first = beam.mesh.t[0] * beam.nd
+            dofs = first[:, None] + np.arange(2 * beam.nd)
+            i, j = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
+            bound._matrix = sparse.coo_matrix((K.ravel(), (i.ravel(), j.ravel())),
+                                              shape=(beam.N, beam.N)).tocsr()
+        else:
+            bound._packs, bound.linear = _bent_packs(beam, self), False
+        return bound
+
+    def element_forces(self, u: Array) -> Array:
+        """The forces on the coordinates of each element.
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (N,).
+
+        Returns
+        -------
+        ndarray
+            Shape (nelements, nb, 2).
+        """
+        beam = self.beam
+        if beam.has_sections:
+            q = beam.kernel.gather(beam.q0_local + u)
+            return np.einsum("eij,ej->ei", self._elements, q.reshape(len(q), -1)).reshape(q.shape)
+        u_e, out = beam.kernel.gather(u), 0.0
+        for pack, sign in self._packs:
+            force = np.zeros(u_e.size)
+            own = pack._replace(start=np.arange(len(u_e)) * u_e[0].size)
+            beam.kernel.texts.force(own, u_e.ravel(), force)
+            out = out + sign * force.reshape(u_e.shape)
+        return np.asarray(out)
+
+    def force(self, u: Array) -> Array:
+        if self.beam.has_sections:
+            return self._matrix @ (self.beam.q0_local + u)
+        return self.beam.kernel.scatter(self.element_forces(u))
+
+    def mean_force(self, u0: Array, u1: Array) -> Array:
+        if self.beam.has_sections:
+            return super().mean_force(u0, u1)
+        out = np.zeros(self.beam.N)
+        for pack, sign in self._packs:
+            force = np.zeros(self.beam.N)
+            self.beam.kernel.texts.mean(pack, u0, u1, force)
+            out += sign * force
+        return out
+
+    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
+        if self.beam.has_sections:
+            A = self._matrix.tocoo()
+            return A.row, A.col, A.data
+        nd, ne = 2 * self.beam.nd, self.beam.mesh.nelements
+        u_e, K = self.beam.kernel.gather(u).ravel(), np.zeros((ne, nd, nd))
+        i, j = np.tril_indices(nd)
+        for pack, sign in self._packs:
+            own, flat = pack._replace(start=np.arange(ne) * nd), np.zeros((ne, nd, nd + 1))
+            S = np.zeros((2, len(pack.weights), ne))
+            self.beam.kernel.texts.tangent(own, u_e, np.zeros(u_e.size), S, False, S,
+                                           Destination(flat.reshape(-1), nd + 1, 0))
+            K[:, i, j] += sign * flat[:, j, i - j]
+        K[:, j, i] = K[:, i, j]
+        dofs = self.beam.mesh.t[0][:, None] * self.beam.nd + np.arange(nd)
+        rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
+        return rows.ravel(), columns.ravel(), K.ravel()
+
+    def potential(self, u: Array) -> float:
+        if self.beam.has_sections:
+            return -float(u @ (self._matrix @ (self.beam.q0_local + 0.5 * u)))
+        energy = np.zeros(self.beam.mesh.nelements)
+        for pack, sign in self._packs:
+            for state, less in ((u, 1.0), (0.0 * u, -1.0)):
+                one = np.zeros_like(energy)
+                self.beam.kernel.texts.strain_energy(pack, state, one)
+                energy += less * sign * one
+        return -float(np.sum(energy))
+
+    def spread(self, u: Array) -> Spread:
+        return self._spread
+
+    # fields
+
+    def strain_at(self, X: Array, e: Array) -> Array:
+        """E0 at points, shape (3, n, m).
+
+        Parameters
+        ----------
+        X, e
+            Reference points (2, n, m) and their elements (n,).
+        """
+        across = self.beam.across
+        x, y = across.coordinates(X, e)
+        which, out = np.broadcast_to(across.which(X), x.shape), np.empty((3, *x.shape))
+        for k, slab in enumerate(across.slabs):
+            on = which == k
+            out[:, on] = self.of_slab(slab, x[on], y[on])
+        return out
+
+    def stress_at(self, X: Array, e: Array) -> Array:
+        """S0 at points, shape (3, n, m).
+
+        Parameters
+        ----------
+        X, e
+            Reference points (2, n, m) and their elements (n,).
+        """
+        beam, E0 = self.beam, self.strain_at(X, e)
+        if beam.has_sections:
+            laws = [layer.material.law(layer.material.shear_factor(layer.element)).stress
+                    for layer in beam.layers]
+        else:
+            laws = [_Along(slab.material.axial_modulus) for slab in beam.across.slabs]
+        return beam.across.of_slabs(X, E0, [lambda law=law: law(E0) for law in laws], e)
+
+
+class Temperature(EigenStrain):
+    """The stress-free strain of a temperature: that of each material's ``thermal_expansion``.
+
+    Parameters
+    ----------
+    change
+        Change of the temperature from that of the stress-free state: a number, or a function of
+        material coordinates (x, y).
+    beam, amplitude
+        As for :class:`~skfem_ancf.loads.Load`.
+    """
+
+    def __init__(self, change: Any, beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(None, None, None, beam, amplitude)
+        self.change = _number_or_function("the temperature", change)
+
+    def bind(self, beam: Beam) -> Load:
+        if not any(slab.material.thermal_expansion for slab in beam.across.slabs):
+            raise InputError(f"no material of {beam!r} expands with the temperature: give one a "
+                             "thermal_expansion, as StVenantKirchhoff(..., thermal_expansion=1e-5)")
+        return super().bind(beam)
+
+    def of_slab(self, slab: Slab, x: Array, y: Array) -> Array:
+        law = slab.material
+        size = law.thermal_expansion * (1.0 + law.nu if law.plane == "strain" else 1.0)
+        T = size * _asked("the temperature", self.change, x, y)
+        return np.array([T, T, 0.0 * T])
+
+
+class _Along:
+    """Stress along a fibre of a cable."""
+
+    def __init__(self, modulus):
+        self.modulus = modulus
+
+    def __call__(self, strain):
+        return np.array([self.modulus * strain[0], 0.0 * strain[0], 0.0 * strain[0]])
+
+
+def _number_or_function(name, value):
+    if value is None or callable(value):
+        return None if value is None else require_function(name, value, "of (x, y)")
+    if isinstance(value, bool) or not np.isreal(value) or np.ndim(value) or not np.isfinite(value):
+        raise InputError(f"{name} must be a number or a function of (x, y), got {shown(value)}")
+    return float(value)
+
+
+def _asked(name, f, x, y):
+    """A number or a function of material coordinates, at arrays of one shape."""
+    if not callable(f):
+        return np.full(np.shape(x), 0.0 if f is None else f)
+
+    def values(x, y):
+        found = f(x, y)
+        return np.broadcast_to(found, x.shape) if np.ndim(found) == 0 else found
+
+    return ask_array(f"{name}(x, y)", np.shape(x), values, x, y)
+
+
+def _pushed_apart(beam, eigen):
+    """The derivative of the forces of the stresses S0: constant matrices of the elements."""
+    kernel, across, ne, parts = beam.kernel, beam.across, beam.mesh.nelements, []
+    for table in kernel.tables:
+        term, pack = table.term, table.pack
+        if pack.law.kind != LINEAR:
+            raise InputError(
+                f"a stress-free strain needs stress linear in the strain, which "
+                f"{type(table.slab.material).__name__} has not: use StVenantKirchhoff")
+        E0 = []
+        for row, name in enumerate(COMPONENTS):
+            xi, eta = term.nodes(name), term.section_nodes
+            X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
+            values = eigen.of_slab(table.slab, *across.coordinates(X))[row]
+            matrix = term.matrix(name)
+            E0.append(values if matrix is None else values @ matrix.T)
+        S0 = np.einsum("cd,dep->epc", pack.law.D, np.array(E0)) * np.broadcast_to(
+            pack.weights.T, (ne, len(pack.weights)))[..., None]
+        parts.append(S0.transpose(0, 2, 1).reshape(ne, -1))
+    stress, nb = np.concatenate(parts, axis=1), beam.nd // 2
+    return np.concatenate([kernel.geometric(np.zeros((part.stop - part.start, 2 * nb, 2)), part,
+                                            stress[part])
+                           for part in (slice(k.start, min(k.stop, ne)) for k in kernel.chunks())])
+
+
+def _bent_packs(beam, eigen):
+    """Packs of a cable, and signs, whose energies differ by N0 eps + M0 kappa and a constant.
+
+    One has a stress-free curvature that is less by 1, M0 for E I, and N0 for what couples both.
+    """
+    pack, xi = beam.kernel.packs[0], beam.kernel.points
+    N0, M0 = np.zeros((2, beam.mesh.nelements, len(xi)))
+    across = beam.across
+    for slab, (eta, w) in across.rules(8):
+        X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
+        x, y = across.coordinates(X)
+        size = (slab.material.axial_modulus * across.grade(slab, X) * across.breadth(slab, X)
+                * beam.mesh.mapping().height(X[0])[0] * np.tile(w, len(xi)))
+        S0 = size * eigen.of_slab(slab, x, y)[0]
+        N0 += S0.reshape(*N0.shape, -1).sum(axis=-1)
+        M0 -= (S0 * y).reshape(*M0.shape, -1).sum(axis=-1)
+    n, ne = N0.T.shape
+    none = pack.constant[:0]
+    plain = pack._replace(
+        stiffness=np.array([np.zeros((n, ne)), M0.T, N0.T]), place=np.arange(ne),
+        weights=np.ascontiguousarray(np.broadcast_to(pack.weights, (n, ne))), constant=none,
+        pairs=pack.pairs._replace(held=np.ascontiguousarray(pack.pairs.held[:, :0])))
+    return (plain._replace(kappa0=pack.kappa0 - 1.0), 1.0), (plain, -1.0)
+
+
+# functions of time too
+
+
+def takes_time(function: Any) -> bool:
+    """True if a function takes three arguments, x, y and t."""
+    if not callable(function):
+        return False
+    try:
+        kinds = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        return False
+    return sum(p.default is p.empty and p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)
+               for p in kinds) == 3
+
+
+def products(name: str, function: Callable[..., Any], beam: Beam
+             ) -> list[tuple[Callable[..., Any], Callable[[float], float]]]:
+    """A function (x, y, t) as a sum of functions of (x, y) times functions of t.
+
+    Found by empirical interpolation: the function at some times, and its values at as many places
+    as the factors; exact for what is such a sum.
+
+    Parameters
+    ----------
+    name
+        For messages.
+    function
+        Takes arrays x and y of one shape, and a time.
+    beam
+        The :class:`~skfem_ancf.Beam` on which it is wanted.
+
+    Returns
+    -------
+    list
+        Pairs of a function of place and one of time.
+
+    Raises
+    ------
+    InputError
+        If it takes more than a few products.
+
+    References
+    ----------
+    Barrault, Maday, Nguyen, Patera: "An empirical interpolation method", Comptes Rendus
+    Mathematique 339 (2004).
+    """
+    X = np.array(np.meshgrid(np.linspace(0.02, 0.97, 7), np.linspace(0.01, 0.98, 9))
+                 ).reshape(2, -1)
+    x, y = (c.ravel() for c in beam.across.coordinates(X))
+    times = np.append(np.linspace(0.0, 1.0, 33), np.geomspace(1e-3, 1e3, 40) * 1.0371)
+    at = [_at(function, t) for t in times]
+    F = np.array([_asked(f"{name}(t={t:g})", f, x, y) for t, f in zip(times, at)])
+    size, left, chosen, places = np.max(np.abs(F)), F.copy(), [], []
+    while np.max(np.abs(left)) > CLOSE * size:
+        k, p = np.unravel_index(np.argmax(np.abs(left)), left.shape)
+        chosen.append(k)
+        places.append(p)
+        if len(chosen) > MOST:
+            raise InputError(
+                f"{name}(x, y, t) is no sum of at most {MOST} functions of (x, y) times functions "
+                "of t, as x * np.sin(t) is: give such a sum, or several eigenstrains with an "
+                "amplitude each")
+        left = F - np.linalg.solve(F[np.ix_(chosen, places)].T, F[:, places].T).T @ F[chosen]
+    inverse = np.linalg.inv(F[np.ix_(chosen, places)])
+    return [(at[k], _Coefficient(name, function, x[places], y[places], inverse[:, j]))
+            for j, k in enumerate(chosen)]
+
+
+def _at(function, t):
+    return _AtTime(function, float(t))
+
+
+class _AtTime:
+    """A function (x, y, t) at one time."""
+
+    def __init__(self, function, t):
+        self.function, self.t = function, t
+
+    def __call__(self, x, y):
+        return self.function(x, y, self.t)
+
+
+class _Coefficient:
+    """The factor of one product as a function of time."""
+
+    def __init__(self, name, function, x, y, weights):
+        self.name, self.function, self.x, self.y, self.weights = name, function, x, y, weights
+
+    def __call__(self, t):
+        if np.ndim(t):
+            return np.array([self(s) for s in t])
+        found = _asked(f"{self.name}(t={t:g})", _AtTime(self.function, float(t)), self.x, self.y)
+        if not np.all(np.isfinite(found)):
+            raise CallbackError(f"{self.name} is not finite at t = {t:g}")
+        return float(found @ self.weights)
