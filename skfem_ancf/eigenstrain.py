@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from scipy import sparse
 
-from .errors import CallbackError, InputError, ask_array, require_function, shown
+from .errors import InputError, ask_array, require_finite_scalar, require_function, shown
 from .formulations import COMPONENTS
 from .kernels.base import Destination
 from .kernels.law import LINEAR
@@ -54,6 +54,7 @@ class EigenStrain(Load):
     # of a bound one: a matrix for each element, with sections
     _elements: Any = None
     _packs: Any = None
+    _matrix: Any = None
     _spread: Any = None
 
     def __init__(self, xx: Any = None, yy: Any = None, xy: Any = None, beam: WhichBeam = None,
@@ -86,6 +87,9 @@ class EigenStrain(Load):
     def bind(self, beam: Beam) -> Load:
         bound = cast("EigenStrain", super().bind(beam))
         bound._spread = Spread(eigen=bound)
+        function = getattr(self.amplitude, "function", None)
+        if isinstance(function, Coefficient):
+            bound.at_rest = function(1.0)
         if beam.has_sections:
             K = _pushed_apart(beam, self)
             bound._elements, bound.linear = K, True
@@ -220,7 +224,7 @@ class Temperature(EigenStrain):
     def __init__(self, change: Any, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
         super().__init__(None, None, None, beam, amplitude)
-        self.change = _number_or_function("the temperature", change)
+        self.change = _number_or_function("the temperature", change, False)
 
     def bind(self, beam: Beam) -> Load:
         if not any(slab.material.thermal_expansion for slab in beam.across.slabs):
@@ -245,12 +249,16 @@ class _Along:
         return np.array([self.modulus * strain[0], 0.0 * strain[0], 0.0 * strain[0]])
 
 
-def _number_or_function(name, value):
-    if value is None or callable(value):
-        return None if value is None else require_function(name, value, "of (x, y)")
-    if isinstance(value, bool) or not np.isreal(value) or np.ndim(value) or not np.isfinite(value):
-        raise InputError(f"{name} must be a number or a function of (x, y), got {shown(value)}")
-    return float(value)
+def _number_or_function(name, value, optional=True):
+    if value is None and optional:
+        return None
+    if callable(value):
+        return require_function(name, value, "of (x, y)")
+    try:
+        return require_finite_scalar(name, value)
+    except InputError as error:
+        raise InputError(f"{name} must be a number or a function of (x, y), got {shown(value)}"
+                         ) from error
 
 
 def _asked(name, f, x, y):
@@ -331,7 +339,7 @@ def takes_time(function: Any) -> bool:
 
 
 def products(name: str, function: Callable[..., Any], beam: Beam
-             ) -> list[tuple[Callable[..., Any], Callable[[float], float]]]:
+             ) -> list[tuple[Callable[..., Any], Coefficient]]:
     """A function (x, y, t) as a sum of functions of (x, y) times functions of t.
 
     Found by empirical interpolation: the function at some times, and its values at as many places
@@ -379,7 +387,7 @@ def products(name: str, function: Callable[..., Any], beam: Beam
                 "amplitude each")
         left = F - np.linalg.solve(F[np.ix_(chosen, places)].T, F[:, places].T).T @ F[chosen]
     inverse = np.linalg.inv(F[np.ix_(chosen, places)])
-    return [(at[k], _Coefficient(name, function, x[places], y[places], inverse[:, j]))
+    return [(at[k], Coefficient(name, function, x[places], y[places], inverse[:, j]))
             for j, k in enumerate(chosen)]
 
 
@@ -397,16 +405,30 @@ class _AtTime:
         return self.function(x, y, self.t)
 
 
-class _Coefficient:
-    """The factor of one product as a function of time."""
+class Coefficient:
+    """The factor of one product as a function of time.
 
-    def __init__(self, name, function, x, y, weights):
+    Parameters
+    ----------
+    name, function
+        For messages, and the function (x, y, t).
+    x, y, weights
+        Places at which it is asked, and what its values there are multiplied by, shape (k,).
+    amplitude
+        Another factor, a function of time, or None.
+    """
+
+    def __init__(self, name: str, function: Callable[..., Any], x: Array, y: Array,
+                 weights: Array, amplitude: TimeFunction = None) -> None:
         self.name, self.function, self.x, self.y, self.weights = name, function, x, y, weights
+        self.amplitude = amplitude
+
+    def times(self, amplitude: TimeFunction) -> Coefficient:
+        """The product with a function of time."""
+        return Coefficient(self.name, self.function, self.x, self.y, self.weights, amplitude)
 
     def __call__(self, t):
         if np.ndim(t):
             return np.array([self(s) for s in t])
         found = _asked(f"{self.name}(t={t:g})", _AtTime(self.function, float(t)), self.x, self.y)
-        if not np.all(np.isfinite(found)):
-            raise CallbackError(f"{self.name} is not finite at t = {t:g}")
-        return float(found @ self.weights)
+        return float(found @ self.weights) * (1.0 if self.amplitude is None else self.amplitude(t))

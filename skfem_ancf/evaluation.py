@@ -28,7 +28,7 @@ def evaluate(e, what, u, v, factors, t, scale, use_carried, stresses, carried, f
     factors, t, scale
         As for :func:`~skfem_ancf.tables.external_force`.
     """
-    at = scale if np.isnan(t) else t  # the time of a motion, in statics the load factor
+    at = t if np.isfinite(t) else scale  # the time of a motion, in statics the load factor
     if what == FORCE:
         body_force(e.body, u, f)
         add_elastic_force(e.forces, at, u, u, f)

@@ -127,6 +127,9 @@ class Values(Mapping):
         Displacement of the coordinates that the part is numbered by, shape (N,).
     find
         Returns the recovered field of the beam, or None; None for the field of the elements.
+    eigen
+        Returns what the stress of the elements is less by at points of a part, for stress-free
+        strains; None where there are none.
 
     Attributes
     ----------

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .beam import Beam
     from .checks import Checks
     from .joints.base import Joint
+    from .points import Part
     from .recovery import Recovery
     from .rigid import RigidBody
     from .statics.stability import Verdict

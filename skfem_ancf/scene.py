@@ -717,7 +717,7 @@ class Scene:
         load = Pressure(self._beams[k], boundary, require_finite_scalar("p", p), amplitude)
         return self._put(loads=[(k, load)])
 
-    def temperature(self, change: float | Callable[..., ArrayLike], beam: WhichBeam = None,
+    def temperature(self, change: Any, beam: WhichBeam = None,
                     amplitude: TimeFunction = None) -> Scene:
         """A change of the temperature: materials expand by their ``thermal_expansion``.
 
@@ -726,7 +726,7 @@ class Scene:
         change
             In degrees from the stress-free state: a number, or a function of material coordinates
             x, the parameter of the axis, and y, the distance from it, arrays of one shape; or of
-            (x, y, t).
+            (x, y, t), which statics take at t = 1.
         beam
             The beam, its name or its number, in a scene of several.
         amplitude
@@ -758,7 +758,7 @@ class Scene:
         k, at = self._number(beam), self._beams[self._number(beam)]
         if not takes_time(change):
             return self._put(loads=[(k, Temperature(change, None, amplitude))])
-        return self._put(loads=[(k, Temperature(f, None, _both(c, amplitude)))
+        return self._put(loads=[(k, Temperature(f, None, c.times(amplitude)))
                                 for f, c in products("the temperature", change, at)])
 
     def eigenstrain(self, xx: Any = None, yy: Any = None, xy: Any = None, beam: WhichBeam = None,
@@ -772,7 +772,7 @@ class Scene:
         ----------
         xx, yy, xy
             eps_xx, eps_yy and eps_xy: numbers, or functions of material coordinates (x, y), arrays
-            of one shape, or of (x, y, t).
+            of one shape, or of (x, y, t), which statics take at t = 1.
         beam
             The beam, its name or its number, in a scene of several.
         amplitude
@@ -789,11 +789,13 @@ class Scene:
             If the stress of a material is not linear in the strain, or a function of (x, y, t) is
             no sum of few products of one of (x, y) and one of t.
         """
-        k, at, loads, given = self._number(beam), self._beams[self._number(beam)], [], {}
+        k, at, loads = self._number(beam), self._beams[self._number(beam)], []
+        given: dict[str, Any] = {}
         for name, value in (("xx", xx), ("yy", yy), ("xy", xy)):
             if takes_time(value):
-                loads += [EigenStrain(**{name: f}, amplitude=_both(c, amplitude))
-                          for f, c in products(f"eps_{name}", value, at)]
+                for f, c in products(f"eps_{name}", value, at):
+                    part: dict[str, Any] = {name: f}
+                    loads.append(EigenStrain(**part, amplitude=c.times(amplitude)))
             else:
                 given[name] = value
         if not loads or any(value is not None for value in given.values()):
@@ -1542,20 +1544,6 @@ class Scene:
         return State(self.system, result.u, result.load, result.force, result.converged,
                      result.iterations, result.message, result.steps, result.multipliers,
                      doubt=result.doubt)
-
-
-class _Product:
-    """The product of two functions of time."""
-
-    def __init__(self, a, b):
-        self.a, self.b = a, b
-
-    def __call__(self, t):
-        return self.a(t) * self.b(t)
-
-
-def _both(coefficient, amplitude):
-    return coefficient if amplitude is None else _Product(coefficient, amplitude)
 
 
 def _branch(point, system):

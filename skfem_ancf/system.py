@@ -297,19 +297,20 @@ class System:
         return np.ascontiguousarray(rows[weights > 0.0])
 
     def _evaluate(self, what, u, v=None, load=1.0, t=None, stresses=None, carried=None,
-                  use_carried=False):
+                  use_carried=False, geometric=True):
         """Run :func:`~skfem_ancf.evaluation.evaluate`; returns the force."""
         tables = self.machine.tables
         u, v = np.array(u, dtype=float), np.array(u if v is None else v, dtype=float)
-        factors = tables.static_factors(load)
+        first = what == TANGENT and t is None and not geometric
+        factors = tables.static_factors(load, 0.0 if first else None)
+        time = np.inf if first else np.nan if t is None else float(t)
         if what == TANGENT and t is not None and self._varying:
             factors = load * tables.factors(np.array([t]))[0]
         none = tables.stresses if stresses is None or carried is None else None
         force = np.zeros(self.N)
         run, equations = self.machine.of(evaluate)
-        run(equations, what, u, v, factors, np.nan if t is None else float(t), float(load),
-            use_carried, none if stresses is None else stresses,
-            none if carried is None else carried, force)
+        run(equations, what, u, v, factors, time, float(load), use_carried,
+            none if stresses is None else stresses, none if carried is None else carried, force)
         return force
 
     def momentum(self, v: Array) -> Array:
@@ -583,7 +584,8 @@ class System:
         stresses = self.machine.tables.stresses
         if not geometric:
             carried = np.zeros_like(stresses)
-        force = self._evaluate(TANGENT, u, None, load, t, stresses, carried, carried is not None)
+        force = self._evaluate(TANGENT, u, None, load, t, stresses, carried, carried is not None,
+                               geometric)
         return force, (u.copy(), stresses)
 
     def stress_step(self, evaluations: tuple[Array, Array], du: Array) -> Array:

@@ -1,0 +1,196 @@
+"""Temperature and stress-free strains: Timoshenko's strip, exact curls, buckling, free motion."""
+
+import pickle
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
+                        MeshBeam, NeoHookean, Scene, Section, StVenantKirchhoff)
+from skfem_ancf.errors import CallbackError
+
+STEEL = StVenantKirchhoff(E=2e11, nu=0.0, density=8000, thermal_expansion=12e-6)
+BRASS = StVenantKirchhoff(E=1e11, nu=0.0, density=8500, thermal_expansion=19e-6)
+ELEMENTS = {"order 1": ElementBeamANCF(1), "order 2": ElementBeamANCF(2),
+            "cubic": ElementBeamANCFCubic(2), "cubic of order 3": ElementBeamANCFCubic(3),
+            "cable": ElementBeamCable(3), "quintic cable": ElementBeamCable(5)}
+every = pytest.mark.parametrize("element", ELEMENTS.values(), ids=ELEMENTS)
+
+
+def strip(element, lower=0.001, upper=0.001, n=16, L=0.2, laws=(STEEL, BRASS), **options):
+    section = Section.layers((lower, laws[0]), (upper, laws[1]), width=0.01)
+    mesh = MeshBeam.init_line(np.linspace(0, L, n + 1), height=lower + upper)
+    return Beam(mesh, element, section=section, **options)
+
+
+def timoshenko(lower, upper, change):
+    """Curvature of a bimetal strip that is heated: Timoshenko (1925), equation 4."""
+    m, n, h = lower / upper, STEEL.E / BRASS.E, lower + upper
+    # the layer that expands less is below: the strip bends down
+    return -6 * (19e-6 - 12e-6) * change * (1 + m) ** 2 / (
+        h * (3 * (1 + m) ** 2 + (1 + m * n) * (m**2 + 1 / (m * n))))
+
+
+@every
+@pytest.mark.parametrize("upper", [0.001, 0.003])
+@pytest.mark.parametrize("solver", ["solve_static", "solve_linear"])
+def test_timoshenkos_strip(element, upper, solver):
+    beam = strip(element, upper=upper)
+    state = getattr(Scene(beam).clamp("left").temperature(20.0), solver)()
+    kappa = timoshenko(0.001, upper, 20.0)
+    assert state.displacement((0.2, 0.0))[1] == pytest.approx(kappa * 0.02, rel=1e-3)
+
+
+@every
+def test_a_free_body_expands_without_stress(element):
+    """Uniform expansion: E = E0 everywhere, stress and section forces vanish."""
+    law = STEEL.replace(nu=0.3)
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 9), height=lambda x: 0.1 - 0.02 * x)
+    beam = Beam(mesh, element, law, width=0.02)
+    held = Scene(beam).pin("left").fix("right", "r^2")
+    state = held.temperature(500.0).solve_static()
+    e = 12e-6 * 500
+    stretch = e if not beam.has_sections else np.sqrt(1 + 2 * e) - 1
+    assert state.displacement((1.0, 0.0))[0] == pytest.approx(stretch, rel=1e-9)
+    S = state.stress((0.52, 0.01), recover=False)
+    # of a cable the strain is that of Green and Lagrange of its engineering strain
+    assert np.max(np.abs(S)) < (1e-8 if beam.has_sections else 4e-3) * 2e11 * e
+    own = state.resultants((0.52, 0.0), recover=False)
+    assert abs(own.N) < 4e-3 * 2e11 * e * 0.002 and abs(own.M) < 1e-5 * 2e11 * e * 0.002
+
+
+@pytest.mark.parametrize("element, n", [(ElementBeamANCFCubic(2), 48), (ElementBeamCable(5), 32),
+                                        (ElementBeamANCF(2), 160)])
+def test_a_strip_curls_three_turns(element, n):
+    """A stress-free strain linear across: an exact circle arc, its end at the start again."""
+    L, h = 1.0, 0.002
+    kappa = 6.0 * np.pi / L
+    mesh = MeshBeam.init_line(np.linspace(0, L, n + 1), height=h)
+    beam = Beam(mesh, element, STEEL, width=0.01)
+    scene = Scene(beam).clamp("left").eigenstrain(xx=lambda x, y: -kappa * y + kappa**2 * y**2 / 2)
+    state = scene.solve_static()
+    assert_allclose(state.displacement((L, 0.0)), [-L, 0.0], atol=2e-3)
+    middle = 1.0 / kappa
+    x = state.displacement((0.5, 0.0)) + [0.5, 0.0]
+    assert np.hypot(x[0], x[1] - middle) == pytest.approx(middle, rel=1e-2)
+    assert state.iterations < 250
+
+
+def test_heat_buckles_a_beam_between_walls():
+    """alpha T E A = 4 pi^2 E I / L^2: without the change of length before."""
+    h, L = 0.01, 1.0
+    for element in (ElementBeamANCFCubic(2), ElementBeamANCF(2)):
+        mesh = MeshBeam.init_line(np.linspace(0, L, 33), height=h)
+        beam = Beam(mesh, element, STEEL, width=0.02)
+        factor = Scene(beam).clamp("left").clamp("right").temperature(1.0).buckling(1).factors[0]
+        assert factor == pytest.approx(np.pi**2 * h**2 / (3 * L**2) / 12e-6, rel=5e-3)
+
+
+def test_stress_of_a_held_beam_and_of_each_layer():
+    """Between walls S = -E alpha T in each layer, and N is their sum."""
+    for element in (ElementBeamANCFCubic(2), ElementBeamCable(5)):
+        beam = strip(element, L=0.02)
+        state = Scene(beam).clamp("left").clamp("right").temperature(10.0).solve_static()
+        for y, law in ((-0.0005, STEEL), (0.0005, BRASS)):
+            S = state.stress((0.01, y), recover=False)
+            assert S[0] == pytest.approx(-law.E * law.thermal_expansion * 10.0, rel=1e-3)
+        N = -10.0 * 1e-5 * (STEEL.E * 12e-6 + BRASS.E * 19e-6)
+        assert state.resultants((0.01, 0.0), recover=False).N == pytest.approx(N, rel=1e-3)
+
+
+def test_recovered_fields_know_the_strain():
+    """A temperature linear across bends a free beam without stress; held at the end it is stressed.
+    """
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 17), height=0.05), ElementBeamANCFCubic(3),
+                STEEL, width=0.02)
+    scene = Scene(beam).clamp("left").temperature(lambda x, y: 100.0 * y).point_force(
+        (0.0, -50.0), at=(1.0, 0.0))
+    state = scene.solve_static()
+    assert state.recovered == {0: ""}
+    second = 0.02 * 0.05**3 / 12
+    S = state.stress((0.5, 0.02))
+    assert S[0] == pytest.approx(50.0 * 0.5 * 0.02 / second, rel=1e-3)
+    assert state.strain((0.5, 0.02))[0] == pytest.approx(S[0] / 2e11 + 12e-6 * 2.0, rel=1e-4)
+    assert state.resultants((0.5, 0.0)).M == pytest.approx(-25.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)])
+def test_force_is_the_derivative_of_the_potential_and_stiffness_that_of_the_force(element):
+    load = Scene(strip(element, n=4)).temperature(lambda x, y: 100.0 + x).system.loads[0]
+    u, du = 1e-4 * np.random.default_rng(0).standard_normal((2, load.beam.N))
+    step = 1e-6 * du
+    slope = (load.potential(u + step) - load.potential(u - step)) / 2e-6
+    assert slope == pytest.approx(-load.force(u) @ du, rel=1e-6)
+    i, j, v = load.stiffness(u)
+    K = np.zeros((load.beam.N,) * 2)
+    np.add.at(K, (i, j), v)
+    change = (load.force(u + step) - load.force(u - step)) / 2e-6
+    assert_allclose(K @ du, change, atol=1e-6 * np.abs(change).max())
+    work = load.mean_force(u, u + du) @ du
+    assert work == pytest.approx(load.potential(u) - load.potential(u + du), rel=1e-9)
+    assert_allclose(load.beam.kernel.scatter(load.element_forces(u)), load.force(u),
+                    atol=1e-12 * np.abs(load.force(u)).max())
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)])
+def test_motion_after_a_sudden_heating_conserves_energy(element):
+    scene = Scene(strip(element, n=4)).clamp("left").temperature(50.0)
+    history = scene.integrate(t_end=0.02, dt=2e-4, scheme="energy-momentum")
+    assert np.ptp(history.total_energy) < 1e-8 * np.ptp(history.strain_energy)
+
+
+def test_a_muscle_bends_a_finger_and_functions_of_time_are_products():
+    """A layer that shortens: the same by amplitude, by (x, y, t), and in statics at t = 1."""
+    soft = StVenantKirchhoff(E=1e6, nu=0.0, density=1000)
+    mesh = MeshBeam.init_line(np.linspace(0, 0.1, 9), height=0.01)
+    beam = Beam(mesh, ElementBeamANCFCubic(2), soft, width=0.01)
+
+    def pull(x, y, t):
+        return -0.1 * np.maximum(y, 0.0) / 0.005 * (1.0 + x) * np.sin(3.0 * t)
+
+    one = Scene(beam).clamp("left").eigenstrain(xx=pull)
+    two = Scene(beam).clamp("left").eigenstrain(
+        xx=lambda x, y: pull(x, y, np.pi / 6), amplitude=lambda t: np.sin(3.0 * t))
+    a, b = (s.integrate(t_end=0.05, dt=1e-3).displacement((0.1, 0.0))[-1] for s in (one, two))
+    assert_allclose(a, b, rtol=1e-8)
+    still = Scene(beam).clamp("left").eigenstrain(xx=lambda x, y: pull(x, y, 1.0))
+    assert_allclose(one.solve_static().displacement((0.1, 0)),
+                    still.solve_static().displacement((0.1, 0)), rtol=1e-8)
+    assert still.solve_static().displacement((0.1, 0))[1] > 1e-4  # it bends up, to the muscle
+
+
+def profile(x, y):
+    return 10.0 * x + 100.0 * y
+
+
+def test_pickles_and_refines():
+    scene = Scene(strip(ElementBeamANCF(2), n=4)).clamp("left").temperature(profile)
+    tip = scene.solve_static().displacement((0.2, 0.0))
+    again = pickle.loads(pickle.dumps(scene)).solve_static().displacement((0.2, 0.0))
+    assert_allclose(again, tip, rtol=1e-12)
+    fine = scene.solve_static(adapt=1e-3)
+    assert fine.beams[0].mesh.nelements > 4
+
+
+@pytest.mark.parametrize("make, words", [
+    (lambda s: s.temperature(None), "temperature|number"),
+    (lambda s: s.temperature("hot"), "number or a function"),
+    (lambda s: s.temperature(np.nan), "number or a function"),
+    (lambda s: s.eigenstrain(xx=lambda x, y: np.nan * x), "finite"),
+    (lambda s: s.eigenstrain(xx=lambda x, y: np.zeros(3)), "shape"),
+    (lambda s: s.eigenstrain(xx=lambda x, y, t: np.tanh(50.0 * (x - t))), "no sum of at most"),
+])
+def test_errors_teach(make, words):
+    with pytest.raises((InputError, CallbackError), match=words):
+        make(Scene(strip(ElementBeamANCF(2))).clamp("left"))
+
+
+def test_what_cannot_expand_says_so():
+    mesh = MeshBeam.init_line([0, 1], height=0.1)
+    dull = Scene(Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(1e6, 0.3), width=0.1))
+    with pytest.raises(InputError, match="thermal_expansion"):
+        dull.temperature(1.0)
+    rubber = Scene(Beam(mesh, ElementBeamANCF(2), NeoHookean(1e6, 0.3), width=0.1))
+    with pytest.raises(InputError, match="linear in the strain"):
+        rubber.eigenstrain(xx=0.1)
