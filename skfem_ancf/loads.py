@@ -112,7 +112,7 @@ class Load(Sealable):
     beam: Any
     linear = False
     turning = False
-    #: The factor in statics.
+    #: The factor in statics: 1 but for some loads of the package.
     at_rest = 1.0
     for_bodies = False
 

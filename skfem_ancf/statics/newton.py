@@ -343,5 +343,5 @@ def _target(system, result, load, start):
     times = np.array([at])
     before = full if gap is not None else result.load
     return Target(tables.static_factors(full), tables.static_factors(full, before), full, at,
-                  tables.offsets(times)[0], tables.slopes(times)[0], np.zeros(system.N) if gap is None else gap,
-                  values - result.u[system.fixed])
+                  tables.offsets(times)[0], tables.slopes(times)[0],
+                  np.zeros(system.N) if gap is None else gap, values - result.u[system.fixed])
