@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.integrate import quad
+import scipy
 
 from ..errors import InputError, ask_number, require_function, require_not_negative, shown
 from ..quadrature import gauss
@@ -58,7 +58,7 @@ class Law:
         """The potential at s; its integral from zero where none was given."""
         if self.energy is not None:
             return ask_number(f"the potential of {self.name} at {{:g}}", self.energy, float(s))
-        return float(quad(self, 0.0, s, epsabs=0.0, epsrel=1e-12, limit=200)[0])
+        return float(scipy.integrate.quad(self, 0.0, s, epsabs=0.0, epsrel=1e-12, limit=200)[0])
 
     def work(self, a: float, b: float) -> float:
         """What the potential gains from a to b, two states of one step.
