@@ -96,13 +96,14 @@ WORDS = {
     "k": "number of modes|index", "cmap": "colour map", "names": "coordinate",
     "form": "[Ff]orm|load",
     "times_or_ix": "refinements|elements|subdomain|function", "tind": "elements|subdomain|function",
-    "elements": "element|subdomain|points", "at": "place|point|boundary|section|facet",
+    "elements": "element|subdomain|points", "at": "place|point|boundary|section|facet|beam",
     "boundary": "place|point|facet|function", "facets": "place|point|boundary|function",
     "fields": "field", "dr": "derivative", "factors": "factor|body", "filename": "file|read|write",
     "shear_correction": "shear correction", "t_start": "t_eval", "radius": "joints",
     "t_end": "times", "adapt": "max_elements", "function": "function|the field 'f'",
     "side": "place|facet|boundary|point", "between": "point of a spring", "other": "beam|place",
     "first": "point|beam", "second": "point|beam", "body": "rigid bod|beam", "beams": "[Bb]eam",
+    "on": "beam|direction|point",
 }
 
 
@@ -459,6 +460,23 @@ call("scene.weld", lambda first, second, name, apart: moved(
         first, second, name=name, apart=apart) and clamped()),
      dict(first=(0, "right"), second=(1, (1.0, 0.0)), name="w", apart=True),
      first="other", second="other", name="label?", apart="flag")
+def slid(**options):
+    """A scene with a slider on a beam, or on the ground if a direction is given."""
+    scene = Scene(beam(), RigidBody(1.0, 1.0, (0.5, 0.0))).clamp("left")
+    return scene.slider(**options), moved(scene)
+
+
+call("scene.slider", slid, dict(at=(1, (0.5, 0.0)), on=0, angle=True, name="s"), at="other",
+     on="beam?", angle="flag", name="label?")
+call("scene.slider, line", slid, dict(at=(0, (1.0, 0.0)), on="ground", direction=(0.0, 1.0)),
+     at="other", direction="vector")
+call("joint sleeve", lambda **k: joined("sleeve", clamped, **k),
+     dict(at=("ground", (0.5, 0.0)), on=0, angle=False, name="s"), at="other", on="beam?",
+     angle="flag", name="label?")
+call("joint slot", lambda **k: joined("slot", clamped, **k),
+     dict(at=(0, (0.75, 0.0)), on="ground", direction=(1.0, 0.0), through=(0.75, 0.0), angle=False,
+          name="s"), at="other", on="other", direction="vector", through="vector?", angle="flag",
+     name="label?")
 call("state.angle", lambda **k: Scene(beam(), RigidBody(1.0, 1.0)).state().angle(**k),
      dict(body=1), body="other")
 call("scene.gravity", lambda **k: moved(clamped().gravity(**k)),

@@ -9,7 +9,8 @@ import numpy as np
 from ..errors import InputError, require_finite, require_flag, require_label, shown, teaching
 from ..beam import select_beam
 from .axis import Axis
-from .base import (Joint, Vector, cross_terms, gradients, named_place, point, rotation, section)
+from .base import (GROUND, Joint, Vector, cross_terms, gradients, named_place, point, rotation,
+                   section)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -89,7 +90,7 @@ class Sleeve(Joint):
     def bind(self, scene: Scene) -> None:
         which, at = named_place(scene, self.at)
         beam = select_beam(scene.beams, self.on)
-        if scene.members and which != "ground" and scene.beam(which) is beam:
+        if which != GROUND and scene.beam(which) is beam:
             raise InputError(f"{self!r}: a point of {beam!r} cannot slide along the beam itself")
         self.axis = Axis(beam, scene.offset(beam))
         zero = np.zeros(scene.N)
@@ -234,7 +235,8 @@ class Slot(Joint):
         The point: (beam, (x, y)) with a Beam, a RigidBody, a name or a number; a RigidBody for its
         centre of mass.
     on
-        The body, its name or its number, or "ground".
+        The body, its name or its number, or "ground"; a Beam for a line that is carried by the
+        section at ``through``.
     direction
         Direction of the line in the state of the start, shape (2,).
     through
@@ -273,6 +275,9 @@ class Slot(Joint):
                         np.hstack([self.p.weights, -b.weights]))
         if not self.w.dofs.size:
             raise InputError(f"{self!r}: the point and the line are both of the ground")
+        if which == self.on or (which != GROUND and self.on != GROUND
+                                and scene.beam(which) is scene.beam(self.on)):
+            raise InputError(f"{self!r}: a point cannot slide along a line of its own beam or body")
         gap = _cross(self.direction, self.w.start)
         size = min(beam.size for beam in scene.beams)
         if abs(gap) > 1e-6 * size:

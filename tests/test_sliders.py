@@ -1,0 +1,419 @@
+"""Sliders on beams and bodies; welds and hinges at points between the ends of beams."""
+
+import pickle
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+from scipy.optimize import fsolve
+
+from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
+                        ElementBeamCable, InputError, MeshBeam, RigidBody, Scene,
+                        StVenantKirchhoff)
+
+G = 9.81
+E, H = 1e9, 0.01
+EI, EA = E * H**4 / 12, E * H * H
+
+
+def line(a, b, n, element=None, name=None, E=E, h=H, density=100.0, grading=1.0):
+    """A straight beam from a to b."""
+    a, d = np.array(a, dtype=float), np.subtract(b, a)
+    mesh = MeshBeam.init_line(np.hypot(*d) * np.linspace(0, 1, n + 1)**grading, h, origin=a,
+                              angle=np.arctan2(d[1], d[0]))
+    return Beam(mesh, element or ElementBeamCable(), StVenantKirchhoff(E, 0.0, density), width=h,
+                name=name)
+
+
+# derivatives
+
+@pytest.mark.parametrize("angle", [False, True])
+@pytest.mark.parametrize("element", [ElementBeamCable(), ElementBeamCable(5), ElementBeamANCF(3),
+                                     ElementBeamANCFCubic(2)], ids=repr)
+def test_derivatives_on_elements_of_unequal_length(element, angle):
+    rng = np.random.default_rng(0)
+    a = line((0, 0), (2, 0.5), 4, element, "a", grading=1.3)
+    b = line((0.8, 0.2), (1, 1), 3, element, "b")
+    scene = Scene(a, b, RigidBody(1.0, 0.1, (1.5, 0.4)))
+    for at in (("b", (0.8, 0.2)), (2, (1.2, 0.3)), ("ground", (1.2, 0.3))):
+        joint = scene.slider(at, "a", angle=angle)
+        u, v = 0.01 * rng.standard_normal(scene.N), rng.standard_normal(scene.N)
+        m, h = rng.standard_normal(1 + angle), 1e-6
+        slope = (joint.value(u + h * v, 0) - joint.value(u - h * v, 0)) / (2 * h)
+        assert_allclose(joint.jacobian(u, 0) @ v, slope, atol=1e-8)
+        i, j, values = joint.curvature(u, 0, m)
+        C = np.zeros((scene.N, scene.N))
+        np.add.at(C, (i, j), values)
+        second = m @ (joint.jacobian(u + h * v, 0) - joint.jacobian(u - h * v, 0)) / (2 * h)
+        assert_allclose(C @ v, second, rtol=0, atol=1e-7 * np.abs(second).max())
+        assert_allclose(C, C.T, rtol=0, atol=1e-12)
+
+
+# motion
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+@pytest.mark.parametrize("angle", [False, True])
+def test_a_mass_on_an_inclined_plane(scheme, angle):
+    """g sin(slope) along it, across all elements; m g cos(slope) on it."""
+    plane = line((0, 0), (2, -1), 5, E=1e14)
+    body = RigidBody(1.0, 0.1, (0.2, -0.1))
+    scene = Scene(plane, body).clamp("left").clamp("right").gravity((0, -G), beam=body)
+    slider = scene.slider(body, plane, angle=angle)
+    history = scene.integrate(0.6, 5e-3, scheme=scheme)
+    way = [slider.distance(u) for u in history.u]
+    assert_allclose(way, np.hypot(0.2, 0.1) + 0.5 * G / np.sqrt(5) * history.t**2, atol=1e-5)
+    # of the plane's own vibration the mean is zero
+    force = history.joint_force(slider)[:, 0]
+    assert_allclose(np.mean(force[20:]), G * 2 / np.sqrt(5), rtol=1e-2)
+    assert np.ptp(history.total_energy) < 1e-6
+
+
+def thrown(element, angle=True):
+    """A body slides along a beam that bends under it and vibrates."""
+    beam = line((0, 0), (2, 0), 6, element, E=3e7, h=0.05, name="rail")
+    body = RigidBody(1.0, 0.01, (0.3, 0))
+    scene = Scene(beam, body).pin("left").pin("right").gravity((0, -G))
+    scene.initial_velocity(to_the_right, beam=body)
+    slider = scene.slider(body, beam, angle=angle)
+    return scene, body, slider
+
+
+def to_the_right(x):
+    return np.array([1.0 + 0 * x[0], 0 * x[0]])
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(), ElementBeamANCF(2)], ids=repr)
+def test_energy_of_a_body_that_slides_on_a_beam(element):
+    """Of second order in the step: the equation is no quadratic one."""
+    drift, ends = [], []
+    for dt in (8e-3, 4e-3, 2e-3):
+        scene, body, slider = thrown(element)
+        history = scene.integrate(0.4, dt)
+        drift.append(np.ptp(history.total_energy) / history.strain_energy.max())
+        ends.append(slider.distance(history.u[-1]))
+        s = [slider.distance(u) for u in history.u]
+        assert s[0] < 0.31 and s[-1] > 0.7  # over element boundaries
+        assert_allclose(history.position(body)[-1], scene_position(scene, history, s[-1]),
+                        atol=1e-7)
+    assert drift[0] < 2e-4 and drift[-1] < drift[0]
+    assert abs(ends[1] - ends[2]) < 0.5 * abs(ends[0] - ends[1])
+
+
+def scene_position(scene, history, s):
+    """The point of the axis at a length of the stress-free one."""
+    return history.position((s, 0.0), beam="rail")[-1]
+
+
+def test_a_sleeve_keeps_its_angle():
+    scene, body, slider = thrown(ElementBeamCable(5))
+    state = scene.integrate(0.3, 4e-3).state(-1 % 76)
+    s = slider.distance(state.u)
+    a, b = state.position((s - 1e-4, 0.0), "rail"), state.position((s + 1e-4, 0.0), "rail")
+    assert_allclose(state.angle(body), np.arctan2(*(b - a)[::-1]), atol=1e-7)
+    assert abs(state.angle(body)) > 1e-3
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+def test_compiled_is_the_same(needs_compiled, monkeypatch, scheme):
+    runs = []
+    for way in ("0", "1"):
+        monkeypatch.setenv("SKFEM_ANCF_COMPILED", way)
+        scene, _, _ = thrown(ElementBeamANCF(2))
+        runs.append(scene.integrate(0.05, 5e-3, scheme=scheme).u)
+    assert_allclose(runs[1], runs[0], rtol=0, atol=1e-9)
+
+
+def test_a_slider_goes_on_from_a_checkpoint(tmp_path):
+    scene, _, _ = thrown(ElementBeamCable())
+    whole = scene.integrate(0.05, 5e-3, checkpoint=tmp_path / "run.npz", every=3)
+    assert np.array_equal(scene.resume(tmp_path / "run.npz").u, whole.u)
+    again = pickle.loads(pickle.dumps(scene))
+    assert np.array_equal(again.integrate(0.05, 5e-3).u, whole.u)
+
+
+def test_a_mass_that_leaves_its_beam_is_said_to():
+    plane = line((0, 0), (1, -0.5), 4, E=1e12, name="plane")
+    body = RigidBody(1.0, 0.1, (0.8, -0.4))
+    scene = Scene(plane, body).clamp("left").clamp("right").gravity((0, -G), beam=body)
+    scene.slider(body, plane, name="skate")
+    with pytest.raises(ConvergenceError, match="skate.*left the beam 'plane' at its right") as o:
+        scene.integrate(1.0, 0.01)
+    leave = np.sqrt(2 * np.hypot(0.2, 0.1) / (G / np.sqrt(5)))
+    assert abs(o.value.state.t[-1] - leave) < 0.02
+
+
+# statics
+
+def overhang(F, a, length):
+    """Elastica of EI = 1, clamped at 0, through a smooth ring at (a, 0), a force F up at its end.
+
+    The ring pushes along the normal: unknowns are that force, the curvature at the root, and where
+    and at which angle the ring is.
+    """
+    def shoot(z, F):
+        k0, R, s, theta = z
+
+        def bend(force, begin, end, y):
+            return solve_ivp(lambda _, y: [np.cos(y[2]), np.sin(y[2]), y[3], force[0] * np.sin(y[2])
+                                           - force[1] * np.cos(y[2])],
+                             (begin, end), y, rtol=1e-11, atol=1e-13).y[:, -1]
+
+        first = bend((-R * np.sin(theta), F + R * np.cos(theta)), 0.0, s, [0.0, 0.0, 0.0, k0])
+        second = bend((0.0, F), s, length, first)
+        return np.array([first[0] - a, first[1], first[2] - theta, second[3]]), second
+
+    over, z = length - a, np.array([0.0, 0.0, a, 0.0])
+    z[:2] = -0.1 * F * over / 2, -0.1 * F * (1 + 1.5 * over / a)
+    for part in np.linspace(0.1, 1.0, 10):
+        z = fsolve(lambda z: shoot(z, part * F)[0], z, xtol=1e-11)
+    return z[:3], shoot(z, F)[1]
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(), ElementBeamANCF(2)], ids=repr)
+def test_a_beam_through_a_ring(element):
+    """Large bending; the beam is drawn through the ring."""
+    (_, R, s), end = overhang(2.5, 1.0, 2.0)
+    assert s > 1.009
+    beam = line((0, 0), (2, 0), 64, element)
+    scene = Scene(beam).clamp("left").point_force((0, 2.5 * EI), (2, 0))
+    ring = scene.slider(("ground", (1, 0)), beam)
+    state = scene.solve_static()
+    assert_allclose(ring.distance(state.u), s, atol=3e-5)
+    assert_allclose(state.position((2, 0)), end[:2], atol=1e-4)
+    assert_allclose(state.joint_force(ring)[0], -R * EI, rtol=2e-4)
+    assert state.stability == "stable"
+
+
+def test_a_sleeve_that_carries_a_moment():
+    """Clamped, guided at 1, a force at the end of the overhang: nothing reaches the root."""
+    F = 1e-3 * EI
+    beam = line((0, 0), (2, 0), 128)
+    scene = Scene(beam).clamp("left").point_force((0, F), (2, 0))
+    guide = scene.slider(("ground", (1, 0)), beam, angle=True)
+    state = scene.solve_static()
+    assert_allclose(state.displacement((2, 0))[1], F / (3 * EI), rtol=1e-4)
+    assert_allclose(np.abs(state.joint_force(guide)), (F, F * 1.0), rtol=2e-3)
+    assert abs(state.reactions("left").moment) < 1e-2 * F
+
+
+def test_a_beam_on_a_beam():
+    """The end of a cantilever rests on the middle of another, across: springs of 3 EI / l^3."""
+    low = line((0, 0), (2, 0), 32, name="low")
+    high = line((1, 0), (1, 1), 32, name="high", E=2 * E)
+    scene = Scene(low, high).clamp("left", "low").clamp("right", "high")
+    slider = scene.slider(("high", (1, 0)), "low")
+    F = 1e-3 * EI
+    scene.point_force((F, 0), (1, 0), "high")
+    state = scene.solve_static()  # along the axis nothing is held
+    assert_allclose(state.displacement((1, 0), "high")[0], F / (3 * 2 * EI), rtol=1e-4)
+    assert abs(state.joint_force(slider)[0]) < 1e-2 * F
+    scene = Scene(low, high).clamp("left", "low").clamp("right", "high")
+    slider = scene.slider(("high", (1, 0)), "low")
+    state = scene.point_force((0, F), (2, 0), "low").solve_static()
+    # the upper beam is a strut of 2 EA, the lower one a propped cantilever with an overhang
+    assert_allclose(state.joint_force(slider)[0], F * 2.5, rtol=1e-3)
+
+
+def test_a_slot_in_a_body():
+    """Whitworth's quick return: a pin on a crank drives a rocker with a slot."""
+    crank = RigidBody(1.0, 0.1, (0.0, 0.15), name="crank")
+    rocker = RigidBody(2.0, 0.3, (0.0, -0.2), angle=0.5 * np.pi, name="rocker")
+    scene = Scene(line((5, 0), (6, 0), 2), crank, rocker).clamp("left", 0)
+    scene.pin((0, 0), crank).pin((0, -0.7), rocker)
+    scene.joint("angle", at=None, beam=crank, angle=lambda t: 4.0 * t + t * t)
+    slot = scene.slider((crank, (0.0, 0.3)), rocker, direction=(0, 1))
+    history = scene.integrate(1.0, 5e-3, scheme="generalized-alpha")
+    turn = 4.0 * history.t + history.t**2
+    pin = 0.3 * np.array([-np.sin(turn), np.cos(turn)])
+    assert_allclose(history.position((0.0, 0.3), crank), pin.T, atol=1e-8)
+    expected = np.arctan2(pin[1] + 0.7, pin[0])
+    assert_allclose(history.angle(rocker), np.unwrap(expected), atol=1e-8)
+    assert not scene.system.machine.tables.plain.joints.own  # quadratic: a table
+    assert history.joint_force(slot).shape == (201, 1)
+
+
+def test_energy_in_a_slot_is_kept():
+    """A bead in a slot of a body that turns freely, angular momentum too."""
+    disk = RigidBody(2.0, 0.5, (0, 3), name="disk")
+    bead = RigidBody(0.4, 1e-3, (0.1, 3), name="bead")
+    scene = Scene(line((5, 0), (6, 0), 2), disk, bead).clamp("left", 0)
+    scene.pin((0, 3), disk).slider(bead, disk, direction=(1, 0), angle=True)
+    for body in (disk, bead):
+        scene.initial_velocity(lambda x: 6.0 * np.array([-(x[1] - 3.0), x[0]]), beam=body)
+    history = scene.integrate(0.5, 2.5e-3)
+    assert np.ptp(history.total_energy) < 1e-10
+    r = np.hypot(*(history.position(bead) - (0, 3)).T)
+    J = 0.5 + 1e-3 + 0.4 * r**2
+    assert_allclose(J * history.angular_velocity(disk), (0.501 + 0.004) * 6.0, rtol=1e-9)
+    # r'^2 = w0^2 (J0 / J) r^2 ... by energy
+    rate = np.sqrt(36.0 * 0.505 * (1 - 0.505 / J[-1]) / 0.4)
+    v = history.velocity(bead)[-1]
+    along = history.position(bead)[-1] - (0, 3)
+    assert_allclose(v @ along / r[-1], rate, rtol=1e-4)
+
+
+# welds and hinges between ends
+
+def across(n, length=2.0, short=1e-4, **options):
+    """A beam of n elements, of which a short one has the middle of the beam inside of it."""
+    half = 0.5 * length
+    x = np.linspace(0, half - 0.4 * short, n // 2 + 1)
+    x = np.append(x, half + 0.6 * short + (half - 0.6 * short) * np.linspace(0, 1, n // 2 + 1))
+    return Beam(MeshBeam.init_line(x, H), options.pop("element", None) or ElementBeamCable(),
+                StVenantKirchhoff(E, 0.0, 100.0), width=H, **options)
+
+
+def frame(element, n):
+    """A girder of length 2, clamped at both ends, with a post of 0.7 on it.
+
+    With an odd number of elements the post stands inside of a short one.
+    """
+    girder = line((0, 0), (2, 0), n, element, "girder") if n % 2 == 0 else across(
+        n, element=element, name="girder")
+    post = line((1, 0), (1, 0.7), n, element, "post")
+    scene = Scene(girder, post)
+    for end in ("left", "right"):
+        scene.clamp(end, "girder", thickness="free")
+    return scene
+
+
+@pytest.mark.parametrize("element, n, tol", [
+    (ElementBeamCable(), 64, 1e-4), (ElementBeamCable(), 151, 1e-4),
+    (ElementBeamANCF(2), 128, 1e-4), (ElementBeamANCF(1), 151, 1e-3)], ids=str)
+def test_a_tee(element, n, tol):
+    """A force on the post: M l / 16 EI turns the middle; at a node, and inside an element."""
+    scene, F = frame(element, n), 1e-3 * EI
+    weld = scene.weld((1, 0))
+    state = scene.point_force((F, 0), (1, 0.7), "post").solve_static()
+    turn = -F * 0.7 * 2 / (16 * EI)
+    expected = -turn * 0.7 + F * 0.7**3 / (3 * EI) + F / (2 * EA)
+    assert_allclose(state.displacement((1, 0.7), "post")[0], expected, rtol=tol)
+    force = state.joint_force(weld)
+    assert_allclose(force[0], F, rtol=1e-6)
+    assert_allclose(abs(force[2]), F * 0.7, rtol=1e-4)
+    root = state.reactions("left", "girder"), state.reactions("right", "girder")
+    assert_allclose(sum(r.force[0] for r in root), -F, rtol=1e-6)
+
+
+def test_a_tee_is_as_two_beams_that_meet_in_it():
+    """Against a girder of two halves, all welded at one point by one call; large bending."""
+    F = 2.0 * EI
+    tee = frame(ElementBeamCable(), 96)
+    tee.weld((1, 0))
+    one = tee.point_force((F, 0), (1, 0.7), "post").solve_static()
+    halves = [line((0, 0), (1, 0), 48, name="a"), line((1, 0), (2, 0), 48, name="b"),
+              line((1, 0), (1, 0.7), 96, name="post")]
+    scene = Scene(*halves)
+    scene.clamp("left", "a", thickness="free").clamp("right", "b", thickness="free")
+    star = scene.weld((1, 0))
+    assert len(star.equations) == 6 and "from number 2" in star.equations[-1]
+    two = scene.point_force((F, 0), (1, 0.7), "post").solve_static()
+    tip = two.displacement((1, 0.7), "post")
+    assert np.hypot(*tip) > 0.15
+    assert_allclose(one.displacement((1, 0.7), "post"), tip, rtol=2e-3)
+
+
+@pytest.mark.parametrize("kind", ["one call", "several calls", "a body between"])
+def test_a_star(kind):
+    """Four arms of length 1 clamped at their ends: a moment at the middle turns it by M / 16 EI."""
+    arms = [line((0, 0), (np.cos(a), np.sin(a)), 24, name=f"arm {k}")
+            for k, a in enumerate((0.1, 1.7, 3.5, 4.9))]
+    hub = RigidBody(1.0, 0.1, (0, 0), name="hub")
+    scene = Scene(*arms, hub) if kind == "a body between" else Scene(*arms)
+    for arm in arms:
+        scene.clamp("right", arm, thickness="free")
+    if kind == "several calls":
+        for arm in arms[1:]:
+            scene.weld((arms[0], "left"), (arm, "left"))
+    else:
+        scene.weld((0, 0))
+    M = 1e-3 * EI
+    if kind == "a body between":
+        scene.moment(hub, M)
+    else:
+        scene.moment("left", M, arms[2])
+    state = scene.solve_static()
+    turn = M / (16 * EI)
+    angles = [float(state.resultants((0, 0), arm).angle) for arm in arms]
+    start = np.array([0.1, 1.7, 3.5, 4.9])
+    assert_allclose(np.angle(np.exp(1j * (np.array(angles) - start))), turn, rtol=1e-4)
+    if kind == "a body between":
+        assert_allclose(state.angle(hub), turn, rtol=1e-4)
+
+
+def test_a_hinge_in_the_middle_of_a_beam():
+    """A post that stands on a girder by a hinge and is held at its top: a strut."""
+    scene = frame(ElementBeamCable(), 65)
+    hinge = scene.hinge((1, 0))
+    scene.joint("line", at=(1, 0.7), beam="post", direction=(0, 1))
+    F = 1e-3 * EI
+    state = scene.point_force((0, -F), (1, 0.7), "post").solve_static()
+    assert_allclose(state.displacement((1, 0), "girder")[1], -F * 8 / (192 * EI), rtol=1e-4)
+    assert_allclose(state.joint_force(hinge), (0, -F), atol=1e-6 * F)
+
+
+def test_a_weld_to_the_ground_inside_an_element():
+    """As a clamp there: two cantilevers."""
+    beam = across(101)
+    scene = Scene(beam)
+    scene.weld((beam, (1, 0)), ("ground", (1, 0)))
+    F = 1e-3 * EI
+    state = scene.point_force((0, F), (2, 0)).point_force((0, 2 * F), (0, 0)).solve_static()
+    assert_allclose(state.displacement([(2, 0), (0, 0)])[1], np.array([F, 2 * F]) / (3 * EI),
+                    rtol=2e-4)
+
+
+def test_a_post_on_the_surface_of_a_beam():
+    """The point of a section is on its top: the arm of the girder's half height counts."""
+    h = 0.1
+    girder = line((0, 0), (2, 0), 40, ElementBeamANCF(2), "girder", h=h, E=1e6)
+    post = line((1, h / 2), (1, 0.5 + h / 2), 10, ElementBeamANCF(2), "post", h=h, E=1e12)
+    scene = Scene(girder, post).clamp("left", "girder").clamp("right", "girder")
+    scene.weld((girder, (1, h / 2)), (post, "left"))
+    F, I = 1e-2, 1e6 * h**4 / 12
+    state = scene.point_force((F, 0), post.mesh.p[:, -1], "post").solve_static()
+    arm = 0.5 + h / 2
+    expected = F * arm * arm * 2 / (16 * I) + F / (2 * 1e6 * h * h)
+    found = state.displacement(post.mesh.p[:, -1], "post")[0]
+    # the girder's shear: angle F arm / l / G A each side
+    shear = F * arm * arm / 2 / (5 / 6 * 0.5e6 * h * h)
+    assert_allclose(found, expected + shear, rtol=3e-2)
+
+
+def test_motion_of_a_tee():
+    """Energy, and the joint closed, in a weld inside an element."""
+    scene = frame(ElementBeamANCF(2), 5).gravity((30.0, 0.0))
+    weld = scene.weld((1, 0))
+    history = scene.integrate(0.2, 2e-3)
+    assert np.ptp(history.total_energy) < 1e-10
+    assert np.abs([weld.value(u, 0.0) for u in history.u]).max() < 1e-10
+    assert_allclose(history.position((1, 0), "post"), history.position((1, 0), "girder"),
+                    atol=1e-10)
+
+
+# what is refused
+
+@pytest.mark.parametrize("call, what", [
+    (lambda s: s.slider((0, (1.0, 0.0)), 0), "along the beam itself"),
+    (lambda s: s.slider((2, (0.5, 0.3)), 0), "0.3 off the axis"),
+    (lambda s: s.slider(("ground", (2.5, 0.0)), 0), "off the axis"),
+    (lambda s: s.slider(("ground", (0.5, 0.0)), 0, direction=(1, 0)), "give no direction"),
+    (lambda s: s.slider((0, (0.5, 0.0)), 2), "needs the direction"),
+    (lambda s: s.slider((0, (0.5, 0.0)), "ground"), "needs the direction"),
+    (lambda s: s.slider((0, (0.5, 0.0)), 2, direction=(0, 0)), "must not be zero"),
+    (lambda s: s.slider((0, (0.5, 0.0)), 2, direction=(1, np.nan)), "direction"),
+    (lambda s: s.slider((0, (0.5, 0.0)), 2, direction=(1, 0), angle="yes"), "angle"),
+    (lambda s: s.slider(("ground", (0.5, 0.0)), "ground", direction=(1, 0)), "both of the ground"),
+    (lambda s: s.slider((0, (0.5, 0.0)), "rail"), "rail"),
+    (lambda s: s.joint("slot", at=(0, (0.5, 0.0)), on=2, direction=(1, 0), through=(0, 1)),
+     "off the line"),
+    (lambda s: s.slider((2, (0.5, 2.0)), 2, direction=(1, 0)), "its own beam or body"),
+    (lambda s: s.slider((9.0, 9.0), 0), "no beam and no rigid body"),
+    (lambda s: s.slider((1.0, 0.0), 0), "say which"),
+])
+def test_bad_sliders(call, what):
+    scene = Scene(line((0, 0), (1, 0), 4), line((1, 0), (2, 0), 4), RigidBody(1.0, 1e-3, (0.5, 2)))
+    with pytest.raises(InputError, match=what):
+        call(scene)
+    assert not scene.joints
