@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from .system import System
 
 
+#: Times at which joints are tried, whether tables give them.
+TRIED = 0.0, 0.37
+
+
 @by_place
 class Equations(NamedTuple):
     """A scene for texts.
@@ -223,9 +227,8 @@ class Tables:
         if not s.joints:
             return True
         k, i, j, v, gk, gi, _ = tables
-        t, start = 0.0, np.zeros(1)
-        c, g = self.offsets(start)[0], self.slopes(start)[0]
-        for u in 0.1 * np.random.default_rng(0).standard_normal((2, s.N)):
+        for t, u in zip(TRIED, 0.1 * np.random.default_rng(0).standard_normal((2, s.N))):
+            c, g = self.offsets(np.array([t]))[0], self.slopes(np.array([t]))[0]
             slope = sparse.csr_array((g, (gk, gi)), shape=(s.m, s.N))
             J = slope + sparse.csr_array((v * u[j], (k, i)), shape=slope.shape)
             phi, gap = c + 0.5 * (J + slope) @ u, J - s.sparse_jacobian(u, t)

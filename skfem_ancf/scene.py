@@ -25,7 +25,8 @@ from .forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring,
 from .errors import (ConvergenceError, InputError, Interrupted, StabilityWarning, ask_field,
                      require_finite, require_finite_scalar, require_option, shown, taught, teaching)
 from .joints import Joint, bind_joint, get_joint
-from .joints.base import members_at, named_place
+from .joints.base import both_of, members_at, named_place
+from .joints.prescribed import Turned
 from .loads import EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight, bind_load
 from .path import CriticalPoint, Path
 from .pickling import functions_of, require_picklable
@@ -561,6 +562,67 @@ class Scene:
         if direction is not None:
             raise InputError("a slider on a beam moves along its axis: give no direction")
         return self.joint("sleeve", at=at, on=on, angle=angle, name=name)
+
+    def motor(self, at: Any, angle: TimeFunction = None, speed: Any = None, torque: Any = None,
+              other: Any = None) -> Joint | Load:
+        """Turn a rigid body or a section: by a given angle, at a given speed, or with a torque.
+
+        Parameters
+        ----------
+        at
+            A RigidBody, or (beam, place) with a place that is one section, as (0, "left").
+        angle
+            The angle from that of the start as a function of time, in radians.
+        speed
+            Angular velocity, a number or a function of time: the angle is its integral from the
+            time 0.
+        torque
+            Moment, a number or a function of time; a function counts as one in statics, as every
+            amplitude.
+        other
+            What the motor stands on, as ``at``: the angle is measured from it, and it takes the
+            torque with the opposite sign. The ground by default.
+
+        Returns
+        -------
+        Joint or Load
+            Of a joint ``joint_force`` is the moment of the motor.
+
+        Raises
+        ------
+        InputError
+            Unless one of angle, speed and torque is given.
+
+        Notes
+        -----
+        A torque that depends on the state is one of ``scene.control``.
+        """
+        given = [name for name, value in (("angle", angle), ("speed", speed), ("torque", torque))
+                 if value is not None]
+        if len(given) != 1:
+            raise InputError("a motor has an angle, a speed or a torque: give one of them, got "
+                             f"{given or 'none'}")
+        at = both_of("at", at)
+        if torque is not None:
+            return self._torque(at, torque, other)
+        if speed is not None:
+            angle = Turned(speed)
+        if other is None:
+            return self.joint("angle", beam=at[0], at=at[1], angle=angle)
+        return self.joint("turn", at=at, other=other, angle=angle)
+
+    def _torque(self, at, torque, other):
+        """Moments of a motor; the first of them."""
+        M, amplitude = (1.0, torque) if callable(torque) else (
+            require_finite_scalar("torque", torque), None)
+        loads = []
+        for (which, place), sign in ((at, 1.0), (other and both_of("other", other), -1.0)):
+            k = self._number(which)
+            loads.append((k, EndMoment(self.members[k], place, sign * M, amplitude)))
+            if other is None:
+                break
+        n = len(self._loads)
+        return self._put(loads=loads)._loads[n][2]
 
     def _joined(self, places):
         """Beams and places of a joint."""

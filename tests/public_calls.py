@@ -103,7 +103,7 @@ WORDS = {
     "t_end": "times", "adapt": "max_elements", "function": "function|the field 'f'",
     "side": "place|facet|boundary|point", "between": "point of a spring", "other": "beam|place",
     "first": "point|beam", "second": "point|beam", "body": "rigid bod|beam", "beams": "[Bb]eam",
-    "on": "beam|direction|point",
+    "on": "beam|direction|point", "torque": "torque|amplitude",
 }
 
 
@@ -470,6 +470,23 @@ call("scene.slider", slid, dict(at=(1, (0.5, 0.0)), on=0, angle=True, name="s"),
      on="beam?", angle="flag", name="label?")
 call("scene.slider, line", slid, dict(at=(0, (1.0, 0.0)), on="ground", direction=(0.0, 1.0)),
      at="other", direction="vector")
+def driven(**options):
+    """A beam turned at its left end."""
+    scene = free().pin("left")
+    return scene.motor(**options), moved(scene)
+
+
+call("scene.motor", driven,
+     dict(at=(0, "left"), angle=lambda t: 0.1 * t), at="other", angle="function")
+call("scene.motor, speed", driven,
+     dict(at=(0, "left"), speed=0.1), {"speed": {"float class": "a function of a number"}},
+     speed="number")
+call("scene.motor, torque", driven,
+     dict(at=(0, "left"), torque=0.1), {"torque": {"float class": "a function of a number"}},
+     torque="number")
+call("joint turn", lambda **k: joined("turn", two, **k),
+     dict(at=(0, "right"), other=(1, "left"), angle=lambda t: 0.1 * t, name="t"), at="other",
+     other="other", angle="function", name="label?")
 call("joint sleeve", lambda **k: joined("sleeve", clamped, **k),
      dict(at=("ground", (0.5, 0.0)), on=0, angle=False, name="s"), at="other", on="beam?",
      angle="flag", name="label?")

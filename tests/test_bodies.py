@@ -2,6 +2,7 @@
 
 import pickle
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -515,3 +516,122 @@ def test_bad_calls(name):
     with pytest.raises(InputError):
         BAD[name](scene, body)
     assert not scene.loads and not scene.joints and not scene.elements
+
+
+# motors, and a mechanism against another code
+
+def lever(position=(0.3, 2.0), name="lever"):
+    """A body on a pin at (0, 2), beside a beam at rest."""
+    body = RigidBody(1.5, 0.2, position, name=name)
+    return Scene(beam_of(2), body).clamp("left").pin((0, 2), body), body
+
+
+def accelerating(t):
+    return 2.0 + 3.0 * t
+
+
+def pulsing(t):
+    return 0.5 * np.cos(5 * t)
+
+
+@pytest.mark.parametrize("options, angle", [
+    (dict(angle=lambda t: t**3), lambda t: t**3),
+    (dict(speed=4.0), lambda t: 4.0 * t),
+    (dict(speed=accelerating), lambda t: 2 * t + 1.5 * t * t)], ids=["angle", "speed", "function"])
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+def test_motors_that_prescribe_a_motion(options, angle, scheme):
+    scene, body = lever()
+    motor = scene.motor(body, **options)
+    history = scene.integrate(0.8, 2e-3, scheme=scheme)
+    assert_allclose(history.angle(body), angle(history.t), atol=1e-9)
+    J, t = 0.2 + 1.5 * 0.09, 0.4
+    rate = (angle(t + 1e-4) - 2 * angle(t) + angle(t - 1e-4)) / 1e-8
+    assert_allclose(history.joint_force(motor)[200, 0], J * rate, rtol=2e-2, atol=1e-3)
+
+
+@pytest.mark.parametrize("torque, expected", [(0.7, lambda t: 0.35 * t * t),
+                                              (pulsing, lambda t: 0.02 * (1 - np.cos(5 * t)))])
+def test_motors_with_a_torque(torque, expected):
+    scene, body = lever()
+    scene.motor(body, torque=torque)
+    history = scene.integrate(1.0, 2e-3)
+    assert_allclose(history.angle(body), expected(history.t) / 0.335, atol=1e-5)
+
+
+@pytest.mark.parametrize("options", [dict(angle=lambda t: 2 * t * t), dict(speed=lambda t: 4 * t)])
+def test_a_motor_between_two_bodies(options):
+    """Free in space: angular momentum stays zero, the angle between them is given."""
+    a, b = RigidBody(1.0, 0.2, (0, 2), name="a"), RigidBody(1.0, 0.3, (0, 2), name="b")
+    scene = Scene(beam_of(2), a, b).clamp("left")
+    scene.hinge(a, b)
+    scene.motor(a, other=b, **options)
+    assert scene.system.machine.tables.plain.joints.own  # it turns with time and with the other
+    history = scene.integrate(0.8, 4e-3, scheme="generalized-alpha")
+    relative = 2 * history.t**2
+    assert_allclose(history.angle(a) - history.angle(b), relative, atol=1e-8)
+    assert_allclose(history.angle(a), relative * 0.3 / 0.5, atol=1e-4)
+    assert np.abs(history.angular_momentum).max() < 1e-3
+
+
+def test_a_torque_between_two_bodies():
+    a, b = RigidBody(1.0, 0.2, (0, 2), name="a"), RigidBody(1.0, 0.3, (0, 2), name="b")
+    scene = Scene(beam_of(2), a, b).clamp("left")
+    scene.hinge(a, b)
+    scene.motor(a, torque=0.6, other=b)
+    history = scene.integrate(0.5, 2e-3)
+    assert_allclose(history.angle(a), 1.5 * history.t**2, atol=1e-5)
+    assert_allclose(history.angle(b), -history.t**2, atol=1e-5)
+    assert np.abs(history.angular_momentum).max() < 1e-6
+    assert np.ptp(history.total_energy) < 1e-12
+
+
+def test_a_motor_at_the_root_of_a_beam():
+    """A beam turned by its section, and in statics by the angle at full load."""
+    beam = beam_of(8, E=1e6)
+    scene = Scene(beam).pin("left")
+    scene.motor((beam, "left"), angle=lambda t: 0.5 * t)
+    state = scene.solve_static()
+    assert_allclose(state.position((1, 0)), (np.cos(0.5), np.sin(0.5)), atol=1e-9)
+
+
+@pytest.mark.parametrize("options, what", [
+    (dict(), "got none"), (dict(angle=lambda t: t, speed=1.0), "give one of them"),
+    (dict(angle=3.0), "angle"), (dict(speed="fast"), "speed"), (dict(speed=np.nan), "speed"),
+    (dict(torque="1"), "torque"), (dict(torque=1.0, other=3), "other"),
+    (dict(angle=lambda t: t, other=(9, "left")), "9"), (dict(torque=1.0, at=(0, 1.0)), "at is a"),
+])
+def test_bad_motors(options, what):
+    scene, body = lever()
+    n = len(scene.joints)
+    with pytest.raises(InputError, match=what):
+        scene.motor(**{"at": body, **options})
+    assert len(scene.joints) == n and not scene.loads
+
+
+def test_a_flexible_slider_crank_as_by_exudyn(monkeypatch):
+    """To 1e-3 of what the rod bends; the stored motion is that of benchmarks/slider_crank.py."""
+    root = Path(__file__).parents[1]
+    monkeypatch.syspath_prepend(root / "benchmarks")
+    case = pytest.importorskip("slider_crank")
+    exudyn = np.load(root / "tests" / "data" / "slider_crank.npz")
+    x = np.linspace(case.CRANK, case.CRANK + case.ROD, 17)
+    rod = Beam(MeshBeam.init_line(x, case.SIDE), ElementBeamCable(),
+               StVenantKirchhoff(case.E, 0.0, case.DENSITY), width=case.SIDE)
+    crank = RigidBody(case.CRANK_MASS, case.CRANK_INERTIA, (case.CRANK / 2, 0), name="crank")
+    slider = RigidBody(case.SLIDER_MASS, 1e-6, (x[-1], 0), name="slider")
+    scene = Scene(crank, rod, slider).pin((0, 0), crank)
+    scene.motor(crank, angle=case.angle)
+    scene.hinge((crank, (x[0], 0)), (rod, (x[0], 0)))
+    scene.hinge((rod, (x[-1], 0)), slider)
+    scene.slider(slider, "ground", direction=(1, 0), angle=True)
+    history = scene.integrate(case.END, 5e-5, scheme="generalized-alpha", t_eval=exudyn["t"])
+    angle = case.angle(history.t)
+    lean = np.arcsin(case.CRANK * np.sin(angle) / case.ROD)
+    stiff = np.array([case.CRANK * np.cos(angle) + 0.5 * case.ROD * np.cos(lean),
+                      0.5 * case.CRANK * np.sin(angle)]).T
+    bent = np.hypot(*(exudyn["middle"] - stiff).T).max()
+    assert bent > 8e-3 * case.ROD and exudyn["error"] < 1e-4 * bent
+    assert_allclose(history.angle(crank), angle, atol=1e-8)
+    assert_allclose(history.position(slider)[:, 0], exudyn["slider"], rtol=0, atol=1e-3 * bent)
+    middle = history.position((x[8], 0), rod)
+    assert_allclose(middle, exudyn["middle"], rtol=0, atol=1e-3 * bent)

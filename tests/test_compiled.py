@@ -165,6 +165,7 @@ JOINED = {
     "circle": dict(beam="forearm", at=(1.0, 0.0), center=(0.4, 0.1)),
     "position": dict(beam="arm", at=(0.4, -0.03), r=lambda t: (0.4 + np.sin(t), t * t - 0.03)),
     "angle": dict(beam="forearm", at="right", angle=lambda t: np.sin(3 * t)),
+    "turn": dict(at=("arm", "left"), other=("forearm", "right"), angle=lambda t: np.sin(3 * t)),
     "plane": dict(beam="forearm", at="left"),
     "sleeve": dict(at=("ground", (1 + 0.5 * np.cos(1.1), 0.5 * np.sin(1.1))), on="forearm"),
     "slot": dict(at=("arm", (0.3, 0.02)), on="forearm", direction=(0.7, -0.02), through=(1, 0)),

@@ -42,6 +42,7 @@ CASES = {
     "circle": dict(beam="forearm", at=(1.2, 0.45), center=(0.4, 0.1)),
     "position": dict(beam="arm", at=(0.4, -0.03), r=lambda t: (0.4 + np.sin(t), t * t - 0.03)),
     "angle": dict(beam="forearm", at="right", angle=lambda t: np.sin(3 * t)),
+    "turn": dict(at=("arm", "left"), other=("forearm", "right"), angle=lambda t: np.sin(3 * t)),
     "plane": dict(beam="forearm", at="left"),
     "sleeve": dict(at=("ground", (1.2, 0.45)), on="forearm", angle=True),
     "slot": dict(at=("arm", (0.3, 0.02)), on="ground", direction=(1, 2), angle=True),
@@ -168,7 +169,7 @@ def test_a_frame_of_hinges_and_welds_is_solved_through_its_border():
 
 # conservation and drift
 
-FORCED = ("position", "angle")
+FORCED = ("position", "angle", "turn")
 
 
 @pytest.mark.parametrize("name", [n for n in JOINTS if n not in FORCED])

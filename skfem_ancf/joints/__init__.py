@@ -9,7 +9,7 @@ from .base import Joint, bind_joint
 from .guides import OnCircle, OnLine
 from .hinge import Hinge
 from .plane_section import PlaneSection
-from .prescribed import PrescribedAngle, PrescribedPosition
+from .prescribed import PrescribedAngle, PrescribedPosition, PrescribedTurn
 from .sliders import Sleeve, Slot
 from .weld import Weld
 
@@ -21,6 +21,7 @@ JOINTS = {
     "circle": OnCircle,
     "position": PrescribedPosition,
     "angle": PrescribedAngle,
+    "turn": PrescribedTurn,
     "plane": PlaneSection,
     "sleeve": Sleeve,
     "slot": Slot,
@@ -48,4 +49,5 @@ def get_joint(joint: str | Joint, **options: Any) -> Joint:
 
 
 __all__ = ["JOINTS", "Hinge", "Joint", "OnCircle", "OnLine", "PlaneSection", "PrescribedAngle",
-           "PrescribedPosition", "Sleeve", "Slot", "Weld", "bind_joint", "get_joint"]
+           "PrescribedPosition", "PrescribedTurn", "Sleeve", "Slot", "Weld", "bind_joint",
+           "get_joint"]

@@ -452,11 +452,13 @@ def point(scene: Scene, beam: WhichMember, at: Any) -> Vector:
         The beam or rigid body, its name or its number; "ground" for a point of the ground.
     at
         The point: its place (x, y) in the stress-free state, shape (2,); None for the centre of
-        mass of a rigid body.
+        mass of a rigid body; a place of a beam that is one section, as "left", for its axis there.
     """
     if isinstance(beam, str) and beam == GROUND:
         return _fixed(np.array(as_point(at)))
     member = scene.beam(beam)
+    if isinstance(at, str) and not isinstance(member, RigidBody):
+        return section(scene, member, at)[0]
     dofs, weights = member.probe(at)
     if isinstance(member, RigidBody):
         start = member.place(at)
@@ -534,6 +536,24 @@ def each(value: Any, what: str, n: int) -> tuple[Any, ...]:
         return tuple(value)
     raise InputError(f"a joint of {n} beams needs {what}, one for all of them or one for each, as "
                      f"at=('right', 'left'), got {shown(value)}")
+
+
+def both_of(name: str, place: Any) -> tuple[Any, Any]:
+    """A beam or body and a place of it; a RigidBody alone is all of it.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    place
+        As (beam, place), or a RigidBody.
+    """
+    if isinstance(place, RigidBody):
+        return place, None
+    if not isinstance(place, (tuple, list)) or len(place) != 2 or is_point(place):
+        raise InputError(f"{name} is a beam with a place of it, as (1, 'left'), or a RigidBody, "
+                         f"got {shown(place)}")
+    return place[0], place[1]
 
 
 def several(beams: Any) -> tuple[Any, ...]:

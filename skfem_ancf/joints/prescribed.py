@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.integrate import quad
 
-from ..errors import ask_array, ask_number, require_function, require_label, teaching
+from ..errors import (ask_array, ask_number, require_finite_scalar, require_function, require_label,
+                      teaching)
+from ..rigid import on_body
 from ..sampling import sample
-from .base import Joint, gradients, point, section
+from .base import Joint, both_of, cross_terms, gradients, point, rotation, section
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,7 +19,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from ..scene import Scene
-    from ..types import Array, Place, WhichBeam
+    from ..types import Array, WhichMember
+
+#: Pieces of an integral over time, at most.
+PIECES = 500
 
 
 @teaching
@@ -38,7 +44,7 @@ class PrescribedPosition(Joint):
     equations = ("force along x", "force along y")
     moving = True
 
-    def __init__(self, at: ArrayLike, r: Callable[[float], ArrayLike], beam: WhichBeam = None,
+    def __init__(self, at: ArrayLike, r: Callable[[float], ArrayLike], beam: WhichMember = None,
                  name: str | None = None) -> None:
         self.motion = require_function("r", r, "of time that returns a position (2,)")
         self.at, self.beam, self.name = at, beam, require_label("name", name)
@@ -59,16 +65,16 @@ class PrescribedPosition(Joint):
 
 @teaching
 class PrescribedAngle(Joint):
-    """The direction of an end section has turned by angle(t): e(t) x d = 0.
+    """The direction of a section or a rigid body has turned by angle(t): e(t) x d = 0.
 
     Parameters
     ----------
     at
-        The end section, "left" or "right".
+        The section, as "left" or "right" or a point through which it goes; a RigidBody.
     angle
         The angle in radians as a function of time, from the stress-free state, counterclockwise.
     beam
-        The beam, by Beam, name or number; None where there is only one.
+        The beam, by Beam, name or number; None where there is only one. Or a RigidBody.
     name
         What messages call the joint.
     """
@@ -77,10 +83,11 @@ class PrescribedAngle(Joint):
     constant = False
     moving = True
 
-    def __init__(self, at: Place, angle: Callable[[float], float], beam: WhichBeam = None,
+    def __init__(self, at: Any, angle: Callable[[float], float], beam: WhichMember = None,
                  name: str | None = None) -> None:
         self.angle = require_function("angle", angle, "of time that returns radians")
-        self.at, self.beam, self.name = at, beam, require_label("name", name)
+        self.at, self.beam = on_body(at, beam)
+        self.name = require_label("name", name)
 
     def bind(self, scene: Scene) -> None:
         _, self.d = section(scene, self.beam, self.at)
@@ -107,3 +114,69 @@ class PrescribedAngle(Joint):
     def slope(self, times: Array, N: int) -> tuple[Array, Array]:
         values = self._normals(times)[:, :, None] * self.d.weights[None]
         return self.d.dofs.ravel(), values.reshape(len(times), 1, -1)
+
+
+class Turned:
+    """The integral of an angular velocity from the time 0, as a function of time.
+
+    Parameters
+    ----------
+    speed
+        The angular velocity: a number, or a function of time.
+    """
+
+    def __init__(self, speed: float | Callable[[float], float]) -> None:
+        self.speed = require_function("speed", speed, "of time that returns radians per time") if (
+            callable(speed)) else require_finite_scalar("speed", speed)
+
+    def __call__(self, t: float) -> float:
+        if not callable(self.speed):
+            return self.speed * t
+        return float(quad(lambda s: ask_number("speed(t={:g})", self.speed, s), 0.0, t,
+                          epsabs=1e-13, epsrel=1e-13, limit=PIECES)[0])
+
+
+@teaching
+class PrescribedTurn(Joint):
+    """The angle between two sections or rigid bodies grows by angle(t): d x (R(t) e) = 0.
+
+    Parameters
+    ----------
+    at, other
+        Each (beam, place) with a Beam, a RigidBody, a name or a number, and a place as for
+        :class:`PrescribedAngle`. What turns, and from what its angle is measured.
+    angle
+        The angle in radians as a function of time, from the stress-free state, counterclockwise.
+    name
+        What messages call the joint.
+    """
+
+    equations = ("moment",)
+    constant = False
+    moving = True
+
+    def __init__(self, at: Any, other: Any, angle: Callable[[float], float],
+                 name: str | None = None) -> None:
+        self.angle = require_function("angle", angle, "of time that returns radians")
+        self.at, self.other = both_of("at", at), both_of("other", other)
+        self.name = require_label("name", name)
+
+    def bind(self, scene: Scene) -> None:
+        (_, self.d), (_, self.e) = (section(scene, *place) for place in (self.at, self.other))
+        self.start = float(np.arctan2(*self.d.start[::-1]) - np.arctan2(*self.e.start[::-1]))
+
+    def _turn(self, t: float) -> Array:
+        return rotation(self.start + ask_number("angle(t={:g})", self.angle, t))
+
+    def value(self, u: Array, t: float) -> Array:
+        d, e = self.d(u), self._turn(t) @ self.e(u)
+        return np.array([e[0] * d[1] - e[1] * d[0]])
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        Q, d = self._turn(t), self.d(u)
+        e = Q @ self.e(u)
+        return gradients([(self.d, (-e[1], e[0])), (self.e, (d[1], -d[0]) @ Q)])
+
+    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
+        i, j, v = cross_terms(self.d, self.e, self._turn(t))
+        return i, j, -multipliers[0] * v
