@@ -104,7 +104,9 @@ class Tables:
         same = plain.viscous is plain.body
         return plain._replace(
             body=body, viscous=body if same else self._flat(plain.viscous, addresses),
-            forces=plain.forces._replace(address=addresses["elements"]))
+            forces=plain.forces._replace(
+                address=addresses["elements"],
+                contacts=plain.forces.contacts._replace(address=addresses["contacts"])))
 
     def _flat(self, body, addresses):
         """The FlatBody of a Body."""

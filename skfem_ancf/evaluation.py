@@ -31,10 +31,10 @@ def evaluate(e, what, u, v, factors, t, scale, use_carried, stresses, carried, f
     at = t if np.isfinite(t) else scale  # the time of a motion, in statics the load factor
     if what == FORCE:
         body_force(e.body, u, f)
-        add_elastic_force(e.forces, at, u, u, f)
+        add_elastic_force(e.forces, at, 0.0, u, u, f)
     elif what == TANGENT:
         body_tangent(e.body, u, f, carried, use_carried, stresses, e.K)
-        add_elastic_force(e.forces, at, u, u, f)
+        add_elastic_force(e.forces, at, 0.0, u, u, f)
         add_load_stiffness(e.loads, factors, t, scale, u, e.K)
         add_element_tangent(e.forces, at, u, e.K)
     elif what == CARRY:
@@ -43,6 +43,6 @@ def evaluate(e, what, u, v, factors, t, scale, use_carried, stresses, carried, f
         body_stress(e.body, u, stresses)
     elif what == MEAN:
         body_mean(e.body, u, v, f)
-        add_elastic_force(e.forces, at, u, v, f)
+        add_elastic_force(e.forces, at, 0.0, u, v, f)
     else:
         add_viscous_force(e.viscous, u, v, f)

@@ -101,6 +101,8 @@ class Machine:
         self._kept = Kept()
         if not all(beam.compiled for beam in system.beams):
             self._plain = "compiled=False"
+        elif system.forces.contacts.own:
+            self._plain = "a distance of your own: SignedDistance"
 
     @property
     def _off(self):

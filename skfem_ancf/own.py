@@ -59,6 +59,18 @@ def own_elements(handle, what, t, factor, a, b, out):
 
 
 @primitive("own")
+def own_poses(handle, t, span, poses):
+    """Where obstacles are that move, see :meth:`skfem_ancf.forces.contacts.Contacts.put`."""
+    owner(handle).put(t, span, poses)
+
+
+@primitive("primitives")
+def own_distance(handle, obstacle, t, x, out):
+    """Distance, gradient and second derivatives of a shape of one's own."""
+    owner(handle).ask(obstacle, t, x, out)
+
+
+@primitive("own")
 def own_solve(handle, t, u, multipliers, R, phi, du, dm):
     """Solve with the multipliers by sparse factors; False if there is no solution."""
     return bool(owner(handle).solve_own(t, u, multipliers, R, phi, du, dm))
@@ -72,4 +84,5 @@ QUESTIONS = (
     lambda handle, what, t, scale, u, _, flat: own_load_stiffness(handle, t, scale, u, flat),
     lambda handle, what, t, _, u, v, out: own_joints(handle, what, t, u, v, out),
     own_elements,
+    lambda handle, what, t, span, _, __, poses: own_poses(handle, t, span, poses),
 )

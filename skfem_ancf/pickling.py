@@ -27,6 +27,8 @@ def functions_of(things: Iterable[Any], what: str = "of") -> Iterator[tuple[str,
     for thing in things:
         spread = getattr(thing, "_spread", None)  # of a load, which may hold a function too
         more = {} if spread is None else vars(spread)
+        if hasattr(thing, "shape"):  # of an obstacle
+            more = vars(thing.shape)
         for name, value in (*vars(thing).items(), *more.items()):
             name = name.lstrip("_")
             value = getattr(value, "function", value)  # an Amplitude, for one

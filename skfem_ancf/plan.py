@@ -82,7 +82,7 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         "each iteration; the last evaluates the force only")
     add("mass", "constant" if dynamic else "skipped",
         "assembled and factorised once" if dynamic else "no inertia in statics")
-    for item in (_bodies(s), _damping(s, dynamic), _elements(s)):
+    for item in (_bodies(s), _damping(s, dynamic), _elements(s), _obstacles(s, dynamic)):
         add(*item)
     dead = [load for load in scene.loads if load.constant and load.amplitude is None]
     rest = len(scene.loads) - len(dead)
@@ -152,7 +152,24 @@ def _elements(s):
         return "force elements", "skipped", "no springs, no masses"
     ours = sum(type(element).__module__.startswith(__package__) for element in forces.own)
     return "force elements", "computed", (
-        f"{len(forces.elements)}: {len(forces.parts)} in tables, {len(forces.own) - ours} of your "
-        f"own, {ours} by functions asked in Python, {len(forces.masses)} in the mass"
+        f"{len(forces.elements)}: {len(forces.parts)} in tables, {len(forces.contacts.obstacles)} "
+        f"obstacles, {len(forces.own) - ours} of your own, {ours} by functions asked in Python, "
+        f"{len(forces.masses)} in the mass"
         + (f", {len(forces.sampled)} sampled" if forces.sampled else "")
         + (", some couple points far apart" if forces.far else ""))
+
+
+def _obstacles(s, dynamic):
+    """Term, status and reason of contact."""
+    contacts = s.forces.contacts
+    if not contacts.obstacles:
+        return "obstacles", "skipped", "there are none"
+    points = sum(len(group.first) for one in contacts.obstacles for group in one.groups)
+    elements = sum(group.elements for one in contacts.obstacles for group in one.groups)
+    how = [text for text, there in (
+        ("friction", contacts.anchored),
+        ("augmented Lagrangian", contacts.augmented and not dynamic),
+        ("moving", contacts.moving), ("a distance in Python", contacts.own)) if there]
+    return "obstacles", "computed", (
+        f"{len(contacts.obstacles)}, {points} points of the surface where one of {elements} "
+        "elements is near" + "".join(f", {text}" for text in how))

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .beam import Beam
     from .checks import Checks
     from .joints.base import Joint
+    from .obstacles.contact import Contact
     from .points import Part
     from .recovery import Recovery
     from .rigid import RigidBody
@@ -80,6 +81,8 @@ class State(Frozen):
         run kept.
     verdict
         What is known of its stability, or None: it is found when asked for.
+    memory
+        What load steps have left behind at obstacles, shape (n,), or None.
 
     Attributes
     ----------
@@ -102,7 +105,8 @@ class State(Frozen):
                  steps: Iterable[Any] = (), multipliers: Array | None = None,
                  t: float | None = None, inertia: Array | float = 0.0,
                  acceleration: Array | None = None, motion: Any = None, origin: Any = None,
-                 verdict: Verdict | None = None, doubt: str = "") -> None:
+                 verdict: Verdict | None = None, doubt: str = "",
+                 memory: Array | None = None) -> None:
         self.system, self.u, self.load = system, u, load
         self.converged, self.iterations, self.message = converged, iterations, message
         self.steps = tuple(steps)
@@ -113,6 +117,7 @@ class State(Frozen):
         self.multipliers = np.zeros(system.m) if multipliers is None else multipliers
         self.doubt, self._verdict = doubt, verdict
         self._checks: Checks | None = None
+        self._memory = memory
         for name, size in (("u", system.N), ("multipliers", system.m)):
             if np.shape(getattr(self, name)) != (size,):
                 raise InputError(f"{name} must have shape ({size},) in this scene, got "
@@ -140,7 +145,7 @@ class State(Frozen):
         if {"u", "multipliers", "system", "load", "t"} & set(changes):
             vars(other).update(_verdict=None, _checks=None)
         if {"u", "multipliers", "system"} & set(changes):
-            vars(other).update(_force=None, _motion=None, _origin=None)
+            vars(other).update(_force=None, _motion=None, _origin=None, _memory=None)
         other._seal()
         return other
 
@@ -162,6 +167,7 @@ class State(Frozen):
         from .statics.stability import verdict
 
         if self._verdict is None and self.t is None:
+            self.system.forces.contacts.recall(self._memory)
             self._verdict = verdict(self.system, np.array(self.u), self.load, self.multipliers)
         return self._verdict
 
@@ -480,15 +486,40 @@ class State(Frozen):
 
     # of the whole
 
+    def contact(self, obstacle: int | None = None) -> Contact:
+        """Where the body touches obstacles, and how hard.
+
+        Parameters
+        ----------
+        obstacle
+            The number of an obstacle, in the order in which they were given; None for all.
+
+        Returns
+        -------
+        Contact
+            With ``points``, ``force``, ``pressure``, ``gap``, ``total`` and ``penetration``, see
+            :class:`~skfem_ancf.obstacles.Contact`.
+
+        Raises
+        ------
+        InputError
+            If there are no obstacles, or none of that number.
+        """
+        from .obstacles.contact import contact_of
+
+        return contact_of(self, obstacle)
+
     @property
     def strain_energy(self) -> float:
         """Strain energy of the scene."""
-        return self.system.strain_energy(self.u)
+        self.system.forces.contacts.recall(self._memory)
+        return self.system.strain_energy(self.u, self.load if self.t is None else self.t)
 
     @property
     def internal_force(self) -> Array:
         """Internal force on all coordinates, shape (N,)."""
         if self._force is None:
+            self.system.forces.contacts.recall(self._memory)
             self._force = self.system.internal_force(self.u, self.t, self.load)
         return self._force
 

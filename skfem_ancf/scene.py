@@ -20,6 +20,7 @@ from .dynamics import get_scheme
 from .dynamics.checkpoint import resume
 from .dynamics.integrate import follow, integrate
 from .eigenstrain import EigenStrain, Temperature, products, takes_time
+from .obstacles import Obstacle
 from .forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring, TorsionalSpring,
                      bind_force)
 from .errors import (ConvergenceError, InputError, Interrupted, StabilityWarning, ask_field,
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from .dynamics.base import Scheme
     from .dynamics.history import History
     from .eigen import Buckling, Modes
+    from .obstacles import Shape
     from .plan import Plan
     from .types import Array, Place, StrPath, TimeFunction, WhichBeam, WhichMember
 
@@ -1097,6 +1099,53 @@ class Scene:
         """
         return self._put(elements=[PointMass(mass, at, inertia, beam)])
 
+    def obstacle(self, shape: Shape, friction: float = 0.0, stiffness: float | None = None,
+                 beam: WhichBeam = None, **options: Any) -> Scene:
+        """Something that the surface of beams cannot enter.
+
+        Parameters
+        ----------
+        shape
+            A :class:`~skfem_ancf.obstacles.Circle`, :class:`~skfem_ancf.obstacles.Line`,
+            :class:`~skfem_ancf.obstacles.Polygon` or
+            :class:`~skfem_ancf.obstacles.SignedDistance`.
+        friction
+            Coulomb's coefficient, zero or positive.
+        stiffness
+            Pressure per penetration, positive; ``E / height`` of each beam by default.
+        beam
+            The beam, its name or its number; all of the scene by default.
+        **options
+            Those of :class:`~skfem_ancf.obstacles.Obstacle`: ``method``, ``position``, ``angle``,
+            ``damping``, ``points``, ``width``, ``tolerance``, ``slip_speed``.
+
+        Returns
+        -------
+        Scene
+            Itself. ``state.contact()`` says where it is touched and how hard.
+
+        Raises
+        ------
+        InputError
+            If a number is out of range, or the obstacle cuts a beam in the stress-free state.
+
+        Examples
+        --------
+        A cantilever that rests on a pin:
+
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> from skfem_ancf.obstacles import Circle
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 17), height=0.01), ElementBeamANCF(2),
+        ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)
+        >>> scene = Scene(beam).clamp("left").gravity((0, -9.81))
+        >>> scene = scene.obstacle(Circle((0.8, -0.15), 0.1))
+        >>> state = scene.solve_static()
+        >>> bool(-0.06 < state.displacement((0.8, 0))[1] < -0.04)
+        True
+        """
+        return self._put(elements=[Obstacle(shape, friction, stiffness, beam, **options)])
+
     # damping
 
     def damping(self, mass: float = 0.0, stiffness: float = 0.0,
@@ -1254,6 +1303,7 @@ class Scene:
         system = self.system
         system.require_supports()
         zero, none = np.zeros(system.N), np.zeros(system.m)
+        system.forces.contacts.recall(None)
         force, _ = system.assemble(zero, 1.0, geometric=False)
         du0 = np.zeros(system.N)
         du0[system.fixed] = system.values(1.0)
@@ -1315,7 +1365,9 @@ class Scene:
                 state = solve_adaptive(self, adapt, **options)
             else:
                 u = None if start is None else displacement(self.system, start)
-                state = self._solve(u, **options)
+                # that of another scene is of other obstacles, perhaps
+                memory = None if start is None or start.system is not self.system else start._memory
+                state = self._solve(u, memory=memory, **options)
             self._warn(state)
         return state
 
@@ -1417,6 +1469,7 @@ class Scene:
         """
         system = self.system
         system.require_supports()
+        system.forces.contacts.require_path()
         critical = None if branch is None else _branch(branch, system)
         try:
             return Path(system, *continuation(system, branch=critical, **options))
@@ -1605,7 +1658,7 @@ class Scene:
     def _state(self, result):
         return State(self.system, result.u, result.load, result.force, result.converged,
                      result.iterations, result.message, result.steps, result.multipliers,
-                     doubt=result.doubt)
+                     doubt=result.doubt, memory=result.memory)
 
 
 def _branch(point, system):

@@ -335,11 +335,19 @@ class System:
             total += np.sum(q[:, 0] * pb[:, 1] - q[:, 1] * pb[:, 0])
         return float(total)
 
-    def strain_energy(self, u: Array) -> float:
-        """Strain energy of all beams, and the potential of force elements."""
+    def strain_energy(self, u: Array, t: float = 1.0) -> float:
+        """Strain energy of all beams, and the potential of force elements.
+
+        Parameters
+        ----------
+        u
+            Displacement, shape (N,).
+        t
+            Time, for obstacles that move; in statics the load factor.
+        """
         energy = sum(b.kernel.energy(u[s]) for b, s in zip(self.beams, self.slices))
         if self.forces.elements:
-            energy += self.forces.potential(self.machine.tables.plain.forces, u)
+            energy += self.forces.potential(self.machine.tables.plain.forces, u, t)
         return float(energy)
 
     def load_potential(self, u: Array, t: float | None = None) -> float:

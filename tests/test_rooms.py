@@ -15,6 +15,7 @@ LARGER = {
     "beam.py::Beam.__init__": "options of a user, each with a default, by keyword",
     "evaluation.py::evaluate": "one function for all that is asked, so that it is compiled once",
     "compiled/blocks.py::block": "a function of C: arrays are addresses and sizes",
+    "compiled/contacts.py::contacts": "a function of C: arrays are addresses and sizes",
     "compiled/elements.py::elements": "a function of C: arrays are addresses and sizes",
     "dynamics/integrate.py::integrate": "options of a user, each with a default, by keyword",
     "results.py::State.__init__": "a record: what a solution is, and where it has it from",

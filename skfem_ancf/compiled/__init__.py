@@ -19,7 +19,8 @@ from pathlib import Path
 logger = logging.getLogger(__name__)
 
 #: What is compiled apart from the texts that call it, and the module that does so.
-ADDRESSES = {"SectionPack": "blocks", "CablePack": "blocks", "elements": "elements"}
+ADDRESSES = {"SectionPack": "blocks", "CablePack": "blocks", "elements": "elements",
+             "contacts": "contacts"}
 #: Compiled functions that this process has, by the name of their text.
 LOADED: dict = {}
 #: Why Numba cannot be used though it is installed.

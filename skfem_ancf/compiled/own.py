@@ -38,6 +38,11 @@ def own_elements(handle, what, t, factor, a, b, out):
     _ask(np.int64(4), handle, what, t, factor, a, b, out)
 
 
+@jit
+def own_poses(handle, t, span, poses):
+    _ask(np.int64(5), handle, np.int64(0), t, span, poses, poses, poses)
+
+
 @njit
 def own_solve(handle, t, u, multipliers, R, phi, du, dm):
     with objmode(done="boolean"):

@@ -85,5 +85,10 @@ def own_evaluate(handle, strain, out):
 
 
 @jit
+def own_distance(handle, obstacle, t, x, out):
+    out[:] = np.nan  # scenes with such shapes run in NumPy
+
+
+@jit
 def log1p(x):
     return np.log1p(x)

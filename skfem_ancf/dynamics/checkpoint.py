@@ -103,6 +103,7 @@ def fingerprint(system: System) -> dict[str, str]:
             values.append(np.array(place.force(x, 0.0 * x, 0.0)))
         for mass in alone.masses:
             values += mass.mass_entries()
+        values += alone.contacts.tables[1:3] if element.groups else []
         parts[f"force element {k}"] = _digest(type(element).__name__, tables.numbers, tables.start,
                                               tables.of, tables.weight, *values)
     return parts
@@ -127,6 +128,9 @@ def functions(system: System, t_start: float, t_end: float) -> dict[str, Array]:
     for k, joint in enumerate(system.all_joints):
         if joint.moving:
             found[f"motion of joint {k}"] = np.asarray(joint.offset(times, system.N), dtype=float)
+    for k, one in enumerate(system.forces.contacts.obstacles):
+        if one.moves:
+            found[f"motion of obstacle {k}"] = np.array([one.pose(t)[:6] for t in times])
     for k, element in enumerate(system.forces.elements):
         if element in system.forces.own:
             x = np.array([one.start for one in element.links])

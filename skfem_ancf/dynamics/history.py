@@ -341,7 +341,7 @@ class History:
     @cached_property
     def strain_energy(self) -> Array:
         """Strain energy, with the potential of force elements, shape (nt,)."""
-        return np.array([self.system.strain_energy(u) for u in self.u])
+        return np.array([self.system.strain_energy(u, t) for u, t in zip(self.u, self.t)])
 
     @cached_property
     def kinetic_energy(self) -> Array:

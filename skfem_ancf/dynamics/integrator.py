@@ -141,6 +141,7 @@ class Integrator:
             Time, and the step in which functions of time are asked.
         """
         s = self.system
+        s.forces.contacts.recall(None)
         y = Motion(t, u.copy(), v.copy(), np.zeros(s.N), np.zeros(s.N),
                    np.zeros(s.m))
         y.u[s.fixed] = s.values(1.0, t)
@@ -162,7 +163,7 @@ class Integrator:
         acceleration, y.multipliers = s.solve_mass(force, y.u, t, rate)
         y.acceleration = y.acceleration + acceleration
         y.algorithmic, y.force = y.acceleration.copy(), y.multipliers
-        self.expect(max(float(0.5 * y.v @ s.mass.multiply(y.v)), s.strain_energy(y.u)))
+        self.expect(max(float(0.5 * y.v @ s.mass.multiply(y.v)), s.strain_energy(y.u, t)))
         return y
 
     def expect(self, energy: float) -> None:
@@ -195,6 +196,7 @@ class Integrator:
         The number of steps done, and a function that gives the Motion after each.
         """
         s, before = self.system, self._state.copy()
+        s.forces.contacts.recall(None)  # states may have been asked meanwhile
         course = self._courses.of(y.t if start is None else start, dt, first, n,
                                   (first, first + n) if block is None else block, self.limit)
         if dt != self._dt:

@@ -18,7 +18,8 @@ import numpy as np
 
 from ..band import Band, copy, factorize, fix, multiply, solve_joined, subtract_rows
 from ..body import body_carry, body_force, body_mean, body_stress, body_tangent
-from ..forces.texts import add_elastic_force, element_stiffness
+from ..forces.texts import (add_contact_tangent, add_elastic_force, add_rubbing_tangent,
+                            element_stiffness)
 from ..source import F1, F2, F3, borrowed, by_place, lanes, source
 from ..tables import (add_curvature_force, add_load_stiffness, add_products, constraint,
                       joint_directions, mean_external_force)
@@ -286,7 +287,7 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
                 body_mean(e.body, y[0], u, f)
             else:
                 body_force(e.body, u, f)
-            add_elastic_force(e.forces, s.acting, y[0] if rule.conserving > 0 else u, u, f)
+            add_elastic_force(e.forces, s.acting, s.dt, y[0] if rule.conserving > 0 else u, u, f)
             if damped:
                 _resist(e, matrices, rule, s, w)
             anew = joined and (not s.constant or state[SIZE] < 0.0)
@@ -476,6 +477,8 @@ def _tangent(e, matrices, rule, s, w):
             matrices.rows.S[k, k] = s.damping_factor
     add_load_stiffness(e.loads, s.factors, s.acting, 1.0, w.x.middle, matrices.A)
     _add_elements(e.forces, matrices, s, w)
+    if e.forces.contacts.number > 0:
+        _add_obstacles(e, matrices, rule, s, w)
     for i in lanes(A.size):
         A[i] = s.mass_factor * M[i] + s.stiffness_factor * A[i]
 
@@ -494,6 +497,19 @@ def _add_elements(forces, matrices, s, w):
         for a in range(k):
             for b in range(k):
                 S[modes + a, modes + b] = s.stiffness_factor * between[a * k + b]
+
+
+@source
+def _add_obstacles(e, matrices, rule, s, w):
+    """Add the derivatives of contact to the band: of the iterate, as its velocity is."""
+    u, u0, v, pace = w.x.u, w.y[0], w.x.v, w.x.pace
+    add_contact_tangent(e.forces, s.acting, s.dt, u0 if rule.conserving > 0 else u, u, matrices.A)
+    if matrices.dampers.elements > 0:
+        _free_velocity(e.free, rule, s, w)
+        for i in lanes(u.size):
+            pace[i] = (u[i] - u0[i]) / s.dt if rule.conserving > 0 else v[i]
+        add_rubbing_tangent(e.forces, s.acting, s.damping_factor / s.stiffness_factor,
+                            w.x.middle, pace, matrices.A)
 
 
 @source

@@ -102,6 +102,8 @@ class ForceElement(Sealable):
         :func:`skfem_ancf.spread.facets_along` returns them; None if that is not known.
     links
         What :meth:`bind` has returned, once it is bound.
+    groups
+        Points of the surface that it may touch, of an obstacle.
 
     Examples
     --------
@@ -131,6 +133,7 @@ class ForceElement(Sealable):
     distributed = False
     along: tuple[Beam, list[Facets], tuple[float, ...]] | None = None
     links: Any = ()
+    groups: Any = ()
 
     def bind(self, scene: Scene) -> Sequence[Vector | Link]:
         """The points and sections on which it acts, found in the scene's coordinates.

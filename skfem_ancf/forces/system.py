@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .base import Part
+from .contacts import Contacts
 from .control import Control
 from .masses import PointMass
 from .texts import (ELASTIC, NUMBERS, RESISTING, TORSION, ForceTables, element_stiffness,
@@ -42,12 +43,14 @@ class Forces:
         True if all have symmetric derivatives.
     masses
         Those that add to the mass.
+    contacts
+        The obstacles, a :class:`~skfem_ancf.forces.contacts.Contacts`.
     resists
         True if velocities may cause a force.
     """
 
     def __init__(self, elements: Sequence[ForceElement], N: int, bandwidth: int) -> None:
-        self.elements, self._N = list(elements), N
+        self.elements, self._N, self._bandwidth = list(elements), N, bandwidth
         parts: list[Part] = []
         self.own = []
         for element in self.elements:
@@ -78,7 +81,9 @@ class Forces:
         self._far = [bool(np.any(np.abs(i - j) > bandwidth)) for i, j, _, _ in self._couplings]
         self.far, self.symmetric = any(self._far), all(e.symmetric for e in self.elements)
         self.masses = [element for element in self.elements if isinstance(element, PointMass)]
-        self.resists = bool(self.own) or any(_resists(part) for part in self.parts)
+        self.contacts = Contacts(self.elements)
+        self.resists = bool(self.own) or any(_resists(part) for part in self.parts) or any(
+            one.friction > 0.0 or one.damping > 0.0 for one in self.contacts.obstacles)
 
     def _coupling(self, k):
         """Rows, columns, weights and places of the derivatives that element k adds."""
@@ -137,7 +142,7 @@ class Forces:
             np.ascontiguousarray(numbers.T).ravel(), self.size,
             position(i[keep], j[keep]).astype(np.int64), place[keep].astype(np.int64), w[keep],
             (rows * between + columns).astype(np.int64), places.astype(np.int64),
-            handle if self.own else 0)
+            handle if self.own else 0, self.contacts.tables)
 
     def acting_rows(self) -> Array:
         """The derivatives of the places where elements act on few points, shape (k, N)."""
@@ -192,7 +197,7 @@ class Forces:
         vectors_of(tables, u, 1.0, y)
         return y
 
-    def potential(self, tables: ForceTables, u: Array) -> float:
+    def potential(self, tables: ForceTables, u: Array, t: float = 0.0) -> float:
         """The potential of all elements; those without one count as zero.
 
         Parameters
@@ -201,9 +206,11 @@ class Forces:
             Those of :meth:`tables`.
         u
             Displacement of the coordinates, shape (N,).
+        t
+            Time, for obstacles that move.
         """
         y = self.vectors(tables, u)
-        return potential(tables, y) + sum(
+        return potential(tables, y) + self.contacts.potential(u, t) + sum(
             element.potential(y[rows].reshape(-1, 2)) or 0.0
             for element, (rows, _) in zip(self.own, self._slices))
 
@@ -308,7 +315,9 @@ class Forces:
         D = self.stiffness(tables, t, u, v, factor)
         near, far = self._entries(False), self._entries(True)
         i, j, w, place = (np.append(a, b) for a, b in zip(near, far))
-        return i, j, w * D[place]
+        touched = self.contacts.entries(t, u, self._bandwidth)
+        return (np.append(i, touched[0]), np.append(j, touched[1]),
+                np.append(w * D[place], touched[2]))
 
     def add_own(self, what: int, t: float, factor: float, a: Array, b: Array,
                 out: Array) -> None:

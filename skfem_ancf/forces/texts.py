@@ -10,9 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..own import own_elements
+from ..own import own_elements, own_poses
 from ..source import F1, I1, lanes, primitive, shaped, source
 from ..tables import add_products
+from .contact_texts import (ALONG, DAMPED_TANGENT, FORCE, TANGENT, ContactTables, Question,
+                            run_contacts)
+from .contact_texts import RESISTING as RUBBING
 
 #: Kinds of elements.
 SPRING, TORSION, FOUNDATION, DRAG = map(np.int64, range(4))  # Numba compiles for each int
@@ -21,6 +24,8 @@ SPRING, TORSION, FOUNDATION, DRAG = map(np.int64, range(4))  # Numba compiles fo
 #: and 1 if it only pushes. Drag: factors of squares of normal and tangential velocity.
 NUMBERS = 5
 TINY = 1e-200
+#: For the layout of a band where there is none.
+NONE = np.int64(0)
 
 
 class Kinds(NamedTuple):
@@ -52,6 +57,8 @@ class ForceTables(NamedTuple):
         Where it goes between the rows of elements that couple what is far apart.
     own
         Handle of what has elements of one's own; 0 for none.
+    contacts
+        The obstacles, a :class:`~skfem_ancf.forces.contact_texts.ContactTables`.
     address
         That of the compiled function of :mod:`skfem_ancf.compiled.elements`; 0 for plain texts.
     """
@@ -70,6 +77,7 @@ class ForceTables(NamedTuple):
     row_at: I1
     row_of: I1
     own: int
+    contacts: ContactTables
     address: int = 0
 
 
@@ -120,15 +128,59 @@ def _add_force(tables, what, t, u, v, start, f):
 
 
 @source
-def add_elastic_force(tables, t, u0, u1, f):
-    """Add the force without velocity whose work from u0 to u1 is the change of the potential."""
+def add_elastic_force(tables, t, span, u0, u1, f):
+    """Add the force without velocity whose work from u0 to u1 is the change of the potential.
+
+    A mean over a span of time about t; at t where both states are the same.
+    """
     _add_force(tables, np.int64(ELASTIC), t, u0, u1, 1.0, f)
+    add_contact(tables.contacts, Question(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)
 
 
 @source
 def add_resisting_force(tables, t, u, v, f):
     """Add the part of the force that velocities cause."""
     _add_force(tables, np.int64(RESISTING), t, u, v, 0.0, f)
+    add_contact(tables.contacts, Question(RUBBING, t, 0.0, 0.0, NONE, NONE), u, v, f)
+
+
+@source
+def add_contact(contacts, asked, u, v, out):
+    """Add what is asked of obstacles, a :class:`~skfem_ancf.forces.contact_texts.Question`."""
+    if contacts.number > 0:
+        if contacts.moving > 0:
+            own_poses(contacts.own, asked.t, asked.span, contacts.poses)
+        run_contacts(contacts, asked, u, v, out)
+
+
+@source
+def add_contact_tangent(tables, t, span, u0, u1, A):
+    """Add to a band the derivative of their mean force by its end: twice, unless both are one."""
+    add_contact(tables.contacts, Question(TANGENT, t, span, 0.0, A.ld, A.top), u0, u1, A.flat)
+
+
+@source
+def add_rubbing_tangent(tables, t, factor, u, v, A):
+    """Add to a band the derivative of friction and damping, that by velocities with a factor."""
+    add_contact(tables.contacts, Question(DAMPED_TANGENT, t, 0.0, factor, A.ld, A.top), u, v,
+                A.flat)
+
+
+@source
+def contact_work(tables, t, u, du, f):
+    """The product of the force at u and du; f is room, which is left at zero."""
+    add_contact(tables.contacts, Question(FORCE, t, 0.0, 0.0, NONE, NONE), u, u, f)
+    work = np.dot(f, du)
+    for i in lanes(f.size):
+        f[i] = 0.0
+    return work
+
+
+@source
+def contact_along(tables, t, u, du, out):
+    """Its derivative along du, and the largest way of an element, into out, shape (2,)."""
+    out[0], out[1] = 0.0, 0.0
+    add_contact(tables.contacts, Question(ALONG, t, 0.0, 0.0, NONE, NONE), u, du, out)
 
 
 @source
@@ -148,6 +200,7 @@ def add_element_tangent(tables, t, u, A):
         D, v = np.empty(tables.size), np.zeros(u.size)
         element_stiffness(tables, t, u, v, 0.0, D)
         add_products(A.flat, tables.band_at, tables.band_weight, D, tables.band_of)
+    add_contact_tangent(tables, t, 0.0, u, u, A)
 
 
 # the kinds

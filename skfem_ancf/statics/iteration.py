@@ -9,7 +9,8 @@ import numpy as np
 from ..band import clear, copy, diagonal, factorize, fix, multiply, solve, weighted
 from ..body import body_carry, body_force, body_tangent
 from ..border import (Factors, add_curvature, factorize_bordered, new_factors, solve_bordered)
-from ..forces.texts import add_elastic_force, add_element_tangent
+from ..forces.texts import (add_elastic_force, add_element_tangent, contact_along,
+                            contact_work)
 from ..own import own_solve
 from ..source import F1, borrowed, by_place, lanes, source
 from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
@@ -146,7 +147,7 @@ def equilibrium(e, target, rules, x, w, record):
         last = (k > 1 or (k > 0 and quiet)) and settled(work * part, reference, rules)
         if last:
             body_force(e.body, x.u, x.force)
-            add_elastic_force(e.forces, target.at, x.u, x.u, x.force)
+            add_elastic_force(e.forces, target.at, 0.0, x.u, x.u, x.force)
         else:
             _tangent(e, target, rules, x, w, k)
         opening = _residual(e, target, x, w)
@@ -170,6 +171,8 @@ def equilibrium(e, target, rules, x, w, record):
         before, work = work, _correction(e, target, rules, x, w, moving)
         if not (0.0 <= work < 1e300):
             return SINGULAR, k
+        if e.forces.contacts.number > 0 and not moving:
+            _hold_back(e, target.at, x, w)
         moving = False
         if rules.mixed > 0:
             body_carry(e.body, x.u, w.du, x.stresses, x.carried)
@@ -198,7 +201,7 @@ def settled(work, reference, rules):
 def _tangent(e, target, rules, x, w, k):
     """The internal force, the tangent, and 1 / its diagonal."""
     body_tangent(e.body, x.u, x.force, x.carried, rules.mixed > 0 and k > 0, x.stresses, e.K)
-    add_elastic_force(e.forces, target.at, x.u, x.u, x.force)
+    add_elastic_force(e.forces, target.at, 0.0, x.u, x.u, x.force)
     factors, t = (target.factors, np.nan) if k > 0 else (target.before, np.inf)
     add_load_stiffness(e.loads, factors, t, target.scale, x.u, e.K)
     add_element_tangent(e.forces, target.at, x.u, e.K)
@@ -248,6 +251,60 @@ def _correction(e, target, rules, x, w, moving):
     for i in lanes(N):
         w.du[i] += w.push[i]
     return work
+
+
+#: Part of the work that a correction leaves along its direction, up to which it is taken; of the
+#: work tried, and how often; parts of a correction that are looked at for obstacles on the way.
+LEFT, TRIES, PARTS = 0.5, 12, 16
+
+
+@source
+def _hold_back(e, t, x, w):
+    """Shorten a correction that runs into obstacles.
+
+    Of the equations linearised without contact, and contact as it is, what is left along the
+    correction has to be small, see Crisfield (1991), 9.2: without that points come and go.
+    """
+    N, work, two = x.u.size, np.dot(w.R, w.du), np.empty(2)
+    there, room = np.empty(N), np.zeros(N)
+    contact_along(e.forces, t, x.u, w.du, two)
+    if not work > 0.0:
+        return
+    parts = int(min(max(np.ceil(two[1]), 1.0), PARTS))
+    before, low, high = contact_work(e.forces, t, x.u, w.du, room), 0.0, 1.0
+    left, left_low = work, work
+    for k in range(parts):
+        high = (k + 1.0) / parts
+        left = _left(e, t, x, w, high, work, two[0], before, there, room)
+        if left < -LEFT * work:
+            break
+        low, left_low = high, left
+    if left >= -LEFT * work:
+        return
+    s = high
+    for k in range(TRIES):
+        s = 0.5 * (low + high) if left_low <= 0.0 or k > 2 else max(
+            low + 0.1 * (high - low), low + (high - low) * left_low / (left_low - left))
+        now = _left(e, t, x, w, s, work, two[0], before, there, room)
+        if abs(now) <= LEFT * work:
+            break
+        if now > 0.0:
+            low, left_low = s, now
+        else:
+            high, left = s, now
+    for i in lanes(N):
+        w.du[i] *= s
+    for k in lanes(w.dm.size):
+        w.dm[k] *= s
+
+
+@source
+def _left(e, t, x, w, s, work, along, before, there, room):
+    """What is left along the correction at a part s of it."""
+    for i in lanes(there.size):
+        there[i] = x.u[i] + s * w.du[i]
+    now = contact_work(e.forces, t, there, w.du, room)
+    return (1.0 - s) * work - (now - before - s * along)
 
 
 @source

@@ -25,6 +25,8 @@ logger = logging.getLogger(__name__)
 
 #: Iterations in a load step, at most.
 MAX_ITERATIONS = 10000
+#: Corrections of the pressure of obstacles in a load step, at most.
+AUGMENTED = 50
 METHODS = ("mixed", "newton")
 
 
@@ -65,6 +67,8 @@ class StaticResult:
         Whether full load was reached, and in words how.
     rejected
         Load steps that were given up.
+    memory
+        What load steps have left behind at obstacles, shape (n,), or None.
     unstable, doubt
         Whether the equilibrium gives way in some direction, and what could not be told.
     """
@@ -79,6 +83,7 @@ class StaticResult:
     rejected: int = 0
     unstable: bool = False
     doubt: str = ""
+    memory: Array | None = None
 
     @property
     def iterations(self) -> int:
@@ -89,7 +94,8 @@ class StaticResult:
 @taught
 def solve_static(system: System, u: Array | None = None, method: str = "mixed", tol: float = 1e-8,
                  max_iterations: int = 30, first_step: float = 1.0, min_step: float = 1e-4,
-                 progress: bool | None = None, stable: bool = True) -> StaticResult:
+                 progress: bool | None = None, stable: bool = True,
+                 memory: Array | None = None) -> StaticResult:
     """Find the equilibrium at full load.
 
     The load is applied in steps: the first is ``first_step`` of it, a step that fails is cut to a
@@ -121,6 +127,8 @@ def solve_static(system: System, u: Array | None = None, method: str = "mixed", 
         Take no unstable equilibrium: a step that lands on one is cut, and where the path itself
         loses its stability the solution goes on along the direction that gives way, see
         :func:`~skfem_ancf.statics.stability.descend`. False takes any.
+    memory
+        What load steps had left behind at obstacles, at the displacement ``u``; shape (n,).
 
     Returns
     -------
@@ -144,7 +152,8 @@ def solve_static(system: System, u: Array | None = None, method: str = "mixed", 
     if not 0.0 < require_positive("first_step", first_step) <= 1.0:
         raise InputError(f"first_step must lie in (0, 1], got {first_step!r}")
     max_iterations = require_integer("max_iterations", max_iterations, 1, MAX_ITERATIONS)
-    origin = np.zeros(system.N), None
+    origin, contacts = (np.zeros(system.N), None), system.forces.contacts
+    contacts.begin(origin[0] if u is None else u, 0.0 if u is None else 1.0, memory)
     if u is not None:
         u = require_finite("u", u, (system.N,))
         missing = system.external_force(u) - system.internal_force(u)
@@ -182,9 +191,10 @@ def solve_static(system: System, u: Array | None = None, method: str = "mixed", 
                                   "state is what has converged", result) from None
             bar.update(load - result.load)
             u, multipliers, force = found
+            contacts.settle(u, _acting(options, load)[1])
             # one assignment: who interrupts finds the old result or the new one
             result = replace(result, u=u, multipliers=multipliers, force=force, load=load,
-                             steps=[*result.steps, record])
+                             steps=[*result.steps, record], memory=contacts.remember())
             cuts = 0
             logger.info("load %.6g converged in %d iterations", load, record.iterations)
             if record.iterations <= max(8, max_iterations // 3):
@@ -221,15 +231,39 @@ class _Unstable(_Failed):
 
 def _step(system, result, load, options, record, stable):
     """One load step: a stable equilibrium if that is wanted."""
-    found = _iterate(system, result, load, *options, record)
+    full, at = _acting(options, load)
+    found = _augmented(system, result, load, options, record, at)
+    passed = system.forces.contacts.passed((result.u, _acting(options, result.load)[1]),
+                                           (found[0], at))
+    if passed:
+        raise _Failed(passed)
     if not stable or result.unstable:
         return found
-    full, at = _acting(options, load)
     if not stability.holds(system, found[0], full, found[1], at):
         raise _Unstable("the equilibrium found is unstable", found)
     if result.rejected and not stability.heads_on(system, result, found[0], load, options[0]):
         raise _Unstable("the equilibrium found lies on the other side", found)
     return found
+
+
+def _augmented(system, result, load, options, record, at):
+    """The equilibrium, again until obstacles that ask for it are entered no deeper than that."""
+    contacts = system.forces.contacts
+    contacts.recall(result.memory if result.steps else contacts.begun)
+    found = _iterate(system, result, load, *options, record)
+    if not contacts.augmented:
+        return found
+    for _ in range(AUGMENTED):
+        if contacts.augment(found[0], at) <= 1.0:
+            return found
+        one = LoadStep(load, 0)
+        found = _iterate(system, replace(result, u=found[0], multipliers=found[1]), load, *options,
+                         one)
+        record.iterations += one.iterations
+        record.force_residuals += one.force_residuals
+        record.energy_residuals += one.energy_residuals
+    raise _Failed(f"the penetration of obstacles is above its tolerance after {AUGMENTED} "
+                  "corrections of the pressure")
 
 
 def _acting(options, load):

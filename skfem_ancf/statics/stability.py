@@ -67,6 +67,7 @@ class Verdict:
 
 
 FOLLOWS = "against divergence: the loads have no potential, and flutter is not seen in statics"
+RUBS = "with friction as it is, sticking or slipping: it has no potential, and flutter is not seen"
 
 
 def verdict(system: System, u: Array, load: float, multipliers: Array,
@@ -98,14 +99,16 @@ def verdict(system: System, u: Array, load: float, multipliers: Array,
 def verdict_of_factors(system: System) -> Verdict:
     """As :func:`verdict`, from the tangent that has been factorised."""
     negative, singular = system.inertia()
+    rubs = system.forces.contacts.anchored
+    who = "friction or loads have" if rubs else "the loads have"
     if system.symmetric or _is_symmetric(system):
         return Verdict("unstable" if negative else "singular" if singular else "stable", negative)
     if system.determinant_sign() < 0:
-        return Verdict("unstable", negative, "by divergence: the loads have no potential")
+        return Verdict("unstable", negative, f"by divergence: {who} no potential")
     if negative:
-        return Verdict("undecided", negative, "the loads have no potential, and only the symmetric "
+        return Verdict("undecided", negative, f"{who} no potential, and only the symmetric "
                        "part of the tangent is indefinite: scene.modes tells")
-    return Verdict("singular" if singular else "stable", 0, FOLLOWS)
+    return Verdict("singular" if singular else "stable", 0, RUBS if rubs else FOLLOWS)
 
 
 def _is_symmetric(system):
@@ -428,7 +431,7 @@ def potential(system: System, u: Array, load: float) -> float:
     load
         Load factor.
     """
-    return system.strain_energy(u) + load * system.load_potential(u)
+    return system.strain_energy(u, load) + load * system.load_potential(u)
 
 
 def position_weights(system: System) -> Array:

@@ -1,0 +1,403 @@
+"""The obstacles of a scene in its equations: their tables, and what load steps leave behind."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..band import Band
+from ..errors import InputError
+from ..own import handle_of
+from .contact_texts import (ANCHORED, FRICTION, HEADER, MEMORY, NOW, OWN, POSE, POSES, STICKING,
+                            STIFFNESS, TANGENT, WIDTH, ContactTables, Question, distances,
+                            of_contacts, places, resist, slope_of, stick, surface, velocities)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..types import Array
+
+
+#: Parts of a load step at which a way through an obstacle is looked for.
+PARTS = 8
+
+
+class Group(NamedTuple):
+    """The points of one beam that may touch one obstacle, those of an element side by side.
+
+    Attributes
+    ----------
+    first, weights, slopes
+        First coordinate of the element of each point, (n,), weights of its pairs of coordinates,
+        (pairs, n), and those of the slope of the axis, or None.
+    areas, offsets, starts
+        Area, distance from the axis, (n,), and place and slope without displacement, (4, n).
+    elements, points
+        How many elements, and points of each.
+    depth
+        How deep a way from one state to the next may cut the obstacle.
+    numbers
+        By the numbers of :mod:`skfem_ancf.forces.contact_texts`, shape (8,).
+    """
+
+    first: Any
+    weights: Any
+    slopes: Any
+    areas: Any
+    offsets: Any
+    starts: Any
+    elements: int
+    points: int
+    depth: float
+    numbers: Any
+
+
+class Contacts:
+    """The obstacles of a scene.
+
+    Parameters
+    ----------
+    elements
+        Force elements, bound: those with ``groups`` are obstacles.
+
+    Attributes
+    ----------
+    obstacles
+        These.
+    tables
+        A :class:`~skfem_ancf.forces.contact_texts.ContactTables`.
+    moving, own
+        True if an obstacle moves; if one has a shape of one's own.
+    begun
+        The memory that load steps have begun with.
+    """
+
+    def __init__(self, elements: Sequence[Any]) -> None:
+        self.obstacles = [element for element in elements if element.groups]
+        self._groups = [(k, group) for k, one in enumerate(self.obstacles) for group in one.groups]
+        self.moving = any(one.moves for one in self.obstacles)
+        self.own = any(one.shape.kind == OWN for one in self.obstacles)
+        poses = np.zeros(POSES * len(self.obstacles))
+        self.put(0.0, 0.0, poses)
+        self.tables = self._make(poses)
+        self.begun: Any = None
+
+    def _make(self, poses):
+        n = len(self._groups)
+        ints, floats = _Pieces(HEADER * n), _Pieces(0)
+        headers, memory = np.zeros((n, HEADER), dtype=np.int64), 1 + n
+        for number, (k, group) in enumerate(self._groups):
+            shape, none = self.obstacles[k].shape, np.zeros((0, len(group.first)))
+            slopes = none if group.slopes is None else group.slopes
+            shared = group.points, len(group.weights)
+            headers[number] = (
+                shape.kind, k, group.elements, *shared, group.slopes is not None,
+                ints.add(group.first), floats.add(group.weights), floats.add(slopes),
+                floats.add(group.areas), floats.add(group.offsets), floats.add(group.starts),
+                *map(floats.add, _middle(group)), floats.add(group.numbers),
+                floats.add(shape.numbers), len(shape.numbers), memory, number)
+            memory += 3 * len(group.first)
+        return ContactTables(n, np.concatenate([headers.ravel(), ints.whole(np.int64)]),
+                             floats.whole(float), poses, np.zeros(memory), np.zeros(2, np.int64),
+                             int(self.moving or self.own), handle_of(self))
+
+    # what texts ask
+
+    def put(self, t: float, span: float, poses: Array) -> None:
+        """Put all obstacles where they are at a time, and at both ends of a span about it.
+
+        Parameters
+        ----------
+        t, span
+            The time, and how long the span is.
+        poses
+            Written, shape (30 obstacles,).
+        """
+        for k, one in enumerate(self.obstacles):
+            rows = poses[k * POSES:(k + 1) * POSES].reshape(-1, POSE)
+            rows[:] = one.pose(t)
+            if span > 0.0:
+                rows[1:] = one.pose(t - 0.5 * span), one.pose(t + 0.5 * span)
+
+    def ask(self, obstacle: int, t: float, x: Array, out: Array) -> None:
+        """Distance, gradient and second derivatives of a shape of one's own.
+
+        Parameters
+        ----------
+        obstacle
+            Its number.
+        t
+            The time.
+        x
+            Points, shape (2, n).
+        out
+            Written, shape (6, n).
+        """
+        out[:] = self.obstacles[obstacle].shape.derivatives(x, t)
+
+    # memory
+
+    @property
+    def augmented(self) -> bool:
+        """True if an obstacle takes the augmented Lagrangian."""
+        return any(one.method == "augmented" for one in self.obstacles)
+
+    @property
+    def anchored(self) -> bool:
+        """True if an obstacle has friction."""
+        return any(one.friction > 0.0 for one in self.obstacles)
+
+    def recall(self, memory: Array | None) -> None:
+        """Go on with what :meth:`remember` gave, or with nothing: no friction, no reach.
+
+        Parameters
+        ----------
+        memory
+            Shape (n,), or None.
+        """
+        self.tables.memory[:] = 0.0 if memory is None else memory
+
+    def remember(self) -> Array | None:
+        """What load steps have left behind; None where there is nothing of it."""
+        memory = self.tables.memory
+        return memory.copy() if np.any(memory) else None
+
+    def begin(self, u: Array, t: float, memory: Array | None = None) -> None:
+        """Points stick from here on, and nothing reaches beyond the surface.
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (N,).
+        t
+            Load factor.
+        memory
+            What :meth:`remember` gave at this displacement, shape (n,), to go on from; or None.
+        """
+        self.recall(memory)
+        if memory is None and self.anchored:
+            self.settle(u, t)
+            self.tables.memory[ANCHORED] = 1.0
+        self.begun = self.remember()
+
+    def require_path(self) -> None:
+        """Begin a path by arc length; raises InputError where there is none."""
+        for one in self.obstacles:
+            if one.friction > 0.0 or one.moves or one.method != "penalty":
+                raise InputError(f"continuation knows obstacles that rest, without friction and by "
+                                 f"penalty, not {one!r}: use solve_static")
+        self.recall(None)
+
+    def settle(self, u: Array, t: float) -> None:
+        """Anchors go after points that have slipped, to where these just do not slip.
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (N,).
+        t
+            Load factor.
+        """
+        for k, ((which, group), x, found) in enumerate(self.look(u, t)):
+            memory, numbers = self._reach(k), group.numbers
+            if numbers[FRICTION] == 0.0:
+                continue
+            pose = self.tables.poses[which * POSES:which * POSES + POSE]
+            turn = np.array([[pose[2], -pose[3]], [pose[3], pose[2]]])
+            pivot, moved = pose[4:6, None], pose[4:6, None] + pose[:2, None]
+            along = np.array([-found[2], found[1]])
+            anchor = turn @ (memory[1:] - pivot) + moved
+            limit = (numbers[FRICTION] * numbers[STIFFNESS] / numbers[STICKING]
+                     * slope_of(memory[0] - found[0], numbers[WIDTH]))
+            slip = np.clip(np.sum((x - anchor) * along, axis=0), -limit, limit)
+            memory[1:] = turn.T @ (x - slip * along - moved) + pivot
+
+    def augment(self, u: Array, t: float) -> float:
+        """The largest penetration; where it is too large, pressures reach on by it.
+
+        The augmented Lagrangian: where a point has come to rest below the surface, its pressure
+        will hold it on the surface.
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (N,).
+        t
+            Load factor.
+
+        Returns
+        -------
+        float
+            The largest penetration, or distance at which there is pressure, over the tolerance of
+            its obstacle.
+        """
+        looked = [(k, self.obstacles[which], self._reach(k)[0], found[0])
+                  for k, ((which, _), _, found) in enumerate(self.look(u, t))]
+        looked = [row for row in looked if row[1].method == "augmented"]
+        worst = max(float(np.abs(np.maximum(-gap, -reach)).max()) / one.tolerance
+                    for _, one, reach, gap in looked)
+        for k, _, reach, gap in looked if worst > 1.0 else ():
+            reach[:] = np.maximum(reach - gap, 0.0)
+            self.tables.memory[1 + k] = reach.max()
+        return worst
+
+    # values
+
+    def _place(self, t):
+        if self.moving or self.own:
+            self.put(t, 0.0, self.tables.poses)
+
+    def look(self, u: Array, t: float) -> list[tuple[Any, Array, Array]]:
+        """Where the points of all groups are.
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (N,).
+        t
+            Time; in statics the load factor.
+
+        Returns
+        -------
+        list
+            For each group its number of obstacle and :class:`Group`, the points (2, n), and what
+            :func:`~skfem_ancf.forces.contact_texts.distances` says of them, (6, n).
+        """
+        self._place(t)
+        out = []
+        for k, (which, group) in enumerate(self._groups):
+            header = self._header(k)
+            at = np.arange(len(group.first))
+            z, x, found = np.empty((4, at.size)), np.empty((2, at.size)), np.empty((6, at.size))
+            places(self.tables, header, u, at, z)
+            surface(self.tables, header, at, z, x)
+            distances(self.tables, header, NOW, x, found)
+            out.append(((which, group), x, found))
+        return out
+
+    def _header(self, k):
+        return self.tables.ints[k * HEADER:(k + 1) * HEADER]
+
+    def _reach(self, k):
+        header, n = self._header(k), len(self._groups[k][1].first)
+        return self.tables.memory[header[MEMORY]:header[MEMORY] + 3 * n].reshape(3, n)
+
+    def pushes(self, u: Array, v: Array | None, t: float) -> list[tuple[Any, ...]]:
+        """What obstacles do to points.
+
+        Parameters
+        ----------
+        u, v
+            Displacement and velocity, shape (N,); no velocity in statics.
+        t
+            Time; in statics the load factor.
+
+        Returns
+        -------
+        list
+            For each group its number of obstacle, points (2, n), forces on them (2, n), pressures
+            and distances, (n,).
+        """
+        out = []
+        for k, ((which, group), x, found) in enumerate(self.look(u, t)):
+            n, header, numbers = len(group.first), self._header(k), group.numbers
+            at, a = np.arange(n), self._reach(k)[0] - found[0]
+            pressure = numbers[STIFFNESS] * slope_of(a, numbers[WIDTH])
+            size, K = pressure * group.areas, np.zeros((4, n))
+            F, more = -size * found[1:3], np.zeros((2, n))
+            if self.tables.memory[ANCHORED] > 0.0 and numbers[FRICTION] > 0.0:
+                stick(self.tables, header, at, x, a, size, found, F, K)
+            if v is not None:
+                z, w = np.empty((4, n)), np.empty((2, n))
+                places(self.tables, header, u, at, z)
+                velocities(self.tables, header, at, v, z, x, w)
+                resist(self.tables, header, at, 0.0, w, found, more, K)
+            out.append((which, x, -F - more, pressure, found[0]))
+        return out
+
+    def passed(self, a: tuple[Array, float], b: tuple[Array, float]) -> str | None:
+        """Which obstacle a body has passed through from one state to another, in words.
+
+        Parameters
+        ----------
+        a, b
+            Displacement, shape (N,), and time of each.
+        """
+        if not self._groups:
+            return None
+        depths = []
+        for part in np.arange(PARTS + 1) / PARTS:
+            looked = self.look(a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]))
+            depths.append([-found[0].min() for _, _, found in looked])
+        for k, (which, group) in enumerate(self._groups):
+            way = [row[k] for row in depths]
+            if max(way) > max(way[0], way[-1], 0.0) + group.depth:
+                return f"a body has passed through {self.obstacles[which]!r}"
+        return None
+
+    def potential(self, u: Array, t: float) -> float:
+        """The potential of the penetration.
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (N,).
+        t
+            Time; in statics the load factor.
+        """
+        total = 0.0
+        for k, ((_, group), _, found) in enumerate(self.look(u, t)):
+            a, width = self._reach(k)[0] - found[0], group.numbers[WIDTH]
+            S = (np.maximum(a, 0.0) ** 3 - np.maximum(a - width, 0.0) ** 3) / (6.0 * width)
+            total += group.numbers[STIFFNESS] * float(group.areas @ S)
+        return total
+
+    def entries(self, t: float, u: Array, bandwidth: int) -> tuple[Array, Array, Array]:
+        """The derivative of the force by the coordinates: rows, columns and values.
+
+        Parameters
+        ----------
+        t
+            Time; in statics the load factor.
+        u
+            Displacement of the coordinates, shape (N,).
+        bandwidth
+            Subdiagonals of the scene's band.
+        """
+        if not self._groups:
+            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)
+        ld = 2 * bandwidth + 1
+        A = Band(np.zeros(ld * len(u)), np.zeros(0, dtype=np.int32), ld, bandwidth, bandwidth)
+        self._place(t)
+        asked = Question(TANGENT, t, 0.0, 0.0, ld, bandwidth)
+        of_contacts(self.tables, asked, u, u, A.flat)
+        at, = np.nonzero(A.flat)
+        j, i = np.divmod(at, ld)
+        return i + j - bandwidth, j, A.flat[at]
+
+
+class _Pieces:
+    """Arrays one behind the other."""
+
+    def __init__(self, first):
+        self.parts, self.at = [], first
+
+    def add(self, x):
+        self.parts.append(np.ravel(x))
+        self.at += self.parts[-1].size
+        return self.at - self.parts[-1].size
+
+    def whole(self, kind):
+        return np.concatenate([np.zeros(0), *self.parts]).astype(kind)
+
+
+def _middle(group):
+    """Weights and place of the middle of each element, and how much weights differ from them."""
+    n, m = group.elements, group.points
+    each = group.weights.reshape(-1, n, m)
+    mean, half = each.mean(axis=2), len(group.weights) // 2
+    spread = np.abs(each - mean[..., None]).max(axis=2)
+    spread[0] = 0.0  # both places together are a translation
+    spread[half] = np.maximum(spread[half], np.abs(each[0] - mean[0][:, None]).max(axis=1))
+    return mean, group.starts[:2].reshape(2, n, m).mean(axis=2), spread

@@ -1,0 +1,264 @@
+"""What a scene may touch: a shape, where it is, and how it resists."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import (InputError, MeshError, ask_array, require_function,
+                      require_integer, require_not_negative, require_option, require_positive,
+                      shown, teaching)
+from ..forces.base import ForceElement, Link, Part
+from ..forces.contacts import Contacts, Group
+from ..kernels.section import beam_gradients
+from ..quadrature import gauss_lobatto
+from .shapes import Shape
+
+if TYPE_CHECKING:
+    from ..scene import Scene
+    from ..types import Array, WhichBeam
+
+METHODS = ("penalty", "augmented")
+#: Width of the transition from no pressure to one in proportion to the penetration, relative to
+#: the height; a body may be cut so deep at the start.
+WIDTH = 1e-3
+#: Penetration that is left by the augmented Lagrangian, relative to the height.
+TOLERANCE = 1e-6
+#: Speed below which friction is less than Coulomb's, relative to that of sound.
+SLIPPING = 1e-5
+#: Relative step in time for the velocity of an obstacle.
+STEP = 1e-6
+#: Points across an end.
+ACROSS = 3
+
+
+@teaching
+class Obstacle(ForceElement):
+    """An obstacle for the surface of beams: bottom, top and both ends.
+
+    Each point of a rule on the surface is pressed out of the shape with ``stiffness`` times the
+    depth to which it is in it, per area of the stress-free surface; see
+    :mod:`skfem_ancf.forces.contact_texts`. Of a cable the surface is its axis, moved by half of
+    the height along the normal.
+
+    Parameters
+    ----------
+    shape
+        A :class:`~skfem_ancf.obstacles.Circle`, :class:`~skfem_ancf.obstacles.Line`,
+        :class:`~skfem_ancf.obstacles.Polygon` or :class:`~skfem_ancf.obstacles.SignedDistance`.
+    friction
+        Coulomb's coefficient, zero or positive.
+    stiffness
+        Pressure per penetration, positive; by default ``E / height`` of each beam, that of half of
+        its own thickness or so.
+    beam
+        The beam, its name or its number; all of the scene by default.
+    method
+        "penalty", or "augmented": in statics each load step is solved again with the pressures
+        that it has found, until the penetration is less than ``tolerance``. A motion has the
+        penalty alone.
+    position
+        A function of time that returns the displacement (x, y) of the shape from where it was
+        given; in statics time is the load factor.
+    angle
+        A function of time that returns the angle by which it has turned, counterclockwise, about
+        its ``pivot``: center, point or mean of the corners.
+    damping
+        In a motion the pressure grows by so much of itself per velocity of approach, zero or
+        positive (time per length), as of Hunt and Crossley; it never pulls.
+    points
+        Points along each element on bottom and top, at least 2, of a Gauss-Lobatto rule; by
+        default two more than the degree of the element's axis.
+    **options
+        ``width``: of the transition from no pressure to one in proportion to the penetration, a
+        length, by default a thousandth of the height. ``tolerance``: the penetration that
+        "augmented" leaves, a length, by default a millionth of the height. ``slip_speed``: in a
+        motion friction is ``v / sqrt(v^2 + slip_speed^2)`` of Coulomb's at the speed v; by default
+        1e-5 of the speed of sound.
+
+    References
+    ----------
+    Wriggers: "Computational Contact Mechanics", Springer 2006; Laursen, Chawla: "Design of energy
+    conserving algorithms for frictionless dynamic contact problems", International Journal for
+    Numerical Methods in Engineering 40 (1997); Hunt, Crossley: "Coefficient of restitution
+    interpreted as damping in vibroimpact", Journal of Applied Mechanics 42 (1975).
+    """
+
+    distributed = True
+
+    def __init__(self, shape: Shape, friction: float = 0.0, stiffness: float | None = None,
+                 beam: WhichBeam = None, method: str = "penalty", position: Any = None,
+                 angle: Any = None, damping: float = 0.0, points: int | None = None,
+                 **options: float | None) -> None:
+        if not isinstance(shape, Shape):
+            raise InputError("an obstacle is a Circle, Line, Polygon or SignedDistance of "
+                             f"skfem_ancf.obstacles, got {shown(shape)}")
+        self.shape, self.beam = shape, beam
+        self.friction = require_not_negative("friction", friction, False)
+        self.damping = require_not_negative("damping", damping)
+        self.penalty = None if stiffness is None else require_positive("stiffness", stiffness)
+        self.method = require_option("method", method, METHODS)
+        self.points = None if points is None else require_integer("points", points, 2, 64)
+        self.position, self.angle = position, angle
+        for name, function in (("position", position), ("angle", angle)):
+            if function is not None:
+                require_function(name, function, "of time")
+        self.options = _options(options)
+        self.symmetric = self.friction == 0.0
+        self.tolerance = 0.0
+
+    @property
+    def moves(self) -> bool:
+        """True if its place depends on time."""
+        return self.position is not None or self.angle is not None
+
+    def pose(self, t: float) -> Array:
+        """Where it is: displacement, cosine and sine, pivot, velocities, when; shape (10,).
+
+        Parameters
+        ----------
+        t
+            The time.
+        """
+        out = np.array([0.0, 0.0, 1.0, 0.0, *self.shape.pivot, 0.0, 0.0, 0.0, t])
+        if self.moves:
+            h = STEP * max(1.0, abs(t))
+            now, before, after = (self._at(time) for time in (t, t - h, t + h))
+            out[:2], out[2:4] = now[:2], (np.cos(now[2]), np.sin(now[2]))
+            out[6:9] = (after - before) / (2.0 * h)
+        return out
+
+    def _at(self, t):
+        place = np.zeros(2) if self.position is None else ask_array(
+            "position(t={:g})", (2,), self.position, t)
+        turn = 0.0 if self.angle is None else ask_array("angle(t={:g})", (), self.angle, t)
+        return np.append(place, turn)
+
+    def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
+        """Its surface at a time as straight pieces.
+
+        Parameters
+        ----------
+        box
+            Lower left and upper right of what is to be seen, one a column, shape (2, 2).
+        t
+            Time; in statics the load factor.
+
+        Returns
+        -------
+        points, pieces
+            Shape (2, n), and the numbers of both ends of each, (m, 2).
+        """
+        if not self.moves:
+            return self.shape.outline(box, t)
+        pose = self.pose(t)
+        turn = np.array([[pose[2], -pose[3]], [pose[3], pose[2]]])
+        pivot = pose[4:6, None]
+        corners = np.array([[box[0, i], box[1, j]] for i in (0, 1) for j in (0, 1)]).T
+        corners = turn.T @ (corners - pivot - pose[:2, None]) + pivot
+        points, pieces = self.shape.outline(
+            np.array([corners.min(axis=1), corners.max(axis=1)]).T, t)
+        return turn @ (points - pivot) + pivot + pose[:2, None], pieces
+
+    def bind(self, scene: Scene) -> list[Link]:
+        beams = scene.beams if self.beam is None else [scene.beam(self.beam)]
+        height = min(beam.mesh.height for beam in beams)
+        self.tolerance = self.options["tolerance"] or TOLERANCE * height
+        groups = []
+        for beam in beams:
+            groups += self._groups_of(beam, scene.offset(beam))
+        places = np.concatenate([group.starts[:2] for group in groups], axis=1)
+        self.shape = self.shape.fitted(places, height)
+        self.groups = tuple(groups)
+        contacts = Contacts([self])
+        for (_, group), x, found in contacts.look(np.zeros(scene.N), 0.0):
+            deepest = int(np.argmin(found[0]))
+            if not found[0, deepest] >= -group.numbers[1]:
+                raise InputError(
+                    f"{self!r} cuts the body at the start: the point "
+                    f"{shown(x[:, deepest].tolist())} of its surface is {-found[0, deepest]:.4g} "
+                    "deep in it. Move the obstacle, or the body to where it is")
+        self._require_outside(beams)
+        return [Link(np.zeros(2))]
+
+    def _require_outside(self, beams):
+        """Raise InputError if the surface of a shape is inside of a beam."""
+        pose = self.pose(0.0)
+        turn = np.array([[pose[2], -pose[3]], [pose[3], pose[2]]])
+        for beam in beams:
+            for x in self.shape.landmarks().T:
+                at = turn @ (x - pose[4:6]) + pose[4:6] + pose[:2]
+                try:
+                    Y = beam.locate(at)[1][1]
+                except MeshError:
+                    continue
+                if 0.0 < min(Y, 1.0 - Y) and min(Y, 1.0 - Y) > WIDTH:
+                    raise InputError(f"{self!r} cuts the body at the start: its point "
+                                     f"{shown(at.tolist())} is inside of {beam!r}")
+
+    def parts(self) -> list[Part]:
+        return []
+
+    # points of the surface
+
+    def _groups_of(self, beam, first):
+        """The groups of bottom and top, and of both ends."""
+        h, n = beam.mesh.height, self.points or beam.element.axis_degree + 2
+        xi, along = _lobatto(n)
+        eta, across = _lobatto(ACROSS)
+        sides = np.array([np.tile(xi, 2), np.repeat([0.0, 1.0], n)]), np.tile(along, 2)
+        last = beam.mesh.nelements - 1
+        ends = [(np.array([np.full(ACROSS, end), eta]), across * h, np.array([e]))
+                for end, e in ((0.0, 0), (1.0, last))]
+        return [self._group(beam, first, *sides, None)] + [
+            self._group(beam, first, *end) for end in ends]
+
+    def _group(self, beam, first, X, w, tind):
+        mesh, mapping = beam.mesh, beam.mesh.mapping()
+        elements = np.arange(mesh.nelements) if tind is None else tind
+        h, n, m = mesh.height, len(elements), X.shape[1]
+        offsets, slopes = np.zeros((n, m)), None
+        at, starts = X, np.zeros((4, n, m))
+        if not beam.has_sections:
+            offsets[:] = h * (X[1] - 0.5)
+            at = np.array([X[0], np.full(m, 0.5)])
+            G, frame = beam_gradients(mesh, beam.element, at, elements)
+            slopes = np.moveaxis(G[0], -1, 0).reshape(-1, n * m)
+            starts[2:] = np.moveaxis(frame[0], -1, 0)
+        starts[:2] = mapping.F(at, elements)
+        weights = beam.element.functions(mapping, at, elements)[0]
+        areas = np.broadcast_to(w, (n, m)) * beam.width
+        if tind is None:  # length of the side, by xi
+            areas = areas * np.hypot(*mapping.DF(at, elements)[:, 0])
+        nodes = first + mesh.t[0, elements] * beam.nd
+        middle = starts[:2].mean(axis=2, keepdims=True)
+        radius = float((np.hypot(*(starts[:2] - middle)) + np.abs(offsets)).max())
+        k = self.penalty or beam.material.E / h
+        sound = np.sqrt(beam.material.E / (beam.material.density or beam.material.E))
+        numbers = np.array([k, self.options["width"] or WIDTH * h, self.friction, k, self.damping,
+                            self.options["slip_speed"] or SLIPPING * sound, radius,
+                            -1.0 if self.shape.hollow else 1.0])
+        return Group(np.repeat(nodes, m), weights.reshape(-1, n * m), slopes, areas.ravel(),
+                     offsets.ravel(), starts.reshape(4, -1), n, m, 0.5 * h, numbers)
+
+    def __repr__(self) -> str:
+        return f"<Obstacle {self.shape!r}>"
+
+
+def _lobatto(n):
+    """Points and weights on [0, 1]."""
+    x = gauss_lobatto(n)
+    P = np.polynomial.legendre.Legendre.basis(n - 1)(x)
+    return 0.5 * (x + 1.0), 1.0 / (n * (n - 1) * P**2)
+
+
+def _options(options):
+    known = ("width", "tolerance", "slip_speed")
+    for name in options:
+        require_option("option of an obstacle", name, known)
+    return {name: None if options.get(name) is None else require_positive(name, options[name])
+            for name in known}
+
+
+__all__ = ["Obstacle"]

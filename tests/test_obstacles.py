@@ -1,0 +1,422 @@
+"""Contact of beams with obstacles."""
+
+import pickle
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_bvp
+
+from skfem_ancf import (Beam, CallbackError, ElementBeamANCF, ElementBeamCable, InputError,
+                        MeshBeam, Scene, StVenantKirchhoff)
+from skfem_ancf.forces import contact_texts as texts
+from skfem_ancf.forces.texts import add_contact
+from skfem_ancf.obstacles import Circle, Line, Polygon, SignedDistance
+
+ELEMENTS = ElementBeamANCF(2), ElementBeamCable(3)
+
+
+def round_distance(x, y):
+    """As Circle((0.5, -0.2), 0.19)."""
+    return np.sqrt((x - 0.5) ** 2 + (y + 0.2) ** 2) - 0.19
+
+
+def beam(element=None, n=8, height=0.01, nu=0.3, E=2e8, length=1.0):
+    return Beam(MeshBeam.init_line(np.linspace(0, length, n + 1), height=height),
+                ElementBeamANCF(2) if element is None else element,
+                StVenantKirchhoff(E, nu, 7800), width=0.01)
+
+
+def asked(what, t=0.0):
+    return texts.Question(what, t, 0.0, 0.0, 0, 0)
+
+
+SHAPES = {"line": Line((0, -0.006), (0.05, 1)), "circle": Circle((0.5, -0.2), 0.19),
+          "polygon": Polygon([(0.4, -0.006), (0.6, -0.006), (0.55, -0.1), (0.45, -0.1)]),
+          "rounded": Polygon([(0.4, -0.01), (0.6, -0.01), (0.5, -0.1)], radius=0.004),
+          "hollow": Circle((0.5, 0.0), 0.5003, hollow=True),
+          "distance": SignedDistance(round_distance)}
+
+
+# the shapes
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_gradients_and_second_derivatives_are_those_of_the_distance(name):
+    shape = SHAPES[name].fitted(np.zeros((2, 1)), 0.01)
+    x = np.array([[0.41, 0.47, 0.56, 0.62], [0.05, -0.004, 0.01, 0.03]])
+    scene = Scene(beam()).obstacle(shape)
+    contacts = scene.system.forces.contacts
+    header = contacts.tables.ints[:texts.HEADER]
+
+    def found_at(x):
+        out = np.empty((6, x.shape[1]))
+        texts.distances(contacts.tables, header, texts.NOW, np.ascontiguousarray(x), out)
+        return out
+
+    found, h = found_at(x), 1e-5
+    assert np.allclose(found[0], shape.distance(x), rtol=0, atol=1e-14)
+    e = h * np.eye(2)[:, :, None]
+    for k in range(2):
+        slope = (found_at(x + e[k]) - found_at(x - e[k])) / (2 * h)
+        assert np.allclose(found[1 + k], slope[0], rtol=0, atol=1e-6)
+        assert np.allclose(found[3 + k:5 + k], slope[1:3], rtol=0,
+                           atol=1e-4 * np.abs(found[3:]).max() + 1e-6)
+
+
+def test_the_distance_of_a_polygon_is_that_of_its_nearest_point():
+    corners = np.array([(0, 0), (2, 0), (2, 1), (1, 0.4), (0, 1)])
+    shape = Polygon(corners[::-1])
+    points = np.random.default_rng(0).uniform(-1, 3, (2, 400))
+    s = np.linspace(0, 1, 4001)
+    rim = np.concatenate([a + s[:, None] * (b - a)
+                          for a, b in zip(corners, np.roll(corners, -1, axis=0))])
+    nearest = np.array([np.hypot(*(rim - p).T).min() for p in points.T])
+    from matplotlib.path import Path
+    inside = Path(corners).contains_points(points.T)
+    assert np.allclose(shape.distance(points), np.where(inside, -nearest, nearest), atol=1e-3)
+
+
+# derivatives of the equations
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("element", ELEMENTS, ids=["sections", "cable"])
+def test_the_tangent_is_the_derivative_of_the_force(element, name, friction):
+    scene = Scene(beam(element, 4)).obstacle(
+        SHAPES[name], friction=friction, width=1e-3, position=lambda t: (0.002 * t, 0.012 * t),
+        angle=lambda t: 0.02 * t)
+    s, rng = scene.system, np.random.default_rng(0)
+    contacts, u, t = s.forces.contacts, 1e-3 * rng.standard_normal(s.N), 1.0
+    contacts.begin(u + 1e-5 * rng.standard_normal(s.N), t)
+
+    def force(u):
+        out = np.zeros(s.N)
+        add_contact(contacts.tables, asked(texts.FORCE, t), u, u, out)
+        return out
+
+    assert np.abs(force(u)).max() > 0
+    i, j, v = contacts.entries(t, u, s.bandwidth)
+    K = np.zeros((s.N, s.N))
+    K[i, j] += v
+    h = 1e-7
+    D = np.array([(force(u + h * e) - force(u - h * e)) / (2 * h) for e in np.eye(s.N)]).T
+    assert np.allclose(K, D, rtol=0, atol=1e-4 * np.abs(D).max())
+    d, out = rng.standard_normal(s.N), np.zeros(2)
+    add_contact(contacts.tables, asked(texts.ALONG, t), u, d, out)
+    assert abs(out[0] / (d @ K @ d) - 1) < 1e-10
+    if friction == 0:
+        slope = [(contacts.potential(u + h * e, t) - contacts.potential(u - h * e, t)) / (2 * h)
+                 for e in np.eye(s.N)]
+        assert np.allclose(slope, force(u), rtol=0, atol=1e-6 * np.abs(slope).max())
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("element", ELEMENTS, ids=["sections", "cable"])
+def test_the_mean_force_does_the_work_that_the_potential_loses(element, name):
+    scene = Scene(beam(element, 4)).obstacle(SHAPES[name], width=1e-3,
+                                             position=lambda t: (0.0, 0.012 * t))
+    s, rng = scene.system, np.random.default_rng(1)
+    contacts, t = s.forces.contacts, 1.0
+    for size in (1e-2, 1e-3, 1e-5):
+        u, d = 1e-3 * rng.standard_normal(s.N), size * rng.standard_normal(s.N)
+        f = np.zeros(s.N)
+        add_contact(contacts.tables, asked(texts.FORCE, t), u, u + d, f)
+        change = contacts.potential(u + d, t) - contacts.potential(u, t)
+        assert abs(f @ d - change) <= 1e-11 * contacts.potential(u, t) + 1e-9 * abs(change)
+
+
+# statics
+
+
+def test_a_beam_lies_on_the_floor_with_the_weight_that_the_clamp_leaves():
+    """Its free part is that of the elastica, its end lies flat."""
+    b = beam(ElementBeamCable(5), 32, nu=0.0)
+    scene = Scene(b).clamp("left").gravity((0, -9.81)).obstacle(Line((0, -0.055)), stiffness=1e12)
+    state = scene.solve_static()
+    assert state.stability == "stable" and state.contact().penetration < 1e-6
+    weight = 7800 * 1e-4 * 9.81
+    assert np.allclose(state.contact().total, [0, weight - state.reactions("left").force[1]],
+                       atol=1e-9 * weight)
+    EI = 2e8 * 1e-8 / 12
+
+    def right(s, y, p):
+        """Angle, moment, height over the part s of the free length p[0]; V p[1] at the clamp."""
+        V = p[1] - weight * s * p[0]
+        return p[0] * np.array([y[1] / EI, V * np.cos(y[0]), np.sin(y[0])])
+
+    def ends(a, b, p):
+        return np.array([a[0], a[2], b[0], b[1], b[2] + 0.05])
+
+    s = np.linspace(0, 1, 41)
+    guess = np.array([-0.25 * s * (1 - s), -0.1 * (4 - 16 * s + 12 * s**2), -0.05 * s])
+    found = solve_bvp(right, ends, s, guess, p=[0.53, 0.35 * weight], tol=1e-8)
+    assert found.success
+    free = found.p[0]
+    x = np.linspace(0.05, 0.95 * free, 7)
+    heights = state.position([(a, 0) for a in x])[1]
+    assert np.allclose(heights, found.sol(x / free)[2], rtol=0, atol=5e-6)
+
+
+def test_a_strip_pressed_on_a_cylinder_wraps_it():
+    """Where it touches its axis has the curvature 1 / (R + h / 2); beyond it is an elastica."""
+    R, h, L, E = 0.3, 0.004, 0.5, 2e9
+    b = Beam(MeshBeam.init_line(np.linspace(0, L, 41), h), ElementBeamCable(5),
+             StVenantKirchhoff(E, 0.0), width=1.0)
+    F = 250.0
+    scene = Scene(b).clamp("left").point_force((0, -F), (L, 0))
+    scene.obstacle(Circle((0, -R - h / 2), R), stiffness=1e13)
+    state = scene.solve_static()
+    r, EI = R + h / 2, E * h**3 / 12
+
+    def right(s, y, p):
+        """Angle, curvature over the free length p[0], from where the circle is left."""
+        return p[0] * np.array([y[1], F / EI * np.cos(y[0]), np.cos(y[0]), np.sin(y[0])])
+
+    def ends(a, b, p):
+        angle = -(L - p[0]) / r
+        return np.array([a[0] - angle, a[1] + 1 / r, b[1], a[2] + r * np.sin(angle),
+                         a[3] + r - r * np.cos(angle)])
+
+    s = np.linspace(0, 1, 41)
+    guess = np.array([-0.8 - 0.5 * s, -3 + 3 * s, 0.2 + 0.2 * s, -0.1 - 0.2 * s])
+    found = solve_bvp(right, ends, s, guess, p=[0.15], tol=1e-8)
+    assert found.success
+    tip = found.y[2:, -1]
+    assert np.allclose(state.position((L, 0)), tip, rtol=0, atol=1e-4 * L)
+    wrapped = L - found.p[0]
+    assert wrapped > 0.1
+    at = np.linspace(0.02, 0.8 * wrapped, 9)
+    kappa = [state.resultants((a, 0), recover=False).curvature for a in at]
+    assert np.allclose(np.abs(kappa), 1 / r, rtol=1e-4)
+
+
+@pytest.mark.parametrize("shape", [Circle((0.8, -0.06), 0.05), SignedDistance(
+    lambda x, y: np.sqrt((x - 0.8) ** 2 + (y + 0.06) ** 2) - 0.05)], ids=["circle", "distance"])
+def test_a_stop_holds_a_leaf_spring_as_a_support_does(shape):
+    """Beyond the gap the force of the stop is that of a propped cantilever."""
+    b = beam(ElementBeamCable(5), 20, height=0.002, nu=0.0)
+    EI, F, a = 2e8 * 0.01 * 0.002**3 / 12, 2e-4, 0.8
+    state = Scene(b).clamp("left").point_force((0, -F), (1, 0)).obstacle(
+        shape, stiffness=1e13).solve_static()
+    gap = 0.009
+    # deflection at a by F at the end, less that by the stop's force there
+    R = (F * a**2 * (3 - a) / 6 - EI * gap) * 3 / a**3
+    contact = state.contact()
+    assert R > 0 and abs(contact.total[1] / R - 1) < 5e-3
+    assert np.allclose(contact.points.mean(axis=1), [0.8, -0.01], atol=0.02)
+    assert state.stability == "stable"
+
+
+def test_an_elastica_between_walls_touches_one_in_a_point():
+    """A strip whose ends come closer buckles against a wall, which then pushes on its middle."""
+    h, d, way = 0.004, 0.048, 0.00595
+    b = beam(ElementBeamCable(5), 32, height=h, nu=0.0)
+    scene = Scene(b).clamp("left").fix("right", "r^1", -way).fix("right", ["r^2", "r_X^2"])
+    scene.point_force((0, 5e-3), (0.5, 0)).obstacle(Line((0, 0.05), (0, -1)), stiffness=1e12)
+    scene.obstacle(Line((0, -0.05), (0, 1)), stiffness=1e12)
+    state = scene.solve_static(first_step=0.1)
+    top, bottom = state.contact(0), state.contact(1)
+    assert top.penetration < 1e-6 and len(bottom) == 0 and state.stability == "stable"
+    EI, EA = 2e8 * 0.01 * h**3 / 12, 2e8 * 0.01 * h
+
+    def right(s, y, p):
+        """Angle, moment, x, y of the left half, under the thrust p[0] and half the wall's force."""
+        cos, sin = np.cos(y[0]), np.sin(y[0])
+        stretch = 1 - (p[0] * cos - p[1] * sin) / EA
+        return np.array([y[1] / EI, -p[0] * sin - p[1] * cos, stretch * cos, stretch * sin])
+
+    def ends(a, b, p):
+        return np.array([a[0], a[2], a[3], b[0], b[2] - 0.5 + way / 2, b[3] - d])
+
+    s = np.linspace(0, 0.5, 41)
+    guess = np.array([0.2 * np.sin(2 * np.pi * s), EI * np.cos(2 * np.pi * s), s,
+                      0.024 * (1 - np.cos(2 * np.pi * s))])
+    found = solve_bvp(right, ends, s, guess, p=[80 * EI, 0.0], tol=1e-9)
+    assert found.success
+    thrust = state.reactions("left").force[0]
+    assert abs(thrust / found.p[0] - 1) < 2e-3
+    assert abs(top.total[1] - 2 * found.p[1] + 5e-3) < 2e-3 * abs(top.total[1])
+
+
+# motion
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=["sections", "cable"])
+@pytest.mark.parametrize("shape", [Line((0, -0.03)), Circle((0.45, -0.23), 0.2)],
+                         ids=["line", "circle"])
+def test_energy_is_kept_by_a_beam_that_bounces(element, shape):
+    b = beam(element, 6, height=0.02)
+    history = Scene(b).gravity((0, -9.81)).obstacle(shape).integrate(0.15, 5e-4)
+    assert np.ptp(history.total_energy) < 1e-9 * history.kinetic_energy.max()
+    nearest = [state.contact().nearest for state in history]
+    assert min(nearest) < -1e-6 and nearest[-1] > -1e-3 and max(nearest[-60:]) > 0
+
+
+def test_a_beam_that_falls_on_the_floor_comes_to_rest_on_it():
+    b = beam(ElementBeamCable(3), 4, height=0.02)
+    scene = Scene(b).gravity((0, -9.81)).obstacle(Line((0, -0.015)), stiffness=1e8, damping=2.0)
+    history = scene.damping(mass=30.0, stiffness=1e-4).integrate(0.3, 1e-3)
+    last, late = history.state(-1), history.states(range(200, 300))
+    weight = 7800 * 0.02 * 0.01 * 9.81
+    force = np.mean([state.contact().total for state in late], axis=0)
+    assert np.allclose(force, [0, weight], atol=1e-2 * weight)
+    assert np.abs(last.v).max() < 2e-2 and history.dissipated[-1] > 0.9 * weight * 0.005
+    assert np.ptp(history.total_energy + history.dissipated) < 1e-8 * weight
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+def test_a_wall_that_moves_bounces_a_beam_off_with_twice_its_velocity(scheme):
+    b = beam(ElementBeamCable(3), 2, height=0.02)
+    scene = Scene(b).obstacle(Line((0, -0.0105)), position=lambda t: (0.0, 0.5 * t),
+                              stiffness=1e7)
+    history = scene.integrate(0.04, 5e-4, scheme=scheme)
+    p = history.momentum[-1, 1] / (7800 * 0.02 * 0.01)
+    assert abs(p - 1) < (1e-3 if scheme == "energy-momentum" else 0.02)
+
+
+# what it costs
+
+
+def test_far_from_obstacles_only_the_search_is_paid():
+    asked = []
+
+    def distance(x, y):
+        asked.append(np.size(x))
+        return y + 10.0
+
+    n = 8
+    scene = Scene(beam(n=n)).clamp("left").point_force((0, -1e-3), (1, 0))
+    free = scene.solve_static()
+    scene.obstacle(SignedDistance(distance, gradient=lambda x, y: np.array([0 * x, 1 + 0 * x]),
+                                  hessian=lambda x, y: np.zeros((3, *x.shape))))
+    asked.clear()
+    counts = scene.system.forces.contacts.tables.counts
+    counts[:] = 0
+    u = np.zeros(scene.system.N)
+    scene.system.internal_force(u)
+    # one point of each element, bottom and top together, and one of each end
+    assert asked == [n, 1, 1] and counts.tolist() == [n + 2, 0]
+    assert np.array_equal(scene.solve_static().u, free.u) and counts[1] == 0
+
+
+def test_without_obstacles_nothing_is_paid(monkeypatch):
+    def never(*args):
+        raise AssertionError("asked for contact")
+
+    monkeypatch.setattr("skfem_ancf.forces.texts.run_contacts", never)
+    scene = Scene(beam()).clamp("left").gravity((0, -9.81))
+    assert scene.system.forces.contacts.tables.number == 0
+    scene.solve_static()
+    scene.integrate(2e-3, 1e-3)
+
+
+# around it
+
+
+def test_scenes_with_obstacles_pickle_and_adapt_and_are_planned():
+    scene = Scene(beam()).clamp("left").gravity((0, -9.81)).obstacle(
+        Circle((0.8, -0.16), 0.1), friction=0.2).obstacle(SignedDistance(round_distance))
+    state, again = scene.solve_static(), pickle.loads(pickle.dumps(scene)).solve_static()
+    assert np.array_equal(state.u, again.u)
+    back = pickle.loads(pickle.dumps(state))
+    assert np.array_equal(back.contact().force, state.contact().force)
+    assert np.allclose(state.reactions("left").force + state.contact().total,
+                       [0, 7800 * 1e-4 * 9.81])
+    assert scene.plan()["obstacles"].status == "computed"
+    assert "Python" in scene.plan()["obstacles"].reason
+    assert Scene(beam()).plan()["obstacles"].status == "skipped"
+    finer = Scene(beam(n=4)).clamp("left").point_force((0, -0.02), (1, 0)).obstacle(
+        Circle((0.8, -0.06), 0.05)).solve_static(adapt=1e-3)
+    assert finer.beams[0].mesh.nelements > 4 and finer.contact().total[1] > 0
+
+
+def test_a_motion_with_obstacles_goes_on_from_its_checkpoint(tmp_path):
+    def scene(radius=0.2):
+        return Scene(beam(ElementBeamCable(3), 6, height=0.02)).gravity((0, -9.81)).obstacle(
+            Circle((0.45, -0.22), radius), friction=0.3, slip_speed=0.1, position=still)
+
+    history = scene().integrate(0.06, 1e-3, checkpoint=tmp_path / "run.npz", every=20)
+    again = scene().resume(tmp_path / "run.npz")
+    assert np.array_equal(again.u, history.u) and history.dissipated[-1] > 0
+    with pytest.raises(Exception, match="force element 0"):
+        scene(0.19).resume(tmp_path / "run.npz")
+
+
+def still(t):
+    return 0.0, 0.001 * np.sin(t)
+
+
+# what is wrong
+
+
+@pytest.mark.parametrize("make, message", [
+    (lambda: Circle((0, 0), -1.0), "radius must be positive"),
+    (lambda: Circle((0, np.nan), 1.0), "center"),
+    (lambda: Line((0, 0), (0, 0)), "direction"),
+    (lambda: Polygon([(0, 0), (1, 0)]), "three corners"),
+    (lambda: Polygon([(0, 0), (1, 1), (1, 0), (0, 1)]), "cross"),
+    (lambda: Polygon([(0, 0), (1, 0), (1, 0), (0, 1)]), "one place"),
+    (lambda: Polygon([(0, 0), (1, 0), (np.inf, 1)]), "finite"),
+    (lambda: Polygon([(0, 0), (1, 0), (0, 1)], radius=-1), "radius"),
+    (lambda: SignedDistance(3.0), "function"),
+])
+def test_shapes_that_are_none_say_so(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+@pytest.mark.parametrize("options, message", [
+    ({"friction": -0.1}, "friction must be zero or positive"),
+    ({"stiffness": -1.0}, "stiffness must be positive"),
+    ({"stiffness": np.nan}, "stiffness"),
+    ({"method": "lagrange"}, "penalty"),
+    ({"damping": -1.0}, "damping"),
+    ({"width": 0.0}, "width must be positive"),
+    ({"smooth": 1.0}, "known"),
+    ({"points": 1}, "points"),
+    ({"position": 3.0}, "position must be a function"),
+    ({"position": lambda t: t}, "position"),
+])
+def test_obstacles_out_of_range_say_so(options, message):
+    scene = Scene(beam())
+    with pytest.raises(InputError, match=message):
+        scene.obstacle(Line((0, -1)), **options)
+    assert not scene.elements
+
+
+@pytest.mark.parametrize("shape, message", [
+    (Line((0, -0.001)), "0.004 deep"),
+    (Circle((0.5, -0.1), 0.0977), "0.0027 deep"),
+    (Circle((0.53, 0.0), 0.002), "inside of"),
+    (Circle((0.5, 0.0), 0.4, hollow=True), "cuts the body"),
+])
+def test_an_obstacle_that_cuts_the_body_at_the_start_is_refused(shape, message):
+    with pytest.raises(InputError, match=message):
+        Scene(beam()).obstacle(shape)
+
+
+@pytest.mark.parametrize("f, message", [
+    (lambda x, y: 1.0, "shape"),
+    (lambda x, y: (x, y), "shape"),
+    (lambda x, y: np.nan * x, "finite"),
+    (lambda x, y: 5.0 * (y + 1.0), "slope is 1"),
+    (lambda x, y: {}["a"], "KeyError"),
+])
+def test_distance_functions_that_are_none_say_so(f, message):
+    with pytest.raises(CallbackError, match=message):
+        Scene(beam()).obstacle(SignedDistance(f))
+
+
+def test_a_gradient_that_is_not_that_of_the_distance_is_refused():
+    with pytest.raises(CallbackError, match="not that of f"):
+        Scene(beam()).obstacle(SignedDistance(
+            lambda x, y: y + 1.0, gradient=lambda x, y: np.array([1 + 0 * x, 0 * x])))
+
+
+def test_what_knows_no_obstacles_says_so():
+    scene = Scene(beam()).clamp("left").gravity((0, -9.81))
+    with pytest.raises(InputError, match="no obstacle"):
+        scene.solve_static().contact()
+    with pytest.raises(InputError, match="continuation"):
+        scene.obstacle(Line((0, -0.1)), friction=0.1).continuation(steps=2)
