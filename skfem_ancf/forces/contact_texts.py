@@ -579,8 +579,8 @@ def velocities(tables, group, at, v, z, x, w):
 def resist(tables, group, at, factor, w, found, F, K):
     """Coulomb's friction, smooth about rest, and damping in proportion to the pressure.
 
-    Of friction the tangent takes its mean slope by the velocity from rest on, not its slope there:
-    so an iteration finds the rest from any velocity.
+    Of friction the tangent takes its mean slope by the velocity from rest on, not its slope there,
+    and not that it grows with the pressure: so an iteration finds the rest from any velocity.
     """
     numbers, areas = _numbers(tables, group), tables.floats[group[AREAS]:]
     for i in lanes(at.size):
@@ -597,7 +597,7 @@ def resist(tables, group, at, factor, w, found, F, K):
         stiff = k * curvature_of(-found[0, i], numbers[WIDTH])
         c = factor * pressure * numbers[DAMPING] * (loss < 1.0) - loss * stiff
         _add_friction(found, i, tx, ty, pressure * share,
-                      factor * pressure * numbers[FRICTION] / speed, share * stiff, K)
+                      factor * pressure * numbers[FRICTION] / speed, 0.0, K)
         K[0, i] += c * nx * nx
         K[1, i] += c * nx * ny
         K[2, i] += c * ny * nx
