@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
 METHODS = ("penalty", "augmented")
 #: Width of the transition from no pressure to one in proportion to the penetration, relative to
-#: the height; a body may be cut so deep at the start.
+#: the height.
 WIDTH = 1e-3
+#: How deep a body may be cut at the start, relative to its height: meshes of curves are not exact.
+CUT = 1e-2
 #: Penetration that is left by the augmented Lagrangian, relative to the height.
 TOLERANCE = 1e-6
 #: Speed below which friction is less than Coulomb's, relative to that of sound.
@@ -174,7 +176,7 @@ class Obstacle(ForceElement):
         contacts = Contacts([self])
         for (_, group), x, found in contacts.look(np.zeros(scene.N), 0.0):
             deepest = int(np.argmin(found[0]))
-            if not found[0, deepest] >= -group.numbers[1]:
+            if not found[0, deepest] >= -CUT * height:
                 raise InputError(
                     f"{self!r} cuts the body at the start: the point "
                     f"{shown(x[:, deepest].tolist())} of its surface is {-found[0, deepest]:.4g} "
@@ -193,7 +195,7 @@ class Obstacle(ForceElement):
                     Y = beam.locate(at)[1][1]
                 except MeshError:
                     continue
-                if 0.0 < min(Y, 1.0 - Y) and min(Y, 1.0 - Y) > WIDTH:
+                if min(Y, 1.0 - Y) > CUT:
                     raise InputError(f"{self!r} cuts the body at the start: its point "
                                      f"{shown(at.tolist())} is inside of {beam!r}")
 
@@ -204,12 +206,12 @@ class Obstacle(ForceElement):
 
     def _groups_of(self, beam, first):
         """The groups of bottom and top, and of both ends."""
-        h, n = beam.mesh.height, self.points or beam.element.axis_degree + 2
+        n = self.points or beam.element.axis_degree + 2
         xi, along = _lobatto(n)
         eta, across = _lobatto(ACROSS)
         sides = np.array([np.tile(xi, 2), np.repeat([0.0, 1.0], n)]), np.tile(along, 2)
         last = beam.mesh.nelements - 1
-        ends = [(np.array([np.full(ACROSS, end), eta]), across * h, np.array([e]))
+        ends = [(np.array([np.full(ACROSS, end), eta]), across, np.array([e]))
                 for end, e in ((0.0, 0), (1.0, last))]
         return [self._group(beam, first, *sides, None)] + [
             self._group(beam, first, *end) for end in ends]
@@ -221,21 +223,27 @@ class Obstacle(ForceElement):
         offsets, slopes = np.zeros((n, m)), None
         at, starts = X, np.zeros((4, n, m))
         if not beam.has_sections:
-            offsets[:] = h * (X[1] - 0.5)
+            offsets[:] = mapping.offset(X, elements)
             at = np.array([X[0], np.full(m, 0.5)])
             G, frame = beam_gradients(mesh, beam.element, at, elements)
             slopes = np.moveaxis(G[0], -1, 0).reshape(-1, n * m)
             starts[2:] = np.moveaxis(frame[0], -1, 0)
         starts[:2] = mapping.F(at, elements)
         weights = beam.element.functions(mapping, at, elements)[0]
-        areas = np.broadcast_to(w, (n, m)) * beam.width
-        if tind is None:  # length of the side, by xi
-            areas = areas * np.hypot(*mapping.DF(at, elements)[:, 0])
+        if tind is None:  # lengths of both sides, by xi, and their widths
+            half, length = m // 2, np.hypot(*mapping.DF(at, elements)[:, 0])
+            width = [np.broadcast_to(_face(beam.across, side, part, elements), (n, half))
+                     for side, part in ((0, X[:, :half]), (1, X[:, half:]))]
+            areas = w * length * np.concatenate(width, axis=1)
+        else:
+            areas = w * mapping.height(X[0], elements)[0] * beam.across.outline(X, elements)
+        areas = np.broadcast_to(areas, (n, m))
         nodes = first + mesh.t[0, elements] * beam.nd
         middle = starts[:2].mean(axis=2, keepdims=True)
         radius = float((np.hypot(*(starts[:2] - middle)) + np.abs(offsets)).max())
-        k = self.penalty or beam.material.E / h
-        sound = np.sqrt(beam.material.E / (beam.material.density or beam.material.E))
+        laws = [slab.material for slab in beam.across.slabs]
+        E = max(law.E for law in laws)
+        k, sound = self.penalty or E / h, np.sqrt(E / max(law.density or E for law in laws))
         numbers = np.array([k, self.options["width"] or WIDTH * h, self.friction, k, self.damping,
                             self.options["slip_speed"] or SLIPPING * sound, radius,
                             -1.0 if self.shape.hollow else 1.0])
@@ -244,6 +252,14 @@ class Obstacle(ForceElement):
 
     def __repr__(self) -> str:
         return f"<Obstacle {self.shape!r}>"
+
+
+def _face(across, side, X, elements):
+    """The width of bottom or top; of a section without any, as a circle, the largest."""
+    slab = across.slabs[-side]
+    if slab.face is not None and slab.face[side] == 0.0:
+        return across.outline(X, elements)
+    return across.face(side, X, elements)
 
 
 def _lobatto(n):
