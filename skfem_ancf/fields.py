@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -128,8 +128,8 @@ class Values(Mapping):
     find
         Returns the recovered field of the beam, or None; None for the field of the elements.
     eigen
-        Returns what the stress of the elements is less by at points of a part, for stress-free
-        strains; None where there are none.
+        Returns the stress-free strain at points of a part, (3, n) or 0, or for a second argument
+        True what the stress of the elements is less by; None where there is none.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ class Values(Mapping):
 
     def __init__(self, part: Part, u: Array,
                  find: Callable[[], Recovery | None] | None = None,
-                 eigen: Callable[[Part], Any] | None = None) -> None:
+                 eigen: Callable[..., Any] | None = None) -> None:
         self._part, self._u, self._find, self._eigen = part, u, find, eigen
         self.beam, self.n = part.beam, len(part.e)
         self._known: dict[str, Array] = {}
@@ -194,7 +194,34 @@ class Values(Mapping):
         if self._recovery is not None:
             return self._recovery.at(self._part, slice(3, 6))
         S = self._part.stress(self._u)
-        return S if self._eigen is None else S - self._eigen(self._part)
+        return S if self._eigen is None else S - self._eigen(self._part, True)
+
+    @cached_property
+    def elastic(self) -> Array:
+        """The strain less that without stress, (3, n)."""
+        return self.strain if self._eigen is None else self.strain - self._eigen(self._part)
+
+    def of_materials(self, ask: Callable[[Any], Array], graded: bool = False) -> Array:
+        """A field that the material at each point gives.
+
+        Parameters
+        ----------
+        ask
+            Returns the field (n,) of a material.
+        graded
+            It is proportional to the modulus.
+
+        Returns
+        -------
+        ndarray
+            Shape (n,).
+        """
+        across = self.beam.across
+        if across.plain:
+            return ask(self.beam.material)
+        found = [partial(ask, slab.material) for slab in across.slabs]
+        return across.of_slabs(self._part.at, np.zeros((self.n, 1)), [
+            partial(_column, one) for one in found], self._part.e, graded)[:, 0]
 
     @cached_property
     def F(self) -> Array:
@@ -214,8 +241,8 @@ class Values(Mapping):
         """Change of volume; NaN where the material has no thickness left."""
         F = self.F
         with np.errstate(invalid="ignore"):
-            return (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) * self.beam.material.thickness_stretch(
-                self.strain)
+            return (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) * self.of_materials(
+                lambda law: law.thickness_stretch(self.elastic))
 
     @cached_property
     def sigma(self) -> Array:
@@ -233,17 +260,20 @@ class Values(Mapping):
         if material.plane == "stress":
             return np.zeros(self.n)
         if not self.beam.has_sections:  # eps_zz = 0 and S_yy = 0
-            return material.nu * self.S[0] / self._volume
+            return self.of_materials(lambda law: law.nu * self.S[0]) / self._volume
         with np.errstate(invalid="ignore", divide="ignore"):
-            return material.stress_zz(self.strain) / self._volume
+            return self.of_materials(lambda law: law.stress_zz(self.elastic), True) / self._volume
 
     @cached_property
     def energy(self) -> Array:
         """Strain energy per stress-free volume, (n,)."""
-        law = self.beam.material.law()
-        if isinstance(law, LinearLaw) or not self.beam.has_sections:
-            return 0.5 * np.sum(self.strain * self.S, axis=0)
-        return law.energy(self.strain)
+        def of(material):
+            law = material.law()
+            if isinstance(law, LinearLaw) or not self.beam.has_sections:
+                return 0.5 * np.sum(self.elastic * self.S, axis=0)
+            return law.energy(self.elastic)
+
+        return self.of_materials(of)
 
     @cached_property
     def principal(self) -> tuple[Array, Array]:
@@ -256,6 +286,10 @@ class Values(Mapping):
     def principal_stress(self) -> tuple[Array, Array]:
         """Principal Cauchy stresses in the plane, (2, n), and the direction of the larger."""
         return _principal(self.sigma)
+
+
+def _column(ask):
+    return ask()[:, None]
 
 
 def _principal(tensor):
@@ -413,4 +447,4 @@ def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Va
     if recover and hasattr(state, "recovery"):
         def find():
             return state.recovery(beam)
-    return Values(part, state.u_of(beam), find, getattr(state, "eigen_stress", None))
+    return Values(part, state.u_of(beam), find, getattr(state, "eigen", None))

@@ -357,25 +357,28 @@ class State(Frozen):
         at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
         field = find_field(field)
         return at.gather([field.of(Values(part, self.u, partial(
-            self._recovery_of, part.number) if recover else None, self.eigen_stress))
+            self._recovery_of, part.number) if recover else None, self.eigen))
             for part in at.parts])
 
-    def eigen_stress(self, part: Part) -> Any:
-        """What the stress of the elements is less by at points, for stress-free strains.
+    def eigen(self, part: Part, stress: bool = False) -> Any:
+        """The stress-free strain at points, or what the stress of the elements is less by for it.
 
         Parameters
         ----------
         part
             A :class:`~skfem_ancf.points.Part`.
+        stress
+            The latter.
 
         Returns
         -------
         ndarray
             Shape (3, n), or 0.
         """
-        return sum(self.load * load.factor(self.t) * load.stress_at(part.at, part.e)[..., 0]
-                   for load in self.system.loads
-                   if isinstance(load, EigenStrain) and load.beam is part.beam)
+        return sum(self.load * load.factor(self.t) * (
+            load.stress_at if stress else load.strain_at)(part.at, part.e)[..., 0]
+            for load in self.system.loads
+            if isinstance(load, EigenStrain) and load.beam is part.beam)
 
     def _strain(self, part, recover):
         r = self._recovery_of(part.number) if recover else None
@@ -387,7 +390,7 @@ class State(Frozen):
         r = self._recovery_of(part.number) if recover else None
         if r is not None:
             return r.at(part, slice(3, 6))
-        return part.stress(self.u) - self.eigen_stress(part)
+        return part.stress(self.u) - self.eigen(part, True)
 
     # recovered fields
 

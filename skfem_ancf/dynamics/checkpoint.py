@@ -76,7 +76,9 @@ def fingerprint(system: System) -> dict[str, str]:
         parts[f"element {who}"] = _digest(type(beam.element).__name__, beam.element.order,
                                           beam.element.axis_degree, beam.nd)
         parts[f"material {who}"] = _digest(type(beam.material).__name__, *_numbers(beam.material))
-        parts[f"width {who}"] = _digest(beam.width)
+        parts[f"width {who}"] = (_digest(beam.width) if beam.across.plain else _digest(
+            *(x for pack in beam.kernel.packs for x in (
+                pack.weights, getattr(pack, "stiffness", None), getattr(pack, "moduli", None)))))
         parts[f"damping {who}"] = _digest(beam.damping)
         parts[f"formulation {who}"] = _digest(beam.formulation.name, *_numbers(beam.formulation))
     for k, body in enumerate(system.bodies):

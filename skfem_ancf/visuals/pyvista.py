@@ -45,13 +45,14 @@ def _wanted(fields):
 
 def _normal(field, values):
     """The component of a tensor normal to the plane, (n,); NaN where the law does not say it."""
-    material = values.beam.material
+    strain, cable = values.elastic, not values.beam.has_sections
     try:
         if field.name == "strain":
-            return 0.5 * (material.thickness_stretch(values.strain) ** 2 - 1.0)
+            return values.of_materials(lambda law: 0.5 * (law.thickness_stretch(strain)**2 - 1.0))
         if field.name == "stress":
-            return (material.nu * values.S[0] * (material.plane == "strain")
-                    if not values.beam.has_sections else material.stress_zz(values.strain))
+            return values.of_materials(lambda law: (
+                law.nu * values.S[0] * (law.plane == "strain") if cable else
+                law.stress_zz(strain)), not cable)
         return values.sigma_zz
     except (InputError, NotImplementedError):
         return np.full(values.n, np.nan)
