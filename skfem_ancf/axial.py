@@ -10,6 +10,7 @@ from .errors import ask_field, require_finite
 from .kernels.section import beam_gradients
 from .loads import DeadLoad, Load
 from .quadrature import gauss
+from .rigid import RigidBody
 from .spread import AXIS, Sampled, Spread
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class FollowerForce(Load):
-    """A force on a material point that turns with the tangent of the axis there.
+    """A force on a material point that turns with the tangent of the axis there, or with a body.
 
     It has no potential: what is loaded by it may flutter.
 
@@ -38,10 +39,12 @@ class FollowerForce(Load):
 
     constant = False
     symmetric = False
-    # of a bound one: the point, its coordinates, weights of its place and of the tangent
-    _station: float
+    for_bodies = True
+    # of a bound one: the point, coordinates and weights of its place and of the tangent
+    _stations: tuple[float, ...]
     _dofs: Any
     _weights: Any
+    _along: Any
     _slopes: Any
     _start: Any
     _turn: Any
@@ -51,14 +54,19 @@ class FollowerForce(Load):
         super().__init__(beam, amplitude)
         self.total, self.at = require_finite("force", force, (2,)), at
 
-    def bind(self, beam: Beam) -> Load:
-        bound = cast("FollowerForce", super().bind(beam))
-        e, X = beam.locate(self.at)
-        bound._station = e + float(X[0])
-        bound._dofs, bound._weights = beam.probe(self.at)
-        slopes, frame = beam_gradients(beam.mesh, beam.element, np.array([X[:1], [0.5]]),
-                                       np.array([e]))
-        bound._slopes, bound._start = slopes[0, 0, 0], frame[0, 0, 0]
+    def bind(self, beam: Beam | RigidBody) -> Load:
+        bound = cast("FollowerForce", super().bind(cast("Beam", beam)))
+        bound._dofs, weights = beam.probe(self.at)
+        bound._weights = np.broadcast_to(weights, bound._dofs.shape)
+        if isinstance(beam, RigidBody):
+            bound._stations, bound._start = (), beam.q0[2:]
+            bound._along, bound._slopes = beam.section_direction(0)
+        else:
+            e, X = beam.locate(self.at)
+            bound._stations, bound._along = (e + float(X[0]),), bound._dofs
+            slopes, frame = beam_gradients(beam.mesh, beam.element, np.array([X[:1], [0.5]]),
+                                           np.array([e]))
+            bound._slopes, bound._start = slopes[0, 0, 0], frame[0, 0, 0]
         # the force is a matrix times the unit tangent
         (x, y), n = self.total, bound._start / np.hypot(*bound._start)
         a, b = x * n[0] + y * n[1], x * n[1] - y * n[0]
@@ -66,25 +74,25 @@ class FollowerForce(Load):
         return bound
 
     def _tangent(self, u):
-        return self._start + u[self._dofs] @ self._slopes
+        return self._start + u[self._along] @ self._slopes
 
     def force(self, u: Array) -> Array:
         d = self._tangent(u)
         out = np.zeros(self.beam.N)
-        np.add.at(out, self._dofs, np.outer(self._turn @ d / np.hypot(*d), self._weights))
+        np.add.at(out, self._dofs, (self._turn @ d / np.hypot(*d))[:, None] * self._weights)
         return out
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
         d = self._tangent(u)
         size = np.hypot(*d)
         D = self._turn @ (np.eye(2) - np.outer(d, d) / size**2) / size
-        values = np.einsum("ij,k,l->ikjl", D, self._weights, self._slopes)
+        values = np.einsum("ij,ik,l->ikjl", D, self._weights, self._slopes)
         rows = np.broadcast_to(self._dofs[:, :, None, None], values.shape)
-        columns = np.broadcast_to(self._dofs[None, None], values.shape)
+        columns = np.broadcast_to(self._along[None, None], values.shape)
         return rows.ravel(), columns.ravel(), values.ravel()
 
     def spread(self, u: Array) -> Spread:
-        return Spread(stations=(self._station,))
+        return Spread(stations=self._stations)
 
 
 class LineLoad(Load):

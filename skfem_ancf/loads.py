@@ -220,7 +220,8 @@ def bind_load(load: Load, beam: Beam | RigidBody) -> Load:
     """
     if isinstance(beam, RigidBody) and not load.for_bodies:
         raise InputError(f"{type(load).__name__} acts on beams and not on {beam!r}: a rigid body "
-                         "takes scene.gravity, scene.point_force, scene.moment, springs and joints")
+                         "takes scene.gravity, point_force, follower_force, moment, springs and "
+                         "joints")
     bound = load.bind(cast("Beam", beam))
     if type(bound) in (DeadLoad, Pressure, EndMoment):
         bound._seal()

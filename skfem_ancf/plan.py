@@ -91,14 +91,15 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
     add("varying loads", "computed" if rest else "skipped",
         f"{rest} depend on displacement or time" if rest else "no follower load, no amplitude")
     add("multipliers", "computed" if s.m else "skipped",
-        f"{s.m} equations of {len(s.joints)} joint(s)" if s.m else
+        f"{s.m} equations of {len(s.joints)} joint(s) and directors of rigid bodies" if s.bodies
+        else f"{s.m} equations of {len(s.joints)} joint(s)" if s.m else
         "no joints" if not scene.joints else "the joints only fix coordinates")
     bandwidth = s.K.bandwidth
     if not dynamic and s.forces.far:
         solver = "banded with a border of the points that force elements couple"
     elif s.m and not dynamic and s.machine.tables.plain.border.wide:
         solver = "sparse LU with the multipliers: " + (
-            "a joint of your own is not quadratic" if s.bordered else
+            "a joint is not quadratic, as a slider on a beam" if s.bordered else
             f"too many for a border ({s.m})")
     elif not s.symmetric:
         solver = f"banded LU, half bandwidth {bandwidth}: a force has no potential"

@@ -690,7 +690,7 @@ class Scene:
 
     def follower_force(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
                        amplitude: TimeFunction = None) -> Scene:
-        """A force on a material point that turns with the tangent of the axis there.
+        """A force on a material point that turns with the tangent of the axis, or with a body.
 
         Parameters
         ----------
@@ -708,6 +708,7 @@ class Scene:
         Scene
             Itself.
         """
+        at, beam = on_body(at, beam)
         return self._put(loads=[(self._number(beam), FollowerForce(force, at, None, amplitude))])
 
     def line_load(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,

@@ -92,6 +92,19 @@ def test_a_moment_turns_a_body():
     assert np.ptp(history.total_energy) < 1e-10
 
 
+def test_a_follower_force_turns_with_a_body():
+    """A thruster off the centre: the body spins up, and its path is that of the integrals."""
+    body = RigidBody(2.0, 0.4, position=(0, 2), angle=0.3)
+    scene = Scene(beam_of(2), body).clamp("left").follower_force((3.0, 0.0), (0.0, 1.8), body)
+    history = scene.integrate(1.0, 2e-3)
+    rate = 3.0 * 0.2 / 0.4
+    assert_allclose(history.angle(body) - 0.3, 0.5 * rate * history.t**2, atol=1e-5)
+    exact = solve_ivp(lambda t, y: [*y[2:], 1.5 * np.cos(0.5 * rate * t * t),
+                                    1.5 * np.sin(0.5 * rate * t * t)], (0, 1), [0, 2, 0, 0],
+                      rtol=1e-10, atol=1e-10).y[:2, -1]
+    assert_allclose(history.position(body)[-1], exact, atol=1e-5)
+
+
 def test_a_prescribed_angle():
     body = RigidBody(1.0, 0.5, position=(0.1, 2))
     scene = Scene(beam_of(2), body).clamp("left").pin((0, 2), body)
@@ -489,7 +502,7 @@ BAD = {
     "traction": lambda s, b: s.traction("left", (1, 0), b),
     "pressure": lambda s, b: s.pressure("top", 1.0, b),
     "line load": lambda s, b: s.line_load((1, 0), b),
-    "follower": lambda s, b: s.follower_force((1, 0), (0, 0), b),
+    "follower": lambda s, b: s.follower_force((1, 0), "left", b),
     "foundation": lambda s, b: s.foundation(1.0, beam=b),
     "drag": lambda s, b: s.drag(1.0, 1.0, beam=b),
     "nowhere": lambda s, b: s.hinge((9, 9), (8, 8)),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.integrate import quad
 
 from ..errors import (ask_array, ask_number, require_finite_scalar, require_function, require_label,
                       teaching)
@@ -132,6 +131,8 @@ class Turned:
     def __call__(self, t: float) -> float:
         if not callable(self.speed):
             return self.speed * t
+        from scipy.integrate import quad
+
         return float(quad(lambda s: ask_number("speed(t={:g})", self.speed, s), 0.0, t,
                           epsabs=1e-13, epsrel=1e-13, limit=PIECES)[0])
 
