@@ -120,6 +120,9 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         way, reason = s.machine.choose("steps" if dynamic else "equilibrium")
         add("compiled loop", "skipped" if way == "plain" else "computed",
             f"whole {'time steps, in blocks' if dynamic else 'iterations'}: {reason}")
+    sensors = scene.sensors if dynamic else {}
+    add("sensors", "computed" if sensors else "skipped",
+        f"{len(sensors)} read at every step" if sensors else "there are none")
     add("fields", "skipped", "strain and stress are computed where a State is asked for them")
     return Plan(items)
 

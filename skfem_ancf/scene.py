@@ -19,12 +19,14 @@ from .doors import configuration, displacement
 from .dynamics import get_scheme
 from .dynamics.checkpoint import resume
 from .dynamics.integrate import follow, integrate
+from .dynamics.sensors import Sensor
 from .eigenstrain import EigenStrain, Temperature, products, takes_time
 from .obstacles import Obstacle
 from .forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring, TorsionalSpring,
                      bind_force)
 from .errors import (ConvergenceError, InputError, Interrupted, StabilityWarning, ask_field,
-                     require_finite, require_finite_scalar, require_option, shown, taught, teaching)
+                     require_finite, require_finite_scalar, require_label, require_option, shown,
+                     taught, teaching)
 from .joints import Joint, bind_joint, get_joint
 from .joints.base import both_of, members_at, named_place
 from .joints.prescribed import Turned
@@ -129,12 +131,13 @@ class Scene:
         self._velocities: dict[int, tuple[Any, Array]] = {}
         self._elements: tuple[tuple[ForceElement, ForceElement], ...] = ()
         self._damping: Damping | None = None
+        self._sensors: dict[str, Sensor] = {}
         self._system: System | None = None
 
     def __getstate__(self):
         """What was given and bound: the equations are built again."""
         given = [*(load for _, load, _ in self._loads), *(joint for joint, _ in self._joints),
-                 *(element for element, _ in self._elements)]
+                 *(element for element, _ in self._elements), *self._sensors.values()]
         require_picklable([*functions_of([*self._supports, *given]), *(
             (f"the initial velocity of beam {k}", v) for k, (v, _) in self._velocities.items()
             if callable(v))])
@@ -1239,7 +1242,7 @@ class Scene:
             raise InputError(f"beams must be a list of {len(self._beams)} Beam(s), got "
                              f"{shown(beams)}")
         scene = Scene(*beams, *self._bodies)
-        scene._damping = self._damping
+        scene._damping, scene._sensors = self._damping, self._sensors
         if len(scene.beams) != len(self._beams):
             raise InputError(f"the scene has {len(self._beams)} beams, got {len(scene.beams)}")
         changed = [a.mesh is not b.mesh for a, b in zip(self._beams, scene.beams)]
@@ -1554,7 +1557,71 @@ class Scene:
                                    np.zeros(b.N) for k, b in enumerate(self.members)])
         u = None if start is None else displacement(self.system, start)
         return integrate(self.system, t_end, dt, get_scheme(scheme), u, velocity, start=start,
-                         **options)
+                         sensors=self._checked_sensors(), **options)
+
+    def sensor(self, name: str, what: str | Callable[[State], Any], at: Any = None,
+               beam: WhichBeam = None, recover: bool = False) -> Scene:
+        """Write something down at every step of motions: ``history.sensors[name]``.
+
+        States may then be stored sparsely, by ``integrate(..., t_eval=...)``.
+
+        Parameters
+        ----------
+        name
+            Its name; a second sensor of a name takes the place of the first.
+        what
+            "position", "displacement", "velocity" or "acceleration" of points; "strain", "stress"
+            or another field there; "N", "Q", "M", "force", "curvature", "shear" or "angle" of
+            sections; "joint_force"; or a function of the State that returns a number or an array.
+        at
+            Points, as for :meth:`State.displacement <skfem_ancf.results.State.displacement>`; a
+            joint of the scene for its force; None for a function.
+        beam
+            The beam, its name or its number; found if it is not given.
+        recover
+            Recovered fields and section forces, a millisecond a step and beam; by default those of
+            the elements.
+
+        Returns
+        -------
+        Scene
+            Itself.
+
+        Raises
+        ------
+        NameUnknown
+            If the quantity is not known.
+        MeshError
+            If a point is outside the body.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+        >>> scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.01),
+        ...                    ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.3, 7800), width=0.01))
+        >>> scene = scene.pin("left").gravity((0, -9.81)).sensor("tip", "position", at=(1, 0))
+        >>> history = scene.integrate(t_end=0.02, dt=1e-3, t_eval=[0.02])
+        >>> len(history), history.sensors["tip"].shape, history.sensors.t.shape
+        (1, (21, 2), (21,))
+        """
+        if require_label("name", name) is None:
+            raise InputError("the name of a sensor must be a text, got None")
+        sensor = Sensor(what, at, beam, recover)
+        with self._lock:
+            sensor.check(self.system)
+            self._sensors = {**self._sensors, name: sensor}
+        return self
+
+    @property
+    def sensors(self) -> dict[str, Sensor]:
+        """The sensors by name."""
+        return dict(self._sensors)
+
+    def _checked_sensors(self):
+        for sensor in self._sensors.values():
+            sensor.check(self.system)
+        return list(self._sensors.items())
 
     def resume(self, path: StrPath, scheme: str | Scheme | type[Scheme] | None = None,
                progress: bool | None = None) -> History:
@@ -1596,7 +1663,7 @@ class Scene:
         >>> bool(np.array_equal(again.u, history.u))
         True
         """
-        return follow(*resume(self.system, path, scheme), progress)
+        return follow(*resume(self.system, path, scheme, self._checked_sensors()), progress)
 
     @_alone
     def modes(self, k: int, state: State | None = None) -> Modes:

@@ -22,10 +22,13 @@ from .base import Motion
 from .run import Run, Task
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ..results import State
     from ..system import System
     from ..types import Array, StrPath
     from .base import Scheme
+    from .sensors import Sensor
 
 logger = logging.getLogger(__name__)
 
@@ -360,6 +363,8 @@ class Checkpoint:
                            for name, v in (memory or {}).items()})
         for name, values in self._functions.items():
             arrays[f"function.{name}"] = values
+        if run.recorder.sensors:
+            arrays.update({f"sensor.{k}": v for k, v in run.recorder.remember().items()})
         if run.task.t_eval is not None:
             arrays["t_eval"] = run.task.t_eval
         arrays["text"] = _bytes({**self._text, "t": float(y.t), "done": bool(run.done)})
@@ -407,8 +412,8 @@ def _compare(system, text, arrays, path):
                               + ", ".join(other))
 
 
-def resume(system: System, path: StrPath,
-           scheme: str | Scheme | type[Scheme] | None = None) -> tuple[Run, Checkpoint]:
+def resume(system: System, path: StrPath, scheme: str | Scheme | type[Scheme] | None = None,
+           sensors: Sequence[tuple[str, Sensor]] = ()) -> tuple[Run, Checkpoint]:
     """The Run of a checkpoint, and the Checkpoint that goes on writing it.
 
     Parameters
@@ -419,6 +424,8 @@ def resume(system: System, path: StrPath,
         Name of the file.
     scheme
         The scheme, if it is one of the caller's own.
+    sensors
+        Those of the scene, pairs of name and :class:`~skfem_ancf.dynamics.sensors.Sensor`.
 
     Raises
     ------
@@ -429,7 +436,9 @@ def resume(system: System, path: StrPath,
     _compare(system, text, arrays, path)
     task = Task(**{**text["task"], "t_eval": arrays.get("t_eval"),
                    "breakpoints": tuple(text["task"]["breakpoints"])})
-    run = Run(system, _scheme_of(text["scheme"], scheme), task)
+    run = Run(system, _scheme_of(text["scheme"], scheme), task, sensors)
+    run.recorder.recall({k[7:]: v for k, v in arrays.items() if k.startswith("sensor.")}
+                        if sensors or "sensor.t" in arrays else {"t": np.zeros(0)})
     try:
         _restore(run, arrays)
     except (KeyError, ValueError, TypeError, IndexError) as error:

@@ -50,6 +50,9 @@ class History:
     dissipated
         The work of damping since the start, shape (nt,): that of its force with the
         energy-momentum scheme, the integral of its power by the trapezoidal rule with others.
+    sensors
+        What the sensors of the scene have read at every step, by name: a
+        :class:`~skfem_ancf.dynamics.sensors.Readings` with its times ``t``.
     event
         The time at which ``integrate(until=...)`` has ended it; None if nothing did.
     steps
@@ -116,6 +119,7 @@ class History:
         self.t, self.u, self.v = columns["t"], columns["u"], columns["v"]
         self.acceleration, self.multipliers = columns["acceleration"], columns["multipliers"]
         self.dissipated, self.event = columns["dissipated"], run.event
+        self.sensors = run.recorder.readings()
         self._others = columns["algorithmic"], columns["force"], columns["before"]
         self._memories = self.memories
         if self._rows and run.y is not None and self._rows[-1].t == run.y.t:
@@ -184,13 +188,24 @@ class History:
             require_index("instants", k, len(self)) for k in _numbers(instants)])
 
     def _states(self, ks):
-        sections = sum(2 * beam.mesh.nelements + 1 for beam in self.system.beams)
-        size = max(1, SECTIONS // sections)
-        for first in range(0, len(ks), size):
-            states = [self.state(k) for k in ks[first:first + size]]
-            for state in states:
-                vars(state)["together"] = states
-            yield from states
+        for first in range(0, len(ks), self._group):
+            yield from _together([self.state(k) for k in ks[first:first + self._group]])
+
+    @property
+    def _group(self):
+        """States whose fields are recovered at once."""
+        return max(1, SECTIONS // sum(2 * beam.mesh.nelements + 1 for beam in self.system.beams))
+
+    def instants(self, motions: Sequence[Motion]) -> Iterator[State]:
+        """States of Motions of this system, whose fields are recovered many at once.
+
+        Parameters
+        ----------
+        motions
+            Each a :class:`~skfem_ancf.dynamics.base.Motion`.
+        """
+        for first in range(0, len(motions), self._group):
+            yield from _together([self.instant(y) for y in motions[first:first + self._group]])
 
     def __iter__(self):
         return self.states()
@@ -437,3 +452,10 @@ def _numbers(instants):
     if isinstance(instants, (str, bytes, dict, set)) or not hasattr(instants, "__iter__"):
         raise InputError(f"instants must be a list of their numbers, got {shown(instants)}")
     return instants
+
+
+def _together(states):
+    """The states, each of which knows that the fields of all are recovered at once."""
+    for state in states:
+        vars(state)["together"] = states
+    return states

@@ -16,7 +16,7 @@ from .integrator import Integrator, StepFailed
 from .run import Run, Task
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ..types import Array, StrPath
     from .base import Scheme
     from .history import History
+    from .sensors import Sensor
 
 MAX_STEPS = 10**9
 MIN_RTOL = 1e-12
@@ -37,7 +38,8 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
               tol: float | None = None, rtol: float = 1e-5, progress: bool | None = None,
               start: State | None = None, breakpoints: ArrayLike = (),
               checkpoint: StrPath | None = None, every: int | None = None,
-              until: Callable[[State], float] | None = None) -> History:
+              until: Callable[[State], float] | None = None,
+              sensors: Sequence[tuple[str, Sensor]] = ()) -> History:
     """Integrate the equation of motion.
 
     Parameters
@@ -86,6 +88,8 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         changes its sign, at an instant within a step that is found as those of ``t_eval``.
         ``history.event`` is its time, None if there was none up to ``t_end``. It is asked after
         each step, so that two changes within one are not seen. Not with ``checkpoint``.
+    sensors
+        Pairs of name and :class:`~skfem_ancf.dynamics.sensors.Sensor`: those of the scene.
 
     Returns
     -------
@@ -108,7 +112,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     task = _task(t_start, t_end, dt, t_eval, tol, rtol, [
         *np.atleast_1d(breakpoints), *_samples(system, t_start, t_end)])
     system.require_independent_joints()
-    run = Run(system, scheme, task)
+    run = Run(system, scheme, task, sensors)
     if until is not None:
         if checkpoint is not None:
             raise InputError("a checkpoint cannot keep the function until(state): leave out "

@@ -13,14 +13,16 @@ from ..errors import AncfError, ask_number
 from .base import Motion, Scheme
 from .history import History
 from .integrator import Integrator, StepFailed
+from .sensors import Recorder
 from .stepsize import StepSize
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from ..results import State
     from ..system import System
     from ..types import Array
+    from .sensors import Sensor
 
 #: Part of a step up to which an instant is interpolated: a step that short is all round-off.
 CLOSE = 1e-6
@@ -73,6 +75,8 @@ class Run:
         What is integrated, and how.
     task : Task
         From when to when, and what to store.
+    sensors
+        Pairs of name and :class:`~skfem_ancf.dynamics.sensors.Sensor`.
 
     Attributes
     ----------
@@ -90,7 +94,8 @@ class Run:
         The time at which it did, or None.
     """
 
-    def __init__(self, system: System, scheme: Scheme, task: Task) -> None:
+    def __init__(self, system: System, scheme: Scheme, task: Task,
+                 sensors: Sequence[tuple[str, Sensor]] = ()) -> None:
         self.system, self.scheme, self.task = system, scheme, task
         self.integrator = Integrator(system, scheme, task.tol)
         self._side: Integrator | None = None
@@ -101,6 +106,7 @@ class Run:
         self.segment = self.n = self._next = self.steps = self.rejected = 0
         self.size = 1e-4 * task.span if task.dt is None else task.dt
         self.history = History(system, scheme, self)
+        self.recorder = Recorder(sensors, system, self.history.instants)
         self.y: Any = None
         self.longest: int | None = None
         self.until: Callable[[State], float] | None = None
@@ -143,6 +149,7 @@ class Run:
         self._store_start()
 
     def _store_start(self):
+        self.recorder.record([self.y])
         wanted = self.task.t_eval
         if wanted is None or wanted[0] <= self.task.t_start:
             self.history.append(self.y)
@@ -265,6 +272,7 @@ class Run:
         else:
             self.n += 1
         self._store(old, new)
+        self.recorder.record([new])
         self.y, self.steps = new, self.steps + 1
 
     def _look(self, old, new):
@@ -318,6 +326,8 @@ class Run:
             new.t = self._time(first + k + 1)
             return new
 
+        if self.recorder.sensors:
+            self.recorder.record([instant(k) for k in range(done)])
         while k < done - 1:
             old, k = k, k + 1
             if self.task.t_eval is not None:

@@ -1,0 +1,212 @@
+"""Sensors: what is written down at every step of a motion, of which few states are stored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import (CheckpointError, InputError, NameUnknown, ask_array, require_flag, shown,
+                      teaching)
+from ..fields import FIELDS, find_field
+from ..frozen import Frozen
+from ..joints.base import Joint
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from ..results import State
+    from ..system import System
+    from ..types import Array, WhichBeam
+    from .base import Motion
+
+#: What is read of the coordinates of many steps at once.
+MOVING = ("position", "displacement", "velocity", "acceleration")
+#: What is read of a section.
+SECTION = ("N", "Q", "M", "force", "curvature", "shear", "angle")
+
+
+@teaching
+class Sensor(Frozen):
+    """What is written down at every step.
+
+    Parameters
+    ----------
+    what
+        "position", "displacement", "velocity" or "acceleration" of points; "strain", "stress" or
+        another name of :data:`skfem_ancf.fields.FIELDS` there; "N", "Q", "M", "force", "curvature",
+        "shear" or "angle" of sections; "joint_force"; or a function of the State
+        that returns a number or an array.
+    at
+        Points, as for :meth:`State.displacement <skfem_ancf.results.State.displacement>`; a joint
+        for its force; None for a function.
+    beam
+        The beam, its name or its number; found if it is not given.
+    recover
+        Recovered fields and section forces, which takes about a millisecond a step and beam; by
+        default those of the elements.
+    """
+
+    def __init__(self, what: str | Callable[[State], Any], at: Any = None, beam: WhichBeam = None,
+                 recover: bool = False) -> None:
+        self.recover = require_flag("recover", recover)
+        self.what, self.at, self.beam = what, at, beam
+        if callable(what) and not isinstance(what, type):
+            if at is not None:
+                raise InputError("a sensor that is a function of the State has no place: leave "
+                                 f"out at=, got {shown(at)}")
+            return
+        known = (*MOVING, *SECTION, "joint_force", *FIELDS)
+        if not isinstance(what, str) or what not in known:
+            raise NameUnknown("quantity of a sensor", what, known)
+        if what == "joint_force":
+            if not isinstance(at, Joint):
+                raise InputError(f'a sensor of "joint_force" is at a joint, as scene.joint gives '
+                                 f"it to scene.joints, got {shown(at)}")
+        elif at is None:
+            raise InputError(f"a sensor of {what!r} is at points of the body: give at=")
+
+    def check(self, system: System) -> None:
+        """Raise MeshError or InputError if it cannot be read in a scene.
+
+        Parameters
+        ----------
+        system
+            The :class:`~skfem_ancf.system.System` of the scene.
+        """
+        if callable(self.what) or self.what == "joint_force":
+            return
+        found = system.points.find(self.at, self.beam)
+        if self.what in SECTION and len(found.parts) != 1:
+            raise InputError("the points of a sensor of sections must be in one beam: make one for "
+                             "each")
+        if self.what == "acceleration" and any(part.off_axis for part in found.parts):
+            raise InputError("the acceleration of a cable is known on its axis: off it sections "
+                             "turn with the tangent; put the sensor on the axis")
+
+    @property
+    def moving(self) -> bool:
+        """True if it is read of the coordinates of many steps at once."""
+        return self.what in MOVING
+
+    def read_steps(self, system: System, steps: Sequence[Motion]) -> Array:
+        """Of one that is :attr:`moving`, the values at some steps, shape (n, ...).
+
+        Parameters
+        ----------
+        system
+            The :class:`~skfem_ancf.system.System`.
+        steps
+            Motions.
+        """
+        at = system.points.find(self.at, self.beam)
+        u = np.array([y.u for y in steps])
+        if self.what == "velocity":
+            return at.velocity(u, np.array([y.v for y in steps]))
+        if self.what == "acceleration":
+            return at.displacement(np.array([y.acceleration for y in steps]))
+        found = at.displacement(u)
+        return found + at.start if self.what == "position" else found
+
+    def read(self, state: State) -> Any:
+        """Of another one, the value at a State: a number or an array."""
+        what: Any = self.what
+        if callable(what):
+            return ask_array("the function of a sensor", None, what, state)
+        if what == "joint_force":
+            return state.joint_force(self.at)
+        if what in ("strain", "stress"):
+            return getattr(state, what)(self.at, self.beam, self.recover)
+        if what in SECTION:
+            return getattr(state.resultants(self.at, self.beam, self.recover), what)
+        return state.field(find_field(what), self.at, self.beam, self.recover)
+
+    def __repr__(self) -> str:
+        where = "" if self.at is None else f" at {shown(self.at)}"
+        return f"<Sensor of {shown(self.what)}{where}>"
+
+
+class Readings(Mapping):
+    """What sensors have read: a mapping from their names to arrays (nt, ...).
+
+    Parameters
+    ----------
+    t
+        Times of the readings: the start and the end of every step, shape (nt,).
+    values
+        The arrays by name.
+    """
+
+    def __init__(self, t: Array, values: dict[str, Array]) -> None:
+        self.t, self._values = t, values
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self._values:
+            raise NameUnknown("sensor", name, self._values)
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __repr__(self) -> str:
+        return f"<Readings of {list(self._values)} at {len(self.t)} times>"
+
+
+class Recorder:
+    """Reads the sensors of a run.
+
+    Parameters
+    ----------
+    sensors
+        Pairs of name and :class:`Sensor`.
+    system
+        What is integrated.
+    states_of
+        Makes States of Motions, one after the other.
+    """
+
+    def __init__(self, sensors: Sequence[tuple[str, Sensor]], system: System,
+                 states_of: Callable[[Sequence[Motion]], Iterable[State]]) -> None:
+        self.sensors, self._system, self._states_of = list(sensors), system, states_of
+        self._t: list[Array] = []
+        self._read: list[list[Array]] = [[] for _ in self.sensors]
+
+    def record(self, steps: Sequence[Motion]) -> None:
+        """Read at the ends of steps."""
+        if not self.sensors or not steps:
+            return
+        others: dict[int, list[Any]] = {k: [] for k, (_, sensor) in enumerate(self.sensors)
+                                        if not sensor.moving}
+        if others:
+            for state in self._states_of(steps):
+                for k, values in others.items():
+                    values.append(self.sensors[k][1].read(state))
+        self._t.append(np.array([y.t for y in steps]))
+        for k, ((_, sensor), read) in enumerate(zip(self.sensors, self._read)):
+            read.append(np.array(others[k]) if k in others else
+                        sensor.read_steps(self._system, steps))
+
+    def readings(self) -> Readings:
+        """What was read so far."""
+        return Readings(np.concatenate([np.zeros(0), *self._t]), {
+            name: np.concatenate(read) if read else np.zeros(0)
+            for (name, _), read in zip(self.sensors, self._read)})
+
+    # files
+
+    def remember(self) -> dict[str, Array]:
+        """The same as arrays by name, for a checkpoint."""
+        found = self.readings()
+        return {"t": found.t, **{str(k): values for k, values in enumerate(found.values())}}
+
+    def recall(self, arrays: dict[str, Array]) -> None:
+        """Go on after what :meth:`remember` gave; raises CheckpointError for other sensors."""
+        if len(arrays) != len(self.sensors) + 1:
+            raise CheckpointError(f"the run had {max(len(arrays) - 1, 0)} sensors, the scene has "
+                                  f"{len(self.sensors)}: {[name for name, _ in self.sensors]}")
+        self._t = [arrays["t"]]
+        self._read = [[arrays[str(k)]] for k in range(len(self.sensors))]
