@@ -99,14 +99,22 @@ class Tables:
     def flat(self) -> Equations:
         from . import compiled
 
-        plain, addresses = self.plain, compiled.kernels()
+        plain = self.plain
+        addresses = {part: compiled.address(part) for part in self.parts}
         body = self._flat(_with_laws(plain.body, compiled.law), addresses)
         same = plain.viscous is plain.body
         return plain._replace(
             body=body, viscous=body if same else self._flat(plain.viscous, addresses),
             forces=plain.forces._replace(
-                address=addresses["elements"],
-                contacts=plain.forces.contacts._replace(address=addresses["contacts"])))
+                address=addresses.get("elements", 0),
+                contacts=plain.forces.contacts._replace(address=addresses.get("contacts", 0))))
+
+    @property
+    def parts(self) -> list[str]:
+        """What of :data:`skfem_ancf.compiled.ADDRESSES` the scene has."""
+        packs = {type(pack).__name__ for pack in self.plain.body.packs}
+        return [*sorted(packs), *["elements"] * (self.plain.forces.number > 0),
+                *["contacts"] * (self.plain.forces.contacts.number > 0)]
 
     def _flat(self, body, addresses):
         """The FlatBody of a Body."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from contextlib import contextmanager
 from functools import wraps
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,28 +20,29 @@ from .progress import progress_bar
 from .switch import compiled_off, wanted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator, Sequence
 
     from .system import System
 
 logger = logging.getLogger(__name__)
 
-#: Seconds that compiling takes, about: the kernels, which all texts call, and each text; and
-#: loading what lies on disk.
-COMPILING = {"kernels": 23.0, "equilibrium": 11.0, "steps": 14.0, "evaluate": 4.0}
+#: Seconds that compiling takes, about: the kernels that texts call, each if a scene has it, and
+#: each text; and loading what lies on disk.
+COMPILING = {"SectionPack": 5.0, "CablePack": 4.0, "elements": 4.0, "contacts": 3.0,
+             "equilibrium": 6.0, "steps": 7.5, "evaluate": 2.5}
 LOADING = 0.7
 
 
-def compiling(name: str) -> float:
-    """Seconds that compiling a text takes, about, with the kernels where there are none.
+def compiling(name: str, parts: Sequence[str]) -> float:
+    """Seconds that compiling a text takes, about, with the kernels that are not there yet.
 
     Parameters
     ----------
-    name
-        A key of :data:`COMPILING`.
+    name, parts
+        Keys of :data:`COMPILING`: the text, and the kernels of a scene.
     """
-    there = compiled.kernels.cache_info().currsize or compiled.on_disk()
-    return COMPILING[name] + (0.0 if there else COMPILING["kernels"])
+    return COMPILING[name] + sum(COMPILING[part] for part in parts
+                                 if part not in compiled.KNOWN and not compiled.on_disk(part))
 
 
 class Choice(NamedTuple):
@@ -139,10 +141,11 @@ class Machine:
             return Choice("plain", self._off)
         if name in compiled.LOADED:
             return Choice("loaded", "compiled code is loaded")
-        seconds = compiling(name)
+        parts = self.tables.parts
+        seconds = compiling(name, parts)
         if wanted() == "1":
             return Choice("compiled", "SKFEM_ANCF_COMPILED=1")
-        if compiled.on_disk(name):
+        if compiled.on_disk(name, *parts):
             if CLOCK.spent >= LOADING:
                 return Choice("compiled", "compiled code lies on disk")
             return Choice("plain", f"NumPy has taken {CLOCK.spent:.2g} s so far, loading the "
@@ -173,8 +176,10 @@ class Machine:
         choice = self.choose(name)
         if choice.way == "plain":
             return CLOCK.timed(text), self.tables.plain
+        parts = [part for part in self.tables.parts if part not in compiled.KNOWN]
         try:
-            equations = self.tables.flat
+            with _announced(parts):
+                equations = self.tables.flat
         except ImportError as error:  # made for another NumPy
             compiled.PROBLEMS.append(f"Numba cannot be imported: {error}")
             logger.info(compiled.PROBLEMS[-1])
@@ -199,13 +204,21 @@ class Machine:
 def _load(text, args):
     """The compiled function; says so where that takes long."""
     name = text.__name__
-    if name in compiled.LOADED:
-        return compiled.LOADED[name]
-    if compiled.on_disk(name):
-        return compiled.load(text, args)
-    said = f"compiling once, about {compiling(name):g} s, kept on disk"
-    logger.info("%s: %s", name, said)
+    if name not in compiled.LOADED:
+        with _announced([name]):
+            compiled.load(text, args)
+    return compiled.LOADED[name]
+
+
+@contextmanager
+def _announced(names: Sequence[str]) -> Iterator[None]:
+    """Say what is compiled, if it is not there."""
+    names = [name for name in names if not compiled.on_disk(name)]
+    if not names:
+        yield
+        return
+    said = f"compiling once, about {sum(COMPILING[name] for name in names):g} s, kept on disk"
+    logger.info("%s: %s", ", ".join(names), said)
     with progress_bar(None, 1.0, said) as bar:
-        function = compiled.load(text, args)
+        yield
         bar.update(1.0)
-    return function

@@ -21,6 +21,8 @@ logger = logging.getLogger(__name__)
 #: What is compiled apart from the texts that call it, and the module that does so.
 ADDRESSES = {"SectionPack": "blocks", "CablePack": "blocks", "elements": "elements",
              "contacts": "contacts"}
+#: Those of them that this process has.
+KNOWN: set[str] = set()
 #: Compiled functions that this process has, by the name of their text.
 LOADED: dict = {}
 #: Why Numba cannot be used though it is installed.
@@ -67,15 +69,15 @@ def _note_of(name: str) -> Path:
 
 
 def on_disk(*names: str) -> bool:
-    """True if texts, and what they call, are compiled and kept, as far as is known without Numba.
+    """True if all are compiled and kept, as far as is known without Numba.
 
     Parameters
     ----------
     *names
-        Names of texts.
+        Of texts, or keys of :data:`ADDRESSES`.
     """
     try:
-        return all(_note_of(part).exists() for part in (*names, *ADDRESSES))
+        return all(_note_of(name).exists() for name in names)
     except OSError:
         return False
 
@@ -96,12 +98,17 @@ def note(name: str) -> None:
 
 
 @cache
-def kernels() -> dict[str, int]:
-    """The addresses of what all texts call; compiles it or takes it from disk."""
-    found = {}
-    for name, module in ADDRESSES.items():
-        found[name] = import_module(f".{module}", __package__).address(name)
-        note(name)
+def address(part: str) -> int:
+    """That of what all texts call; compiles it or takes it from disk.
+
+    Parameters
+    ----------
+    part
+        A key of :data:`ADDRESSES`.
+    """
+    found = import_module(f".{ADDRESSES[part]}", __package__).address(part)
+    note(part)
+    KNOWN.add(part)
     return found
 
 

@@ -28,6 +28,8 @@ def address(name):
 
 @jit
 def run_kinds(tables, what, y, w, factor, out):
+    if tables.number == 0:
+        return
     number = room(1, y)
     number[0] = factor
     call(tables.address, (
