@@ -267,7 +267,7 @@ class Scene:
     def _portable(self, joint):
         """A copy of a joint as it was given, with beams by number: it fits other meshes."""
         def numbered(value):
-            if isinstance(value, (Beam, RigidBody)):
+            if isinstance(value, Beam):  # rigid bodies stay the same on other meshes
                 return self._number(value)
             if not isinstance(value, (tuple, list)):
                 return value

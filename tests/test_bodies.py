@@ -347,6 +347,19 @@ def test_finer_meshes_keep_the_bodies():
     assert state.error_estimate["displacement"] <= 1e-3
 
 
+def test_what_names_a_body_itself_is_found_again():
+    """On a finer mesh, and in a pickle."""
+    beam, body = beam_of(2, E=1e6), RigidBody(0.01, 1e-4, (1.1, 0), name="bob")
+    scene = Scene(beam, body).clamp("left").gravity((0, -G))
+    scene.weld((beam, "right"), (body, (1, 0)))
+    scene.control(lambda t, bob: -0.5 * bob.angle, at=body, kind="moment", sections={"bob": body})
+    scene.spring(2.0, (("ground", (1.1, 1.0)), body)).torsional_spring(0.1, body)
+    state = scene.solve_static(adapt=1e-3)
+    fine = scene.with_beams([beam_of(24, E=1e6)]).solve_static()
+    assert_allclose(state.angle("bob"), fine.angle("bob"), rtol=2e-3)
+    assert_allclose(state.angle(body), scene.solve_static().angle(body), rtol=1e-2)
+
+
 def test_automatic_steps_with_bodies():
     scene, body, stiffness = pendulum()
     history = spun(scene, body, 4.0).integrate(1.0, "auto", rtol=1e-5)
