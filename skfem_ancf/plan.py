@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
+from .eigenstrain import EigenStrain
 from .errors import NameUnknown, require_option
 
 if TYPE_CHECKING:
@@ -71,6 +74,14 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
             sorted({f"{b.material.nu:g}" for b in poisson})))
     else:
         add("Poisson coupling", "skipped", "nu = 0, or a section without thickness strain")
+    uneven = [b for b in beams if not b.across.simple]
+    if uneven:
+        add("sections", "constant", ", ".join(sorted({_section(b) for b in uneven})))
+    eigen = [load for load in scene.loads if isinstance(load, EigenStrain)]
+    if eigen:
+        add("stress-free strain", "computed", f"{len(eigen)}: " + (
+            "a constant matrix each" if all(load.linear for load in eigen) else
+            "of cables in Python"))
     held = [b for b in beams if b.kernel.constant is not None]
     add("stabilisation", "constant" if held else "skipped",
         "quadratic: one matrix" if held else "the quadrature leaves no mode out")
@@ -125,6 +136,19 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         f"{len(sensors)} read at every step" if sensors else "there are none")
     add("fields", "skipped", "strain and stress are computed where a State is asked for them")
     return Plan(items)
+
+
+def _section(beam):
+    """The section of a beam that is no rectangle of one height, width and material, in words."""
+    mesh, slabs = beam.mesh, len(beam.across.slabs)
+    what = [repr(beam.section)] if not beam.across.plain else []
+    if mesh.heights is not None:
+        what.append(f"height {np.min(mesh.heights):.4g} to {mesh.height:.4g}")
+    if slabs > 1:
+        what.append(f"{slabs} laws")
+    if any(slab.grade is not None for slab in beam.across.slabs):
+        what.append("graded")
+    return " ".join(what)
 
 
 def _damping(s, dynamic):

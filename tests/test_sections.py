@@ -381,3 +381,31 @@ def test_beams_with_sections_are_replaced_pickled_and_refined():
     assert plain.width == 0.02
     profile = plain.replace(section=PROFILES["I"][0])
     assert profile.width is None and profile.replace(material=BRASS).material is BRASS
+
+
+def test_a_bimetal_beam_bends_as_the_plane_body_and_each_layer_has_its_stress():
+    P, L = 1e-2, 0.5
+    pieces, y = [], -0.05
+    for thickness, law, b in BIMETAL.parts:
+        pieces.append((y, y + thickness, law, b))
+        y += thickness
+    _, basis, u = plane(pieces, L, (0.0, -P), n=(100, 4))
+    wanted = axis_tip(basis, u, L)
+    state = cantilever(Beam(line(40, L=L), ElementBeamANCFCubic(5), section=BIMETAL), (0.0, -P))
+    assert_allclose(state.displacement((L, 0.0))[1], wanted[1], rtol=3e-3)
+    Y = np.array([-0.0499, -0.03, -0.0101, -0.0099, 0.02, 0.0499])
+    x = np.array([0.25 + 0.0 * Y, Y])
+    exact = _plane_stress(basis, u, x, pieces)[0]
+    assert_allclose(state.stress(x, recover=False)[0], exact, atol=5e-3 * np.abs(exact).max())
+
+
+def test_the_plan_lists_sections_and_strains():
+    scene = Scene(Beam(line(), ElementBeamANCF(2), section=BIMETAL)).clamp("left").eigenstrain(0.1)
+    reasons = {item.term: item.reason for item in scene.plan()}
+    assert "2 laws" in reasons["sections"] and "matrix" in reasons["stress-free strain"]
+    mesh = MeshBeam.init_line([0, 1], height=lambda x: 0.1 - 0.05 * x)
+    terms = {item.term: item.reason for item in Scene(
+        Beam(mesh, ElementBeamANCF(2), STEEL, width=0.1)).plan()}
+    assert "0.05 to 0.1" in terms["sections"]
+    assert "sections" not in {item.term for item in Scene(
+        Beam(line(), ElementBeamANCF(2), STEEL, width=0.1)).plan()}

@@ -359,6 +359,12 @@ class Across(Frozen):
         """
         mapping = self.mesh.mapping()
         ne, n = self.mesh.nelements if tind is None else len(tind), xi.shape[-1]
+        if self.simple:
+            slab, h = self.slabs[0], self.mesh.height
+            size = slab.width * h * (1.0 if what == "area" else self.density(slab, xi)
+                                     if what == "mass" else getattr(slab.material, _MODULI[what]))
+            return np.broadcast_to(np.array([[[size]], [[0.0]], [[size * h**2 / 12.0]]]),
+                                   (3, ne, n))
         out = np.zeros((3, ne, n))
         for slab, (eta, w) in self.rules(POINTS, what == "mass"):
             X = np.array(np.broadcast_arrays(np.repeat(xi, len(eta), -1), np.tile(eta, n)))
