@@ -74,14 +74,8 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
             sorted({f"{b.material.nu:g}" for b in poisson})))
     else:
         add("Poisson coupling", "skipped", "nu = 0, or a section without thickness strain")
-    uneven = [b for b in beams if not b.across.simple]
-    if uneven:
-        add("sections", "constant", ", ".join(sorted({_section(b) for b in uneven})))
-    eigen = [load for load in scene.loads if isinstance(load, EigenStrain)]
-    if eigen:
-        add("stress-free strain", "computed", f"{len(eigen)}: " + (
-            "a constant matrix each" if all(load.linear for load in eigen) else
-            "of cables in Python"))
+    for item in _sections(scene):
+        add(*item)
     held = [b for b in beams if b.kernel.constant is not None]
     add("stabilisation", "constant" if held else "skipped",
         "quadratic: one matrix" if held else "the quadrature leaves no mode out")
@@ -136,6 +130,18 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         f"{len(sensors)} read at every step" if sensors else "there are none")
     add("fields", "skipped", "strain and stress are computed where a State is asked for them")
     return Plan(items)
+
+
+def _sections(scene):
+    """Terms, status and reasons of sections and stress-free strains, where there are any."""
+    uneven = [b for b in scene.beams if not b.across.simple]
+    if uneven:
+        yield "sections", "constant", ", ".join(sorted({_section(b) for b in uneven}))
+    eigen = [load for load in scene.loads if isinstance(load, EigenStrain)]
+    if eigen:
+        yield "stress-free strain", "computed", f"{len(eigen)}: " + (
+            "a constant matrix each" if all(load.linear for load in eigen) else
+            "of cables in Python")
 
 
 def _section(beam):
