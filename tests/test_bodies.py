@@ -348,7 +348,7 @@ def test_finer_meshes_keep_the_bodies():
 
 
 def test_what_names_a_body_itself_is_found_again():
-    """On a finer mesh, and in a pickle."""
+    """On a finer mesh, where beams are others and bodies the same."""
     beam, body = beam_of(2, E=1e6), RigidBody(0.01, 1e-4, (1.1, 0), name="bob")
     scene = Scene(beam, body).clamp("left").gravity((0, -G))
     scene.weld((beam, "right"), (body, (1, 0)))
