@@ -239,6 +239,77 @@ def test_an_elastica_between_walls_touches_one_in_a_point():
     assert abs(top.total[1] - 2 * found.p[1] + 5e-3) < 2e-3 * abs(top.total[1])
 
 
+def test_a_rope_on_a_pulley_has_the_capstan_ratio():
+    """exp(mu pi) where it slips all round, pulled against a spring; Euler, Eytelwein."""
+    R, h, k, mu = 0.5, 0.004, 1e3, 0.3
+    r, tail = R + h / 2, 0.3
+
+    def axis(s):
+        s = np.asarray(s, dtype=float)
+        phi = np.clip((s - tail) / r, 0, np.pi)
+        up, down = np.minimum(s - tail, 0), np.maximum(s - tail - np.pi * r, 0)
+        return np.array([-r * np.cos(phi), r * np.sin(phi) + up - down])
+
+    end = tail + np.pi * r
+    s = np.concatenate([[0, tail / 2], np.linspace(tail, end, 17), [end + tail / 2, end + tail]])
+    rope = Beam(MeshBeam.init_curve(axis, s, h), ElementBeamCable(5), StVenantKirchhoff(1e7, 0.0),
+                width=1.0)
+    scene = Scene(rope).fix("left", "r^1").fix("right", "r^1").fix("right", "r^2", -0.05)
+    scene.spring(k, between=((-r, -tail), (-r, -tail - 1)))
+    scene.obstacle(Circle((0, 0), R - 2e-5), friction=mu, stiffness=1e7)
+    state = scene.solve_static()
+    pull = -state.reactions("right").force[1]
+    hold = k * state.displacement((-r, -tail))[1]
+    assert abs(pull / hold / np.exp(mu * np.pi) - 1) < 5e-3
+    assert "friction" in state.verdict.note and state.stability == "stable"
+    assert np.allclose(state.contact().total[1], pull + hold, rtol=1e-6)
+
+
+def test_friction_holds_what_sticks_and_gives_way_at_its_limit():
+    """A strip between a wall and a stamp: pulled by less than mu N it stays, by more it slips."""
+    b = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.02), ElementBeamANCF(2),
+             StVenantKirchhoff(2e8, 0.0), width=0.01)
+    pressure, mu = 1e4, 0.4
+    limit = mu * pressure * 0.01
+
+    def pulled(force):
+        scene = Scene(b).spring(1.0, between=((1, 0), (2, 0)))
+        scene.foundation(1e-3, side="top").pressure("top", pressure)
+        scene.point_force((force, 0), (1, 0)).obstacle(Line((0, -0.01)), friction=mu)
+        return scene, scene.solve_static(first_step=0.25)
+
+    (scene, held), (_, slipped) = pulled(0.5 * limit), pulled(1.5 * limit)
+    again = scene.solve_static(start=held)  # its anchors too
+    assert np.allclose(again.u, held.u, rtol=0, atol=1e-9)
+    assert abs(held.displacement((0, 0))[0]) < 1e-4
+    assert np.allclose(held.contact().total, [-0.5 * limit, pressure * 0.01], rtol=2e-2)
+    assert np.allclose(slipped.contact().total, [-limit, pressure * 0.01], rtol=2e-2)
+    assert slipped.displacement((0, 0))[0] > 1.0
+
+
+def test_the_augmented_lagrangian_leaves_the_penetration_that_was_asked_for():
+    def lying(**options):
+        return Scene(beam(ElementBeamCable(5), 32)).clamp("left").gravity((0, -9.81)).obstacle(
+            Line((0, -0.05)), stiffness=1e9, **options).solve_static()
+
+    soft, exact = lying(), lying(method="augmented", tolerance=1e-7)
+    assert soft.contact().penetration > 1e-6 and exact.contact().penetration < 1e-7
+    hard = Scene(beam(ElementBeamCable(5), 32)).clamp("left").gravity((0, -9.81)).obstacle(
+        Line((0, -0.05)), stiffness=1e13).solve_static()
+    at = [(x, 0) for x in np.linspace(0, 1, 21)]
+    assert np.allclose(exact.position(at), hard.position(at), rtol=0, atol=1e-6)
+    assert np.allclose(exact.reactions("left").force + exact.contact().total,
+                       [0, 7800 * 1e-4 * 9.81], atol=1e-7)
+
+
+def test_a_stamp_that_moves_with_the_load_presses_as_deep_as_it_goes():
+    b = beam(ElementBeamCable(5), 16)
+    state = Scene(b).clamp("left").clamp("right").obstacle(
+        Circle((0.5, 0.056), 0.05), position=lambda t: (0.0, -0.02 * t)).solve_static(
+            first_step=0.1)
+    assert abs(state.displacement((0.5, 0))[1] + 0.019) < 5e-5
+
+
 # motion
 
 
@@ -273,6 +344,22 @@ def test_a_wall_that_moves_bounces_a_beam_off_with_twice_its_velocity(scheme):
     history = scene.integrate(0.04, 5e-4, scheme=scheme)
     p = history.momentum[-1, 1] / (7800 * 0.02 * 0.01)
     assert abs(p - 1) < (1e-3 if scheme == "energy-momentum" else 0.02)
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+def test_a_beam_slides_down_a_slope_as_coulomb_says(scheme):
+    """With the acceleration g (sin a - mu cos a); what friction takes is in the balance."""
+    a, mu, g = np.radians(30), 0.3, 9.81
+    b = Beam(MeshBeam.init_line(np.linspace(0, 1, 3), height=0.02), ElementBeamCable(3),
+             StVenantKirchhoff(2e8, 0.3, 7800), width=0.02)
+    scene = Scene(b).gravity((g * np.sin(a), -g * np.cos(a))).obstacle(
+        Line((0, -0.01)), friction=mu, stiffness=1e8, damping=1.0)
+    history = scene.integrate(0.15, 1e-3, scheme=scheme)
+    speed = history.momentum[:, 0] / (7800 * 0.02**2)
+    slope = np.polyfit(history.t[50:], speed[50:], 1)[0]
+    assert abs(slope / (g * (np.sin(a) - mu * np.cos(a))) - 1) < 1e-2
+    energy = history.total_energy + history.dissipated
+    assert np.ptp(energy) < (1e-9 if scheme == "energy-momentum" else 1e-2) * history.dissipated[-1]
 
 
 # what it costs
@@ -345,6 +432,39 @@ def test_a_motion_with_obstacles_goes_on_from_its_checkpoint(tmp_path):
 
 def still(t):
     return 0.0, 0.001 * np.sin(t)
+
+
+def test_outlines_are_in_files_and_pictures(tmp_path):
+    meshio = pytest.importorskip("meshio")
+    b = beam(ElementBeamCable(3), 4, height=0.02)
+    scene = Scene(b).gravity((0, -9.81)).obstacle(
+        Circle((0.5, -0.3), 0.2), position=lambda t: (t, 0.0)).obstacle(
+            SignedDistance(lambda x, y: y + 0.3 + 0 * x))
+    history = scene.integrate(2e-3, 1e-3)
+    history.state(-1).save(tmp_path / "one.vtu")
+    lines = meshio.read(tmp_path / "one_obstacles.vtu")
+    assert [c.type for c in lines.cells] == ["line"]
+    which = lines.cell_data["obstacle"][0]
+    at = lines.points[lines.cells[0].data]
+    rim = at[which == 0].reshape(-1, 3)
+    assert np.allclose(np.hypot(rim[:, 0] - 0.502, rim[:, 1] + 0.3), 0.2)
+    # the second is below the box that is drawn: the first only, or a line at its height
+    assert np.allclose(at[which == 1][..., 1], -0.3)
+    history.save(tmp_path / "run.pvd")
+    text = (tmp_path / "run.pvd").read_text()
+    assert text.count('part="1"') == 3 and (tmp_path / "run_00002_obstacles.vtu").exists()
+    plain = Scene(b).gravity((0, -9.81)).integrate(1e-3, 1e-3)
+    plain.state(-1).save(tmp_path / "plain.vtu")
+    assert not (tmp_path / "plain_obstacles.vtu").exists()
+    ax = history.state(-1).plot()
+    drawn = [len(c.get_segments()) for c in ax.collections if hasattr(c, "get_segments")]
+    assert sum(n >= 96 for n in drawn) == 1
+    history.animate(tmp_path / "run.gif", backend="matplotlib")
+    pytest.importorskip("pyvista")
+    series = history.to_pyvista()
+    first = series.mesh["obstacle 0"].points.copy()
+    series.update(2)
+    assert np.allclose(series.mesh["obstacle 0"].points - first, [0.002, 0, 0], atol=1e-6)
 
 
 # what is wrong

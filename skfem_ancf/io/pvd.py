@@ -8,6 +8,7 @@ from xml.sax.saxutils import quoteattr
 
 from ..errors import require_options, require_path, teaching
 from ..fields import find_fields
+from ..obstacles.pictures import obstacles_of
 from .vtu import replacing, require_next, save_frame
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ class PvdWriter:
 
     Both files are complete after every :meth:`add`, so ParaView can follow a run, and what was
     written before an interruption can be opened. Frames are called ``stem_00000.vtu``, and so on,
-    and lie beside the .pvd.
+    and lie beside the .pvd; outlines of obstacles are a second part of it.
 
     Parameters
     ----------
@@ -122,6 +123,9 @@ class PvdWriter:
         frame = save_frame(state, self.path.with_name(name), self._packed, **self.options)
         self.frames.append((t, name))
         self._rows.append(f'<DataSet timestep="{t!r}" part="0" file={quoteattr(name)}/>')
+        if obstacles_of(state):
+            beside = quoteattr(name.replace(".vtu", "_obstacles.vtu"))
+            self._rows.append(f'<DataSet timestep="{t!r}" part="1" file={beside}/>')
         return frame
 
     def _list(self):

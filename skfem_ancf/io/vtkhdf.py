@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import (FileError, InputError, MissingExtra, require_option, require_options,
                       require_path, teaching)
 from ..fields import find_fields
-from .vtu import PRECISIONS, body_fields, require_next
+from .vtu import PRECISIONS, body_fields, require_next, save_obstacles
 from .xml import topology
 
 if TYPE_CHECKING:
@@ -116,6 +116,7 @@ class VtkHdfWriter:
         body = body_fields(state, **self.options)
         if not self.times:
             self._begin(body)
+            save_obstacles(state, self.path, body)
         elif len(body.points) != self._n:
             raise InputError(f"all frames have the same points: the first has {self._n}, this one "
                              f"{len(body.points)}")

@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import (FileError, InputError, require_finite_scalar, require_flag,
                       require_integer, require_like, require_option, require_path, shown, taught)
 from ..fields import find_fields, values_on_grid
+from ..obstacles.pictures import around, outlines
 from ..quadrature import tensor
 from .xml import write_vtu
 
@@ -157,6 +158,9 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
                                    has no thickness left.
     =============================  ==========================================================
 
+    The outlines of obstacles about the body go into a file of lines beside it, ``name_obstacles``,
+    with their numbers in ``obstacle``.
+
     ``beam`` and ``element``, on cells, are the numbers of both. A rigid body is the polygon of its
     outline, numbered behind the beams, without strain and stress (NaN).
 
@@ -237,7 +241,46 @@ def save_frame(state: Any, filename: StrPath, packed: dict, precision: str = "do
         else:
             _write_vtk(temporary, body)
     logger.info("wrote %s: %d points", path, len(body.points))
+    save_obstacles(state, path, body, dtype, raw)
     return path
+
+
+def save_obstacles(state: Any, path: Path, body: BodyFields, dtype: Any = np.float64,
+                   raw: bool = False) -> Path | None:
+    """Write the outlines of obstacles about a body into a file beside its own.
+
+    Parameters
+    ----------
+    state
+        A State, or anything with its ``beams``.
+    path
+        The file of the body.
+    body
+        Its :class:`BodyFields`.
+    dtype, raw
+        As for :func:`skfem_ancf.io.xml.write_vtu`.
+
+    Returns
+    -------
+    pathlib.Path or None
+        The file; None without obstacles.
+    """
+    walls = outlines(state, around(body.points[:, :2].T))
+    if not walls:
+        return None
+    ends = np.concatenate(walls).reshape(-1, 2)
+    points = np.column_stack([ends, np.zeros(len(ends))])
+    numbers = np.repeat(np.arange(len(walls)), [len(wall) for wall in walls])
+    lines = BodyFields(points, [("line", np.arange(len(ends)).reshape(-1, 2))], {},
+                       {"obstacle": [numbers]})
+    suffix = path.suffix if path.suffix.lower() in SUFFIXES else ".vtu"
+    beside = path.with_name(f"{path.stem}_obstacles{suffix}")
+    with replacing(beside) as temporary:
+        if suffix.lower() == ".vtu":
+            write_vtu(temporary, lines, dtype, raw)
+        else:
+            _write_vtk(temporary, lines)
+    return beside
 
 
 def _write_vtk(path, body):

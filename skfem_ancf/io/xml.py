@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 LEVEL = 4
 
 #: VTK's numbers of the cells.
-CELL_TYPES = {"polygon": 7, "quad": 9, "VTK_LAGRANGE_QUADRILATERAL": 70}
+CELL_TYPES = {"line": 3, "polygon": 7, "quad": 9, "VTK_LAGRANGE_QUADRILATERAL": 70}
 
 _NAMES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
 

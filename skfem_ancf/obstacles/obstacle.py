@@ -26,7 +26,7 @@ WIDTH = 1e-3
 #: How deep a body may be cut at the start, relative to its height: meshes of curves are not exact.
 CUT = 1e-2
 #: Penetration that is left by the augmented Lagrangian, relative to the height.
-TOLERANCE = 1e-6
+TOLERANCE = 1e-5
 #: Speed below which friction is less than Coulomb's, relative to that of sound.
 SLIPPING = 1e-5
 #: Relative step in time for the velocity of an obstacle.
@@ -75,7 +75,7 @@ class Obstacle(ForceElement):
     **options
         ``width``: of the transition from no pressure to one in proportion to the penetration, a
         length, by default a thousandth of the height. ``tolerance``: the penetration that
-        "augmented" leaves, a length, by default a millionth of the height. ``slip_speed``: in a
+        "augmented" leaves, a length, by default 1e-5 of the height. ``slip_speed``: in a
         motion friction is ``v / sqrt(v^2 + slip_speed^2)`` of Coulomb's at the speed v; by default
         1e-5 of the speed of sound.
 

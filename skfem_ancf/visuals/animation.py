@@ -11,7 +11,7 @@ from ..errors import (FileError, InputError, MissingExtra, require_flag,
                       require_positive, require_text, taught)
 from ..io.vtu import replacing
 from .matplotlib import _colormap, unit_of
-from .pyvista import Scenery, _dressed, _look, new_plotter, pixels
+from .pyvista import Scenery, _dressed, _look, lines_of, new_plotter, pixels
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -160,6 +160,8 @@ def _by_pyvista(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: Any,
         _look(plotter, scenery)
         for k, time in enumerate(t):
             mesh.points = scenery.points(k)
+            if scenery.wall is not None:
+                scenery.wall.copy_from(lines_of(scenery.walls[k]))
             mesh.point_data[scenery.field.name][:] = scenery.values(k)
             clock.SetInput(f"t = {time:.4g}")
             if k == 0:
@@ -186,11 +188,11 @@ def _picture_of(plotter, fine):
 
 def _by_matplotlib(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: Any,
                    unit: str | None) -> Iterator[Array]:
-    from .matplotlib import _GHOST, _INK, _MUTED, _RIGID, _figure_class
+    from .matplotlib import _GHOST, _INK, _MUTED, _RIGID, _WALL, _figure_class
 
     Figure = _figure_class()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.collections import PolyCollection
+    from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.tri import Triangulation
 
     figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, layout="constrained")
@@ -210,6 +212,7 @@ def _by_matplotlib(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: An
                          shading="gouraud", vmin=scenery.low, vmax=scenery.high,
                          cmap=cmap or ("RdYlBu_r" if field.signed else "viridis"))
     rigid = ax.add_collection(PolyCollection(scenery.outlines(0), facecolor=_RIGID, edgecolor=_INK))
+    walls = ax.add_collection(LineCollection(scenery.walls[0], colors=_WALL, linewidths=1.2))
     ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
     ax.set_aspect("equal")
     unit = unit_of(field, unit)
@@ -220,7 +223,7 @@ def _by_matplotlib(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: An
     clock = ax.set_title("", loc="right", fontsize=8, color=_INK)
     canvas.draw()
     figure.set_layout_engine("none")
-    for artist in (rigid, image, clock):
+    for artist in (walls, rigid, image, clock):
         artist.set_animated(True)
     canvas.draw()
     background = canvas.copy_from_bbox(figure.bbox)  # all that stays
@@ -229,9 +232,10 @@ def _by_matplotlib(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: An
         image._triangulation.x, image._triangulation.y = x[:, 0], x[:, 1]
         image.set_array(scenery.values(k))
         rigid.set_verts(scenery.outlines(k))
+        walls.set_segments(scenery.walls[k])
         clock.set_text(f"t = {time:.4g}")
         canvas.restore_region(background)
-        for artist in (rigid, image, clock):
+        for artist in (walls, rigid, image, clock):
             ax.draw_artist(artist)
         yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 

@@ -11,6 +11,7 @@ from ..errors import (InputError, MissingExtra, require_finite_scalar, require_f
                       require_text, shown, taught)
 from ..fields import DRAWN, Field, find_field, values_on_grid
 from ..io.vtu import _subdivision, grid, quads, replacing
+from ..obstacles.pictures import AROUND, around, outlines
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -28,6 +29,7 @@ MAX_DPI = 2400
 _EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max",
            (True, True): "both"}
 _INK, _MUTED, _GHOST, _RIGID = "#222222", "#666666", "#d9d9d9", "#bbbbbb"
+_WALL = "#7a5230"
 
 
 @taught
@@ -110,14 +112,14 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     bodies = [_Body(state, beam, drawn, m, n, recover) for beam in state.beams]
     factor = _thickness(thickness, bodies)
     ghosts = [line for b in bodies for line in b.outline(b.reference, factor)] if undeformed else []
-    outlines = [line for b in bodies for line in b.outline(b.deformed, factor)]
+    edges = [line for b in bodies for line in b.outline(b.deformed, factor)]
     rigid = [b.outline_at(state.u_of(b)).T for b in getattr(state, "bodies", ())]
     points = np.concatenate([b.points(b.deformed, factor).reshape(2, -1) for b in bodies], axis=1)
     values = np.concatenate([b.values.ravel() for b in bodies])
     low, high = _limits(limits, values, drawn)
 
     if ax is None:
-        ax = Figure(figsize=_figsize(np.concatenate(ghosts + outlines + rigid), colorbar),
+        ax = Figure(figsize=_figsize(np.concatenate(ghosts + edges + rigid), colorbar),
                     layout="constrained").add_subplot()
     if ghosts:
         ax.add_collection(PolyCollection(ghosts, facecolor=_GHOST, edgecolor=_GHOST, linewidth=0.5,
@@ -134,10 +136,14 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     image = ax.tripcolor(Triangulation(*points, triangles=triangles), values, shading="gouraud",
                          cmap=cmap or ("RdYlBu_r" if drawn.signed else "viridis"),
                          vmin=low, vmax=high, zorder=2)
-    ax.add_collection(LineCollection([np.vstack([line, line[:1]]) for line in outlines],
+    ax.add_collection(LineCollection([np.vstack([line, line[:1]]) for line in edges],
                                      colors=_INK, linewidths=0.5, zorder=3))
+    walls = outlines(state, around(np.concatenate(ghosts + edges + rigid).T))
+    if walls:
+        ax.add_collection(LineCollection(np.concatenate(walls), colors=_WALL, linewidths=1.2,
+                                         zorder=2.5), autolim=False)
     ax.set_aspect("equal")
-    ax.margins(0.04)
+    ax.margins(AROUND if walls else 0.04)
     ax.autoscale_view()
     _dress(ax, (drawn.title or drawn.name) if title is None else title, factor)
     if colorbar:

@@ -13,6 +13,7 @@ from ..errors import (InputError, MissingExtra, require_flag, require_index, req
                       teaching)
 from ..fields import DRAWN, FIELDS, Field, find_field, find_fields, values_on_grid
 from ..io.vtu import _subdivision, grid, lagrange_cell, quads, replacing
+from ..obstacles.pictures import around, obstacles_of, outlines
 from .matplotlib import _Body, _colormap, _limits, _thickness, unit_of
 
 if TYPE_CHECKING:
@@ -201,17 +202,23 @@ def _make(state, fields=None, subdivide=(8, 4), lagrange=False, undeformed=False
     grids: list[Any] = [_Grid(beam, subdivide, lagrange) for beam in state.beams]
     grids += [_RigidGrid(body) for body in getattr(state, "bodies", ())]
     blocks = [g.make(state, *options) for g in grids]
+    box = around(np.concatenate([np.asarray(block.points)[:, :2] for block in blocks]).T)
+    walls = [lines_of(wall) for wall in outlines(state, box)]
 
     def update(other):
         for g, block in zip(grids, blocks):
             g.update(block, other, *options)
+        for wall, ends in zip(walls, outlines(other, box)):
+            wall.copy_from(lines_of(ends))
 
-    if len(blocks) == 1:
+    if len(blocks) == 1 and not walls:
         return blocks[0], update
     mesh = pv.MultiBlock()
     for k, (g, block) in enumerate(zip(grids, blocks)):
         kind = "body" if isinstance(g, _RigidGrid) else "beam"
         mesh.append(block, name=f"{kind} {k}" if g.beam.name is None else g.beam.name)
+    for k, wall in enumerate(walls):
+        mesh.append(wall, name=f"obstacle {k}")
     return mesh, update
 
 
@@ -234,7 +241,8 @@ def to_pyvista(state: State, fields: Any = None, subdivide: tuple[int, int] = (8
     Returns
     -------
     pyvista.UnstructuredGrid, or pyvista.MultiBlock
-        Of one beam, or of several and of the outlines of rigid bodies by their names.
+        Of one beam, or of several and of the outlines of rigid bodies and obstacles by their
+        names.
 
     Raises
     ------
@@ -273,8 +281,18 @@ class Scenery:
                       for state in states]
         every = [body for frame in self.frames for body in frame]
         self.factor = _thickness(thickness, every)
+        self.walls, self.wall = self._walls(states), None
         self.low, self.high = _limits(limits, np.concatenate([b.values.ravel() for b in every]),
                                       self.field)
+
+    def _walls(self, states):
+        """The outlines of obstacles in each frame, shapes (n, 2, 2)."""
+        none = np.zeros((0, 2, 2))
+        if not obstacles_of(states[0]):
+            return [none] * len(states)
+        every = [self.points(k, ghost)[:, :2] for k in range(len(states)) for ghost in (0, 1)]
+        box = around(np.concatenate(every).T)
+        return [np.concatenate([none, *outlines(state, box)]) for state in states]
 
     def points(self, k: int, undeformed: bool = False) -> Any:
         """Points of a frame, shape (n, 3).
@@ -343,10 +361,27 @@ def _dressed(scenery, plotter, cmap, undeformed, unit):
                              color="black",
                              vertical=False, title_font_size=18, label_font_size=14, n_labels=5,
                              position_x=0.2, width=0.6, height=0.09, fmt="%.3g"))
+    if len(scenery.walls[0]):
+        scenery.wall = lines_of(scenery.walls[0])
+        plotter.add_mesh(scenery.wall, color="#7a5230", line_width=2, lighting=False)
     if scenery.note:
         plotter.add_text(scenery.note, position="upper_left", font_size=9, color="#444444")
     plotter.set_background("white")
     return mesh
+
+
+def lines_of(walls: Any) -> Any:
+    """Straight pieces as a mesh of pyvista.
+
+    Parameters
+    ----------
+    walls
+        Their ends, shape (n, 2, 2).
+    """
+    ends = walls.reshape(-1, 2)
+    pieces = np.arange(len(ends)).reshape(-1, 2)
+    return _pyvista().PolyData(np.column_stack([ends, np.zeros(len(ends))]), lines=np.column_stack(
+        [np.full(len(pieces), 2), pieces]).ravel())
 
 
 def _look(plotter, scenery):
