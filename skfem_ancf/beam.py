@@ -162,7 +162,7 @@ class Beam(Frozen):
                              f"material must be a Material, got {shown(material)}")
         self.material: Material = material or self.section.slabs(mesh, None)[0].material
         if isinstance(element, str) and element == "auto":
-            element = choose_element(mesh, self.material, fields, tolerance)
+            element = choose_element(mesh, self.material.reference()[0], fields, tolerance)
         if not isinstance(element, ElementBeam):
             raise InputError(f"element must be a ElementBeam, got {shown(element)}")
         self.mesh: MeshBeam = element.fitted(mesh)

@@ -182,7 +182,7 @@ def modes(system: System, state: State, k: int) -> Modes:
 
 def _bending_eigenvalue(system):
     """omega^2 of the slowest bending that a beam as long as the scene could have."""
-    stiffness = min(b.material.E * b.mesh.height**2 / b.density for b in system.beams) / 12.0
+    stiffness = min(b.across.bending_over_mass(b.density) for b in system.beams)
     return stiffness * (np.pi / system.size) ** 4
 
 
@@ -372,7 +372,7 @@ def _follower(tangent, Ks, k):
 
 def _require_no_flutter(system, tangent, Ks, factor):
     """Raise InputError if oscillations grow below a load factor, as far as linear theory says."""
-    if any(beam.material.density is None for beam in system.beams):
+    if any(slab.density is None for beam in system.beams for slab in beam.across.slabs):
         return
     M, S = system.mass.tocsc()[tangent.free][:, tangent.free], tangent.S
     k, small = min(8, tangent.size[0] - tangent.size[1]), tangent.size[0] <= DENSE

@@ -293,6 +293,9 @@ def test_graded_moduli_and_densities():
         eps = beam.strain(state.u, np.array([[0.5], [0.9]]), np.array([8]))[0, 0, 0]
         E = law.E(0.5 * (mesh_x(beam, 8) + mesh_x(beam, 9)), 0.04)
         assert S == pytest.approx(E * eps, rel=1e-9)
+    scene = Scene(Beam(line(), "auto", law, width=0.02)).clamp("left").gravity((0, -1e-3))
+    assert scene.modes(1, scene.solve_static()).frequencies[0] == pytest.approx(
+        scene.modes(1).frequencies[0], rel=1e-3)
     soft = NeoHookean(E=law.E, nu=0.3)
     assert Beam(line(4), ElementBeamANCF(2), soft, width=0.02).kernel.energy(
         1e-3 * np.ones(40)) >= 0

@@ -389,5 +389,19 @@ class Across(Frozen):
         return EI - ES**2 / EA
 
 
+    def bending_over_mass(self, density: float) -> float:
+        """E I over the mass per length, where it is least.
+
+        Parameters
+        ----------
+        density
+            Mean mass per volume.
+        """
+        if self.simple:
+            return self.slabs[0].material.E * self.mesh.height**2 / density / 12.0
+        mass = self.moments(np.array([0.5]), what="mass")[0]
+        return float(np.min(self.bending[:, None] / mass))
+
+
 _MODULI = {"stiffness": "axial_modulus", "E": "E"}
 _NAMES = {"width": "width", "grade": "E", "density": "density"}
