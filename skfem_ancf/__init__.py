@@ -11,6 +11,7 @@ from .errors import (AncfError, CallbackError, CallError, ConvergenceError, File
                      SupportError)
 from .materials import NeoHookean, StVenantKirchhoff
 from .mesh import MeshBeam
+from .obstacles import Circle, Line, Polygon, SignedDistance
 from .rigid import RigidBody
 from .scene import Scene
 from .sections import Section
@@ -18,11 +19,10 @@ from .sections import Section
 __version__ = "0.1.0"
 
 __all__ = [
-    "HHT", "AncfError", "Beam", "CallError", "CallbackError", "ConvergenceError",
+    "HHT", "AncfError", "Beam", "CallError", "CallbackError", "Circle", "ConvergenceError",
     "ElementBeamANCF", "ElementBeamANCFCubic", "ElementBeamCable", "ElementBeamPatelShabana",
-    "EnergyMomentum", "FileError", "GeneralizedAlpha", "InputError", "KelvinVoigt", "MeshBeam",
-    "MeshError",
-    "MissingExtra", "ModelWarning", "NameUnknown", "NeoHookean", "Newmark", "RigidBody",
-    "Scene", "Section",
+    "EnergyMomentum", "FileError", "GeneralizedAlpha", "InputError", "KelvinVoigt", "Line",
+    "MeshBeam", "MeshError", "MissingExtra", "ModelWarning", "NameUnknown", "NeoHookean", "Newmark",
+    "Polygon", "RigidBody", "Scene", "Section", "SignedDistance",
     "StVenantKirchhoff", "StabilityWarning", "SupportError", "forms", "reference_coordinates",
 ]

@@ -310,6 +310,14 @@ def test_a_stamp_that_moves_with_the_load_presses_as_deep_as_it_goes():
     assert abs(state.displacement((0.5, 0))[1] + 0.019) < 5e-5
 
 
+def test_a_path_by_arc_length_leads_to_the_state_of_load_steps():
+    scene = Scene(beam(ElementBeamCable(5), 16)).clamp("left").point_force((0, -1.0), (1, 0))
+    scene.obstacle(Circle((0.6, -0.1), 0.05))
+    path, state = scene.continuation(max_load=1.0, ds=0.02), scene.solve_static()
+    assert path.load[-1] == 1.0 and state.contact().penetration > 0
+    assert np.allclose(path.state(-1).displacement((1, 0)), state.displacement((1, 0)), atol=1e-8)
+
+
 # motion
 
 
