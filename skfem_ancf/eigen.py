@@ -300,7 +300,7 @@ def buckling(system: System, k: int) -> Buckling:
     Raises
     ------
     InputError
-        If k is out of range or the loads do not buckle the beam.
+        If k is out of range, the loads do not buckle the beam, or it touches an obstacle before.
     """
     system.require_supports()
     zero, none = np.zeros(system.N), np.zeros(system.m)
@@ -321,6 +321,8 @@ def buckling(system: System, k: int) -> Buckling:
                          if symmetric else _FLUTTER)
     factors = -1.0 / theta[good]
     order = np.argsort(factors)[:k]
+    system.forces.contacts.require_free(factors[order[0]] * du, "buckling()",
+                                        "continuation(): it touches before it buckles")
     if not symmetric:
         _require_no_flutter(system, tangent, Ks, factors[order[0]])
     shapes = np.zeros((len(order), system.N))

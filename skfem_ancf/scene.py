@@ -1303,6 +1303,8 @@ class Scene:
         ------
         SupportError
             If a rigid motion is free.
+        InputError
+            If the solution enters an obstacle.
         """
         system = self.system
         system.require_supports()
@@ -1318,6 +1320,7 @@ class Scene:
             phi = phi - system.full_jacobian(zero, 1.0) @ du0
         system.factorize(zero, 1.0, none)
         du, multipliers = system.solve(load, phi)
+        system.forces.contacts.require_free(du + du0, "solve_linear()", "solve_static()")
         return State(system, du + du0, force=None, iterations=1, message="linear, one solve",
                      multipliers=multipliers, verdict=verdict_of_factors(system))
 

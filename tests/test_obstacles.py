@@ -548,3 +548,24 @@ def test_what_knows_no_obstacles_says_so():
         scene.solve_static().contact()
     with pytest.raises(InputError, match="continuation"):
         scene.obstacle(Line((0, -0.1)), friction=0.1).continuation(steps=2)
+
+
+def test_linear_solutions_that_enter_an_obstacle_are_refused():
+    """Far from it they are what they are without it."""
+    hanging = Scene(beam()).clamp("left").gravity((0, -0.1))
+    free = hanging.solve_linear()
+    hanging.obstacle(Line((0, -0.5)))
+    assert np.array_equal(hanging.solve_linear().u, free.u)
+    with pytest.raises(InputError, match="solve_linear.. knows no contact"):
+        Scene(beam()).clamp("left").gravity((0, -9.81)).obstacle(Line((0, -0.1))).solve_linear()
+
+
+def test_buckling_loads_beyond_a_contact_are_refused():
+    """A column that the load bends aside: a wall close by is touched before it buckles."""
+    def column(distance):
+        scene = Scene(beam()).clamp("left").point_force((-1.0, -1e-2), at=(1, 0))
+        return scene.obstacle(Line((0, -distance)))
+
+    assert column(0.5).buckling(1).factors[0] > 0.0
+    with pytest.raises(InputError, match="touches before it buckles"):
+        column(0.0051).buckling(1)

@@ -189,6 +189,20 @@ class Contacts:
                                  f"penalty, not {one!r}: use solve_static")
         self.recall(None)
 
+    def require_free(self, u: Array, what: str, instead: str) -> None:
+        """Raise InputError if a linear solution enters an obstacle.
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (N,).
+        what, instead
+            What it is of, and what to use.
+        """
+        if self.potential(u, 1.0) > 0.0:
+            raise InputError(f"{what} knows no contact, and its solution enters an obstacle: use "
+                             f"{instead}")
+
     def settle(self, u: Array, t: float) -> None:
         """Anchors go after points that have slipped, to where these just do not slip.
 
