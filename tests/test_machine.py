@@ -101,6 +101,18 @@ def test_taken_from_disk_once_numpy_has_taken_as_long_as_loading(auto, monkeypat
     assert not [r for r in caplog.records if "compiling once" in r.message]
 
 
+def test_everything_is_compiled_beforehand(needs_compiled, monkeypatch):
+    from skfem_ancf.compiled.__main__ import main
+    from skfem_ancf.switch import VARIABLE
+
+    monkeypatch.setenv(VARIABLE, "1")
+    main()
+    assert compiled.KNOWN == set(compiled.ADDRESSES)
+    assert {"evaluate", "equilibrium", "steps"} <= set(compiled.LOADED)
+    assert compiled.on_disk(*machine.COMPILING)
+    assert compiled.KNOWN | {"evaluate", "equilibrium", "steps"} == set(machine.COMPILING)
+
+
 def test_kernels_that_a_scene_has_not_are_not_compiled():
     assert scene().system.machine.tables.parts == ["SectionPack"]
     cable = scene(ElementBeamCable(3))
