@@ -13,6 +13,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         MeshBeam, NameUnknown, NeoHookean, Scene, Section, StVenantKirchhoff)
 from skfem_ancf.errors import CallError
 from skfem_ancf.materials.base import hooke
+from skfem_ancf.obstacles import Line
 from skfem_ancf.quadrature import gauss
 from skfem_ancf.sections.measure import Piece, Weighted
 
@@ -299,6 +300,20 @@ def test_graded_moduli_and_densities():
     soft = NeoHookean(E=law.E, nu=0.3)
     assert Beam(line(4), ElementBeamANCF(2), soft, width=0.02).kernel.energy(
         1e-3 * np.ones(40)) >= 0
+
+
+def test_graded_materials_vibrate_and_lie_on_obstacles():
+    """With functions that are constant: frequencies and contacts are those of the numbers."""
+    law = StVenantKirchhoff(E=lambda x, y: 1e8 + 0 * x, nu=0.0, density=lambda x, y: 1e3 + 0 * y)
+    plain = StVenantKirchhoff(E=1e8, nu=0.0, density=1e3)
+    frequencies, contacts = [], []
+    for material in (law, plain):
+        scene = Scene(Beam(line(8), ElementBeamANCFCubic(2), material, width=0.02)).clamp("left")
+        frequencies.append(scene.modes(3).frequencies)
+        state = scene.gravity((0, -9.81)).obstacle(Line((0, -0.0505))).solve_static()
+        contacts.append(state.contact().force)
+    assert_allclose(frequencies[0], frequencies[1], rtol=1e-9)
+    assert_allclose(contacts[0], contacts[1], rtol=1e-6)
 
 
 def mesh_x(beam, node):

@@ -241,9 +241,8 @@ class Obstacle(ForceElement):
         nodes = first + mesh.t[0, elements] * beam.nd
         middle = starts[:2].mean(axis=2, keepdims=True)
         radius = float((np.hypot(*(starts[:2] - middle)) + np.abs(offsets)).max())
-        laws = [slab.material for slab in beam.across.slabs]
-        E = max(law.E for law in laws)
-        k, sound = self.penalty or E / h, np.sqrt(E / max(law.density or E for law in laws))
+        E, density = _stiffest(beam.across, elements)
+        k, sound = self.penalty or E / h, np.sqrt(E / (density or E))
         numbers = np.array([k, self.options["width"] or WIDTH * h, self.friction, k, self.damping,
                             self.options["slip_speed"] or SLIPPING * sound, radius,
                             -1.0 if self.shape.hollow else 1.0])
@@ -252,6 +251,16 @@ class Obstacle(ForceElement):
 
     def __repr__(self) -> str:
         return f"<Obstacle {self.shape!r}>"
+
+
+def _stiffest(across, elements):
+    """The largest modulus and the largest density of the layers, in the middles of elements."""
+    E, density = [], []
+    for slab in across.slabs:
+        X = np.array([[0.5], slab.measure.gauss(1)[0]])
+        E.append(np.max(slab.material.E * across.grade(slab, X, elements)))
+        density.append(0.0 if slab.density is None else np.max(across.density(slab, X, elements)))
+    return float(max(E)), float(max(density))
 
 
 def _face(across, side, X, elements):
