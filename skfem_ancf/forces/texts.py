@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..band import clear
 from ..own import own_elements, own_poses
 from ..source import F1, I1, lanes, primitive, shaped, source
 from ..tables import add_products
@@ -190,6 +191,7 @@ def element_stiffness(tables, t, u, v, factor, D):
     y, w = np.empty(size), np.empty(size)
     vectors_of(tables, u, 1.0, y)
     vectors_of(tables, v, 0.0, w)
+    clear(D)
     _evaluate(tables, np.int64(DERIVATIVES), t, factor, y, w, D)
 
 
@@ -338,9 +340,7 @@ def resisting(kinds, y, w, G):
 
 @source
 def derivatives(kinds, y, w, factor, D):
-    """Their derivatives, those of ``resisting`` by w with a factor; (i, j) at 4 i + j."""
-    for k in lanes(D.size):
-        D[k] = 0.0
+    """Their derivatives, those of ``resisting`` by w with a factor; (i, j) at 4 i + j of zeros."""
     p, d, s = (_part(kinds, SPRING, NUMBERS, kinds.numbers), _part(kinds, SPRING, 4, y),
                _part(kinds, SPRING, 16, D))
     for e in lanes(p.shape[1]):
