@@ -11,10 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+from skfem_ancf import (Beam, ElementBeamANCF, MeshBeam, NeoHookean, Scene, Section,
+                        StVenantKirchhoff)
 from skfem_ancf.dynamics import SCHEMES, GeneralizedAlpha, Newmark, checkpoint
 from skfem_ancf.errors import (CallbackError, CheckpointError, CheckpointWarning, InputError,
                                Interrupted, MissingExtra)
+from skfem_ancf.obstacles import SignedDistance
 
 from test_restart import driven, swinging
 
@@ -427,6 +429,27 @@ def test_other_scenes_are_refused(tmp_path, monkeypatch):
                          ({"f": None}, "load 1"), ({"hold": "clamp"}, "supports")):
         with pytest.raises(CheckpointError, match=f"of another scene, .*{part}"):
             build(**change).resume(copies[1])
+
+
+def test_functions_of_places_and_layers_are_compared(tmp_path):
+    def build(k=5.0, depth=0.5, top=1000.0, E=1e5, own=1e5):
+        layers = Section.layers((0.05, StVenantKirchhoff(1e5, 0.3, 1000.0)),
+                                (0.05, NeoHookean(E, 0.3, top)), width=0.1)
+        beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 3), 0.1), ElementBeamANCF(2),
+                    section=layers, compiled=False)
+        return Scene(beam).clamp("left").point_force((0, 1), (1, 0)).spring(
+            lambda s: k * s, between=((1, 0), (1, 1))).obstacle(
+                SignedDistance(lambda x, y: y + depth)).torsional_spring(
+                    lambda s: own * s**3, at=(0.5, 0))
+
+    path = tmp_path / "run.npz"
+    build().integrate(5e-3, 2.5e-3, checkpoint=path)
+    assert build().resume(path).t[-1] == pytest.approx(5e-3)
+    for change, part in (({"k": 6.0}, "force element 0"), ({"depth": 0.4}, "shape of obstacle 0"),
+                         ({"top": 900.0}, "width of beam 0"), ({"E": 1.1e5}, "width of beam 0"),
+                         ({"own": 2e5}, "force element 2")):
+        with pytest.raises(CheckpointError, match=f"of another scene, .*{part}"):
+            build(**change).resume(path)
 
 
 def test_without_h5py(tmp_path, monkeypatch):

@@ -35,6 +35,8 @@ logger = logging.getLogger(__name__)
 FORMAT = 3
 #: Times of a motion at which functions of time are compared.
 TIMES = 33
+#: Points of the surface, about, at which distances of obstacles are.
+PLACES = 32
 #: Seconds between two files by default, and the part of the time that writing may take.
 SECONDS, SHARE = 60.0, 0.05
 _MAGIC = "skfem-ancf checkpoint"
@@ -81,7 +83,10 @@ def fingerprint(system: System) -> dict[str, str]:
         parts[f"material {who}"] = _digest(type(beam.material).__name__, *_numbers(beam.material))
         parts[f"width {who}"] = (_digest(beam.width) if beam.across.plain else _digest(
             *(x for pack in beam.kernel.packs for x in (
-                pack.weights, getattr(pack, "stiffness", None), getattr(pack, "moduli", None)))))
+                pack.weights, getattr(pack, "stiffness", None), getattr(pack, "moduli", None))),
+            *(x for slab in beam.across.slabs for x in (
+                type(slab.material).__name__, *_numbers(slab.material))),
+            *(beam.inertia[1::2] if all(s.density is not None for s in beam.across.slabs) else ())))
         parts[f"damping {who}"] = _digest(beam.damping)
         parts[f"formulation {who}"] = _digest(beam.formulation.name, *_numbers(beam.formulation))
     for k, body in enumerate(system.bodies):
@@ -104,14 +109,22 @@ def fingerprint(system: System) -> dict[str, str]:
         tables = alone.tables(lambda i, j: i, False, 0)
         values = [alone.stiffness(tables, 0.0, 1e-3 * probe, probe, c) for c in (0.0, 1.0)]
         for place in alone.own:
-            x = np.array([one.start for one in place.links])
-            values.append(np.array(place.force(x, 0.0 * x, 0.0)))
+            x, v = _moved(place)
+            values += [np.array(place.force(x - v, 0.0 * v, 0.0)), np.array(place.force(x, v, 0.0))]
         for mass in alone.masses:
             values += mass.mass_entries()
         values += alone.contacts.tables[1:3] if element.groups else []
         parts[f"force element {k}"] = _digest(type(element).__name__, tables.numbers, tables.start,
                                               tables.of, tables.weight, *values)
     return parts
+
+
+def _moved(element):
+    """Points of a force element a little beside their start, and how far: (n, 2) twice."""
+    x = np.array([one.start for one in element.links])
+    v = 1e-3 * np.linalg.norm(x, axis=-1, keepdims=True) * np.random.default_rng(0).standard_normal(
+        x.shape)
+    return x + v, v
 
 
 def functions(system: System, t_start: float, t_end: float) -> dict[str, Array]:
@@ -136,6 +149,9 @@ def functions(system: System, t_start: float, t_end: float) -> dict[str, Array]:
     for k, one in enumerate(system.forces.contacts.obstacles):
         if one.moves:
             found[f"motion of obstacle {k}"] = np.array([one.pose(t)[:6] for t in times])
+        x = np.concatenate([group.starts[:2] for group in one.groups], axis=1)
+        x = x[:, ::max(1, x.shape[1] // PLACES)]
+        found[f"shape of obstacle {k}"] = np.array([one.shape.distance(x, t) for t in times])
     for k, element in enumerate(system.forces.elements):
         if element in system.forces.own:
             x = np.array([one.start for one in element.links])
