@@ -13,6 +13,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.io import PvdWriter, body_fields, save_vtu, vtu
 from skfem_ancf.io.vtu import grid, lagrange_cell, quads
+from skfem_ancf.materials import Material
 from skfem_ancf.results import State
 
 FIELDS = {f"{a}_{k}" for a in ("eps", "S", "sigma") for k in ("xx", "yy", "xy")} | {"displacement"}
@@ -302,3 +303,20 @@ def test_elements_of_other_kinds(element, mesh, tmp_path):
     lagrange = meshio.read(state.save(tmp_path / "lagrange.vtu", lagrange=True))
     degree = max(element.axis_degree, element.order)
     assert lagrange.cells[0].data.shape == (beam.mesh.nelements, (degree + 1) ** 2)
+
+
+def test_a_law_that_does_not_say_its_thickness_is_written_without_cauchy_stress(tmp_path):
+    class Fibres(Material):
+        def energy(self, strain):
+            return 0.5 * self.E * np.sum(strain**2, axis=0)
+
+        def stress(self, strain):
+            return self.E * strain
+
+    beam = Beam(MeshBeam.init_line([0, 0.5, 1], 0.1), ElementBeamANCF(2), Fibres(1e6, 0.0), 0.1)
+    state = Scene(beam).clamp("left").point_force((0, -1), at=(1, 0)).solve_static()
+    state.save(tmp_path / "own.vtu")
+    data = meshio.read(tmp_path / "own.vtu").point_data
+    assert np.isnan(data["sigma_xx"]).all() and np.abs(data["S_xx"]).max() > 0.0
+    with pytest.raises(InputError, match="thickness_stretch"):
+        state.save(tmp_path / "own.vtu", fields=["sigma_xx"])

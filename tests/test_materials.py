@@ -494,5 +494,5 @@ def test_parts_add_up_to_the_law(law, k_s):
 
 def test_thickness_stretch_of_the_users_own_law():
     assert np.all(Stiffening(E, NU, plane="strain").thickness_stretch(STRAINS) == 1.0)
-    with pytest.raises(NotImplementedError, match="Stiffening does not define thickness_stretch"):
+    with pytest.raises(InputError, match="Stiffening does not define thickness_stretch"):
         Stiffening(E, NU).thickness_stretch(STRAINS)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
 
-from skfem_ancf import (Beam, CallbackError, ElementBeamANCF, ElementBeamCable, InputError,
+from skfem_ancf import (Beam, CallbackError, ConvergenceError, ElementBeamANCF,
+                        ElementBeamCable, InputError,
                         MeshBeam, Scene, StVenantKirchhoff)
 from skfem_ancf.forces import contact_texts as texts
 from skfem_ancf.forces.texts import add_contact
@@ -570,3 +571,18 @@ def test_buckling_loads_beyond_a_contact_are_refused():
     assert column(0.5).buckling(1).factors[0] > 0.0
     with pytest.raises(InputError, match="touches before it buckles"):
         column(0.0051).buckling(1)
+
+
+def test_a_motion_that_does_not_go_on_with_friction_says_what_helps(monkeypatch):
+    from skfem_ancf.dynamics.integrator import StepFailed
+    from skfem_ancf.dynamics.run import Run
+
+    def advance(self):
+        raise StepFailed("no convergence")
+
+    monkeypatch.setattr(Run, "advance", advance)
+    scene = Scene(beam()).clamp("left").obstacle(Line((0, -0.5)))
+    with pytest.raises(ConvergenceError, match="try a smaller dt"):
+        scene.integrate(1e-2, 1e-3)
+    with pytest.raises(ConvergenceError, match="slip_speed"):
+        scene.obstacle(Line((0, -0.6)), friction=0.3).integrate(1e-2, 1e-3)

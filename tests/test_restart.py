@@ -124,7 +124,7 @@ def test_a_state_knows_its_velocity():
     assert state.t == history.t[7]
     assert np.array_equal(state.v, history.v[7])
     assert np.array_equal(state.acceleration, history.acceleration[7])
-    assert_allclose(state.velocity((0.7, 0)), history.velocity((0.7, 0))[7], rtol=1e-14)
+    assert_allclose(state.velocity((0.7, 0)), history.velocity((0.7, 0))[7], rtol=1e-12)
 
 
 def test_time_may_be_shifted():

@@ -218,7 +218,7 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
                     file.update()
     except StepFailed as failure:
         raise ConvergenceError(f"the motion could not be continued beyond t = {run.y.t:.6g}: "
-                               f"{failure}; try a smaller dt", history.close()) from None
+                               f"{failure}; {_advice(run)}", history.close()) from None
     except AncfError as error:  # of a function of the caller's: what is done is kept
         vars(error)["state"] = history.close()
         raise
@@ -240,3 +240,11 @@ def _warn_of_turns(history):
 
 
 __all__ = ["Integrator", "integrate"]
+
+
+def _advice(run):
+    """What may help a motion that did not go on."""
+    if any(one.friction > 0.0 for one in run.system.forces.contacts.obstacles):
+        return ("where points stick to an obstacle, a larger slip_speed= of scene.obstacle, else a "
+                "smaller dt")
+    return "try a smaller dt"

@@ -108,7 +108,7 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
         x = values.x if undeformed else values.x + values.u
         points.append(_rows(x))
         for field in wanted:
-            value = field.of(values)
+            value = _known(field, values, fields is None)
             data.setdefault(field.name, []).append(
                 value if field.components == 1 else _rows(value) if field.components == 2 else
                 value.T)
@@ -135,6 +135,17 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
                       {name: np.concatenate(v) for name, v in data.items()}, numbers)
 
 
+def _known(field, values, lenient):
+    """A field; not a number where a law does not say it, unless it was asked for."""
+    try:
+        return field.of(values)
+    except InputError as error:
+        if not lenient:
+            raise
+        logger.info("%s is not a number: %s", field.name, error)
+        return np.full(values.n if field.components == 1 else (field.components, values.n), np.nan)
+
+
 @taught
 def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
              lagrange: bool = False, undeformed: bool = False, recover: bool = True,
@@ -155,7 +166,7 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
     S_xx, S_yy, S_xy               second Piola-Kirchhoff stress in the same frame
     sigma_xx, sigma_yy, sigma_xy   Cauchy stress F S F^T / J along the global axes; J holds the
                                    change of thickness in plane stress. NaN where the material
-                                   has no thickness left.
+                                   has no thickness left, or a law of one's own does not say it.
     =============================  ==========================================================
 
     The outlines of obstacles about the body go into a file of lines beside it, ``name_obstacles``,

@@ -242,7 +242,7 @@ class Material(Frozen):
         """Stretch out of the plane, shape (...): 1 in plane strain. Needed for Cauchy stress."""
         if self.plane == "strain":
             return np.ones(np.shape(strain)[1:])
-        raise NotImplementedError(
+        raise InputError(
             f"{type(self).__name__} does not define thickness_stretch(strain), the stretch out of "
             "the plane that makes S_33 zero in plane stress")
 
