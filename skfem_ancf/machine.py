@@ -28,8 +28,8 @@ logger = logging.getLogger(__name__)
 
 #: Seconds that compiling takes, about: the kernels that texts call, each if a scene has it, and
 #: each text; and loading what lies on disk.
-COMPILING = {"SectionPack": 5.0, "CablePack": 3.0, "elements": 3.0, "contacts": 6.0,
-             "equilibrium": 6.0, "steps": 7.5, "evaluate": 2.5}
+COMPILING = {"SectionPack": 6.0, "CablePack": 3.0, "elements": 3.5, "contacts": 8.0,
+             "equilibrium": 6.5, "steps": 8.0, "evaluate": 3.0}
 LOADING = 0.7
 
 
