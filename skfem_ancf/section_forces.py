@@ -147,7 +147,7 @@ class Sections:
         Shape (2, ..., n, k).
         """
         f = self.forces
-        out = np.zeros((2,) + f.states + self.shape) 
+        out = np.zeros((2,) + f.states + self.shape)
         if any(s.where == side for s in f.sampled):
             out += self.sampled(side) / f.beam.across.face(side, self.X, self.e)
         for factor, load in f.faces:
@@ -235,18 +235,6 @@ class SectionForces:
         beam, mesh = self.beam, self.beam.mesh
         ne, (x, w) = mesh.nelements, gauss(ALONG)
         e, xi = np.repeat(np.arange(ne), ALONG), np.tile(x, ne)
-        parts = []
-        for slab, (eta, v) in beam.across.rules(beam.element.order + 1, inertia=True):
-            whole = not beam.has_sections
-            if whole:
-                eta, v = WHOLE
-            inside = Sections(self, e, xi, eta)
-            size = beam.across.breadth(slab, inside.X, e, whole) * v * inside.volume
-            parts.append((inside, size * inside.body))
-        for side in (0, 1):
-            if any(np.any(load.faces[side]) for _, load in self.faces) or any(
-                    s.where == side for s in self.sampled):
-                face = Sections(self, e, xi, np.array([float(side)]))
         parts = []
         for slab, (eta, v) in beam.across.rules(beam.element.order + 1, inertia=True):
             whole = not beam.has_sections
