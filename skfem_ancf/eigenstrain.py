@@ -15,7 +15,7 @@ from scipy import sparse
 
 from .errors import InputError, ask_array, require_finite_scalar, require_function, shown
 from .formulations import COMPONENTS
-from .kernels.base import Destination
+from .kernels.base import apart
 from .kernels.law import LINEAR
 from .loads import Load
 from .spread import Spread
@@ -51,6 +51,7 @@ class EigenStrain(Load):
 
     constant = False
     linear = True
+    prestress = True
     # of a bound one: a matrix for each element, with sections
     _elements: Any = None
     _packs: Any = None
@@ -93,9 +94,7 @@ class EigenStrain(Load):
         if beam.has_sections:
             K = _pushed_apart(beam, self)
             bound._elements, bound.linear = K, True
-            first = beam.mesh.t[0] * beam.nd
-            dofs = first[:, None] + np.arange(2 * beam.nd)
-            i, j = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
+            i, j = _entries(beam)
             bound._matrix = sparse.coo_matrix((K.ravel(), (i.ravel(), j.ravel())),
                                               shape=(beam.N, beam.N)).tocsr()
         else:
@@ -119,13 +118,9 @@ class EigenStrain(Load):
         if beam.has_sections:
             q = beam.kernel.gather(beam.q0_local + u)
             return np.einsum("eij,ej->ei", self._elements, q.reshape(len(q), -1)).reshape(q.shape)
-        u_e, out = beam.kernel.gather(u), 0.0
-        for pack, sign in self._packs:
-            force = np.zeros(u_e.size)
-            own = pack._replace(start=np.arange(len(u_e)) * u_e[0].size)
-            beam.kernel.texts.force(own, u_e.ravel(), force)
-            out = out + sign * force.reshape(u_e.shape)
-        return np.asarray(out)
+        u_e = beam.kernel.gather(u)
+        return np.asarray(sum(sign * beam.kernel.forces_of([apart(pack, slice(None))], u_e)
+                              for pack, sign in self._packs))
 
     def force(self, u: Array) -> Array:
         if self.beam.has_sections:
@@ -146,19 +141,11 @@ class EigenStrain(Load):
         if self.beam.has_sections:
             A = self._matrix.tocoo()
             return A.row, A.col, A.data
-        nd, ne = 2 * self.beam.nd, self.beam.mesh.nelements
-        u_e, K = self.beam.kernel.gather(u).ravel(), np.zeros((ne, nd, nd))
-        i, j = np.tril_indices(nd)
-        for pack, sign in self._packs:
-            own, flat = pack._replace(start=np.arange(ne) * nd), np.zeros((ne, nd, nd + 1))
-            S = np.zeros((2, len(pack.weights), ne))
-            self.beam.kernel.texts.tangent(own, u_e, np.zeros(u_e.size), S, False, S,
-                                           Destination(flat.reshape(-1), nd + 1, 0))
-            K[:, i, j] += sign * flat[:, j, i - j]
-        K[:, j, i] = K[:, i, j]
-        dofs = self.beam.mesh.t[0][:, None] * self.beam.nd + np.arange(nd)
-        rows, columns = np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
-        return rows.ravel(), columns.ravel(), K.ravel()
+        u_e = self.beam.kernel.gather(u)
+        K = sum(sign * self.beam.kernel.tangents_of([apart(pack, slice(None))], u_e)
+                for pack, sign in self._packs)
+        rows, columns = _entries(self.beam)
+        return rows.ravel(), columns.ravel(), np.ravel(K)
 
     def potential(self, u: Array) -> float:
         if self.beam.has_sections:
@@ -265,12 +252,13 @@ def _asked(name, f, x, y):
     """A number or a function of material coordinates, at arrays of one shape."""
     if not callable(f):
         return np.full(np.shape(x), 0.0 if f is None else f)
+    return ask_array(f"{name}(x, y)", np.shape(x), f, x, y, number=True)
 
-    def values(x, y):
-        found = f(x, y)
-        return np.broadcast_to(found, x.shape) if np.ndim(found) == 0 else found
 
-    return ask_array(f"{name}(x, y)", np.shape(x), values, x, y)
+def _entries(beam):
+    """Rows and columns of the matrices of all elements, shape (nelements, 2 nb, 2 nb) each."""
+    dofs = beam.mesh.t[0][:, None] * beam.nd + np.arange(2 * beam.nd)
+    return np.broadcast_arrays(dofs[:, :, None], dofs[:, None])
 
 
 def _pushed_apart(beam, eigen):

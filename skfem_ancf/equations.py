@@ -197,14 +197,13 @@ class Tables:
         scale
             The load factor.
         before
-            That of the state to start from, for the first tangent: the stiffness of a stress-free
-            strain belongs to the stress that it causes, which is not yet there.
+            That of the state to start from, for the first tangent, of loads that prestress.
         """
         _, turning, linear, _ = self._loads
         columns = [None, *self._rows, *linear, *turning, *linear]
         out = scale * np.array([1.0 if load is None else load.at_rest for load in columns])
         for k, load in enumerate(linear):
-            if before is not None and load.symmetric:
+            if before is not None and load.prestress:
                 out[len(out) - len(linear) + k] = before * load.at_rest
         return out
 

@@ -595,7 +595,7 @@ def ask_number(what: str, function: Callable[..., Any], *args: Any) -> float:
 
 
 def ask_array(what: str, shape: Sequence[int | None] | None, function: Callable[..., Any],
-              *args: Any) -> Array:
+              *args: Any, number: bool = False) -> Array:
     """As :func:`ask`, for a function that returns finite numbers of a shape.
 
     Parameters
@@ -604,8 +604,13 @@ def ask_array(what: str, shape: Sequence[int | None] | None, function: Callable[
         As for :func:`ask`.
     shape
         The shape that its value must have, as for :func:`require_finite`.
+    number
+        A number will do: it is the value everywhere.
     """
-    return _returned(require_finite, what, ask(what, function, *args), args, shape)
+    value = ask(what, function, *args)
+    if number and np.ndim(value) == 0:
+        value = np.broadcast_to(value, shape)  # type: ignore[arg-type]
+    return _returned(require_finite, what, value, args, shape)
 
 
 def ask_field(what: str, function: Callable[[Array], Any], x: Array) -> Array:

@@ -114,6 +114,8 @@ class Load(Sealable):
     turning = False
     #: The factor in statics: 1 but for some loads of the package.
     at_rest = 1.0
+    #: Its derivative belongs to a stress that it causes, which the first tangent does not have yet.
+    prestress = False
     for_bodies = False
 
     def __init__(self, beam: WhichBeam = None, amplitude: TimeFunction = None) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 import scipy
 
 from .kernels.along import CableSections
-from .eigenstrain import EigenStrain
 from .quadrature import gauss
 from .mapping import cross
 from .section_forces import Sections
@@ -218,7 +217,7 @@ def _own(state, beam, e, xi):
     u, mapping = state.u_of(beam), beam.mesh.mapping()
     eta, area = _rule(beam, e, xi)
     X = np.array([np.repeat(xi[:, None], len(eta), 1), np.repeat(eta[None], len(xi), 0)])
-    S, eigen = beam.stress(u, X, e), _eigen(state, beam)
+    S, eigen = beam.stress(u, X, e), state.eigenstrains(beam)
     for factor, load in eigen:
         S = S - factor * load.stress_at(X, e)
     H, frame = beam.gradients(u, X, e)
@@ -246,12 +245,6 @@ def _own(state, beam, e, xi):
         R = N * t + Q * normal
     return dict(N=N, Q=Q, M=M, curvature=curvature, stretch=stretch, shear=shear, angle=angle,
                 force=R)
-
-
-def _eigen(state, beam):
-    """Factors and loads of stress-free strains on a beam."""
-    return [(state.load * load.factor(state.t), load) for load in state.system.loads
-            if isinstance(load, EigenStrain) and load.beam is beam]
 
 
 def _rule(beam, e, xi):

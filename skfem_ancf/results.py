@@ -375,10 +375,13 @@ class State(Frozen):
         ndarray
             Shape (3, n), or 0.
         """
-        return sum(self.load * load.factor(self.t) * (
-            load.stress_at if stress else load.strain_at)(part.at, part.e)[..., 0]
-            for load in self.system.loads
-            if isinstance(load, EigenStrain) and load.beam is part.beam)
+        return sum(factor * (load.stress_at if stress else load.strain_at)(
+            part.at, part.e)[..., 0] for factor, load in self.eigenstrains(part.beam))
+
+    def eigenstrains(self, beam: Beam) -> list[tuple[float, EigenStrain]]:
+        """Factors and loads of stress-free strains on a beam."""
+        return [(self.load * load.factor(self.t), load) for load in self.system.loads
+                if isinstance(load, EigenStrain) and load.beam is beam]
 
     def _strain(self, part, recover):
         r = self._recovery_of(part.number) if recover else None

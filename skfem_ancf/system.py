@@ -15,7 +15,6 @@ from .bordered import BorderedMatrix, border, border_negative, columns_product
 from .checks import Screen
 from .constraints import Constraints
 from .damping import Damping
-from .eigenstrain import EigenStrain
 from .errors import InputError
 from .evaluation import CARRY, FORCE, MEAN, TANGENT, VISCOUS, evaluate
 from .forces.system import Forces
@@ -433,13 +432,13 @@ class System:
         ----------
         t, scale, u
             As there; u of shape (N,). An infinite time is that of the first tangent in statics,
-            when the stress that a stress-free strain causes is not yet there.
+            when no load has prestressed the body yet.
         flat
             The numbers of the matrix, shape (n,).
         """
         for load in self.machine.tables.own_loads:
             s = self.of(load)
-            if np.isinf(t) and isinstance(load, EigenStrain):
+            if np.isinf(t) and load.prestress:
                 continue
             i, j, v = load.stiffness(u[s])
             keep = np.full(len(v), not self.symmetric) | (np.asarray(i) >= np.asarray(j))

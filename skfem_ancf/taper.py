@@ -65,7 +65,7 @@ def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, An
     require_function("height", height, "of parameters (n,) that returns heights (n,)")
     a, b = s[t]
     at = a + np.append(PLACES, BETWEEN)[:, None] * (b - a)
-    found = ask_array("height(x)", (at.size,), lambda x: _spread(height(x), x), at.ravel())
+    found = ask_array("height(x)", (at.size,), height, at.ravel(), number=True)
     found = found.reshape(at.shape)
     if not np.all(found > 0.0):
         k = np.unravel_index(np.argmin(found), found.shape)
@@ -80,11 +80,6 @@ def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, An
             f"cubic polynomial misses it by {np.max(gap):.1%}. Put a node at a kink, weld two "
             "beams where it jumps, or take more elements")
     return float(np.max(heights)), heights, height
-
-
-def _spread(value, x):
-    """A constant as one number for each parameter."""
-    return np.broadcast_to(value, x.shape) if np.ndim(value) == 0 else value
 
 
 @lru_cache(1)

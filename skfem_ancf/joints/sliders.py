@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InputError, require_finite, require_flag, require_label, shown, teaching
 from ..beam import select_beam
+from ..mapping import cross
 from .axis import Axis
 from .base import (GROUND, Joint, Vector, cross_terms, gradients, named_place, point, rotation,
                    section)
@@ -22,15 +23,6 @@ if TYPE_CHECKING:
 
 #: How far beyond an end of a beam a sleeve may be, in elements.
 BEYOND = 1e-6
-
-
-def _cross(a: Array, b: Array) -> Any:
-    return a[0] * b[1] - a[1] * b[0]
-
-
-def _crossed(a: Array, B: Array) -> Array:
-    """a x b for each column b of a matrix."""
-    return a[0] * B[1] - a[1] * B[0]
 
 
 def _pairs(A: Array, B: Array) -> Array:
@@ -173,9 +165,9 @@ class Sleeve(Joint):
         s = self._parameter(u)
         c, d = self.axis.at(u, s)[:2]
         d = d / self.axis.beam.mesh.lengths[self.axis.element(s)]
-        out = [_cross(d, self.p(u) - c)]
+        out = [cross(d, self.p(u) - c)]
         if self.angle:
-            out.append(_cross(self.d(u), self.Q @ d))
+            out.append(cross(self.d(u), self.Q @ d))
         return np.array(out)
 
     def _slopes(self, u: Array) -> tuple[Any, ...]:
@@ -189,10 +181,10 @@ class Sleeve(Joint):
         columns, c, e, E, C, D = self._terms(u)
         Gs = c[2] @ e - c[1] @ c[1]
         s_y = -(c[1] @ E + e @ C[1]) / Gs
-        first = [(_cross(c[2], e), _crossed(c[1], E) - _crossed(e, C[1]))]
+        first = [(cross(c[2], e), cross(c[1], E) - cross(e, C[1]))]
         if self.angle:
             d, Q = self.d(u), self.Q
-            first.append((_cross(d, Q @ c[2]), _crossed(d, Q @ C[1]) - _crossed(Q @ c[1], D)))
+            first.append((cross(d, Q @ c[2]), cross(d, Q @ C[1]) - cross(Q @ c[1], D)))
         return columns, c, e, E, C, D, Gs, s_y, first
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
@@ -212,13 +204,13 @@ class Sleeve(Joint):
         s_yy = -(_dots(C[1], E) + mixed(c[2] @ E + e @ C[2] - 2.0 * c[1] @ C[1])
                  + (c[3] @ e - 3.0 * c[1] @ c[2]) * np.outer(s_y, s_y)) / Gs
         H = multipliers[0] * (
-            _pairs(C[1], E) + mixed(_crossed(c[2], E) - _crossed(e, C[2]))
-            + (_cross(c[3], e) - _cross(c[2], c[1])) * np.outer(s_y, s_y) + first[0][0] * s_yy)
+            _pairs(C[1], E) + mixed(cross(c[2], E) - cross(e, C[2]))
+            + (cross(c[3], e) - cross(c[2], c[1])) * np.outer(s_y, s_y) + first[0][0] * s_yy)
         if self.angle:
             d, Q = self.d(u), self.Q
             H = H + multipliers[1] * (
-                _pairs(D, Q @ C[1]) + mixed(_crossed(d, Q @ C[2]) - _crossed(Q @ c[2], D))
-                + _cross(d, Q @ c[3]) * np.outer(s_y, s_y) + first[1][0] * s_yy)
+                _pairs(D, Q @ C[1]) + mixed(cross(d, Q @ C[2]) - cross(Q @ c[2], D))
+                + cross(d, Q @ c[3]) * np.outer(s_y, s_y) + first[1][0] * s_yy)
         n = len(columns)
         return np.repeat(columns, n), np.tile(columns, n), H.ravel()
 
@@ -278,7 +270,7 @@ class Slot(Joint):
         if which == self.on or (which != GROUND and self.on != GROUND
                                 and scene.beam(which) is scene.beam(self.on)):
             raise InputError(f"{self!r}: a point cannot slide along a line of its own beam or body")
-        gap = _cross(self.direction, self.w.start)
+        gap = cross(self.direction, self.w.start)
         size = min(beam.size for beam in scene.beams)
         if abs(gap) > 1e-6 * size:
             raise InputError(f"{self!r}: the point ({self.p.start[0]:.6g}, {self.p.start[1]:.6g}) "
@@ -291,7 +283,7 @@ class Slot(Joint):
 
     def value(self, u: Array, t: float) -> Array:
         e = self.e(u)
-        return np.array([_cross(Q @ e, a(u)) for a, Q in self.pairs])
+        return np.array([cross(Q @ e, a(u)) for a, Q in self.pairs])
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         e, equations = self.e(u), []

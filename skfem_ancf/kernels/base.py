@@ -714,8 +714,20 @@ class Chain:
         elements
             A slice of the elements.
         """
+        return self.forces_of(self.apart(elements), u_e)
+
+    def forces_of(self, packs: list[Any], u_e: Array) -> Array:
+        """Forces (ne, nb, 2) of packs as :func:`apart` makes them.
+
+        Parameters
+        ----------
+        packs
+            The packs, all of the same elements.
+        u_e
+            Displacements of the coordinates of these elements, shape (ne, nb, 2).
+        """
         out = np.zeros(u_e.size, dtype=u_e.dtype)
-        for pack in self.apart(elements):
+        for pack in packs:
             self.texts.force(pack, u_e.ravel(), out)
         return out.reshape(u_e.shape)
 
@@ -732,9 +744,21 @@ class Chain:
         carried
             Stresses of each pack for the geometric part; those of the displacement if None.
         """
-        return self._tangents_of(self.apart(elements), u_e, carried)
+        return self.tangents_of(self.apart(elements), u_e, carried)
 
-    def _tangents_of(self, packs, u_e, carried=None):
+    def tangents_of(self, packs: list[Any], u_e: Array,
+                    carried: list[Array] | None = None) -> Array:
+        """Tangents (ne, 2 nb, 2 nb) of packs as :func:`apart` makes them.
+
+        Parameters
+        ----------
+        packs
+            The packs, all of the same elements.
+        u_e
+            Displacements of the coordinates of these elements, shape (ne, nb, 2).
+        carried
+            As for :meth:`element_tangents`.
+        """
         ne, n = len(u_e), 2 * self.nd
         u, force, flat = u_e.ravel(), np.zeros(u_e.size), np.zeros((ne, n, n + 1))
         for k, pack in enumerate(packs):
@@ -806,7 +830,7 @@ class Chain:
             carried.append(np.ascontiguousarray(own.transpose(1, 2, 0) / pack.weights))
             packs.append(self.without_material(pack))
             first += shape[0] * shape[1]
-        return self._tangents_of(packs, u_e, carried)
+        return self.tangents_of(packs, u_e, carried)
 
     def strain_increment(self, pack: Any, u: Array, du: Array, out: Array) -> None:
         """The strain's derivative in the direction du, (components, points, elements).

@@ -388,7 +388,6 @@ class Across(Frozen):
         EA, ES, EI = self.moments(np.array([0.5]), tind, "E")[:, :, 0]
         return EI - ES**2 / EA
 
-
     def bending_over_mass(self, density: float) -> float:
         """E I over the mass per length, where it is least.
 

@@ -275,12 +275,7 @@ def asked(what: str, function: Callable[..., Any], x: Array, y: Array) -> Array:
         If a value is not positive.
     """
     x, y = (np.ascontiguousarray(a) for a in np.broadcast_arrays(x, y))
-
-    def values(x, y):
-        found = function(x, y)
-        return np.broadcast_to(found, x.shape) if np.ndim(found) == 0 else found
-
-    out = ask_array(f"{what}(x, y)", x.shape, values, x, y)
+    out = ask_array(f"{what}(x, y)", x.shape, function, x, y, number=True)
     if not np.all(out > 0.0):
         k = np.unravel_index(np.argmin(out), out.shape)
         raise InputError(f"the {what} must be positive all over the body: the function returns "
