@@ -62,5 +62,26 @@ def needs_compiled():
 
 
 @pytest.fixture
+def interrupted(monkeypatch):
+    """Calls what integrates with a checkpoint, up to an interrupt; returns the exception."""
+    from skfem_ancf.dynamics.checkpoint import Checkpoint
+
+    def run(integrate, steps=14):
+        update = Checkpoint.update
+
+        def stop(self):
+            update(self)
+            if self.run.steps >= steps:
+                raise KeyboardInterrupt
+
+        with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt) as caught:
+            patch.setattr(Checkpoint, "update", stop)
+            integrate()
+        return caught.value
+
+    return run
+
+
+@pytest.fixture
 def arc():
     return quarter_arc()

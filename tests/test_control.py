@@ -110,21 +110,11 @@ def test_a_force_between_two_points_and_a_moment_between_two_sections():
     assert_allclose(state.reactions("left", beam="a").moment, -2.0 * x - 0.3, rtol=1e-6)
 
 
-def test_a_motion_goes_on_from_a_checkpoint(tmp_path, monkeypatch):
-    from skfem_ancf.dynamics.checkpoint import Checkpoint
+def test_a_motion_goes_on_from_a_checkpoint(tmp_path, interrupted):
     scene, path = arm(dt=4e-3), tmp_path / "run.npz"
     whole = scene.integrate(0.03, 1e-3, scheme="generalized-alpha")
-    update = Checkpoint.update
-
-    def stop(self):
-        update(self)
-        if self.run.steps >= 14:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(Checkpoint, "update", stop)
-    with pytest.raises(KeyboardInterrupt):
-        scene.integrate(0.03, 1e-3, scheme="generalized-alpha", checkpoint=path, every=7)
-    monkeypatch.undo()
+    interrupted(lambda: scene.integrate(0.03, 1e-3, scheme="generalized-alpha", checkpoint=path,
+                                        every=7))
     assert np.array_equal(arm(dt=4e-3).resume(path).u, whole.u)
 
 

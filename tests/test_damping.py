@@ -321,21 +321,11 @@ def test_copies_files_and_other_meshes(tmp_path):
     assert beam_of().replace(width=0.02).damping.time == 2e-3
 
 
-def test_an_interrupted_run_goes_on_bit_for_bit(tmp_path, monkeypatch):
-    from skfem_ancf.dynamics.checkpoint import Checkpoint
+def test_an_interrupted_run_goes_on_bit_for_bit(tmp_path, interrupted):
     scene, path = hinged("cable", 1e-3), tmp_path / "run.npz"
     whole = scene.integrate(0.03, 1e-3, scheme="generalized-alpha")
-    update = Checkpoint.update
-
-    def stop(self):
-        update(self)
-        if self.run.steps >= 14:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(Checkpoint, "update", stop)
-    with pytest.raises(KeyboardInterrupt):
-        scene.integrate(0.03, 1e-3, scheme="generalized-alpha", checkpoint=path, every=7)
-    monkeypatch.undo()
+    interrupted(lambda: scene.integrate(0.03, 1e-3, scheme="generalized-alpha", checkpoint=path,
+                                        every=7))
     again = scene.resume(path)
     assert np.array_equal(again.u, whole.u)
     assert np.array_equal(again.dissipated, whole.dissipated)

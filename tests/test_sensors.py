@@ -8,7 +8,6 @@ from numpy.testing import assert_allclose
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, MeshError,
                         NameUnknown, Scene, StVenantKirchhoff)
-from skfem_ancf.dynamics.checkpoint import Checkpoint
 from skfem_ancf.errors import CheckpointError
 
 
@@ -77,21 +76,12 @@ def test_steps_of_automatic_size_and_events():
     assert_allclose(history.sensors["tip"][-1, 1], -0.05, atol=1e-9)
 
 
-def test_they_go_on_from_a_checkpoint(tmp_path, monkeypatch):
+def test_they_go_on_from_a_checkpoint(tmp_path, interrupted):
     scene, path = with_all(swinging()), tmp_path / "run.npz"
     whole = scene.integrate(0.03, 1e-3, t_eval=[0.03])
-    update = Checkpoint.update
-
-    def stop(self):
-        update(self)
-        if self.run.steps >= 14:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(Checkpoint, "update", stop)
-    with pytest.raises(KeyboardInterrupt) as interrupt:
-        scene.integrate(0.03, 1e-3, t_eval=[0.03], checkpoint=path, every=7)
-    assert len(interrupt.value.state.sensors.t) == 15
-    monkeypatch.undo()
+    interrupt = interrupted(
+        lambda: scene.integrate(0.03, 1e-3, t_eval=[0.03], checkpoint=path, every=7))
+    assert len(interrupt.state.sensors.t) == 15
     with pytest.raises(CheckpointError, match="sensors"):
         swinging().resume(path)
     again = scene.resume(path)
