@@ -109,7 +109,7 @@ class Tables:
                 address=addresses.get("elements", 0),
                 contacts=plain.forces.contacts._replace(address=addresses.get("contacts", 0))))
 
-    @property
+    @cached_property
     def parts(self) -> list[str]:
         """What of :data:`skfem_ancf.compiled.ADDRESSES` the scene has."""
         packs = {type(pack).__name__ for pack in self.plain.body.packs}

@@ -176,29 +176,33 @@ class Machine:
         choice = self.choose(name)
         if choice.way == "plain":
             return CLOCK.timed(text), self.tables.plain
-        parts = [part for part in self.tables.parts if part not in compiled.KNOWN]
         try:
-            with _announced(parts):
+            with _announced([part for part in self.tables.parts if part not in compiled.KNOWN]):
                 equations = self.tables.flat
-        except ImportError as error:  # made for another NumPy
-            compiled.PROBLEMS.append(f"Numba cannot be imported: {error}")
-            logger.info(compiled.PROBLEMS[-1])
-            return CLOCK.timed(text), self.tables.plain
         except compiled.TextProblem as error:
             self._plain = str(error)
             logger.info(self._plain)
             return CLOCK.timed(text), self.tables.plain
+        except Exception as error:  # of a Numba that is not as those that are known
+            return _given_up(text, error), self.tables.plain
 
         def run(*args):
             try:
                 function = _load(text, args)
-            except Exception as error:  # of a Numba that is not as those that are known
-                compiled.PROBLEMS.append(f"{text.__name__} cannot be compiled: {error!r}")
-                logger.warning("%s; it runs in NumPy", compiled.PROBLEMS[-1])
-                return CLOCK.timed(text)(self.tables.plain, *args[1:])
+            except Exception as error:
+                return _given_up(text, error)(self.tables.plain, *args[1:])
             return function(*(self._kept(x) for x in args))
 
         return run, equations
+
+
+def _given_up(text, error):
+    """The plain text, in place of one that cannot be compiled; nor is any other from now on."""
+    compiled.PROBLEMS.append(
+        f"Numba cannot be imported: {error}" if isinstance(error, ImportError) else
+        f"{text.__name__} cannot be compiled: {error!r}")
+    logger.warning("%s; it runs in NumPy", compiled.PROBLEMS[-1])
+    return CLOCK.timed(text)
 
 
 def _load(text, args):

@@ -9,14 +9,14 @@ from numba import carray, types
 from numba.extending import intrinsic
 
 from ..kernels.base import Destination
-from ..kernels.cable import CablePack, cable_block
-from ..kernels.section import SectionPack, section_block
+from ..kernels.cable import cable_block
+from ..kernels.section import section_block
 from .calls import call
-from .records import reader, record_type
+from .packs import READERS
 from .twin import address_of, jit, named, twin
 
 #: The text of a kind of packs, by the name of its class.
-BLOCKS = {"SectionPack": (SectionPack, section_block), "CablePack": (CablePack, cable_block)}
+BLOCKS = {"SectionPack": section_block, "CablePack": cable_block}
 
 
 def block(place, what, first, last, u, v, f, n, given, n_given, out, n_out, flat, n_flat,
@@ -37,9 +37,8 @@ _SIGNATURE = types.void(_N, _N, _N, _N, _F, _F, _F, _N, _F, _N, _F, _N, _F, _N, 
 
 def address(name):
     """Of the compiled function of a kind of packs; compiles it or takes it from disk."""
-    kind, text = BLOCKS[name]
-    function = named(block, {"carray": carray, "Destination": Destination, "text": twin(text),
-                             "read": reader(record_type(kind))})
+    function = named(block, {"carray": carray, "Destination": Destination,
+                             "text": twin(BLOCKS[name]), "read": READERS[name]})
     function.__qualname__ = f"{function.__qualname__}_{name}"
     return address_of(function, _SIGNATURE)
 

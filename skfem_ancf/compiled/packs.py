@@ -1,10 +1,12 @@
 """Packs of beams, by the places of their words."""
 
-from ..body import CablePack, SectionPack
+from ..body import PACKS
 from .records import reader, record_type
 from .twin import jit
 
-_section, _cable = reader(record_type(SectionPack)), reader(record_type(CablePack))
+#: What reads a pack at an address, by the name of its class.
+READERS = {kind.__name__: reader(record_type(kind)) for kind in PACKS}
+_section, _cable = READERS.values()
 
 
 @jit

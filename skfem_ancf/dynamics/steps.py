@@ -432,6 +432,15 @@ def _free_velocity(free, rule, s, w):
 
 
 @source
+def _pace(free, rule, s, w):
+    """The velocity that damping resists, of the iterate."""
+    u, u0, v, pace = w.x.u, w.y[0], w.x.v, w.x.pace
+    _free_velocity(free, rule, s, w)
+    for i in lanes(u.size):
+        pace[i] = (u[i] - u0[i]) / s.dt if rule.conserving > 0 else v[i]
+
+
+@source
 def _velocity(joints, free, mass, rule, s, w, state):
     """v_1 of the iterate, with the joints' impulses; FAILED if these are not determined.
 
@@ -502,14 +511,12 @@ def _add_elements(forces, matrices, s, w):
 @source
 def _add_obstacles(e, matrices, rule, s, w):
     """Add the derivatives of contact to the band: of the iterate, as its velocity is."""
-    u, u0, v, pace = w.x.u, w.y[0], w.x.v, w.x.pace
+    u, u0 = w.x.u, w.y[0]
     add_contact_tangent(e.forces, s.acting, s.dt, u0 if rule.conserving > 0 else u, u, matrices.A)
     if matrices.dampers.elements > 0:
-        _free_velocity(e.free, rule, s, w)
-        for i in lanes(u.size):
-            pace[i] = (u[i] - u0[i]) / s.dt if rule.conserving > 0 else v[i]
+        _pace(e.free, rule, s, w)
         add_rubbing_tangent(e.forces, s.acting, s.damping_factor / s.stiffness_factor,
-                            w.x.middle, pace, matrices.A)
+                            w.x.middle, w.x.pace, matrices.A)
 
 
 @source
@@ -528,13 +535,11 @@ def _factorize(free, matrices, state):
 @source
 def _resist(e, matrices, rule, s, w):
     """Add the damping force of the iterate to the internal one."""
-    u, u0, v, pace, d, f = w.x.u, w.y[0], w.x.v, w.x.pace, w.x.damping, w.x.force
+    d, f = w.x.damping, w.x.force
     _middle(rule, w)
-    _free_velocity(e.free, rule, s, w)
-    for i in lanes(u.size):
-        pace[i] = (u[i] - u0[i]) / s.dt if rule.conserving > 0 else v[i]
-    damping_force(e, matrices.dampers, matrices.M, s.acting, w.x.middle, pace, d, w.x.room)
-    for i in lanes(u.size):
+    _pace(e.free, rule, s, w)
+    damping_force(e, matrices.dampers, matrices.M, s.acting, w.x.middle, w.x.pace, d, w.x.room)
+    for i in lanes(f.size):
         f[i] += d[i]
 
 
