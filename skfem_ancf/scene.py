@@ -28,7 +28,7 @@ from .errors import (ConvergenceError, InputError, Interrupted, StabilityWarning
                      require_finite, require_finite_scalar, require_label, require_option, shown,
                      taught, teaching)
 from .joints import Joint, bind_joint, get_joint
-from .joints.base import both_of, members_at, named_place
+from .joints.base import both_of, is_ground, members_at, named_place
 from .joints.prescribed import Turned
 from .loads import EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight, bind_load
 from .path import CriticalPoint, Path
@@ -559,8 +559,7 @@ class Scene:
             When solving, if the point leaves the beam at an end.
         """
         at = tuple(named_place(self, at))
-        ground = isinstance(on, str) and on == "ground"
-        if ground or isinstance(self.beam(on), RigidBody):
+        if is_ground(on) or isinstance(self.beam(on), RigidBody):
             if direction is None:
                 raise InputError(f"a slider on {shown(on)} needs the direction of its line")
             return self.joint("slot", at=at, on=on, direction=direction, angle=angle, name=name)
@@ -620,12 +619,12 @@ class Scene:
         """Moments of a motor; the first of them."""
         M, amplitude = (1.0, torque) if callable(torque) else (
             require_finite_scalar("torque", torque), None)
-        loads = []
-        for (which, place), sign in ((at, 1.0), (other and both_of("other", other), -1.0)):
+        loads, places = [], [(at, 1.0)]
+        if other is not None:
+            places.append((both_of("other", other), -1.0))
+        for (which, place), sign in places:
             k = self._number(which)
             loads.append((k, EndMoment(self.members[k], place, sign * M, amplitude)))
-            if other is None:
-                break
         n = len(self._loads)
         return self._put(loads=loads)._loads[n][2]
 

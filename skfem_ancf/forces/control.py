@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import (InputError, ask_array, ask_number, require_function, require_option,
                       require_positive, shown, teaching)
-from ..joints.base import GROUND, named_place, section
+from ..joints.base import is_ground, named_place, section
 from ..places import is_point
 from ..rigid import RigidBody
 from .base import ForceElement, Link, differences, link
@@ -129,7 +129,7 @@ class Control(ForceElement):
             which, at = named_place(scene, place)
         else:
             which, at = self.beam, place
-        if isinstance(which, str) and which == GROUND:
+        if is_ground(which):
             raise InputError("the ground does not turn: leave other= out for a moment from there")
         return link(section(scene, which, at)[1])
 

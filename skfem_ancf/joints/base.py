@@ -423,7 +423,7 @@ def named_place(scene: Scene, place: Any, where_none_is: str | None = None) -> t
         return place, None
     if isinstance(place, (tuple, list)) and len(place) == 2 and not is_point(place):
         which, at = place
-        if isinstance(which, str) and which == GROUND:
+        if is_ground(which):
             at = tuple(map(float, require_finite("a point of the ground", at, (2,))))
         elif isinstance(at, np.ndarray):
             at = tuple(at.tolist())
@@ -454,7 +454,7 @@ def point(scene: Scene, beam: WhichMember, at: Any) -> Vector:
         The point: its place (x, y) in the stress-free state, shape (2,); None for the centre of
         mass of a rigid body; a place of a beam that is one section, as "left", for its axis there.
     """
-    if isinstance(beam, str) and beam == GROUND:
+    if is_ground(beam):
         return _fixed(np.array(as_point(at)))
     member = scene.beam(beam)
     if isinstance(at, str) and not isinstance(member, RigidBody):
@@ -483,7 +483,7 @@ def section(scene: Scene, beam: WhichMember, place: Any) -> tuple[Vector, Vector
         of the axis, and the direction that of its tangent. Of a rigid body a point, or None for its
         centre of mass.
     """
-    if isinstance(beam, str) and beam == GROUND:
+    if is_ground(beam):
         return point(scene, beam, place), _fixed(np.array([1.0, 0.0]))
     member = scene.beam(beam)
     first = scene.offset(member)
@@ -556,12 +556,17 @@ def both_of(name: str, place: Any) -> tuple[Any, Any]:
     return place[0], place[1]
 
 
+def is_ground(beam: Any) -> bool:
+    """True for the name of the ground."""
+    return isinstance(beam, str) and beam == GROUND
+
+
 def several(beams: Any) -> tuple[Any, ...]:
     """The beams and bodies of a joint, two at least."""
     if not isinstance(beams, (tuple, list)) or len(beams) < 2:
         raise InputError("beams must be two beams or rigid bodies or more, by Beam, RigidBody, "
                          f"name or number, or 'ground', got {shown(beams)}")
-    if all(isinstance(b, str) and b == GROUND for b in beams):
+    if all(map(is_ground, beams)):
         raise InputError(f"a joint holds a beam or a rigid body, got {shown(beams)}")
     return tuple(beams)
 

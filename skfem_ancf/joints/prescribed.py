@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 
 from ..errors import (ask_array, ask_number, require_finite_scalar, require_function, require_label,
                       teaching)
@@ -131,10 +132,9 @@ class Turned:
     def __call__(self, t: float) -> float:
         if not callable(self.speed):
             return self.speed * t
-        from scipy.integrate import quad
-
-        return float(quad(lambda s: ask_number("speed(t={:g})", self.speed, s), 0.0, t,
-                          epsabs=1e-13, epsrel=1e-13, limit=PIECES)[0])
+        return float(scipy.integrate.quad(
+            lambda s: ask_number("speed(t={:g})", self.speed, s), 0.0, t,
+            epsabs=1e-13, epsrel=1e-13, limit=PIECES)[0])
 
 
 @teaching

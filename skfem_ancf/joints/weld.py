@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, require_flag, require_label, teaching
-from .base import (GROUND, Joint, cross_terms, each, equations_of, gradients, rotation, section,
+from .base import (Joint, cross_terms, each, equations_of, gradients, is_ground, rotation, section,
                    several)
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class Weld(Joint):
 
     def _require_together(self, scene: Scene, b: Vector) -> None:
         gap = b.start - self.a.start
-        beams = [scene.beam(beam) for beam in self.beams if not _is_ground(beam)]
+        beams = [scene.beam(beam) for beam in self.beams if not is_ground(beam)]
         if not self.apart and np.hypot(*gap) > 1e-6 * min(beam.size for beam in beams):
             raise InputError(
                 f"the sections to weld are {np.hypot(*gap):.6g} apart, one at "
@@ -93,7 +93,3 @@ class Weld(Joint):
         i, j, v = zip(*(cross_terms(self.da, db, Q) for _, db, Q in self.pairs))
         return (np.concatenate(i), np.concatenate(j),
                 np.concatenate([-m * x for m, x in zip(multipliers[2::3], v)]))
-
-
-def _is_ground(beam: Any) -> bool:
-    return isinstance(beam, str) and beam == GROUND
