@@ -1,4 +1,4 @@
-# make demo    the cantilever of the paper: numbers, out/*.vtu, out/*.png
+# make demo    the cantilever of the paper: numbers, out/*.vtu, out/*.png; nothing else is installed
 # make test    the tests, on two processes; ARGS="..." goes to pytest
 # make test-settings   most of them as on an old processor, and without Numba
 # make paper   the paper's tables; bench: timings; stress: large and hard cases
@@ -6,6 +6,7 @@
 # make coverage  the tests, with the lines and branches that they run
 # make lint    ruff and mypy, of the versions that pyproject.toml names
 # make docs    reference pages from the docstrings, out/docs, and the pictures of docs/
+# make dist    sdist and wheel, in out/dist
 # make clean   removes .venv and out
 #
 # The first target called builds a virtual environment in .venv with $(PYTHON), 3.10 or newer.
@@ -18,10 +19,17 @@ PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test test-settings lint paper bench stress fuzz mutants coverage docs clean
+.PHONY: demo test test-settings lint paper bench stress fuzz mutants coverage docs dist clean
 
-demo: $(VENV)/test.stamp
+demo: $(VENV)/demo.stamp
 	$(PY) demos/cantilever.py
+	@echo "open $(CURDIR)/out/cantilever_gravity.png"
+
+# what the demo needs, and each step of it said: the first thing that somebody sees
+$(VENV)/demo.stamp: pyproject.toml | $(PY)
+	@echo "installing skfem-ancf with NumPy, SciPy, scikit-fem and matplotlib into $(VENV)"
+	$(PY) -m pip install --disable-pip-version-check --editable '.[plot,progress]'
+	@touch $@
 
 test: $(VENV)/test.stamp
 	$(PY) -m skfem_ancf.compiled
@@ -77,12 +85,16 @@ docs: $(VENV)/docs.stamp
 	$(PY) -m pdoc --docformat numpy --output-directory out/docs skfem_ancf '!skfem_ancf.compiled'
 	@echo "open out/docs/index.html; the guides are docs/*.md"
 
+dist: $(VENV)/dist.stamp
+	$(PY) -m build --outdir out/dist
+
 clean:
 	rm -rf $(VENV) out
 
 $(PY):
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || \
 	  { echo "Python 3.10 or newer is needed: make PYTHON=/path/to/python3"; exit 1; }
+	@echo "making a virtual environment in $(VENV)"
 	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
 
 # one stamp per extra, so that nothing is installed twice

@@ -81,7 +81,8 @@ def test_the_sdist_holds_the_tests_and_what_they_read(built):
         wanted = {p.relative_to(copy) for p in (copy / folder).rglob("*") if p.is_file()}
         assert wanted - {p.relative_to(source) for p in source.rglob("*")} == set(), folder
     for name in ("Makefile", "LICENSE", "README.md", "pyproject.toml", "MANIFEST.in",
-                 "CONTRIBUTING.md"):
+                 "CONTRIBUTING.md", "CHANGELOG.md", "CITATION.cff", ".pre-commit-config.yaml",
+                 ".github/workflows/tests.yml"):
         assert (source / name).is_file(), name
 
 
@@ -95,6 +96,11 @@ def test_the_wheel_holds_the_package_and_nothing_else(built):
     assert sorted(names) == sorted(p.relative_to(copy).as_posix() for p in sources)
     assert f"\nVersion: {skfem_ancf.__version__}\n" in metadata
     assert "\nLicense-Expression: BSD-3-Clause\n" in metadata
+    owner = re.search(r"Copyright \(c\) \d+, (.*)", (ROOT / "LICENSE").read_text())[1]
+    assert f"\nAuthor: {owner}\n" in metadata
+    for minor in range(10, 15):
+        assert f"\nClassifier: Programming Language :: Python :: 3.{minor}\n" in metadata
+    assert "\nClassifier: Typing :: Typed\n" in metadata
 
 
 @pytest.mark.parametrize("kind", ["sdist", "wheel"])
@@ -122,3 +128,77 @@ def test_installed_in_an_environment_of_its_own(built, kind, tmp_path):
               SKFEM_ANCF_COMPILED="0")  # not to compile it anew
     assert f"tested {found[1]}" in out
     assert re.search(r"\d+ passed", out) or "[100%]" in out
+
+
+def read_yaml(name):
+    return pytest.importorskip("yaml").safe_load((ROOT / name).read_text(encoding="utf-8"))
+
+
+def test_one_version_everywhere():
+    headings = re.findall(r"^## \[(.*?)\](?: - (\S+))?$", (ROOT / "CHANGELOG.md").read_text(),
+                          re.MULTILINE)
+    assert headings[0] == ("Unreleased", "")
+    citation = read_yaml("CITATION.cff")
+    assert headings[1] == (skfem_ancf.__version__, str(citation["date-released"]))
+    assert str(citation["version"]) == skfem_ancf.__version__
+
+
+def test_the_citation_is_of_this_package_and_of_the_paper():
+    citation = read_yaml("CITATION.cff")
+    assert {"cff-version", "message", "title", "authors"} <= set(citation)
+    assert citation["license"] == "BSD-3-Clause"
+    assert citation["authors"][0]["name"] in (ROOT / "LICENSE").read_text()
+    paper = citation["references"][0]
+    assert paper["title"] in (ROOT / "docs" / "paper.md").read_text().replace("\n", " ")
+    for reference in citation["references"]:
+        assert {"type", "title", "authors"} <= set(reference)
+
+
+def test_changes_are_of_the_kinds_of_keep_a_changelog():
+    kinds = re.findall(r"^### (.*)$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    assert set(kinds) <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
+
+
+def test_workflows_call_targets_of_the_makefile():
+    makefile, called = (ROOT / "Makefile").read_text(), set()
+    for file in sorted((ROOT / ".github" / "workflows").glob("*.yml")):
+        for job in read_yaml(file.relative_to(ROOT))["jobs"].values():
+            for step in job["steps"]:
+                called |= set(re.findall(r"make ([\w-]+)", step.get("run", "")))
+    assert called == {"test", "test-settings", "lint", "docs", "dist"}
+    assert all(f"\n{target}:" in makefile for target in called)
+    tested = read_yaml(".github/workflows/tests.yml")["jobs"]["test"]["strategy"]["matrix"]
+    assert tested["python"] == ["3.10", "3.11", "3.12", "3.13", "3.14"]
+
+
+def test_the_hook_has_the_ruff_of_make_lint():
+    hook, = read_yaml(".pre-commit-config.yaml")["repos"][0]["hooks"]
+    wanted, = hook["additional_dependencies"]
+    assert f'"{wanted}"' in (ROOT / "pyproject.toml").read_text()
+
+
+def test_extras_are_in_the_readme():
+    extras = re.findall(r"^(\w+) = \[", (ROOT / "pyproject.toml").read_text().split(
+        "[project.optional-dependencies]")[1].split("\n[")[0], re.MULTILINE)
+    users = set(extras) - {"coverage", "lint", "dist"}  # of targets of the Makefile alone
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert {name for name in extras if f"\n| `{name}` | " in readme} == users
+
+
+def test_the_readme_runs_with_the_dependencies_alone(tmp_path):
+    """To its last line, which says what a picture needs."""
+    code = ("import sys; sys.modules.update(dict.fromkeys("
+            "['matplotlib', 'tqdm', 'numba', 'h5py', 'pyvista', 'imageio']))\n")
+    code += re.search(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"),
+                      re.DOTALL)[1]
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, text=True, check=False,
+                          env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True)
+    assert "root reaction:" in done.stdout
+    assert [p.name for p in tmp_path.iterdir()] == ["cantilever.vtu"]
+    assert 'pip install ".[plot]"' in done.stderr.splitlines()[-1]
+
+
+def test_make_demo_ends_with_a_picture_that_the_demo_writes():
+    picture = re.search(r'@echo "open \$\(CURDIR\)/out/(\w+\.png)"',
+                        (ROOT / "Makefile").read_text())[1]
+    assert picture in (ROOT / "demos" / "cantilever.py").read_text()
