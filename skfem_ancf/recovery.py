@@ -10,9 +10,11 @@ beam between two places where its section force jumps:
    the rate of their section. This rate and the stretch of the axis are those for which the
    section has its force and moment; S_xx is that of the law.
 3. S_xy and S_yy follow from the equilibrium of the body, ``div P + b = 0``, integrated across the
-   section from the lower face with its load. What is left at the upper face is spread linearly,
-   and a parabola added to S_xy that gives the section its shear force. The law's inverse gives
-   eps_yy and eps_xy, which enter step 2: both are repeated.
+   section from the lower face with its load. What is left at the upper face is spread over the
+   area, and Jourawski's shear stress (of a rectangle a parabola) added to S_xy that gives the
+   section its shear force. The law's inverse gives eps_yy and eps_xy, which enter step 2: both are
+   repeated. Where the width or the law jumps across the section, so do they
+   (:mod:`skfem_ancf.panels`): P_2 times the width does not.
 4. This is the solution of Saint-Venant, to high order in h / L. Supports and point loads cause
    boundary layers of the length h besides. Where the elements there are short enough to resolve
    them, their own stress is taken, from where it is most accurate: the mean of two Gauss points,
@@ -23,7 +25,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from copy import copy
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,14 +37,15 @@ from scipy.linalg import solve_banded
 from .formulations.ecm import EnhancedContinuum
 from .kept import kept
 from .materials import LinearLaw
-from .quadrature import gauss, lagrange
+from .panels import Panels
+from .quadrature import gauss
 from .mapping import cross
 from .section_forces import NotRecovered, SectionForces, Sections, viscous_forces
 from .series import chebyshev
 from .spread import AXIS, SNAP, Sampled, station_of_node, stations_of_vector
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -50,9 +53,6 @@ if TYPE_CHECKING:
     from .points import Part
     from .results import State
     from .types import Array, Law
-
-#: Points across a section: 2 N + 1, and at least these.
-ACROSS = 7
 
 #: Rounds of steps 2 and 3 at most, and the change of the stretch, relative to its largest, at which
 #: they end.
@@ -71,12 +71,6 @@ CHUNK = 2048
 #: no longer. Not at all if the elements there are longer than COARSE heights; if they are longer
 #: than FINE, in part.
 INNER, LAYER, FINE, COARSE = 0.5, 1.2, 0.25, 0.5
-
-
-def integration(nodes: Array) -> Array:
-    """From values at the nodes on [0, 1] to the integrals from 0 to each node; shape (n, n)."""
-    x, w = gauss(len(nodes))
-    return np.array([b * (w @ lagrange(nodes, b * x)) for b in nodes])
 
 
 def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[int] = (0, 1, 2),
@@ -196,31 +190,45 @@ class _Piece:
             self.Rv, self.Mv = self._viscous()
             self.R, self.M = self.R - self.Rv, self.M - self.Mv
         eta, across = recovery.eta, recovery.beam.across
-        sections = Sections(self.forces, self.e, xi, eta)
-        speed = np.hypot(*sections.J[:, 0, :, len(eta) // 2])
+        sections = Sections(self.forces, self.e, xi, eta, self.forces.lifted)
+        axis = Sections(self.forces, self.e, xi, np.array([0.5]))
+        speed = np.hypot(*axis.J[:, 0, :, 0])
         h, slope = mesh.mapping().height(sections.X[0], self.e)
         self.Y, self.lean = h * (eta - 0.5), slope / speed[:, None] * (eta - 0.5)
-        self.h, self.swell = h / mesh.height, slope / (speed[:, None] * h)
-        slab, = across.slabs
-        self.width = across.breadth(slab, sections.X, self.e)
-        self.grade = across.grade(slab, sections.X, self.e)
+        self.height, self.swell = h, slope / (speed[:, None] * h)
+        self.width = recovery.panels.width * (
+            recovery.of_slabs(across.breadth, sections.X, self.e) + 0.0 * sections.X[0])
+        self.grade = recovery.of_slabs(across.grade, sections.X, self.e)
         self.g = sections.volume / (speed[:, None] * h)
         self.E0 = sum(np.moveaxis(np.multiply.outer(factor, eigen.strain_at(sections.X, self.e)),
                                   np.ndim(factor), 0) for factor, eigen in self.forces.eigen)
-        self.body = self.g * (sections.body + self._axis_load())
-        at_faces = [Sections(self.forces, self.e, xi, np.array([float(k)])) for k in (0, 1)]
-        self.faces = [(across.face(k, at.X, self.e) * at.face(k))[..., 0] / speed
-                      for k, at in enumerate(at_faces)]
-        r = Sections(self.forces, self.e, xi, np.array([0.5])).field(self.forces.q, slope=True)
+        area = self.integral(1.0)[:, None]
+        self.below = self.from_bottom(self.width) / area
+        axis_load = axis.sampled(AXIS) / (area * speed[:, None])
+        self.body = self.g * (sections.body + axis_load)
+        self.faces = [self._face(k) / speed for k in (0, 1)]
+        self.bubble = self._jourawski()
+        r = axis.field(self.forces.q, slope=True)
         self.raw_angle = np.unwrap(np.arctan2(r[1, ..., 0], r[0, ..., 0]))
         self.phi = self.raw_angle
         self._solve()
 
-    def _axis_load(self):
-        """A load of the axis as a force per volume, the same across the section; or 0."""
-        axis = Sections(self.forces, self.e, self.xi, np.array([0.5]))
-        area = self.recovery.beam.across.moments(axis.X[0], self.e, "area")[0]
-        return axis.sampled(AXIS) / (area * np.hypot(*axis.J[:, 0]))
+    def _face(self, side):
+        """Force per xi on the bottom (0) or top (1), (2, ..., n)."""
+        at = Sections(self.forces, self.e, self.xi, np.array([float(side)]))
+        force = at.face(side)
+        if np.any(force):  # a circle has no face
+            force = self.recovery.beam.across.face(side, at.X, self.e) * force
+        return force[..., 0]
+
+    def _jourawski(self):
+        """Shear stress in bending but for a factor: first moment of E dA beyond, over the width.
+
+        Of a rectangle of one material a parabola.
+        """
+        E = self.grade * self.recovery.modulus(np.zeros((3, *self.g.shape)))
+        centre = (self.integral(E * self.Y) / self.integral(E))[:, None]
+        return self.from_bottom(self.width * E * (centre - self.Y)) / self.width
 
     def _viscous(self):
         """The part of force and moment that resists the rate of the strain, splined."""
@@ -257,15 +265,15 @@ class _Piece:
 
     def integral(self, values):
         """The integral over the section, with the width, of values (..., n, m)."""
-        return (self.width * self.h * values) @ self.recovery.whole
+        return (self.width * self.height * values) @ self.recovery.panels.whole
 
     def from_bottom(self, values):
         """The integral from the bottom to each point of values (..., n, m)."""
-        return self.h * (values @ self.recovery.from_bottom.T)
+        return self.height * (values @ self.recovery.panels.from_bottom.T)
 
     def from_axis(self, values):
         """The integral from the axis to each point of values (..., n, m)."""
-        return self.h * (values @ self.recovery.from_axis.T)
+        return self.height * (values @ self.recovery.panels.from_axis.T)
 
     def slope_from_axis(self, values, d_ds):
         """The integral from the axis of the derivative along it, at the same distance from it.
@@ -280,10 +288,10 @@ class _Piece:
         """The strain (3, ..., n, m) with S_yy, S_xy, and the stretch, or S_xx, as they are."""
         r = self.recovery
         if self.stress_given:
-            return self.E0 + strain_of_stress(r.law, self.S / self.grade, self.eps - self.E0)
+            return self.E0 + r.strain_of(self.S / self.grade, self.eps - self.E0)
         self.eps[0] = 0.5 * (self.stretch**2 - 1.0)
-        eps = strain_of_stress(r.law, self._fed / self.grade, self.eps - self.E0, (1, 2))
-        self.S[0] = self.grade * r.law.stress(eps)[0]
+        eps = r.strain_of(self._fed / self.grade, self.eps - self.E0, (1, 2))
+        self.S[0] = self.grade * r.by_law(lambda law, strain: law.stress(strain)[0], eps)
         return eps + self.E0
 
     def _section(self):
@@ -330,17 +338,18 @@ class _Piece:
     def _turn(self):
         """The rate at which sections turn, the angles of fibres and of the frame."""
         r, along = self.recovery, self.g * self.rX[0]
-        total = (self.h * self.rY) @ r.whole
+        total = (self.height * self.rY) @ r.panels.whole
         with_faces = along + self.lean * self.rY[0]
         self.rate = (self.d_ds(total[0][..., None])[..., 0]
-                     - (with_faces[..., -1] - with_faces[..., 0])) / total[1]
+                     - with_faces @ (r.panels.top - r.panels.bottom)) / total[1]
         dt, dn = self.d_ds(self.rY)
         normal = (self.slope_from_axis(self.rY[1], dn)
                   + self.from_axis(self.rate[..., None] * self.rY[0]))
         self.alpha = np.arcsin(np.clip(normal / (self.g * self.stretch), -1.0, 1.0))
         turned = (self.slope_from_axis(self.rY[0], smoothed(self.s, dt, 0.5 * r.beam.mesh.height))
                   - self.from_axis(self.rate[..., None] * self.rY[1]))
-        self.stretch = (along[..., r.middle, None] + turned) / (self.g * np.cos(self.alpha))
+        self.stretch = ((along @ r.panels.axis)[..., None] + turned) / (
+            self.g * np.cos(self.alpha))
         phi = scipy.interpolate.CubicSpline(self.s, self.rate, axis=-1).antiderivative()(self.s)
         self.phi = phi + (self.raw_angle - phi) @ self._line
 
@@ -359,8 +368,9 @@ class _Piece:
         dP = np.array([d0 - rate * P[1], d1 + rate * P[0]]) + self.width * turned(
             self.body, c[..., None], s[..., None])
         bottom, top = (turned(f, c, s)[..., None] for f in self.faces)
-        P2 = -bottom - self.from_bottom(dP + self.swell * P)  # with what leaves oblique faces
-        P2 = P2 + (top - P2[..., -1:]) * self.recovery.eta + self.lean * P
+        dP = dP + self.swell * P  # with what leaves oblique faces
+        left = top + bottom + ((self.height * dP) @ self.recovery.panels.whole)[..., None]
+        P2 = left * self.below - bottom - self.from_bottom(dP) + self.lean * P
         P2 = P2 / (self.g * self.width)
         det = cross(self.rX, self.rY)
         self.S = np.array([self.S[0], cross(self.rX, P2) / det,
@@ -378,24 +388,21 @@ class _Piece:
                 np.array([-np.sin(self.phi), np.cos(self.phi)]))
         N, Q = np.sum(self.Rv * t, axis=0), np.sum(self.Rv * n, axis=0)
         (x, y), (a, b) = self.from_axis(self.rY), self.rX
-        units = np.array([1.0 + 0.0 * y, y / self.recovery.beam.mesh.height]) / self.g
+        units = self.recovery.modulus(self.eps - self.E0) * self.grade * np.array(
+            [1.0 + 0.0 * y, y / self.recovery.beam.mesh.height]) / self.g
         K = np.array([[self.integral(a * unit), self.integral((x * b - y * a) * unit)]
                       for unit in units])
         det = K[0, 0] * K[1, 1] - K[0, 1] * K[1, 0]
         first = (K[1, 1] * N - K[1, 0] * self.Mv) / det
         second = (K[0, 0] * self.Mv - K[0, 1] * N) / det
         S = first[..., None] * units[0] + second[..., None] * units[1]
-        bubble = self._bubble
+        bubble = self.bubble
         missing = Q - self.integral(b * S)
         return S, (missing / self.integral(self.rY[1] * bubble))[..., None] * bubble
 
-    @property
-    def _bubble(self):
-        return 1.0 - (2.0 * self.recovery.eta - 1.0) ** 2
-
     def _shear(self):
-        """Add a parabola to S_xy that gives the section its shear force."""
-        bubble = self._bubble
+        """Add Jourawski's shear stress to S_xy, so that the section has its shear force."""
+        bubble = self.bubble
         missing = self.Q - self.integral(self.rX[1] * self.S[0] + self.rY[1] * self.S[2])
         self.S[2] += (missing / self.integral(self.rY[1] * bubble))[..., None] * bubble
 
@@ -413,8 +420,7 @@ class _Piece:
             self._balance()
             self._shear()
         self.stress, self.angle = self.S, self.phi[..., None] + self.alpha
-        self.strain = self.E0 + strain_of_stress(self.recovery.law, self.S / self.grade,
-                                                 self.eps - self.E0)
+        self.strain = self.E0 + self.recovery.strain_of(self.S / self.grade, self.eps - self.E0)
 
     def _rounds(self):
         """Steps 2 and 3 in turn, for each state until its stretch has settled."""
@@ -444,7 +450,7 @@ class _Piece:
         lengths = np.diff(r.lengths)[self.e]
         weight = np.zeros(len(self.s))
         for k in (0, -1):
-            h = np.max(np.broadcast_to(r.beam.mesh.height * self.h, self.g.shape)[k])
+            h = np.max(np.broadcast_to(self.height, self.g.shape)[k])
             x = np.abs(self.s - self.s[k]) / h
             size = np.max(lengths[x <= LAYER]) / h
             fine = np.clip((COARSE - size) / (COARSE - FINE), 0.0, 1.0)
@@ -467,6 +473,15 @@ class _Piece:
 def largest(values: Array) -> Array:
     """The largest absolute value of each field (..., n, m), shape (...)."""
     return np.max(np.abs(values), axis=(-2, -1))
+
+
+def _axial(law, strain):
+    """Change of S_xx with eps_xx while S_yy and S_xy stay, shape (...), of strains (3, ...)."""
+    D = law.D if isinstance(law, LinearLaw) else law.moduli(strain)
+    det = D[1, 1] * D[2, 2] - D[1, 2] * D[2, 1]
+    return 0.0 * strain[0] + D[0, 0] - (
+        D[0, 1] * (D[1, 0] * D[2, 2] - D[1, 2] * D[2, 0])
+        + D[0, 2] * (D[1, 1] * D[2, 0] - D[1, 0] * D[2, 1])) / det
 
 
 class _Table:
@@ -527,22 +542,22 @@ class Recovery:
 
     def __init__(self, forces: SectionForces, u: Array) -> None:
         self.forces, self.beam = forces, forces.beam
-        beam, mesh = self.beam, self.beam.mesh
-        if len(beam.across.slabs) > 1 or beam.across.slabs[0].face is not None:
-            raise NotRecovered("stress that jumps across the section is not known to it")
-        self.law = beam.across.slabs[0].material.law()
-        m = max(ACROSS, 2 * beam.element.order + 1)
-        self.eta = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, m))
-        self.middle = m // 2
-        self.eta[self.middle] = 0.5
-        self._to_series, self.from_bottom = kept(beam.tables, ("across", m), lambda: (
-            np.linalg.inv(chebvander(2.0 * self.eta - 1.0, m - 1)),
-            mesh.height * integration(self.eta)))
-        self.from_axis = self.from_bottom - self.from_bottom[self.middle]
-        self.whole = self.from_bottom[-1]
+        beam = self.beam
+        #: Why it has section forces, but no fields; "" if it has.
+        self.why = "" if beam.section.has_fields else (
+            f"{beam.section!r} does not say what it is made of: strain and stress are those of a "
+            "rectangle with these numbers; State.resultants() has what is known")
+        slabs = beam.across.slabs
+        if not all(hasattr(slab.measure, "pieces") for slab in slabs):
+            raise NotRecovered("a section of your own has a measure without pieces")
+        self.panels = kept(beam.tables, "across", lambda: Panels(slabs, beam.element.order))
+        self.eta = self.panels.eta
+        self.laws = [(columns, slab.material.law(slab.shear))
+                     for slab, columns in zip(slabs, self.panels.slabs)]
         self.lengths, self._inside = kept(beam.tables, "arc", self._arc_tables)
-        self.has_stress = beam.element.carries_shear_parabola and not isinstance(
-            beam.formulation, EnhancedContinuum)
+        self.has_stress = (len(slabs) == 1 and slabs[0].face is None
+                           and beam.element.carries_shear_parabola
+                           and not isinstance(beam.formulation, EnhancedContinuum))
         self._u = u
         self.pieces = [_Piece(self, a, b) for a, b in zip(forces.cuts[:-1], forces.cuts[1:])]
         bad = sum(~np.all(np.isfinite(p.strain), axis=(0, -2, -1)) for p in self.pieces)
@@ -555,11 +570,48 @@ class Recovery:
 
     def modulus(self, strain: Array) -> Array:
         """Change of S_xx with eps_xx while S_yy and S_xy stay, at strains (3, ...)."""
-        law = self.law
-        D = law.D if isinstance(law, LinearLaw) else law.moduli(strain)
-        det = D[1, 1] * D[2, 2] - D[1, 2] * D[2, 1]
-        return D[0, 0] - (D[0, 1] * (D[1, 0] * D[2, 2] - D[1, 2] * D[2, 0])
-                          + D[0, 2] * (D[1, 1] * D[2, 0] - D[1, 0] * D[2, 1])) / det
+        return self.by_law(_axial, strain)
+
+    def strain_of(self, stress: Array, strain: Array, unknown: Sequence[int] = (0, 1, 2)) -> Array:
+        """:func:`strain_of_stress` of each point's law, at the points across sections.
+
+        Parameters
+        ----------
+        stress, strain, unknown
+            As there, shapes (3, ..., n, m).
+        """
+        return self.by_law(partial(strain_of_stress, unknown=unknown), stress, strain)
+
+    def by_law(self, function: Callable[..., Array], *fields: Array) -> Array:
+        """A function of a law and of fields (..., n, m), of the law that each point has.
+
+        Parameters
+        ----------
+        function
+            Takes the law and the fields where it is that of the material.
+        *fields
+            At the points across sections.
+        """
+        if len(self.laws) == 1:
+            return function(self.laws[0][1], *fields)
+        return np.concatenate([function(law, *(f[..., columns] for f in fields))
+                               for columns, law in self.laws], axis=-1)
+
+    def of_slabs(self, of: Callable[..., Any], X: Array, e: Array) -> Any:
+        """What a method of Across says of each slab at its points.
+
+        Parameters
+        ----------
+        of
+            Takes a slab, points and elements.
+        X, e
+            Points across sections, shape (2, n, m), and elements, shape (n,).
+        """
+        slabs = self.beam.across.slabs
+        if len(slabs) == 1:
+            return of(slabs[0], X, e)
+        return np.concatenate([np.broadcast_to(of(slab, X[..., at], e), X[0, :, at].shape)
+                               for slab, at in zip(slabs, self.panels.slabs)], axis=-1)
 
     def of(self, k: int) -> Recovery:
         """The field of one of several states.
@@ -665,8 +717,7 @@ class Recovery:
         """As :meth:`_places`, of one point."""
         end = xi > 1.0 - SNAP
         station = e + (1.0 if end else 0.0 if xi < SNAP else xi)
-        return (station, end, self._arc_of_one(e, xi),
-                chebyshev(eta, len(self.eta)) @ self._to_series)
+        return station, end, self._arc_of_one(e, xi), self.panels.values(eta)
 
     def _arc_of_one(self, e, xi):
         start, end = self.lengths[e:e + 2].tolist()
@@ -681,8 +732,7 @@ class Recovery:
         """
         end = xi > 1.0 - SNAP
         station = e + np.where(end, 1.0, np.where(xi < SNAP, 0.0, xi))
-        return station, end, self.arc(e, xi), chebvander(2.0 * eta - 1.0, self.middle * 2) @ (
-            self._to_series)
+        return station, end, self.arc(e, xi), self.panels.values(eta)
 
     def _values(self, places, rows):
         station, end, s, weights = places

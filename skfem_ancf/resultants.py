@@ -122,7 +122,7 @@ def resultants(state: State, number: int, part: Part | None = None,
     Resultants
     """
     beam = state.beams[number]
-    recovery = state.recovery(beam) if recover else None
+    recovery = state.balance(beam) if recover else None
     if part is None:
         e, xi, after = _everywhere(beam, None if recovery is None else recovery.forces.cuts)
     else:
@@ -197,18 +197,18 @@ def _axis(recovery, piece):
     The direction of a section is that of 12 / h^3 int Y r dY, of which the derivatives across the
     section follow from its strain.
     """
-    eps, middle = piece.strain, recovery.middle
-    phi, stretch = piece.angle[:, middle], np.sqrt(1.0 + 2.0 * eps[0])
+    eps, axis = piece.strain, recovery.panels.axis
+    phi, stretch = piece.angle @ axis, np.sqrt(1.0 + 2.0 * eps[0])
     lam_y = np.sqrt(1.0 + 2.0 * eps[1])
     across = piece.angle + np.arccos(np.clip(eps[2] / (stretch * lam_y), -1.0, 1.0))
     r_Y = lam_y * _directions(across)[0]
-    d = (piece.from_axis(r_Y) * piece.Y) @ recovery.whole
+    d = (piece.from_axis(r_Y) * piece.Y) @ recovery.panels.whole
     normal = np.unwrap(np.arctan2(d[1], d[0])) - 0.5 * np.pi
     shear = (phi - normal + np.pi) % (2.0 * np.pi) - np.pi
     # not the derivative of the angle, which is fitted to that of the elements
     start = (piece.g[:, 0] - piece.g[:, -1]) / (piece.Y[..., -1] - piece.Y[..., 0])
     curvature = piece.rate - start - piece.d_ds(shear)
-    values = np.array([phi, stretch[:, middle], shear, curvature])
+    values = np.array([phi, stretch @ axis, shear, curvature])
     return scipy.interpolate.CubicSpline(piece.s, values.T)
 
 

@@ -404,16 +404,32 @@ class State(Frozen):
         """
         return self._recovery_of(self.beams.index(select_beam(self.beams, beam)))
 
-    def _recovery_of(self, k):
+    def balance(self, beam: Beam) -> Recovery | None:
+        """The :class:`~skfem_ancf.recovery.Recovery` with the section forces of a beam, or None.
+
+        A section given by numbers has these, but no fields.
+
+        Parameters
+        ----------
+        beam
+            One of the beams.
+        """
+        return self._recovery_of(self.beams.index(beam), fields=False)
+
+    def _recovery_of(self, k, fields=True):
         if k not in self._recoveries:
             states = [state for state in self.together if k not in state._recoveries]
             for state, found in zip(states, recover(states, k)):
                 state._recoveries[k] = found
-                if isinstance(found, NotRecovered):
+                if why := state._why(k):
                     logger.info("%r: strain and stress are those of the elements: %s",
-                                self.beams[k], found)
+                                self.beams[k], why)
         found = self._recoveries[k]
-        return None if isinstance(found, NotRecovered) else found
+        return None if isinstance(found, NotRecovered) or fields and found.why else found
+
+    def _why(self, k):
+        found = self._recoveries[k]
+        return str(found) if isinstance(found, NotRecovered) else found.why
 
     @property
     def recovered(self) -> dict[Any, str]:
@@ -425,9 +441,7 @@ class State(Frozen):
         out = {}
         for k, beam in enumerate(self.beams):
             self.recovery(beam)
-            found = self._recoveries[k]
-            out[k if beam.name is None else beam.name] = (
-                str(found) if isinstance(found, NotRecovered) else "")
+            out[k if beam.name is None else beam.name] = self._why(k)
         return out
 
     @cached_property

@@ -39,6 +39,9 @@ SMALL = 4096
 #: hold the equation of motion in the mean over a step only, and the mean of both sides is right.
 UNBALANCED, UNBALANCED_MOTION = 0.02, 0.5
 
+#: Section forces below this part of those that stress-free strains have alone are round-off.
+BALANCED = 1e-4
+
 
 class NotRecovered(AncfError):
     """The section forces or fields of a beam cannot be recovered; the message says why.
@@ -67,9 +70,13 @@ class Sections:
         Element of each section and its place there, shapes (n,).
     eta
         Points across each section, shape (k,).
+    lifted
+        Of a cable: points off its axis are at ``r + Y r_X``, the latter turned by 90 degrees, as
+        its :class:`~skfem_ancf.inertia.Inertia` has them. If not, all are on the axis.
     """
 
-    def __init__(self, forces: SectionForces, e: Array, xi: Array, eta: Array) -> None:
+    def __init__(self, forces: SectionForces, e: Array, xi: Array, eta: Array,
+                 lifted: bool = False) -> None:
         self.forces, self.e = forces, e
         beam = forces.beam
         self.shape = len(e), len(eta)
@@ -80,6 +87,10 @@ class Sections:
             self.X, self._value, self._slope, self.J = kept(
                 beam.tables, key, lambda: self._tables(beam, e, xi, eta))
         self.volume = self.J[0, 0] * self.J[1, 1] - self.J[0, 1] * self.J[1, 0]
+        self._arm: Any = 0.0
+        if lifted:
+            axis = Sections(forces, e, xi, np.array([0.5]))
+            self._arm = beam.mesh.mapping().offset(self.X, e) / np.hypot(*axis.J[:, 0])
 
     def _tables(self, beam, e, xi, eta):
         """Reference points, local functions and their slopes, and the derivative of the map."""
@@ -105,12 +116,21 @@ class Sections:
         ndarray
             Shape (2, n, k), or (2, states, n, k).
         """
-        return np.einsum("bnk,...nbi->i...nk", self._slope if slope else self._value,
-                         q_e[..., self.e, :, :], optimize=True)
+        def of(functions):
+            return np.einsum("bnk,...nbi->i...nk", functions, q_e[..., self.e, :, :],
+                             optimize=True)
+
+        if slope or not np.any(self._arm):
+            return of(self._slope if slope else self._value)
+        r_xi = of(self._slope)
+        return of(self._value) + self._arm * np.array([-r_xi[1], r_xi[0]])
 
     def spread(self, values: Array) -> Array:
         """Element vectors (..., ne, nb, 2) of forces (2, ..., n, k), summed."""
         parts = np.einsum("bnk,i...nk->n...bi", self._value, values, optimize=True)
+        if np.any(self._arm):
+            turned = self._arm * np.array([values[1], -values[0]])
+            parts = parts + np.einsum("bnk,i...nk->n...bi", self._slope, turned, optimize=True)
         out = np.zeros((self.forces.beam.mesh.nelements,) + parts.shape[1:])
         np.add.at(out, self.e, parts)
         return np.moveaxis(out, 0, -3)
@@ -211,6 +231,7 @@ class SectionForces:
             raise NotRecovered("a load is given by its force on the coordinates only: where it "
                                "acts across the section is not known")
         self.states = u.shape[:-1]
+        self.lifted = not (beam.has_sections or beam.across.simple)
         gather = beam.kernel.gather
         self.q = _each(gather, beam.q0_local + u)
         self.acceleration = None if acceleration is None else _each(gather, acceleration)
@@ -236,11 +257,11 @@ class SectionForces:
         ne, (x, w) = mesh.nelements, gauss(ALONG)
         e, xi = np.repeat(np.arange(ne), ALONG), np.tile(x, ne)
         parts = []
-        for slab, (eta, v) in beam.across.rules(beam.element.order + 1, inertia=True):
-            whole = not beam.has_sections
+        for slab, (eta, v) in beam.across.rules(max(beam.element.order, 1) + 1, inertia=True):
+            whole = not (beam.has_sections or self.lifted)
             if whole:
                 eta, v = WHOLE
-            inside = Sections(self, e, xi, eta)
+            inside = Sections(self, e, xi, eta, self.lifted)
             size = beam.across.breadth(slab, inside.X, e, whole) * v * inside.volume
             parts.append((inside, size * inside.body))
         for side in (0, 1):
@@ -261,15 +282,22 @@ class SectionForces:
         internal = _each(beam.kernel.forces, u)
         if self.viscous is not None:
             internal = internal + self.viscous
-        for factor, eigen in self.eigen:
-            internal = internal - np.reshape(factor, (*np.shape(factor), 1, 1, 1)) * _each(
-                eigen.element_forces, u)
-        left, right = np.split(internal - load, 2, axis=-2)
         q = np.split(self.q, 2, axis=-2)
+        #: Size of force times height and moment that stress-free strains have alone.
+        self._pushed = np.zeros(self.states)
+        for factor, eigen in self.eigen:
+            pushed = np.reshape(factor, (*np.shape(factor), 1, 1, 1)) * _each(
+                eigen.element_forces, u)
+            internal = internal - pushed
+            self._pushed = self._pushed + self._size(*_at_ends(q, pushed))
         # of the part of the beam on the right of a section on that on its left
-        self.R = np.array([-left[..., 0, :], right[..., 0, :]])  # (2 ends, ..., ne, 2)
-        self.M = np.array([-_moments(q[0], left), _moments(q[1], right)])
+        self.R, self.M = _at_ends(q, internal - load)
         self.ends = np.array([q[0][..., 0, :], q[1][..., 0, :]])
+
+    def _size(self, R, M):
+        """The largest force times the height, and moment, of each state."""
+        return (np.max(np.abs(R), axis=(0, -2, -1)) * self.beam.mesh.height
+                + np.max(np.abs(M), axis=(0, -1)))
 
     def viscous_middles(self) -> tuple[Array, Array]:
         """The part of force and moment that resists the rate of the strain, in the middle of
@@ -378,8 +406,7 @@ class SectionForces:
         R[..., mesh.t[1], :], M[..., mesh.t[1]] = self.R[1], self.M[1]
         R[..., mesh.t[0], :] -= self.R[0]
         M[..., mesh.t[0]] -= self.M[0]
-        size = (np.max(np.abs(self.R), axis=(0, -2, -1)) * mesh.height
-                + np.max(np.abs(self.M), axis=(0, -1)))
+        size = np.maximum(self._size(self.R, self.M), BALANCED * self._pushed)
         if np.any(size == 0.0):
             raise NotRecovered("the beam carries no load", size == 0.0)
         place = np.zeros(n)
@@ -400,6 +427,15 @@ class SectionForces:
 def _each(function, u):
     """A function of a vector (N,), of one state or of each of several (states, N)."""
     return function(u) if u.ndim == 1 else np.array([function(x) for x in u])
+
+
+def _at_ends(q, force):
+    """Forces (2 ends, ..., ne, 2) and moments (2 ends, ..., ne) of element vectors, as sections
+    have them; q: coordinates of the left and the right nodes, (..., ne, nb, 2).
+    """
+    left, right = np.split(force, 2, axis=-2)
+    return (np.array([-left[..., 0, :], right[..., 0, :]]),
+            np.array([-_moments(q[0], left), _moments(q[1], right)]))
 
 
 def _moments(q, force):

@@ -13,7 +13,7 @@ from skfem_ancf.dynamics import GeneralizedAlpha
 from skfem_ancf.errors import ConvergenceError, MeshError, NameUnknown
 from skfem_ancf.io import body_fields
 from skfem_ancf.quadrature import gauss, tensor
-from skfem_ancf.recovery import integration, smoothed, strain_of_stress
+from skfem_ancf.recovery import smoothed, strain_of_stress
 from skfem_ancf.statics.adapt import strain_error
 
 REFERENCE = np.load(Path(__file__).parent / "data" / "reference_2d.npz")
@@ -405,11 +405,6 @@ def test_files_and_pictures_show_the_recovered_field():
 
 
 # tools
-
-def test_integration_matrix():
-    x = np.array([0.0, 0.1, 0.5, 0.8, 1.0])
-    assert_allclose(integration(x) @ x**3, x**4 / 4, atol=1e-14)
-
 
 def test_smoothing():
     """cos(k s) is damped by 1 / (1 + k^2 l^2); its slope at the ends is zero."""

@@ -237,7 +237,7 @@ def test_a_sandwich_shears_as_the_plane_body_and_its_stress_jumps():
         assert state.displacement((L, 0.0))[1] == pytest.approx(wanted, rel=error)
         Y = np.array([-0.0499, -0.0401, -0.0399, 0.0, 0.0399, 0.0401, 0.0499])
         x = np.array([0.5 + 0.0 * Y, Y])
-        sxx = _plane_stress(basis, u, x, pieces)[0]
+        sxx = plane_stress(basis, u, x, pieces)[0]
         found = beam.stress(state.u, *_reference(beam, x))[0, :, 0]
         assert_allclose(found, sxx, atol=0.03 * np.abs(sxx).max())
 
@@ -247,7 +247,7 @@ def _reference(beam, x):
     return np.array(X).T[:, :, None], np.array(e)
 
 
-def _plane_stress(basis, u, x, pieces):
+def plane_stress(basis, u, x, pieces):
     """Stress of the plane body at points, by the elements that hold them."""
     cells = basis.mesh.element_finder()(*x)
     X = basis.mapping.invF(x[:, :, None], tind=cells)
@@ -413,7 +413,7 @@ def test_a_bimetal_beam_bends_as_the_plane_body_and_each_layer_has_its_stress():
     assert_allclose(state.displacement((L, 0.0))[1], wanted[1], rtol=3e-3)
     Y = np.array([-0.0499, -0.03, -0.0101, -0.0099, 0.02, 0.0499])
     x = np.array([0.25 + 0.0 * Y, Y])
-    exact = _plane_stress(basis, u, x, pieces)[0]
+    exact = plane_stress(basis, u, x, pieces)[0]
     assert_allclose(state.stress(x, recover=False)[0], exact, atol=5e-3 * np.abs(exact).max())
 
 

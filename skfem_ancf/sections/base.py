@@ -44,6 +44,8 @@ class Slab:
         Mass per volume: a number, a function of (x, y), or None.
     inertia
         The measure of its mass, if that is another.
+    shear
+        Factor on the shear modulus under the shear stress that equilibrium asks for.
     """
 
     material: Material
@@ -55,6 +57,7 @@ class Slab:
     grade: Callable[..., Any] | None = None
     density: Any = None
     inertia: Any = None
+    shear: float = 1.0
 
     @property
     def part(self) -> float:
@@ -77,9 +80,12 @@ class Section(Frozen):
     ----------
     has_materials : bool
         It has materials of its own: the beam is given none.
+    has_fields : bool
+        Strain and stress across it are known; not so of numbers.
     """
 
     has_materials = False
+    has_fields = True
 
     @staticmethod
     def profile(name: str, **sizes: float) -> Section:

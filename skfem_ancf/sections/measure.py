@@ -49,6 +49,7 @@ class Uniform(Frozen):
 
     def __init__(self, low: float = 0.0, high: float = 1.0, more: int = 0) -> None:
         self.low, self.high, self.more = low, high, more
+        self.pieces, self.mean = (Piece(low, high, 1.0),), high - low
 
     def gauss(self, n: int) -> Rule:
         """Points eta (m,) and weights (m,), whose sum is 1, exact to degree 2 n - 1.

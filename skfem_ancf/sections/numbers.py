@@ -36,6 +36,7 @@ class Numbers(Section):
     """
 
     has_materials = True
+    has_fields = False
 
     def __init__(self, EA: float, EI: float, GA: float | None = None, rhoA: float | None = None,
                  rhoI: float | None = None, width: float = 1.0) -> None:
@@ -60,7 +61,7 @@ class Numbers(Section):
         own = part if self.rhoI is None or self.rhoA is None else (
             np.sqrt(12.0 * self.rhoI / self.rhoA) / h)
         return [Slab(law, b, Uniform(0.5 - 0.5 * part, 0.5 + 0.5 * part), face=(b, b), outer=b,
-                     density=density,
+                     density=density, shear=2.4 * GA / self.EA,
                      inertia=Uniform(0.5 - 0.5 * own, 0.5 + 0.5 * own))]
 
     def __repr__(self) -> str:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from ..quadrature import gauss, lagrange
-from .measure import Piece, Weighted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,11 +54,10 @@ def shear_factor(slabs: Sequence[Slab], order: int) -> float:
 def _points(slabs, t, w):
     """Points of each piece with their weights, widths and moduli."""
     for slab in slabs:
-        m, law = slab.measure, slab.material
-        pieces = m.pieces if isinstance(m, Weighted) else [
-            Piece(m.low, m.high, slab.width / slab.part)]
-        for low, high, width in pieces:
+        law, mean = slab.material, slab.measure.mean
+        for low, high, width in slab.measure.pieces:
             half = 0.5 * (high - low)
             eta, one = 0.5 * (low + high) - half * np.cos(t), np.ones(len(t))
-            yield (eta, half * np.sin(t) * w, (width(eta) if callable(width) else width) * one,
+            width = (width(eta) if callable(width) else width) * slab.width / mean
+            yield (eta, half * np.sin(t) * w, width * one,
                    law.axial_modulus * one, law.G * one)
