@@ -590,7 +590,7 @@ class Recovery:
         function
             Takes the law and the fields where it is that of the material.
         *fields
-            At the points across sections.
+            At the points across sections, shape (..., n, m).
         """
         if len(self.laws) == 1:
             return function(self.laws[0][1], *fields)
