@@ -23,7 +23,7 @@ export OMP_NUM_THREADS ?= 1
 
 demo: $(VENV)/demo.stamp
 	$(PY) demos/cantilever.py
-	@echo "open $(CURDIR)/out/cantilever_gravity.png"
+	@echo "open $(CURDIR)/out/cantilever.png"
 
 # what the demo needs, and each step of it said: the first thing that somebody sees
 $(VENV)/demo.stamp: pyproject.toml | $(PY)

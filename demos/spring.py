@@ -1,57 +1,73 @@
-"""A meander spring, curved in its stress-free state, pulled until it is nearly straight.
+"""A meander spring, pulled until it is straight
+=============================================
 
-    python demos/spring.py
-
-The spring follows y = A sin(x), is clamped at one end and pulled by a force along x at the other.
-Its stiffness rises as the bends straighten. Writes out/spring.vtu and out/spring.png.
+Flat springs that are cut from sheet follow a wave. Pulled a little, such a spring is as soft as the
+bending of its arms allows; pulled far, the arms lie along the force and it gets stiff. The wave is
+the stress-free state of the beam here: a curve given as a function.
 """
 
-import argparse
-from pathlib import Path
-
+import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure
+from scipy.integrate import quad
 
-from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, NeoHookean, Scene
+from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, NeoHookean, Scene
 
-PERIODS, AMPLITUDE, HEIGHT, WIDTH = 3, 1.6, 0.3, 1.0
-FORCES = (2.0, 8.0, 32.0, 128.0)
+# %%
+# Three periods of y = 16 mm sin(x / 10 mm), in rubber 1 mm thick and 10 mm wide.
 
-
-def meander(s):
-    """The axis: the parameter runs along x."""
-    return np.array([s, AMPLITUDE * np.sin(s)])
-
-
-def main(out="out", elements=72, progress=True):
-    """Pull with growing forces, print the extension and write files; returns the last state."""
-    out = Path(out)
-    mesh = MeshBeam.init_curve(meander, np.linspace(0, 2 * np.pi * PERIODS, elements + 1), HEIGHT)
-    beam = Beam(mesh, ElementBeamANCF(3), NeoHookean(E=2e4, nu=0.45, plane="strain"), WIDTH)
-    end, length = mesh.p[:, -1], mesh.lengths.sum()
-    print(f"{elements} elements of order 3, axis of length {length:.4g}, end to end {end[0]:.4g}")
-    print(f"{'force':>8}{'end to end':>12}{'stiffness':>11}")
-    before = (0.0, end[0])
-    axes = Figure(figsize=(8, 7), layout="constrained").subplots(len(FORCES), 1, sharex=True)
-    for force, ax in zip(FORCES, axes):
-        scene = Scene(beam).clamp("left").point_force((force, 0), at=end)
-        state = scene.solve_static(progress=progress)
-        now = (force, state.position(end)[0])
-        stiffness = (now[0] - before[0]) / (now[1] - before[1])
-        print(f"{force:8g}{now[1]:12.4f}{stiffness:11.3f}")
-        before = now
-        state.plot("eps_xx", ax=ax, thickness=1, limits=(-0.06, 0.06),
-                   title=f"axial strain at a force of {force:g}",
-                   colorbar=ax is axes[-1])
-        ax.set(xlabel="x" if ax is axes[-1] else "", ylim=(-2.4, 2.4))
-    state.save(out / "spring.vtu")
-    axes[0].figure.savefig(out / "spring.png", dpi=150, bbox_inches="tight")
-    print(f"wrote {out / 'spring.vtu'} and {out / 'spring.png'}")
-    return state
+unit, amplitude, periods = 0.01, 1.6, 3
+height, width = 0.1 * unit, unit
+rubber = NeoHookean(E=5e6, nu=0.45, plane="stress")
 
 
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--out", default="out", help="folder for the files")
-    parser.add_argument("--elements", type=int, default=72)
-    main(**vars(parser.parse_args()))
+def wave(s):
+    return unit * np.array([s, amplitude * np.sin(s)])
+
+
+mesh = MeshBeam.init_curve(wave, np.linspace(0, 2 * np.pi * periods, 73), height)
+beam = Beam(mesh, ElementBeamANCFCubic(2), rubber, width)
+end, length = mesh.p[:, -1], mesh.lengths.sum()
+print(f"end to end {1e3 * end[0]:.1f} mm, along the wave {1e3 * length:.1f} mm")
+
+
+def pull(force, start=None):
+    scene = Scene(beam).clamp("left", thickness="free").point_force((force, 0), at=end)
+    return scene.solve_static(start=start)
+
+
+# %%
+# **The check**: for small forces Castigliano's theorem gives the travel of the end as an integral
+# over the wave, of M^2 / EI with the lever y and of N^2 / EA.
+
+EI, EA = rubber.E * width * height**3 / 12, rubber.E * width * height
+
+
+def flexibility(s):
+    ds = unit * np.hypot(1, amplitude * np.cos(s))
+    return (wave(s)[1] ** 2 / EI + (unit / ds) ** 2 / EA) * ds
+
+
+stiffness = 1 / quad(flexibility, 0, 2 * np.pi * periods, limit=200)[0]
+small = 1e-3 * stiffness * end[0]
+found = small / pull(small).displacement(end)[0]
+print(f"stiffness at rest {found:.4f} N/m, Castigliano {stiffness:.4f} N/m")
+assert np.isclose(found, stiffness, rtol=0.01)
+
+# %%
+# Larger and larger forces, each solution the start of the next.
+
+forces = np.array([0.125, 0.5, 2, 8]) * stiffness * end[0]
+states = [pull(forces[0])]
+for force in forces[1:]:
+    states.append(pull(force, states[-1]))
+travel = np.array([state.displacement(end)[0] for state in states])
+tangent = np.diff(forces) / np.diff(travel)
+print("stiffness between them:", tangent.round(2), "N/m")
+assert np.all(np.diff(tangent) > 0) and tangent[0] > stiffness
+
+fig, axes = plt.subplots(len(states), 1, sharex=True, figsize=(8, 8), layout="constrained")
+for force, state, ax in zip(forces, states, axes):
+    state.plot("eps_xx", ax=ax, thickness=1, limits=(-0.06, 0.06), colorbar=ax is axes[-1],
+               title=rf"$\varepsilon_{{xx}}$ at {1e3 * force:.3g} mN")
+    ax.set(xlabel="x (m)" if ax is axes[-1] else "", ylabel="y (m)", ylim=(-0.025, 0.025))
+plt.show()

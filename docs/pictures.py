@@ -1,20 +1,39 @@
 """Makes the pictures of the guides: python docs/pictures.py."""
 
-import shutil
-import sys
-import tempfile
+import runpy
 from pathlib import Path
 
-DOCS = Path(__file__).resolve().parent
-sys.path.insert(0, str(DOCS.parent / "demos"))
+import matplotlib
 
+matplotlib.use("Agg")
 import numpy as np
-from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, MeshBeam, Scene,
+                        StVenantKirchhoff)
 from skfem_ancf.obstacles import Circle, Line
 
-import cantilever
-import rollup
-import spring
+DOCS = Path(__file__).resolve().parent
+DEMOS = DOCS.parent / "demos"
+
+
+def cantilever(elements):
+    """The paper's cantilever under its own weight."""
+    soft = StVenantKirchhoff(E=2e8, nu=0.3, density=7800, shear_correction="paper")
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, elements + 1), height=0.01),
+                ElementBeamANCF(3), soft, width=0.01, formulation="continuum")
+    scene = Scene(beam).fix("left", ["r", "r_X", "r_Y1", "r_Y0^1", "r_Y2^1"])
+    return scene.gravity((0, -9.81)).solve_static()
+
+
+def with_root(state, filename, recover):
+    """The deformed body, and its root enlarged."""
+    look = dict(limits=(-0.015, 0.015), recover=recover)
+    ax = state.plot("eps_yy", **look)
+    zoom = ax.inset_axes([0.42, 0.08, 0.56, 0.66])
+    state.plot("eps_yy", ax=zoom, thickness=1, colorbar=False, title="the root, to scale",
+               undeformed=False, **look)
+    zoom.set(xlim=(-0.005, 0.13), ylim=(-0.115, 0.0225), xlabel="", ylabel="")
+    ax.figure.savefig(filename, dpi=150, bbox_inches="tight")
 
 
 def on_a_cylinder():
@@ -27,14 +46,13 @@ def on_a_cylinder():
 
 def main(folder=DOCS):
     """Write cantilever.png (64 elements), cantilever_16.png (not recovered), obstacles, others."""
+    folder = Path(folder)
     for elements, name, recover in ((64, "cantilever.png", True), (16, "cantilever_16.png", False)):
-        state = cantilever.cantilever(2e8, elements).gravity((0, -9.81)).solve_static()
-        cantilever.picture(state, Path(folder) / name, recover)
-    on_a_cylinder().plot("eps_xx", thickness=1, filename=Path(folder) / "obstacles.png", dpi=110)
-    with tempfile.TemporaryDirectory() as out:
-        for demo in (rollup, spring):
-            demo.main(out, progress=False)
-            shutil.copy(Path(out) / f"{demo.__name__}.png", folder)
+        with_root(cantilever(elements), folder / name, recover)
+    on_a_cylinder().plot("eps_xx", thickness=1, filename=folder / "obstacles.png", dpi=110)
+    for demo in ("rollup", "spring"):
+        figure = runpy.run_path(str(DEMOS / f"{demo}.py"))["fig"]
+        figure.savefig(folder / f"{demo}.png", dpi=150, bbox_inches="tight")
 
 
 if __name__ == "__main__":

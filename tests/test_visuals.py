@@ -154,3 +154,14 @@ Scene(beam).clamp("left").solve_static().plot(filename=sys.argv[1])
 assert "matplotlib.pyplot" not in sys.modules
 """
     subprocess.run([sys.executable, "-c", script, str(tmp_path / "a.png")], check=True)
+
+
+def test_colour_bars_say_the_unit(state):
+    def labels(**options):
+        ax = state.plot("S_xx", **options)
+        return {text for bar in (*ax.figure.axes, *ax.child_axes)
+                for text in (bar.get_xlabel(), bar.get_ylabel())} - {"x", "y", ""}
+
+    assert labels(unit="Pa") == {"Pa"} and labels() == {"force / area"} and not labels(unit="")
+    with pytest.raises(InputError, match="unit must be a text"):
+        state.plot("S_xx", unit=1)

@@ -36,8 +36,9 @@ _WALL = "#7a5230"
 def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
                thickness: float | str = "auto", undeformed: bool = True, colorbar: bool = True,
                cmap: Any = None, limits: tuple[float, float] | None = None,
-               title: str | None = None, subdivide: tuple[int, int] = (16, 8),
-               filename: StrPath | None = None, dpi: float = 200, recover: bool = True) -> Any:
+               title: str | None = None, unit: str | None = None,
+               subdivide: tuple[int, int] = (16, 8), filename: StrPath | None = None,
+               dpi: float = 200, recover: bool = True) -> Any:
     """Draw the deformed body of a state, coloured by a field.
 
     Parameters
@@ -66,6 +67,8 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
         the colour bar gets arrows.
     title
         Title of the picture; the name of the field by default, "" for none.
+    unit
+        For the colour bar, as "Pa".
     subdivide
         Patches along and across each element.
     filename
@@ -108,6 +111,7 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     recover = require_flag("recover", recover)
     colorbar, cmap = require_flag("colorbar", colorbar), _colormap(cmap)
     filename, dpi = _page(ax, title, filename, dpi)
+    unit = require_text("unit", unit)
     m, n = _subdivision(subdivide)
     bodies = [_Body(state, beam, drawn, m, n, recover) for beam in state.beams]
     factor = _thickness(thickness, bodies)
@@ -148,7 +152,7 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     _dress(ax, (drawn.title or drawn.name) if title is None else title, factor)
     if colorbar:
         _add_colorbar(ax, image, bool(np.any(values < low)), bool(np.any(values > high)),
-                      unit_of(drawn))
+                      unit_of(drawn, unit))
     if filename is not None:
         with replacing(filename) as temporary:
             ax.figure.savefig(temporary, dpi=dpi, bbox_inches="tight")
