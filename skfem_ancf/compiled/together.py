@@ -10,8 +10,12 @@ from __future__ import annotations
 from itertools import count
 from typing import Any, NamedTuple
 
+from llvmlite.binding import parse_assembly
 from numba import types
 from numba.core import compiler
+from numba.core.compiler_machinery import PassManager
+from numba.core.dispatcher import Dispatcher
+from numba.core.errors import NumbaError
 from numba.core.registry import cpu_target
 from numba.core.imputils import lower_constant
 from numba.extending import models, register_model, typeof_impl
@@ -26,8 +30,11 @@ class _Part:
         return getattr(self._library, name)
 
     def add_ir_module(self, module):
-        self.modules.append(module)
-        self._library.add_ir_module(module)
+        read = parse_assembly(str(module))
+        read.name = module.name
+        read.verify()
+        self.modules.append(read)
+        self._library.add_llvm_module(read.clone())
 
     def add_linking_library(self, library):
         self.linked.append(library)
@@ -51,7 +58,18 @@ class _Open:
         for library in part.linked:
             self.library.add_linking_library(library)
         for module in part.modules:
-            self.library.add_ir_module(module)
+            self.library.add_llvm_module(module.clone())
+
+
+class _Compiler(compiler.CompilerBase):
+    """Numba's, with fewer passes."""
+
+    def define_pipelines(self):
+        whole = compiler.DefaultPassBuilder.define_nopython_pipeline(self.state)
+        some = PassManager("text")
+        some.passes.extend(x for x in whole.passes if x[0].__name__ not in _LEFT_OUT)
+        some.finalize()
+        return [some]
 
 
 class _Made(NamedTuple):
@@ -62,6 +80,48 @@ class _Made(NamedTuple):
     part: _Part
 
 
+class _Known(compiler.Flags):
+    """Flags that stay as they are: Numba asks for their hash at each call that it types."""
+
+    __slots__ = ()
+    _HASH = hash(compiler.Flags())
+
+    def __hash__(self):
+        return self._HASH
+
+    def copy(self):
+        return compiler.Flags(self)
+
+
+class TextFlags(compiler.Flags):
+    """Numba's flags for texts: each is compiled with the same copy of them.
+
+    Parameters
+    ----------
+    options
+        Those of ``numba.njit``.
+    counts
+        Whether owners of arrays are counted.
+    """
+
+    __slots__ = ("known",)
+
+    def __init__(self, options, counts):
+        super().__init__()
+        cpu_target.options.parse_as_flags(self, {"nopython": True, **options})
+        self.nrt = counts
+        self.no_compile = self.no_cpython_wrapper = self.no_cfunc_wrapper = True
+        self.known = _Known(self)
+
+    def copy(self):
+        return self.known
+
+
+#: Passes for what texts have not: closures, contexts, lists of literals.
+_LEFT_OUT = {"WithLifting", "InlineClosureLikes", "RewriteDynamicRaises", "InlineInlinables",
+             "MakeFunctionToJitFunction", "FindLiterallyCalls", "LiteralUnroll", "InlineOverloads",
+             "LiteralPropagationSubPipelinePass", "DeadBranchPrune", "RewriteSemanticConstants"}
+_ALLOCATES = {"empty", "zeros", "full", "nonzero", "dot"}
 #: The entries that are being compiled, the innermost last.
 _OPEN: list[_Open] = []
 _numbers = count()
@@ -72,12 +132,14 @@ class Text:
 
     Parameters
     ----------
-    function, options
-        A Python function, and Numba's options.
+    function
+        A Python function.
+    flags
+        Two :class:`TextFlags`, with owners of arrays not counted and counted.
     """
 
-    def __init__(self, function, options):
-        self.function, self.options, self.made = function, options, {}
+    def __init__(self, function, flags):
+        self.function, self.flags, self.made = function, flags, {}
         self.number = next(_numbers)
 
     def of(self, args):
@@ -93,13 +155,25 @@ class Text:
         return self.made[args]
 
     def _lowered(self, args, entry):
-        flags, part, key = compiler.Flags(), _Part(entry.library), object()
-        cpu_target.options.parse_as_flags(flags, {"nopython": True, **self.options})
-        flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
+        """Owners of arrays are counted only where one is allocated, given back or boxed."""
+        names = set(self.function.__code__.co_names)
+        if not (names & _ALLOCATES or any(isinstance(self.function.__globals__.get(x), Dispatcher)
+                                          for x in names)):
+            try:
+                made = self._compiled(args, entry, False)
+                if not isinstance(made.signature.return_type, (types.Array, types.BaseTuple)):
+                    return made
+            except NumbaError:
+                pass  # said again, if it was not for the owners
+        return self._compiled(args, entry, True)
+
+    def _compiled(self, args, entry, counts):
+        part, key = _Part(entry.library), object()
         entry.parts.append(part)
         try:
             made = compiler.compile_extra(cpu_target.typing_context, cpu_target.target_context,
-                                          self.function, args, None, flags, {}, library=part)
+                                          self.function, args, None, self.flags[counts], {},
+                                          library=part, pipeline_class=_Compiler)
         finally:
             entry.parts.pop()
         cpu_target.target_context.insert_user_function(key, made.fndesc)

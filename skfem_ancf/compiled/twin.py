@@ -11,13 +11,14 @@ from numba import cfunc, njit, typeof
 from ..source import column, lanes
 from . import stamp
 from .records import record_type
-from .together import Entry, Text
+from .together import Entry, Text, TextFlags
 from .words import Words
 
 logger = logging.getLogger(__name__)
 
 # no "nnan" and "ninf": a strain that is not finite must be seen
 OPTIONS = {"fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
+_FLAGS = TextFlags(OPTIONS, False), TextFlags(OPTIONS, True)
 #: What reading a cache raises that holds something else.
 _SPOILT = OSError, EOFError, pickle.PickleError, KeyError, ValueError
 
@@ -64,7 +65,7 @@ def named(function, names=None):
 def jit(function, entry=False):
     """Compile a function; ``entry`` as for :func:`twin`."""
     if not entry:
-        return Text(function, OPTIONS)
+        return Text(function, _FLAGS)
     try:
         return njit(cache=True, pipeline_class=Entry, **OPTIONS)(function)
     except RuntimeError as error:  # there is no folder that can be written
