@@ -363,6 +363,15 @@ class BandMatrix:
             lower[k, :self.n - k] = 0.5 * (ab[top + k, :self.n - k] + ab[top - k, k:])
         return out
 
+    def skew_size(self) -> tuple[float, float]:
+        """The largest entries, without sign, of A - A^T and of A."""
+        ab, top = self.ab, self._diagonal
+        size = float(np.max(np.abs(ab[max(top - self.bandwidth, 0):])))
+        if self.symmetric:
+            return 0.0, size
+        return max((float(np.max(np.abs(ab[top + k, :self.n - k] - ab[top - k, k:])))
+                    for k in range(1, min(self.bandwidth + 1, self.n))), default=0.0), size
+
     def tocsc(self) -> csc_matrix:
         """The matrix as a scipy.sparse array in CSC format."""
         k: Array = np.arange(-self.bandwidth, self.bandwidth + 1)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
                         NeoHookean, Scene, StVenantKirchhoff)
@@ -181,3 +182,14 @@ def test_compiled_is_plain(kind, mesh):
             assert any(np.any(x) for x in found[0])
             for a, b in zip(*found):
                 assert np.max(np.abs(a - b)) <= 2e-13 * np.max(np.abs(a))
+
+
+@pytest.mark.parametrize(("n", "bandwidth"), [(1, 0), (3, 4), (9, 2)])
+def test_skew_size_of_a_band_matrix_is_that_of_the_dense_one(n, bandwidth):
+    for symmetric in (True, False):
+        A = BandMatrix(n, bandwidth, symmetric)
+        i, j = np.nonzero(abs(np.arange(n)[:, None] - np.arange(n)) <= bandwidth)
+        A.add(i, j, np.sin(1.0 + np.minimum(i, j) + 7.0 * np.maximum(i, j) + (0.0 if symmetric
+                                                                             else (i > j))))
+        dense = A.tocsc().toarray()
+        assert_allclose(A.skew_size(), (np.max(abs(dense - dense.T)), np.max(abs(dense))))
