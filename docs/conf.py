@@ -1,0 +1,102 @@
+"""How Sphinx makes the pages: make docs."""
+
+import os
+import re
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+
+# pictures are drawn without a display, and scenes computed in NumPy: nothing is timed here
+os.environ.setdefault("SKFEM_ANCF_COMPILED", "0")
+os.environ.setdefault("PYVISTA_OFF_SCREEN", "true")
+
+import pyvista
+import skfem_ancf
+from pyvista.plotting.utilities.sphinx_gallery import DynamicScraper
+
+pyvista.BUILDING_GALLERY = True
+warnings.filterwarnings("error", module="skfem_ancf")
+
+project = "skfem-ancf"
+author = "the skfem-ancf developers"
+project_copyright = "2026, the skfem-ancf developers"
+release = version = skfem_ancf.__version__
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc",
+              "sphinx.ext.mathjax", "sphinx-mathjax-offline", "sphinx_design",
+              "sphinx_gallery.gen_gallery"]
+exclude_patterns = ["generated/verification.md"]  # a part of a page
+myst_enable_extensions = ["dollarmath", "colon_fence"]
+myst_heading_anchors = 3
+mathjax_path = "mathjax/tex-chtml.js"
+
+# the reference: signatures have the types, docstrings the words
+autosummary_generate = True
+autodoc_typehints = "signature"
+autodoc_member_order = "bysource"
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Place", "WhichBeam",
+                                                "WhichMember", "TimeFunction", "StrPath", "Rule")}
+python_use_unqualified_type_names = True
+maximum_signature_line_length = 88
+numpydoc_show_class_members = False
+templates_path = ["templates"]
+
+sphinx_gallery_conf = {
+    "examples_dirs": "../demos",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"\.py$",
+    "ignore_pattern": r"__init__\.py",
+    "image_scrapers": ("matplotlib", DynamicScraper()),
+    "matplotlib_animations": True,
+    "abort_on_example_error": True,
+    "remove_config_comments": True,
+    "min_reported_time": 1e9,
+    "show_memory": False,
+    "show_signature": False,
+    "plot_gallery": "True",
+    "doc_module": ("skfem_ancf",),
+    "backreferences_dir": "generated/examples",
+    "inspect_global_variables": True,
+    "nested_sections": False,
+}
+
+html_theme = "pydata_sphinx_theme"
+html_title = "skfem-ancf"
+html_static_path = ["static"]
+html_css_files = ["pages.css"]
+html_show_sourcelink = False
+html_copy_source = False
+html_sidebars = {"index": [], "tutorial": []}
+html_theme_options = {
+    "logo": {"text": "skfem-ancf"},
+    "navbar_align": "left",
+    "header_links_before_dropdown": 7,
+    "show_toc_level": 2,
+    "show_prev_next": False,
+    "navbar_end": ["theme-switcher"],
+    "footer_start": ["copyright"],
+    "footer_end": ["theme-version"],
+}
+
+
+def links_of_pages(app, docname, source):
+    """Links out of docs/ to what has a page here; of other files only the name is left."""
+    text = source[0].replace("](../CONTRIBUTING.md", "](contributing.md")
+    text = re.sub(r"\]\(\.\./demos/(\w+)\.py\)", r"](gallery/\1.rst)", text)
+    source[0] = re.sub(r"\[[^\]]*\]\(\.\./([^)]*)\)", r"`\1`", text)
+
+
+def verification(app):
+    """The table of verification.md, computed."""
+    subprocess.run([sys.executable, HERE.parent / "benchmarks" / "verification.py", "--out",
+                    HERE / "generated" / "verification.md"], check=True,
+                   stdout=subprocess.DEVNULL)
+
+
+def setup(app):
+    """Called by Sphinx."""
+    app.connect("source-read", links_of_pages)
+    app.connect("builder-inited", verification)
