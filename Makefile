@@ -5,7 +5,8 @@
 # make fuzz    2000 random scenes; mutants: changes of the text that the tests should see
 # make coverage  the tests, with the lines and branches that they run
 # make lint    ruff and mypy, of the versions that pyproject.toml names
-# make docs    reference pages from the docstrings, out/docs, and the pictures of docs/
+# make docs    the pages of docs/, the gallery and the reference, out/docs/index.html
+# make pictures  the pictures of docs/ that README.md and the pages show, anew
 # make dist    sdist and wheel, in out/dist
 # make clean   removes .venv and out
 #
@@ -19,7 +20,7 @@ PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test test-settings lint paper bench stress fuzz mutants coverage docs dist clean
+.PHONY: demo test test-settings lint paper bench stress fuzz mutants coverage docs pictures dist clean
 
 demo: $(VENV)/demo.stamp
 	$(PY) demos/cantilever.py
@@ -80,10 +81,16 @@ mutants: $(VENV)/coverage.stamp
 coverage: $(VENV)/coverage.stamp
 	$(PY) -m pytest -n 2 --cov --cov-report=term-missing:skip-covered --cov-fail-under=95 $(ARGS)
 
+# the scripts of the pages and the examples of the docstrings, the pages with every warning an
+# error, and their links; without a network
 docs: $(VENV)/docs.stamp
+	$(PY) -m pytest -n 2 tests/test_readme.py tests/test_reference.py skfem_ancf
+	$(PY) -m sphinx -W --keep-going -d out/doctrees -b html docs out/docs
+	$(PY) docs/check_links.py out/docs
+	@echo "open $(CURDIR)/out/docs/index.html"
+
+pictures: $(VENV)/test.stamp
 	$(PY) docs/pictures.py
-	$(PY) -m pdoc --docformat numpy --output-directory out/docs skfem_ancf '!skfem_ancf.compiled'
-	@echo "open out/docs/index.html; the guides are docs/*.md"
 
 dist: $(VENV)/dist.stamp
 	$(PY) -m build --outdir out/dist

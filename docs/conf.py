@@ -85,8 +85,16 @@ html_theme_options = {
 def links_of_pages(app, docname, source):
     """Links out of docs/ to what has a page here; of other files only the name is left."""
     text = source[0].replace("](../CONTRIBUTING.md", "](contributing.md")
-    text = re.sub(r"\]\(\.\./demos/(\w+)\.py\)", r"](gallery/\1.rst)", text)
+    text = re.sub(r"\]\((?:\.\./)?demos/(\w+)\.py\)", r"](gallery/\1.rst)", text)
     source[0] = re.sub(r"\[[^\]]*\]\(\.\./([^)]*)\)", r"`\1`", text)
+
+
+def links_of_parts(app, path, docname, content):
+    """The same for README.md, CONTRIBUTING.md and CHANGELOG.md, which lie above docs/."""
+    if path.suffix == ".md":
+        text = content[0].replace("](docs/", "](").replace("](CONTRIBUTING.md", "](contributing.md")
+        content[0] = text
+        links_of_pages(app, docname, content)
 
 
 def verification(app):
@@ -99,4 +107,5 @@ def verification(app):
 def setup(app):
     """Called by Sphinx."""
     app.connect("source-read", links_of_pages)
+    app.connect("include-read", links_of_parts)
     app.connect("builder-inited", verification)

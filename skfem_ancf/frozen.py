@@ -33,6 +33,13 @@ class _Sealing(type):
         made._seal()
         return made
 
+    @property
+    def __signature__(cls) -> inspect.Signature:
+        """The arguments of the constructor, for ``help``: not those of ``__call__``."""
+        arguments = inspect.signature(cls.__init__)  # type: ignore[misc]
+        return arguments.replace(parameters=list(arguments.parameters.values())[1:],
+                                 return_annotation=inspect.Signature.empty)
+
 
 class Sealable:
     """Base class of objects whose public attributes do not change once they are sealed."""

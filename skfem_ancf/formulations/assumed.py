@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 class Assumed(Formulation):
     """Strain components sampled along the axis where the interpolation can make them vanish.
 
-    A cubic axis cannot keep |r_X| constant while it bends, and sections that turn linearly get
+    A cubic axis cannot keep ``|r_X|`` constant while it bends, and sections that turn linearly get
     thinner between two nodes that have turned. Sampled where the interpolation can vanish, and
     interpolated between, neither is seen, and the error of a mesh does not grow with the
     slenderness. The element says where, in :attr:`~skfem_ancf.elements.ElementBeam.sampling`:

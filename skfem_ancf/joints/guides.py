@@ -59,7 +59,7 @@ class OnLine(Joint):
 
 @teaching
 class OnCircle(Joint):
-    """(|r - c|^2 - R^2) / (2 R) = 0: a material point slides on a circle.
+    """``(|r - c|^2 - R^2) / (2 R) = 0``: a material point slides on a circle.
 
     Parameters
     ----------
