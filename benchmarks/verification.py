@@ -274,7 +274,9 @@ def table(rows):
     lines = ["| case | asked | reference | " + " | ".join(names) + " | source |",
              "|---|---|---|" + "---|" * len(names) + "---|"]
     for row in rows:
-        errors = [f"{row.errors[n]:+.1e}" if n in row.errors else "-" for n in names]
+        # a hyphen at which no line is broken
+        errors = [f"{row.errors[n]:+.1e}".replace("e-", "e\u2011") if n in row.errors else "-"
+                  for n in names]
         source = row.case.source
         if "doi:" in source:
             text, doi = source.split("doi:")

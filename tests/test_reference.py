@@ -65,8 +65,8 @@ def test_what_public_methods_return_is_in_the_reference():
             value = inspect.unwrap(getattr(value, "__func__", value))
             if name.startswith("_") or not inspect.isfunction(value):
                 continue
-            for word in re.findall(r"\w+", str(value.__annotations__.get("return", ""))):
-                if word in classes and not word.startswith("_") and word not in MACHINERY:
-                    if not any(classes[word] is other for other in listed):
-                        missing.add(f"{word}, of {value.__qualname__}")
+            returned = re.findall(r"\w+", str(value.__annotations__.get("return", "")))
+            missing |= {f"{word}, of {value.__qualname__}" for word in returned
+                        if word in classes and not word.startswith("_") and word not in MACHINERY
+                        and not any(classes[word] is other for other in listed)}
     assert not missing
