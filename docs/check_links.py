@@ -1,4 +1,4 @@
-"""Links of built pages to each other, anchors and pictures too: python docs/check_links.py FOLDER."""
+"""Links of built pages to each other, anchors too: python docs/check_links.py FOLDER."""
 
 import sys
 from html.parser import HTMLParser

@@ -83,8 +83,12 @@ html_theme_options = {
 
 
 def links_of_pages(app, docname, source):
-    """Links out of docs/ to what has a page here; of other files only the name is left."""
-    text = source[0].replace("](../CONTRIBUTING.md", "](contributing.md")
+    """Links out of docs/ to what has a page here; of other files only the name is left.
+
+    A link whose text is the name of the file shows the title of the page.
+    """
+    text = re.sub(r"\[(?:docs/)?([\w-]+\.md)\]\((?=\1)", "[](", source[0])
+    text = text.replace("](../CONTRIBUTING.md", "](contributing.md")
     text = re.sub(r"\]\((?:\.\./)?demos/(\w+)\.py\)", r"](gallery/\1.rst)", text)
     source[0] = re.sub(r"\[[^\]]*\]\(\.\./([^)]*)\)", r"`\1`", text)
 
