@@ -9,6 +9,7 @@ from .elements import (ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
 from .errors import (AncfError, CallbackError, CallError, ConvergenceError, FileError, InputError,
                      MeshError, MissingExtra, ModelWarning, NameUnknown, StabilityWarning,
                      SupportError)
+from .frame import Frame
 from .materials import NeoHookean, StVenantKirchhoff
 from .mesh import MeshBeam
 from .obstacles import Circle, Line, Polygon, SignedDistance
@@ -21,7 +22,7 @@ __version__ = "0.1.0"
 __all__ = [
     "HHT", "AncfError", "Beam", "CallError", "CallbackError", "Circle", "ConvergenceError",
     "ElementBeamANCF", "ElementBeamANCFCubic", "ElementBeamCable", "ElementBeamPatelShabana",
-    "EnergyMomentum", "FileError", "GeneralizedAlpha", "InputError", "KelvinVoigt", "Line",
+    "EnergyMomentum", "FileError", "Frame", "GeneralizedAlpha", "InputError", "KelvinVoigt", "Line",
     "MeshBeam", "MeshError", "MissingExtra", "ModelWarning", "NameUnknown", "NeoHookean", "Newmark",
     "Polygon", "RigidBody", "Scene", "Section", "SignedDistance",
     "StVenantKirchhoff", "StabilityWarning", "SupportError", "forms", "reference_coordinates",

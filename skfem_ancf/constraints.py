@@ -10,6 +10,7 @@ from scipy import sparse
 
 from .errors import SupportError, shown
 from .joints.base import Joint, same_joint
+from .joints.nodes import Nodes, chain_ends
 from .rank import first_dependent, null_space, unit_rows
 from .rigid import RigidBody
 
@@ -346,7 +347,7 @@ class Constraints:
 
     def require_independent_joints(self) -> None:
         """Raise SupportError if joints repeat or contradict each other or the supports."""
-        if not self.joints:
+        if not self.joints or self.condensable:
             return
         zero = np.zeros(self.N)
         found = first_dependent(self.sparse_jacobian(zero, 0.0), self.free,
@@ -398,42 +399,67 @@ class Constraints:
     @property
     def bordered(self) -> bool:
         """True if the multipliers are few enough for a border about the band matrix."""
-        return self.m + len(self.springs) <= WIDE_BORDER
+        return self.frame is None and self.m + len(self.springs) <= WIDE_BORDER
+
+    @cached_property
+    def frame(self) -> Nodes | None:
+        """The joint of the nodes of a frame, or None."""
+        return next((joint for joint in self.joints if isinstance(joint, Nodes)), None)
+
+    @property
+    def condensable(self) -> bool:
+        """True if nothing holds but the nodes of a frame."""
+        return self.frame is not None and len(self.joints) == 1 and not len(self.fixed)
 
     def free_rigid_motions(self) -> list[str]:
         """Descriptions of the rigid motions that nothing holds, one string each."""
-        if all(self._standing):
+        if self.frame is None and all(self._standing):
             return []
-        sizes = [member.size for member in self.members]
-        values = np.concatenate([member.rigid_motions() / [1.0, 1.0, size]
-                                 for member, size in zip(self.members, sizes)])
-        of_member = np.repeat(np.arange(len(sizes)), [b.N for b in self.members])
-        motions = sparse.csr_array(
-            (values.ravel(), (3 * of_member[:, None] + np.arange(3)).ravel(),
-             3 * np.arange(self.N + 1)), shape=(self.N, 3 * len(sizes)))
+        motions, joints, bodies = self._motions()
         pushed = self._stiffness() @ motions
         size = abs(pushed).max(axis=1).toarray().ravel() if pushed.nnz else np.zeros(self.N)
-        held = sparse.vstack([motions[self.fixed],
-                              self.sparse_jacobian(np.zeros(self.N), 0.0) @ motions,
+        held = sparse.vstack([motions[self.fixed], joints,
                               pushed[size > 1e-9 * size.max(initial=0.0)]])
-        return [self._describe(v, sizes) for v in null_space(unit_rows(held))]
+        return [_describe(v, bodies) for v in null_space(unit_rows(held))]
 
-    def _describe(self, v, sizes):
-        parts = []
-        for k, beam in enumerate(self.members):
-            a, b, c = v[3 * k:3 * k + 3]
-            who = self._who(k)
-            if max(abs(a), abs(b), abs(c)) < 1e-8:
-                continue
-            if abs(c) < 1e-8:
-                d = np.round(np.array([a, b]) / np.hypot(a, b), 8)
-                d = (d if d[np.argmax(np.abs(d))] > 0 else -d) + 0.0  # no -0
-                parts.append(f"translation along ({d[0]:.3g}, {d[1]:.3g}){who}")
-            else:
-                x = beam.origin + np.array([-b, a]) * sizes[k] / c
-                x = np.where(np.abs(x) < 1e-9 * sizes[k], 0.0, x)
-                parts.append(f"rotation about ({x[0]:.4g}, {x[1]:.4g}){who}")
-        return " with ".join(parts)
+    def _motions(self):
+        """Rigid motions of the bodies, those that joints hold, and (who, origin, size) of each.
+
+        Bodies are beams and rigid bodies, of a frame the parts whose lines are joined rigidly. The
+        columns of a body are two translations and the rotation, in units of its size.
+        """
+        values = np.concatenate([member.rigid_motions() for member in self.members])
+        sizes = [member.size for member in self.members]
+        numbers = [member.N for member in self.members]
+        joints = self.sparse_jacobian(np.zeros(self.N), 0.0)
+        if self.frame is None:
+            bodies = [(self._who(k), b.origin, b.size) for k, b in enumerate(self.members)]
+            of_body = np.repeat(np.arange(len(bodies)), numbers)
+        else:
+            origin, size, parts = self.members[0].origin, self.size, self.frame.parts()
+            shift = np.repeat([member.origin - origin for member in self.members], numbers, axis=0)
+            values[:, 2] += shift[:, 0] * values[:, 1] - shift[:, 1] * values[:, 0]
+            of_body, first = np.zeros(self.N, dtype=int), 0
+            for beam, s in zip(self.members, self.slices):
+                if isinstance(beam, RigidBody):
+                    continue
+                ends = chain_ends(beam)
+                number = np.repeat(parts[first:first + len(ends)], ends[:, 1] - ends[:, 0] + 1)
+                of_body[s], first = np.repeat(number, beam.nd), first + len(ends)
+            who = self.frame.describe(parts)
+            # rigid bodies beside the frame move on their own
+            extra = [k for k, member in enumerate(self.members) if isinstance(member, RigidBody)]
+            for n, k in enumerate(extra):
+                of_body[self.slices[k]] = len(who) + n
+            bodies = [(name, origin, size) for name in [*who, *map(self._who, extra)]]
+            sizes = [size] * len(self.members)
+        values /= np.stack([np.ones(self.N), np.ones(self.N), np.repeat(sizes, numbers)], axis=1)
+        motions = sparse.csr_array((values.ravel(), (3 * of_body[:, None] + np.arange(3)).ravel(),
+                                    3 * np.arange(self.N + 1)), shape=(self.N, 3 * len(bodies)))
+        if self.frame is None:
+            return motions, joints @ motions, bodies
+        held = self.frame.held_motions(parts, origin, size, len(bodies))
+        return motions, sparse.vstack([held, joints[len(self.frame.equations):] @ motions]), bodies
 
     def require_supports(self) -> None:
         """Raise SupportError if a rigid motion is free, or joints are not independent."""
@@ -447,6 +473,24 @@ class Constraints:
                 + ". Add a support, for example scene.clamp('left'), or solve in time with "
                 "scene.integrate")
         self._supported = True
+
+
+def _describe(v, bodies):
+    """A rigid motion of bodies (who, origin, size) in words."""
+    parts = []
+    for k, (who, origin, size) in enumerate(bodies):
+        a, b, c = v[3 * k:3 * k + 3]
+        if max(abs(a), abs(b), abs(c)) < 1e-8:
+            continue
+        if abs(c) < 1e-8:
+            d = np.round(np.array([a, b]) / np.hypot(a, b), 8)
+            d = (d if d[np.argmax(np.abs(d))] > 0 else -d) + 0.0  # no -0
+            parts.append(f"translation along ({d[0]:.3g}, {d[1]:.3g}){who}")
+        else:
+            x = origin + np.array([-b, a]) * size / c
+            x = np.where(np.abs(x) < 1e-9 * size, 0.0, x)
+            parts.append(f"rotation about ({x[0]:.4g}, {x[1]:.4g}){who}")
+    return " with ".join(parts)
 
 
 def _fixes(joint, zero):

@@ -212,18 +212,12 @@ class Tables:
     def _joints(self):
         s, none = self.system, np.zeros(0)
         second, first, at = [[none] * 4], [[none] * 2], 0
-        zero, probe = np.zeros(s.N), np.zeros(1)
         for joint in s.joints:
-            rows = np.arange(at, at + len(joint.equations))
-            for row, unit in zip(rows, np.eye(len(rows))):
-                found = joint.curvature(zero, 0.0, unit)
-                if found is not None:
-                    i, j, v = (np.asarray(x) for x in found)
-                    keep = v != 0
-                    second.append((np.full(keep.sum(), row), i[keep], j[keep], v[keep]))
-            columns = joint.slope(probe, s.N)[0]
-            first.append((np.repeat(rows, len(columns)), np.tile(columns, len(rows))))
-            at += len(rows)
+            k, *entries = joint.second_entries(s.N)
+            second.append([at + k, *entries])
+            rows, columns, _ = joint.slope_entries(np.zeros(1), s.N)
+            first.append([at + rows, columns])
+            at += len(joint.equations)
         k, i, j, v = (np.concatenate(x) for x in zip(*second))
         gk, gi = (np.concatenate(x) for x in zip(*first))
         tables = JointTables(*(x.astype(np.int64) for x in (k, i, j)), v.astype(float),
@@ -259,7 +253,7 @@ class Tables:
         if not s.joints:
             return np.zeros((len(times), 0))
         return np.hstack([np.zeros((len(times), 0))] + [
-            j.slope(times, s.N)[1].reshape(len(times), -1) for j in s.joints])
+            j.slope_entries(times, s.N)[2] for j in s.joints])
 
     def _border(self, joints):
         s, none = self.system, np.zeros(0, dtype=np.int64)

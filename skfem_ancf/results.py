@@ -549,7 +549,8 @@ class State(Frozen):
         Parameters
         ----------
         boundary
-            A boundary name, or anything else scikit-fem takes for facets.
+            A boundary name, or anything else scikit-fem takes for facets; of a frame nodes, see
+            :meth:`Frame.nodes <skfem_ancf.frame.Frame.nodes>`.
         beam
             The beam, its name or its number, in a scene of several.
 
@@ -557,6 +558,10 @@ class State(Frozen):
         -------
         Reaction
         """
+        frame = self.system.constraints.frame
+        if frame is not None and beam is None:
+            multipliers = self.multipliers[:len(frame.equations)]
+            return Reaction(*frame.reaction(boundary, self.u, multipliers))
         member: Any = select_member(self.beams, self.system.bodies, beam)
         s = self.system.of(member)
         total = np.where(self.system.free, 0.0, self._support_force())

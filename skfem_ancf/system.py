@@ -13,6 +13,7 @@ from scipy.sparse.linalg import splu
 from . import eigen
 from .bordered import BorderedMatrix, border, border_negative, columns_product
 from .checks import Screen
+from .condensed import Condensed
 from .constraints import Constraints
 from .damping import Damping
 from .errors import InputError
@@ -20,7 +21,7 @@ from .evaluation import CARRY, FORCE, MEAN, TANGENT, VISCOUS, evaluate
 from .forces.system import Forces
 from .forces.texts import add_resisting_force
 from .joints.director import UnitDirector
-from .linalg import INACCURATE, BandMatrix, dense
+from .linalg import INACCURATE, BandMatrix, Inertia, dense
 from .machine import Machine
 from .pickling import functions_of, require_picklable
 from .points import Points
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from .beam import Beam
     from .forces.base import ForceElement
     from .joints.base import Joint
-    from .linalg import Inertia
     from .loads import Load
     from .rigid import RigidBody
     from .types import Array
@@ -632,6 +632,9 @@ class System:
         if not self.coupled:
             self.K.factorize()
             return
+        if self.condensed is not None:
+            self.condensed.factorize(self.K, u, multipliers)
+            return
         if u is not None:
             self._assembled = np.array(u), float(t)
         self._J = self.jacobian(u, t)
@@ -642,6 +645,15 @@ class System:
             self._factors = BorderedMatrix(self.K, self._J, i, j, v, self.springs, self.loose)
         else:
             self._sparse = self._sparse_factors(self._whole())
+
+    @cached_property
+    def condensed(self) -> Condensed | None:
+        """What condenses a frame to its nodes; None of other scenes, and where more is coupled."""
+        frame = self.constraints.frame
+        if (frame is None or not self.constraints.condensable or not self.symmetric
+                or self.forces.far or self.bodies):
+            return None
+        return Condensed(self.beams, self.slices, frame)
 
     @property
     def coupled(self) -> bool:
@@ -688,6 +700,8 @@ class System:
         if not self.coupled:
             K = self.K if self.symmetric else self.K.symmetric_part()
             return K.inertia()
+        if self.condensed is not None:
+            return self.condensed.inertia()
         if self.bordered:
             return self._factors.inertia()
         K = self._reduced()
@@ -704,6 +718,8 @@ class System:
             The solution: shape (N,), time, shape (m,).
         """
         K = self.K
+        if self.condensed is not None:
+            return self.condensed.inertia() == Inertia(0, False)
         if (not K.definite or self.forces.far or self.bodies
                 or (self.joints and not self.bordered)):
             return False
@@ -723,6 +739,8 @@ class System:
         """
         if not self.coupled:
             return self.K.determinant_sign()
+        if self.condensed is not None:
+            return -1 if self.condensed.inertia().negative % 2 else 1
         if self.bordered:
             return self._factors.determinant_sign()
         return determinant_sign(self._reduced())
@@ -761,6 +779,8 @@ class System:
         if not self.coupled:
             return self.K.solve(b), _NONE
         phi = _NONE if phi is None else phi
+        if self.condensed is not None:
+            return self.condensed.solve(b, phi)
         if self._sparse is None:
             x, multipliers, error = self._factors.solve(b, phi)
             if error < INACCURATE:

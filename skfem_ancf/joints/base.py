@@ -300,6 +300,50 @@ class Joint(Sealable):
         np.add.at(J, (rows, where), values)
         return columns, np.broadcast_to(J, (len(times),) + J.shape)
 
+    def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
+        """As :meth:`slope`, by its entries; a joint of many equations overrides it.
+
+        Parameters
+        ----------
+        times
+            Times, shape (n,).
+        N
+            Number of the scene's coordinates.
+
+        Returns
+        -------
+        rows, columns, values
+            Shapes (k,), (k,) and (n, k).
+        """
+        columns, values = self.slope(times, N)
+        m = len(self.equations)
+        return (np.repeat(np.arange(m), len(columns)), np.tile(columns, m),
+                values.reshape(len(times), m * len(columns)))
+
+    def second_entries(self, N: int) -> tuple[Array, Array, Array, Array]:
+        """The second derivatives of Phi in the stress-free state, equation by equation.
+
+        Parameters
+        ----------
+        N
+            Number of the scene's coordinates.
+
+        Returns
+        -------
+        equations, rows, columns, values
+            Shapes (k,).
+        """
+        zero, none = np.zeros(N), np.zeros(0, dtype=int)
+        out: list[Any] = [(none, none, none, np.zeros(0))]
+        for row, unit in enumerate(np.eye(len(self.equations))):
+            found = self.curvature(zero, 0.0, unit)
+            if found is not None:
+                i, j, v = (np.asarray(x) for x in found)
+                keep = v != 0
+                out.append((np.full(keep.sum(), row), i[keep], j[keep], v[keep]))
+        k, i, j, v = (np.concatenate(x) for x in zip(*out))
+        return k, i, j, v
+
     def __repr__(self) -> str:
         at = getattr(self, "at", None)
         if isinstance(at, tuple) and len(at) > 1 and all(x is at[0] for x in at):  # given once

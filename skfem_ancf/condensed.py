@@ -1,0 +1,449 @@
+"""The linear systems of a frame: members are condensed to their ends, those to the nodes.
+
+An end has the coordinates of its node, x, y and the rotation of the section, and private ones: the
+stretch of the section's direction, and what an element has besides. In the frame of its direction
+the first three are those of the node, up to what the equations of the node are open by. So no
+multiplier is unknown: they are the forces left at the ends.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from .joints.nodes import chain_ends
+from .linalg import Inertia
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .beam import Beam
+    from .joints.nodes import Nodes
+    from .linalg import BandMatrix
+    from .types import Array
+
+#: A pivot that small beside the diagonal is round-off.
+LOST = 1e-13
+
+
+class Group(NamedTuple):
+    """Chains of one beam with equally many elements.
+
+    Attributes
+    ----------
+    members
+        Their numbers among the chains of all beams, shape (M,).
+    first
+        First coordinate of each, shape (M,).
+    nd, elements
+        Coordinates of a node, elements of a chain.
+    """
+
+    members: Array
+    first: Array
+    nd: int
+    elements: int
+
+    @property
+    def ends(self) -> Array:
+        """Numbers of the starts and the ends of the chains, shape (2, M)."""
+        return 2 * self.members + np.array([[0], [1]])
+
+    @property
+    def places(self) -> Array:
+        """Numbers of the coordinates of each chain, shape (M, (elements + 1) nd)."""
+        return self.first[:, None] + np.arange((self.elements + 1) * self.nd)
+
+    def coordinates(self, u: Array) -> Array:
+        """The coordinates (M, elements + 1, nd) of a vector (N,)."""
+        return u[self.places].reshape(len(self.first), self.elements + 1, self.nd)
+
+
+def groups_of(beams: Sequence[Beam], slices: Sequence[slice]) -> list[Group]:
+    """The chains of all beams in groups.
+
+    Parameters
+    ----------
+    beams, slices
+        The beams, and the coordinates of each.
+    """
+    out, number = [], 0
+    for beam, s in zip(beams, slices):
+        first, last = chain_ends(beam).T
+        for n in np.unique(last - first):
+            some = np.flatnonzero(last - first == n)
+            out.append(Group(number + some, s.start + beam.nd * first[some], beam.nd, int(n)))
+        number += len(first)
+    return out
+
+
+class Condensed:
+    """Factors of ``[K + sum l H, J^T; J, 0]`` of a frame.
+
+    Parameters
+    ----------
+    beams, slices
+        The beams, and the coordinates of each.
+    nodes
+        What joins them, a :class:`~skfem_ancf.joints.nodes.Nodes`, bound.
+    """
+
+    def __init__(self, beams: Sequence[Beam], slices: Sequence[slice], nodes: Nodes) -> None:
+        self.nodes, self.groups = nodes, groups_of(beams, slices)
+        self._bases = [[_Basis(nodes, group, ends) for ends in group.ends] for group in self.groups]
+        number = np.cumsum(self._unknown()).reshape(-1, 3) - 1
+        self.size = int(number.max(initial=-1)) + 1
+        #: unknown of each end's x, y and rotation; one behind the last where there is none
+        self._unknowns = np.where(self._unknown(), number, self.size)[nodes.nodes]
+        self._unknowns[nodes.hinged, 2] = self.size
+        self._own = nodes.hinged.reshape(-1, 2)
+        self._order: Array | None = None
+        self._make_pattern()
+
+    def _unknown(self):
+        """Whether x, y and the rotation of a node are unknown, (number, 3)."""
+        out = ~self.nodes.held
+        rigid = np.zeros(len(out), dtype=bool)
+        rigid[self.nodes.nodes[~self.nodes.hinged]] = True
+        out[:, 2] &= rigid
+        return out
+
+    def _make_pattern(self):
+        """Where the entries of the members go in the matrix of the nodes."""
+        at, n = self._unknowns.reshape(-1, 6), self.size
+        i = np.broadcast_to(at[:, :, None], (len(at), 6, 6)).ravel()
+        j = np.broadcast_to(at[:, None], (len(at), 6, 6)).ravel()
+        self._inside = np.flatnonzero((i < n) & (j < n))
+        key = j[self._inside].astype(np.int64) * n + i[self._inside]
+        found, self._place = np.unique(key, return_inverse=True)
+        self._indices = (found % n).astype(np.int32)
+        self._indptr = np.searchsorted(found, n * np.arange(n + 1)).astype(np.int32)
+
+    # factors
+
+    def factorize(self, K: BandMatrix, u: Array, multipliers: Array) -> None:
+        """Factorise a tangent.
+
+        Parameters
+        ----------
+        K
+            That of the beams, symmetric and not yet factorised.
+        u, multipliers
+            Where the joints are linearised, shapes (N,) and (m,).
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError, RuntimeError
+            If the matrix is singular.
+        """
+        self._turns = self.nodes.turns(u)
+        moments = self._moments(multipliers)
+        self._parts = [_Part(group, K, bases, self._turns, moments)
+                       for group, bases in zip(self.groups, self._bases)]
+        S = np.empty((len(self._own), 6, 6))
+        for part in self._parts:
+            S[part.group.members] = part.ends
+        sides = [(np.flatnonzero(own), k) for own, k in zip(self._own.T, (2, 5))]
+        self._released = [_Release(S, members, k) for members, k in sides if len(members)]
+        self._ends, self._nodes = S, self._factors(S)
+
+    def _moments(self, multipliers):
+        """How rotation and stretch of each end are coupled by the multipliers of the rotations."""
+        out = np.zeros(len(self._turns))
+        follower, leader, scale = self._pairs()
+        value = self.nodes.split(multipliers)[1] * scale
+        np.add.at(out, leader, -value)
+        out[follower] += value
+        return out
+
+    def _pairs(self):
+        """Ends that follow a rotation, those that lead them, and the scale of their equation."""
+        s = self.nodes.turned
+        m = self.nodes.leader[s]
+        return s, m, (np.conj(self._turns[s]) * self._turns[m]).real
+
+    def _factors(self, ends):
+        """Sparse factors of the matrix of the nodes, and the numbers of its unknowns."""
+        at, n = self._unknowns, self.size
+        if not n:
+            return at, np.zeros(0), None
+        values = np.bincount(self._place, ends.ravel()[self._inside], len(self._indices))
+        A = sparse.csc_array((values, self._indices, self._indptr), (n, n))
+        lu = splu(A, "MMD_AT_PLUS_A" if self._order is None else "NATURAL", diag_pivot_thresh=0.0,
+                  options={"SymmetricMode": True})
+        if not np.array_equal(lu.perm_r, lu.perm_c):
+            raise np.linalg.LinAlgError("a pivot of the nodes is zero")
+        if self._order is None:  # number them anew: the next factors need no ordering
+            self._order = lu.perm_c
+            self._unknowns = np.append(self._order, n)[at]
+            self._make_pattern()
+        return at, lu.U.diagonal()[lu.perm_c] / np.abs(A.diagonal()), lu
+
+    def inertia(self) -> Inertia:
+        """Signs of the eigenvalues of the tangent on the tangent space of the joints."""
+        found = [part.inertia() for part in self._parts]
+        negative, singular = sum(x.negative for x in found), any(x.singular for x in found)
+        for ratio in [self._nodes[1], *(np.sign(x.pivot) for x in self._released)]:
+            negative += int(np.sum(ratio < 0.0))
+            singular = singular or bool(np.any(np.abs(ratio) < LOST))
+        return Inertia(negative, singular)
+
+    # solution
+
+    def solve(self, b: Array, phi: Array) -> tuple[Array, Array]:
+        """Solve with the factors.
+
+        Parameters
+        ----------
+        b, phi
+            Forces (N,), and what the equations of the nodes should change by, (m,).
+
+        Returns
+        -------
+        x, multipliers
+            Shapes (N,) and (m,).
+        """
+        at, _, lu = self._nodes
+        v, x = self._offsets(phi).reshape(-1, 6), np.zeros(len(b))
+        f = np.empty(v.shape)
+        for part in self._parts:
+            f[part.group.members] = part.reduce(b)
+        for turned in self._released:
+            turned.reduce(f)
+        if lu is not None:
+            left = f - (self._ends @ v[..., None])[..., 0]
+            nodes = np.bincount(at.ravel(), left.ravel(), self.size + 1)
+            nodes[:-1] = lu.solve(nodes[:-1])
+            nodes[-1] = 0.0
+            v += nodes[at].reshape(-1, 6)
+        forces = (f - (self._ends @ v[..., None])[..., 0]).reshape(-1, 3)
+        forces[self.nodes.hinged, 2] = 0.0
+        for turned in reversed(self._released):
+            turned.expand(f, v)
+        for part in self._parts:
+            part.expand(v[part.group.members], x)
+        return x, self._multipliers(forces)
+
+    def _offsets(self, phi):
+        """By how much ends move apart from the unknowns of their nodes, (ends, 3)."""
+        nodes, out = self.nodes, np.zeros((len(self._turns), 3))
+        forces, moments, x, y, angle = nodes.split(phi)
+        out[nodes.held_x, 0], out[nodes.held_y, 1] = x, y
+        out[nodes.held_angle, 2] = angle / self._turns[nodes.held_angle].real
+        follower, leader, scale = self._pairs()
+        out[nodes.followers, :2] = out[nodes.leader[nodes.followers], :2] - forces
+        out[follower, 2] = out[leader, 2] - moments / scale
+        return out
+
+    def _multipliers(self, forces):
+        """Those that leave the forces (ends, 3) at the ends."""
+        nodes = self.nodes
+        number = len(nodes.held)
+        total = np.stack([np.bincount(nodes.nodes, f, number) for f in forces.T], axis=1)
+        follower, _, scale = self._pairs()
+        held = nodes.held_x, nodes.held_y, nodes.held_angle
+        x, y, angle = (total[nodes.nodes[ends], k] for k, ends in enumerate(held))
+        return np.concatenate([
+            *(0.0 - forces[nodes.followers, :2].T), -forces[follower, 2] / scale, x, y,
+            angle / self._turns[nodes.held_angle].real])
+
+
+class _Release:
+    """Rotations of hinged ends, coordinate k of the six of a member: they are the member's own.
+
+    Parameters
+    ----------
+    S
+        Matrices (members, 6, 6); changed.
+    members
+        Numbers of those that are hinged there, shape (k,).
+    k
+        2 at the start, 5 at the end.
+    """
+
+    def __init__(self, S: Array, members: Array, k: int) -> None:
+        self.members, self.k = members, k
+        some = S[members]
+        self.row, self.pivot = some[:, k].copy(), some[:, k, k].copy()
+        if not np.all(self.pivot):
+            raise np.linalg.LinAlgError("a hinged end has no stiffness")
+        some -= self.row[:, :, None] * (self.row / self.pivot[:, None])[:, None]
+        some[:, k] = some[:, :, k] = 0.0
+        S[members] = some
+
+    def reduce(self, f: Array) -> None:
+        """Eliminate them from forces (members, 6); in their place is what is known of them."""
+        own = f[self.members, self.k] / self.pivot
+        f[self.members] -= self.row * own[:, None]
+        f[self.members, self.k] = own
+
+    def expand(self, f: Array, v: Array) -> None:
+        """Find them, zero in v (members, 6), from what :meth:`reduce` left in f."""
+        v[self.members, self.k] = (f[self.members, self.k]
+                                   - np.sum(self.row * v[self.members], axis=1) / self.pivot)
+
+
+class _Basis:
+    """Unknowns of the ends of a group's members on one side.
+
+    Displacements along x and y, the rotation of the section with all that gives its direction, the
+    stretches of that along itself, and what is left.
+
+    Parameters
+    ----------
+    nodes
+        The :class:`~skfem_ancf.joints.nodes.Nodes`.
+    group, ends
+        The members, and the numbers of these ends, shape (M,).
+    """
+
+    def __init__(self, nodes: Nodes, group: Group, ends: Array) -> None:
+        at = nodes.directions[0, ends] - nodes.positions[ends, :1]
+        places, first = np.unique(at[0], return_index=True)
+        self._c, self._ends, self._start = nodes.weights[ends][:, first], ends, nodes.start[ends]
+        self._at, n, nd = places, len(places), group.nd
+        self._size = np.sum(self._c**2, axis=1)
+        # directions in which the weighted sum does not change
+        self._others = np.linalg.qr(self._c[:, :, None], mode="complete")[0][:, :, 1:]
+        self._template = np.zeros((len(ends), nd, nd))
+        self._template[:, 0, 0] = self._template[:, 1, 1] = 1.0
+        used = np.concatenate([[0, 1], places, places + 1])
+        self._template[:, np.setdiff1d(np.arange(nd), used), 2 + 2 * n:] = np.eye(nd - 2 - 2 * n)
+
+    def __call__(self, turns: Array) -> Array:
+        """Displacements of the coordinates for these unknowns, shape (M, nd, nd)."""
+        d = turns[self._ends] * self._start
+        self._length, n, x = np.abs(d), len(self._at), self._at
+        along, out = d / self._length, self._template.copy()
+        turn = (1j * d / self._size)[:, None] * self._c
+        out[:, x, 2], out[:, x + 1, 2] = turn.real, turn.imag
+        for k in range(n):
+            out[:, x[k], 3 + k], out[:, x[k] + 1, 3 + k] = along.real, along.imag
+        across = (1j * along)[:, None, None] * self._others
+        out[:, x, 3 + n:2 + 2 * n], out[:, x + 1, 3 + n:2 + 2 * n] = across.real, across.imag
+        return out
+
+    def add_curvature(self, moments: Array, K: Array) -> None:
+        """Add what multipliers do to rotation and stretch to matrices (M, nd, nd)."""
+        coupling = (moments[self._ends] / self._length)[:, None] * self._c
+        n = len(self._at)
+        K[:, 2, 3:3 + n] += coupling
+        K[:, 3:3 + n, 2] += coupling
+
+
+class _Part:
+    """A group's members with their inner coordinates eliminated.
+
+    Parameters
+    ----------
+    group
+        The :class:`Group`.
+    K
+        Tangent of all beams.
+    bases
+        The :class:`_Basis` of both sides.
+    turns, moments
+        Of all ends, as the bases take them, shape (ends,).
+
+    Attributes
+    ----------
+    ends
+        What is left, shape (M, 6, 6).
+    """
+
+    def __init__(self, group: Group, K: BandMatrix, bases: Sequence[_Basis], turns: Array,
+                 moments: Array) -> None:
+        self.group, self._T = group, [basis(turns) for basis in bases]
+        D, C = _blocks(K, group)
+        nd, n = group.nd, group.elements
+        first, to_first, last = D[:, 0], C[:, 0], D[:, 1]
+        #: inner nodes: matrix, its inverse, that by the displacements of the start and the next one
+        self._inner: list[tuple[Array, Array, Array]] = []
+        for k in range(1, n):
+            A, inverse = last, np.linalg.inv(last)
+            X = inverse @ np.concatenate([to_first, C[:, k].transpose(0, 2, 1)], axis=2)
+            self._inner.append((A, inverse, X))
+            first = first - to_first.transpose(0, 2, 1) @ X[:, :, :nd]
+            last = D[:, k + 1] - C[:, k] @ X[:, :, nd:]
+            to_first = -C[:, k] @ X[:, :, :nd]
+        S = self._T[0], self._T[1]
+        both = np.empty((len(D), 2 * nd, 2 * nd))
+        both[:, :nd, :nd] = _between(S[0], first, S[0])
+        both[:, nd:, nd:] = _between(S[1], last, S[1])
+        both[:, nd:, :nd] = _between(S[1], to_first, S[0])
+        both[:, :nd, nd:] = both[:, nd:, :nd].transpose(0, 2, 1)
+        for side, basis in zip((slice(nd), slice(nd, None)), bases):
+            basis.add_curvature(moments, both[:, side, side])
+        self._shared = np.append(np.arange(3), nd + np.arange(3))
+        self._private = np.delete(np.arange(2 * nd), self._shared)
+        p, s = self._private, self._shared
+        A, W = both[:, p[:, None], p], both[:, p[:, None], s]
+        inverse = np.linalg.inv(A)
+        X = inverse @ W
+        self._outer = A, inverse, X
+        self.ends = both[:, s[:, None], s] - W.transpose(0, 2, 1) @ X
+
+    def inertia(self) -> Inertia:
+        """Signs of the eigenvalues of what was eliminated."""
+        negative, singular = 0, False
+        for A, *_ in [*self._inner, self._outer]:
+            size = 1.0 / np.sqrt(np.abs(A.diagonal(axis1=1, axis2=2)))
+            values = np.linalg.eigvalsh(size[:, :, None] * A * size[:, None])
+            negative += int(np.sum(values < 0.0))
+            singular = singular or bool(np.any(np.abs(values) < LOST))
+        return Inertia(negative, singular)
+
+    def reduce(self, b: Array) -> Array:
+        """Forces (M, 6) at the ends from those on the coordinates, (N,)."""
+        f, nd = self.group.coordinates(b), self.group.nd
+        self._known = []
+        first, last = f[:, 0], f[:, 1]
+        for k, (_, inverse, X) in enumerate(self._inner):
+            self._known.append(_times(inverse, last))
+            both = _times(X.transpose(0, 2, 1), last)
+            first, last = first - both[:, :nd], f[:, k + 2] - both[:, nd:]
+        g = np.concatenate([_times(T.transpose(0, 2, 1), x)
+                            for T, x in zip(self._T, (first, last))], axis=1)
+        _, inverse, X = self._outer
+        own = g[:, self._private]
+        self._known.append(_times(inverse, own))
+        return g[:, self._shared] - _times(X.transpose(0, 2, 1), own)
+
+    def expand(self, v: Array, x: Array) -> None:
+        """All displacements from those at the ends, (M, 6), after :meth:`reduce`; x is (N,)."""
+        group, nd = self.group, self.group.nd
+        both = np.empty((len(v), 2 * nd))
+        both[:, self._shared] = v
+        both[:, self._private] = self._known[-1] - _times(self._outer[2], v)
+        out = np.empty((len(v), group.elements + 1, nd))
+        out[:, 0], out[:, -1] = (_times(T, both[:, k * nd:(k + 1) * nd])
+                                 for k, T in enumerate(self._T))
+        for k in range(group.elements - 1, 0, -1):
+            ends = np.concatenate([out[:, 0], out[:, k + 1]], axis=1)
+            out[:, k] = self._known[k - 1] - _times(self._inner[k - 1][2], ends)
+        x[group.places] = out.reshape(len(v), -1)
+
+
+def _times(A, x):
+    """Matrices (M, i, j) times vectors (M, j)."""
+    return (A @ x[:, :, None])[:, :, 0]
+
+
+def _between(S, A, T):
+    """S^T A T."""
+    return S.transpose(0, 2, 1) @ A @ T
+
+
+def _blocks(K, group):
+    """Of chains the matrices of nodes (M, elements + 1, nd, nd), and those between neighbours.
+
+    The latter, (M, elements, nd, nd), have the rows of the right node.
+    """
+    a, b, ld = np.arange(group.nd)[:, None], np.arange(group.nd), K.band.ld
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    first = (group.first[:, None] + group.nd * np.arange(group.elements + 1))[..., None, None] * ld
+    flat = K.band.flat
+    return flat[first + low * ld + high - low], flat[first[:, :-1] + b * ld + group.nd + a - b]

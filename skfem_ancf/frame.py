@@ -1,0 +1,434 @@
+"""Frames: lines between nodes, rigid or hinged where they meet."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .beam import Beam
+from .elements import ElementBeamCable
+from .errors import (InputError, require_finite, require_finite_scalar, require_integer,
+                     require_names, shown, teaching)
+from .joints.base import bind_joint
+from .joints.nodes import HELD, Nodes
+from .loads import DeadLoad, EndMoment
+from .net import Net, net_from_meshio
+from .scene import Scene
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from .results import State
+    from .types import Array, TimeFunction, WhichBeam
+
+#: Name of the beam of lines that are in no group.
+REST = "lines"
+
+
+class NodeMoment(EndMoment):
+    """A moment on a section at a node, whose angle is counted from -pi to pi."""
+
+    def bind(self, beam: Beam) -> NodeMoment:
+        return self
+
+    def angle(self, u: Array) -> float:
+        start = self.beam.q0_local[self.dofs] @ self.c @ [1.0, 1.0j]
+        return float(np.angle(self.direction(u) @ [1.0, 1.0j] / start))
+
+
+@teaching
+class Frame(Scene):
+    """A :class:`Scene` of lines between nodes: use :meth:`from_lines` or :meth:`from_meshio`.
+
+    Lines that meet at a node share its position, and those that are not hinged there the rotation
+    of the section. Unknowns of the solution are these of the nodes: the coordinates of the lines
+    are condensed to them, so that cost and memory are those of a sparse matrix with three rows a
+    node, however many elements a line has. The lines of a group are one beam with the name of the
+    group: ``beam="columns"`` in loads, section forces and pictures. Supports, forces and moments
+    take nodes: a name, a number, a point (x, y), a function of the points, or a list of these.
+
+    Parameters
+    ----------
+    net
+        The lines, a :class:`~skfem_ancf.net.Net`.
+    beams
+        A Beam with a chain for each line of a group, group after group, and then for the others.
+    lines
+        Numbers of the lines in the order of the chains, shape (m,).
+    hinged
+        Whether the start and the end of each line are hinged, shape (2, m).
+
+    Examples
+    --------
+    >>> from skfem_ancf import Frame, StVenantKirchhoff
+    >>> steel = StVenantKirchhoff(E=2.1e11, nu=0.3, density=7850)
+    >>> frame = Frame.from_lines([(0, 0), (0, 3), (4, 3), (4, 0)], [(0, 1), (1, 2), (2, 3)],
+    ...                          nodes={"ground": [0, 3]}, material=steel, height=0.2, width=0.1)
+    >>> state = frame.clamp("ground").point_force((1e4, 0), at=(0, 3)).solve_static()
+    >>> state.converged, round(float(state.displacement((4, 3))[0]), 5)
+    (True, 0.00138)
+    """
+
+    def __init__(self, net: Net, beams: Sequence[Beam], lines: Array, hinged: Array) -> None:
+        super().__init__(*beams)
+        self.net, self._lines = net, lines
+        ends = net.lines[:, lines].T.ravel()
+        self._nodes = Nodes(ends, hinged[:, lines].T.ravel(),
+                            np.zeros((net.points.shape[1], 3), dtype=bool), net, lines)
+        self._join()
+
+    @classmethod
+    def from_lines(cls, points: Any, lines: Any, groups: Mapping[str, Any] | None = None,
+                   nodes: Mapping[str, Any] | None = None, hinges: Any = (),
+                   curves: Mapping[int, Callable[[Array], Any]] | None = None, elements: Any = 1,
+                   sections: Mapping[str, Mapping[str, Any]] | None = None,
+                   **beam: Any) -> Frame:
+        """A frame of lines between points.
+
+        Parameters
+        ----------
+        points
+            A list of pairs (x, y), or an array (2, n).
+        lines
+            Pairs of numbers of points, or an array (2, m).
+        groups
+            Numbers of lines by name: each group is a beam of that name. A line is in one group at
+            most; those in none are the beam "lines".
+        nodes
+            Numbers of points by name, for supports and loads.
+        hinges
+            Where lines may turn: "all" for a truss; or a list of numbers and names of nodes, where
+            all lines are hinged, and of pairs (line, node), each by its number or its name.
+        curves
+            By the number of a line a function of parameters s (k,), from 0 to 1, that returns the
+            points (2, k) of its axis.
+        elements
+            How many elements a line is divided into, or for each line, shape (m,).
+        sections
+            Arguments of ``beam`` by group, where they differ: ``{"columns": {"height": 0.3}}``.
+        **beam
+            ``height``, and the arguments of :class:`~skfem_ancf.Beam`: ``material`` and ``width``
+            or ``section``, and where they differ from these ``element`` (``ElementBeamCable(5)``),
+            ``formulation``, ``damping``.
+
+        Returns
+        -------
+        Frame
+
+        Raises
+        ------
+        MeshError
+            If a line joins an unknown point, has no length, or is there twice; if a point is in
+            no line, or two are at one place.
+        InputError
+            If an argument is of the wrong kind.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Frame, StVenantKirchhoff
+        >>> arch = Frame.from_lines([(-1, 0), (1, 0)], [(0, 1)], elements=8, height=0.01, width=0.1,
+        ...                         curves={0: lambda s: np.array([-np.cos(np.pi * s),
+        ...                                                        np.sin(np.pi * s)])},
+        ...                         material=StVenantKirchhoff(E=2e11, nu=0.3))
+        >>> round(float(arch.beams[0].mesh.lengths.sum()), 6)
+        3.141593
+        """
+        return cls._made(Net(points, lines, groups, nodes, curves), hinges, elements, sections,
+                         beam)
+
+    @classmethod
+    def from_meshio(cls, mesh: Any, hinges: Any = (), elements: Any = 1,
+                    sections: Mapping[str, Mapping[str, Any]] | None = None,
+                    **beam: Any) -> Frame:
+        """A frame of the line cells of a mesh: of Gmsh's ``.msh``, ``.vtu``, and others.
+
+        Parameters
+        ----------
+        mesh
+            A ``meshio.Mesh``, or the name of a file. Each cell "line" or "line3", which is curved,
+            is a line. Cell sets and physical groups of lines are groups; those of vertices, and
+            point sets, are names of nodes.
+        hinges, elements, sections, **beam
+            As for :meth:`from_lines`.
+
+        Returns
+        -------
+        Frame
+
+        Raises
+        ------
+        FileError
+            If the file cannot be read.
+        MeshError
+            If it holds no lines, or as for :meth:`from_lines`.
+
+        Examples
+        --------
+        >>> import meshio
+        >>> from skfem_ancf import Frame, StVenantKirchhoff
+        >>> mesh = meshio.Mesh([[0, 0], [0, 1], [1, 1]], [("line", [[0, 1], [1, 2]])],
+        ...                    cell_sets={"column": [[0]], "girder": [[1]]})
+        >>> frame = Frame.from_meshio(mesh, material=StVenantKirchhoff(E=2e11, nu=0.3), height=0.1,
+        ...                           width=0.1)
+        >>> [beam.name for beam in frame.beams]
+        ['column', 'girder']
+        """
+        return cls._made(net_from_meshio(mesh), hinges, elements, sections, beam)
+
+    @classmethod
+    def _made(cls, net, hinges, elements, sections, options):
+        m = net.lines.shape[1]
+        elements = _elements(elements, m)
+        sections = dict(sections or {})
+        require_names("group of lines", list(sections), [*net.groups, REST])
+        groups = dict(net.groups)
+        rest = np.setdiff1d(np.arange(m), np.concatenate([*groups.values(), [-1]]))
+        if len(rest):
+            if REST in groups:
+                raise InputError(f"lines {rest[:5].tolist()} are in no group and would be the beam "
+                                 f"{REST!r}, which is the name of a group: name it otherwise")
+            groups[REST] = rest
+        beams = []
+        for name, lines in groups.items():
+            given = {"element": ElementBeamCable(5), **options, **sections.get(name, {})}
+            if "height" not in given:
+                raise InputError("the lines need a height of their section: give height=, or one "
+                                 f"for each group in sections, as {{{name!r}: {{'height': 0.1}}}}")
+            mesh = net.mesh(lines, elements, require_finite_scalar("height", given.pop("height")))
+            beams.append(Beam(mesh, name=name, **given))
+        net.curves = {}  # the meshes have them
+        return cls(net, beams, np.concatenate(list(groups.values())), _hinged(net, hinges))
+
+    def _join(self):
+        """Bind the nodes anew."""
+        given = self._nodes._unsealed()
+        with self._lock:
+            bound = bind_joint(given, self)
+            given._seal()
+            self._joints = ((given, bound), *self._joints[1:])
+            self._system = None
+
+    @property
+    def points(self) -> Array:
+        """Places of the nodes, shape (2, n)."""
+        return self.net.points
+
+    def nodes(self, place: Any) -> Array:
+        """Numbers of the nodes at a place, shape (k,).
+
+        Parameters
+        ----------
+        place
+            The name of nodes, the number of a node, a point (x, y), a function of the points x
+            (2, n) that returns n truth values, or an array or list of these.
+        """
+        return self.net.nodes_at(place)
+
+    # supports
+
+    def hold(self, place: Any, *what: str) -> Frame:
+        """Hold nodes: their displacement along x, along y, or their rotation.
+
+        Parameters
+        ----------
+        place
+            Nodes, see :meth:`nodes`.
+        *what
+            Of "x", "y" and "angle".
+
+        Returns
+        -------
+        Frame
+            Itself.
+
+        Raises
+        ------
+        InputError
+            If the rotation is held of a node at which all lines are hinged.
+        """
+        names = require_names("what is held", list(what), HELD)
+        nodes, held = self.nodes(place), self._nodes.held.copy()
+        for name in names:
+            held[nodes, HELD.index(name)] = True
+        if "angle" in names:
+            rigid = self._nodes.nodes[~self._nodes.hinged]
+            loose = np.setdiff1d(nodes, rigid)
+            if len(loose):
+                raise InputError(f"all lines are hinged at node {loose[0]}: it has no rotation to "
+                                 "hold, pin it")
+        self._nodes = Nodes(self._nodes.nodes, self._nodes.hinged, held, self.net, self._lines)
+        self._join()
+        return self
+
+    def clamp(self, boundary: Any, beam: WhichBeam = None, thickness: str = "free") -> Frame:
+        """Hold nodes fast: their positions and, where a line is rigid there, their rotation.
+
+        Parameters
+        ----------
+        boundary
+            Nodes, see :meth:`nodes`.
+        beam, thickness
+            Of a Scene; of a frame None and "free".
+
+        Returns
+        -------
+        Frame
+            Itself.
+        """
+        _no_beam(beam)
+        if thickness != "free":
+            raise InputError('the sections at the nodes of a frame may get thinner or thicker: '
+                             f'thickness is "free", got {shown(thickness)}')
+        return self.hold(boundary, *HELD)
+
+    def pin(self, boundary: Any, beam: WhichBeam = None) -> Frame:
+        """Fix the positions of nodes, which may turn.
+
+        Parameters
+        ----------
+        boundary
+            Nodes, see :meth:`nodes`.
+        beam
+            Of a Scene; of a frame None.
+
+        Returns
+        -------
+        Frame
+            Itself.
+        """
+        _no_beam(beam)
+        return self.hold(boundary, "x", "y")
+
+    # loads
+
+    def point_force(self, force: ArrayLike, at: Any, beam: WhichBeam = None,
+                    amplitude: TimeFunction = None) -> Frame:
+        """A dead force on each of some nodes, or on a material point of a beam.
+
+        Parameters
+        ----------
+        force
+            The force on each of them, shape (2,).
+        at
+            Nodes, see :meth:`nodes`; with ``beam`` a material point (x, y).
+        beam
+            The beam, its name or its number, for a point between nodes.
+        amplitude
+            A function of time by which the force is multiplied in a motion.
+
+        Returns
+        -------
+        Frame
+            Itself.
+        """
+        if beam is not None:
+            super().point_force(force, at, beam, amplitude)
+            return self
+        force = require_finite("force", force, (2,))
+        number, node = self._ends_at(at)
+        loads = []
+        for k in np.unique(number):
+            vector = np.zeros(self.beams[k].N)
+            vector.reshape(-1, self.beams[k].nd)[node[number == k], :2] = force
+            loads.append((k, DeadLoad(self.beams[k], vector, amplitude)))
+        self._put(loads=loads)
+        return self
+
+    def moment(self, boundary: Any, M: float, beam: WhichBeam = None,
+               amplitude: TimeFunction = None) -> Frame:
+        """A moment on each of some nodes.
+
+        Parameters
+        ----------
+        boundary
+            Nodes, see :meth:`nodes`, at which a line is rigid.
+        M
+            The moment (force times length), counterclockwise.
+        beam
+            Of a Scene; of a frame None.
+        amplitude
+            A function of time by which the moment is multiplied in a motion.
+
+        Returns
+        -------
+        Frame
+            Itself.
+        """
+        _no_beam(beam)
+        M = require_finite_scalar("M", M)
+        loads = [(k, NodeMoment(self.beams[k], int(node), M, amplitude))
+                 for k, node in zip(*self._ends_at(boundary))]
+        self._put(loads=loads)
+        return self
+
+    def _ends_at(self, place):
+        """Of nodes the beams (k,) whose ends lead there, and the nodes of their meshes (k,)."""
+        joint = self._joints[0][1]
+        ends = joint.leaders[np.searchsorted(joint.nodes[joint.leaders], self.nodes(place))]
+        first = joint.positions[ends, 0]
+        starts = np.array([self.offset(k) for k in range(len(self.beams))])
+        number = np.searchsorted(starts, first, side="right") - 1
+        nd = np.array([beam.nd for beam in self.beams])
+        return number, (first - starts[number]) // nd[number]
+
+    # results
+
+    def rotations(self, state: State) -> Array:
+        """Rotations of the nodes, from -pi to pi, shape (n,); NaN where all lines are hinged.
+
+        Parameters
+        ----------
+        state
+            A State of this frame.
+        """
+        joint = self._joints[0][1]
+        out = np.full(self.points.shape[1], np.nan)
+        rigid = joint.leaders[~joint.hinged[joint.leaders]]
+        out[joint.nodes[rigid]] = np.angle(joint.turns(state.u)[rigid])
+        return out
+
+    def with_beams(self, beams: Sequence[Beam]) -> Scene:
+        """Raises InputError: the lines of a frame have their meshes from its nodes."""
+        raise InputError("a frame is not put on other meshes: divide its lines finer, by "
+                         "elements= of Frame.from_lines")
+
+
+def _no_beam(beam):
+    if beam is not None:
+        raise InputError(f"a frame is held and loaded at nodes, got beam={shown(beam)}: name the "
+                         "nodes, by a name, a number, or a point (x, y)")
+
+
+def _elements(elements, m):
+    """How many elements each line has, (m,)."""
+    if isinstance(elements, (int, np.integer)) and not isinstance(elements, bool):
+        return np.full(m, require_integer("elements", elements, 1))
+    found = np.asarray(elements)
+    if found.shape != (m,) or found.dtype.kind not in "iu" or np.any(found < 1):
+        raise InputError("elements is a positive integer, or one for each line, of shape "
+                         f"({m},), got {shown(elements)}")
+    return found.astype(np.int64)
+
+
+def _hinged(net, hinges):
+    """Whether the start and the end of each line are hinged, (2, m)."""
+    out = np.zeros(net.lines.shape, dtype=bool)
+    if isinstance(hinges, str) and hinges == "all":
+        return ~out
+    if isinstance(hinges, (str, int, np.integer)):
+        hinges = [hinges]
+    for one in hinges:
+        if isinstance(one, tuple) and len(one) == 2:
+            line, node = (int(net.lines_of(one[0])[0]), int(net.nodes_at(one[1])[0]))
+            at = net.lines[:, line] == node
+            if not np.any(at):
+                raise InputError(f"line {line} does not end at node {node}: it joins "
+                                 f"{net.lines[:, line].tolist()}")
+            out[at, line] = True
+        else:
+            out |= np.isin(net.lines, net.nodes_at(one))
+    return out
