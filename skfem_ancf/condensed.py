@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 #: A pivot that small beside the diagonal is round-off.
 LOST = 1e-13
+#: Unknowns that an end shares with its node.
+SHARED = 3
 
 
 class Group(NamedTuple):
@@ -369,22 +371,20 @@ class _Part:
             first = first - to_first.transpose(0, 2, 1) @ X[:, :, :nd]
             last = D[:, k + 1] - C[:, k] @ X[:, :, nd:]
             to_first = -C[:, k] @ X[:, :, :nd]
-        S = self._T[0], self._T[1]
-        both = np.empty((len(D), 2 * nd, 2 * nd))
-        both[:, :nd, :nd] = _between(S[0], first, S[0])
-        both[:, nd:, nd:] = _between(S[1], last, S[1])
-        both[:, nd:, :nd] = _between(S[1], to_first, S[0])
-        both[:, :nd, nd:] = both[:, nd:, :nd].transpose(0, 2, 1)
-        for side, basis in zip((slice(nd), slice(nd, None)), bases):
-            basis.add_curvature(moments, both[:, side, side])
-        self._shared = np.append(np.arange(3), nd + np.arange(3))
-        self._private = np.delete(np.arange(2 * nd), self._shared)
-        p, s = self._private, self._shared
-        A, W = both[:, p[:, None], p], both[:, p[:, None], s]
+        ends = np.empty((len(D), 2, nd, 2, nd))
+        left, right = self._T
+        ends[:, 0, :, 0], ends[:, 1, :, 1] = _between(left, first, left), _between(right, last, right)
+        ends[:, 1, :, 0] = _between(right, to_first, left)
+        ends[:, 0, :, 1] = ends[:, 1, :, 0].transpose(0, 2, 1)
+        for side, basis in enumerate(bases):
+            basis.add_curvature(moments, ends[:, side, :, side])
+        p = 2 * (nd - SHARED)
+        A = ends[:, :, SHARED:, :, SHARED:].reshape(-1, p, p)
+        W = ends[:, :, SHARED:, :, :SHARED].reshape(-1, p, 2 * SHARED)
         inverse = np.linalg.inv(A)
         X = inverse @ W
         self._outer = A, inverse, X
-        self.ends = both[:, s[:, None], s] - W.transpose(0, 2, 1) @ X
+        self.ends = ends[:, :, :SHARED, :, :SHARED].reshape(-1, 6, 6) - W.transpose(0, 2, 1) @ X
 
     def inertia(self) -> Inertia:
         """Signs of the eigenvalues of what was eliminated."""
@@ -405,25 +405,24 @@ class _Part:
             self._known.append(_times(inverse, last))
             both = _times(X.transpose(0, 2, 1), last)
             first, last = first - both[:, :nd], f[:, k + 2] - both[:, nd:]
-        g = np.concatenate([_times(T.transpose(0, 2, 1), x)
-                            for T, x in zip(self._T, (first, last))], axis=1)
+        g = np.stack([_times(T.transpose(0, 2, 1), x) for T, x in zip(self._T, (first, last))], 1)
         _, inverse, X = self._outer
-        own = g[:, self._private]
+        own = g[:, :, SHARED:].reshape(len(g), -1)
         self._known.append(_times(inverse, own))
-        return g[:, self._shared] - _times(X.transpose(0, 2, 1), own)
+        return g[:, :, :SHARED].reshape(-1, 6) - _times(X.transpose(0, 2, 1), own)
 
     def expand(self, v: Array, x: Array) -> None:
         """All displacements from those at the ends, (M, 6), after :meth:`reduce`; x is (N,)."""
         group, nd = self.group, self.group.nd
-        both = np.empty((len(v), 2 * nd))
-        both[:, self._shared] = v
-        both[:, self._private] = self._known[-1] - _times(self._outer[2], v)
+        ends = np.empty((len(v), 2, nd))
+        ends[:, :, :SHARED] = v.reshape(-1, 2, SHARED)
+        ends[:, :, SHARED:] = (self._known[-1] - _times(self._outer[2], v)
+                               ).reshape(-1, 2, nd - SHARED)
         out = np.empty((len(v), group.elements + 1, nd))
-        out[:, 0], out[:, -1] = (_times(T, both[:, k * nd:(k + 1) * nd])
-                                 for k, T in enumerate(self._T))
+        out[:, 0], out[:, -1] = (_times(T, ends[:, k]) for k, T in enumerate(self._T))
         for k in range(group.elements - 1, 0, -1):
-            ends = np.concatenate([out[:, 0], out[:, k + 1]], axis=1)
-            out[:, k] = self._known[k - 1] - _times(self._inner[k - 1][2], ends)
+            around = np.concatenate([out[:, 0], out[:, k + 1]], axis=1)
+            out[:, k] = self._known[k - 1] - _times(self._inner[k - 1][2], around)
         x[group.places] = out.reshape(len(v), -1)
 
 

@@ -488,13 +488,21 @@ class MeshBeam(Frozen, Mesh2D):
 
     @property
     def is_uniform(self) -> bool:
-        """True if every element is straight, of the same length and height: one table for all."""
+        """True if one table does for all: elements straight, of one length, height and direction, in chains of one length."""
         if not hasattr(self, "_is_uniform"):
             # the round-off of the nodes' positions is no difference in length
             noise = 8 * np.finfo(float).eps * np.max(np.abs(self.p))
             self._is_uniform = self.is_straight and self.heights is None and bool(
-                np.ptp(self.lengths) <= 1e-13 * np.max(self.lengths) + noise)
+                np.ptp(self.lengths) <= 1e-13 * np.max(self.lengths) + noise
+                and np.max(np.ptp(self.p_X, axis=1)) <= 1e-12 + noise / np.min(self.lengths)
+                and np.ptp(self.chain_lengths) <= 1e-12 * np.max(self.chain_lengths))
         return self._is_uniform
+
+    @property
+    def chain_lengths(self) -> Array:
+        """Length of the chain that each element is in, shape (nelements,)."""
+        chain = np.cumsum(~np.isin(self.t[0], self.t[1])) - 1
+        return np.bincount(chain, self.lengths)[chain]
 
     def element_finder(self, mapping: Any = None) -> Callable[..., Array]:
         """A function from points x, y to the elements that hold them.

@@ -222,8 +222,7 @@ def _residual(e, target, x, w):
     if w.phi.size > 0:
         constraint(e.joints, target.c, target.g, target.at, x.u, w.phi)
         add_joint_force(e.joints, target.g, target.at, x.u, x.multipliers, w.push)
-        for k in range(w.phi.size):
-            opening = max(opening, abs(w.phi[k]))
+        opening = np.max(np.abs(w.phi))
     for i in lanes(x.u.size):
         w.R[i] = (w.load[i] - x.force[i] - target.gap[i] - w.push[i]) * e.free[i]
     return opening
