@@ -8,7 +8,7 @@ multiplier is unknown: they are the forces left at the ends.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -104,6 +104,12 @@ class Condensed:
         self._own = nodes.hinged.reshape(-1, 2)
         self._order: Array | None = None
         self._make_pattern()
+        self._parts: list[_Part] = []
+
+    @property
+    def ready(self) -> bool:
+        """True if there are factors."""
+        return bool(self._parts)
 
     def _unknown(self):
         """Whether x, y and the rotation of a node are unknown, (number, 3)."""
@@ -365,15 +371,16 @@ class _Part:
         #: inner nodes: matrix, its inverse, that by the displacements of the start and the next one
         self._inner: list[tuple[Array, Array, Array]] = []
         for k in range(1, n):
-            A, inverse = last, np.linalg.inv(last)
-            X = inverse @ np.concatenate([to_first, C[:, k].transpose(0, 2, 1)], axis=2)
+            A, inverse = last, _inverse(last)
+            X = _solved(A, inverse, np.concatenate([to_first, C[:, k].transpose(0, 2, 1)], axis=2))
             self._inner.append((A, inverse, X))
             first = first - to_first.transpose(0, 2, 1) @ X[:, :, :nd]
             last = D[:, k + 1] - C[:, k] @ X[:, :, nd:]
             to_first = -C[:, k] @ X[:, :, :nd]
         ends = np.empty((len(D), 2, nd, 2, nd))
         left, right = self._T
-        ends[:, 0, :, 0], ends[:, 1, :, 1] = _between(left, first, left), _between(right, last, right)
+        ends[:, 0, :, 0] = _between(left, first, left)
+        ends[:, 1, :, 1] = _between(right, last, right)
         ends[:, 1, :, 0] = _between(right, to_first, left)
         ends[:, 0, :, 1] = ends[:, 1, :, 0].transpose(0, 2, 1)
         for side, basis in enumerate(bases):
@@ -381,8 +388,8 @@ class _Part:
         p = 2 * (nd - SHARED)
         A = ends[:, :, SHARED:, :, SHARED:].reshape(-1, p, p)
         W = ends[:, :, SHARED:, :, :SHARED].reshape(-1, p, 2 * SHARED)
-        inverse = np.linalg.inv(A)
-        X = inverse @ W
+        inverse = _inverse(A)
+        X = _solved(A, inverse, W)
         self._outer = A, inverse, X
         self.ends = ends[:, :, :SHARED, :, :SHARED].reshape(-1, 6, 6) - W.transpose(0, 2, 1) @ X
 
@@ -401,14 +408,14 @@ class _Part:
         f, nd = self.group.coordinates(b), self.group.nd
         self._known = []
         first, last = f[:, 0], f[:, 1]
-        for k, (_, inverse, X) in enumerate(self._inner):
-            self._known.append(_times(inverse, last))
+        for k, (A, inverse, X) in enumerate(self._inner):
+            self._known.append(_solved(A, inverse, last[:, :, None])[:, :, 0])
             both = _times(X.transpose(0, 2, 1), last)
             first, last = first - both[:, :nd], f[:, k + 2] - both[:, nd:]
         g = np.stack([_times(T.transpose(0, 2, 1), x) for T, x in zip(self._T, (first, last))], 1)
-        _, inverse, X = self._outer
+        A, inverse, X = self._outer
         own = g[:, :, SHARED:].reshape(len(g), -1)
-        self._known.append(_times(inverse, own))
+        self._known.append(_solved(A, inverse, own[:, :, None])[:, :, 0])
         return g[:, :, :SHARED].reshape(-1, 6) - _times(X.transpose(0, 2, 1), own)
 
     def expand(self, v: Array, x: Array) -> None:
@@ -424,6 +431,19 @@ class _Part:
             around = np.concatenate([out[:, 0], out[:, k + 1]], axis=1)
             out[:, k] = self._known[k - 1] - _times(self._inner[k - 1][2], around)
         x[group.places] = out.reshape(len(v), -1)
+
+
+def _inverse(A):
+    """The inverse of symmetric matrices, in units in which their diagonals are one."""
+    size = np.sqrt(np.abs(A.diagonal(axis1=1, axis2=2)))
+    scale = size[:, :, None] * size[:, None]
+    return np.linalg.inv(A / scale) / scale
+
+
+def _solved(A, inverse, B):
+    """A^-1 B, as accurate as by factors: of what an inverse alone gives A leaves too much."""
+    X = inverse @ B
+    return X + inverse @ (B - A @ X)
 
 
 def _times(A, x):

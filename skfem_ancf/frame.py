@@ -69,7 +69,7 @@ class Frame(Scene):
     ...                          nodes={"ground": [0, 3]}, material=steel, height=0.2, width=0.1)
     >>> state = frame.clamp("ground").point_force((1e4, 0), at=(0, 3)).solve_static()
     >>> state.converged, round(float(state.displacement((4, 3))[0]), 5)
-    (True, 0.00138)
+    (True, 0.00124)
     """
 
     def __init__(self, net: Net, beams: Sequence[Beam], lines: Array, hinged: Array) -> None:
@@ -213,6 +213,11 @@ class Frame(Scene):
             self._system = None
 
     @property
+    def _bound(self) -> Any:
+        """The joint of the nodes, bound."""
+        return self._joints[0][1]
+
+    @property
     def points(self) -> Array:
         """Places of the nodes, shape (2, n)."""
         return self.net.points
@@ -223,8 +228,8 @@ class Frame(Scene):
         Parameters
         ----------
         place
-            The name of nodes, the number of a node, a point (x, y), a function of the points x
-            (2, n) that returns n truth values, or an array or list of these.
+            The name of nodes, the number of a node, a point as a tuple (x, y), a function of the
+            points x (2, n) that returns n truth values, an array of numbers, or a list of these.
         """
         return self.net.nodes_at(place)
 
@@ -266,6 +271,9 @@ class Frame(Scene):
 
     def clamp(self, boundary: Any, beam: WhichBeam = None, thickness: str = "free") -> Frame:
         """Hold nodes fast: their positions and, where a line is rigid there, their rotation.
+
+        That of the best straight line through a section, which may still warp and change its
+        thickness, as at the other nodes.
 
         Parameters
         ----------
@@ -367,7 +375,7 @@ class Frame(Scene):
 
     def _ends_at(self, place):
         """Of nodes the beams (k,) whose ends lead there, and the nodes of their meshes (k,)."""
-        joint = self._joints[0][1]
+        joint = self._bound
         ends = joint.leaders[np.searchsorted(joint.nodes[joint.leaders], self.nodes(place))]
         first = joint.positions[ends, 0]
         starts = np.array([self.offset(k) for k in range(len(self.beams))])
@@ -385,7 +393,7 @@ class Frame(Scene):
         state
             A State of this frame.
         """
-        joint = self._joints[0][1]
+        joint = self._bound
         out = np.full(self.points.shape[1], np.nan)
         rigid = joint.leaders[~joint.hinged[joint.leaders]]
         out[joint.nodes[rigid]] = np.angle(joint.turns(state.u)[rigid])

@@ -488,7 +488,10 @@ class MeshBeam(Frozen, Mesh2D):
 
     @property
     def is_uniform(self) -> bool:
-        """True if one table does for all: elements straight, of one length, height and direction, in chains of one length."""
+        """True if one table does for all elements: straight, of one length, height and direction.
+
+        The chains that they make are of one length, too.
+        """
         if not hasattr(self, "_is_uniform"):
             # the round-off of the nodes' positions is no difference in length
             noise = 8 * np.finfo(float).eps * np.max(np.abs(self.p))

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 #: How far from a node a point may be that names it, relative to the size of the net.
 NEAR = 1e-9
-PLACES = ("the name of nodes, the number of a node, a point (x, y), a function of the points x "
-          "that returns truth values, or an array or list of these")
+PLACES = ("the name of nodes, the number of a node, a point as a tuple (x, y), a function of the "
+          "points x that returns truth values, or a list of these")
 
 
 class Net:
@@ -113,8 +113,8 @@ class Net:
         Parameters
         ----------
         place
-            The name of nodes, the number of a node, a point (x, y), a function of the points x
-            (2, n) that returns n truth values, or an array or list of these.
+            The name of nodes, the number of a node, a point as a tuple (x, y), a function of the
+            points x (2, n) that returns n truth values, an array of numbers, or a list of these.
 
         Raises
         ------
@@ -130,7 +130,7 @@ class Net:
             if place not in self.nodes:
                 raise NameUnknown("name of nodes", place, self.nodes)
             return self.nodes[place]
-        if is_point(place) and not (isinstance(place, np.ndarray) and place.dtype.kind in "iu"):
+        if is_point(place) and not isinstance(place, list):
             return self._node_near(place)
         if isinstance(place, (int, np.integer)) and not isinstance(place, bool):
             return np.array([require_integer("the number of a node", place, 0, n - 1)])
@@ -200,9 +200,9 @@ class Net:
             arc = self._arc(int(lines[k]), int(n[k]), height)
             p[:, nodes], tangent[:, nodes], turning[:, nodes] = arc.p, arc.p_X, arc.p_XY
             lengths[np.searchsorted(left, nodes[:-1])] = arc.lengths
-        mesh = MeshBeam(np.ascontiguousarray(p), np.array([left, left + 1]), height=height, p_X=tangent,
-                        p_Y=np.array([0.0 - tangent[1], tangent[0]]), lengths=lengths,
-                        p_XY=turning)
+        mesh = MeshBeam(np.ascontiguousarray(p), np.array([left, left + 1]), height=height,
+                        p_X=tangent, p_Y=np.array([0.0 - tangent[1], tangent[0]]),
+                        lengths=lengths, p_XY=turning)
         mesh._boundaries = mesh._build_default_tags()
         return mesh
 

@@ -719,7 +719,7 @@ class System:
         """
         K = self.K
         if self.condensed is not None:
-            return self.condensed.inertia() == Inertia(0, False)
+            return self.condensed.ready and self.condensed.inertia() == Inertia(0, False)
         if (not K.definite or self.forces.far or self.bodies
                 or (self.joints and not self.bordered)):
             return False

@@ -129,7 +129,7 @@ class Assumed(Formulation):
                       width: float) -> Array | None:
         tind = np.arange(1 if mesh.is_uniform else mesh.nelements)
         L, EI = mesh.lengths[tind], material.E * width * mesh.height**3 / 12.0
-        per = {"element": L, "beam": mesh.chain_lengths[tind], "": 1.0}
+        per = {"element": L, "beam": mesh.chain_lengths[tind], "": np.ones(len(tind))}
         q = element.rigid(mesh)
         q[0] = mesh.p
         q = np.concatenate([q[:, :, end] for end in mesh.t[:, tind]])  # (2 nb, 2, ne)

@@ -12,8 +12,6 @@ from scipy.sparse.csgraph import connected_components
 from .base import Joint
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from ..beam import Beam
     from ..net import Net
     from ..scene import Scene
@@ -123,7 +121,7 @@ class Nodes(Joint):
         return np.concatenate([gap[:, 0], gap[:, 1], angle.imag, r[self.held_x, 0],
                                r[self.held_y, 1], g[self.held_angle].imag])
 
-    def _linear(self):
+    def _linear(self) -> Any:
         """Rows, columns and values of the equations of positions."""
         s, n, k = self.followers, len(self.followers), len(self.turned)
         m, row = self.leader[s], np.arange(len(self.followers))
@@ -137,7 +135,7 @@ class Nodes(Joint):
         values[n:2 * n] = values[3 * n:4 * n] = -1.0
         return rows, columns, values
 
-    def _angles(self, factors, ends, first):
+    def _angles(self, factors: Array, ends: Array, first: int) -> Any:
         """Rows, columns and values of ``Im(factor dg)`` of some ends, one row each."""
         z = (factors * self.frame[ends])[:, None] * self.weights[ends]
         values = np.stack([z.imag, z.real], axis=1)
@@ -178,7 +176,7 @@ class Nodes(Joint):
         k, i, j, values = self.second_entries(len(u))
         return i, j, multipliers[k] * values
 
-    def split(self, multipliers: Array) -> tuple[Array, Array, Array, Array, Array]:
+    def split(self, multipliers: Array) -> tuple[Array, ...]:
         """Forces (followers, 2) and moments (turned,) of followers, and those that hold nodes.
 
         Parameters
@@ -234,7 +232,7 @@ class Nodes(Joint):
         parts
             What :meth:`parts` returns, shape (ends / 2,).
         origin, size
-            Of the coordinates of the motions: two translations and a rotation of each part.
+            Of the motions, two translations and a rotation of each part: shape (2,), and a length.
         number
             Of parts and other bodies.
 
@@ -285,11 +283,11 @@ def chain_ends(beam: Beam) -> Array:
     return np.stack([np.setdiff1d(left, right), np.setdiff1d(right, left)], axis=1)
 
 
-def _directions(beam: Beam, nodes: Sequence[int]) -> tuple[Any, Array]:
+def _directions(beam: Beam, nodes: Array) -> tuple[Any, Array]:
     """Coordinates (2, nodes, n) and weights (nodes, n) of the directions of sections."""
     if beam.mesh.heights is None:
         dofs, c = beam.section_direction(int(nodes[0]))
-        shift = beam.nd * (np.asarray(nodes) - nodes[0])
+        shift = beam.nd * (nodes - nodes[0])
         return dofs[:, None] + shift[:, None], np.tile(c, (len(nodes), 1))
     found = [beam.section_direction(int(node)) for node in nodes]
     return np.stack([dofs for dofs, _ in found], axis=1), np.array([c for _, c in found])

@@ -1,0 +1,431 @@
+"""Frames whose lines are condensed to their nodes, against welded beams and closed forms."""
+
+import pickle
+import tracemalloc
+
+import meshio
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import brentq
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, MeshBeam, Scene, Section,
+                        StVenantKirchhoff)
+from skfem_ancf.condensed import Condensed
+from skfem_ancf.errors import FileError, InputError, MeshError, NameUnknown, SupportError
+
+E, H = 2e11, 0.02
+STEEL = StVenantKirchhoff(E, 0.3, density=7800.0)
+EA, EI = E * H**2, E * H**4 / 12
+PORTAL = [(0, 0), (0, 1), (1, 1), (1, 0)], [(0, 1), (1, 2), (2, 3)]
+
+
+def portal(clamp=True, points=PORTAL[0], **options):
+    frame = Frame.from_lines(points, PORTAL[1], nodes={"ground": [0, 3], "corners": [1, 2]},
+                             **{"material": STEEL, "height": H, "width": H, **options})
+    return frame.clamp("ground") if clamp else frame
+
+
+def square(n, size=1.0, **options):
+    """A frame of n times n cells on the ground."""
+    number = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    y, x = np.divmod(number.ravel(), n + 1)
+    lines = np.hstack([[number[:-1].ravel(), number[1:].ravel()],
+                       [number[1:, :-1].ravel(), number[1:, 1:].ravel()]])
+    return Frame.from_lines(size * np.array([x, y]), lines, **{
+        "nodes": {"ground": number[0], "side": number[1:, 0]}, "height": H, "width": H,
+        "material": STEEL, **options}).clamp("ground")
+
+
+def welded(frame, loads, **options):
+    """The same of a beam for each line, with multipliers, and forces on its first end at nodes."""
+    element = options.get("element", ElementBeamCable(5))
+    n, beams, ends = options.get("elements", 1), [], {}
+    for k, (i, j) in enumerate(frame.net.lines.T):
+        a, d = frame.points[:, i], frame.points[:, j] - frame.points[:, i]
+        mesh = MeshBeam.init_line(np.linspace(0, np.hypot(*d), n + 1), H, a,
+                                  np.arctan2(d[1], d[0]))
+        beams.append(Beam(mesh, element, STEEL, width=H))
+        ends.setdefault(i, []).append((k, "left"))
+        ends.setdefault(j, []).append((k, "right"))
+    scene = Scene(*beams)
+    for node, ((k, end), *others) in ends.items():
+        if node in frame.nodes("ground"):
+            at = tuple(frame.points[:, node])
+            scene.joint("weld", beams=("ground", k), at=(at, end))
+        for other, its_end in others:
+            scene.joint("weld", beams=(k, other), at=(end, its_end))
+        for place, force in loads:
+            if node in frame.nodes(place):
+                scene.point_force(force, tuple(frame.points[:, node]), beam=k)
+    return scene, {node: found[0][0] for node, found in ends.items()}
+
+
+def stiffness_method(points, lines, held, forces, hinged=False):
+    """Displacements (n, 3) of straight members by linear theory, Przemieniecki (1968)."""
+    points, n = np.array(points, dtype=float), len(points)
+    K, f = np.zeros((3 * n, 3 * n)), np.zeros(3 * n)
+    for i, j in lines:
+        d = points[j] - points[i]
+        L = np.hypot(*d)
+        c, s = d / L
+        a, b = EA / L, 0.0 if hinged else EI / L**3
+        k = np.array([[a, 0, 0, -a, 0, 0], [0, 12 * b, 6 * b * L, 0, -12 * b, 6 * b * L],
+                      [0, 6 * b * L, 4 * b * L**2, 0, -6 * b * L, 2 * b * L**2],
+                      [-a, 0, 0, a, 0, 0], [0, -12 * b, -6 * b * L, 0, 12 * b, -6 * b * L],
+                      [0, 6 * b * L, 2 * b * L**2, 0, -6 * b * L, 4 * b * L**2]])
+        T = np.kron(np.eye(2), [[c, s, 0], [-s, c, 0], [0, 0, 1]])
+        at = np.append(3 * i + np.arange(3), 3 * j + np.arange(3))
+        K[np.ix_(at, at)] += T.T @ k @ T
+    for node, force in forces.items():
+        f[3 * node:3 * node + len(force)] = force
+    if hinged:
+        held = [*held, *range(2, 3 * n, 3)]
+    free = np.setdiff1d(np.arange(3 * n), held)
+    u = np.zeros(3 * n)
+    u[free] = np.linalg.solve(K[np.ix_(free, free)], f[free])
+    return u.reshape(n, 3)
+
+
+def at_nodes(frame, state):
+    return state.displacement(frame.points).T
+
+
+# statics
+
+
+@pytest.mark.parametrize("elements", [1, 3])
+def test_small_displacements_are_those_of_the_stiffness_method(elements):
+    points, lines = [(0, 0), (0.2, 1), (1.4, 1.3), (1.2, 0)], [(0, 1), (2, 1), (2, 3), (0, 2)]
+    frame = Frame.from_lines(points, lines, elements=elements, material=STEEL, height=H, width=H)
+    state = frame.clamp(0).pin(3).point_force((3.0, -5.0), at=1).moment(2, 1.5).solve_linear()
+    exact = stiffness_method(points, lines, [0, 1, 2, 9, 10], {1: (3.0, -5.0), 2: (0, 0, 1.5)})
+    size = np.abs(exact).max()
+    assert_allclose(at_nodes(frame, state), exact[:, :2], rtol=0, atol=1e-6 * size)
+    assert_allclose(frame.rotations(state), exact[:, 2], rtol=0, atol=1e-6 * size)
+
+
+@pytest.mark.parametrize("element, elements", [
+    (ElementBeamCable(5), 1), (ElementBeamCable(3), 3), (ElementBeamANCF(2), 2),
+    (ElementBeamANCF(3), 2)])
+def test_a_frame_is_that_of_welded_beams(element, elements):
+    """Large displacements; also where the directions of sections and the axis are apart."""
+    frame = square(2, element=element, elements=elements)
+    loads = [("side", (600.0, 0.0)), (8, (0.0, -300.0))]
+    for place, force in loads:
+        frame.point_force(force, at=place)
+    state = frame.solve_static(tol=1e-10)
+    scene, of_node = welded(frame, loads, element=element, elements=elements)
+    other = scene.solve_static(tol=1e-10)
+    expected = np.array([other.displacement(tuple(p), beam=of_node[k])
+                         for k, p in enumerate(frame.points.T)])
+    assert np.abs(expected).max() > 0.02
+    assert_allclose(at_nodes(frame, state), expected, rtol=0, atol=1e-8)
+    assert state.strain_energy == pytest.approx(other.strain_energy, rel=1e-8)
+
+
+def test_the_condensed_solution_solves_the_equations_with_multipliers():
+    """At a state in which the joints are closed, hinges and all: by the whole matrix."""
+    frame = Frame.from_lines([*PORTAL[0], (2, 1.2)], [*PORTAL[1], (2, 4), (0, 2)], elements=2,
+                             hinges=[(3, 2), (4, 0)], material=STEEL, height=H, width=H)
+    frame.clamp([0, 3]).pin(4).point_force((400.0, -300.0), at=1)
+    state, system = frame.solve_static(tol=1e-12), frame.system
+    assert isinstance(system.condensed, Condensed)
+    rng = np.random.default_rng(0)
+    b, c = rng.standard_normal(system.N), 1e-4 * rng.standard_normal(system.m)
+    system.assemble(state.u)
+    K = system.K.tocsc().toarray() + system.curvature(state.u, 1.0, state.multipliers).toarray()
+    J = system.jacobian(state.u, 1.0).toarray()
+    d = np.append(1 / np.sqrt(np.abs(K.diagonal())), np.full(system.m, 1.0))
+    whole = np.block([[K, J.T], [J, np.zeros((system.m, system.m))]]) * d * d[:, None]
+    exact = d * np.linalg.solve(whole, d * np.append(b, c))
+    system.factorize(state.u, 1.0, state.multipliers)
+    x, multipliers = system.solve(b, c)
+    error = (np.append(x, multipliers) - exact) / d
+    assert np.abs(error).max() < 1e-8 * np.abs(exact / d).max()
+    negative, singular = system.inertia()
+    null = np.linalg.svd(J)[2][len(J):].T
+    assert (negative, singular) == (np.sum(np.linalg.eigvalsh(null.T @ K @ null) < 0), False)
+
+
+@pytest.mark.parametrize("slenderness", [1e2, 1e3, 1e4, 1e5])
+@pytest.mark.parametrize("elements", [1, 4])
+def test_few_iterations_at_every_slenderness(slenderness, elements):
+    h = 1.0 / slenderness  # E I and the mass are kept
+    soft = StVenantKirchhoff(2e8 * (0.01 / h) ** 3, 0.3, density=7800.0)
+    frame = portal(material=soft, height=h, width=0.01, elements=elements)
+    state = frame.point_force((0.3, -0.2), at=1).solve_static()
+    assert state.iterations <= 8 and len(state.steps) == 1 and state.stability == "stable"
+    assert state.displacement((0.0, 1.0))[0] == pytest.approx(0.115804, rel=1e-4)
+
+
+def test_reactions_hold_the_loads():
+    frame = portal().point_force((200.0, -100.0), at=1).moment(2, 30.0).gravity((0, -9.81))
+    state = frame.solve_static(tol=1e-11)
+    total = state.reactions("ground")
+    assert_allclose(total.force, [-200.0, 100.0 + 9.81 * frame.beams[0].total_mass], rtol=1e-7)
+    left, right = state.reactions(0), state.reactions(3)
+    assert_allclose(total.force, left.force + right.force, rtol=1e-12)
+    assert total.moment == pytest.approx(
+        left.moment + right.moment + right.force[1], rel=1e-9)  # the arm is 1
+    assert set(left.coordinates) == {"x", "y", "angle"}
+    assert left.moment == pytest.approx(left.coordinates["angle"])
+    assert state.reactions(1).force.tolist() == [0.0, 0.0]
+
+
+def test_a_truss_has_no_moments_and_the_forces_of_its_bars():
+    points, lines = [(0, 0), (1, 0), (2, 0), (0.5, 0.8), (1.5, 0.8)], [
+        (0, 1), (1, 2), (3, 4), (0, 3), (1, 3), (1, 4), (2, 4)]
+    frame = Frame.from_lines(points, lines, hinges="all", elements=2, material=STEEL, height=H,
+                             width=H).pin(0).hold(2, "y").point_force((0, -100.0), at=1)
+    state = frame.solve_linear()
+    exact = stiffness_method(points, lines, [0, 1, 7], {1: (0, -100.0)}, hinged=True)
+    assert_allclose(at_nodes(frame, state), exact[:, :2], rtol=0, atol=1e-12)
+    assert np.all(np.isnan(frame.rotations(state)))
+    diagonal = 50.0 * np.hypot(0.5, 0.8) / 0.8
+    found = frame.solve_static().resultants((0.25, 0.4))
+    assert found.N == pytest.approx(-diagonal, rel=1e-4) and abs(found.M) < 1e-6
+
+
+def test_a_hinge_on_one_side():
+    """A beam clamped at one end and hinged at a node between two: 3 E I / L^3 beside E A."""
+    P = 2.0
+    frame = Frame.from_lines([(0, 0), (1, 0), (2, 0)], [(0, 1), (1, 2)], hinges=[(0, 1)],
+                             material=STEEL, height=H, width=H).clamp([0, 2])
+    u = frame.point_force((0, -P), at=1).solve_linear().displacement((1, 0))
+    assert u[1] == pytest.approx(-P / (6 * EI), rel=1e-10)
+
+
+def test_lees_frame_snaps_through():
+    """Limit loads in E I / L^2 of the stiffness of A = 6, I = 2, L = 120 by an extensible elastica.
+
+    18.556728 and -9.414432; Lee, Manuel, Rossow (1968) found 18.55 with others.
+    """
+    soft = StVenantKirchhoff(720.0, 0.3)
+    frame = Frame.from_lines([(0, 0), (0, 120), (24, 120), (120, 120)], [(0, 1), (1, 2), (2, 3)],
+                             elements=[4, 1, 4], material=soft, height=2.0, width=3.0)
+    unit = 720.0 * 2.0 / 120.0**2
+    path = frame.pin([0, 3]).point_force((0.0, -18.7 * unit), at=2).continuation()
+    found = [18.7 * point.state.load for point in path.critical_points[:2]]
+    assert_allclose(found, [18.556728, -9.414432], rtol=2e-4)
+
+
+def test_a_square_is_pulled_to_a_line_as_the_elastica():
+    """A square frame pulled at opposite corners is four clamped-guided elasticas.
+
+    Under P at a corner each half of a side is a cantilever with P / 2 at its tip at 45 degrees to
+    it: Bisshopp and Drucker (1945) with inclined load, integrated here by shooting.
+    """
+    h, L = 0.001, 1.0
+    soft = StVenantKirchhoff(2e11, 0.3)
+    EI, side = 2e11 * h**4 / 12, L * np.sqrt(0.5)
+    points = [(0, side), (side, 0), (0, -side), (-side, 0)]
+    frame = Frame.from_lines(points, [(0, 1), (1, 2), (2, 3), (3, 0)], elements=6, height=h,
+                             width=h, material=soft)
+    P = 8.0 * EI / L**2
+    frame.hold(2, "x", "y", "angle").hold(0, "x", "angle")
+    state = frame.point_force((0.0, P), at=0).solve_static()
+    # half a side: theta'' = -(P / 2 E I) sin(theta) of its angle to the load, pi / 4 at the corner
+    from scipy.integrate import solve_ivp
+
+    def half(k0):
+        return solve_ivp(lambda s, y: [y[1], 0.5 * P / EI * np.sin(y[0]), np.cos(y[0])],
+                         (0.0, L / 2), [np.pi / 4, k0, 0.0], rtol=1e-11, atol=1e-12)
+
+    k0 = brentq(lambda k: half(k).y[1, -1], -6.0, 0.0)
+    stretched = 4.0 * half(k0).y[2, -1] - 2.0 * side
+    assert state.displacement((0.0, side))[1] == pytest.approx(stretched, rel=1e-5)
+
+
+def test_a_curved_line_is_a_beam_on_a_curve():
+    def arc(s):
+        return np.array([-np.cos(np.pi * s), np.sin(np.pi * s)])
+
+    frame = Frame.from_lines([(-1, 0), (1, 0)], [(0, 1)], curves={0: arc}, elements=8,
+                             material=STEEL, height=H, width=H)
+    tip = frame.clamp(0).point_force((0, -50.0), at=1).solve_static().displacement((1, 0))
+    mesh = MeshBeam.init_curve(arc, np.linspace(0, 1, 9), H)
+    scene = Scene(Beam(mesh, ElementBeamCable(5), STEEL, width=H)).clamp("left", thickness="free")
+    assert_allclose(tip, scene.point_force((0, -50.0), (1, 0)).solve_static().displacement((1, 0)),
+                    rtol=1e-8)
+
+
+# modes and buckling
+
+
+def test_a_free_frame_has_three_zero_modes():
+    frame = Frame.from_lines([(0, 0), (0, 1), (1, 1), (1.5, 0.2)], [(0, 1), (1, 2), (2, 3), (0, 2)],
+                             material=STEEL, height=H, width=H)
+    frequencies = frame.modes(4).frequencies
+    assert np.all(np.abs(frequencies[:3]) < 1e-6 * frequencies[3])
+    assert len(frame.system.free_rigid_motions()) == 3
+
+
+def test_modes_of_a_portal_frame_by_beam_theory():
+    """Sway and first symmetric mode of an inextensible clamped portal frame of equal members.
+
+    From the dynamic stiffnesses of Bernoulli's beam, Clough and Penzien (1975).
+    """
+    def functions(b):
+        c, s, C, S = np.cos(b), np.sin(b), np.cosh(b), np.sinh(b)
+        D = 1 - c * C
+        return np.array([b * (s * C - c * S), b * (S - s), b**2 * s * S,
+                         b**3 * (s * C + c * S)]) / D
+
+    def sway(b):  # rotation of both corners alike, translation of the girder with its mass
+        near, far, coupled, shear = functions(b)
+        return (2 * near + far) * (2 * shear - b**4) - 2 * coupled**2
+
+    def symmetric(b):
+        near, far, *_ = functions(b)
+        return 2 * near - far
+
+    exact = [brentq(sway, 1.5, 2.0), brentq(symmetric, 3.0, 3.9)]
+    h = 1e-3
+    frequencies = portal(height=h, width=h, elements=2).modes(2).frequencies
+    assert_allclose(frequencies / np.sqrt(E * h**2 / (12 * 7800.0)), np.square(exact), rtol=1e-4)
+
+
+def test_a_portal_frame_buckles_sideways():
+    """k L tan(k L) = ... of a clamped portal under loads on its columns: 7.379 E I / L^2.
+
+    The sway of a column with a girder of stiffness 6 E I / L at its top, Timoshenko and Gere
+    (1961), 2.4: k L / tan(k L) = -6.
+    """
+    h = 1e-3
+    frame = portal(height=h, width=h, elements=2).point_force((0, -1.0), at="corners")
+    exact = brentq(lambda x: x / np.tan(x) + 6.0, 2.0, 3.0) ** 2
+    assert frame.buckling(1).factors[0] / (E * h**4 / 12) == pytest.approx(exact, rel=1e-4)
+
+
+# its parts
+
+
+def test_groups_are_beams_with_sections_of_their_own():
+    sections = {"girder": {"height": 0.04}, "columns": {"element": ElementBeamANCF(2)}}
+    frame = portal(groups={"columns": [0, 2], "girder": [1]}, sections=sections)
+    assert [beam.name for beam in frame.beams] == ["columns", "girder"]
+    assert frame.beam("girder").mesh.height == 0.04
+    state = frame.line_load((0, -1e3), beam="girder").solve_static()
+    assert state.reactions("ground").force[1] == pytest.approx(1e3, rel=1e-7)
+    section = Section.profile("I", width=0.05, web=0.005, flange=0.008)
+    other = portal(height=0.1, width=None, section=section)
+    assert other.beams[0].section is section
+
+
+def test_a_frame_of_meshio(tmp_path):
+    points = [[0, 0, 0], [0, 1, 0], [1, 1, 0], [1, 0, 0], [0.5, 1.1, 0], [9, 9, 9]]
+    mesh = meshio.Mesh(points, [("vertex", [[0], [3]]), ("line", [[0, 1], [2, 3]]),
+                                ("line3", [[1, 2, 4]])],
+                       cell_sets={"columns": [[], [0, 1], []], "girder": [[], [], [0]],
+                                  "ground": [[0, 1], [], []]}, point_sets={"top": [1, 2]})
+    options = {"material": STEEL, "height": H, "width": H}
+    frame = Frame.from_meshio(mesh, **options).clamp("ground")
+    assert {beam.name for beam in frame.beams} == {"columns", "girder"}
+    assert frame.points.shape == (2, 4) and frame.nodes("top").tolist() == [1, 2]
+    parabola = MeshBeam.init_curve(lambda s: np.array([s, 1 + 0.4 * s * (1 - s)]), [0, 1], H)
+    assert frame.beam("girder").mesh.lengths == pytest.approx(parabola.lengths)
+    numbers = [np.array([7, 7]), np.array([1, 1]), np.array([2])]
+    mesh = meshio.Mesh(points[:5], mesh.cells, cell_data={"gmsh:physical": numbers,
+                                                          "gmsh:geometrical": numbers},
+                       field_data={"columns": np.array([1, 1]), "girder": np.array([2, 1]),
+                                   "ground": np.array([7, 0])})
+    mesh.write(tmp_path / "portal.msh", file_format="gmsh22", binary=False)
+    again = Frame.from_meshio(tmp_path / "portal.msh", **options).clamp("ground")
+    force = {"force": (100.0, 0.0), "at": (0.0, 1.0)}
+    assert_allclose(again.point_force(**force).solve_static().u,
+                    frame.point_force(**force).solve_static().u, atol=1e-12)
+
+
+def test_a_frame_is_pickled_and_copied():
+    frame = portal().point_force((100.0, 0), at=1)
+    state = frame.solve_static()
+    again = pickle.loads(pickle.dumps(frame))
+    assert_allclose(again.solve_static().u, state.u, atol=1e-15)
+    assert isinstance(again, Frame) and again.nodes("corners").tolist() == [1, 2]
+
+
+def test_springs_and_other_joints_belong_to_it_too():
+    """A torsional spring, and what couples more than the nodes: a joint of a scene."""
+    k = 5.0
+    frame = Frame.from_lines([(0, 0), (1, 0)], [(0, 1)], material=STEEL, height=H, width=H)
+    frame.clamp(0).spring(k, between=((1, 0), ("ground", (1, -1)))).point_force((0, -1.0), at=1)
+    assert frame.system.condensed is not None
+    tip = frame.solve_linear().displacement((1, 0))[1]
+    assert tip == pytest.approx(-1 / (3 * EI + k), rel=1e-9)
+    held = Frame.from_lines([(0, 0), (1, 0)], [(0, 1)], material=STEEL, height=H, width=H)
+    held.clamp(0)
+    held.joint("line", at=(1, 0), direction=(1, 0))
+    state = held.moment(1, 1.0).solve_linear()
+    assert held.system.condensed is None
+    assert held.rotations(state)[1] == pytest.approx(1 / (4 * EI), rel=1e-9)
+
+
+def test_memory_is_linear():
+    """Bytes of a solution for each line do not grow with the frame."""
+    used = []
+    for n in (8, 16):
+        frame = square(n).point_force((10.0, 0), at="side")
+        tracemalloc.start()
+        try:
+            frame.solve_static()
+            used.append(tracemalloc.get_traced_memory()[1] / frame.net.lines.shape[1])
+        finally:
+            tracemalloc.stop()
+    assert used[1] < 1.3 * used[0]
+
+
+# what is refused
+
+
+@pytest.mark.parametrize("points, lines, options, error, message", [
+    (PORTAL[0], [(0, 1), (1, 7)], {}, MeshError, "line 1 joins the points .1, 7.*0 to 3"),
+    (PORTAL[0], [*PORTAL[1], (1, 1)], {}, MeshError, "line 3 has no length"),
+    (PORTAL[0], [*PORTAL[1], (2, 1)], {}, MeshError, "lines 1 and 3 are the same"),
+    ([*PORTAL[0], (5, 5)], PORTAL[1], {}, MeshError, "point 4 at .5, 5. is in no line"),
+    ([*PORTAL[0], (0, 1), (2, 2)], [*PORTAL[1], (4, 5)], {}, MeshError, "1 and 4 are both at"),
+    (*PORTAL, {"groups": {"a": [0, 1], "b": [1]}}, InputError, "line 1 is in the groups 'a' and"),
+    (*PORTAL, {"groups": {"a": [3]}}, MeshError, "'a' holds the number 3"),
+    (*PORTAL, {"sections": {"column": {}}, "groups": {"columns": [0]}}, NameUnknown, "columns"),
+    (*PORTAL, {"hinges": [(0, 3)]}, InputError, "line 0 does not end at node 3"),
+    (*PORTAL, {"elements": 0}, InputError, "elements must be an integer >= 1"),
+    (*PORTAL, {"height": None}, InputError, "height must be a number"),
+    (*PORTAL, {"curves": {0: lambda s: np.array([s, s])}}, MeshError, "curve of line 0 runs from"),
+    ("text", PORTAL[1], {}, InputError, "points are pairs"),
+    (np.zeros((4, 2)), PORTAL[1], {}, InputError, "transpose"),
+    (PORTAL[0], [(0, 0.5)], {}, InputError, "lines are numbers of points"),
+])
+def test_lines_that_make_no_frame(points, lines, options, error, message):
+    with pytest.raises(error, match=message):
+        Frame.from_lines(points, lines, **{"material": STEEL, "height": H, "width": H, **options})
+
+
+def test_what_is_not_held_is_said():
+    parts = Frame.from_lines([(0, 0), (1, 0), (5, 1), (6, 1)], [(0, 1), (2, 3)], material=STEEL,
+                             height=H, width=H).clamp(0)
+    with pytest.raises(SupportError, match="translation along.*of the part with line 1"):
+        parts.point_force((1, 0), at=2).solve_static()
+    mechanism = Frame.from_lines([(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 1), (1, 2), (2, 3), (3, 0)],
+                                 hinges="all", material=STEEL, height=H, width=H).pin([0, 1])
+    with pytest.raises(SupportError, match="rotation about"):
+        mechanism.point_force((1, 0), at=2).solve_static()
+
+
+@pytest.mark.parametrize("call, error, message", [
+    (lambda f: f.clamp("grund"), NameUnknown, "did you mean 'ground'"),
+    (lambda f: f.clamp((0.5, 0.5)), MeshError, "no node .* nearest is number"),
+    (lambda f: f.clamp(9), InputError, "number of a node"),
+    (lambda f: f.clamp(0, beam=0), InputError, "held and loaded at nodes"),
+    (lambda f: f.clamp(0, thickness="fixed"), InputError, 'thickness is "free"'),
+    (lambda f: f.hold(0, "z"), NameUnknown, "what is held"),
+    (lambda f: f.clamp(lambda x: x[0] > 7), MeshError, "selects none of the 4 nodes"),
+    (lambda f: f.clamp(lambda x: 1), InputError, "returns n truth values"),
+    (lambda f: f.gravity((0, -1)).solve_static(adapt=1e-3), InputError, "elements="),
+    (lambda f: Frame.from_meshio(meshio.Mesh([[0, 0]], []), material=STEEL), MeshError, "no lines"),
+    (lambda f: Frame.from_meshio("nothing.msh", material=STEEL), FileError, "nothing.msh"),
+    (lambda f: Frame.from_lines(*PORTAL, hinges="all", material=STEEL, height=H, width=H).clamp(0),
+     InputError, "pin it"),
+])
+def test_calls_that_mean_nothing(call, error, message):
+    with pytest.raises(error, match=message):
+        call(portal())
