@@ -441,17 +441,10 @@ class Constraints:
             values[:, 2] += shift[:, 0] * values[:, 1] - shift[:, 1] * values[:, 0]
             of_body, first = np.zeros(self.N, dtype=int), 0
             for beam, s in zip(self.members, self.slices):
-                if isinstance(beam, RigidBody):
-                    continue
                 ends = chain_ends(beam)
                 number = np.repeat(parts[first:first + len(ends)], ends[:, 1] - ends[:, 0] + 1)
                 of_body[s], first = np.repeat(number, beam.nd), first + len(ends)
-            who = self.frame.describe(parts)
-            # rigid bodies beside the frame move on their own
-            extra = [k for k, member in enumerate(self.members) if isinstance(member, RigidBody)]
-            for n, k in enumerate(extra):
-                of_body[self.slices[k]] = len(who) + n
-            bodies = [(name, origin, size) for name in [*who, *map(self._who, extra)]]
+            bodies = [(name, origin, size) for name in self.frame.describe(parts)]
             sizes = [size] * len(self.members)
         values /= np.stack([np.ones(self.N), np.ones(self.N), np.repeat(sizes, numbers)], axis=1)
         motions = sparse.csr_array((values.ravel(), (3 * of_body[:, None] + np.arange(3)).ravel(),

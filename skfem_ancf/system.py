@@ -651,7 +651,7 @@ class System:
         """What condenses a frame to its nodes; None of other scenes, and where more is coupled."""
         frame = self.constraints.frame
         if (frame is None or not self.constraints.condensable or not self.symmetric
-                or self.forces.far or self.bodies):
+                or self.forces.far):
             return None
         return Condensed(self.beams, self.slices, frame)
 
