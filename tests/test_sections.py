@@ -1,6 +1,7 @@
 """Profiles, layers and numbers: against beam theory, and scikit-fem's Q2 elements in the plane."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -51,22 +52,24 @@ def cantilever(beam, force=None, moment=None):
     return scene.solve_static()
 
 
-def plane(pieces, length, force, n=(80, 4)):
+def plane(pieces, length, force, n=(80, 4), height=None):
     """Displacement and stress at points of a clamped body of linear elasticity, pulled at x = L.
 
-    pieces: (bottom, top, material, width), from the bottom; force: the whole of it.
+    pieces: (bottom, top, material, width), from the bottom; force: the whole of it; height: of the
+    body, less than that of the pieces by a factor that is a function of x.
     """
     y = np.concatenate([np.linspace(a, b, n[1] + 1)[:-1] for a, b, _, _ in pieces]
                        + [[pieces[-1][1]]])
     mesh = MeshQuad.init_tensor(np.linspace(0, length, n[0] + 1), y).with_boundaries(
         {"left": lambda x: x[0] == 0, "right": lambda x: np.isclose(x[0], length)})
+    middle = mesh.p[1][mesh.t].mean(axis=0)
+    if height is not None:
+        mesh = replace(mesh, doflocs=np.array([mesh.p[0], mesh.p[1] * height(mesh.p[0])]))
     basis = Basis(mesh, ElementVector(ElementQuad2()))
 
     def at(y, of):
         which = np.clip(np.searchsorted([p[1] for p in pieces], y), 0, len(pieces) - 1)
         return np.array([of(p) for p in pieces])[which]
-
-    middle = mesh.p[1][mesh.t].mean(axis=0)
 
     def voigt(u):
         e = sym_grad(u)
@@ -83,7 +86,8 @@ def plane(pieces, length, force, n=(80, 4)):
 
     @LinearForm
     def load(v, w):
-        b = at(w.x[1], lambda p: p[3])
+        b = at(w.x[1] if height is None else w.x[1] / height(length), lambda p: p[3])
+        b = b if height is None else b / height(length)
         return b / area * (force[0] * v[0] + force[1] * v[1])
 
     K = asm(stiffness, basis)
@@ -247,14 +251,15 @@ def _reference(beam, x):
     return np.array(X).T[:, :, None], np.array(e)
 
 
-def plane_stress(basis, u, x, pieces):
+def plane_stress(basis, u, x, pieces, height=None):
     """Stress of the plane body at points, by the elements that hold them."""
     cells = basis.mesh.element_finder()(*x)
     X = basis.mapping.invF(x[:, :, None], tind=cells)
     grads = sum(u[basis.element_dofs[k, cells]][None, None, :, None] * basis.elem.gbasis(
         basis.mapping, X, k, tind=cells)[0].grad for k in range(basis.Nbfun))[..., 0]
     e = np.array([grads[0, 0], grads[1, 1], grads[0, 1] + grads[1, 0]])
-    D = np.array([hooke(p[2].E, p[2].nu, "stress") for y in x[1] for p in pieces
+    level = x[1] if height is None else x[1] / height(x[0])
+    D = np.array([hooke(p[2].E, p[2].nu, "stress") for y in level for p in pieces
                   if p[0] <= y < p[1]])
     return np.einsum("nij,jn->in", D, e)
 

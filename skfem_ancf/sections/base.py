@@ -88,7 +88,7 @@ class Section(Frozen):
     has_fields = True
 
     @staticmethod
-    def profile(name: str, **sizes: float) -> Section:
+    def profile(name: str, scaled: bool = False, **sizes: float) -> Section:
         """A profile of one material, as high as the mesh.
 
         Rules across it are Gauss rules of its width, exact to round-off for the polynomials of the
@@ -101,6 +101,10 @@ class Section(Frozen):
         name
             "rectangle" (width), "I" and "T" (width, web, flange; the flange of a T is at the top),
             "box" (width, wall), "tube" (wall) or "circle".
+        scaled
+            For a mesh whose height varies: sizes are those where it is largest. Flanges and the
+            lower and upper walls of a box are the same part of the height everywhere; webs and
+            widths stay. A tube is scaled as a whole, a circle always.
         **sizes
             Width over all, thickness of the web, of a flange and of the walls.
 
@@ -124,7 +128,7 @@ class Section(Frozen):
         """
         from .profiles import Profile
 
-        return Profile(name, **sizes)
+        return Profile(name, scaled, **sizes)
 
     @staticmethod
     def layers(*layers: Any, width: float | Callable[..., Any] | None = None) -> Section:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import CallError, InputError, require_option, require_positive
+from ..errors import CallError, InputError, require_flag, require_option, require_positive
 from .base import Section, Slab, slab_of
 from .measure import Piece, Weighted
 
@@ -25,12 +25,15 @@ class Profile(Section):
     ----------
     name
         One of :data:`SIZES`.
+    scaled
+        On a tapered mesh what lies across the height is the same part of it everywhere.
     **sizes
         Its sizes.
     """
 
-    def __init__(self, name: str, **sizes: float) -> None:
+    def __init__(self, name: str, scaled: bool = False, **sizes: float) -> None:
         self.name = require_option("profile", name, SIZES)
+        self.scaled = require_flag("scaled", scaled)
         wanted = SIZES[name]
         if set(sizes) != set(wanted):
             raise CallError(
@@ -79,9 +82,11 @@ class Profile(Section):
     def slabs(self, mesh: MeshBeam, material: Any) -> list[Slab]:
         pieces = self.pieces(mesh.height)
         fixed = self.name not in ("rectangle", "circle")
-        if fixed and mesh.heights is not None:
-            raise InputError(f"{self!r} has thicknesses that stay: on a tapered mesh give the "
-                             "width as a function of (x, y), or weld beams of constant height")
+        if fixed and mesh.heights is not None and not self.scaled:
+            raise InputError(
+                f"{self!r} has thicknesses that stay, and jumps of its width must be at one part "
+                "of the height all along: on a tapered mesh give scaled=True, by which flanges and "
+                "walls get thinner with the height, or weld beams of constant height")
         if self.name == "rectangle":
             return [slab_of(material, self.sizes["width"])]
         measure = Weighted(pieces)
@@ -92,7 +97,7 @@ class Profile(Section):
 
     def __repr__(self) -> str:
         sizes = "".join(f", {k}={v:g}" for k, v in self.sizes.items())
-        return f"Section.profile({self.name!r}{sizes})"
+        return f"Section.profile({self.name!r}{', scaled=True' * self.scaled}{sizes})"
 
 
 class _Chord:
