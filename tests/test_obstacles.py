@@ -240,6 +240,48 @@ def test_an_elastica_between_walls_touches_one_in_a_point():
     assert abs(top.total[1] - 2 * found.p[1] + 5e-3) < 2e-3 * abs(top.total[1])
 
 
+def test_an_elastica_between_walls_touches_both():
+    """A strip held in its middle's height buckles to an S, and touches each wall in a point."""
+    h, d, way, m = 0.004, 0.028, 0.009, 2e-3
+    b = beam(ElementBeamCable(5), 32, height=h, nu=0.0)
+    scene = Scene(b).clamp("left").fix("right", "r^1", -way).fix("right", ["r^2", "r_X^2"])
+    scene.fix(lambda x: np.abs(x[0] - 0.5) < 1e-9, "r^2").moment((0.5, 0), m)
+    scene.obstacle(Line((0, 0.03), (0, -1)), stiffness=1e10)
+    scene.obstacle(Line((0, -0.03), (0, 1)), stiffness=1e10)
+    state = scene.solve_static(first_step=0.1)
+    walls = state.contact(0), state.contact(1)
+    assert state.stability == "stable" and max(w.penetration for w in walls) < 5e-6
+    EI, EA = 2e8 * 0.01 * h**3 / 12, 2e8 * 0.01 * h
+
+    def right(s, y, p):
+        """Angle, moment, x, y from the clamp to the wall, and from there to the middle."""
+        thrust, shear, wall, at = p
+        out = []
+        for z, V, length in ((y[:4], shear, at), (y[4:], shear + wall, 0.5 - at)):
+            cos, sin = np.cos(z[0]), np.sin(z[0])
+            stretch = 1 - (thrust * cos - V * sin) / EA
+            out += [length * f for f in (z[1] / EI, -thrust * sin - V * cos, stretch * cos,
+                                         stretch * sin)]
+        return np.array(out)
+
+    def ends(a, b, p):
+        return np.array([a[0], a[2], a[3], b[0], b[3] + d, a[4], a[5] - b[1], a[6] - b[2],
+                         a[7] + d, b[5] - m / 2, b[6] - 0.5 + way / 2, b[7]])
+
+    s = np.linspace(0, 1, 41)
+    wave = 0.5 * d * (np.cos(np.pi * s) - 1)
+    guess = np.array([-0.2 * np.sin(np.pi * s), -EI * np.cos(np.pi * s), 0.3 * s, wave,
+                      0.2 * np.sin(np.pi / 2 * s), EI * np.cos(np.pi / 2 * s), 0.3 + 0.2 * s,
+                      -d * np.cos(np.pi / 2 * s)])
+    found = solve_bvp(right, ends, s, guess, p=[18 * np.pi**2 * EI, 0.1, -0.3, 0.31], tol=1e-8)
+    assert found.success
+    thrust, _, wall, at = found.p
+    assert abs(state.reactions("left").force[0] / thrust - 1) < 3e-3
+    assert abs(walls[1].total[1] / abs(wall) - 1) < 1e-2
+    assert np.allclose(walls[0].total, -walls[1].total, rtol=1e-6, atol=1e-9)
+    assert np.allclose(walls[1].points.mean(axis=1)[0], found.y[2, -1], atol=0.01)
+
+
 def test_a_rope_on_a_pulley_has_the_capstan_ratio():
     """exp(mu pi) where it slips all round, pulled against a spring; Euler, Eytelwein."""
     R, h, k, mu = 0.5, 0.004, 1e3, 0.3
