@@ -160,7 +160,11 @@ def modes(system: System, state: State, k: int) -> Modes:
     SupportError
         If joints are not independent in this state.
     """
-    system.forces.contacts.recall(state._memory)
+    with state.contact_memory():
+        return _modes(system, state, k)
+
+
+def _modes(system, state, k):
     tangent = StrainTangent(system, state.u, state.load, state.t, state.multipliers)
     if tangent.size[0] <= DENSE:
         tangent.require_independent()

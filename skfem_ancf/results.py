@@ -20,6 +20,7 @@ from .section_forces import NotRecovered
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+    from contextlib import AbstractContextManager
     from pathlib import Path
 
     from numpy.typing import ArrayLike
@@ -159,6 +160,10 @@ class State(Frozen):
             lines.append(f"  equilibrium: {self.verdict}")
         return "\n".join(lines + [f"  {line}" for line in str(self.checks).splitlines()])
 
+    def contact_memory(self) -> AbstractContextManager[None]:
+        """What its points remember of obstacles, lent to the equations while it is asked."""
+        return self.system.forces.contacts.lent(self._memory)
+
     @property
     def verdict(self) -> Verdict | None:
         """What the tangent says of an equilibrium: a
@@ -167,8 +172,8 @@ class State(Frozen):
         from .statics.stability import verdict
 
         if self._verdict is None and self.t is None:
-            self.system.forces.contacts.recall(self._memory)
-            self._verdict = verdict(self.system, np.array(self.u), self.load, self.multipliers)
+            with self.contact_memory():
+                self._verdict = verdict(self.system, np.array(self.u), self.load, self.multipliers)
         return self._verdict
 
     @property
@@ -532,15 +537,15 @@ class State(Frozen):
     @property
     def strain_energy(self) -> float:
         """Strain energy of the scene."""
-        self.system.forces.contacts.recall(self._memory)
-        return self.system.strain_energy(self.u, self.load if self.t is None else self.t)
+        with self.contact_memory():
+            return self.system.strain_energy(self.u, self.load if self.t is None else self.t)
 
     @property
     def internal_force(self) -> Array:
         """Internal force on all coordinates, shape (N,)."""
         if self._force is None:
-            self.system.forces.contacts.recall(self._memory)
-            self._force = self.system.internal_force(self.u, self.t, self.load)
+            with self.contact_memory():
+                self._force = self.system.internal_force(self.u, self.t, self.load)
         return self._force
 
     def reactions(self, boundary: Place | None, beam: WhichMember = None) -> Reaction:

@@ -1308,7 +1308,6 @@ class Scene:
         system = self.system
         system.require_supports()
         zero, none = np.zeros(system.N), np.zeros(system.m)
-        system.forces.contacts.recall(None)
         force, _ = system.assemble(zero, 1.0, geometric=False)
         du0 = np.zeros(system.N)
         du0[system.fixed] = system.values(1.0)

@@ -275,7 +275,7 @@ def test_an_elastica_between_walls_touches_both():
                       -d * np.cos(np.pi / 2 * s)])
     found = solve_bvp(right, ends, s, guess, p=[18 * np.pi**2 * EI, 0.1, -0.3, 0.31], tol=1e-8)
     assert found.success
-    thrust, _, wall, at = found.p
+    thrust, wall = found.p[[0, 2]]
     assert abs(state.reactions("left").force[0] / thrust - 1) < 3e-3
     assert abs(walls[1].total[1] / abs(wall) - 1) < 1e-2
     assert np.allclose(walls[0].total, -walls[1].total, rtol=1e-6, atol=1e-9)
@@ -328,6 +328,32 @@ def test_friction_holds_what_sticks_and_gives_way_at_its_limit():
     assert np.allclose(held.contact().total, [-0.5 * limit, pressure * 0.01], rtol=2e-2)
     assert np.allclose(slipped.contact().total, [-limit, pressure * 0.01], rtol=2e-2)
     assert slipped.displacement((0, 0))[0] > 1.0
+
+
+def test_states_own_what_they_remember_of_obstacles():
+    """Asked in any order, between load steps too, they say the same; nothing is left behind."""
+    scene = Scene(beam(ElementBeamCable(5), 16)).clamp("left").gravity((0, -9.81)).point_force(
+        (1e-2, 0), (1, 0))
+    scene.obstacle(Line((0, -0.05)), method="augmented", stiffness=1e9, friction=0.5)
+    memory = scene.system.forces.contacts.tables.memory
+    state = scene.solve_static(first_step=0.5)
+    assert not np.any(memory) and np.any(state._memory)
+
+    def said(one):
+        one = one.replace(message="again")  # which keeps nothing of what it was asked
+        return [one.contact().total, one.strain_energy, one.verdict.stability,
+                one.modes(1).frequencies if hasattr(one, "modes") else 0.0]
+
+    first = said(state)
+    free = scene.state(np.array(state.u))
+    assert not np.allclose(said(free)[0], first[0])
+    for a, b in zip(said(state), first):
+        assert np.all(a == b)
+    assert scene.modes(1, state).frequencies == pytest.approx(scene.modes(1, state).frequencies)
+    assert not np.any(memory)
+    with pytest.raises(ConvergenceError):
+        scene.solve_static(max_iterations=1, min_step=0.5)
+    assert not np.any(memory)
 
 
 def test_the_augmented_lagrangian_leaves_the_penetration_that_was_asked_for():

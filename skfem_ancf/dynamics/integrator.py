@@ -141,7 +141,6 @@ class Integrator:
             Time, and the step in which functions of time are asked.
         """
         s = self.system
-        s.forces.contacts.recall(None)
         y = Motion(t, u.copy(), v.copy(), np.zeros(s.N), np.zeros(s.N),
                    np.zeros(s.m))
         y.u[s.fixed] = s.values(1.0, t)
@@ -196,7 +195,6 @@ class Integrator:
         The number of steps done, and a function that gives the Motion after each.
         """
         s, before = self.system, self._state.copy()
-        s.forces.contacts.recall(None)  # states may have been asked meanwhile
         course = self._courses.of(y.t if start is None else start, dt, first, n,
                                   (first, first + n) if block is None else block, self.limit)
         if dt != self._dt:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from .contact_texts import (ANCHORED, FRICTION, HEADER, MEMORY, NOW, OWN, POSE, 
                             of_contacts, places, resist, slope_of, stick, surface, velocities)
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from ..types import Array
 
@@ -69,8 +70,6 @@ class Contacts:
         A :class:`~skfem_ancf.forces.contact_texts.ContactTables`.
     moving, own
         True if an obstacle moves; if one has a shape of one's own.
-    begun
-        The memory that load steps have begun with.
     """
 
     def __init__(self, elements: Sequence[Any]) -> None:
@@ -81,7 +80,6 @@ class Contacts:
         poses = np.zeros(POSES * len(self.obstacles))
         self.put(0.0, 0.0, poses)
         self.tables = self._make(poses)
-        self.begun: Any = None
 
     def _make(self, poses):
         n = len(self._groups)
@@ -148,8 +146,28 @@ class Contacts:
         """True if an obstacle has friction."""
         return any(one.friction > 0.0 for one in self.obstacles)
 
-    def recall(self, memory: Array | None) -> None:
-        """Go on with what :meth:`remember` gave, or with nothing: no friction, no reach.
+    @contextmanager
+    def lent(self, memory: Array | None = None) -> Iterator[None]:
+        """For the time of an evaluation points have the memory of a state.
+
+        States own their memories; tables have one only while a state, or a way of load steps, asks
+        something, and what they had before is put back. So the order in which states are asked
+        does not matter, and a motion has none.
+
+        Parameters
+        ----------
+        memory
+            What :meth:`remember` gave, shape (n,), or None: no anchors, no reach.
+        """
+        before = self.tables.memory.copy()
+        try:
+            self.put_back(memory)
+            yield
+        finally:
+            self.put_back(before)
+
+    def put_back(self, memory: Array | None) -> None:
+        """Go on with what :meth:`remember` gave, or with nothing: no anchors, no reach.
 
         Parameters
         ----------
@@ -163,7 +181,7 @@ class Contacts:
         memory = self.tables.memory
         return memory.copy() if np.any(memory) else None
 
-    def begin(self, u: Array, t: float, memory: Array | None = None) -> None:
+    def begin(self, u: Array, t: float, memory: Array | None = None) -> Array | None:
         """Points stick from here on, and nothing reaches beyond the surface.
 
         Parameters
@@ -174,20 +192,24 @@ class Contacts:
             Load factor.
         memory
             What :meth:`remember` gave at this displacement, shape (n,), to go on from; or None.
+
+        Returns
+        -------
+        ndarray or None
+            The memory that load steps begin with, shape (n,).
         """
-        self.recall(memory)
+        self.put_back(memory)
         if memory is None and self.anchored:
             self.settle(u, t)
             self.tables.memory[ANCHORED] = 1.0
-        self.begun = self.remember()
+        return self.remember()
 
     def require_path(self) -> None:
-        """Begin a path by arc length; raises InputError where there is none."""
+        """Raise InputError where there is no path by arc length."""
         for one in self.obstacles:
             if one.friction > 0.0 or one.moves or one.method != "penalty":
                 raise InputError(f"continuation knows obstacles that rest, without friction and by "
                                  f"penalty, not {one!r}: use solve_static")
-        self.recall(None)
 
     def require_free(self, u: Array, what: str, instead: str) -> None:
         """Raise InputError if a linear solution enters an obstacle.

@@ -77,13 +77,14 @@ def contact_of(state: State, obstacle: Any = None) -> Contact:
         raise InputError("the scene has no obstacle: scene.obstacle(Circle((0, -1), 0.5)) adds one")
     which = None if obstacle is None else require_index("obstacle", obstacle,
                                                         len(contacts.obstacles))
-    contacts.recall(state._memory)
     found: list[list[Array]] = [[np.zeros((2, 0))], [np.zeros((2, 0))], [np.zeros(0)],
                                 [np.zeros(0)]]
     nearest = np.inf
     t = state.load if state.t is None else state.t
     v = None if state.t is None else np.array(state.v)
-    for k, *values in contacts.pushes(np.array(state.u), v, t):
+    with state.contact_memory():
+        pushes = contacts.pushes(np.array(state.u), v, t)
+    for k, *values in pushes:
         if which is None or k == which:
             nearest = min(nearest, float(values[3].min()))
             for column, x in zip(found, values):

@@ -152,17 +152,25 @@ def solve_static(system: System, u: Array | None = None, method: str = "mixed", 
     if not 0.0 < require_positive("first_step", first_step) <= 1.0:
         raise InputError(f"first_step must lie in (0, 1], got {first_step!r}")
     max_iterations = require_integer("max_iterations", max_iterations, 1, MAX_ITERATIONS)
+    with system.forces.contacts.lent():
+        return _load_steps(system, u, memory, stable, (first_step, min_step),
+                           (method, tol, max_iterations), progress)
+
+
+def _load_steps(system, u, memory, stable, steps, options, progress):
+    """As :func:`solve_static`, with options that are known to be good."""
+    (first_step, min_step), max_iterations = steps, options[-1]
     origin, contacts = (np.zeros(system.N), None), system.forces.contacts
-    contacts.begin(origin[0] if u is None else u, 0.0 if u is None else 1.0, memory)
+    memory = contacts.begin(origin[0] if u is None else u, 0.0 if u is None else 1.0, memory)
     if u is not None:
         u = require_finite("u", u, (system.N,))
         missing = system.external_force(u) - system.internal_force(u)
         origin = u.copy(), missing * system.mask
     u = origin[0].copy()
     result = StaticResult(u, np.zeros(system.m), 0.0, np.zeros(system.N), [], False,
-                          "no load step has converged")
+                          "no load step has converged", memory=memory)
     step, cuts = float(first_step), 0
-    options = origin, method, tol, max_iterations
+    options = origin, *options
     with progress_bar(progress, total=1.0, desc="load") as bar:
         while result.load < 1.0:
             load = min(1.0, result.load + step)
@@ -249,7 +257,7 @@ def _step(system, result, load, options, record, stable):
 def _augmented(system, result, load, options, record, at):
     """The equilibrium, again until obstacles that ask for it are entered no deeper than that."""
     contacts = system.forces.contacts
-    contacts.recall(result.memory if result.steps else contacts.begun)
+    contacts.put_back(result.memory)
     found = _iterate(system, result, load, *options, record)
     if not contacts.augmented:
         return found
