@@ -654,3 +654,31 @@ def test_a_motion_that_does_not_go_on_with_friction_says_what_helps(monkeypatch)
         scene.integrate(1e-2, 1e-3)
     with pytest.raises(ConvergenceError, match="slip_speed"):
         scene.obstacle(Line((0, -0.6)), friction=0.3).integrate(1e-2, 1e-3)
+
+
+def test_what_would_stick_creeps_in_a_motion_at_the_speed_that_the_guide_says():
+    """On a slope: m dv/dt = m g sin - mu m g cos v / sqrt(v^2 + s^2), after many of its times."""
+    slope, speed, mu = np.radians(20), 0.02, 0.5
+    g = 9.81 * np.array([-np.sin(slope), -np.cos(slope)])
+    b = beam(ElementBeamCable(3), 2, height=0.02)
+    scene = Scene(b).gravity(g).obstacle(Line((0, -0.01)), friction=mu, stiffness=1e8, damping=10.0,
+                                         slip_speed=speed)
+    history = scene.integrate(0.15, 1e-3, scheme="generalized-alpha")
+    r = np.tan(slope) / mu
+    assert abs(-history.momentum[-1, 0] / b.total_mass / (
+        speed * r / np.sqrt(1 - r * r)) - 1) < 0.05
+
+
+@pytest.mark.parametrize("ratio", [1.0, 0.1])
+def test_an_impact_goes_in_as_deep_as_the_guide_says(ratio):
+    """v sqrt(density height / stiffness); an augmented obstacle is refused, which says so."""
+    b, h = beam(ElementBeamCable(5), 4, height=0.02), 0.02
+    stiffness = ratio * 2e8 / h
+    time = np.sqrt(7800 * h / stiffness)
+    scene = Scene(b).gravity((0, -9.81)).obstacle(Line((0, -0.02)), stiffness=stiffness, width=1e-7)
+    history = scene.integrate(0.05, 0.5 * time)
+    deepest = max(state.contact().penetration for state in history)
+    assert abs(deepest / (np.sqrt(2 * 9.81 * 0.01) * time) - 1) < 0.05
+    refused = Scene(b).gravity((0, -9.81)).obstacle(Line((0, -0.02)), method="augmented")
+    with pytest.raises(InputError, match="penetration"):
+        refused.integrate(0.05, 1e-3)

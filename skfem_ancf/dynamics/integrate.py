@@ -112,6 +112,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     task = _task(t_start, t_end, dt, t_eval, tol, rtol, [
         *np.atleast_1d(breakpoints), *_samples(system, t_start, t_end)])
     system.require_independent_joints()
+    system.forces.contacts.require_motion()
     run = Run(system, scheme, task, sensors)
     if until is not None:
         if checkpoint is not None:

@@ -211,6 +211,17 @@ class Contacts:
                 raise InputError(f"continuation knows obstacles that rest, without friction and by "
                                  f"penalty, not {one!r}: use solve_static")
 
+    def require_motion(self) -> None:
+        """Raise InputError if an obstacle is of load steps only."""
+        for one in self.obstacles:
+            if one.method == "augmented":
+                raise InputError(
+                    f"{one!r} has method='augmented', which corrects pressures after a load step: "
+                    "in a motion each correction would do work that nothing pays for. Take "
+                    "'penalty': a body that arrives with the speed v goes in by v sqrt(density "
+                    "height / stiffness), so stiffness = density height (v / penetration)^2, and "
+                    "dt about sqrt(density height / stiffness)")
+
     def require_free(self, u: Array, what: str, instead: str) -> None:
         """Raise InputError if a linear solution enters an obstacle.
 

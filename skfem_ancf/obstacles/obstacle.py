@@ -58,7 +58,7 @@ class Obstacle(ForceElement):
         The beam, its name or its number; all of the scene by default.
     method
         "penalty", or "augmented": in statics each load step is solved again with the pressures
-        that it has found, until the penetration is less than ``tolerance``. A motion has the
+        that it has found, until the penetration is less than ``tolerance``. A motion takes the
         penalty alone.
     position
         A function of time that returns the displacement (x, y) of the shape from where it was
