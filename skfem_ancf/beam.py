@@ -568,6 +568,11 @@ class Beam(Frozen):
         """The local functions of the elements as a :class:`~skfem_ancf.series.Series`."""
         return Series(self.element, self.mesh.height)
 
+    @cached_property
+    def scales(self) -> Array:
+        """What the local functions of each element are times those of length 1, (ne, nb)."""
+        return read_only(self.series.scales(self.mesh.lengths))
+
     @_fields
     def stress(self, u: Array, X: Array, tind: Array | None = None) -> Array:
         """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy), force per area of the stress-free body.

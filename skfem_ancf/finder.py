@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 
 from .errors import MeshError
+from .mapping import cross
 
 if TYPE_CHECKING:
     from .mesh import MeshBeam
@@ -122,9 +123,11 @@ class Finder:
         k = int(d.argmin())
         if not d[k] <= self._far**2:
             return False if d[k] > self._far**2 else None
-        e, xi = k // SAMPLES, (k % SAMPLES + 0.5) / SAMPLES
+        e, (x0, y0, a, b, c, d) = k // SAMPLES, self._steps[k]
+        xi = (k % SAMPLES + 0.5) / SAMPLES + a * (x - x0) + b * (y - y0)
+        eta = 0.5 + c * (x - x0) + d * (y - y0)
         for _ in range(3):
-            found = self.mapping.find_in(e, x, y, xi)
+            found = self.mapping.find_in(e, x, y, xi, eta)
             if found is None:
                 return None
             # as in _near
@@ -132,7 +135,7 @@ class Finder:
                      if found[0] > 1.0 + noise else -1)
             if other < 0:
                 return e, *found
-            e, xi = int(other), 0.5
+            e, xi, eta = int(other), 0.5, 0.5
         return None
 
     def _find(self, x, noise):
@@ -173,6 +176,15 @@ class Finder:
     def _samples(self):
         samples = np.array([(np.arange(SAMPLES) + 0.5) / SAMPLES, np.full(SAMPLES, 0.5)])
         return self.mapping.F(samples).reshape(2, -1)
+
+    @cached_property
+    def _steps(self):
+        """Of each sample its place, and the inverse of the derivatives of the map there."""
+        e, xi = np.divmod(np.arange(SAMPLES * self.mesh.nelements), SAMPLES)
+        J0, J1, _ = self.mapping.derivatives(e, (xi + 0.5) / SAMPLES, 0.5)
+        det = cross(J0, J1)
+        return np.array([*self._samples, J1[1] / det, -J1[0] / det, -J0[1] / det,
+                         J0[0] / det]).T.tolist()
 
     @cached_property
     def _far(self):

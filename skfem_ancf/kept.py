@@ -29,7 +29,7 @@ def kept(store: dict, key: Hashable, make: Callable[[], Any], most: int = 32) ->
     found = store.get(key)
     if found is None:
         found = make()
-        for old in list(store)[:max(len(store) - most + 1, 0)]:
-            store.pop(old, None)
+        while len(store) >= most:
+            store.pop(next(iter(store)), None)
         store[key] = found
     return found

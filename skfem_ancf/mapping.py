@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .types import Array
 
 #: Corrections of Newton's method that are small enough.
-CLOSE = 1e-8
+CLOSE = 1e-7
 
 _FACET_POINTS = (  # the point of the reference cell at X on facet bottom, right, top, left
     lambda s: (s, 0.0 * s), lambda s: (1.0 + 0.0 * s, s),
@@ -47,6 +47,9 @@ def cross(a: Array, b: Array) -> Array:
 
 def _polynomial(coefficients, xi):
     """A polynomial, its lowest coefficient first, and its derivative, by Horner's rule."""
+    if len(coefficients) == 2:  # of nearly all directors, for single points
+        a, b = coefficients
+        return a + xi * b, b + 0.0 * xi
     value, slope = coefficients[-1], 0.0
     for c in coefficients[-2::-1]:
         slope = value + xi * slope
@@ -68,8 +71,10 @@ def correction(axis: Any, director: Any, gap: Sequence[Any], xi: Any, eta: Any
     xi, eta
         The reference point so far.
     """
-    (x, dx), (y, dy) = (_polynomial(c, xi) for c in axis)
-    (nx, dnx), (ny, dny) = (_polynomial(c, xi) for c in director)
+    (_, a, b, c), (_, p, q, r) = axis
+    x, y = xi * (a + xi * (b + xi * c)), xi * (p + xi * (q + xi * r))
+    dx, dy = a + xi * (2.0 * b + 3.0 * xi * c), p + xi * (2.0 * q + 3.0 * xi * r)
+    (nx, dnx), (ny, dny) = _polynomial(director[0], xi), _polynomial(director[1], xi)
     Y = eta - 0.5
     x, y = gap[0] - x - Y * nx, gap[1] - y - Y * ny
     ax, ay = dx + Y * dnx, dy + Y * dny
@@ -327,7 +332,8 @@ class MappingBeam(Mapping):
                 break
         return X
 
-    def find_in(self, e: int, x: float, y: float, xi: float) -> tuple[float, float] | None:
+    def find_in(self, e: int, x: float, y: float, xi: float, eta: float = 0.5
+                ) -> tuple[float, float] | None:
         """The reference point of one point, as :meth:`invF` says; None if it is far outside.
 
         Parameters
@@ -336,11 +342,11 @@ class MappingBeam(Mapping):
             The element.
         x, y
             The point.
-        xi
+        xi, eta
             To start from.
         """
         (x0, y0), axis, director = self._numbers(e)
-        gap, eta = (x - x0, y - y0), 0.5
+        gap = x - x0, y - y0
         for _ in range(8):
             try:
                 d, f = correction(axis, director, gap, xi, eta)

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 #: Types of numbers of which nothing has to be asked.
 PLAIN = (float, int, np.float64)
+#: How far from the middle of the section, relative to its height, the axis of a cable reaches.
+ON_AXIS = 1e-12
 
 #: Coordinates beyond which a point is looked at before it is looked for.
 HUGE = 1e300
@@ -116,6 +118,7 @@ class Part:
             known["e"], known["X"] = e, X
         if place is not None:
             known["place"] = place
+            known["off_axis"] = not beam.has_sections and abs(place[2] - 0.5) > ON_AXIS
 
     @cached_property
     def e(self) -> Array:
@@ -149,8 +152,8 @@ class Part:
         if self.beam.has_sections:
             return False
         if self.n == 1:
-            return abs(self.place[2] - 0.5) > 1e-12
-        return bool(np.any(np.abs(self.X[1] - 0.5) > 1e-12))
+            return abs(self.place[2] - 0.5) > ON_AXIS
+        return bool(np.any(np.abs(self.X[1] - 0.5) > ON_AXIS))
 
     @cached_property
     def dofs(self) -> Array:
@@ -159,32 +162,42 @@ class Part:
         first = self.coordinates.start + beam.mesh.t[0, self.e] * beam.nd
         return first + np.arange(2 * beam.nd).reshape(-1, 2, 1)
 
-    def _table(self, table):
+    def _table(self, which):
+        """The local functions, 0, or their derivatives by xi, 1: (nb, n)."""
         beam, series = self.beam, self.beam.series
         if beam.mesh.heights is not None:  # no polynomial of xi that elements share
             rows = beam.element.of_mesh(beam.mesh.mapping(), self.at, self.e)
-            return rows[int(table is series.along)][..., 0] * series.scale(beam, self.e)
+            return rows[which][..., 0] * beam.scales[self.e].T
         if self.n == 1:
             e, xi, eta = self.place
-            return series.at(table, xi, eta)[:, None] * series.scale(beam, e)[:, None]
-        return series.values(table, self.X) * series.scale(beam, self.e)
+            return (series.at(series.tables[which], xi, eta) * beam.scales[e])[:, None]
+        return series.values(series.tables[which], self.X) * beam.scales[self.e].T
 
     @cached_property
     def weights(self) -> Array:
         """Of these coordinates in the position, (nb, n)."""
-        return self._table(self.beam.series.value)
+        return self._table(0)
 
     @cached_property
     def slopes(self) -> Array:
         """Of these coordinates in the derivative of the position by xi, (nb, n)."""
-        return self._table(self.beam.series.along)
+        return self._table(1)
 
     @cached_property
     def one(self) -> tuple[Array, Array]:
         """Coordinates (2, nb) and weights (nb,) of a single point on which it depends linearly."""
-        return self._one_dofs, self.weights[:, 0]
+        return self._one_dofs(), self._table(0)[:, 0]
 
     @cached_property
+    def _one_with_slope(self):
+        """Coordinates (2, nb) of a single point, and weights in its place and slope, (nb, 2)."""
+        beam, (e, xi, eta) = self.beam, self.place
+        if beam.mesh.heights is None:
+            both = beam.series.at(beam.series.tables, xi, eta) * beam.scales[e]
+        else:
+            both = np.array([self._table(0)[:, 0], self._table(1)[:, 0]])
+        return self._one_dofs(), both.T
+
     def _one_dofs(self):
         beam = self.beam
         first = self.coordinates.start + beam.mesh.t[0, self.place[0]] * beam.nd
@@ -211,10 +224,20 @@ class Part:
 
     def displacement(self, u: Array) -> Array:
         """Displacements (..., 2, n) for coordinates ``u`` (..., N) of the scene."""
-        out = self.combine(self.weights, u)
-        if self.off_axis:
-            out += self._lever * _turned(self._tangent(u) - self._tangent0)
-        return out
+        if not self.off_axis:
+            return self.combine(self.weights, u)
+        alone = self.n == 1 and u.ndim == 1
+        if alone:  # by numbers, which is many times faster
+            dofs, weights = self._one_with_slope
+            (x, ax), (y, ay) = (u[dofs] @ weights).tolist()
+        else:
+            x, y = np.moveaxis(self.combine(self.weights, u), -2, 0)
+            ax, ay = np.moveaxis(self.combine(self.slopes, u), -2, 0)
+        lever, bx, by, tx, ty = self._section
+        ax, ay = ax + bx, ay + by
+        size = (ax * ax + ay * ay) ** 0.5
+        moved = x - lever * (ay / size - ty), y + lever * (ax / size - tx)
+        return np.array(moved)[:, None] if alone else np.stack(moved, -2)
 
     def velocity(self, u: Array, v: Array) -> Array:
         """Velocities (..., 2, n).
@@ -226,11 +249,12 @@ class Part:
         """
         out = self.combine(self.weights, v)
         if self.off_axis:
-            a, rate = self._start_slope + self.combine(self.slopes, u), self.combine(self.slopes, v)
-            size = np.sqrt(np.sum(a * a, axis=-2, keepdims=True))
-            t = a / size
-            out += self._lever * _turned(
-                (rate - t * np.sum(t * rate, axis=-2, keepdims=True)) / size)
+            lever, bx, by, _, _ = self._section
+            ax, ay = np.moveaxis(self.combine(self.slopes, u), -2, 0)
+            px, py = np.moveaxis(self.combine(self.slopes, v), -2, 0)
+            ax, ay = ax + bx, ay + by
+            turn = lever * (ax * py - ay * px) / (ax * ax + ay * ay) ** 1.5
+            out -= np.stack([turn * ax, turn * ay], -2)
         return out
 
     def strain(self, u: Array) -> Array:
@@ -244,7 +268,7 @@ class Part:
         beam = self.beam
         if self.n > 1:
             return beam.kinematics.strain_at(beam, u[self.coordinates], self.e, self.X)
-        return self._strain_at(u[self._one_dofs])[:, None]
+        return self._strain_at(u[self._one_dofs()])[:, None]
 
     @cached_property
     def _strain_at(self):
@@ -263,28 +287,23 @@ class Part:
                                       self.e)[..., 0]
 
     @cached_property
-    def _lever(self):
-        return np.ravel(self.beam.mesh.mapping().offset(self.at, self.e))
+    def _section(self):
+        """How far the points are from the axis, its slope in the stress-free body and its tangent.
 
-    @cached_property
-    def _start_slope(self):
-        q0 = self.beam.q0_local
-        if self.n == 1:
-            return q0[self.one[0] - self.coordinates.start] @ self.slopes
-        return sum(w * q0[d - self.coordinates.start] for w, d in zip(self.slopes, self.dofs))
-
-    @cached_property
-    def _tangent0(self):
-        return self._start_slope / np.hypot(*self._start_slope)
-
-    def _tangent(self, u):
-        a = self._start_slope + self.combine(self.slopes, u)
-        return a / np.sqrt(np.sum(a * a, axis=-2, keepdims=True))
-
-
-def _turned(t):
-    """Vectors (..., 2, n) turned by 90 degrees."""
-    return np.stack([-t[..., 1, :], t[..., 0, :]], -2)
+        Numbers of a single point.
+        """
+        q0, mesh = self.beam.q0_local, self.beam.mesh
+        if self.n > 1:
+            lever = np.ravel(mesh.mapping().offset(self.at, self.e))
+            x, y = sum(w * q0[d - self.coordinates.start]
+                       for w, d in zip(self.slopes, self.dofs))
+        else:
+            dofs, weights = self._one_with_slope
+            x, y = (q0[dofs - self.coordinates.start] @ weights[:, 1]).tolist()
+            lever = (mesh.height * (self.place[2] - 0.5) if mesh.heights is None
+                     else float(mesh.mapping().offset(self.at, self.e)[0, 0]))
+        size = (x * x + y * y) ** 0.5
+        return lever, x, y, x / size, y / size
 
 
 class BodyPart:
@@ -516,10 +535,12 @@ class Points:
         if not abs(x) + abs(y) < HUGE:
             return None
         x, y = float(x), float(y)
-        for b in self.beams if beam is None else (select_beam(self.beams, beam),):
+        wanted = None if beam is None else select_beam(self.beams, beam)
+        for k, b in enumerate(self.beams):
+            if b is not wanted and wanted is not None:
+                continue
             place = b.finder.one(x, y)
             if place:
-                k = self.beams.index(b)
                 return Located(True, 1, [Part(b, k, self.slices[k], None, place=place)])
             if place is None:
                 return None

@@ -41,7 +41,6 @@ from .panels import Panels
 from .quadrature import gauss
 from .mapping import cross
 from .section_forces import NotRecovered, SectionForces, Sections, viscous_forces
-from .series import chebyshev
 from .spread import AXIS, SNAP, Sampled, station_of_node, stations_of_vector
 
 if TYPE_CHECKING:
@@ -723,7 +722,11 @@ class Recovery:
         start, end = self.lengths[e:e + 2].tolist()
         if self.beam.mesh.is_straight:
             return start + xi * (end - start)
-        return start + float(chebyshev(xi, 9) @ self._inside[e])
+        z, last, before = 2.0 * xi - 1.0, 0.0, 0.0
+        first, *others = self._inside[e].tolist()
+        for c in reversed(others):  # Clenshaw's rule
+            last, before = c + 2.0 * z * last - before, last
+        return start + first + z * last - before
 
     def _places(self, e, xi, eta):
         """What evaluation at points (n,) needs and does not change with the state.

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebvander
 
 if TYPE_CHECKING:
-    from .beam import Beam
     from .elements.base import ElementBeam
     from .types import Array
 
@@ -36,9 +35,11 @@ def chebyshev(x: Any, n: int) -> Array:
     [1.0, 0.5, -0.5]
     """
     z = 2.0 * x - 1.0
-    out = [1.0 + 0.0 * z, z]
-    while len(out) < n:
-        out.append(2.0 * z * out[-1] - out[-2])
+    before, last, twice = 1.0 + 0.0 * z, z, 2.0 * z
+    out = [before, last]
+    for _ in range(n - 2):
+        before, last = last, twice * last - before
+        out.append(last)
     return np.array(out[:n])
 
 
@@ -57,6 +58,8 @@ class Series:
     value, along, across
         Coefficients c of the functions and of their derivatives by xi and by eta, shape
         (nb, p, m) each.
+    tables
+        The first two of them, (2, nb, p, m).
     power
         The power of the length that each takes, (nb,).
     """
@@ -72,18 +75,19 @@ class Series:
         self.along, self.across = np.zeros((2, *self.value.shape))
         self.along[:, :-1] = 2.0 * chebder(self.value, axis=1)
         self.across[:, :, :-1] = 2.0 * chebder(self.value, axis=2)
+        self.tables = np.stack([self.value, self.along])
 
     def at(self, table: Array, xi: float, eta: float) -> Array:
-        """The values at one point, shape (nb,).
+        """The values at one point, shape (nb,) or (2, nb).
 
         Parameters
         ----------
         table
-            One of the attributes, shape (nb, p, m).
+            One of the attributes, shape (nb, p, m) or (2, nb, p, m).
         xi, eta
             The reference point.
         """
-        return table @ chebyshev(eta, table.shape[2]) @ chebyshev(xi, table.shape[1])
+        return table @ chebyshev(eta, table.shape[-1]) @ chebyshev(xi, table.shape[-2])
 
     def values(self, table: Array, X: Array) -> Array:
         """The values at many points, shape (nb, n).
@@ -99,21 +103,6 @@ class Series:
         products = chebyshev(X[0], p)[:, None] * chebyshev(X[1], m)
         return table.reshape(-1, p * m) @ products.reshape(p * m, -1)
 
-    def scale(self, beam: Beam, e: Any) -> Array:
-        """The powers of the lengths of elements e that the functions take.
-
-        Parameters
-        ----------
-        beam
-            A :class:`~skfem_ancf.Beam`.
-        e
-            A number, or numbers of shape (n,).
-
-        Returns
-        -------
-        ndarray
-            Shape (nb,), or (nb, n).
-        """
-        if np.ndim(e):
-            return beam.mesh.lengths[e] ** self.power[:, None]
-        return beam.mesh.lengths[e] ** self.power
+    def scales(self, lengths: Array) -> Array:
+        """The powers of the lengths (ne,) of elements that the functions take, (ne, nb)."""
+        return lengths[:, None] ** self.power

@@ -185,7 +185,7 @@ class ElementStrain:
             return self.at(int(e[0]), float(X[0, 0]), float(X[1, 0]))(u_e)[:, None]
         few = n < beam.mesh.nelements
         of = e if few else np.arange(beam.mesh.nelements)
-        scale = beam.series.scale(beam, of)
+        scale = beam.scales[of].T
         u_e = beam.kernel.gather(u, of).transpose(1, 2, 0) * scale[:, None]
         # polynomials of the derivatives by xi and eta: (places, 2, m, 2, elements)
         groups = [table @ u_e.reshape(len(u_e), -1) for table in self._tables]
@@ -281,9 +281,9 @@ class ElementStrain:
             at = [self._bottom[..., e] + eta * self._rise[..., e]] if self.places else []
             if self.here:
                 at.append(_turning(*self.beam.mesh.mapping().derivatives(e, xi, eta))[:, None])
-            det, a, b, c, d, x, y = np.concatenate(at, axis=1)
-            slopes = np.array([[a, b], [c, d]] / det).transpose(2, 0, 1) @ slopes
-            frame = np.array([[x, y], [-y, x]]).transpose(2, 0, 1)
+            turning = np.concatenate(at, axis=1) if len(at) > 1 else at[0]
+            slopes = (turning[1:5] / turning[0]).T.reshape(-1, 2, 2) @ slopes
+            frame = (turning[_OF_FRAME] * _SIGN).T.reshape(-1, 2, 2)
         weights = rows @ chebyshev(xi, rows.shape[1])
         return PointStrain(slopes.reshape(-1, slopes.shape[2]), frame, weights.reshape(3, -1))
 
@@ -296,12 +296,16 @@ class ElementStrain:
 
     def _element(self, e):
         """What an element multiplies slopes by, (2 or 1, nb), and the frame of a straight one."""
-        mesh, scale = self.beam.mesh, self.beam.series.scale(self.beam, e)
+        mesh, scale = self.beam.mesh, self.beam.scales[e]
         if not mesh.is_straight:
             return scale, None
         x, y = mesh.p_X[:, mesh.t[0, e]]
         return (scale / np.array([[mesh.lengths[e]], [mesh.height]]),
                 np.array([[[x, y], [-y, x]]]))
+
+
+#: Where the frame (x, y), (-y, x) is in what :func:`_turning` returns, and with which sign.
+_OF_FRAME, _SIGN = [5, 6, 6, 5], np.array([[1.0], [1.0], [-1.0], [1.0]])
 
 
 def _turning(J0, J1, t):
