@@ -28,14 +28,15 @@ class CableSections:
                  element: ElementBeamCable) -> None:
         t = kernel.t if tind is None else kernel.t[:, tind]
         L = (mesh.lengths if tind is None else mesh.lengths[tind])
-        xi = np.broadcast_to(xi, (t.shape[1],) + np.shape(xi)[-1:])
-        scale = L[:, None] ** np.tile(np.arange(element.nodal_dofs), 2)
-        G1, G2 = (np.moveaxis(element.axis(xi, d), 0, -1) * scale[:, None, :]
-                  / L[:, None, None] ** d for d in (1, 2))
+        if len(np.shape(xi)) == 1:
+            xi = np.broadcast_to(xi, (t.shape[1], len(xi)))
+        powers = np.array([*range(element.nodal_dofs)] * 2) - 1.0
+        scale = (L[:, None] ** powers)[:, None, :]
+        G1 = element.axis(xi, 1).transpose(1, 2, 0) * scale
+        G2 = element.axis(xi, 2).transpose(1, 2, 0) * (scale / L[:, None, None])
         q = element.rigid(mesh)
         q[0] = mesh.p
-        q = np.moveaxis(q, -1, 0)
-        q_e = np.concatenate([q[t[0]], q[t[1]]], axis=1)
+        q_e = np.concatenate([q[:, :, t[0]], q[:, :, t[1]]]).transpose(2, 0, 1)
         a0, b0 = G1 @ q_e, (0.0 if mesh.is_straight else 1.0) * (G2 @ q_e)
         frame, (n, ne) = np.concatenate([a0, b0], axis=1).transpose(1, 2, 0), a0.shape[1::-1]
         square0, each = np.sum(a0 * a0, axis=-1), np.arange(ne)
