@@ -82,12 +82,16 @@ html_theme_options = {
 }
 
 
-def links_of_pages(app, docname, source):
-    """Links out of docs/ to what has a page here; of other files only the name is left.
+def titled(match):
+    """A link to a page, with the page's title in place of the name of its file."""
+    name = match[1]
+    title = (HERE / name).read_text(encoding="utf-8").split("\n")[0].removeprefix("# ")
+    return f"[{title}]({name}"
 
-    A link whose text is the name of the file shows the title of the page.
-    """
-    text = re.sub(r"\[(?:docs/)?([\w-]+\.md)\]\((?=\1)", "[](", source[0])
+
+def links_of_pages(app, docname, source):
+    """Links out of docs/ to what has a page here; of other files only the name is left."""
+    text = re.sub(r"\[([\w-]+\.md)\]\(\1", titled, source[0])
     text = text.replace("](../CONTRIBUTING.md", "](contributing.md")
     text = re.sub(r"\]\((?:\.\./)?demos/(\w+)\.py\)", r"](gallery/\1.rst)", text)
     source[0] = re.sub(r"\[[^\]]*\]\(\.\./([^)]*)\)", r"`\1`", text)
@@ -96,8 +100,8 @@ def links_of_pages(app, docname, source):
 def links_of_parts(app, path, docname, content):
     """The same for README.md, CONTRIBUTING.md and CHANGELOG.md, which lie above docs/."""
     if path.suffix == ".md":
-        text = content[0].replace("](docs/", "](").replace("](CONTRIBUTING.md", "](contributing.md")
-        content[0] = text
+        content[0] = content[0].replace("[docs/", "[").replace("](docs/", "](").replace(
+            "](CONTRIBUTING.md", "](contributing.md")
         links_of_pages(app, docname, content)
 
 
