@@ -463,8 +463,8 @@ class Constraints:
         if free:
             raise SupportError(
                 "the supports leave rigid motions free: " + "; ".join(free)
-                + ". Add a support, for example scene.clamp('left'), or solve in time with "
-                "scene.integrate")
+                + ". Add a support, for example scene.clamp('left'), scene.pin('right') or, as a "
+                "roller, scene.fix('right', 'r^2'), or solve in time with scene.integrate")
         self._supported = True
 
 

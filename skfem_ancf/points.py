@@ -452,6 +452,8 @@ class Points:
                 and type(points[1]) in PLAIN):
             key: Any = points, name, type(beam)
         else:
+            if isinstance(points, (int, float)):
+                as_points(points)  # x and y as two arguments: y is no beam
             one = beam is not None or self._alone
             points = as_points(points, select_beam(self.beams, beam).mesh if one else None)
             key = points.tobytes(), points.ndim, name, type(beam)

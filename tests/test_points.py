@@ -216,6 +216,13 @@ def test_true_is_not_one_even_if_one_is_known():
         state.displacement((True, 0.0))
 
 
+def test_two_numbers_are_not_a_point_and_a_beam():
+    state = bent(LINE, ElementBeamANCF(2))
+    for y in (0.0, 0, 0.01):
+        with pytest.raises(MeshError, match=r"two coordinates \(x, y\).* got 0\.5"):
+            state.displacement(0.5, y)
+
+
 def test_points_outside_name_the_extent_of_the_body():
     state = bent(LINE, ElementBeamANCF(2))
     with pytest.raises(MeshError, match=r"\(0\.5, 2\) is outside the body: .*lies within x from 0 "
