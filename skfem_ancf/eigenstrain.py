@@ -2,7 +2,8 @@
 
 The potential energy is W(E - E0). For stress linear in the strain this is W(E) less the work of
 ``S0 = D E0`` in the strain, which is a load: the body is pushed apart by stresses S0. They enter at
-the points of integration, E0 sampled and interpolated there as the formulation does E.
+the points of integration, E0 sampled and interpolated there as the formulation does E. Other laws:
+:mod:`skfem_ancf.growth`.
 """
 
 from __future__ import annotations
@@ -15,13 +16,14 @@ from scipy import sparse
 
 from .errors import InputError, ask_array, require_finite_scalar, require_function, shown
 from .formulations import COMPONENTS
+from .growth import Growth, sampled
 from .kernels.base import apart
 from .kernels.law import LINEAR
 from .loads import Load
 from .spread import Spread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from .beam import Beam
     from .sections import Slab
@@ -57,6 +59,9 @@ class EigenStrain(Load):
     _packs: Any = None
     _matrix: Any = None
     _spread: Any = None
+    # of laws that are not linear: what it does, and the factor in a motion
+    _growth: Growth | None = None
+    _size = 1.0
 
     def __init__(self, xx: Any = None, yy: Any = None, xy: Any = None, beam: WhichBeam = None,
                  amplitude: TimeFunction = None) -> None:
@@ -91,7 +96,10 @@ class EigenStrain(Load):
         function = getattr(self.amplitude, "function", None)
         if isinstance(function, Coefficient):
             bound.at_rest = function(1.0)
-        if beam.has_sections:
+        if beam.has_sections and any(t.pack.law.kind != LINEAR for t in beam.kernel.tables):
+            bound._growth, bound.linear = Growth(beam, self), False
+            bound._size = bound.at_rest
+        elif beam.has_sections:
             K = _pushed_apart(beam, self)
             bound._elements, bound.linear = K, True
             i, j = _entries(beam)
@@ -101,13 +109,27 @@ class EigenStrain(Load):
             bound._packs, bound.linear = _bent_packs(beam, self), False
         return bound
 
-    def element_forces(self, u: Array) -> Array:
+    @property
+    def alone(self) -> bool:
+        """True if what it does depends on other stress-free strains of its beam."""
+        return self._growth is not None
+
+    def acting(self, t: float | None) -> tuple[float, Load]:
+        if self._growth is None:
+            return super().acting(t)
+        one = self._unsealed()
+        one._size = self.factor(t)
+        return 1.0, one
+
+    def element_forces(self, u: Array, factor: float = 1.0) -> Array:
         """The forces on the coordinates of each element.
 
         Parameters
         ----------
         u
             Displacement of the coordinates, shape (N,).
+        factor
+            On the strain.
 
         Returns
         -------
@@ -115,19 +137,26 @@ class EigenStrain(Load):
             Shape (nelements, nb, 2).
         """
         beam = self.beam
-        if beam.has_sections:
-            q = beam.kernel.gather(beam.q0_local + u)
-            return np.einsum("eij,ej->ei", self._elements, q.reshape(len(q), -1)).reshape(q.shape)
         u_e = beam.kernel.gather(u)
-        return np.asarray(sum(sign * beam.kernel.forces_of([apart(pack, slice(None))], u_e)
+        if self._growth is not None:
+            return self._growth.forces(u_e, factor)
+        if beam.has_sections:
+            q = beam.kernel.gather(beam.q0_local) + u_e
+            return factor * np.einsum("eij,ej->ei", self._elements,
+                                      q.reshape(len(q), -1)).reshape(q.shape)
+        return factor * np.asarray(sum(sign * beam.kernel.forces_of([apart(pack, slice(None))], u_e)
                               for pack, sign in self._packs))
 
     def force(self, u: Array) -> Array:
-        if self.beam.has_sections:
+        if self._matrix is not None:
             return self._matrix @ (self.beam.q0_local + u)
-        return self.beam.kernel.scatter(self.element_forces(u))
+        return self.beam.kernel.scatter(self.element_forces(u, self._size))
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
+        if self._growth is not None:  # Gonzalez (1996)
+            force, d = super().mean_force(u0, u1), u1 - u0
+            gain = self.potential(u0) - self.potential(u1)
+            return force + (gain - force @ d) / (d @ d) * d
         if self.beam.has_sections:
             return super().mean_force(u0, u1)
         out = np.zeros(self.beam.N)
@@ -138,16 +167,21 @@ class EigenStrain(Load):
         return out
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
-        if self.beam.has_sections:
+        if self._matrix is not None:
             A = self._matrix.tocoo()
             return A.row, A.col, A.data
         u_e = self.beam.kernel.gather(u)
         K = sum(sign * self.beam.kernel.tangents_of([apart(pack, slice(None))], u_e)
-                for pack, sign in self._packs)
+                for pack, sign in self._packs) if self._growth is None else (
+                    self._growth.tangents(u_e, self._size))
         rows, columns = _entries(self.beam)
         return rows.ravel(), columns.ravel(), np.ravel(K)
 
     def potential(self, u: Array) -> float:
+        if self._growth is not None:
+            u_e = self.beam.kernel.gather(u)
+            return self._growth.potential(u_e, self._size) - self._growth.potential(
+                0.0 * u_e, self._size)
         if self.beam.has_sections:
             return -float(u @ (self._matrix @ (self.beam.q0_local + 0.5 * u)))
         energy = np.zeros(self.beam.mesh.nelements)
@@ -179,21 +213,27 @@ class EigenStrain(Load):
             out[:, on] = self.of_slab(slab, x[on], y[on])
         return out
 
-    def stress_at(self, X: Array, e: Array) -> Array:
-        """S0 at points, shape (3, n, m).
+    def stress_at(self, u: Array, X: Array, e: Array, factor: float = 1.0) -> Array:
+        """What the stress is less by at points, S(E) - S(E - factor E0), shape (3, n, m).
 
         Parameters
         ----------
+        u
+            Displacement of the coordinates, shape (N,).
         X, e
             Reference points (2, n, m) and their elements (n,).
+        factor
+            On the strain.
         """
         beam, E0 = self.beam, self.strain_at(X, e)
+        E = beam.strain(u, X, e) if self._growth is not None else 0.0 * E0
         if beam.has_sections:
             laws = [layer.material.law(layer.material.shear_factor(layer.element)).stress
                     for layer in beam.layers]
         else:
             laws = [_Along(slab.material.axial_modulus) for slab in beam.across.slabs]
-        return beam.across.of_slabs(X, E0, [lambda law=law: law(E0) for law in laws], e)
+        return beam.across.of_slabs(
+            X, E0, [lambda law=law: law(E) - law(E - factor * E0) for law in laws], e)
 
 
 class Temperature(EigenStrain):
@@ -255,6 +295,23 @@ def _asked(name, f, x, y):
     return ask_array(f"{name}(x, y)", np.shape(x), f, x, y, number=True)
 
 
+def require_alone(loads: Sequence[tuple[int, Any]]) -> None:
+    """Raise InputError where two stress-free strains of one beam do not add up.
+
+    Parameters
+    ----------
+    loads
+        Numbers of beams, and loads on them.
+    """
+    eigen = [(k, load) for k, load in loads if isinstance(load, EigenStrain)]
+    for k, load in eigen:
+        if load.alone and sum(other == k for other, _ in eigen) > 1:
+            raise InputError(
+                f"{load.beam!r} has a stress that is not linear in the strain, so its stress-free "
+                "strains do not add up: give their sum as one eigenstrain, a function of (x, y) "
+                "or one product of it and a function of t")
+
+
 def _entries(beam):
     """Rows and columns of the matrices of all elements, shape (nelements, 2 nb, 2 nb) each."""
     dofs = beam.mesh.t[0][:, None] * beam.nd + np.arange(2 * beam.nd)
@@ -263,21 +320,10 @@ def _entries(beam):
 
 def _pushed_apart(beam, eigen):
     """The derivative of the forces of the stresses S0: constant matrices of the elements."""
-    kernel, across, ne, parts = beam.kernel, beam.across, beam.mesh.nelements, []
+    kernel, ne, parts = beam.kernel, beam.mesh.nelements, []
     for table in kernel.tables:
-        term, pack = table.term, table.pack
-        if pack.law.kind != LINEAR:
-            raise InputError(
-                f"a stress-free strain needs stress linear in the strain, which "
-                f"{type(table.slab.material).__name__} has not: use StVenantKirchhoff")
-        E0 = []
-        for row, name in enumerate(COMPONENTS):
-            xi, eta = term.nodes(name), term.section_nodes
-            X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
-            values = eigen.of_slab(table.slab, *across.coordinates(X))[row]
-            matrix = term.matrix(name)
-            E0.append(values if matrix is None else values @ matrix.T)
-        S0 = np.einsum("cd,dep->epc", pack.law.D, np.array(E0)) * np.broadcast_to(
+        pack = table.pack
+        S0 = np.einsum("cd,dpe->epc", pack.law.D, sampled(beam, table, eigen)) * np.broadcast_to(
             pack.weights.T, (ne, len(pack.weights)))[..., None]
         parts.append(S0.transpose(0, 2, 1).reshape(ne, -1))
     stress, nb = np.concatenate(parts, axis=1), beam.nd // 2

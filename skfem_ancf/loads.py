@@ -153,6 +153,10 @@ class Load(Sealable):
         """The amplitude at time ``t``; 1 without one, or in statics, where ``t`` is None."""
         return self.at_rest if t is None else 1.0 if self.amplitude is None else self.amplitude(t)
 
+    def acting(self, t: float | None) -> tuple[float, Load]:
+        """A factor, and the load that it is on, at time ``t``; None in statics."""
+        return self.factor(t), self
+
     def mean_force(self, u0: Array, u1: Array) -> Array:
         """A mean of the force between two displacements whose work is exact if it can be.
 

@@ -661,8 +661,10 @@ class Recovery:
         stress = beam.stress(self._u, X) if self._u.ndim == 1 else np.stack(
             [beam.stress(u, X) for u in self._u], axis=1)
         for factor, eigen in self.forces.eigen:
-            S0 = eigen.stress_at(X, np.arange(beam.mesh.nelements))
-            stress = stress - np.moveaxis(np.multiply.outer(factor, S0), np.ndim(factor), 0)
+            e = np.arange(beam.mesh.nelements)
+            stress = stress - (eigen.stress_at(self._u, X, e, factor) if self._u.ndim == 1 else
+                               np.stack([eigen.stress_at(u, X, e, f)
+                                         for u, f in zip(self._u, factor)], axis=1))
         stress = stress.reshape(stress.shape[:-1] + (len(x), len(self.eta)))
         if beam.element.sections == "linear":
             return np.array([0.5]), stress.mean(axis=-2, keepdims=True)

@@ -219,7 +219,7 @@ def _own(state, beam, e, xi):
     X = np.array([np.repeat(xi[:, None], len(eta), 1), np.repeat(eta[None], len(xi), 0)])
     S, eigen = beam.stress(u, X, e), state.eigenstrains(beam)
     for factor, load in eigen:
-        S = S - factor * load.stress_at(X, e)
+        S = S - load.stress_at(u, X, e, factor)
     H, frame = beam.gradients(u, X, e)
     F = H + frame
     P = F[:, 0] * S[0] + F[:, 1] * S[2]
@@ -238,7 +238,7 @@ def _own(state, beam, e, xi):
         EA, ES, EI = beam.across.moments(xi[:, None], e)[..., 0]
         N, M = EA * (stretch - 1.0) - ES * curvature, EI * curvature - ES * (stretch - 1.0)
         for factor, load in eigen:
-            S0 = factor * load.stress_at(X, e)[0] * area
+            S0 = load.stress_at(u, X, e, factor)[0] * area
             Y = beam.mesh.mapping().offset(X, e)
             N, M = N - np.sum(S0, axis=-1), M + np.sum(S0 * Y, axis=-1)
         Q = np.full(len(e), np.nan)

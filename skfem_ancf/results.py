@@ -380,8 +380,10 @@ class State(Frozen):
         ndarray
             Shape (3, n), or 0.
         """
-        return sum(factor * (load.stress_at if stress else load.strain_at)(
-            part.at, part.e)[..., 0] for factor, load in self.eigenstrains(part.beam))
+        u = self.u_of(part.beam)
+        return sum((load.stress_at(u, part.at, part.e, factor) if stress else
+                    factor * load.strain_at(part.at, part.e))[..., 0]
+                   for factor, load in self.eigenstrains(part.beam))
 
     def eigenstrains(self, beam: Beam) -> list[tuple[float, EigenStrain]]:
         """Factors and loads of stress-free strains on a beam."""

@@ -20,7 +20,7 @@ from .dynamics import get_scheme
 from .dynamics.checkpoint import resume
 from .dynamics.integrate import follow, integrate
 from .dynamics.sensors import Sensor
-from .eigenstrain import EigenStrain, Temperature, products, takes_time
+from .eigenstrain import EigenStrain, Temperature, products, require_alone, takes_time
 from .obstacles import Obstacle
 from .forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring, TorsionalSpring,
                      bind_force)
@@ -251,6 +251,7 @@ class Scene:
             for support in supports:
                 support.bind(self.members[support.beam], fixed)
             loads = tuple((k, load, bind_load(load, self.members[k])) for k, load in loads)
+            require_alone([(k, load) for k, _, load in self._loads + loads])
             bound = [bind_joint(joint, self) for joint in joints]
             joints = tuple(zip(map(self._portable, joints), bound))
             velocities = {k: (v, self._bind_velocity(k, v)) for k, v in velocities}
@@ -853,8 +854,8 @@ class Scene:
         Raises
         ------
         InputError
-            If the stress of a material is not linear in the strain, or a function of (x, y, t) is
-            no sum of few products of one of (x, y) and one of t.
+            If a function of (x, y, t) is no sum of few products of one of (x, y) and one of t, or
+            if the beam has another stress-free strain, and a law that is not linear.
         """
         k, at, loads = self._number(beam), self._beams[self._number(beam)], []
         given: dict[str, Any] = {}

@@ -286,8 +286,8 @@ class SectionForces:
         #: Size of force times height and moment that stress-free strains have alone.
         self._pushed = np.zeros(self.states)
         for factor, eigen in self.eigen:
-            pushed = np.reshape(factor, (*np.shape(factor), 1, 1, 1)) * _each(
-                eigen.element_forces, u)
+            pushed = eigen.element_forces(u, factor) if u.ndim == 1 else np.array(
+                [eigen.element_forces(x, f) for x, f in zip(u, factor)])
             internal = internal - pushed
             self._pushed = self._pushed + self._size(*_at_ends(q, pushed))
         # of the part of the beam on the right of a section on that on its left

@@ -184,8 +184,8 @@ class System:
             return self.constant_force
         out = self.constant_force.copy()
         for load in self._varying:
-            s = self.of(load)
-            out[s] += load.factor(t) * load.force(u[s])
+            s, (factor, acting) = self.of(load), load.acting(t)
+            out[s] += factor * acting.force(u[s])
         return out
 
     def _require_coordinates(self, u):
@@ -359,8 +359,8 @@ class System:
         t
             Time; None for full size.
         """
-        return float(sum(load.factor(t) * (load.potential(u[self.of(load)]) or 0.0)
-                         for load in self.loads))
+        return float(sum(factor * (acting.potential(u[self.of(load)]) or 0.0)
+                         for load in self.loads for factor, acting in [load.acting(t)]))
 
     @cached_property
     def stiffness_scale(self) -> float:
@@ -406,8 +406,8 @@ class System:
             Displacement, and what is added to, shape (N,).
         """
         for load in self.machine.tables.own_loads:
-            s = self.of(load)
-            out[s] += scale * load.factor(None if np.isnan(t) else t) * load.force(u[s])
+            s, (factor, acting) = self.of(load), load.acting(None if np.isnan(t) else t)
+            out[s] += scale * factor * acting.force(u[s])
 
     def add_own_mean_force(self, t: float, u0: Array, u1: Array, out: Array) -> None:
         """As :meth:`add_own_force`, of their mean force.
@@ -420,10 +420,10 @@ class System:
             Displacements, and what is added to, shape (N,).
         """
         for load in self.machine.tables.own_loads:
-            s = self.of(load)
-            force = load.force(u1[s]) if np.array_equal(u0[s], u1[s]) else load.mean_force(
+            s, (factor, acting) = self.of(load), load.acting(t)
+            force = acting.force(u1[s]) if np.array_equal(u0[s], u1[s]) else acting.mean_force(
                 u0[s], u1[s])
-            out[s] += load.factor(t) * force
+            out[s] += factor * force
 
     def subtract_own_stiffness(self, t: float, scale: float, u: Array, flat: Array) -> None:
         """Subtract the derivative of :meth:`add_own_force` from the numbers of a band matrix.
@@ -440,9 +440,10 @@ class System:
             s = self.of(load)
             if np.isinf(t) and load.prestress:
                 continue
-            i, j, v = load.stiffness(u[s])
+            factor, acting = load.acting(t if np.isfinite(t) else None)
+            i, j, v = acting.stiffness(u[s])
             keep = np.full(len(v), not self.symmetric) | (np.asarray(i) >= np.asarray(j))
-            factor = scale * load.factor(t if np.isfinite(t) else None)
+            factor = scale * factor
             at = self.K._position(s.start + np.asarray(i), s.start + np.asarray(j))
             np.add.at(flat, at[keep], -factor * np.asarray(v)[keep])
 

@@ -271,8 +271,9 @@ def load_stiffness(system: System, u: Array, load: float, t: float | None = None
         if item.constant:
             continue
         s = system.of(item)
-        i, j, v = item.stiffness(u[s])
-        K = K - sparse.csr_matrix((load * item.factor(t) * v, (s.start + i, s.start + j)),
+        factor, acting = item.acting(t)
+        i, j, v = acting.stiffness(u[s])
+        K = K - sparse.csr_matrix((load * factor * v, (s.start + i, s.start + j)),
                                   shape=K.shape)
     return K
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        MeshBeam, NeoHookean, Scene, Section, StVenantKirchhoff)
+                        MeshBeam, Scene, Section, StVenantKirchhoff)
 from skfem_ancf.errors import CallbackError
 
 STEEL = StVenantKirchhoff(E=2e11, nu=0.0, density=8000, thermal_expansion=12e-6)
@@ -191,6 +191,3 @@ def test_what_cannot_expand_says_so():
     dull = Scene(Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(1e6, 0.3), width=0.1))
     with pytest.raises(InputError, match="thermal_expansion"):
         dull.temperature(1.0)
-    rubber = Scene(Beam(mesh, ElementBeamANCF(2), NeoHookean(1e6, 0.3), width=0.1))
-    with pytest.raises(InputError, match="linear in the strain"):
-        rubber.eigenstrain(xx=0.1)

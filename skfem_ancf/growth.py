@@ -1,0 +1,154 @@
+"""Stress-free strains of laws whose stress is not linear in the strain.
+
+The energy of such a law is W(E - E0). As a load that is ``W(E - E0) - W(E)``, whose stress at the
+points of integration depends on the strain and, not in proportion, on the size of E0. It is
+evaluated by NumPy.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .formulations import COMPONENTS
+from .kernels.law import LINEAR, law_evaluate
+
+if TYPE_CHECKING:
+    from .beam import Beam
+    from .types import Array
+
+
+class Growth:
+    """The stress-free strain E0 of a beam with sections, and what it does to the elements.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    eigen
+        The :class:`~skfem_ancf.eigenstrain.EigenStrain`.
+    """
+
+    def __init__(self, beam: Beam, eigen: Any) -> None:
+        self.beam = beam
+        self._E0 = [sampled(beam, table, eigen) for table in beam.kernel.tables]
+
+    def stresses(self, u_e: Array, factor: float) -> list[Array]:
+        """S(E - factor E0) - S(E) at the points of each term, negative: (3, points, ne) each.
+
+        Parameters
+        ----------
+        u_e
+            Displacement of the elements' coordinates, shape (ne, nb, 2).
+        factor
+            On E0.
+        """
+        return [self._asked(pack, E, np.empty(E.shape)) - self._asked(
+            pack, E - factor * E0, np.empty(E.shape)) for pack, E, E0 in self._terms(u_e)]
+
+    def forces(self, u_e: Array, factor: float) -> Array:
+        """The forces on the coordinates of each element, shape (ne, nb, 2).
+
+        Parameters
+        ----------
+        u_e, factor
+            As for :meth:`stresses`, u_e of shape (ne, nb, 2).
+        """
+        S = self._geometric(u_e, self.stresses(u_e, factor))
+        q = self.beam.kernel.gather(self.beam.q0_local) + u_e
+        return np.einsum("eij,ej->ei", S, q.reshape(len(q), -1)).reshape(q.shape)
+
+    def tangents(self, u_e: Array, factor: float) -> Array:
+        """The derivatives of :meth:`forces`, shape (ne, 2 nb, 2 nb).
+
+        Parameters
+        ----------
+        u_e, factor
+            As for :meth:`stresses`, u_e of shape (ne, nb, 2).
+        """
+        out = self._geometric(u_e, self.stresses(u_e, factor))
+        for pack, E, E0 in self._terms(u_e):
+            D = (self._asked(pack, E, np.empty((9, *E.shape[1:]))) - self._asked(
+                pack, E - factor * E0, np.empty((9, *E.shape[1:])))) * pack.weights
+            B = self._slopes(pack, u_e)
+            out += np.einsum("icpe,cdpe,jdpe->eij", B, D.reshape(3, *E.shape), B, optimize=True)
+        return out
+
+    def potential(self, u_e: Array, factor: float) -> float:
+        """The integral of W(E - factor E0) - W(E).
+
+        Parameters
+        ----------
+        u_e, factor
+            As for :meth:`stresses`, u_e of shape (ne, nb, 2).
+        """
+        return sum(float(np.sum(pack.weights * (self._asked(
+            pack, E - factor * E0, np.empty((1, *E.shape[1:]))) - self._asked(
+                pack, E, np.empty((1, *E.shape[1:])))))) for pack, E, E0 in self._terms(u_e))
+
+    # terms
+
+    def _terms(self, u_e):
+        """Packs of all elements, each with coordinates of its own, strains and E0 at points."""
+        for pack, E0 in zip(self.beam.kernel.apart(), self._E0):
+            E = np.empty(E0.shape)
+            self.beam.kernel.texts.stress(_unit(pack), np.ascontiguousarray(u_e).ravel(), E)
+            yield pack, E, E0
+
+    @staticmethod
+    def _asked(pack, strain, out):
+        law_evaluate(pack.law, np.ascontiguousarray(strain), out)
+        return out
+
+    def _slopes(self, pack, u_e):
+        """The derivative of the strain by each coordinate, (2 nb, 3, points, ne)."""
+        u, out = np.ascontiguousarray(u_e).ravel(), []
+        for k in range(u_e[0].size):
+            unit = np.zeros((len(u_e), u_e[0].size))
+            unit[:, k] = 1.0
+            out.append(np.empty((3, len(pack.weights), len(u_e))))
+            self.beam.kernel.strain_increment(pack, u, unit.ravel(), out[-1])
+        return np.array(out)
+
+    def _geometric(self, u_e, stresses):
+        """Matrices (ne, 2 nb, 2 nb) whose product with places is the force of given stresses."""
+        ne, kernel = len(u_e), self.beam.kernel
+        weighted = np.concatenate([(S * np.broadcast_to(pack.weights, S.shape[1:]))
+                                   .transpose(2, 0, 1).reshape(ne, -1)
+                                   for pack, S in zip(kernel.packs, stresses)], axis=1)
+        return np.concatenate([kernel.geometric(u_e[part], part, weighted[part])
+                               for part in (slice(k.start, min(k.stop, ne))
+                                            for k in kernel.chunks())])
+
+
+def _unit(pack):
+    """The pack of a law whose stress is the strain."""
+    return pack._replace(law=pack.law._replace(kind=LINEAR, D=np.eye(3)))
+
+
+def sampled(beam: Beam, table: Any, eigen: Any) -> Array:
+    """A stress-free strain at the points of a term, sampled as the formulation does the strain.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam` with sections.
+    table
+        The tables of the term.
+    eigen
+        The :class:`~skfem_ancf.eigenstrain.EigenStrain`.
+
+    Returns
+    -------
+    ndarray
+        Shape (3, points, nelements).
+    """
+    term, out = table.term, []
+    for row, name in enumerate(COMPONENTS):
+        xi, eta = term.nodes(name), term.section_nodes
+        X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
+        values = eigen.of_slab(table.slab, *beam.across.coordinates(X))[row]
+        matrix = term.matrix(name)
+        out.append(values if matrix is None else values @ matrix.T)
+    return np.ascontiguousarray(np.array(out).transpose(0, 2, 1))
