@@ -8,7 +8,7 @@
 # make docs    the pages of docs/, the gallery and the reference, out/docs/index.html
 # make pictures  the pictures of docs/ that README.md and the pages show, anew
 # make dist    sdist and wheel, in out/dist
-# make clean   removes .venv and out
+# make clean   removes .venv, out and what the pages are made of
 #
 # The first target called builds a virtual environment in .venv with $(PYTHON), 3.10 or newer.
 
@@ -96,7 +96,7 @@ dist: $(VENV)/dist.stamp
 	$(PY) -m build --outdir out/dist
 
 clean:
-	rm -rf $(VENV) out
+	rm -rf $(VENV) out demos/out docs/gallery docs/generated
 
 $(PY):
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || \
