@@ -349,6 +349,7 @@ class _Piece:
                   - self.from_axis(self.rate[..., None] * self.rY[1]))
         self.stretch = ((along @ r.panels.axis)[..., None] + turned) / (
             self.g * np.cos(self.alpha))
+        refuse(~np.all(np.isfinite(self.rate), axis=-1))
         phi = scipy.interpolate.CubicSpline(self.s, self.rate, axis=-1).antiderivative()(self.s)
         self.phi = phi + (self.raw_angle - phi) @ self._line
 
@@ -469,6 +470,18 @@ class _Piece:
         return scipy.interpolate.CubicSpline(s, values, axis=-2)(self.s)
 
 
+def refuse(bad: Array) -> None:
+    """Raise :class:`NotRecovered` for the fields that have diverged, if there are any.
+
+    Parameters
+    ----------
+    bad
+        True for these, shape (...).
+    """
+    if np.any(bad):
+        raise NotRecovered("the strain is too large: the section has no state of equilibrium", bad)
+
+
 def largest(values: Array) -> Array:
     """The largest absolute value of each field (..., n, m), shape (...)."""
     return np.max(np.abs(values), axis=(-2, -1))
@@ -559,10 +572,8 @@ class Recovery:
                            and not isinstance(beam.formulation, EnhancedContinuum))
         self._u = u
         self.pieces = [_Piece(self, a, b) for a, b in zip(forces.cuts[:-1], forces.cuts[1:])]
-        bad = sum(~np.all(np.isfinite(p.strain), axis=(0, -2, -1)) for p in self.pieces)
-        if np.any(bad):
-            raise NotRecovered("the strain is too large: the section has no state of equilibrium",
-                               bad > 0)
+        for piece in self.pieces:
+            refuse(~np.all(np.isfinite(piece.strain), axis=(0, -2, -1)))
         self._tables = [_Table(p.s, np.concatenate(
             [p.strain, p.stress, p.angle[None]])) for p in self.pieces]
         self._cuts = forces.cuts.tolist()

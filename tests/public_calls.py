@@ -678,11 +678,13 @@ call("modes.mode", lambda **k: modes().mode(**k), dict(i=0, amplitude=0.1), i="i
 # pictures
 
 drawing = dict(field="S_xx", thickness=1.0, undeformed=True, colorbar=False, cmap="viridis",
-               limits=(-1.0, 1.0), title="title", subdivide=(2, 2), dpi=50)
+               limits=(-1.0, 1.0), title="title", unit="Pa", subdivide=(2, 2), dpi=50)
 call("state.plot", lambda **k: state().plot(**k), drawing, {"limits": {"[True, False]": ""}},
      field="name", ax="other?", thickness="positive", undeformed="flag", colorbar="flag",
-     cmap="name?", limits="other?", title="title?", subdivide="other", filename="file?",
-     dpi="positive")
+     cmap="name?", limits="other?", title="title?", unit="title?", subdivide="other",
+     filename="file?", dpi="positive")
+call("history.plot", lambda **k: history().plot(**k), dict(field="S_xx", times=[0.0, 0.02]),
+     field="name")
 film = dict(filename="f.gif", field="S_xx", frames=2, fps=5.0, backend="matplotlib", thickness=1.0,
             undeformed=True, cmap="viridis", limits=(-1.0, 1.0), unit="Pa", subdivide=(1, 1),
             recover=False, size=(320, 240))

@@ -165,3 +165,24 @@ def test_colour_bars_say_the_unit(state):
     assert labels(unit="Pa") == {"Pa"} and labels() == {"force / area"} and not labels(unit="")
     with pytest.raises(InputError, match="unit must be a text"):
         state.plot("S_xx", unit=1)
+
+
+def test_several_states_share_a_picture():
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.02), ElementBeamANCF(2),
+                StVenantKirchhoff(E=2e8, nu=0.3, density=7800), width=0.02)
+    history = Scene(beam).pin("left").gravity((0, -9.81)).integrate(0.2, 0.02)
+    ax = history.plot("eps_xx", [0, 0.1, 0.199], thickness=1, subdivide=(4, 2))
+    images = [c for c in ax.collections if c.get_array() is not None]
+    outlines = [c for c in ax.collections if len(c.get_paths()) == 3]
+    alone = [history.state(k).plot("eps_xx", thickness=1, subdivide=(4, 2)) for k in (0, 5, 10)]
+    own = np.concatenate([c.get_array() for one in alone for c in one.collections
+                          if c.get_array() is not None])
+    assert len(images) == 1 and len(outlines) == 1 and len(ax.figure.axes) == 2
+    np.testing.assert_allclose(images[0].get_array(), own, atol=1e-12 + 1e-6 * np.abs(own).max())
+    assert len(history.plot(times=0.1, undeformed=False).collections) == 2
+    assert len(history.plot().collections[-1].get_paths()) == 8
+    with pytest.raises(InputError, match="no state to draw"):
+        plot_state([])
+    for wrong in (["x"], [], 0.3, [-1e-3, 0.1]):
+        with pytest.raises(InputError, match="times"):
+            history.plot(times=wrong)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, require_index, require_path, shown, teaching
+from ..errors import (InputError, require_finite, require_index, require_path, shown,
+                      teaching)
 from ..points import require_body
 from ..resultants import over_time
 from ..results import State
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
     from ..system import System
     from ..types import Array, StrPath, WhichBeam, WhichMember
     from .base import Scheme
+
+#: Instants of a picture where none are named.
+STROBES = 8
 
 #: Sections of all states whose fields are recovered at once.
 SECTIONS = 2048
@@ -407,6 +411,46 @@ class History:
         from ..visuals.pyvista import Series
 
         return Series(self, **options)
+
+    def plot(self, field: Any = "eps_yy", times: ArrayLike | None = None, **options: Any) -> Any:
+        """Draw the body at several times in one picture, as a stroboscope shows it.
+
+        Parameters
+        ----------
+        field
+            What it is coloured by, as for :func:`skfem_ancf.visuals.matplotlib.plot_state`.
+        times
+            Of each the stored instant that is nearest is drawn, shape (n,); by default eight, from
+            first to last.
+        **options
+            Those of :func:`skfem_ancf.visuals.matplotlib.plot_state`.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height=0.01), ElementBeamCable(),
+        ...             StVenantKirchhoff(E=2e8, nu=0.3, density=7800), width=0.01)
+        >>> history = Scene(beam).pin("left").gravity((0, -9.81)).integrate(0.1, 0.01)
+        >>> history.plot("displacement", times=[0, 0.05, 0.1]).get_xlabel()
+        'x'
+        """
+        from ..visuals.matplotlib import plot_state
+
+        if not len(self):
+            raise InputError("the history has no instants")
+        first, last = self.t[0], self.t[-1]
+        wanted = np.linspace(first, last, STROBES) if times is None else np.ravel(
+            require_finite("times", times))
+        if not len(wanted) or wanted.min() < first or wanted.max() > last:
+            raise InputError(f"times must be instants of the motion, from {first:g} to {last:g}, "
+                             f"at least one; got {shown(times)}")
+        instants = np.unique(np.argmin(np.abs(self.t - wanted[:, None]), axis=1))
+        return plot_state(list(self.states(instants)), field, **options)
 
     def animate(self, filename: StrPath, field: Any = "eps_yy", **options: Any) -> Any:
         """Write a film; see :func:`skfem_ancf.visuals.animation.animate`.

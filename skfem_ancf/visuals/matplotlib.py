@@ -44,7 +44,9 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     Parameters
     ----------
     state
-        A :class:`~skfem_ancf.results.State`, or anything with its ``beams`` and ``u_of``.
+        A :class:`~skfem_ancf.results.State`, or anything with its ``beams`` and ``u_of``; or a list
+        of them, drawn over each other with one range of colours and the stress-free body of the
+        first.
     field
         A name of :data:`skfem_ancf.fields.FIELDS` with one component, as "S_xx", "von_mises" or
         "eps_1"; "displacement" for its magnitude; or a function or Field of your own, see
@@ -105,19 +107,19 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.tri import Triangulation
 
-    drawn = find_field(field, DRAWN)
-    require_like("state", state, "State", "beams", "u_of")
+    drawn, states = find_field(field, DRAWN), _states(state)
     undeformed = require_flag("undeformed", undeformed)
     recover = require_flag("recover", recover)
     colorbar, cmap = require_flag("colorbar", colorbar), _colormap(cmap)
     filename, dpi = _page(ax, title, filename, dpi)
     unit = require_text("unit", unit)
     m, n = _subdivision(subdivide)
-    bodies = [_Body(state, beam, drawn, m, n, recover) for beam in state.beams]
+    bodies = [_Body(s, beam, drawn, m, n, recover) for s in states for beam in s.beams]
     factor = _thickness(thickness, bodies)
-    ghosts = [line for b in bodies for line in b.outline(b.reference, factor)] if undeformed else []
+    ghosts = [line for b in bodies[:len(states[0].beams)] if undeformed
+              for line in b.outline(b.reference, factor)]
     edges = [line for b in bodies for line in b.outline(b.deformed, factor)]
-    rigid = [b.outline_at(state.u_of(b)).T for b in getattr(state, "bodies", ())]
+    rigid = [b.outline_at(s.u_of(b)).T for s in states for b in getattr(s, "bodies", ())]
     points = np.concatenate([b.points(b.deformed, factor).reshape(2, -1) for b in bodies], axis=1)
     values = np.concatenate([b.values.ravel() for b in bodies])
     low, high = _limits(limits, values, drawn)
@@ -142,7 +144,8 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
                          vmin=low, vmax=high, zorder=2)
     ax.add_collection(LineCollection([np.vstack([line, line[:1]]) for line in edges],
                                      colors=_INK, linewidths=0.5, zorder=3))
-    walls = outlines(state, around(np.concatenate(ghosts + edges + rigid).T))
+    box = around(np.concatenate(ghosts + edges + rigid).T)
+    walls = [wall for s in states for wall in outlines(s, box)]
     if walls:
         ax.add_collection(LineCollection(np.concatenate(walls), colors=_WALL, linewidths=1.2,
                                          zorder=2.5), autolim=False)
@@ -157,6 +160,16 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
         with replacing(filename) as temporary:
             ax.figure.savefig(temporary, dpi=dpi, bbox_inches="tight")
     return ax
+
+
+def _states(state):
+    """What is drawn, as a list."""
+    states = state if isinstance(state, (list, tuple)) else [state]
+    if not states:
+        raise InputError("there is no state to draw: got an empty list")
+    for one in states:
+        require_like("state", one, "State", "beams", "u_of")
+    return states
 
 
 def _colormap(cmap):
