@@ -23,7 +23,8 @@ def rocker_angle(phi):
     """Of a rigid linkage, from the law of cosines."""
     x, y = crank * np.cos(phi) - ground, crank * np.sin(phi)
     d = np.hypot(x, y)
-    return np.pi + np.arctan2(-y, -x) - np.arccos((d**2 + rocker**2 - coupler**2) / (2 * d * rocker))
+    inside = np.arccos((d**2 + rocker**2 - coupler**2) / (2 * d * rocker))
+    return np.pi + np.arctan2(-y, -x) - inside
 
 
 A, B, D = np.array([0.0, 0.0]), np.array([crank, 0.0]), np.array([ground, 0.0])

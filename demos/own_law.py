@@ -73,8 +73,8 @@ def section(axis, curvature, part):
 
 
 for moment, found in zip(moments, curvatures):
-    expected = fsolve(lambda x: [section(*x, "force") / EI, section(*x, "moment") / moment - 1],
-                      [1, moment / EI])[1]
+    expected = fsolve(lambda x, M: [section(*x, "force") / EI, section(*x, "moment") / M - 1],
+                      [1, moment / EI], args=(moment,))[1]
     print(f"M = {moment:.3f} N m: curvature {found:.4f} 1/m, integral {expected:.4f}, "
           f"Hooke {moment / EI:.4f}")
     assert np.isclose(found, expected, rtol=2e-3)

@@ -68,7 +68,8 @@ assert path.stable[0] and path.stable[-1] and not all(path.stable)
 branch = scene.continuation(branch=first, ds=1e-3, max_load=1.5, steps=40)
 assert not any(branch.stable[1:10])
 
-fig, (above, below) = plt.subplots(2, 1, figsize=(7, 6.4), height_ratios=(2.4, 1), layout="constrained")
+fig, (above, below) = plt.subplots(2, 1, figsize=(7, 6.4), height_ratios=(2.4, 1),
+                                   layout="constrained")
 above.plot(b - rise, load_of(b) / limit, lw=6, alpha=0.3, label="closed form")
 path.plot(crown, ax=above)
 branch.plot(crown, ax=above)
