@@ -8,7 +8,7 @@ import matplotlib
 matplotlib.use("Agg")
 import numpy as np
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, MeshBeam, Scene,
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, MeshBeam, Scene,
                         StVenantKirchhoff)
 from skfem_ancf.obstacles import Circle, Line
 
@@ -44,12 +44,23 @@ def on_a_cylinder():
     return scene.obstacle(Line((0, -0.2), normal=(0, 1)), friction=0.3).solve_static()
 
 
+def pushed_frame(n=5):
+    """The first state of frames.md."""
+    number = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    lines = np.hstack([[number[:-1].ravel(), number[1:].ravel()],
+                       [number[1:, :-1].ravel(), number[1:, 1:].ravel()]])
+    frame = Frame.from_lines(np.array(np.divmod(number.ravel(), n + 1)[::-1], dtype=float), lines,
+                             material=StVenantKirchhoff(E=2.1e11, nu=0.3), height=0.02, width=0.02)
+    return frame.clamp(number[0]).point_force((2000, 0), at=number[1:, 0]).solve_static()
+
+
 def main(folder=DOCS):
-    """Write cantilever.png (64 elements), cantilever_16.png (not recovered), obstacles, others."""
+    """Write cantilever.png (64 elements), cantilever_16.png (not recovered), frames, others."""
     folder = Path(folder)
     for elements, name, recover in ((64, "cantilever.png", True), (16, "cantilever_16.png", False)):
         with_root(cantilever(elements), folder / name, recover)
     on_a_cylinder().plot("eps_xx", thickness=1, filename=folder / "obstacles.png", dpi=110)
+    pushed_frame().plot("eps_xx", thickness=6, filename=folder / "frames.png", dpi=110)
     for demo in ("rollup", "spring"):
         figure = runpy.run_path(str(DEMOS / f"{demo}.py"))["fig"]
         figure.savefig(folder / f"{demo}.png", dpi=150, bbox_inches="tight")

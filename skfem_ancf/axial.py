@@ -121,11 +121,8 @@ class LineLoad(Load):
         given = self.per_length
         values = (ask_field("force(x)", given, x) if callable(given) else
                   np.broadcast_to(given[:, None, None], x.shape))
-        vector = np.zeros(beam.N)
-        for e in range(mesh.nelements):
-            for k, point in enumerate(X.T):
-                dofs, weights = beam.probe_reference(e, point)
-                np.add.at(vector, dofs, np.outer(lengths[e, k] * values[:, e, k], weights))
+        functions = beam.element.functions(mapping, X)[0]
+        vector = beam.kernel.scatter(np.einsum("kep,iep->eki", functions, lengths * values))
         spread = Spread(sampled=(Sampled(AXIS, np.arange(mesh.nelements), xi,
                                          values * (lengths / w)),))
         return DeadLoad(beam, vector, self.amplitude, spread)

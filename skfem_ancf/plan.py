@@ -100,7 +100,10 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         else f"{s.m} equations of {len(s.joints)} joint(s)" if s.m else
         "no joints" if not scene.joints else "the joints only fix coordinates")
     bandwidth = s.K.bandwidth
-    if not dynamic and s.forces.far:
+    if not dynamic and s.condensed is not None:
+        solver = (f"lines condensed to {s.condensed.size} displacements and rotations of nodes, "
+                  "sparse LDL^T of these: no multiplier is unknown")
+    elif not dynamic and s.forces.far:
         solver = "banded with a border of the points that force elements couple"
     elif s.m and not dynamic and s.machine.tables.plain.border.wide:
         solver = "sparse LU with the multipliers: " + (

@@ -7,6 +7,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from work_precision import frames
 from work_precision.cases import runs_of, warm_up
 from work_precision.micro import SCALED
 
@@ -16,7 +17,9 @@ def peak(case, index, quick):
     pid = os.fork()
     if pid == 0:
         try:
-            if case in SCALED:
+            if case == "frames":
+                frames.frame(index).solve_linear()
+            elif case in SCALED:
                 SCALED[case](index).solve_linear()
             else:
                 runs_of(case, quick)[index].build().solve()

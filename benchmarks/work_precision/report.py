@@ -152,6 +152,16 @@ def scaling(rows):
                     "iterations", "peak (MB)", "kB an element", ""], lines), "![](scaling.png)", ""]
 
 
+def frames(rows):
+    """Lines about square frames."""
+    cells = [(r["cells"], r["code"], r["variant"], f"{r['error']:.1e}", f"{1e3 * r['seconds']:.4g}",
+              r["iterations"], r["peak_mb"], r["note"]) for r in rows]
+    return ["## Square frames under a lateral load", "", "From parameters to the displacement of a "
+            "corner: building is in the time.", "",
+            *table(["cells", "code", "variant", "error", "ms", "iterations", "peak (MB)", ""],
+                   cells)]
+
+
 def case_lines(name, rows):
     """Lines of a case: the front of each code."""
     lines = [f"## {name}: {PROBLEMS[name].title}", "", f"![]({name}.png)", "",
@@ -203,6 +213,8 @@ def report(results, about, loading, quick):
                                                   if row[3] == row[4] else "only Exudyn")
                                        for row in against(results[name], EXUDYN, DECADES[1:]))]
                               for name in others])]
+    if "frames" in results:
+        lines += frames(results["frames"])
     if "scaling" in results:
         lines += scaling(results["scaling"])
     for name in PROBLEMS:
