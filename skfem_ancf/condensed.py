@@ -8,6 +8,7 @@ multiplier is unknown: they are the forces left at the ends.
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from .joints.nodes import chain_ends
-from .linalg import Inertia
+from .linalg import SMALL, Inertia
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from .joints.nodes import Nodes
     from .linalg import BandMatrix
     from .types import Array
+
+logger = logging.getLogger(__name__)
 
 #: A pivot that small beside the diagonal is round-off.
 LOST = 1e-13
@@ -96,14 +99,20 @@ class Condensed:
     def __init__(self, beams: Sequence[Beam], slices: Sequence[slice], nodes: Nodes) -> None:
         self.nodes, self.groups = nodes, groups_of(beams, slices)
         self._bases = [[_Basis(nodes, group, ends) for ends in group.ends] for group in self.groups]
-        number = np.cumsum(self._unknown()).reshape(-1, 3) - 1
-        self.size = int(number.max(initial=-1)) + 1
+        unknown = self._unknown()
+        order = _order(nodes)
+        number = np.empty(unknown.shape, dtype=np.int64)
+        number[order] = np.cumsum(unknown[order]).reshape(-1, 3) - 1
+        self.size = int(np.sum(unknown))
         #: unknown of each end's x, y and rotation; one behind the last where there is none
-        self._unknowns = np.where(self._unknown(), number, self.size)[nodes.nodes]
+        self._unknowns = np.where(unknown, number, self.size)[nodes.nodes]
         self._unknowns[nodes.hinged, 2] = self.size
+        at = self._unknowns.reshape(-1, 6)
+        i, j = (np.broadcast_to(x, (len(at), 6, 6)).ravel() for x in (at[:, :, None], at[:, None]))
+        self._inside = np.flatnonzero((i < self.size) & (j < self.size))
+        #: where the entries of the members go in the matrix of the nodes
+        self._entries = tuple(x[self._inside].astype(np.int32) for x in (i, j))
         self._own = nodes.hinged.reshape(-1, 2)
-        self._order: Array | None = None
-        self._make_pattern()
         self._parts: list[_Part] = []
 
     @property
@@ -118,17 +127,6 @@ class Condensed:
         rigid[self.nodes.nodes[~self.nodes.hinged]] = True
         out[:, 2] &= rigid
         return out
-
-    def _make_pattern(self):
-        """Where the entries of the members go in the matrix of the nodes."""
-        at, n = self._unknowns.reshape(-1, 6), self.size
-        i = np.broadcast_to(at[:, :, None], (len(at), 6, 6)).ravel()
-        j = np.broadcast_to(at[:, None], (len(at), 6, 6)).ravel()
-        self._inside = np.flatnonzero((i < n) & (j < n))
-        key = j[self._inside].astype(np.int64) * n + i[self._inside]
-        found, self._place = np.unique(key, return_inverse=True)
-        self._indices = (found % n).astype(np.int32)
-        self._indptr = np.searchsorted(found, n * np.arange(n + 1)).astype(np.int32)
 
     # factors
 
@@ -174,27 +172,21 @@ class Condensed:
         return s, m, (np.conj(self._turns[s]) * self._turns[m]).real
 
     def _factors(self, ends):
-        """Sparse factors of the matrix of the nodes, and the numbers of its unknowns."""
-        at, n = self._unknowns, self.size
+        """Pivots of the matrix of the nodes, over its diagonal, and its sparse factors."""
+        n = self.size
         if not n:
-            return at, np.zeros(0), None
-        values = np.bincount(self._place, ends.ravel()[self._inside], len(self._indices))
-        A = sparse.csc_array((values, self._indices, self._indptr), (n, n))
-        lu = splu(A, "MMD_AT_PLUS_A" if self._order is None else "NATURAL", diag_pivot_thresh=0.0,
-                  options={"SymmetricMode": True})
+            return np.zeros(0), None
+        A = sparse.coo_array((ends.ravel()[self._inside], self._entries), (n, n)).tocsc()
+        lu = splu(A, "NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         if not np.array_equal(lu.perm_r, lu.perm_c):
             raise np.linalg.LinAlgError("a pivot of the nodes is zero")
-        if self._order is None:  # number them anew: the next factors need no ordering
-            self._order = lu.perm_c
-            self._unknowns = np.append(self._order, n)[at]
-            self._make_pattern()
-        return at, lu.U.diagonal()[lu.perm_c] / np.abs(A.diagonal()), lu
+        return lu.U.diagonal()[lu.perm_c] / np.abs(A.diagonal()), lu
 
     def inertia(self) -> Inertia:
         """Signs of the eigenvalues of the tangent on the tangent space of the joints."""
         found = [part.inertia() for part in self._parts]
         negative, singular = sum(x.negative for x in found), any(x.singular for x in found)
-        for ratio in [self._nodes[1], *(np.sign(x.pivot) for x in self._released)]:
+        for ratio in [self._nodes[0], *(np.sign(x.pivot) for x in self._released)]:
             negative += int(np.sum(ratio < 0.0))
             singular = singular or bool(np.any(np.abs(ratio) < LOST))
         return Inertia(negative, singular)
@@ -214,7 +206,7 @@ class Condensed:
         x, multipliers
             Shapes (N,) and (m,).
         """
-        at, _, lu = self._nodes
+        at, lu = self._unknowns, self._nodes[1]
         v, x = self._offsets(phi).reshape(-1, 6), np.zeros(len(b))
         f = np.empty(v.shape)
         for part in self._parts:
@@ -257,6 +249,15 @@ class Condensed:
         return np.concatenate([
             *(0.0 - forces[nodes.followers, :2].T), -forces[follower, 2] / scale, x, y,
             angle / self._turns[nodes.held_angle].real])
+
+
+def _order(nodes):
+    """Numbers of the nodes in an order in which sparse factors stay sparse."""
+    (i, j), n = nodes.nodes.reshape(-1, 2).T, len(nodes.held)
+    one = np.ones(len(i))
+    links = sparse.coo_array((np.append(one, one), (np.append(i, j), np.append(j, i))), (n, n))
+    A = (links + 2.0 * len(i) * sparse.eye_array(n)).tocsc()
+    return np.argsort(splu(A, "MMD_AT_PLUS_A", options={"SymmetricMode": True}).perm_c)
 
 
 class _Release:
@@ -398,7 +399,14 @@ class _Part:
         negative, singular = 0, False
         for A, *_ in [*self._inner, self._outer]:
             size = 1.0 / np.sqrt(np.abs(A.diagonal(axis1=1, axis2=2)))
-            values = np.linalg.eigvalsh(size[:, :, None] * A * size[:, None])
+            A = size[:, :, None] * A * size[:, None]
+            try:
+                pivots = np.linalg.cholesky(A).diagonal(axis1=1, axis2=2) ** 2
+                if np.min(pivots) > SMALL:
+                    continue
+            except np.linalg.LinAlgError:
+                logger.debug("lines give way between their ends")
+            values = np.linalg.eigvalsh(A)
             negative += int(np.sum(values < 0.0))
             singular = singular or bool(np.any(np.abs(values) < LOST))
         return Inertia(negative, singular)

@@ -100,7 +100,8 @@ def exudyn_system(cells, elements, nodes):
 def exudyn_run(cells, nodes, elements):
     """A Run of Exudyn's geometrically exact beams: all of it is timed."""
     def solve():
-        container, mbs, corner = exudyn_system(cells, elements, nodes)
+        system = exudyn_system(cells, elements, nodes)  # its container has to live
+        mbs, corner = system[1:]
         settings = exudyn_beams.settings(STATIC, 1, 1e-8)
         if not mbs.SolveStatic(settings):
             raise RuntimeError("not solved")
