@@ -8,7 +8,7 @@ from scipy.integrate import solve_bvp
 
 from skfem_ancf import (Beam, CallbackError, ConvergenceError, ElementBeamANCF,
                         ElementBeamCable, InputError,
-                        MeshBeam, Scene, StVenantKirchhoff)
+                        MeshBeam, ModelWarning, Scene, StVenantKirchhoff)
 from skfem_ancf.forces import contact_texts as texts
 from skfem_ancf.forces.texts import add_contact
 from skfem_ancf.obstacles import Circle, Line, Polygon, SignedDistance
@@ -682,3 +682,27 @@ def test_an_impact_goes_in_as_deep_as_the_guide_says(ratio):
     refused = Scene(b).gravity((0, -9.81)).obstacle(Line((0, -0.02)), method="augmented")
     with pytest.raises(InputError, match="penetration"):
         refused.integrate(0.05, 1e-3)
+
+
+@pytest.mark.parametrize("radius", [0.05, 0.01])
+def test_adapted_meshes_stay_small_over_a_small_circle(radius):
+    """A contact in one place, as of a knife: the tip against that of a fine mesh."""
+    def bent(n, **options):
+        scene = Scene(beam(ElementBeamCable(5), n)).clamp("left").point_force((0, -0.5), (1, 0))
+        return scene.obstacle(Circle((0.61, -0.01 - radius), radius)).solve_static(**options)
+
+    state, fine = bent(8, adapt=1e-3), bent(64)
+    assert state.beams[0].mesh.nelements <= 32 and len(state.contact()) > 0
+    assert np.allclose(state.position((1, 0)), fine.position((1, 0)), atol=1e-3)
+    assert abs(state.contact().points[0].mean() - fine.contact().points[0].mean()) < 5e-3
+
+
+def test_what_points_cannot_see_is_said():
+    """The smallest of circles, and a rule that is the caller's."""
+    scene = Scene(beam(ElementBeamCable(5), 8)).clamp("left")
+    with pytest.warns(ModelWarning, match="apart"):
+        scene.obstacle(Circle((0.6, -0.02), 0.002), points=7)
+    group = scene.obstacle(Circle((0.6, -0.1), 0.05)).system.forces.contacts.obstacles[1].groups[0]
+    x, areas = group.starts[0, :group.points // 2], group.areas[:group.points // 2]
+    assert np.diff(x).max() < np.sqrt(8 * 0.01 * 0.05 * 0.01) and np.all(areas > 0)
+    assert abs(areas.sum() - 0.01 / 8) < 1e-15 and abs(areas @ x**3 - 0.01 * (1 / 8)**4 / 4) < 1e-15

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from ..types import Array
 
 
-#: Parts of a load step at which a way through an obstacle is looked for.
-PARTS = 8
+#: Parts of a load step at which a way through an obstacle is looked for, at least and at most.
+PARTS, MOST_PARTS = 8, 100
 
 
 class Group(NamedTuple):
@@ -373,8 +373,12 @@ class Contacts:
         """
         if not self._groups:
             return None
+        ends = [self.look(*x) for x in (a, b)]
+        ways = [float(np.hypot(*(y - x)).max()) / group.depth
+                for (_, x, _), ((_, group), y, _) in zip(*ends)]
+        parts = int(np.clip(np.ceil(max(ways)), PARTS, MOST_PARTS))
         depths = []
-        for part in np.arange(PARTS + 1) / PARTS:
+        for part in np.arange(parts + 1) / parts:
             looked = self.look(a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]))
             depths.append([-found[0].min() for _, _, found in looked])
         for k, (which, group) in enumerate(self._groups):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import (InputError, MeshError, ask_array, require_function,
+from ..errors import (InputError, MeshError, ModelWarning, ask_array, require_function,
                       require_integer, require_not_negative, require_option, require_positive,
                       shown, teaching)
 from ..forces.base import ForceElement, Link, Part
@@ -33,6 +34,9 @@ SLIPPING = 1e-5
 STEP = 1e-6
 #: Points across an end.
 ACROSS = 3
+#: How deep a circle may sink in between two points of a straight surface, relative to the height;
+#: and points along an element at most.
+SINK, MOST = 1e-2, 200
 
 
 @teaching
@@ -70,8 +74,10 @@ class Obstacle(ForceElement):
         In a motion the pressure grows by so much of itself per velocity of approach, zero or
         positive (time per length), as of Hunt and Crossley; it never pulls.
     points
-        Points along each element on bottom and top, at least 2, of a Gauss-Lobatto rule; by
-        default two more than the degree of the element's axis.
+        Points along each element on bottom and top, at least 2, of a Gauss-Lobatto rule. By
+        default two more than the degree of the element's axis, and so many such rules one after
+        the other that a shape of a small radius cannot sink in between two points by more than a
+        hundredth of the height.
     **options
         ``width``: of the transition from no pressure to one in proportion to the penetration, a
         length, by default a thousandth of the height. ``tolerance``: the penetration that
@@ -206,15 +212,30 @@ class Obstacle(ForceElement):
 
     def _groups_of(self, beam, first):
         """The groups of bottom and top, and of both ends."""
-        n = self.points or beam.element.axis_degree + 2
-        xi, along = _lobatto(n)
+        xi, along = self._along(beam)
         eta, across = _lobatto(ACROSS)
-        sides = np.array([np.tile(xi, 2), np.repeat([0.0, 1.0], n)]), np.tile(along, 2)
+        sides = np.array([np.tile(xi, 2), np.repeat([0.0, 1.0], len(xi))]), np.tile(along, 2)
         last = beam.mesh.nelements - 1
         ends = [(np.array([np.full(ACROSS, end), eta]), across, np.array([e]))
                 for end, e in ((0.0, 0), (1.0, last))]
         return [self._group(beam, first, *sides, None)] + [
             self._group(beam, first, *end) for end in ends]
+
+    def _along(self, beam):
+        """Points and weights along the elements of a beam."""
+        rule = _lobatto(self.points or beam.element.axis_degree + 2)
+        bend, longest = self.shape.bend, float(beam.mesh.lengths.max())
+        apart = longest * float(np.max(np.diff(rule[0])))
+        if self.points is None and bend > 0.0:
+            wanted = np.ceil(apart / np.sqrt(8.0 * SINK * bend * beam.mesh.height))
+            pieces = int(np.clip(wanted, 1, MOST // len(rule[0])))
+            rule, apart = _repeated(*rule, pieces), apart / pieces
+        if apart > 2.0 * bend > 0.0:
+            warnings.warn(
+                f"{self!r} has a radius of {bend:.4g}, and the points of {beam!r} that touch it "
+                f"are {apart:.4g} apart: it passes between them unseen. Use shorter elements where "
+                "it is, or a larger points=", ModelWarning, stacklevel=2)
+        return rule
 
     def _group(self, beam, first, X, w, tind):
         mesh, mapping = beam.mesh, beam.mesh.mapping()
@@ -247,7 +268,8 @@ class Obstacle(ForceElement):
                             self.options["slip_speed"] or SLIPPING * sound, radius,
                             -1.0 if self.shape.hollow else 1.0])
         return Group(np.repeat(nodes, m), weights.reshape(-1, n * m), slopes, areas.ravel(),
-                     offsets.ravel(), starts.reshape(4, -1), n, m, 0.5 * h, numbers)
+                     offsets.ravel(), starts.reshape(4, -1), n, m,
+                     0.5 * min(h, self.shape.bend or h), numbers)
 
     def __repr__(self) -> str:
         return f"<Obstacle {self.shape!r}>"
@@ -276,6 +298,14 @@ def _lobatto(n):
     x = gauss_lobatto(n)
     P = np.polynomial.legendre.Legendre.basis(n - 1)(x)
     return 0.5 * (x + 1.0), 1.0 / (n * (n - 1) * P**2)
+
+
+def _repeated(x, w, pieces):
+    """A rule with points at both ends on each of equal pieces of [0, 1]."""
+    points = np.add.outer(np.arange(pieces), x)[:, :-1].ravel() / pieces
+    weights = np.tile(w[:-1], pieces) / pieces
+    weights[len(w) - 1::len(w) - 1] += w[-1] / pieces  # two meet
+    return np.append(points, 1.0), np.append(weights, w[-1] / pieces)
 
 
 def _options(options):

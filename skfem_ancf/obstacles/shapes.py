@@ -41,9 +41,13 @@ class Shape(Sealable):
         The point about which it turns, where its angle depends on time; shape (2,).
     hollow
         It is solid outside and not inside.
+    bend
+        The smallest radius of its surface; infinite where it is straight or that is not known, zero
+        for sharp corners.
     """
 
     kind = OWN
+    bend = np.inf
     numbers: Any = np.zeros(0)
     pivot: Any = np.zeros(2)
     hollow = False
@@ -176,6 +180,7 @@ class Circle(Shape):
         self.radius = require_positive("radius", radius)
         self.hollow = require_flag("hollow", hollow)
         self.numbers, self.pivot = np.append(self.center, self.radius), self.center
+        self.bend = self.radius
 
     def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
         x = np.asarray(x, dtype=float)
@@ -227,7 +232,7 @@ class Polygon(Shape):
             raise InputError("points must be three corners or more, each (x, y), as "
                              f"[(0, 0), (1, 0), (0, 1)], got {shown(points)}")
         corners = require_finite("points", corners)
-        self.radius = require_not_negative("radius", radius, False)
+        self.bend = self.radius = require_not_negative("radius", radius, False)
         self.hollow = require_flag("hollow", hollow)
         _require_simple(corners)
         after = np.roll(corners, -1, axis=0)
