@@ -661,3 +661,29 @@ def test_a_flexible_slider_crank_as_by_exudyn(monkeypatch):
     assert_allclose(history.position(slider)[:, 0], exudyn["slider"], rtol=0, atol=1e-3 * bent)
     middle = history.position((x[8], 0), rod)
     assert_allclose(middle, exudyn["middle"], rtol=0, atol=1e-3 * bent)
+
+
+def test_bodies_alone_are_told_to_take_a_beam_that_stands_aside():
+    """Two hinged bodies beside the beam that the error names: SciPy's double pendulum."""
+    bodies = [RigidBody(2.0, 0.1, (0.5, 0)), RigidBody(1.0, 0.05, (1.5, 0))]
+    with pytest.raises(InputError, match="stands aside"):
+        Scene(*bodies)
+    aside = Beam(MeshBeam.init_line([5, 6], height=0.1), ElementBeamCable(3),
+                 StVenantKirchhoff(1e9, 0.3, 1000), width=0.1)
+    scene = Scene(aside, *bodies).clamp("left").pin((0, 0), bodies[0])
+    scene.hinge((bodies[0], (1, 0)), (bodies[1], (1, 0)))
+    for body in bodies:
+        scene.point_force((0, -9.81 * body.mass), body)
+    history = scene.integrate(1.0, 1e-3)
+
+    def rate(t, y):
+        a, b, va, vb = y
+        M = np.array([[0.1 + 2.0 * 0.25 + 1.0, 0.5 * np.cos(a - b)],
+                      [0.5 * np.cos(a - b), 0.05 + 0.25]])
+        f = [-9.81 * 2.0 * np.cos(a) - 0.5 * np.sin(a - b) * vb**2,
+             -9.81 * 0.5 * np.cos(b) + 0.5 * np.sin(a - b) * va**2]
+        return np.append([va, vb], np.linalg.solve(M, f))
+
+    exact = solve_ivp(rate, (0, 1), np.zeros(4), rtol=1e-10, atol=1e-12).y[:2, -1]
+    assert_allclose([history.angle(body)[-1] for body in bodies], exact, atol=1e-4)
+    assert np.ptp(history.total_energy) < 1e-9 * history.kinetic_energy.max()
