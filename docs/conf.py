@@ -8,6 +8,7 @@ import warnings
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
 
 # pictures are drawn without a display, and scenes computed in NumPy: nothing is timed here
 os.environ.setdefault("SKFEM_ANCF_COMPILED", "0")
@@ -49,7 +50,7 @@ sphinx_gallery_conf = {
     "gallery_dirs": "gallery",
     "filename_pattern": r"\.py$",
     "ignore_pattern": r"__init__\.py",
-    "image_scrapers": ("matplotlib", DynamicScraper()),
+    "image_scrapers": ("matplotlib", "films", DynamicScraper()),
     "matplotlib_animations": True,
     "abort_on_example_error": True,
     "remove_config_comments": True,
