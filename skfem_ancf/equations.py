@@ -1,5 +1,6 @@
 """The equations of a scene as tables that texts take."""
 
+from copy import copy
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,7 +14,7 @@ from .compiled.words import Words
 from .forces.texts import ForceTables
 from .kernels.law import text_of, with_text
 from .kernels.moments import MomentPack
-from .kernels.section import SectionPack
+from .kernels.section import SectionPack, linearised
 from .own import handle_of
 from .sampling import sample
 from .source import F1, I1, by_place
@@ -115,6 +116,21 @@ class Tables:
         packs = {type(pack).__name__ for pack in self.plain.body.packs}
         return [*sorted(packs), *["elements"] * (self.plain.forces.number > 0),
                 *["contacts"] * (self.plain.forces.contacts.number > 0)]
+
+    @cached_property
+    def linearised(self) -> "Tables | None":
+        """The same with laws of constant moduli, those without strain; None if all are such."""
+        body = self.plain.body
+        packs = [linearised(pack) if isinstance(pack, SectionPack) else pack
+                 for pack in body.packs]
+        if all(one is other for one, other in zip(packs, body.packs)):
+            return None
+        tables = copy(self)
+        vars(tables).pop("flat", None)
+        tables._words = []
+        body = body._replace(packs=tuple(packs))
+        tables.plain = self.plain._replace(body=body, viscous=body)
+        return tables
 
     def _flat(self, body, addresses):
         """The FlatBody of a Body."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 import time
 from contextlib import contextmanager
-from functools import wraps
+from copy import copy
+from functools import cached_property, wraps
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -28,8 +29,8 @@ logger = logging.getLogger(__name__)
 
 #: Seconds that compiling takes, about: the kernels that texts call, each if a scene has it, and
 #: each text; and loading what lies on disk.
-COMPILING = {"SectionPack": 6.0, "CablePack": 3.0, "elements": 3.5, "contacts": 8.0,
-             "equilibrium": 6.5, "steps": 8.0, "evaluate": 3.0}
+COMPILING = {"SectionPack": 5.5, "CablePack": 2.5, "elements": 3.2, "contacts": 8.0,
+             "equilibrium": 6.2, "steps": 7.2, "evaluate": 2.3}
 LOADING = 0.7
 
 
@@ -111,6 +112,16 @@ class Machine:
         if self._plain is not None:
             return self._plain
         return compiled.PROBLEMS[0] if compiled.PROBLEMS else compiled_off()
+
+    @cached_property
+    def linearised(self) -> Machine | None:
+        """What runs the texts for :attr:`Tables.linearised`; None if the laws are linear."""
+        tables = self.tables.linearised
+        if tables is None:
+            return None
+        machine = copy(self)
+        machine.tables, machine._kept = tables, Kept()
+        return machine
 
     def choose(self, name: str) -> Choice:
         """The way of a text for the next call.

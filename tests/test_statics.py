@@ -7,9 +7,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, root
 
 import exact
-from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamPatelShabana,
-                        InputError, MeshBeam, MeshError, NameUnknown, Scene, StVenantKirchhoff,
-                        SupportError)
+from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
+                        ElementBeamPatelShabana, InputError, MeshBeam, MeshError, NameUnknown,
+                        NeoHookean, Scene, StVenantKirchhoff, SupportError)
 from skfem_ancf.formulations import FORMULATIONS
 from skfem_ancf.materials import LinearLaw, Material
 
@@ -605,3 +605,16 @@ def test_an_interrupt_keeps_what_has_converged(monkeypatch):
             assert np.allclose(again.u, whole.u, rtol=0, atol=1e-9)
         else:
             assert len(kept.load) == 3 and kept.load[-1] < 1.0
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamANCFCubic(2)], ids=repr)
+def test_laws_with_bounds_find_a_large_rotation_in_one_step(element):
+    """By way of the equilibrium of their first moduli: Newton's first steps strain them too far."""
+    height = 0.1
+    mesh = MeshBeam.init_line(np.linspace(0, 2, 17), height=height)
+    scene = Scene(Beam(mesh, element, NeoHookean(2.07e11, 0.3), width=0.1)).clamp("left")
+    scene.point_force((0, -1.5e9 * height**3), at=(2, 0))
+    state, careful = scene.solve_static(), scene.solve_static(first_step=0.1)
+    assert len(state.steps) == 1 and state.iterations <= 12
+    assert_allclose(state.q, careful.q, rtol=0, atol=1e-7)
+    assert state.displacement((2, 0))[1] < -1.2

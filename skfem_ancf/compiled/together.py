@@ -10,6 +10,7 @@ from __future__ import annotations
 from itertools import count
 from typing import Any, NamedTuple
 
+import numpy as np
 from llvmlite.binding import parse_assembly
 from numba import types
 from numba.core import compiler
@@ -121,7 +122,9 @@ class TextFlags(compiler.Flags):
 _LEFT_OUT = {"WithLifting", "InlineClosureLikes", "RewriteDynamicRaises", "InlineInlinables",
              "MakeFunctionToJitFunction", "FindLiterallyCalls", "LiteralUnroll", "InlineOverloads",
              "LiteralPropagationSubPipelinePass", "DeadBranchPrune", "RewriteSemanticConstants"}
-_ALLOCATES = {"empty", "zeros", "full", "nonzero", "dot"}
+#: What texts take of NumPy, and of its arrays, without a need for another array.
+_OF_NUMBERS = {"abs", "arctan2", "ceil", "floor", "hypot", "inf", "int64", "log1p", "maximum",
+               "minimum", "nan", "shape", "sign", "size", "sqrt"}
 #: The entries that are being compiled, the innermost last.
 _OPEN: list[_Open] = []
 _numbers = count()
@@ -155,10 +158,8 @@ class Text:
         return self.made[args]
 
     def _lowered(self, args, entry):
-        """Owners of arrays are counted only where one is allocated, given back or boxed."""
-        names = set(self.function.__code__.co_names)
-        if not (names & _ALLOCATES or any(isinstance(self.function.__globals__.get(x), Dispatcher)
-                                          for x in names)):
+        """Owners of arrays are counted only where one may be allocated, given back or boxed."""
+        if not _makes_arrays(self.function):
             try:
                 made = self._compiled(args, entry, False)
                 if not isinstance(made.signature.return_type, (types.Array, types.BaseTuple)):
@@ -178,6 +179,14 @@ class Text:
             entry.parts.pop()
         cpu_target.target_context.insert_user_function(key, made.fndesc)
         return _Made(made.signature, key, part)
+
+
+def _makes_arrays(function):
+    """True if it calls functions of arrays, of NumPy or of Numba, which may make others."""
+    given = function.__globals__
+    names = set(function.__code__.co_names)
+    of_numpy = {x for x in names & set(dir(np)) if x not in given} if "np" in names else set()
+    return not of_numpy <= _OF_NUMBERS or any(isinstance(given.get(x), Dispatcher) for x in names)
 
 
 class TextType(types.Callable):

@@ -32,7 +32,7 @@ class LawTables(NamedTuple):
     address
         That of the compiled text; 0 for the plain one.
     D
-        Constant moduli, shape (3, 3).
+        Moduli, those without strain where they depend on it, shape (3, 3).
     constants
         Of a law with texts.
     scale
@@ -182,7 +182,7 @@ def law_tables(law: Any, owner: Any) -> LawTables:
     owner
         What asks it.
     """
-    none, one = np.zeros((3, 3)), np.ones(3)
+    one = np.ones(3)
     if isinstance(law, LinearLaw):
         return LawTables(LINEAR, 0, 0, packed(law.D), np.zeros(3), one)
     base, scale = (law.base, law.scale) if type(law) is ShearCorrected else (law, one)
@@ -192,4 +192,6 @@ def law_tables(law: Any, owner: Any) -> LawTables:
     _LAWS[handle] = base
     for known in (_LAWS, _FOLLOWED):
         weakref.finalize(owner, known.pop, handle, None)
-    return LawTables(kind, handle, 0, none, constants, packed(scale))
+    with np.errstate(all="ignore"):
+        D = np.reshape(law.moduli(np.zeros((3, 1, 1))), (3, 3))
+    return LawTables(kind, handle, 0, packed(D), constants, packed(scale))

@@ -529,6 +529,22 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
         packed(mixing.data[in_order]), mixing_rounds)
 
 
+def linearised(pack: SectionPack) -> SectionPack:
+    """The pack with a law of constant moduli, those that its own has without strain.
+
+    Parameters
+    ----------
+    pack
+        Of any law.
+    """
+    if pack.law.kind == LINEAR:
+        return pack
+    t, c, p = pack.mixing
+    moduli = np.zeros((pack.terms.shape[1], pack.weights.shape[1]))
+    np.add.at(moduli, t, (pack.parts * pack.law.D.reshape(9)[c])[:, None] * pack.weights[p])
+    return pack._replace(law=pack.law._replace(kind=LINEAR), moduli=packed(moduli))
+
+
 def _joined(along, ns):
     """The matrices as one array, and the first of the samples of each, which come ns at a time."""
     sizes = [L.shape[1] for L in along]
