@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from .errors import (FileError, InputError, MeshError, NameUnknown, ask_field, require_finite,
                      require_integer, require_label, require_path, shown)
@@ -97,7 +97,7 @@ class Net:
 
     def _require_apart(self):
         """No two points at one place: lines would look joined there and not be."""
-        for i, j in sorted(cKDTree(self.points.T).query_pairs(NEAR * self.size)):
+        for i, j in sorted(scipy.spatial.cKDTree(self.points.T).query_pairs(NEAR * self.size)):
             raise MeshError(f"the points {i} and {j} are both at {_at(self.points[:, i])}: lines "
                             "that end there would not be joined; let them end at one point, with "
                             "hinges where they may turn")

@@ -204,3 +204,12 @@ def test_make_demo_ends_with_a_picture_that_the_demo_writes():
     picture = re.search(r'@echo "open \$\(CURDIR\)/out/(\w+\.png)"',
                         (ROOT / "Makefile").read_text())[1]
     assert picture in (ROOT / "demos" / "cantilever.py").read_text()
+
+
+def test_what_is_heavy_is_imported_when_it_is_needed():
+    heavy = ("scipy.spatial", "scipy.optimize", "scipy.interpolate", "scipy.integrate", "numba",
+             "meshio", "matplotlib", "pyvista", "h5py", "tqdm")
+    code = f"import sys, skfem_ancf; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], text=True, check=True,
+                          stdout=subprocess.PIPE)
+    assert done.stdout.strip() == "[]"
