@@ -55,6 +55,7 @@ sphinx_gallery_conf = {
     "abort_on_example_error": True,
     "remove_config_comments": True,
     "min_reported_time": 1e9,
+    "thumbnail_size": (460, 300),
     "show_memory": False,
     "write_computation_times": False,
     "show_signature": False,
