@@ -228,6 +228,14 @@ class Scene:
                 return found[0]
         return self._places[id(select_member(self._beams, self._bodies, beam))][0]
 
+    def _number_at(self, at, beam):
+        """As :meth:`_number`; if no beam is named, that of the only one that has the point."""
+        if beam is None and at is not None and len(self.members) > 1:
+            found = members_at(self, at)
+            if len(found) == 1:
+                return found[0]
+        return self._number(beam)
+
     def _number_of_beam(self, beam):
         """As :meth:`_number`; raises InputError of a rigid body."""
         k = self._number(beam)
@@ -684,7 +692,7 @@ class Scene:
             The point: its place (x, y) in the stress-free body; of a rigid body also None, for its
             centre of mass.
         beam
-            The beam, its name or its number, in a scene of several; or a RigidBody.
+            The beam, its name or its number, where several have the point; or a RigidBody.
         amplitude
             A function of time by which the force is multiplied in a motion.
 
@@ -694,7 +702,8 @@ class Scene:
             Itself.
         """
         at, beam = on_body(at, beam)
-        return self._put(loads=[(self._number(beam), PointForce(force, at, None, amplitude))])
+        k = self._number_at(at, beam)
+        return self._put(loads=[(k, PointForce(force, at, None, amplitude))])
 
     def follower_force(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
                        amplitude: TimeFunction = None) -> Scene:
@@ -707,7 +716,7 @@ class Scene:
         at
             The point: its place (x, y) in the stress-free body, shape (2,).
         beam
-            The beam, its name or its number, in a scene of several.
+            The beam, its name or its number, where several have the point.
         amplitude
             A function of time by which the force is multiplied in a motion.
 
@@ -717,7 +726,8 @@ class Scene:
             Itself.
         """
         at, beam = on_body(at, beam)
-        return self._put(loads=[(self._number(beam), FollowerForce(force, at, None, amplitude))])
+        k = self._number_at(at, beam)
+        return self._put(loads=[(k, FollowerForce(force, at, None, amplitude))])
 
     def line_load(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
                   amplitude: TimeFunction = None) -> Scene:

@@ -285,3 +285,17 @@ def test_reactions_at_a_point():
         (0, -9.81)).solve_static()
     weight = 2 * 0.1 * 0.1 * 7800 * 9.81
     assert_allclose(state.reactions((0, 0)).force[1], weight / 2, rtol=1e-6)
+
+
+def test_a_force_finds_the_beam_that_has_its_point():
+    arm = beam(line(origin=(2.0, 0.0)), name="arm")
+    post = beam(name="post")
+    named, found = (Scene(post, arm).clamp("left", "post") for _ in range(2))
+    for scene, where in ((named, {"beam": "arm"}), (found, {})):
+        scene.weld((2.0, 0.0))
+        scene.point_force((0, -1), at=(3.0, 0.0), **where)
+        scene.follower_force((0, -1), at=(3.5, 0.0), **where)
+    assert_array_equal(found.solve_linear().u, named.solve_linear().u)
+    for at in ((2.0, 0.0), (9.0, 0.0), "right"):  # of both, of none, no point
+        with pytest.raises(AncfError, match="say which with beam="):
+            found.point_force((0, -1), at=at)
