@@ -9,11 +9,11 @@ import numpy as np
 from .beam import Beam
 from .elements import ElementBeamCable
 from .errors import (InputError, require_finite, require_finite_scalar, require_integer,
-                     require_names, shown, teaching)
+                     require_names, require_option, require_options, shown, teaching)
 from .joints.base import bind_joint
 from .joints.nodes import HELD, Nodes
 from .loads import DeadLoad, EndMoment
-from .net import Net, net_from_meshio
+from .net import Net, mapping_of, net_from_meshio
 from .scene import Scene
 
 if TYPE_CHECKING:
@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from .results import State
     from .types import Array, TimeFunction, WhichBeam
 
+#: What is given for all lines, or for those of a group.
+BEAM = "height", "material", "width", "section", "element", "formulation", "damping", "compiled"
+#: Elements of a line, at most.
+MOST = 2**16
 #: Name of the beam of lines that are in no group.
 REST = "lines"
 
@@ -137,6 +141,8 @@ class Frame(Scene):
         >>> round(float(arch.beams[0].mesh.lengths.sum()), 6)
         3.141593
         """
+        require_options("Frame.from_lines", beam, ("points", "lines", "groups", "nodes", "hinges",
+                                                   "curves", "elements", "sections", *BEAM))
         return cls._made(Net(points, lines, groups, nodes, curves), hinges, elements, sections,
                          beam)
 
@@ -177,14 +183,19 @@ class Frame(Scene):
         >>> [beam.name for beam in frame.beams]
         ['column', 'girder']
         """
+        require_options("Frame.from_meshio", beam,
+                        ("mesh", "hinges", "elements", "sections", *BEAM))
         return cls._made(net_from_meshio(mesh), hinges, elements, sections, beam)
 
     @classmethod
     def _made(cls, net, hinges, elements, sections, options):
         m = net.lines.shape[1]
         elements = _elements(elements, m)
-        sections = dict(sections or {})
-        require_names("group of lines", list(sections), [*net.groups, REST])
+        sections = mapping_of("sections", sections)
+        require_names("group of lines in sections", list(sections), [*net.groups, REST])
+        for name, given in sections.items():
+            require_options(f"the section of {name!r}", mapping_of(f"sections[{name!r}]", given),
+                            BEAM)
         groups = dict(net.groups)
         rest = np.setdiff1d(np.arange(m), np.concatenate([*groups.values(), [-1]]))
         if len(rest):
@@ -211,6 +222,10 @@ class Frame(Scene):
             given._seal()
             self._joints = ((given, bound), *self._joints[1:])
             self._system = None
+
+    def __repr__(self):
+        n, m = self.points.shape[1], len(self._lines)
+        return f"<Frame of {m} line(s) between {n} nodes, {len(self.loads)} load(s)>"
 
     @property
     def _bound(self) -> Any:
@@ -288,9 +303,7 @@ class Frame(Scene):
             Itself.
         """
         _no_beam(beam)
-        if thickness != "free":
-            raise InputError('the sections at the nodes of a frame may get thinner or thicker: '
-                             f'thickness is "free", got {shown(thickness)}')
+        require_option("thickness at the nodes of a frame", thickness, ("free",))
         return self.hold(boundary, *HELD)
 
     def pin(self, boundary: Any, beam: WhichBeam = None) -> Frame:
@@ -414,11 +427,11 @@ def _no_beam(beam):
 def _elements(elements, m):
     """How many elements each line has, (m,)."""
     if isinstance(elements, (int, np.integer)) and not isinstance(elements, bool):
-        return np.full(m, require_integer("elements", elements, 1))
-    found = np.asarray(elements)
-    if found.shape != (m,) or found.dtype.kind not in "iu" or np.any(found < 1):
-        raise InputError("elements is a positive integer, or one for each line, of shape "
-                         f"({m},), got {shown(elements)}")
+        return np.full(m, require_integer("elements", elements, 1, MOST))
+    found = require_finite("elements", elements, (m,))
+    if np.any(found != np.floor(found)) or not np.all((found >= 1) & (found <= MOST)):
+        raise InputError(f"elements is an integer from 1 to {MOST}, or one for each line, got "
+                         f"{shown(elements)}")
     return found.astype(np.int64)
 
 
@@ -429,6 +442,9 @@ def _hinged(net, hinges):
         return ~out
     if isinstance(hinges, (str, int, np.integer)):
         hinges = [hinges]
+    if not isinstance(hinges, (list, tuple, set, frozenset)) and np.ndim(hinges) == 0:
+        raise InputError('hinges are "all", or a list of nodes and of pairs (line, node), got '
+                         f"{shown(hinges)}")
     for one in hinges:
         if isinstance(one, tuple) and len(one) == 2:
             line, node = (int(net.lines_of(one[0])[0]), int(net.nodes_at(one[1])[0]))

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
 
-from .errors import (FileError, InputError, MeshError, NameUnknown, ask_field, require_finite,
-                     require_integer, require_label, require_path, shown)
+from .errors import (FileError, InputError, MeshError, NameUnknown, ask, ask_field,
+                     require_finite, require_integer, require_label, require_path, shown)
 from .mesh import MeshBeam
 from .places import is_point
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from .types import Array
 
@@ -59,8 +60,8 @@ class Net:
         n, m = self.points.shape[1], self.lines.shape[1]
         self.groups = _named("group", "lines", groups, m)
         self.nodes = _named("name", "nodes", nodes, n)
-        self.curves = {require_integer("the number of a curved line", k, 0, m - 1): curve
-                       for k, curve in (curves or {}).items()}
+        self.curves = {require_integer("the number of a line in curves", k, 0, m - 1): curve
+                       for k, curve in mapping_of("curves", curves).items()}
         self._require_lines()
         self._require_apart()
         taken = np.zeros(m, dtype=int)
@@ -135,7 +136,7 @@ class Net:
         if isinstance(place, (int, np.integer)) and not isinstance(place, bool):
             return np.array([require_integer("the number of a node", place, 0, n - 1)])
         if callable(place):
-            chosen = np.asarray(place(self.points))
+            chosen = np.asarray(ask("the function that names nodes, of x,", place, self.points))
             if chosen.shape != (n,) or chosen.dtype != bool:
                 raise InputError("a function that names nodes takes points x of shape (2, n) and "
                                  f"returns n truth values, as lambda x: x[1] == 0; for n = {n} it "
@@ -143,7 +144,8 @@ class Net:
             if not np.any(chosen):
                 raise MeshError(f"the function {place!r} selects none of the {n} nodes")
             return np.flatnonzero(chosen)
-        if isinstance(place, (list, tuple, set, frozenset, np.ndarray)) and len(place):
+        if isinstance(place, (list, tuple, set, frozenset)) and len(place) or (
+                isinstance(place, np.ndarray) and place.ndim == 1 and len(place)):
             return np.unique(np.concatenate([self.nodes_at(one) for one in place]))
         raise InputError(f"a place of a frame is {PLACES}, got {shown(place)}")
 
@@ -217,6 +219,21 @@ class Net:
         return MeshBeam.init_curve(curve, np.linspace(0.0, 1.0, n + 1), height)
 
 
+def mapping_of(name: str, given: Any) -> Mapping[Any, Any]:
+    """A dict that was given, or an empty one for None.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    given
+        What was given.
+    """
+    if given is not None and not isinstance(given, Mapping):
+        raise InputError(f"{name} must be a dict, got {shown(given)}")
+    return given or {}
+
+
 def _pairs(what, values):
     """Pairs as an array (2, n)."""
     if isinstance(values, np.ndarray):
@@ -244,15 +261,14 @@ def _numbers(what, values):
 
 def _named(kind, what, given, n):
     """Numbers by name."""
-    if given is not None and not hasattr(given, "items"):
-        raise InputError(f"{what} by name are a dict, as {{'name': [0, 1]}}, got {shown(given)}")
     out = {}
-    for name, numbers in (given or {}).items():
+    for name, numbers in mapping_of(f"{kind}s of {what}", given).items():
         if require_label(f"a {kind} of {what}", name) is None:
             raise InputError(f"a {kind} of {what} is a text, got None")
-        found = np.unique(np.atleast_1d(np.asarray(numbers)))
-        if found.dtype.kind not in "iu" or not len(found):
+        found = require_finite(f"the numbers of {what} of {name!r}", numbers)
+        if found.ndim != 1 or not len(found) or np.any(found != np.floor(found)):
             raise InputError(f"{name!r} must hold numbers of {what}, got {shown(numbers)}")
+        found = np.unique(found).astype(np.int64)
         if found[0] < 0 or found[-1] >= n:
             raise MeshError(f"{name!r} holds the number {found[0] if found[0] < 0 else found[-1]}: "
                             f"the {what} are numbered 0 to {n - 1}")

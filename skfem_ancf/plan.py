@@ -99,25 +99,7 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         f"{s.m} equations of {len(s.joints)} joint(s) and directors of rigid bodies" if s.bodies
         else f"{s.m} equations of {len(s.joints)} joint(s)" if s.m else
         "no joints" if not scene.joints else "the joints only fix coordinates")
-    bandwidth = s.K.bandwidth
-    if not dynamic and s.condensed is not None:
-        solver = (f"lines condensed to {s.condensed.size} displacements and rotations of nodes, "
-                  "sparse LDL^T of these: no multiplier is unknown")
-    elif not dynamic and s.forces.far:
-        solver = "banded with a border of the points that force elements couple"
-    elif s.m and not dynamic and s.machine.tables.plain.border.wide:
-        solver = "sparse LU with the multipliers: " + (
-            "a joint is not quadratic, as a slider on a beam" if s.bordered else
-            f"too many for a border ({s.m})")
-    elif not s.symmetric:
-        solver = f"banded LU, half bandwidth {bandwidth}: a force has no potential"
-    else:
-        solver = f"banded Cholesky, half bandwidth {bandwidth}"
-    if s.m and (dynamic or s.bordered):
-        springs = 0 if dynamic else len(s.springs)
-        solver += ", bordered by the multipliers" + (
-            f" and by {springs} springs on beams that joints alone hold" if springs else "")
-    add("linear solver", "computed", solver)
+    add("linear solver", "computed", _linear_solver(s, dynamic))
     rules = sorted({(b.element.order, b.kernel.section_points) for b in beams if b.has_sections})
     add("section quadrature", "constant" if rules else "skipped",
         "; ".join(f"order {n}: {p} points, exact for degree {2 * p - 1} of {4 * n}"
@@ -133,6 +115,30 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         f"{len(sensors)} read at every step" if sensors else "there are none")
     add("fields", "skipped", "strain and stress are computed where a State is asked for them")
     return Plan(items)
+
+
+def _linear_solver(s, dynamic):
+    """How the linear systems of a system are solved."""
+    bandwidth = s.K.bandwidth
+    if not dynamic and s.condensed is not None:
+        solver = (f"lines condensed to {s.condensed.size} displacements and rotations of nodes, "
+                  "sparse LDL^T of these: no multiplier is unknown")
+    elif not dynamic and s.forces.far:
+        solver = "banded with a border of the points that force elements couple"
+    elif s.m and not dynamic and s.machine.tables.plain.border.wide:
+        solver = "sparse LU with the multipliers: " + (
+            "a joint is not quadratic, as a slider on a beam" if s.bordered else
+            "more is joined, held or followed by loads than the nodes" if s.constraints.frame else
+            f"too many for a border ({s.m})")
+    elif not s.symmetric:
+        solver = f"banded LU, half bandwidth {bandwidth}: a force has no potential"
+    else:
+        solver = f"banded Cholesky, half bandwidth {bandwidth}"
+    if s.m and (dynamic or s.bordered):
+        springs = 0 if dynamic else len(s.springs)
+        solver += ", bordered by the multipliers" + (
+            f" and by {springs} springs on beams that joints alone hold" if springs else "")
+    return solver
 
 
 def _sections(scene):

@@ -16,6 +16,7 @@ import scipy.linalg
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from .condensed import Condensed
 from .errors import ConvergenceError, SupportError
 from .forces.texts import add_elastic_force
 
@@ -31,6 +32,8 @@ REFINEMENTS, REFINED, ACCEPTED = 6, 1e-12, 1e-6
 NEAR = 1e-5
 #: Tolerance of that correction, whose right-hand side is round-off.
 ROUGH = 1e-2
+#: Coordinates up to which a frame is not condensed.
+FEW = 600
 #: Ratio of one correction to the one before at which they lead nowhere.
 SLOW = 0.5
 
@@ -156,6 +159,24 @@ class StrainTangent:
         weight = np.sqrt(abs((self.B.multiply(self.CB)).sum(axis=0)).A1)
         if np.max(weight * np.abs(du[:, 0])) <= NEAR * np.max(weight * np.abs(u[self.free])):
             self._set_stress(self.stress + self.CB @ du[:, 0], self.multipliers + dm[:, 0])
+
+    def condense(self, condensed: Condensed, shift: float) -> Condensed:
+        """Factors of the tangent of a frame, condensed to its nodes, with the mass times a number.
+
+        Parameters
+        ----------
+        condensed
+            That of the system, which is left as it is.
+        shift
+            What the mass is multiplied by.
+        """
+        (u, load, t, _), system = self._at, self.system
+        own = Condensed(system.beams, system.slices, condensed.nodes)
+        system.assemble(u, load, t=t)
+        if shift:
+            system.K.combine(1.0, system.K, shift, system.mass)
+        own.factorize(system.K, u, self.multipliers)
+        return own
 
     @property
     def symmetric(self) -> bool:
@@ -301,9 +322,19 @@ class Inverse:
     """
 
     def __init__(self, tangent: StrainTangent, M: Any = None, shift: float = 0.0) -> None:
-        self._tangent, self._n, m = tangent, *tangent.size
+        self._tangent, self._n = tangent, tangent.size[0]
         self._M, self._shift = M, shift
         self._rest = tangent.S + shift * M if shift else tangent.S
+        self._by_strains, self._nodes = False, None
+        condensed = tangent.system.condensed
+        if condensed is not None and self._n > FEW:
+            self._nodes = tangent.condense(condensed, shift)
+        else:
+            self._lu = self._factors(self._scaled(), [])
+
+    def _scaled(self):
+        """The assembled matrix, after the units of coordinates and joints have been found."""
+        tangent, m = self._tangent, self._tangent.size[1]
         K = tangent.B.T @ tangent.CB + self._rest
         # unit diagonal: coordinates and joints have units of their own
         diagonal = abs(K.diagonal())
@@ -312,8 +343,7 @@ class Inverse:
         J = tangent.J @ sparse.diags(self._d)
         size = np.sqrt(np.asarray(J.multiply(J).sum(axis=1)).ravel()) if m else np.zeros(0)
         self._e = 1.0 / np.where(size > 0, size, 1.0)
-        self._by_strains = False
-        self._lu = self._factors(K, [])
+        return K
 
     def _factors(self, K, stresses):
         """Factors of K between scaled coordinates, the joints, and rows for stresses before."""
@@ -337,6 +367,8 @@ class Inverse:
 
     def _use_strains(self):
         """Factors with the stresses ``C B x`` as unknowns, in units of the strains' stiffness."""
+        if self._nodes is not None:
+            self._scaled()
         B, CB = self._tangent.B, self._tangent.CB
         size, strain = (abs(A).max(axis=1).toarray().ravel() for A in (CB, B))
         held = (size == 0.0) | (strain == 0.0)  # strains of fixed coordinates only
@@ -348,6 +380,9 @@ class Inverse:
             [W @ CB, B.T @ sparse.diags(size), -self._small * sparse.eye(number)])
 
     def _once(self, b, c):
+        if self._nodes is not None and not self._by_strains:
+            x, l = zip(*(self._nodes.solve(*columns) for columns in zip(b.T, c.T)))
+            return np.array(x).T, np.array(l).T
         b, c = self._d[:, None] * b, self._e[:, None] * c
         if self._by_strains:
             none = np.zeros((self._tangent.B.shape[0], b.shape[1]))
@@ -385,7 +420,7 @@ class Inverse:
         x, l
             Shapes (n, k) and (m, k).
         """
-        c = np.zeros((len(self._e), b.shape[1])) if c is None else c
+        c = np.zeros((self._tangent.size[1], b.shape[1])) if c is None else c
         x, l, good = self._refined(b, c, accepted)
         if not good and not self._by_strains:
             logger.info("assembled stiffnesses are too inaccurate: stresses become unknowns")

@@ -10,13 +10,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
+import meshio
 import numpy as np
 from skfem import Basis, ElementVector, LinearForm
 
 from skfem_ancf import (HHT, Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
-                        ElementBeamPatelShabana, EnergyMomentum, GeneralizedAlpha, KelvinVoigt,
-                        MeshBeam, NeoHookean, Newmark, RigidBody, Scene, StVenantKirchhoff, forms,
-                        reference_coordinates)
+                        ElementBeamPatelShabana, EnergyMomentum, Frame, GeneralizedAlpha,
+                        KelvinVoigt, MeshBeam, NeoHookean, Newmark, RigidBody, Scene,
+                        StVenantKirchhoff, forms, reference_coordinates)
 from skfem_ancf.dynamics import get_scheme
 from skfem_ancf.elements import choose_element
 from skfem_ancf.formulations import Assumed, Continuum, get_formulation
@@ -83,6 +84,7 @@ TAKES = {
     "drawn": {"[]": "none"},
     "components": {},
     "title": {k: "any text" for k in ("'text'", "'1.0'", "''")},
+    "nodes": {"0": "the number of a node"},
     "other": {},
     "file": {},
 }
@@ -96,8 +98,10 @@ WORDS = {
     "k": "number of modes|index", "cmap": "colour map", "names": "coordinate",
     "form": "[Ff]orm|load",
     "times_or_ix": "refinements|elements|subdomain|function", "tind": "elements|subdomain|function",
-    "elements": "element|subdomain|points", "at": "place|point|boundary|section|facet|beam",
-    "boundary": "place|point|facet|function", "facets": "place|point|boundary|function",
+    "elements": "element|subdomain|points", "at": "place|point|boundary|section|facet|beam|node",
+    "boundary": "place|point|facet|function|node", "place": "place|node", "what": "held",
+    "hinges": "hinge|node|line", "groups": "group|lines", "curves": "curve", "mesh": "mesh",
+    "facets": "place|point|boundary|function",
     "fields": "field", "dr": "derivative", "factors": "factor|body", "filename": "file|read|write",
     "shear_correction": "shear correction", "t_start": "t_eval", "radius": "joints",
     "t_end": "times", "adapt": "max_elements", "function": "function|the field 'f'",
@@ -444,6 +448,36 @@ call("scene.follower_force", lambda **k: moved(clamped().follower_force(**k)),
 call("scene.line_load", lambda **k: moved(clamped().line_load(**k)),
      dict(force=(0.0, -0.1), beam=0, amplitude=amplitude), force="vector", beam="beam?",
      amplitude="function?")
+def frame(points=((0, 0), (0, 1), (1, 1)), lines=((0, 1), (1, 2)), **options):
+    return Frame.from_lines(points, lines, **{
+        "nodes": {"ground": [0]}, "height": 0.02, "width": 0.02,
+        "material": StVenantKirchhoff(2e11, 0.3, density=7800.0), **options})
+
+
+call("Frame.from_lines", lambda **k: frame(**k),
+     dict(points=((0, 0), (0, 1), (1, 1)), lines=((0, 1), (1, 2)), groups={"a": [0]},
+          nodes={"b": [1]}, hinges=[(0, 1)], curves={}, elements=2, sections={}, height=0.02),
+     {name: {"{}": "none"} for name in ("groups", "nodes", "curves", "sections")}
+     | {"hinges": {"[]": "none", "0": "a node"}}, points="other", lines="other",
+     groups="other?", nodes="other?", hinges="other", curves="other?", elements="other",
+     sections="other?", height="positive")
+call("Frame.from_meshio", lambda mesh: Frame.from_meshio(
+    mesh, height=0.02, width=0.02, material=StVenantKirchhoff(2e11, 0.3)),
+     dict(mesh=meshio.Mesh([[0, 0], [0, 1]], [("line", [[0, 1]])])), mesh="other")
+call("frame.nodes", lambda **k: frame().nodes(**k), dict(place=(0, 1)), place="nodes")
+call("frame.hold", lambda place, what: frame().hold(place, what), dict(place=0, what="x"),
+     place="nodes", what="other")
+call("frame.clamp", lambda **k: frame().clamp(**k), dict(boundary=0, thickness="free"),
+     boundary="nodes", thickness="other")
+call("frame.pin", lambda **k: frame().pin(**k), dict(boundary="ground"), boundary="nodes")
+call("frame.point_force", lambda **k: moved(frame().clamp(0).point_force(**k)),
+     dict(force=(0, -1), at=2, beam=None, amplitude=amplitude), force="vector",
+     at="nodes", amplitude="function?")
+call("frame.moment", lambda **k: moved(frame().clamp(0).moment(**k)),
+     dict(boundary=2, M=1e-3, amplitude=amplitude), boundary="nodes", M="number",
+     amplitude="function?")
+
+
 call("RigidBody", lambda **k: moved(Scene(beam(), RigidBody(**k)).clamp("left")),
      dict(mass=1.0, inertia=0.1, position=(0.0, 2.0), angle=0.1, name="b",
           outline=[(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]),
