@@ -432,3 +432,17 @@ def test_the_plan_lists_sections_and_strains():
     assert "0.05 to 0.1" in terms["sections"]
     assert "sections" not in {item.term for item in Scene(
         Beam(line(), ElementBeamANCF(2), STEEL, width=0.1)).plan()}
+
+
+@pytest.mark.parametrize("height", [0.01, 0.1])
+def test_a_cable_has_rotary_inertia_if_its_section_is_given(height):
+    """A hinged beam: Rayleigh's factor 1 / sqrt(1 + (n pi h)^2 / 12) on Euler's frequencies."""
+    frequencies = []
+    for options in ({"width": 0.01}, {"section": Section.profile("rectangle", width=0.01)}):
+        beam = Beam(line(12, h=height), ElementBeamCable(5), PLAIN, **options)
+        scene = Scene(beam).pin("left").fix("right", "r^2")
+        frequencies.append(scene.modes(2).frequencies)
+    k = np.pi * np.array([1, 2])
+    assert_allclose(frequencies[0], k**2 * height * np.sqrt(2e8 / 7800 / 12), rtol=1e-5)
+    assert_allclose(frequencies[1] / frequencies[0], (1 + (k * height) ** 2 / 12) ** -0.5,
+                    rtol=1e-8)
