@@ -108,6 +108,12 @@ def links_of_parts(app, path, docname, content):
         links_of_pages(app, docname, content)
 
 
+def names_of_types(app, what, name, thing, options, signature, returned):
+    """Names of types as they are written, inside of others too."""
+    return tuple(text and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", text)
+                 for text in (signature, returned))
+
+
 def verification(app):
     """The table of verification.md, computed."""
     subprocess.run([sys.executable, HERE.parent / "benchmarks" / "verification.py", "--out",
@@ -120,3 +126,4 @@ def setup(app):
     app.connect("source-read", links_of_pages)
     app.connect("include-read", links_of_parts)
     app.connect("builder-inited", verification)
+    app.connect("autodoc-process-signature", names_of_types)
