@@ -501,10 +501,8 @@ def stick(tables, group, at, x, a, pressure, found, F, K):
     memory, numbers = _memory(tables, group), _numbers(tables, group)
     areas = tables.floats[group[AREAS]:]
     for i in lanes(at.size):
-        p, q = memory[1, at[i]] - pose[4], memory[2, at[i]] - pose[5]
         tx, ty = -found[2, i], found[1, i]
-        slip = ((x[0, i] - pose[0] - pose[4] - pose[2] * p + pose[3] * q) * tx
-                + (x[1, i] - pose[1] - pose[5] - pose[3] * p - pose[2] * q) * ty)
+        slip = slip_of(pose, memory[1, at[i]], memory[2, at[i]], x[0, i], x[1, i], tx, ty)
         k, limit = numbers[STICKING] * areas[at[i]], numbers[FRICTION] * pressure[i]
         sticks = 1.0 * (np.abs(k * slip) < limit)
         T = np.minimum(np.maximum(k * slip, -limit), limit)
@@ -513,6 +511,14 @@ def stick(tables, group, at, x, a, pressure, found, F, K):
         F[0, i] += T * tx
         F[1, i] += T * ty
         _add_friction(found, i, tx, ty, T, k * sticks, change, K)
+
+
+@source
+def slip_of(pose, p, q, x, y, tx, ty):
+    """How far a point (x, y) is along t from its anchor (p, q), which moves with the obstacle."""
+    a, b = p - pose[4], q - pose[5]
+    return ((x - pose[0] - pose[4] - pose[2] * a + pose[3] * b) * tx
+            + (y - pose[1] - pose[5] - pose[3] * a - pose[2] * b) * ty)
 
 
 @source

@@ -12,7 +12,8 @@ from ..errors import InputError
 from ..own import handle_of
 from .contact_texts import (ANCHORED, FRICTION, HEADER, MEMORY, NOW, OWN, POSE, POSES, STICKING,
                             STIFFNESS, TANGENT, WIDTH, ContactTables, Question, distances,
-                            of_contacts, places, resist, slope_of, stick, surface, velocities)
+                            of_contacts, places, resist, slip_of, slope_of, stick, surface,
+                            velocities)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -52,6 +53,32 @@ class Group(NamedTuple):
     points: int
     depth: float
     numbers: Any
+
+
+def carried(pose: Array, x: Array) -> Array:
+    """Where points of an obstacle are that were at x, shape (2, n), when it was given.
+
+    Parameters
+    ----------
+    pose
+        That of :meth:`~skfem_ancf.obstacles.obstacle.Obstacle.pose`, shape (10,).
+    x
+        Points, shape (2, n).
+    """
+    turn = np.array([[pose[2], -pose[3]], [pose[3], pose[2]]])
+    return turn @ (x - pose[4:6, None]) + pose[4:6, None] + pose[:2, None]
+
+
+def taken_back(pose: Array, x: Array) -> Array:
+    """The inverse of :func:`carried`.
+
+    Parameters
+    ----------
+    pose, x
+        As there, shapes (10,) and (2, n).
+    """
+    turn = np.array([[pose[2], pose[3]], [-pose[3], pose[2]]])
+    return turn @ (x - pose[4:6, None] - pose[:2, None]) + pose[4:6, None]
 
 
 class Contacts:
@@ -251,14 +278,11 @@ class Contacts:
             if numbers[FRICTION] == 0.0:
                 continue
             pose = self.tables.poses[which * POSES:which * POSES + POSE]
-            turn = np.array([[pose[2], -pose[3]], [pose[3], pose[2]]])
-            pivot, moved = pose[4:6, None], pose[4:6, None] + pose[:2, None]
             along = np.array([-found[2], found[1]])
-            anchor = turn @ (memory[1:] - pivot) + moved
             limit = (numbers[FRICTION] * numbers[STIFFNESS] / numbers[STICKING]
                      * slope_of(memory[0] - found[0], numbers[WIDTH]))
-            slip = np.clip(np.sum((x - anchor) * along, axis=0), -limit, limit)
-            memory[1:] = turn.T @ (x - slip * along - moved) + pivot
+            slip = np.clip(slip_of(pose, *memory[1:], *x, *along), -limit, limit)
+            memory[1:] = taken_back(pose, x - slip * along)
 
     def augment(self, u: Array, t: float) -> float:
         """The largest penetration; where it is too large, pressures reach on by it.

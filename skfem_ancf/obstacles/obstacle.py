@@ -11,7 +11,7 @@ from ..errors import (InputError, MeshError, ModelWarning, ask_array, require_fu
                       require_integer, require_not_negative, require_option, require_positive,
                       shown, teaching)
 from ..forces.base import ForceElement, Link, Part
-from ..forces.contacts import Contacts, Group
+from ..forces.contacts import Contacts, Group, carried, taken_back
 from ..kernels.section import beam_gradients
 from ..quadrature import gauss_lobatto
 from .shapes import Shape
@@ -161,13 +161,11 @@ class Obstacle(ForceElement):
         if not self.moves:
             return self.shape.outline(box, t)
         pose = self.pose(t)
-        turn = np.array([[pose[2], -pose[3]], [pose[3], pose[2]]])
-        pivot = pose[4:6, None]
-        corners = np.array([[box[0, i], box[1, j]] for i in (0, 1) for j in (0, 1)]).T
-        corners = turn.T @ (corners - pivot - pose[:2, None]) + pivot
+        corners = taken_back(pose, np.array(
+            [[box[0, i], box[1, j]] for i in (0, 1) for j in (0, 1)]).T)
         points, pieces = self.shape.outline(
             np.array([corners.min(axis=1), corners.max(axis=1)]).T, t)
-        return turn @ (points - pivot) + pivot + pose[:2, None], pieces
+        return carried(pose, points), pieces
 
     def bind(self, scene: Scene) -> list[Link]:
         beams = scene.beams if self.beam is None else [scene.beam(self.beam)]
@@ -192,11 +190,9 @@ class Obstacle(ForceElement):
 
     def _require_outside(self, beams):
         """Raise InputError if the surface of a shape is inside of a beam."""
-        pose = self.pose(0.0)
-        turn = np.array([[pose[2], -pose[3]], [pose[3], pose[2]]])
+        landmarks = carried(self.pose(0.0), self.shape.landmarks()).T
         for beam in beams:
-            for x in self.shape.landmarks().T:
-                at = turn @ (x - pose[4:6]) + pose[4:6] + pose[:2]
+            for at in landmarks:
                 try:
                     Y = beam.locate(at)[1][1]
                 except MeshError:
