@@ -12,7 +12,9 @@ from scipy.optimize import brentq
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, MeshBeam, Scene, Section,
                         StVenantKirchhoff, tangent)
 from skfem_ancf.condensed import Condensed
+from skfem_ancf.dynamics import integrate
 from skfem_ancf.errors import FileError, InputError, MeshError, NameUnknown, SupportError
+from skfem_ancf.system import System
 
 E, H = 2e11, 0.02
 STEEL = StVenantKirchhoff(E, 0.3, density=7800.0)
@@ -157,6 +159,33 @@ def test_few_iterations_at_every_slenderness(slenderness, elements):
     state = frame.point_force((0.3, -0.2), at=1).solve_static()
     assert state.iterations <= 8 and len(state.steps) == 1 and state.stability == "stable"
     assert state.displacement((0.0, 1.0))[0] == pytest.approx(0.115804, rel=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_any_frame_is_that_with_multipliers_as_unknowns(seed, monkeypatch):
+    """Lines at any angles, in groups of several elements, hinged here and there."""
+    rng = np.random.default_rng(seed)
+    points = np.array(np.divmod(np.arange(9), 3)[::-1]) + 0.2 * rng.uniform(-1, 1, (2, 9))
+    lines = [(i, j) for i in range(9) for j in range(i + 1, 9)
+             if (j == i + 1 and j % 3) or j == i + 3 or (j == i + 4 and rng.random() < 0.3)]
+    lines = [lines[k][::rng.choice([1, -1])] for k in rng.permutation(len(lines))]
+    n = len(lines)
+    hinges = [(k, lines[k][rng.integers(2)]) for k in rng.choice(n, 3, replace=False)]
+    options = {"groups": {"a": range(0, n, 3)}, "sections": {"a": {
+        "height": 0.03, "element": [ElementBeamCable(3), ElementBeamANCF(2)][seed % 2]}},
+        "elements": rng.integers(1, 4, n), "hinges": hinges}
+    found = []
+    for condensed in (System.condensed, None):
+        monkeypatch.setattr(System, "condensed", condensed)
+        frame = Frame.from_lines(points, lines, height=H, width=H, material=STEEL, **options)
+        frame.clamp([0, 1]).pin(2).point_force((300.0, -500.0), at=[6, 8]).moment(7, 40.0)
+        state = frame.line_load((0, -200.0), beam="a").solve_static(tol=1e-11)
+        found.append((state, state.reactions([0, 1, 2])))
+    (a, p), (b, q) = found
+    assert np.abs(a.u).max() > 1e-3 and a.stability == b.stability
+    assert_allclose(a.displacement(points), b.displacement(points), rtol=0, atol=1e-9)
+    assert_allclose(a.multipliers, b.multipliers, atol=1e-6 * np.abs(b.multipliers).max(), rtol=0)
+    assert_allclose([*p.force, p.moment], [*q.force, q.moment], rtol=1e-6)
 
 
 def test_reactions_hold_the_loads():
@@ -307,6 +336,23 @@ def test_modes_and_buckling_of_many_lines_are_those_with_multipliers(monkeypatch
         found.append([*frame.modes(3, state).frequencies, *frame.buckling(2).factors])
     assert frame.N > 600
     assert_allclose(found[0], found[1], rtol=1e-8)
+
+
+def test_a_small_frame_moves_with_its_multipliers():
+    """A portal that is let go swings with its first frequency, and keeps its energy."""
+    frame = portal(height=1e-2, width=1e-2).point_force((1e-2, 0.0), at=1, amplitude=lambda t: 0.0)
+    period = 2 * np.pi / frame.modes(1).frequencies[0]
+    history = frame.integrate(period, period / 100, start=frame.solve_static())
+    x = history.displacement((0.0, 1.0))[:, 0]
+    assert_allclose([x[50], x[100]], [-x[0], x[0]], rtol=0.02)  # it has other motions, too
+    energy = history.strain_energy + history.kinetic_energy
+    assert np.ptp(energy) < 1e-9 * energy[0]
+
+
+def test_a_motion_of_too_many_multipliers_is_refused(monkeypatch):
+    monkeypatch.setattr(integrate, "LARGEST", 1e-6)
+    with pytest.raises(InputError, match=r"12 equations of joints.*scene.modes\(k\)"):
+        portal().integrate(1.0, 0.1)
 
 
 # its parts

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from .sensors import Sensor
 
 MAX_STEPS = 10**9
+#: Gigabytes of the joints' matrices, at most.
+LARGEST = 2.0
 MIN_RTOL = 1e-12
 EPS = np.finfo(float).eps
 
@@ -111,6 +113,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         t_start = 0.0 if motion is None else motion.t
     task = _task(t_start, t_end, dt, t_eval, tol, rtol, [
         *np.atleast_1d(breakpoints), *_samples(system, t_start, t_end)])
+    _require_room(system)
     system.require_independent_joints()
     system.forces.contacts.require_motion()
     run = Run(system, scheme, task, sensors)
@@ -143,6 +146,16 @@ def _samples(system, t_start, t_end):
             raise InputError(f"dt of {control!r} is too small for a motion of {span:g}")
         found += (start + control.dt * np.arange(1, np.ceil(span / control.dt))).tolist()
     return found
+
+
+def _require_room(system):
+    """Raise InputError if the joints' dense matrices would fill the memory."""
+    size = 24e-9 * system.m * system.N
+    if size > LARGEST:
+        raise InputError(
+            f"a motion keeps the derivatives of {system.m} equations of joints by {system.N} "
+            f"coordinates as dense matrices, {size:.3g} GB: take fewer or longer lines and beams, "
+            "or the frequencies and shapes of scene.modes(k), which are found by sparse matrices")
 
 
 def _task(t_start, t_end, dt, t_eval, tol, rtol, breakpoints):
