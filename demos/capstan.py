@@ -1,0 +1,75 @@
+r"""A rope on a pulley that does not turn
+=====================================
+
+A sailor holds a ship with one hand, if the rope goes round a bollard: friction lets the tension
+grow along the contact, by the factor :math:`e^{\mu \alpha}` of Euler and Eytelwein [1]_. Here a
+rope lies over half a pulley with a weight at one end, and the other end is pulled until it slips.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from skfem_ancf import Beam, Circle, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+
+# %%
+# The rope hangs over the pulley from the start: straight, half a circle, straight. It is thin, and
+# the arc is its stress-free shape, so that bending plays no part.
+
+radius, hanging, thickness, friction = 0.1, 0.1, 2e-3, 0.25
+cord = StVenantKirchhoff(E=5e7, nu=0.0)
+arc = np.pi / 2 * (radius + thickness / 2)
+
+
+def shape(s):
+    turn = np.clip(s, -arc, arc) / (radius + thickness / 2)
+    beyond = np.abs(s) - np.minimum(np.abs(s), arc)
+    return np.array([(radius + thickness / 2) * np.sin(turn),
+                     (radius + thickness / 2) * np.cos(turn) - beyond])
+
+
+ends = np.linspace(arc, arc + hanging, 4)
+nodes = np.concatenate([-ends[::-1], np.linspace(-arc, arc, 41)[1:-1], ends])
+rope = Beam(MeshBeam.init_curve(shape, nodes, thickness), ElementBeamCable(5), cord, thickness)
+held, pulled = shape(nodes[0]), shape(nodes[-1])
+
+weight, way = 1.0, 4e-3
+scene = Scene(rope).fix("left", "r^1").fix("right", "r^1")
+scene.obstacle(Circle((0, 0), radius), friction=friction, stiffness=1e9)
+scene.point_force((0, -weight), at=held)
+scene.fix("right", "r^2", displacement=-way)
+state = scene.solve_static(first_step=0.1)
+
+# %%
+# **The check**: the force of the hand over the weight, and the tension all along the contact.
+
+hand = -state.reactions("right").force[1]
+print(f"force of the hand: {hand:.4f} N; Euler and Eytelwein {weight * np.exp(friction * np.pi):.4f} N")
+assert np.isclose(hand, weight * np.exp(friction * np.pi), rtol=0.015)
+
+s = np.linspace(nodes[0], nodes[-1], 201)[1:-1]
+tension = state.resultants(shape(s)).N
+expected = weight * np.exp(friction * np.clip(s + arc, 0, 2 * arc) / (radius + thickness / 2))
+print(f"tension along the rope within {100 * np.max(abs(tension / expected - 1)):.1f} %")
+assert np.max(abs(tension / expected - 1)) < 0.05
+
+# %%
+# The pulley feels both ends; and where the rope presses.
+
+contact = state.contact()
+print("force on the rope from the pulley:", contact.total.round(3), "N")
+assert np.isclose(contact.total[1], weight + hand, rtol=1e-3)
+
+fig, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.4), layout="constrained")
+state.plot(lambda v: 1e-6 * v["S_xx"], ax=left, thickness=3, undeformed=False, cmap="viridis",
+           title="stress along the rope", unit="MPa")
+left.set(xlabel="x (m)", ylabel="y (m)")
+angle = np.degrees(s / (radius + thickness / 2))
+right.plot(angle, expected, lw=5, alpha=0.3, label="Euler and Eytelwein")
+right.plot(angle, tension, "k", lw=1.2, label="computed")
+right.set(xlabel="angle on the pulley (degrees)", ylabel="tension (N)")
+right.legend(frameon=False)
+plt.show()
+
+# %%
+# .. [1] L. Euler, Remarques sur l'effet du frottement dans l'equilibre, Mem. Acad. Sci. Berlin 18
+#    (1762) 265-278; J. A. Eytelwein, Handbuch der Statik fester Korper (1808).
