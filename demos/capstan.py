@@ -43,8 +43,9 @@ state = scene.solve_static(first_step=0.1)
 # **The check**: the force of the hand over the weight, and the tension all along the contact.
 
 hand = -state.reactions("right").force[1]
-print(f"force of the hand: {hand:.4f} N; Euler and Eytelwein {weight * np.exp(friction * np.pi):.4f} N")
-assert np.isclose(hand, weight * np.exp(friction * np.pi), rtol=0.015)
+wanted = weight * np.exp(friction * np.pi)
+print(f"force of the hand: {hand:.4f} N; Euler and Eytelwein {wanted:.4f} N")
+assert np.isclose(hand, wanted, rtol=0.015)
 
 s = np.linspace(nodes[0], nodes[-1], 201)[1:-1]
 tension = state.resultants(shape(s)).N

@@ -36,8 +36,8 @@ def tangent(s):
     return np.array([np.cos(turn), np.sin(turn)])
 
 
-mesh = MeshBeam.init_curve(curve, np.concatenate([-ends[::-1], np.linspace(-arc, arc, 9)[1:-1], ends]),
-                           height, tangent)
+nodes = np.concatenate([-ends[::-1], np.linspace(-arc, arc, 9)[1:-1], ends])
+mesh = MeshBeam.init_curve(curve, nodes, height, tangent)
 fork = Beam(mesh, ElementBeamANCFCubic(2), steel, height, name="fork")
 
 # %%
