@@ -80,7 +80,7 @@ for force in forces:
 travel = np.array([state.displacement(middle)[1] for state in states])
 angles = np.degrees([state.angle("shackle") for state in states])
 print(f"at {forces[-1]:g} N: {1e3 * travel[-1]:.1f} mm, secant "
-      f"{1e-3 * forces[-1] / travel[-1]:.3f} N/mm; shackle leans by up to {angles.max():.1f} degrees")
+      f"{1e-3 * forces[-1] / travel[-1]:.3f} N/mm; shackle leans by {angles.max():.1f} degrees")
 
 fig, (above, below) = plt.subplots(2, 1, figsize=(8, 6.4), height_ratios=(1.1, 1),
                                    layout="constrained")

@@ -33,7 +33,7 @@ def pumped(pressure, start=None):
 # load p b stays normal to it, on the lower face, which gets longer. Lengths in L, forces in EI/L^2.
 
 
-def line(load):
+def line(full):
     def equations(s, v):
         angle, M, N, Q = v[:4]
         face = 1 + M * height / (2 * length)
@@ -45,7 +45,7 @@ def line(load):
     s = np.linspace(0, 1, 61)
     guess = np.zeros((6, 61))
     guess[4] = s
-    for load in np.linspace(0.1, 1, 10) * load:
+    for load in np.linspace(0.1, 1, 10) * full:
         found = solve_bvp(equations, ends, s, guess, tol=1e-8)
         s, guess = found.x, found.y
     return found.sol(1.0)

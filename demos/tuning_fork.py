@@ -88,7 +88,6 @@ for k, (frequency, ax) in enumerate(zip(frequencies, axes)):
 # the others. Its frequency is that of the free fork.
 
 singing = int(np.argmin(felt))
-print("frequencies", frequencies.round(1), "Hz; force in the foot", np.round(felt, 2), "N")
 assert felt[singing] < 0.3 * min(f for k, f in enumerate(felt) if k != singing)
 assert np.isclose(frequencies[singing], free[0], rtol=0.01)
 
