@@ -331,14 +331,7 @@ def net_from_meshio(mesh: Any) -> Net:
 def _names(mesh, blocks, first, used):
     """Names of lines and of nodes from cell sets, point sets, and physical groups of Gmsh."""
     sets = {name: parts for name, parts in mesh.cell_sets.items()
-            if not name.startswith("gmsh:")}
-    numbers = mesh.cell_data.get("gmsh:physical")
-    if not sets and numbers is not None:
-        names = {int(number): name for name, (number, _) in mesh.field_data.items()}
-        for number in np.unique(np.concatenate([np.ravel(part) for part in numbers])):
-            if number:
-                sets[names.get(int(number), str(int(number)))] = [
-                    np.flatnonzero(np.ravel(part) == number) for part in numbers]
+            if not name.startswith("gmsh:")} or _numbered(mesh)
     groups, nodes = {}, {}
     where = {int(k): i for i, k in enumerate(used)}
     for name, parts in sets.items():
@@ -356,6 +349,27 @@ def _names(mesh, blocks, first, used):
         if at:
             nodes[name] = np.array(at)
     return groups, nodes
+
+
+def _numbered(mesh):
+    """Cell sets that a file has as numbers: physical groups, or what meshio writes of names.
+
+    Into formats without names it writes data called "a-b", which are 0 in the set a, 1 in b.
+    """
+    sets = {}
+    names = {int(number): name for name, (number, _) in mesh.field_data.items()}
+    for key, parts in mesh.cell_data.items():
+        found = np.unique(np.concatenate([np.ravel(part) for part in parts]))
+        if key == "gmsh:physical":
+            known = {int(k): names.get(int(k), str(int(k))) for k in found if k}
+        elif found.dtype.kind in "iu" and ":" not in key and -1 <= found[0] and (
+                found[-1] < len(key.split("-"))):
+            known = dict(enumerate(key.split("-")))
+        else:
+            continue
+        for number, name in known.items():
+            sets[name] = [np.flatnonzero(np.ravel(part) == number) for part in parts]
+    return sets
 
 
 class _Parabola:

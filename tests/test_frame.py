@@ -394,6 +394,16 @@ def test_a_frame_of_meshio(tmp_path):
                     frame.point_force(**force).solve_static().u, atol=1e-12)
 
 
+def test_a_frame_of_a_vtu_file(tmp_path):
+    """Names of cells are numbers there, as meshio writes them."""
+    mesh = meshio.Mesh(np.pad(np.array(PORTAL[0], float), ((0, 0), (0, 1))),
+                       [("line", PORTAL[1])], cell_sets={"columns": [[0, 2]], "girder": [[1]]})
+    mesh.write(tmp_path / "portal.vtu")
+    frame = Frame.from_meshio(tmp_path / "portal.vtu", material=STEEL, height=H, width=H)
+    assert [(beam.name, beam.mesh.nelements) for beam in frame.beams] == [("columns", 2),
+                                                                          ("girder", 1)]
+
+
 def test_a_frame_is_pickled_and_copied():
     frame = portal().point_force((100.0, 0), at=1)
     state = frame.solve_static()
