@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_bvp
 
 from skfem_ancf import (Beam, CallbackError, ConvergenceError, ElementBeamANCF,
-                        ElementBeamCable, InputError,
+                        ElementBeamANCFCubic, ElementBeamCable, InputError,
                         MeshBeam, ModelWarning, Scene, StVenantKirchhoff)
 from skfem_ancf.forces import contact_texts as texts
 from skfem_ancf.forces.texts import add_contact
@@ -707,3 +707,14 @@ def test_what_points_cannot_see_is_said():
     x, areas = group.starts[0, :group.points // 2], group.areas[:group.points // 2]
     assert np.diff(x).max() < np.sqrt(8 * 0.01 * 0.05 * 0.01) and np.all(areas > 0)
     assert abs(areas.sum() - 0.01 / 8) < 1e-15 and abs(areas @ x**3 - 0.01 * (1 / 8)**4 / 4) < 1e-15
+
+
+def test_sections_that_stick_at_an_impact_go_on_with_the_slip_speed_of_the_guide():
+    """A tenth of the speed of the impact: about as many iterations as without friction."""
+    taken = []
+    for mu in (0.5, 0.0):
+        b = beam(ElementBeamANCFCubic(2), 4, height=0.02)
+        scene = Scene(b).clamp("left").gravity((0, -9.81))
+        scene.obstacle(Line((0, -0.03)), friction=mu, slip_speed=0.1)
+        taken.append(scene.integrate(0.07, 1e-3).iterations)
+    assert taken[0] < 1.1 * taken[1]

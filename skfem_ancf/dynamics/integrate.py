@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import (AncfError, ConvergenceError, InputError, Interrupted, ModelWarning,
                       require_finite, require_finite_scalar, require_function, require_positive,
                       shown, taught)
+from ..forces.contact_texts import SLIPPING
 from ..progress import progress_bar
 from .checkpoint import Checkpoint, same_problem
 from .integrator import Integrator, StepFailed
@@ -258,7 +259,10 @@ __all__ = ["Integrator", "integrate"]
 
 def _advice(run):
     """What may help a motion that did not go on."""
-    if any(one.friction > 0.0 for one in run.system.forces.contacts.obstacles):
-        return ("where points stick to an obstacle, a larger slip_speed= of scene.obstacle, else a "
-                "smaller dt")
+    speeds = [group.numbers[SLIPPING] for one in run.system.forces.contacts.obstacles
+              if one.friction > 0.0 for group in one.groups]
+    if speeds:
+        return ("where points stick to an obstacle, a larger slip_speed= of scene.obstacle, which "
+                f"is {min(speeds):.3g}: a tenth of the speed at which bodies meet it is enough. "
+                "Else a smaller dt")
     return "try a smaller dt"
