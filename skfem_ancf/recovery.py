@@ -561,7 +561,8 @@ class Recovery:
             "rectangle with these numbers; State.resultants() has what is known")
         slabs = beam.across.slabs
         if not all(hasattr(slab.measure, "pieces") for slab in slabs):
-            raise NotRecovered("a section of your own has a measure without pieces")
+            raise NotRecovered(f"{beam.section!r} has a measure that does not say its width: give "
+                               "it pieces and mean, as Weighted has")
         self.panels = kept(beam.tables, "across", lambda: Panels(slabs, beam.element.order))
         self.eta = self.panels.eta
         self.laws = [(columns, slab.material.law(slab.shear))

@@ -11,6 +11,8 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         NeoHookean, Scene, Section)
 from skfem_ancf.damping import KelvinVoigt
 from skfem_ancf.panels import Panels
+from skfem_ancf.sections.base import slab_of
+from skfem_ancf.sections.measure import Uniform
 
 T = Section.profile("T", width=0.06, web=0.01, flange=0.015)
 ELEMENTS = [ElementBeamANCF(2), ElementBeamANCFCubic(2), ElementBeamCable(5)]
@@ -214,3 +216,28 @@ def test_tapered_profiles_are_the_plane_body(name):
         assert state.displacement((1, 0))[1] == pytest.approx(tip[1], rel=error)
         area = 0.75 * sum((b - a) * width for a, b, _, width in pieces)
         assert beam.total_mass == pytest.approx(7800 * area, rel=1e-9)
+
+
+class Strip(Section):
+    """A section of one's own, whose measure is known by its rules alone."""
+
+    def __init__(self, says):
+        self.says = says
+
+    def slabs(self, mesh, material):
+        return [slab_of(material, 0.02, Rules() if not self.says else Uniform())]
+
+
+class Rules:
+    low, high = 0.0, 1.0
+
+    def gauss(self, n):
+        return Uniform().gauss(n)
+
+
+def test_sections_of_ones_own_are_recovered_if_they_say_their_width():
+    states = [cantilever(Beam(line(), ElementBeamANCF(2), STEEL, section=Strip(says)), (0.0, -P))
+              for says in (True, False)]
+    assert states[0].recovered == {0: ""} and "pieces" in states[1].recovered[0]
+    assert states[0].stress((0.5, 0.0))[2] == pytest.approx(-1.5 * P / 0.002, rel=1e-5)
+    assert_allclose(*(state.u for state in states), rtol=1e-9)

@@ -54,8 +54,11 @@ def shear_factor(slabs: Sequence[Slab], order: int) -> float:
 def _points(slabs, t, w):
     """Points of each piece with their weights, widths and moduli."""
     for slab in slabs:
-        law, mean = slab.material, slab.measure.mean
-        for low, high, width in slab.measure.pieces:
+        law, m = slab.material, slab.measure
+        # a measure of one's own may not say its width
+        pieces, mean = (m.pieces, m.mean) if hasattr(m, "pieces") else (
+            [(m.low, m.high, 1.0)], m.high - m.low)
+        for low, high, width in pieces:
             half = 0.5 * (high - low)
             eta, one = 0.5 * (low + high) - half * np.cos(t), np.ones(len(t))
             width = (width(eta) if callable(width) else width) * slab.width / mean
