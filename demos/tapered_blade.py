@@ -70,7 +70,7 @@ assert bent < state.displacement((0, length))[0] < 1.05 * bent
 fig = plt.figure(figsize=(9.4, 5.6), layout="constrained")
 left, right = fig.subfigures(1, 2, width_ratios=(1, 1.8))
 ax = left.subplots()
-state.plot("S_xx", ax=ax, thickness=6, unit="Pa", title="stress $S_{xx}$")
+state.plot(lambda v: 1e-6 * v["S_xx"], ax=ax, thickness=6, unit="MPa", title="stress $S_{xx}$")
 ax.set(xlabel="x (m)", ylabel="y (m)", xticks=(0, 0.4), xlim=(-0.4, 0.7))
 state.plot_resultants(axes=right.subplots(3, 1, sharex=True))
 for ax, unit in zip(right.axes, ("N", "N", "N m")):
