@@ -35,7 +35,7 @@ class Growth:
         self._E0 = [sampled(beam, table, eigen) for table in beam.kernel.tables]
 
     def stresses(self, u_e: Array, factor: float) -> list[Array]:
-        """S(E - factor E0) - S(E) at the points of each term, negative: (3, points, ne) each.
+        """S(E) - S(E - factor E0) at the points of each term, (3, points, ne) each.
 
         Parameters
         ----------
@@ -44,8 +44,7 @@ class Growth:
         factor
             On E0.
         """
-        return [self._asked(pack, E, np.empty(E.shape)) - self._asked(
-            pack, E - factor * E0, np.empty(E.shape)) for pack, E, E0 in self._terms(u_e)]
+        return [_loss(3, pack, E, factor * E0) for pack, E, E0 in self._terms(u_e)]
 
     def forces(self, u_e: Array, factor: float) -> Array:
         """The forces on the coordinates of each element, shape (ne, nb, 2).
@@ -69,8 +68,7 @@ class Growth:
         """
         out = self._geometric(u_e, self.stresses(u_e, factor))
         for pack, E, E0 in self._terms(u_e):
-            D = (self._asked(pack, E, np.empty((9, *E.shape[1:]))) - self._asked(
-                pack, E - factor * E0, np.empty((9, *E.shape[1:])))) * pack.weights
+            D = _loss(9, pack, E, factor * E0) * pack.weights
             B = self._slopes(pack, u_e)
             out += np.einsum("icpe,cdpe,jdpe->eij", B, D.reshape(3, *E.shape), B, optimize=True)
         return out
@@ -83,9 +81,8 @@ class Growth:
         u_e, factor
             As for :meth:`stresses`, u_e of shape (ne, nb, 2).
         """
-        return sum(float(np.sum(pack.weights * (self._asked(
-            pack, E - factor * E0, np.empty((1, *E.shape[1:]))) - self._asked(
-                pack, E, np.empty((1, *E.shape[1:])))))) for pack, E, E0 in self._terms(u_e))
+        return -sum(float(np.sum(pack.weights * _loss(1, pack, E, factor * E0)))
+                    for pack, E, E0 in self._terms(u_e))
 
     # terms
 
@@ -95,11 +92,6 @@ class Growth:
             E = np.empty(E0.shape)
             self.beam.kernel.texts.stress(_unit(pack), np.ascontiguousarray(u_e).ravel(), E)
             yield pack, E, E0
-
-    @staticmethod
-    def _asked(pack, strain, out):
-        law_evaluate(pack.law, np.ascontiguousarray(strain), out)
-        return out
 
     def _slopes(self, pack, u_e):
         """The derivative of the strain by each coordinate, (2 nb, 3, points, ne)."""
@@ -120,6 +112,14 @@ class Growth:
         return np.concatenate([kernel.geometric(u_e[part], part, weighted[part])
                                for part in (slice(k.start, min(k.stop, ne))
                                             for k in kernel.chunks())])
+
+
+def _loss(rows, pack, E, E0):
+    """Energy (1 row), stress (3) or moduli (9) of E, less those of E - E0."""
+    out = np.empty((2, rows, *E.shape[1:]))
+    for strain, values in zip((E, E - E0), out):
+        law_evaluate(pack.law, np.ascontiguousarray(strain), values)
+    return out[0] - out[1]
 
 
 def _unit(pack):
