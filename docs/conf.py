@@ -64,6 +64,7 @@ sphinx_gallery_conf = {
     "backreferences_dir": "generated/examples",
     "inspect_global_variables": True,
     "nested_sections": False,
+    "within_subsection_order": "order.Order",
 }
 
 html_theme = "pydata_sphinx_theme"

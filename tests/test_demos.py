@@ -64,6 +64,8 @@ def test_every_demo_is_in_the_gallery_once():
     titles = [ast.get_docstring(ast.parse(path.read_text())).splitlines()[0] for path in DEMOS]
     assert len(set(titles)) == len(titles)
     assert (ROOT / "demos" / "GALLERY_HEADER.rst").is_file()
+    order = runpy.run_path(str(ROOT / "docs" / "order.py"))["ORDER"]
+    assert len(set(order)) == len(order) and set(order) <= {path.stem for path in DEMOS}
 
 
 def test_demos_that_the_readme_names_exist():

@@ -1,0 +1,23 @@
+"""The order of the gallery: first beams, statics, stability, motion, machines, what is added."""
+
+from pathlib import Path
+
+ORDER = """
+first_beam rollup plain_scikit_fem cantilever choose_element poisson_locking thick_beam
+tapered_blade catenary spring leaf_spring bimetal soft_finger frame
+cylinder capstan ring
+column shallow_arch
+pendulum spaghetti driven_arm four_bar tuning_fork damping
+own_law own_element fit_modulus uncertainty
+""".split()
+
+
+class Order:
+    """What sphinx-gallery sorts the files of a folder by; those without a place come last."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def __call__(self, filename):
+        name = Path(filename).stem
+        return ORDER.index(name) if name in ORDER else len(ORDER)
