@@ -70,8 +70,8 @@ print(f"stiffness at rest: {1e-3 * found:.3f} N/mm, Castigliano {1e-3 * expected
 assert np.isclose(found, expected, rtol=3e-3)
 
 # %%
-# Up to a load that presses the leaf flat. Its eyes move apart on the way, the shackle swings out, and
-# the spring is softer than at rest.
+# Up to a load that presses the leaf flat. Its eyes move apart on the way, the shackle swings out,
+# and the spring is softer than at rest.
 
 forces = np.linspace(500, 5000, 10)
 states = []
