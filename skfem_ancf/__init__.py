@@ -3,7 +3,7 @@
 from . import forms
 from .beam import Beam, reference_coordinates
 from .damping import KelvinVoigt
-from .dynamics import HHT, EnergyMomentum, GeneralizedAlpha, Newmark
+from .dynamics import HHT, EnergyMomentum, Gauss, GeneralizedAlpha, Newmark, Radau
 from .elements import (ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                        ElementBeamPatelShabana)
 from .errors import (AncfError, CallbackError, CallError, ConvergenceError, FileError, InputError,
@@ -22,8 +22,8 @@ __version__ = "0.1.0"
 __all__ = [
     "HHT", "AncfError", "Beam", "CallError", "CallbackError", "Circle", "ConvergenceError",
     "ElementBeamANCF", "ElementBeamANCFCubic", "ElementBeamCable", "ElementBeamPatelShabana",
-    "EnergyMomentum", "FileError", "Frame", "GeneralizedAlpha", "InputError", "KelvinVoigt", "Line",
-    "MeshBeam", "MeshError", "MissingExtra", "ModelWarning", "NameUnknown", "NeoHookean", "Newmark",
-    "Polygon", "RigidBody", "Scene", "Section", "SignedDistance",
+    "EnergyMomentum", "FileError", "Frame", "Gauss", "GeneralizedAlpha", "InputError",
+    "KelvinVoigt", "Line", "MeshBeam", "MeshError", "MissingExtra", "ModelWarning", "NameUnknown",
+    "NeoHookean", "Newmark", "Polygon", "Radau", "RigidBody", "Scene", "Section", "SignedDistance",
     "StVenantKirchhoff", "StabilityWarning", "SupportError", "forms", "reference_coordinates",
 ]

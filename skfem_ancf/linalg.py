@@ -202,18 +202,23 @@ class BandMatrix:
             if info == 0:
                 self._factor = ("pb", c)
                 return self
-            general = BandMatrix(self.n, self.bandwidth, symmetric=False)
-            ab, lower, top = general.ab, self.ab, 2 * self.bandwidth
-            ab[top:] = lower
-            for k in range(1, self.bandwidth + 1):
-                ab[top - k, k:] = lower[k, :self.n - k]
-        else:
-            general = self
+        general = self.general()
         lu, pivots, info = lapack.dgbtrf(general.ab, self.bandwidth, self.bandwidth)
         if info != 0 or not np.all(np.isfinite(lu[2 * self.bandwidth])):
             raise np.linalg.LinAlgError("the matrix is singular")
         self._factor = ("gb", lu, pivots)
         return self
+
+    def general(self) -> BandMatrix:
+        """The same matrix with both halves; itself if it has them."""
+        if not self.symmetric:
+            return self
+        general = BandMatrix(self.n, self.bandwidth, symmetric=False)
+        ab, lower, top = general.ab, self.ab, 2 * self.bandwidth
+        ab[top:] = lower
+        for k in range(1, self.bandwidth + 1):
+            ab[top - k, k:] = lower[k, :self.n - k]
+        return general
 
     def solve(self, b: Array) -> Array:
         """Solve with the factors; ``b`` of shape (n,) or (n, k)."""

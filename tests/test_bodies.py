@@ -39,7 +39,7 @@ def spun(scene, body, rate):
 
 # motion
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", [name for name, cls in SCHEMES.items() if cls.joined])
 def test_a_pendulum_swings_as_it_should(scheme):
     scene, body, stiffness = pendulum()
     exact = solve_ivp(lambda t, y: [y[1], -stiffness * np.sin(y[0])], (0, 1), [0, 4.0], rtol=1e-11,

@@ -125,7 +125,8 @@ def test_balance_with_joints_and_all_kinds_at_once(extra):
     history = scene.integrate(0.1, 2e-3)
     assert history.dissipated[-1] > 0.0
     assert np.ptp(history.total_energy + history.dissipated) < 2e-12 * history.kinetic_energy.max()
-    for scheme in SCHEMES:  # the others: to their order
+    # the others: to their order
+    for scheme in (name for name, cls in SCHEMES.items() if cls.joined):
         gaps = []
         for dt in (2e-3, 1e-3):
             history = scene.integrate(0.05, dt, scheme=scheme)

@@ -5,10 +5,13 @@ from __future__ import annotations
 from ..errors import require_option, taught
 from .base import Motion, Scheme
 from .energy_momentum import EnergyMomentum
+from .gauss import Gauss
 from .generalized_alpha import HHT, GeneralizedAlpha, Newmark
+from .radau import Radau
 
 #: The schemes by name.
-SCHEMES = {cls.name: cls for cls in (EnergyMomentum, GeneralizedAlpha, HHT, Newmark)}
+SCHEMES = {cls.name: cls for cls in (EnergyMomentum, GeneralizedAlpha, HHT, Newmark, Gauss,
+                                    Radau)}
 
 
 @taught
@@ -27,5 +30,5 @@ def get_scheme(scheme: str | Scheme | type[Scheme]) -> Scheme:
     return SCHEMES[require_option("scheme", scheme, SCHEMES)]()
 
 
-__all__ = ["HHT", "SCHEMES", "EnergyMomentum", "GeneralizedAlpha", "Motion", "Newmark", "Scheme",
-           "get_scheme"]
+__all__ = ["HHT", "SCHEMES", "EnergyMomentum", "Gauss", "GeneralizedAlpha", "Motion", "Newmark",
+           "Radau", "Scheme", "get_scheme"]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from ..system import System
     from ..types import Array
     from .integrator import Integrator
 
@@ -70,6 +71,10 @@ class Scheme:
         of its middle.
     tol : float
         Default tolerance of the iteration in a step, relative, in the energy norm.
+    joined : bool
+        It is for scenes with joints and rigid bodies too.
+    adaptive : bool
+        It estimates its error, which chooses steps with ``dt="auto"``.
     error_constant : float
         The error that a step adds to the displacement is about this number times dt^2 times the
         change of the acceleration.
@@ -80,6 +85,7 @@ class Scheme:
     tol = 1e-9
     parameters: tuple[float, ...] = (0.0, 0.0, 0.25, 0.5)
     conserving = False
+    joined = adaptive = True
     error_constant = 1.0 / 12.0
 
     def step(self, integrator: Integrator, y: Motion, dt: float) -> Motion:
@@ -108,6 +114,15 @@ class Scheme:
             If there is no such step: it is tried in two halves.
         """
         return integrator.take(y, dt)
+
+    def require(self, system: System) -> None:
+        """Raise InputError for a system that the scheme is not for.
+
+        Parameters
+        ----------
+        system
+            A :class:`~skfem_ancf.system.System`.
+        """
 
     def local_error(self, old: Motion, new: Motion, dt: float) -> Array:
         """Estimate of the error that a step adds to the displacement.

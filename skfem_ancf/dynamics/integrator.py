@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from .base import Motion
 from .course import Courses
 from .rates import rates
 from .dampers import Dampers, Rows, solve_rows
-from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, READY,
+from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, EPS, FACTORIZED, FAILURE, FAILURES, READY,
                     STATE, Matrices, Rule, mass_factor, room_for_steps, steps)
 
 if TYPE_CHECKING:
@@ -57,9 +57,13 @@ class Integrator:
         Time beyond which no function of time is asked.
     longest
         Steps of a block at most.
+    kept : dict of ndarray
+        What a scheme with steps of its own keeps for the next, as factors: :meth:`forget` clears
+        it.
     """
 
     def __init__(self, system: System, scheme: Scheme, tol: float | None = None) -> None:
+        scheme.require(system)
         self.system, self.scheme, self.limit = system, scheme, np.inf
         self.tol = scheme.tol if tol is None else require_positive("tol", tol)
         alpha_m, alpha_f, beta, gamma = map(float, scheme.parameters)
@@ -77,6 +81,7 @@ class Integrator:
         self._courses = Courses(system, scheme.conserving)
         self._state, self._dt, self.substeps, self._lost = np.zeros(STATE), np.nan, 0, ""
         self.longest = int(np.clip(STORED // (4 * system.N), 1, BLOCK))
+        self.kept: dict[str, Array] = {}
 
     @property
     def iterations(self) -> int:
@@ -87,6 +92,30 @@ class Integrator:
     def factorizations(self) -> int:
         """Tangents factorised."""
         return int(self._state[FACTORIZED])
+
+    def tally(self, iterations: int, factorizations: int) -> None:
+        """Count what a scheme with steps of its own has done.
+
+        Parameters
+        ----------
+        iterations, factorizations
+            Residuals solved for, and tangents factorised.
+        """
+        self._state[COUNT] += iterations
+        self._state[FACTORIZED] += factorizations
+
+    def rough(self, u: Array, mass_factor: float) -> float:
+        """What round-off leaves of a correction, in the energy norm.
+
+        Parameters
+        ----------
+        u
+            Displacement, shape (N,).
+        mass_factor
+            Of the mass in the iteration matrix.
+        """
+        noise = abs(u @ self.system.mass.multiply(u))
+        return float(np.sqrt(self.rule.floor**2 + EPS * EPS * mass_factor * noise))
 
     def count(self, other: Integrator) -> None:
         """Add the counts of another, which begins from zero."""
@@ -100,35 +129,51 @@ class Integrator:
 
     # the start
 
-    def _rates(self, function, t, dt):
-        """First and second derivative of a function of one time, in a step ahead."""
-        return rates(lambda times: np.array([function(t) for t in times]), t, dt, True, self.limit)
+    def _rates(self, function, t, dt, ahead):
+        """First and second derivative of a function of one time."""
+        return rates(lambda times: np.array([function(t) for t in times]), t, dt, ahead,
+                     self.limit)
 
-    def _support_rates(self, t, dt):
-        """Velocity and acceleration of the fixed coordinates, shape (nfixed,)."""
+    def support_rates(self, t: float, dt: float, ahead: bool = True) -> Any:
+        """Velocity and acceleration of the fixed coordinates, shape (nfixed,) each.
+
+        Parameters
+        ----------
+        t, dt, ahead
+            As for :meth:`constraint_rate`.
+        """
         s = self.system
         if not s.moves:
             return np.zeros((2, len(s.fixed)))
-        return rates(s.values_at, t, dt, True, self.limit)
+        return rates(s.values_at, t, dt, ahead, self.limit)
 
-    def _constraint_rate(self, u, v, t, dt):
-        """The rate of the joints' Phi, shape (m,)."""
+    def constraint_rate(self, u: Array, v: Array, t: float, dt: float,
+                        ahead: bool = True) -> Array:
+        """The rate of the joints' Phi, shape (m,); parameters are those of :meth:`start`.
+
+        Parameters
+        ----------
+        u, v
+            Displacement and velocity, shape (N,).
+        t, dt, ahead
+            Time, the step in which functions of time are asked, and whether it begins there.
+        """
         s = self.system
         rate = s.full_jacobian(u, t) @ v
         if s.drives:
-            rate = rate + self._rates(lambda t: s.constraint(u, t), t, dt)[0]
+            rate = rate + self._rates(lambda t: s.constraint(u, t), t, dt, ahead)[0]
         return rate
 
-    def _constraint_acceleration(self, u, v, t, dt):
+    def _constraint_acceleration(self, u, v, t, dt, ahead):
         """The second rate of Phi without accelerations of the coordinates, shape (m,)."""
         s = self.system
         rate = s.quadratic(u, t, v)
         if s.drives:
-            rate = (rate + self._rates(lambda t: s.constraint(u, t), t, dt)[1]
-                    + 2.0 * self._rates(lambda t: s.full_jacobian(u, t) @ v, t, dt)[0])
+            rate = (rate + self._rates(lambda t: s.constraint(u, t), t, dt, ahead)[1]
+                    + 2.0 * self._rates(lambda t: s.full_jacobian(u, t) @ v, t, dt, ahead)[0])
         return rate
 
-    def start(self, u: Array, v: Array, t: float, dt: float) -> Motion:
+    def start(self, u: Array, v: Array, t: float, dt: float, ahead: bool = True) -> Motion:
         """The Motion at the start, with consistent velocity, acceleration and multipliers.
 
         Where motions are given as functions of time, their rates are those in a step dt ahead.
@@ -139,6 +184,8 @@ class Integrator:
             Displacement and velocity, shape (N,).
         t, dt
             Time, and the step in which functions of time are asked.
+        ahead
+            The step begins there; False where it ends.
         """
         s = self.system
         y = Motion(t, u.copy(), v.copy(), np.zeros(s.N), np.zeros(s.N),
@@ -148,12 +195,12 @@ class Integrator:
         if gap > 1e-8 * s.size:
             raise SupportError(f"the joints are open by {gap:.3g} at the start: begin with beams "
                                "that fit, or from a static solution (start=)")
-        y.v[s.fixed], y.acceleration[s.fixed] = self._support_rates(t, dt)
+        y.v[s.fixed], y.acceleration[s.fixed] = self.support_rates(t, dt, ahead)
         rate = np.zeros(s.m)
         if s.joints:
             y.v = y.v + s.solve_mass(np.zeros(s.N), y.u, t,
-                                     -self._constraint_rate(y.u, y.v, t, dt))[0]
-            rate = -(self._constraint_acceleration(y.u, y.v, t, dt)
+                                     -self.constraint_rate(y.u, y.v, t, dt, ahead))[0]
+            rate = -(self._constraint_acceleration(y.u, y.v, t, dt, ahead)
                      + s.full_jacobian(y.u, t) @ y.acceleration)
         force = (s.external_force(y.u, t) - s.internal_force(y.u, t)
                  - s.mass.multiply(y.acceleration))
@@ -279,6 +326,7 @@ class Integrator:
     def forget(self) -> None:
         """Make new factors in the next step."""
         self._state[READY] = 0.0
+        self.kept.clear()
 
     # what a motion goes on with
 
@@ -288,12 +336,15 @@ class Integrator:
                   "substeps": np.array(self.substeps)}
         if self.ready:
             memory.update({name: array.copy() for name, array in self._factors().items()})
+        memory.update({f"kept {name}": array.copy() for name, array in self.kept.items()})
         return memory
 
     def recall(self, memory: dict[str, Array]) -> None:
         """Go on with what :meth:`remember` gave."""
         self._state[:], self._dt = memory["state"], float(memory["dt"])
         self.substeps = int(memory["substeps"])
+        self.kept = {name[5:]: np.array(array) for name, array in memory.items()
+                     if name.startswith("kept ")}
         if self.ready:
             for name, array in self._factors().items():
                 array[...] = memory[name]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import InputError
 from ..sampling import sample
 
 if TYPE_CHECKING:
@@ -49,6 +50,11 @@ class StepSize:
     t_start, t_end
         Times of start and end.
 
+    Raises
+    ------
+    InputError
+        If the scheme does not estimate its error.
+
     References
     ----------
     Error per unit step: Hairer, Norsett, Wanner: "Solving ordinary differential equations I",
@@ -58,6 +64,9 @@ class StepSize:
 
     def __init__(self, system: System, scheme: Scheme, rtol: float, t_start: float,
                  t_end: float) -> None:
+        if not scheme.adaptive:
+            raise InputError(f"{scheme!r} does not estimate its error: give the step size dt, or "
+                             "take 'energy-momentum' or 'generalized-alpha' with dt='auto'")
         self.system, self.scheme, self.rtol = system, scheme, rtol
         self.span = t_end - t_start
         self._mass = sum(b.total_mass for b in system.members)

@@ -1,0 +1,48 @@
+"""The methods of Gauss."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..errors import require_integer
+from ..quadrature import gauss
+from .collocation import Collocation
+
+if TYPE_CHECKING:
+    from ..types import Array
+
+
+class Gauss(Collocation):
+    """Collocation at the points of Gauss: of order 2 n with n points, symmetric and symplectic.
+
+    Momentum and angular momentum are conserved to the tolerance of the iteration, as all that is
+    quadratic in the state; the energy stays close to what it was for very long times. n = 1 is the
+    implicit midpoint rule. Nothing is damped, so that a stiff beam goes on vibrating with what it
+    has: see :class:`Radau` for those.
+
+    Parameters
+    ----------
+    points
+        1 to 4.
+
+    Examples
+    --------
+    >>> from skfem_ancf.dynamics import Gauss
+    >>> Gauss(3), Gauss(3).order
+    (<Gauss, 3 points>, 6)
+
+    References
+    ----------
+    Hairer, Lubich, Wanner: "Geometric Numerical Integration", II.1.3 and VI.4.
+    """
+
+    name = "gauss"
+    joined = False
+
+    def __init__(self, points: int = 3) -> None:
+        self.number = require_integer("points", points, 1, 4)
+        self.order = 2 * self.number
+
+    @property
+    def points(self) -> Array:
+        return gauss(self.number)[0]

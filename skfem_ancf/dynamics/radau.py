@@ -1,0 +1,37 @@
+"""The method of Radau IIA."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .collocation import Collocation
+
+if TYPE_CHECKING:
+    from ..types import Array
+
+
+class Radau(Collocation):
+    """Collocation at the three points of Radau, of which the last is the end: of order 5.
+
+    What a step does not resolve is damped out at once (L-stable): for stiff beams and large steps.
+
+    Examples
+    --------
+    >>> from skfem_ancf.dynamics import Radau
+    >>> Radau().points.round(4).tolist()
+    [0.1551, 0.6449, 1.0]
+
+    References
+    ----------
+    Hairer, Wanner: "Solving Ordinary Differential Equations II", IV.5, table 5.6.
+    """
+
+    name = "radau"
+    order = 5
+
+    @property
+    def points(self) -> Array:
+        root = np.sqrt(6.0)
+        return np.array([0.4 - 0.1 * root, 0.4 + 0.1 * root, 1.0])
