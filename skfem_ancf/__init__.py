@@ -16,6 +16,7 @@ from .obstacles import Circle, Line, Polygon, SignedDistance
 from .rigid import RigidBody
 from .scene import Scene
 from .sections import Section
+from .sweeps import sweep
 
 __version__ = "0.1.0"
 
@@ -26,4 +27,5 @@ __all__ = [
     "KelvinVoigt", "Line", "MeshBeam", "MeshError", "MissingExtra", "ModelWarning", "NameUnknown",
     "NeoHookean", "Newmark", "Polygon", "Radau", "RigidBody", "Scene", "Section", "SignedDistance",
     "StVenantKirchhoff", "StabilityWarning", "SupportError", "forms", "reference_coordinates",
+    "sweep",
 ]

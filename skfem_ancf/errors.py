@@ -180,6 +180,10 @@ class CheckpointWarning(UserWarning):
     """A checkpoint could not be written; the run goes on, the last good file stays."""
 
 
+class SweepWarning(UserWarning):
+    """Members of a sweep failed; the others are there."""
+
+
 # messages
 
 def shown(value: object) -> str:

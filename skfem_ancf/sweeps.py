@@ -1,0 +1,249 @@
+"""Sweeps: one scene after another from a table of parameters, wherever there are processors."""
+
+from __future__ import annotations
+
+import inspect
+import time
+import warnings
+from collections.abc import Mapping
+from contextlib import closing
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .errors import (CallbackError, CallError, FileError, InputError, Interrupted, NameUnknown,
+                     SweepWarning, require_function, require_integer, require_path, shown, taught)
+from .members import Sweep, column_of, require_plain
+from .progress import progress_bar
+from .workers import Task, here, in_processes, on_cluster
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from .types import Array, ArrayLike, StrPath
+
+#: Seconds between two files, and how many times longer than writing one they are at least.
+_SECONDS, _RARER = 2.0, 20.0
+
+
+@taught
+def sweep(build: Callable[..., Any],
+          parameters: Mapping[str, ArrayLike] | Sequence[Mapping[str, Any]],
+          measure: Callable[[Any], Any], workers: int | None = None, client: Any = None,
+          path: StrPath | None = None, progress: bool | None = None) -> Sweep:
+    """Build, solve and measure a scene for each of many sets of parameters.
+
+    Each member is ``measure(build(**its parameters))``: ``build`` describes, ``measure`` solves and
+    reads. Results do not depend on where members are computed, nor on their order. A member that
+    fails is nan, and is listed with its parameters in ``failures``; the others go on.
+
+    Parameters
+    ----------
+    build
+        From the parameters, by keyword, to a :class:`Scene`, or whatever ``measure`` takes.
+    parameters
+        From name to an array of shape (n, ...), one row for each member; or a list of n dicts.
+    measure
+        From the scene to a number, an array of numbers, or a dict of them by name; of equal names
+        and shapes for all members.
+    workers
+        How many processes; None: in this one. They import ``build`` and ``measure``, which are to
+        be defined by ``def`` at the top of a module; a script calls under
+        ``if __name__ == "__main__":``. Libraries of linear algebra have one thread in each.
+    client
+        A ``dask.distributed.Client``, in place of ``workers``.
+    path
+        A file (.npz) that is written as results come. If it is there, the sweep goes on: what is
+        done is taken from it, what failed is tried again. Parameters are compared with those of
+        the file; whether the functions are the same nobody can know.
+    progress
+        Show a bar: True, False, or None: on a terminal, after a second, if tqdm is installed.
+
+    Returns
+    -------
+    Sweep
+        Arrays by name, in the order of the parameters.
+
+    Raises
+    ------
+    InputError
+        If arguments do not fit; NameUnknown and CallError, if ``build`` takes other parameters.
+    FileError
+        If the file is of another sweep.
+    PickleError
+        If functions cannot be sent to other processes.
+    CallbackError
+        If all members fail.
+    Interrupted
+        By Ctrl-C; its ``state`` is the Sweep so far, and the file holds it too.
+
+    Warns
+    -----
+    SweepWarning
+        If members fail.
+
+    Examples
+    --------
+    A cantilever is bent by a force: four moduli.
+
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff, sweep
+    >>> mesh = MeshBeam.init_line(np.linspace(0, 1, 3), height=0.01)
+    >>> def build(E):
+    ...     beam = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(E=E, nu=0.3), width=0.01)
+    ...     return Scene(beam).clamp("left").point_force((0, -0.01), at=(1, 0))
+    >>> def tip(scene):
+    ...     return scene.solve_static().displacement((1, 0))[1]
+    >>> result = sweep(build, {"E": [1e9, 2e9, 4e9, 8e9]}, tip)
+    >>> EI = result["E"] * 0.01**4 / 12
+    >>> bool(np.allclose(result["value"], -0.01 / (3 * EI), rtol=1e-4))
+    True
+    """
+    require_function("build", build, "of the parameters that returns a scene")
+    require_function("measure", measure, "of a scene that returns a number or array")
+    if workers is not None and client is not None:
+        raise InputError("workers and client say both where to compute: give one of them")
+    if workers is not None:
+        workers = require_integer("workers", workers, 1)
+    members = _members(parameters)
+    _require_signature(build, members[0])
+    columns = {name: column_of([member[name] for member in members]) for name in members[0]}
+    record = _Record(columns, None if path is None else require_path("path", path, (".npz",)))
+    task, places = Task(build, measure), record.places
+    source = (on_cluster(task, members, places, client) if client is not None else
+              here(task, members, places) if workers is None else
+              in_processes(task, members, places, workers))
+    try:
+        with progress_bar(progress, len(members), "members") as bar, closing(source):
+            bar.update(len(members) - len(places))
+            for chunk, found in source:
+                record.add(chunk, found)
+                bar.update(len(chunk))
+    except KeyboardInterrupt:
+        raise Interrupted(record.stopped(), record.kept()) from None
+    except BaseException:
+        record.kept()
+        raise
+    return _judged(record.kept())
+
+
+class _Record:
+    """What is found, and its file, written now and then."""
+
+    def __init__(self, columns: dict[str, Array], path: Path | None) -> None:
+        self.columns, self.path = columns, path
+        self.found: list[dict[str, Array] | str | None] = [None] * len(next(iter(columns.values())))
+        self.next = time.monotonic() + _SECONDS
+        if path is not None:
+            require_plain(columns)
+            if path.exists():
+                self.found = _done(path, columns)
+        self.places = [k for k, one in enumerate(self.found) if one is None]
+
+    def add(self, places, found):
+        """Take what was found of members; write, if it is time to."""
+        for k, one in zip(places, found):
+            self.found[k] = one
+        if self.path is not None and time.monotonic() >= self.next:
+            begun = time.monotonic()
+            self.kept()
+            now = time.monotonic()
+            self.next = now + max(_SECONDS, _RARER * (now - begun))
+
+    def kept(self):
+        """The Sweep so far, in its file too."""
+        result = Sweep(self.columns, self.found)
+        if self.path is not None:
+            result.save(self.path)
+        return result
+
+    def stopped(self):
+        """Where it was interrupted."""
+        done = sum(isinstance(one, dict) for one in self.found)
+        return (f"interrupted with {done} of {len(self.found)} members done; " + (
+            "they are in the state of this exception; with path= the next call would go on"
+            if self.path is None else f"call again with {str(self.path)!r} to go on"))
+
+
+def _members(parameters):
+    """A list of dicts, of one that is not empty and of equal names."""
+    if isinstance(parameters, Mapping):
+        columns = {name: _rows(name, values) for name, values in parameters.items()}
+        lengths = {name: len(rows) for name, rows in columns.items()}
+        if len(set(lengths.values())) > 1:
+            raise InputError(f"the parameters must have equal lengths, got {lengths}; for all "
+                             "combinations hand a list of dicts, made by itertools.product")
+        members = [dict(zip(columns, row)) for row in zip(*columns.values())]
+    else:
+        if isinstance(parameters, str) or not hasattr(parameters, "__iter__"):
+            raise InputError("parameters must be a dict of arrays or a list of dicts, got "
+                             f"{shown(parameters)}")
+        members = list(parameters)
+        for k, member in enumerate(members):
+            if not isinstance(member, Mapping) or set(member) != set(members[0]):
+                raise InputError("parameters must be a dict of arrays, or a list of dicts with "
+                                 f"equal names; the first has {shown(members[0])}, number {k} is "
+                                 f"{shown(member)}")
+        members = [dict(member) for member in members]
+    if not members or not members[0]:
+        raise InputError(f"there are no members in the parameters {shown(parameters)}")
+    return members
+
+
+def _rows(name, values):
+    values = getattr(values, "values", values)  # of pandas and xarray
+    if isinstance(values, str) or np.ndim(values) == 0 and not hasattr(values, "__len__"):
+        raise InputError(f"the parameter {name!r} must have one value for each member, got "
+                         f"{shown(values)}; what is the same for all belongs into build")
+    return list(values)
+
+
+def _require_signature(build, member):
+    try:
+        known = inspect.signature(build).parameters
+    except (TypeError, ValueError):  # of some functions written in C
+        return
+    if not any(p.kind is p.VAR_KEYWORD for p in known.values()):
+        for name in member:
+            if name not in known:
+                raise NameUnknown("parameter of build", name, known)
+    missing = [name for name, p in known.items() if p.default is p.empty and name not in member
+               and p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]
+    if missing:
+        raise CallError(f"build needs {', '.join(map(repr, missing))}, not among the parameters "
+                        f"{', '.join(map(repr, member))}")
+
+
+def _done(path, columns):
+    """What a file of an interrupted sweep of the same parameters has."""
+    before = Sweep.load(path)
+    if list(before.parameters) != list(columns):
+        differ = f"{list(before.parameters)} there, {list(columns)} here"
+    elif len(before) != len(next(iter(columns.values()))):
+        differ = f"{len(before)} members there, {len(next(iter(columns.values())))} here"
+    else:
+        differ = next((f"{name!r} of member {k} is {shown(there[k])} there, {shown(now[k])} here"
+                       for name, now in columns.items() for there in [before.parameters[name]]
+                       for k in range(len(now)) if not _same(there[k], now[k])), "")
+    if differ:
+        raise FileError(f"{path} is of a sweep with other parameters: {differ}; give another path, "
+                        "or delete the file")
+    return [one if isinstance(one, dict) else None for one in before.found]
+
+
+def _same(a, b):
+    floats = {np.asarray(a).dtype.kind, np.asarray(b).dtype.kind} == {"f"}
+    return np.array_equal(a, b, equal_nan=floats)
+
+
+def _judged(result):
+    """The result, with a warning of failures."""
+    failures = result.failures
+    if failures:
+        text = (f"{len(failures)} of {len(result)} members failed, the first with "
+                f"{failures[0].parameters}: {failures[0].error}")
+        if len(failures) == len(result):
+            raise CallbackError(text)
+        warnings.warn(f"{text}; all are in .failures", SweepWarning, stacklevel=4)
+    return result

@@ -1,0 +1,248 @@
+"""Where members of a sweep are computed: here, in other processes, on a cluster."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from collections import deque
+from contextlib import contextmanager
+from functools import partial
+from queue import SimpleQueue
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .errors import AncfError, CallbackError, InputError, PickleError, require_like, shown
+from .pickling import require_picklable
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Iterable
+
+    from .types import Array
+
+    #: Values by name, or the text of an error.
+    Found = dict[str, Array] | str
+    Chunks = Generator[tuple[list[int], list[Found]], None, None]
+
+#: Seconds that a worker computes before it reports: sending takes a millisecond.
+CHUNK = 0.2
+_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+class Task:
+    """A member, from its parameters to what is measured.
+
+    Parameters
+    ----------
+    build
+        From the parameters to a scene.
+    measure
+        From the scene to a number, an array or a dict of them.
+    """
+
+    def __init__(self, build: Callable[..., Any], measure: Callable[[Any], Any]) -> None:
+        self.build, self.measure = build, measure
+
+    def __call__(self, member: dict[str, Any]) -> Found:
+        """What is measured of a member, by name, or the text of the error."""
+        try:
+            return _named(self.measure(self.build(**member)), member)
+        except Exception as error:  # of the caller's functions, which may raise anything
+            return f"{type(error).__name__}: {error}"
+
+    def chunk(self, members: list[dict[str, Any]]) -> tuple[float, list[Found]]:
+        """Seconds, and what is found of each of several members."""
+        begun = time.perf_counter()
+        found = [self(member) for member in members]
+        return time.perf_counter() - begun, found
+
+
+def _named(value, member):
+    values = value if isinstance(value, dict) else {"value": value}
+    found = {}
+    for name, one in values.items():
+        array = np.asarray(one)
+        if not isinstance(name, str) or array.dtype.kind not in "biufc":
+            raise CallbackError("measure must return a number, an array of numbers, or a dict of "
+                                f"them by name, got {shown(value)}")
+        if name in member:
+            raise CallbackError(f"measure calls a value {name!r}, which is a parameter of build: "
+                                "give it another name")
+        found[name] = np.array(array, dtype=complex if array.dtype.kind == "c" else float)
+    return found
+
+
+def here(task: Task, members: list[dict[str, Any]], places: Iterable[int]) -> Chunks:
+    """Compute members in this process; yields their places and what was found.
+
+    Parameters
+    ----------
+    task
+        What is done with each.
+    members
+        Parameters of all.
+    places
+        Which of them are computed.
+    """
+    for k in places:
+        yield [k], [task(members[k])]
+
+
+def in_processes(task: Task, members: list[dict[str, Any]], places: Iterable[int], workers: int
+                 ) -> Chunks:
+    """As :func:`here`, in processes of this computer, started anew ("spawn").
+
+    Parameters
+    ----------
+    task, members, places
+        As there.
+    workers
+        How many.
+
+    Raises
+    ------
+    PickleError
+        If the functions cannot be sent to another process.
+    """
+    _require_sendable(task)
+    with _Pool(workers) as pool:
+        yield from _spread(pool.submit, workers, task, members, places)
+
+
+def on_cluster(task: Task, members: list[dict[str, Any]], places: Iterable[int], client: Any
+               ) -> Chunks:
+    """As :func:`here`, by the workers of a Dask client.
+
+    Parameters
+    ----------
+    task, members, places
+        As there.
+    client
+        A ``dask.distributed.Client``.
+
+    Raises
+    ------
+    InputError
+        If it is no client, or has no workers.
+    """
+    require_like("client", client, "dask.distributed.Client", "submit", "nthreads")
+    lanes = sum(client.nthreads().values())
+    if lanes < 1:
+        raise InputError("client has no workers: start some, or client.wait_for_workers(n)")
+    yield from _spread(partial(client.submit, pure=False), lanes, task, members, places)
+
+
+def _require_sendable(task):
+    named = [("build", task.build), ("measure", task.measure)]
+    require_picklable(named)
+    for what, function in named:
+        main = sys.modules["__main__"]
+        if getattr(function, "__module__", None) == "__main__" and not hasattr(main, "__file__"):
+            raise PickleError(f"{what}, {shown(function)}, was typed where other processes cannot "
+                              "find it: write it to a module and import it, leave workers out, or "
+                              "hand a client of dask.distributed, which sends any function")
+
+
+class _Pool:
+    """Processes that are started again where one has died."""
+
+    def __init__(self, workers):
+        self.workers = workers
+
+    def __enter__(self):
+        from multiprocessing import active_children
+
+        self.others = set(active_children())
+        self.start()
+        try:
+            self.submit(os.getpid).result()
+        except RuntimeError as error:  # BrokenProcessPool
+            raise AncfError(
+                "processes cannot be started: in a script, call sweep under "
+                "if __name__ == '__main__':, since each of them imports the script") from error
+        return self
+
+    def start(self):
+        from concurrent.futures import ProcessPoolExecutor
+        from multiprocessing import get_context
+
+        self.pool = ProcessPoolExecutor(self.workers, get_context("spawn"), _quiet)
+
+    def submit(self, *call):
+        """A future, of other processes if one of these has died."""
+        from concurrent.futures import BrokenExecutor
+
+        with _single_threads():
+            try:
+                return self.pool.submit(*call)
+            except BrokenExecutor:
+                self.pool.shutdown()
+                self.start()
+                return self.pool.submit(*call)
+
+    def __exit__(self, kind, error, trace):
+        from multiprocessing import active_children
+
+        if kind is not None:  # no one waits for what they are doing
+            for process in set(active_children()) - self.others:
+                process.terminate()
+        self.pool.shutdown(cancel_futures=True)
+
+
+def _quiet():
+    """Ctrl-C ends a worker without a word."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@contextmanager
+def _single_threads():
+    """Processes that are started inside have one thread for linear algebra."""
+    names = [name for name in _THREADS if name not in os.environ]
+    os.environ.update(dict.fromkeys(names, "1"))
+    try:
+        yield
+    finally:
+        for name in names:
+            del os.environ[name]
+
+
+def _spread(submit, lanes, task, members, places):
+    """Chunks in flight, two for each lane; what came back, as it comes.
+
+    Members that were in flight when a worker died are computed again, one at a time, so that the
+    one which kills is known.
+    """
+    places, again, flying, back = deque(places), deque(), {}, SimpleQueue()
+    mean = None
+    try:
+        while places or again or flying:
+            alone = bool(again)
+            source, most = (again, 1) if alone else (places, 2 * lanes)
+            while source and len(flying) < most:
+                size = 1 if alone else _size(mean, len(source), lanes)
+                chunk = [source.popleft() for _ in range(min(size, len(source)))]
+                future = submit(task.chunk, [members[k] for k in chunk])
+                flying[future] = chunk, alone
+                future.add_done_callback(back.put)
+            future = back.get()
+            chunk, was_alone = flying.pop(future)
+            try:
+                seconds, found = future.result()
+            except Exception as error:
+                if not was_alone:
+                    again.extend(chunk)
+                    continue
+                found = [f"{type(error).__name__}: {error}"]
+            else:
+                mean = max(seconds, 1e-6) / len(chunk)
+            yield chunk, found
+    finally:
+        for future in flying:
+            future.cancel()
+
+
+def _size(mean, left, lanes):
+    """Members of a chunk, of as many as are left, of a mean of seconds or None."""
+    return 1 if mean is None else int(np.clip(CHUNK / mean, 1, 1 + left // (2 * lanes)))

@@ -1,0 +1,220 @@
+"""Sweeps: every member against its closed form, wherever it is computed."""
+
+import itertools
+import os
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from skfem_ancf import (Beam, CallbackError, CallError, ElementBeamCable, FileError, InputError,
+                        MeshBeam, MissingExtra, NameUnknown, Scene, StVenantKirchhoff, sweep)
+from skfem_ancf.errors import Interrupted, PickleError, SweepWarning
+from skfem_ancf.members import Sweep
+
+MESH = MeshBeam.init_line([0.0, 0.5, 1.0], 0.01)
+FORCE = 1e-4
+
+
+def cantilever(E, width=0.01):
+    beam = Beam(MESH, ElementBeamCable(5), StVenantKirchhoff(E=E, nu=0.3), width)
+    return Scene(beam).clamp("left").point_force((0, -FORCE), at=(1, 0))
+
+
+def deflection(scene):
+    return -scene.solve_static().displacement((1, 0))[1]
+
+
+def formula(E, width=0.01):
+    """Of the tip, for small deflections."""
+    return 4.0 * FORCE / (np.asarray(E) * np.asarray(width) * 0.01**3)
+
+
+def just(x):
+    return x
+
+
+def root(x):
+    if x < 0.0:
+        raise ValueError(f"no root of {x:g}")
+    return x**0.5
+
+
+def lethal(scene):
+    if scene.beams[0].width == 3.0:
+        os._exit(1)
+    return deflection(scene)
+
+
+E = [1e9, 2e9, 4e9, 8e9, 1.6e10]
+
+
+def test_each_member_has_its_closed_form():
+    result = sweep(cantilever, {"E": E, "width": [0.01, 0.02, 0.03, 0.04, 0.05]}, deflection)
+    assert_allclose(result["value"], formula(E, result["width"]), rtol=1e-5)
+    assert list(result.status) == 5 * ["done"] and result.failures == []
+
+
+def test_a_list_of_dicts_and_several_values():
+    table = [dict(E=e, width=b) for e, b in itertools.product(E[:3], (0.01, 0.02))]
+
+    def measure(scene):
+        state = scene.solve_static()
+        return {"tip": state.displacement((1, 0)), "root": state.reactions("left").force[1]}
+
+    result = sweep(cantilever, table, measure)
+    assert_allclose(-result["tip"][:, 1], formula(result["E"], result["width"]), rtol=1e-5)
+    assert_allclose(result["root"], FORCE, rtol=1e-9)
+    assert result["tip"].shape == (6, 2)
+
+
+def test_processes_give_the_same_and_lose_only_the_one_that_dies():
+    table = {"E": E, "width": [0.01, 0.02, 3.0, 0.03, 0.04]}
+    with pytest.warns(SweepWarning, match="BrokenProcessPool"):
+        there = sweep(cantilever, table, lethal, workers=2)
+    assert [failure.member for failure in there.failures] == [2]
+    here = sweep(cantilever, table, deflection)["value"]
+    assert_array_equal(np.delete(there["value"], 2), np.delete(here, 2))
+
+
+def test_a_cluster_gives_the_same():
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None
+                                  ) as cluster, distributed.Client(cluster) as client:
+        there = sweep(cantilever, {"E": E}, deflection, client=client)
+        with pytest.warns(SweepWarning, match="no root of -1"):
+            roots = sweep(just, {"x": [4.0, -1.0]}, root, client=client)
+    assert_array_equal(there["value"], sweep(cantilever, {"E": E}, deflection)["value"])
+    assert_array_equal(roots["value"], [2.0, np.nan])
+
+
+def test_what_fails_is_listed_and_the_others_go_on():
+    with pytest.warns(SweepWarning, match=r"1 of 3 members failed.*-4.*no root of -4"):
+        result = sweep(just, {"x": [1.0, -4.0, 9.0]}, root)
+    assert_array_equal(result["value"], [1.0, np.nan, 3.0])
+    (failure,) = result.failures
+    assert failure == (1, {"x": -4.0}, "ValueError: no root of -4")
+    assert list(result.status) == ["done", "failed", "done"]
+
+
+def test_a_member_that_does_not_converge_fails_alone():
+    def measure(scene):
+        return scene.solve_static(max_iterations=1 if scene.beams[0].width > 0.015 else 50
+                                  ).displacement((1, 0))[1]
+
+    with pytest.warns(SweepWarning, match="ConvergenceError"):
+        result = sweep(cantilever, {"E": E[:2], "width": [0.01, 0.02]}, measure)
+    assert_allclose(-result["value"], [formula(E[0]), np.nan], rtol=1e-5)
+
+
+def test_an_interrupted_sweep_goes_on(tmp_path):
+    path, asked = tmp_path / "roots.npz", []
+
+    def measure(x, stop=True):
+        asked.append(x)
+        if stop and x == 2.0:
+            raise KeyboardInterrupt
+        return root(x - 0.5)
+
+    table = {"x": np.arange(5.0)}
+    with pytest.raises(Interrupted, match="interrupted with 1 of 5 .*to go on") as caught:
+        sweep(just, table, measure, path=path)
+    assert_array_equal(caught.value.state["value"], [np.nan, 0.5**0.5, *3 * [np.nan]])
+    with np.load(path) as file:
+        assert_array_equal(file["done"], [False, True, False, False, False])
+    asked.clear()
+    with pytest.warns(SweepWarning, match="no root of -0.5"):
+        result = sweep(just, table, lambda x: measure(x, stop=False), path=path)
+    assert asked == [0.0, 2.0, 3.0, 4.0]  # what failed is tried again
+    assert_allclose(result["value"], np.r_[np.nan, (np.arange(1.0, 5.0) - 0.5)**0.5])
+    again = Sweep.load(path)
+    assert_array_equal(again["value"], result["value"])
+    assert again.failures == result.failures
+
+
+def test_the_file_is_of_one_table(tmp_path):
+    path = tmp_path / "roots.npz"
+    sweep(just, {"x": [1.0, np.nan]}, abs, path=path)
+    sweep(just, {"x": [1.0, np.nan]}, abs, path=path)
+    for table, text in (({"x": [1.0, 2.0]}, "'x' of member 1 is .*nan.* there, .*2.0.* here"),
+                        ({"x": [1.0]}, "2 members there, 1 here")):
+        with pytest.raises(FileError, match=text):
+            sweep(just, table, abs, path=path)
+    with pytest.raises(FileError, match="there"):
+        sweep(lambda y: y, {"y": [1.0, 2.0]}, abs, path=path)
+    path.write_bytes(b"no file of NumPy")
+    with pytest.raises(FileError, match="cannot be read as a sweep"):
+        sweep(just, {"x": [1.0, 2.0]}, abs, path=path)
+    with pytest.raises(InputError, match="numbers or texts; 'x'"):
+        sweep(just, {"x": [MESH]}, id, path=tmp_path / "other.npz")
+
+
+def test_the_file_is_written_as_results_come(tmp_path, monkeypatch):
+    monkeypatch.setattr("skfem_ancf.sweeps._SECONDS", 0.0)
+    monkeypatch.setattr("skfem_ancf.sweeps._RARER", 0.0)
+    path, seen = tmp_path / "roots.npz", []
+
+    def measure(x):
+        seen.append(int(np.sum(Sweep.load(path).status == "done")) if path.exists() else 0)
+        return x
+
+    sweep(just, {"x": np.arange(4.0)}, measure, path=path)
+    assert seen == [0, 1, 2, 3]
+    assert os.listdir(tmp_path) == ["roots.npz"]
+
+
+@pytest.mark.parametrize("table, error, text", [
+    ({"E": [1e9], "width": [0.01, 0.02]}, InputError, "equal lengths, got .*itertools.product"),
+    ({"E": [1e9], "wdith": [0.1]}, NameUnknown, "'wdith'; known: 'E', 'width'; did you mean 'wid"),
+    ({"width": [0.01]}, CallError, "build needs 'E', not among the parameters 'width'"),
+    ({"E": 1e9}, InputError, "'E' must have one value for each member.*belongs into build"),
+    ({}, InputError, "no members"), ({"E": []}, InputError, "no members"),
+    ([{"E": 1.0}, {"width": 2.0}], InputError, "equal names.*number 1 is"),
+    (7, InputError, "dict of arrays or a list of dicts, got 7"),
+])
+def test_a_wrong_table_is_refused(table, error, text):
+    with pytest.raises(error, match=text):
+        sweep(cantilever, table, deflection)
+
+
+def test_functions_that_cannot_be_sent_are_refused():
+    with pytest.raises(PickleError, match="measure, .*lambda.*by def at the top of a module"):
+        sweep(just, {"x": [1.0]}, lambda x: x, workers=2)
+
+
+@pytest.mark.parametrize("options, text", [
+    (dict(workers=0), "workers must be an integer >= 1"), (dict(client=3), "distributed.Client"),
+    (dict(workers=1, client=3), "give one of them"), (dict(path="x.txt"), "end with .npz"),
+])
+def test_wrong_options_are_refused(options, text):
+    with pytest.raises(InputError, match=text):
+        sweep(just, {"x": [1.0]}, abs, **options)
+
+
+def test_what_is_measured_has_one_shape_and_new_names():
+    with pytest.warns(SweepWarning, match=r"\(2,\), of the first member 'value' of shape \(1,\)"):
+        result = sweep(just, {"x": [1, 2, 1]}, np.ones)
+    assert_array_equal(result["value"][:, 0], [1.0, np.nan, 1.0])
+    for measure, text in ((str, "must return a number"), (lambda x: {"x": 1}, "another name"),
+                          (lambda x: None, "got None")):
+        with pytest.raises(CallbackError, match=f"3 of 3 members failed.*{text}"):
+            sweep(just, {"x": [1, 2, 1]}, measure)
+
+
+def test_arrays_are_asked_for_by_name():
+    result = sweep(just, {"x": [1.0, 2.0]}, lambda x: {"double": 2.0 * x, "turned": 1j * x})
+    assert_array_equal(result["turned"], [1j, 2j])
+    assert repr(result) == "<Sweep of x: 2 done, 0 failed, 0 open; values: double, turned>"
+    with pytest.raises(NameUnknown, match="'dobule'; known: 'x', 'double', .*mean 'double'"):
+        result["dobule"]
+
+
+def test_xarray_has_the_parameters_as_coordinates(monkeypatch):
+    result = sweep(just, {"x": [1.0, 2.0]}, lambda x: {"square": x**2, "pair": [x, -x]})
+    with monkeypatch.context() as patch, pytest.raises(MissingExtra, match=r"\[arrays\]"):
+        patch.setitem(__import__("sys").modules, "xarray", None)
+        result.to_xarray()
+    pytest.importorskip("xarray")
+    data = result.to_xarray()
+    assert data["square"].swap_dims(member="x").sel(x=2.0) == 4.0
+    assert data["pair"].dims == ("member", "pair_0")
