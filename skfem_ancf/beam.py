@@ -340,11 +340,14 @@ class Beam(Frozen):
     @property
     def dofnames(self) -> list[str]:
         """Names of the coordinates of a node, as scikit-fem gives them: r^1, r^2, r_X^1, ..."""
-        return self.vector_element.dofnames
+        return [f"{name}^{k}" for name in self.element.dofnames for k in (1, 2)]
 
     def nodes(self, boundary: Place) -> Array:
         """Nodes at a place, see :meth:`dofs`."""
-        return self.mesh._expand_facets(facets_of(self.mesh, boundary))[0]
+        facets = np.unique(facets_of(self.mesh, boundary))
+        if facets[-1] < self.mesh.p.shape[1]:  # sections have the numbers of their nodes
+            return facets
+        return np.unique(self.mesh.facets[:, facets])
 
     def dofs(self, boundary: Place, names: str | Sequence[str] | None = None) -> Array:
         """Coordinate numbers at a place.

@@ -367,7 +367,8 @@ class Constraints:
         for beam, s in zip(self.members, self.slices):
             held = np.flatnonzero(~self.free[s])
             motions = unit_rows(beam.rigid_motions()[held] / [1.0, 1.0, self.size])
-            found.append(len(motions) > 0 and np.linalg.matrix_rank(motions, 1e-9) == 3)
+            found.append(len(motions) > 2 and bool(
+                np.linalg.svd(motions, compute_uv=False)[2] > 1e-9))
         return found
 
     @cached_property

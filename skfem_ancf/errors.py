@@ -349,7 +349,7 @@ def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = N
     ):
         wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
         raise InputError(f"{name} must have shape {wanted}, got {array.shape}")
-    if not np.all(np.isfinite(array)):
+    if not np.isfinite(array).all():
         bad = array[~np.isfinite(array)][0]
         raise InputError(f"{name} has a value that is NaN or infinite: {bad}")
     return array

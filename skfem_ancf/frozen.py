@@ -103,6 +103,20 @@ class Frozen(Sealable, metaclass=_Sealing):
         self._seal()
 
 
+class Content:
+    """Arrays as the key of a cache: equal where they have the same numbers."""
+
+    def __init__(self, *arrays: Array) -> None:
+        self.arrays = arrays
+        self._key = tuple((x.shape, x.dtype.char, x.tobytes()) for x in arrays)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Content) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+
 class ReadOnlyDict(dict):
     """A dictionary of arrays that does not change.
 

@@ -116,6 +116,19 @@ class MappingBeam(Mapping):
             n = [n[0], L * m.p_XY[:, t[0]], n[1], L * m.p_XY[:, t[1]]]
         return axis, m.height * np.stack(n, 1)
 
+    @cached_property
+    def _constant(self):
+        """Derivatives by xi and eta of straight elements of one height, (2, 2, ne), or None."""
+        m = self.mesh
+        if not m.is_straight or m.heights is not None or m.sections != "linear":
+            return None
+        return np.stack([m.p[:, m.t[1]] - m.p[:, m.t[0]], m.height * m.p_Y[:, m.t[0]]], 1)
+
+    def _everywhere(self, constant, X, tind):
+        """What is constant in each element, (2, 2, ne), at the points of :meth:`F`."""
+        constant = constant if tind is None else constant[:, :, tind]
+        return np.repeat(constant[..., None], X.shape[-1], axis=-1)
+
     def _director(self, xi, derivative=0):
         """The functions of xi that interpolate the section director."""
         return (hermite if self.mesh.sections == "cubic" else linear)(xi, derivative)
@@ -209,6 +222,8 @@ class MappingBeam(Mapping):
         ndarray
             Shape (2, 2, nelements, npoints).
         """
+        if self._constant is not None:
+            return self._everywhere(self._constant, X, tind)
         axis, director = self._coefficients(tind)
         xi, eta = X
         turning = self._sum(director, (eta - 0.5) * self._director(xi, 1))
@@ -275,6 +290,9 @@ class MappingBeam(Mapping):
         ndarray
             Shape (2, 2, nelements, npoints), orthonormal, the same across a section.
         """
+        if self._constant is not None:
+            e1 = self._constant[:, 0] / self.mesh.lengths
+            return self._everywhere(np.stack([e1, np.array([-e1[1], e1[0]])], 1), X, tind)
         axis, _ = self._coefficients(tind)
         e1 = self._sum(axis, hermite(X[0], 1))
         e1 = e1 / np.sqrt(e1[0] ** 2 + e1[1] ** 2)
@@ -483,6 +501,8 @@ class MappingBeam(Mapping):
 
     def check(self) -> None:
         """Raise :class:`MeshError` where the body folds: the map is not one to one."""
+        if self._constant is not None:
+            return  # it has rectangles
         xi, eta = np.meshgrid(np.linspace(0, 1, 9), [0.0, 1.0])
         det = self.detDF(np.array([xi.ravel(), eta.ravel()]))
         bad = np.nonzero(~(det.min(axis=1) > 0))[0]

@@ -251,8 +251,9 @@ class MeshBeam(Frozen, Mesh2D):
         if not (np.array_equal(t[1], t[0] + 1) and np.all(np.diff(t[0]) > 0)):
             raise MeshError("the nodes of a MeshBeam are numbered along its axis: element k joins "
                             "t[0, k] and t[0, k] + 1, and t[0] increases")
-        odd = np.setxor1d(t, np.arange(p.shape[1]))
-        if len(odd):
+        if (t[0, 0] or t[1, -1] != p.shape[1] - 1
+                or np.any(t[0, 1:] > t[1, :-1] + 1)):  # the elements leave nodes out
+            odd = np.setxor1d(t, np.arange(p.shape[1]))
             raise MeshError(f"every node of a MeshBeam is part of an element: there are "
                             f"{p.shape[1]} nodes, and node {odd[0]} is only in "
                             f"{'t' if odd[0] in t else 'the nodes'}")
@@ -399,8 +400,7 @@ class MeshBeam(Frozen, Mesh2D):
     def _build_default_tags(self):
         n, ne = self.p.shape[1], self.nelements
         elements = np.arange(ne, dtype=np.int32)
-        ends = np.setdiff1d(self.t[0], self.t[1]), np.setdiff1d(self.t[1], self.t[0])
-        return {"left": ends[0][:1].astype(np.int32), "right": ends[1][-1:].astype(np.int32),
+        return {"left": self.t[0, :1].astype(np.int32), "right": self.t[1, -1:].astype(np.int32),
                 "bottom": n + elements, "top": n + ne + elements}
 
     def normalize_facets(self, facets: Any) -> Array:
@@ -504,7 +504,7 @@ class MeshBeam(Frozen, Mesh2D):
     @property
     def chain_lengths(self) -> Array:
         """Length of the chain that each element is in, shape (nelements,)."""
-        chain = np.cumsum(~np.isin(self.t[0], self.t[1])) - 1
+        chain = np.cumsum(np.append(False, self.t[0, 1:] != self.t[1, :-1]))
         return np.bincount(chain, self.lengths)[chain]
 
     def element_finder(self, mapping: Any = None) -> Callable[..., Array]:

@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 
 from .errors import InputError, require_finite, require_integer, shown, taught
+from .frozen import Content
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -92,6 +93,12 @@ def lagrange(nodes: ArrayLike, x: ArrayLike) -> Array:
     nodes, x = require_finite("nodes", nodes, (None,)), require_finite("x", x, (None,))
     if len(np.unique(nodes)) < len(nodes):
         raise InputError(f"nodes must be different, got {shown(nodes)}")
+    return _lagrange(Content(nodes, x)).copy()
+
+
+@lru_cache(64)
+def _lagrange(content):
+    nodes, x = content.arrays
     out = np.ones((len(x), len(nodes)))
     for i, a in enumerate(nodes):
         for j, b in enumerate(nodes):

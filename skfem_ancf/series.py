@@ -4,10 +4,13 @@ follow from a table by products of matrices.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebvander
+
+from .frozen import read_only
 
 if TYPE_CHECKING:
     from .elements.base import ElementBeam
@@ -43,6 +46,20 @@ def chebyshev(x: Any, n: int) -> Array:
     return np.array(out[:n])
 
 
+@lru_cache(64)
+def _places(n):
+    """The zeros of T_n on [0, 1]."""
+    return read_only(0.5 - 0.5 * np.cos(np.pi * (np.arange(n) + 0.5) / n))
+
+
+@lru_cache(64)
+def _matrices(n):
+    """From values at :func:`_places` to coefficients, and from these to those of the slope."""
+    slope = np.zeros((n, n))
+    slope[:-1] = 2.0 * chebder(np.eye(n))
+    return np.linalg.inv(chebvander(2.0 * _places(n) - 1.0, n - 1)), slope
+
+
 class Series:
     """The local functions of an element of length 1 as ``sum c_ij T_i(2 xi - 1) T_j(2 eta - 1)``.
 
@@ -67,14 +84,12 @@ class Series:
     def __init__(self, element: ElementBeam, h: float) -> None:
         p = max(element.axis_degree, 3 if element.sections == "cubic" else 1) + 1
         m = max(element.order, 1) + 1
-        x, y = (0.5 - 0.5 * np.cos(np.pi * (np.arange(n) + 0.5) / n) for n in (p, m))
+        x, y = _places(p), _places(m)
         values, _, _, self.power = element.local(
             np.array([np.repeat(x, m), np.tile(y, p)]), h)
-        Vx, Vy = (np.linalg.inv(chebvander(2.0 * z - 1.0, len(z) - 1)) for z in (x, y))
+        (Vx, Dx), (Vy, Dy) = _matrices(p), _matrices(m)
         self.value = Vx @ values.reshape(-1, p, m) @ Vy.T
-        self.along, self.across = np.zeros((2, *self.value.shape))
-        self.along[:, :-1] = 2.0 * chebder(self.value, axis=1)
-        self.across[:, :, :-1] = 2.0 * chebder(self.value, axis=2)
+        self.along, self.across = Dx @ self.value, self.value @ Dy.T
         self.tables = np.stack([self.value, self.along])
 
     def at(self, table: Array, xi: float, eta: float) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.polynomial import legendre
 from skfem.element import DiscreteField, Element
 
 from ..errors import MeshError
-from ..frozen import Frozen
+from ..frozen import Content, Frozen, read_only
 from ..quadrature import gauss
 from ..reference import RefBeam, hermite_basis
 from .sampling import Held, Sampling, default_sampling, missed
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 #: How sections vary between the nodes that hold 1, 2, ... derivatives along X, the 0th included.
 SECTIONS = ("linear", "cubic", "quintic", "septic")
+
+#: Points at most of which the local functions are kept.
+KEPT_POINTS = 512
 
 
 class ElementBeam(Frozen, Element):
@@ -84,7 +87,7 @@ class ElementBeam(Frozen, Element):
         self.section = section
         self.dofnames = ["r", "r_X", *names]
         self.nodal_dofs = len(self.dofnames)
-        self.functionals = ((0.0, 0, 0), (0.0, 1, 0), *functionals)
+        self.functionals = ((0.0, 0, 0), (0.0, 1, 0), *map(tuple, functionals))
         self.welded = ["r", *welded]
         self.doflocs = np.array([[xi, 0.5 + f[0]] for xi in (0.0, 1.0) for f in self.functionals])
         self._along = (sum(across == 0 for _, _, across in self.functionals),
@@ -132,18 +135,9 @@ class ElementBeam(Frozen, Element):
     def carries_shear_parabola(self) -> bool:
         return self.section.degree >= 3
 
-    @cached_property
+    @property
     def _factors(self) -> Array:
-        """Of all local functions: row of the axis functions, or -1, of those along X that a
-        section function has, its number, the power of h, and that of the length."""
-        m, n = self._along
-        rows = []
-        for node in (0, 1):
-            for k, (_, slope, power) in enumerate(self.functionals):
-                of = m * node + slope if power == 0 else -1
-                rows.append((of, n * node + slope, (k - m) % max(self.section.number, 1), power,
-                             slope))
-        return np.array(rows).T
+        return _factors(self._along, self.functionals, self.section.number)
 
     def local(self, X: Array, h: float | Array, i: int | slice = slice(None),
               rate: float | Array = 0.0) -> tuple[Array, Array, Array, Any]:
@@ -172,20 +166,16 @@ class ElementBeam(Frozen, Element):
                 self._index_error()
             value, d_xi, d_eta, (slope,) = self.local(X, h, slice(i, i + 1), rate)
             return value[0], d_xi[0], d_eta[0], int(slope)
-        axis, along, number, power, slope = self._factors[:, i]
-        out = np.zeros((3, len(axis)) + np.shape(X)[1:], np.result_type(X, float))
-        of_axis, of_section = axis >= 0, axis < 0
-        for d in (0, 1):
-            out[d, of_axis] = hermite_basis(self._along[0], X[0], d)[axis[of_axis]]
-        if np.any(of_section):
-            S, dS = (hermite_basis(self._along[1], X[0], d)[along[of_section]] for d in (0, 1))
-            P, dP = (values[number[of_section]] for values in self.section(X[1] - 0.5))
-            p = power[of_section].reshape((-1,) + (1,) * (S.ndim - 1))
-            S, dS = h**p * S, h**p * dS
-            if np.ndim(h):  # h^p P(Y / h) of a height that varies
-                dS += p * rate / h * S
-            out[:, of_section] = S * P, dS * P, S * dP
-        return out[0], out[1], out[2], slope
+        power, slope = self._factors[3:, i]
+        if isinstance(X, np.ndarray) and X.ndim == 2 and X.shape[1] <= KEPT_POINTS:
+            unit = _kept_functions(self._along, self.functionals, self.section, Content(X))[:, i]
+        else:
+            unit = _unit_functions(self._along, self._factors[:, i], self.section, X)
+        power = power.reshape((-1,) + (1,) * (unit.ndim - 2))
+        value, d_xi, d_eta = h**power * unit
+        if np.ndim(h):  # h^p P(Y / h) of a height that varies
+            d_xi += power * rate / h * value
+        return value, d_xi, d_eta, slope
 
     def gbasis(self, mapping: MappingBeam, X: Array, i: int,
                tind: Array | None = None) -> tuple[DiscreteField, ...]:
@@ -400,6 +390,41 @@ class ElementBeam(Frozen, Element):
         return f"<{type(self).__name__} of order {self.order}, coordinates {self.dofnames}>"
 
 
+@lru_cache(64)
+def _factors(along, functionals, number):
+    """Of all local functions: row of the axis functions, or -1, of those along X that a section
+    function has, its number, the power of h, and that of the length."""
+    m, n = along
+    rows = []
+    for node in (0, 1):
+        for k, (_, slope, power) in enumerate(functionals):
+            of = m * node + slope if power == 0 else -1
+            rows.append((of, n * node + slope, (k - m) % max(number, 1), power, slope))
+    return read_only(np.array(rows).T)
+
+
+@lru_cache(256)
+def _kept_functions(along, functionals, section, content):
+    """All of :func:`_unit_functions`, of one array of points."""
+    X, = content.arrays
+    return read_only(_unit_functions(along, _factors(along, functionals, section.number), section,
+                                     X))
+
+
+def _unit_functions(along, factors, section, X):
+    """Local functions of height 1 and length 1 and their derivatives by xi and eta, (3, n, ...)."""
+    axis, of_node, number, _, _ = factors
+    out = np.zeros((3, len(axis)) + np.shape(X)[1:], np.result_type(X, float))
+    of_axis, of_section = axis >= 0, axis < 0
+    for d in (0, 1):
+        out[d, of_axis] = hermite_basis(along[0], X[0], d)[axis[of_axis]]
+    if np.any(of_section):
+        S, dS = (hermite_basis(along[1], X[0], d)[of_node[of_section]] for d in (0, 1))
+        P, dP = (values[number[of_section]] for values in section(X[1] - 0.5))
+        out[:, of_section] = S * P, dS * P, S * dP
+    return out
+
+
 class SectionFunctions(Frozen):
     """Polynomials P_k(eta), P_k(0) = 0, given by their derivatives in the Legendre basis.
 
@@ -414,6 +439,17 @@ class SectionFunctions(Frozen):
     def __init__(self, derivatives: ArrayLike) -> None:
         self._dP = np.asarray(derivatives)
         self._P = legendre.legint(self._dP, lbnd=0.0, axis=0) / 2
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or (type(self) is type(other) is SectionFunctions
+                                 and self._content == other._content)
+
+    def __hash__(self) -> int:
+        return hash(self._content) if type(self) is SectionFunctions else id(self)
+
+    @cached_property
+    def _content(self):
+        return Content(self._dP)
 
     @property
     def degree(self) -> int:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
 
+from ..frozen import read_only
 from ..quadrature import gauss, gauss_lobatto
 from ..reference import hermite_basis
 
@@ -113,11 +115,16 @@ def missed(m: int, n: int) -> list[Array]:
         Combinations of the coordinates of an element of length 1, each of shape (2 m,): the
         coefficients of the Legendre polynomials of degree n to 2 m - 2 in the slope.
     """
+    return list(_missed(m, n))
+
+
+@lru_cache(64)
+def _missed(m, n):
     x, w = gauss(2 * m)
     out = []
     for degree in range(n, 2 * m - 1):
         P = legendre.legval(2.0 * x - 1.0, np.eye(degree + 1)[degree])
         weights = (2 * degree + 1) * hermite_basis(m, x, 1) @ (w * P)
         weights[m] = -weights[0]  # exactly: a translation is not resisted
-        out.append(weights)
+        out.append(read_only(weights))
     return out

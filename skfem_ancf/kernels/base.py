@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError
+from ..frozen import Content
 from ..source import F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
 from ..types import Array
 
@@ -306,26 +307,17 @@ def pair_tables(table: Array, pairs: Array, constant: Array, elements: int) -> P
                       packed(np.arange(elements) * (len(C) > 1), np.int64))
 
 
-class Content:
-    """Arrays as the key of a cache: equal where they have the same numbers."""
-
-    def __init__(self, *arrays: Array) -> None:
-        self.arrays = arrays
-        self._key = tuple((x.shape, x.dtype.char, x.tobytes()) for x in arrays)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Content) and self._key == other._key
-
-    def __hash__(self) -> int:
-        return hash(self._key)
+def pair_numbers(pairs: Array) -> Array:
+    """The number of each of pairs (2, p) of rows among those of two rows, shape (p,)."""
+    off = pairs[0] != pairs[1]
+    return np.where(off, np.cumsum(off) - 1, np.sum(off))
 
 
 @lru_cache(64)
 def _partners(content):
     """Which pairs are of two rows, their numbers, and the ``partners`` and ``rounds``."""
     (g, h), = content.arrays
-    off, n = g != h, np.arange(len(g))
-    number = np.where(off, np.cumsum(off) - 1, np.sum(off))
+    off, n, number = g != h, np.arange(len(g)), pair_numbers(content.arrays[0])
     both = np.concatenate([[g, h, n, np.full(len(g), 2)],
                            np.array([h, g, n, np.full(len(g), 3)])[:, off]], axis=1)
     order, rounds = in_rounds(both[0])

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy import sparse
 
+from ..frozen import Content
 from ..materials import LinearLaw
-from ..quadrature import tensor
 from ..source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
 from ..types import Array
-from .base import (CARRY, MEAN, STRESS, TANGENT, VISCOUS, Chain, Content, PairTables, Texts,
-                   add_force, add_held_energy, add_tangent, apart, block, copy_stress, in_rounds,
-                   load, packed, pair_tables, product)
+from .base import (CARRY, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables, Texts, add_force,
+                   add_held_energy, add_tangent, apart, block, copy_stress, in_rounds, load,
+                   packed, pair_numbers, pair_tables, product)
 from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
 
 if TYPE_CHECKING:
@@ -449,7 +449,7 @@ def _rows(mesh, element, term, tind):
     eta = term.section_nodes
     tables = []
     for k, xi in enumerate((xi_x, xi_y)):
-        X, _ = tensor((xi, np.ones(len(xi))), (eta, np.ones(len(eta))))
+        X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
         G, frame = beam_gradients(mesh, element, X, tind)
         tables.append((G[k], frame[k].transpose(1, 2, 0)))
     G = np.concatenate([part for part, _ in tables], axis=1)
@@ -497,36 +497,26 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
     nb, ne, ns = G.shape[2], len(left), weights.shape[0] // len(along[0])
     (g, h), normal = (np.concatenate(part) for part in zip(*rows)), sum(len(x) for x, _ in rows[:2])
     rows = np.array([g, h])
-    factors = np.where(g == h, 0.5, 1.0)
-    coupled = law.D != 0.0 if law.kind == LINEAR else np.ones((3, 3), bool)
-    terms, mixing = _terms(Content(rows, coupled, *along), weights.shape[0])
-    moduli = np.zeros((terms.shape[1], 1))
-    if law.kind == LINEAR:
+    factors, linear = np.where(g == h, 0.5, 1.0), law.kind == LINEAR
+    content = Content(rows, law.D != 0.0 if linear else np.ones((3, 3), bool), *along)
+    terms, mixing, sizes = _terms(content, weights.shape[0])
+    keep, moduli = np.ones(terms.shape[1], bool), np.zeros((terms.shape[1], 1))
+    if linear:
         D = np.kron(law.D.reshape(9, 1), weights)
         moduli = mixing @ D
-        keep = np.any(np.abs(moduli) > 1e-14 * (abs(mixing) @ np.abs(D)), axis=1)  # else orthogonal
-        terms, moduli, mixing = terms[:, keep], moduli[keep], mixing[:0]
-    pairs, of = _pairs(Content(terms[:2], rows))
-    tables = pair_tables(G, pairs, constant, ne)
-    own = of[:terms.shape[1]]
-    order, rounds = in_rounds(own)
-    terms = np.stack([own, tables.pairs[2, own], terms[2], terms[3]])[:, order]
-    if law.kind == LINEAR:
-        moduli = moduli[order]
-    else:
-        mixing = mixing[order]
-    mixing = mixing.tocoo()
-    in_order, mixing_rounds = in_rounds(mixing.row)
-    summands = np.array([mixing.row, *np.divmod(mixing.col, weights.shape[0])])[:, in_order]
+        keep = np.any(np.abs(moduli) > 1e-14 * (sizes @ np.abs(D)), axis=1)  # else orthogonal
+    layout = _layout(content, weights.shape[0], Content(keep), linear)
+    if linear:
+        moduli = moduli[layout.order]
     shared = len(G) == 1
     joined, ends = _joined(along, ns)
     return SectionPack(
         packed(G), packed(G.transpose(0, 2, 1)[:int(shared)]), packed(frame),
         packed(weights), packed(np.zeros(ne) if shared else np.arange(ne), np.int64),
-        packed([*rows, of[terms.shape[1]:]], np.int64), factors, int(normal), joined, ends, law,
-        packed(constant), packed(left * nb, np.int64), packed(np.arange(2 * nb), np.int64), tables,
-        packed(terms, np.int64), rounds, packed(moduli), packed(summands, np.int64),
-        packed(mixing.data[in_order]), mixing_rounds)
+        layout.rows, factors, int(normal), joined, ends, law,
+        packed(constant), packed(left * nb, np.int64), packed(np.arange(2 * nb), np.int64),
+        pair_tables(G, layout.pairs, constant, ne), layout.terms, layout.rounds, packed(moduli),
+        layout.mixing, layout.parts, layout.mixing_rounds)
 
 
 def linearised(pack: SectionPack) -> SectionPack:
@@ -554,11 +544,39 @@ def _joined(along, ns):
     return out, packed(np.cumsum([0, *sizes]) * ns, np.int64)
 
 
+class _Layout(NamedTuple):
+    """The fields of a :class:`SectionPack` that depend on rows and interpolations only.
+
+    ``pairs`` (2, p) are those of rows; ``order`` says which of all terms those of the pack are.
+    """
+
+    pairs: Array
+    order: Array
+    rows: I2
+    terms: I2
+    rounds: I1
+    mixing: I2
+    parts: F1
+    mixing_rounds: I1
+
+
 @lru_cache(64)
-def _pairs(content):
-    """The different columns of arrays (2, n) side by side, and which of them each is."""
-    pairs, of = np.unique(np.concatenate(content.arrays, axis=1), axis=1, return_inverse=True)
-    return pairs, of.ravel()
+def _layout(content, points, kept, linear):
+    """The _Layout of the terms of :func:`_terms` that are kept; of a linear law without mixing."""
+    rows, (keep,) = content.arrays[0], kept.arrays
+    terms, mixing, _ = _terms(content, points)
+    terms = terms[:, keep]
+    pairs, of = np.unique(np.concatenate([terms[:2], rows], axis=1), axis=1, return_inverse=True)
+    of, number = of.ravel(), pair_numbers(pairs)
+    own = of[:terms.shape[1]]
+    order, rounds = in_rounds(own)
+    terms = np.stack([own, number[own], terms[2], terms[3]])[:, order]
+    mixing = (mixing[:0] if linear else mixing[order]).tocoo()
+    in_order, mixing_rounds = in_rounds(mixing.row)
+    summands = np.array([mixing.row, *np.divmod(mixing.col, points)])[:, in_order]
+    return _Layout(pairs, np.flatnonzero(keep)[order],
+                   packed([*rows, of[len(own):]], np.int64), packed(terms, np.int64), rounds,
+                   packed(summands, np.int64), packed(mixing.data[in_order]), mixing_rounds)
 
 
 @lru_cache(64)
@@ -578,6 +596,8 @@ def _terms(content, points):
         g, h, k, l, with g <= h, each once, shape (4, n).
     mixing : sparse matrix
         Moduli of the terms from ``w D`` at the points, shape (n, 9 points): (c, d) of D first.
+    sizes : sparse matrix
+        Its absolute values.
     """
     rows, coupled, *along = content.arrays
     factors, ns = np.where(rows[0] == rows[1], 0.5, 1.0), points // len(along[0])
@@ -600,7 +620,7 @@ def _terms(content, points):
     terms, of = np.unique(terms, axis=1, return_inverse=True)
     mixing = sparse.csr_matrix((value, (of.ravel(), column_of)),
                                shape=(terms.shape[1], 9 * points))
-    return terms, mixing
+    return terms, mixing, abs(mixing)
 
 
 def _viscous(pack, time, none):
@@ -665,13 +685,19 @@ class Kernel(Chain):
             self.t.shape[1] if t.shared else 1) for t in self.firsts)
 
     def inverted(self, u: Array) -> bool:
-        return any(first.inverted(apart(first.pack, part), self.gather(u, part).ravel())
-                   for part in self.chunks() for first in self.firsts)
+        return any(first.inverted(pack, u_e) for first, pack, u_e in self._of_firsts(u))
+
+    def _of_firsts(self, u):
+        """Each of the first tables with a pack of some elements and their coordinates."""
+        parts = self.chunks()
+        for part in parts:
+            u_e = u if len(parts) == 1 else self.gather(u, part).ravel()
+            for first in self.firsts:
+                yield first, first.pack if len(parts) == 1 else apart(first.pack, part), u_e
 
     def shortest(self, u: Array) -> Any:
         """Smallest stretch of the fibres along the axis, where eps_xx is sampled."""
-        return min(first.shortest(apart(first.pack, part), self.gather(u, part).ravel())
-                   for part in self.chunks() for first in self.firsts)
+        return min(first.shortest(pack, u_e) for first, pack, u_e in self._of_firsts(u))
 
     def strain_increment(self, pack: SectionPack, u: Array, du: Array, out: Array) -> None:
         """The strain's derivative in the direction du, (3, points, elements).
