@@ -125,11 +125,11 @@ def hermite(xi: ArrayLike, derivative: int = 0) -> Array:
 
 
 @lru_cache
-def _hermite_coefficients(m: int) -> Array:
-    """Powers of the Hermite polynomials of degree 2 m - 1 on [0, 1]: (2 m, 2 m), columns."""
+def _hermite_coefficients(m: int, derivative: int) -> Array:
+    """Powers of a derivative of the Hermite polynomials of degree 2 m - 1 on [0, 1], columns."""
     conditions = [[polynomial.polyval(x, polynomial.polyder(row, d)) for row in np.eye(2 * m)]
                   for x in (0.0, 1.0) for d in range(m)]
-    return np.linalg.inv(np.array(conditions))
+    return polynomial.polyder(np.linalg.inv(np.array(conditions)), derivative)
 
 
 def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
@@ -148,5 +148,4 @@ def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
     """
     if m < 3 and derivative < 3:
         return (linear if m == 1 else hermite)(xi, derivative)
-    coefficients = polynomial.polyder(_hermite_coefficients(m), derivative)
-    return polynomial.polyval(np.asarray(xi), coefficients)
+    return polynomial.polyval(np.asarray(xi), _hermite_coefficients(m, derivative))

@@ -391,6 +391,13 @@ class ElementBeam(Frozen, Element):
 
 
 @lru_cache(64)
+def _integrals(content):
+    """From the coefficients of derivatives by eta in 2 eta to those of functions, zero at 0."""
+    derivatives, = content.arrays
+    return read_only(legendre.legint(derivatives, lbnd=0.0, axis=0) / 2)
+
+
+@lru_cache(64)
 def _factors(along, functionals, number):
     """Of all local functions: row of the axis functions, or -1, of those along X that a section
     function has, its number, the power of h, and that of the length."""
@@ -438,7 +445,7 @@ class SectionFunctions(Frozen):
 
     def __init__(self, derivatives: ArrayLike) -> None:
         self._dP = np.asarray(derivatives)
-        self._P = legendre.legint(self._dP, lbnd=0.0, axis=0) / 2
+        self._P = _integrals(Content(self._dP))
 
     def __eq__(self, other: object) -> bool:
         return self is other or (type(self) is type(other) is SectionFunctions

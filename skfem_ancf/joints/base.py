@@ -40,8 +40,8 @@ class Vector:
 
     def __init__(self, start: ArrayLike, dofs: Array, weights: Array) -> None:
         weights = np.broadcast_to(weights, np.shape(dofs))
-        size = np.max(np.abs(weights), axis=0, initial=0.0)
-        keep = size > 1e-14 * np.max(size, initial=0.0)
+        size = np.abs(weights).max(axis=0, initial=0.0)
+        keep = size > 1e-14 * size.max(initial=0.0)
         self.start, self.dofs, self.weights = np.asarray(start), dofs[:, keep], weights[:, keep]
 
     def __call__(self, u: Array) -> Array:

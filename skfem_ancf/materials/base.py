@@ -199,7 +199,8 @@ class Material(Frozen):
     def is_hooke(self) -> bool:
         """True if the law is Hooke's of E and nu, in Green-Lagrange strain."""
         law, D = self.law(), hooke(self.E, self.nu, self.plane)
-        return isinstance(law, LinearLaw) and np.allclose(law.D, D, rtol=1e-9, atol=1e-9 * D[0, 0])
+        return isinstance(law, LinearLaw) and bool(np.all(
+            np.abs(law.D - D) <= 1e-9 * (np.abs(D) + D[0, 0])))
 
     @property
     def lame(self) -> float:

@@ -1,0 +1,67 @@
+"""What making and solving a scene computes, by counts of calls."""
+
+import numpy as np
+import pytest
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, MeshBeam, Scene,
+                        StVenantKirchhoff)
+from skfem_ancf.elements import base
+from skfem_ancf.kernels import section
+
+
+def cantilever(element, n=4, length=1.0, height=0.01, E=2e9, angle=0.0):
+    mesh = MeshBeam.init_line(length * np.linspace(0, 1, n + 1), height=height, angle=angle)
+    beam = Beam(mesh, element, StVenantKirchhoff(E, 0.3, 7800.0), width=0.01)
+    return Scene(beam).clamp("left", thickness="free").gravity((0.0, -9.81))
+
+
+def counted(monkeypatch, owner, name):
+    calls, function = [], getattr(owner, name)
+
+    def call(*args, **kwargs):
+        calls.append(args)
+        return function(*args, **kwargs)
+
+    monkeypatch.setattr(owner, name, call)
+    return calls
+
+
+@pytest.mark.parametrize("element", [lambda: ElementBeamANCF(3), lambda: ElementBeamCable(5)])
+def test_local_functions_are_made_once_a_process(monkeypatch, element):
+    cantilever(element()).solve_static().displacement((1.0, 0.0))
+    functions = counted(monkeypatch, base, "_unit_functions")
+    layouts = section._layout.cache_info().misses
+    facets = counted(monkeypatch, MeshBeam, "_init_facets")
+    scene = cantilever(element(), 7, length=1.2, height=0.02, E=3e9)  # all of it is another
+    assert scene.solve_static().displacement((1.2, 0.0))[1] < 0
+    assert not functions and not facets
+    assert section._layout.cache_info().misses == layouts
+    assert "vector_element" not in vars(scene.beams[0]) and "basis" not in vars(scene.beams[0])
+
+
+def test_a_tapered_beam_has_slopes_of_its_height():
+    X, step = np.array([[0.2, 0.7], [0.1, 0.9]]), 1e-30j
+    element, h, rate = ElementBeamANCF(3), np.array([0.3, 0.2]), np.array([0.05, -0.1])
+    _, d_xi, d_eta, _ = element.local(X, h, rate=rate)
+    along = element.local(X + np.array([[step], [0.0]]), h + step * rate)[0]
+    across = element.local(X + np.array([[0.0], [step]]), h)[0]
+    assert np.allclose(along.imag / step.imag, d_xi, rtol=1e-12, atol=1e-14)
+    assert np.allclose(across.imag / step.imag, d_eta, rtol=1e-12, atol=1e-14)
+
+
+def test_straight_maps_are_those_of_the_general_formula():
+    mesh = MeshBeam.init_line([0.0, 0.4, 1.0], 0.2, origin=(3.0, -1.0), angle=0.7)
+    X = np.random.default_rng(0).random((2, 5))
+    few = mesh.mapping()
+    found = few.DF(X), few.frame(X), few.DF(X, np.array([1])), few.invDF(X)
+    vars(few)["_constant"] = None  # as of a curve
+    general = few.DF(X), few.frame(X), few.DF(X, np.array([1])), few.invDF(X)
+    for a, b in zip(found, general):
+        assert a.shape == b.shape and np.allclose(a, b, rtol=1e-13, atol=1e-13 * np.max(np.abs(b)))
+
+
+def test_elements_of_other_points_share_nothing():
+    X = np.array([[0.2, 0.7], [0.1, 0.9]])
+    one, other = ElementBeamANCF(5), ElementBeamANCF(5, "equispaced")
+    assert one.section == ElementBeamANCF(5).section != other.section
+    assert not np.allclose(one.local(X, 0.1)[0], other.local(X, 0.1)[0])
