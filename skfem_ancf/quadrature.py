@@ -97,7 +97,7 @@ def lagrange(nodes: ArrayLike, x: ArrayLike) -> Array:
 
 
 @lru_cache(64)
-def _lagrange(content):
+def _lagrange(content: Content) -> Array:
     nodes, x = content.arrays
     out = np.ones((len(x), len(nodes)))
     for i, a in enumerate(nodes):

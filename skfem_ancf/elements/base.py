@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from ..mesh import MeshBeam
     from ..types import Array, Rule
 
+    Functionals = tuple[tuple[float, int, int], ...]
+
 
 #: How sections vary between the nodes that hold 1, 2, ... derivatives along X, the 0th included.
 SECTIONS = ("linear", "cubic", "quintic", "septic")
@@ -87,7 +89,8 @@ class ElementBeam(Frozen, Element):
         self.section = section
         self.dofnames = ["r", "r_X", *names]
         self.nodal_dofs = len(self.dofnames)
-        self.functionals = ((0.0, 0, 0), (0.0, 1, 0), *map(tuple, functionals))
+        self.functionals: Functionals = (
+            (0.0, 0, 0), (0.0, 1, 0), *((y, along, across) for y, along, across in functionals))
         self.welded = ["r", *welded]
         self.doflocs = np.array([[xi, 0.5 + f[0]] for xi in (0.0, 1.0) for f in self.functionals])
         self._along = (sum(across == 0 for _, _, across in self.functionals),
@@ -391,14 +394,14 @@ class ElementBeam(Frozen, Element):
 
 
 @lru_cache(64)
-def _integrals(content):
+def _integrals(content: Content) -> Array:
     """From the coefficients of derivatives by eta in 2 eta to those of functions, zero at 0."""
     derivatives, = content.arrays
     return read_only(legendre.legint(derivatives, lbnd=0.0, axis=0) / 2)
 
 
 @lru_cache(64)
-def _factors(along, functionals, number):
+def _factors(along: tuple[int, int], functionals: Functionals, number: int) -> Array:
     """Of all local functions: row of the axis functions, or -1, of those along X that a section
     function has, its number, the power of h, and that of the length."""
     m, n = along
@@ -411,14 +414,16 @@ def _factors(along, functionals, number):
 
 
 @lru_cache(256)
-def _kept_functions(along, functionals, section, content):
+def _kept_functions(along: tuple[int, int], functionals: Functionals, section: SectionFunctions,
+                    content: Content) -> Array:
     """All of :func:`_unit_functions`, of one array of points."""
     X, = content.arrays
     return read_only(_unit_functions(along, _factors(along, functionals, section.number), section,
                                      X))
 
 
-def _unit_functions(along, factors, section, X):
+def _unit_functions(along: tuple[int, int], factors: Array, section: SectionFunctions,
+                    X: Array) -> Array:
     """Local functions of height 1 and length 1 and their derivatives by xi and eta, (3, n, ...)."""
     axis, of_node, number, _, _ = factors
     out = np.zeros((3, len(axis)) + np.shape(X)[1:], np.result_type(X, float))
@@ -455,7 +460,7 @@ class SectionFunctions(Frozen):
         return hash(self._content) if type(self) is SectionFunctions else id(self)
 
     @cached_property
-    def _content(self):
+    def _content(self) -> Content:
         return Content(self._dP)
 
     @property

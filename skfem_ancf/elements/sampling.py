@@ -119,7 +119,7 @@ def missed(m: int, n: int) -> list[Array]:
 
 
 @lru_cache(64)
-def _missed(m, n):
+def _missed(m: int, n: int) -> list[Array]:
     x, w = gauss(2 * m)
     out = []
     for degree in range(n, 2 * m - 1):
