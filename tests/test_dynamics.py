@@ -21,7 +21,8 @@ from skfem_ancf.forces.system import Forces
 from skfem_ancf.dynamics.steps import STATE, Course, Matrices, Rule, room_for_steps, steps
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.equations import Equations
-from skfem_ancf.errors import ConvergenceError, InputError, NameUnknown, SupportError
+from skfem_ancf.errors import (ConvergenceError, InputError, ModelWarning, NameUnknown,
+                               SupportError)
 from skfem_ancf.formulations import FORMULATIONS
 from skfem_ancf.kernels.moments import MomentPack
 from skfem_ancf.linalg import BandMatrix
@@ -775,3 +776,12 @@ def test_a_function_that_takes_arrays_is_asked_a_few_times():
     asked = []
     sample(lambda t: asked.append(np.shape(t)) or np.sin(t), np.linspace(0, 1, 1000))
     assert asked == [(1000,), (), (), ()]
+
+
+def test_a_body_that_is_turned_inside_out_is_said():
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 5), 0.2)
+    beam = Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(1e3, 0.3, 100.0), 0.1)
+    scene = Scene(beam).clamp("left").point_force((-40.0, 0.0), at=(1, 0))
+    with pytest.warns(ModelWarning, match=r"inside out, at t = 0\.\d+ or before") as seen:
+        scene.integrate(0.05, 2e-3)
+    assert seen[0].filename == __file__

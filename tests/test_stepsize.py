@@ -76,6 +76,7 @@ def blow(t, at=0.7, width=0.002):
     return np.where(np.abs(t - at) < width, np.cos(0.5 * np.pi * (t - at) / width) ** 2, 0.0)
 
 
+@pytest.mark.filterwarnings("ignore:the body is turned inside out")
 @pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
 def test_a_blow_after_rest_is_seen(scheme):
     scene = Scene(soft(2, 1, E=1e4))

@@ -15,7 +15,7 @@ try:
         from exudyn.beams import GenerateBeamElementsAlongLine
     exudyn.config.printToConsole = False
 except ImportError:
-    exudyn = None
+    exudyn = items = None
 
 KINDS = {"ANCFCable2D": ("cable", 0), "GE2D linear": ("rod", 2), "GE2D quadratic": ("rod", 3)}
 

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from .sensors import Sensor
 
 MAX_STEPS = 10**9
+#: Steps after which a motion is looked at whether its body is turned inside out.
+LOOKED = 16
 #: Gigabytes of the joints' matrices, at most.
 LARGEST = 2.0
 MIN_RTOL = 1e-12
@@ -221,7 +223,7 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
     -------
     History
     """
-    history, task = run.history, run.task
+    history, task, body = run.history, run.task, _Body(run)
     try:
         with progress_bar(progress, total=task.span, desc="time") as bar:
             bar.update(run.y.t - task.t_start)
@@ -229,6 +231,7 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
                 before = run.y.t
                 run.advance()
                 bar.update(run.y.t - before)
+                body.look()
                 if file is not None:
                     file.update()
     except StepFailed as failure:
@@ -240,8 +243,30 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
     except KeyboardInterrupt:
         raise Interrupted(f"stopped at t = {run.y.t:.6g} of {task.t_end:.6g}; the exception's "
                           "state is the History up to there", history.close()) from None
+    body.warn()
     _warn_of_turns(history.close())
     return history
+
+
+class _Body:
+    """Sees now and then whether a body has been turned inside out."""
+
+    def __init__(self, run):
+        self.run, self.next, self.t = run, 0, None
+
+    def look(self):
+        run = self.run
+        if self.t is None and (run.steps >= self.next or run.done):
+            self.next = run.steps + LOOKED
+            if run.system.inverted(run.y.u):
+                self.t = run.y.t
+
+    def warn(self):
+        if self.t is not None:
+            warnings.warn(f"the body is turned inside out, at t = {self.t:.6g} or before: it is "
+                          "compressed or bent beyond what it can bear, and what follows means "
+                          "nothing. Use NeoHookean, more elements or a smaller load", ModelWarning,
+                          stacklevel=9)
 
 
 def _warn_of_turns(history):
@@ -251,7 +276,7 @@ def _warn_of_turns(history):
     if len(jumps):
         warnings.warn(f"at t = {history.t[jumps[0] + 1]:.6g} a torsional spring has turned by more "
                       "than half a turn: its angle is taken in (-pi, pi], so that its moment "
-                      "jumps there and the energy is not kept", ModelWarning, stacklevel=5)
+                      "jumps there and the energy is not kept", ModelWarning, stacklevel=9)
 
 
 __all__ = ["Integrator", "integrate"]
