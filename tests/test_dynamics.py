@@ -148,6 +148,22 @@ def test_high_order_with_joints_and_moving_supports():
         assert_allclose(value[-1], known, rtol=0, atol=5e-6 * np.abs(known).max())
 
 
+@pytest.mark.parametrize("scheme", [cls() for cls in SCHEMES.values()], ids=repr)
+def test_a_step_to_a_breakpoint_has_the_loads_before_it(scheme):
+    """A force that ends at a breakpoint, and a motion that goes on without it."""
+    def pushed(amplitude=None):
+        return Scene(soft()).clamp("left").point_force((0, -30.0), at=(1, 0), amplitude=amplitude)
+
+    whole = pushed(lambda t: float(t < 0.105)).integrate(0.2, 0.01, scheme=scheme,
+                                                         breakpoints=[0.105])
+    first = pushed().integrate(0.105, 0.01, scheme=scheme)
+    second = Scene(soft()).clamp("left").integrate(
+        0.2, 0.01, scheme=scheme, start=first.state(-1))
+    for name in ("u", "v"):
+        one, other = getattr(whole, name)[-1], getattr(second, name)[-1]
+        assert_allclose(one, other, rtol=0, atol=1e-9 * np.abs(other).max())
+
+
 def test_gauss_conserves_momenta_and_keeps_the_energy():
     scene = Scene(soft(2, 2, E=1e4, h=0.2)).initial_velocity(
         lambda x: np.array([1.0 - 2.0 * x[1], 3.0 * x[0] * x[0]]))

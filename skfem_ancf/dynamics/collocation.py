@@ -170,7 +170,7 @@ class _Stages:
     def __init__(self, scheme, integrator, y, dt):
         self.table, self.integrator, self.y, self.dt = scheme._table, integrator, y, dt
         s, c = integrator.system, self.table.points
-        self.times = y.t + dt * c
+        self.times = np.minimum(y.t + dt * c, integrator.limit)  # before what jumps at the end
         self.system, self.multipliers = s, np.tile(y.multipliers, (len(c), 1))
         if y.memory:
             self.multipliers = y.memory["forces"].copy()
