@@ -141,7 +141,8 @@ class Part:
     @cached_property
     def start(self) -> Array:
         """Positions in the stress-free body, (2, n)."""
-        if self.n == 1 and not self.off_axis:
+        if self.n == 1 and not self.off_axis and (self.beam.has_sections
+                                                  or self.beam.mesh.is_straight):
             beam, (dofs, weights) = self.beam, self.one
             return (beam.origin + beam.q0_local[dofs - self.coordinates.start] @ weights)[:, None]
         return self.beam.mesh.mapping().F(self.at, self.e)[..., 0]

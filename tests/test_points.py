@@ -18,10 +18,11 @@ METHODS = ("displacement", "position", "velocity", "strain", "stress")
 
 
 def inside(mesh, n=40, seed=0):
-    """Elements and points of a body, some of them on faces and between elements."""
+    """Elements and points of a body, some of them on faces, between elements and on the axis."""
     rng = np.random.default_rng(seed)
     e, X = rng.integers(0, mesh.nelements, n), rng.random((2, n))
     X[0, :8], X[1, 4:12] = np.tile([0.0, 1.0], 4), np.repeat([0.0, 1.0], 4)
+    X[1, 12:16] = 0.5
     return e, X, mesh.mapping().F(X[:, :, None], e)[..., 0]
 
 
