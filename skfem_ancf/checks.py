@@ -130,7 +130,7 @@ def _findings(beam, stretch, turn):
     if turn > limit:
         out.append(f"the mesh{who} is too coarse for the curvature found: the axis turns by "
                    f"{turn:.3g} rad over one element, where {limit:g} is the limit: use more "
-                   "elements there, or solve_static(adapt=...)")
+                   "elements there, or solve_static(adapt=...); in a Frame, elements=")
     return out
 
 

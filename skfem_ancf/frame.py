@@ -275,14 +275,15 @@ class Frame(Scene):
         for name in names:
             held[nodes, HELD.index(name)] = True
         if "angle" in names:
-            rigid = self._nodes.nodes[~self._nodes.hinged]
-            loose = np.setdiff1d(nodes, rigid)
-            if len(loose):
-                raise InputError(f"all lines are hinged at node {loose[0]}: it has no rotation to "
-                                 "hold, pin it")
+            self._require_rigid(nodes, "it has no rotation to hold, pin it")
         self._nodes = Nodes(self._nodes.nodes, self._nodes.hinged, held, self.net, self._lines)
         self._join()
         return self
+
+    def _require_rigid(self, nodes, advice):
+        loose = np.setdiff1d(nodes, self._nodes.nodes[~self._nodes.hinged])
+        if len(loose):
+            raise InputError(f"all lines are hinged at node {loose[0]}: {advice}")
 
     def clamp(self, boundary: Any, beam: WhichBeam = None, thickness: str = "free") -> Frame:
         """Hold nodes fast: their positions and, where a line is rigid there, their rotation.
@@ -378,9 +379,16 @@ class Frame(Scene):
         -------
         Frame
             Itself.
+
+        Raises
+        ------
+        InputError
+            If all lines are hinged at one of the nodes.
         """
         _no_beam(beam)
         M = require_finite_scalar("M", M)
+        self._require_rigid(self.nodes(boundary), "no line takes a moment there; leave one of them "
+                            "rigid, by pairs (line, node) in hinges")
         loads = [(k, NodeMoment(self.beams[k], int(node), M, amplitude))
                  for k, node in zip(*self._ends_at(boundary))]
         self._put(loads=loads)

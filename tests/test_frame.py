@@ -492,6 +492,8 @@ def test_what_is_not_held_is_said():
     (lambda f: Frame.from_meshio("nothing.msh", material=STEEL), FileError, "nothing.msh"),
     (lambda f: Frame.from_lines(*PORTAL, hinges="all", material=STEEL, height=H, width=H).clamp(0),
      InputError, "pin it"),
+    (lambda f: Frame.from_lines(*PORTAL, hinges=[1], material=STEEL, height=H,
+                                width=H).moment(1, 2.0), InputError, "no line takes a moment"),
 ])
 def test_calls_that_mean_nothing(call, error, message):
     with pytest.raises(error, match=message):
