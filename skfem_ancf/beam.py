@@ -76,6 +76,10 @@ def _coordinates(mesh, element, p):
     return np.ascontiguousarray(q.transpose(2, 0, 1)).ravel()
 
 
+#: Attributes of a beam that are made once and depend on its mesh and element only.
+_GEOMETRY = ("vector_element", "q0", "origin", "q0_local", "rows", "finder", "series", "scales")
+
+
 def _fields(method):
     """A method of coordinates, points and elements, with what it is given checked."""
 
@@ -198,6 +202,11 @@ class Beam(Frozen):
         NameUnknown
             If an argument is not known.
 
+        Notes
+        -----
+        What does not depend on the changes is not made again: of another material the tables of
+        all strains stay, of another width what depends on mesh and element.
+
         Examples
         --------
         >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, StVenantKirchhoff
@@ -215,7 +224,22 @@ class Beam(Frozen):
         given = {name: getattr(self, name) for name in known} | {"material": self._given}
         given["width" if "section" in changes or not isinstance(self.section, Rectangle) else
               "section"] = None
-        return type(self)(**{**given, **changes})
+        other = type(self)(**{**given, **changes})
+        if other.mesh is self.mesh and other.element is self.element:
+            self._share(other)
+        return other
+
+    def _share(self, other):
+        """Hand on what depends on mesh and element, and to another material of one section more."""
+        mine, its = vars(self), vars(other)
+        its.update((name, mine[name]) for name in _GEOMETRY if name in mine)
+        if (other.formulation is not self.formulation or other.width != self.width
+                or not (self.across.plain and other.across.plain)):
+            return
+        if other.across.slabs[0].density == self.across.slabs[0].density and "inertia" in mine:
+            its["inertia"] = self.inertia
+        if "kernel" in mine:
+            its["kernel"] = self.kinematics.kernel(other.across, other.formulation, self.kernel)
 
     def with_mesh(self, mesh: MeshBeam) -> Beam:
         """The same beam on another mesh."""

@@ -501,8 +501,9 @@ class MappingBeam(Mapping):
 
     def check(self) -> None:
         """Raise :class:`MeshError` where the body folds: the map is not one to one."""
-        if self._constant is not None:
-            return  # it has rectangles
+        J = self._constant
+        if J is not None and np.all(cross(J[:, 0], J[:, 1]) > 0.0):
+            return  # they are rectangles
         xi, eta = np.meshgrid(np.linspace(0, 1, 9), [0.0, 1.0])
         det = self.detDF(np.array([xi.ravel(), eta.ravel()]))
         bad = np.nonzero(~(det.min(axis=1) > 0))[0]

@@ -1286,6 +1286,49 @@ class Scene:
                           [(k, v) for k, (v, _) in self._velocities.items()],
                           [element for element, _ in self._elements])
 
+    def replace(self, beam: WhichBeam = None, **changes: Any) -> Scene:
+        """The same scene with some arguments of one beam changed.
+
+        Parameters
+        ----------
+        beam
+            The beam, its name or its number; None for the only one.
+        **changes
+            Arguments of :class:`Beam`, as ``material=...``, ``width=...`` or ``mesh=...``.
+
+        Returns
+        -------
+        Scene
+            Another one. A state of this scene is a good start for its
+            ``solve_static(start=state)``, if the mesh has not changed.
+
+        Raises
+        ------
+        NameUnknown
+            If an argument or the beam is not known.
+        InputError
+            As :meth:`with_beams`.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> material = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)
+        >>> scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.01),
+        ...                    ElementBeamCable(5), material, width=0.01))
+        >>> state = scene.clamp("left").gravity((0, -9.81)).solve_static()
+        >>> stiffer = scene.replace(material=material.replace(E=2.02e8))
+        >>> new = stiffer.solve_static(start=state)
+        >>> new.iterations < state.iterations
+        True
+        >>> bool(new.displacement((1, 0))[1] > state.displacement((1, 0))[1])
+        True
+        """
+        k = self._number_of_beam(beam)
+        beams = list(self._beams)
+        beams[k] = beams[k].replace(**changes)
+        return self.with_beams(beams)
+
     @_alone
     def plan(self, kind: str = "static") -> Plan:
         """What a solution computes, keeps constant or skips, and why; ``print`` it.

@@ -6,7 +6,7 @@ import pytest
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, MeshBeam, Scene,
                         StVenantKirchhoff)
 from skfem_ancf.elements import base
-from skfem_ancf.kernels import section
+from skfem_ancf.kernels import cable, section
 
 
 def cantilever(element, n=4, length=1.0, height=0.01, E=2e9, angle=0.0):
@@ -65,3 +65,54 @@ def test_elements_of_other_points_share_nothing():
     one, other = ElementBeamANCF(5), ElementBeamANCF(5, "equispaced")
     assert one.section == ElementBeamANCF(5).section != other.section
     assert not np.allclose(one.local(X, 0.1)[0], other.local(X, 0.1)[0])
+
+
+@pytest.mark.parametrize("element", [lambda: ElementBeamANCF(1), lambda: ElementBeamANCF(3),
+                                     lambda: ElementBeamCable(3), lambda: ElementBeamCable(5)])
+@pytest.mark.parametrize("angle", [0.0, 0.4])
+@pytest.mark.parametrize("name, value", [("E", 2.02e9), ("nu", 0.0), ("plane", "strain"),
+                                         ("density", 7000.0)])
+def test_a_replaced_material_is_that_of_a_scene_built_anew(element, angle, name, value):
+    scene = cantilever(element(), 8, angle=angle)
+    scene.solve_static()
+    beam = scene.beams[0]
+    changed = scene.replace(material=beam.material.replace(**{name: value}))
+    anew = Scene(Beam(beam.mesh, element(), beam.material.replace(**{name: value}), width=0.01))
+    anew.clamp("left", thickness="free").gravity((0.0, -9.81))
+    u = 1e-3 * np.random.default_rng(0).standard_normal(beam.N)
+    for make in (lambda k: k.force(u), lambda k: k.tangents(u), lambda k: k.energies(u)):
+        a, b = make(changed.beams[0].kernel), make(anew.beams[0].kernel)
+        assert np.allclose(a, b, rtol=1e-13, atol=1e-13 * np.max(np.abs(b)))
+    a, b = changed.solve_static().u, anew.solve_static().u
+    assert np.allclose(a, b, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("element", [lambda: ElementBeamANCF(3), lambda: ElementBeamCable(5)])
+def test_a_replaced_material_keeps_tables(monkeypatch, element):
+    scene = cantilever(element(), 16, E=2e8)
+    state = scene.solve_static()
+    beam = scene.beams[0]
+    tables = [counted(monkeypatch, module, "pair_tables") for module in (section, cable)]
+    rows, asked = counted(monkeypatch, section, "_rows"), counted(
+        monkeypatch, base.ElementBeam, "functions")
+    changed = scene.replace(material=beam.material.replace(E=2.02e8))
+    new = changed.solve_static(start=state)
+    assert not tables[0] and not tables[1] and not rows and not asked
+    assert changed.beams[0].q0_local is beam.q0_local
+    assert changed.beams[0].inertia is beam.inertia
+    assert state.iterations >= 6 and new.iterations <= 3
+    assert np.allclose(new.u, changed.solve_static().u, rtol=0, atol=1e-9)
+
+
+def test_a_replaced_width_or_mesh_is_no_old_one():
+    scene = cantilever(ElementBeamANCF(3), 8)
+    force = scene.solve_static().beams[0].kernel.force
+    u = 1e-3 * np.random.default_rng(0).standard_normal(scene.N)
+    wider, thicker = scene.replace(width=0.02), scene.replace(
+        mesh=scene.beams[0].mesh.replace(height=0.011))
+    assert np.allclose(wider.beams[0].kernel.force(u), 2.0 * force(u), rtol=1e-12)
+    assert wider.beams[0].total_mass == pytest.approx(2.0 * scene.beams[0].total_mass)
+    assert thicker.beams[0].total_mass == pytest.approx(1.1 * scene.beams[0].total_mass)
+    assert thicker.beams[0].q0.shape == scene.beams[0].q0.shape
+    assert -0.05 > thicker.solve_static().displacement((1, 0))[1] > (
+        scene.solve_static().displacement((1, 0))[1])

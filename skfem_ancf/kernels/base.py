@@ -296,15 +296,35 @@ def pair_tables(table: Array, pairs: Array, constant: Array, elements: int) -> P
         G, H = table[0, g].T, table[0, h].T
         symmetric = (G[a] * H[b] + off * H[a] * G[b])[None]
         skew = np.append((G[c] * H[d] - H[c] * G[d])[:, off], np.zeros((len(c), 1)), axis=1)[None]
+    return PairTables(packed([g, h, number], np.int64), packed(symmetric), packed(skew),
+                      places.lower, places.strictly, partners, rounds, places.entries,
+                      places.signs, places.ends, *_held(places, constant, nb, elements))
+
+
+def with_constant(pairs: PairTables, constant: Array, elements: int) -> PairTables:
+    """The tables with another stabilisation.
+
+    Parameters
+    ----------
+    pairs
+        What :func:`pair_tables` has returned.
+    constant, elements
+        As there, shape (0, 1 or elements, 2 nb, 2 nb).
+    """
+    nb = constant.shape[1] // 2
+    held, held_skew, place = _held(_places(nb), constant, nb, elements)
+    return pairs._replace(held=held, held_skew=held_skew, held_place=place)
+
+
+def _held(places, constant, nb, elements):
+    """``held``, ``held_skew`` and ``held_place`` of PairTables."""
+    (a, b), (c, d) = places.lower, places.strictly
     C = constant.reshape(-1, nb, 2, nb, 2)
     held = np.stack([C[:, a, 0, b, 0], C[:, a, 1, b, 1],
                      0.5 * (C[:, a, 0, b, 1] + C[:, b, 0, a, 1])], axis=2)
     held_skew = 0.5 * (C[:, c, 0, d, 1] - C[:, d, 0, c, 1])
-    return PairTables(packed([g, h, number], np.int64), packed(symmetric), packed(skew),
-                      places.lower, places.strictly, partners, rounds, places.entries,
-                      places.signs, places.ends,
-                      packed(held.reshape(len(C), 3 * len(a)).T), packed(held_skew.T),
-                      packed(np.arange(elements) * (len(C) > 1), np.int64))
+    return (packed(held.reshape(len(C), 3 * len(a)).T), packed(held_skew.T),
+            packed(np.arange(elements) * (len(C) > 1), np.int64))
 
 
 def pair_numbers(pairs: Array) -> Array:

@@ -19,7 +19,7 @@ from ..source import F2, F3, I1, lanes, primitive, room, source
 from ..types import Array
 from .base import (CARRY, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
                    Texts, add_force, add_held_energy, add_tangent, block, copy_stress, load,
-                   packed, pair_tables, product)
+                   packed, pair_tables, product, with_constant)
 
 if TYPE_CHECKING:
     from ..formulations.base import Formulation
@@ -287,11 +287,14 @@ class CableKernel(Chain):
         ``ElementBeamCable``.
     formulation
         That of the beam; its first term has the Gauss points along the axis.
+    before
+        The kernel of the same beam of another material, whose tables serve; None to make them.
     """
 
     texts = CABLES
 
-    def __init__(self, across: "Across", formulation: "Formulation") -> None:
+    def __init__(self, across: "Across", formulation: "Formulation",
+                 before: "CableKernel | None" = None) -> None:
         mesh, element = across.mesh, across.element
         super().__init__(mesh, element)
         if element.axis_degree > 5 and not mesh.is_straight:
@@ -306,7 +309,11 @@ class CableKernel(Chain):
         self.points_number = n
         self.shared = mesh.is_uniform or np.ptp(mesh.lengths) <= 1e-13 * np.max(mesh.lengths)
         self._across, self.points = across, gauss(n)[0]
-        self.packs = [self._pack(mesh, element, across, n)]
+        if before is not None and before.points_number == n:
+            self.volume = before.volume
+            self.packs = [self._renewed(*before.packs)]
+        else:
+            self.packs = [self._pack(mesh, element, across, n)]
 
     @property
     def scale(self) -> float:
@@ -332,7 +339,7 @@ class CableKernel(Chain):
         xi, w = gauss(n)
         L = mesh.lengths[:1] if self.shared else mesh.lengths
         few = self.shared and across.constant
-        EA, ES, EI = np.swapaxes(across.moments(xi, np.zeros(1, int) if few else None), 1, 2)
+        EA, ES, EI = self._stiffness(few)
         weights = np.broadcast_to(w[:, None] * L, EA.shape if self.shared else (n, ne))
         area = across.moments(xi, what="area")[0]
         self.volume = float(np.sum(area.T * w[:, None] * mesh.lengths))
@@ -355,6 +362,18 @@ class CableKernel(Chain):
             packed([EA, EI, -ES]), packed(constant),
             packed(mesh.t[0] * self.nd, np.int64), packed(np.arange(2 * self.nd), np.int64),
             pair_tables(table, pairs, constant, ne))
+
+    def _stiffness(self, few):
+        """EA, ES and EI at the points, (3, points, elements), or (3, points, 1) of one element."""
+        found = self._across.moments(self.points, np.zeros(1, int) if few else None)
+        return np.swapaxes(found, 1, 2)
+
+    def _renewed(self, pack):
+        """A pack of another material with the stiffnesses of this one."""
+        EA, ES, EI = self._stiffness(self.shared and self._across.constant)
+        constant = pack.constant[:0] if self.constant is None else self.constant
+        return pack._replace(stiffness=packed([EA, EI, -ES]), constant=packed(constant),
+                             pairs=with_constant(pack.pairs, constant, pack.start.size))
 
     def _stress_free(self, mesh, element, xi, table):
         """a and b in the stress-free state, (rows, 2, 1 or elements)."""

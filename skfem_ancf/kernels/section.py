@@ -19,7 +19,7 @@ from ..source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped,
 from ..types import Array
 from .base import (CARRY, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables, Texts, add_force,
                    add_held_energy, add_tangent, apart, block, copy_stress, in_rounds, load,
-                   packed, pair_numbers, pair_tables, product)
+                   packed, pair_numbers, pair_tables, product, with_constant)
 from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
 
 if TYPE_CHECKING:
@@ -384,6 +384,9 @@ class TermTables:
         Stabilisation of each element, shape (0, 1 or elements, 2 nb, 2 nb).
     owner
         What is kept alive as long as a law of one's own is asked.
+    before
+        Those of another material on the same mesh, element and section, whose tables serve; None
+        to make them.
 
     Attributes
     ----------
@@ -394,18 +397,27 @@ class TermTables:
     """
 
     def __init__(self, across: "Across", slab: "Slab", term: "Term", constant: Array,
-                 owner: Any) -> None:
+                 owner: Any, before: "TermTables | None" = None) -> None:
         self.law, self.term, self.slab, mesh = term.law, term, slab, across.mesh
         self.shared = across.uniform
         tind = np.array([0]) if self.shared else None
-        self.points, W = term.quadrature
         self.section_points = len(term.section[0])
         whole = self.section_points == 1
-        self.w = across.volume(slab, self.points, W, tind, whole)
-        G, frame, rows, self._sheared, self._along = _rows(mesh, across.element, term, tind)
+        if before is not None and not _same_places(term, before.term):
+            before = None
+        if before is None:
+            self.points, W = term.quadrature
+            self.w = across.volume(slab, self.points, W, tind, whole)
+            self._rows, self._interpolation = _rows(mesh, across.element, term, tind), (
+                _interpolation(term))
+        else:
+            self.points, self.w = before.points, before.w
+            self._rows, self._interpolation = before._rows, before._interpolation
+        G, frame, rows, self._sheared, self._along = self._rows
         weights = self.w * across.grade(slab, self.points, tind, whole)
-        self.pack = section_pack(G, frame, weights.T, rows, _interpolation(term),
-                                 law_tables(self.law, owner), constant, mesh.t[0])
+        self.pack = section_pack(G, frame, weights.T, rows, self._interpolation,
+                                 law_tables(self.law, owner), constant, mesh.t[0],
+                                 before and before.pack)
 
     def _gradients(self, pack, u):
         U = np.empty((pack.table.shape[2], 2, pack.start.size))
@@ -442,6 +454,13 @@ class TermTables:
         return np.sqrt(np.min(np.sum(rx * rx, axis=1)))
 
 
+def _same_places(a, b):
+    """True if two terms are sampled and integrated at the same places."""
+    rules = [(x.axis, x.section, x.section_samples or ()) for x in (a, b)]
+    return a.samples == b.samples and all(
+        len(x) == len(y) and all(map(np.array_equal, x, y)) for x, y in zip(*rules))
+
+
 def _rows(mesh, element, term, tind):
     """Table and frame, g and h of each component's samples, and those of shear and of eps_xx."""
     xi_x = np.unique(np.concatenate([term.nodes("xx"), term.nodes("xy")]))
@@ -476,7 +495,8 @@ def _interpolation(term):
 
 
 def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[Array],
-                 law: LawTables, constant: Array, left: Array) -> SectionPack:
+                 law: LawTables, constant: Array, left: Array,
+                 before: SectionPack | None = None) -> SectionPack:
     """The SectionPack of one term.
 
     Parameters
@@ -493,6 +513,8 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
         Stabilisation (0, 1 or elements, 2 nb, 2 nb).
     left
         The left node of each element.
+    before
+        One of the same G, whose tables of pairs serve if the law couples the same strains.
     """
     nb, ne, ns = G.shape[2], len(left), weights.shape[0] // len(along[0])
     (g, h), normal = (np.concatenate(part) for part in zip(*rows)), sum(len(x) for x, _ in rows[:2])
@@ -510,13 +532,17 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
         moduli = moduli[layout.order]
     shared = len(G) == 1
     joined, ends = _joined(along, ns)
+    if before is not None and before.rows is layout.rows:
+        pairs = with_constant(before.pairs, constant, ne)
+    else:
+        pairs = pair_tables(G, layout.pairs, constant, ne)
     return SectionPack(
         packed(G), packed(G.transpose(0, 2, 1)[:int(shared)]), packed(frame),
         packed(weights), packed(np.zeros(ne) if shared else np.arange(ne), np.int64),
         layout.rows, factors, int(normal), joined, ends, law,
         packed(constant), packed(left * nb, np.int64), packed(np.arange(2 * nb), np.int64),
-        pair_tables(G, layout.pairs, constant, ne), layout.terms, layout.rounds, packed(moduli),
-        layout.mixing, layout.parts, layout.mixing_rounds)
+        pairs, layout.terms, layout.rounds, packed(moduli), layout.mixing, layout.parts,
+        layout.mixing_rounds)
 
 
 def linearised(pack: SectionPack) -> SectionPack:
@@ -639,20 +665,25 @@ class Kernel(Chain):
         A body with its section, a :class:`~skfem_ancf.sections.Across`.
     formulation
         A :class:`~skfem_ancf.formulations.Formulation`.
+    before
+        The kernel of the same beam of another material, whose tables serve; None to make them.
     """
 
     texts = SECTIONS
 
-    def __init__(self, across: "Across", formulation: "Formulation") -> None:
+    def __init__(self, across: "Across", formulation: "Formulation",
+                 before: "Kernel | None" = None) -> None:
         super().__init__(across.mesh, across.element)
         self.constant = across.stabilisation(formulation)
+        known = [] if before is None else list(before.tables)
         none = np.zeros((0, 2 * self.nd, 2 * self.nd))
         constants = [none if self.constant is None else self.constant]
         self.tables, self._across = [], across
         for slab, terms in across.terms(formulation):
             for term in terms:
                 constant = constants.pop() if constants else none
-                self.tables.append(TermTables(across, slab, term, constant, self))
+                self.tables.append(TermTables(across, slab, term, constant, self,
+                                              known.pop(0) if known else None))
         self.packs = [t.pack for t in self.tables]
         slabs = [id(t.slab) for t in self.tables]
         #: The tables of the first term of each slab.
