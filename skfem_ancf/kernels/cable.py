@@ -310,7 +310,7 @@ class CableKernel(Chain):
         self.shared = mesh.is_uniform or np.ptp(mesh.lengths) <= 1e-13 * np.max(mesh.lengths)
         self._across, self.points = across, gauss(n)[0]
         if before is not None and before.points_number == n:
-            self.volume = before.volume
+            self.volume: float = before.volume
             self.packs = [self._renewed(*before.packs)]
         else:
             self.packs = [self._pack(mesh, element, across, n)]

@@ -415,9 +415,9 @@ class TermTables:
             self._rows, self._interpolation = before._rows, before._interpolation
         G, frame, rows, self._sheared, self._along = self._rows
         weights = self.w * across.grade(slab, self.points, tind, whole)
-        self.pack = section_pack(G, frame, weights.T, rows, self._interpolation,
-                                 law_tables(self.law, owner), constant, mesh.t[0],
-                                 before and before.pack)
+        self.pack: SectionPack = section_pack(
+            G, frame, weights.T, rows, self._interpolation, law_tables(self.law, owner), constant,
+            mesh.t[0], None if before is None else before.pack)
 
     def _gradients(self, pack, u):
         U = np.empty((pack.table.shape[2], 2, pack.start.size))
@@ -675,10 +675,11 @@ class Kernel(Chain):
                  before: "Kernel | None" = None) -> None:
         super().__init__(across.mesh, across.element)
         self.constant = across.stabilisation(formulation)
-        known = [] if before is None else list(before.tables)
+        known = [] if before is None else before.tables[:]
         none = np.zeros((0, 2 * self.nd, 2 * self.nd))
         constants = [none if self.constant is None else self.constant]
-        self.tables, self._across = [], across
+        self.tables: list[TermTables] = []
+        self._across = across
         for slab, terms in across.terms(formulation):
             for term in terms:
                 constant = constants.pop() if constants else none
