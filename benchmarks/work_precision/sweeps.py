@@ -1,0 +1,80 @@
+"""Many cantilevers of example 5.2, each with a modulus of its own, from parameters to the tip.
+
+Seconds are those of a clock on the wall, for each member: building is in them, and the start of
+processes. A sweep of two members before has loaded what is compiled; what that took, with the start,
+is in ``setup_seconds``. The error is that of the member with the modulus of the example.
+"""
+
+import time
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from skfem_ancf import sweep
+
+from . import exudyn_beams, ours
+from .exudyn_beams import exudyn
+from .micro import row
+from .problems import PROBLEMS
+from .references import reference
+
+PROBLEM = PROBLEMS["5.2"]
+OURS = (("ancf", 3, 16), ("cable", 5, 4))
+#: Processes of this package; None: that of the benchmark.
+PLACES = (None, 2)
+EXUDYN = (("ANCFCable2D", 8), ("ANCFCable2D", 32), ("GE2D quadratic", 4), ("GE2D quadratic", 16))
+
+
+def scene(E, kind, order, n):
+    """A member, of this package."""
+    return ours.scene(replace(PROBLEM, E=E), ours.ELEMENTS[kind](order), n)
+
+
+def tip(made):
+    """Its tip."""
+    return made.solve_static().displacement(PROBLEM.tip)
+
+
+def peer(E, kind, n):
+    """Tip of a member, of Exudyn."""
+    solver = exudyn_beams.run(replace(PROBLEM, E=E), kind, n).build()
+    return np.array(solver.read(solver.solve())[0])
+
+
+def runs_of():
+    """Code, variant, elements, mechanical model, and from moduli (n,) to tips (n, 2)."""
+    for kind, order, n in OURS:
+        model, build = ours.element_of(kind, order)[1], partial(scene, kind=kind, order=order, n=n)
+        for workers in PLACES:
+            def run(moduli, build=build, workers=workers):
+                return sweep(build, {"E": moduli}, tip, workers=workers, progress=False)["value"]
+
+            where = "this process" if workers is None else f"{workers} processes"
+            yield ours.CODE, f"{kind} {order}, {where}", n, model, run
+    for kind, n in EXUDYN if exudyn is not None else ():
+        def run(moduli, kind=kind, n=n):
+            return np.array([peer(E, kind, n) for E in moduli])
+
+        yield exudyn_beams.CODE, f"{kind}, a loop", n, exudyn_beams.KINDS[kind][0], run
+
+
+def measure(sizes, about, watch):
+    """Rows for so many members, of this package here and in two processes, and of a peer."""
+    rows = []
+    for members in watch(sizes, "sweep"):
+        moduli = PROBLEM.E * (1.0 + 0.2 * (np.arange(members) - members // 2) / members)
+        for code, variant, n, model, run in runs_of():
+            setup, _ = timed(run, moduli[:2])
+            seconds, tips = timed(run, moduli)
+            error = np.linalg.norm(tips[members // 2] - reference("5.2", model)) / PROBLEM.L
+            rows.append(row("sweep", code, variant, n, "", seconds / members, about, error,
+                            f"{members} members", setup_seconds=setup))
+    return rows
+
+
+def timed(run, moduli):
+    """Seconds on the wall, and the result."""
+    begun = time.perf_counter()
+    tips = run(moduli)
+    return time.perf_counter() - begun, tips
