@@ -122,7 +122,8 @@ def goal_sweep(results):
     if "sweep" not in results:
         return [f"**{SWEEP}**: not measured in this run.", ""]
     lines = [(r["variant"], r["elements"], f"{r['error']:.1e}", f"{1e3 * r['seconds']:.3g}",
-              f"{r['setup_seconds']:.2g}", f"{ratio:.3g}" if its else "", named(its), verdict if its else "")
+              f"{r['setup_seconds']:.2g}", f"{ratio:.3g}" if its else "", named(its),
+              verdict if its else "")
              for r, ratio, its, verdict in sweeps(results["sweep"])]
     verdict = "met" if all(line[-1] == "met" for line in lines) else "missed"
     return [f"**{SWEEP}**: {verdict if any(line[-1] for line in lines) else 'no peer took part'}. "

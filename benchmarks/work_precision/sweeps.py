@@ -1,8 +1,8 @@
 """Many cantilevers of example 5.2, each with a modulus of its own, from parameters to the tip.
 
 Seconds are those of a clock on the wall, for each member: building is in them, and the start of
-processes. A sweep of two members before has loaded what is compiled; what that took, with the start,
-is in ``setup_seconds``. The error is that of the member with the modulus of the example.
+processes. A sweep of two members before has loaded what is compiled; what that took is in
+``setup_seconds``. The error is that of the member with the modulus of the example.
 """
 
 import time
