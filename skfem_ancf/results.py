@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .beam import select_beam, select_member
-from .errors import InputError, NameUnknown, require_flag, teaching
+from .errors import InputError, NameUnknown, require_flag, shown, teaching
 from .eigenstrain import EigenStrain
 from .fields import Values, find_field
 from .frozen import Frozen
@@ -564,6 +564,11 @@ class State(Frozen):
         Returns
         -------
         Reaction
+
+        Raises
+        ------
+        InputError
+            If a beam of a frame is named that no support holds there: clamps and pins hold nodes.
         """
         frame = self.system.constraints.frame
         if frame is not None and beam is None:
@@ -581,6 +586,9 @@ class State(Frozen):
         by_name = dict(zip(member.dofnames, forces.sum(axis=0).ravel()))
         held = set(np.nonzero(~self.system.free[s].reshape(-1, member.nd)[nodes].all(axis=0))[0])
         names = {n: float(v) for k, (n, v) in enumerate(by_name.items()) if k in held}
+        if frame is not None and not names:
+            raise InputError(f"no support of beam {shown(beam)} at {shown(boundary)}: what holds "
+                             "the nodes of a frame is asked of nodes, without beam=")
         return Reaction(forces[:, 0].sum(axis=0), float(moment), names)
 
     def _support_force(self):
