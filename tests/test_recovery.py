@@ -413,6 +413,7 @@ def test_smoothing():
     assert_allclose(out, np.cos(4 * np.pi * s) / (1 + (0.4 * np.pi) ** 2), atol=1e-3)
 
 
+@pytest.mark.filterwarnings("ignore:the body is turned inside out")
 def test_fields_that_diverge_are_those_of_the_elements():
     # so soft that St. Venant and Kirchhoff's law has no section in equilibrium on the way
     beam = Beam(MeshBeam.init_line(np.linspace(0, 1.2, 13), 0.009), ElementBeamANCFCubic(2),

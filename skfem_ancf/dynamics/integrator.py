@@ -66,6 +66,9 @@ class Integrator:
         scheme.require(system)
         self.system, self.scheme, self.limit = system, scheme, np.inf
         self.tol = scheme.tol if tol is None else require_positive("tol", tol)
+        if self.tol >= 1.0:
+            raise InputError(f"tol is the error of a step's iteration, relative: less than 1, and "
+                             f"1e-6 is coarse already; got {shown(tol)}")
         alpha_m, alpha_f, beta, gamma = map(float, scheme.parameters)
         self.rule = Rule(int(scheme.conserving), alpha_m, alpha_f, beta, gamma, self.tol,
                          8.0 * system.stiffness_scale)
