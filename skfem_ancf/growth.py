@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .formulations import COMPONENTS
-from .kernels.law import LINEAR, law_evaluate
+from .kernels.law import law_evaluate
+from .kernels.section import with_unit_law
 
 if TYPE_CHECKING:
     from .beam import Beam
@@ -90,7 +91,7 @@ class Growth:
         """Packs of all elements, each with coordinates of its own, strains and E0 at points."""
         for pack, E0 in zip(self.beam.kernel.apart(), self._E0):
             E = np.empty(E0.shape)
-            self.beam.kernel.texts.stress(_unit(pack), np.ascontiguousarray(u_e).ravel(), E)
+            self.beam.kernel.texts.stress(with_unit_law(pack), np.ascontiguousarray(u_e).ravel(), E)
             yield pack, E, E0
 
     def _slopes(self, pack, u_e):
@@ -120,11 +121,6 @@ def _loss(rows, pack, E, E0):
     for strain, values in zip((E, E - E0), out):
         law_evaluate(pack.law, np.ascontiguousarray(strain), values)
     return out[0] - out[1]
-
-
-def _unit(pack):
-    """The pack of a law whose stress is the strain."""
-    return pack._replace(law=pack.law._replace(kind=LINEAR, D=np.eye(3)))
 
 
 def sampled(beam: Beam, table: Any, eigen: Any) -> Array:

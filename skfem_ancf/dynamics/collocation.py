@@ -14,7 +14,8 @@ from ..linalg import dense
 from .base import Motion, Scheme
 from .dampers import add_damping
 from .integrator import StepFailed
-from .steps import DIVERGING, ITERATIONS, LEAST
+from .steps import (DONE, FAILED, FAILURE, FAILURES, FRESH, ITERATIONS, LAST_SIZE, NOT_CONVERGED,
+                    RATE, READY, SIZE, STATE, judge)
 
 if TYPE_CHECKING:
     from ..system import System
@@ -201,55 +202,50 @@ class _Stages:
 
     def solve(self, Z):
         """Simplified Newton iteration."""
-        i, h, fresh, before, rate = self.integrator, self.dt, False, None, REUSED
+        i, h, joints, state = self.integrator, self.dt, self.system.joints, np.zeros(STATE)
         rough = i.rough(self.y.u, max(abs(x) for x in self.table.values)**2 / h**2)
         wanted = i.tol * np.sqrt(i.energy) + rough
+        state[READY], state[RATE], state[SIZE] = i.kept.get("dt") == h, REUSED, -1.0
         for _ in range(ITERATIONS):
-            if i.kept.get("dt") != h:
+            if not state[READY]:
                 self._factorize()
-                fresh, before = True, None
+                state[READY], state[FRESH], state[SIZE] = 1.0, 1.0, -1.0
             U, V, W = self.states(Z)
             R = np.array([self.residual(*x) for x in zip(U, V, W, self.times, self.multipliers)])
-            gaps = np.array([i.constraint_rate(u, v, t, h, False) if self.system.joints
-                             else self.y.multipliers for u, v, t in zip(U, V, self.times)])
+            gaps = np.zeros(self.multipliers.shape)
+            if joints:
+                gaps = np.array([i.constraint_rate(u, v, t, h, False)
+                                 for u, v, t in zip(U, V, self.times)])
             dZ, forces = self._correction(R, gaps)
             i.tally(len(R), 0)
-            size = abs(np.sum(dZ * R))
-            if self.system.joints:  # what closes them needs no residual
-                size += np.sum(np.abs(dZ @ i.kept["J"].T * forces))
-            size = float(np.sqrt(size))
-            if not np.isfinite(size):
-                raise StepFailed("the residual is not finite")
+            work = abs(np.sum(dZ * R))
+            if joints:  # what closes them needs no residual
+                work += np.sum(np.abs(dZ @ i.kept["J"].T * forces))
+            state[LAST_SIZE], state[SIZE] = state[SIZE], np.sqrt(work)
             Z, self.multipliers = Z + dZ, self.multipliers + forces
-            if before is not None:
-                rate = max(size / before, LEAST)
-                if rate > 1.0 and size <= 1e3 * rough:
-                    break
-                if rate > REUSED and size * min(1.0, rate) > wanted:
-                    if fresh and rate > DIVERGING:
-                        raise StepFailed("the iteration diverges")
-                    i.kept.clear()
-            before = size
-            if size * min(1.0, rate) <= wanted:
-                break
-        else:
-            raise StepFailed(f"no convergence in {ITERATIONS} iterations")
-        return self.states(Z)
+            told = judge(state, wanted, rough, REUSED)
+            if told == DONE:
+                return self.states(Z)
+            if told == FAILED:
+                raise StepFailed(FAILURES[int(state[FAILURE])])
+        raise StepFailed(FAILURES[NOT_CONVERGED])
 
     def _factorize(self):
         """Factors of the iteration matrix at the start of the step."""
         i, s, h, y = self.integrator, self.system, self.dt, self.y
         s.assemble(y.u, t=y.t)
-        K, M = s.K.general(), s.mass.general()
-        D, dampers, stresses = s.new_band(), i.matrices.dampers, s.machine.tables.stresses
+        K, M, D = s.K.general(), s.mass.general().band.flat, 0.0
         if s.damped:
-            add_damping(s.machine.tables.plain.viscous, dampers, s.mass.band, 1.0, y.u,
-                        np.zeros((3, len(stresses))), np.zeros(s.N), D.band)
-        D = D.general()
+            band, tables = s.new_band(), s.machine.tables
+            add_damping(tables.plain.viscous, i.matrices.dampers, s.mass.band, 1.0, y.u,
+                        np.zeros((3, len(tables.stresses))), np.zeros(s.N), band.band)
+            D = band.general().band.flat
         everywhere, diagonal = K.fixed_positions(s.fixed)
         i.kept = {"dt": np.array(h)}
+        if s.joints:
+            i.kept["J"] = np.ascontiguousarray(dense(s.jacobian(y.u, y.t)))
         for k, x in enumerate(self.table.values):
-            flat = K.band.flat + x / h * D.band.flat + (x / h)**2 * M.band.flat
+            flat = K.band.flat + x / h * D + (x / h)**2 * M
             flat[everywhere], flat[diagonal] = 0.0, 1.0
             trf = lapack.zgbtrf if isinstance(x, complex) else lapack.dgbtrf
             lu, pivots, info = trf(flat.reshape(s.N, -1).T, K.bandwidth, K.bandwidth)
@@ -257,8 +253,7 @@ class _Stages:
                 raise np.linalg.LinAlgError("the iteration matrix is singular")
             i.kept[f"lu {k}"], i.kept[f"pivots {k}"] = lu, pivots
             if s.joints:
-                i.kept["J"] = J = np.ascontiguousarray(dense(s.jacobian(y.u, y.t)))
-                i.kept[f"Y {k}"] = np.ascontiguousarray(self._solve(k, J.T + 0.0))
+                i.kept[f"Y {k}"] = np.ascontiguousarray(self._solve(k, i.kept["J"].T + 0.0))
         i.tally(0, len(self.table.values))
 
     def _correction(self, R, gaps):

@@ -13,8 +13,8 @@ from .base import Motion
 from .course import Courses
 from .rates import rates
 from .dampers import Dampers, Rows, solve_rows
-from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, EPS, FACTORIZED, FAILURE, FAILURES, READY,
-                    STATE, Matrices, Rule, mass_factor, room_for_steps, steps)
+from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, READY,
+                    STATE, Matrices, Rule, mass_factor, room_for_steps, round_off, steps)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -118,7 +118,7 @@ class Integrator:
             Of the mass in the iteration matrix.
         """
         noise = abs(u @ self.system.mass.multiply(u))
-        return float(np.sqrt(self.rule.floor**2 + EPS * EPS * mass_factor * noise))
+        return float(round_off(self.rule, 1.0, mass_factor, noise))
 
     def count(self, other: Integrator) -> None:
         """Add the counts of another, which begins from zero."""

@@ -301,7 +301,7 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
             if told == GO_ON:
                 told = _correct(e.joints, e.free, matrices, s, w, state, anew)
             if told == GO_ON:
-                told = _judge(state, wanted, rough)
+                told = judge(state, wanted, rough, REUSED)
             if told == ASTRAY:  # by old factors
                 copy(w.x.guess, u)
                 copy(w.m.l0, w.m.l)
@@ -330,8 +330,18 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
 
 
 @source
-def _judge(state, wanted, rough):
-    """What the size of a correction tells: of factors that are kept as long as it contracts."""
+def judge(state, wanted, rough, reused):
+    """What the size of a correction tells: of factors that are kept as long as it contracts.
+
+    Parameters
+    ----------
+    state
+        With FRESH, SIZE and LAST_SIZE; RATE, READY and FAILURE are written.
+    wanted, rough
+        A size that is small enough, and its round-off.
+    reused
+        Contraction up to which factors are kept.
+    """
     size, before = state[SIZE], state[LAST_SIZE]
     if not size < 1e300:
         state[FAILURE] = NOT_FINITE
@@ -341,13 +351,19 @@ def _judge(state, wanted, rough):
         if rate > 1.0 and size <= 1e3 * rough:
             return DONE
         state[RATE] = max(rate, LEAST)  # of one step, used in the next
-        if rate > REUSED and size * min(1.0, rate) > wanted:
+        if rate > reused and size * min(1.0, rate) > wanted:
             if state[FRESH] > 0.0 and rate > DIVERGING:
                 state[FAILURE] = DIVERGES
                 return FAILED
             state[READY] = 0.0
             return ASTRAY if rate > 1.0 else GO_ON
     return DONE if size * min(1.0, state[RATE]) <= wanted else GO_ON
+
+
+@source
+def round_off(rule, stiffness_factor, mass_factor, noise):
+    """The round-off of a correction, by that of the strains and of the mass times u, u."""
+    return np.sqrt(rule.floor**2 * stiffness_factor + EPS * EPS * mass_factor * noise)
 
 
 # one step
@@ -409,7 +425,7 @@ def _begin(free, M, rule, s, w, state):
     _free_velocity(free, rule, s, w)
     energy = max(state[ENERGY], _energy(M, w.x.v, w.x.room))
     noise = 2.0 * abs(_energy(M, u, w.x.room))
-    rough = np.sqrt(rule.floor**2 * s.stiffness_factor + EPS * EPS * s.mass_factor * noise)
+    rough = round_off(rule, s.stiffness_factor, s.mass_factor, noise)
     return rough, rule.tol * np.sqrt(energy) + rough
 
 

@@ -324,6 +324,17 @@ def _add_tangent(pack, first, at, samples, D, w, r, to):
     add_tangent(pack.table, pairs, pack.start, first, M, M_skew, to)
 
 
+def with_unit_law(pack: SectionPack) -> SectionPack:
+    """The pack with a law whose stress is the strain.
+
+    Parameters
+    ----------
+    pack
+        Of any law.
+    """
+    return pack._replace(law=pack.law._replace(kind=LINEAR, D=np.eye(3)))
+
+
 def section_energy(pack: SectionPack, u: Array, out: Array) -> None:
     """Add the strain energy of each element to out, (elements,).
 
@@ -336,8 +347,7 @@ def section_energy(pack: SectionPack, u: Array, out: Array) -> None:
     """
     strain = np.empty((3, len(pack.weights), out.size), u.dtype)
     W = np.empty((1,) + strain.shape[1:], u.dtype)
-    law = pack.law._replace(kind=LINEAR, D=np.eye(3))
-    SECTIONS.stress(pack._replace(law=law), u, strain)
+    SECTIONS.stress(with_unit_law(pack), u, strain)
     law_evaluate(pack.law, strain, W)
     out += np.sum(pack.weights * W[0], axis=0)
     add_held_energy(pack, u, out)
@@ -741,8 +751,7 @@ class Kernel(Chain):
         u, du, out
             Displacement and direction, shape (N,), and the result.
         """
-        unit = pack.law._replace(kind=LINEAR, D=np.eye(3))
-        SECTIONS.carry(pack._replace(law=unit), u, du, np.zeros_like(out), out)
+        SECTIONS.carry(with_unit_law(pack), u, du, np.zeros_like(out), out)
 
     def weighted_moduli(self, pack: SectionPack, u: Array) -> Array:
         """w D at the points of integration, shape (3, 3, points, elements).
@@ -758,8 +767,7 @@ class Kernel(Chain):
         if pack.law.kind == LINEAR:
             return np.broadcast_to(pack.law.D[:, :, None, None] * pack.weights, (3, 3, n, ne))
         strain, D = np.empty((3, n, ne)), np.empty((3, 3, n, ne))
-        unit = pack.law._replace(kind=LINEAR, D=np.eye(3))
-        SECTIONS.stress(pack._replace(law=unit), u, strain)
+        SECTIONS.stress(with_unit_law(pack), u, strain)
         law_evaluate(pack.law, strain, D.reshape(9, n, ne))
         return D * pack.weights
 
