@@ -397,8 +397,7 @@ class Frame(Scene):
     def _ends_at(self, place):
         """Of nodes the beams (k,) whose ends lead there, and the nodes of their meshes (k,)."""
         joint = self._bound
-        ends = joint.leaders[np.searchsorted(joint.nodes[joint.leaders], self.nodes(place))]
-        first = joint.positions[ends, 0]
+        first = joint.positions[joint.leading(self.nodes(place)), 0]
         starts = np.array([self.offset(k) for k in range(len(self.beams))])
         number = np.searchsorted(starts, first, side="right") - 1
         nd = np.array([beam.nd for beam in self.beams])

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import zipfile
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from .archive import write
 from .errors import (FileError, InputError, MissingExtra, NameUnknown, require_path, shown,
                      teaching)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from .types import Array, StrPath
 
@@ -146,7 +145,10 @@ class Sweep:
                   "errors": np.array([f.error for f in failures], dtype=str)}
         for folder, columns in (("parameters", self.parameters), ("values", self.values)):
             arrays.update((f"{folder}/{name}", column) for name, column in columns.items())
-        _replace(path, arrays)
+        try:
+            write(path, arrays)
+        except OSError as error:
+            raise FileError(f"{path} cannot be written: {error}") from error
 
     @classmethod
     def load(cls, path: StrPath) -> Sweep:
@@ -244,14 +246,3 @@ def _arrays(found):
 
 def _labelled(name, values):
     return ("member", *(f"{name}_{axis}" for axis in range(values.ndim - 1))), values
-
-
-def _replace(path: Path, arrays: dict[str, Array]) -> None:
-    """Write beside, then rename: at no time is there half a file."""
-    part = path.with_name(path.name + ".part")
-    try:
-        with open(part, "wb") as file:
-            np.savez(file, **arrays)  # type: ignore[arg-type]
-        os.replace(part, path)
-    except OSError as error:
-        raise FileError(f"{path} cannot be written: {error}") from error

@@ -5,17 +5,17 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-import os
 import time
 import warnings
 import zipfile
 import zlib
-from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import (CheckpointError, CheckpointWarning, InputError, MissingExtra, require_integer,
+from ..archive import find_h5py
+from ..archive import write as _write
+from ..errors import (CheckpointError, CheckpointWarning, InputError, require_integer,
                       require_path, shown)
 from ..forces.system import Forces
 from .base import Motion
@@ -217,61 +217,14 @@ def _scheme_of(text, given):
 # files
 
 
-def _h5py():
-    try:
-        import h5py
-    except ImportError:
-        raise MissingExtra("h5py", "files") from None
-    return h5py
-
-
 def _checksum(arrays):
     return np.frombuffer(bytes.fromhex(_digest(*(
         part for name in sorted(arrays) for part in (name, arrays[name])))), dtype=np.uint8)
 
 
-def _write(path, arrays):
-    """Write a file beside its place, and put it there when it is complete and on the disk."""
-    part = path.with_name(path.name + ".part")
-    try:
-        with open(part, "wb") as file:
-            if path.suffix == ".h5":
-                with _h5py().File(file, "w") as h5:
-                    for name, array in arrays.items():
-                        h5.create_dataset(name, data=array)
-            else:  # by way of memory: an archive on a full disk cannot be closed
-                content = BytesIO()
-                np.savez(content, **arrays)
-                file.write(content.getbuffer())
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
-        _sync_folder(path.parent)
-    except BaseException:
-        try:
-            part.unlink(missing_ok=True)
-        except OSError:
-            pass
-        raise
-
-
-def _sync_folder(folder):
-    """Put the new name on the disk too, where the system can."""
-    try:
-        handle = os.open(folder, os.O_RDONLY)
-    except OSError:  # not on Windows
-        return
-    try:
-        os.fsync(handle)
-    except OSError:
-        pass
-    finally:
-        os.close(handle)
-
-
 def _load(path):
     if path.suffix == ".h5":
-        with _h5py().File(path, "r") as h5:
+        with find_h5py().File(path, "r") as h5:
             return {name: np.asarray(h5[name][()]) for name in h5}
     with open(path, "rb") as file, np.load(file, allow_pickle=False) as npz:
         return {name: npz[name] for name in npz.files}
@@ -313,7 +266,7 @@ def _path(path):
     if path.suffix not in (".npz", ".h5"):
         raise InputError(f"a checkpoint ends in .npz or .h5, got {shown(str(path))}")
     if path.suffix == ".h5":
-        _h5py()
+        find_h5py()
     return path
 
 

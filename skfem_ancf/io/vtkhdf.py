@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import (FileError, InputError, MissingExtra, require_option, require_options,
+from ..archive import find_h5py
+from ..errors import (FileError, InputError, require_option, require_options,
                       require_path, teaching)
 from ..fields import find_fields
 from .vtu import PRECISIONS, body_fields, require_next, save_obstacles
@@ -53,14 +54,11 @@ class VtkHdfWriter:
         precision = self.options.pop("precision", "double")
         self._dtype = PRECISIONS[require_option("precision", precision, PRECISIONS)]
         find_fields(self.options.get("fields"))
-        try:
-            import h5py
-        except ImportError:
-            raise MissingExtra("h5py", "files") from None
+        files = find_h5py()
         self._temporary = self.path.with_name(f".{self.path.stem}.{os.getpid()}.vtkhdf")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = h5py.File(self._temporary, "w")
+            self._file = files.File(self._temporary, "w")
         except OSError as error:
             raise FileError(f"cannot write {str(self.path)!r}: {error}") from error
         self._root = self._file.create_group("VTKHDF")

@@ -68,7 +68,7 @@ class Nodes(Joint):
         order = np.lexsort((np.arange(len(nodes)), hinged, nodes))
         _, first = np.unique(nodes[order], return_index=True)
         self.leaders = order[first]
-        self.leader = self.leaders[np.searchsorted(nodes[self.leaders], nodes)]
+        self.leader = self.leading(nodes)
         follows = self.leader != np.arange(len(nodes))
         self.followers = np.flatnonzero(follows)
         self.turned = np.flatnonzero(follows & ~hinged)
@@ -79,6 +79,16 @@ class Nodes(Joint):
         self.equations = ((FORCE_X,) * n + (FORCE_Y,) * n + (MOMENT,) * k
                           + (FORCE_X,) * len(self.held_x) + (FORCE_Y,) * len(self.held_y)
                           + (MOMENT,) * len(self.held_angle))
+
+    def leading(self, nodes: Array) -> Array:
+        """The ends that lead at some nodes, shape (k,).
+
+        Parameters
+        ----------
+        nodes
+            Numbers of the nodes, shape (k,).
+        """
+        return self.leaders[np.searchsorted(self.nodes[self.leaders], nodes)]
 
     def bind(self, scene: Scene) -> None:
         positions, directions, weights, start = [], [], [], []
@@ -210,8 +220,7 @@ class Nodes(Joint):
             scale = self.turns(u)[at].real if k == 2 else 1.0
             out[self.nodes[at], k] = -part * scale
         x, y, moment = out[nodes].T
-        leaders = self.leaders[np.searchsorted(self.nodes[self.leaders], nodes)]
-        r = self.net.points[:, nodes] + u[self.positions[leaders]].T
+        r = self.net.points[:, nodes] + u[self.positions[self.leading(nodes)]].T
         (a, b), held = r - r[:, :1], np.any(self.held[nodes], axis=0)
         total = {name: float(np.sum(out[nodes, k])) for k, name in enumerate(HELD) if held[k]}
         return np.array([x.sum(), y.sum()]), float(np.sum(moment + a * y - b * x)), total
