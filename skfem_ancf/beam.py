@@ -700,6 +700,9 @@ def select_beam(beams: Sequence[Beam], beam: WhichMember) -> Beam:
     if found:
         return found[0]
     known = [b.name if b.name is not None else k for k, b in enumerate(beams)]
+    if not beams:
+        raise InputError("this is asked of beams, the scene has rigid bodies alone: name one of "
+                         f"them, by itself, its name or its number; got {shown(beam)}")
     if beam is None:
         raise InputError(f"the scene has {len(beams)} beams: say which with beam=, one of {known}")
     if isinstance(beam, RigidBody):
@@ -716,13 +719,16 @@ def select_member(beams: Sequence[Beam], bodies: Sequence[RigidBody],
     beams, bodies
         Those of a scene.
     which
-        A Beam or a RigidBody, its name or its number; None for the only beam.
+        A Beam or a RigidBody, its name or its number; None for the only beam, without beams for
+        the only body.
 
     Raises
     ------
     NameUnknown
         If there is none, or None is given and there are several beams.
     """
+    if which is None and not beams and len(bodies) == 1:
+        return bodies[0]
     if which is None or not bodies:
         return select_beam(beams, which)
     members = *beams, *bodies

@@ -72,7 +72,7 @@ def body_of(beams: Sequence["Beam"], slices: Sequence[slice]) -> "Body":
             packs.append(pack)
             rows.append([PACKS.index(type(pack)), s.start, s.stop, at, at + size, *shape])
             at += size
-    return Body(tuple(packs), np.array(rows, dtype=np.int64))
+    return Body(tuple(packs), np.array(rows, dtype=np.int64).reshape(-1, ELEMENTS + 1))
 
 
 def viscous_body_of(body: "Body", beams: Sequence["Beam"], times: Sequence[float]) -> "Body":

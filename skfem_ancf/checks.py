@@ -66,7 +66,7 @@ def check(state: State) -> Checks:
         ratio, stretches = beam.kinematics.deformation(beam, u)
         values.append((np.min(ratio), np.min(stretches), np.max(stretches), turning(beam, u)))
         found += _findings(beam, values[-1][1], values[-1][3])
-    det, low, high, turn = zip(*values)
+    det, low, high, turn = zip(*values or [(1.0, 1.0, 1.0, 0.0)])
     return Checks(float(min(det)), float(min(low)), float(max(high)), float(max(turn)),
                   tuple(found))
 
@@ -81,6 +81,9 @@ class Screen:
     """
 
     def __init__(self, beams: Sequence[Beam]) -> None:
+        self._none = not beams
+        if self._none:
+            return
         first = np.concatenate([[0], np.cumsum([b.N for b in beams])])
         node = np.concatenate([[0], np.cumsum([b.N // b.nd for b in beams])])
         self._x = np.concatenate([n + np.arange(2, b.N, b.nd) for n, b in zip(first, beams)])
@@ -91,6 +94,8 @@ class Screen:
 
     def passes(self, u: Array) -> bool:
         """False if a fibre may be compressed, or an element may turn, beyond the range."""
+        if self._none:
+            return True
         r = (u[self._x] + 1j * u[self._x + 1]) / self._start + 1.0
         turn = np.abs(np.angle(r[self._right] * r[self._left].conj()))
         # the largest curvature of an element is seldom more than twice its mean

@@ -464,9 +464,25 @@ class Constraints:
         if free:
             raise SupportError(
                 "the supports leave rigid motions free: " + "; ".join(free)
-                + ". Add a support, for example scene.clamp('left'), scene.pin('right') or, as a "
-                "roller, scene.fix('right', 'r^2'), or solve in time with scene.integrate")
+                + f". Add a support, for example {self._advice()}, or solve in time with "
+                "scene.integrate")
         self._supported = True
+
+    def _advice(self):
+        """What would hold the scene, in words."""
+        if self.frame is not None:
+            points = self.frame.net.points
+            x = "({:.6g}, {:.6g})".format(*points[:, np.lexsort(points)[0]])
+            return (f"frame.clamp({x}), the name or number of a node in place of its point, or as "
+                    f"a roller frame.hold({x}, 'y')")
+        member = self.members[0]
+        if isinstance(member, RigidBody):
+            who = repr(0 if member.name is None else member.name)
+            x = "({:.6g}, {:.6g})".format(*member.position)
+            return (f"scene.clamp({x}, beam={who}) for all of a body, scene.pin({x}, beam={who}) "
+                    "for a point, or springs")
+        return ("scene.clamp('left'), scene.pin('right') or, as a roller, "
+                "scene.fix('right', 'r^2')")
 
 
 def _describe(v, bodies):

@@ -185,7 +185,13 @@ def _modes(system, state, k):
 
 
 def _bending_eigenvalue(system):
-    """omega^2 of the slowest bending that a beam as long as the scene could have."""
+    """omega^2 of the slowest bending that a beam as long as the scene could have.
+
+    Of rigid bodies alone that of all their mass on one spring, or swinging by all loads.
+    """
+    if not system.beams:
+        mass = sum(body.total_mass for body in system.bodies)
+        return system.energy_of_bodies / (mass * system.size**2) or 1.0
     stiffness = min(b.across.bending_over_mass(b.density) for b in system.beams)
     return stiffness * (np.pi / system.size) ** 4
 

@@ -216,7 +216,7 @@ class BandMatrix:
         general = BandMatrix(self.n, self.bandwidth, symmetric=False)
         ab, lower, top = general.ab, self.ab, 2 * self.bandwidth
         ab[top:] = lower
-        for k in range(1, self.bandwidth + 1):
+        for k in range(1, min(self.bandwidth + 1, self.n)):
             ab[top - k, k:] = lower[k, :self.n - k]
         return general
 
@@ -364,7 +364,7 @@ class BandMatrix:
             return out
         lower, ab, top = out.ab, self.ab, 2 * self.bandwidth
         lower[0] = ab[top]
-        for k in range(1, self.bandwidth + 1):
+        for k in range(1, min(self.bandwidth + 1, self.n)):
             lower[k, :self.n - k] = 0.5 * (ab[top + k, :self.n - k] + ab[top - k, k:])
         return out
 

@@ -63,8 +63,11 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         items.append(Item(term, status, reason))
 
     points = sum(b.mesh.nelements * b.kernel.points_number for b in beams)
-    add("strain energy", "computed", f"{points} integration points, "
-        + ", ".join(sorted({b.formulation.name for b in beams})))
+    if beams:
+        add("strain energy", "computed", f"{points} integration points, "
+            + ", ".join(sorted({b.formulation.name for b in beams})))
+    else:
+        add("strain energy", "skipped", "rigid bodies alone")
     shared = [b for b in beams if b.kernel.shared]
     add("tables", "constant", "one for all elements of a straight beam with equal elements"
         if len(shared) == len(beams) else "one for each element: curved or unequal elements")

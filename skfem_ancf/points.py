@@ -481,7 +481,7 @@ class Points:
         """Located of a body that is named; None if none is."""
         if isinstance(points, RigidBody):
             points, beam = points.position, points
-        elif beam is None:
+        elif beam is None and (self.beams or len(self.bodies) > 1):
             return None
         body = select_member(self.beams, self.bodies, beam)
         if not isinstance(body, RigidBody):

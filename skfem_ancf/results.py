@@ -158,7 +158,9 @@ class State(Frozen):
         lines = [repr(self)[1:-1]]
         if self.t is None:
             lines.append(f"  equilibrium: {self.verdict}")
-        return "\n".join(lines + [f"  {line}" for line in str(self.checks).splitlines()])
+        if self.beams:
+            lines += [f"  {line}" for line in str(self.checks).splitlines()]
+        return "\n".join(lines)
 
     def contact_memory(self) -> AbstractContextManager[None]:
         """What its points remember of obstacles, lent to the equations while it is asked."""

@@ -87,7 +87,7 @@ class System:
         self.N = int(self.offsets[-1])
         self.slices = [slice(int(a), int(b)) for a, b in zip(self.offsets[:-1], self.offsets[1:])]
         self._index = {id(b): k for k, b in enumerate(self.members)}
-        self.size = float(sum(b.size for b in self.beams))
+        self.size = float(sum(b.size for b in self.beams)) or _extent(self.bodies)
         self.constraints = Constraints(self.members, self.slices, self.size, fixed, values,
                                        [*self._directors(fixed), *joints], self._held_by_elements)
         self.forces = Forces(elements, self.N, self.bandwidth)
@@ -365,8 +365,17 @@ class System:
     @cached_property
     def stiffness_scale(self) -> float:
         """eps times the square root of modulus times volume: the round-off of strains of 1."""
-        total = sum(b.kernel.scale for b in self.beams)
+        total = sum(b.kernel.scale for b in self.beams) or self.energy_of_bodies
         return np.finfo(float).eps * np.sqrt(total)
+
+    @cached_property
+    def energy_of_bodies(self) -> float:
+        """What springs and loads do to rigid bodies over the scene's size; zero with beams."""
+        if self.beams:
+            return 0.0
+        springs = abs(self._held_by_elements())
+        force = np.max(np.abs(self.external_force(np.zeros(self.N))))
+        return float((springs.max() if springs.nnz else 0.0) * self.size**2 + force * self.size)
 
     @cached_property
     def work_noise(self) -> float:
@@ -375,6 +384,8 @@ class System:
         A displacement of the scene's size is known to eps times that size, its gradient in an
         element to that over the element's length.
         """
+        if not self.beams:
+            return self.stiffness_scale
         total = sum(b.kernel.scale / np.sum(b.mesh.lengths) * np.sum(1.0 / b.mesh.lengths)
                     for b in self.beams)
         return np.finfo(float).eps * self.size * np.sqrt(total)
@@ -382,7 +393,7 @@ class System:
     @cached_property
     def noise(self) -> float:
         """How much larger the round-off of a residual is than that of the strains."""
-        return np.sqrt(max(b.nd for b in self.beams))
+        return np.sqrt(max(b.nd for b in self.members))
 
     def inverted(self, u: Array) -> bool:
         """True if a body is turned inside out somewhere."""
@@ -551,7 +562,7 @@ class System:
     @property
     def bandwidth(self) -> int:
         """Subdiagonals of the tangent and of the mass matrix."""
-        return max(2 * b.nd for b in self.beams) - 1
+        return max(2 * b.nd for b in self.members) - 1
 
     @cached_property
     def K(self) -> BandMatrix:
@@ -790,3 +801,9 @@ class System:
             self._sparse = self._sparse_factors(self._factors.tocsc())
         x = self._sparse.solve(np.append(b, self._weight * phi))
         return x[:self.N], self._weight * x[self.N:]
+
+
+def _extent(bodies):
+    """How far bodies reach."""
+    corners = np.concatenate([body.outline_at(np.zeros(body.N)) for body in bodies], axis=1)
+    return float(np.max(np.ptp(corners, axis=1)))

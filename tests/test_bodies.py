@@ -9,11 +9,13 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from scipy.special import ellipk
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, KelvinVoigt, MeshBeam,
-                        MeshError, NameUnknown, RigidBody, Scene, StVenantKirchhoff, SupportError)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, KelvinVoigt, Line,
+                        MeshBeam, MeshError, NameUnknown, RigidBody, Scene, StVenantKirchhoff,
+                        SupportError)
 from skfem_ancf.dynamics import SCHEMES
-from skfem_ancf.errors import CheckpointError, ImmutableError
+from skfem_ancf.errors import AncfError, CheckpointError, ImmutableError
 
 G = 9.81
 EI = 1e4 * 0.1**4 / 12
@@ -503,7 +505,7 @@ def test_a_body_does_not_change():
 
 
 BAD = {
-    "no beam": lambda s, b: Scene(b),
+    "no beam and no body": lambda s, b: Scene(),
     "twice": lambda s, b: Scene(beam_of(), b, b),
     "same names": lambda s, b: Scene(beam_of(name="bob"), b),
     "a boundary": lambda s, b: s.clamp("left", b),
@@ -663,17 +665,12 @@ def test_a_flexible_slider_crank_as_by_exudyn(monkeypatch):
     assert_allclose(middle, exudyn["middle"], rtol=0, atol=1e-3 * bent)
 
 
-def test_bodies_alone_are_told_to_take_a_beam_that_stands_aside():
-    """Two hinged bodies beside the beam that the error names: SciPy's double pendulum."""
+def test_two_bodies_alone_are_a_double_pendulum():
+    """SciPy's double pendulum."""
     bodies = [RigidBody(2.0, 0.1, (0.5, 0)), RigidBody(1.0, 0.05, (1.5, 0))]
-    with pytest.raises(InputError, match="stands aside"):
-        Scene(*bodies)
-    aside = Beam(MeshBeam.init_line([5, 6], height=0.1), ElementBeamCable(3),
-                 StVenantKirchhoff(1e9, 0.3, 1000), width=0.1)
-    scene = Scene(aside, *bodies).clamp("left").pin((0, 0), bodies[0])
+    scene = Scene(*bodies).pin((0, 0), bodies[0])
     scene.hinge((bodies[0], (1, 0)), (bodies[1], (1, 0)))
-    for body in bodies:
-        scene.point_force((0, -9.81 * body.mass), body)
+    scene.gravity((0, -9.81))
     history = scene.integrate(1.0, 1e-3)
 
     def rate(t, y):
@@ -687,3 +684,81 @@ def test_bodies_alone_are_told_to_take_a_beam_that_stands_aside():
     exact = solve_ivp(rate, (0, 1), np.zeros(4), rtol=1e-10, atol=1e-12).y[:2, -1]
     assert_allclose([history.angle(body)[-1] for body in bodies], exact, atol=1e-4)
     assert np.ptp(history.total_energy) < 1e-9 * history.kinetic_energy.max()
+
+
+def alone(angle=1.0, arm=0.6):
+    """A pendulum without any beam, and its small frequency."""
+    body = RigidBody(2.0, 0.1, position=(arm * np.sin(angle), -arm * np.cos(angle)), name="bob")
+    scene = Scene(body).pin((0, 0)).gravity((0, -G))
+    return scene, body, np.sqrt(2.0 * G * arm / (0.1 + 2.0 * arm**2))
+
+
+@pytest.mark.parametrize("scheme, error", [("energy-momentum", 2e-4), ("generalized-alpha", 1e-3),
+                                           ("radau", 1e-8)])
+def test_the_period_of_a_pendulum_alone(scheme, error):
+    scene, body, omega = alone()
+    quarter = ellipk(np.sin(0.5) ** 2) / omega
+    history = scene.integrate(2.0 * quarter, quarter / 50, scheme=scheme,
+                              until=lambda state: state.angle(body) + 1.0)
+    assert abs(history.event - quarter) < error * quarter
+    if scheme == "energy-momentum":
+        assert np.ptp(history.total_energy) < 1e-11
+
+
+def test_two_masses_and_a_spring():
+    a, b = RigidBody(1.0, 0.1, name="a"), RigidBody(2.0, 0.1, position=(1, 0), name="b")
+    scene = Scene(a, b).spring(100.0, between=(a, b))
+    omega = np.sqrt(100.0 * 1.5)
+    modes = scene.modes(6)
+    assert_allclose(modes.frequencies, [0.0] * 5 + [omega], atol=1e-6 * omega)
+    scene.initial_velocity(lambda x: np.array([1.0 + 0.0 * x[0], 0.0 * x[0]]), a)
+    dt = 2.0 * np.pi / omega / 800
+    scene.sensor("left", "position", at=a)
+    history = scene.integrate(1.0, dt)
+    exact = history.t / 3.0 + 2.0 / 3.0 * np.sin(omega * history.t) / omega
+    assert_allclose(history.position(a)[:, 0], exact, rtol=0, atol=2e-5)
+    assert_allclose(history.sensors["left"][:, 0], exact, rtol=0, atol=2e-5)
+    assert_allclose(history.momentum, np.tile([1.0, 0.0], (len(history.t), 1)), atol=1e-12)
+    assert np.ptp(history.total_energy) < 1e-11
+
+
+def test_statics_of_bodies_alone():
+    """A body on three springs sags as its stiffness says; it buckles on a weak turning spring."""
+    body = RigidBody(1.0, 0.1, name="plate")
+    scene = Scene(body)
+    for x, y, dx, dy in ((-0.2, 0, 0, 1), (0.2, 0, 0, 1), (0.2, 0, 1, 0)):
+        scene.spring(1e4, between=(("ground", (x + dx, y + dy)), (body, (x, y))))
+    state = scene.gravity((0, -G)).solve_static()
+    assert state.converged and state.stability == "stable" and len(scene.plan()) > 5
+    assert_allclose(state.position(body), [0, -G / 2e4], atol=1e-6)
+    post = RigidBody(1.0, 0.1, position=(0, 0.5))
+    scene = Scene(post).pin((0, 0)).torsional_spring(2.0, post).point_force((0, -1), (0, 1))
+    assert_allclose(scene.buckling(1).factors, [2.0], rtol=1e-9)
+    fallen = scene.point_force((0, -2), (0, 1)).point_force((1e-3, 0), (0, 1)).solve_static()
+    turn = abs(fallen.angle(post))
+    assert_allclose(turn / np.sin(turn), 1.5, rtol=2e-3)
+
+
+def test_a_scene_of_bodies_is_kept_and_written(tmp_path):
+    scene, body, _ = alone()
+    history = scene.integrate(0.2, 0.01, checkpoint=tmp_path / "half.npz", every=7)
+    again = pickle.loads(pickle.dumps(scene)).resume(tmp_path / "half.npz")
+    assert np.array_equal(again.u, history.u)
+    history.save(tmp_path / "swing.pvd")
+    grid = history.state(-1).to_pyvista()
+    assert grid.n_cells == 1 and np.allclose(grid.bounds[:2], [
+        np.min(body.outline_at(history.u[-1])[0]), np.max(body.outline_at(history.u[-1])[0])])
+    assert len(history.state(-1).plot().collections) == 2  # outlines, and none of a beam
+    assert "det F" not in str(history.state(-1))
+
+
+@pytest.mark.parametrize("wrong, words", [
+    (lambda scene, body: scene.solve_static(), "scene.pin"),
+    (lambda scene, body: scene.obstacle(Line((0, -3), (0, 1))), "surfaces of beams"),
+    (lambda scene, body: scene.pressure(1.0, "top"), "beams"),
+    (lambda scene, body: scene.integrate(0.02, 0.01).state(-1).resultants(), "bodies alone"),
+])
+def test_what_bodies_alone_have_not(wrong, words):
+    scene, body, _ = alone()
+    with pytest.raises(AncfError, match=words):
+        wrong(scene, body)

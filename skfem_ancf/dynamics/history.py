@@ -198,7 +198,8 @@ class History:
     @property
     def _group(self):
         """States whose fields are recovered at once."""
-        return max(1, SECTIONS // sum(2 * beam.mesh.nelements + 1 for beam in self.system.beams))
+        sections = sum(2 * beam.mesh.nelements + 1 for beam in self.system.beams)
+        return max(1, SECTIONS // max(1, sections))
 
     def instants(self, motions: Sequence[Motion]) -> Iterator[State]:
         """States of Motions of this system, whose fields are recovered many at once.

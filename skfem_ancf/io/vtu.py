@@ -98,6 +98,8 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
         raise InputError(f"subdivide={(m, n)} makes {total} points, more than {MAX_POINTS}")
     first, points, cells = 0, [], []
     data: dict[str, list[Array]] = {}
+    if not state.beams:  # what rigid bodies have
+        data = {field.name: [] for field in wanted if field.name == "displacement"}
     numbers: dict[str, list[Array]] = {"beam": [], "element": []}
     for b, beam in enumerate(state.beams):
         if lagrange:

@@ -169,6 +169,9 @@ class Obstacle(ForceElement):
 
     def bind(self, scene: Scene) -> list[Link]:
         beams = scene.beams if self.beam is None else [scene.beam(self.beam)]
+        if not beams:
+            raise InputError("an obstacle is touched by surfaces of beams, the scene has rigid "
+                             "bodies alone: hold them by one-sided springs, or add a beam")
         height = min(beam.mesh.height for beam in beams)
         self.tolerance = self.options["tolerance"] or TOLERANCE * height
         groups = []

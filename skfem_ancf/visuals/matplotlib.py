@@ -105,7 +105,6 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     """
     Figure = _figure_class()
     from matplotlib.collections import LineCollection, PolyCollection
-    from matplotlib.tri import Triangulation
 
     drawn, states = find_field(field, DRAWN), _states(state)
     undeformed = require_flag("undeformed", undeformed)
@@ -120,8 +119,7 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
               for line in b.outline(b.reference, factor)]
     edges = [line for b in bodies for line in b.outline(b.deformed, factor)]
     rigid = [b.outline_at(s.u_of(b)).T for s in states for b in getattr(s, "bodies", ())]
-    points = np.concatenate([b.points(b.deformed, factor).reshape(2, -1) for b in bodies], axis=1)
-    values = np.concatenate([b.values.ravel() for b in bodies])
+    values = np.concatenate([np.zeros(0), *(b.values.ravel() for b in bodies)])
     low, high = _limits(limits, values, drawn)
 
     if ax is None:
@@ -133,15 +131,10 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     if rigid:
         ax.add_collection(PolyCollection(rigid, facecolor=_RIGID, edgecolor=_INK, linewidth=0.5,
                                          zorder=1.5), autolim=True)
-    patches = quads(m, n)
-    first = np.concatenate([[0], np.cumsum([b.values.size for b in bodies])])
-    cells = np.concatenate([
-        (f + np.arange(0, b.values.size, (m + 1) * (n + 1))[:, None, None] + patches).reshape(-1, 4)
-        for f, b in zip(first, bodies)])
-    triangles = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
-    image = ax.tripcolor(Triangulation(*points, triangles=triangles), values, shading="gouraud",
-                         cmap=cmap or ("RdYlBu_r" if drawn.signed else "viridis"),
-                         vmin=low, vmax=high, zorder=2)
+    if bodies:
+        image = ax.tripcolor(_triangulation(bodies, m, n, factor), values, shading="gouraud",
+                             cmap=cmap or ("RdYlBu_r" if drawn.signed else "viridis"),
+                             vmin=low, vmax=high, zorder=2)
     ax.add_collection(LineCollection([np.vstack([line, line[:1]]) for line in edges],
                                      colors=_INK, linewidths=0.5, zorder=3))
     box = around(np.concatenate(ghosts + edges + rigid).T)
@@ -153,13 +146,25 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     ax.margins(AROUND if walls else 0.04)
     ax.autoscale_view()
     _dress(ax, (drawn.title or drawn.name) if title is None else title, factor)
-    if colorbar:
+    if colorbar and bodies:
         _add_colorbar(ax, image, bool(np.any(values < low)), bool(np.any(values > high)),
                       unit_of(drawn, unit))
     if filename is not None:
         with replacing(filename) as temporary:
             ax.figure.savefig(temporary, dpi=dpi, bbox_inches="tight")
     return ax
+
+
+def _triangulation(bodies, m, n, factor):
+    """Two triangles for each quad."""
+    from matplotlib.tri import Triangulation
+
+    points = np.concatenate([b.points(b.deformed, factor).reshape(2, -1) for b in bodies], axis=1)
+    first = np.concatenate([[0], np.cumsum([b.values.size for b in bodies])])
+    cells = np.concatenate([
+        (f + np.arange(0, b.values.size, (m + 1) * (n + 1))[:, None, None]
+         + quads(m, n)).reshape(-1, 4) for f, b in zip(first, bodies)])
+    return Triangulation(*points, np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]]))
 
 
 def _states(state):
@@ -237,6 +242,8 @@ class _Body:
 def _thickness(thickness, bodies):
     if not (isinstance(thickness, str) and thickness == "auto"):
         return require_positive("thickness", thickness)
+    if not bodies:
+        return 1.0
     shapes = [(b, p) for b in bodies for p in (b.reference, b.deformed)]
     x = np.concatenate([axis.reshape(2, -1) for _, (_, axis) in shapes], axis=1)
     factor = round(READABLE * np.max(np.ptp(x, axis=1)) / max(b.height for b in bodies))

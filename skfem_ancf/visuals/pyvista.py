@@ -282,8 +282,8 @@ class Scenery:
         every = [body for frame in self.frames for body in frame]
         self.factor = _thickness(thickness, every)
         self.walls, self.wall = self._walls(states), None
-        self.low, self.high = _limits(limits, np.concatenate([b.values.ravel() for b in every]),
-                                      self.field)
+        values = np.concatenate([np.zeros(0), *(b.values.ravel() for b in every)])
+        self.low, self.high = _limits(limits, values, self.field)
 
     def _walls(self, states):
         """The outlines of obstacles in each frame, shapes (n, 2, 2)."""
@@ -304,9 +304,9 @@ class Scenery:
         undeformed
             Those of the stress-free body.
         """
-        x = np.concatenate([
+        x = np.concatenate([np.zeros((2, 0)), *(
             b.points(b.reference if undeformed else b.deformed, self.factor).reshape(2, -1)
-            for b in self.frames[k]], axis=1)
+            for b in self.frames[k])], axis=1)
         return np.concatenate([np.array([*x, np.zeros(x.shape[1])]).T, *(
             outline_points(body, 0.0 * u if undeformed else u) for body, u in self.rigid[k])])
 
@@ -324,9 +324,9 @@ class Scenery:
         """Quads as rows of points, shape (nc, 4)."""
         m, n = self.size
         first = np.cumsum([0] + [b.values.size for b in self.frames[0]])
-        return np.concatenate([
+        return np.concatenate([np.zeros((0, 4), dtype=int), *(
             (f + np.arange(0, b.values.size, (m + 1) * (n + 1))[:, None, None]
-             + quads(m, n)).reshape(-1, 4) for f, b in zip(first, self.frames[0])])
+             + quads(m, n)).reshape(-1, 4) for f, b in zip(first, self.frames[0]))])
 
     @property
     def faces(self) -> Any:
