@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .band import clear
-from .kernels.base import CARRY, FORCE, MEAN, STRESS, TANGENT, VISCOUS, Destination
+from .kernels.base import CARRY, FORCE, GIVEN, MEAN, STRESS, TANGENT, VISCOUS, Destination
 from .kernels.cable import CablePack, cable_evaluate
 from .kernels.section import SectionPack, section_evaluate
 from .source import I1, I2, primitive, shaped, source
@@ -174,3 +174,21 @@ def body_mean(body, u0, u1, f):
     clear(f)
     none = f[:0]
     evaluate_body(body, np.int64(MEAN), u0, u1, f, none, np.int64(0), none, none, np.int64(0))
+
+
+@source
+def body_mixed(body, mean, u0, u1, f, carried, stresses):
+    """As :func:`body_force` at u1, or :func:`body_mean`, but of carried stresses.
+
+    The stresses of the strain are written.
+    """
+    clear(f)
+    evaluate_body(body, np.int64(MEAN if mean else FORCE), u0 if mean else u1, u1, f, carried,
+                  np.int64(1), stresses, f, np.int64(0))
+
+
+@source
+def add_force_of(body, u, stresses, f):
+    """Add the force at u of given stresses."""
+    none = f[:0]
+    evaluate_body(body, np.int64(GIVEN), u, u, f, stresses, np.int64(1), none, none, np.int64(0))

@@ -86,7 +86,8 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         "no stress in a linear solve" if linear else "the stress is not zero")
     add("tangent", "constant" if linear else "computed",
         "one assembly, one factorisation" if linear else
-        "its factors are kept while the iteration contracts" if dynamic else
+        "its factors are kept while the iteration contracts; where a step's own do not, "
+        "stresses are carried" if dynamic else
         "each iteration; the last evaluates the force only")
     add("mass", "constant" if dynamic else "skipped",
         "assembled and factorised once" if dynamic else "no inertia in statics")

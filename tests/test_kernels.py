@@ -10,6 +10,10 @@ from skfem_ancf.compiled import load
 from skfem_ancf.evaluation import CARRY, FORCE, MEAN, STRESS, TANGENT, evaluate
 from skfem_ancf.formulations import get_formulation
 from skfem_ancf.kernels import CableKernel, Kernel, law
+from skfem_ancf.kernels import base as kinds_of
+from skfem_ancf.kernels.base import GIVEN, nowhere
+from skfem_ancf.kernels.cable import _unit
+from skfem_ancf.kernels.section import with_unit_law
 from skfem_ancf.linalg import BandMatrix
 from skfem_ancf.materials import Material
 from skfem_ancf.sections import Across, Rectangle
@@ -135,6 +139,32 @@ def test_carried_stresses_and_parts_of_the_tangent(kind, mesh):
     close(material, k.tangents(u, geometric=False), 1e-12)
     close(np.einsum("emi,em->ei", B, stress), k.forces(u).reshape(len(B), -1))
     close(material + k.geometric(k.gather(u), slice(None), stress), k.tangents(u), 1e-12)
+
+
+@kinds
+@every
+def test_work_of_given_stresses_is_that_on_the_change_of_the_strain(kind, mesh):
+    k, rng = kernel(kind, mesh), np.random.default_rng(3)
+    u, v = states(k)
+    for pack in k.packs:
+        free = pack._replace(constant=pack.constant[:0])
+        rate, change, own = (np.zeros((k.texts.components, len(pack.weights), len(pack.start)))
+                             for _ in range(3))
+        S = rng.standard_normal(rate.shape)
+        f, g, same, mean = np.zeros((4, k.N))
+        k.strain_increment(pack, u, v, rate)
+        k.texts.evaluate(pack, GIVEN, u, u, f, S, S[:0], nowhere(f))
+        assert abs(f @ v - np.sum(pack.weights * S * rate)) < 1e-12 * np.abs(f) @ np.abs(v)
+        unit = with_unit_law(free) if kind.startswith("section") else _unit(free)
+        for x, sign in ((u, -1.0), (v, 1.0)):
+            k.texts.stress(unit, x, own)
+            change += sign * own
+        k.texts.evaluate(free, kinds_of.MEAN, u, v, g, S, own, nowhere(g))
+        assert abs(g @ (v - u) - np.sum(pack.weights * S * change)) < 1e-12 * (
+            np.abs(g) @ np.abs(v - u))
+        k.texts.evaluate(free, kinds_of.MEAN, u, v, same, own, own.copy(), nowhere(same))
+        k.texts.mean(free, u, v, mean)
+        close(same, mean)
 
 
 def test_a_law_of_ones_own_goes_with_its_kernel():

@@ -84,6 +84,51 @@ def test_same_iterations_in_numpy_and_compiled(seed, needs_compiled):
     assert np.abs(slow.u).max() > 1e-3
 
 
+def stiff_pendulum(slenderness, element, flag, law=StVenantKirchhoff, rods=1):
+    """Hinged rods that fall from the horizontal, of the EI of L/h = 100 to a mass."""
+    h, L = 1.0 / slenderness, 1.0 / rods
+    material = law(2e8 * (0.01 / h)**2, 0.3, 7800.0)
+    x = np.linspace(0, L, 1 + 16 // rods)
+    scene = Scene(*(Beam(MeshBeam.init_line(x, h, origin=(k * L, 0)), element, material, 0.01,
+                         name=f"rod {k}", compiled=flag) for k in range(rods)))
+    scene.gravity((0, -9.81)).pin("left", beam="rod 0")
+    if rods == 2:
+        scene.joint("hinge", beams=("rod 0", "rod 1"), at=(0.5, 0.0))
+    return scene
+
+
+@pytest.mark.parametrize("slenderness", [1e3, 1e4])
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(3)])
+@pytest.mark.parametrize("scheme", [EnergyMomentum(), GeneralizedAlpha(1.0)])
+def test_few_iterations_where_the_axis_is_stiff(slenderness, element, scheme):
+    """And the equation of the scheme holds, whatever its iteration carried."""
+    scene = stiff_pendulum(slenderness, element, False)
+    history = scene.integrate(0.2, 1e-2, scheme)
+    assert history.substeps == 0
+    assert history.iterations <= 8 * history.steps
+    assert history.factorizations <= 1.25 * history.steps
+    if not scheme.conserving:
+        return
+    assert np.ptp(history.total_energy) < 2e-13 * history.kinetic_energy.max()
+    system, (u0, u1), (v0, v1) = scene.system, history.u[-2:], history.v[-2:]
+    inertia, weight = system.mass.multiply((v1 - v0) / 1e-2), system.external_force(u1, 0.2)
+    missing = (inertia + system.mean_internal_force(u0, u1) - weight)[system.free]
+    assert np.abs(missing).max() < 1e-6 * np.abs(weight).max()
+
+
+@pytest.mark.parametrize("element, scheme, law, rods", [
+    (ElementBeamANCF(2), EnergyMomentum(), NeoHookean, 1),
+    (ElementBeamANCFCubic(2), GeneralizedAlpha(0.8), StVenantKirchhoff, 2),
+    (ElementBeamCable(5), EnergyMomentum(), StVenantKirchhoff, 2)])
+def test_carried_stresses_are_the_same_compiled(element, scheme, law, rods, needs_compiled):
+    slow, fast = (stiff_pendulum(1e3, element, flag, law, rods).integrate(0.1, 1e-2, scheme,
+                                                                          tol=1e-10)
+                  for flag in (False, True))
+    assert fast.iterations == slow.iterations < 100 and slow.substeps == 0
+    assert fast.factorizations == slow.factorizations
+    assert_allclose(fast.u, slow.u, rtol=0, atol=1e-8)
+
+
 def random_static_scene(seed, flag):
     """A scene of :func:`random_scene`, and what holds both beams."""
     rng = np.random.default_rng(1000 + seed)

@@ -355,7 +355,7 @@ class Integrator:
     def _factors(self):
         A, rows = self.matrices.A, self.matrices.rows
         beside = {"S": rows.S, "Z": rows.Z, "H": rows.H} if len(rows.P) else {}
-        return {"A": A.flat, "pivots": A.pivots, **beside}
+        return {"A": A.flat, "pivots": A.pivots, "origin": self._work.x.origin, **beside}
 
 
 def _damping(system):

@@ -17,7 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..band import Band, copy, factorize, fix, multiply, solve_joined, subtract_rows
-from ..body import body_carry, body_force, body_mean, body_stress, body_tangent
+from ..body import (add_force_of, body_carry, body_force, body_mean, body_mixed, body_stress,
+                    body_tangent)
 from ..forces.texts import (add_contact_tangent, add_elastic_force, add_rubbing_tangent,
                             element_stiffness)
 from ..source import F1, F2, F3, borrowed, by_place, lanes, source
@@ -31,6 +32,9 @@ EPS = 2.2e-16
 ITERATIONS = 30
 #: Contraction up to which factors are kept.
 REUSED = 0.1
+#: The same for factors of the step's own where stresses are carried, and for how many steps they
+#: are, from one on that wants new factors again.
+CARRIED, LASTING = 0.3, 32.0
 #: Contraction expected of new factors, and the least that is expected of any.
 EXPECTED, LEAST = 0.1, 0.01
 #: Growth of a correction, with new factors, beyond which the step is given up.
@@ -39,10 +43,11 @@ DIVERGING = 2.0
 #: What a run of steps keeps, in one array: whether there are factors, how many iterations and
 #: factorisations there were, the last contraction, the size of the step before, the largest energy
 #: seen, and why a step has failed; of the step, whether its factors are its own, and the sizes of
-#: the last two corrections, negative where there is none; the work of damping so far.
+#: the last two corrections, negative where there is none; the work of damping so far; for how many
+#: steps stresses are carried.
 (READY, COUNT, FACTORIZED, RATE, BEFORE, ENERGY, FAILURE, FRESH, SIZE, LAST_SIZE,
- DISSIPATED) = range(11)
-STATE = 11
+ DISSIPATED, MIXED) = range(12)
+STATE = 12
 #: By the number in ``state[FAILURE]``.
 FAILURES = ("", "the iteration matrix is singular", "the residual is not finite",
             "the iteration diverges", f"no convergence in {ITERATIONS} iterations",
@@ -164,6 +169,8 @@ class Vectors(NamedTuple):
         The first four as said; room.
     damping, pace
         The damping force, and the velocity that it resists.
+    origin, straight
+        Where the factors were made, and u at the end with the velocity at the begin.
     """
 
     u: F1
@@ -181,6 +188,8 @@ class Vectors(NamedTuple):
     room: F1
     damping: F1
     pace: F1
+    origin: F1
+    straight: F1
 
 
 class Shares(NamedTuple):
@@ -220,7 +229,8 @@ class Work(NamedTuple):
     S
         ``J1 A^-1 J^T``, shape (m, m).
     stresses
-        Of all beams: zero, those at the begin, and others, shape (3, k).
+        Of all beams: zero, those at the begin, others, carried ones, those of the iterate, shape
+        (5, k).
     """
 
     y: F2
@@ -243,7 +253,7 @@ def room_for_steps(N: int, m: int, stresses: int) -> Work:
     """
     x, shares = np.zeros((len(Vectors._fields), N)), np.zeros((len(Shares._fields), m))
     return Work(np.zeros((4, N)), Vectors(*x), Shares(*shares), np.zeros((3, m, N)),
-                np.zeros((m, m)), np.zeros((3, stresses)))
+                np.zeros((m, m)), np.zeros((5, stresses)))
 
 
 @source
@@ -257,7 +267,7 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
     matrices, rule, course
         As above.
     state
-        What is kept from step to step, shape (11,).
+        What is kept from step to step, shape (12,).
     w
         :class:`Work`.
     rows, multiplier_rows, works
@@ -278,15 +288,13 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
         s = _step(e.joints, rule, course, n)
         rough, wanted = _begin(e.free, matrices.M, rule, s, w, state)
         told = GO_ON
+        _start(e, s, w, state)
         for _ in range(ITERATIONS):
             if state[READY] == 0.0:
                 _tangent(e, matrices, rule, s, w)
                 if not _factorize(e.free, matrices, state):
                     return n
-            if rule.conserving > 0:
-                body_mean(e.body, y[0], u, f)
-            else:
-                body_force(e.body, u, f)
+            _internal_force(e.body, rule, w, state)
             add_elastic_force(e.forces, s.acting, s.dt, y[0] if rule.conserving > 0 else u, u, f)
             if damped:
                 _resist(e, matrices, rule, s, w)
@@ -301,10 +309,9 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
             if told == GO_ON:
                 told = _correct(e.joints, e.free, matrices, s, w, state, anew)
             if told == GO_ON:
-                told = judge(state, wanted, rough, REUSED)
-            if told == ASTRAY:  # by old factors
-                copy(w.x.guess, u)
-                copy(w.m.l0, w.m.l)
+                told = _judged(e.body, rule, w, state, wanted, rough)
+            if told == ASTRAY:
+                _start(e, s, w, state)
             elif told != GO_ON:
                 break
         if told == DONE:
@@ -356,7 +363,7 @@ def judge(state, wanted, rough, reused):
                 state[FAILURE] = DIVERGES
                 return FAILED
             state[READY] = 0.0
-            return ASTRAY if rate > 1.0 else GO_ON
+            return ASTRAY if rate > 1.0 and state[FRESH] == 0.0 else GO_ON
     return DONE if size * min(1.0, state[RATE]) <= wanted else GO_ON
 
 
@@ -404,7 +411,7 @@ def _begin(free, M, rule, s, w, state):
 
     Returns the round-off of a correction, and the size of one that is small enough.
     """
-    h, u, guess = s.dt, w.x.u, w.x.guess
+    h, u, guess, straight = s.dt, w.x.u, w.x.guess, w.x.straight
     base, speed, rest, held = w.x.base, w.x.speed, w.x.rest, w.x.held
     u0, v0, a0, w0 = w.y[0], w.y[1], w.y[2], w.y[3]
     b, c = h * h * (0.5 - rule.beta), h * (1.0 - rule.gamma)
@@ -415,12 +422,12 @@ def _begin(free, M, rule, s, w, state):
         speed[i] = v0[i] + c * w0[i]
         rest[i] = p * w0[i] - q * a0[i]
         held[i] = s.supports[2, i]
-        u[i] = (base[i] + d * a[i]) * free[i] + s.supports[0, i]
-        guess[i] = u[i]
+        guess[i] = (base[i] + d * a[i]) * free[i] + s.supports[0, i]
+        straight[i] = (u0[i] + h * v0[i]) * free[i] + s.supports[0, i]
+        u[i] = guess[i]
     if rule.conserving > 0:  # what the velocity changes by
         for i in lanes(u.size):
             held[i] = (s.supports[1, i] - v0[i]) * (1.0 - free[i]) / h
-    copy(w.m.l0, w.m.l)
     state[FRESH], state[SIZE] = 0.0, -1.0
     _free_velocity(free, rule, s, w)
     energy = max(state[ENERGY], _energy(M, w.x.v, w.x.room))
@@ -483,6 +490,62 @@ def _energy(M, v, room):
 
 
 @source
+def _start(e, s, w, state):
+    """Where the iteration begins; with carried stresses on a straight way."""
+    copy(w.x.straight if state[MIXED] > 0.0 else w.x.guess, w.x.u)
+    copy(w.m.l0, w.m.l)
+    if state[MIXED] > 0.0:
+        body_stress(e.body, w.y[0], w.stresses[3])
+
+
+@source
+def _internal_force(body, rule, w, state):
+    """The internal force of the iterate.
+
+    With carried stresses S, what is missing in ``S = D eps(u)`` acts as the factors take it, in the
+    directions of where they were made::
+
+        f = B(u)^T S + B(origin)^T (D eps(u) - S)
+    """
+    u0, u, f, carried, own, missing = (w.y[0], w.x.u, w.x.force, w.stresses[3], w.stresses[4],
+                                       w.stresses[2])
+    if state[MIXED] > 0.0:
+        body_mixed(body, rule.conserving > 0, u0, u, f, carried, own)
+        for i in lanes(missing.size):
+            missing[i] = own[i] - carried[i]
+        add_force_of(body, w.x.origin, missing, f)
+    elif rule.conserving > 0:
+        body_mean(body, u0, u, f)
+    else:
+        body_force(body, u, f)
+
+
+@source
+def _judged(body, rule, w, state, wanted, rough):
+    """What the last correction tells, of iterations with carried stresses and without.
+
+    A stiff and slender beam turned by old factors is stretched by what they take for bending: its
+    iteration wants ever new ones. Carried stresses, ``S = D (eps(u) + B(origin) du)``, are as far
+    off as the factors have turned, whatever D is.
+    """
+    du, room, fresh = w.x.du, w.x.room, state[FRESH] > 0.0
+    if state[MIXED] > 0.0:
+        c = 0.5 if rule.conserving > 0 else 1.0
+        for i in lanes(du.size):
+            room[i] = c * du[i]
+        body_carry(body, w.x.origin, room, w.stresses[4], w.stresses[3])
+        told = judge(state, wanted, rough, CARRIED if fresh else REUSED)
+        if told == GO_ON and not fresh and state[LAST_SIZE] < 0.0:
+            state[READY] = 0.0  # old ones have turned the beam
+        return told
+    told = judge(state, wanted, rough, REUSED)
+    if fresh and (told == FAILED or told != DONE and state[READY] == 0.0):
+        state[MIXED], state[READY] = LASTING, 0.0
+        return ASTRAY
+    return told
+
+
+@source
 def _tangent(e, matrices, rule, s, w):
     """The iteration matrix, with the stresses at the begin of the step.
 
@@ -494,6 +557,7 @@ def _tangent(e, matrices, rule, s, w):
     if dampers.viscous > 0:
         body_carry(e.viscous, w.y[0], w.y[1], stresses[1], stresses[1])
     _middle(rule, w)
+    copy(w.x.middle, w.x.origin)
     body_tangent(e.body, w.x.middle, w.x.force, stresses[1], yes, stresses[2], matrices.A)
     if dampers.active > 0:
         add_damping(e.viscous, dampers, matrices.M, s.damping_factor / s.stiffness_factor,
@@ -708,5 +772,5 @@ def _finish(free, M, s, w, state):
         v0[i] = v[i]
         a0[i] = a1[i]
         w0[i] = w1[i] * free[i] + given[i]
-    state[BEFORE] = s.dt
+    state[BEFORE], state[MIXED] = s.dt, max(0.0, state[MIXED] - 1.0)
     state[ENERGY] = max(state[ENERGY], _energy(M, v, w.x.room))

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 #: Elements of which Python evaluates matrices together; bounds the memory.
 CHUNK = 1024
 #: What a kernel finds; given as ``np.int64``, or Numba compiles for each.
-FORCE, TANGENT, MEAN, STRESS, CARRY, VISCOUS = range(6)
+FORCE, TANGENT, MEAN, STRESS, CARRY, VISCOUS, GIVEN = range(7)
 #: Fields of a pack whose first axis are the elements, where they have matrices of their own.
 MATRICES = {"table", "constant"}
 #: Those whose last axis are the elements, where they have tables of their own.

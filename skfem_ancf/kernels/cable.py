@@ -17,7 +17,7 @@ from ..errors import InputError
 from ..quadrature import gauss
 from ..source import F2, F3, I1, lanes, primitive, room, source
 from ..types import Array
-from .base import (CARRY, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
+from .base import (CARRY, GIVEN, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
                    Texts, add_force, add_held_energy, add_tangent, block, copy_stress, load,
                    packed, pair_tables, product, with_constant)
 
@@ -213,14 +213,20 @@ def cable_block(pack, what, first, last, u, v, f, given, out, to):
     if what == VISCOUS:  # rates in place of strains
         S[:], one[:2], one[2:] = 0.0, 1.0, 0.0
         cable_changes(one, r[0], d[1], square[0], kappa[0], S, strain[0])
-    if what == TANGENT or what == STRESS:
+    k = states - 1
+    if out.shape[0] > 0:
         for c in range(2):
             for p in lanes(n):
                 for e in lanes(size):
-                    out[c, p, e] = (stiffness[c, p, e] * strain[0, c, p, e]
-                                    + stiffness[2, p, e] * strain[0, 1 - c, p, e])
+                    x, y = strain[0, c, p, e], strain[0, 1 - c, p, e]
+                    x, y = x + strain[k, c, p, e], y + strain[k, 1 - c, p, e]
+                    out[c, p, e] = 0.5 * (stiffness[c, p, e] * x + stiffness[2, p, e] * y)
     if what == STRESS:
         return
+    if given.shape[0] > 0 and what != TANGENT:  # they are the strains of no law
+        stiffness[:2], stiffness[2:] = 1.0, 0.0
+        for j in range(states):
+            copy_stress(given, strain[j])
     if what == MEAN:
         for k in lanes(nb):
             for i in lanes(2):
@@ -228,7 +234,8 @@ def cable_block(pack, what, first, last, u, v, f, given, out, to):
                     U[0, k, i, e] = 0.5 * (U[0, k, i, e] + U[1, k, i, e])
     cable_rows(stiffness, weights, r[:states], square[:states], kappa[:states],
                strain[:states], T)
-    add_force(pack.table, pack.transposed, pack.constant, pack.start, pack.span, first, T, U[0], f)
+    held = pack.constant[:0] if what == GIVEN else pack.constant
+    add_force(pack.table, pack.transposed, held, pack.start, pack.span, first, T, U[0], f)
     if what == TANGENT:
         M, skew = room((3 * n, 3, size), weights), room((n + 1, 1, size), weights)
         copy_stress(given if given.shape[0] > 0 else out, S)

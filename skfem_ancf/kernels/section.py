@@ -17,9 +17,9 @@ from ..frozen import Content
 from ..materials import LinearLaw
 from ..source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
 from ..types import Array
-from .base import (CARRY, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables, Texts, add_force,
-                   add_held_energy, add_tangent, apart, block, copy_stress, in_rounds, load,
-                   packed, pair_numbers, pair_tables, product, with_constant)
+from .base import (CARRY, GIVEN, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables, Texts,
+                   add_force, add_held_energy, add_tangent, apart, block, copy_stress, in_rounds,
+                   load, packed, pair_numbers, pair_tables, product, with_constant)
 from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
 
 if TYPE_CHECKING:
@@ -237,16 +237,17 @@ def section_evaluate(pack, what, u, v, f, given, out, to):
     pack
         SectionPack.
     what
-        ``FORCE``, ``TANGENT``, ``MEAN``, ``STRESS``, ``CARRY``, or ``VISCOUS``: the force of
-        stresses that a linear law has of the rate of the strain.
+        ``FORCE``, ``TANGENT``, ``MEAN``, ``STRESS``, ``CARRY``, ``VISCOUS``: the force of
+        stresses that a linear law has of the rate of the strain, or ``GIVEN``: that of given
+        stresses alone, without stabilisation.
     u, v
         Displacement, and at the end for the mean, its change for carried stresses, its rate for
         viscous ones, shape (N,).
     f
         Force, added to.
     given
-        Stresses (3, points, elements): those before, or carried ones for the tangent, or of no
-        component (0, ...).
+        Stresses (3, points, elements): those before, or carried ones for the tangent, or those
+        of which the force is in place of the strain's, or of no component (0, ...).
     out
         Stresses, written.
     to
@@ -291,20 +292,23 @@ def section_block(pack, what, first, last, u, v, f, given, out, to):
         add_scaled(0.5, change, strain, strain)
         add_scaled(0.5, U[1], U[0], U[0])
     D = room((9, n, size if what == CARRY or what == TANGENT and law.kind else 0), w)
-    for k in range(1 if what == CARRY else 0, 2 if D.size > 0 else 1):
+    for k in range(1 if what == CARRY or what == GIVEN else 0, 2 if D.size > 0 else 1):
         law_evaluate(law, change if what == VISCOUS else strain, D if k else S)
     if what == CARRY:
         tangent_stress(D, change, S)
         add_scaled(1.0, given, S, S)
     elif what == MEAN and law.kind != LINEAR:
         conserve(law, strain, change, S)
-    if what == TANGENT or what == STRESS or what == CARRY:
+    if out.shape[0] > 0:
         copy_stress(S, out)
     if what == STRESS or what == CARRY:
         return
+    if given.shape[0] > 0 and what != TANGENT:
+        copy_stress(given, S)
     to_samples(pack.along, pack.ends, w, S, samples)
     row_forces(rows, pack.normal, r, samples, T)
-    add_force(table, pack.transposed, pack.constant, pack.start, pack.span, first, T, U[0], f)
+    held = pack.constant[:0] if what == GIVEN else pack.constant
+    add_force(table, pack.transposed, held, pack.start, pack.span, first, T, U[0], f)
     if what == TANGENT:
         if given.shape[0] > 0:
             copy_stress(given, S)
