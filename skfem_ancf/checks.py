@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -78,6 +78,13 @@ class Screen:
     ----------
     beams
         The beams of a scene.
+
+    Attributes
+    ----------
+    start
+        Tangents of the nodes in the stress-free state, complex.
+    slender
+        Height over length of each element.
     """
 
     def __init__(self, beams: Sequence[Beam]) -> None:
@@ -87,20 +94,30 @@ class Screen:
         first = np.concatenate([[0], np.cumsum([b.N for b in beams])])
         node = np.concatenate([[0], np.cumsum([b.N // b.nd for b in beams])])
         self._x = np.concatenate([n + np.arange(2, b.N, b.nd) for n, b in zip(first, beams)])
-        self._start = np.concatenate([tangents(b, 0.0) for b in beams])
+        self.start = np.concatenate([tangents(b, 0.0) for b in beams])
         self._left, self._right = np.hstack([n + b.mesh.t for n, b in zip(node, beams)])
-        self._slender = np.concatenate([b.mesh.height / b.mesh.lengths for b in beams])
+        self.slender = np.concatenate([b.mesh.height / b.mesh.lengths for b in beams])
         self._limit = np.concatenate([np.full(b.mesh.nelements, turning_limit(b)) for b in beams])
 
-    def passes(self, u: Array) -> bool:
-        """False if a fibre may be compressed, or an element may turn, beyond the range."""
+    def passes(self, u: Array, start: Array | None = None, slender: Array | None = None) -> Any:
+        """False if a fibre may be compressed, or an element may turn, beyond the range.
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (..., N).
+        start, slender
+            Of others than the beams, (..., nodes) and (..., elements).
+        """
         if self._none:
             return True
-        r = (u[self._x] + 1j * u[self._x + 1]) / self._start + 1.0
-        turn = np.abs(np.angle(r[self._right] * r[self._left].conj()))
+        start = self.start if start is None else start
+        slender = self.slender if slender is None else slender
+        r = (u[..., self._x] + 1j * u[..., self._x + 1]) / start + 1.0
+        turn = np.abs(np.angle(r[..., self._right] * r[..., self._left].conj()))
         # the largest curvature of an element is seldom more than twice its mean
-        return (bool(np.all(turn < self._limit))
-                and np.min(np.abs(r)) - np.max(turn * self._slender) > 1.1 * COMPRESSED)
+        return np.all(turn < self._limit, axis=-1) & (
+            np.min(np.abs(r), axis=-1) - np.max(turn * slender, axis=-1) > 1.1 * COMPRESSED)
 
 
 def warn_of(state: State, stacklevel: int) -> None:

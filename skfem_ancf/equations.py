@@ -125,11 +125,20 @@ class Tables:
                  for pack in body.packs]
         if all(one is other for one, other in zip(packs, body.packs)):
             return None
+        body = body._replace(packs=tuple(packs))
+        return self.with_equations(self.plain._replace(body=body, viscous=body))
+
+    def with_equations(self, plain: Equations) -> "Tables":
+        """The same with other numbers.
+
+        Parameters
+        ----------
+        plain
+            In place of those of the system.
+        """
         tables = copy(self)
         vars(tables).pop("flat", None)
-        tables._words = []
-        body = body._replace(packs=tuple(packs))
-        tables.plain = self.plain._replace(body=body, viscous=body)
+        tables._words, tables.plain = [], plain
         return tables
 
     def _flat(self, body, addresses):

@@ -119,6 +119,16 @@ class Machine:
         tables = self.tables.linearised
         if tables is None:
             return None
+        return self.with_tables(tables)
+
+    def with_tables(self, tables: Tables) -> Machine:
+        """The same for other tables of the system, with its work arrays.
+
+        Parameters
+        ----------
+        tables
+            In place of its own.
+        """
         machine = copy(self)
         machine.tables, machine._kept = tables, Kept()
         return machine

@@ -50,6 +50,8 @@ class Sweep:
         From name to array of shape (n, ...), one row for each member.
     found
         For each member a dict of arrays, the text of an error, or None where it is not done.
+    report
+        How members were solved, in words.
 
     Attributes
     ----------
@@ -63,6 +65,9 @@ class Sweep:
     failures : list of Failure
         Those that failed; a member whose values have other names or shapes than those of the first
         that is done has failed too.
+    report : str
+        How many members were solved together, how, and why others were solved alone; empty where
+        ``measure`` solves.
 
     Examples
     --------
@@ -75,8 +80,8 @@ class Sweep:
     """
 
     def __init__(self, parameters: dict[str, Array],
-                 found: Sequence[dict[str, Array] | str | None]) -> None:
-        self.parameters = parameters
+                 found: Sequence[dict[str, Array] | str | None], report: str = "") -> None:
+        self.parameters, self.report = parameters, report
         self.found = _alike(found)
         self.status = np.array(["open" if one is None else "done" if isinstance(one, dict)
                                 else "failed" for one in self.found])

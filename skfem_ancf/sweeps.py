@@ -13,8 +13,10 @@ import numpy as np
 
 from .errors import (CallbackError, CallError, FileError, InputError, Interrupted, NameUnknown,
                      SweepWarning, require_function, require_integer, require_path, shown, taught)
+from .batch import solve_together, threads_of
 from .members import Sweep, column_of, require_plain
 from .progress import progress_bar
+from .readings import Readings, measured
 from .workers import Task, here, in_processes, on_cluster
 
 if TYPE_CHECKING:
@@ -30,7 +32,7 @@ _SECONDS, _RARER = 2.0, 20.0
 @taught
 def sweep(build: Callable[..., Any],
           parameters: Mapping[str, ArrayLike] | Sequence[Mapping[str, Any]],
-          measure: Callable[[Any], Any], workers: int | None = None, client: Any = None,
+          measure: Callable[[Any], Any] | tuple[Any, ...] | dict[str, Any], workers: int | None = None, client: Any = None,
           path: StrPath | None = None, progress: bool | None = None) -> Sweep:
     """Build, solve and measure a scene for each of many sets of parameters.
 
@@ -101,7 +103,7 @@ def sweep(build: Callable[..., Any],
     True
     """
     require_function("build", build, "of the parameters that returns a scene")
-    require_function("measure", measure, "of a scene that returns a number or array")
+    measure = measured(measure)
     if workers is not None and client is not None:
         raise InputError("workers and client say both where to compute: give one of them")
     if workers is not None:
@@ -111,9 +113,7 @@ def sweep(build: Callable[..., Any],
     columns = {name: column_of([member[name] for member in members]) for name in members[0]}
     record = _Record(columns, None if path is None else require_path("path", path, (".npz",)))
     task, places = Task(build, measure), record.places
-    source = (on_cluster(task, members, places, client) if client is not None else
-              here(task, members, places) if workers is None else
-              in_processes(task, members, places, workers))
+    source = _source(task, members, places, workers, client, record)
     try:
         with progress_bar(progress, len(members), "members") as bar, closing(source):
             bar.update(len(members) - len(places))
@@ -128,11 +128,29 @@ def sweep(build: Callable[..., Any],
     return _judged(record.kept())
 
 
+def _source(task, members, places, workers, client, record):
+    """Chunks of members and what was found: together, those that can be; then the others."""
+    if client is not None:
+        yield from on_cluster(task, members, places, client)
+        return
+    if isinstance(task.measure, Readings):
+        left = set(places)
+        for chunk, found in solve_together(task.build, task.measure, members, places,
+                                           threads_of(workers), record.said):
+            left -= set(chunk)
+            yield chunk, found
+        places = sorted(left)
+    if places:
+        yield from (here(task, members, places) if workers is None else
+                    in_processes(task, members, places, workers))
+
+
 class _Record:
     """What is found, and its file, written now and then."""
 
     def __init__(self, columns: dict[str, Array], path: Path | None) -> None:
         self.columns, self.path = columns, path
+        self.said: list[str] = []
         self.found: list[dict[str, Array] | str | None] = [None] * len(next(iter(columns.values())))
         self.next = time.monotonic() + _SECONDS
         if path is not None:
@@ -153,7 +171,7 @@ class _Record:
 
     def kept(self):
         """The Sweep so far, in its file too."""
-        result = Sweep(self.columns, self.found)
+        result = Sweep(self.columns, self.found, "; ".join(self.said))
         if self.path is not None:
             result.save(self.path)
         return result

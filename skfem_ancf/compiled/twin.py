@@ -18,6 +18,8 @@ logger = logging.getLogger(__name__)
 
 # no "nnan" and "ninf": a strain that is not finite must be seen
 OPTIONS = {"fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
+#: Of what Python calls: other threads of Python go on meanwhile.
+ENTRY = {"nogil": True, **OPTIONS}
 _FLAGS = TextFlags(OPTIONS, False), TextFlags(OPTIONS, True)
 #: What reading a cache raises that holds something else.
 _SPOILT = OSError, EOFError, pickle.PickleError, KeyError, ValueError
@@ -67,10 +69,10 @@ def jit(function, entry=False):
     if not entry:
         return Text(function, _FLAGS)
     try:
-        return njit(cache=True, pipeline_class=Entry, **OPTIONS)(function)
+        return njit(cache=True, pipeline_class=Entry, **ENTRY)(function)
     except RuntimeError as error:  # there is no folder that can be written
         logger.info("compiled code is not kept: %s", error)
-        return njit(pipeline_class=Entry, **OPTIONS)(function)
+        return njit(pipeline_class=Entry, **ENTRY)(function)
 
 
 def address_of(function, signature, kept=True):
@@ -94,7 +96,7 @@ def compile_for(text, args):
         entry = function.compile(types)
     except _SPOILT as error:
         logger.info("what was kept of compiled code cannot be used: %s", error)
-        entry = njit(pipeline_class=Entry, **OPTIONS)(function.py_func).compile(types)
+        entry = njit(pipeline_class=Entry, **ENTRY)(function.py_func).compile(types)
 
     def run(*args):
         args = [Words(x) if hasattr(x, "by_place") else x for x in args]

@@ -876,6 +876,16 @@ class Chain:
         """True if the body is turned inside out somewhere: no deformation of a real one."""
         return False
 
+    def inverted_members(self, packs: Any, u: Array) -> Array:
+        """For each of several beams alike whether it is :meth:`inverted`, shape (members,).
+
+        Parameters
+        ----------
+        packs, u
+            Tables of all members, and their displacements, shape (members, N).
+        """
+        return np.zeros(len(u), dtype=bool)
+
 
 def apart(pack: Any, elements: slice) -> Any:
     """A pack of some elements, a slice, each with coordinates of its own.

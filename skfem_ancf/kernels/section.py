@@ -23,6 +23,8 @@ from .base import (CARRY, GIVEN, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTabl
 from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ..elements.base import ElementBeam
     from ..formulations.base import Formulation, Term
     from ..mesh import MeshBeam
@@ -450,9 +452,19 @@ class TermTables:
         u
             Displacement, shape (N,).
         """
+        return not np.all(self.upright(pack, u))
+
+    def upright(self, pack: SectionPack, u: Array) -> Any:
+        """Where det F is positive, of each sample of the shear and each element.
+
+        Parameters
+        ----------
+        pack, u
+            The tables, and the displacement, shape (N,).
+        """
         r = self._gradients(pack, u)
         rx, ry = r[self._sheared[0]], r[self._sheared[1]]
-        return not np.all(rx[:, 0] * ry[:, 1] > rx[:, 1] * ry[:, 0])
+        return rx[:, 0] * ry[:, 1] > rx[:, 1] * ry[:, 0]
 
     def shortest(self, pack: SectionPack, u: Array) -> Any:
         """Smallest stretch of the fibres along the axis, where eps_xx is sampled.
@@ -557,6 +569,25 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
         packed(constant), packed(left * nb, np.int64), packed(np.arange(2 * nb), np.int64),
         pairs, layout.terms, layout.rounds, packed(moduli), layout.mixing, layout.parts,
         layout.mixing_rounds)
+
+
+def side_by_side(pack: SectionPack, members: int, N: int) -> SectionPack:
+    """The pack of as many beams alike, for what needs table and frame only.
+
+    Parameters
+    ----------
+    pack
+        Of one, or with table and frame of them all.
+    members, N
+        How many, and the number of coordinates of each.
+    """
+    def all_of(x, axis, alike):
+        return x if x.shape[axis] in (alike, members * ne) else np.concatenate(members * [x], axis)
+
+    ne = pack.start.size
+    start = (N * np.arange(members)[:, None] + pack.start).ravel()
+    return pack._replace(start=start, table=all_of(pack.table, 0, 1),
+                         frame=all_of(pack.frame, 2, 1))
 
 
 def linearised(pack: SectionPack) -> SectionPack:
@@ -732,6 +763,23 @@ class Kernel(Chain):
 
     def inverted(self, u: Array) -> bool:
         return any(first.inverted(pack, u_e) for first, pack, u_e in self._of_firsts(u))
+
+    def inverted_members(self, packs: "Sequence[SectionPack]", u: Array) -> Array:
+        """For each of several beams alike whether it is :meth:`inverted`, shape (members,).
+
+        Parameters
+        ----------
+        packs
+            :func:`side_by_side` of each of the :attr:`packs`.
+        u
+            Displacement of the coordinates, shape (members, N).
+        """
+        found = np.zeros(len(u), dtype=bool)
+        for table, pack in zip(self.tables, packs):
+            if table in self.firsts:
+                up = np.all(table.upright(pack, u.ravel()), axis=0)
+                found |= ~np.all(up.reshape(len(u), -1), axis=1)
+        return found
 
     def _of_firsts(self, u):
         """Each of the first tables with a pack of some elements and their coordinates."""

@@ -14,8 +14,8 @@ from ..linalg import INACCURATE
 from ..own import handle_of
 from ..progress import progress_bar
 from . import stability
-from .iteration import (CONVERGED, NOT_CONVERGED, NOT_FINITE, SINGULAR, Rules, Target, Unknowns,
-                        equilibrium, room_for_iterations)
+from .iteration import (ALONE, CLOSED, CONVERGED, NOT_CONVERGED, NOT_FINITE, SINGULAR, Rules,
+                        Target, Unknowns, equilibrium, room_for_iterations)
 
 if TYPE_CHECKING:
     from ..system import System
@@ -359,7 +359,7 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record, d
                      tables.stresses, tables.stresses)
         residuals = np.zeros((max_iterations + 1, 2))
         run, equations = machine.of(equilibrium)
-        status, n = run(equations, target, rules, x, room, residuals)
+        status, n = run(equations, target, rules, x, room, residuals, ALONE)
         if status != SINGULAR or solver is not None:
             break
         solver = system  # factors with exchanges of rows, or sparse ones
@@ -393,7 +393,7 @@ def rules_of(system: System, method: str, tol: float, max_iterations: int) -> Ru
     floor = 8.0 * system.work_noise
     # the residual sums the noise of all coordinates, the work that of the strains
     return Rules(int(method == "mixed"), max_iterations, tol, floor, floor * system.noise,
-                 1e-12 * system.size, INACCURATE, 0)
+                 CLOSED * system.size, INACCURATE, 0, 2)
 
 
 _ENDS = {SINGULAR: "the tangent is singular", NOT_FINITE: "the strain is not finite",

@@ -1,0 +1,277 @@
+"""What scenes of one topology differ by: numbers, as functions of their parameters.
+
+Everything that a static solution takes of a scene is arrays, those of
+:class:`~skfem_ancf.equations.Equations` most of all. Scenes whose integers and shapes are equal
+differ by floats only. A few scenes are built; from these the floats of all others follow by
+:class:`~skfem_ancf.polynomials.Polynomial`, where that is exact to round-off.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from .kernels.law import LINEAR, TEXT
+from .kernels.section import SectionPack
+from .polynomials import Polynomial
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from .equations import Equations
+    from .readings import Reading
+    from .scene import Scene
+    from .types import Array
+
+#: Largest surplus of the numbers of an array, relative to the largest of them, that is round-off;
+#: and their largest error at scenes that were not asked.
+ROUND_OFF, EXACT = 4e-15, 1e-13
+
+
+class Unlike(Exception):
+    """Scenes that cannot be solved together; the message says why."""
+
+
+class Solved(NamedTuple):
+    """All that a static solution takes of a scene.
+
+    Attributes
+    ----------
+    equations
+        :class:`~skfem_ancf.equations.Equations`, without room for the tangent.
+    factors, before
+        Of loads, at full load and before the first correction from zero.
+    held
+        Displacements of the fixed coordinates.
+    noise
+        Square of the noise of a correction's work, and the size of the scene.
+    spread
+        See :class:`~skfem_ancf.statics.iteration.Members`.
+    start, slender
+        Of :class:`~skfem_ancf.checks.Screen`, the first as real and imaginary parts.
+    points
+        Coordinates, weights and places of the points that are read, and whether they are off the
+        axis of a cable, for each reading and beam.
+    """
+
+    equations: Equations
+    factors: Array
+    before: Array
+    held: Array
+    noise: Array
+    spread: Array
+    start: Array
+    slender: Array
+    points: tuple[Any, ...]
+
+
+class Numbers:
+    """A scene as numbers.
+
+    Parameters
+    ----------
+    scene, readings
+        The scene, and what will be read of it.
+
+    Attributes
+    ----------
+    scene, solved
+        The scene, and its :class:`Solved`.
+    same
+        What has to be equal.
+    arrays
+        Those of floats by their places.
+    vector
+        All of them, one behind the other.
+    """
+
+    def __init__(self, scene: Scene, readings: Sequence[Reading]) -> None:
+        system = scene.system
+        problem = _own(system)
+        if problem:
+            raise Unlike(problem)
+        system.require_supports()
+        tables, screen = system.machine.tables, system.screen
+        self.scene, self.located = scene, [reading.located(scene) for reading in readings]
+        self.solved = Solved(
+            tables.plain._replace(K=(), viscous=()), tables.static_factors(1.0),
+            tables.static_factors(1.0, 0.0), system.values(1.0),
+            np.array([system.work_noise**2, system.size]), np.array([system.noise]),
+            np.array([screen.start.real, screen.start.imag]), screen.slender,
+            tuple(tuple((part.dofs, part.weights, part.start, int(part.off_axis))
+                        for part in located.parts) for located in self.located))
+        self.arrays: dict[Any, Array] = {}
+        same = []
+        for place, value in _leaves(self.solved):
+            if isinstance(value, np.ndarray) and value.dtype.kind == "f":
+                self.arrays[place] = value
+                same.append((place, value.shape))
+            elif isinstance(value, np.ndarray):
+                same.append((place, value.shape, value.tobytes()))
+            else:
+                same.append((place, value))
+        self.same = same
+        self.vector = np.concatenate([x.ravel() for x in self.arrays.values()])
+
+
+def _own(system):
+    """Why a system cannot be solved together with others; empty if it can."""
+    laws = [pack.law.kind for pack in system.machine.tables.plain.body.packs
+            if isinstance(pack, SectionPack)]
+    return next((text for text, there in (
+        ("joints have multipliers", system.m), ("there are rigid bodies", system.bodies),
+        ("a load has no potential, or is one of your own",
+         not system.symmetric or system.machine.tables.own_loads),
+        ("there are obstacles", system.forces.contacts.obstacles),
+        ("force elements are of your own, or couple points far apart",
+         system.forces.own or system.forces.far),
+        ("a law is one of your own in Python", any(k not in (LINEAR, TEXT) for k in laws)),
+        ("coordinates are coupled outside of the band", system.coupled)) if there), "")
+
+
+def _leaves(x: Any, place: tuple = ()) -> Iterator[tuple[tuple, Any]]:
+    """Places and values of what is no tuple."""
+    if not isinstance(x, tuple):
+        yield place, x
+        return
+    for k, part in enumerate(x):
+        if hasattr(x, "_fields") and x._fields[k] in ("handle", "contacts"):
+            continue  # of the one scene; there are no obstacles
+        yield from _leaves(part, (*place, k))
+
+
+def _with(x: Any, arrays: dict, place: tuple = ()) -> Any:
+    """The same tuple with other arrays at some places."""
+    if not isinstance(x, tuple):
+        return arrays.get(place, x)
+    parts = [_with(part, arrays, (*place, k)) for k, part in enumerate(x)]
+    return type(x)(*parts) if hasattr(x, "_fields") else tuple(parts)
+
+
+class Family:
+    """Scenes of one topology.
+
+    Parameters
+    ----------
+    build
+        From parameters, shape (d,), to a Scene.
+    readings
+        What will be read of them.
+    low, high
+        The box of the parameters, shape (d,).
+    most
+        How many scenes may be built.
+
+    Attributes
+    ----------
+    one
+        The :class:`Numbers` of the first one that was built.
+    asked
+        How many were built.
+    scale, which
+        Number i of a scene is ``scale[i]`` times the function ``which[i]`` of its parameters, of
+        the arrays that are not the same for all, one behind the other.
+
+    Raises
+    ------
+    Unlike
+        If they are not, or their numbers are no polynomials of the parameters.
+    """
+
+    def __init__(self, build: Callable[[Array], Scene], readings: Sequence[Reading], low: Array,
+                 high: Array, most: int) -> None:
+        self._build, self._readings = build, readings
+        self.one: Numbers | None = None
+        polynomial = Polynomial(self.numbers, low, high, self._size, most)
+        if polynomial.rest > 1.0:
+            raise Unlike(f"{most} scenes did not suffice to see how the numbers of all depend on "
+                         "the parameters")
+        self.asked, self._polynomial = polynomial.asked, polynomial
+        self._sort(polynomial.surplus)
+
+    def numbers(self, x: Array) -> Array:
+        """The vector of :class:`Numbers` for parameters (d,); raises Unlike."""
+        try:
+            found = Numbers(self._build(x), self._readings)
+        except Unlike:
+            raise
+        except Exception as error:  # of the caller's function, which may raise anything
+            raise Unlike(f"build, or what is read, failed for {x}: {error!r}") from error
+        if self.one is None:
+            self.one = found
+            sizes = [x.size for x in found.arrays.values()]
+            self._ends = np.cumsum([0, *sizes])
+            self._filled = np.flatnonzero(sizes)
+        elif found.same != self.one.same:
+            raise Unlike("topologies differ")
+        return found.vector
+
+    def _largest(self, x):
+        """The largest of each array that has numbers."""
+        return np.maximum.reduceat(np.abs(x), self._ends[self._filled])
+
+    def _size(self, surplus, largest):
+        top = self._largest(largest)
+        return float(np.max(self._largest(surplus) / (ROUND_OFF * top + 1e-300)))
+
+    def _sort(self, surplus):
+        """Find the different functions among the numbers."""
+        sizes = np.diff(self._ends)[self._filled]
+        noise = np.repeat(self._largest(np.max(np.abs(surplus), axis=0)), sizes) * ROUND_OFF
+        surplus = surplus.copy()
+        surplus[1:][np.abs(surplus[1:]) <= noise] = 0.0
+        varies = np.add.reduceat(np.any(surplus[1:] != 0.0, axis=0), self._ends[self._filled]) > 0
+        places = [list(self.one.arrays)[k] for k in self._filled]
+        self.places = [place for place, there in zip(places, varies) if there]
+        columns = surplus[:, np.repeat(varies, sizes)]
+        ends = np.cumsum([0, *sizes[varies]])
+        self._slices = {place: slice(a, b) for place, a, b in zip(self.places, ends, ends[1:])}
+        top = np.argmax(np.abs(columns), axis=0)
+        self.scale = columns[top, np.arange(columns.shape[1])]
+        unit = columns / np.where(self.scale == 0.0, 1.0, self.scale)
+        constant = ~np.any(columns[1:] != 0.0, axis=0)
+        unit[:, constant] = np.eye(len(columns))[:, :1]
+        keys = np.ascontiguousarray(unit.round(9).T + 0.0).view(f"V{8 * len(columns)}").ravel()
+        _, first, which = np.unique(keys, return_index=True, return_inverse=True)
+        which = which.ravel()
+        apart = np.flatnonzero(np.any(np.abs(self.scale * (unit[:, first[which]] - unit))
+                                      > noise[np.repeat(varies, sizes)], axis=0))
+        which[apart] = len(first) + np.arange(len(apart))
+        self.which, self._functions = which.astype(np.int64), unit[:, np.append(first, apart)]
+
+    def values(self, x: Array) -> Array:
+        """The functions at parameters (n, d), shape (n, functions)."""
+        return np.ascontiguousarray(self._polynomial.basis(x) @ self._functions)
+
+    def solved(self, numbers: Array) -> Solved:
+        """A :class:`Solved` whose arrays are views of numbers."""
+        return _with(self.one.solved, {
+            place: numbers[s].reshape(self.one.arrays[place].shape)
+            for place, s in self._slices.items()})
+
+    def array(self, place: tuple, values: Array) -> Array | None:
+        """An array of several scenes, one row for each; None if it is the same for all.
+
+        Parameters
+        ----------
+        place
+            Where it is in :class:`Solved`.
+        values
+            What :meth:`values` has given.
+        """
+        s = self._slices.get(place)
+        if s is None:
+            return None
+        return (self.scale[s] * values[:, self.which[s]]).reshape(
+            -1, *self.one.arrays[place].shape)
+
+    def agrees(self, x: Array) -> bool:
+        """True if the numbers of a scene of parameters (d,), which is built, are these."""
+        found, mine = self.numbers(x), self.one.vector.copy()
+        at = dict(zip(self.one.arrays, zip(self._ends, self._ends[1:])))
+        values = self.values(x[None])[0]
+        for place, s in self._slices.items():
+            mine[slice(*at[place])] = self.scale[s] * values[self.which[s]]
+        largest = self._largest(np.maximum(np.abs(found), np.abs(mine)))
+        return bool(np.all(self._largest(found - mine) <= EXACT * largest + 1e-300))

@@ -1,0 +1,372 @@
+"""Members of a sweep that are scenes of one topology, solved together in compiled code."""
+
+from __future__ import annotations
+
+import logging
+import os
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from queue import SimpleQueue
+from threading import Lock
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import compiled
+from .alike import Family, Unlike
+from .kernels.section import SectionPack, side_by_side
+from .linalg import BandMatrix
+from .polynomials import Polynomial
+from .statics.iteration import (CONVERGED, Members, Target, Unknowns, equilibrium,
+                                room_for_iterations)
+from .statics.newton import rules_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from .readings import Reading, Readings
+    from .scene import Scene
+    from .types import Array
+
+logger = logging.getLogger(__name__)
+
+#: Members of a call of compiled code.
+CHUNK = 128
+#: A family has so many members at least, and for each scene that is built to learn of it.
+LEAST, EACH = 16, 4
+#: Members that are solved alone, too, and how far these solutions may differ, relative.
+TRIED, NEAR = 2, 1e-6
+#: Error of a start that is given, relative; how large it may be for a start to be given at all,
+#: and members for each one that is solved to find starts.
+START, USEFUL, STARTS = 1e-10, 1e-2, 16
+#: Method, tolerance and most iterations of ``solve_static``.
+OPTIONS = "mixed", 1e-8, 30
+#: What is compiled in one thread at a time.
+_LOCK = Lock()
+
+
+class Lane:
+    """The arrays in which a thread solves members.
+
+    Parameters
+    ----------
+    family
+        A :class:`~skfem_ancf.alike.Family`.
+    """
+
+    def __init__(self, family: Family) -> None:
+        one = family.one
+        system = one.scene.system
+        self.family, self.numbers = family, np.empty(len(family.scale))
+        solved = family.solved(self.numbers)
+        band = BandMatrix(system.N, system.bandwidth, True).band
+        equations = solved.equations._replace(K=band, viscous=solved.equations.body)
+        tables = system.machine.tables.with_equations(equations)
+        self._machine = system.machine.with_tables(tables)
+        self._solved, N, none = solved, system.N, np.zeros(0)
+        self._target = Target(solved.factors, solved.before, 1.0, 1.0, none, none, np.zeros(N),
+                              np.zeros(len(solved.held)))
+        self._rules = rules_of(system, *OPTIONS)
+        self._room = room_for_iterations(equations, 0)
+        self._x = Unknowns(np.empty(N), none, np.empty(N), tables.stresses, tables.stresses)
+        self._record = np.empty((OPTIONS[-1] + 1, 2))
+
+    def solve(self, values: Array, u: Array, given: bool) -> Array:
+        """Solve members.
+
+        Parameters
+        ----------
+        values
+            What the family says of their parameters, shape (n, functions).
+        u
+            Where they start, shape (n, N); becomes their solutions.
+        given
+            False for a start from zero.
+
+        Returns
+        -------
+        ndarray
+            As ``found`` of :class:`~skfem_ancf.statics.iteration.Members`.
+        """
+        solved, found = self._solved, np.zeros((len(u), 3), dtype=np.int64)
+        found[:, 2] = given
+        members = Members(self.numbers, self.family.scale, self.family.which, values, solved.noise,
+                          solved.held, solved.factors, solved.spread, u, found)
+        args = self._target, self._rules, self._x, self._room, self._record, members
+        with np.errstate(all="ignore"):  # what overflows is seen in the residual
+            with _LOCK:
+                run, equations = self._machine.of(equilibrium)
+                if equilibrium.__name__ not in compiled.LOADED:
+                    run(equations, *args)
+                    return found
+            run(equations, *args)
+        return found
+
+
+class Batch:
+    """Members of one topology.
+
+    Parameters
+    ----------
+    build
+        From parameters, shape (d,), to a Scene.
+    readings
+        What is read of them.
+    x
+        Their parameters, shape (n, d), all of which differ between some.
+
+    Raises
+    ------
+    Unlike
+        If they cannot be solved together.
+    """
+
+    def __init__(self, build: Callable[[Array], Scene], readings: Sequence[Reading], x: Array
+                 ) -> None:
+        if len(x) < LEAST:
+            raise Unlike(f"{len(x)} members are fewer than {LEAST}")
+        low, high = np.min(x, axis=0), np.max(x, axis=0)
+        self.x, self._readings = x, readings
+        self.family = Family(build, readings, low, high, len(x) // EACH)
+        tried = np.random.default_rng(0).choice(len(x), TRIED, replace=False)
+        for k in tried:
+            if not self.family.agrees(x[k]):
+                raise Unlike("the numbers of the scenes are no polynomials of the parameters")
+        self.lane = Lane(self.family)
+        self.start: Polynomial | None = None
+        if len(x) >= STARTS * LEAST:
+            self._find_starts(build, low, high, len(x) // STARTS)
+        self._compare(build, tried)
+
+    def _find_starts(self, build, low, high, most):
+        """Solutions as polynomials of the parameters, where they are such, nearly."""
+        def solution(x):
+            u = np.zeros((1, self.family.one.scene.system.N))
+            found = self.lane.solve(self.family.values(x[None]), u, False)
+            return u[0] if found[0, 0] == CONVERGED else build(x).solve_static().u
+
+        try:
+            start = Polynomial(solution, low, high, lambda surplus, largest: float(
+                np.max(np.abs(surplus)) / (START * np.max(largest) + 1e-300)), most)
+        except Exception:  # of the caller's function, or a scene has no equilibrium
+            logger.debug("no polynomial of solutions", exc_info=True)
+            return
+        if start.rest * START <= USEFUL:
+            self.start = start
+
+    def _compare(self, build, tried):
+        """Solve some alone: by load steps, from zero."""
+        u, found, good = self.solve(self.lane, tried)
+        for k, mine in zip(tried[good], u[good]):
+            try:
+                its = build(self.x[k]).solve_static().u
+            except Exception:  # that member will fail alone, and say why
+                continue
+            if np.max(np.abs(its - mine)) > NEAR * np.max(np.abs(its)):
+                raise Unlike("a member that was solved alone has another equilibrium")
+
+    def solve(self, lane: Lane, which: Array) -> tuple[Array, Array, Array]:
+        """Solve members.
+
+        Parameters
+        ----------
+        lane
+            The arrays of this thread.
+        which
+            Numbers of the members, shape (k,).
+
+        Returns
+        -------
+        u, found, good
+            Displacements (k, N); status, linear systems and start (k, 3); which are solved: (k,).
+        """
+        x = self.x[which]
+        values = self.family.values(x)
+        start = self.start
+        u = (np.zeros((len(x), self.family.one.scene.system.N)) if start is None else
+             np.ascontiguousarray(start(x)))
+        found = lane.solve(values, u, start is not None)
+        good = found[:, 0] == CONVERGED
+        u[~good] = 0.0
+        return u, found, good & self._sound(u, values)
+
+    def _sound(self, u, values):
+        """Which are not turned inside out, and in the range of law and mesh; shape (k,)."""
+        family, solved = self.family, self.family.one.solved
+        system, places = family.one.scene.system, _Places(family, values)
+        start = places("start")
+        start = None if start is None else start[:, 0] + 1j * start[:, 1]
+        good = system.screen.passes(u, start, places("slender"))
+        first, packs = 0, solved.equations.body.packs
+        for beam, s in zip(system.beams, system.slices):
+            last, n = first + len(beam.kernel.packs), s.stop - s.start
+            tables = [places.pack(k, pack, len(u), n) for k, pack in
+                      enumerate(packs[first:last], first) if isinstance(pack, SectionPack)]
+            good &= ~beam.kernel.inverted_members(tables, u[:, s])
+            first = last
+        return good
+
+    def read(self, u: Array, which: Array) -> dict[str, Array]:
+        """What is read of solutions: from name to an array, one row for each.
+
+        Parameters
+        ----------
+        u, which
+            Displacements (k, N), and the numbers of the members.
+        """
+        family, out = self.family, {}
+        places = _Places(family, self.family.values(self.x[which]) if family.places else None)
+        for k, (item, located) in enumerate(zip(self._readings, family.one.located)):
+            values = []
+            for j, part in enumerate(located.parts):
+                weights, start = (places("points", k, j, m) for m in (1, 2))
+                moved = part.displacement(u) if weights is None else np.sum(
+                    weights[:, :, None] * u[:, part.dofs], axis=1)
+                if item.what == "position":
+                    moved = moved + (part.start if start is None else start)
+                values.append(moved)
+            out[item.name] = located.gather(values)
+        return out
+
+
+class _Places:
+    """Arrays of some members by their names."""
+
+    def __init__(self, family, values):
+        self.family, self.values = family, values
+
+    def __call__(self, name, *more):
+        place = self.family.one.solved._fields.index(name), *more
+        return self.family.array(place, self.values)
+
+    def pack(self, k, pack, members, N):
+        """The pack number k of members side by side."""
+        solved, changed = self.family.one.solved, {}
+        at = solved._fields.index("equations"), solved.equations._fields.index("body"), 0, k
+        for name, axis in (("table", 0), ("frame", 2)):
+            x = self.family.array((*at, pack._fields.index(name)), self.values)
+            if x is not None:
+                count = pack.start.size // x.shape[1 + axis]
+                x = np.moveaxis(x, 1 + axis, 1)  # (members, 1 or elements, ...)
+                x = np.repeat(x.reshape(-1, *x.shape[2:]), count, axis=0)
+                changed[name] = np.ascontiguousarray(np.moveaxis(x, 0, axis))
+        return side_by_side(pack._replace(**changed), members, N)
+
+
+def threads_of(workers: int | None) -> int:
+    """How many threads solve: as many as are asked for, or as there are processors."""
+    if workers is not None:
+        return workers
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:
+        return os.cpu_count() or 1
+
+
+def families(members: list[dict[str, Any]], places: Sequence[int]
+             ) -> Iterator[tuple[list[int], list[str], Array]]:
+    """Members that may be of one topology: equal but for floats.
+
+    Parameters
+    ----------
+    members, places
+        Parameters of all, and which of them are asked for.
+
+    Yields
+    ------
+    places, names, x
+        Some of the places, names of floats that differ among them, and their values, (n, d).
+    """
+    groups: dict[Any, list[int]] = {}
+    for k in places:
+        key = tuple((name, None if isinstance(value, float) else _key(value))
+                    for name, value in members[k].items())
+        groups.setdefault(key, []).append(k)
+    for found in groups.values():
+        names = [name for name, value in members[found[0]].items() if isinstance(value, float)
+                 and any(members[k][name] != value for k in found)]
+        yield found, names, np.array([[members[k][name] for name in names] for k in found],
+                                     dtype=float).reshape(len(found), len(names))
+
+
+def _key(value):
+    try:
+        hash(value)
+    except TypeError:
+        return np.asarray(value).tobytes() if isinstance(value, np.ndarray) else repr(value)
+    return value
+
+
+def solve_together(build: Callable[..., Scene], readings: Readings, members: list[dict[str, Any]],
+                   places: Sequence[int], threads: int, said: list[str]
+                   ) -> Iterator[tuple[list[int], list[dict[str, Array]]]]:
+    """Solve members of one topology together; yields their places and what was read.
+
+    Parameters
+    ----------
+    build, readings
+        From parameters to a scene, and what is read of it.
+    members, places
+        Parameters of all, and which are computed.
+    threads
+        How many threads.
+    said
+        Lines are added to it: what was done, and why not all is together.
+    """
+    if not readings.at_points:
+        said.append("each member was solved alone: what is read is a function of the State")
+        return
+    for found, names, x in families(members, places):
+        def build_at(values, first=members[found[0]], names=names):
+            return build(**{**first, **dict(zip(names, map(float, values)))})
+
+        try:
+            if not np.all(np.isfinite(x)):
+                raise Unlike("a parameter is not finite")
+            batch = Batch(build_at, readings.items, x)
+        except Unlike as reason:
+            said.append(f"{len(found)} members were solved alone: {reason}")
+            logger.info(said[-1])
+            continue
+        counts = np.zeros(4, dtype=int)
+        for which, values, good, iterations in _spread(batch, threads):
+            names_of = list(values)
+            rows = [dict(zip(names_of, row)) for row in zip(*values.values())]
+            counts += len(good), good.sum(), *iterations
+            yield [found[k] for k in which[good]], rows
+        said.append(f"{counts[1]} of {counts[0]} members were solved together: "
+                    f"{batch.family.asked} scenes were built to know all, {counts[2]} linear "
+                    f"systems, {counts[3]} from zero"
+                    + (f", the others from a polynomial of {batch.start.asked} solutions"
+                       if batch.start is not None else ""))
+        logger.info(said[-1])
+
+
+def _spread(batch, threads):
+    """Chunks of members in threads; which, what is read of the good ones, which those are, and
+    how many linear systems were solved and how many members from zero.
+    """
+    n, lanes = len(batch.x), SimpleQueue()
+    threads = max(1, min(threads, n // CHUNK))
+    for lane in [batch.lane, *(Lane(batch.family) for _ in range(threads - 1))]:
+        lanes.put(lane)
+
+    def solve(which):
+        lane = lanes.get()
+        try:
+            u, found, good = batch.solve(lane, which)
+        finally:
+            lanes.put(lane)
+        values = batch.read(u[good], which[good])
+        return which, values, good, (found[:, 1].sum(), np.sum(found[:, 2] != 1))
+
+    chunks = np.array_split(np.arange(n), -(-n // CHUNK))
+    with ThreadPoolExecutor(threads) as pool:
+        flying = {pool.submit(solve, chunk) for chunk in chunks}
+        try:
+            while flying:
+                done, flying = wait(flying, return_when=FIRST_COMPLETED)
+                for future in done:
+                    yield future.result()
+        finally:
+            for future in flying:
+                future.cancel()
