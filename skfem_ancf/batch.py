@@ -262,42 +262,45 @@ def threads_of(workers: int | None) -> int:
         return os.cpu_count() or 1
 
 
-def families(members: list[dict[str, Any]], places: Sequence[int]
-             ) -> Iterator[tuple[list[int], list[str], Array]]:
+def families(columns: dict[str, Array], places: Sequence[int]
+             ) -> Iterator[tuple[Array, list[str], Array]]:
     """Members that may be of one topology: equal but for floats.
 
     Parameters
     ----------
-    members, places
-        Parameters of all, and which of them are asked for.
+    columns
+        From the name of a parameter to an array, one row for each member.
+    places
+        Which of them are asked for.
 
     Yields
     ------
     places, names, x
         Some of the places, names of floats that differ among them, and their values, (n, d).
     """
-    groups: dict[Any, list[int]] = {}
-    for k in places:
-        key = tuple((name, None if isinstance(value, float) else _key(value))
-                    for name, value in members[k].items())
-        groups.setdefault(key, []).append(k)
+    at = np.array(places)
+    floats = [name for name, x in columns.items() if x.dtype.kind == "f" and x.ndim == 1]
+    others = [x for name, x in columns.items() if name not in floats]
+    groups: dict[Any, list[int]] = {} if others else {None: np.arange(len(at))}
+    for k, place in enumerate(places) if others else ():
+        groups.setdefault(tuple(_key(x[place]) for x in others), []).append(k)
     for found in groups.values():
-        names = [name for name, value in members[found[0]].items() if isinstance(value, float)
-                 and any(members[k][name] != value for k in found)]
-        yield found, names, np.array([[members[k][name] for name in names] for k in found],
-                                     dtype=float).reshape(len(found), len(names))
+        mine = at[found]
+        names = [name for name in floats if np.any(columns[name][mine] != columns[name][mine[0]])]
+        yield mine, names, np.array([columns[name][mine] for name in names]).reshape(
+            len(names), len(mine)).T
 
 
 def _key(value):
     try:
         hash(value)
     except TypeError:
-        return np.asarray(value).tobytes() if isinstance(value, np.ndarray) else repr(value)
+        return value.tobytes() if isinstance(value, np.ndarray) else repr(value)
     return value
 
 
 def solve_together(build: Callable[..., Scene], readings: Readings, members: list[dict[str, Any]],
-                   places: Sequence[int], threads: int, said: list[str]
+                   columns: dict[str, Array], places: Sequence[int], threads: int, said: list[str]
                    ) -> Iterator[tuple[list[int], list[dict[str, Array]]]]:
     """Solve members of one topology together; yields their places and what was read.
 
@@ -305,8 +308,8 @@ def solve_together(build: Callable[..., Scene], readings: Readings, members: lis
     ----------
     build, readings
         From parameters to a scene, and what is read of it.
-    members, places
-        Parameters of all, and which are computed.
+    members, columns, places
+        Parameters of all, as dicts and as arrays by name, and which are computed.
     threads
         How many threads.
     said
@@ -315,7 +318,7 @@ def solve_together(build: Callable[..., Scene], readings: Readings, members: lis
     if not readings.at_points:
         said.append("each member was solved alone: what is read is a function of the State")
         return
-    for found, names, x in families(members, places):
+    for found, names, x in families(columns, places):
         def build_at(values, first=members[found[0]], names=names):
             return build(**{**first, **dict(zip(names, map(float, values)))})
 
@@ -329,10 +332,9 @@ def solve_together(build: Callable[..., Scene], readings: Readings, members: lis
             continue
         counts = np.zeros(4, dtype=int)
         for which, values, good, iterations in _spread(batch, threads):
-            names_of = list(values)
-            rows = [dict(zip(names_of, row)) for row in zip(*values.values())]
+            rows = [dict(zip(values, row)) for row in zip(*values.values())]
             counts += len(good), good.sum(), *iterations
-            yield [found[k] for k in which[good]], rows
+            yield found[which[good]].tolist(), rows
         said.append(f"{counts[1]} of {counts[0]} members were solved together: "
                     f"{batch.family.asked} scenes were built to know all, {counts[2]} linear "
                     f"systems, {counts[3]} from zero"

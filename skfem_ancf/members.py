@@ -228,7 +228,8 @@ def _alike(found):
     shapes = {name: value.shape for name, value in first.items()}
     out = []
     for one in found:
-        if isinstance(one, dict) and {k: v.shape for k, v in one.items()} != shapes:
+        if isinstance(one, dict) and (one.keys() != shapes.keys() or any(
+                one[name].shape != shape for name, shape in shapes.items())):
             one = (f"CallbackError: measure returned {_listed(one)}, of the first member "
                    f"{_listed(first)}: names and shapes must be those of all members")
         out.append(one)

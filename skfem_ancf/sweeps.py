@@ -135,8 +135,8 @@ def _source(task, members, places, workers, client, record):
         return
     if isinstance(task.measure, Readings):
         left = set(places)
-        for chunk, found in solve_together(task.build, task.measure, members, places,
-                                           threads_of(workers), record.said):
+        for chunk, found in solve_together(task.build, task.measure, members, record.columns,
+                                           places, threads_of(workers), record.said):
             left -= set(chunk)
             yield chunk, found
         places = sorted(left)

@@ -132,10 +132,13 @@ class Members(NamedTuple):
 
 @by_place
 class Work(NamedTuple):
-    """Work arrays: residual, correction, 1 / diagonal, loads, joints' opening and correction."""
+    """Work arrays: residual, correction, displacement before it, 1 / diagonal, loads, joints'
+    opening and correction.
+    """
 
     R: F1
     du: F1
+    before: F1
     scale: F1
     load: F1
     push: F1
@@ -155,8 +158,8 @@ def room_for_iterations(e: Equations, m: int) -> Work:
         Number of multipliers.
     """
     N = e.free.size
-    R, du, scale, load, push = np.empty((5, N))
-    return Work(R, du, scale, load, push, np.zeros(m), np.zeros(m),
+    R, du, before, scale, load, push = np.empty((6, N))
+    return Work(R, du, before, scale, load, push, np.zeros(m), np.zeros(m),
                 new_factors(e.border, e.K, m, N))
 
 
@@ -282,8 +285,7 @@ def iterate(e, target, rules, x, w, record):
         if e.forces.contacts.number > 0 and not moving:
             _hold_back(e, target.at, x, w)
         moving = False
-        if rules.mixed > 0:
-            body_carry(e.body, x.u, w.du, x.stresses, x.carried)
+        copy(x.u, w.before)
         for i in lanes(N):
             x.u[i] += w.du[i]
         for i in lanes(m):
@@ -308,7 +310,10 @@ def settled(work, reference, rules):
 @source
 def _tangent(e, target, rules, x, w, k):
     """The internal force, the tangent, and 1 / its diagonal."""
-    body_tangent(e.body, x.u, x.force, x.carried, rules.mixed > 0 and k > 0, x.stresses, e.K)
+    mixed = rules.mixed > 0 and k > 0
+    if mixed:
+        body_carry(e.body, w.before, w.du, x.stresses, x.carried)
+    body_tangent(e.body, x.u, x.force, x.carried, mixed, x.stresses, e.K)
     add_elastic_force(e.forces, target.at, 0.0, x.u, x.u, x.force)
     factors, t = (target.factors, np.nan) if k > 0 else (target.before, np.inf)
     add_load_stiffness(e.loads, factors, t, target.scale, x.u, e.K)
