@@ -8,12 +8,10 @@ differ by floats only. A few scenes are built; from these the floats of all othe
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
-from .kernels.law import LINEAR, TEXT
-from .kernels.section import SectionPack
 from .polynomials import Polynomial
 
 if TYPE_CHECKING:
@@ -26,7 +24,9 @@ if TYPE_CHECKING:
 
 #: Largest surplus of the numbers of an array, relative to the largest of them, that is round-off;
 #: and their largest error at scenes that were not asked.
-ROUND_OFF, EXACT = 4e-15, 1e-13
+ROUND_OFF, EXACT = 2e-14, 1e-12
+#: Arrays whose round-off is that of another one, of the same tuple.
+BESIDE = {"held_skew": "held"}
 
 
 class Unlike(Exception):
@@ -88,21 +88,20 @@ class Numbers:
 
     def __init__(self, scene: Scene, readings: Sequence[Reading]) -> None:
         system = scene.system
-        problem = _own(system)
-        if problem:
-            raise Unlike(problem)
+        if system.machine.tables.alone:
+            raise Unlike(system.machine.tables.alone)
         system.require_supports()
         tables, screen = system.machine.tables, system.screen
         self.scene, self.located = scene, [reading.located(scene) for reading in readings]
         self.solved = Solved(
-            tables.plain._replace(K=(), viscous=()), tables.static_factors(1.0),
+            tables.plain._replace(K=cast(Any, ()), viscous=()), tables.static_factors(1.0),
             tables.static_factors(1.0, 0.0), system.values(1.0),
             np.array([system.work_noise**2, system.size]), np.array([system.noise]),
             np.array([screen.start.real, screen.start.imag]), screen.slender,
             tuple(tuple((part.dofs, part.weights, part.start, int(part.off_axis))
                         for part in located.parts) for located in self.located))
         self.arrays: dict[Any, Array] = {}
-        same = []
+        same: list[tuple[Any, ...]] = []
         for place, value in _leaves(self.solved):
             if isinstance(value, np.ndarray) and value.dtype.kind == "f":
                 self.arrays[place] = value
@@ -115,21 +114,6 @@ class Numbers:
         self.vector = np.concatenate([x.ravel() for x in self.arrays.values()])
 
 
-def _own(system):
-    """Why a system cannot be solved together with others; empty if it can."""
-    laws = [pack.law.kind for pack in system.machine.tables.plain.body.packs
-            if isinstance(pack, SectionPack)]
-    return next((text for text, there in (
-        ("joints have multipliers", system.m), ("there are rigid bodies", system.bodies),
-        ("a load has no potential, or is one of your own",
-         not system.symmetric or system.machine.tables.own_loads),
-        ("there are obstacles", system.forces.contacts.obstacles),
-        ("force elements are of your own, or couple points far apart",
-         system.forces.own or system.forces.far),
-        ("a law is one of your own in Python", any(k not in (LINEAR, TEXT) for k in laws)),
-        ("coordinates are coupled outside of the band", system.coupled)) if there), "")
-
-
 def _leaves(x: Any, place: tuple = ()) -> Iterator[tuple[tuple, Any]]:
     """Places and values of what is no tuple."""
     if not isinstance(x, tuple):
@@ -139,6 +123,21 @@ def _leaves(x: Any, place: tuple = ()) -> Iterator[tuple[tuple, Any]]:
         if hasattr(x, "_fields") and x._fields[k] in ("handle", "contacts"):
             continue  # of the one scene; there are no obstacles
         yield from _leaves(part, (*place, k))
+
+
+def _beside(solved, places, filled):
+    """For each array that has numbers the one whose size its round-off has."""
+    places = [places[k] for k in filled]
+    out = np.arange(len(places))
+    for k, place in enumerate(places):
+        parent = solved
+        for step in place[:-1]:
+            parent = parent[step]
+        names = getattr(parent, "_fields", ())
+        other = BESIDE.get(names[place[-1]]) if names else None
+        if other is not None:
+            out[k] = places.index((*place[:-1], names.index(other)))
+    return out
 
 
 def _with(x: Any, arrays: dict, place: tuple = ()) -> Any:
@@ -182,7 +181,7 @@ class Family:
     def __init__(self, build: Callable[[Array], Scene], readings: Sequence[Reading], low: Array,
                  high: Array, most: int) -> None:
         self._build, self._readings = build, readings
-        self.one: Numbers | None = None
+        self.one: Any = None
         polynomial = Polynomial(self.numbers, low, high, self._size, most)
         if polynomial.rest > 1.0:
             raise Unlike(f"{most} scenes did not suffice to see how the numbers of all depend on "
@@ -192,6 +191,9 @@ class Family:
 
     def numbers(self, x: Array) -> Array:
         """The vector of :class:`Numbers` for parameters (d,); raises Unlike."""
+        return self._numbers(x).vector
+
+    def _numbers(self, x):
         try:
             found = Numbers(self._build(x), self._readings)
         except Unlike:
@@ -203,22 +205,27 @@ class Family:
             sizes = [x.size for x in found.arrays.values()]
             self._ends = np.cumsum([0, *sizes])
             self._filled = np.flatnonzero(sizes)
+            self._beside = _beside(found.solved, list(found.arrays), self._filled)
         elif found.same != self.one.same:
             raise Unlike("topologies differ")
-        return found.vector
+        return found
 
     def _largest(self, x):
         """The largest of each array that has numbers."""
         return np.maximum.reduceat(np.abs(x), self._ends[self._filled])
 
+    def _scales(self, x):
+        """What the round-off of each of these arrays is compared with."""
+        largest = self._largest(x)
+        return np.maximum(largest, largest[self._beside])
+
     def _size(self, surplus, largest):
-        top = self._largest(largest)
-        return float(np.max(self._largest(surplus) / (ROUND_OFF * top + 1e-300)))
+        return float(np.max(self._largest(surplus) / (ROUND_OFF * self._scales(largest) + 1e-300)))
 
     def _sort(self, surplus):
         """Find the different functions among the numbers."""
         sizes = np.diff(self._ends)[self._filled]
-        noise = np.repeat(self._largest(np.max(np.abs(surplus), axis=0)), sizes) * ROUND_OFF
+        noise = np.repeat(self._scales(np.max(np.abs(surplus), axis=0)), sizes) * ROUND_OFF
         surplus = surplus.copy()
         surplus[1:][np.abs(surplus[1:]) <= noise] = 0.0
         varies = np.add.reduceat(np.any(surplus[1:] != 0.0, axis=0), self._ends[self._filled]) > 0
@@ -258,7 +265,7 @@ class Family:
         place
             Where it is in :class:`Solved`.
         values
-            What :meth:`values` has given.
+            What :meth:`values` has given, shape (n, functions).
         """
         s = self._slices.get(place)
         if s is None:
@@ -266,12 +273,14 @@ class Family:
         return (self.scale[s] * values[:, self.which[s]]).reshape(
             -1, *self.one.arrays[place].shape)
 
-    def agrees(self, x: Array) -> bool:
-        """True if the numbers of a scene of parameters (d,), which is built, are these."""
-        found, mine = self.numbers(x), self.one.vector.copy()
+    def tried(self, x: Array) -> Scene:
+        """A scene of parameters (d,); raises Unlike if its numbers are others than these."""
+        found, mine = self._numbers(x), self.one.vector.copy()
         at = dict(zip(self.one.arrays, zip(self._ends, self._ends[1:])))
         values = self.values(x[None])[0]
         for place, s in self._slices.items():
             mine[slice(*at[place])] = self.scale[s] * values[self.which[s]]
-        largest = self._largest(np.maximum(np.abs(found), np.abs(mine)))
-        return bool(np.all(self._largest(found - mine) <= EXACT * largest + 1e-300))
+        largest = self._scales(np.maximum(np.abs(found.vector), np.abs(mine)))
+        if np.any(self._largest(found.vector - mine) > EXACT * largest + 1e-300):
+            raise Unlike("the numbers of the scenes are no polynomials of the parameters")
+        return found.scene

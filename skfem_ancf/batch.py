@@ -33,13 +33,17 @@ logger = logging.getLogger(__name__)
 CHUNK = 128
 #: A family has so many members at least, and for each scene that is built to learn of it.
 LEAST, EACH = 16, 4
-#: Members that are solved alone, too, and how far these solutions may differ, relative.
-TRIED, NEAR = 2, 1e-6
-#: Error of a start that is given, relative; how large it may be for a start to be given at all,
-#: and members for each one that is solved to find starts.
-START, USEFUL, STARTS = 1e-10, 1e-2, 16
+#: Members that are built and solved alone, too: at least, and for each so many one; and how far
+#: these solutions may differ, relative.
+TRIED, OF, NEAR = 2, 2500, 1e-6
+#: Error of a start that is given, relative, and how large it may be for a start to be given at
+#: all; members for each one that is solved to find starts, and for each that is solved from zero,
+#: too, to see whether a start leads to what zero leads to.
+START, USEFUL, STARTS, CHECKED = 1e-10, 1e-2, 16, 256
 #: Method, tolerance and most iterations of ``solve_static``.
 OPTIONS = "mixed", 1e-8, 30
+#: Members that are solved alone since they may be out of the range of law or mesh, about.
+WARNED = 4
 #: What is compiled in one thread at a time.
 _LOCK = Lock()
 
@@ -127,21 +131,18 @@ class Batch:
         low, high = np.min(x, axis=0), np.max(x, axis=0)
         self.x, self._readings = x, readings
         self.family = Family(build, readings, low, high, len(x) // EACH)
-        tried = np.random.default_rng(0).choice(len(x), TRIED, replace=False)
-        for k in tried:
-            if not self.family.agrees(x[k]):
-                raise Unlike("the numbers of the scenes are no polynomials of the parameters")
+        tried = np.random.default_rng(0).choice(len(x), max(TRIED, len(x) // OF), replace=False)
+        scenes = [self.family.tried(x[k]) for k in tried]
         self.lane = Lane(self.family)
         self.start: Polynomial | None = None
         if len(x) >= STARTS * LEAST:
             self._find_starts(build, low, high, len(x) // STARTS)
-        self._compare(build, tried)
+        self._compare(tried, scenes)
 
     def _find_starts(self, build, low, high, most):
         """Solutions as polynomials of the parameters, where they are such, nearly."""
         def solution(x):
-            u = np.zeros((1, self.family.one.scene.system.N))
-            found = self.lane.solve(self.family.values(x[None]), u, False)
+            u, found = self._from_zero(self.lane, self.family.values(x[None]))
             return u[0] if found[0, 0] == CONVERGED else build(x).solve_static().u
 
         try:
@@ -150,21 +151,31 @@ class Batch:
         except Exception:  # of the caller's function, or a scene has no equilibrium
             logger.debug("no polynomial of solutions", exc_info=True)
             return
-        if start.rest * START <= USEFUL:
-            self.start = start
+        if start.rest * START > USEFUL:
+            return
+        self.start = start
+        some = np.random.default_rng(1).choice(len(self.x), max(LEAST // 2, len(self.x) // CHECKED))
+        u, _, good, _ = self.solve(self.lane, some)
+        known, found = self._from_zero(self.lane, self.family.values(self.x[some]))
+        both = good & (found[:, 0] == CONVERGED)
+        if np.any(_apart(u[both], known[both]) > NEAR):
+            self.start = None  # another branch
 
-    def _compare(self, build, tried):
+    def _compare(self, tried, scenes):
         """Solve some alone: by load steps, from zero."""
-        u, found, good = self.solve(self.lane, tried)
-        for k, mine in zip(tried[good], u[good]):
-            try:
-                its = build(self.x[k]).solve_static().u
-            except Exception:  # that member will fail alone, and say why
+        u, _, good, _ = self.solve(self.lane, tried)
+        for scene, mine, there in zip(scenes, u, good):
+            if not there:
                 continue
-            if np.max(np.abs(its - mine)) > NEAR * np.max(np.abs(its)):
+            try:
+                its = scene.solve_static().u
+            except Exception:  # that member will fail alone, and say why
+                logger.debug("a member has no solution alone", exc_info=True)
+                continue
+            if _apart(mine, its) > NEAR:
                 raise Unlike("a member that was solved alone has another equilibrium")
 
-    def solve(self, lane: Lane, which: Array) -> tuple[Array, Array, Array]:
+    def solve(self, lane: Lane, which: Array) -> tuple[Array, Array, Array, Array]:
         """Solve members.
 
         Parameters
@@ -176,26 +187,39 @@ class Batch:
 
         Returns
         -------
-        u, found, good
-            Displacements (k, N); status, linear systems and start (k, 3); which are solved: (k,).
+        u, found, good, doubtful
+            Displacements (k, N); status, linear systems and start (k, 3); which are solved, and
+            which may be out of the range of law or mesh: (k,).
         """
         x = self.x[which]
         values = self.family.values(x)
-        start = self.start
-        u = (np.zeros((len(x), self.family.one.scene.system.N)) if start is None else
-             np.ascontiguousarray(start(x)))
-        found = lane.solve(values, u, start is not None)
+        if self.start is None:
+            u, found = self._from_zero(lane, values)
+        else:
+            begun = np.ascontiguousarray(self.start(x))
+            u = begun.copy()
+            found = lane.solve(values, u, True)
+            far = _apart(u, begun) > USEFUL
+            if np.any(far):  # it may have come to another branch
+                u[far], found[far] = self._from_zero(lane, values[far])
         good = found[:, 0] == CONVERGED
         u[~good] = 0.0
-        return u, found, good & self._sound(u, values)
+        upright, doubtful = self._checked(u, values)
+        return u, found, good & upright, good & upright & doubtful
 
-    def _sound(self, u, values):
-        """Which are not turned inside out, and in the range of law and mesh; shape (k,)."""
+    def _from_zero(self, lane, values):
+        """Displacements, and what :meth:`Lane.solve` says, without a start."""
+        u = np.zeros((len(values), self.family.one.scene.system.N))
+        return u, lane.solve(values, u, False)
+
+    def _checked(self, u, values):
+        """Which are not turned inside out, and which may be out of range; shape (k,)."""
         family, solved = self.family, self.family.one.solved
         system, places = family.one.scene.system, _Places(family, values)
         start = places("start")
         start = None if start is None else start[:, 0] + 1j * start[:, 1]
-        good = system.screen.passes(u, start, places("slender"))
+        doubtful = ~system.screen.passes(u, start, places("slender"))
+        good = np.ones(len(u), dtype=bool)
         first, packs = 0, solved.equations.body.packs
         for beam, s in zip(system.beams, system.slices):
             last, n = first + len(beam.kernel.packs), s.stop - s.start
@@ -203,7 +227,7 @@ class Batch:
                       enumerate(packs[first:last], first) if isinstance(pack, SectionPack)]
             good &= ~beam.kernel.inverted_members(tables, u[:, s])
             first = last
-        return good
+        return good, doubtful
 
     def read(self, u: Array, which: Array) -> dict[str, Array]:
         """What is read of solutions: from name to an array, one row for each.
@@ -226,6 +250,11 @@ class Batch:
                 values.append(moved)
             out[item.name] = located.gather(values)
         return out
+
+
+def _apart(u, v):
+    """How far displacements are from others, relative; of each row."""
+    return np.max(np.abs(u - v), axis=-1) / (np.max(np.abs(v), axis=-1) + 1e-300)
 
 
 class _Places:
@@ -278,10 +307,12 @@ def families(columns: dict[str, Array], places: Sequence[int]
     places, names, x
         Some of the places, names of floats that differ among them, and their values, (n, d).
     """
+    if not len(places):
+        return
     at = np.array(places)
     floats = [name for name, x in columns.items() if x.dtype.kind == "f" and x.ndim == 1]
     others = [x for name, x in columns.items() if name not in floats]
-    groups: dict[Any, list[int]] = {} if others else {None: np.arange(len(at))}
+    groups: dict[Any, list[int]] = {} if others else {None: list(range(len(at)))}
     for k, place in enumerate(places) if others else ():
         groups.setdefault(tuple(_key(x[place]) for x in others), []).append(k)
     for found in groups.values():
@@ -330,22 +361,26 @@ def solve_together(build: Callable[..., Scene], readings: Readings, members: lis
             said.append(f"{len(found)} members were solved alone: {reason}")
             logger.info(said[-1])
             continue
-        counts = np.zeros(4, dtype=int)
-        for which, values, good, iterations in _spread(batch, threads):
+        counts = np.zeros(5, dtype=int)
+        for which, values, good, doubtful, iterations in _spread(batch, threads):
             rows = [dict(zip(values, row)) for row in zip(*values.values())]
-            counts += len(good), good.sum(), *iterations
-            yield found[which[good]].tolist(), rows
+            alone = np.flatnonzero(doubtful)[:max(0, WARNED - counts[4])]  # they will warn
+            keep = np.delete(np.arange(len(rows)), alone)
+            counts += len(good), len(keep), *iterations, doubtful.sum()
+            yield found[which[good][keep]].tolist(), [rows[k] for k in keep]
         said.append(f"{counts[1]} of {counts[0]} members were solved together: "
                     f"{batch.family.asked} scenes were built to know all, {counts[2]} linear "
                     f"systems, {counts[3]} from zero"
                     + (f", the others from a polynomial of {batch.start.asked} solutions"
-                       if batch.start is not None else ""))
+                       if batch.start is not None else "")
+                    + (f"; {counts[4]} may be out of the range of law or mesh, some of which were "
+                       "solved alone, with a warning where they are" if counts[4] else ""))
         logger.info(said[-1])
 
 
 def _spread(batch, threads):
-    """Chunks of members in threads; which, what is read of the good ones, which those are, and
-    how many linear systems were solved and how many members from zero.
+    """Chunks of members in threads: which, what is read of the good ones, which those are, which
+    of them are doubtful, and how many linear systems were solved and how many members from zero.
     """
     n, lanes = len(batch.x), SimpleQueue()
     threads = max(1, min(threads, n // CHUNK))
@@ -355,11 +390,11 @@ def _spread(batch, threads):
     def solve(which):
         lane = lanes.get()
         try:
-            u, found, good = batch.solve(lane, which)
+            u, found, good, doubtful = batch.solve(lane, which)
         finally:
             lanes.put(lane)
         values = batch.read(u[good], which[good])
-        return which, values, good, (found[:, 1].sum(), np.sum(found[:, 2] != 1))
+        return which, values, good, doubtful[good], (found[:, 1].sum(), np.sum(found[:, 2] != 1))
 
     chunks = np.array_split(np.arange(n), -(-n // CHUNK))
     with ThreadPoolExecutor(threads) as pool:

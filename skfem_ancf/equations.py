@@ -12,7 +12,7 @@ from .body import FlatBody, body_of, stress_size, viscous_body_of
 from .border import Border
 from .compiled.words import Words
 from .forces.texts import ForceTables
-from .kernels.law import text_of, with_text
+from .kernels.law import OWN, text_of, with_text
 from .kernels.moments import MomentPack
 from .kernels.section import SectionPack, linearised
 from .own import handle_of
@@ -116,6 +116,19 @@ class Tables:
         packs = {type(pack).__name__ for pack in self.plain.body.packs}
         return [*sorted(packs), *["elements"] * (self.plain.forces.number > 0),
                 *["contacts"] * (self.plain.forces.contacts.number > 0)]
+
+    @property
+    def alone(self) -> str:
+        """Why the scene cannot be solved together with others of its topology; empty if it can."""
+        s = self.system
+        laws = [pack.law.kind for pack in self.plain.body.packs if isinstance(pack, SectionPack)]
+        return next((text for text, there in (
+            ("joints have multipliers", s.m), ("there are rigid bodies", s.bodies),
+            ("a load has no potential, or is one of your own", not s.symmetric or self.own_loads),
+            ("there are obstacles", s.forces.contacts.obstacles),
+            ("force elements are of your own, or couple points far apart",
+             s.forces.own or s.forces.far),
+            ("a law is one of your own in Python", OWN in laws)) if there), "")
 
     @cached_property
     def linearised(self) -> "Tables | None":

@@ -114,6 +114,11 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         way, reason = s.machine.choose("steps" if dynamic else "equilibrium")
         add("compiled loop", "skipped" if way == "plain" else "computed",
             f"whole {'time steps, in blocks' if dynamic else 'iterations'}: {reason}")
+    if kind == "static":
+        alone = s.machine.tables.alone
+        add("sweep", "skipped" if alone else "computed",
+            f"members are solved one by one: {alone}" if alone else
+            "members that differ by floats are solved together, if points are read")
     sensors = scene.sensors if dynamic else {}
     add("sensors", "computed" if sensors else "skipped",
         f"{len(sensors)} read at every step" if sensors else "there are none")

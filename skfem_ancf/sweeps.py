@@ -32,7 +32,8 @@ _SECONDS, _RARER = 2.0, 20.0
 @taught
 def sweep(build: Callable[..., Any],
           parameters: Mapping[str, ArrayLike] | Sequence[Mapping[str, Any]],
-          measure: Callable[[Any], Any] | tuple[Any, ...] | dict[str, Any], workers: int | None = None, client: Any = None,
+          measure: Callable[[Any], Any] | tuple[Any, ...] | dict[str, Any],
+          workers: int | None = None, client: Any = None,
           path: StrPath | None = None, progress: bool | None = None) -> Sweep:
     """Build, solve and measure a scene for each of many sets of parameters.
 
@@ -40,21 +41,33 @@ def sweep(build: Callable[..., Any],
     reads. Results do not depend on where members are computed, nor on their order. A member that
     fails is nan, and is listed with its parameters in ``failures``; the others go on.
 
+    Where ``measure`` says what to read of material points at equilibrium, as ``("displacement",
+    (1, 0))``, members that differ by floats only are solved together: a few scenes are built, of
+    the others the numbers follow, and compiled code solves one after the other in as many threads
+    as there are processors. See ``result.report``. That takes smooth functions of the parameters: a
+    choice that ``build`` makes by comparing a float may go unseen where it concerns a few members
+    only; hand it as a text, a truth value or an integer.
+
     Parameters
     ----------
     build
-        From the parameters, by keyword, to a :class:`Scene`, or whatever ``measure`` takes.
+        From the parameters, by keyword, to a :class:`Scene`, or whatever ``measure`` takes. For
+        members that are solved together it is asked at a few values between theirs.
     parameters
         From name to an array of shape (n, ...), one row for each member; or a list of n dicts.
     measure
         From the scene to a number, an array of numbers, or a dict of them by name; of equal names
-        and shapes for all members.
+        and shapes for all members. Or what to read of the scene's ``solve_static()``: a pair
+        (what, at) or a triple (what, at, beam) of "displacement" or "position", a point (x, y),
+        points (2, n) or the name of an end, and a beam; or a dict by name of such and of functions
+        of the State.
     workers
-        How many processes; None: in this one. They import ``build`` and ``measure``, which are to
-        be defined by ``def`` at the top of a module; a script calls under
+        How many processes, of threads for members that are solved together; None: in this one, and
+        as many threads as there are processors. Processes import ``build`` and ``measure``, which
+        are to be defined by ``def`` at the top of a module; a script calls under
         ``if __name__ == "__main__":``. Libraries of linear algebra have one thread in each.
     client
-        A ``dask.distributed.Client``, in place of ``workers``.
+        A ``dask.distributed.Client``, in place of ``workers``; it solves members one by one.
     path
         A file (.npz) that is written as results come. If it is there, the sweep goes on: what is
         done is taken from it, what failed is tried again. Parameters are compared with those of
@@ -101,6 +114,12 @@ def sweep(build: Callable[..., Any],
     >>> EI = result["E"] * 0.01**4 / 12
     >>> bool(np.allclose(result["value"], -0.01 / (3 * EI), rtol=1e-4))
     True
+
+    A thousand, solved together:
+
+    >>> many = sweep(build, {"E": np.linspace(1e9, 8e9, 1000)}, ("displacement", (1, 0)))
+    >>> many.report[:23]
+    '1000 of 1000 members we'
     """
     require_function("build", build, "of the parameters that returns a scene")
     measure = measured(measure)

@@ -1,0 +1,212 @@
+"""Members of one topology, solved together: against themselves alone, and closed forms."""
+
+import itertools
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
+                        MeshBeam, NeoHookean, Scene, StVenantKirchhoff, batch, sweep)
+from skfem_ancf.alike import Unlike
+from skfem_ancf.batch import Batch, Lane
+from skfem_ancf.errors import NameUnknown, SweepWarning
+from skfem_ancf.obstacles import Circle
+from skfem_ancf.polynomials import Polynomial
+from skfem_ancf.readings import Readings
+
+TIP = {"tip": ("displacement", "right"), "end": ("position", "right")}
+ELEMENTS = {"section": ElementBeamANCF(2), "cubic": ElementBeamANCFCubic(2),
+            "cable": ElementBeamCable(5)}
+
+
+def cantilever(E=2e8, b=0.01, h=0.02, L=1.0, F=1e-3, kind="cable", law=StVenantKirchhoff, n=4):
+    mesh = MeshBeam.init_line(np.linspace(0, L, n + 1), height=h)
+    beam = Beam(mesh, ELEMENTS[kind], law(E, 0.3, 1000.0), width=b)
+    return Scene(beam).clamp("left").gravity((0, -1.0)).point_force((0, -F), at=(L, 0))
+
+
+def arc(R, M, kind="cubic"):
+    mesh = MeshBeam.init_curve(lambda s: (R * np.sin(s), R * (1 - np.cos(s))),
+                               np.linspace(0, np.pi / 2, 5), 0.05)
+    return Scene(Beam(mesh, ELEMENTS[kind], StVenantKirchhoff(2e8, 0.3), width=0.02)
+                 ).clamp("left").moment("right", M)
+
+
+def column(force, E=2e8):
+    """Pushed beyond Euler's load, and aside by a force of either sign."""
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 5), height=0.02)
+    return Scene(Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(E, 0.3), width=0.01)
+                 ).clamp("left").point_force((-4.5, force), at=(1, 0))
+
+
+def drawn(n, **ranges):
+    rng = np.random.default_rng(2)
+    return {name: rng.uniform(*ends, n) for name, ends in ranges.items()}
+
+
+def alone(build, table, k):
+    scene = build(**{name: values[k] for name, values in table.items()})
+    return scene.solve_static().displacement(tuple(scene.beams[0].mesh.p[:, -1]))
+
+
+def compare(build, table, n, rtol=1e-8, least=None):
+    result = sweep(build, table, TIP, workers=1)
+    together = int(result.report.split(" of ")[0])
+    assert together >= (n if least is None else least), result.report
+    for k in (0, n // 2, n - 1):
+        assert_allclose(result["tip"][k], alone(build, table, k), rtol=rtol, atol=1e-12)
+    return result
+
+
+@pytest.mark.parametrize("kind, law", [("section", StVenantKirchhoff), ("cable", StVenantKirchhoff),
+                                       ("cubic", NeoHookean)])
+def test_material_width_and_load(kind, law):
+    table = drawn(48, E=(1.6e8, 2.4e8), b=(0.008, 0.012), F=(0.0, 0.01))
+    result = compare(lambda **p: cantilever(kind=kind, law=law, n=2, **p), table, 48)
+    assert_allclose(result["end"] - result["tip"], np.tile([1.0, 0.0], (48, 1)), atol=1e-15)
+
+
+@pytest.mark.parametrize("kind", ["section", "cable"])
+def test_geometry(kind):
+    """Lengths and heights, in powers of which tables are not short polynomials."""
+    table = drawn(400, h=(0.018, 0.022), L=(0.9, 1.1))
+    result = compare(lambda **p: cantilever(kind=kind, n=2, **p), table, 400)
+    assert_allclose((result["end"] - result["tip"])[:, 0], table["L"], rtol=1e-13)
+
+
+def test_curves_and_their_radius():
+    compare(arc, drawn(160, R=(0.9, 1.1), M=(0.0, 0.02)), 160)
+
+
+def test_small_deflections():
+    b, h = 0.01, 0.02
+    table = drawn(300, E=(1e9, 2e9), F=(1e-4, 2e-4), L=(0.9, 1.1))
+    result = sweep(lambda **p: cantilever(**p).replace(
+        material=StVenantKirchhoff(p["E"], 0.3, 1e-9)), table, ("displacement", "right"))
+    E, F, L = table.values()
+    assert_allclose(-result["value"][:, 1], F * L**3 / (3 * E * b * h**3 / 12), rtol=1e-4)
+    assert "300 of 300" in result.report
+
+
+def test_threads_and_chunks_change_nothing(monkeypatch):
+    table = drawn(300, E=(1e8, 2.4e8), F=(0.0, 0.01))
+    one = sweep(cantilever, table, TIP, workers=1)
+    monkeypatch.setattr(batch, "CHUNK", 50)
+    three = sweep(cantilever, table, TIP, workers=3)
+    assert_array_equal(one["tip"], three["tip"])
+    assert one.report == three.report and "from a polynomial" in one.report
+    assert ", 0 from zero" in one.report
+
+
+def test_no_branch_is_changed(monkeypatch):
+    """Beyond Euler's load the column leans to the side of its small force: no polynomial."""
+    monkeypatch.setattr(batch, "STARTS", 1)
+    forces = np.linspace(-0.11, 0.1, 24)
+    result = sweep(column, {"force": forces}, ("displacement", (1, 0)))
+    assert_array_equal(np.sign(result["value"][:, 1]), np.sign(forces))
+    assert np.min(np.abs(result["value"][:, 1])) > 0.3
+    for k in (0, 12, 23):
+        assert_allclose(result["value"][k], alone(column, {"force": forces}, k), rtol=1e-7)
+
+
+def test_a_start_far_from_the_branch_is_not_followed():
+    """Starts that are wrong are seen, and those members are solved from zero."""
+    x = np.linspace(1e8, 2e8, 300)[:, None]
+    made = Batch(lambda x: cantilever(E=float(x[0])), Readings(TIP).items, x)
+    which = np.arange(40)
+    u, found, good, _ = made.solve(made.lane, which)
+    assert good.all() and (found[:, 2] == 1).all() and found[:, 1].max() <= 2
+    start = made.start
+    made.start = lambda x: start(x) * np.where(x > x[20], 3.0, 1.0)
+    again, found, good, _ = made.solve(Lane(made.family), which)
+    assert good.all() and (found[21:, 2] != 1).all()
+    assert_allclose(again, u, rtol=1e-6, atol=1e-9)
+
+
+def test_what_is_not_alike_is_grouped_or_alone():
+    table = [dict(E=E, n=n) for n, E in itertools.product([1, 2], np.linspace(1e9, 2e9, 20))]
+    result = sweep(cantilever, [*table, dict(E=1e9, n=3)], TIP)
+    assert result.report.count("20 of 20 members") == 2
+    assert "1 members were solved alone: 1 members are fewer than 16" in result.report
+    assert_allclose(result["tip"][25], alone(cantilever, {"E": [1e9 + 5e9 / 19], "n": [2]}, 0))
+    assert not result.failures and "sweep" in str(cantilever().plan())
+
+
+def beside_a_circle(E):
+    return cantilever(E).obstacle(Circle((5.0, 5.0), 0.1))
+
+
+def stepped(E):
+    return cantilever(1e9 if E < 1.5e9 else 2e9)
+
+
+def rough(E):
+    return cantilever(1e9 * (2.0 + abs(E - 1.51e9) / 1e9))
+
+
+def restless(E):
+    if 1.2e9 < E < 1.8e9:
+        raise ValueError("not there")
+    return cantilever(E)
+
+
+@pytest.mark.parametrize("build, reason", [
+    (beside_a_circle, "there are obstacles"), (stepped, "polynomials|did not suffice"),
+    (rough, "polynomials|did not suffice"), (restless, "not there")])
+def test_why_members_are_alone(build, reason):
+    x = np.linspace(1e9, 2e9, 40)[:, None]
+    with pytest.raises(Unlike, match=reason):
+        Batch(lambda x: build(float(x[0])), Readings(TIP).items, x)
+
+
+def test_what_fails_alone_is_listed():
+    """Members that have no value of a parameter, and those whose scene is refused."""
+    def build(E):
+        return cantilever(E) if E < 1.9e9 else cantilever(E).replace(width=-1.0)
+
+    E = np.append(np.linspace(1e9, 1.8e9, 20), np.nan)
+    with pytest.warns(SweepWarning, match="1 of 21 members failed"):
+        result = sweep(cantilever, {"E": E}, TIP)
+    assert np.isnan(result["tip"][-1]).all() and "not finite" in result.report
+    with pytest.warns(SweepWarning, match="width"):
+        result = sweep(build, {"E": np.linspace(1e9, 2e9, 20)}, TIP)
+    assert len(result.failures) == 2 and "width" in result.report
+
+
+def test_functions_of_the_state_and_a_file(tmp_path):
+    measure = {"tip": ("displacement", (1, 0)),
+               "root": lambda state: state.reactions("left").moment}
+    result = sweep(cantilever, {"E": [1e9, 2e9]}, measure, path=tmp_path / "a.npz")
+    assert result["root"].shape == (2,) and "function of the State" in result.report
+    table = {"E": np.linspace(1e9, 2e9, 20)}
+    first = sweep(cantilever, table, TIP, path=tmp_path / "b.npz")
+    again = sweep(cantilever, table, TIP, path=tmp_path / "b.npz")
+    assert_array_equal(first["tip"], again["tip"])
+    assert "20 of 20" in first.report and again.report == ""
+
+
+@pytest.mark.parametrize("measure, error, text", [
+    ("tip", InputError, "function of the scene"), ({}, InputError, "empty"),
+    (("speed", (1, 0)), NameUnknown, "displacement"), (("position",), InputError, "a pair"),
+    ({"x": 3}, InputError, "a pair"), (("position", None), InputError, "needs a point")])
+def test_measures_that_are_none(measure, error, text):
+    with pytest.raises(error, match=text):
+        sweep(cantilever, {"E": [1e9]}, measure)
+
+
+def test_polynomials_grow_where_they_have_to():
+    asked = []
+
+    def function(x):
+        asked.append(x)
+        return np.array([1.0 + x[0] * x[1] * x[2], np.exp(x[1])])
+
+    p = Polynomial(function, np.zeros(3), np.full(3, 2.0),
+                   lambda surplus, largest: np.max(np.abs(surplus)) / 1e-13, 200)
+    x = np.random.default_rng(0).uniform(0, 2, (20, 3))
+    assert_allclose(p(x), np.array([1.0 + np.prod(x, axis=1), np.exp(x[:, 1])]).T, rtol=1e-12)
+    assert p.rest <= 1.0 and len(asked) == p.asked < 45  # of 17 along one axis
+    few = Polynomial(function, np.zeros(3), np.full(3, 2.0),
+                     lambda surplus, largest: np.max(np.abs(surplus)) / 1e-13, 10)
+    assert few.asked == 10 and few.rest > 1.0
