@@ -94,7 +94,8 @@ class Polynomial:
                 break
             del border[fresh]
             inside.add(fresh)
-        self.asked, self.rest = len(self.surplus), max(border.values(), default=0.0)
+        self.asked = len(self.surplus)
+        self.rest = float(max(border.values(), default=0.0))
 
     def _point(self, index):
         return self.low + 0.5 * (1.0 + leja()[index]) * (self.high - self.low)
