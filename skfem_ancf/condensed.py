@@ -62,10 +62,6 @@ class Group(NamedTuple):
         """Numbers of the coordinates of each chain, shape (M, (elements + 1) nd)."""
         return self.first[:, None] + np.arange((self.elements + 1) * self.nd)
 
-    def coordinates(self, u: Array) -> Array:
-        """The coordinates (M, elements + 1, nd) of a vector (N,)."""
-        return u[self.places].reshape(len(self.first), self.elements + 1, self.nd)
-
 
 def groups_of(beams: Sequence[Beam], slices: Sequence[slice]) -> list[Group]:
     """The chains of all beams in groups.
@@ -146,6 +142,7 @@ class Condensed:
             If the matrix is singular.
         """
         self._turns = self.nodes.turns(u)
+        self._pairs = self._followers()
         moments = self._moments(multipliers)
         self._parts = [_Part(group, K, bases, self._turns, moments)
                        for group, bases in zip(self.groups, self._bases)]
@@ -159,13 +156,13 @@ class Condensed:
     def _moments(self, multipliers):
         """How rotation and stretch of each end are coupled by the multipliers of the rotations."""
         out = np.zeros(len(self._turns))
-        follower, leader, scale = self._pairs()
+        follower, leader, scale = self._pairs
         value = self.nodes.split(multipliers)[1] * scale
         np.add.at(out, leader, -value)
         out[follower] += value
         return out
 
-    def _pairs(self):
+    def _followers(self):
         """Ends that follow a rotation, those that lead them, and the scale of their equation."""
         s = self.nodes.turned
         m = self.nodes.leader[s]
@@ -233,7 +230,7 @@ class Condensed:
         forces, moments, x, y, angle = nodes.split(phi)
         out[nodes.held_x, 0], out[nodes.held_y, 1] = x, y
         out[nodes.held_angle, 2] = angle / self._turns[nodes.held_angle].real
-        follower, leader, scale = self._pairs()
+        follower, leader, scale = self._pairs
         out[nodes.followers, :2] = out[nodes.leader[nodes.followers], :2] - forces
         out[follower, 2] = out[leader, 2] - moments / scale
         return out
@@ -242,10 +239,10 @@ class Condensed:
         """Those that leave the forces (ends, 3) at the ends."""
         nodes = self.nodes
         number = len(nodes.held)
-        total = np.stack([np.bincount(nodes.nodes, f, number) for f in forces.T], axis=1)
-        follower, _, scale = self._pairs()
+        total = np.array([np.bincount(nodes.nodes, f, number) for f in forces.T])
+        follower, _, scale = self._pairs
         held = nodes.held_x, nodes.held_y, nodes.held_angle
-        x, y, angle = (total[nodes.nodes[ends], k] for k, ends in enumerate(held))
+        x, y, angle = (total[k, nodes.nodes[ends]] for k, ends in enumerate(held))
         return np.concatenate([
             *(0.0 - forces[nodes.followers, :2].T), -forces[follower, 2] / scale, x, y,
             angle / self._turns[nodes.held_angle].real])
@@ -366,6 +363,7 @@ class _Part:
     def __init__(self, group: Group, K: BandMatrix, bases: Sequence[_Basis], turns: Array,
                  moments: Array) -> None:
         self.group, self._T = group, [basis(turns) for basis in bases]
+        self._places = group.places
         D, C = _blocks(K, group)
         nd, n = group.nd, group.elements
         first, to_first, last = D[:, 0], C[:, 0], D[:, 1]
@@ -413,7 +411,8 @@ class _Part:
 
     def reduce(self, b: Array) -> Array:
         """Forces (M, 6) at the ends from those on the coordinates, (N,)."""
-        f, nd = self.group.coordinates(b), self.group.nd
+        nd = self.group.nd
+        f = b[self._places].reshape(len(self._places), -1, nd)
         self._known = []
         first, last = f[:, 0], f[:, 1]
         for k, (A, inverse, X) in enumerate(self._inner):
@@ -438,7 +437,7 @@ class _Part:
         for k in range(group.elements - 1, 0, -1):
             around = np.concatenate([out[:, 0], out[:, k + 1]], axis=1)
             out[:, k] = self._known[k - 1] - _times(self._inner[k - 1][2], around)
-        x[group.places] = out.reshape(len(v), -1)
+        x[self._places] = out.reshape(len(v), -1)
 
 
 def _inverse(A):

@@ -226,12 +226,7 @@ class Constraints:
         v
             Direction, shape (N,).
         """
-        out = []
-        for joint in self.joints:
-            for unit in np.eye(len(joint.equations)):
-                second = joint.curvature(u, t, unit)
-                out.append(0.0 if second is None else second[2] @ (v[second[0]] * v[second[1]]))
-        return np.array(out)
+        return np.concatenate([np.zeros(0), *(joint.quadratic(u, t, v) for joint in self.joints)])
 
     def curvature(self, u: Array, t: float, multipliers: Array) -> sparse.csr_matrix:
         """sum_k multipliers[k] d^2 Phi_k / du^2 at free coordinates, sparse, shape (N, N).

@@ -129,6 +129,10 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
 def _linear_solver(s, dynamic):
     """How the linear systems of a system are solved."""
     bandwidth = s.K.bandwidth
+    if dynamic and s.by_nodes:
+        return ("lines condensed to displacements and rotations of nodes, sparse LDL^T of these, "
+                "for steps and for the mass with its impulses; by 'energy-momentum', "
+                "'generalized-alpha' and its kin")
     if not dynamic and s.condensed is not None:
         solver = (f"lines condensed to {s.condensed.size} displacements and rotations of nodes, "
                   "sparse LDL^T of these: no multiplier is unknown")

@@ -16,6 +16,7 @@ from .checks import Screen
 from .condensed import Condensed
 from .constraints import Constraints
 from .damping import Damping
+from .eliminated import EliminatedMass, condensed
 from .errors import InputError
 from .evaluation import CARRY, FORCE, MEAN, TANGENT, VISCOUS, evaluate
 from .forces.system import Forces
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 _NONE = np.zeros(0)
+#: Equations of the nodes of a frame above which steps of a motion eliminate them.
+MANY = 48
 
 
 def _of_constraints(name: str) -> Any:
@@ -545,6 +548,11 @@ class System:
         rate
             Shape (m,).
         """
+        if self.by_nodes:
+            mass = self._mass_by_nodes
+            mass.forget()
+            return mass.solve(np.zeros(self.N) if u is None else u, t, b,
+                              np.zeros(self.m) if rate is None else rate)
         x = self.mass_factors.solve(b * self.free)
         if not self.joints:
             return x, np.zeros(0)
@@ -665,7 +673,17 @@ class System:
         if (frame is None or not self.constraints.condensable or not self.symmetric
                 or self.forces.far):
             return None
-        return Condensed(self.beams, self.slices, frame)
+        return condensed(self)
+
+    @cached_property
+    def by_nodes(self) -> bool:
+        """True if steps of a motion eliminate the nodes of a frame; few equations are a border."""
+        return (self.constraints.condensable and not self.forces.far and self.m > MANY
+                and not len(self.damping.modal))
+
+    @cached_property
+    def _mass_by_nodes(self):
+        return EliminatedMass(self)
 
     @property
     def coupled(self) -> bool:

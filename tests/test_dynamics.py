@@ -209,12 +209,12 @@ def oscillator():
 def amplification(scheme, dt):
     """Eigenvalues of a step of size dt of u'' + u = 0."""
     equations, matrices = oscillator()
-    rule = Rule(int(scheme.conserving), *scheme.parameters, 1e-14, 0.0)
+    rule = Rule(int(scheme.conserving), *scheme.parameters, 1e-14, 0.0, 0, 0)
     course = Course(dt, np.array([[dt, dt]]), np.ones((1, 1)), np.zeros((1, 3, 1)),
                     JointMotion(np.zeros((1, 3, 0)), np.zeros((1, 4, 0)), 0))
     rows = []
     for u, v, w in np.eye(3):
-        work, new = room_for_steps(1, 0, 0), np.empty((1, 4, 1))
+        work, new = room_for_steps(1, 0, 0, 0), np.empty((1, 4, 1))
         work.y[:, 0] = u, v, -u, w
         done = steps(equations, matrices, rule, course, np.zeros(STATE), work, new,
                      np.zeros((1, 2, 0)), np.zeros(1))

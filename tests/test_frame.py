@@ -9,8 +9,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, MeshBeam, Scene, Section,
-                        StVenantKirchhoff, tangent)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, KelvinVoigt, MeshBeam,
+                        Scene, Section, StVenantKirchhoff, system, tangent)
 from skfem_ancf.condensed import Condensed
 from skfem_ancf.dynamics import integrate
 from skfem_ancf.errors import FileError, InputError, MeshError, NameUnknown, SupportError
@@ -131,21 +131,22 @@ def test_the_condensed_solution_solves_the_equations_with_multipliers():
     frame = Frame.from_lines([*PORTAL[0], (2, 1.2)], [*PORTAL[1], (2, 4), (0, 2)], elements=2,
                              hinges=[(3, 2), (4, 0)], material=STEEL, height=H, width=H)
     frame.clamp([0, 3]).pin(4).point_force((400.0, -300.0), at=1)
-    state, system = frame.solve_static(tol=1e-12), frame.system
-    assert isinstance(system.condensed, Condensed)
+    state, equations = frame.solve_static(tol=1e-12), frame.system
+    assert isinstance(equations.condensed, Condensed)
     rng = np.random.default_rng(0)
-    b, c = rng.standard_normal(system.N), 1e-4 * rng.standard_normal(system.m)
-    system.assemble(state.u)
-    K = system.K.tocsc().toarray() + system.curvature(state.u, 1.0, state.multipliers).toarray()
-    J = system.jacobian(state.u, 1.0).toarray()
-    d = np.append(1 / np.sqrt(np.abs(K.diagonal())), np.full(system.m, 1.0))
-    whole = np.block([[K, J.T], [J, np.zeros((system.m, system.m))]]) * d * d[:, None]
+    b, c = rng.standard_normal(equations.N), 1e-4 * rng.standard_normal(equations.m)
+    equations.assemble(state.u)
+    K = equations.K.tocsc().toarray()
+    K += equations.curvature(state.u, 1.0, state.multipliers).toarray()
+    J = equations.jacobian(state.u, 1.0).toarray()
+    d = np.append(1 / np.sqrt(np.abs(K.diagonal())), np.full(equations.m, 1.0))
+    whole = np.block([[K, J.T], [J, np.zeros((equations.m, equations.m))]]) * d * d[:, None]
     exact = d * np.linalg.solve(whole, d * np.append(b, c))
-    system.factorize(state.u, 1.0, state.multipliers)
-    x, multipliers = system.solve(b, c)
+    equations.factorize(state.u, 1.0, state.multipliers)
+    x, multipliers = equations.solve(b, c)
     error = (np.append(x, multipliers) - exact) / d
     assert np.abs(error).max() < 1e-8 * np.abs(exact / d).max()
-    negative, singular = system.inertia()
+    negative, singular = equations.inertia()
     null = np.linalg.svd(J)[2][len(J):].T
     assert (negative, singular) == (np.sum(np.linalg.eigvalsh(null.T @ K @ null) < 0), False)
 
@@ -347,6 +348,82 @@ def test_a_small_frame_moves_with_its_multipliers():
     assert_allclose([x[50], x[100]], [-x[0], x[0]], rtol=0.02)  # it has other motions, too
     energy = history.strain_energy + history.kinetic_energy
     assert np.ptp(energy) < 1e-9 * energy[0]
+
+
+def swinging(eliminated, monkeypatch, scheme, n=60, dt=1e-3, **options):
+    """A frame of two times two cells, two hinged ends in it, after a step load."""
+    monkeypatch.setattr(system, "MANY", 0 if eliminated else 10**9)
+    frame = square(2, hinges=[(0, 3), (7, 4)]).point_force((3000.0, 0), at="side")
+    assert frame.system.by_nodes == eliminated
+    return frame.integrate(n * dt, dt, scheme=scheme, **options)
+
+
+@pytest.mark.parametrize("scheme, error", [("energy-momentum", 1e-10), ("generalized-alpha", 1e-7)])
+def test_motion_by_elimination_is_that_by_multipliers(scheme, error, monkeypatch):
+    """The same equations, solved by nodes: histories agree to the tolerance of the iteration."""
+    ours, dense = (swinging(on, monkeypatch, scheme) for on in (True, False))
+    assert np.abs(dense.u).max() > 0.3  # large, of cells of size one
+    for name in ("u", "v", "multipliers"):
+        a, b = np.array(getattr(ours, name)), np.array(getattr(dense, name))
+        assert np.abs(a - b).max() < 100 * error * np.abs(b).max()
+    assert np.abs(ours.u - dense.u).max() < error
+    assert abs(ours.iterations - dense.iterations) < 0.02 * dense.iterations
+    assert max(np.abs(ours.system.constraint(u, 0.0)).max() for u in ours.u) < 1e-11
+    if scheme == "energy-momentum":
+        assert np.ptp(ours.total_energy[1:]) < 1e-10 * ours.kinetic_energy.max()
+
+
+def test_a_frame_swings_in_its_first_mode(monkeypatch):
+    monkeypatch.setattr(system, "MANY", 0)
+    frame = square(4)
+    modes = frame.modes(1)
+    period = 2.0 * np.pi / modes.frequencies[0]
+    start = modes.mode(0, 1e-6 / np.abs(modes.shapes[0]).max())
+    history = frame.integrate(period, period / 200, start=start)
+    x = np.array(history.u) @ frame.system.mass.multiply(modes.shapes[0])
+    assert_allclose(x / x[0], np.cos(2.0 * np.pi * history.t / period), atol=2e-3)
+    assert np.ptp(history.total_energy) < 1e-9 * history.total_energy[0]
+
+
+@pytest.mark.parametrize("change", ["damping", "pressure", "auto"])
+def test_what_else_acts_in_a_motion_by_elimination(change, monkeypatch):
+    """A damped material, a load without potential, steps of automatic size."""
+    dt = "auto" if change == "auto" else 2e-3
+    histories = []
+    for eliminated in (True, False):
+        options = {"damping": KelvinVoigt(1e-3)} if change == "damping" else {}
+        frame = square(2, **options).point_force((100.0, 0), at="side")
+        if change == "pressure":
+            frame.pressure("top", 50.0)
+        monkeypatch.setattr(system, "MANY", 0 if eliminated else 10**9)
+        histories.append(frame.integrate(0.02, dt, rtol=1e-3))
+    ours, dense = histories
+    if change == "auto":
+        assert abs(len(ours.t) / len(dense.t) - 1.0) < 0.1
+    assert_allclose(ours.u[-1], dense.u[-1], rtol=0,
+                    atol=(1e-3 if change == "auto" else 1e-10) * np.abs(dense.u).max())
+    assert np.ptp(ours.total_energy + ours.dissipated) < 1e-9 * dense.kinetic_energy.max() or (
+        change == "pressure")
+
+
+def test_a_motion_by_elimination_goes_on_from_its_checkpoint(monkeypatch, tmp_path):
+    whole = swinging(True, monkeypatch, "energy-momentum", n=12, checkpoint=tmp_path / "a.npz",
+                     every=5)
+    frame = square(2, hinges=[(0, 3), (7, 4)]).point_force((3000.0, 0), at="side")
+    assert np.array_equal(frame.resume(tmp_path / "a.npz").u, whole.u)
+
+
+def test_memory_of_a_motion_is_that_of_sparse_matrices():
+    """Dense ones of 1,806 equations by 4,872 coordinates took 211 MB."""
+    frame = square(14).point_force((30.0, 0), at="side")
+    assert "LDL^T" in frame.plan("dynamic")["linear solver"].reason
+    tracemalloc.start()
+    try:
+        history = frame.integrate(3e-3, 1e-3, t_eval=[3e-3])
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 60e6 and history.factorizations == 1
 
 
 def test_a_motion_of_too_many_multipliers_is_refused(monkeypatch):

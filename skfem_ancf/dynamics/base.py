@@ -140,3 +140,8 @@ class Scheme:
             Shape (N,).
         """
         return self.error_constant * dt**2 * (new.algorithmic - old.algorithmic)
+
+
+def in_steps(scheme: Scheme) -> bool:
+    """True of a scheme whose steps are those of :mod:`skfem_ancf.dynamics.steps`."""
+    return type(scheme).step is Scheme.step

@@ -13,6 +13,7 @@ from ..errors import (AncfError, ConvergenceError, InputError, Interrupted, Mode
 from ..forces.contact_texts import SLIPPING
 from ..progress import progress_bar
 from .checkpoint import Checkpoint, same_problem
+from .base import in_steps
 from .integrator import Integrator, StepFailed
 from .run import Run, Task
 
@@ -116,7 +117,8 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         t_start = 0.0 if motion is None else motion.t
     task = _task(t_start, t_end, dt, t_eval, tol, rtol, [
         *np.atleast_1d(breakpoints), *_samples(system, t_start, t_end)])
-    _require_room(system)
+    if not (in_steps(scheme) and system.by_nodes):
+        _require_room(system)
     system.require_independent_joints()
     system.forces.contacts.require_motion()
     run = Run(system, scheme, task, sensors)
@@ -157,8 +159,10 @@ def _require_room(system):
     if size > LARGEST:
         raise InputError(
             f"a motion keeps the derivatives of {system.m} equations of joints by {system.N} "
-            f"coordinates as dense matrices, {size:.3g} GB: take fewer or longer lines and beams, "
-            "or the frequencies and shapes of scene.modes(k), which are found by sparse matrices")
+            f"coordinates as dense matrices, {size:.3g} GB: a Frame of lines eliminates its nodes "
+            "in 'energy-momentum' and 'generalized-alpha', if it is held at nodes, without other "
+            "joints, springs between points far apart and modal damping; else take fewer or longer "
+            "beams, or the frequencies and shapes of scene.modes(k)")
 
 
 def _task(t_start, t_end, dt, t_eval, tol, rtol, breakpoints):

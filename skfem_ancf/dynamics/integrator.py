@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..band import Band, factorize, fix
+from ..eliminated import Eliminated, EliminatedMass
 from ..errors import InputError, SupportError, require_positive, shown
-from .base import Motion
+from ..own import handle_of
+from .base import Motion, in_steps
 from .course import Courses
 from .rates import rates
 from .dampers import Dampers, Rows, solve_rows
@@ -70,17 +72,22 @@ class Integrator:
             raise InputError(f"tol is the error of a step's iteration, relative: less than 1, and "
                              f"1e-6 is coarse already; got {shown(tol)}")
         alpha_m, alpha_f, beta, gamma = map(float, scheme.parameters)
+        M, A = system.mass.band, system.new_band()
+        self.matrices = Matrices(M, _copy(M), A.band, *_damping(system))
+        self._nodes: tuple[Eliminated, EliminatedMass] | None = None
+        if in_steps(scheme) and system.by_nodes:
+            self._nodes = Eliminated(system, A), EliminatedMass(system)
+        handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
         self.rule = Rule(int(scheme.conserving), alpha_m, alpha_f, beta, gamma, self.tol,
-                         8.0 * system.stiffness_scale)
-        M = system.mass.band
-        self.matrices = Matrices(M, _copy(M), _copy(M), *_damping(system))
+                         8.0 * system.stiffness_scale, *handles)
         fix(self.matrices.mass, system.mask)
         if not factorize(self.matrices.mass):
             if system.forces.masses:
                 raise InputError("the mass matrix is singular to round-off: a mass or an inertia "
                                  f"of {shown(system.forces.masses)} is too large beside the beams")
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
-        self._work = room_for_steps(system.N, system.m, system.machine.tables.stresses.size)
+        self._work = room_for_steps(system.N, system.m, system.machine.tables.stresses.size,
+                                    0 if self._nodes else system.m)
         self._courses = Courses(system, scheme.conserving)
         self._state, self._dt, self.substeps, self._lost = np.zeros(STATE), np.nan, 0, ""
         self.longest = int(np.clip(STORED // (4 * system.N), 1, BLOCK))
@@ -249,6 +256,8 @@ class Integrator:
                                   (first, first + n) if block is None else block, self.limit)
         if dt != self._dt:
             self._dt, self._state[READY] = dt, 0.0
+        if self._nodes:
+            self._nodes[1].lag = 0.5 * dt if self.scheme.conserving else 0.0
         self._state[[BEFORE, FAILURE, DISSIPATED]] = y.before, 0.0, y.dissipated
         rows, multiplier_rows, works = np.empty((n, 4, s.N)), np.empty((n, 2, s.m)), np.empty(n)
         work = self._work
@@ -318,6 +327,8 @@ class Integrator:
 
     def solve(self, b: Array) -> Array:
         """The inverse of the last iteration matrix times b (N,)."""
+        if self._nodes:
+            return self._nodes[0].solve(b)
         x = b.copy()
         solve_rows(self.matrices.A, self.matrices.rows, x)
         return x
@@ -339,6 +350,10 @@ class Integrator:
                   "substeps": np.array(self.substeps)}
         if self.ready:
             memory.update({name: array.copy() for name, array in self._factors().items()})
+        if self._nodes:
+            steps, mass = self._nodes
+            memory.update({"at": steps.at[0], "multipliers at": steps.at[1],
+                           "mass at": np.zeros(0) if mass.at is None else mass.at})
         memory.update({f"kept {name}": array.copy() for name, array in self.kept.items()})
         return memory
 
@@ -351,6 +366,15 @@ class Integrator:
         if self.ready:
             for name, array in self._factors().items():
                 array[...] = memory[name]
+        if self._nodes:
+            self._recall_nodes(memory)
+
+    def _recall_nodes(self, memory):
+        steps, mass = self._nodes
+        if self.ready:
+            steps.factorize(memory["at"], memory["multipliers at"])
+        if len(memory["mass at"]):
+            mass.factorize(memory["mass at"])
 
     def _factors(self):
         A, rows = self.matrices.A, self.matrices.rows

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from ..errors import AncfError, ask_number
-from .base import Motion, Scheme
+from .base import Motion, Scheme, in_steps
 from .history import History
 from .integrator import Integrator, StepFailed
 from .sensors import Recorder
@@ -112,7 +112,7 @@ class Run:
         self.until: Callable[[State], float] | None = None
         self.event: float | None = None
         self._value: float | None = None
-        self._in_blocks, self._pace = type(scheme).step is Scheme.step, 1
+        self._in_blocks, self._pace = in_steps(scheme), 1
         self._limit()
 
     # the start

@@ -16,14 +16,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..band import Band, copy, factorize, fix, multiply, solve_joined, subtract_rows
+from ..band import Band, clear, copy, factorize, fix, multiply, solve_joined, subtract_rows
 from ..body import (add_force_of, body_carry, body_force, body_mean, body_mixed, body_stress,
                     body_tangent)
 from ..forces.texts import (add_contact_tangent, add_elastic_force, add_rubbing_tangent,
                             element_stiffness)
+from ..own import own_solve
 from ..source import F1, F2, F3, borrowed, by_place, lanes, source
-from ..tables import (add_curvature_force, add_load_stiffness, add_products, constraint,
-                      joint_directions, mean_external_force)
+from ..tables import (add_constraint_rate, add_curvature_force, add_joint_force,
+                      add_load_stiffness, add_products, constraint, joint_directions,
+                      mean_external_force)
 from .dampers import (Dampers, Rows, add_damping, damping_force, factorize_rows, solve_rows)
 from .rates import JointMotion, JointMotions, acceleration_of_joints, drive_rate
 
@@ -53,6 +55,8 @@ FAILURES = ("", "the iteration matrix is singular", "the residual is not finite"
             "the iteration diverges", f"no convergence in {ITERATIONS} iterations",
             "the joints depend on each other")
 SINGULAR, NOT_FINITE, DIVERGES, NOT_CONVERGED, DEPENDENT = range(1, 6)
+#: How impulses of joints are found that are eliminated.
+ROUGHLY, EXACTLY = range(2)
 #: What a correction tells.
 GO_ON, DONE, ASTRAY, FAILED = range(4)
 
@@ -70,6 +74,9 @@ class Rule(NamedTuple):
         Tolerance of the iteration, relative, in the energy norm.
     floor
         Round-off of the strains in that norm.
+    solver, mass_solver
+        Handles of what solves with the iteration matrix and with the mass where joints are
+        eliminated, see :mod:`skfem_ancf.eliminated`; 0 where they are a border.
     """
 
     conserving: int
@@ -79,6 +86,8 @@ class Rule(NamedTuple):
     gamma: float
     tol: float
     floor: float
+    solver: int
+    mass_solver: int
 
 
 @by_place
@@ -225,9 +234,9 @@ class Work(NamedTuple):
         As above.
     J
         The joints' directions where they act, those at the end of the step, and the solutions with
-        the former, shape (3, m, N).
+        the former, shape (3, m, N); of no joint where they are eliminated.
     S
-        ``J1 A^-1 J^T``, shape (m, m).
+        ``J1 A^-1 J^T``, shape (m, m), or of none.
     stresses
         Of all beams: zero, those at the begin, others, carried ones, those of the iterate, shape
         (5, k).
@@ -241,7 +250,7 @@ class Work(NamedTuple):
     stresses: F2
 
 
-def room_for_steps(N: int, m: int, stresses: int) -> Work:
+def room_for_steps(N: int, m: int, stresses: int, dense: int) -> Work:
     """The :class:`Work` of steps.
 
     Parameters
@@ -250,10 +259,12 @@ def room_for_steps(N: int, m: int, stresses: int) -> Work:
         Numbers of coordinates and of equations of joints.
     stresses
         Number of the stresses of all beams.
+    dense
+        Number of equations in dense matrices: m, or 0 where they are eliminated.
     """
     x, shares = np.zeros((len(Vectors._fields), N)), np.zeros((len(Shares._fields), m))
-    return Work(np.zeros((4, N)), Vectors(*x), Shares(*shares), np.zeros((3, m, N)),
-                np.zeros((m, m)), np.zeros((5, stresses)))
+    return Work(np.zeros((4, N)), Vectors(*x), Shares(*shares), np.zeros((3, dense, N)),
+                np.zeros((dense, dense)), np.zeros((5, stresses)))
 
 
 @source
@@ -292,7 +303,7 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
         for _ in range(ITERATIONS):
             if state[READY] == 0.0:
                 _tangent(e, matrices, rule, s, w)
-                if not _factorize(e.free, matrices, state):
+                if not _factorize(e.free, matrices, rule, s, w, state):
                     return n
             _internal_force(e.body, rule, w, state)
             add_elastic_force(e.forces, s.acting, s.dt, y[0] if rule.conserving > 0 else u, u, f)
@@ -301,13 +312,13 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
             anew = joined and (not s.constant or state[SIZE] < 0.0)
             if anew:
                 _directions(e.joints, rule, s, w)
-            _residual(e.loads, e.free, matrices.M, rule, s, w)
+            _residual(e.loads, e.joints, e.free, matrices.M, rule, s, w)
             told = GO_ON
             if joined and rule.conserving > 0 and not s.constant:
-                told = _velocity(e.joints, e.free, matrices.mass, rule, s, w, state)
+                told = _velocity(e.joints, e.free, matrices.mass, rule, s, w, state, ROUGHLY)
                 _add_impulses(e.joints, s, w)
             if told == GO_ON:
-                told = _correct(e.joints, e.free, matrices, s, w, state, anew)
+                told = _correct(e.joints, e.free, matrices, rule, s, w, state, anew)
             if told == GO_ON:
                 told = _judged(e.body, rule, w, state, wanted, rough)
             if told == ASTRAY:
@@ -317,7 +328,7 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
         if told == DONE:
             if joined:
                 _directions(e.joints, rule, s, w)
-            told = _velocity(e.joints, e.free, matrices.mass, rule, s, w, state)
+            told = _velocity(e.joints, e.free, matrices.mass, rule, s, w, state, EXACTLY)
             _accelerations(e.free, rule, s, w, state)
             if told == GO_ON and joined and rule.conserving == 0:
                 told = _close_acceleration(e.joints, e.free, matrices.mass, rule, s, w, state)
@@ -464,18 +475,42 @@ def _pace(free, rule, s, w):
 
 
 @source
-def _velocity(joints, free, mass, rule, s, w, state):
+def _velocity(joints, free, mass, rule, s, w, state, exact):
     """v_1 of the iterate, with the joints' impulses; FAILED if these are not determined.
 
-    ``v_1 = v - M^-1 J^T impulse`` with ``d Phi / dt = 0`` at the end of the step.
+    ``v_1 = v - M^-1 J^T impulse`` with ``d Phi / dt = 0`` at the end of the step; up to what an
+    iteration leaves, where that is not the last, unless ``exact``.
     """
     _free_velocity(free, rule, s, w)
-    anew = w.S.size > 0
+    anew = w.m.impulse.size > 0
     if anew:
         drive_rate(joints, s.joints, s.t, s.dt, w.x.u, w.m.impulse)
+        if rule.mass_solver > 0:
+            return _eliminated(joints, rule, s, w, w.x.middle, w.m.impulse, w.x.v, state, exact)
         if not solve_joined(mass, w.J[0], w.J[1], free, anew, w.J[2], w.S, w.m.impulse, w.x.v):
             state[FAILURE] = DEPENDENT
             return FAILED
+    return GO_ON
+
+
+@source
+def _eliminated(joints, rule, s, w, at, b, x, state, exact):
+    """Change x by ``-M^-1 J^T b``, left in ``w.x.pace``, so that ``J1 x`` becomes what -b was.
+
+    Of joints that are eliminated. J is that at the displacement ``at``, J1 that at the end of the
+    step. FAILED if they depend on each other.
+    """
+    change, rate = w.x.pace, w.m.phi
+    add_constraint_rate(joints, s.joints.g[0], s.t, w.x.u, x, b)
+    for k in lanes(b.size):
+        rate[k] = -b[k]
+    copy(at, change)
+    known = w.m.l if exact > 0 else w.m.l[:0]  # none: roughly
+    if not own_solve(rule.mass_solver, s.t, w.x.u, known, x, rate, change, b):
+        state[FAILURE] = DEPENDENT
+        return FAILED
+    for i in lanes(x.size):
+        x[i] += change[i]
     return GO_ON
 
 
@@ -600,14 +635,22 @@ def _add_obstacles(e, matrices, rule, s, w):
 
 
 @source
-def _factorize(free, matrices, state):
+def _factorize(free, matrices, rule, s, w, state):
     """Factors of the iteration matrix; False if it has none."""
     fix(matrices.A, free)
     state[FACTORIZED] += 1.0
-    if not factorize(matrices.A):
+    if rule.solver > 0:  # asked without a right-hand side: with what multipliers do at u
+        l, dl, none = w.m.l, w.m.dl, w.x.du[:0]
+        for k in lanes(l.size):
+            dl[k] = s.stiffness_factor * l[k]
+        good = own_solve(rule.solver, s.acting, w.x.middle, dl, none, none, none, none)
+    else:
+        good = factorize(matrices.A)
+    if not good:
         state[FAILURE] = SINGULAR
         return False
-    factorize_rows(matrices.A, matrices.rows, free)
+    if rule.solver == 0:
+        factorize_rows(matrices.A, matrices.rows, free)
     state[READY], state[RATE], state[FRESH], state[SIZE] = 1.0, EXPECTED, 1.0, -1.0
     return True
 
@@ -653,12 +696,14 @@ def _add_work(e, matrices, rule, s, w, state, power):
 def _directions(joints, rule, s, w):
     """The joints' directions where they act, and at the end of the step."""
     _middle(rule, w)
+    if rule.solver > 0:
+        return
     joint_directions(joints, s.joints.g[1], s.acting, w.x.middle, w.J[0])
     joint_directions(joints, s.joints.g[0], s.t, w.x.u, w.J[1])
 
 
 @source
-def _residual(loads, free, M, rule, s, w):
+def _residual(loads, joints, free, M, rule, s, w):
     """R = Q - f - M a - J^T lambda."""
     u, base, rest, held = w.x.u, w.x.base, w.x.rest, w.x.held
     a, R, f, room = w.x.acceleration, w.x.residual, w.x.force, w.x.room
@@ -668,7 +713,13 @@ def _residual(loads, free, M, rule, s, w):
     mean_external_force(loads, s.factors, s.acting, w.y[0] if rule.conserving > 0 else u, u, R)
     for i in lanes(u.size):
         R[i] = R[i] - f[i] - room[i]
-    subtract_rows(w.J[0], w.m.l, R)
+    if rule.solver > 0:
+        clear(room)
+        add_joint_force(joints, s.joints.g[1], s.acting, w.x.middle, w.m.l, room)
+        for i in lanes(u.size):
+            R[i] -= room[i]
+    else:
+        subtract_rows(w.J[0], w.m.l, R)
 
 
 @source
@@ -683,7 +734,7 @@ def _add_impulses(joints, s, w):
 
 
 @source
-def _correct(joints, free, matrices, s, w, state, anew):
+def _correct(joints, free, matrices, rule, s, w, state, anew):
     """Correct u and the multipliers; FAILED if these are not determined."""
     u, R, du, room = w.x.u, w.x.residual, w.x.du, w.x.room
     l, dl, phi, A, rows = w.m.l, w.m.dl, w.m.phi, matrices.A, matrices.rows
@@ -691,11 +742,14 @@ def _correct(joints, free, matrices, s, w, state, anew):
     for i in lanes(u.size):
         R[i] *= free[i]
         du[i] = R[i]
-    solve_rows(A, rows, du)
+    if rule.solver == 0:
+        solve_rows(A, rows, du)
     work = abs(np.dot(R, du))
     if l.size > 0:
         constraint(joints, s.joints.c[0], s.joints.g[0], s.t, u, phi)
-        copy(phi, dl)
+        for k in lanes(l.size):
+            dl[k] = phi[k]
+            phi[k] = -phi[k]
         if anew and rows.P.shape[0] > 0:
             anew = False
             for k in range(l.size):
@@ -703,15 +757,20 @@ def _correct(joints, free, matrices, s, w, state, anew):
                 for i in lanes(u.size):
                     out[i] = row[i] * free[i]
                 solve_rows(A, rows, out)
-        if not solve_joined(A, w.J[0], w.J[1], free, anew, w.J[2], w.S, dl, du):
+        if rule.solver > 0:
+            good = own_solve(rule.solver, s.t, u, l, R, phi, du, dl)
+        else:
+            good = solve_joined(A, w.J[0], w.J[1], free, anew, w.J[2], w.S, dl, du)
+        if not good:
             state[FAILURE] = DEPENDENT
             return FAILED
         for i in lanes(u.size):
             room[i] = np.abs(R[i] * du[i])
         work = np.dot(room, free)
-        for k in range(l.size):
+        for k in lanes(l.size):
             l[k] += dl[k]
-            work += abs(phi[k] * dl[k])
+            phi[k] = np.abs(phi[k] * dl[k])
+        work += np.sum(phi)
     for i in lanes(u.size):
         u[i] += du[i]
     state[LAST_SIZE], state[SIZE] = state[SIZE], np.sqrt(work)
@@ -750,15 +809,22 @@ def _close_acceleration(joints, free, mass, rule, s, w, state):
     a1, w1, l, dl, shared = w.x.acceleration, w.x.du, w.m.l, w.m.dl, w.m.phi
     l0, last, anew = w.m.l0, w.m.last, w.m.l.size > 0
     acceleration_of_joints(joints, s.joints, s.t, s.dt, w.x.u, w.x.v, dl)
-    if not solve_joined(mass, w.J[1], w.J[1], free, anew, w.J[2], w.S, dl, a1):
-        state[FAILURE] = DEPENDENT
-        return FAILED
     share = (1.0 - rule.alpha_f) / (1.0 - rule.alpha_m)
+    if rule.mass_solver > 0:
+        if _eliminated(joints, rule, s, w, w.x.u, dl, a1, state, EXACTLY) == FAILED:
+            return FAILED
+        for i in lanes(w1.size):
+            w1[i] += share * w.x.pace[i]
+    else:
+        if not solve_joined(mass, w.J[1], w.J[1], free, anew, w.J[2], w.S, dl, a1):
+            state[FAILURE] = DEPENDENT
+            return FAILED
+        for k in lanes(l.size):
+            shared[k] = share * dl[k]
+        subtract_rows(w.J[2], shared, w1)
     for k in lanes(l.size):
-        shared[k] = share * dl[k]
         l0[k] = l[k] + dl[k]
         last[k] = l0[k]
-    subtract_rows(w.J[2], shared, w1)
     return GO_ON
 
 

@@ -246,6 +246,25 @@ class Joint(Sealable):
         """
         return None
 
+    def quadratic(self, u: Array, t: float, v: Array) -> Array:
+        """The second derivative of Phi in a direction, a number for each equation.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        t
+            Time; in statics the load factor.
+        v
+            The direction, shape (N,).
+        """
+        out = np.zeros(len(self.equations))
+        for k, unit in enumerate(np.eye(len(out))):
+            second = self.curvature(u, t, unit)
+            if second is not None:
+                out[k] = second[2] @ (v[second[0]] * v[second[1]])
+        return out
+
     def lost(self, u: Array) -> str:
         """Why the joint cannot hold in a converged state, in words; "" if it can.
 

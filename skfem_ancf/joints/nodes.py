@@ -186,6 +186,10 @@ class Nodes(Joint):
         k, i, j, values = self.second_entries(len(u))
         return i, j, multipliers[k] * values
 
+    def quadratic(self, u: Array, t: float, v: Array) -> Array:
+        k, i, j, values = self.second_entries(len(u))
+        return np.bincount(k, values * v[i] * v[j], len(self.equations))
+
     def split(self, multipliers: Array) -> tuple[Array, ...]:
         """Forces (followers, 2) and moments (turned,) of followers, and those that hold nodes.
 
