@@ -242,6 +242,40 @@ def test_what_two_entries_call_is_lowered_once(needs_compiled, monkeypatch):
     assert [name for name in lowered if name == "cube"] == ["cube"]
 
 
+@pytest.mark.parametrize("order", ["C", "F", "A"])
+def test_single_numbers_of_arrays_are_read_and_written_as_by_numpy(needs_compiled, order):
+    """From either end, of any layout and kind of number; slices are Numba's, as in other code."""
+    from numba import njit
+
+    from skfem_ancf.compiled.twin import compile_for
+
+    def given():
+        a = np.arange(48.0).reshape(4, 6, 2)[:, :3] if order == "A" else np.array(
+            np.arange(24.0).reshape(4, 3, 2), order=order)
+        return a, np.array([3, -1, 0, 2]), np.zeros(8), np.zeros(4, dtype=bool)
+
+    expected = given()
+    exchange(*expected)
+    for run in (compile_for(exchange, given()), njit(exchange)):
+        found = given()
+        run(*found)
+        for x, y in zip(found, expected):
+            assert x.tolist() == y.tolist()
+
+
+@source
+def exchange(a, places, y, flags):
+    y[0] = a[1, 2, 1]
+    y[-1] = a[-1, places[1], places[-2]]
+    a[places[0], -2, 1] = 7
+    places[-1] = 5
+    y[2] += places[3]
+    y[3:5] = a[0, 1]
+    flags[-3] = y[0] > 1.0
+    if flags[1]:
+        y[5] = a[2, 0, 0] - 1
+
+
 @source
 def cube(x, y):
     for i in lanes(x.size):

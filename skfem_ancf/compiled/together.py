@@ -7,6 +7,8 @@ Numba does, but share the module of the entry, which is optimised once.
 
 from __future__ import annotations
 
+import gc
+from contextlib import contextmanager
 from itertools import count
 from typing import Any, NamedTuple
 
@@ -18,7 +20,7 @@ from numba.core.compiler_machinery import PassManager
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
 from numba.core.registry import cpu_target
-from numba.core.imputils import lower_constant
+from numba.core.imputils import lower_builtin, lower_constant
 from numba.extending import models, register_model, typeof_impl
 
 class _Part:
@@ -73,49 +75,44 @@ class _Compiler(compiler.CompilerBase):
         return [some]
 
 
+class _Typing:
+    """Numba's context of types, which tries no function again for types that it knew before."""
+
+    def __init__(self, context):
+        self._context, self._found, self._functions = context, {}, {}
+
+    def __getattr__(self, name):
+        return getattr(self._context, name)
+
+    def resolve_function_type(self, func, args, kws):
+        """The signature of a call: Numba tries each of a function's templates until one fits."""
+        function = self._function(func)
+        if not isinstance(function, types.Function):
+            return self._context.resolve_function_type(func, args, kws)
+        key = function, tuple(args), tuple(dict(kws).items())
+        signature, made = self._found.get(key, (None, None))
+        # a template that was tried since, for other flags, may have made other code
+        if signature is None or function.get_impl_key(signature) is not made:
+            signature = self._context.resolve_function_type(func, args, kws)
+            if signature is not None and signature.is_precise() and signature.recvr is None:
+                self._found[key] = signature, function.get_impl_key(signature)
+        return signature
+
+    def _function(self, func):
+        """What Numba knows a function by, an operator for instance."""
+        if isinstance(func, types.Type | str):
+            return func
+        if func not in self._functions:
+            self._functions[func] = self._context.resolve_value_type(func)
+        return self._functions[func]
+
+
 class _Made(NamedTuple):
     """A text for types of arguments: its signature, and what Numba knows it by."""
 
     signature: Any
     key: object
     part: _Part
-
-
-class _Known(compiler.Flags):
-    """Flags that stay as they are: Numba asks for their hash at each call that it types."""
-
-    __slots__ = ()
-    _HASH = hash(compiler.Flags())
-
-    def __hash__(self):
-        return self._HASH
-
-    def copy(self):
-        return compiler.Flags(self)
-
-
-class TextFlags(compiler.Flags):
-    """Numba's flags for texts: each is compiled with the same copy of them.
-
-    Parameters
-    ----------
-    options
-        Those of ``numba.njit``.
-    counts
-        Whether owners of arrays are counted.
-    """
-
-    __slots__ = ("known",)
-
-    def __init__(self, options, counts):
-        super().__init__()
-        cpu_target.options.parse_as_flags(self, {"nopython": True, **options})
-        self.nrt = counts
-        self.no_compile = self.no_cpython_wrapper = self.no_cfunc_wrapper = True
-        self.known = _Known(self)
-
-    def copy(self):
-        return self.known
 
 
 #: Passes for what texts have not: closures, contexts, lists of literals.
@@ -127,6 +124,7 @@ _OF_NUMBERS = {"abs", "arctan2", "ceil", "floor", "hypot", "inf", "int64", "log1
                "minimum", "nan", "shape", "sign", "size", "sqrt"}
 #: The entries that are being compiled, the innermost last.
 _OPEN: list[_Open] = []
+_TYPING = _Typing(cpu_target.typing_context)
 _numbers = count()
 
 
@@ -172,7 +170,7 @@ class Text:
         part, key = _Part(entry.library), object()
         entry.parts.append(part)
         try:
-            made = compiler.compile_extra(cpu_target.typing_context, cpu_target.target_context,
+            made = compiler.compile_extra(_TYPING, cpu_target.target_context,
                                           self.function, args, None, self.flags[counts], {},
                                           library=part, pipeline_class=_Compiler)
         finally:
@@ -214,6 +212,12 @@ def _typeof(text, c):
     return TextType(text)
 
 
+@lower_builtin("__array__", types.Array)
+def _itself(context, builder, signature, args):
+    """An array as an array. Numba looks for this at each access to one, each time everywhere."""
+    return args[0]
+
+
 @lower_constant(TextType)
 def _constant(context, builder, kind, text):
     return context.get_dummy_value()
@@ -228,6 +232,19 @@ class Entry(compiler.Compiler):
         self.state.library = library
         _OPEN.append(_Open(library))
         try:
-            return super().compile_extra(func)
+            with _nothing_collected():
+                return super().compile_extra(func)
         finally:
             _OPEN.pop()
+
+
+@contextmanager
+def _nothing_collected():
+    """Numba makes millions of small objects that live as long as it works."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()

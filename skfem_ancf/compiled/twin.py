@@ -9,9 +9,10 @@ from types import FunctionType
 from numba import cfunc, njit, typeof
 
 from ..source import column, lanes
-from . import stamp
+from . import access, stamp  # noqa: F401
+from .flags import TextFlags
 from .records import record_type
-from .together import Entry, Text, TextFlags
+from .together import Entry, Text
 from .words import Words
 
 logger = logging.getLogger(__name__)

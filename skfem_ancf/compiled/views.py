@@ -15,10 +15,8 @@ _ALIGNED = 64
 
 def _without_owner(context, builder, kind, value):
     if isinstance(kind, types.Array):
-        array = context.make_array(kind)(context, builder, value)
-        array.meminfo = cgutils.get_null_value(array.meminfo.type)
-        array.parent = cgutils.get_null_value(array.parent.type)
-        return array._getvalue()
+        none = cgutils.get_null_value(context.get_value_type(types.voidptr))
+        return _with(context, builder, kind, value, {"meminfo": none, "parent": none})
     if isinstance(kind, types.BaseTuple):
         for k, part in enumerate(kind.types):
             one = _without_owner(context, builder, part, builder.extract_value(value, k))
@@ -37,18 +35,22 @@ def borrowed(typing, x):
 
 def array_at(context, builder, kind, pointer, shape):
     """A contiguous array at a pointer."""
-    array = context.make_array(kind)(context, builder)
     size = _WORD(context.get_abi_sizeof(context.get_data_type(kind.dtype)))
-    count, strides = _WORD(1), []
-    for n in reversed(shape):
+    shape, count, strides = list(shape), shape[-1], [size]
+    for n in reversed(shape[:-1]):
         strides.insert(0, builder.mul(count, size))
         count = builder.mul(count, n)
-    array.data = builder.bitcast(pointer, array.data.type)
-    array.shape, array.strides = (cgutils.pack_array(builder, x) for x in (shape, strides))
-    array.itemsize, array.nitems = size, count
-    array.meminfo = cgutils.get_null_value(array.meminfo.type)
-    array.parent = cgutils.get_null_value(array.parent.type)
-    return array._getvalue()
+    return _with(context, builder, kind, cgutils.get_null_value(context.get_value_type(kind)), {
+        "data": pointer, "shape": cgutils.pack_array(builder, shape), "itemsize": size,
+        "strides": cgutils.pack_array(builder, strides), "nitems": count})
+
+
+def _with(context, builder, kind, array, parts):
+    """An array with other parts."""
+    model = context.data_model_manager[kind]
+    for name, part in parts.items():
+        array = builder.insert_value(array, part, model.get_field_position(name))
+    return array
 
 
 def _sizes(context, builder, shape, value):
@@ -85,9 +87,9 @@ def shaped(typing, x, shape):
     found = _kind(x, shape)
 
     def generate(context, builder, signature, args):
-        array = context.make_array(x)(context, builder, args[0])
-        return array_at(context, builder, found, array.data,
-                      _sizes(context, builder, shape, args[1]))
+        place = context.data_model_manager[x].get_field_position("data")
+        return array_at(context, builder, found, builder.extract_value(args[0], place),
+                        _sizes(context, builder, shape, args[1]))
 
     return found(x, shape), generate
 
