@@ -23,9 +23,10 @@ if TYPE_CHECKING:
 COMPRESSED = 1.0 / np.sqrt(3.0)
 #: Angle, in radians, by which the axis may turn over one element, for a cubic axis and others.
 #: A cubic cable bent by an end moment is off by 1.7, 4.5, 9, 14 % of its length at 0.76, 0.93, 1.07
-#: and 1.18 rad, and beyond 1.2 rad nothing is left of the solution.
-TURNING = {3: 1.0}
-TURNING_SMOOTH = 1.6
+#: and 1.18 rad, and beyond 1.2 rad nothing is left of the solution; one of degree 5 by 1.5e-5 at
+#: 1.6 rad, of degree 7 by 2.4e-8 at 2, of degree 9 by 5e-11 at 2.5.
+TURNING = {3: 1.0, 5: 1.6, 7: 2.0}
+TURNING_SMOOTH = 2.5
 
 
 @dataclass(frozen=True)

@@ -122,8 +122,9 @@ def of_cable(beam: Beam) -> Inertia:
     tind = np.array([0]) if across.uniform else None
     X = np.array([xi, 0.5 + 0.0 * xi])
     N = beam.element.functions(mapping, X, tind)[0]
-    h = mapping.height(xi, tind)[0]
-    mass, *moments = across.moments(xi, tind, "mass") * w * mapping.detDF(X, tind) / h
+    # the length of the axis: directors that are interpolated between nodes are shorter than one
+    speed = np.sqrt(np.sum(mapping.DF(X, tind)[:, 0] ** 2, axis=0))
+    mass, *moments = across.moments(xi, tind, "mass") * w * speed
     if across.simple:
         return Inertia(N, mass)
     return Inertia(N, mass, beam.element.slopes(mapping, X, tind)[0][:, 0], np.array(moments))

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from functools import cached_property
+from math import factorial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from skfem.mapping import Mapping
 
 from .errors import MeshError
-from .reference import hermite, linear
+from .nodal import nodal_derivatives, turned
+from .reference import SECTIONS, hermite_basis
 from .taper import powers
 
 if TYPE_CHECKING:
@@ -71,9 +73,12 @@ def correction(axis: Any, director: Any, gap: Sequence[Any], xi: Any, eta: Any
     xi, eta
         The reference point so far.
     """
-    (_, a, b, c), (_, p, q, r) = axis
-    x, y = xi * (a + xi * (b + xi * c)), xi * (p + xi * (q + xi * r))
-    dx, dy = a + xi * (2.0 * b + 3.0 * xi * c), p + xi * (2.0 * q + 3.0 * xi * r)
+    if len(axis[0]) == 4:
+        (_, a, b, c), (_, p, q, r) = axis
+        x, y = xi * (a + xi * (b + xi * c)), xi * (p + xi * (q + xi * r))
+        dx, dy = a + xi * (2.0 * b + 3.0 * xi * c), p + xi * (2.0 * q + 3.0 * xi * r)
+    else:
+        (x, dx), (y, dy) = _polynomial(axis[0], xi), _polynomial(axis[1], xi)
     (nx, dnx), (ny, dny) = _polynomial(director[0], xi), _polynomial(director[1], xi)
     Y = eta - 0.5
     x, y = gap[0] - x - Y * nx, gap[1] - y - Y * ny
@@ -89,8 +94,10 @@ class MappingBeam(Mapping):
     Hermite functions H_i, nodal positions and tangents x_i and section directors n_1, n_2.
     Every ANCF element of order 1 or more contains this map, so the stress-free state, and
     any rigid motion of it, is represented exactly. On a mesh with ``sections="cubic"``, for
-    elements whose sections are cubic too, the directors are interpolated by H_i as well. The
-    height h of a tapered beam is cubic in xi.
+    elements whose sections are cubic too, the directors are interpolated by H_i as well; with
+    "quintic" and the names beyond, for elements of that degree, both are interpolated by Hermite
+    functions of that degree (:func:`.nodal.nodal_derivatives`). The height h of a tapered beam is
+    cubic in xi.
 
     Parameters
     ----------
@@ -109,12 +116,23 @@ class MappingBeam(Mapping):
 
     @cached_property
     def _all_coefficients(self):
-        m, t, L = self.mesh, self.mesh.t, self.mesh.lengths
-        axis = np.stack([m.p[:, t[0]], L * m.p_X[:, t[0]], m.p[:, t[1]], L * m.p_X[:, t[1]]], 1)
-        n = [m.p_Y[:, t[0]], m.p_Y[:, t[1]]]
-        if m.sections == "cubic":
-            n = [n[0], L * m.p_XY[:, t[0]], n[1], L * m.p_XY[:, t[1]]]
-        return axis, m.height * np.stack(n, 1)
+        m, (k, n) = self.mesh, self._orders
+        axis = nodal_derivatives(m, max(k - 1, n if n > 2 else 1))
+        directors = [m.p_Y, m.p_XY, *(turned(d) for d in axis[3:])]
+        axis, directors = (np.stack([m.lengths**j * d[:, end] for end in m.t
+                                     for j, d in enumerate(values)], 1)
+                           for values in (axis[:k], directors[:n]))
+        return axis, m.height * directors
+
+    @property
+    def _orders(self):
+        """How many derivatives of the axis and of the director a node has, the 0th included."""
+        n = 1 + SECTIONS.index(self.mesh.sections)
+        return max(2, n), n
+
+    def _axis(self, xi, derivative=0):
+        """The functions of xi that interpolate the axis."""
+        return hermite_basis(self._orders[0], xi, derivative)
 
     @cached_property
     def _constant(self):
@@ -131,7 +149,7 @@ class MappingBeam(Mapping):
 
     def _director(self, xi, derivative=0):
         """The functions of xi that interpolate the section director."""
-        return (hermite if self.mesh.sections == "cubic" else linear)(xi, derivative)
+        return hermite_basis(self._orders[1], xi, derivative)
 
     @cached_property
     def _heights(self):
@@ -207,7 +225,7 @@ class MappingBeam(Mapping):
         across = self._sum(director, (eta - 0.5) * self._director(xi))
         if self.mesh.heights is not None:
             across *= self._relative(xi, tind)[0]
-        return self._sum(axis, hermite(xi)) + across
+        return self._sum(axis, self._axis(xi)) + across
 
     def DF(self, X: Array, tind: Array | None = None) -> Array:
         """The Jacobian: derivatives of :meth:`F` by xi and eta.
@@ -231,7 +249,7 @@ class MappingBeam(Mapping):
         if self.mesh.heights is not None:
             g, rate = self._relative(xi, tind)
             turning, across = g * turning + (eta - 0.5) * rate * across, g * across
-        return np.stack([self._sum(axis, hermite(xi, 1)) + turning, across], 1)
+        return np.stack([self._sum(axis, self._axis(xi, 1)) + turning, across], 1)
 
     def detDF(self, X: Array, tind: Array | None = None) -> Array:
         """The determinant of :meth:`DF`.
@@ -294,21 +312,19 @@ class MappingBeam(Mapping):
             e1 = self._constant[:, 0] / self.mesh.lengths
             return self._everywhere(np.stack([e1, np.array([-e1[1], e1[0]])], 1), X, tind)
         axis, _ = self._coefficients(tind)
-        e1 = self._sum(axis, hermite(X[0], 1))
+        e1 = self._sum(axis, self._axis(X[0], 1))
         e1 = e1 / np.sqrt(e1[0] ** 2 + e1[1] ** 2)
         return np.stack([e1, np.array([-e1[1], e1[0]])], 1)
 
     @cached_property
     def _powers(self):
-        """Axis from the first node, and director, as polynomials of xi, (2, 4 and 2 or 4, ne)."""
+        """Axis from the first node, and director, as polynomials of xi, (2, n, ne) both."""
         axis, director = self._all_coefficients
-        axis = axis - axis[:, :1] * np.array([1.0, 0.0, 1.0, 0.0])[:, None]
-        zero = np.zeros(1)
-        cubic = [hermite(zero, d) / (1, 1, 2)[d] for d in range(3)]
-        cubic.append(hermite(zero + 1.0) - sum(cubic))  # what is left at xi = 1
-        few = cubic if self.mesh.sections == "cubic" else [linear(zero), linear(zero, 1)]
-        axis, director = (np.stack([self._sum(c, f)[..., 0] for f in functions], 1)
-                          for c, functions in ((axis, cubic), (director, few)))
+        axis = axis.copy()
+        axis[:, [0, self._orders[0]]] -= axis[:, :1]
+        axis, director = (np.stack([self._sum(c, hermite_basis(m, np.zeros(1), d))[..., 0]
+                                    / factorial(d) for d in range(2 * m)], 1)
+                          for m, c in zip(self._orders, (axis, director)))
         if self.mesh.heights is None:
             return [axis, director]
         product = np.zeros((2, director.shape[1] + 3, axis.shape[2]))
@@ -334,7 +350,7 @@ class MappingBeam(Mapping):
         Returns
         -------
         ndarray
-            Shape (2, nelements, npoints).
+            Shape (2, nelements, npoints); NaN where no such point was found.
         """
         first = self._all_coefficients[0][:, 0]
         axis, director = (c[..., None] if tind is None else np.take(c, tind, axis=2)[..., None]
@@ -346,8 +362,10 @@ class MappingBeam(Mapping):
             dX = np.array(correction(axis, director, gap, *X))
             X += np.clip(dX, -1.0, 1.0)
             # the square of the last correction is left
-            if not np.any(np.abs(dX) > CLOSE * (1.0 + np.abs(X))):
-                break
+            far = np.abs(dX) > CLOSE * (1.0 + np.abs(X))
+            if not np.any(far):
+                return X
+        X[:, np.any(far, axis=0)] = np.nan
         return X
 
     def find_in(self, e: int, x: float, y: float, xi: float, eta: float = 0.5

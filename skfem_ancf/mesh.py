@@ -23,7 +23,7 @@ from .frozen import Frozen, ReadOnlyDict
 from .mapping import MappingBeam
 from .pickling import require_picklable
 from .places import is_point
-from .reference import ElementBeamP1
+from .reference import SECTIONS, ElementBeamP1
 from .refinement import halved
 from .taper import Scaled, heights_of
 
@@ -73,7 +73,7 @@ class MeshBeam(Frozen, Mesh2D):
     p_XY
         Derivative of ``p_Y`` along the axis, shape (2, nvertices), or None if it is not known.
     sections
-        "linear" or "cubic": how ``p_Y`` is interpolated between the nodes, see
+        "linear", "cubic", ...: how ``p_Y`` is interpolated between the nodes, see
         :meth:`with_sections`.
     s
         Parameter of each node on the curve, or None.
@@ -263,10 +263,10 @@ class MeshBeam(Frozen, Mesh2D):
             self._straight()
         self.p_X = require_finite("p_X", self.p_X, p.shape)
         self.p_Y = require_finite("p_Y", self.p_Y, p.shape)
-        require_option("interpolation of the sections", self.sections, ("linear", "cubic"))
+        require_option("interpolation of the sections", self.sections, SECTIONS)
         if self.p_XY is not None:
             self.p_XY = require_finite("p_XY", self.p_XY, p.shape)
-        elif self.sections == "cubic":
+        elif self.sections != "linear":
             raise MeshError("the mesh does not know how its sections turn (p_XY): build it with "
                             "MeshBeam.init_line or MeshBeam.init_curve")
         self.lengths = require_finite("lengths", self.lengths, (t.shape[1],))
@@ -296,13 +296,15 @@ class MeshBeam(Frozen, Mesh2D):
         self.p_XY = np.zeros(p.shape)
 
     def with_sections(self, sections: str) -> MeshBeam:
-        """The mesh with section directors interpolated "linear" or "cubic" along the axis.
+        """The mesh with section directors interpolated "linear", "cubic", ... along the axis.
 
+        The names are those of :data:`skfem_ancf.reference.SECTIONS`: "quintic", "septic", "of
+        degree 9" ... "of degree 15" for directors and axis, which is cubic for the first two.
         Elements with sections that vary linearly along X hold the stress-free state of a curved
         beam exactly on a mesh with "linear", those with cubic sections on one with "cubic". A
         ``Beam`` chooses for itself; it makes no difference for straight beams.
         """
-        require_option("interpolation of the sections", sections, ("linear", "cubic"))
+        require_option("interpolation of the sections", sections, SECTIONS)
         return self if sections == self.sections else replace(self, sections=sections)
 
     def replace(self, **changes: Any) -> MeshBeam:
@@ -524,6 +526,7 @@ class MeshBeam(Frozen, Mesh2D):
             n, k = candidates.shape
             X = mapping.invF(np.repeat(x, k, axis=1)[:, :, None], tind=candidates.ravel())
             outside = np.max(np.abs(X[:, :, 0] - 0.5) - 0.5, axis=0).reshape(n, k)
+            outside[np.isnan(outside)] = np.inf
             size = np.max(np.abs(x), initial=0.0) + np.max(np.abs(self.p))
             outside[outside < 1e-9 + 8 * np.finfo(float).eps * size / self.height] = 0.0
             rows, which = np.arange(n), np.argmin(outside, axis=1)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from math import comb, perm
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.polynomial import polynomial
 from skfem.element import ElementH1
 from skfem.refdom import Refdom, RefLine, RefQuad
 
@@ -14,6 +14,11 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from .types import Array
+
+
+#: How sections vary between the nodes that hold 1, 2, ... derivatives along X, the 0th included.
+SECTIONS = ("linear", "cubic", "quintic", "septic",
+            *(f"of degree {degree}" for degree in (9, 11, 13, 15)))
 
 
 class RefBeam(Refdom):
@@ -126,10 +131,21 @@ def hermite(xi: ArrayLike, derivative: int = 0) -> Array:
 
 @lru_cache
 def _hermite_coefficients(m: int, derivative: int) -> Array:
-    """Powers of a derivative of the Hermite polynomials of degree 2 m - 1 on [0, 1], columns."""
-    conditions = [[polynomial.polyval(x, polynomial.polyder(row, d)) for row in np.eye(2 * m)]
-                  for x in (0.0, 1.0) for d in range(m)]
-    return polynomial.polyder(np.linalg.inv(np.array(conditions)), derivative)
+    """Bernstein coefficients of a derivative of the Hermite functions of degree n = 2 m - 1.
+
+    Shape (n + 1 - derivative, 2 m). A function whose k-th derivative at 0 is 1 and whose others
+    vanish has coefficients ``binom(i, k) (n - k)! / n!``, i < m; the one at 1 is its mirror image.
+    All are of one sign: nothing cancels, at no degree (Farouki and Rajan, "On the numerical
+    condition of polynomials in Bernstein form", Computer Aided Geometric Design 4, 1987). The
+    differences that derivatives are made of are taken of integers.
+    """
+    n = 2 * m - 1
+    left = [[comb(i, k) * perm(n, m) // perm(n, k) if i < m else 0 for i in range(n + 1)]
+            for k in range(m)]
+    rows = np.array(left + [[(-1) ** k * b for b in row[::-1]] for k, row in enumerate(left)],
+                    dtype=object)
+    rows = np.diff(rows, derivative, axis=1) * perm(n, derivative)
+    return np.array(rows / perm(n, m), dtype=float).T
 
 
 def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
@@ -148,4 +164,9 @@ def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
     """
     if m < 3 and derivative < 3:
         return (linear if m == 1 else hermite)(xi, derivative)
-    return polynomial.polyval(np.asarray(xi), _hermite_coefficients(m, derivative))
+    x, degree = np.asarray(xi), 2 * m - 1 - derivative
+    if degree < 0:
+        return np.zeros((2 * m,) + x.shape)
+    powers = np.array([comb(degree, i) * x**i * (1.0 - x) ** (degree - i)
+                       for i in range(degree + 1)])
+    return np.tensordot(_hermite_coefficients(m, derivative), powers, (0, 0))

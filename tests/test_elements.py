@@ -1,6 +1,7 @@
 """The beam elements: their space, their coordinates, and what they represent exactly."""
 
 from copy import deepcopy
+from math import factorial
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from conftest import MESHES
 from skfem_ancf import (ElementBeamANCF, ElementBeamPatelShabana, InputError, MeshBeam, MeshError,
                         NameUnknown)
 from skfem_ancf.elements.ancf import POINT_FAMILIES
-from skfem_ancf.reference import ElementBeamP1, RefBeam, hermite, linear
+from skfem_ancf.reference import SECTIONS, ElementBeamP1, RefBeam, hermite, linear
 
 ORDERS = range(1, 11)
 SIZES = [(1.0, 1.0), (0.01, 3.0), (250.0, 1e-3)]
@@ -34,19 +35,22 @@ def tabulate(element, mesh, X=POINTS, tind=None):
 def functionals(element, mesh, L, h):
     """Each coordinate applied to each local function: (element, coordinate, function).
 
-    Derivatives are taken of the values with the complex step along the reference axes, on
-    elements of length L and height h; second derivatives are those of the gradient along Y.
+    Derivatives are taken of the values, or of the gradient along Y, by Cauchy's integral around
+    the point along a reference axis, exact for polynomials; on elements of length L and height h.
     """
-    L, coordinates = np.broadcast_to(L, mesh.nelements), 2 * element.functionals
-    X = np.array([element.doflocs[:, 0], [0.5 + y for y, _, _ in coordinates]], dtype=complex)
-    X += 1j * STEP * np.array([[mx > 0, mx == 0 and my > 0] for _, mx, my in coordinates]).T
-    values, gradients = tabulate(element, mesh, X)
-    along_Y = np.einsum("niep,iep->nep", gradients, mesh.mapping().DF(X)[:, 1] / h)
+    L, coordinates, n, radius = np.broadcast_to(L, mesh.nelements), 2 * element.functionals, 32, 0.5
+    circle = np.exp(2j * np.pi * np.arange(n) / n)
     out = np.empty((mesh.nelements, len(coordinates), len(coordinates)))
-    for k, (_, mx, my) in enumerate(coordinates):
-        assert (mx, my) in ((0, 0), (1, 0), (0, 1), (0, 2), (1, 1))
-        applied = (values if mx + my < 2 else along_Y)[:, :, k].T
-        out[:, k] = (applied.imag / STEP / (L[:, None] if mx else h) if mx + my else applied.real)
+    for k, (y, mx, my) in enumerate(coordinates):
+        more, axis = (mx, 0) if mx else (max(my - 1, 0), 1)
+        assert mx == 0 or my < 2
+        X = np.array([[element.doflocs[k, 0]], [0.5 + y]]) + np.zeros(n, dtype=complex)
+        X[axis] += radius * circle
+        values, gradients = tabulate(element, mesh, X)
+        if my:
+            values = np.einsum("niep,iep->nep", gradients, mesh.mapping().DF(X)[:, 1] / h)
+        applied = factorial(more) * (values @ circle**-more).real / n / radius**more
+        out[:, k] = (applied / (h if axis else L) ** more).T
     return out
 
 
@@ -123,14 +127,11 @@ def test_gauss_lobatto_points():
 
 @pytest.mark.parametrize("L, h", SIZES)
 def test_space_is_reproduced_exactly(element, L, h):
-    """{1, X, X^2, X^3} and {Y^k, X Y^k : k = 1..N}, from coordinates taken analytically.
-
-    Cubic sections have X^2 Y^k and X^3 Y^k too.
-    """
+    """{1, X, ... X^p} and {Y^k, ... X^s Y^k : k = 1..N}, from coordinates taken analytically."""
     mesh = one_element(L, h)
     values, gradients = tabulate(element, mesh)
-    powers = [(a, 0) for a in range(4)]
-    powers += [(a, k) for a in range(4 if element.sections == "cubic" else 2)
+    powers = [(a, 0) for a in range(element.axis_degree + 1)]
+    powers += [(a, k) for a in range(2 * SECTIONS.index(element.sections) + 2)
                for k in range(1, element.order + 1)]
     assert len(powers) == len(element.doflocs)
     xi, eta = POINTS[0], POINTS[1] - 0.5
@@ -143,18 +144,23 @@ def test_space_is_reproduced_exactly(element, L, h):
         assert_allclose(grad, [f.deriv()(xi) * g(eta), f(xi) * g.deriv()(eta)], atol=2e-11)
 
 
+def units(element, L, h):
+    return np.array([L ** -mx * h ** -my for _, mx, my in 2 * element.functionals])
+
+
 @pytest.mark.parametrize("name", MESHES)
 def test_functions_are_dual_to_the_coordinates(element, name):
     mesh = MESHES[name]()
     L = np.hypot(*np.diff(mesh.p)) if mesh.is_straight else mesh.lengths
-    for matrix in functionals(element, mesh, L, mesh.height):
-        assert_allclose(matrix, np.eye(len(matrix)), atol=1e-10)
+    for length, matrix in zip(L, functionals(element, mesh, L, mesh.height)):
+        size = units(element, length, mesh.height)
+        assert_allclose(matrix * size / size[:, None], np.eye(len(matrix)), atol=1e-10)
 
 
 @pytest.mark.parametrize("L, h", SIZES)
 def test_duality_does_not_depend_on_units(element, L, h):
     matrix = functionals(element, one_element(L, h), L, h)[0]
-    size = np.array([L ** -mx * h ** -my for _, mx, my in 2 * element.functionals])
+    size = units(element, L, h)
     assert_allclose(matrix * size / size[:, None], np.eye(len(size)), atol=1e-11)
 
 
@@ -304,14 +310,15 @@ def test_stress_free_state_needs_sections_of_its_own_kind(element, sections):
 def test_attributes(element):
     n, number = element.order, element.nodal_dofs
     assert number == len(element.dofnames) == len(element.functionals)
-    assert number == {"linear": n + 2, "cubic": 2 * n + 2}[element.sections]
+    p = element.axis_degree
+    assert number == (p + 1) // 2 + n * (SECTIONS.index(element.sections) + 1)
     assert element.dofnames[:2] == ["r", "r_X"] and len(set(element.dofnames)) == number
     welded = [name for name, f in zip(element.dofnames, element.functionals) if f[1] == 0]
     assert element.welded == welded and len(welded) == n + 1
     assert element.carries_shear_parabola == (n >= 3)
     assert element.doflocs.shape == (2 * number, 2)
     assert_array_equal(element.doflocs[:, 0], np.repeat([0.0, 1.0], number))
-    assert element.refdom is RefBeam and element.axis_degree == 3
+    assert element.refdom is RefBeam and p >= 3 and p % 2 == 1
     assert f"order {n}" in repr(element)
     with pytest.raises(ValueError, match="basis functions"):
         element.gbasis(one_element().mapping(), POINTS, 2 * number)
@@ -323,7 +330,7 @@ def test_default_quadrature_is_exact(element):
     mesh = one_element(0.7, 0.3)
     energy = Functional(lambda w: np.sum(w["r"].grad ** 2, (0, 1)) ** 2)  # degree of the strain's
     bases = [Basis(mesh, ElementVector(element), **kw)
-             for kw in ({}, {"intorder": 4 * element.order + 20})]
+             for kw in ({}, {"intorder": 4 * element.order + 4 * element.axis_degree + 8})]
     q = np.random.default_rng(5).standard_normal(bases[0].N)
     U, exact = (energy.assemble(basis, r=basis.interpolate(q)) for basis in bases)
     assert_allclose(U, exact, rtol=1e-11)

@@ -737,7 +737,7 @@ def test_bad_direct_construction(p, t, message):
     (dict(p_X=np.ones((2, 2))), r"p_X must have shape \(2, 3\)"),
     (dict(p_Y=np.full((2, 3), np.nan)), "p_Y has a value"),
     (dict(p_XY=np.zeros((2, 2))), r"p_XY must have shape \(2, 3\)"),
-    (dict(sections="quintic"), "unknown interpolation of the sections 'quintic'; known: 'linear'"),
+    (dict(sections="quartic"), "unknown interpolation of the sections 'quartic'; known: 'linear'"),
     (dict(sections="cubic"), r"does not know how its sections turn \(p_XY\)"),
 ])
 def test_bad_fields(change, message):

@@ -105,7 +105,7 @@ def test_held_of_a_cubic_axis_is_the_mean_slope_less_the_chord(element, k):
                                            and element.order else "beam")
 
 
-@pytest.mark.parametrize("p, s", [(3, 1), (3, 3), (5, 1), (5, 3), (5, 5), (7, 5), (7, 7)])
+@pytest.mark.parametrize("p, s", [(3, 1), (3, 3), (5, 1), (5, 3), (5, 5), (7, 5)])
 def test_samples_leave_something_to_bend_with(p, s):
     sampling = default_sampling(p, s)
     new = {name: sum(x > 0 for x in sampling.places(name)) for name in ("xx", "yy", "xy")}
@@ -292,8 +292,12 @@ def test_modes_motion_and_recovery():
         assert stress[0] == pytest.approx(-M * 0.005 / (WIDTH * 0.02**3 / 12), rel=1e-3)
 
 
-def test_curved_meshes_are_for_elements_whose_axis_is_cubic():
+def test_curved_meshes_are_for_axes_and_sections_of_one_degree():
     arc = MeshBeam.init_curve(lambda s: np.array([np.sin(s), 1 - np.cos(s)]), [0.0, 0.5, 1.0], 0.1)
-    for cls in OWN.values():
+    for name, cls in OWN.items():
+        if name != "quintic axis":
+            beam = Beam(arc, cls(), StVenantKirchhoff(1.0, 0.3), 1.0)
+            assert beam.mesh.sections == "quintic"
+            continue
         with pytest.raises(MeshError, match="is for straight meshes"):
             Beam(arc, cls(), StVenantKirchhoff(1.0, 0.3), 1.0)

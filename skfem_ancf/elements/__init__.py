@@ -5,6 +5,7 @@ from .base import ElementBeam
 from .cable import ElementBeamCable
 from .choose import ORDER_OF_FIELD, choose_element
 from .cubic import ElementBeamANCFCubic
+from .hermite import ElementBeamANCFHermite
 from .patel_shabana import ElementBeamPatelShabana
 
 #: The elements that the tests run over, by name.
@@ -12,8 +13,10 @@ ELEMENTS = {
     **{f"ancf-{n}": (lambda n=n: ElementBeamANCF(n)) for n in range(1, 11)},
     "patel-shabana": ElementBeamPatelShabana,
     **{f"cubic-{n}": (lambda n=n: ElementBeamANCFCubic(n)) for n in (1, 2, 3, 6)},
+    **{f"degree-{p}-order-{n}": (lambda n=n, p=p: ElementBeamANCFHermite(n, p))
+       for p, n in ((5, 2), (9, 1))},
 }
 
 __all__ = ["ELEMENTS", "ORDER_OF_FIELD", "ElementBeam", "ElementBeamANCF",
-           "ElementBeamANCFCubic", "ElementBeamCable", "ElementBeamPatelShabana",
-           "choose_element"]
+           "ElementBeamANCFCubic", "ElementBeamANCFHermite", "ElementBeamCable",
+           "ElementBeamPatelShabana", "choose_element"]

@@ -79,7 +79,7 @@ class ElementBeamANCF(ElementBeam):
         self.section_points = 0.5 * x
         names, functionals = self._coordinates()
         super().__init__(SectionFunctions(np.linalg.inv(legendre.legvander(x, n - 1))), names,
-                         functionals, names[:n])
+                         functionals, [f"r_Y{k}" for k in range(n)])
 
     def _coordinates(self) -> tuple[list[str], list[tuple[float, int, int]]]:
         """Names of the section coordinates of a node, and what they are."""

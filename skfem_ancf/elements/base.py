@@ -9,10 +9,11 @@ import numpy as np
 from numpy.polynomial import legendre
 from skfem.element import DiscreteField, Element
 
-from ..errors import MeshError
+from ..errors import InputError, MeshError, shown
 from ..frozen import Content, Frozen, read_only
+from ..nodal import nodal_derivatives, turned
 from ..quadrature import gauss
-from ..reference import RefBeam, hermite_basis
+from ..reference import SECTIONS, RefBeam, hermite_basis
 from .sampling import Held, Sampling, default_sampling, missed
 
 if TYPE_CHECKING:
@@ -27,11 +28,31 @@ if TYPE_CHECKING:
     Functionals = tuple[tuple[float, int, int], ...]
 
 
-#: How sections vary between the nodes that hold 1, 2, ... derivatives along X, the 0th included.
-SECTIONS = ("linear", "cubic", "quintic", "septic")
+#: Degrees along the axis of the elements of the package.
+DEGREES = tuple(range(3, 16, 2))
 
 #: Points at most of which the local functions are kept.
 KEPT_POINTS = 512
+
+
+def require_degree(degree: object) -> int:
+    """A degree along the axis: one of :data:`DEGREES`.
+
+    Parameters
+    ----------
+    degree
+        What was given.
+
+    Raises
+    ------
+    InputError
+        If it is another.
+    """
+    if (isinstance(degree, bool) or not isinstance(degree, (int, np.integer))
+            or degree not in DEGREES):
+        raise InputError(f"the degree along the axis is one of {', '.join(map(str, DEGREES))}, got "
+                         f"{shown(degree)}: half of the Hermite functions belong to each node")
+    return int(degree)
 
 
 class ElementBeam(Frozen, Element):
@@ -352,15 +373,21 @@ class ElementBeam(Frozen, Element):
         Raises
         ------
         MeshError
-            If it is curved, and a curved mesh, whose axis is cubic, cannot be the element's.
+            If it is curved, and the element's axis and sections are of two degrees, which those of
+            a curved mesh are not but for a cubic axis.
         """
         if mesh.is_straight:
             return mesh
-        if self.section.number and (self.axis_degree > 3 or self._along[1] > 2):
+        if self.section.number and self.axis_degree > 3 and self._along[0] != self._along[1]:
             raise MeshError(
-                f"{self!r} is for straight meshes: the axis of a curved one is cubic, its sections "
-                "linear or cubic. Use ElementBeamANCF, ElementBeamANCFCubic or ElementBeamCable(5)")
-        return mesh.with_sections(self.sections)
+                f"{self!r} is for straight meshes: axis and sections of a curved one are of one "
+                "degree. Use ElementBeamANCF, ElementBeamANCFHermite or ElementBeamCable")
+        return mesh.with_sections(self.mesh_sections)
+
+    @property
+    def mesh_sections(self) -> str:
+        """How a curved mesh of the element interpolates its sections."""
+        return self.sections
 
     def rigid(self, mesh: MeshBeam) -> Array:
         """The coordinates of the nodes in the stress-free state, less their positions.
@@ -380,13 +407,16 @@ class ElementBeam(Frozen, Element):
         MeshError
             If the mesh is curved and interpolates its sections in another way.
         """
-        if mesh.sections != self.sections and not mesh.is_straight:
-            raise MeshError(f"the sections of {self!r} are {self.sections}, those of the curved "
-                            f"mesh {mesh.sections}: use mesh.with_sections({self.sections!r})")
+        if mesh.sections != self.mesh_sections and not mesh.is_straight:
+            raise MeshError(f"the sections of {self!r} are {self.mesh_sections}, those of the "
+                            f"curved mesh {mesh.sections}: use "
+                            f"mesh.with_sections({self.mesh_sections!r})")
         zero = np.zeros(mesh.p.shape)
         known = {(1, 0): mesh.p_X, (0, 1): mesh.p_Y, (1, 1): mesh.p_XY}
-        if mesh.p_XY is not None:  # the tangent turns as the normal does
-            known[2, 0] = np.array([mesh.p_XY[1], -mesh.p_XY[0]])
+        if mesh.p_XY is not None and not mesh.is_straight:
+            more = dict(enumerate(nodal_derivatives(mesh, max(2, *self._along))[2:], 2))
+            known |= {(k, 0): d for k, d in more.items()}
+            known |= {(k - 1, 1): turned(d) for k, d in more.items() if k > 2}
         return np.array([known.get(f[1:], zero) for f in self.functionals])
 
     def __repr__(self) -> str:

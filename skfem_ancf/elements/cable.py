@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError, shown, teaching
-from ..reference import hermite_basis
-from .base import ElementBeam, SectionFunctions
+from ..errors import teaching
+from ..reference import SECTIONS, hermite_basis
+from .base import ElementBeam, SectionFunctions, require_degree
 from .sampling import Held, Sampling, missed
 
 if TYPE_CHECKING:
@@ -26,13 +26,14 @@ class ElementBeamCable(ElementBeam):
     Parameters
     ----------
     degree
-        Degree of the axis along X: 3 (coordinates ``r``, ``r_X``), 5 (``r_XX`` too; by far the
-        most accurate for its cost) or 7 (``r_XXX`` too, on straight meshes only).
+        Degree of the axis along X: 3 (coordinates ``r``, ``r_X``), 5 (``r_XX`` too; the one for
+        frames and loads at points), 7, ... 15 (derivatives up to the (degree - 1) / 2-th). One or
+        two elements of degree 9 and more replace many where the loads are smooth.
 
     Raises
     ------
     InputError
-        If the degree is not 3, 5 or 7.
+        If the degree is not odd, or not from 3 to 15.
 
     References
     ----------
@@ -53,11 +54,8 @@ class ElementBeamCable(ElementBeam):
     carries_shear_parabola = False
 
     def __init__(self, degree: int = 3) -> None:
-        if (isinstance(degree, bool) or not isinstance(degree, (int, np.integer))
-                or degree not in (3, 5, 7)):
-            raise InputError(f"the degree of a cable is 3, 5 or 7, got {shown(degree)}")
-        m = (int(degree) + 1) // 2
-        super().__init__(SectionFunctions(np.zeros((1, 0))), ["r_XX", "r_XXX"][:m - 2],
+        m = (require_degree(degree) + 1) // 2
+        super().__init__(SectionFunctions(np.zeros((1, 0))), ["r_" + "X" * k for k in range(2, m)],
                          [(0.0, k, 0) for k in range(2, m)], [])
         self.maxdeg = self.axis_degree
 
@@ -65,6 +63,11 @@ class ElementBeamCable(ElementBeam):
     def strain_degree(self) -> int:
         # |r_X| and the curvature are no polynomials: as many points as coordinates of both nodes
         return self.axis_degree
+
+    @property
+    def mesh_sections(self) -> str:
+        # an axis of degree 5 has all that is known of a curved mesh whose axis is cubic
+        return "linear" if self.axis_degree < 7 else SECTIONS[self.nodal_dofs - 1]
 
     def axis(self, xi: Array, derivative: int) -> Array:
         """The 2 m Hermite functions of the axis, or a derivative of them by xi.

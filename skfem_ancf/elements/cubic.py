@@ -1,9 +1,9 @@
 """ANCF beam elements whose sections vary cubically along the axis: fourth order."""
 
-from .ancf import ElementBeamANCF
+from .hermite import ElementBeamANCFHermite
 
 
-class ElementBeamANCFCubic(ElementBeamANCF):
+class ElementBeamANCFCubic(ElementBeamANCFHermite):
     """As :class:`ElementBeamANCF`, with Hermite functions along X for the section slopes too.
 
     The coordinates of a node are ``r``, ``r_X``, the section slopes ``r_Y0`` ... and their
@@ -20,7 +20,5 @@ class ElementBeamANCFCubic(ElementBeamANCF):
     ['r', 'r_X', 'r_Y0', 'r_Y1', 'r_XY0', 'r_XY1']
     """
 
-    def _coordinates(self) -> tuple[list[str], list[tuple[float, int, int]]]:
-        names, functionals = super()._coordinates()
-        return (names + [name.replace("r_Y", "r_XY") for name in names],
-                functionals + [(eta, 1, m) for eta, _, m in functionals])
+    def __init__(self, order: int, points: str = "chebyshev") -> None:
+        super().__init__(order, 3, points)

@@ -80,6 +80,9 @@ def default_sampling(p: int, s: int) -> Sampling:
       the points of eps_xx.
 
     Linear sections, p = 3 and s = 1, have 1 of 6 left, p = s = 3 has 2 of 8, p = s = 5 1 of 12.
+    Counting ends there: sections of degree 7 and more that keep enough points to resist each
+    mode, s for eps_yy and s - 1 for eps_xy, have none left. They do without: what they do not meet
+    exactly between the samples is as small as the error of polynomials of their degree.
 
     Parameters
     ----------
@@ -90,7 +93,8 @@ def default_sampling(p: int, s: int) -> Sampling:
     if s < p:
         return Sampling(min(p - 1, (p + s + 2 - few) // 2), {"yy": _lobatto(few)},
                         volume=int(s == 1))
-    many = min(s, p + s + 2 - (p - 1) - (few - 1))
+    few = max(few, s - 1)
+    many = s if s > 5 else min(s, p + s + 2 - (p - 1) - (few - 1))
     return Sampling(many, {"xx": tuple(gauss(p - 1)[0]), "yy": _lobatto(many),
                            "xy": _lobatto(few)})
 

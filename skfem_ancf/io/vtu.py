@@ -187,8 +187,9 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
         Number of straight quads along and across each element.
     lagrange
         Write each element as one VTK_LAGRANGE_QUADRILATERAL in place of straight quads. Its
-        degree is that of the element, 3 or N if that is larger, so the deformed geometry is
-        exact; for cables, whose sections follow the unit normal, it is interpolated.
+        degree is that of the axis, or N if that is larger, so the deformed geometry is exact up
+        to degree 10; beyond it, and for cables, whose sections follow the unit normal, it is
+        interpolated.
     undeformed
         Put the points at their stress-free places. ParaView's filter "Warp By Vector" then moves
         them by any multiple of ``displacement``.
@@ -395,9 +396,10 @@ def lagrange_cell(beam: Beam) -> tuple[Array, Array]:
     """Points of the Lagrange cell that holds an element, and their order in VTK.
 
     VTK numbers the corners, then the inner points of the edges bottom, right, top, left (in the
-    directions of rising xi and eta), then the inside with xi fastest.
+    directions of rising xi and eta), then the inside with xi fastest. An axis of a degree beyond
+    those of VTK is interpolated by the highest there is.
     """
-    p = max(beam.element.axis_degree, beam.element.order)
+    p = max(min(beam.element.axis_degree, MAX_LAGRANGE_DEGREE), beam.element.order)
     if p > MAX_LAGRANGE_DEGREE:
         raise InputError(f"VTK evaluates Lagrange cells up to degree {MAX_LAGRANGE_DEGREE}, this "
                          f"element has {p}: use subdivide= instead of lagrange=True")

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError
 from ..quadrature import gauss
 from ..source import F2, F3, I1, lanes, primitive, room, source
 from ..types import Array
@@ -304,9 +303,6 @@ class CableKernel(Chain):
                  before: "CableKernel | None" = None) -> None:
         mesh, element = across.mesh, across.element
         super().__init__(mesh, element)
-        if element.axis_degree > 5 and not mesh.is_straight:
-            raise InputError(f"a cable of degree {element.axis_degree} needs a straight mesh: use "
-                             "degree 5 on a curve")
         self.constant = across.stabilisation(formulation)
         n = len(formulation.terms(element, across.slabs[0].material)[0].axis[0])
         joined = mesh.t[0, 1:] == mesh.t[1, :-1]

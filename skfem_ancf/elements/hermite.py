@@ -1,0 +1,54 @@
+"""ANCF beam elements of any odd degree along the axis."""
+
+from __future__ import annotations
+
+from ..errors import teaching
+from .ancf import ElementBeamANCF
+from .base import require_degree
+
+
+@teaching
+class ElementBeamANCFHermite(ElementBeamANCF):
+    """As :class:`ElementBeamANCF`, with Hermite functions of a degree along X for axis and section.
+
+    The coordinates of a node are ``r`` and the section slopes ``r_Y0`` ..., with their derivatives
+    along the axis up to the (degree - 1) / 2-th: of degree 5 ``r``, ``r_X``, ``r_XX``, ``r_Y0``
+    ..., ``r_XY0`` ..., ``r_XXY0`` .... The position is the full product of polynomials of that
+    degree in X and of degree N in Y. One or two elements of degree 9 and more replace many cubic
+    ones where loads and section are smooth; where the shear force jumps, end the element.
+
+    Parameters
+    ----------
+    order
+        Degree N >= 1 of the section.
+    degree
+        Degree along X: 3, 5, ... 15.
+    points
+        Where the section slopes sit, as for :class:`ElementBeamANCF`.
+
+    Raises
+    ------
+    InputError
+        If the order is not an integer >= 1, or the degree is not odd or not from 3 to 15.
+    NameUnknown
+        If the family of points is not known.
+
+    Examples
+    --------
+    >>> from skfem_ancf import ElementBeamANCFHermite
+    >>> ElementBeamANCFHermite(1, degree=5).dofnames
+    ['r', 'r_X', 'r_XX', 'r_Y0', 'r_XY0', 'r_XXY0']
+    """
+
+    def __init__(self, order: int, degree: int = 5, points: str = "chebyshev") -> None:
+        self._slopes = require_degree(degree) // 2
+        super().__init__(order, points)
+
+    def _coordinates(self) -> tuple[list[str], list[tuple[float, int, int]]]:
+        names, functionals = super()._coordinates()
+        more = range(2, self._slopes + 1)
+        each = range(self._slopes + 1)
+        return (["r_" + "X" * k for k in more]
+                + [name.replace("r_", "r_" + "X" * k) for k in each for name in names],
+                [(0.0, k, 0) for k in more]
+                + [(eta, k, m) for k in each for eta, _, m in functionals])
