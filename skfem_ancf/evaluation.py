@@ -4,7 +4,7 @@ import numpy as np
 
 from .body import (add_viscous_force, body_carry, body_force, body_mean, body_stress,
                    body_tangent)
-from .forces.texts import add_elastic_force, add_element_tangent
+from .forces.texts import AT_ONCE, add_elastic_force, add_element_tangent
 from .source import source
 from .tables import add_load_stiffness
 
@@ -43,6 +43,6 @@ def evaluate(e, what, u, v, factors, t, scale, use_carried, stresses, carried, f
         body_stress(e.body, u, stresses)
     elif what == MEAN:
         body_mean(e.body, u, v, f)
-        add_elastic_force(e.forces, at, 0.0, u, v, f)
+        add_elastic_force(e.forces, at, AT_ONCE, u, v, f)
     else:
         add_viscous_force(e.viscous, u, v, f)

@@ -29,7 +29,7 @@ logger = logging.getLogger(__name__)
 
 #: Seconds that compiling takes, about: the kernels that texts call, each if a scene has it, and
 #: each text; and loading what lies on disk.
-COMPILING = {"SectionPack": 5.5, "CablePack": 2.5, "elements": 3.2, "contacts": 8.0,
+COMPILING = {"SectionPack": 5.5, "CablePack": 2.5, "elements": 3.2, "contacts": 5.0,
              "equilibrium": 6.2, "steps": 8.0, "evaluate": 2.3}
 LOADING = 0.7
 

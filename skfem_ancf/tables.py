@@ -61,6 +61,12 @@ class LoadTables(NamedTuple):
 
 
 @primitive("scatter")
+def add_each(out, at, x):
+    """out[at] += x, however often a place occurs."""
+    np.add.at(out, at, x)
+
+
+@primitive("scatter")
 def add_products(out, at, v, x, i):
     """out[at] += v x[i], however often a place occurs."""
     np.add.at(out, at, v * x[i])

@@ -4,6 +4,13 @@ from .twin import jit
 
 
 @jit
+def add_each(out, at, x):
+    """out[at] += x."""
+    for k in range(at.size):
+        out[at[k]] += x[k]
+
+
+@jit
 def add_products(out, at, v, x, i):
     """out[at] += v x[i]."""
     for k in range(at.size):

@@ -291,7 +291,7 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
     The number of steps done; one that fails is the last.
     """
     course, state = borrowed(course), borrowed(state)
-    m, y, u, f = w.m.l.size, w.y, w.x.u, w.x.force
+    m, y = w.m.l.size, w.y
     joined, damped, power = m > 0, matrices.dampers.active > 0, 0.0
     if damped and rule.conserving == 0:
         power = _power(e, matrices, course.times[0, 0] - course.dt, y[0], y[1], w)
@@ -306,7 +306,7 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
                 if not _factorize(e.free, matrices, rule, s, w, state):
                     return n
             _internal_force(e.body, rule, w, state)
-            add_elastic_force(e.forces, s.acting, s.dt, y[0] if rule.conserving > 0 else u, u, f)
+            _add_elastic(e.forces, rule, s, w)
             if damped:
                 _resist(e, matrices, rule, s, w)
             anew = joined and (not s.constant or state[SIZE] < 0.0)
@@ -627,11 +627,24 @@ def _add_elements(forces, matrices, s, w):
 def _add_obstacles(e, matrices, rule, s, w):
     """Add the derivatives of contact to the band: of the iterate, as its velocity is."""
     u, u0 = w.x.u, w.y[0]
-    add_contact_tangent(e.forces, s.acting, s.dt, u0 if rule.conserving > 0 else u, u, matrices.A)
+    if rule.conserving > 0:
+        add_contact_tangent(e.forces, s.acting, s.dt, u0, u, matrices.A)
+    else:
+        add_contact_tangent(e.forces, s.acting, 0.0, u, u, matrices.A)
     if matrices.dampers.elements > 0:
         _pace(e.free, rule, s, w)
         add_rubbing_tangent(e.forces, s.acting, s.damping_factor / s.stiffness_factor,
                             w.x.middle, w.x.pace, matrices.A)
+
+
+@source
+def _add_elastic(forces, rule, s, w):
+    """Add the force of elements to the internal one: that of the iterate, or its mean."""
+    u, f = w.x.u, w.x.force
+    if rule.conserving > 0:
+        add_elastic_force(forces, s.acting, s.dt, w.y[0], u, f)
+    else:
+        add_elastic_force(forces, s.acting, 0.0, u, u, f)
 
 
 @source

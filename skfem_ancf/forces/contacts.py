@@ -10,10 +10,10 @@ import numpy as np
 from ..band import Band
 from ..errors import InputError
 from ..own import handle_of
-from .contact_texts import (ANCHORED, FRICTION, HEADER, MEMORY, NOW, OWN, POSE, POSES, STICKING,
-                            STIFFNESS, TANGENT, WIDTH, ContactTables, Question, distances,
-                            of_contacts, places, resist, slip_of, slope_of, stick, surface,
-                            velocities)
+from .contact_texts import (ANCHORED, DEPTH, FRICTION, HEADER, LAST, MEMORY, MIDDLE, NOW, OWN, POSE,
+                            POSES, RATES, ROWS, STICKING, STIFFNESS, TANGENT, WIDTH, ContactTables,
+                            Question, distances, levers, mean_slope, of_contacts, places, press,
+                            resist, slide, slip_of, surface)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -115,13 +115,13 @@ class Contacts:
         for number, (k, group) in enumerate(self._groups):
             shape, none = self.obstacles[k].shape, np.zeros((0, len(group.first)))
             slopes = none if group.slopes is None else group.slopes
-            shared = group.points, len(group.weights)
             headers[number] = (
-                shape.kind, k, group.elements, *shared, group.slopes is not None,
-                ints.add(group.first), floats.add(group.weights), floats.add(slopes),
-                floats.add(group.areas), floats.add(group.offsets), floats.add(group.starts),
-                *map(floats.add, _middle(group)), floats.add(group.numbers),
-                floats.add(shape.numbers), len(shape.numbers), memory, number)
+                shape.kind, k, group.elements, group.points, len(group.weights),
+                group.slopes is not None, ints.add(group.first),
+                floats.add(np.concatenate([group.weights, slopes])), floats.add(group.areas),
+                floats.add(group.offsets), floats.add(group.starts), floats.add(_middle(group)),
+                floats.add(group.numbers), floats.add(shape.numbers), len(shape.numbers), memory,
+                number)
             memory += 3 * len(group.first)
         return ContactTables(n, np.concatenate([headers.ravel(), ints.whole(np.int64)]),
                              floats.whole(float), poses, np.zeros(memory), np.zeros(2, np.int64),
@@ -280,7 +280,7 @@ class Contacts:
             pose = self.tables.poses[which * POSES:which * POSES + POSE]
             along = np.array([-found[2], found[1]])
             limit = (numbers[FRICTION] * numbers[STIFFNESS] / numbers[STICKING]
-                     * slope_of(memory[0] - found[0], numbers[WIDTH]))
+                     * mean_slope(*2 * (memory[0] - found[0],), numbers[WIDTH]))
             slip = np.clip(slip_of(pose, *memory[1:], *x, *along), -limit, limit)
             memory[1:] = taken_back(pose, x - slip * along)
 
@@ -304,7 +304,7 @@ class Contacts:
             its obstacle.
         """
         looked = [(k, self.obstacles[which], self._reach(k)[0], found[0])
-                  for k, ((which, _), _, found) in enumerate(self.look(u, t))]
+                  for k, ((which, _), _, found) in enumerate(self.look(u, t, False))]
         looked = [row for row in looked if row[1].method == "augmented"]
         worst = max(float(np.abs(np.maximum(-gap, -reach)).max()) / one.tolerance
                     for _, one, reach, gap in looked)
@@ -319,7 +319,7 @@ class Contacts:
         if self.moving or self.own:
             self.put(t, 0.0, self.tables.poses)
 
-    def look(self, u: Array, t: float) -> list[tuple[Any, Array, Array]]:
+    def look(self, u: Array, t: float, whole: bool = True) -> list[tuple[Any, Array, Array]]:
         """Where the points of all groups are.
 
         Parameters
@@ -328,6 +328,8 @@ class Contacts:
             Displacement of the coordinates, shape (N,).
         t
             Time; in statics the load factor.
+        whole
+            With the derivatives of distances.
 
         Returns
         -------
@@ -341,9 +343,9 @@ class Contacts:
             header = self._header(k)
             at = np.arange(len(group.first))
             z, x, found = np.empty((4, at.size)), np.empty((2, at.size)), np.empty((6, at.size))
-            places(self.tables, header, u, at, z)
-            surface(self.tables, header, at, z, x)
-            distances(self.tables, header, NOW, x, found)
+            places(self.tables.ints, self.tables.floats, header, u, 1.0, at, z, 0)
+            surface(self.tables.floats, header, at, z, 0, x)
+            distances(self.tables, header, NOW, whole, x, found)
             out.append(((which, group), x, found))
         return out
 
@@ -372,19 +374,18 @@ class Contacts:
         """
         out = []
         for k, ((which, group), x, found) in enumerate(self.look(u, t)):
-            n, header, numbers = len(group.first), self._header(k), group.numbers
-            at, a = np.arange(n), self._reach(k)[0] - found[0]
-            pressure = numbers[STIFFNESS] * slope_of(a, numbers[WIDTH])
-            size, K = pressure * group.areas, np.zeros((4, n))
-            F, more = -size * found[1:3], np.zeros((2, n))
-            if self.tables.memory[ANCHORED] > 0.0 and numbers[FRICTION] > 0.0:
-                stick(self.tables, header, at, x, a, size, found, F, K)
+            n, header = len(group.first), self._header(k)
+            at, rows, lever = np.arange(n), np.empty((ROWS, n)), np.empty((8, n))
+            F, more, K = np.zeros((4, n)), np.zeros((4, n)), np.zeros((4, n))
+            rows[DEPTH:LAST], rows[LAST:LAST + 2] = self._reach(k)[0] - found[0], x
+            press(self.tables, header, at, rows, found, F, K)
             if v is not None:
-                z, w = np.empty((4, n)), np.empty((2, n))
-                places(self.tables, header, u, at, z)
-                velocities(self.tables, header, at, v, z, x, w)
-                resist(self.tables, header, at, 0.0, w, found, more, K)
-            out.append((which, x, -F - more, pressure, found[0]))
+                places(self.tables.ints, self.tables.floats, header, u, 1.0, at, rows, MIDDLE)
+                places(self.tables.ints, self.tables.floats, header, v, 0.0, at, rows, RATES)
+                levers(self.tables.floats, header, at, rows, lever)
+                slide(lever, rows)
+                resist(self.tables, header, 0.0, at, rows, x, found, more, K)
+            out.append((which, x, -F[:2] - more[:2], F[2] / group.areas, found[0]))
         return out
 
     def passed(self, a: tuple[Array, float], b: tuple[Array, float]) -> str | None:
@@ -397,13 +398,13 @@ class Contacts:
         """
         if not self._groups:
             return None
-        ends = [self.look(*x) for x in (a, b)]
+        ends = [self.look(*x, whole=False) for x in (a, b)]
         ways = [float(np.hypot(*(y - x)).max()) / group.depth
                 for (_, x, _), ((_, group), y, _) in zip(*ends)]
         parts = int(np.clip(np.ceil(max(ways)), PARTS, MOST_PARTS))
         depths = []
         for part in np.arange(parts + 1) / parts:
-            looked = self.look(a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]))
+            looked = self.look(a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), False)
             depths.append([-found[0].min() for _, _, found in looked])
         for k, (which, group) in enumerate(self._groups):
             way = [row[k] for row in depths]
@@ -422,7 +423,7 @@ class Contacts:
             Time; in statics the load factor.
         """
         total = 0.0
-        for k, ((_, group), _, found) in enumerate(self.look(u, t)):
+        for k, ((_, group), _, found) in enumerate(self.look(u, t, False)):
             a, width = self._reach(k)[0] - found[0], group.numbers[WIDTH]
             S = (np.maximum(a, 0.0) ** 3 - np.maximum(a - width, 0.0) ** 3) / (6.0 * width)
             total += group.numbers[STIFFNESS] * float(group.areas @ S)
@@ -468,11 +469,12 @@ class _Pieces:
 
 
 def _middle(group):
-    """Weights and place of the middle of each element, and how much weights differ from them."""
+    """Place of the middle of each element; then weights, and how much they differ from these."""
     n, m = group.elements, group.points
     each = group.weights.reshape(-1, n, m)
     mean, half = each.mean(axis=2), len(group.weights) // 2
     spread = np.abs(each - mean[..., None]).max(axis=2)
     spread[0] = 0.0  # both places together are a translation
     spread[half] = np.maximum(spread[half], np.abs(each[0] - mean[0][:, None]).max(axis=1))
-    return mean, group.starts[:2].reshape(2, n, m).mean(axis=2), spread
+    start = group.starts[:2].reshape(2, n, m).mean(axis=2)
+    return np.concatenate([start, np.stack([mean, spread], axis=1).reshape(-1, n)])

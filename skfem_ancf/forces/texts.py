@@ -27,6 +27,8 @@ NUMBERS = 5
 TINY = 1e-200
 #: For the layout of a band where there is none.
 NONE = np.int64(0)
+#: The span of a mean between two states at one time.
+AT_ONCE = 1e-300
 
 
 class Kinds(NamedTuple):
@@ -132,7 +134,7 @@ def _add_force(tables, what, t, u, v, start, f):
 def add_elastic_force(tables, t, span, u0, u1, f):
     """Add the force without velocity whose work from u0 to u1 is the change of the potential.
 
-    A mean over a span of time about t; at t where both states are the same.
+    A mean over a span of time about t; the force at t where both states are one and the span zero.
     """
     _add_force(tables, np.int64(ELASTIC), t, u0, u1, 1.0, f)
     add_contact(tables.contacts, Question(FORCE, t, span, 0.0, NONE, NONE), u0, u1, f)

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import (CallbackError, InputError, ask, require_finite, require_flag,
                       require_function, require_not_negative, require_positive, shown, teaching,
                       warnings_as_errors)
-from ..forces.contact_texts import CIRCLE, LINE, OWN, POLYGON
+from ..forces.contact_texts import OUTLINE, OWN, outline
 from ..frozen import Sealable
 from .outlines import circle, clipped, contour
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 STEP, COARSE = 1e-6, 1e-4
 #: By how much a distance may grow more than what it is the distance of.
 STEEP = 0.05
+#: An edge without end, in its lengths.
+FAR = 1e300
 _COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
 
@@ -130,7 +132,7 @@ class Line(Shape):
     1.5
     """
 
-    kind = LINE
+    kind = OUTLINE
 
     def __init__(self, point: ArrayLike, normal: ArrayLike = (0.0, 1.0)) -> None:
         self.point = require_finite("point", point, (2,))
@@ -138,16 +140,16 @@ class Line(Shape):
         size = np.hypot(*self.normal)
         if not size > 0.0:
             raise InputError(f"normal must have a direction, got {shown(normal)}")
-        self.numbers = np.append(self.point, self.normal / size)
-        self.pivot = self.point
+        self._unit, self.pivot = self.normal / size, self.point
+        p, q = self._unit
+        self.numbers = np.array([0.0, -FAR, FAR, *self.point, -q, p, 1.0])
 
     def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
-        a, b, p, q = self.numbers
         x = np.asarray(x, dtype=float)
-        return p * (x[0] - a) + q * (x[1] - b)
+        return self._unit[0] * (x[0] - self.point[0]) + self._unit[1] * (x[1] - self.point[1])
 
     def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
-        return clipped(self.numbers[:2], self.numbers[2:], box)
+        return clipped(self.point, self._unit, box)
 
     def __repr__(self) -> str:
         return f"<Line at {shown(self.point)}, normal {shown(self.normal)}>"
@@ -173,13 +175,14 @@ class Circle(Shape):
     2.0
     """
 
-    kind = CIRCLE
+    kind = OUTLINE
 
     def __init__(self, center: ArrayLike, radius: float, hollow: bool = False) -> None:
         self.center = require_finite("center", center, (2,))
         self.radius = require_positive("radius", radius)
         self.hollow = require_flag("hollow", hollow)
-        self.numbers, self.pivot = np.append(self.center, self.radius), self.center
+        self.pivot = self.center
+        self.numbers = np.array([self.radius, 0.0, 1.0, *self.center, 0.0, 0.0, 1.0])
         self.bend = self.radius
 
     def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
@@ -221,7 +224,7 @@ class Polygon(Shape):
     [-0.25, 1.0]
     """
 
-    kind = POLYGON
+    kind = OUTLINE
 
     def __init__(self, points: ArrayLike, radius: float = 0.0, hollow: bool = False) -> None:
         try:
@@ -243,14 +246,12 @@ class Polygon(Shape):
         before = np.roll(edges, 1, axis=0)
         turn = before[:, 0] * edges[:, 1] - before[:, 1] * edges[:, 0]
         sides = np.where(turn >= 0.0, 1.0, -1.0)
-        self.numbers = np.append(self.radius, np.column_stack([corners, edges, sides]))
+        self.numbers = np.append([self.radius, 0.0, 1.0], np.column_stack([corners, edges, sides]))
 
     def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
-        from ..forces.contact_texts import polygon
-
         x = np.asarray(x, dtype=float)
         out = np.zeros((6, int(np.prod(x.shape[1:]))))
-        polygon(self.numbers, x.reshape(2, -1), out)
+        outline(self.numbers, False, x.reshape(2, -1), out)
         gap = out[0].reshape(x.shape[1:])
         return -gap if self.hollow else gap
 
