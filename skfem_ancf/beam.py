@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from .formulations.base import Formulation, Term
     from .inertia import Inertia
-    from .types import Array, Place, WhichMember
+    from .types import Array, Law, Place, Rule, WhichMember
 
 
 @taught
@@ -436,6 +436,11 @@ class Beam(Frozen):
         return {}
 
     @cached_property
+    def touched(self) -> dict:
+        """Tables of the elements in which single points were asked for last."""
+        return {}
+
+    @cached_property
     def grids(self) -> dict:
         """Points of all elements at which fields were asked for last, by the reference points."""
         return {}
@@ -573,18 +578,60 @@ class Beam(Frozen):
         ndarray
             Shape (3, nelements, npoints).
         """
+        return self._at_points(self.strain_of(term), u, X, tind)
+
+    def _at_points(self, strain, u, X, tind):
         tind = np.arange(self.mesh.nelements) if tind is None else tind
         shape = len(tind), X.shape[-1]
         points = X.reshape(2, -1) if X.ndim == 3 else np.tile(X, shape[0])
-        return self.strain_of(term)(u, np.repeat(tind, shape[1]), points).reshape(3, *shape)
+        return strain(u, np.repeat(tind, shape[1]), points).reshape(3, *shape)
 
-    def strain_of(self, term: Term) -> ElementStrain | TaperedStrain:
-        """The strain of a term of the formulation: an :class:`~.strains.ElementStrain`, kept."""
-        found = self._strains.get(id(term))
+    def strains(self, strain: Array, u: Array, X: Array, tind: Array | None = None
+                ) -> Callable[..., Array]:
+        """The strains of all terms, as :meth:`Formulation.stress_of
+        <skfem_ancf.formulations.Formulation.stress_of>` asks for them.
+
+        Parameters
+        ----------
+        strain
+            That of the first term, shape (3, nelements, npoints).
+        u, X, tind
+            As for :meth:`gradients`, shapes (N,), (2, npoints) or (2, nelements, npoints), and
+            (nelements,).
+        """
+        def at(term: Term, xi: float | None = None, across: Rule | None = None) -> Array:
+            if term is self.terms[0] and xi is None and across is None:
+                return strain
+            of = self.strain_of(term, getattr(term.law, "rows", (0, 1, 2)))
+            x = X[0] if xi is None else 0.0 * X[0] + xi
+            eta, weights = ((X[1],), (1.0,)) if across is None else across
+            return sum((w * self._at_points(of, u, np.array([x, 0.0 * X[1] + y]), tind)
+                        for y, w in zip(eta, weights)), np.zeros((3, 1, 1)))
+
+        return at
+
+    def strain_of(self, term: Term, rows: Sequence[int] = (0, 1, 2)) -> Any:
+        """The strain of a term of the formulation, kept: an :class:`~.strains.ElementStrain`.
+
+        Of a tapered beam a :class:`~.strains.TaperedStrain`.
+
+        Parameters
+        ----------
+        term
+            A :class:`~skfem_ancf.formulations.Term`.
+        rows
+            The components that are asked for; the others are zero.
+        """
+        found = self._strains.get((id(term), rows))
         if found is None:
             kind = ElementStrain if self.mesh.heights is None else TaperedStrain
-            found = self._strains[id(term)] = kind(self, term)
+            found = self._strains[id(term), rows] = kind(self, term, rows)
         return found
+
+    @cached_property
+    def law(self) -> Law:
+        """That of the material, with the shear factor of the element."""
+        return self.material.law(self.material.shear_factor(self.element))
 
     @cached_property
     def _strains(self):

@@ -18,7 +18,7 @@ from .errors import (CallbackError, InputError, NameUnknown, ask, require_finite
                      require_flag, require_integer, require_text, shown, teaching)
 from .kept import kept
 from .materials import LinearLaw
-from .points import Part
+from .parts import Part
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -122,7 +122,7 @@ class Values(Mapping):
     Parameters
     ----------
     part
-        The :class:`~skfem_ancf.points.Part` with the points.
+        The :class:`~skfem_ancf.parts.Part` with the points.
     u
         Displacement of the coordinates that the part is numbered by, shape (N,).
     find

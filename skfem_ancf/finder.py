@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from .errors import MeshError
-from .mapping import cross
+from .kept import kept
 
 if TYPE_CHECKING:
     from .mesh import MeshBeam
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 #: Samples of each element in the tree of the finder, and candidates for a point that is in none of
 #: the elements next to its nearest sample.
 SAMPLES, CANDIDATES = 4, 6
+
+#: Squares of the plane of which a finder remembers what is near, at most.
+CELLS = 2**14
 
 
 class Finder:
@@ -40,6 +43,9 @@ class Finder:
                                 np.arange(mesh.nelements) - 1, -1)
         self._after = np.append(np.where(self._before[1:] >= 0, np.arange(1, mesh.nelements), -1),
                                 -1)
+        #: Where single points begin, for squares of the plane, see :meth:`_start`.
+        self._cells: dict = {}
+        self._cell = 0.5 * float(np.min(mesh.lengths))
         self._line = self._straight_line()
 
     def _straight_line(self):
@@ -81,19 +87,22 @@ class Finder:
             (e, xi, eta); or False where it is certain that the point is outside, or None where
             the general search has to say.
         """
-        noise = 1e-9 + self._round_off * (self.size + max(abs(x), abs(y)))
-        found = (self._one_near if self._line is None else self._one_on_line)(x, y, noise)
+        found = (self._one_near if self._line is None else self._one_on_line)(x, y, self._noise)
         if not found:
             return found
         e, xi, eta = found
+        if 0.0 <= xi <= 1.0 and 0.0 <= eta <= 1.0:
+            return found
         outside = max(abs(xi - 0.5), abs(eta - 0.5)) - 0.5
-        if not outside <= noise:
+        if not outside <= self._noise:
             return False if outside > 1.0 and self._line is not None else None
         return e, min(max(xi, 0.0), 1.0), min(max(eta, 0.0), 1.0)
 
     @cached_property
-    def _round_off(self):
-        return 8.0 * float(np.finfo(float).eps) / self.mesh.height
+    def _noise(self):
+        """As that of a call, for points of the body."""
+        return 1e-9 + 8.0 * float(np.finfo(float).eps) * (
+            2.0 * self.size / self.mesh.height + 1.0)
 
     @cached_property
     def _numbers(self):
@@ -118,25 +127,42 @@ class Finder:
         return e, xi, (dx * y - dy * x) / height + 0.5
 
     def _one_near(self, x, y, noise):
-        sx, sy = self._samples
-        d = (sx - x) ** 2 + (sy - y) ** 2
-        k = int(d.argmin())
-        if not d[k] <= self._far**2:
-            return False if d[k] > self._far**2 else None
-        e, (x0, y0, a, b, c, d) = k // SAMPLES, self._steps[k]
-        xi = (k % SAMPLES + 0.5) / SAMPLES + a * (x - x0) + b * (y - y0)
-        eta = 0.5 + c * (x - x0) + d * (y - y0)
+        cell = x // self._cell, y // self._cell
+        start = self._cells.get(cell)
+        if start is None:
+            start = kept(self._cells, cell, lambda: self._start(cell), CELLS)
+        if not start:
+            return start
+        e, xi, a, b = start
+        xi += a * x + b * y
         for _ in range(3):
-            found = self.mapping.find_in(e, x, y, xi, eta)
+            found = self.mapping.find_in(e, x, y, xi)
             if found is None:
                 return None
             # as in _near
-            other = (self._before[e] if found[0] <= noise else self._after[e]
+            other = (self._neighbours[0][e] if found[0] <= noise else self._neighbours[1][e]
                      if found[0] > 1.0 + noise else -1)
             if other < 0:
                 return e, *found
-            e, xi, eta = int(other), 0.5, 0.5
+            e, xi = other, 0.5
         return None
+
+    def _start(self, cell):
+        """Of a square of the plane the element next to its middle, and xi linear in x and y there.
+
+        Four numbers; False if it is outside of all elements, None if it has no middle.
+        """
+        x, y = self._cell * (cell[0] + 0.5), self._cell * (cell[1] + 0.5)
+        d = np.hypot(self._samples[0] - x, self._samples[1] - y)
+        k = int(d.argmin())
+        if not d[k] <= self._far + self._cell:
+            return False if d[k] > self._far else None
+        e, xi = k // SAMPLES, (k % SAMPLES + 0.5) / SAMPLES
+        found = self.mapping.find_in(e, x, y, xi)
+        if found is None or not -0.5 < found[0] < 1.5:
+            return e, xi, 0.0, 0.0
+        a, b = self.mapping.section_at(e, x, y, found[0])
+        return e, found[0] - a * x - b * y, a, b
 
     def _find(self, x, noise):
         e, X, outside = (self._near if self._line is None else self._on_line)(x, noise)
@@ -173,18 +199,13 @@ class Finder:
         return e, X, outside
 
     @cached_property
+    def _neighbours(self):
+        return self._before.tolist(), self._after.tolist()
+
+    @cached_property
     def _samples(self):
         samples = np.array([(np.arange(SAMPLES) + 0.5) / SAMPLES, np.full(SAMPLES, 0.5)])
         return self.mapping.F(samples).reshape(2, -1)
-
-    @cached_property
-    def _steps(self):
-        """Of each sample its place, and the inverse of the derivatives of the map there."""
-        e, xi = np.divmod(np.arange(SAMPLES * self.mesh.nelements), SAMPLES)
-        J0, J1, _ = self.mapping.derivatives(e, (xi + 0.5) / SAMPLES, 0.5)
-        det = cross(J0, J1)
-        return np.array([*self._samples, J1[1] / det, -J1[0] / det, -J0[1] / det,
-                         J0[0] / det]).T.tolist()
 
     @cached_property
     def _far(self):

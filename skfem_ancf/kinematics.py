@@ -15,6 +15,7 @@ from .kernels import CableKernel, Kernel
 from .kernels.along import CableSections
 from .errors import InputError
 from .formulations.ecm import AXIS
+from .near import NearCable, NearSections, fibre
 from .quadrature import gauss
 
 if TYPE_CHECKING:
@@ -32,11 +33,14 @@ class Sections:
     ----------
     kernel
         Class of the strain energy.
+    near
+        Class of what single points ask of an element in one state.
     has_sections : bool
         Points off the axis are linear in the coordinates.
     """
 
     kernel: Any = Kernel
+    near: Any = NearSections
     has_sections = True
 
     @staticmethod
@@ -173,19 +177,6 @@ class Sections:
         return beam.strain_of(beam.terms[0])(u, e, X)
 
     @staticmethod
-    def strain_of_point(beam: Beam, e: int, xi: float, eta: float) -> Any:
-        """A function from the coordinates (2, nb) of an element to the strain at a point, (3,).
-
-        Parameters
-        ----------
-        beam
-            A :class:`~skfem_ancf.Beam`.
-        e, xi, eta
-            Element and reference point.
-        """
-        return beam.strain_of(beam.terms[0]).at(e, xi, eta)
-
-    @staticmethod
     def stress(beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
         """Second Piola-Kirchhoff stress, shape (3, nelements, npoints).
 
@@ -243,6 +234,7 @@ class Cable(Sections):
     """Sections stay normal to the axis, and get thinner so that S_yy = 0."""
 
     kernel: Any = CableKernel
+    near: Any = NearCable
     has_sections = False
 
     @staticmethod
@@ -307,21 +299,12 @@ class Cable(Sections):
 
     @staticmethod
     def _strain_of(beam, Y, which, eps, kappa):
-        e = eps - Y * kappa
-        xx = e + 0.5 * e * e
         ratios = np.array([slab.material.lateral_ratio for slab in beam.across.slabs])
-        return np.array([xx, -ratios[which] * xx, 0.0 * xx])
+        return np.array(fibre(Y, eps, kappa, ratios[which]))
 
     @classmethod
     def strain_at(cls, beam: Beam, u: Array, e: Array, X: Array) -> Array:
         return cls.strain(beam, u, X[:, :, None], e)[..., 0]
-
-    @classmethod
-    def strain_of_point(cls, beam: Beam, e: int, xi: float, eta: float) -> Any:
-        at = CableSections(beam.kernel, np.array([[xi]]), np.array([e]), beam.mesh, beam.element)
-        X = np.array([[[xi]], [[eta]]])
-        Y, which = beam.mesh.mapping().offset(X, np.array([e])), beam.across.which(X)
-        return lambda u_e: cls._strain_of(beam, Y, which, *at(u_e.T[None])[1])[:, 0, 0]
 
     @staticmethod
     def stress(beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:

@@ -49,9 +49,16 @@ def cross(a: Array, b: Array) -> Array:
 
 def _polynomial(coefficients, xi):
     """A polynomial, its lowest coefficient first, and its derivative, by Horner's rule."""
-    if len(coefficients) == 2:  # of nearly all directors, for single points
+    if len(coefficients) == 2:  # of nearly all directors, axes, and both, for single points
         a, b = coefficients
         return a + xi * b, b + 0.0 * xi
+    if len(coefficients) == 4:
+        a, b, c, d = coefficients
+        return a + xi * (b + xi * (c + xi * d)), b + xi * (2.0 * c + xi * (3.0 * d))
+    if len(coefficients) == 5:
+        a, b, c, d, e = coefficients
+        return (a + xi * (b + xi * (c + xi * (d + xi * e))),
+                b + xi * (2.0 * c + xi * (3.0 * d + xi * (4.0 * e))))
     value, slope = coefficients[-1], 0.0
     for c in coefficients[-2::-1]:
         slope = value + xi * slope
@@ -59,32 +66,51 @@ def _polynomial(coefficients, xi):
     return value, slope
 
 
-def correction(axis: Any, director: Any, gap: Sequence[Any], xi: Any, eta: Any
-               ) -> tuple[Any, Any]:
-    """What Newton's method adds to the reference point of a point of the body.
+def _product(a, b):
+    """The product of polynomials (n, ne) and (..., m, ne), the lowest coefficients first."""
+    out = np.zeros((*b.shape[:-2], len(a) + b.shape[-2] - 1, b.shape[-1]))
+    for k, c in enumerate(a):
+        out[..., k:k + b.shape[-2], :] += c * b
+    return out
+
+
+def beside_section(director: Any, crossed: Sequence[Any], gap: Sequence[Any]) -> list[Any]:
+    """How far a point is beside the section of an element, times the height: a polynomial of xi.
+
+    The cross product of what leads from the axis to the point, and of the director: it does not
+    depend on eta, and vanishes where the section holds the point.
 
     Parameters
     ----------
-    axis, director
-        For each component the coefficients of both as polynomials of xi, the lowest first: numbers
-        or arrays (...). The axis begins at zero.
+    director
+        For each component the coefficients of a polynomial of xi, the lowest first: numbers or
+        arrays (...).
+    crossed
+        Those of minus the cross product of axis and director, at least as many; the axis begins at
+        zero.
     gap
         The point seen from where the axis begins, two components.
-    xi, eta
-        The reference point so far.
     """
-    if len(axis[0]) == 4:
-        (_, a, b, c), (_, p, q, r) = axis
-        x, y = xi * (a + xi * (b + xi * c)), xi * (p + xi * (q + xi * r))
-        dx, dy = a + xi * (2.0 * b + 3.0 * xi * c), p + xi * (2.0 * q + 3.0 * xi * r)
-    else:
-        (x, dx), (y, dy) = _polynomial(axis[0], xi), _polynomial(axis[1], xi)
-    (nx, dnx), (ny, dny) = _polynomial(director[0], xi), _polynomial(director[1], xi)
-    Y = eta - 0.5
-    x, y = gap[0] - x - Y * nx, gap[1] - y - Y * ny
-    ax, ay = dx + Y * dnx, dy + Y * dny
-    det = ax * ny - ay * nx
-    return (x * ny - y * nx) / det, (ax * y - ay * x) / det
+    x, y = gap
+    return [c + (x * ny - y * nx) for c, nx, ny in zip(crossed, *director)] + list(
+        crossed[len(director[0]):])
+
+
+def height_in_section(axis: Any, director: Any, gap: Sequence[Any], xi: Any) -> Any:
+    """The place eta of a point across the section that holds it.
+
+    Parameters
+    ----------
+    axis
+        As ``director``, of the axis: it begins at zero.
+    director, gap
+        As for :func:`beside_section`.
+    xi
+        The place of the section along the element.
+    """
+    (rx, _), (ry, _) = _polynomial(axis[0], xi), _polynomial(axis[1], xi)
+    (nx, _), (ny, _) = _polynomial(director[0], xi), _polynomial(director[1], xi)
+    return 0.5 + ((gap[0] - rx) * nx + (gap[1] - ry) * ny) / (nx * nx + ny * ny)
 
 
 class MappingBeam(Mapping):
@@ -318,19 +344,20 @@ class MappingBeam(Mapping):
 
     @cached_property
     def _powers(self):
-        """Axis from the first node, and director, as polynomials of xi, (2, n, ne) both."""
+        """Axis from the first node, and director, as polynomials of xi, (2, n, ne) both.
+
+        And minus their cross product, (n, ne).
+        """
         axis, director = self._all_coefficients
         axis = axis.copy()
         axis[:, [0, self._orders[0]]] -= axis[:, :1]
         axis, director = (np.stack([self._sum(c, hermite_basis(m, np.zeros(1), d))[..., 0]
                                     / factorial(d) for d in range(2 * m)], 1)
                           for m, c in zip(self._orders, (axis, director)))
-        if self.mesh.heights is None:
-            return [axis, director]
-        product = np.zeros((2, director.shape[1] + 3, axis.shape[2]))
-        for k, g in enumerate(self._heights):  # the product of two polynomials
-            product[:, k:k + director.shape[1]] += g * director
-        return [axis, product]
+        if self.mesh.heights is not None:
+            director = _product(self._heights, director)
+        crossed = _product(axis[1], director[0]) - _product(axis[0], director[1])
+        return [axis, director, crossed]
 
     def invF(self, x: Array, tind: Array | None = None, max_iterations: int = 30,
              xi: ArrayLike = 0.5) -> Array:
@@ -353,23 +380,25 @@ class MappingBeam(Mapping):
             Shape (2, nelements, npoints); NaN where no such point was found.
         """
         first = self._all_coefficients[0][:, 0]
-        axis, director = (c[..., None] if tind is None else np.take(c, tind, axis=2)[..., None]
-                          for c in self._powers)
-        gap = x - (first if tind is None else np.take(first, tind, axis=1))[:, :, None]
+        axis, director, crossed = (c[..., None] if tind is None else c.take(tind, axis=-1)[..., None]
+                                  for c in self._powers)
+        gap = x - (first if tind is None else first.take(tind, axis=1))[:, :, None]
+        beside = beside_section(director, crossed, gap)
         X = np.empty(x.shape)
-        X[0], X[1] = xi, 0.5
+        X[0] = xi
         for _ in range(max_iterations):
-            dX = np.array(correction(axis, director, gap, *X))
-            X += np.clip(dX, -1.0, 1.0)
+            value, slope = _polynomial(beside, X[0])
+            change = value / slope
+            X[0] -= np.clip(change, -1.0, 1.0)
             # the square of the last correction is left
-            far = np.abs(dX) > CLOSE * (1.0 + np.abs(X))
+            far = np.abs(change) > CLOSE * (1.0 + np.abs(X[0]))
             if not np.any(far):
-                return X
-        X[:, np.any(far, axis=0)] = np.nan
+                break
+        X[1] = height_in_section(axis, director, gap, X[0])
+        X[:, far] = np.nan
         return X
 
-    def find_in(self, e: int, x: float, y: float, xi: float, eta: float = 0.5
-                ) -> tuple[float, float] | None:
+    def find_in(self, e: int, x: float, y: float, xi: float) -> tuple[float, float] | None:
         """The reference point of one point, as :meth:`invF` says; None if it is far outside.
 
         Parameters
@@ -378,22 +407,37 @@ class MappingBeam(Mapping):
             The element.
         x, y
             The point.
-        xi, eta
+        xi
             To start from.
         """
-        (x0, y0), axis, director = self._numbers(e)
+        (x0, y0), axis, director, crossed = self._numbers(e)
         gap = x - x0, y - y0
-        for _ in range(8):
-            try:
-                d, f = correction(axis, director, gap, xi, eta)
-            except ZeroDivisionError:
+        beside = beside_section(director, crossed, gap)
+        for _ in range(8):  # as in invF
+            value, slope = _polynomial(beside, xi)
+            if not abs(value) < abs(slope):
                 return None
-            xi, eta = xi + d, eta + f
-            if not (abs(d) <= 1.0 and abs(f) <= 1.0):
-                return None
-            if abs(d) <= CLOSE * (1.0 + abs(xi)) and abs(f) <= CLOSE * (1.0 + abs(eta)):
-                return xi, eta
+            change = value / slope
+            xi -= change
+            if abs(change) <= CLOSE * (1.0 + abs(xi)):
+                return xi, height_in_section(axis, director, gap, xi)
         return None
+
+    def section_at(self, e: int, x: float, y: float, xi: float) -> tuple[float, float]:
+        """The derivatives by x and y of the place along an element whose section holds a point.
+
+        Parameters
+        ----------
+        e
+            The element.
+        x, y
+            The point.
+        xi
+            Its place along the element.
+        """
+        (x0, y0), _, director, crossed = self._numbers(e)
+        slope = _polynomial(beside_section(director, crossed, (x - x0, y - y0)), xi)[1]
+        return -_polynomial(director[1], xi)[0] / slope, _polynomial(director[0], xi)[0] / slope
 
     def derivatives(self, e: Any, xi: Any, eta: Any) -> tuple[Any, Any, Any]:
         """The derivatives of the map by xi and eta, and the tangent of the axis.
@@ -409,20 +453,20 @@ class MappingBeam(Mapping):
             Three vectors, each a pair of numbers or arrays.
         """
         if isinstance(e, int):
-            _, axis, director = self._numbers(e)
+            _, axis, director, _ = self._numbers(e)
         else:
-            axis, director = (c[:, :, e] for c in self._powers)
-        dx, dy = (_polynomial(c, xi)[1] for c in axis)
-        (nx, dnx), (ny, dny) = (_polynomial(c, xi) for c in director)
+            axis, director = (c[:, :, e] for c in self._powers[:2])
+        dx, dy = _polynomial(axis[0], xi)[1], _polynomial(axis[1], xi)[1]
+        (nx, dnx), (ny, dny) = _polynomial(director[0], xi), _polynomial(director[1], xi)
         Y, size = eta - 0.5, (dx * dx + dy * dy) ** 0.5
         return (dx + Y * dnx, dy + Y * dny), (nx, ny), (dx / size, dy / size)
 
     def _numbers(self, e):
-        """Of one element: where its axis begins, and the polynomials of its components."""
+        """Of one element: where its axis begins, and the polynomials of :attr:`_powers`."""
         found = self._known.get(e)
         if found is None:
-            axis, director = (c[..., e].tolist() for c in self._powers)
-            found = self._known[e] = self._all_coefficients[0][:, 0, e].tolist(), axis, director
+            found = self._known[e] = [c[..., e].tolist() for c in (
+                self._all_coefficients[0][:, 0], *self._powers)]
         return found
 
     @cached_property

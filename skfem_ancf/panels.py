@@ -59,7 +59,7 @@ class Panel(NamedTuple):
 
     def values(self, s: Any) -> Array:
         """Weights of values at the nodes for those at points s, shape (..., n)."""
-        return chebyshev(s, len(self.nodes)).T @ self.series
+        return chebyshev(s, self.series.shape[0]).T.dot(self.series)
 
     def integrals(self, ends: Array) -> Array:
         """From values at the nodes to the integrals over eta from s = 0 to ends, shape (k, n)."""

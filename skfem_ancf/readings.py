@@ -9,6 +9,7 @@ from .errors import InputError, require_label, require_option, shown
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from .point import Point
     from .points import Located
     from .results import State
     from .scene import Scene
@@ -36,7 +37,7 @@ class Reading(NamedTuple):
     at: Any = None
     beam: WhichMember = None
 
-    def located(self, scene: Scene) -> Located:
+    def located(self, scene: Scene) -> Located | Point:
         """The points in a scene."""
         at = self.at
         if isinstance(at, str):

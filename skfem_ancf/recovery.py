@@ -26,6 +26,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from copy import copy
 from functools import cached_property, partial
+from operator import mul
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,6 +42,7 @@ from .panels import Panels
 from .quadrature import gauss
 from .mapping import cross
 from .section_forces import NotRecovered, SectionForces, Sections, viscous_forces
+from .series import polynomials
 from .spread import AXIS, SNAP, Sampled, station_of_node, stations_of_vector
 
 if TYPE_CHECKING:
@@ -49,7 +51,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from .beam import Beam
-    from .points import Part
+    from .parts import Part
+    from .point import Point
     from .results import State
     from .types import Array, Law
 
@@ -63,8 +66,8 @@ BALANCE, BALANCE_AT_END = 2, 10
 #: Sections up to which the derivative along the axis is a matrix.
 FEW = 128
 
-#: Points that are evaluated at once.
-CHUNK = 2048
+#: Points that are evaluated at once; elements of which arc lengths are kept for single ones.
+CHUNK, ELEMENTS = 2048, 4096
 
 #: Within INNER heights of an end of a piece the elements' own stress is used, from LAYER heights on
 #: no longer. Not at all if the elements there are longer than COARSE heights; if they are longer
@@ -512,10 +515,11 @@ class _Table:
         return one
 
     def one(self, s, weights, rows):
-        """The rows at one place, for the weights (m,) of the points across."""
+        """The rows at one place, for the weights (m,) of the points across; a list of numbers."""
         k = max(bisect_right(self._list, s) - 1, 0)
-        c, d = self._c[:, k, rows], s - self._list[k]
-        return (((c[0] * d + c[1]) * d + c[2]) * d + c[3]) @ weights
+        d = s - self._list[k]
+        return [((a * d + b) * d + c) * d + e
+                for a, b, c, e in zip(*self._c[:, k, rows].dot(weights).tolist())]
 
     def many(self, s, weights, rows):
         """The rows (rows, n) at places (n,), for weights (n, m)."""
@@ -567,7 +571,7 @@ class Recovery:
         self.eta = self.panels.eta
         self.laws = [(columns, slab.material.law(slab.shear))
                      for slab, columns in zip(slabs, self.panels.slabs)]
-        self.lengths, self._inside = kept(beam.tables, "arc", self._arc_tables)
+        self.lengths, self._inside, self._arcs = kept(beam.tables, "arc", self._arc_tables)
         self.has_stress = (len(slabs) == 1 and slabs[0].face is None
                            and beam.element.carries_shear_parabola
                            and not isinstance(beam.formulation, EnhancedContinuum))
@@ -644,7 +648,7 @@ class Recovery:
         speed = np.hypot(*axis)
         series = np.linalg.solve(chebvander(2.0 * x - 1.0, 7), speed.T)
         inside = chebint(series, lbnd=-1.0, scl=0.5).T  # (ne, 9): the length from xi = 0
-        return np.append(0.0, np.cumsum(speed @ w)), inside
+        return np.append(0.0, np.cumsum(speed @ w)), inside, {}
 
     def arc(self, e: ArrayLike, xi: ArrayLike) -> Array:
         """Arc length along the stress-free axis of places of elements.
@@ -710,21 +714,31 @@ class Recovery:
         Parameters
         ----------
         part
-            The :class:`~skfem_ancf.points.Part` with the points.
+            The :class:`~skfem_ancf.parts.Part` with the points.
         rows
             A slice of the seven rows.
         """
         places = part.tables.get("recovery")
-        if part.n > 1:
-            if places is None:
-                places = part.tables["recovery"] = self._places(part.e, *part.X)
-            return self._values(places, rows)
         if places is None:
-            places = part.tables["recovery"] = self._place(*part.place)
-        station, end, s, weights = places
+            places = part.tables["recovery"] = self._places(part.e, *part.X)
+        return self._values(places, rows)
+
+    def at_point(self, point: Point, rows: slice) -> list[float]:
+        """As :meth:`at`, of a single point, as a list of numbers.
+
+        Parameters
+        ----------
+        point
+            The :class:`~skfem_ancf.point.Point`.
+        rows
+            A slice of the seven rows.
+        """
+        if point.recovery is None:
+            point.recovery = self._place(*point.place)
+        station, end, s, weights = point.recovery
         find = bisect_left if end else bisect_right
         piece = min(max(find(self._cuts, station) - 1, 0), len(self._tables) - 1)
-        return self._tables[piece].one(s, weights, rows)[:, None]
+        return self._tables[piece].one(s, weights, rows)
 
     def _place(self, e, xi, eta):
         """As :meth:`_places`, of one point."""
@@ -733,14 +747,20 @@ class Recovery:
         return station, end, self._arc_of_one(e, xi), self.panels.values(eta)
 
     def _arc_of_one(self, e, xi):
-        start, end = self.lengths[e:e + 2].tolist()
         if self.beam.mesh.is_straight:
+            start, end = self.lengths[e:e + 2].tolist()
             return start + xi * (end - start)
-        z, last, before = 2.0 * xi - 1.0, 0.0, 0.0
-        first, *others = self._inside[e].tolist()
-        for c in reversed(others):  # Clenshaw's rule
-            last, before = c + 2.0 * z * last - before, last
-        return start + first + z * last - before
+        found = self._arcs.get(e)
+        if found is None:
+            found = kept(self._arcs, e, lambda: self._arc_in(e), ELEMENTS)
+        start, inside = found
+        return start + sum(map(mul, inside, polynomials(xi, len(inside))))
+
+    def _arc_in(self, e):
+        """Of one element the arc length where it begins, and in it, without terms of round-off."""
+        inside = self._inside[e]
+        last = np.max(np.nonzero(np.abs(inside) > 1e-17 * inside[0]))
+        return float(self.lengths[e]), inside[:last + 1].tolist()
 
     def _places(self, e, xi, eta):
         """What evaluation at points (n,) needs and does not change with the state.

@@ -15,7 +15,7 @@ from .section_forces import Sections
 from .spread import SNAP
 
 if TYPE_CHECKING:
-    from .points import Part
+    from .parts import Part
     from .results import State
     from .types import Array
 

@@ -13,6 +13,7 @@ from .errors import InputError, NameUnknown, require_flag, shown, teaching
 from .eigenstrain import EigenStrain
 from .fields import Values, find_field
 from .frozen import Frozen
+from .point import Point
 from .points import require_body
 from .recovery import actions, recover
 from .resultants import Resultants, resultants
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from .checks import Checks
     from .joints.base import Joint
     from .obstacles.contact import Contact
-    from .points import Part
+    from .parts import Part
     from .recovery import Recovery
     from .rigid import RigidBody
     from .statics.stability import Verdict
@@ -37,6 +38,9 @@ if TYPE_CHECKING:
     from .types import Array, Place, StrPath, WhichBeam, WhichMember
 
 logger = logging.getLogger(__name__)
+
+#: Rows of recovered fields.
+STRAIN, STRESS = slice(0, 3), slice(3, 6)
 
 
 class Reaction(NamedTuple):
@@ -141,7 +145,7 @@ class State(Frozen):
                 raise NameUnknown("attribute of State", name, known)
         other = object.__new__(type(self))
         vars(other).update(vars(self), **changes)
-        for name in ("_recoveries", "actions", "together"):
+        for name in ("_recoveries", "_near", "actions", "together"):
             vars(other).pop(name, None)
         if {"u", "multipliers", "system", "load", "t"} & set(changes):
             vars(other).update(_verdict=None, _checks=None)
@@ -315,6 +319,11 @@ class State(Frozen):
             (:attr:`recovered`); False for the strain of the element at the point.
         """
         at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
+        if isinstance(at, Point):
+            r = self._recovery_of(at.number) if recover else None
+            xx, yy, xy = (at.strain(self.u, self._near) if r is None else
+                          r.at_point(at, STRAIN))
+            return np.array([xx, yy, 0.5 * xy])
         values = at.gather([self._strain(part, recover) for part in at.parts])
         values[2] *= 0.5
         return values
@@ -330,6 +339,12 @@ class State(Frozen):
             As for :meth:`strain`: one point, shape (2,), or many.
         """
         at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
+        if isinstance(at, Point):
+            r = self._recovery_of(at.number) if recover else None
+            if r is not None:
+                return np.array(r.at_point(at, STRESS))
+            S = at.stress(self.u, self._near)
+            return S - self.eigen(at.parts[0], True)[:, 0] if self.eigenstrains(at.beam) else S
         return at.gather([self._stress(part, recover) for part in at.parts])
 
     def field(self, field: Any, point: ArrayLike, beam: WhichBeam = None,
@@ -373,7 +388,7 @@ class State(Frozen):
         Parameters
         ----------
         part
-            A :class:`~skfem_ancf.points.Part`.
+            A :class:`~skfem_ancf.parts.Part`.
         stress
             The latter.
 
@@ -395,13 +410,13 @@ class State(Frozen):
     def _strain(self, part, recover):
         r = self._recovery_of(part.number) if recover else None
         if r is not None:
-            return r.at(part, slice(0, 3))
+            return r.at(part, STRAIN)
         return part.strain(self.u)
 
     def _stress(self, part, recover):
         r = self._recovery_of(part.number) if recover else None
         if r is not None:
-            return r.at(part, slice(3, 6))
+            return r.at(part, STRESS)
         return part.stress(self.u) - self.eigen(part, True)
 
     # recovered fields
@@ -455,6 +470,11 @@ class State(Frozen):
 
     @cached_property
     def _recoveries(self):
+        return {}
+
+    @cached_property
+    def _near(self):
+        """What single points have asked of elements, by beam and element."""
         return {}
 
     @cached_property

@@ -37,13 +37,31 @@ def chebyshev(x: Any, n: int) -> Array:
     >>> chebyshev(0.75, 3).tolist()
     [1.0, 0.5, -0.5]
     """
+    return np.array(polynomials(x, n))
+
+
+def polynomials(x: Any, n: int) -> list[Any]:
+    """As :func:`chebyshev`, as a list: of numbers for a number.
+
+    Parameters
+    ----------
+    x
+        A number, or an array of any shape, on [0, 1].
+    n
+        How many.
+
+    Examples
+    --------
+    >>> polynomials(0.75, 3)
+    [1.0, 0.5, -0.5]
+    """
     z = 2.0 * x - 1.0
     before, last, twice = 1.0 + 0.0 * z, z, 2.0 * z
     out = [before, last]
     for _ in range(n - 2):
         before, last = last, twice * last - before
         out.append(last)
-    return np.array(out[:n])
+    return out[:n]
 
 
 @lru_cache(64)
@@ -91,18 +109,35 @@ class Series:
         self.value = Vx @ values.reshape(-1, p, m) @ Vy.T
         self.along, self.across = Dx @ self.value, self.value @ Dy.T
         self.tables = np.stack([self.value, self.along])
+        #: Of functions that are the same across the section both derivatives by xi, (2, nb, p).
+        self.axis = np.stack([self.along[..., 0], (Dx @ self.along)[..., 0]])
+        self._shape = p, m
+        self._value, self._both = (np.ascontiguousarray(t.swapaxes(-1, -2))
+                                   for t in (self.value, self.tables))
 
-    def at(self, table: Array, xi: float, eta: float) -> Array:
-        """The values at one point, shape (nb,) or (2, nb).
+    def at(self, xi: float, eta: float) -> Array:
+        """The functions at one point, shape (nb,).
 
         Parameters
         ----------
-        table
-            One of the attributes, shape (nb, p, m) or (2, nb, p, m).
         xi, eta
             The reference point.
         """
-        return table @ chebyshev(eta, table.shape[-1]) @ chebyshev(xi, table.shape[-2])
+        return self._at(self._value, xi, eta)
+
+    def with_slopes(self, xi: float, eta: float) -> Array:
+        """The functions and their derivatives by xi at one point, shape (2, nb).
+
+        Parameters
+        ----------
+        xi, eta
+            The reference point.
+        """
+        return self._at(self._both, xi, eta)
+
+    def _at(self, table, xi, eta):
+        p, m = self._shape
+        return table.dot(np.array(polynomials(xi, p))).dot(np.array(polynomials(eta, m)))
 
     def values(self, table: Array, X: Array) -> Array:
         """The values at many points, shape (nb, n).
@@ -115,8 +150,8 @@ class Series:
             Reference points, shape (2, n).
         """
         _, p, m = table.shape
-        products = chebyshev(X[0], p)[:, None] * chebyshev(X[1], m)
-        return table.reshape(-1, p * m) @ products.reshape(p * m, -1)
+        both = chebyshev(X[0], p)[:, None] * chebyshev(X[1], m)
+        return table.reshape(-1, p * m) @ both.reshape(p * m, -1)
 
     def scales(self, lengths: Array) -> Array:
         """The powers of the lengths (ne,) of elements that the functions take, (ne, nb)."""

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
 from .formulations import COMPONENTS
 from .kept import kept
-from .mapping import cross
-from .series import chebyshev
+from .series import chebyshev, polynomials
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Sequence
 
     from .beam import Beam
     from .formulations.base import Term
@@ -23,35 +22,124 @@ if TYPE_CHECKING:
 #: Points that are evaluated at once.
 CHUNK = 2048
 
-#: Points of which tables are kept.
-POINTS = 64
+#: Elements of which tables for single points are kept.
+ELEMENTS = 1024
 
-#: Which derivatives of the position make each strain component.
-PAIRS = ((0, 0), (1, 1), (0, 1))
+#: Which derivatives of the position each strain component needs: along the axis 0, across it 1.
+NEEDS = ((0,), (1,), (0, 1))
+
+
+def along_axis(a: Any, b: Any, x: Any, y: Any) -> Any:
+    """Green-Lagrange strain eps_xx.
+
+    Parameters
+    ----------
+    a, b
+        Derivatives of the displacement along the axis and across it, each a pair of numbers or
+        arrays (n,).
+    x, y
+        The tangent of the stress-free axis.
+    """
+    return (x + 0.5 * a[0]) * a[0] + (y + 0.5 * a[1]) * a[1]
+
+
+def across_axis(a: Any, b: Any, x: Any, y: Any) -> Any:
+    """Green-Lagrange strain eps_yy; parameters are those of :func:`along_axis`.
+
+    Parameters
+    ----------
+    a, b, x, y
+        As there, pairs of arrays of shape (n,), and of shape (n,).
+    """
+    return (0.5 * b[0] - y) * b[0] + (x + 0.5 * b[1]) * b[1]
+
+
+def shear(a: Any, b: Any, x: Any, y: Any) -> Any:
+    """Twice the Green-Lagrange strain eps_xy; parameters are those of :func:`along_axis`.
+
+    Parameters
+    ----------
+    a, b, x, y
+        As there, pairs of arrays of shape (n,), and of shape (n,).
+    """
+    return (x + a[0]) * b[0] + (y + a[1]) * b[1] - y * a[0] + x * a[1]
+
+
+#: The components in their order.
+STRAINS = along_axis, across_axis, shear
 
 
 class PointStrain(NamedTuple):
-    """The strain at one point as a function of the coordinates of its element.
+    """The strain at one point as a function of the polynomials of its element in a state.
 
     Attributes
     ----------
-    slopes
-        Derivatives of the local functions along the axis and across it where the strain is
-        sampled, shape (2 places, nb).
-    frame
-        The beam's frame there, (places, along which, component).
+    terms
+        As ``ElementStrain.terms``.
+    along, across
+        The Chebyshev polynomials of both reference coordinates, arrays.
     weights
-        Of products of derivatives in the strain, shape (3, 4 places).
+        Of the samples in the strain, a list.
+    frames
+        The tangent of the stress-free axis at each place, pairs of numbers.
+    inverse, turning
+        Of curved elements one over the determinants at places, and what :func:`_turning` says of
+        the point itself, or None.
     """
 
-    slopes: Array
-    frame: Array
-    weights: Array
+    terms: list[tuple[int, int, int, int]]
+    along: Array
+    across: Array
+    weights: list[float]
+    frames: list[Any]
+    inverse: list[float] | None
+    turning: Any
 
-    def __call__(self, u_e: Array) -> Array:
-        """(eps_xx, eps_yy, 2 eps_xy) for displacements (2, nb) of the coordinates, shape (3,)."""
-        H = (self.slopes @ u_e.T).reshape(-1, 2, 2)  # places, along which it is derived, component
-        return self.weights @ ((self.frame + 0.5 * H) @ H.swapaxes(-1, -2)).ravel()
+    def __call__(self, polynomials: Array) -> list[float]:
+        """(eps_xx, eps_yy, 2 eps_xy) of what :meth:`ElementStrain.polynomials` returns."""
+        slopes = polynomials.dot(self.along).dot(self.across).tolist()
+        if self.inverse is not None:
+            here = slopes[len(self.inverse):]
+            slopes = [(f * x, f * y) for f, (x, y) in zip(self.inverse, slopes)]
+            if here:
+                slopes += turned(self.turning, *here)
+        return interpolated(self.terms, self.weights, slopes, self.frames)
+
+
+def turned(turning: Sequence[Any], by_xi: Any, by_eta: Any) -> list[Any]:
+    """Derivatives along the axis and across it.
+
+    Parameters
+    ----------
+    turning
+        What :func:`_turning` returns.
+    by_xi, by_eta
+        Derivatives by xi and by eta, pairs of numbers or arrays (n,).
+    """
+    det, a, b, c, d = turning[:5]
+    return [((a * by_xi[0] + b * by_eta[0]) / det, (a * by_xi[1] + b * by_eta[1]) / det),
+            ((c * by_xi[0] + d * by_eta[0]) / det, (c * by_xi[1] + d * by_eta[1]) / det)]
+
+
+def interpolated(terms: Sequence[Any], weights: Sequence[Any], slopes: Sequence[Any],
+                 frames: Sequence[Any]) -> list[Any]:
+    """The strain (eps_xx, eps_yy, 2 eps_xy): of each component the sum of weighted samples.
+
+    Parameters
+    ----------
+    terms
+        As ``ElementStrain.terms``.
+    weights
+        Of each term, numbers or arrays (n,).
+    slopes
+        Derivatives of the displacement, each a pair of numbers or arrays (n,).
+    frames
+        The tangent of the stress-free axis at each place, pairs of numbers or arrays.
+    """
+    out: list[Any] = [0.0, 0.0, 0.0]
+    for weight, (row, place, a, b) in zip(weights, terms):
+        out[row] = out[row] + weight * STRAINS[row](slopes[a], slopes[b], *frames[place])
+    return out
 
 
 class TaperedStrain:
@@ -59,12 +147,12 @@ class TaperedStrain:
 
     Parameters
     ----------
-    beam, term
+    beam, term, rows
         As for :class:`ElementStrain`.
     """
 
-    def __init__(self, beam: Beam, term: Term) -> None:
-        self.beam, self.term = beam, term
+    def __init__(self, beam: Beam, term: Term, rows: Sequence[int] = (0, 1, 2)) -> None:
+        self.beam, self.term, self.rows = beam, term, rows
 
     def __call__(self, u: Array, e: Array, X: Array) -> Array:
         """(eps_xx, eps_yy, 2 eps_xy) at points.
@@ -81,23 +169,10 @@ class TaperedStrain:
         ndarray
             Shape (3, n).
         """
-        return self._of(self.beam.kernel.gather(u, e), e, X)
-
-    def at(self, e: int, xi: float, eta: float) -> Callable[[Array], Array]:
-        """What gives the strain at one point in many states.
-
-        Parameters
-        ----------
-        e, xi, eta
-            Element and reference point.
-        """
-        at, X = np.array([e]), np.array([[xi], [eta]])
-        return lambda u_e: self._of(u_e.T[None], at, X)[:, 0]
-
-    def _of(self, u_e, e, X):
+        u_e = self.beam.kernel.gather(u, e)
         found = {}
 
-        def products(xi):
+        def at_place(xi):
             key = None if xi is None else float(xi)
             if key not in found:
                 at = X if xi is None else np.array([0.0 * X[0] + xi, X[1]])
@@ -109,9 +184,12 @@ class TaperedStrain:
 
         out = []
         for row, name in enumerate(COMPONENTS):
+            if row not in self.rows:
+                out.append(0.0 * X[0])
+                continue
             weights = self.term.interpolation(name, X[0])
-            out.append(products(None)[row] if weights is None else sum(
-                w * products(xi)[row] for xi, w in zip(self.term.nodes(name), weights.T)))
+            out.append(at_place(None)[row] if weights is None else sum(
+                w * at_place(xi)[row] for xi, w in zip(self.term.nodes(name), weights.T)))
         return np.array(out)
 
 
@@ -119,7 +197,8 @@ class ElementStrain:
     """The strain of a term of a formulation: interpolated samples.
 
     A component is sampled at places along the axis that are the same in all elements: there the
-    slopes of the position are polynomials across the section. One that is not sampled is
+    derivatives of the position along the axis and across it are polynomials across the section,
+    divided by the determinant of the map of a curved element. A component that is not sampled is
     evaluated at the points themselves.
 
     Parameters
@@ -128,39 +207,84 @@ class ElementStrain:
         A :class:`~skfem_ancf.Beam` with sections.
     term
         A :class:`~skfem_ancf.formulations.Term`.
+    rows
+        The components that are asked for; the others are zero.
+
+    Attributes
+    ----------
+    terms : list
+        For each sample of a component: the component, the place, and which of the derivatives are
+        those along the axis and across it there.
     """
 
-    def __init__(self, beam: Beam, term: Term) -> None:
-        self._points: dict = {}
+    def __init__(self, beam: Beam, term: Term, rows: Sequence[int] = (0, 1, 2)) -> None:
         self._elements: dict = {}
-        self.beam, self.term, series = beam, term, beam.series
-        self.places = sorted({float(xi) for name in term.samples for xi in term.samples[name]})
-        self.here = any(name not in term.samples for name in COMPONENTS)
-        count = len(self.places) + self.here
-        p = max([len(xi) for xi in term.samples.values()], default=1)
-        self._samples = np.zeros((3, count, p))  # how much a place has in a component
-        for row, name in enumerate(COMPONENTS):
-            if name not in term.samples:
-                self._samples[row, -1, 0] = 1.0
-                continue
-            nodes = np.asarray(term.samples[name])
-            lagrange = np.linalg.inv(chebvander(2.0 * nodes - 1.0, len(nodes) - 1)).T
-            for xi, coefficients in zip(nodes, lagrange):
-                self._samples[row, self.places.index(float(xi)), :len(nodes)] = coefficients
-        self._used = [np.nonzero(np.any(s, axis=1))[0] for s in self._samples]
-        self._rows = np.zeros((3, count, 2, 2, p))  # of all products of derivatives at one point
-        for row, (J, K) in enumerate(PAIRS):
-            self._rows[row, :, J, K] += self._samples[row]
-            if J != K:
-                self._rows[row, :, K, J] += self._samples[row]
+        self.beam, series = beam, beam.series
+        names = [COMPONENTS[row] for row in rows]
+        self.places = sorted({float(xi) for name in names for xi in term.samples.get(name, ())})
+        self.here = any(name not in term.samples for name in names)
+        self.terms: list[tuple[int, int, int, int]] = []
+        self._pairs: list[tuple[int, int]] = []  # places and derivatives there that are needed
+        most = max(len(term.samples.get(name, (0.0,))) for name in names)
+        weights = []
+        if self.here:
+            self._pairs += [(len(self.places), 0), (len(self.places), 1)]
+        for row, name in zip(rows, names):
+            nodes = np.asarray(term.samples.get(name, ()))
+            lagrange = np.linalg.inv(chebvander(2.0 * nodes - 1.0, len(nodes) - 1)).T if len(
+                nodes) else np.ones((1, 1))
+            at = [self.places.index(float(xi)) for xi in nodes] or [len(self.places)]
+            for place, coefficients in zip(at, lagrange):
+                pairs = [self._pair(place, J) for J in NEEDS[row]]
+                self.terms.append((row, place, pairs[0], pairs[-1]))
+                weights.append(np.append(coefficients, np.zeros(most - len(coefficients))))
+        self._weights = np.array(weights)
+        self._sort()
+        # of length 1: by xi, by eta of each place: (places, 2, m, nb); of the points (2, p m, nb)
         both = series.along, series.across
-        # by xi, by eta of each place: (places, 2, m, nb); of the points (1, 2, p m, nb)
         self._fixed = np.array([[np.einsum("bpm,p->mb", table, chebyshev(
             xi, table.shape[1])) for table in both] for xi in self.places]).reshape(
                 -1, 2, series.value.shape[2], len(series.value))
-        self._free = np.array([[table.reshape(len(table), -1).T for table in both]])
-        self._tables = [self._fixed] * bool(self.places) + [self._free] * self.here
-        self._shape, self._scaled = series.value.shape[1:], (2, len(series.value))
+        self._free = np.array([table.reshape(len(table), -1).T for table in both])
+        self._shape = series.value.shape[1:]
+
+    def _pair(self, place, J):
+        if (place, J) not in self._pairs:
+            self._pairs.append((place, J))
+        return self._pairs.index((place, J))
+
+    def _sort(self):
+        """Pairs by their places, and as arrays those that are the same in all elements."""
+        order = sorted(range(len(self._pairs)), key=lambda k: self._pairs[k])
+        new = {old: k for k, old in enumerate(order)}
+        self.terms = [(row, place, new[a], new[b]) for row, place, a, b in self.terms]
+        self._pairs = [self._pairs[k] for k in order]
+        fixed = np.array([pair for pair in self._pairs if pair[0] < len(self.places)], dtype=int)
+        self._at, self._which = fixed.reshape(-1, 2).T
+
+    # derivatives at places, as polynomials across the section
+
+    def _turned(self, tables, e):
+        """Along the axis and across it, from derivatives by xi and eta: (pairs, M, k, n).
+
+        Tables (places, 2, m, k, n) for elements (n,).
+        """
+        mesh, at, which = self.beam.mesh, self._at, self._which
+        if not len(at):
+            return []
+        if mesh.is_straight:
+            size = np.array([mesh.lengths[e], np.full(len(e), mesh.height)])
+            table = tables[at, which]
+            return table / size[which].reshape(len(at), 1, 1, len(e))
+        return sum(_times(self._map[1 + 2 * which + k, at][..., e], tables[at, k]) for k in (0, 1))
+
+    @cached_property
+    def _map(self):
+        """What :func:`_turning` says of the places, linear in 2 eta - 1, (7, places, 2, ne)."""
+        xi, e = np.array(self.places)[:, None], np.arange(self.beam.mesh.nelements)
+        low, high = (np.array(_turning(*self.beam.mesh.mapping().derivatives(e, xi, eta)))
+                     for eta in (0.0, 1.0))
+        return np.stack([0.5 * (low + high), 0.5 * (high - low)], axis=2)
 
     # at many points
 
@@ -180,82 +304,69 @@ class ElementStrain:
             Shape (3, n).
         """
         beam, n = self.beam, len(e)
-        if n == 1:
-            u_e = u[beam.mesh.t[0, e[0]] * beam.nd + beam.rows]
-            return self.at(int(e[0]), float(X[0, 0]), float(X[1, 0]))(u_e)[:, None]
         few = n < beam.mesh.nelements
         of = e if few else np.arange(beam.mesh.nelements)
-        scale = beam.scales[of].T
-        u_e = beam.kernel.gather(u, of).transpose(1, 2, 0) * scale[:, None]
-        # polynomials of the derivatives by xi and eta: (places, 2, m, 2, elements)
-        groups = [table @ u_e.reshape(len(u_e), -1) for table in self._tables]
-        groups = [table.reshape(*table.shape[:3], 2, len(of)) for table in groups]
+        u_e = beam.kernel.gather(u, of).transpose(1, 2, 0) * beam.scales[of].T[:, None]
+        turned, free = self._polynomials(u_e, of)
         out = np.empty((3, n), u_e.dtype)
         for first in range(0, n, CHUNK):
             part = slice(first, first + CHUNK)
             at = np.arange(n)[part] if few else e[part]
-            out[:, part] = self._chunk(groups, at, e[part], X[:, part])
+            T = polynomials(X[1, part], max(self._shape[1] + 1, 2))
+            slopes = self._slopes(turned, at, e[part], T)
+            if self.here:
+                slopes += self._slopes_here(free, at, e[part], X[:, part], T)
+            weights = list(self._weights @ chebyshev(X[0, part], self._weights.shape[1]))
+            for row, values in zip(out, interpolated(
+                    self.terms, weights, slopes, self._frames(e[part], X[:, part]))):
+                row[part] = values
         return out
 
-    def _chunk(self, groups, at, e, X):
-        """The strain at points, from the polynomials of their elements, number ``at`` there."""
-        p, m = self._shape
-        T = chebyshev(X[1], m)
-        found = []
-        for table in groups:
-            basis = T
-            if table is not groups[0] or not self.places:
-                basis = (chebyshev(X[0], p)[:, None] * T).reshape(p * m, -1)
-            value = table[:, :, 0].take(at, axis=-1) * basis[0]
-            for j in range(1, len(basis)):
-                value += table[:, :, j].take(at, axis=-1) * basis[j]
-            found.append(value)
-        H = np.concatenate(found) if len(found) > 1 else found[0]  # (places, 2, component, n)
-        frame = self._turn(H, e, X)
-        W = np.tensordot(self._samples, chebyshev(X[0], self._samples.shape[2]), 1)
-        out = np.empty((3, len(e)), H.dtype)
-        for row, (J, K) in enumerate(PAIRS):
-            used = self._used[row]
-            D, g = H[used], frame if len(frame) == 1 else frame[used]
-            E = np.sum((g[:, J] + 0.5 * D[:, J]) * D[:, K], axis=1)
-            if J != K:
-                E += np.sum((g[:, K] + 0.5 * D[:, K]) * D[:, J], axis=1)
-            out[row] = np.sum(W[row, used] * E, axis=0)
+    def _polynomials(self, u_e, of):
+        """Derivatives of displacements (nb, 2, n) of elements: at places, and by xi and eta."""
+        flat = u_e.reshape(len(u_e), -1)
+        fixed = (self._fixed @ flat).reshape(*self._fixed.shape[:3], 2, len(of))
+        turned = self._turned(fixed, of)
+        return turned, (self._free @ flat).reshape(2, -1, 2, len(of)) if self.here else None
+
+    def _slopes(self, turned, at, e, T):
+        """Derivatives at places, (2, n) each, from polynomials of elements, number ``at`` there."""
+        straight = self.beam.mesh.is_straight
+        inverse = [] if straight else [1.0 / (d[0].take(e) + T[1] * d[1].take(e))
+                                       for d in self._map[0]]
+        out = []
+        for (place, _), table in zip(self._pairs, turned):
+            value = table[0].take(at, axis=-1)
+            for c, basis in zip(table[1:], T[1:]):
+                value += c.take(at, axis=-1) * basis
+            if not straight:
+                value *= inverse[place]
+            out.append(value)
         return out
 
-    def _turn(self, H, e, X):
-        """From derivatives by xi and eta, in place, to those along the axis and across it.
-
-        Returns the beam's frame (1 or places, along which, component, n).
-        """
+    def _slopes_here(self, free, at, e, X, T):
+        """Derivatives at the points themselves, (2, n) each."""
+        (p, m), both = self._shape, []
+        basis = (chebyshev(X[0], p)[:, None] * np.array(T[:m])).reshape(p * m, -1)
+        for table in free:
+            value = table[0].take(at, axis=-1)
+            for c, of in zip(table[1:], basis[1:]):
+                value += c.take(at, axis=-1) * of
+            both.append(value)
         mesh = self.beam.mesh
         if mesh.is_straight:
-            t = mesh.p_X[:, mesh.t[0]].take(e, axis=-1)
-            H[:, 0] /= mesh.lengths[e]
-            H[:, 1] /= mesh.height
-            return np.array([[t, [-t[1], t[0]]]])
-        parts = [self._bottom[..., e] + X[1] * self._rise[..., e]] if self.places else []
-        if self.here:
-            parts.append(_turning(*mesh.mapping().derivatives(e, *X))[:, None])
-        det, a, b, c, d, x, y = np.concatenate(parts, axis=1)
-        along = (a[:, None] * H[:, 0] + b[:, None] * H[:, 1]) / det[:, None]
-        H[:, 1] = (c[:, None] * H[:, 0] + d[:, None] * H[:, 1]) / det[:, None]
-        H[:, 0] = along
-        return np.array([[x, y], [-y, x]]).transpose(2, 0, 1, 3)
+            return [both[0] / mesh.lengths[e], both[1] / mesh.height]
+        return turned(_turning(*mesh.mapping().derivatives(e, *X)), *both)
 
-    @cached_property
-    def _bottom(self):
-        """What :func:`_turning` says of the places at the bottom of all elements."""
-        return self._turning_at(0.0)
-
-    @cached_property
-    def _rise(self):
-        """How much more it is at the top."""
-        return self._turning_at(1.0) - self._bottom
-
-    def _turning_at(self, eta):
-        xi, ne = np.array(self.places)[:, None], self.beam.mesh.nelements
-        return _turning(*self.beam.mesh.mapping().derivatives(np.arange(ne), xi, eta))
+    def _frames(self, e, X=None):
+        """The tangent of the axis at all places, and at points X."""
+        mesh, count = self.beam.mesh, len(self.places)
+        if mesh.is_straight:
+            return [mesh.p_X[:, mesh.t[0]].take(e, axis=-1)] * (count + self.here)
+        out = [self._map[5:, place, 0].take(e, axis=-1) for place in range(count)]
+        if self.here and X is not None:
+            out.append(mesh.mapping().derivatives(e, *X)[2])
+        return out
 
     # at one point
 
@@ -267,55 +378,89 @@ class ElementStrain:
         e, xi, eta
             Element and reference point.
         """
-        return kept(self._points, (e, xi, eta), lambda: self._at(e, xi, eta), POINTS)
-
-    def _at(self, e, xi, eta):
-        p, m = self._shape
-        (fixed, free, rows), T = self._flat, chebyshev(eta, m)
-        slopes = fixed @ T
+        _, (n, m), frames, determinants = self._of(e)
+        along, across = polynomials(xi, max(n, self._weights.shape[1])), polynomials(eta, m)
+        basis = np.array(along)
+        weights = self._weights.dot(basis[:self._weights.shape[1]]).tolist()
+        tables = self.terms, basis[:n], np.array(across), weights
+        if determinants is None:
+            return PointStrain(*tables, frames, None, None)
+        turning = None
         if self.here:
-            slopes = np.concatenate([slopes, free @ (chebyshev(xi, p)[:, None] * T).ravel()])
-        scale, frame = kept(self._elements, e, lambda: self._element(e), POINTS)
-        slopes = slopes.reshape(-1, *self._scaled) * scale  # (places, 2, nb)
-        if frame is None:
-            at = [self._bottom[..., e] + eta * self._rise[..., e]] if self.places else []
-            if self.here:
-                at.append(_turning(*self.beam.mesh.mapping().derivatives(e, xi, eta))[:, None])
-            turning = np.concatenate(at, axis=1) if len(at) > 1 else at[0]
-            slopes = (turning[1:5] / turning[0]).T.reshape(-1, 2, 2) @ slopes
-            frame = (turning[_OF_FRAME] * _SIGN).T.reshape(-1, 2, 2)
-        weights = rows @ chebyshev(xi, rows.shape[1])
-        return PointStrain(slopes.reshape(-1, slopes.shape[2]), frame, weights.reshape(3, -1))
+            turning = _turning(*self.beam.mesh.mapping().derivatives(e, xi, eta))
+            frames = [*frames, turning[5:]]
+        return PointStrain(*tables, frames, [1.0 / (c + across[1] * d) for c, d in determinants],
+                           turning)
 
-    @cached_property
-    def _flat(self):
-        """The tables as matrices: (2 nb places, m), (2 nb, p m), and the weights (12 places, .)."""
-        fixed, free = (np.moveaxis(table, 2, -1) for table in (self._fixed, self._free))
-        return (fixed.reshape(-1, fixed.shape[-1]), free.reshape(-1, free.shape[-1]),
-                self._rows.reshape(-1, self._rows.shape[-1]))
+    def polynomials(self, e: int, u_e: Array) -> Array:
+        """The derivatives in an element that single points need, as polynomials.
 
-    def _element(self, e):
-        """What an element multiplies slopes by, (2 or 1, nb), and the frame of a straight one."""
-        mesh, scale = self.beam.mesh, self.beam.scales[e]
-        if not mesh.is_straight:
-            return scale, None
-        x, y = mesh.p_X[:, mesh.t[0, e]]
-        return (scale / np.array([[mesh.lengths[e]], [mesh.height]]),
-                np.array([[[x, y], [-y, x]]]))
+        At the places along the axis and across it, of curved elements times the determinant; at
+        the points themselves too, of curved elements by xi and by eta.
+
+        Parameters
+        ----------
+        e
+            The element.
+        u_e
+            Displacements of its coordinates, shape (2, nb).
+
+        Returns
+        -------
+        ndarray
+            Coefficients, shape (pairs, 2, across, along).
+        """
+        return np.tensordot(self._of(e)[0], u_e, (1, 1)).transpose(0, 3, 1, 2)
+
+    def _of(self, e):
+        found = self._elements.get(e)
+        return found if found is not None else kept(
+            self._elements, e, lambda: self._tables_of(e), ELEMENTS)
+
+    def _tables_of(self, e):
+        """Of one element what single points need of it.
+
+        As :meth:`polynomials` those of all local functions, (pairs, nb, across, along); how many
+        polynomials there are along and across; the tangents at the places; of curved elements the
+        determinants, linear in 2 eta - 1.
+        """
+        mesh, scale, at = self.beam.mesh, self.beam.scales[e], np.array([e])
+        straight, (p, m) = mesh.is_straight, self._shape
+        shape = p if self.here else 1, m if straight else m + 1
+        table = np.zeros((len(self._pairs), len(scale), shape[1], shape[0]))
+        for row, polynomial in zip(table, self._turned((self._fixed * scale)[..., None], at)):
+            row[..., 0] = polynomial[..., 0].T
+        if self.here:
+            size = np.array([mesh.lengths[e], mesh.height]) if straight else np.ones(2)
+            table[-2:, :, :m] = (self._free * (scale / size[:, None])[:, None]).swapaxes(
+                1, 2).reshape(2, -1, p, m).swapaxes(2, 3)
+        frames = [tuple(f[:, 0].tolist()) for f in self._frames(at)]
+        return table, shape, frames, None if straight else [
+            tuple(self._map[0, place, :, e].tolist()) for place in self._at]
 
 
-#: Where the frame (x, y), (-y, x) is in what :func:`_turning` returns, and with which sign.
-_OF_FRAME, _SIGN = [5, 6, 6, 5], np.array([[1.0], [1.0], [-1.0], [1.0]])
+def _times(linear, table):
+    """Products of linear functions (pairs, 2, n) of z and polynomials (pairs, m, k, n).
+
+    All are sums of Chebyshev polynomials of z; the products have m + 1 terms.
+    """
+    c, d = linear[:, 0, None, None], linear[:, 1, None, None]
+    out = np.zeros((table.shape[0], table.shape[1] + 1, table.shape[2], linear.shape[-1]),
+                   table.dtype)
+    out[:, :-1] += c * table
+    out[:, 1:2] += d * table[:, :1]
+    out[:, 2:] += 0.5 * d * table[:, 1:]
+    out[:, :-2] += 0.5 * d * table[:, 1:]
+    return out
 
 
 def _turning(J0, J1, t):
-    """What takes derivatives by xi and eta to those along the frame, shape (7, ...).
+    """What takes derivatives by xi and eta to those along the frame, a list of seven.
 
     The determinant of the map; times that, how much of both is in the one along the axis, and in
     the one across it; the tangent. All are linear in eta.
 
     J0, J1 and t are the derivatives of the map and the tangent, (2, ...).
     """
-    n = -t[1], t[0]
-    return np.array([cross(J0, J1), *(part for v in (t, n)
-                                      for part in (cross(v, J1), cross(J0, v))), *t])
+    (a, b), (c, d), (x, y) = J0, J1, t
+    return [a * d - b * c, x * d - y * c, a * y - b * x, -x * c - y * d, a * x + b * y, x, y]

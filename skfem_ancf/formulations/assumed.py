@@ -13,7 +13,7 @@ from .base import Formulation, Term
 from .ecm import AXIS, split_moduli
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from ..beam import Beam
     from ..elements.base import ElementBeam
@@ -107,23 +107,15 @@ class Assumed(Formulation):
         return [Term(laws[0], whole.axis, whole.section, whole.samples),
                 Term(laws[1], gauss(volume), whole.section, samples)]
 
-    def stress(self, beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
+    def stress_of(self, beam: Beam, strain: Callable[..., Array]) -> Array:
         first, *others = beam.terms
-        total = first.law.stress(strain)
-        for term in others:
-            total = total + term.law.stress(self._strain_of(term, beam, u, X, tind))
+        total = first.law.stress(strain(first))
+        for term in others:  # of the middle of the element, or of the section's mean
+            xi, mean = term.axis[0], term.section_samples
+            total = total + term.law.stress(strain(
+                term, None if len(xi) > 1 else xi[0], None if mean is None else (
+                    mean[0], mean[1][0])))
         return total
-
-    @staticmethod
-    def _strain_of(term: Term, beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:
-        """What a term takes for the strain at X: that of the middle, or the section's mean."""
-        xi = term.axis[0]
-        x = X[0] if len(xi) > 1 else 0.0 * X[0] + xi[0]
-        if term.section_samples is None:
-            return beam.sampled_strain(term, u, np.array([x, X[1]]), tind)
-        eta, (w,) = term.section_samples
-        return sum(wi * beam.sampled_strain(term, u, np.array([x, 0.0 * X[1] + y]), tind)
-                   for y, wi in zip(eta, w))
 
     def stabilisation(self, mesh: MeshBeam, element: ElementBeam, material: Material,
                       width: float) -> Array | None:

@@ -12,7 +12,7 @@ from ..frozen import Frozen
 from ..quadrature import gauss, lagrange, tensor
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -157,8 +157,26 @@ class Formulation(Frozen):
         ndarray
             Shape (3, nelements, npoints).
         """
-        material = beam.material
-        return material.law(material.shear_factor(beam.element)).stress(strain)
+        return self.stress_of(beam, beam.strains(strain, u, X, tind))
+
+    def stress_of(self, beam: Beam, strain: Callable[..., Array]) -> Array:
+        """As :meth:`stress`, which calls it: for one point and for many.
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+        strain
+            Called as ``strain(term, xi, across)`` it returns the strain of a term of the beam at
+            the points, (3, ...): with xi at that place along their elements instead, and with
+            points and weights ``across`` its mean over their sections.
+
+        Returns
+        -------
+        ndarray
+            Shape (3, ...).
+        """
+        return beam.law.stress(strain(beam.terms[0]))
 
     @staticmethod
     def full_rules(element: ElementBeam) -> tuple[Rule, Rule]:

@@ -11,7 +11,7 @@ from ..materials import LinearLaw
 from .base import Formulation, Term
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from ..beam import Beam
     from ..elements.base import ElementBeam
@@ -74,10 +74,9 @@ class EnhancedContinuum(Formulation):
             terms.append(Term(LinearLaw(coupling), axis, AXIS))
         return terms
 
-    def stress(self, beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
+    def stress_of(self, beam: Beam, strain: Callable[..., Array]) -> Array:
         first, *coupling = beam.terms
-        out = first.law.stress(strain)
+        out = first.law.stress(strain(first))
         if coupling:
-            axis = np.array([X[0], 0.0 * X[1] + 0.5])
-            out = out + coupling[0].law.stress(beam.kinematics.strain(beam, u, axis, tind))
+            out = out + coupling[0].law.stress(strain(first, None, AXIS))
         return out

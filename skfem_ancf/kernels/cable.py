@@ -69,6 +69,34 @@ class CablePack(NamedTuple):
 
 
 @source
+def curvature(a0, a1, b0, b1, square):
+    """The material curvature of an axis with derivatives a and b.
+
+    Parameters
+    ----------
+    a0, a1, b0, b1
+        Their components: numbers, or arrays of one shape.
+    square
+        ``|a|^2``.
+    """
+    return (a0 * b1 - a1 * b0) / square
+
+
+@source
+def extension(a0, a1, da0, da1, length, length0):
+    """The extension of an axis, without cancellation.
+
+    Parameters
+    ----------
+    a0, a1, da0, da1
+        Its derivative, and the displacement part of it: numbers, or arrays of one shape.
+    length, length0
+        ``|a|``, and the same in the stress-free state.
+    """
+    return ((2.0 * a0 - da0) * da0 + (2.0 * a1 - da1) * da1) / (length + length0)
+
+
+@source
 def cable_strain(pack, first, d, r, weights, stiffness, square, kappa, strain):
     """Strains of the elements from ``first`` on, without cancellation in the extension.
 
@@ -91,9 +119,8 @@ def cable_strain(pack, first, d, r, weights, stiffness, square, kappa, strain):
         for e in lanes(size):
             a0, a1, da0, da1 = r[p, 0, e], r[p, 1, e], d[p, 0, e], d[p, 1, e]
             s = a0 * a0 + a1 * a1
-            k = (a0 * b[p, 1, e] - a1 * b[p, 0, e]) / s
-            strain[0, p, e] = (((2.0 * a0 - da0) * da0 + (2.0 * a1 - da1) * da1)
-                               / (np.sqrt(s) + pack.length0[p, at0[e]]))
+            k = curvature(a0, a1, b[p, 0, e], b[p, 1, e], s)
+            strain[0, p, e] = extension(a0, a1, da0, da1, np.sqrt(s), pack.length0[p, at0[e]])
             strain[1, p, e] = k - pack.kappa0[p, at0[e]]
             square[p, e], kappa[p, e], weights[p, e] = s, k, pack.weights[p, at[e]]
     for c in lanes(3):

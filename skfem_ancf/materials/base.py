@@ -367,13 +367,15 @@ class LinearLaw:
 
     def __init__(self, D: ArrayLike) -> None:
         self.D = np.asarray(D)
+        #: The components of the strain on which the stress depends.
+        self.rows = tuple(k for k, column in enumerate(self.D.T) if np.any(column))
 
     def energy(self, strain: Array) -> Array:
         return 0.5 * np.sum(strain * self.stress(strain), axis=0)
 
     def stress(self, strain: Array) -> Array:
         strain = np.asarray(strain)
-        return (self.D @ strain.reshape(3, -1)).reshape(strain.shape)
+        return self.D.dot(strain.reshape(3, -1)).reshape(strain.shape)
 
     def moduli(self, strain: Array) -> Array:
         shape = np.shape(strain)[1:]

@@ -1,0 +1,180 @@
+"""A single material point: what :class:`~skfem_ancf.points.Located` says of many, by numbers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .kept import kept
+from .parts import ON_AXIS, Part, carried, swung
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .beam import Beam
+    from .types import Array
+
+#: Elements of which a beam keeps what single points ask for.
+ELEMENTS = 4096
+
+
+class Point:
+    """One point of one beam, found in a scene.
+
+    What is made of it is kept in slots: properties would take longer than what they keep.
+
+    Parameters
+    ----------
+    beam, number, coordinates
+        As for :class:`~skfem_ancf.parts.Part`.
+    place
+        Element and reference point (e, xi, eta).
+    x
+        Where it was looked for, two numbers; None if it is known by its place only.
+
+    Attributes
+    ----------
+    one : bool
+        True: it was given as a single point.
+    n : int
+        1.
+    off_axis : bool
+        It is one of a cable off its axis: its section turns with the tangent.
+    recovery, strain_table
+        What of recovered fields, and of the strain of the elements, does not depend on the state.
+    """
+
+    __slots__ = ("_both", "_dofs", "_lever", "_parts", "_scale", "_weights", "_x", "beam",
+                 "coordinates", "number", "off_axis", "place", "recovery", "strain_table")
+    one, n = True, 1
+
+    def __init__(self, beam: Beam, number: int, coordinates: slice,
+                 place: tuple[int, float, float], x: tuple[float, float] | None = None) -> None:
+        self.beam, self.number, self.coordinates = beam, number, coordinates
+        self.place, self._x = place, x
+        self.off_axis = not beam.has_sections and abs(place[2] - 0.5) > ON_AXIS
+        of_element = beam.touched.get(place[0])
+        self._dofs, self._scale = of_element if of_element is not None else kept(
+            beam.touched, place[0], self._of_element, ELEMENTS)
+        self._weights = self._both = self._lever = None
+        self._parts: list[Part] | None = None
+        self.recovery: Any = None
+        self.strain_table: Any = None
+
+    def _of_element(self):
+        """Coordinates (2, nb) of the beam that move the element, and scales of its functions."""
+        e, beam = self.place[0], self.beam
+        return beam.mesh.t[0, e] * beam.nd + beam.rows, beam.scales[e]
+
+    @property
+    def parts(self) -> list[Part]:
+        """The point as one of many, a list of one Part."""
+        if self._parts is None:
+            e, xi, eta = self.place
+            self._parts = [Part(self.beam, self.number, self.coordinates, None, np.array([e]),
+                                np.array([[xi], [eta]]))]
+        return self._parts
+
+    def gather(self, values: Sequence[Array]) -> Array:
+        """What is known at :attr:`parts`, (..., 1), at the point, (...)."""
+        return values[0][..., 0]
+
+    @property
+    def start(self) -> Array:
+        """Its position in the stress-free body, (2,)."""
+        _, xi, eta = self.place
+        if self._x is not None and 0.0 < xi < 1.0 and 0.0 < eta < 1.0:
+            return np.array(self._x)
+        return self.parts[0].start[:, 0]  # it may have been moved to the border
+
+    def own(self, u: Array) -> Array:
+        """Of coordinates ``u`` (..., N) of the scene those of the element, (..., 2, nb)."""
+        u = u[..., self.coordinates]
+        return u[self._dofs] if u.ndim == 1 else u[..., self._dofs]
+
+    def displacement(self, u: Array) -> Array:
+        """Displacements (..., 2) for coordinates ``u`` (..., N) of the scene."""
+        if not self.off_axis:
+            return self.own(u).dot(self._position())
+        found = carried(self._section(), *self._moving(self.own(u)))
+        return np.array(found) if u.ndim == 1 else np.stack(found, -1)
+
+    def velocity(self, u: Array, v: Array) -> Array:
+        """Velocities (..., 2).
+
+        Parameters
+        ----------
+        u, v
+            Displacement of the coordinates of the scene and its rate, shapes (..., N).
+        """
+        if not self.off_axis:
+            return self.own(v).dot(self._position())
+        slope = self._moving(self.own(u))[2:]
+        found = swung(self._section(), *slope, *self._moving(self.own(v)))
+        return np.array(found) if v.ndim == 1 else np.stack(found, -1)
+
+    def _position(self):
+        """Weights of the coordinates of the element in its position, (nb,)."""
+        if self._weights is None:
+            _, xi, eta = self.place
+            self._weights = (self.beam.series.at(xi, eta) * self._scale
+                             if self.beam.mesh.heights is None else self.parts[0].weights[:, 0])
+        return self._weights
+
+    def _with_slope(self):
+        """Weights of the coordinates of the element in its position and its slope, (2, nb)."""
+        if self._both is None:
+            _, xi, eta = self.place
+            self._both = (self.beam.series.with_slopes(xi, eta) * self._scale
+                          if self.beam.mesh.heights is None else
+                          np.array([self.parts[0].weights[:, 0], self.parts[0].slopes[:, 0]]))
+        return self._both
+
+    def _moving(self, q):
+        """Position and slope of changes q (..., 2, nb) of the coordinates, four components."""
+        moved = self._with_slope().dot(q.T) if q.ndim == 2 else np.moveaxis(
+            q.dot(self._with_slope().T), (-1, -2), (0, 1))
+        (x, y), (ax, ay) = moved.tolist() if q.ndim == 2 else moved
+        return x, y, ax, ay
+
+    def _section(self):
+        """As :func:`~skfem_ancf.parts.carried` takes it."""
+        if self._lever is None:
+            mesh, eta = self.beam.mesh, self.place[2]
+            lever = (mesh.height * (eta - 0.5) if mesh.heights is None
+                     else float(mesh.mapping().offset(self.parts[0].at, self.parts[0].e)[0, 0]))
+            slope = self.beam.q0_local[self._dofs].dot(self._with_slope()[1])
+            self._lever = lever, *slope.tolist()
+        return self._lever
+
+    def strain(self, u: Array, near: dict[Any, Any]) -> Sequence[float]:
+        """The strain of the elements (eps_xx, eps_yy, 2 eps_xy).
+
+        Parameters
+        ----------
+        u
+            Coordinates of the scene, shape (N,).
+        near
+            What points have asked for in this state, by beam and element.
+        """
+        if self.beam.mesh.heights is not None:
+            return self.parts[0].strain(u)[:, 0].tolist()
+        return self._near(u, near).strain(self)
+
+    def stress(self, u: Array, near: dict[Any, Any]) -> Array:
+        """The stress of the elements (S_xx, S_yy, S_xy), shape (3,).
+
+        Parameters
+        ----------
+        u, near
+            As for :meth:`strain`, u of shape (N,).
+        """
+        found = None if self.beam.mesh.heights is not None else self._near(u, near).stress(self)
+        return self.parts[0].stress(u)[:, 0] if found is None else found
+
+    def _near(self, u, near):
+        key = self.number, self.place[0]
+        found = near.get(key)
+        return found if found is not None else kept(near, key, lambda: self.beam.kinematics.near(
+            self.beam, key[1], self.own(u)), ELEMENTS)
