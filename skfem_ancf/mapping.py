@@ -380,8 +380,8 @@ class MappingBeam(Mapping):
             Shape (2, nelements, npoints); NaN where no such point was found.
         """
         first = self._all_coefficients[0][:, 0]
-        axis, director, crossed = (c[..., None] if tind is None else c.take(tind, axis=-1)[..., None]
-                                  for c in self._powers)
+        axis, director, crossed = ((c if tind is None else c.take(tind, axis=-1))[..., None]
+                                   for c in self._powers)
         gap = x - (first if tind is None else first.take(tind, axis=1))[:, :, None]
         beside = beside_section(director, crossed, gap)
         X = np.empty(x.shape)
