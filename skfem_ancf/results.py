@@ -131,7 +131,7 @@ class State(Frozen):
     def replace(self, **changes: Any) -> State:
         """The same state with other attributes, as ``replace(message="guess")``.
 
-        ``error_estimate`` and ``scene`` are those of an adaptive solution.
+        ``error_estimate``, ``scene`` and ``refinements`` are those of an adaptive solution.
 
         Raises
         ------
@@ -139,7 +139,8 @@ class State(Frozen):
             If an attribute is not known.
         """
         known = [name for name in vars(self) if not name.startswith("_")]
-        known += [name for name in ("error_estimate", "scene") if name not in known]
+        known += [name for name in ("error_estimate", "scene", "refinements")
+                  if name not in known]
         for name in changes:
             if name not in known:
                 raise NameUnknown("attribute of State", name, known)

@@ -1386,8 +1386,10 @@ class Scene:
             A State to start from, of this scene or of one whose beams have equal meshes and
             elements; the stress-free state by default. :meth:`state` makes one of coordinates.
         adapt
-            Tolerance of the error: refine the meshes where it is, starting from those given. The
-            state's ``error_estimate`` says what was reached; its beams are the refined ones. With
+            Tolerance of the error: raise the degree of elements that have one, where the solution
+            is smooth (up to ``max_degree=``), else refine the meshes where it is, starting from
+            those given. The state's ``error_estimate`` says what was reached, its
+            ``refinements`` what was done; its beams are the refined ones. With
             ``goal="strain"`` it is the error of the strain. See
             :func:`skfem_ancf.statics.adapt.solve_adaptive`.
         **options

@@ -603,7 +603,8 @@ call("scene.solve_static", lambda **k: loaded_once().solve_static(**k),
      start="other?", method="name", tol="positive", max_iterations="count", first_step="positive",
      min_step="positive", progress="progress")
 call("scene.solve_static, adapt", lambda **k: loaded_once().solve_static(**k),
-     dict(adapt=0.5, max_elements=16), adapt="positive?", max_elements="count")
+     dict(adapt=0.5, max_elements=16, max_degree=5), adapt="positive?", max_elements="count",
+     max_degree="count")
 call("scene.solve_linear", lambda **k: loaded_once().solve_linear(**k), {})
 call("scene.continuation", lambda **k: loaded_once().continuation(**k),
      dict(steps=2, ds=0.02, ds_max=0.1, max_load=None, until=lambda point: True, tol=1e-8,

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import exact
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamCable, InputError, MeshBeam, Scene, StVenantKirchhoff)
+                        ElementBeamANCFHermite, ElementBeamCable, InputError, MeshBeam, Scene,
+                        StVenantKirchhoff)
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.results import State
 from skfem_ancf.statics.adapt import refine
@@ -86,3 +88,83 @@ def test_scene_is_put_on_other_beams():
     numbered = Scene(left).clamp(np.array([0]))
     with pytest.raises(InputError, match="names or functions"):
         numbered.with_beams([left.with_mesh(left.mesh.refined())])
+
+
+# the degree
+
+def test_degrees_need_fewer_coordinates_than_halved_elements():
+    """5.2 to 1e-8: where the solution is smooth the degree is raised, and the result says so."""
+    found = {}
+    for most in (5, 7, 15):
+        element = ElementBeamCable(min(most, 7))
+        state = cantilever(element, 4).solve_static(adapt=1e-8, max_degree=most)
+        known = exact.gravity_cantilever(2e8, 0.3, 7800, 1.0, 0.01, 0.01, model="extensible")
+        assert np.hypot(*(state.displacement((1, 0)) - known)) < 1e-8
+        assert max(state.error_estimate.values()) <= 1e-8
+        found[most] = state
+        last = state.refinements[-1]
+        assert (last.degree, last.elements) == (state.beams[0].element.axis_degree,
+                                                state.beams[0].mesh.nelements)
+    assert {r.kind for r in found[5].refinements} == {r.kind for r in found[7].refinements} == {
+        "split"}
+    assert [(r.kind, r.degree) for r in found[15].refinements] == [
+        ("degree", 9), ("degree", 11), ("degree", 13)]
+    N = {most: state.scene.N for most, state in found.items()}
+    assert N[15] <= 70 and N[15] < 0.6 * N[7] and N[15] < 0.6 * N[5]
+
+
+def test_elements_are_halved_where_the_solution_is_rough():
+    """A force inside: the shear force jumps at it, which no degree shows."""
+    def scene(n, degree):
+        mesh = MeshBeam.init_line(np.linspace(0, 1, n + 1), 0.01)
+        beam = Beam(mesh, ElementBeamCable(degree), StVenantKirchhoff(2e8, 0.3), 0.01)
+        return Scene(beam).clamp("left").point_force((0, -0.3), at=(0.5, 0))
+
+    fine = scene(64, 5).solve_static().displacement((1, 0))
+    state = scene(2, 5).solve_static(adapt=1e-6)
+    assert np.hypot(*(state.displacement((1, 0)) - fine)) < 1e-6
+    kinds = [r.kind for r in state.refinements]
+    assert kinds[0] == "degree" and "split" in kinds and kinds[-1] == "split"
+    assert state.beams[0].element.axis_degree <= 7
+    x = state.beams[0].mesh.p[0]
+    assert np.min(np.diff(x)) < 0.3 * np.max(np.diff(x)) and 0.5 in x
+
+
+def test_beams_are_refined_one_by_one():
+    """Two beams, one of them of an element that has no other degree."""
+    def beam(x, element, name):
+        return Beam(MeshBeam.init_line(x, 0.01), element, StVenantKirchhoff(2e8, 0.3, 7800), 0.01,
+                    name=name)
+
+    smooth = beam([0, 0.25, 0.5], ElementBeamCable(5), "smooth")
+    rough = beam([0.5, 0.75, 1.0], ElementBeamANCF(2), "linear")
+    scene = Scene(smooth, rough).clamp("left", beam="smooth").gravity((0, -3.0))
+    scene.joint("weld", beams=(smooth, rough), at=("right", "left"))
+    state = scene.solve_static(adapt=1e-4)
+    assert next(r.kind for r in state.refinements if r.beam == 0) == "degree"
+    assert {r.kind for r in state.refinements if r.beam == 1} == {"split"}
+    assert state.beams[0].element.axis_degree > 5
+    assert 2 * state.beams[0].mesh.nelements < state.beams[1].mesh.nelements
+    fine = Scene(*(b.with_mesh(b.mesh.refined(k)) for b, k in zip((smooth, rough), (3, 6))))
+    fine.clamp("left", beam=0).gravity((0, -3.0)).joint("weld", beams=(0, 1), at=("right", "left"))
+    assert_allclose(state.displacement((1, 0), 1), fine.solve_static().displacement((1, 0), 1),
+                    atol=1e-4)
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(13), ElementBeamANCFCubic(2),
+                                     ElementBeamANCFHermite(3, 5, "gauss-lobatto")], ids=repr)
+def test_raised_elements(element):
+    raised = element.raised()
+    assert raised.axis_degree == element.axis_degree + 2 and raised.order == element.order
+    assert set(element.dofnames) < set(raised.dofnames)
+    assert ElementBeamCable(15).raised() is None and ElementBeamANCF(2).raised() is None
+
+
+def test_elements_of_ones_own_keep_their_degree():
+    class Own(ElementBeamCable):
+        pass
+
+    class OwnSections(ElementBeamANCFHermite):
+        pass
+
+    assert Own(5).raised() is None and OwnSections(2, 5).raised() is None

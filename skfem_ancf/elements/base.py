@@ -136,6 +136,11 @@ class ElementBeam(Frozen, Element):
         other.__dict__.update(vars(self), _measure=measure, shear=shear)
         return other
 
+    def raised(self) -> ElementBeam | None:
+        """The element of the next degree along the axis, or None: for ``solve_static(adapt=...)``.
+        """
+        return None
+
     def across(self, n: int) -> Rule:
         """Points eta and weights across the section, n of them; those of Gauss unless it is known.
 

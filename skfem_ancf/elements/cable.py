@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import teaching
 from ..reference import SECTIONS, hermite_basis
-from .base import ElementBeam, SectionFunctions, require_degree
+from .base import DEGREES, ElementBeam, SectionFunctions, require_degree
 from .sampling import Held, Sampling, missed
 
 if TYPE_CHECKING:
@@ -58,6 +58,11 @@ class ElementBeamCable(ElementBeam):
         super().__init__(SectionFunctions(np.zeros((1, 0))), ["r_" + "X" * k for k in range(2, m)],
                          [(0.0, k, 0) for k in range(2, m)], [])
         self.maxdeg = self.axis_degree
+
+    def raised(self) -> ElementBeamCable | None:
+        if type(self) is not ElementBeamCable or self.axis_degree == DEGREES[-1]:
+            return None
+        return ElementBeamCable(self.axis_degree + 2)
 
     @property
     def strain_degree(self) -> int:

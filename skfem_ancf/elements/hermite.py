@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..errors import teaching
 from .ancf import ElementBeamANCF
-from .base import require_degree
+from .base import DEGREES, require_degree
 
 
 @teaching
@@ -41,8 +41,15 @@ class ElementBeamANCFHermite(ElementBeamANCF):
     """
 
     def __init__(self, order: int, degree: int = 5, points: str = "chebyshev") -> None:
-        self._slopes = require_degree(degree) // 2
+        self._slopes, self._points = require_degree(degree) // 2, points
         super().__init__(order, points)
+
+    def raised(self) -> ElementBeamANCFHermite | None:
+        # the subclass of degree 3 is of this family; one's own is another element
+        own = type(self).__module__.split(".")[0] != __name__.split(".")[0]
+        if own or self.axis_degree == DEGREES[-1]:
+            return None
+        return ElementBeamANCFHermite(self.order, self.axis_degree + 2, self._points)
 
     def _coordinates(self) -> tuple[list[str], list[tuple[float, int, int]]]:
         names, functionals = super()._coordinates()

@@ -1,12 +1,14 @@
-"""Graded meshes: elements where the error is."""
+"""Elements where the error is, of a higher degree where the solution is smooth."""
 
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..elements.base import DEGREES
 from ..errors import (ConvergenceError, InputError, NameUnknown, require_integer, require_positive,
                       taught)
 from ..quadrature import gauss, tensor
@@ -26,6 +28,9 @@ logger = logging.getLogger(__name__)
 #: Part of the squared error whose elements are halved.
 BULK = 0.7
 
+#: By what a higher degree has to divide the error of a beam, for the solution to be called smooth.
+SMOOTH = 10.0
+
 #: What the error is measured in.
 GOALS = ("displacement", "strain")
 
@@ -33,17 +38,44 @@ GOALS = ("displacement", "strain")
 MAX_ELEMENTS = 10**7
 
 
+@dataclass(frozen=True)
+class Refinement:
+    """What one round of an adaptive solution did to a beam.
+
+    Attributes
+    ----------
+    beam
+        Number of the beam in the scene.
+    kind
+        "degree" if the degree along the axis was raised, "split" if elements were halved.
+    degree, elements
+        Degree along the axis and number of elements after it.
+    error
+        The estimate of the beam's part of the error that led to it.
+    """
+
+    beam: int
+    kind: str
+    degree: int
+    elements: int
+    error: float
+
+
 @taught
 def solve_adaptive(scene: Scene, tol: float, max_elements: int = 20000, goal: str = "displacement",
-                   **options: Any) -> State:
-    """Solve on meshes that are refined until the estimated error is small enough.
+                   max_degree: int = DEGREES[-1], **options: Any) -> State:
+    """Solve with higher degrees or on finer meshes until the estimated error is small enough.
 
-    With the goal "displacement" each round solves on a mesh and on the same with every element
-    halved. The difference is the estimate: in the displacement of the beams' ends relative to the
-    size of the scene, and relative in the strain energy. Once the mesh resolves the solution, a
-    method of order p leaves the finer solution an error of 1 / (2^p - 1) of it, a third or less.
-    The elements that contribute most to the difference in the energy norm are halved for the next
-    round.
+    With the goal "displacement" each round solves twice. Beams of an element that has a higher
+    degree (:meth:`~skfem_ancf.elements.ElementBeam.raised`: cables and
+    :class:`~skfem_ancf.ElementBeamANCFHermite`) are compared with the same of the next degree, as
+    long as each degree divides their error by ten and more: there the solution is smooth. All
+    others are compared with the same whose elements are halved. The difference is the estimate: in
+    the displacement of the beams' ends relative to the size of the scene, and relative in the
+    strain energy. Once the mesh resolves the solution, a method of order p leaves the finer
+    solution an error of 1 / (2^p - 1) of it, a third or less, and a higher degree a tenth of it.
+    Smooth beams take the higher degree for the next round; of the others the elements are halved
+    that contribute most to the difference in the energy norm.
 
     With the goal "strain" the estimate is the difference of the elements' strain and the recovered
     one (:mod:`skfem_ancf.recovery`), in the L2 norm over the body relative to that of the strain,
@@ -61,14 +93,17 @@ def solve_adaptive(scene: Scene, tol: float, max_elements: int = 20000, goal: st
         Largest number of elements of the finer mesh.
     goal
         "displacement" or "strain".
+    max_degree
+        Largest degree along the axis; that of the elements, or less, to halve elements alone.
     **options
         Those of :func:`~skfem_ancf.statics.newton.solve_static`.
 
     Returns
     -------
     State
-        On the finer mesh of the last round, with ``error_estimate``, a dictionary with
-        "displacement" and "energy", or "strain", and ``scene``, the scene on that mesh.
+        The finer one of the last round, with ``error_estimate``, a dictionary with
+        "displacement" and "energy", or "strain", ``scene``, the scene on that mesh, and
+        ``refinements``, a tuple of :class:`Refinement` that says what was done.
 
     Raises
     ------
@@ -78,31 +113,119 @@ def solve_adaptive(scene: Scene, tol: float, max_elements: int = 20000, goal: st
         If the goal is "strain" and a beam's strain cannot be recovered.
     ConvergenceError
         If ``max_elements`` do not suffice; its ``state`` is the last State.
+
+    References
+    ----------
+    Melenk, Wohlmuth: "On residual-based a posteriori error estimation in hp-FEM", Advances in
+    Computational Mathematics 15 (2001), for the choice by the reduction that was predicted.
     """
     tol = require_positive("adapt", tol)
     max_elements = require_integer("max_elements", max_elements, 1, MAX_ELEMENTS)
+    max_degree = require_integer("max_degree", max_degree, 1, DEGREES[-1])
     if goal not in GOALS:
         raise NameUnknown("goal", goal, GOALS)
     if goal == "strain":
         return _solve_for_strain(scene, tol, max_elements, **options)
-    coarse = scene
+    rounds = _Rounds(scene, tol, max_degree)
     while True:
-        # each from the stress-free state: what a coarse mesh does not see as strain a finer one
-        # does, which makes its solution a poor start
-        state = coarse._solve(None, **options)
-        everywhere = [np.arange(b.mesh.nelements) for b in coarse.beams]
-        fine, prolong = refine(coarse, everywhere)
+        # each mesh from the stress-free state: what a coarse mesh does not see as strain a finer
+        # one does, which makes its solution a poor start
+        coarse, state = rounds.scene, rounds.state or rounds.scene._solve(None, **options)
+        fine = rounds.finer()
         better = fine._solve(None, **options)
-        estimate = _compare(coarse, state, fine, better)
-        better = better.replace(error_estimate=estimate, scene=fine)
+        estimate, errors = _compare(coarse, state, fine, better)
+        better = better.replace(error_estimate=estimate, scene=fine,
+                                refinements=rounds.done(errors, fine))
         n = sum(b.mesh.nelements for b in fine.beams)
-        logger.info("%d elements, estimated error %.3g", n, max(estimate.values()))
-        if max(estimate.values()) <= tol:
+        logger.info("%d elements, %d coordinates, estimated error %.3g", n, fine.N,
+                    max(estimate.values()))
+        if rounds.judge(errors) and max(estimate.values()) <= tol:
             return better
         if n >= max_elements:
             raise _too_few(n, estimate, tol, better)
-        marked = _mark(coarse, fine, better.u - prolong(state.u), better.u)
-        coarse, _ = refine(coarse, marked)
+        rounds.advance(state, fine, better, errors)
+
+
+class _Rounds:
+    """The beams of an adaptive solution: which have a higher degree next, and which are split.
+
+    Parameters
+    ----------
+    scene, tol, max_degree
+        As for :func:`solve_adaptive`.
+    """
+
+    def __init__(self, scene: Scene, tol: float, max_degree: int) -> None:
+        self.scene, self.tol, self._most = scene, tol, max_degree
+        self.state: State | None = None  # where a round has solved the scene of the next
+        self._rough: set[int] = set()
+        self._before: dict[int, float] = {}
+        self._refinements: tuple[Refinement, ...] = ()
+
+    def _raised(self, k):
+        """The element of a beam of the next degree; None if its elements are to be split."""
+        element = self.scene.beams[k].element
+        may = k not in self._rough and element.axis_degree + 2 <= self._most
+        return element.raised() if may else None
+
+    def _small(self, error):
+        return error <= 0.1 * self.tol
+
+    def finer(self) -> Scene:
+        """The scene to compare with."""
+        raised = [self._raised(k) for k in range(len(self.scene.beams))]
+        everywhere = [np.arange(b.mesh.nelements if e is None else 0)
+                      for b, e in zip(self.scene.beams, raised)]
+        return _with_elements(refine(self.scene, everywhere)[0], raised)
+
+    def done(self, errors: list[float], scene: Scene) -> tuple[Refinement, ...]:
+        """All that was done, with what leads to another scene from the one there is."""
+        return self._refinements + tuple(
+            Refinement(k, "split" if new.mesh.nelements > old.mesh.nelements else "degree",
+                       new.element.axis_degree, new.mesh.nelements, errors[k])
+            for k, (old, new) in enumerate(zip(self.scene.beams, scene.beams))
+            if new.nd > old.nd or new.mesh.nelements > old.mesh.nelements)
+
+    def judge(self, errors: list[float]) -> bool:
+        """Find where a higher degree gains little; False if that is not known yet, or news."""
+        sure = True
+        for k, error in enumerate(errors):
+            if self._raised(k) is None:
+                continue
+            before = self._before.get(k)
+            if before is None:
+                sure = False
+            elif (error * SMOOTH > before and not self._small(error)
+                  and error >= 0.5 * max(errors)):  # a small one may be another beam's
+                self._rough.add(k)
+                sure = sure and before <= self.tol
+        return sure
+
+    def advance(self, state: State, fine: Scene, better: State, errors: list[float]) -> None:
+        """Take the higher degrees that gain, and split the elements that matter in other beams."""
+        beams = self.scene.beams
+        split = [new.mesh.nelements > old.mesh.nelements for old, new in zip(beams, fine.beams)]
+        raised = [None if self._small(error) and k in self._before else self._raised(k)
+                  for k, error in enumerate(errors)]
+        self._before = {k: e for k, e in enumerate(errors) if self._raised(k) is not None}
+        if all(e is not None for e in raised):
+            scene, solved = fine, better
+        else:
+            marked = _mark(self.scene, state, fine, better, split)
+            some = any(e is not None for e in raised) or any(len(m) for m in marked)
+            scene, solved = self.scene, state
+            if some:
+                scene, solved = _with_elements(refine(self.scene, marked)[0], raised), None
+        self._refinements = self.done(errors, scene)
+        self.scene, self.state = scene, solved
+
+
+def _with_elements(scene, elements):
+    """The scene with beams of other elements, where they are given."""
+    if all(e is None for e in elements):
+        return scene
+    return scene.with_beams([b if e is None else b.replace(element=e)
+                             for b, e in zip(scene.beams, elements)])
 
 
 def _too_few(n, estimate, tol, state):
@@ -214,27 +337,35 @@ def _prolong(old, new, marked, u):
 
 
 def _compare(coarse, state, fine, better):
-    size, change = coarse.system.size, 0.0
+    """The estimate, and for each beam what it has of the larger of its parts."""
+    total, changes, energies = better.strain_energy, [], []
     for a, b in zip(coarse.beams, fine.beams):
-        for end in (0, -1):
-            d = (better.u_of(b).reshape(-1, b.nd)[end, :2]
-                 - state.u_of(a).reshape(-1, a.nd)[end, :2])
-            change = max(change, float(np.hypot(*d)))
-    old, new = state.strain_energy, better.strain_energy
-    return {"displacement": change / size,
-            "energy": abs(new - old) / abs(new) if new else 0.0}
+        u, v = state.u_of(a), better.u_of(b)
+        ends = [v.reshape(-1, b.nd)[end, :2] - u.reshape(-1, a.nd)[end, :2] for end in (0, -1)]
+        changes.append(float(np.max(np.hypot(*np.transpose(ends)))) / coarse.system.size)
+        energies.append(float(b.kernel.energy(v) - a.kernel.energy(u)) / (total or 1.0))
+    estimate = {"displacement": max(changes, default=0.0),
+                "energy": abs(better.strain_energy - state.strain_energy) / (abs(total) or 1.0)}
+    return estimate, [max(c, abs(e)) for c, e in zip(changes, energies)]
 
 
-def _mark(coarse, fine, difference, u):
-    """The elements of the coarse mesh that make up most of the difference in the energy norm."""
+def _mark(coarse, state, fine, better, split):
+    """The elements of the coarse mesh that make up most of the difference in the energy norm.
+
+    Of beams that are not ``split`` none: their elements were not halved, but of a higher degree.
+    """
     errors = []
-    for a, b in zip(coarse.beams, fine.beams):
-        s = fine.system.of(b)
-        d = b.kernel.gather(difference[s]).reshape(b.mesh.nelements, -1)
-        K = b.kernel.tangents(u[s])
-        local = np.abs(np.einsum("ei,eij,ej->e", d, K, d))
+    for a, b, s in zip(coarse.beams, fine.beams, split):
+        if not s:
+            errors.append(np.zeros(a.mesh.nelements))
+            continue
+        v = better.u_of(b)
+        d = v - _prolong(a, b, np.arange(a.mesh.nelements), state.u_of(a))
+        d = b.kernel.gather(d).reshape(b.mesh.nelements, -1)
+        local = np.abs(np.einsum("ei,eij,ej->e", d, b.kernel.tangents(v), d))
         errors.append(local.reshape(-1, 2).sum(axis=1))
-    return _largest(np.concatenate(errors), [len(e) for e in errors])
+    chosen = _largest(np.concatenate(errors), [len(e) for e in errors])
+    return [c if s else np.arange(0) for c, s in zip(chosen, split)]
 
 
 def _largest(errors, numbers):
