@@ -22,6 +22,8 @@ WINDOW = 1e-8  # smallest over largest eigenvalue of an inverse that is taken fr
 ORTHOGONAL = 1e-5  # scalar product of two shapes of unit mass
 ROUND_OFF = 1e-7  # of the frequency of a rigid motion, over that of the slowest bending
 SLOW = 1e-6  # a velocity at which what is quadratic in it can be left out
+UNREFINED = 1e-7  # error of an inverse that Lanczos takes as it is
+LANCZOS = 1e-10  # its tolerance
 REAL = 1e-7  # imaginary over absolute value of an eigenvalue that counts as real
 
 
@@ -168,7 +170,7 @@ def _modes(system, state, k):
     tangent = StrainTangent(system, state.u, state.load, state.t, state.multipliers)
     if tangent.size[0] <= DENSE:
         tangent.require_independent()
-    M = system.mass.tocsc()[tangent.free][:, tangent.free]
+    M = _free_mass(system, tangent)
     n, m = tangent.size
     k = _count(k, n - m)
     shift, small = _shift(system, state), n <= DENSE or 2 * k > n - m
@@ -182,6 +184,14 @@ def _modes(system, state, k):
     frequencies = np.sqrt(values) if np.any(values.imag) else (
         np.sign(values.real) * np.sqrt(np.abs(values.real)))
     return Modes(frequencies, shapes, state, values.astype(complex))
+
+
+def _free_mass(system, tangent):
+    """The mass matrix between the free coordinates, sparse."""
+    M = system.mass.tocsc()
+    if len(tangent.free) < system.N:
+        M = M[tangent.free][:, tangent.free]
+    return M.tocsr()
 
 
 def _bending_eigenvalue(system):
@@ -238,12 +248,16 @@ def _dense(tangent, M, k, shift):
 
 
 def _sparse(tangent, M, k, shift):
-    """The k lowest by Lanczos on the inverse."""
+    """The k lowest by Lanczos on the inverse, which need not be refined where it is good.
+
+    An error of a shape is squared in its quotient, after a step of subspace iteration.
+    """
     inverse = Inverse(tangent, M, shift)
-    start = np.random.default_rng(0).standard_normal(M.shape[0])
+    start = inverse.solve(np.random.default_rng(0).standard_normal(M.shape[0]))
+    apply = inverse.once if inverse.left < UNREFINED else inverse.solve
     try:
-        _, X = eigsh(M, k=k, M=M, sigma=-shift, v0=inverse.solve(start),
-                     OPinv=LinearOperator(M.shape, inverse.solve, dtype=float))
+        _, X = eigsh(M, k=k, M=M, sigma=-shift, v0=start, tol=LANCZOS,
+                     OPinv=LinearOperator(M.shape, apply, dtype=float))
     except ArpackNoConvergence as failure:
         raise ConvergenceError(f"of {k} modes Lanczos found {len(failure.eigenvalues)}; ask for "
                                "another number") from None
@@ -386,7 +400,7 @@ def _require_no_flutter(system, tangent, Ks, factor):
     """Raise InputError if oscillations grow below a load factor, as far as linear theory says."""
     if any(slab.density is None for beam in system.beams for slab in beam.across.slabs):
         return
-    M, S = system.mass.tocsc()[tangent.free][:, tangent.free], tangent.S
+    M, S = _free_mass(system, tangent), tangent.S
     k, small = min(8, tangent.size[0] - tangent.size[1]), tangent.size[0] <= DENSE
     shift = _bending_eigenvalue(system)
     try:

@@ -326,6 +326,8 @@ class Inverse:
         self._M, self._shift = M, shift
         self._rest = tangent.S + shift * M if shift else tangent.S
         self._by_strains, self._nodes = False, None
+        #: relative error of the factors alone, of the last solution
+        self.left = np.inf
         condensed = tangent.system.condensed
         if condensed is not None and self._n > FEW:
             self._nodes = tangent.condense(condensed, shift)
@@ -402,6 +404,10 @@ class Inverse:
         """
         return self.solve_both(b.reshape(self._n, -1))[0].reshape(b.shape)
 
+    def once(self, b: Array) -> Array:
+        """x for a column b, shape (n,), by the factors alone: wrong by about :attr:`left`."""
+        return self._once(b[:, None], np.zeros((self._tangent.size[1], 1)))[0][:, 0]
+
     def solve_both(self, b: Array, c: Array | None = None,
                    accepted: float = ACCEPTED) -> tuple[Array, Array]:
         """x and l for columns b and ``J x = c``.
@@ -442,11 +448,13 @@ class Inverse:
     def _refined(self, b, c, accepted):
         J, before = self._tangent.J, np.inf
         x, l = self._once(b, c)
-        for _ in range(REFINEMENTS):
+        for k in range(REFINEMENTS):
             rest = b - self._tangent.multiply(x, self._rest) - J.T @ l
             dx, dl = self._once(rest, c - J @ x)
             x, l = x + dx, l + dl
             size, step = self._norm(x), self._norm(dx)
+            if k == 0:
+                self.left = step / size if size > 0.0 else np.inf
             if not step > REFINED * size:
                 break
             if not step < SLOW * before:
