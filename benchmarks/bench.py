@@ -14,16 +14,16 @@ for _name in ("OPENBLAS", "OMP", "MKL", "NUMBA"):  # before NumPy is imported
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from tqdm import tqdm
-from work_precision import figures, frames, micro, runs, sweeps
+from work_precision import figures, frames, large, micro, runs, sweeps
 from work_precision.cases import CASES, runs_of, warm_up
 from work_precision.problems import PROBLEMS
 from work_precision.references import reference
 from work_precision.report import OURS, goals, report
 
-OPERATIONS = ("tangent", "iteration", "scaling", "frames", "sweep")
+OPERATIONS = ("tangent", "iteration", "scaling", "frames", "large", "sweep")
 SIZES = {False: dict(tangent=(16, 256, 4096), scaling=(16, 64, 256, 1024, 4096, 16384, 100000),
-                     frames=(14, 30, 100), sweep=(500,)),
-         True: dict(tangent=(16,), scaling=(16, 64), frames=(2,), sweep=(5,))}
+                     frames=(14, 30, 100), large=(14, 30, 65, 100, 204), sweep=(500,)),
+         True: dict(tangent=(16,), scaling=(16, 64), frames=(2,), large=(2, 3), sweep=(5,))}
 PASSES = 2
 
 
@@ -62,7 +62,7 @@ def run(out, names, quick):
     total = (sum((2 + PASSES) * len(runs_of(name, quick)) for name in cases)
              + sum({"tangent": len(sizes["tangent"]), "iteration": 2,
                     "scaling": 3 * len(sizes["scaling"]), "frames": len(sizes["frames"]),
-                    "sweep": len(sizes["sweep"])}[name]
+                    "large": len(sizes["large"]), "sweep": len(sizes["sweep"])}[name]
                    for name in names if name in OPERATIONS))
     with tqdm(total=total, unit="run", dynamic_ncols=True) as bar, runs.Memory(quick) as memory:
 
@@ -82,6 +82,8 @@ def run(out, names, quick):
                 rows = micro.iteration(about, watch)
             elif name == "frames":
                 rows = frames.measure(sizes["frames"], about, watch, memory)
+            elif name == "large":
+                rows = large.measure(sizes["large"], about, watch, memory)
             elif name == "sweep":
                 rows = sweeps.measure(sizes["sweep"], about, watch)
             else:

@@ -187,7 +187,8 @@ class EliminatedMass:
             dx, dl = self._condensed.solve(b - self._M.multiply(x) - J.T @ l, rate - J1 @ x)
             x, l = x + dx, l + dl
             step, size = np.linalg.norm(dx), max(scale, np.linalg.norm(x))
-            if step <= EXACT * size or not step < np.inf:
+            left = step * min(1.0, step / before) if before < np.inf else step
+            if left <= EXACT * size or not step < np.inf:
                 return x, l
             if step > contraction * before:
                 return (x, l) if step <= rough * size else None

@@ -21,6 +21,8 @@ EI = EA * SIZE**2 / 12.0
 GA = 10.0 * (1.0 + NU) / (12.0 + 11.0 * NU) * EA / (2.0 * (1.0 + NU))
 #: Forces on the nodes (N) that bend frames of so many cells.
 FORCE = {2: 2000.0, 14: 2000.0, 30: 1500.0, 100: 600.0}
+#: The same of other numbers, times that.
+ALL = 6e4
 #: Cells up to which Exudyn takes part: with 60 it takes more than 50 s for one element a line.
 MOST = 30
 
@@ -42,12 +44,17 @@ def net(cells):
     return np.array([x, y], dtype=float), lines, number
 
 
-def frame(cells, degree=5, elements=1):
-    """The Frame of this package."""
+def force(cells):
+    """The force on each node of the left side."""
+    return FORCE.get(cells, ALL / cells)
+
+
+def frame(cells, degree=5, elements=1, part=1.0):
+    """The Frame of this package, under a part of the forces."""
     points, lines, number = net(cells)
     made = Frame.from_lines(points, lines, element=ElementBeamCable(degree), elements=elements,
                             material=StVenantKirchhoff(E, NU, RHO), height=SIZE, width=SIZE)
-    return made.clamp(number[0]).point_force((FORCE[cells], 0.0), at=number[1:, 0])
+    return made.clamp(number[0]).point_force((part * force(cells), 0.0), at=number[1:, 0])
 
 
 def run(cells, degree, elements):
@@ -65,7 +72,7 @@ def run(cells, degree, elements):
                "cable", lambda: Solver(solve, read, dofs))
 
 
-def exudyn_system(cells, elements, nodes):
+def exudyn_system(cells, elements, nodes, part=1.0):
     """The assembled system of GE2D beams of so many nodes, and its corner."""
     points, lines, number = net(cells)
     container = exudyn.SystemContainer()
@@ -92,7 +99,7 @@ def exudyn_system(cells, elements, nodes):
             mbs.AddObject(items.CoordinateConstraint(markerNumbers=[fixed, marker]))
     for k in number[1:, 0]:
         marker = mbs.AddMarker(items.MarkerNodePosition(nodeNumber=corners[k]))
-        mbs.AddLoad(items.Force(markerNumber=marker, loadVector=[FORCE[cells], 0.0, 0.0]))
+        mbs.AddLoad(items.Force(markerNumber=marker, loadVector=[part * force(cells), 0.0, 0.0]))
     mbs.Assemble()
     return container, mbs, corners[number[-1, 0]]
 

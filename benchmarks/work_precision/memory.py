@@ -19,6 +19,8 @@ def peak(case, index, quick):
         try:
             if case == "frames":
                 frames.frame(index).solve_linear()
+            elif case == "large":
+                frames.frame(index).solve_static()
             elif case in SCALED:
                 SCALED[case](index).solve_linear()
             else:

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from . import large
 from .figures import front, usable
 from .problems import PROBLEMS
 
@@ -190,6 +191,20 @@ def frames(rows):
                    cells)]
 
 
+def large_frames(rows):
+    """Lines about large frames."""
+    cells = [(r["cells"], r["dofs"], r["code"], r["variant"], f"{1e3 * r['seconds']:.4g}",
+              r["iterations"], r["peak_mb"], r["note"]) for r in rows]
+    statics = [r for r in rows if r["variant"] == "statics"]
+    powers = [f"{name} grows as the power {large.fitted(statics, column):.2f} of the coordinates"
+              for name, column in (("time", "seconds"), ("memory", "peak_mb"))]
+    return ["## Large frames", "", "Statics from parameters to the displacement of a corner, "
+            "building and the first solution included; other rows without building. In statics "
+            f"{' and '.join(powers)}, by least squares.", "",
+            *table(["cells", "coordinates", "code", "what", "ms", "iterations", "peak (MB)", ""],
+                   cells)]
+
+
 def case_lines(name, rows):
     """Lines of a case: the front of each code."""
     lines = [f"## {name}: {PROBLEMS[name].title}", "", f"![]({name}.png)", "",
@@ -243,6 +258,8 @@ def report(results, about, loading, quick):
                               for name in others])]
     if "frames" in results:
         lines += frames(results["frames"])
+    if "large" in results:
+        lines += large_frames(results["large"])
     if "scaling" in results:
         lines += scaling(results["scaling"])
     for name in PROBLEMS:
