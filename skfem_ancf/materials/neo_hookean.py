@@ -56,7 +56,7 @@ def neo_hookean(constants: Array, strain: Array, out: Array) -> None:
                 change = np.expm1(x[p, e])
                 dx = ((G * change + 0.5 * lame * (log_det[p, e] + x[p, e]))
                       / (G * (change + 1.0) + 0.5 * lame))
-                dx = dx / np.maximum(1.0, np.abs(dx))
+                dx = np.maximum(dx, -1.0)  # convex: from above it comes down by itself
                 x[p, e] -= dx
                 moved[p, e] = np.abs(dx) > 1e-14 * (1e-14 + np.abs(x[p, e]))
     for p in lanes(n):

@@ -26,6 +26,8 @@ SMALLEST = 1e-14
 CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
 #: What joints may be open by, over the size of the scene.
 CLOSED = 1e-12
+#: Work of the third correction, as a root over that of all forces, of an iteration that is astray.
+ASTRAY = 0.9
 
 
 class Target(NamedTuple):
@@ -70,6 +72,8 @@ class Rules(NamedTuple):
         Handle of what solves the linear systems, see :mod:`skfem_ancf.own`; 0 for the band.
     least
         Corrections at least, where the residual at the start is not round-off.
+    wary
+        1 if it ends where the first corrections do not get smaller.
     """
 
     mixed: int
@@ -81,6 +85,7 @@ class Rules(NamedTuple):
     inaccurate: float
     solver: int
     least: int
+    wary: int
 
 
 class Unknowns(NamedTuple):
@@ -211,7 +216,8 @@ def _member(e, target, rules, x, w, record, members, before, least):
         e, Target(target.factors, before, target.scale, target.at, target.c, target.g, target.gap,
                   target.prescribed),
         Rules(rules.mixed, rules.iterations, rules.tol, floor, floor * members.spread[0],
-              CLOSED * members.noise[1], rules.inaccurate, rules.solver, least), x, w, record)
+              CLOSED * members.noise[1], rules.inaccurate, rules.solver, least, rules.wary),
+        x, w, record)
     if status != CONVERGED:
         return status, number
     if number == 0:  # the tangent is there, its factors are not
@@ -292,6 +298,8 @@ def iterate(e, target, rules, x, w, record):
             x.multipliers[i] += w.dm[i]
         reference = reference_work(x.force, w.load, x.u)
         record[k, 1] = work / reference if reference > 0.0 else 0.0
+        if rules.wary > 0 and k == 2 and record[k, 1] > ASTRAY:
+            return NOT_CONVERGED, k + 1
     return NOT_CONVERGED, rules.iterations
 
 

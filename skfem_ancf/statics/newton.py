@@ -71,6 +71,9 @@ class StaticResult:
         Load steps that were given up.
     memory
         What load steps have left behind at obstacles, shape (n,), or None.
+    astray
+        Whether the equilibrium of the laws' first moduli was no better a start; then it is not
+        looked for again.
     unstable, doubt
         Whether the equilibrium gives way in some direction, and what could not be told.
     """
@@ -86,6 +89,7 @@ class StaticResult:
     unstable: bool = False
     doubt: str = ""
     memory: Array | None = None
+    astray: bool = False
 
     @property
     def iterations(self) -> int:
@@ -231,6 +235,10 @@ class _Failed(Exception):
     """A load step did not converge; the message says why."""
 
 
+class _Astray(_Failed):
+    """The first corrections of a load step did not get smaller."""
+
+
 class _Unstable(_Failed):
     """A load step ended at an unstable equilibrium, ``found``."""
 
@@ -277,25 +285,29 @@ def _found(system, result, load, options, record):
     A correction that turns the beam far strains it for once, more than a law may bear that others
     than Hooke's are; the equilibrium that Hooke's finds is close to theirs.
     """
+    machine = None if result.astray else system.machine.linearised
+    if machine is None:
+        return _iterate(system, result, load, options, record)
     try:
-        return _iterate(system, result, load, *options, record)
-    except _Failed as failure:
-        machine = system.machine.linearised
-        if machine is None:
-            raise
-        try:
-            origin, method, tol, most = options
-            close = _iterate(system, result, load, origin, method, max(tol, NEAR), most, record,
-                             machine=machine)
-            return _from(close, system, result, load, options, record)
-        except _Failed:
-            raise failure from None
+        return _iterate(system, result, load, options, record, wary=True)
+    except _Failed as failed:
+        failure = failed
+    try:
+        origin, method, tol, most = options
+        close = _iterate(system, result, load, (origin, method, max(tol, NEAR), most), record,
+                         machine=machine)
+        return _from(close, system, result, load, options, record)
+    except _Failed:
+        result.astray = True
+    if isinstance(failure, _Astray):
+        return _iterate(system, result, load, options, record)
+    raise failure
 
 
 def _from(found, system, result, load, options, record, descent=None):
     """Iterate on from what has been found; the record takes both."""
     one = LoadStep(load, 0)
-    found = _iterate(system, replace(result, u=found[0], multipliers=found[1]), load, *options, one,
+    found = _iterate(system, replace(result, u=found[0], multipliers=found[1]), load, options, one,
                      descent)
     record.iterations += one.iterations
     record.force_residuals += one.force_residuals
@@ -336,17 +348,17 @@ def _rescue(system, result, load, options, record, failure):
     return found
 
 
-def _iterate(system, result, load, start, method, tol, max_iterations, record, descent=None,
-             machine=None):
+def _iterate(system, result, load, options, record, descent=None, machine=None, wary=False):
     """Iterate to equilibrium at one load; returns displacement, multipliers, internal force.
 
-    ``start`` is the displacement at load 0 and what was missing there to equilibrium under the
+    The start is the displacement at load 0 and what was missing there to equilibrium under the
     full load, or None for the stress-free state; the missing part is reduced to nothing.
     """
+    start, method, tol, max_iterations = options
     machine = machine or system.machine
     tables = machine.tables
     target = _target(system, result, load, start)
-    rules = rules_of(system, method, tol, max_iterations)
+    rules = rules_of(system, method, tol, max_iterations)._replace(wary=int(wary))
     room, solver = machine.room(room_for_iterations, system.m), None
     if descent is not None:
         solver = descent
@@ -366,6 +378,8 @@ def _iterate(system, result, load, start, method, tol, max_iterations, record, d
     record.iterations = n
     record.force_residuals = residuals[:n + 1, 0].tolist()
     record.energy_residuals = residuals[:n, 1].tolist()
+    if status == NOT_CONVERGED and n < max_iterations:
+        raise _Astray("the first corrections do not get smaller")
     if status != CONVERGED:
         raise _Failed(_ENDS[status].format(max_iterations))
     if system.inverted(x.u):
@@ -393,7 +407,7 @@ def rules_of(system: System, method: str, tol: float, max_iterations: int) -> Ru
     floor = 8.0 * system.work_noise
     # the residual sums the noise of all coordinates, the work that of the strains
     return Rules(int(method == "mixed"), max_iterations, tol, floor, floor * system.noise,
-                 CLOSED * system.size, INACCURATE, 0, 2)
+                 CLOSED * system.size, INACCURATE, 0, 2, 0)
 
 
 _ENDS = {SINGULAR: "the tangent is singular", NOT_FINITE: "the strain is not finite",
