@@ -17,10 +17,13 @@ def test_quick_case_writes_rows_picture_and_report(case, tmp_path, monkeypatch):
     with open(tmp_path / f"{case}.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert {"case", "code", "variant", "elements", "dofs", "steps", "error", "seconds",
-            "iterations",
+            "whole_seconds", "cold_seconds", "iterations",
             "peak_mb", "versions", "machine"} <= set(rows[0])
     ours = [r for r in rows if r["code"] == "skfem-ancf" and r["seconds"]]
     assert ours and all(float(r["seconds"]) > 0 for r in ours)
+    if case == "5.1":
+        assert all(float(r["whole_seconds"]) > 0 for r in ours)
+        assert sum(r["cold_seconds"] != "" for r in ours) == 1
     if case == "5.1":
         assert min(float(r["error"]) for r in ours if r["error"]) < 1e-4
     assert case in (tmp_path / "report.md").read_text(encoding="utf-8").lower()
@@ -61,10 +64,12 @@ def test_a_sweep_is_measured_with_its_errors(monkeypatch):
     from work_precision import report
 
     monkeypatch.setattr(bench.sweeps, "EXUDYN", ())
-    monkeypatch.setattr(bench.sweeps, "PLACES", (None,))
+    monkeypatch.setattr(bench.sweeps, "PLACES", ("together", "one by one"))
     rows = bench.sweeps.measure((3,), ("", ""), lambda items, _: items)
-    assert [row["variant"] for row in rows] == ["ancf 3, this process", "cable 5, this process"]
-    assert rows[0]["error"] < 1e-2 and rows[1]["error"] < 1e-3
+    assert [row["variant"] for row in rows] == [
+        f"{kind}, {place}" for kind in ("ancf 3", "cable 5")
+        for place in ("together", "one by one")]
+    assert rows[0]["error"] < 1e-2 and rows[2]["error"] < 1e-3
     assert all(row["seconds"] > 0 for row in rows)
     assert "no peer took part" in report.goal_sweep({"sweep": rows})[0]
 

@@ -127,4 +127,5 @@ def run(problem, kind, n, steps=1, rtol=1e-8, dense=False, modified=None):
 
         return Solver(solve, read, mbs.systemData.ODE2Size())
 
-    return Run(p, CODE, ", ".join(words), n, KINDS[kind][0], build, steps)
+    recipe = "exudyn_beams", (kind, n, steps, rtol, dense, modified), {}
+    return Run(p, CODE, ", ".join(words), n, KINDS[kind][0], build, steps, recipe)

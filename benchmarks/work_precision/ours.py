@@ -80,4 +80,7 @@ def run(problem, kind, order, n, formulation="assumed", compiled=True, grade=1.0
 
         return Solver(solve, read, s.N)
 
-    return Run(p, CODE, ", ".join(words), n, model, build, steps)
+    recipe = "ours", (kind, order, n), dict(
+        options, formulation=formulation, compiled=compiled, grade=grade, steps=steps,
+        scheme=scheme)
+    return Run(p, CODE, ", ".join(words), n, model, build, steps, recipe)

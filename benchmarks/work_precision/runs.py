@@ -5,6 +5,7 @@ import os
 import platform
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from contextlib import contextmanager
@@ -17,7 +18,8 @@ import numpy as np
 from .problems import Problem
 
 COLUMNS = ("case", "code", "variant", "elements", "dofs", "steps", "error", "seconds",
-           "iterations", "peak_mb", "setup_seconds", "runs", "note", "versions", "machine")
+           "whole_seconds", "cold_seconds", "iterations", "peak_mb", "setup_seconds", "runs",
+           "note", "versions", "machine")
 #: Seconds spent on the repetitions of one run, each of two passes, and how many there are at most.
 BUDGET, MOST = 0.1, 7
 #: A run that takes longer than this many seconds is made once.
@@ -39,7 +41,10 @@ class Solver:
 
 @dataclass
 class Run:
-    """One entry of a work-precision diagram; ``model`` names the reference for its error."""
+    """One entry of a work-precision diagram; ``model`` names the reference for its error.
+
+    ``recipe`` has the module whose ``run`` has made it, and its arguments behind the problem.
+    """
 
     problem: Problem
     code: str
@@ -48,6 +53,7 @@ class Run:
     model: str
     build: Callable
     steps: int | None = None
+    recipe: tuple = ()
 
     @property
     def label(self):
@@ -65,13 +71,19 @@ def clock():
 
 
 def versions():
-    """Versions of what takes part, in one line."""
+    """Versions of what takes part, and the commit, in one line."""
     out = [f"python {platform.python_version()}"]
     for name in ("skfem-ancf", "scikit-fem", "numpy", "scipy", "numba", "exudyn"):
         try:
             out.append(f"{name} {version(name)}")
         except PackageNotFoundError:
             continue
+    try:
+        found = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True,
+                               text=True, check=True, cwd=Path(__file__).parent)
+        out.append(f"commit {found.stdout.strip()}")
+    except (OSError, subprocess.CalledProcessError):
+        pass
     return ", ".join(out)
 
 
@@ -115,6 +127,7 @@ class Timed:
 
     def __init__(self, run):
         self.run, self.seconds, self.note, self.solver = run, [], "", None
+        self.wholes, self.cold = [], np.nan
         self.first = self.setup = np.nan
         try:
             start = clock()
@@ -128,30 +141,58 @@ class Timed:
             return
         self.setup, self.first = built - start, end - built
         if self.first > LONG:
-            self.seconds = [self.first]
+            self.seconds, self.wholes = [self.first], [end - start]
 
     def repeat(self):
-        """Time the run a few times more."""
+        """Time the run a few times more, alone and from parameters to the value that is read."""
         if self.solver is None or self.first > LONG:
             return
         for _ in range(int(np.clip(BUDGET / max(self.first, 1e-6), 1, MOST))):
             start = clock()
             self.solver.solve()
             self.seconds.append(clock() - start)
+        for _ in range(int(np.clip(BUDGET / max(self.setup + self.first, 1e-6), 1, MOST))):
+            start = clock()
+            solver = self.run.build()
+            solver.read(solver.solve())
+            self.wholes.append(clock() - start)
+
+    def error(self, reference):
+        """Distance of the tip from its reference, over the length of the beam."""
+        return float(np.linalg.norm(np.asarray(self.result[0]) - reference) / self.run.problem.L)
 
     def row(self, reference, peak, about):
         """A row of the CSV file; ``about`` is (versions, machine)."""
         r = self.run
         if self.solver is None:
             return dict(zip(COLUMNS, (r.problem.name, r.code, r.variant, r.elements, "", r.steps,
-                                      np.nan, np.nan, "", peak, np.nan, 0, self.note, *about)))
-        tip, steps, iterations = self.result
-        seconds = float(np.median(self.seconds))
-        error = float(np.linalg.norm(np.asarray(tip) - reference) / r.problem.L)
+                                      np.nan, np.nan, np.nan, np.nan, "", peak, np.nan, 0,
+                                      self.note, *about)))
+        _, steps, iterations = self.result
+        seconds, error = float(np.median(self.seconds)), self.error(reference)
         return dict(zip(COLUMNS, (
             r.problem.name, r.code, r.variant, r.elements, self.solver.dofs, steps, error, seconds,
-            iterations, peak, self.setup + max(0.0, self.first - seconds), len(self.seconds),
-            self.note, *about)))
+            float(np.median(self.wholes)), self.cold, iterations, peak,
+            self.setup + max(0.0, self.first - seconds), len(self.seconds), self.note, *about)))
+
+
+def cold(run):
+    """Processor time from the start of a process to the value read, with nothing compiled before.
+
+    What other codes need is not imported; nan where it cannot be told.
+    """
+    script = Path(__file__).with_name("cold.py")
+    module, args, options = run.recipe
+    with tempfile.TemporaryDirectory() as empty:
+        process = subprocess.Popen(
+            [sys.executable, str(script), json.dumps([module, run.problem.name, args, options])],
+            stdout=subprocess.DEVNULL, env={**os.environ, "NUMBA_CACHE_DIR": empty})
+        if not hasattr(os, "wait4"):
+            process.wait()
+            return np.nan
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = status
+    return usage.ru_utime + usage.ru_stime if status == 0 else np.nan
 
 
 class Memory:

@@ -1,13 +1,14 @@
 """Many cantilevers of example 5.2, each with a modulus of its own, from parameters to the tip.
 
 Seconds are those of a clock on the wall, for each member: building is in them, and the start of
-processes. A sweep of two members before has loaded what is compiled; what that took is in
+processes. A sweep of a few members before has loaded what is compiled; what that took is in
 ``setup_seconds``. The error is that of the member with the modulus of the example.
 """
 
 import time
 from dataclasses import replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 
@@ -22,8 +23,13 @@ from .runs import every_core
 
 PROBLEM = PROBLEMS["5.2"]
 OURS = (("ancf", 3, 16), ("cable", 5, 4))
-#: Processes of this package; None: that of the benchmark.
-PLACES = (None, 2)
+#: How this package solves: all members together in the threads of this process; one by one here,
+#: or in two processes.
+PLACES = ("together", "one by one", "2 processes")
+#: Members of a loop of one by one, at most: each takes as long as the next.
+FEW = 500
+#: Members of a sweep before, which has loaded what is compiled, where they are solved together.
+WARM = 500
 EXUDYN = (("ANCFCable2D", 8), ("ANCFCable2D", 32), ("GE2D quadratic", 4), ("GE2D quadratic", 16))
 
 
@@ -45,14 +51,15 @@ def peer(E, kind, n):
 
 def runs_of():
     """Code, variant, elements, mechanical model, and from moduli (n,) to tips (n, 2)."""
-    for kind, order, n in OURS:
+    for (kind, order, n), place in product(OURS, PLACES):
         model, build = ours.element_of(kind, order)[1], partial(scene, kind=kind, order=order, n=n)
-        for workers in PLACES:
-            def run(moduli, build=build, workers=workers):
-                return sweep(build, {"E": moduli}, tip, workers=workers, progress=False)["value"]
 
-            where = "this process" if workers is None else f"{workers} processes"
-            yield ours.CODE, f"{kind} {order}, {where}", n, model, run
+        def run(moduli, build=build, place=place):
+            return sweep(build, {"E": moduli}, ("displacement", PROBLEM.tip) if place == "together"
+                         else tip, workers=2 if place == "2 processes" else None,
+                         progress=False)["value"]
+
+        yield ours.CODE, f"{kind} {order}, {place}", n, model, run
     for kind, n in EXUDYN if exudyn is not None else ():
         def run(moduli, kind=kind, n=n):
             return np.array([peer(E, kind, n) for E in moduli])
@@ -61,16 +68,17 @@ def runs_of():
 
 
 def measure(sizes, about, watch):
-    """Rows for so many members, of this package here and in two processes, and of a peer."""
+    """Rows for so many members, of this package together, alone and in processes, and of a peer."""
     rows = []
     for members in watch(sizes, "sweep"):
-        moduli = PROBLEM.E * (1.0 + 0.2 * (np.arange(members) - members // 2) / members)
         for code, variant, n, model, run in runs_of():
-            setup, _ = timed(run, moduli[:2])
+            count = members if variant.endswith("together") else min(members, FEW)
+            moduli = PROBLEM.E * (1.0 + 0.2 * (np.arange(count) - count // 2) / count)
+            setup, _ = timed(run, moduli[:WARM] if variant.endswith("together") else moduli[:2])
             seconds, tips = timed(run, moduli)
-            error = np.linalg.norm(tips[members // 2] - reference("5.2", model)) / PROBLEM.L
-            rows.append(row("sweep", code, variant, n, "", seconds / members, about, error,
-                            f"{members} members", setup_seconds=setup))
+            error = np.linalg.norm(tips[count // 2] - reference("5.2", model)) / PROBLEM.L
+            rows.append(row("sweep", code, variant, n, "", seconds / count, about, error,
+                            f"{count} members", setup_seconds=setup))
     return rows
 
 
