@@ -20,7 +20,7 @@ from .finder import Finder
 from .formulations import get_formulation
 from .frozen import Frozen, read_only
 from .kinematics import KINEMATICS
-from .materials import Material
+from .materials import Material, StVenantKirchhoff
 from .mesh import MeshBeam
 from .places import as_point, facets_of
 from .quadrature import gauss, tensor
@@ -233,13 +233,28 @@ class Beam(Frozen):
         """Hand on what depends on mesh and element, and to another material of one section more."""
         mine, its = vars(self), vars(other)
         its.update((name, mine[name]) for name in _GEOMETRY if name in mine)
-        if (other.formulation is not self.formulation or other.width != self.width
+        if (other.formulation is not self.formulation
                 or not (self.across.plain and other.across.plain)):
+            return
+        factors = self._in_proportion(other) if "kernel" in mine else None
+        if factors is not None:
+            its["kernel"] = self.kernel.in_proportion(other.across, *factors)
+        if other.width != self.width:
             return
         if other.across.slabs[0].density == self.across.slabs[0].density and "inertia" in mine:
             its["inertia"] = self.inertia
-        if "kernel" in mine:
+        if "kernel" in mine and "kernel" not in its:
             its["kernel"] = self.kinematics.kernel(other.across, other.formulation, self.kernel)
+
+    def _in_proportion(self, other):
+        """By how much stiffer and wider the other beam is; None if it differs in other ways."""
+        a, b, width = self.material, other.material, self.width
+        if (type(a) is not StVenantKirchhoff or type(b) is not StVenantKirchhoff
+                or (a.nu, a.plane, a.shear_correction) != (b.nu, b.plane, b.shear_correction)
+                or a.graded or b.graded or callable(width) or callable(other.width)
+                or not type(self.formulation).__module__.startswith(f"{__package__}.")):
+            return None
+        return b.E / a.E, other.width / width
 
     def with_mesh(self, mesh: MeshBeam) -> Beam:
         """The same beam on another mesh."""
@@ -419,7 +434,11 @@ class Beam(Frozen):
         MeshError
             If the point is outside the body.
         """
-        x = as_point(point, self.mesh)[:, None]
+        x = as_point(point, self.mesh)
+        place = self.finder.one(*x.tolist())
+        if place and place is not True:
+            return place[0], np.array(place[1:])
+        x = x[:, None]
         e, X, outside = self.finder(x)
         if outside[0] > self.finder.allowed:
             raise self.finder.refuse(x, outside)
@@ -476,8 +495,11 @@ class Beam(Frozen):
         dofs, weights
             Shapes (2, n) and (n,).
         """
-        mapping, tind = self.mesh.mapping(), np.array([e])
-        weights = self.element.functions(mapping, X[:, None], tind)[0][:, 0, 0]
+        if self.mesh.heights is None:
+            weights = self.series.at(self.series.tables[0], *map(float, X)) * self.scales[e]
+        else:
+            mapping, tind = self.mesh.mapping(), np.array([e])
+            weights = self.element.functions(mapping, X[:, None], tind)[0][:, 0, 0]
         first = self.mesh.t[0, e] * self.nd
         return first + np.arange(2 * self.nd).reshape(-1, 2).T, weights
 

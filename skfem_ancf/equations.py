@@ -82,10 +82,7 @@ class Tables:
         self.system = system
         self._own_handle: int | None = None
         self._words: list[Words] = []
-        # of the constant kind, moments, linear ones, others
-        self._loads: list[list[Any]] = [[], [], [], []]
-        for load in system.loads:
-            self._loads[_kind(load)].append(load)
+        self._sort(system.loads)
         self.motion_varies = any(joint.moving for joint in system.joints)
         self.turns = any(joint.moving and not joint.constant for joint in system.joints)
         joints = self._joints()
@@ -95,6 +92,18 @@ class Tables:
                                self._border(joints),
                                viscous_body_of(body, system.beams, system.retardation),
                                self._forces())
+
+    def _sort(self, loads):
+        # of the constant kind, moments, linear ones, others
+        self._loads: list[list[Any]] = [[], [], [], []]
+        for load in loads:
+            self._loads[_kind(load)].append(load)
+
+    @property
+    def asks(self) -> bool:
+        """True if texts ask the system in Python, by its handle."""
+        plain = self.plain
+        return bool(plain.loads.own or plain.joints.own or plain.forces.own)
 
     @cached_property
     def flat(self) -> Equations:
@@ -140,6 +149,29 @@ class Tables:
             return None
         body = body._replace(packs=tuple(packs))
         return self.with_equations(self.plain._replace(body=body, viscous=body))
+
+    def renewed(self, system: "System") -> "Tables":
+        """Those of a system that differs by its loads, or by its beams' materials and widths.
+
+        Parameters
+        ----------
+        system
+            A :class:`~skfem_ancf.system.System` of the same coordinates and joints.
+        """
+        tables, before = copy(self), self.plain
+        tables.system, tables._words, tables._own_handle = system, [], None
+        for name in ("flat", "linearised", "parts", "_stress_size"):
+            vars(tables).pop(name, None)
+        tables._sort(system.loads)
+        plain = before._replace(loads=tables._load_tables())
+        if system.beams != self.system.beams:
+            body = body_of(system.beams, system.slices)
+            plain = plain._replace(body=body, viscous=viscous_body_of(
+                body, system.beams, system.retardation))
+        elif "flat" in vars(self):
+            tables._words, tables.flat = self._words, self.flat._replace(loads=plain.loads)
+        tables.plain = plain
+        return tables
 
     def with_equations(self, plain: Equations) -> "Tables":
         """The same with other numbers.

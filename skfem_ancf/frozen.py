@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from copy import copy
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -159,6 +159,18 @@ def _read_only_dict(plain, more):
     return ReadOnlyDict(plain)
 
 
+@lru_cache(256)
+def _arguments(constructor, more):
+    """Names of its arguments; those of ``more`` are taken by ``**kwargs``."""
+    kinds = inspect.Parameter
+    parameters = inspect.signature(constructor).parameters.values()
+    names = [p.name for p in list(parameters)[1:] if p.kind not in (
+        kinds.VAR_KEYWORD, kinds.VAR_POSITIONAL)]
+    if any(p.kind == kinds.VAR_KEYWORD for p in parameters):
+        names += [name for name in more if name not in names]
+    return names
+
+
 def rebuilt(thing: Any, changes: dict[str, Any], more: Sequence[str] = ()) -> Any:
     """An object made as ``thing`` was, with some arguments of its constructor changed.
 
@@ -178,12 +190,7 @@ def rebuilt(thing: Any, changes: dict[str, Any], more: Sequence[str] = ()) -> An
     InputError
         If the object does not know the argument it was made with.
     """
-    kinds = inspect.Parameter
-    parameters = inspect.signature(type(thing).__init__).parameters.values()
-    names = [p.name for p in list(parameters)[1:] if p.kind not in (
-        kinds.VAR_KEYWORD, kinds.VAR_POSITIONAL)]
-    if any(p.kind == kinds.VAR_KEYWORD for p in parameters):
-        names += [name for name in more if name not in names]
+    names = _arguments(type(thing).__init__, tuple(more))
     for name in changes:
         if name not in names:
             raise NameUnknown(f"argument of {type(thing).__name__}", name, names)

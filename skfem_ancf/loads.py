@@ -486,6 +486,19 @@ class DeadLoad(Load):
                              "put on another: use scene.load(form) or a Load with bind(beam)")
         return self
 
+    def moved(self, beam: Beam) -> DeadLoad:
+        """The same vector on a beam of the same mesh and element.
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+        """
+        other = self._unsealed()
+        other.beam = beam
+        other._seal()
+        return other
+
     def force(self, u: Array) -> Array:
         return self.vector
 

@@ -131,7 +131,13 @@ class Machine:
         """
         machine = copy(self)
         machine.tables, machine._kept = tables, Kept()
+        vars(machine).pop("linearised", None)
         return machine
+
+    @property
+    def shareable(self) -> bool:
+        """True if nothing of the choice between the ways depends on the laws."""
+        return self._plain is None
 
     def choose(self, name: str) -> Choice:
         """The way of a text for the next call.

@@ -30,7 +30,8 @@ from .errors import (ConvergenceError, InputError, Interrupted, StabilityWarning
 from .joints import Joint, bind_joint, get_joint
 from .joints.base import both_of, is_ground, members_at, named_place
 from .joints.prescribed import Turned
-from .loads import EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight, bind_load
+from .loads import (DeadLoad, EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight,
+                    bind_load)
 from .path import CriticalPoint, Path
 from .pickling import functions_of, require_picklable
 from .places import on_other_mesh
@@ -1281,13 +1282,18 @@ class Scene:
                           [(k, v) for k, (v, _) in self._velocities.items()],
                           [element for element, _ in self._elements])
 
-    def replace(self, beam: WhichBeam = None, **changes: Any) -> Scene:
-        """The same scene with some arguments of one beam changed.
+    def replace(self, beam: WhichBeam = None, loads: Sequence[Load] | None = None,
+                **changes: Any) -> Scene:
+        """The same scene with other loads, or with some arguments of one beam changed.
 
         Parameters
         ----------
         beam
-            The beam, its name or its number; None for the only one.
+            The beam that is changed, its name or its number; None for the only one.
+        loads
+            Loads in place of all that the scene has, as :meth:`add` takes them:
+            ``[PointForce((0, -2), at=(1, 0))]`` of :mod:`skfem_ancf.loads`. Those of
+            ``scene.loads`` may be among them.
         **changes
             Arguments of :class:`Beam`, as ``material=...``, ``width=...`` or ``mesh=...``.
 
@@ -1296,6 +1302,11 @@ class Scene:
         Scene
             Another one. A state of this scene is a good start for its
             ``solve_static(start=state)``, if the mesh has not changed.
+
+        Notes
+        -----
+        Scenes that differ by loads, materials or widths share tables and work arrays: only one of
+        them is solved at a time, the others wait.
 
         Raises
         ------
@@ -1318,11 +1329,56 @@ class Scene:
         True
         >>> bool(new.displacement((1, 0))[1] > state.displacement((1, 0))[1])
         True
+
+        The same with half of the weight, and a force:
+
+        >>> from skfem_ancf.loads import PointForce, Weight
+        >>> half = scene.replace(loads=[Weight((0, -4.9)), PointForce((0, 0.02), at=(1, 0))])
+        >>> bool(half.solve_static().displacement((1, 0))[1] > state.displacement((1, 0))[1])
+        True
         """
-        k = self._number_of_beam(beam)
-        beams = list(self._beams)
-        beams[k] = beams[k].replace(**changes)
-        return self.with_beams(beams)
+        with self._lock:
+            scene = self
+            if changes or loads is None:
+                k = self._number_of_beam(beam)
+                beams = list(self._beams)
+                beams[k] = beams[k].replace(**changes)
+                scene = self._stiffer(k, beams, changes) or self.with_beams(beams)
+            return scene if loads is None else scene._loaded(loads)
+
+    def _loaded(self, loads):
+        """The same scene with other loads."""
+        if not isinstance(loads, (list, tuple)) or not all(isinstance(x, Load) for x in loads):
+            raise InputError("loads must be a list of Loads, as [PointForce((0, -2), at=(1, 0))], "
+                             f"got {shown(loads)}; classes are in skfem_ancf.loads")
+        given = tuple((self._number(load.beam), load) for load in loads)
+        bound = tuple((k, load, bind_load(load, self.members[k])) for k, load in given)
+        require_alone([(k, load) for k, _, load in bound])
+        return self._sharing(bound, self._beams)
+
+    def _stiffer(self, k, beams, changes):
+        """The scene of another material or width of beam k, None where more depends on it."""
+        system, old, new = self._system, self._beams[k], beams[k]
+        if (system is None or set(changes) - {"material", "width"} or self._elements
+                or type(self).with_beams is not Scene.with_beams
+                or new.element is not old.element or "kernel" not in vars(new)
+                or not all(type(joint).__module__.startswith(f"{__package__}.")
+                           for joint in self.joints)):
+            return None
+        same = new.width == old.width and new.material.density == old.material.density
+        loads = tuple((n, load, bound if n != k else bound.moved(new) if same and isinstance(
+            bound, DeadLoad) else bind_load(load, new)) for n, load, bound in self._loads)
+        return self._sharing(loads, beams)
+
+    def _sharing(self, loads, beams):
+        """A scene that shares what does not depend on loads, materials and widths."""
+        other, system = copy(self), self._system
+        other._beams, other._loads = tuple(beams), loads
+        if system is not None and not system.forces.contacts.obstacles:
+            other._system = system.renewed([*other.loads, *other._weights()], beams)
+            if other._system is not None:
+                other._lock = self._lock
+        return other
 
     @_alone
     def plan(self, kind: str = "static") -> Plan:

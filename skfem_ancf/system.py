@@ -43,6 +43,9 @@ logger = logging.getLogger(__name__)
 _NONE = np.zeros(0)
 #: Equations of the nodes of a frame above which steps of a motion eliminate them.
 MANY = 48
+#: What a system has found that depends on materials and widths.
+_OF_MATERIALS = ("machine", "points", "mass", "mass_factors", "damped_modes", "_damped_shapes",
+                 "stiffness_scale", "work_noise", "condensed")
 
 
 def _of_constraints(name: str) -> Any:
@@ -82,8 +85,9 @@ class System:
                  joints: Sequence[Joint] = (), damping: Damping | None = None,
                  elements: Sequence[ForceElement] = (),
                  bodies: Sequence[RigidBody] = ()) -> None:
-        self._given = (tuple(beams), tuple(loads), fixed, values, tuple(joints), damping,
-                       tuple(elements), tuple(bodies))
+        self._given: tuple[Any, ...] = (
+            tuple(beams), tuple(loads), fixed, values, tuple(joints), damping, tuple(elements),
+            tuple(bodies))
         self.beams, self.bodies, self.loads = list(beams), list(bodies), list(loads)
         self.members: list[Beam | RigidBody] = [*beams, *bodies]
         self.offsets = np.concatenate([[0], np.cumsum([b.N for b in self.members])])
@@ -94,6 +98,13 @@ class System:
         self.constraints = Constraints(self.members, self.slices, self.size, fixed, values,
                                        [*self._directors(fixed), *joints], self._held_by_elements)
         self.forces = Forces(elements, self.N, self.bandwidth)
+        self._take_loads()
+        self.damping = Damping() if damping is None else damping
+        self.retardation = [self.damping.stiffness + (b.damping.time if b.damping else 0.0)
+                            for b in self.beams]
+        self.viscous = any(time > 0.0 for time in self.retardation)
+
+    def _take_loads(self):
         self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
         self.constant_force = np.zeros(self.N)
         self._varying: list[Any] = []
@@ -103,10 +114,46 @@ class System:
                 self.constant_force[s] += load.force(np.zeros(s.stop - s.start))
             else:
                 self._varying.append(load)
-        self.damping = Damping() if damping is None else damping
-        self.retardation = [self.damping.stiffness + (b.damping.time if b.damping else 0.0)
-                            for b in self.beams]
-        self.viscous = any(time > 0.0 for time in self.retardation)
+
+    def renewed(self, loads: Sequence[Load], beams: Sequence[Beam]) -> System | None:
+        """That of other loads, or of other materials and widths: work arrays are shared.
+
+        Parameters
+        ----------
+        loads
+            The loads of all beams.
+        beams
+            Beams whose meshes and elements are those of this system; or its own.
+
+        Returns
+        -------
+        System or None
+            None if it has to be made anew.
+        """
+        system = object.__new__(type(self))
+        vars(system).update(vars(self))
+        _, _, *others = self._given
+        system._given = (tuple(beams), tuple(loads), *others)
+        beams = list(beams)
+        system.loads, system.beams, system.members = list(loads), beams, [*beams, *self.bodies]
+        system._index = {id(b): k for k, b in enumerate(system.members)}
+        system._take_loads()
+        system.retardation = [system.damping.stiffness + (b.damping.time if b.damping else 0.0)
+                              for b in beams]
+        system.viscous = any(time > 0.0 for time in system.retardation)
+        before = self.machine.tables
+        if beams != self.beams and not (self.machine.shareable and all(
+                beam.kernel.linear for beam in beams)):
+            return None
+        if system.symmetric != self.symmetric or before.asks:
+            return None
+        for name in ("machine",) if beams == self.beams else _OF_MATERIALS:
+            vars(system).pop(name, None)
+        tables = before.renewed(system)
+        if tables.asks:
+            return None
+        system.machine = self.machine.with_tables(tables)
+        return system
 
     fixed = _of_constraints("fixed")
     free = _of_constraints("free")

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, MeshBeam, Scene,
-                        StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, NeoHookean,
+                        Scene, StVenantKirchhoff)
 from skfem_ancf.elements import base
 from skfem_ancf.kernels import cable, section
+from skfem_ancf.loads import EndMoment, PointForce, Pressure, Weight
+from skfem_ancf.system import System
 
 
 def cantilever(element, n=4, length=1.0, height=0.01, E=2e9, angle=0.0):
@@ -116,3 +118,67 @@ def test_a_replaced_width_or_mesh_is_no_old_one():
     assert thicker.beams[0].q0.shape == scene.beams[0].q0.shape
     assert -0.05 > thicker.solve_static().displacement((1, 0))[1] > (
         scene.solve_static().displacement((1, 0))[1])
+
+
+def same(a, b):
+    """Solutions, and what is read of them, of scenes made in two ways."""
+    x, y = a.solve_static(), b.solve_static()
+    assert np.allclose(x.u, y.u, rtol=0, atol=1e-8) and x.iterations == y.iterations
+    for read in (lambda s: s.reactions("left").force, lambda s: s.stress((0.3, 0.0)),
+                 lambda s: s.strain_energy, lambda s: s.position((1.0, 0.0))):
+        assert np.allclose(read(x), read(y), rtol=1e-5, atol=1e-8)
+    assert np.allclose(a.modes(2).frequencies, b.modes(2).frequencies, rtol=1e-8)
+
+
+@pytest.mark.parametrize("element", [lambda: ElementBeamANCF(2), lambda: ElementBeamCable(5)])
+def test_scenes_that_share_are_those_built_anew(monkeypatch, element):
+    """One after the other from one scene, which stays what it was."""
+    def weight(made, g=-9.81):
+        return made.gravity((0.0, g))
+
+    def pull(made):
+        return made.point_force((0.0, 0.3), at=(1.0, 0.0))
+
+    def anew(*add, E=2e9, width=0.01, density=7800.0):
+        beam = Beam(scene.beams[0].mesh, element(), StVenantKirchhoff(E, 0.3, density), width=width)
+        made = Scene(beam).clamp("left", thickness="free")
+        for load in add:
+            load(made)
+        return made
+
+    scene = cantilever(element())
+    first = scene.solve_static().u
+    material, force = scene.beams[0].material, PointForce((0.0, 0.3), at=(1.0, 0.0))
+    pairs = [
+        (dict(material=material.replace(E=3e9)), anew(weight, E=3e9)),
+        (dict(width=0.02), anew(weight, width=0.02)),
+        (dict(material=material.replace(density=5000.0)), anew(weight, density=5000.0)),
+        (dict(loads=[force]), anew(pull)),
+        (dict(loads=[Weight((0.0, -4.0)), force], material=material.replace(E=1e9)),
+         anew(lambda made: weight(made, -4.0), pull, E=1e9)),
+        (dict(loads=[EndMoment(scene.beams[0], "right", 0.02)]),
+         anew(lambda made: made.moment("right", 0.02))),
+        (dict(loads=[*scene.loads, force]), anew(weight, pull))]
+    made = counted(monkeypatch, System, "__init__")
+    changed = [scene.replace(**changes) for changes, _ in pairs]
+    assert all(other.system is not scene.system for other in changed) and not made
+    for other, (_, expected) in reversed(list(zip(changed, pairs))):
+        same(other, expected)
+    assert np.array_equal(scene.solve_static().u, first)
+    same(changed[0].replace(width=0.02).replace(loads=[force]), anew(pull, E=3e9, width=0.02))
+
+
+def test_what_cannot_be_shared_is_built_anew():
+    scene = cantilever(ElementBeamANCF(2))
+    scene.solve_static()
+    beam = scene.beams[0]
+    pushed = scene.replace(loads=[Pressure(beam, "top", 50.0)])
+    other = Scene(beam).clamp("left", thickness="free").pressure("top", 50.0)
+    assert np.allclose(pushed.solve_static().u, other.solve_static().u, atol=1e-9)
+    soft = scene.replace(material=NeoHookean(2e9, 0.3, 7800.0))
+    other = Scene(beam.replace(material=NeoHookean(2e9, 0.3, 7800.0)))
+    other.clamp("left", thickness="free").gravity((0.0, -9.81))
+    assert np.allclose(soft.solve_static().u, other.solve_static().u, atol=1e-9)
+    for wrong in (2.0, [(0.0, -2.0)]):
+        with pytest.raises(InputError, match="list of Loads"):
+            scene.replace(loads=wrong)

@@ -872,6 +872,11 @@ class Chain:
         """The pack of a law without stiffness, for given stresses."""
         raise NotImplementedError
 
+    @property
+    def linear(self) -> bool:
+        """True if all moduli are constant."""
+        return True
+
     def inverted(self, u: Array) -> bool:
         """True if the body is turned inside out somewhere: no deformation of a real one."""
         return False

@@ -9,6 +9,7 @@ stabilised.
 Rows of the table are those of d/dX, then of d^2/dX^2, at the points: ``a = r'``, ``b = r''``.
 """
 
+from copy import copy
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -392,6 +393,26 @@ class CableKernel(Chain):
             packed([EA, EI, -ES]), packed(constant),
             packed(mesh.t[0] * self.nd, np.int64), packed(np.arange(2 * self.nd), np.int64),
             pair_tables(table, pairs, constant, ne))
+
+    def in_proportion(self, across: "Across", stiffness: float, volume: float) -> "CableKernel":
+        """The kernel of the same beam, stiffer, and wider.
+
+        Parameters
+        ----------
+        across
+            Its section.
+        stiffness, volume
+            Factors on the moduli, and on the volume.
+        """
+        other, pack, both = copy(self), self.packs[0], stiffness * volume
+        other._across, other.volume = across, volume * self.volume
+        if self.constant is not None:
+            other.constant = both * self.constant
+        other.packs = [pack._replace(
+            stiffness=both * pack.stiffness, constant=both * pack.constant,
+            pairs=pack.pairs._replace(held=both * pack.pairs.held,
+                                      held_skew=both * pack.pairs.held_skew))]
+        return other
 
     def _stiffness(self, few):
         """EA, ES and EI at the points, (3, points, elements), or (3, points, 1) of one element."""

@@ -6,6 +6,7 @@ integration, and forces go back the same way. With moduli between samples, which
 interpolation and the weights in them, the tangent is a sum over pairs of rows.
 """
 
+from copy import copy
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -435,6 +436,27 @@ class TermTables:
             G, frame, weights.T, rows, self._interpolation, law_tables(self.law, owner), constant,
             mesh.t[0], None if before is None else before.pack)
 
+    def in_proportion(self, slab: "Slab", stiffness: float, volume: float) -> "TermTables":
+        """As :meth:`Kernel.in_proportion`.
+
+        Parameters
+        ----------
+        slab
+            The slab of the other section.
+        stiffness, volume
+            As there.
+        """
+        other, pack, both = copy(self), self.pack, stiffness * volume
+        other.law = LinearLaw(stiffness * pack.law.D)
+        other.slab, other.w = slab, volume * self.w
+        other.term = replace(self.term, law=other.law)
+        other.pack = pack._replace(
+            law=pack.law._replace(D=stiffness * pack.law.D), weights=volume * pack.weights,
+            moduli=both * pack.moduli, constant=both * pack.constant,
+            pairs=pack.pairs._replace(held=both * pack.pairs.held,
+                                      held_skew=both * pack.pairs.held_skew))
+        return other
+
     def _gradients(self, pack, u):
         U = np.empty((pack.table.shape[2], 2, pack.start.size))
         r = np.empty((pack.table.shape[1],) + U.shape[1:])
@@ -736,6 +758,11 @@ class Kernel(Chain):
         self.firsts = [t for k, t in enumerate(self.tables) if id(t.slab) not in slabs[:k]]
 
     @property
+    def linear(self) -> bool:
+        """True if all moduli are constant."""
+        return all(pack.law.kind == LINEAR for pack in self.packs)
+
+    @property
     def shared(self) -> bool:
         """One table serves all elements."""
         return self.tables[0].shared
@@ -763,6 +790,25 @@ class Kernel(Chain):
 
     def inverted(self, u: Array) -> bool:
         return any(first.inverted(pack, u_e) for first, pack, u_e in self._of_firsts(u))
+
+    def in_proportion(self, across: "Across", stiffness: float, volume: float) -> "Kernel":
+        """The kernel of the same beam with linear laws, stiffer, and wider.
+
+        Parameters
+        ----------
+        across
+            Its section.
+        stiffness, volume
+            Factors on the moduli, and on the volume.
+        """
+        other = copy(self)
+        other._across, slabs = across, dict(zip(map(id, self._across.slabs), across.slabs))
+        if self.constant is not None:
+            other.constant = stiffness * volume * self.constant
+        other.tables = [t.in_proportion(slabs[id(t.slab)], stiffness, volume) for t in self.tables]
+        other.firsts = [other.tables[self.tables.index(t)] for t in self.firsts]
+        other.packs = [t.pack for t in other.tables]
+        return other
 
     def inverted_members(self, packs: "Sequence[SectionPack]", u: Array) -> Array:
         """For each of several beams alike whether it is :meth:`inverted`, shape (members,).
