@@ -436,7 +436,7 @@ class Beam(Frozen):
         """
         x = as_point(point, self.mesh)
         place = self.finder.one(*x.tolist())
-        if place and place is not True:
+        if isinstance(place, tuple):
             return place[0], np.array(place[1:])
         x = x[:, None]
         e, X, outside = self.finder(x)
