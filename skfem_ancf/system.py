@@ -43,9 +43,10 @@ logger = logging.getLogger(__name__)
 _NONE = np.zeros(0)
 #: Equations of the nodes of a frame above which steps of a motion eliminate them.
 MANY = 48
-#: What a system has found that depends on materials and widths.
-_OF_MATERIALS = ("machine", "points", "mass", "mass_factors", "damped_modes", "_damped_shapes",
-                 "stiffness_scale", "work_noise", "condensed")
+#: What a system has found that stays for other materials and widths; and for other loads, too.
+_OF_PLACES = {"K", "fixed_positions", "noise", "screen"}
+_OF_BEAMS = _OF_PLACES | {"points", "mass", "mass_factors", "stiffness_scale", "work_noise",
+                          "condensed"}
 
 
 def _of_constraints(name: str) -> Any:
@@ -147,8 +148,10 @@ class System:
             return None
         if system.symmetric != self.symmetric or before.asks:
             return None
-        for name in ("machine",) if beams == self.beams else _OF_MATERIALS:
-            vars(system).pop(name, None)
+        kept = _OF_BEAMS if beams == self.beams else _OF_PLACES
+        for name in list(vars(system)):
+            if name not in kept and isinstance(getattr(type(self), name, None), cached_property):
+                del vars(system)[name]
         tables = before.renewed(system)
         if tables.asks:
             return None
