@@ -496,7 +496,7 @@ class Beam(Frozen):
             Shapes (2, n) and (n,).
         """
         if self.mesh.heights is None:
-            weights = self.series.at(self.series.tables[0], *map(float, X)) * self.scales[e]
+            weights = self.series.at(*map(float, X)) * self.scales[e]
         else:
             mapping, tind = self.mesh.mapping(), np.array([e])
             weights = self.element.functions(mapping, X[:, None], tind)[0][:, 0, 0]
