@@ -229,7 +229,7 @@ class Condensed:
         nodes, out = self.nodes, np.zeros((len(self._turns), 3))
         forces, moments, x, y, angle = nodes.split(phi)
         out[nodes.held_x, 0], out[nodes.held_y, 1] = x, y
-        out[nodes.held_angle, 2] = angle / self._turns[nodes.held_angle].real
+        out[nodes.held_angle, 2] = angle / np.abs(self._turns[nodes.held_angle])
         follower, leader, scale = self._pairs
         out[nodes.followers, :2] = out[nodes.leader[nodes.followers], :2] - forces
         out[follower, 2] = out[leader, 2] - moments / scale
@@ -245,7 +245,7 @@ class Condensed:
         x, y, angle = (total[k, nodes.nodes[ends]] for k, ends in enumerate(held))
         return np.concatenate([
             *(0.0 - forces[nodes.followers, :2].T), -forces[follower, 2] / scale, x, y,
-            angle / self._turns[nodes.held_angle].real])
+            angle / np.abs(self._turns[nodes.held_angle])])
 
 
 def _order(nodes):

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import sparse
 
-from .errors import SupportError, shown
+from .errors import InputError, SupportError, shown
 from .joints.base import Joint, same_joint
 from .joints.nodes import Nodes, chain_ends
+from .joints.settlements import HELD
 from .rank import first_dependent, null_space, unit_rows
 from .rigid import RigidBody
 
@@ -339,6 +340,17 @@ class Constraints:
         raise SupportError(f"{shown(joint)} is not a joint of this scene")
 
     # what is held
+
+    def require_motion(self) -> None:
+        """Raise InputError if something is given in proportion to the load of statics."""
+        if self.frame is not None and np.any(self.frame.settled.numbers):
+            node, k = np.argwhere(self.frame.settled.numbers)[0]
+            value = self.frame.settled.numbers[node, k]
+            raise InputError(
+                f"node {node} is displaced by {HELD[k]}={value:g}, which grows with the load of a "
+                "static solution: for a motion give a function of time, as "
+                f"frame.settle({node}, {HELD[k]}=lambda t: {value:g} * min(t, 1.0)); or lambda t: "
+                f"{value:g} if it stays as it was in the static state at the start")
 
     def require_independent_joints(self) -> None:
         """Raise SupportError if joints repeat or contradict each other or the supports."""

@@ -84,7 +84,7 @@ class Tables:
         self._words: list[Words] = []
         self._sort(system.loads)
         self.motion_varies = any(joint.moving for joint in system.joints)
-        self.turns = any(joint.moving and not joint.constant for joint in system.joints)
+        self.turns = any(joint.turning for joint in system.joints)
         joints = self._joints()
         body = body_of(system.beams, system.slices)
         self.plain = Equations(body, self._load_tables(), joints,

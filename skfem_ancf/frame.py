@@ -8,10 +8,12 @@ import numpy as np
 
 from .beam import Beam
 from .elements import ElementBeamCable
-from .errors import (InputError, require_finite, require_finite_scalar, require_integer,
-                     require_names, require_option, require_options, shown, teaching)
+from .errors import (InputError, require_finite, require_finite_scalar, require_function,
+                     require_integer, require_names, require_option, require_options, shown,
+                     teaching)
 from .joints.base import bind_joint
-from .joints.nodes import HELD, Nodes
+from .joints.nodes import Nodes
+from .joints.settlements import HELD
 from .loads import DeadLoad, EndMoment
 from .net import Net, mapping_of, net_from_meshio
 from .scene import Scene
@@ -270,15 +272,67 @@ class Frame(Scene):
         InputError
             If the rotation is held of a node at which all lines are hinged.
         """
-        names = require_names("what is held", list(what), HELD)
-        nodes, held = self.nodes(place), self._nodes.held.copy()
+        return self._hold(place, require_names("what is held", list(what), HELD))
+
+    def _hold(self, place, names, settled=None):
+        """Hold nodes; they may be displaced."""
+        nodes, held, known = self.nodes(place), self._nodes.held.copy(), self._nodes
         for name in names:
             held[nodes, HELD.index(name)] = True
         if "angle" in names:
             self._require_rigid(nodes, "it has no rotation to hold, pin it")
-        self._nodes = Nodes(self._nodes.nodes, self._nodes.hinged, held, self.net, self._lines)
+        self._nodes = Nodes(known.nodes, known.hinged, held, self.net, self._lines,
+                            known.settled if settled is None else settled)
         self._join()
         return self
+
+    def settle(self, place: Any, x: float | Callable[[float], float] | None = None,
+               y: float | Callable[[float], float] | None = None,
+               angle: float | Callable[[float], float] | None = None) -> Frame:
+        """Displace nodes along x or y, or turn them, by what is given; it is held, too.
+
+        Parameters
+        ----------
+        place
+            Nodes, see :meth:`nodes`.
+        x, y
+            By how much, from where the nodes are in the stress-free state: a number, which grows
+            with the load of a static solution; or a function of time, in statics of the load
+            factor, for motions as well.
+        angle
+            The rotation in radians, counterclockwise, of any size; in the same way.
+
+        Returns
+        -------
+        Frame
+            Itself.
+
+        Raises
+        ------
+        InputError
+            If nothing is given, or the rotation of a node at which all lines are hinged.
+
+        Examples
+        --------
+        A girder of E I = 1 between clamps, one of which sinks by w, is sheared by 12 E I w / L^3:
+
+        >>> from skfem_ancf import Frame, StVenantKirchhoff
+        >>> frame = Frame.from_lines([(0, 0), (1, 0)], [(0, 1)], height=0.01, width=0.01,
+        ...                          material=StVenantKirchhoff(12e8, 0.3))
+        >>> state = frame.clamp([0, 1]).settle(1, y=-1e-4).solve_static()
+        >>> round(float(state.reactions(0).force[1]), 6)
+        0.0012
+        """
+        given = {name: value for name, value in zip(HELD, (x, y, angle)) if value is not None}
+        if not given:
+            raise InputError("settle() displaces nodes: give x=, y= or angle=, a number or a "
+                             "function of time")
+        settled, nodes = self._nodes.settled, self.nodes(place)
+        for name, value in given.items():
+            settled = settled.given(nodes, HELD.index(name), require_function(
+                name, value, "of time that returns a number") if callable(value) else
+                require_finite_scalar(name, value))
+        return self._hold(place, list(given), settled)
 
     def _require_rigid(self, nodes, advice):
         loose = np.setdiff1d(nodes, self._nodes.nodes[~self._nodes.hinged])

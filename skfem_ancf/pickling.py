@@ -32,8 +32,9 @@ def functions_of(things: Iterable[Any], what: str = "of") -> Iterator[tuple[str,
         for name, value in (*vars(thing).items(), *more.items()):
             name = name.lstrip("_")
             value = getattr(value, "function", value)  # an Amplitude, for one
-            if callable(value) and not isinstance(value, type):
-                yield f"the function {name!r} {what} {shown(thing)}", value
+            for one in value if isinstance(value, tuple) else (value,):
+                if callable(one) and not isinstance(one, type):
+                    yield f"the function {name!r} {what} {shown(thing)}", one
 
 
 def require_picklable(items: Iterable[tuple[str, Any]]) -> None:

@@ -13,7 +13,8 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, KelvinVo
                         Scene, Section, StVenantKirchhoff, system, tangent)
 from skfem_ancf.condensed import Condensed
 from skfem_ancf.dynamics import integrate
-from skfem_ancf.errors import FileError, InputError, MeshError, NameUnknown, SupportError
+from skfem_ancf.errors import (FileError, InputError, MeshError, NameUnknown, PickleError,
+                               SupportError)
 from skfem_ancf.system import System
 
 E, H = 2e11, 0.02
@@ -430,6 +431,85 @@ def test_a_motion_of_too_many_multipliers_is_refused(monkeypatch):
     monkeypatch.setattr(integrate, "LARGEST", 1e-6)
     with pytest.raises(InputError, match=r"12 equations of joints.*scene.modes\(k\)"):
         portal().integrate(1.0, 0.1)
+
+
+# settlements
+
+def test_settled_supports_bend_as_linear_theory_says():
+    """A clamped girder, 6 E I w / L^2 and 4 E I a / L at the support that sinks and turns."""
+    girder = Frame.from_lines([(0, 0), (2, 0)], [(0, 1)], material=STEEL, height=H, width=H)
+    girder.clamp([0, 1]).settle(1, y=-1e-5, angle=2e-5)
+    for state in (girder.solve_static(), girder.solve_linear()):
+        moment = EI * (6 * 1e-5 / 2**2 + 4 * 2e-5 / 2)
+        force = EI * (-12 * 1e-5 / 2**3 - 6 * 2e-5 / 2**2)
+        assert_allclose(state.reactions(1).moment, moment, rtol=1e-5)
+        assert_allclose(state.reactions(1).force[1], force, rtol=1e-5)
+        assert_allclose(state.reactions(0).force[1], -force, rtol=1e-5)
+        assert_allclose(girder.rotations(state)[1], 2e-5, rtol=1e-7)
+
+
+def test_supports_that_are_moved_as_a_rigid_body_strain_nothing():
+    a = 1.2
+    frame = portal()
+    for node in frame.nodes("ground"):
+        p = frame.points[:, node]
+        moved = np.array([np.cos(a) * p[0] - np.sin(a) * p[1] + 0.3, np.sin(a) * p[0]
+                          + np.cos(a) * p[1] - 0.2]) - p
+        frame.settle(int(node), x=moved[0], y=moved[1], angle=a)
+    state = frame.solve_static()
+    assert state.converged and state.stability == "stable"
+    assert state.strain_energy < 1e-12 * EI
+    assert_allclose(frame.rotations(state), a, atol=1e-8)
+    assert_allclose(state.reactions("ground").force, 0.0, atol=1e-4)
+
+
+def test_a_large_settlement_is_that_of_joints():
+    """A cantilever whose end is carried and turned, beside joints that prescribe it."""
+    girder = Frame.from_lines([(0, 0), (1, 0)], [(0, 1)], elements=6, material=STEEL, height=H,
+                              width=H).clamp(0).settle(1, x=-0.3, y=0.2, angle=1.5)
+    state = girder.solve_static()
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 7), H), ElementBeamCable(5), STEEL, width=H)
+    scene = Scene(beam).clamp("left", thickness="free")
+    scene.joint("position", at=(1, 0), r=lambda t: (1.0 - 0.3 * t, 0.2 * t))
+    scene.joint("angle", at="right", angle=lambda t: 1.5 * t)
+    other = scene.solve_static()
+    assert_allclose(state.displacement((0.5, 0)), other.displacement((0.5, 0)), atol=1e-9)
+    assert_allclose(state.strain_energy, other.strain_energy, rtol=1e-8)
+    work, d = state.reactions(1), 1e-6  # the work of the support is the energy
+    more = girder.settle(1, angle=1.5 + d).solve_static().strain_energy
+    assert_allclose(work.moment, (more - state.strain_energy) / d, rtol=1e-4)
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+def test_supports_that_shake(scheme, monkeypatch):
+    """Of nodes eliminated, and by multipliers: a support moves and turns, the other shakes."""
+    histories = []
+    for eliminated in (True, False):
+        monkeypatch.setattr(system, "MANY", 0 if eliminated else 10**9)
+        frame = portal().settle(0, x=lambda t: 0.02 * np.sin(40 * t) ** 2,
+                                angle=lambda t: 0.3 * np.sin(20 * t) ** 2)
+        frame.settle(3, y=lambda t: 0.01 * (1 - np.cos(30 * t)))
+        histories.append(frame.integrate(0.05, 1e-3, scheme=scheme))
+    ours, dense = histories
+    assert np.abs(dense.u).max() > 0.1
+    assert_allclose(ours.u, dense.u, rtol=0, atol=1e-6)
+    x = ours.displacement((0, 0))
+    assert_allclose(x[:, 0], 0.02 * np.sin(40 * ours.t) ** 2, atol=1e-11)
+    turns = [frame.rotations(ours.state(k))[0] for k in (10, 30)]
+    assert_allclose(turns, 0.3 * np.sin(20 * ours.t[[10, 30]]) ** 2, atol=1e-9)
+
+
+def test_settlements_that_cannot_be():
+    frame = portal(clamp=False, hinges=[0]).pin(0).clamp(3)
+    with pytest.raises(InputError, match="give x=, y= or angle="):
+        frame.settle(3)
+    with pytest.raises(InputError, match="no rotation to hold"):
+        frame.settle(0, angle=0.1)
+    with pytest.raises(InputError, match=r"frame.settle\(3, y=lambda t: -0.01"):
+        frame.settle(3, y=-0.01).integrate(0.01, 1e-3)
+    moving = frame.settle(3, y=lambda t: -0.01 * min(t, 1.0))
+    with pytest.raises(PickleError, match="lambda"):
+        pickle.dumps(moving)
 
 
 # its parts

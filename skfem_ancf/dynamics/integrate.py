@@ -121,6 +121,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         _require_room(system)
     system.require_independent_joints()
     system.forces.contacts.require_motion()
+    system.constraints.require_motion()
     run = Run(system, scheme, task, sensors)
     if until is not None:
         if checkpoint is not None:

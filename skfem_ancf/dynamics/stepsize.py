@@ -82,7 +82,7 @@ class StepSize:
                 columns.append(sample(load.amplitude, self.times).reshape(-1, 1))
         for joint in s.all_joints:
             if joint.moving:
-                columns.append(joint.offset(self.times, s.N))
+                columns.append(joint.moved(self.times, s.N))
         values = np.hstack(columns)
         values = values[:, np.all(np.isfinite(values), axis=0)]
         size = np.ptp(values, axis=0)

@@ -295,6 +295,28 @@ class Joint(Sealable):
         zero = np.zeros(N)
         return np.array([self.value(zero, t) for t in times])
 
+    @property
+    def turning(self) -> bool:
+        """True if the derivative of Phi in the stress-free state depends on time."""
+        return self.moving and not self.constant
+
+    def moved(self, times: Array, N: int) -> Array:
+        """Those columns of :meth:`offset` that depend on time.
+
+        Parameters
+        ----------
+        times
+            Times, shape (n,).
+        N
+            Number of the scene's coordinates.
+
+        Returns
+        -------
+        ndarray
+            Shape (n, k).
+        """
+        return self.offset(times, N)
+
     def slope(self, times: Array, N: int) -> tuple[Array, Array]:
         """The derivative of Phi in the stress-free state at several times.
 
@@ -311,7 +333,7 @@ class Joint(Sealable):
             Shapes (k,) and (n, m, k): of the coordinates on which it depends.
         """
         zero = np.zeros(N)
-        if self.moving and not self.constant:
+        if self.turning:
             return np.arange(N), np.array([self.jacobian(zero, t) for t in times])
         rows, found, values = self.entries(zero, times[0])
         columns, where = np.unique(found, return_inverse=True)

@@ -10,6 +10,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from .base import Joint
+from .settlements import HELD, Settlements
 
 if TYPE_CHECKING:
     from ..beam import Beam
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from ..types import Array
 
 FORCE_X, FORCE_Y, MOMENT = "force along x", "force along y", "moment"
-#: What may be held of a node.
-HELD = "x", "y", "angle"
 
 
 class Nodes(Joint):
@@ -29,7 +28,8 @@ class Nodes(Joint):
     the first beam. At each node the first rigid end, or else the first, leads the others: the
     equations are ``r_leader - r = 0`` and ``g x g_leader = 0`` with the direction g of a section,
     seen from that of the stress-free state, as in :class:`~skfem_ancf.joints.Weld`; then those of
-    what is held, ``r - r_0 = 0`` and ``(1, 0) x g = 0`` of the leader. Unknowns of the nodes take
+    what is held, ``r - r_0 = d`` and ``(cos a, sin a) x g = 0`` of the leader, with what it is
+    displaced by. Unknowns of the nodes take
     the place of the multipliers where the linear systems are solved, see
     :mod:`skfem_ancf.condensed`.
 
@@ -45,6 +45,8 @@ class Nodes(Joint):
         The :class:`~skfem_ancf.net.Net` that has the nodes.
     lines
         Number of the line of each chain, shape (ends / 2,).
+    settled
+        What held nodes are displaced by, :class:`~skfem_ancf.joints.settlements.Settlements`.
 
     Attributes
     ----------
@@ -61,8 +63,12 @@ class Nodes(Joint):
 
     constant = False
 
-    def __init__(self, nodes: Array, hinged: Array, held: Array, net: Net, lines: Array) -> None:
+    def __init__(self, nodes: Array, hinged: Array, held: Array, net: Net, lines: Array,
+                 settled: Settlements | None = None) -> None:
         self.nodes, self.hinged, self.held = nodes, hinged, held
+        self.settled = Settlements(np.zeros(held.shape)) if settled is None else settled
+        #: functions of time of these
+        self.functions = self.settled.functions
         self.net, self.lines = net, lines
         # rigid ends before hinged ones: the first of each node leads
         order = np.lexsort((np.arange(len(nodes)), hinged, nodes))
@@ -79,6 +85,20 @@ class Nodes(Joint):
         self.equations = ((FORCE_X,) * n + (FORCE_Y,) * n + (MOMENT,) * k
                           + (FORCE_X,) * len(self.held_x) + (FORCE_Y,) * len(self.held_y)
                           + (MOMENT,) * len(self.held_angle))
+
+    @property
+    def moving(self) -> bool:  # type: ignore[override]
+        """True if a node is given a displacement."""
+        return any(self.settled.moves(k) for k in range(len(HELD)))
+
+    @property
+    def turning(self) -> bool:
+        return self.settled.moves(HELD.index("angle"))
+
+    def _shifts(self, times: Array) -> list[Array]:
+        """What held ends are displaced by: along x and y, and angles, shapes (n, k) each."""
+        ends = self.held_x, self.held_y, self.held_angle
+        return [self.settled.by(self.nodes[at], k, times) for k, at in enumerate(ends)]
 
     def leading(self, nodes: Array) -> Array:
         """The ends that lead at some nodes, shape (k,).
@@ -128,8 +148,20 @@ class Nodes(Joint):
         g, r = self.turns(u), u[self.positions]
         gap = r[self.leader[self.followers]] - r[self.followers]
         angle = np.conj(g[self.turned]) * g[self.leader[self.turned]]
-        return np.concatenate([gap[:, 0], gap[:, 1], angle.imag, r[self.held_x, 0],
-                               r[self.held_y, 1], g[self.held_angle].imag])
+        x, y, turn = (shift[0] for shift in self._shifts(np.array([t])))
+        return np.concatenate([gap[:, 0], gap[:, 1], angle.imag, r[self.held_x, 0] - x,
+                               r[self.held_y, 1] - y,
+                               (np.exp(-1j * turn) * g[self.held_angle]).imag])
+
+    def offset(self, times: Array, N: int) -> Array:
+        moved = self.moved(times, N)
+        out = np.zeros((len(times), len(self.equations)))
+        out[:, out.shape[1] - moved.shape[1]:] = moved
+        return out
+
+    def moved(self, times: Array, N: int) -> Array:
+        x, y, turn = self._shifts(times)
+        return np.hstack([-x, -y, -np.sin(turn)])
 
     def _linear(self) -> Any:
         """Rows, columns and values of the equations of positions."""
@@ -154,18 +186,29 @@ class Nodes(Joint):
         return rows.ravel(), columns.ravel(), values.ravel()
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        rows, columns, values = self._entries(u, t)
+        keep = values != 0.0
+        return rows[keep], columns[keep], values[keep]
+
+    def _entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        """As :meth:`entries`, with those that are zero; turns of held ends are the last."""
         g, s, n = self.turns(u), self.turned, len(self.followers)
         m, last = self.leader[s], len(self.equations) - len(self.held_angle)
         parts = [self._linear(), self._angles(np.conj(g[s]), m, 2 * n),
                  self._angles(-np.conj(g[m]), s, 2 * n),
-                 self._angles(np.ones(len(self.held_angle)), self.held_angle, last)]
+                 self._angles(np.exp(-1j * self._shifts(np.array([t]))[2][0]), self.held_angle,
+                              last)]
         rows, columns, values = (np.concatenate(x) for x in zip(*parts))
-        keep = values != 0.0
-        return rows[keep], columns[keep], values[keep]
+        return rows, columns, values
 
     def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
-        rows, columns, values = self.entries(np.zeros(N), 0.0)
-        return rows, columns, np.broadcast_to(values, (len(times), len(values)))
+        rows, columns, values = self._entries(np.zeros(N), 0.0)
+        out = np.tile(values, (len(times) if self.turning else 1, 1))
+        if self.turning:
+            for row, turn in zip(out, self._shifts(times)[2]):
+                last = self._angles(np.exp(-1j * turn), self.held_angle, 0)[2]
+                row[len(row) - len(last):] = last
+        return rows, columns, np.broadcast_to(out, (len(times), len(values)))
 
     def second_entries(self, N: int) -> tuple[Array, Array, Array, Array]:
         s, first = self.turned, 2 * len(self.followers)
@@ -221,7 +264,7 @@ class Nodes(Joint):
         out, nodes = np.zeros(self.held.shape), self.net.nodes_at(place)
         ends = self.held_x, self.held_y, self.held_angle
         for k, (at, part) in enumerate(zip(ends, self.split(multipliers)[2:])):
-            scale = self.turns(u)[at].real if k == 2 else 1.0
+            scale = np.abs(self.turns(u)[at]) if k == 2 else 1.0
             out[self.nodes[at], k] = -part * scale
         x, y, moment = out[nodes].T
         r = self.net.points[:, nodes] + u[self.positions[self.leading(nodes)]].T
