@@ -172,6 +172,41 @@ def solve_many(A: Band, B: Array, X: Array) -> None:
     X[:] = lapack.dtbtrs(ab, y, uplo="L", trans="T", diag="U")[0].T
 
 
+@primitive("factors")
+def factorize_complex(re, im, width):
+    """L D L^T of a complex symmetric band, in place of its lower half; False if there is none.
+
+    Parameters
+    ----------
+    re, im
+        Real and imaginary parts, entry (i, j) at ``j (width + 1) + i - j``.
+    width
+        Half bandwidth.
+    """
+    flat, ld = np.append(re + 1j * im, np.zeros(width * (width + 2))), width + 1
+    for j in range(re.size // ld):
+        column = flat[j * ld:(j + 1) * ld]
+        d = column[0]
+        if not 0.0 < abs(d) < np.inf:
+            return False
+        below = column[1:].copy()
+        column[1:] /= d
+        later = np.lib.stride_tricks.as_strided(flat[(j + 1) * ld:], (width, width),
+                                                (width * flat.itemsize, flat.itemsize))
+        later -= np.triu(np.outer(column[1:], below))  # entries (i, k) of column j + 1 + k
+    re[:], im[:] = flat[:re.size].real, flat[:re.size].imag
+    return True
+
+
+@primitive("factors")
+def solve_complex(re, im, x, y):
+    """Solve in place with the factors of :func:`factorize_complex`; x + i y is (n,)."""
+    ab = (re + 1j * im).reshape(x.size, -1).T
+    z = lapack.ztbtrs(ab, x + 1j * y, uplo="L", diag="U")[0].ravel() / ab[0]
+    z = lapack.ztbtrs(ab, z, uplo="L", trans="T", diag="U")[0].ravel()
+    x[:], y[:] = z.real, z.imag
+
+
 @source
 def clear(x):
     """x = 0."""

@@ -112,6 +112,52 @@ def solve(A, x):
 
 
 @jit
+def factorize_complex(re, im, width):
+    """L D L^T of a complex symmetric band, in place; False if there is none."""
+    ld = width + 1
+    n = re.size // ld
+    for j in range(n):
+        at = j * ld
+        a, b = re[at], im[at]
+        size = a * a + b * b
+        if not size > 0.0 or not size < np.inf:
+            return False
+        m = min(width, n - 1 - j)
+        for k in range(1, m + 1):
+            x, y = re[at + k], im[at + k]
+            c, d = (x * a + y * b) / size, (y * a - x * b) / size
+            other = (j + k) * ld - k
+            for i in range(k, m + 1):
+                re[other + i] -= c * re[at + i] - d * im[at + i]
+                im[other + i] -= c * im[at + i] + d * re[at + i]
+        for k in range(1, m + 1):
+            x, y = re[at + k], im[at + k]
+            re[at + k], im[at + k] = (x * a + y * b) / size, (y * a - x * b) / size
+    return True
+
+
+@jit
+def solve_complex(re, im, x, y):
+    """Solve in place with the factors; x + i y is (n,)."""
+    n = x.size
+    ld = re.size // n
+    for j in range(n):
+        at, a, b = j * ld, x[j], y[j]
+        for k in range(1, min(ld, n - j)):
+            x[j + k] -= re[at + k] * a - im[at + k] * b
+            y[j + k] -= re[at + k] * b + im[at + k] * a
+    for j in range(n - 1, -1, -1):
+        at = j * ld
+        a, b = re[at], im[at]
+        size = a * a + b * b
+        c, d = (x[j] * a + y[j] * b) / size, (y[j] * a - x[j] * b) / size
+        for k in range(1, min(ld, n - j)):
+            c -= re[at + k] * x[j + k] - im[at + k] * y[j + k]
+            d -= re[at + k] * y[j + k] + im[at + k] * x[j + k]
+        x[j], y[j] = c, d
+
+
+@jit
 def dense_solve(A, b):
     """Solve in place, by elimination with pivots; False if A is singular."""
     n = b.size

@@ -7,23 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebval, chebvander
-from scipy.linalg import lapack
 
 from ..errors import InputError
-from ..linalg import dense
 from .base import Motion, Scheme
-from .dampers import add_damping
 from .integrator import StepFailed
-from .steps import (DONE, FAILED, FAILURE, FAILURES, FRESH, ITERATIONS, LAST_SIZE, NOT_CONVERGED,
-                    RATE, READY, SIZE, STATE, judge)
+from .rates import JointMotions
+from .stages import Interval, Method, collocate, room_for_points
+from .steps import DISSIPATED, FAILURE, FAILURES
 
 if TYPE_CHECKING:
     from ..system import System
     from ..types import Array
     from .integrator import Integrator
 
-#: Contraction up to which factors are kept.
-REUSED = 0.3
 #: Instants of a step at which supports are asked that move.
 SAMPLES = 9
 #: Corrections that close joints at the end of a step.
@@ -40,13 +36,10 @@ class _Tableau:
 
     Attributes
     ----------
-    weights
-        b, shape (n,).
-    first, second
-        A^-1 and its square.
-    values, to, back
-        Eigenvalues mu of A^-1, one of each pair; rows of T^-1 for them; columns of T, those of
-        pairs twice.
+    method
+        Its :class:`~skfem_ancf.dynamics.stages.Method`.
+    largest
+        The largest absolute value of the eigenvalues of A^-1.
     fit
         Of a polynomial without its first two terms, from its values at c.
     samples, rates
@@ -58,16 +51,15 @@ class _Tableau:
         self.points = c
         k = np.arange(1, n + 1)
         inverse = np.linalg.inv(np.vander(c, increasing=True))
-        A, self.weights = (c[:, None]**k / k) @ inverse, (1.0 / k) @ inverse
-        self.first = np.linalg.inv(A)
-        self.second = self.first @ self.first
-        values, T = np.linalg.eig(self.first)
+        A, weights = (c[:, None]**k / k) @ inverse, (1.0 / k) @ inverse
+        first = np.linalg.inv(A)
+        values, T = np.linalg.eig(first)
         picked = np.nonzero(values.imag > -1e-12 * abs(values))[0]
-        pair = values.imag[picked] > 1e-12 * abs(values[picked])
-        self.values = [complex(x) if two else float(x.real)
-                       for x, two in zip(values[picked], pair)]
-        self.to = np.linalg.inv(T)[picked]
-        self.back = T[:, picked] * np.where(pair, 2.0, 1.0)
+        values = np.where(abs(values.imag) > 1e-12 * abs(values), values, values.real)[picked]
+        to, back = np.linalg.inv(T)[picked], T[:, picked] * np.where(values.imag > 0.0, 2.0, 1.0)
+        self.largest = float(abs(values).max())
+        self.method = Method(c, weights, first, first @ first, *(
+            np.ascontiguousarray([x.real, x.imag]) for x in (values, to, back)))
         self.fit = np.linalg.inv(c[:, None]**(k + 1))
         self.samples = 0.5 - 0.5 * np.cos(np.pi * np.arange(SAMPLES) / (SAMPLES - 1))
         fit = np.linalg.inv(chebvander(2.0 * self.samples - 1.0, SAMPLES - 1))
@@ -130,20 +122,74 @@ class Collocation(Scheme):
                              "apart: take 'energy-momentum' or 'generalized-alpha'")
 
     def step(self, integrator: Integrator, y: Motion, dt: float) -> Motion:
-        stages = _Stages(self, integrator, y, dt)
-        U, V, W = stages.solve(self._guess(y, dt))
-        s, t, work, table = integrator.system, y.t + dt, 0.0, self._table
-        u, v = y.u + dt * (table.weights @ V), y.v + dt * (table.weights @ W)
-        if table.points[-1] == 1.0:
-            u, v = U[-1], V[-1]
-        if s.damped:
-            work = dt * sum(b * (s.damping_force(p, q, at) @ q) for b, p, q, at in zip(
-                table.weights, U, V, stages.times))
-        new = integrator.start(self._closed(s, u, t), v, t, dt, ahead=False)
-        new.before, new.dissipated = dt, y.dissipated + work
-        new.memory = {"stages": U - new.u, "start": y.u - new.u, "way": dt * y.v,
-                      "dt": np.array(dt), "forces": stages.multipliers}
+        s, table, t = integrator.system, self._table, y.t + dt
+        w, state = self._room(integrator), integrator.begin(dt)
+        given = self._interval(integrator, y, dt)
+        w.y[:2] = y.u, y.v
+        w.guess[:] = self._guess(y, dt)
+        w.first[:] = y.memory["forces"] if y.memory else y.multipliers
+        state[DISSIPATED] = y.dissipated
+        function, equations = s.machine.of(collocate)
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            done = function(equations, integrator.matrices, table.method, given, w, state)
+        if not done:
+            raise StepFailed(FAILURES[int(state[FAILURE])])
+        new = self._end(integrator, w, t, dt)
+        new.before, new.dissipated = dt, float(state[DISSIPATED])
+        new.memory = {"stages": w.U - new.u, "start": y.u - new.u, "way": dt * y.v,
+                      "dt": np.array(dt), "forces": w.l.copy()}
         return new
+
+    def _room(self, integrator):
+        """Work arrays, in which factors are kept from step to step."""
+        table, s, kept = self._table, integrator.system, integrator.kept
+        if integrator.room is None:
+            M, method = s.mass.band, table.method
+            integrator.room = room_for_points(
+                len(method.points), method.values.shape[1], s.N, s.m,
+                s.machine.tables.stresses.size, M._replace(flat=np.zeros(M.flat.size)))
+        w = integrator.room
+        for name in ("re", "im", "J", "Y", "origin"):
+            if name in kept and kept[name] is not getattr(w, name):  # of a motion that goes on
+                getattr(w, name)[...] = kept[name]
+            kept[name] = getattr(w, name)
+        return w
+
+    def _interval(self, integrator, y, dt):
+        """What is given of a step."""
+        s, table, h = integrator.system, self._table, float(dt)
+        c, limit = table.method.points, integrator.limit
+        times = np.minimum(y.t + h * np.append(c, 1.0), limit)  # before what jumps at the end
+        held, tables = np.zeros((3, len(c), s.N)), s.machine.tables
+        at = np.minimum(y.t + h * table.samples, limit)
+        if s.moves:
+            first, second = table.rates @ s.values_at(at)
+            held[0][:, s.fixed] = [s.values(1.0, t) for t in times[:-1]]
+            held[1][:, s.fixed], held[2][:, s.fixed] = first / h, second / h**2
+        joints, drives = tables.plain.joints, int(tables.motion_varies)
+        moves = drives and not joints.own
+        many = times[:-1] if moves else times[:1]
+        zero = joints.own > 0 or not s.m
+        offsets = np.zeros((len(many), 3, s.m))
+        slopes = np.zeros((len(many), 4, len(joints.gk)))
+        if not zero:
+            offsets[:, 0], slopes[:, :2] = tables.offsets(many), tables.slopes(many)[:, None]
+        if moves:
+            offsets[:, 1] = np.tensordot(table.rates[0], tables.offsets(at), 1) / h
+            slopes[:, 2] = np.tensordot(table.rates[0], tables.slopes(at), 1) / h
+        rough = integrator.rough(y.u, (table.largest / h)**2)
+        return Interval(h, float(y.t), times, tables.factors(times), held,
+                        JointMotions(offsets, slopes, drives),
+                        float(integrator.tol * np.sqrt(integrator.energy) + rough), rough)
+
+    def _end(self, integrator, w, t, dt):
+        """The Motion at the end of a step."""
+        s, (u, v, a) = integrator.system, w.y
+        if s.joints or s.moves:
+            return integrator.start(self._closed(s, u, t), v, t, dt, ahead=False)
+        u, v, a = u.copy(), v.copy(), a.copy()
+        integrator.expect(0.5 * float(v @ s.mass.multiply(v)))
+        return Motion(t, u, v, a, a, np.zeros(0))
 
     @staticmethod
     def _closed(system, u, t):
@@ -163,116 +209,3 @@ class Collocation(Scheme):
         x = 1.0 + dt / float(old["dt"]) * c
         return (x**np.arange(2, len(c) + 2) @ fit + old["start"] + x * old["way"]
                 - dt * c * y.v)
-
-
-class _Stages:
-    """The equations of the points of one step."""
-
-    def __init__(self, scheme, integrator, y, dt):
-        self.table, self.integrator, self.y, self.dt = scheme._table, integrator, y, dt
-        s, c = integrator.system, self.table.points
-        self.times = np.minimum(y.t + dt * c, integrator.limit)  # before what jumps at the end
-        self.system, self.multipliers = s, np.tile(y.multipliers, (len(c), 1))
-        if y.memory:
-            self.multipliers = y.memory["forces"].copy()
-        if s.moves:
-            at = np.minimum(y.t + dt * self.table.samples, integrator.limit)
-            rates = self.table.rates @ s.values_at(at)
-            self._held = np.array([s.values(1.0, t) for t in self.times]), rates[0] / dt, (
-                rates[1] / dt**2)
-
-    def states(self, Z):
-        """Displacements, velocities and accelerations at the points."""
-        c, h, y, s = self.table.points[:, None], self.dt, self.y, self.system
-        U, V, W = y.u + h * c * y.v + Z, y.v + self.table.first @ Z / h, (
-            self.table.second @ Z / h**2)
-        if s.moves:
-            U[:, s.fixed], V[:, s.fixed], W[:, s.fixed] = self._held
-        return U, V, W
-
-    def residual(self, u, v, w, t, multipliers):
-        """What is missing in the equation of motion at a point."""
-        s = self.system
-        out = s.external_force(u, t) - s.internal_force(u, t) - s.mass.multiply(w)
-        if s.damped:
-            out -= s.damping_force(u, v, t)
-        if s.joints:
-            out -= multipliers @ s.full_jacobian(u, t)
-        return out * s.free
-
-    def solve(self, Z):
-        """Simplified Newton iteration."""
-        i, h, joints, state = self.integrator, self.dt, self.system.joints, np.zeros(STATE)
-        rough = i.rough(self.y.u, max(abs(x) for x in self.table.values)**2 / h**2)
-        wanted = i.tol * np.sqrt(i.energy) + rough
-        state[READY], state[RATE], state[SIZE] = i.kept.get("dt") == h, REUSED, -1.0
-        for _ in range(ITERATIONS):
-            if not state[READY]:
-                self._factorize()
-                state[READY], state[FRESH], state[SIZE] = 1.0, 1.0, -1.0
-            U, V, W = self.states(Z)
-            R = np.array([self.residual(*x) for x in zip(U, V, W, self.times, self.multipliers)])
-            gaps = np.zeros(self.multipliers.shape)
-            if joints:
-                gaps = np.array([i.constraint_rate(u, v, t, h, False)
-                                 for u, v, t in zip(U, V, self.times)])
-            dZ, forces = self._correction(R, gaps)
-            i.tally(len(R), 0)
-            work = abs(np.sum(dZ * R))
-            if joints:  # what closes them needs no residual
-                work += np.sum(np.abs(dZ @ i.kept["J"].T * forces))
-            state[LAST_SIZE], state[SIZE] = state[SIZE], np.sqrt(work)
-            Z, self.multipliers = Z + dZ, self.multipliers + forces
-            told = judge(state, wanted, rough, REUSED)
-            if told == DONE:
-                return self.states(Z)
-            if told == FAILED:
-                raise StepFailed(FAILURES[int(state[FAILURE])])
-        raise StepFailed(FAILURES[NOT_CONVERGED])
-
-    def _factorize(self):
-        """Factors of the iteration matrix at the start of the step."""
-        i, s, h, y = self.integrator, self.system, self.dt, self.y
-        s.assemble(y.u, t=y.t)
-        K, M, D = s.K.general(), s.mass.general().band.flat, 0.0
-        if s.damped:
-            band, tables = s.new_band(), s.machine.tables
-            add_damping(tables.plain.viscous, i.matrices.dampers, s.mass.band, 1.0, y.u,
-                        np.zeros((3, len(tables.stresses))), np.zeros(s.N), band.band)
-            D = band.general().band.flat
-        everywhere, diagonal = K.fixed_positions(s.fixed)
-        i.kept = {"dt": np.array(h)}
-        if s.joints:
-            i.kept["J"] = np.ascontiguousarray(dense(s.jacobian(y.u, y.t)))
-        for k, x in enumerate(self.table.values):
-            flat = K.band.flat + x / h * D + (x / h)**2 * M
-            flat[everywhere], flat[diagonal] = 0.0, 1.0
-            trf = lapack.zgbtrf if isinstance(x, complex) else lapack.dgbtrf
-            lu, pivots, info = trf(flat.reshape(s.N, -1).T, K.bandwidth, K.bandwidth)
-            if info != 0:
-                raise np.linalg.LinAlgError("the iteration matrix is singular")
-            i.kept[f"lu {k}"], i.kept[f"pivots {k}"] = lu, pivots
-            if s.joints:
-                i.kept[f"Y {k}"] = np.ascontiguousarray(self._solve(k, i.kept["J"].T + 0.0))
-        i.tally(0, len(self.table.values))
-
-    def _correction(self, R, gaps):
-        """What the iteration matrix makes of residuals (points, N) and of rates of joints."""
-        kept, table, s = self.integrator.kept, self.table, self.system
-        b, r, out = table.to @ R, table.to @ gaps, np.zeros(R.shape)
-        forces = np.zeros(gaps.shape)
-        for k, x in enumerate(table.values):
-            y = self._solve(k, b[k])
-            if s.joints:  # x / h J y = -r
-                J, Y = kept["J"], kept[f"Y {k}"]
-                push = np.linalg.solve(J @ Y, J @ y + self.dt / x * r[k])
-                y = y - Y @ push
-                forces += np.outer(table.back[:, k], push).real
-            out += np.outer(table.back[:, k], y).real
-        return out, forces
-
-    def _solve(self, k, b):
-        kept, width = self.integrator.kept, self.system.bandwidth
-        trs, b = (lapack.zgbtrs, b) if isinstance(self.table.values[k], complex) else (
-            lapack.dgbtrs, b.real)
-        return trs(kept[f"lu {k}"], width, width, b, kept[f"pivots {k}"])[0]

@@ -62,6 +62,8 @@ class Integrator:
     kept : dict of ndarray
         What a scheme with steps of its own keeps for the next, as factors: :meth:`forget` clears
         it.
+    room
+        Its work arrays.
     """
 
     def __init__(self, system: System, scheme: Scheme, tol: float | None = None) -> None:
@@ -92,6 +94,7 @@ class Integrator:
         self._state, self._dt, self.substeps, self._lost = np.zeros(STATE), np.nan, 0, ""
         self.longest = int(np.clip(STORED // (4 * system.N), 1, BLOCK))
         self.kept: dict[str, Array] = {}
+        self.room: Any = None
 
     @property
     def iterations(self) -> int:
@@ -113,6 +116,19 @@ class Integrator:
         """
         self._state[COUNT] += iterations
         self._state[FACTORIZED] += factorizations
+
+    def begin(self, dt: float) -> Array:
+        """The state of texts, as of :func:`~skfem_ancf.dynamics.steps.steps`, for a step.
+
+        Parameters
+        ----------
+        dt
+            Its size: factors are kept for one of the same.
+        """
+        if dt != self._dt:
+            self._dt, self._state[READY] = dt, 0.0
+        self._state[FAILURE] = 0.0
+        return self._state
 
     def rough(self, u: Array, mass_factor: float) -> float:
         """What round-off leaves of a correction, in the energy norm.

@@ -1,0 +1,451 @@
+"""The iteration of a step of collocation, as a text.
+
+With ``A^-1 = T diag(mu) T^-1`` the points of a step fall into systems ``K + mu D / h + mu^2 M / h^2``
+for each eigenvalue, one for each pair: complex and symmetric, with a positive real part but for a
+factor, so that their factors L D L^T need no exchanges.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..band import (Band, copy, dense_solve, factorize_complex, multiply, solve,
+                    solve_complex)
+from ..body import (add_force_of, body_carry, body_force, body_mixed, body_stress, body_tangent)
+from ..forces.texts import add_elastic_force, add_element_tangent
+from ..source import F1, F2, F3, borrowed, by_place, lanes, source
+from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, external_force,
+                      joint_directions)
+from .dampers import add_damping, damping_force
+from .rates import JointMotion, JointMotions, drive_rate
+from .steps import (ASTRAY, CARRIED, COUNT, DEPENDENT, DISSIPATED, DONE, FACTORIZED, FAILED, FAILURE,
+                    FRESH, GO_ON, ITERATIONS, LAST_SIZE, LASTING, MIXED, NOT_CONVERGED, RATE, READY,
+                    SINGULAR, SIZE, judge)
+
+#: Contraction up to which factors are kept.
+REUSED = 0.3
+
+
+@by_place
+class Method(NamedTuple):
+    """The numbers of a method of n points and k eigenvalues, one of each pair.
+
+    Attributes
+    ----------
+    points, weights
+        c and b.
+    first, second
+        A^-1 and its square.
+    values, to, back
+        mu, shape (2, k), rows of T^-1, (2, k, n), and columns of T, those of pairs twice, (2, n,
+        k): real and imaginary parts.
+    """
+
+    points: F1
+    weights: F1
+    first: F2
+    second: F2
+    values: F2
+    to: F3
+    back: F3
+
+
+class Interval(NamedTuple):
+    """What is given of a step.
+
+    Attributes
+    ----------
+    h, start
+        Its size, and where it begins.
+    times, factors
+        Of the points and of the end, shape (n + 1,), and of the loads there, (n + 1, l) or (1, l).
+    held
+        Displacement, velocity and acceleration of fixed coordinates there, shape (3, n, N).
+    joints
+        A :class:`~skfem_ancf.dynamics.rates.JointMotions` of the points.
+    wanted, rough
+        A correction that is small enough, and its round-off.
+    """
+
+    h: float
+    start: float
+    times: F1
+    factors: F2
+    held: F3
+    joints: JointMotions
+    wanted: float
+    rough: float
+
+
+@by_place
+class Points(NamedTuple):
+    """What is found, a row for each point, and what of factors is kept.
+
+    Attributes
+    ----------
+    y
+        u and v at the begin of the step; of one that is done at its end, with the acceleration
+        that they have without joints; shape (3, N).
+    Z, U, V, W, R, guess
+        The unknowns, displacement, velocity, acceleration, residual and correction, and where the
+        iteration begins, shape (n, N).
+    l, first, gaps
+        Multipliers, those at the begin of the iteration, and what rates of joints miss, (n, m).
+    carried, own
+        Stresses that are carried, and those of the displacement, shape (n, s).
+    stresses
+        Room, shape (3, s), the first row zero.
+    x
+        Room, shape (6, N).
+    origin
+        Where the factors were made, shape (N,).
+    re, im
+        Factors, shape (k, N (width + 1)).
+    J, Y
+        The joints' directions there, (m, N), and the solutions for them, (2 k, m, N).
+    D
+        Room for the derivative of damping.
+    """
+
+    y: F2
+    Z: F2
+    U: F2
+    V: F2
+    W: F2
+    R: F2
+    guess: F2
+    l: F2
+    first: F2
+    gaps: F2
+    carried: F2
+    own: F2
+    stresses: F2
+    x: F2
+    origin: F1
+    re: F2
+    im: F2
+    J: F2
+    Y: F3
+    D: Band
+
+
+def room_for_points(n: int, k: int, N: int, m: int, stresses: int, D: Band) -> Points:
+    """The Points of n points and k eigenvalues.
+
+    Parameters
+    ----------
+    n, k, N, m, stresses
+        Numbers of points, eigenvalues, coordinates, equations of joints, and stresses.
+    D
+        A band matrix of its own.
+    """
+    size = N * (D.width + 1)
+    return Points(np.zeros((3, N)), *np.zeros((6, n, N)), *np.zeros((3, n, m)),
+                  *np.zeros((2, n, stresses)), np.zeros((3, stresses)), np.zeros((6, N)),
+                  np.zeros(N), *np.zeros((2, k, size)), np.zeros((m, N)),
+                  np.zeros((2 * k, m, N)), D)
+
+
+@source
+def collocate(e, matrices, method, s, w, state):
+    """Iterate to the points of a step; U, V and W are theirs then.
+
+    Parameters
+    ----------
+    e, matrices
+        :class:`~skfem_ancf.equations.Equations`, :class:`~skfem_ancf.dynamics.steps.Matrices`.
+    method, s, w
+        As above.
+    state
+        As of :func:`~skfem_ancf.dynamics.steps.steps`, shape (12,).
+
+    Returns
+    -------
+    1 if it converges.
+    """
+    s, state, n = borrowed(s), borrowed(state), method.points.size
+    state[FRESH], state[SIZE] = 0.0, -1.0
+    told = GO_ON
+    _start(e.body, w, state)
+    for _ in range(ITERATIONS):
+        _states(e.free, method, s, w)
+        if state[READY] == 0.0:
+            if not _factorize(e, matrices, method, s, w):
+                state[FAILURE] = SINGULAR
+                return 0
+            state[FACTORIZED] += method.values.shape[1]
+            state[READY], state[RATE], state[FRESH], state[SIZE] = 1.0, REUSED, 1.0, -1.0
+        for k in range(n):
+            _residual(e, matrices, s, w, state, k)
+        state[COUNT] += n
+        if not _correct(e.free, method, s, w, state):
+            state[FAILURE] = DEPENDENT
+            return 0
+        told = _judged(e.body, s, w, state)
+        if told == ASTRAY:
+            _start(e.body, w, state)
+        elif told != GO_ON:
+            break
+    if told == DONE:
+        _states(e.free, method, s, w)
+        _end(e, matrices, method, s, w, state)
+        state[MIXED] = max(0.0, state[MIXED] - 1.0)
+        return 1
+    if told != FAILED:
+        state[FAILURE] = NOT_CONVERGED
+    return 0
+
+
+@source
+def _end(e, matrices, method, s, w, state):
+    """The end of the step into ``w.y``, and the work of damping."""
+    n, t, dampers = method.points.size, s.times[method.points.size], matrices.dampers
+    u, v, a, f, Q, room = w.y[0], w.y[1], w.y[2], w.x[0], w.x[1], w.x[2]
+    for k in range(n):
+        c, U, V, W = s.h * method.weights[k], w.U[k], w.V[k], w.W[k]
+        if dampers.active > 0:
+            damping_force(e, dampers, matrices.M, s.times[k], U, V, f, room)
+            state[DISSIPATED] += c * np.dot(f, V)
+        for i in lanes(u.size):
+            u[i] += c * V[i]
+            v[i] += c * W[i]
+    if method.points[n - 1] == 1.0:
+        copy(w.U[n - 1], u)
+        copy(w.V[n - 1], v)
+    body_force(e.body, u, f)
+    add_elastic_force(e.forces, t, 0.0, u, u, f)
+    external_force(e.loads, _row(s.factors, n), t, 1.0, u, Q)
+    for i in lanes(a.size):
+        a[i] = (Q[i] - f[i]) * e.free[i]
+    if dampers.active > 0:
+        damping_force(e, dampers, matrices.M, t, u, v, f, room)
+        for i in lanes(a.size):
+            a[i] -= f[i] * e.free[i]
+    solve(matrices.mass, a)
+
+
+# the iteration
+
+
+@source
+def _start(body, w, state):
+    """Where it begins."""
+    for k in range(w.Z.shape[0]):
+        copy(w.guess[k], w.Z[k])
+        copy(w.first[k], w.l[k])
+    if state[MIXED] > 0.0:
+        for k in range(w.Z.shape[0]):
+            body_stress(body, w.y[0], w.carried[k])
+
+
+@source
+def _states(free, method, s, w):
+    """Displacements, velocities and accelerations of the points."""
+    u0, v0, n, N = w.y[0], w.y[1], method.points.size, free.size
+    for k in range(n):
+        U, V, W, Z, c = w.U[k], w.V[k], w.W[k], w.Z[k], s.h * method.points[k]
+        for i in lanes(N):
+            U[i] = (u0[i] + c * v0[i] + Z[i]) * free[i] + s.held[0, k, i]
+            V[i] = v0[i]
+            W[i] = 0.0
+        for j in range(n):
+            Z, p, q = w.Z[j], method.first[k, j] / s.h, method.second[k, j] / (s.h * s.h)
+            for i in lanes(N):
+                V[i] += p * Z[i]
+                W[i] += q * Z[i]
+        for i in lanes(N):
+            V[i] = V[i] * free[i] + s.held[1, k, i]
+            W[i] = W[i] * free[i] + s.held[2, k, i]
+
+
+@source
+def _row(x, k):
+    """Of an array that may have one row for all points."""
+    return x[k if x.shape[0] > 1 else 0]
+
+
+@source
+def _residual(e, matrices, s, w, state, k):
+    """What is missing in the equation of motion at a point, and in the rates of joints."""
+    u, v, R, t, f, Q, d, room = (w.U[k], w.V[k], w.R[k], s.times[k], w.x[0], w.x[1], w.x[2],
+                                 w.x[3])
+    if state[MIXED] > 0.0:
+        missing, own, carried = w.stresses[1], w.own[k], w.carried[k]
+        body_mixed(e.body, False, u, u, f, carried, own)
+        for i in lanes(missing.size):
+            missing[i] = own[i] - carried[i]
+        add_force_of(e.body, w.origin, missing, f)
+    else:
+        body_force(e.body, u, f)
+    add_elastic_force(e.forces, t, 0.0, u, u, f)
+    if matrices.dampers.active > 0:
+        damping_force(e, matrices.dampers, matrices.M, t, u, v, d, room)
+        for i in lanes(f.size):
+            f[i] += d[i]
+    external_force(e.loads, _row(s.factors, k), t, 1.0, u, Q)
+    multiply(matrices.M, w.W[k], room)
+    for i in lanes(f.size):
+        f[i] += room[i]
+    if w.gaps.shape[1] > 0:
+        gap, l = w.gaps[k], w.l[k]
+        g = _row(s.joints.g, k)
+        motion = JointMotion(_row(s.joints.c, k), g, s.joints.drives)
+        add_joint_force(e.joints, g[0], t, u, l, f)
+        drive_rate(e.joints, motion, t, t - s.start, u, gap)
+        add_constraint_rate(e.joints, g[0], t, u, v, gap)
+    for i in lanes(f.size):
+        R[i] = (Q[i] - f[i]) * e.free[i]
+
+
+@source
+def _correct(free, method, s, w, state):
+    """Correct Z and the multipliers; R becomes the correction. False if joints are dependent."""
+    n, N, m, work, closing = method.points.size, free.size, w.l.shape[1], 0.0, 0.0
+    D, dl = np.zeros((n, N)), np.zeros((n, m))
+    x, y, r, q = w.x[0], w.x[1], np.empty(2 * m), np.empty((2 * m, 2 * m))
+    for k in range(method.values.shape[1]):
+        for i in lanes(N):
+            x[i] = 0.0
+            y[i] = 0.0
+        for j in range(n):
+            a, b, R = method.to[0, k, j], method.to[1, k, j], w.R[j]
+            for i in lanes(N):
+                x[i] += a * R[i]
+                y[i] += b * R[i]
+        solve_complex(w.re[k], w.im[k], x, y)
+        if m > 0 and not _join(method, s, w, k, r, q, x, y):
+            return False
+        for j in range(n):
+            a, b, out = method.back[0, j, k], method.back[1, j, k], D[j]
+            for i in lanes(N):
+                out[i] += a * x[i] - b * y[i]
+            for l in range(m):
+                dl[j, l] += a * r[l] - b * r[m + l]
+    for j in range(n):
+        Z, R, d, l, share = w.Z[j], w.R[j], D[j], w.l[j], dl[j]
+        work += np.dot(d, R)
+        for a in range(m):  # what closes them needs no residual
+            closing += abs(np.dot(w.J[a], d) * share[a])
+            l[a] += share[a]
+        for i in lanes(N):
+            Z[i] += d[i]
+            R[i] = d[i]
+    state[LAST_SIZE], state[SIZE] = state[SIZE], np.sqrt(abs(work) + closing)
+    return True
+
+
+@source
+def _join(method, s, w, k, r, q, x, y):
+    """Change x + i y so that the rates of joints become what they have to be, by multipliers r.
+
+    ``mu / h J x = -gap`` for the eigenvalue k.
+    """
+    m, n, p = w.l.shape[1], method.points.size, method.values[0, k]
+    z = method.values[1, k]
+    c, d = s.h * p / (p * p + z * z), -s.h * z / (p * p + z * z)  # h / mu
+    for a in range(m):
+        J = w.J[a]
+        re, im = 0.0, 0.0
+        for j in range(n):
+            re += method.to[0, k, j] * w.gaps[j, a]
+            im += method.to[1, k, j] * w.gaps[j, a]
+        r[a] = np.dot(J, x) + c * re - d * im
+        r[m + a] = np.dot(J, y) + c * im + d * re
+        for b in range(m):
+            re, im = np.dot(J, w.Y[2 * k, b]), np.dot(J, w.Y[2 * k + 1, b])
+            q[a, b], q[m + a, m + b], q[a, m + b], q[m + a, b] = re, re, -im, im
+    if not dense_solve(q, r):
+        return False
+    for b in range(m):
+        re, im, f, g = w.Y[2 * k, b], w.Y[2 * k + 1, b], r[b], r[m + b]
+        for i in lanes(x.size):
+            x[i] -= f * re[i] - g * im[i]
+            y[i] -= f * im[i] + g * re[i]
+    return True
+
+
+@source
+def _judged(body, s, w, state):
+    """What the last correction tells; as in steps of second order."""
+    fresh = state[FRESH] > 0.0
+    if state[MIXED] > 0.0:
+        for k in range(w.R.shape[0]):
+            body_carry(body, w.origin, w.R[k], w.own[k], w.carried[k])
+        told = judge(state, s.wanted, s.rough, CARRIED)
+        if told == GO_ON and not fresh and state[LAST_SIZE] < 0.0:
+            state[READY] = 0.0
+        return told
+    told = judge(state, s.wanted, s.rough, REUSED)
+    if fresh and (told == FAILED or told != DONE and state[READY] == 0.0):
+        state[MIXED], state[READY] = LASTING, 0.0
+        return ASTRAY
+    return told
+
+
+# its factors
+
+
+@source
+def _factorize(e, matrices, method, s, w):
+    """Factors of the iteration matrices at the mean of the points; False if there are none."""
+    origin, f, S, yes = w.origin, w.x[0], w.stresses, w.x.size > 0
+    for i in lanes(origin.size):
+        origin[i] = 0.0
+    for k in range(method.points.size):
+        U, c = w.U[k], method.weights[k]
+        for i in lanes(origin.size):
+            origin[i] += c * U[i]
+    body_stress(e.body, w.y[0], S[1])
+    body_tangent(e.body, origin, f, S[1], yes, S[2], e.K)
+    add_load_stiffness(e.loads, _row(s.factors, 0), s.times[0], 1.0, origin, e.K)
+    add_element_tangent(e.forces, s.times[0], origin, e.K)
+    D = w.D.flat
+    for i in lanes(D.size):
+        D[i] = 0.0
+    if matrices.dampers.active > 0:
+        add_damping(e.viscous, matrices.dampers, matrices.M, 1.0, origin, S, f, w.D)
+    if w.J.shape[0] > 0:
+        joint_directions(e.joints, _row(s.joints.g, 0)[0], s.times[0], origin, w.J)
+        for a in range(w.J.shape[0]):
+            J = w.J[a]
+            for i in lanes(J.size):
+                J[i] *= e.free[i]
+    for k in range(method.values.shape[1]):
+        a, b = method.values[0, k] / s.h, method.values[1, k] / s.h
+        re, im = w.re[k], w.im[k]
+        _combine(e.K, matrices.M, w.D, e.free, a * a - b * b, 2.0 * a * b, a, b, re, im)
+        if not factorize_complex(re, im, e.K.width):
+            return False
+        for j in range(w.J.shape[0]):
+            x, y = w.Y[2 * k, j], w.Y[2 * k + 1, j]
+            copy(w.J[j], x)
+            for i in lanes(y.size):
+                y[i] = 0.0
+            solve_complex(re, im, x, y)
+    return True
+
+
+@source
+def _combine(K, M, D, free, c, d, a, b, re, im):
+    """``K + (c + i d) M + (a + i b) D`` with the supports fixed, the lower half of each column.
+
+    Of a matrix that is not symmetric the mean of both halves: the iteration corrects the rest.
+    """
+    n, top, width = free.size, K.top, K.width
+    k, m, r = K.flat.reshape(n, K.ld), M.flat.reshape(n, K.ld), D.flat.reshape(n, K.ld)
+    x, y = re.reshape(n, width + 1), im.reshape(n, width + 1)
+    for h in range(width + 1):
+        p = top + h
+        for j in lanes(n):
+            x[j, h] = k[j, p] + c * m[j, p] + a * r[j, p]
+            y[j, h] = d * m[j, p] + b * r[j, p]
+        if top > 0 and h < n:
+            later = k[h:]
+            for j in lanes(n - h):
+                x[j, h] += 0.5 * (later[j, top - h] - k[j, p])
+        after = free[min(h, n):]
+        for j in lanes(after.size):
+            x[j, h] *= free[j] * after[j]
+            y[j, h] *= free[j] * after[j]
+    for j in lanes(n):
+        x[j, 0] += 1.0 - free[j]
