@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from ..system import System
     from ..types import Array
     from .integrator import Integrator
@@ -114,6 +116,30 @@ class Scheme:
             If there is no such step: it is tried in two halves.
         """
         return integrator.take(y, dt)
+
+    def in_blocks(self, system: System) -> bool:
+        """True if :meth:`run` takes many steps at once.
+
+        Parameters
+        ----------
+        system
+            A :class:`~skfem_ancf.system.System`.
+        """
+        return type(self).step is Scheme.step
+
+    def run(self, integrator: Integrator, y: Motion, dt: float, n: int,
+            start: float | None = None, first: int = 0,
+            block: tuple[int, int] | None = None) -> tuple[int, Callable[[int], Motion]]:
+        """Up to n steps: as :meth:`skfem_ancf.dynamics.integrator.Integrator.run`.
+
+        Parameters
+        ----------
+        integrator
+            An :class:`~skfem_ancf.dynamics.integrator.Integrator`.
+        y, dt, n, start, first, block
+            As there.
+        """
+        return integrator.run(y, dt, n, start, first, block)
 
     def require(self, system: System) -> None:
         """Raise InputError for a system that the scheme is not for.

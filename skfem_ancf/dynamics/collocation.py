@@ -13,9 +13,10 @@ from .base import Motion, Scheme
 from .integrator import StepFailed
 from .rates import JointMotions
 from .stages import Interval, Method, collocate, room_for_points
-from .steps import DISSIPATED, FAILURE, FAILURES
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from ..system import System
     from ..types import Array
     from .integrator import Integrator
@@ -38,8 +39,6 @@ class _Tableau:
     ----------
     method
         Its :class:`~skfem_ancf.dynamics.stages.Method`.
-    largest
-        The largest absolute value of the eigenvalues of A^-1.
     fit
         Of a polynomial without its first two terms, from its values at c.
     samples, rates
@@ -57,10 +56,10 @@ class _Tableau:
         picked = np.nonzero(values.imag > -1e-12 * abs(values))[0]
         values = np.where(abs(values.imag) > 1e-12 * abs(values), values, values.real)[picked]
         to, back = np.linalg.inv(T)[picked], T[:, picked] * np.where(values.imag > 0.0, 2.0, 1.0)
-        self.largest = float(abs(values).max())
-        self.method = Method(c, weights, first, first @ first, *(
-            np.ascontiguousarray([x.real, x.imag]) for x in (values, to, back)))
         self.fit = np.linalg.inv(c[:, None]**(k + 1))
+        self.method = Method(c, weights, first, first @ first, *(
+            np.ascontiguousarray([x.real, x.imag]) for x in (values, to, back)),
+                             (1.0 + c[:, None])**(k + 1) @ self.fit)
         self.samples = 0.5 - 0.5 * np.cos(np.pi * np.arange(SAMPLES) / (SAMPLES - 1))
         fit = np.linalg.inv(chebvander(2.0 * self.samples - 1.0, SAMPLES - 1))
         self.rates = np.array([2.0**k * chebval(2.0 * c - 1.0, chebder(
@@ -121,24 +120,39 @@ class Collocation(Scheme):
             raise InputError(f"{self!r} is not for scenes with force elements between points far "
                              "apart: take 'energy-momentum' or 'generalized-alpha'")
 
+    def in_blocks(self, system: System) -> bool:
+        return not (system.joints or system.moves)
+
     def step(self, integrator: Integrator, y: Motion, dt: float) -> Motion:
-        s, table, t = integrator.system, self._table, y.t + dt
-        w, state = self._room(integrator), integrator.begin(dt)
-        given = self._interval(integrator, y, dt)
+        done, motion = self.run(integrator, y, dt, 1)
+        if not done:
+            raise StepFailed(integrator.failure)
+        return motion(0)
+
+    def run(self, integrator: Integrator, y: Motion, dt: float, n: int,
+            start: float | None = None, first: int = 0,
+            block: tuple[int, int] | None = None) -> tuple[int, Callable[[int], Motion]]:
+        s, method, w = integrator.system, self._table.method, self._room(integrator)
+        given = self._interval(integrator, y, dt, n)
         w.y[:2] = y.u, y.v
         w.guess[:] = self._guess(y, dt)
         w.first[:] = y.memory["forces"] if y.memory else y.multipliers
-        state[DISSIPATED] = y.dissipated
-        function, equations = s.machine.of(collocate)
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            done = function(equations, integrator.matrices, table.method, given, w, state)
-        if not done:
-            raise StepFailed(FAILURES[int(state[FAILURE])])
-        new = self._end(integrator, w, t, dt)
-        new.before, new.dissipated = dt, float(state[DISSIPATED])
-        new.memory = {"stages": w.U - new.u, "start": y.u - new.u, "way": dt * y.v,
-                      "dt": np.array(dt), "forces": w.l.copy()}
-        return new
+        points = len(method.points)
+        rows, stages, works = np.empty((n, 3, s.N)), np.empty((n, points, s.N)), np.empty(n)
+        done = integrator.call(collocate, y, dt, method, integrator.rule, given, w,
+                               integrator.state, rows, stages, works)
+        times, forces = y.t + dt * np.arange(1, n + 1), w.first.copy()
+
+        def motion(k: int) -> Motion:
+            """After step k, counted from 0."""
+            u, v = rows[k - 1, :2] if k else (y.u, y.v)
+            new = self._end(integrator, rows[k], float(times[k]), dt)
+            new.before, new.dissipated = dt, float(works[k])
+            new.memory = {"stages": stages[k] - new.u, "start": u - new.u, "way": dt * v,
+                          "dt": np.array(dt), "forces": forces}
+            return new
+
+        return done, motion
 
     def _room(self, integrator):
         """Work arrays, in which factors are kept from step to step."""
@@ -155,11 +169,12 @@ class Collocation(Scheme):
             kept[name] = getattr(w, name)
         return w
 
-    def _interval(self, integrator, y, dt):
-        """What is given of a step."""
+    def _interval(self, integrator, y, dt, n):
+        """What is given of steps."""
         s, table, h = integrator.system, self._table, float(dt)
         c, limit = table.method.points, integrator.limit
-        times = np.minimum(y.t + h * np.append(c, 1.0), limit)  # before what jumps at the end
+        times = y.t + h * (np.arange(n)[:, None] + np.append(c, 1.0)).ravel()
+        times = np.minimum(times, limit)  # before what jumps at the end
         held, tables = np.zeros((3, len(c), s.N)), s.machine.tables
         at = np.minimum(y.t + h * table.samples, limit)
         if s.moves:
@@ -177,18 +192,14 @@ class Collocation(Scheme):
         if moves:
             offsets[:, 1] = np.tensordot(table.rates[0], tables.offsets(at), 1) / h
             slopes[:, 2] = np.tensordot(table.rates[0], tables.slopes(at), 1) / h
-        rough = integrator.rough(y.u, (table.largest / h)**2)
-        return Interval(h, float(y.t), times, tables.factors(times), held,
-                        JointMotions(offsets, slopes, drives),
-                        float(integrator.tol * np.sqrt(integrator.energy) + rough), rough)
+        return Interval(h, times, tables.factors(times), held,
+                        JointMotions(offsets, slopes, drives))
 
-    def _end(self, integrator, w, t, dt):
+    def _end(self, integrator, row, t, dt):
         """The Motion at the end of a step."""
-        s, (u, v, a) = integrator.system, w.y
+        s, (u, v, a) = integrator.system, row
         if s.joints or s.moves:
             return integrator.start(self._closed(s, u, t), v, t, dt, ahead=False)
-        u, v, a = u.copy(), v.copy(), a.copy()
-        integrator.expect(0.5 * float(v @ s.mass.multiply(v)))
         return Motion(t, u, v, a, a, np.zeros(0))
 
     @staticmethod

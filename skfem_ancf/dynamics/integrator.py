@@ -117,19 +117,6 @@ class Integrator:
         self._state[COUNT] += iterations
         self._state[FACTORIZED] += factorizations
 
-    def begin(self, dt: float) -> Array:
-        """The state of texts, as of :func:`~skfem_ancf.dynamics.steps.steps`, for a step.
-
-        Parameters
-        ----------
-        dt
-            Its size: factors are kept for one of the same.
-        """
-        if dt != self._dt:
-            self._dt, self._state[READY] = dt, 0.0
-        self._state[FAILURE] = 0.0
-        return self._state
-
     def rough(self, u: Array, mass_factor: float) -> float:
         """What round-off leaves of a correction, in the energy norm.
 
@@ -267,29 +254,17 @@ class Integrator:
         -------
         The number of steps done, and a function that gives the Motion after each.
         """
-        s, before = self.system, self._state.copy()
+        s = self.system
         course = self._courses.of(y.t if start is None else start, dt, first, n,
                                   (first, first + n) if block is None else block, self.limit)
-        if dt != self._dt:
-            self._dt, self._state[READY] = dt, 0.0
         if self._nodes:
             self._nodes[1].lag = 0.5 * dt if self.scheme.conserving else 0.0
-        self._state[[BEFORE, FAILURE, DISSIPATED]] = y.before, 0.0, y.dissipated
         rows, multiplier_rows, works = np.empty((n, 4, s.N)), np.empty((n, 2, s.m)), np.empty(n)
         work = self._work
         work.y[:] = y.u, y.v, y.acceleration, y.algorithmic
         work.m.l0[:], work.m.last[:] = y.multipliers, y.force
-        function, equations = s.machine.of(steps)
-        try:
-            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-                done = function(equations, self.matrices, self.rule, course, self._state, work,
-                                rows, multiplier_rows, works)
-        except BaseException:  # also Ctrl-C: the motion may go on from y
-            self._state[:], self._state[READY] = before, 0.0
-            raise
-        done, self._lost = s.first_lost(rows[:done, 0])
-        if done < n:
-            self._state[READY] = 0.0
+        done = self.call(steps, y, dt, self.rule, course, self._state, work, rows,
+                         multiplier_rows, works)
 
         def motion(k):
             """After step k, counted from 0."""
@@ -297,6 +272,48 @@ class Integrator:
                           dissipated=float(works[k]))
 
         return done, motion
+
+    def call(self, text: Callable, y: Motion, dt: float, *args: Any) -> int:
+        """Take steps by a text of equations, matrices and others.
+
+        Parameters
+        ----------
+        text, *args
+            What it is, and all but its first two arguments, of which ``state`` is
+            :attr:`state` and the third from the end takes the displacements, shape (n, k, N).
+        y, dt
+            Where the motion is, and the size of the steps.
+
+        Returns
+        -------
+        int
+            The number of steps done.
+        """
+        s, before, rows = self.system, self._state.copy(), args[-3]
+        if dt != self._dt:
+            self._dt, self._state[READY] = dt, 0.0
+        self._state[[BEFORE, FAILURE, DISSIPATED]] = y.before, 0.0, y.dissipated
+        function, equations = s.machine.of(text)
+        try:
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                done = function(equations, self.matrices, *args)
+        except BaseException:  # also Ctrl-C: the motion may go on from y
+            self._state[:], self._state[READY] = before, 0.0
+            raise
+        done, self._lost = s.first_lost(rows[:done, 0])
+        if done < len(rows):
+            self._state[READY] = 0.0
+        return done
+
+    @property
+    def state(self) -> Array:
+        """What texts keep from step to step, as of :func:`~skfem_ancf.dynamics.steps.steps`."""
+        return self._state
+
+    @property
+    def failure(self) -> str:
+        """Why the last step has failed."""
+        return self._lost or FAILURES[int(self._state[FAILURE])]
 
     def take(self, y: Motion, dt: float) -> Motion:
         """One step from the Motion ``y``; raises StepFailed.
@@ -308,7 +325,7 @@ class Integrator:
         """
         done, motion = self.run(y, dt, 1)
         if not done:
-            raise StepFailed(self._lost or FAILURES[int(self._state[FAILURE])])
+            raise StepFailed(self.failure)
         return motion(0)
 
     def step(self, y: Motion, dt: float, depth: int = 0) -> Motion:

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from ..errors import AncfError, ask_number
-from .base import Motion, Scheme, in_steps
+from .base import Motion, Scheme
 from .history import History
 from .integrator import Integrator, StepFailed
 from .sensors import Recorder
@@ -112,7 +112,7 @@ class Run:
         self.until: Callable[[State], float] | None = None
         self.event: float | None = None
         self._value: float | None = None
-        self._in_blocks, self._pace = in_steps(scheme), 1
+        self._in_blocks, self._pace = scheme.in_blocks(system), 1
         self._limit()
 
     # the start
@@ -230,7 +230,8 @@ class Run:
             number = min(number, self.longest - self.n % self.longest)
         begun = perf_counter()
         try:
-            done, motion = self.integrator.run(y, self.size, number, self._begun, self.n, block)
+            done, motion = self.scheme.run(self.integrator, y, self.size, number, self._begun,
+                                           self.n, block)
         except AncfError:  # of a function of the caller's: go on as far as it goes
             self._in_blocks = False
             return 0, None

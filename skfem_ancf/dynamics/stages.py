@@ -1,4 +1,4 @@
-"""The iteration of a step of collocation, as a text.
+"""Steps of collocation, as a text.
 
 With ``A^-1 = T diag(mu) T^-1`` the points of a step fall into systems ``K + mu D / h + mu^2 M / h^2``
 for each eigenvalue, one for each pair: complex and symmetric, with a positive real part but for a
@@ -18,9 +18,9 @@ from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, 
                       joint_directions)
 from .dampers import add_damping, damping_force
 from .rates import JointMotion, JointMotions, drive_rate
-from .steps import (ASTRAY, CARRIED, COUNT, DEPENDENT, DISSIPATED, DONE, FACTORIZED, FAILED, FAILURE,
-                    FRESH, GO_ON, ITERATIONS, LAST_SIZE, LASTING, MIXED, NOT_CONVERGED, RATE, READY,
-                    SINGULAR, SIZE, judge)
+from .steps import (ASTRAY, CARRIED, COUNT, DEPENDENT, DISSIPATED, DONE, ENERGY, FACTORIZED,
+                    FAILED, FAILURE, FRESH, GO_ON, ITERATIONS, LAST_SIZE, LASTING, MIXED,
+                    NOT_CONVERGED, RATE, READY, SINGULAR, SIZE, judge, round_off)
 
 #: Contraction up to which factors are kept.
 REUSED = 0.3
@@ -39,6 +39,8 @@ class Method(NamedTuple):
     values, to, back
         mu, shape (2, k), rows of T^-1, (2, k, n), and columns of T, those of pairs twice, (2, n,
         k): real and imaginary parts.
+    ahead
+        Values at 1 + c of the polynomial without its first two terms, from those at c, (n, n).
     """
 
     points: F1
@@ -48,33 +50,30 @@ class Method(NamedTuple):
     values: F2
     to: F3
     back: F3
+    ahead: F2
 
 
 class Interval(NamedTuple):
-    """What is given of a step.
+    """What is given of s steps; of one, where supports or joints move.
 
     Attributes
     ----------
-    h, start
-        Its size, and where it begins.
+    h
+        Their size.
     times, factors
-        Of the points and of the end, shape (n + 1,), and of the loads there, (n + 1, l) or (1, l).
+        Of the points and of the end of each, shape (s (n + 1),), and of the loads there, (s (n +
+        1), l) or (1, l).
     held
-        Displacement, velocity and acceleration of fixed coordinates there, shape (3, n, N).
+        Displacement, velocity and acceleration of fixed coordinates, shape (3, n, N).
     joints
         A :class:`~skfem_ancf.dynamics.rates.JointMotions` of the points.
-    wanted, rough
-        A correction that is small enough, and its round-off.
     """
 
     h: float
-    start: float
     times: F1
     factors: F2
     held: F3
     joints: JointMotions
-    wanted: float
-    rough: float
 
 
 @by_place
@@ -86,6 +85,8 @@ class Points(NamedTuple):
     y
         u and v at the begin of the step; of one that is done at its end, with the acceleration
         that they have without joints; shape (3, N).
+    before
+        u and v at the begin of the step before, shape (2, N).
     Z, U, V, W, R, guess
         The unknowns, displacement, velocity, acceleration, residual and correction, and where the
         iteration begins, shape (n, N).
@@ -108,6 +109,7 @@ class Points(NamedTuple):
     """
 
     y: F2
+    before: F2
     Z: F2
     U: F2
     V: F2
@@ -140,71 +142,115 @@ def room_for_points(n: int, k: int, N: int, m: int, stresses: int, D: Band) -> P
         A band matrix of its own.
     """
     size = N * (D.width + 1)
-    return Points(np.zeros((3, N)), *np.zeros((6, n, N)), *np.zeros((3, n, m)),
+    return Points(np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((3, n, m)),
                   *np.zeros((2, n, stresses)), np.zeros((3, stresses)), np.zeros((6, N)),
                   np.zeros(N), *np.zeros((2, k, size)), np.zeros((m, N)),
                   np.zeros((2 * k, m, N)), D)
 
 
 @source
-def collocate(e, matrices, method, s, w, state):
-    """Iterate to the points of a step; U, V and W are theirs then.
+def collocate(e, matrices, method, rule, s, w, state, rows, stages, works):
+    """Take steps from ``w.y`` and ``w.first`` on.
 
     Parameters
     ----------
-    e, matrices
-        :class:`~skfem_ancf.equations.Equations`, :class:`~skfem_ancf.dynamics.steps.Matrices`.
+    e, matrices, rule
+        :class:`~skfem_ancf.equations.Equations`, :class:`~skfem_ancf.dynamics.steps.Matrices`,
+        :class:`~skfem_ancf.dynamics.steps.Rule`.
     method, s, w
-        As above.
+        As above; of w ``y``, ``guess`` and ``first``.
     state
         As of :func:`~skfem_ancf.dynamics.steps.steps`, shape (12,).
+    rows, stages, works
+        Written: of each step u, v and the acceleration that they have without joints, (s, 3, N),
+        the displacements of its points, (s, n, N), and the work of damping up to its end, (s,).
 
     Returns
     -------
-    1 if it converges.
+    The number of steps done; one that fails is the last.
     """
-    s, state, n = borrowed(s), borrowed(state), method.points.size
+    s, state = borrowed(s), borrowed(state)
+    for k in range(rows.shape[0]):
+        if k > 0:
+            _ahead(method, s, w)
+        if not _converges(e, matrices, method, rule, s, w, state, k):
+            return k
+        copy(w.y[0], w.before[0])
+        copy(w.y[1], w.before[1])
+        _end(e, matrices, method, s, w, state, k)
+        state[MIXED] = max(0.0, state[MIXED] - 1.0)
+        for j in range(3):
+            copy(w.y[j], rows[k, j])
+        for j in range(method.points.size):
+            copy(w.U[j], stages[k, j])
+            copy(w.l[j], w.first[j])
+        works[k] = state[DISSIPATED]
+    return rows.shape[0]
+
+
+@source
+def _converges(e, matrices, method, rule, s, w, state, step):
+    """Iterate to the points of a step: U, V and W are theirs then; False if there are none."""
+    n, room, told, u0 = method.points.size, w.x[0], GO_ON, w.y[0]
+    multiply(matrices.M, u0, room)
+    largest = 0.0
+    for k in range(method.values.shape[1]):
+        a, b = method.values[0, k], method.values[1, k]
+        largest = max(largest, (a * a + b * b) / (s.h * s.h))
+    rough = round_off(rule, 1.0, largest, abs(np.dot(u0, room)))
+    wanted = rule.tol * np.sqrt(state[ENERGY]) + rough
     state[FRESH], state[SIZE] = 0.0, -1.0
-    told = GO_ON
     _start(e.body, w, state)
     for _ in range(ITERATIONS):
         _states(e.free, method, s, w)
         if state[READY] == 0.0:
-            if not _factorize(e, matrices, method, s, w):
+            if not _factorize(e, matrices, method, s, w, step):
                 state[FAILURE] = SINGULAR
-                return 0
+                return False
             state[FACTORIZED] += method.values.shape[1]
             state[READY], state[RATE], state[FRESH], state[SIZE] = 1.0, REUSED, 1.0, -1.0
         for k in range(n):
-            _residual(e, matrices, s, w, state, k)
+            _residual(e, matrices, method, s, w, state, step, k)
         state[COUNT] += n
         if not _correct(e.free, method, s, w, state):
             state[FAILURE] = DEPENDENT
-            return 0
-        told = _judged(e.body, s, w, state)
+            return False
+        told = _judged(e.body, w, state, wanted, rough)
         if told == ASTRAY:
             _start(e.body, w, state)
         elif told != GO_ON:
             break
-    if told == DONE:
-        _states(e.free, method, s, w)
-        _end(e, matrices, method, s, w, state)
-        state[MIXED] = max(0.0, state[MIXED] - 1.0)
-        return 1
-    if told != FAILED:
+    _states(e.free, method, s, w)
+    if told != DONE and told != FAILED:
         state[FAILURE] = NOT_CONVERGED
-    return 0
+    return told == DONE
 
 
 @source
-def _end(e, matrices, method, s, w, state):
+def _ahead(method, s, w):
+    """Where the iteration begins: the polynomial of the step before, at this one's points."""
+    n, h, u0, v0 = method.points.size, s.h, w.y[0], w.y[1]
+    u, v = w.before[0], w.before[1]
+    for k in range(n):
+        guess, c = w.guess[k], h * method.points[k]
+        for i in lanes(u.size):
+            guess[i] = u[i] + (h + c) * v[i] - u0[i] - c * v0[i]
+        for j in range(n):
+            U, p, b = w.U[j], method.ahead[k, j], h * method.points[j]
+            for i in lanes(u.size):
+                guess[i] += p * (U[i] - u[i] - b * v[i])
+
+
+@source
+def _end(e, matrices, method, s, w, state, step):
     """The end of the step into ``w.y``, and the work of damping."""
-    n, t, dampers = method.points.size, s.times[method.points.size], matrices.dampers
+    n, dampers, first = method.points.size, matrices.dampers, step * (method.points.size + 1)
+    t = s.times[first + n]
     u, v, a, f, Q, room = w.y[0], w.y[1], w.y[2], w.x[0], w.x[1], w.x[2]
     for k in range(n):
         c, U, V, W = s.h * method.weights[k], w.U[k], w.V[k], w.W[k]
         if dampers.active > 0:
-            damping_force(e, dampers, matrices.M, s.times[k], U, V, f, room)
+            damping_force(e, dampers, matrices.M, s.times[first + k], U, V, f, room)
             state[DISSIPATED] += c * np.dot(f, V)
         for i in lanes(u.size):
             u[i] += c * V[i]
@@ -214,7 +260,7 @@ def _end(e, matrices, method, s, w, state):
         copy(w.V[n - 1], v)
     body_force(e.body, u, f)
     add_elastic_force(e.forces, t, 0.0, u, u, f)
-    external_force(e.loads, _row(s.factors, n), t, 1.0, u, Q)
+    external_force(e.loads, _row(s.factors, first + n), t, 1.0, u, Q)
     for i in lanes(a.size):
         a[i] = (Q[i] - f[i]) * e.free[i]
     if dampers.active > 0:
@@ -222,6 +268,8 @@ def _end(e, matrices, method, s, w, state):
         for i in lanes(a.size):
             a[i] -= f[i] * e.free[i]
     solve(matrices.mass, a)
+    multiply(matrices.M, v, room)
+    state[ENERGY] = max(state[ENERGY], 0.5 * np.dot(v, room))
 
 
 # the iteration
@@ -265,10 +313,11 @@ def _row(x, k):
 
 
 @source
-def _residual(e, matrices, s, w, state, k):
+def _residual(e, matrices, method, s, w, state, step, k):
     """What is missing in the equation of motion at a point, and in the rates of joints."""
-    u, v, R, t, f, Q, d, room = (w.U[k], w.V[k], w.R[k], s.times[k], w.x[0], w.x[1], w.x[2],
-                                 w.x[3])
+    u, v, R, f, Q, d, room = w.U[k], w.V[k], w.R[k], w.x[0], w.x[1], w.x[2], w.x[3]
+    at = step * (method.points.size + 1) + k
+    t = s.times[at]
     if state[MIXED] > 0.0:
         missing, own, carried = w.stresses[1], w.own[k], w.carried[k]
         body_mixed(e.body, False, u, u, f, carried, own)
@@ -282,7 +331,7 @@ def _residual(e, matrices, s, w, state, k):
         damping_force(e, matrices.dampers, matrices.M, t, u, v, d, room)
         for i in lanes(f.size):
             f[i] += d[i]
-    external_force(e.loads, _row(s.factors, k), t, 1.0, u, Q)
+    external_force(e.loads, _row(s.factors, at), t, 1.0, u, Q)
     multiply(matrices.M, w.W[k], room)
     for i in lanes(f.size):
         f[i] += room[i]
@@ -291,7 +340,7 @@ def _residual(e, matrices, s, w, state, k):
         g = _row(s.joints.g, k)
         motion = JointMotion(_row(s.joints.c, k), g, s.joints.drives)
         add_joint_force(e.joints, g[0], t, u, l, f)
-        drive_rate(e.joints, motion, t, t - s.start, u, gap)
+        drive_rate(e.joints, motion, t, s.h * method.points[k], u, gap)
         add_constraint_rate(e.joints, g[0], t, u, v, gap)
     for i in lanes(f.size):
         R[i] = (Q[i] - f[i]) * e.free[i]
@@ -365,17 +414,17 @@ def _join(method, s, w, k, r, q, x, y):
 
 
 @source
-def _judged(body, s, w, state):
+def _judged(body, w, state, wanted, rough):
     """What the last correction tells; as in steps of second order."""
     fresh = state[FRESH] > 0.0
     if state[MIXED] > 0.0:
         for k in range(w.R.shape[0]):
             body_carry(body, w.origin, w.R[k], w.own[k], w.carried[k])
-        told = judge(state, s.wanted, s.rough, CARRIED)
+        told = judge(state, wanted, rough, CARRIED)
         if told == GO_ON and not fresh and state[LAST_SIZE] < 0.0:
             state[READY] = 0.0
         return told
-    told = judge(state, s.wanted, s.rough, REUSED)
+    told = judge(state, wanted, rough, REUSED)
     if fresh and (told == FAILED or told != DONE and state[READY] == 0.0):
         state[MIXED], state[READY] = LASTING, 0.0
         return ASTRAY
@@ -386,9 +435,10 @@ def _judged(body, s, w, state):
 
 
 @source
-def _factorize(e, matrices, method, s, w):
+def _factorize(e, matrices, method, s, w, step):
     """Factors of the iteration matrices at the mean of the points; False if there are none."""
     origin, f, S, yes = w.origin, w.x[0], w.stresses, w.x.size > 0
+    at = step * (method.points.size + 1)
     for i in lanes(origin.size):
         origin[i] = 0.0
     for k in range(method.points.size):
@@ -397,15 +447,15 @@ def _factorize(e, matrices, method, s, w):
             origin[i] += c * U[i]
     body_stress(e.body, w.y[0], S[1])
     body_tangent(e.body, origin, f, S[1], yes, S[2], e.K)
-    add_load_stiffness(e.loads, _row(s.factors, 0), s.times[0], 1.0, origin, e.K)
-    add_element_tangent(e.forces, s.times[0], origin, e.K)
+    add_load_stiffness(e.loads, _row(s.factors, at), s.times[at], 1.0, origin, e.K)
+    add_element_tangent(e.forces, s.times[at], origin, e.K)
     D = w.D.flat
     for i in lanes(D.size):
         D[i] = 0.0
     if matrices.dampers.active > 0:
         add_damping(e.viscous, matrices.dampers, matrices.M, 1.0, origin, S, f, w.D)
     if w.J.shape[0] > 0:
-        joint_directions(e.joints, _row(s.joints.g, 0)[0], s.times[0], origin, w.J)
+        joint_directions(e.joints, s.joints.g[0, 0], s.times[at], origin, w.J)
         for a in range(w.J.shape[0]):
             J = w.J[a]
             for i in lanes(J.size):
