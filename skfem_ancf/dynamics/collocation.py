@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 #: Instants of a step at which supports are asked that move.
 SAMPLES = 9
-#: Corrections that close joints at the end of a step.
-CLOSINGS = 2
 
 
 class _Tableau:
@@ -42,7 +40,8 @@ class _Tableau:
     fit
         Of a polynomial without its first two terms, from its values at c.
     samples, rates
-        Points in a step, (k,), and what makes both rates at c of values there, (2, n, k).
+        Points in a step, (k,), and what makes both rates at c and at 1 of values there, (2, n + 1,
+        k).
     """
 
     def __init__(self, points: Array) -> None:
@@ -62,7 +61,7 @@ class _Tableau:
                              (1.0 + c[:, None])**(k + 1) @ self.fit)
         self.samples = 0.5 - 0.5 * np.cos(np.pi * np.arange(SAMPLES) / (SAMPLES - 1))
         fit = np.linalg.inv(chebvander(2.0 * self.samples - 1.0, SAMPLES - 1))
-        self.rates = np.array([2.0**k * chebval(2.0 * c - 1.0, chebder(
+        self.rates = np.array([2.0**k * chebval(2.0 * np.append(c, 1.0) - 1.0, chebder(
             np.eye(SAMPLES), k)).T @ fit for k in (1, 2)])
 
 
@@ -121,7 +120,7 @@ class Collocation(Scheme):
                              "apart: take 'energy-momentum' or 'generalized-alpha'")
 
     def in_blocks(self, system: System) -> bool:
-        return not (system.joints or system.moves)
+        return True
 
     def step(self, integrator: Integrator, y: Motion, dt: float) -> Motion:
         done, motion = self.run(integrator, y, dt, 1)
@@ -138,19 +137,20 @@ class Collocation(Scheme):
         w.guess[:] = self._guess(y, dt)
         w.first[:] = y.memory["forces"] if y.memory else y.multipliers
         points = len(method.points)
-        rows, stages, works = np.empty((n, 3, s.N)), np.empty((n, points, s.N)), np.empty(n)
+        rows, stages = np.empty((n, 3, s.N)), np.empty((n, points, s.N))
+        forces, works = np.empty((n, points + 1, s.m)), np.empty(n)
         done = integrator.call(collocate, y, dt, method, integrator.rule, given, w,
-                               integrator.state, rows, stages, works)
-        times, forces = y.t + dt * np.arange(1, n + 1), w.first.copy()
+                               integrator.state, rows, stages, forces, works)
+        times = y.t + dt * np.arange(1, n + 1)
 
         def motion(k: int) -> Motion:
             """After step k, counted from 0."""
             u, v = rows[k - 1, :2] if k else (y.u, y.v)
-            new = self._end(integrator, rows[k], float(times[k]), dt)
-            new.before, new.dissipated = dt, float(works[k])
-            new.memory = {"stages": stages[k] - new.u, "start": u - new.u, "way": dt * v,
-                          "dt": np.array(dt), "forces": forces}
-            return new
+            end, _, a = rows[k]
+            memory = {"stages": stages[k] - end, "start": u - end, "way": dt * v,
+                      "dt": np.array(dt), "forces": forces[k, :-1]}
+            return Motion(float(times[k]), *rows[k], a, forces[k, -1], before=dt, memory=memory,
+                          dissipated=float(works[k]))
 
         return done, motion
 
@@ -175,41 +175,28 @@ class Collocation(Scheme):
         c, limit = table.method.points, integrator.limit
         times = y.t + h * (np.arange(n)[:, None] + np.append(c, 1.0)).ravel()
         times = np.minimum(times, limit)  # before what jumps at the end
-        held, tables = np.zeros((3, len(c), s.N)), s.machine.tables
-        at = np.minimum(y.t + h * table.samples, limit)
+        at = y.t + h * (np.arange(n)[:, None] + table.samples).ravel()
+        tables, at = s.machine.tables, np.minimum(at, limit)
+
+        def moving(function):
+            """Values at the times, and both rates, shape (number of times, 3, ...)."""
+            first, second = np.einsum("kps,rs...->kr...p", table.rates,
+                                      function(at).reshape(n, len(table.samples), -1))
+            first, second = (np.swapaxes(x, 1, 2).reshape(len(times), -1) for x in (first, second))
+            return np.stack([function(times), first / h, second / h**2], axis=1)
+
+        held = np.zeros((len(times) if s.moves else 1, 3, s.N))
         if s.moves:
-            first, second = table.rates @ s.values_at(at)
-            held[0][:, s.fixed] = [s.values(1.0, t) for t in times[:-1]]
-            held[1][:, s.fixed], held[2][:, s.fixed] = first / h, second / h**2
+            held[:, :, s.fixed] = moving(s.values_at)
         joints, drives = tables.plain.joints, int(tables.motion_varies)
-        moves = drives and not joints.own
-        many = times[:-1] if moves else times[:1]
-        zero = joints.own > 0 or not s.m
-        offsets = np.zeros((len(many), 3, s.m))
-        slopes = np.zeros((len(many), 4, len(joints.gk)))
-        if not zero:
-            offsets[:, 0], slopes[:, :2] = tables.offsets(many), tables.slopes(many)[:, None]
-        if moves:
-            offsets[:, 1] = np.tensordot(table.rates[0], tables.offsets(at), 1) / h
-            slopes[:, 2] = np.tensordot(table.rates[0], tables.slopes(at), 1) / h
-        return Interval(h, times, tables.factors(times), held,
-                        JointMotions(offsets, slopes, drives))
-
-    def _end(self, integrator, row, t, dt):
-        """The Motion at the end of a step."""
-        s, (u, v, a) = integrator.system, row
-        if s.joints or s.moves:
-            return integrator.start(self._closed(s, u, t), v, t, dt, ahead=False)
-        return Motion(t, u, v, a, a, np.zeros(0))
-
-    @staticmethod
-    def _closed(system, u, t):
-        """The nearest displacement with closed joints, in the norm of the mass."""
-        for _ in range(CLOSINGS if system.joints else 0):
-            u = u.copy()
-            u[system.fixed] = system.values(1.0, t)
-            u = u + system.solve_mass(np.zeros(system.N), u, t, -system.constraint(u, t))[0]
-        return u
+        c, g = np.zeros((1, 3, s.m)), np.zeros((1, 4, len(joints.gk)))
+        if s.m and not joints.own:
+            c[:, 0], g[:, :2] = tables.offsets(times[:1]), tables.slopes(times[:1])
+            if drives:
+                c = moving(tables.offsets)
+                if tables.turns:
+                    g = moving(tables.slopes)[:, [0, 0, 1, 2]]
+        return Interval(h, times, tables.factors(times), held, JointMotions(c, g, drives))
 
     def _guess(self, y, dt):
         """Z by the polynomial of the step before, or by the acceleration."""

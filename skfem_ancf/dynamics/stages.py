@@ -10,20 +10,22 @@ from typing import NamedTuple
 import numpy as np
 
 from ..band import (Band, copy, dense_solve, factorize_complex, multiply, solve,
-                    solve_complex)
+                    solve_complex, solve_joined)
 from ..body import (add_force_of, body_carry, body_force, body_mixed, body_stress, body_tangent)
 from ..forces.texts import add_elastic_force, add_element_tangent
 from ..source import F1, F2, F3, borrowed, by_place, lanes, source
-from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, external_force,
-                      joint_directions)
+from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
+                      external_force, joint_directions)
 from .dampers import add_damping, damping_force
-from .rates import JointMotion, JointMotions, drive_rate
+from .rates import JointMotion, JointMotions, acceleration_of_joints, drive_rate
 from .steps import (ASTRAY, CARRIED, COUNT, DEPENDENT, DISSIPATED, DONE, ENERGY, FACTORIZED,
                     FAILED, FAILURE, FRESH, GO_ON, ITERATIONS, LAST_SIZE, LASTING, MIXED,
                     NOT_CONVERGED, RATE, READY, SINGULAR, SIZE, judge, round_off)
 
 #: Contraction up to which factors are kept.
 REUSED = 0.3
+#: Corrections that close joints at the end of a step.
+CLOSINGS = 2
 
 
 @by_place
@@ -54,19 +56,18 @@ class Method(NamedTuple):
 
 
 class Interval(NamedTuple):
-    """What is given of s steps; of one, where supports or joints move.
+    """What is given of s steps, at the points and the end of each; one row where nothing varies.
 
     Attributes
     ----------
     h
         Their size.
     times, factors
-        Of the points and of the end of each, shape (s (n + 1),), and of the loads there, (s (n +
-        1), l) or (1, l).
+        Shape (s (n + 1),), and of the loads there, (s (n + 1), l) or (1, l).
     held
-        Displacement, velocity and acceleration of fixed coordinates, shape (3, n, N).
+        Displacement, velocity and acceleration of fixed coordinates, (s (n + 1), 3, N) or (1, ...).
     joints
-        A :class:`~skfem_ancf.dynamics.rates.JointMotions` of the points.
+        A :class:`~skfem_ancf.dynamics.rates.JointMotions`.
     """
 
     h: float
@@ -83,8 +84,7 @@ class Points(NamedTuple):
     Attributes
     ----------
     y
-        u and v at the begin of the step; of one that is done at its end, with the acceleration
-        that they have without joints; shape (3, N).
+        u, v and the acceleration at the begin of the step, then at its end, shape (3, N).
     before
         u and v at the begin of the step before, shape (2, N).
     Z, U, V, W, R, guess
@@ -104,6 +104,9 @@ class Points(NamedTuple):
         Factors, shape (k, N (width + 1)).
     J, Y
         The joints' directions there, (m, N), and the solutions for them, (2 k, m, N).
+    end, S, shares
+        The joints' directions at the end of the step, and solutions by the mass, (2, m, N), both
+        together, (m, m), and multipliers there, (m,).
     D
         Room for the derivative of damping.
     """
@@ -128,6 +131,9 @@ class Points(NamedTuple):
     im: F2
     J: F2
     Y: F3
+    end: F3
+    S: F2
+    shares: F1
     D: Band
 
 
@@ -145,11 +151,11 @@ def room_for_points(n: int, k: int, N: int, m: int, stresses: int, D: Band) -> P
     return Points(np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((3, n, m)),
                   *np.zeros((2, n, stresses)), np.zeros((3, stresses)), np.zeros((6, N)),
                   np.zeros(N), *np.zeros((2, k, size)), np.zeros((m, N)),
-                  np.zeros((2 * k, m, N)), D)
+                  np.zeros((2 * k, m, N)), np.zeros((2, m, N)), np.zeros((m, m)), np.zeros(m), D)
 
 
 @source
-def collocate(e, matrices, method, rule, s, w, state, rows, stages, works):
+def collocate(e, matrices, method, rule, s, w, state, rows, stages, multiplier_rows, works):
     """Take steps from ``w.y`` and ``w.first`` on.
 
     Parameters
@@ -161,9 +167,10 @@ def collocate(e, matrices, method, rule, s, w, state, rows, stages, works):
         As above; of w ``y``, ``guess`` and ``first``.
     state
         As of :func:`~skfem_ancf.dynamics.steps.steps`, shape (12,).
-    rows, stages, works
-        Written: of each step u, v and the acceleration that they have without joints, (s, 3, N),
-        the displacements of its points, (s, n, N), and the work of damping up to its end, (s,).
+    rows, stages, multiplier_rows, works
+        Written: of each step u, v and the acceleration, (s, 3, N), the displacements of its points,
+        (s, n, N), the multipliers of these and at the end, (s, n + 1, m), and the work of damping
+        up to there, (s,).
 
     Returns
     -------
@@ -177,13 +184,17 @@ def collocate(e, matrices, method, rule, s, w, state, rows, stages, works):
             return k
         copy(w.y[0], w.before[0])
         copy(w.y[1], w.before[1])
-        _end(e, matrices, method, s, w, state, k)
+        if not _end(e, matrices, method, s, w, state, k):
+            state[FAILURE] = DEPENDENT
+            return k
         state[MIXED] = max(0.0, state[MIXED] - 1.0)
         for j in range(3):
             copy(w.y[j], rows[k, j])
         for j in range(method.points.size):
             copy(w.U[j], stages[k, j])
             copy(w.l[j], w.first[j])
+            copy(w.l[j], multiplier_rows[k, j])
+        copy(w.shares, multiplier_rows[k, method.points.size])
         works[k] = state[DISSIPATED]
     return rows.shape[0]
 
@@ -202,7 +213,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
     state[FRESH], state[SIZE] = 0.0, -1.0
     _start(e.body, w, state)
     for _ in range(ITERATIONS):
-        _states(e.free, method, s, w)
+        _states(e.free, method, s, w, step)
         if state[READY] == 0.0:
             if not _factorize(e, matrices, method, s, w, step):
                 state[FAILURE] = SINGULAR
@@ -220,7 +231,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
             _start(e.body, w, state)
         elif told != GO_ON:
             break
-    _states(e.free, method, s, w)
+    _states(e.free, method, s, w, step)
     if told != DONE and told != FAILED:
         state[FAILURE] = NOT_CONVERGED
     return told == DONE
@@ -243,7 +254,7 @@ def _ahead(method, s, w):
 
 @source
 def _end(e, matrices, method, s, w, state, step):
-    """The end of the step into ``w.y``, and the work of damping."""
+    """The end of the step into ``w.y``, and the work of damping; False if joints are dependent."""
     n, dampers, first = method.points.size, matrices.dampers, step * (method.points.size + 1)
     t = s.times[first + n]
     u, v, a, f, Q, room = w.y[0], w.y[1], w.y[2], w.x[0], w.x[1], w.x[2]
@@ -258,18 +269,56 @@ def _end(e, matrices, method, s, w, state, step):
     if method.points[n - 1] == 1.0:
         copy(w.U[n - 1], u)
         copy(w.V[n - 1], v)
+    held, motion = _row(s.held, first + n), _motion(s.joints, first + n)
+    for i in lanes(u.size):
+        u[i] = u[i] * e.free[i] + held[0, i]
+        v[i] = v[i] * e.free[i] + held[1, i]
+        a[i] = held[2, i]
+    if w.shares.size > 0 and not _close(e, matrices, s, w, motion, t):
+        return False
+    multiply(matrices.M, a, room)
     body_force(e.body, u, f)
     add_elastic_force(e.forces, t, 0.0, u, u, f)
     external_force(e.loads, _row(s.factors, first + n), t, 1.0, u, Q)
     for i in lanes(a.size):
-        a[i] = (Q[i] - f[i]) * e.free[i]
+        a[i] += (Q[i] - f[i] - room[i]) * e.free[i]
     if dampers.active > 0:
         damping_force(e, dampers, matrices.M, t, u, v, f, room)
         for i in lanes(a.size):
             a[i] -= f[i] * e.free[i]
     solve(matrices.mass, a)
+    if w.shares.size > 0:
+        acceleration_of_joints(e.joints, motion, t, s.h, u, v, w.shares)
+        if not _meet(matrices.mass, e.free, w, a):
+            return False
     multiply(matrices.M, v, room)
     state[ENERGY] = max(state[ENERGY], 0.5 * np.dot(v, room))
+    return True
+
+
+@source
+def _close(e, matrices, s, w, motion, t):
+    """Move u to where joints are closed, the nearest in the norm of the mass, and v with it."""
+    u, v, g, x = w.y[0], w.y[1], motion.g[0], w.x[3]
+    for _ in range(CLOSINGS):
+        joint_directions(e.joints, g, t, u, w.end[0])
+        constraint(e.joints, motion.c[0], g, t, u, w.shares)
+        for i in lanes(x.size):
+            x[i] = 0.0
+        if not _meet(matrices.mass, e.free, w, x):
+            return False
+        for i in lanes(x.size):
+            u[i] += x[i]
+    joint_directions(e.joints, g, t, u, w.end[0])
+    drive_rate(e.joints, motion, t, s.h, u, w.shares)
+    return _meet(matrices.mass, e.free, w, v)
+
+
+@source
+def _meet(mass, free, w, x):
+    """Change x so that J x becomes minus ``w.shares``, which become the multipliers for it."""
+    J, yes = w.end[0], w.shares.size > 0
+    return solve_joined(mass, J, J, free, yes, w.end[1], w.S, w.shares, x)
 
 
 # the iteration
@@ -287,13 +336,14 @@ def _start(body, w, state):
 
 
 @source
-def _states(free, method, s, w):
+def _states(free, method, s, w, step):
     """Displacements, velocities and accelerations of the points."""
     u0, v0, n, N = w.y[0], w.y[1], method.points.size, free.size
     for k in range(n):
         U, V, W, Z, c = w.U[k], w.V[k], w.W[k], w.Z[k], s.h * method.points[k]
+        held = _row(s.held, step * (n + 1) + k)
         for i in lanes(N):
-            U[i] = (u0[i] + c * v0[i] + Z[i]) * free[i] + s.held[0, k, i]
+            U[i] = (u0[i] + c * v0[i] + Z[i]) * free[i] + held[0, i]
             V[i] = v0[i]
             W[i] = 0.0
         for j in range(n):
@@ -302,14 +352,20 @@ def _states(free, method, s, w):
                 V[i] += p * Z[i]
                 W[i] += q * Z[i]
         for i in lanes(N):
-            V[i] = V[i] * free[i] + s.held[1, k, i]
-            W[i] = W[i] * free[i] + s.held[2, k, i]
+            V[i] = V[i] * free[i] + held[1, i]
+            W[i] = W[i] * free[i] + held[2, i]
 
 
 @source
 def _row(x, k):
     """Of an array that may have one row for all points."""
     return x[k if x.shape[0] > 1 else 0]
+
+
+@source
+def _motion(joints, k):
+    """The joints' motion at a point."""
+    return JointMotion(_row(joints.c, k), _row(joints.g, k), joints.drives)
 
 
 @source
@@ -336,9 +392,8 @@ def _residual(e, matrices, method, s, w, state, step, k):
     for i in lanes(f.size):
         f[i] += room[i]
     if w.gaps.shape[1] > 0:
-        gap, l = w.gaps[k], w.l[k]
-        g = _row(s.joints.g, k)
-        motion = JointMotion(_row(s.joints.c, k), g, s.joints.drives)
+        gap, l, motion = w.gaps[k], w.l[k], _motion(s.joints, at)
+        g = motion.g
         add_joint_force(e.joints, g[0], t, u, l, f)
         drive_rate(e.joints, motion, t, s.h * method.points[k], u, gap)
         add_constraint_rate(e.joints, g[0], t, u, v, gap)
@@ -455,7 +510,7 @@ def _factorize(e, matrices, method, s, w, step):
     if matrices.dampers.active > 0:
         add_damping(e.viscous, matrices.dampers, matrices.M, 1.0, origin, S, f, w.D)
     if w.J.shape[0] > 0:
-        joint_directions(e.joints, s.joints.g[0, 0], s.times[at], origin, w.J)
+        joint_directions(e.joints, _row(s.joints.g, at)[0], s.times[at], origin, w.J)
         for a in range(w.J.shape[0]):
             J = w.J[a]
             for i in lanes(J.size):
