@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 import exact
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, MeshBeam, NeoHookean, Scene,
-                        StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, KelvinVoigt,
+                        MeshBeam, NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.band import Band
 from skfem_ancf.body import Body
 from skfem_ancf.dynamics import (HHT, SCHEMES, EnergyMomentum, Gauss, GeneralizedAlpha, Newmark,
@@ -94,6 +94,40 @@ def test_order(scheme):
         assert errors[1] < 0.02
         rate = np.log2(errors[0] / errors[1])
         assert rate == pytest.approx(scheme.order, abs=0.05 * max(2, scheme.order))
+
+
+@pytest.mark.parametrize("scheme", [Gauss(1), Gauss(4), SCHEMES["radau"]()], ids=repr)
+def test_collocation_in_numpy_and_compiled(scheme, needs_compiled):
+    """Damping, a force in time, a moving support, and with joints a driven angle."""
+    found = []
+    for flag in (False, True):
+        beam = soft(2, E=1e4, h=0.2, compiled=flag, damping=KelvinVoigt(1e-3))
+        scene = Scene(beam).damping(mass=0.3).gravity((0, -3.0), amplitude=np.cos)
+        scene.joint("position", at=(0, 0), r=lambda t: (0.1 * np.sin(3 * t), 0.0))
+        if scheme.joined:
+            scene.joint("angle", at="left", angle=lambda t: t**2)
+            scene.joint("line", at=(0.7, 0.0), direction=(1, 0))
+        found.append(scene.integrate(0.5, 0.02, scheme=scheme))
+    slow, fast = found
+    assert fast.iterations == slow.iterations > 0
+    assert fast.factorizations == slow.factorizations
+    for name in ("u", "v", "acceleration", "multipliers", "dissipated"):
+        x, y = getattr(slow, name), getattr(fast, name)
+        assert_allclose(y, x, rtol=0, atol=1e-9 * np.abs(x).max(initial=1e-300))
+
+
+def test_collocation_carries_stresses_of_stiff_beams():
+    """Steps a thousand times longer than the time of a wave along an element."""
+    mesh, ends = MeshBeam.init_line(np.linspace(0, 1, 9), 1e-3), []
+    scene = Scene(Beam(mesh, ElementBeamCable(3), StVenantKirchhoff(2e10, 0.3, 7800.0), 0.01))
+    scene.pin("left").gravity(GRAVITY)
+    for n in (10, 20, 400):
+        history = scene.integrate(0.2, 0.2 / n, scheme="radau", tol=1e-8)
+        ends.append(history.position((1, 0))[-1])
+        assert history.substeps == 0 and history.iterations < 30 * n  # of three points each
+        assert history.factorizations < 5 * n  # of two matrices each
+    errors = [np.linalg.norm(x - ends[-1]) for x in ends[:-1]]
+    assert max(errors) < 2e-4
 
 
 def driven_hub():

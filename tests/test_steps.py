@@ -7,7 +7,8 @@ from numpy.testing import assert_allclose
 from skfem_ancf import (HHT, Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana, EnergyMomentum, GeneralizedAlpha, MeshBeam,
                         Newmark, NeoHookean, Scene, StVenantKirchhoff, compiled)
-from skfem_ancf.band import Band, factorize, solve, solve_joined, subtract_rows
+from skfem_ancf.band import (Band, factorize, factorize_complex, solve, solve_complex,
+                             solve_joined, subtract_rows)
 from skfem_ancf.loads import Load
 
 ELEMENTS = (ElementBeamANCF(1), ElementBeamANCF(2), ElementBeamANCFCubic(2),
@@ -229,3 +230,24 @@ def test_multiples_of_rows(top):
     out = x.copy()
     subtract_rows(J, b, out)
     assert_allclose(out, x - J.T @ b, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize(("n", "width"), [(9, 2), (3, 5), (20, 6), (1, 0)])
+def test_complex_factors(n, width):
+    """Of a symmetric band whose real part is positive definite."""
+    rng = np.random.default_rng(n)
+    A, ld = np.zeros((n, n), dtype=complex), width + 1
+    for d in range(min(width, n - 1) + 1):
+        values = rng.standard_normal(n - d) + 1j * rng.standard_normal(n - d)
+        A += np.diag(values, -d) + np.diag(values, d)
+    A += 4.0 * ld * np.eye(n)
+    lower = np.zeros((n, ld), dtype=complex)
+    for j in range(n):
+        m = min(ld, n - j)
+        lower[j, :m] = A[j:j + m, j]
+    b = rng.standard_normal(n) + 1j * rng.standard_normal(n)
+    re, im, x, y = (z.ravel().copy() for z in (lower.real, lower.imag, b.real, b.imag))
+    assert factorize_complex(re, im, width)
+    solve_complex(re, im, x, y)
+    assert_allclose(A @ (x + 1j * y), b, rtol=0, atol=1e-13)
+    assert not factorize_complex(0.0 * re, 0.0 * im, width)

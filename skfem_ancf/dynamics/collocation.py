@@ -56,13 +56,17 @@ class _Tableau:
         values = np.where(abs(values.imag) > 1e-12 * abs(values), values, values.real)[picked]
         to, back = np.linalg.inv(T)[picked], T[:, picked] * np.where(values.imag > 0.0, 2.0, 1.0)
         self.fit = np.linalg.inv(c[:, None]**(k + 1))
-        self.method = Method(c, weights, first, first @ first, *(
-            np.ascontiguousarray([x.real, x.imag]) for x in (values, to, back)),
-                             (1.0 + c[:, None])**(k + 1) @ self.fit)
+        parts = (np.ascontiguousarray([x.real, x.imag]) for x in (values, to, back))
+        self.method = Method._make([c, weights, first, first @ first, *parts, self.ahead(1.0)])
         self.samples = 0.5 - 0.5 * np.cos(np.pi * np.arange(SAMPLES) / (SAMPLES - 1))
         fit = np.linalg.inv(chebvander(2.0 * self.samples - 1.0, SAMPLES - 1))
         self.rates = np.array([2.0**k * chebval(2.0 * np.append(c, 1.0) - 1.0, chebder(
             np.eye(SAMPLES), k)).T @ fit for k in (1, 2)])
+
+    def ahead(self, ratio: float) -> Array:
+        """``ahead`` of the Method from a step of which the next is so many times as long."""
+        powers = np.arange(2, len(self.fit) + 2)
+        return np.ascontiguousarray((1.0 + ratio * self.points[:, None])**powers @ self.fit)
 
 
 @lru_cache(16)
@@ -132,25 +136,26 @@ class Collocation(Scheme):
             start: float | None = None, first: int = 0,
             block: tuple[int, int] | None = None) -> tuple[int, Callable[[int], Motion]]:
         s, method, w = integrator.system, self._table.method, self._room(integrator)
-        given = self._interval(integrator, y, dt, n)
-        w.y[:2] = y.u, y.v
-        w.guess[:] = self._guess(y, dt)
-        w.first[:] = y.memory["forces"] if y.memory else y.multipliers
-        points = len(method.points)
-        rows, stages = np.empty((n, 3, s.N)), np.empty((n, points, s.N))
-        forces, works = np.empty((n, points + 1, s.m)), np.empty(n)
+        begun = y.t if start is None else start
+        block = (first, first + n) if block is None else block
+        w.y[:2], w.first[:] = (y.u, y.v), y.multipliers
+        w.guess[:] = 0.5 * (dt * method.points[:, None])**2 * y.acceleration
+        if y.memory:
+            w.U[:], w.before[:], w.first[:] = (y.memory[k] for k in ("stages", "start", "forces"))
+        given = self._given(integrator, begun, dt, first, n, block)._replace(
+            begun=int(bool(y.memory)), ahead=self._table.ahead(dt / y.before if y.memory else 1.0))
+        rows, stages = np.empty((n, 3, s.N)), np.empty((n, len(method.points), s.N))
+        forces, works = np.empty((n, len(method.points) + 1, s.m)), np.empty(n)
         done = integrator.call(collocate, y, dt, method, integrator.rule, given, w,
                                integrator.state, rows, stages, forces, works)
-        times = y.t + dt * np.arange(1, n + 1)
 
         def motion(k: int) -> Motion:
             """After step k, counted from 0."""
-            u, v = rows[k - 1, :2] if k else (y.u, y.v)
-            end, _, a = rows[k]
-            memory = {"stages": stages[k] - end, "start": u - end, "way": dt * v,
-                      "dt": np.array(dt), "forces": forces[k, :-1]}
-            return Motion(float(times[k]), *rows[k], a, forces[k, -1], before=dt, memory=memory,
-                          dissipated=float(works[k]))
+            (u, v, a), before = rows[k], rows[k - 1, :2] if k else np.array([y.u, y.v])
+            memory = {"stages": stages[k].copy(), "start": before.copy(),
+                      "forces": forces[k, :-1].copy()}
+            return Motion(begun + dt * (first + k + 1), u, v, a, a, forces[k, -1], None, dt,
+                          memory, float(works[k]))
 
         return done, motion
 
@@ -169,20 +174,34 @@ class Collocation(Scheme):
             kept[name] = getattr(w, name)
         return w
 
-    def _interval(self, integrator, y, dt, n):
-        """What is given of steps."""
-        s, table, h = integrator.system, self._table, float(dt)
-        c, limit = table.method.points, integrator.limit
-        times = y.t + h * (np.arange(n)[:, None] + np.append(c, 1.0)).ravel()
+    def _given(self, integrator, start, dt, first, n, block):
+        """What is given of some steps of a block, whose functions of time are asked at once."""
+        key, points = (start, dt, block, integrator.limit), len(self._table.method.points) + 1
+        if integrator.asked[0] != key:
+            integrator.asked = key, self._interval(integrator, *key)
+        whole = integrator.asked[1]
+        part = slice((first - block[0]) * points, (first - block[0] + n) * points)
+
+        def rows(x):
+            return x if len(x) == 1 else x[part]
+
+        return whole._replace(
+            times=whole.times[part], factors=rows(whole.factors), held=rows(whole.held),
+            joints=JointMotions(rows(whole.joints.c), rows(whole.joints.g), whole.joints.drives))
+
+    def _interval(self, integrator, start, dt, block, limit):
+        """What is given of a block of steps."""
+        s, table, h, steps = integrator.system, self._table, float(dt), np.arange(*block)[:, None]
+        times = start + h * (steps + np.append(table.method.points, 1.0)).ravel()
         times = np.minimum(times, limit)  # before what jumps at the end
-        at = y.t + h * (np.arange(n)[:, None] + table.samples).ravel()
-        tables, at = s.machine.tables, np.minimum(at, limit)
+        at = np.minimum(start + h * (steps + table.samples).ravel(), limit)
+        tables = s.machine.tables
 
         def moving(function):
             """Values at the times, and both rates, shape (number of times, 3, ...)."""
-            first, second = np.einsum("kps,rs...->kr...p", table.rates,
-                                      function(at).reshape(n, len(table.samples), -1))
-            first, second = (np.swapaxes(x, 1, 2).reshape(len(times), -1) for x in (first, second))
+            samples = function(at).reshape(len(steps), len(table.samples), -1)
+            first, second = np.einsum("kps,rsx->krpx", table.rates, samples).reshape(
+                2, len(times), -1)
             return np.stack([function(times), first / h, second / h**2], axis=1)
 
         held = np.zeros((len(times) if s.moves else 1, 3, s.N))
@@ -196,14 +215,5 @@ class Collocation(Scheme):
                 c = moving(tables.offsets)
                 if tables.turns:
                     g = moving(tables.slopes)[:, [0, 0, 1, 2]]
-        return Interval(h, times, tables.factors(times), held, JointMotions(c, g, drives))
-
-    def _guess(self, y, dt):
-        """Z by the polynomial of the step before, or by the acceleration."""
-        c, old = self._table.points[:, None], y.memory
-        if not old:
-            return 0.5 * (dt * c)**2 * y.acceleration
-        fit = self._table.fit @ (old["stages"] - old["start"] - c * old["way"])
-        x = 1.0 + dt / float(old["dt"]) * c
-        return (x**np.arange(2, len(c) + 2) @ fit + old["start"] + x * old["way"]
-                - dt * c * y.v)
+        return Interval(h, 0, table.method.ahead, times, tables.factors(times), held,
+                        JointMotions(c, g, drives))

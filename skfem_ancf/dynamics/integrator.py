@@ -62,8 +62,8 @@ class Integrator:
     kept : dict of ndarray
         What a scheme with steps of its own keeps for the next, as factors: :meth:`forget` clears
         it.
-    room
-        Its work arrays.
+    room, asked
+        Its work arrays, and functions of time asked for a block of steps.
     """
 
     def __init__(self, system: System, scheme: Scheme, tol: float | None = None) -> None:
@@ -95,6 +95,7 @@ class Integrator:
         self.longest = int(np.clip(STORED // (4 * system.N), 1, BLOCK))
         self.kept: dict[str, Array] = {}
         self.room: Any = None
+        self.asked: Any = None, None
 
     @property
     def iterations(self) -> int:

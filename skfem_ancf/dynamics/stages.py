@@ -1,8 +1,8 @@
 """Steps of collocation, as a text.
 
-With ``A^-1 = T diag(mu) T^-1`` the points of a step fall into systems ``K + mu D / h + mu^2 M / h^2``
-for each eigenvalue, one for each pair: complex and symmetric, with a positive real part but for a
-factor, so that their factors L D L^T need no exchanges.
+With ``A^-1 = T diag(mu) T^-1`` the points of a step fall into systems ``K + mu D / h + mu^2 M /
+h^2`` for each eigenvalue, one for each pair: complex and symmetric, with a positive real part but
+for a factor, so that their factors L D L^T need no exchanges.
 """
 
 from typing import NamedTuple
@@ -18,7 +18,7 @@ from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, 
                       external_force, joint_directions)
 from .dampers import add_damping, damping_force
 from .rates import JointMotion, JointMotions, acceleration_of_joints, drive_rate
-from .steps import (ASTRAY, CARRIED, COUNT, DEPENDENT, DISSIPATED, DONE, ENERGY, FACTORIZED,
+from .steps import (ASTRAY, BEFORE, CARRIED, COUNT, DEPENDENT, DISSIPATED, DONE, ENERGY, FACTORIZED,
                     FAILED, FAILURE, FRESH, GO_ON, ITERATIONS, LAST_SIZE, LASTING, MIXED,
                     NOT_CONVERGED, RATE, READY, SINGULAR, SIZE, judge, round_off)
 
@@ -60,8 +60,10 @@ class Interval(NamedTuple):
 
     Attributes
     ----------
-    h
-        Their size.
+    h, begun
+        Their size, and 1 if there is a step before the first.
+    ahead
+        As of the Method for the first step, from one before of another size.
     times, factors
         Shape (s (n + 1),), and of the loads there, (s (n + 1), l) or (1, l).
     held
@@ -71,6 +73,8 @@ class Interval(NamedTuple):
     """
 
     h: float
+    begun: int
+    ahead: F2
     times: F1
     factors: F2
     held: F3
@@ -86,7 +90,7 @@ class Points(NamedTuple):
     y
         u, v and the acceleration at the begin of the step, then at its end, shape (3, N).
     before
-        u and v at the begin of the step before, shape (2, N).
+        u and v at the begin of the step before, shape (2, N); U is that of its points.
     Z, U, V, W, R, guess
         The unknowns, displacement, velocity, acceleration, residual and correction, and where the
         iteration begins, shape (n, N).
@@ -148,10 +152,11 @@ def room_for_points(n: int, k: int, N: int, m: int, stresses: int, D: Band) -> P
         A band matrix of its own.
     """
     size = N * (D.width + 1)
-    return Points(np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((3, n, m)),
-                  *np.zeros((2, n, stresses)), np.zeros((3, stresses)), np.zeros((6, N)),
-                  np.zeros(N), *np.zeros((2, k, size)), np.zeros((m, N)),
-                  np.zeros((2 * k, m, N)), np.zeros((2, m, N)), np.zeros((m, m)), np.zeros(m), D)
+    return Points._make([
+        np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((3, n, m)),
+        *np.zeros((2, n, stresses)), np.zeros((3, stresses)), np.zeros((6, N)), np.zeros(N),
+        *np.zeros((2, k, size)), np.zeros((m, N)), np.zeros((2 * k, m, N)), np.zeros((2, m, N)),
+        np.zeros((m, m)), np.zeros(m), D])
 
 
 @source
@@ -164,7 +169,7 @@ def collocate(e, matrices, method, rule, s, w, state, rows, stages, multiplier_r
         :class:`~skfem_ancf.equations.Equations`, :class:`~skfem_ancf.dynamics.steps.Matrices`,
         :class:`~skfem_ancf.dynamics.steps.Rule`.
     method, s, w
-        As above; of w ``y``, ``guess`` and ``first``.
+        As above; of w ``y`` and ``first``, with what was before, or ``guess``.
     state
         As of :func:`~skfem_ancf.dynamics.steps.steps`, shape (12,).
     rows, stages, multiplier_rows, works
@@ -178,8 +183,8 @@ def collocate(e, matrices, method, rule, s, w, state, rows, stages, multiplier_r
     """
     s, state = borrowed(s), borrowed(state)
     for k in range(rows.shape[0]):
-        if k > 0:
-            _ahead(method, s, w)
+        if k > 0 or s.begun > 0:
+            _ahead(method, method.ahead if k > 0 else s.ahead, s.h, state[BEFORE], w)
         if not _converges(e, matrices, method, rule, s, w, state, k):
             return k
         copy(w.y[0], w.before[0])
@@ -187,7 +192,7 @@ def collocate(e, matrices, method, rule, s, w, state, rows, stages, multiplier_r
         if not _end(e, matrices, method, s, w, state, k):
             state[FAILURE] = DEPENDENT
             return k
-        state[MIXED] = max(0.0, state[MIXED] - 1.0)
+        state[BEFORE], state[MIXED] = s.h, max(0.0, state[MIXED] - 1.0)
         for j in range(3):
             copy(w.y[j], rows[k, j])
         for j in range(method.points.size):
@@ -238,16 +243,15 @@ def _converges(e, matrices, method, rule, s, w, state, step):
 
 
 @source
-def _ahead(method, s, w):
+def _ahead(method, ahead, h, before, w):
     """Where the iteration begins: the polynomial of the step before, at this one's points."""
-    n, h, u0, v0 = method.points.size, s.h, w.y[0], w.y[1]
-    u, v = w.before[0], w.before[1]
+    n, u0, v0, u, v = method.points.size, w.y[0], w.y[1], w.before[0], w.before[1]
     for k in range(n):
         guess, c = w.guess[k], h * method.points[k]
         for i in lanes(u.size):
-            guess[i] = u[i] + (h + c) * v[i] - u0[i] - c * v0[i]
+            guess[i] = u[i] + (before + c) * v[i] - u0[i] - c * v0[i]
         for j in range(n):
-            U, p, b = w.U[j], method.ahead[k, j], h * method.points[j]
+            U, p, b = w.U[j], ahead[k, j], before * method.points[j]
             for i in lanes(u.size):
                 guess[i] += p * (U[i] - u[i] - b * v[i])
 
