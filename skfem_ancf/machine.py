@@ -32,7 +32,7 @@ logger = logging.getLogger(__name__)
 COMPILING = {"SectionPack": 5.5, "CablePack": 2.5, "elements": 3.2, "contacts": 5.0,
              "equilibrium": 6.2, "steps": 8.0, "evaluate": 2.3}
 #: The same for texts that are compiled where they are used, not beforehand.
-WHERE_USED = {"collocate": 8.0}
+WHERE_USED = {"collocate": 13.0}
 LOADING = 0.7
 SECONDS = {**COMPILING, **WHERE_USED}
 

@@ -146,8 +146,8 @@ class Collocation(Scheme):
             begun=int(bool(y.memory)), ahead=self._table.ahead(dt / y.before if y.memory else 1.0))
         rows, stages = np.empty((n, 3, s.N)), np.empty((n, len(method.points), s.N))
         forces, works = np.empty((n, len(method.points) + 1, s.m)), np.empty(n)
-        done = integrator.call(collocate, y, dt, method, integrator.rule, given, w,
-                               integrator.state, rows, stages, forces, works)
+        done = integrator.call(collocate, y, dt, integrator.rule, given, w, integrator.state,
+                               rows, stages, forces, works)
 
         def motion(k: int) -> Motion:
             """After step k, counted from 0."""
@@ -163,10 +163,9 @@ class Collocation(Scheme):
         """Work arrays, in which factors are kept from step to step."""
         table, s, kept = self._table, integrator.system, integrator.kept
         if integrator.room is None:
-            M, method = s.mass.band, table.method
-            integrator.room = room_for_points(
-                len(method.points), method.values.shape[1], s.N, s.m,
-                s.machine.tables.stresses.size, M._replace(flat=np.zeros(M.flat.size)))
+            M, size = s.mass.band, s.machine.tables.stresses.size
+            integrator.room = room_for_points(table.method, s.N, s.m, size,
+                                              M._replace(flat=np.zeros(M.flat.size)))
         w = integrator.room
         for name in ("re", "im", "J", "Y", "origin"):
             if name in kept and kept[name] is not getattr(w, name):  # of a motion that goes on
@@ -214,6 +213,6 @@ class Collocation(Scheme):
             if drives:
                 c = moving(tables.offsets)
                 if tables.turns:
-                    g = moving(tables.slopes)[:, [0, 0, 1, 2]]
+                    g = np.ascontiguousarray(moving(tables.slopes)[:, [0, 0, 1, 2]])
         return Interval(h, 0, table.method.ahead, times, tables.factors(times), held,
                         JointMotions(c, g, drives))

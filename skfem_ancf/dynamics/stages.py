@@ -113,6 +113,8 @@ class Points(NamedTuple):
         together, (m, m), and multipliers there, (m,).
     D
         Room for the derivative of damping.
+    method
+        As above.
     """
 
     y: F2
@@ -139,28 +141,31 @@ class Points(NamedTuple):
     S: F2
     shares: F1
     D: Band
+    method: Method
 
 
-def room_for_points(n: int, k: int, N: int, m: int, stresses: int, D: Band) -> Points:
-    """The Points of n points and k eigenvalues.
+def room_for_points(method: Method, N: int, m: int, stresses: int, D: Band) -> Points:
+    """The Points of a method.
 
     Parameters
     ----------
-    n, k, N, m, stresses
-        Numbers of points, eigenvalues, coordinates, equations of joints, and stresses.
+    method
+        Its numbers.
+    N, m, stresses
+        Numbers of coordinates, of equations of joints, and of stresses.
     D
         A band matrix of its own.
     """
-    size = N * (D.width + 1)
+    n, k, size = method.points.size, method.values.shape[1], N * (D.width + 1)
     return Points._make([
         np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((3, n, m)),
         *np.zeros((2, n, stresses)), np.zeros((3, stresses)), np.zeros((6, N)), np.zeros(N),
         *np.zeros((2, k, size)), np.zeros((m, N)), np.zeros((2 * k, m, N)), np.zeros((2, m, N)),
-        np.zeros((m, m)), np.zeros(m), D])
+        np.zeros((m, m)), np.zeros(m), D, method])
 
 
 @source
-def collocate(e, matrices, method, rule, s, w, state, rows, stages, multiplier_rows, works):
+def collocate(e, matrices, rule, s, w, state, rows, stages, multiplier_rows, works):
     """Take steps from ``w.y`` and ``w.first`` on.
 
     Parameters
@@ -168,7 +173,7 @@ def collocate(e, matrices, method, rule, s, w, state, rows, stages, multiplier_r
     e, matrices, rule
         :class:`~skfem_ancf.equations.Equations`, :class:`~skfem_ancf.dynamics.steps.Matrices`,
         :class:`~skfem_ancf.dynamics.steps.Rule`.
-    method, s, w
+    s, w
         As above; of w ``y`` and ``first``, with what was before, or ``guess``.
     state
         As of :func:`~skfem_ancf.dynamics.steps.steps`, shape (12,).
@@ -181,7 +186,7 @@ def collocate(e, matrices, method, rule, s, w, state, rows, stages, multiplier_r
     -------
     The number of steps done; one that fails is the last.
     """
-    s, state = borrowed(s), borrowed(state)
+    s, state, method = borrowed(s), borrowed(state), w.method
     for k in range(rows.shape[0]):
         if k > 0 or s.begun > 0:
             _ahead(method, method.ahead if k > 0 else s.ahead, s.h, state[BEFORE], w)
