@@ -16,7 +16,7 @@ from .course import Courses
 from .rates import rates
 from .dampers import Dampers, Rows, solve_rows
 from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, READY,
-                    STATE, Matrices, Rule, mass_factor, room_for_steps, round_off, steps)
+                    STATE, Matrices, Rule, mass_factor, room_for_steps, steps)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -106,30 +106,6 @@ class Integrator:
     def factorizations(self) -> int:
         """Tangents factorised."""
         return int(self._state[FACTORIZED])
-
-    def tally(self, iterations: int, factorizations: int) -> None:
-        """Count what a scheme with steps of its own has done.
-
-        Parameters
-        ----------
-        iterations, factorizations
-            Residuals solved for, and tangents factorised.
-        """
-        self._state[COUNT] += iterations
-        self._state[FACTORIZED] += factorizations
-
-    def rough(self, u: Array, mass_factor: float) -> float:
-        """What round-off leaves of a correction, in the energy norm.
-
-        Parameters
-        ----------
-        u
-            Displacement, shape (N,).
-        mass_factor
-            Of the mass in the iteration matrix.
-        """
-        noise = abs(u @ self.system.mass.multiply(u))
-        return float(round_off(self.rule, 1.0, mass_factor, noise))
 
     def count(self, other: Integrator) -> None:
         """Add the counts of another, which begins from zero."""
