@@ -9,8 +9,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamCable, InputError, MeshBeam, RigidBody, Scene,
-                        StVenantKirchhoff)
+                        ElementBeamANCFHermite, ElementBeamCable, InputError, MeshBeam, RigidBody,
+                        Scene, StVenantKirchhoff)
 
 G = 9.81
 E, H = 1e9, 0.01
@@ -30,7 +30,8 @@ def line(a, b, n, element=None, name=None, E=E, h=H, density=100.0, grading=1.0)
 
 @pytest.mark.parametrize("angle", [False, True])
 @pytest.mark.parametrize("element", [ElementBeamCable(), ElementBeamCable(5), ElementBeamANCF(3),
-                                     ElementBeamANCFCubic(2)], ids=repr)
+                                     ElementBeamANCFCubic(2), ElementBeamANCFHermite(2, 5),
+                                     ElementBeamCable(15)], ids=repr)
 def test_derivatives_on_elements_of_unequal_length(element, angle):
     rng = np.random.default_rng(0)
     a = line((0, 0), (2, 0.5), 4, element, "a", grading=1.3)

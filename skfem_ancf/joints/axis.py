@@ -5,15 +5,18 @@ A point of the axis has the parameter s: the number of its element, and where in
 
 from __future__ import annotations
 
+from math import factorial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from ..reference import hermite_basis
 
 if TYPE_CHECKING:
     from ..beam import Beam
     from ..types import Array
 
-#: Points of an element among which the nearest is looked for first.
+#: Points at least of an element among which the nearest is looked for first.
 SAMPLES = 5
 #: Iterations for the nearest point.
 ITERATIONS = 40
@@ -32,19 +35,22 @@ class Axis:
 
     def __init__(self, beam: Beam, first: int) -> None:
         self.beam, self.first, degree = beam, first, beam.element.axis_degree
-        xi = np.linspace(0.0, 1.0, degree + 1)
-        rows = beam.element.local(np.array([xi, np.full(degree + 1, 0.5)]), beam.mesh.height)
-        powers = np.linalg.solve(np.vander(xi, increasing=True), rows[0].T).T
-        self._used = np.flatnonzero(np.max(np.abs(powers), axis=1) > 1e-13)
-        self._slope = np.broadcast_to(rows[3], len(powers))[self._used]
-        #: coefficients of the functions, and of their derivatives by s: (4, nb, degree + 1)
+        # the coordinates of the axis, by their derivatives of both nodes as Hermite functions are
+        along = np.array([-1 if across else a for _, a, across in beam.element.functionals])
+        m, nb = (degree + 1) // 2, len(along)
+        one = np.array([int(np.flatnonzero(along == k)[0]) for k in range(m)])
+        self._used = np.concatenate([one, nb + one])
+        self._slope = np.tile(np.arange(m), 2)
+        # coefficients of the functions, and of their derivatives by s: (4, nb, degree + 1), in
+        # powers of the distance from the middle of the element, where they stay small
         self._powers = np.zeros((4, len(self._used), degree + 1))
-        self._powers[0] = powers[self._used]
+        for k in range(degree + 1):
+            self._powers[0, :, k] = hermite_basis(m, 0.5, k) / factorial(k)
         for k in range(1, 4):
             self._powers[k, :, :-1] = self._powers[k - 1, :, 1:] * np.arange(1, degree + 1)
         self._start = np.asarray(beam.q0)
-        x = np.linspace(0.0, 1.0, SAMPLES)
-        self._samples = self._powers[0] @ x ** np.arange(degree + 1)[:, None]
+        x = np.linspace(0.0, 1.0, max(SAMPLES, degree))
+        self._samples = self._powers[0] @ (x - 0.5) ** np.arange(degree + 1)[:, None]
         elements = np.arange(beam.mesh.nelements)
         self._all = self._local(elements)
         self._scales = beam.mesh.lengths[:, None] ** self._slope
@@ -72,7 +78,7 @@ class Axis:
             Shapes (2, nb) and (4, nb): of the position and its first three derivatives.
         """
         e = self.element(s)
-        xi = (s - e) ** np.arange(self._powers.shape[2])
+        xi = (s - e - 0.5) ** np.arange(self._powers.shape[2])
         return self.first + self._local(e), (self._powers @ xi) * self._scales[e]
 
     def at(self, u: Array, s: float) -> Array:
@@ -102,7 +108,7 @@ class Axis:
         x = np.einsum("eck,ek,ks->ecs", q, self._scales, self._samples)
         gap = np.sum((x - p[:, None]) ** 2, axis=1)
         e, k = np.unravel_index(int(np.argmin(gap)), gap.shape)
-        s, n = float(e + k / (SAMPLES - 1)), self.beam.mesh.nelements
+        s, n = float(e + k / (gap.shape[1] - 1)), self.beam.mesh.nelements
         for _ in range(ITERATIONS):
             c, d, dd, _ = self.at(u, s)
             gap, size = c - p, float(d @ d)
