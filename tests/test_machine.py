@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, EnergyMomentum, MeshBeam, Scene,
-                        StVenantKirchhoff, compiled, machine)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFHermite, ElementBeamCable,
+                        EnergyMomentum, MeshBeam, Scene, StVenantKirchhoff, compiled, machine)
 from skfem_ancf.source import lanes, primitive, source
 
 ROOT = Path(__file__).parent.parent
@@ -179,7 +179,8 @@ def test_one_signature_for_every_scene(needs_compiled, monkeypatch):
     two = scene()
     two = Scene(*two.beams, Beam(MeshBeam.init_line([0.0, 1.0], 0.1), ElementBeamCable(3),
                                  StVenantKirchhoff(1e6, 0.3, 1e3), width=0.1))
-    for s in (scene(), scene(ElementBeamCable(5)), two.clamp("left", 0).clamp("left", 1),
+    for s in (scene(), scene(ElementBeamCable(5)), scene(ElementBeamCable(13)),
+              scene(ElementBeamANCFHermite(2, 7)), two.clamp("left", 0).clamp("left", 1),
               scene().pressure("top", 0.1), scene().moment("right", 1e-3)):
         s.solve_static(), s.integrate(1e-3, 1e-3), s.integrate(1e-3, 1e-3, EnergyMomentum())
     s.system.internal_force(np.zeros(s.system.N))
