@@ -57,7 +57,7 @@ class Dice:
 
 
 def _mesh(dice, most, origin):
-    """The text of a mesh that starts at ``origin``, and whether it is straight."""
+    """The text of a mesh that starts at ``origin``, its length and its height."""
     kind = dice.choice(("line", "line", "graded", "arc", "wave"))
     n, L = dice.integer(2, most), dice.number(0.5, 2.0)
     slenderness = dice.choice((5, 20, 100, 1000))
@@ -67,21 +67,21 @@ def _mesh(dice, most, origin):
     if kind in ("line", "graded"):
         x = (f"np.linspace(0, {L}, {n + 1})" if kind == "line" else
              f"{L} * np.linspace(0, 1, {n + 1})**{dice.choice((1.5, 2.0))}")
-        return (f"MeshBeam.init_line({x}, {h}, origin={origin}, angle={angle})", True, L, h)
+        return (f"MeshBeam.init_line({x}, {h}, origin={origin}, angle={angle})", L, h)
     if kind == "arc":
         R = float(f"{L / dice.number(0.3, 2.5):.3g}")
         r = f"{R} * np.sin(s / {R}), {R} - {R} * np.cos(s / {R})"
     else:
         r = f"s, {float(f'{0.1 * L:.3g}')} * np.sin({float(f'{3 / L:.3g}')} * s)"
     return (f"MeshBeam.init_curve(lambda s: np.array([{r}]),\n    np.linspace(0, {L}, {n + 1}), "
-            f"{h}).rotated({angle}).translated({origin})", False, L, h)
+            f"{h}).rotated({angle}).translated({origin})", L, h)
 
 
 def _beam(dice, k, most, origin, E):
     """Lines of a beam, its length, and its bending stiffness."""
-    mesh, straight, L, h = _mesh(dice, most, origin)
+    mesh, L, h = _mesh(dice, most, origin)
     if dice.integer(0, 3) == 0:
-        element = f"ElementBeamCable({dice.choice((3, 5, 7) if straight else (3, 5))})"
+        element = f"ElementBeamCable({dice.choice((3, 5, 7, 9, 13))})"
     else:
         name = dice.choice([n for n in ELEMENTS if most <= 4 or n not in
                             ("ancf-7", "ancf-8", "ancf-9", "ancf-10", "cubic-6")])

@@ -131,13 +131,13 @@ def hermite(xi: ArrayLike, derivative: int = 0) -> Array:
 
 @lru_cache
 def _hermite_coefficients(m: int, derivative: int) -> Array:
-    """Bernstein coefficients of a derivative of the Hermite functions of degree n = 2 m - 1.
+    """Factors of ``x^i (1 - x)^(n - i)`` in a derivative of the Hermite functions, n = 2 m - 1.
 
-    Shape (n + 1 - derivative, 2 m). A function whose k-th derivative at 0 is 1 and whose others
-    vanish has coefficients ``binom(i, k) (n - k)! / n!``, i < m; the one at 1 is its mirror image.
-    All are of one sign: nothing cancels, at no degree (Farouki and Rajan, "On the numerical
-    condition of polynomials in Bernstein form", Computer Aided Geometric Design 4, 1987). The
-    differences that derivatives are made of are taken of integers.
+    Shape (2 m, n + 1 - derivative): Bernstein coefficients times binomials. The function whose
+    k-th derivative at 0 is 1 and whose others vanish has ``binom(i, k) (n - k)! / n!``, i < m; the
+    one at 1 is its mirror image. All are of one sign: nothing cancels, at no degree (Farouki and
+    Rajan, "On the numerical condition of polynomials in Bernstein form", Computer Aided Geometric
+    Design 4, 1987). The differences that derivatives are made of are taken of integers.
     """
     n = 2 * m - 1
     left = [[comb(i, k) * perm(n, m) // perm(n, k) if i < m else 0 for i in range(n + 1)]
@@ -145,7 +145,8 @@ def _hermite_coefficients(m: int, derivative: int) -> Array:
     rows = np.array(left + [[(-1) ** k * b for b in row[::-1]] for k, row in enumerate(left)],
                     dtype=object)
     rows = np.diff(rows, derivative, axis=1) * perm(n, derivative)
-    return np.array(rows / perm(n, m), dtype=float).T
+    rows = rows * [comb(n - derivative, i) for i in range(rows.shape[1])]
+    return np.array(rows / perm(n, m), dtype=float)
 
 
 def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
@@ -167,6 +168,7 @@ def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
     x, degree = np.asarray(xi), 2 * m - 1 - derivative
     if degree < 0:
         return np.zeros((2 * m,) + x.shape)
-    powers = np.array([comb(degree, i) * x**i * (1.0 - x) ** (degree - i)
-                       for i in range(degree + 1)])
-    return np.tensordot(_hermite_coefficients(m, derivative), powers, (0, 0))
+    k = np.arange(degree + 1)[:, None]
+    flat = x.reshape(1, -1) + 0.0
+    found = _hermite_coefficients(m, derivative) @ (flat**k * (1.0 - flat) ** (degree - k))
+    return found.reshape((2 * m,) + x.shape)

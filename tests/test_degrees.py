@@ -206,3 +206,23 @@ def test_two_elements_are_looked_at_as_many_short_ones_are(element, mesh, tmp_pa
         path = tmp_path / "beam.vtu"
         state.save(path, **options)
         assert path.stat().st_size > 1000
+
+
+def test_meshes_of_a_high_degree_are_moved_saved_and_cut_as_others(tmp_path):
+    mesh = quarter(4, 0.1).with_sections("septic")
+    X = np.array([[0.2, 0.7], [0.1, 0.9]])
+    x = mesh.mapping().F(X)
+    on_the_arc = np.hypot(x[0], x[1] - 1.0) + 0.1 * (X[1] - 0.5)
+    assert_allclose(on_the_arc, 1.0, atol=1e-7)
+    c, s = np.cos(0.3), np.sin(0.3)
+    moved = mesh.rotated(0.3).translated([1.0, 2.0])
+    assert_allclose(moved.mapping().F(X),
+                    np.einsum("ij,jep->iep", [[c, -s], [s, c]], x) + [[[1.0]], [[2.0]]], atol=1e-14)
+    mesh.save_npz(tmp_path / "mesh.npz")
+    for same in (MeshBeam.load_npz(tmp_path / "mesh.npz"), MeshBeam.from_dict(mesh.to_dict())):
+        assert same.sections == "septic"
+        assert_allclose(same.mapping().F(X), x, atol=1e-15)
+    fine = mesh.refined()
+    assert fine.sections == "septic" and mesh.restrict([1, 2]).nelements == 2
+    assert_allclose(fine.mapping().F(np.array([[0.4], [0.9]]))[:, ::2, 0],
+                    mesh.mapping().F(np.array([[0.2], [0.9]]))[:, :, 0], atol=1e-7)
