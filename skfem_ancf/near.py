@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .formulations import Formulation
+from .kernels.along import from_first_node
 from .kernels.cable import curvature, extension
 from .kept import kept
-from .series import polynomials
+from .series import along, polynomials
 
 if TYPE_CHECKING:
     from .beam import Beam
@@ -135,9 +136,10 @@ def _slopes(beam, e):
 
     Coefficients of Chebyshev polynomials of 2 xi - 1: shapes (p, 2, nb) and (4, p).
     """
-    length, mesh = beam.mesh.lengths[e], beam.mesh
+    length, mesh, element = beam.mesh.lengths[e], beam.mesh, beam.element
     scales = beam.scales[e] / length ** np.array([[1], [2]])
-    slopes = beam.series.axis.transpose(2, 0, 1) * scales
+    slopes = scales * np.stack([along(partial(element.axis, derivative=d), element.axis_degree)
+                                for d in (1, 2)]).transpose(2, 0, 1)
     dofs = mesh.t[0, e] * beam.nd + beam.rows
     start = _derived(slopes, beam.q0_local[dofs])
     if mesh.is_straight:
@@ -147,10 +149,7 @@ def _slopes(beam, e):
 
 def _derived(slopes, q):
     """Both derivatives of the axis, both components, (4, p), for coordinates (2, nb)."""
-    q = q.copy()
-    q[:, q.shape[1] // 2] -= q[:, 0]  # seen from its first node: less round-off
-    q[:, 0] = 0.0
-    return (slopes @ q.T).reshape(-1, 4).T
+    return (slopes @ from_first_node(q.T)).reshape(-1, 4).T
 
 
 def fibre(Y: Any, eps: Any, kappa: Any, ratio: Any) -> list[Any]:

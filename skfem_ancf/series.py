@@ -13,6 +13,8 @@ from numpy.polynomial.chebyshev import chebder, chebvander
 from .frozen import read_only
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from .elements.base import ElementBeam
     from .types import Array
 
@@ -78,6 +80,29 @@ def _matrices(n):
     return np.linalg.inv(chebvander(2.0 * _places(n) - 1.0, n - 1)), slope
 
 
+def along(function: Callable[[Array], Array], n: int) -> Array:
+    """Polynomials of xi as sums of Chebyshev polynomials.
+
+    Parameters
+    ----------
+    function
+        From places xi (n,) to the values of k polynomials, (k, n).
+    n
+        How many Chebyshev polynomials they need.
+
+    Returns
+    -------
+    ndarray
+        Coefficients, shape (k, n).
+
+    Examples
+    --------
+    >>> along(lambda xi: np.array([xi, 1.0 + 0.0 * xi]), 2).round(12).tolist()
+    [[0.5, 0.5], [1.0, 0.0]]
+    """
+    return function(_places(n)) @ _matrices(n)[0].T
+
+
 class Series:
     """The local functions of an element of length 1 as ``sum c_ij T_i(2 xi - 1) T_j(2 eta - 1)``.
 
@@ -109,8 +134,6 @@ class Series:
         self.value = Vx @ values.reshape(-1, p, m) @ Vy.T
         self.along, self.across = Dx @ self.value, self.value @ Dy.T
         self.tables = np.stack([self.value, self.along])
-        #: Of functions that are the same across the section both derivatives by xi, (2, nb, p).
-        self.axis = np.stack([self.along[..., 0], (Dx @ self.along)[..., 0]])
         self._shape = p, m
         self._value, self._both = (np.ascontiguousarray(t.swapaxes(-1, -2))
                                    for t in (self.value, self.tables))

@@ -14,6 +14,20 @@ if TYPE_CHECKING:
     from ..types import Array
 
 
+def from_first_node(q_e: Array) -> Array:
+    """Coordinates of elements as seen from their first node: the same slopes with less round-off.
+
+    Parameters
+    ----------
+    q_e
+        Coordinates, or displacements of them, shape (..., nb, 2).
+    """
+    q_e = q_e.copy()
+    q_e[..., q_e.shape[-2] // 2, :] -= q_e[..., 0, :]
+    q_e[..., 0, :] = 0.0
+    return q_e
+
+
 class CableSections:
     """Sections of a cable: what of their strain does not depend on the state.
 
@@ -37,6 +51,7 @@ class CableSections:
         q = element.rigid(mesh)
         q[0] = mesh.p
         q_e = np.concatenate([q[:, :, t[0]], q[:, :, t[1]]]).transpose(2, 0, 1)
+        q_e = from_first_node(q_e)
         a0, b0 = G1 @ q_e, (0.0 if mesh.is_straight else 1.0) * (G2 @ q_e)
         frame, (n, ne) = np.concatenate([a0, b0], axis=1).transpose(1, 2, 0), a0.shape[1::-1]
         square0, each = np.sum(a0 * a0, axis=-1), np.arange(ne)
@@ -54,7 +69,7 @@ class CableSections:
         u_e
             Displacements of the coordinates of the elements, shape (ne, nb, 2).
         """
-        d, (n, ne) = (self._slopes @ u_e).transpose(1, 2, 0), self._shape
+        d, (n, ne) = (self._slopes @ from_first_node(u_e)).transpose(1, 2, 0), self._shape
         r, strain = np.empty(d.shape), np.empty((2, n, ne))
         weights, square, kappa = np.empty((3, n, ne))
         stiffness = np.empty((3, n, ne))
