@@ -378,18 +378,18 @@ class ElementStrain:
         e, xi, eta
             Element and reference point.
         """
-        _, (n, m), frames, determinants = self._of(e)
-        along, across = polynomials(xi, max(n, self._weights.shape[1])), polynomials(eta, m)
-        basis = np.array(along)
-        weights = self._weights.dot(basis[:self._weights.shape[1]]).tolist()
-        tables = self.terms, basis[:n], np.array(across), weights
-        if determinants is None:
-            return PointStrain(*tables, frames, None, None)
-        turning = None
-        if self.here:
-            turning = _turning(*self.beam.mesh.mapping().derivatives(e, xi, eta))
-            frames = [*frames, turning[5:]]
-        return PointStrain(*tables, frames, [1.0 / (c + across[1] * d) for c, d in determinants],
+        _, (n, m, k), frames, determinants = self._elements.get(e) or self._of(e)
+        across = polynomials(eta, m)
+        along = np.array(polynomials(xi, max(n, k)))
+        weights = self._weights.dot(along[:k]).tolist()
+        inverse = turning = None
+        if determinants is not None:
+            z = across[1]
+            inverse = [1.0 / (c + z * d) for c, d in determinants]
+            if self.here:
+                turning = _turning(*self.beam.mesh.mapping().derivatives(e, xi, eta))
+                frames = [*frames, turning[5:]]
+        return PointStrain(self.terms, along[:n], np.array(across), weights, frames, inverse,
                            turning)
 
     def polynomials(self, e: int, u_e: Array) -> Array:
@@ -410,19 +410,17 @@ class ElementStrain:
         ndarray
             Coefficients, shape (pairs, 2, across, along).
         """
-        return np.tensordot(self._of(e)[0], u_e, (1, 1)).transpose(0, 3, 1, 2)
+        return np.ascontiguousarray(np.tensordot(u_e, self._of(e)[0], (1, 1)).swapaxes(0, 1))
 
     def _of(self, e):
-        found = self._elements.get(e)
-        return found if found is not None else kept(
-            self._elements, e, lambda: self._tables_of(e), ELEMENTS)
+        return kept(self._elements, e, lambda: self._tables_of(e), ELEMENTS)
 
     def _tables_of(self, e):
         """Of one element what single points need of it.
 
         As :meth:`polynomials` those of all local functions, (pairs, nb, across, along); how many
-        polynomials there are along and across; the tangents at the places; of curved elements the
-        determinants, linear in 2 eta - 1.
+        polynomials there are along, across and in the weights; the tangents at the places; of
+        curved elements the determinants, linear in 2 eta - 1.
         """
         mesh, scale, at = self.beam.mesh, self.beam.scales[e], np.array([e])
         straight, (p, m) = mesh.is_straight, self._shape
@@ -435,7 +433,7 @@ class ElementStrain:
             table[-2:, :, :m] = (self._free * (scale / size[:, None])[:, None]).swapaxes(
                 1, 2).reshape(2, -1, p, m).swapaxes(2, 3)
         frames = [tuple(f[:, 0].tolist()) for f in self._frames(at)]
-        return table, shape, frames, None if straight else [
+        return table, (*shape, self._weights.shape[1]), frames, None if straight else [
             tuple(self._map[0, place, :, e].tolist()) for place in self._at]
 
 
