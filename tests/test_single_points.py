@@ -1,0 +1,179 @@
+"""One material point alone is where it is among many, and has the same fields: to 1e-13."""
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+from conftest import quarter_arc, s_curve
+from test_points import STEEL, inside
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
+                        NeoHookean, Scene, Section, StVenantKirchhoff, finder)
+from skfem_ancf.elements import ELEMENTS
+
+METHODS = ("displacement", "position", "velocity", "strain", "stress")
+MESHES = {"straight": lambda: MeshBeam.init_line([-1.0, -0.4, 0.3, 1.2], 0.1, angle=0.7),
+          "arc": lambda: quarter_arc(height=0.1), "s-curve": lambda: s_curve(0.1)}
+TAPERS = {True: lambda: MeshBeam.init_line([0.0, 0.5, 1.2], height=lambda x: 0.1 - 0.05 * x),
+          False: lambda: MeshBeam.init_curve(lambda s: np.array([np.cos(s), np.sin(s)]),
+                                             [0.0, 0.5, 1.2], height=lambda s: 0.1 - 0.05 * s)}
+SETTINGS = dict(max_examples=60, deadline=None, database=None)
+PART = st.floats(0.0, 1.0)
+
+
+def agree(state, x, tol=1e-13, names=METHODS, beam=None):
+    """All that is known at points, one by one and together."""
+    asked = [(name, {}) for name in names] + [
+        (name, {"recover": False}) for name in names if name in ("strain", "stress")]
+    for name, options in asked:
+        ask = getattr(state, name)
+        many = ask(x, beam, **options)
+        one = np.array([ask(tuple(p), beam, **options) for p in x.T.tolist()]).T
+        assert_allclose(one, many, rtol=0, atol=tol * np.abs(many).max(), err_msg=f"{name} {options}")
+
+
+def loaded(beam):
+    end = beam.mesh.p[:, -1]
+    return Scene(beam).clamp("left").point_force((0.5, -1.5), at=end).solve_static()
+
+
+@pytest.mark.parametrize("mesh", MESHES)
+def test_every_element(mesh, element):
+    """On faces, between elements, on the axis, and anywhere; at rest."""
+    state = loaded(Beam(MESHES[mesh](), element, STEEL, 0.1))
+    agree(state, inside(state.beams[0].mesh)[2])
+
+
+@pytest.mark.parametrize("plane", ["stress", "strain"])
+@pytest.mark.parametrize("formulation", ["assumed", "continuum", "ecm", "strain-split"])
+@pytest.mark.parametrize("mesh", ["straight", "arc"])
+@pytest.mark.parametrize("order", [1, 2])
+def test_every_formulation(mesh, formulation, order, plane):
+    mesh = MESHES[mesh]()
+    material = StVenantKirchhoff(E=1e6, nu=0.3, plane=plane)
+    beam = Beam(mesh, ElementBeamANCF(order), material, 0.1, formulation=formulation)
+    agree(loaded(beam), inside(mesh, 30)[2], names=("strain", "stress"))
+
+
+@pytest.mark.parametrize("mesh", ["straight", "arc"])
+@pytest.mark.parametrize("kind", ["taper", "profile", "layers", "law"])
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)], ids=repr)
+def test_other_sections_and_laws(kind, element, mesh):
+    mesh, material, section = MESHES[mesh](), STEEL, None
+    if kind == "taper":
+        mesh = TAPERS[mesh.is_straight]()
+    elif kind == "profile":
+        section = Section.profile("I", width=0.1, web=0.01, flange=0.01)
+    elif kind == "layers":
+        material, section = None, Section.layers((0.03, STEEL), (0.07, STEEL.replace(E=3e6)),
+                                                 width=0.1)
+    elif element.order:
+        material = NeoHookean(1e6, 0.3)
+    beam = Beam(mesh, element, material, None if section else 0.1, section=section)
+    agree(loaded(beam), inside(mesh, 30)[2])
+
+
+def test_of_a_heated_strip():
+    mesh = MESHES["arc"]()
+    beam = Beam(mesh, ElementBeamANCF(2), STEEL.replace(thermal_expansion=1e-4), 0.1)
+    state = Scene(beam).clamp("left").temperature(lambda x, y: 10.0 * y / 0.1).solve_static()
+    agree(state, inside(mesh, 30)[2], tol=1e-12, names=("strain", "stress"))
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(3), ElementBeamCable(3)], ids=repr)
+def test_of_a_motion_and_of_its_instants(element):
+    mesh = MESHES["arc"]()
+    scene = Scene(Beam(mesh, element, STEEL, 0.1)).pin("left").gravity((0, -9.81))
+    history = scene.integrate(0.02, 0.005)
+    x = inside(mesh, 20)[2]
+    agree(history.state(3), x)
+    for name in METHODS:
+        one = np.array([getattr(history, name)(tuple(p)) for p in x.T.tolist()])
+        many = getattr(history, name)(x)
+        assert_allclose(np.moveaxis(one, 0, -1), many, atol=1e-13 * np.abs(many).max())
+
+
+def test_of_several_beams_and_by_their_names():
+    beams = [Beam(MeshBeam.init_line([0, 1, 2], height=0.1), ElementBeamANCF(3), STEEL, 0.1,
+                  name="a"),
+             Beam(quarter_arc(height=0.1).translated((2.0, 1.0)), ElementBeamCable(5), STEEL, 0.1,
+                  name="b"),
+             Beam(quarter_arc(height=0.1).translated((-2.0, 1.0)), ElementBeamANCFCubic(2), STEEL,
+                  0.1, name="c")]
+    scene = Scene(*beams)
+    for beam in beams:
+        scene = scene.clamp("left", beam=beam)
+    state = scene.gravity((0, -9.81)).solve_static()
+    x = [inside(beam.mesh, 20)[2] for beam in beams]
+    agree(state, np.hstack(x))
+    for beam, points in zip(beams, x):
+        agree(state, points, beam=beam.name)
+
+
+def test_a_changed_state_is_another():
+    """What points have asked for is of one state."""
+    state = loaded(Beam(MESHES["arc"](), ElementBeamANCF(2), STEEL, 0.1))
+    x = tuple(inside(state.beams[0].mesh, 20)[2][:, 17].tolist())
+    found = state.strain(x, recover=False), state.stress(x, recover=False)
+    none = state.replace(u=0.0 * state.u)
+    assert_allclose(none.strain(x, recover=False), 0.0, atol=1e-15)
+    assert_allclose(none.stress(x, recover=False), 0.0, atol=1e-9)
+    assert_array_equal(state.strain(x, recover=False), found[0])
+    assert_array_equal(state.stress(x, recover=False), found[1])
+
+
+@settings(**SETTINGS)
+@given(xi=PART, eta=PART, bend=st.floats(-1.2, 1.2), height=st.floats(1e-3, 0.4),
+       n=st.integers(1, 6), offset=st.sampled_from([0.0, 100.0]))
+@example(xi=0.0, eta=0.0, bend=1.0, height=0.3, n=3, offset=0.0)
+@example(xi=1.0, eta=1.0, bend=0.0, height=0.3, n=1, offset=0.0)
+def test_a_point_of_a_parabola_is_found(xi, eta, bend, height, n, offset):
+    """By itself and among many, in the same element, at the place that it was made from."""
+    nodes = np.linspace(-0.5, 0.5, n + 1)
+    mesh = MeshBeam.init_curve(lambda s: np.array([s + offset, bend * s * s]), nodes, height)
+    find, e = finder.Finder(mesh), (n - 1) // 2
+    x = mesh.mapping().F(np.array([[xi], [eta]]), np.array([e]))[:, 0]
+    (many,), X, (outside,) = find(x)
+    one = find.one(*x[:, 0].tolist())
+    assert outside == 0 and one and one[0] == many
+    assert_allclose(one[1:], X[:, 0], atol=1e-13 + 1e-15 * offset / height)
+    at = mesh.mapping().F(np.array([[one[1]], [one[2]]]), np.array([one[0]]))[:, 0]
+    assert_allclose(at, x, atol=1e-14 + 1e-15 * offset)
+
+
+@settings(**SETTINGS)
+@given(xi=PART, eta=PART, e=st.integers(0, 2), element=st.sampled_from(sorted(ELEMENTS)))
+def test_fields_of_a_point_of_an_arc(xi, eta, e, element):
+    state = STATES.get(element)
+    if state is None:
+        state = STATES[element] = loaded(Beam(quarter_arc(height=0.1), ELEMENTS[element](), STEEL,
+                                              0.1))
+    mesh = state.beams[0].mesh
+    x = mesh.mapping().F(np.array([[xi], [eta]]), np.array([e]))[:, 0]
+    # the size of the fields, which may vanish at one point
+    agree(state, np.hstack([x, inside(mesh, 16, seed=1)[2][:, ::4]]))
+
+
+STATES: dict = {}
+
+
+def test_a_finder_forgets_squares_of_the_plane(monkeypatch):
+    monkeypatch.setattr(finder, "CELLS", 3)
+    mesh = quarter_arc(12, height=0.1)
+    find = finder.Finder(mesh)
+    e, X, x = inside(mesh, 100)
+    within = (X[0] > 0.01) & (X[0] < 0.99)
+    for k in np.nonzero(within)[0]:
+        assert find.one(*x[:, k].tolist())[0] == e[k]
+    assert len(find._cells) <= 3
+
+
+@pytest.mark.parametrize("mesh", [quarter_arc(8, height=0.1), s_curve(0.1)], ids=["arc", "s"])
+def test_single_points_outside(mesh):
+    """Never found, at once or by the general search, near the body and far away."""
+    find, rng = finder.Finder(mesh), np.random.default_rng(4)
+    x = rng.uniform(-3.0, 3.0, (2, 400))
+    outside = find(x)[2] > 1e-6
+    assert 100 < np.sum(outside) < 400
+    assert not any(find.one(*p) for p in x[:, outside].T.tolist())
