@@ -74,7 +74,12 @@ def _product(a, b):
     return out
 
 
-def beside_section(director: Any, crossed: Sequence[Any], gap: Sequence[Any]) -> list[Any]:
+def _sorted(director, crossed):
+    """The coefficients of :attr:`MappingBeam._powers` as :func:`beside_section` takes them."""
+    return list(zip(crossed, *director)), list(crossed[len(director[0]):])
+
+
+def beside_section(turning: Sequence[Any], rest: Sequence[Any], gap: Sequence[Any]) -> list[Any]:
     """How far a point is beside the section of an element, times the height: a polynomial of xi.
 
     The cross product of what leads from the axis to the point, and of the director: it does not
@@ -82,18 +87,17 @@ def beside_section(director: Any, crossed: Sequence[Any], gap: Sequence[Any]) ->
 
     Parameters
     ----------
-    director
-        For each component the coefficients of a polynomial of xi, the lowest first: numbers or
-        arrays (...).
-    crossed
-        Those of minus the cross product of axis and director, at least as many; the axis begins at
-        zero.
+    turning
+        For each power of xi in the director the coefficients of minus the cross product of axis and
+        director, and of both components of the director, the lowest power first: numbers or arrays
+        (...). The axis begins at zero.
+    rest
+        Those of the cross product with higher powers.
     gap
         The point seen from where the axis begins, two components.
     """
     x, y = gap
-    return [c + (x * ny - y * nx) for c, nx, ny in zip(crossed, *director)] + list(
-        crossed[len(director[0]):])
+    return [c + (x * ny - y * nx) for c, nx, ny in turning] + rest
 
 
 def height_in_section(axis: Any, director: Any, gap: Sequence[Any], xi: Any) -> Any:
@@ -103,7 +107,10 @@ def height_in_section(axis: Any, director: Any, gap: Sequence[Any], xi: Any) -> 
     ----------
     axis
         As ``director``, of the axis: it begins at zero.
-    director, gap
+    director
+        For each component the coefficients of a polynomial of xi, the lowest first: numbers or
+        arrays (...).
+    gap
         As for :func:`beside_section`.
     xi
         The place of the section along the element.
@@ -383,7 +390,7 @@ class MappingBeam(Mapping):
         axis, director, crossed = ((c if tind is None else c.take(tind, axis=-1))[..., None]
                                    for c in self._powers)
         gap = x - (first if tind is None else first.take(tind, axis=1))[:, :, None]
-        beside = beside_section(director, crossed, gap)
+        beside = beside_section(*_sorted(director, crossed), gap)
         X = np.empty(x.shape)
         X[0] = xi
         for _ in range(max_iterations):
@@ -410,9 +417,9 @@ class MappingBeam(Mapping):
         xi
             To start from.
         """
-        (x0, y0), axis, director, crossed = self._numbers(e)
+        (x0, y0), axis, director, turning, rest = self._numbers(e)
         gap = x - x0, y - y0
-        beside = beside_section(director, crossed, gap)
+        beside = beside_section(turning, rest, gap)
         for _ in range(8):  # as in invF
             value, slope = _polynomial(beside, xi)
             if not abs(value) < abs(slope):
@@ -435,8 +442,8 @@ class MappingBeam(Mapping):
         xi
             Its place along the element.
         """
-        (x0, y0), _, director, crossed = self._numbers(e)
-        slope = _polynomial(beside_section(director, crossed, (x - x0, y - y0)), xi)[1]
+        (x0, y0), _, director, turning, rest = self._numbers(e)
+        slope = _polynomial(beside_section(turning, rest, (x - x0, y - y0)), xi)[1]
         return -_polynomial(director[1], xi)[0] / slope, _polynomial(director[0], xi)[0] / slope
 
     def derivatives(self, e: Any, xi: Any, eta: Any) -> tuple[Any, Any, Any]:
@@ -453,7 +460,7 @@ class MappingBeam(Mapping):
             Three vectors, each a pair of numbers or arrays.
         """
         if isinstance(e, int):
-            _, axis, director, _ = self._numbers(e)
+            _, axis, director, _, _ = self._numbers(e)
         else:
             axis, director = (c[:, :, e] for c in self._powers[:2])
         dx, dy = _polynomial(axis[0], xi)[1], _polynomial(axis[1], xi)[1]
@@ -462,11 +469,12 @@ class MappingBeam(Mapping):
         return (dx + Y * dnx, dy + Y * dny), (nx, ny), (dx / size, dy / size)
 
     def _numbers(self, e):
-        """Of one element: where its axis begins, and the polynomials of :attr:`_powers`."""
+        """Of one element: where its axis begins, axis and director, and :func:`_sorted` of these."""
         found = self._known.get(e)
         if found is None:
-            found = self._known[e] = [c[..., e].tolist() for c in (
-                self._all_coefficients[0][:, 0], *self._powers)]
+            start, axis, director, crossed = (c[..., e].tolist() for c in (
+                self._all_coefficients[0][:, 0], *self._powers))
+            found = self._known[e] = start, axis, director, *_sorted(director, crossed)
         return found
 
     @cached_property

@@ -40,6 +40,7 @@ class NearSections:
         self._beam, self._e, self._u_e = beam, e, u_e
         self._first = beam.strain_of(beam.terms[0])
         self._polynomials = {id(self._first): self._first.polynomials(e, u_e)}
+        self._sections: dict[Any, Any] = {}
         self._by_formulation = (beam.across.plain
                                 and type(beam.formulation).stress is Formulation.stress)
 
@@ -77,9 +78,16 @@ class NearSections:
         if polynomials is None:
             polynomials = self._polynomials[id(of)] = of.polynomials(self._e, self._u_e)
         e, x, y = point.place
-        x, (eta, weights) = x if xi is None else xi, ((y,), (1.0,)) if across is None else across
-        return sum((w * np.array(of.at(e, x, y)(polynomials)) for y, w in zip(eta, weights)),
-                   np.zeros(3))
+        if across is None:
+            return np.array(of.at(e, x if xi is None else xi, y)(polynomials))
+        key = id(of), across[0].tobytes(), across[1].tobytes()
+        sections = self._sections.get(key)
+        if sections is None:
+            sections = self._sections[key] = of.sections(e, polynomials, across)
+        table = point.strain_table if xi is None else None
+        if table is None or len(table.along) != polynomials.shape[-1]:
+            table = of.at(e, x if xi is None else xi, y)
+        return np.array(sections(x if xi is None else xi, table.along))
 
 
 class NearCable:

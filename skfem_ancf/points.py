@@ -173,16 +173,15 @@ class Points:
             found = self._of_body(points, beam)
             if found is not None:
                 return found
-        name = beam if beam is None or isinstance(beam, (str, int)) else id(beam)
         if (type(points) is tuple and len(points) == 2 and type(points[0]) in PLAIN
                 and type(points[1]) in PLAIN):
-            key: Any = points if beam is None else (points, name, type(beam))
+            key: Any = points if beam is None else (points, _name(beam), type(beam))
         else:
             if isinstance(points, (int, float)):
                 as_points(points)  # x and y as two arguments: y is no beam
             one = beam is not None or self._alone
             points = as_points(points, select_beam(self.beams, beam).mesh if one else None)
-            key = points.tobytes(), points.ndim, name, type(beam)
+            key = points.tobytes(), points.ndim, _name(beam), type(beam)
         found = self._known.get(key)
         if found is None:
             found = self._find(points, beam)
@@ -277,6 +276,11 @@ class Points:
                 if place is None:
                     return None
         return None
+
+
+def _name(beam):
+    """What a beam is remembered by."""
+    return beam if beam is None or isinstance(beam, (str, int)) else id(beam)
 
 
 def require_body(system: System, which: WhichMember) -> RigidBody:

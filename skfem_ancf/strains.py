@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from .beam import Beam
     from .formulations.base import Term
-    from .types import Array
+    from .types import Array, Rule
 
 #: Points that are evaluated at once.
 CHUNK = 2048
@@ -97,13 +97,24 @@ class PointStrain(NamedTuple):
 
     def __call__(self, polynomials: Array) -> list[float]:
         """(eps_xx, eps_yy, 2 eps_xy) of what :meth:`ElementStrain.polynomials` returns."""
-        slopes = polynomials.dot(self.along).dot(self.across).tolist()
-        if self.inverse is not None:
-            here = slopes[len(self.inverse):]
-            slopes = [(f * x, f * y) for f, (x, y) in zip(self.inverse, slopes)]
-            if here:
-                slopes += turned(self.turning, *here)
-        return interpolated(self.terms, self.weights, slopes, self.frames)
+        terms, along, across, weights, frames, inverse, _ = self
+        slopes = polynomials.dot(along).reshape(-1, len(across)).dot(across).reshape(-1, 2).tolist()
+        return interpolated(terms, weights, slopes if inverse is None else self.slopes(slopes),
+                            frames)
+
+    def slopes(self, values: list[Any]) -> list[Any]:
+        """Derivatives along the axis and across it.
+
+        Parameters
+        ----------
+        values
+            Those of the polynomials, pairs of numbers.
+        """
+        if self.inverse is None:
+            return values
+        here = values[len(self.inverse):]
+        slopes = [(f * x, f * y) for f, (x, y) in zip(self.inverse, values)]
+        return slopes + turned(self.turning, *here) if here else slopes
 
 
 def turned(turning: Sequence[Any], by_xi: Any, by_eta: Any) -> list[Any]:
@@ -140,6 +151,56 @@ def interpolated(terms: Sequence[Any], weights: Sequence[Any], slopes: Sequence[
     for weight, (row, place, a, b) in zip(weights, terms):
         out[row] = out[row] + weight * STRAINS[row](slopes[a], slopes[b], *frames[place])
     return out
+
+
+class SectionStrain(NamedTuple):
+    """The mean of the strain over sections of one element in one state.
+
+    Attributes
+    ----------
+    strain
+        The :class:`ElementStrain`.
+    e
+        The element.
+    samples
+        Means of the samples that are the same at all its sections, a number for each term.
+    here
+        Derivatives by xi and by eta at the points of the rule, (points, 2, 2, along).
+    rule
+        Pairs of these points and their weights.
+    """
+
+    strain: ElementStrain
+    e: int
+    samples: list[float]
+    here: Array
+    rule: list[tuple[float, float]]
+
+    def __call__(self, xi: float, along: Array) -> list[float]:
+        """(eps_xx, eps_yy, 2 eps_xy) of the section at xi.
+
+        Parameters
+        ----------
+        xi
+            Its place.
+        along
+            The Chebyshev polynomials there, shape (along,).
+        """
+        of, means = self.strain, self.samples.copy()
+        if of.here:
+            mapping, frame = of.beam.mesh.mapping(), of.tangent(self.e)
+            for (eta, weight), pair in zip(self.rule, self.here.dot(along).tolist()):
+                if frame is None:
+                    turning = _turning(*mapping.derivatives(self.e, xi, eta))
+                    pair, tangent = turned(turning, *pair), turning[5:]
+                else:
+                    tangent = frame
+                for k, row in of.at_points:
+                    means[k] += weight * STRAINS[row](*pair, *tangent)
+        out = [0.0, 0.0, 0.0]
+        for mean, weight, (row, _, _, _) in zip(means, of.weights(along), of.terms):
+            out[row] += weight * mean
+        return out
 
 
 class TaperedStrain:
@@ -238,8 +299,11 @@ class ElementStrain:
                 pairs = [self._pair(place, J) for J in NEEDS[row]]
                 self.terms.append((row, place, pairs[0], pairs[-1]))
                 weights.append(np.append(coefficients, np.zeros(most - len(coefficients))))
-        self._weights = np.array(weights)
+        self._weights, self._degree = np.array(weights), most
         self._sort()
+        #: The terms, and their components, that are evaluated at the points themselves.
+        self.at_points = [(k, row) for k, (row, place, _, _) in enumerate(self.terms)
+                          if place == len(self.places)]
         # of length 1: by xi, by eta of each place: (places, 2, m, nb); of the points (2, p m, nb)
         both = series.along, series.across
         self._fixed = np.array([[np.einsum("bpm,p->mb", table, chebyshev(
@@ -378,10 +442,9 @@ class ElementStrain:
         e, xi, eta
             Element and reference point.
         """
-        _, (n, m, k), frames, determinants = self._elements.get(e) or self._of(e)
-        across = polynomials(eta, m)
-        along = np.array(polynomials(xi, max(n, k)))
-        weights = self._weights.dot(along[:k]).tolist()
+        _, (n, m), frames, determinants = self._elements.get(e) or self._of(e)
+        across, along = polynomials(eta, m), np.array(polynomials(xi, n))
+        weights = self.weights(along)
         inverse = turning = None
         if determinants is not None:
             z = across[1]
@@ -389,8 +452,41 @@ class ElementStrain:
             if self.here:
                 turning = _turning(*self.beam.mesh.mapping().derivatives(e, xi, eta))
                 frames = [*frames, turning[5:]]
-        return PointStrain(self.terms, along[:n], np.array(across), weights, frames, inverse,
-                           turning)
+        # in half the time of PointStrain(...)
+        return tuple.__new__(PointStrain, (self.terms, along, np.array(across), weights, frames,
+                                           inverse, turning))
+
+    def tangent(self, e: int) -> tuple[float, float] | None:
+        """That of a straight element, or None."""
+        return self._of(e)[2][0] if self.beam.mesh.is_straight else None
+
+    def weights(self, along: Array) -> list[float]:
+        """Those of the samples, for the Chebyshev polynomials of a place along elements."""
+        return self._weights.dot(along[:self._degree]).tolist()
+
+    def sections(self, e: int, polynomials: Array, rule: Rule) -> SectionStrain:
+        """What gives the mean of the strain over any section of an element.
+
+        Parameters
+        ----------
+        e
+            The element.
+        polynomials
+            What :meth:`polynomials` returns, shape (pairs 2 across, along).
+        rule
+            Points and weights across the section.
+        """
+        here, samples = [], np.zeros(len(self.terms))
+        table = polynomials.reshape(len(self._pairs), 2, -1, polynomials.shape[-1])
+        for eta, weight in zip(*rule):
+            at = self.at(e, 0.5, eta)
+            values = table.swapaxes(2, 3).dot(at.across)
+            slopes = at.slopes(values.dot(at.along).tolist())
+            here.append(values[-2:])
+            samples += [weight * STRAINS[row](slopes[a], slopes[b], *at.frames[place])
+                        if place < len(self.places) else 0.0 for row, place, a, b in self.terms]
+        return SectionStrain(self, e, samples.tolist(), np.array(here), [
+            (float(eta), float(weight)) for eta, weight in zip(*rule)])
 
     def polynomials(self, e: int, u_e: Array) -> Array:
         """The derivatives in an element that single points need, as polynomials.
@@ -408,9 +504,10 @@ class ElementStrain:
         Returns
         -------
         ndarray
-            Coefficients, shape (pairs, 2, across, along).
+            Coefficients, shape (pairs 2 across, along).
         """
-        return np.ascontiguousarray(np.tensordot(u_e, self._of(e)[0], (1, 1)).swapaxes(0, 1))
+        table = np.tensordot(u_e, self._of(e)[0], (1, 1)).swapaxes(0, 1)
+        return table.reshape(-1, table.shape[-1])
 
     def _of(self, e):
         return kept(self._elements, e, lambda: self._tables_of(e), ELEMENTS)
@@ -419,21 +516,21 @@ class ElementStrain:
         """Of one element what single points need of it.
 
         As :meth:`polynomials` those of all local functions, (pairs, nb, across, along); how many
-        polynomials there are along, across and in the weights; the tangents at the places; of
-        curved elements the determinants, linear in 2 eta - 1.
+        polynomials there are along and across; the tangents at the places; of curved elements the
+        determinants, linear in 2 eta - 1.
         """
         mesh, scale, at = self.beam.mesh, self.beam.scales[e], np.array([e])
         straight, (p, m) = mesh.is_straight, self._shape
-        shape = p if self.here else 1, m if straight else m + 1
+        shape = max(p if self.here else 1, self._degree), m if straight else m + 1
         table = np.zeros((len(self._pairs), len(scale), shape[1], shape[0]))
         for row, polynomial in zip(table, self._turned((self._fixed * scale)[..., None], at)):
             row[..., 0] = polynomial[..., 0].T
         if self.here:
             size = np.array([mesh.lengths[e], mesh.height]) if straight else np.ones(2)
-            table[-2:, :, :m] = (self._free * (scale / size[:, None])[:, None]).swapaxes(
+            table[-2:, :, :m, :p] = (self._free * (scale / size[:, None])[:, None]).swapaxes(
                 1, 2).reshape(2, -1, p, m).swapaxes(2, 3)
         frames = [tuple(f[:, 0].tolist()) for f in self._frames(at)]
-        return table, (*shape, self._weights.shape[1]), frames, None if straight else [
+        return table, shape, frames, None if straight else [
             tuple(self._map[0, place, :, e].tolist()) for place in self._at]
 
 
