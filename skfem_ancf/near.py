@@ -11,6 +11,7 @@ from .formulations import Formulation
 from .kernels.along import from_first_node
 from .kernels.cable import curvature, extension
 from .kept import kept
+from .point import AGAIN
 from .series import along, polynomials
 
 if TYPE_CHECKING:
@@ -52,9 +53,11 @@ class NearSections:
         point
             A point of the element.
         """
-        if point.strain_table is None:
-            point.strain_table = self._first.at(*point.place)
-        return point.strain_table(self._polynomials[id(self._first)])
+        table = point.strain_table
+        if not table:
+            new = self._first.at(*point.place)
+            table, point.strain_table = new, AGAIN if table is None else new
+        return table(self._polynomials[id(self._first)])
 
     def stress(self, point: Point) -> Array | None:
         """The stress (S_xx, S_yy, S_xy), shape (3,); None where only many points have it.
@@ -84,10 +87,7 @@ class NearSections:
         sections = self._sections.get(key)
         if sections is None:
             sections = self._sections[key] = of.sections(e, polynomials, across)
-        table = point.strain_table if xi is None else None
-        if table is None or len(table.along) != polynomials.shape[-1]:
-            table = of.at(e, x if xi is None else xi, y)
-        return np.array(sections(x if xi is None else xi, table.along))
+        return np.array(sections(x if xi is None else xi))
 
 
 class NearCable:

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 #: Elements of which a beam keeps what single points ask for.
 ELEMENTS = 4096
 
+#: What is kept of a point that was asked for something once: what is made is kept the second time.
+#: For each point that is asked only once it would take longer to keep it than to make it.
+AGAIN = ()
+
 
 class Point:
     """One point of one beam, found in a scene.
@@ -42,7 +46,8 @@ class Point:
     off_axis : bool
         It is one of a cable off its axis: its section turns with the tangent.
     recovery, strain_table
-        What of recovered fields, and of the strain of the elements, does not depend on the state.
+        What of recovered fields, and of the strain of the elements, does not depend on the state;
+        :data:`AGAIN` if it was asked for once.
     """
 
     __slots__ = ("_both", "_dofs", "_lever", "_parts", "_scale", "_weights", "_x", "beam",
@@ -57,7 +62,8 @@ class Point:
         of_element = beam.touched.get(place[0])
         self._dofs, self._scale = of_element if of_element is not None else kept(
             beam.touched, place[0], self._of_element, ELEMENTS)
-        self._weights = self._both = self._lever = None
+        self._weights: Any = None
+        self._both = self._lever = None
         self._parts: list[Part] | None = None
         self.recovery: Any = None
         self.strain_table: Any = None
@@ -116,11 +122,13 @@ class Point:
 
     def _position(self):
         """Weights of the coordinates of the element in its position, (nb,)."""
-        if self._weights is None:
+        weights = self._weights
+        if weights is None or weights is AGAIN:
             _, xi, eta = self.place
-            self._weights = (self.beam.series.at(xi, eta) * self._scale
-                             if self.beam.mesh.heights is None else self.parts[0].weights[:, 0])
-        return self._weights
+            new = (self.beam.series.at(xi, eta) * self._scale
+                   if self.beam.mesh.heights is None else self.parts[0].weights[:, 0])
+            weights, self._weights = new, AGAIN if weights is None else new
+        return weights
 
     def _with_slope(self):
         """Weights of the coordinates of the element in its position and its slope, (2, nb)."""

@@ -39,6 +39,7 @@ from .formulations.ecm import EnhancedContinuum
 from .kept import kept
 from .materials import LinearLaw
 from .panels import Panels
+from .point import AGAIN
 from .quadrature import gauss
 from .mapping import cross
 from .section_forces import NotRecovered, SectionForces, Sections, viscous_forces
@@ -733,9 +734,11 @@ class Recovery:
         rows
             A slice of the seven rows.
         """
-        if point.recovery is None:
-            point.recovery = self._place(*point.place)
-        station, end, s, weights = point.recovery
+        known = point.recovery
+        if not known:
+            new = self._place(*point.place)
+            known, point.recovery = new, AGAIN if known is None else new
+        station, end, s, weights = known
         find = bisect_left if end else bisect_right
         piece = min(max(find(self._cuts, station) - 1, 0), len(self._tables) - 1)
         return self._tables[piece].one(s, weights, rows)

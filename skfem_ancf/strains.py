@@ -176,17 +176,10 @@ class SectionStrain(NamedTuple):
     here: Array
     rule: list[tuple[float, float]]
 
-    def __call__(self, xi: float, along: Array) -> list[float]:
-        """(eps_xx, eps_yy, 2 eps_xy) of the section at xi.
-
-        Parameters
-        ----------
-        xi
-            Its place.
-        along
-            The Chebyshev polynomials there, shape (along,).
-        """
+    def __call__(self, xi: float) -> list[float]:
+        """(eps_xx, eps_yy, 2 eps_xy) of the section at xi."""
         of, means = self.strain, self.samples.copy()
+        along = np.array(polynomials(xi, self.here.shape[-1]))
         if of.here:
             mapping, frame = of.beam.mesh.mapping(), of.tangent(self.e)
             for (eta, weight), pair in zip(self.rule, self.here.dot(along).tolist()):
