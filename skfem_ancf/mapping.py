@@ -79,7 +79,7 @@ def _sorted(director, crossed):
     return list(zip(crossed, *director)), list(crossed[len(director[0]):])
 
 
-def beside_section(turning: Sequence[Any], rest: Sequence[Any], gap: Sequence[Any]) -> list[Any]:
+def beside_section(turning: list[Any], rest: list[Any], gap: Sequence[Any]) -> list[Any]:
     """How far a point is beside the section of an element, times the height: a polynomial of xi.
 
     The cross product of what leads from the axis to the point, and of the director: it does not
@@ -390,7 +390,8 @@ class MappingBeam(Mapping):
         axis, director, crossed = ((c if tind is None else c.take(tind, axis=-1))[..., None]
                                    for c in self._powers)
         gap = x - (first if tind is None else first.take(tind, axis=1))[:, :, None]
-        beside = beside_section(*_sorted(director, crossed), gap)
+        turning, rest = _sorted(director, crossed)
+        beside = beside_section(turning, rest, gap)
         X = np.empty(x.shape)
         X[0] = xi
         for _ in range(max_iterations):
@@ -469,7 +470,7 @@ class MappingBeam(Mapping):
         return (dx + Y * dnx, dy + Y * dny), (nx, ny), (dx / size, dy / size)
 
     def _numbers(self, e):
-        """Of one element: where its axis begins, axis and director, and :func:`_sorted` of these."""
+        """Of one element: where its axis begins, axis and director, :func:`_sorted` of these."""
         found = self._known.get(e)
         if found is None:
             start, axis, director, crossed = (c[..., e].tolist() for c in (

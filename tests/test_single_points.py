@@ -30,7 +30,8 @@ def agree(state, x, tol=1e-13, names=METHODS, beam=None):
         ask = getattr(state, name)
         many = ask(x, beam, **options)
         one = np.array([ask(tuple(p), beam, **options) for p in x.T.tolist()]).T
-        assert_allclose(one, many, rtol=0, atol=tol * np.abs(many).max(), err_msg=f"{name} {options}")
+        assert_allclose(one, many, rtol=0, atol=tol * np.abs(many).max(),
+                        err_msg=f"{name} {options}")
 
 
 def loaded(beam):
