@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-#: Members of a call of compiled code.
-CHUNK = 128
+#: Members of a call of compiled code, and elements that are checked at once.
+CHUNK, ELEMENTS = 128, 1024
 #: A family has so many members at least, and for each scene that is built to learn of it.
 LEAST, EACH = 16, 4
 #: Members that are built and solved alone, too: at least, and for each so many one; and how far
@@ -214,6 +214,13 @@ class Batch:
 
     def _checked(self, u, values):
         """Which are not turned inside out, and which may be out of range; shape (k,)."""
+        elements = sum(beam.mesh.nelements for beam in self.family.one.scene.beams)
+        most = max(1, ELEMENTS // elements)  # what they take together stays in cache
+        parts = [self._checked_few(u[k:k + most], values[k:k + most])
+                 for k in range(0, len(u), most)]
+        return [np.concatenate(x) for x in zip(*parts)]
+
+    def _checked_few(self, u, values):
         family, solved = self.family, self.family.one.solved
         system, places = family.one.scene.system, _Places(family, values)
         start = places("start")

@@ -12,6 +12,8 @@ OURS, EXUDYN, Q2, TEXTBOOK = "skfem-ancf", "Exudyn", "scikit-fem Q2", "scikit-fe
 TANGENT = "Tangent assembly 100 times faster than the textbook BilinearForm, 16 to 4096 elements"
 ITERATION = "A static iteration at 16 elements, N = 3, under 0.25 ms"
 SWEEP = "A sweep of cantilevers 20 times faster than a loop of Exudyn's, at no larger error"
+#: How variants of sweeps end that have no goal: members are solved one by one.
+ALONE = ("one by one", "processes")
 DECADES = 10.0 ** -np.arange(1.0, 8.0)
 
 
@@ -108,7 +110,7 @@ def goals(results):
         out.append((TANGENT, f"{n} elements", "100 times", f"{pairs / fused:.3g}", verdict,
                     f"{1e3 * fused:.3g} ms", f"{1e3 * pairs:.3g} ms"))
     out += [(SWEEP, r["variant"], "20 times", f"{ratio:.3g}", verdict, named(r), named(its))
-            for r, ratio, its, verdict in sweeps(results.get("sweep", ())) if its]
+            for r, ratio, its, verdict in sweeps(results.get("sweep", ())) if its and verdict]
     for r in results.get("iteration", ()):
         if r["variant"].endswith("its iterations"):
             out.append((ITERATION, r["variant"], "0.25 ms", f"{1e3 * r['seconds']:.3g} ms",
@@ -117,12 +119,16 @@ def goals(results):
 
 
 def sweeps(rows):
-    """Rows of this package in a sweep, how many times faster than a peer, its row, the verdict."""
+    """Rows of this package in a sweep, how many times faster than a peer, its row, the verdict.
+
+    There is none on those that are solved one by one.
+    """
     for mine in rows:
         if mine["code"] == OURS:
             its = fastest(rows, EXUDYN, mine["error"])
             ratio = its["seconds"] / mine["seconds"] if its else None
-            yield mine, ratio, its, "met" if ratio is None or ratio >= 20.0 else "missed"
+            verdict = "met" if ratio is None or ratio >= 20.0 else "missed"
+            yield mine, ratio, its, "" if mine["variant"].endswith(ALONE) else verdict
 
 
 def goal_sweep(results):
@@ -133,7 +139,7 @@ def goal_sweep(results):
               f"{1e3 * r['seconds']:.3g}", f"{r['setup_seconds']:.2g}",
               f"{ratio:.3g}" if its else "", named(its), verdict if its else "")
              for r, ratio, its, verdict in sweeps(results["sweep"])]
-    verdict = "met" if all(line[-1] == "met" for line in lines) else "missed"
+    verdict = "missed" if any(line[-1] == "missed" for line in lines) else "met"
     return [f"**{SWEEP}**: {verdict if any(line[-1] for line in lines) else 'no peer took part'}. "
             "(By a clock on the wall, for each member; building, and the start of processes, are "
             "in it; the start is what a few members took before.)", "",
