@@ -39,7 +39,7 @@ TRIED, OF, NEAR = 2, 2500, 1e-6
 #: Error of a start that is given, relative, and how large it may be for a start to be given at
 #: all; members for each one that is solved to find starts, and for each that is solved from zero,
 #: too, to see whether a start leads to what zero leads to.
-START, USEFUL, STARTS, CHECKED = 1e-10, 1e-2, 16, 256
+START, USEFUL, STARTS, CHECKED = 1e-10, 1e-2, 16, 512
 #: Method, tolerance and most iterations of ``solve_static``.
 OPTIONS = "mixed", 1e-8, 30
 #: Members that are solved alone since they may be out of the range of law or mesh, about.

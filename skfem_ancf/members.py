@@ -228,12 +228,20 @@ def _alike(found):
     shapes = {name: value.shape for name, value in first.items()}
     out = []
     for one in found:
-        if isinstance(one, dict) and (one.keys() != shapes.keys() or any(
-                one[name].shape != shape for name, shape in shapes.items())):
+        if isinstance(one, dict) and not _fits(one, shapes):
             one = (f"CallbackError: measure returned {_listed(one)}, of the first member "
                    f"{_listed(first)}: names and shapes must be those of all members")
         out.append(one)
     return out
+
+
+def _fits(values, shapes):
+    if len(values) != len(shapes):
+        return False
+    for name, shape in shapes.items():
+        if name not in values or values[name].shape != shape:
+            return False
+    return True
 
 
 def _listed(values):

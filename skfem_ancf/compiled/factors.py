@@ -4,6 +4,7 @@ import numpy as np
 
 from ..band import LOST
 from .twin import jit
+from .vectors import subtract
 
 
 @jit
@@ -42,11 +43,10 @@ def factorize(A):
             c = flat[at + k]
             if c != 0.0:
                 c *= inverse
-                other = (j + k) * ld - k
-                before = flat[other + k]
-                for i in range(k, m + 1):
-                    flat[other + i] -= c * flat[at + i]
-                if abs(flat[other + k]) < LOST * abs(before):
+                other = (j + k) * ld
+                before = flat[other]
+                subtract(flat, other, flat, at + k, m + 1 - k, c)
+                if abs(flat[other]) < LOST * abs(before):
                     return False
         for k in range(1, m + 1):
             flat[at + k] *= inverse
