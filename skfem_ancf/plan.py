@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from .dynamics.choice import choose_scheme
 from .eigenstrain import EigenStrain
 from .errors import NameUnknown, require_option
 
@@ -119,6 +120,9 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         add("sweep", "skipped" if alone else "computed",
             f"members are solved one by one: {alone}" if alone else
             "members that differ by floats are solved together, if points are read")
+    if dynamic:
+        scheme, reason = choose_scheme(s)
+        add("scheme", "computed", f'scheme="auto" takes {scheme!r}: {reason}')
     sensors = scene.sensors if dynamic else {}
     add("sensors", "computed" if sensors else "skipped",
         f"{len(sensors)} read at every step" if sensors else "there are none")

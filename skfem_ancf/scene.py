@@ -16,7 +16,8 @@ from .beam import Beam, select_member
 from .checks import warn_of
 from .damping import Damping
 from .doors import configuration, displacement
-from .dynamics import get_scheme
+from .dynamics import choose_scheme, get_scheme
+from .dynamics.choice import RTOL
 from .dynamics.checkpoint import resume
 from .dynamics.integrate import follow, integrate
 from .dynamics.sensors import Sensor
@@ -25,8 +26,8 @@ from .obstacles import Obstacle
 from .forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring, TorsionalSpring,
                      bind_force)
 from .errors import (ConvergenceError, InputError, Interrupted, StabilityWarning, ask_field,
-                     require_finite, require_finite_scalar, require_label, require_option, shown,
-                     taught, teaching)
+                     require_finite, require_finite_scalar, require_label, require_option,
+                     require_positive, shown, taught, teaching)
 from .joints import Joint, bind_joint, get_joint
 from .joints.base import both_of, is_ground, members_at, named_place
 from .joints.prescribed import Turned
@@ -1635,7 +1636,8 @@ class Scene:
         dt
             Step size, or "auto".
         scheme
-            A scheme or a name from :data:`skfem_ancf.dynamics.SCHEMES`.
+            A scheme, a name from :data:`skfem_ancf.dynamics.SCHEMES`, or "auto": by joints,
+            damping, stiffness, contact and ``rtol``, as :meth:`plan` says.
         start
             A State to start from, or None for the stress-free state. An instant of a motion
             (``history.state(k)``) goes on with its velocity, from its time; every other State
@@ -1669,6 +1671,9 @@ class Scene:
         velocity = np.concatenate([self._velocities[k][1] if k in self._velocities else
                                    np.zeros(b.N) for k, b in enumerate(self.members)])
         u = None if start is None else displacement(self.system, start)
+        if isinstance(scheme, str) and scheme == "auto":
+            rtol = require_positive("rtol", options.get("rtol", RTOL))
+            scheme = choose_scheme(self.system, rtol).scheme
         return integrate(self.system, t_end, dt, get_scheme(scheme), u, velocity, start=start,
                          sensors=self._checked_sensors(), **options)
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, NameUnknown,
-                        Scene, StVenantKirchhoff, SupportError)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, KelvinVoigt, Line,
+                        MeshBeam, NameUnknown, Scene, StVenantKirchhoff, SupportError)
 from skfem_ancf.beam import Beam as BeamClass
 from skfem_ancf import compiled
 from skfem_ancf import body
-from skfem_ancf.dynamics import steps
+from skfem_ancf.dynamics import choose_scheme, steps
 from skfem_ancf.kernels.base import FORCE, TANGENT
 from skfem_ancf.statics import iteration
 from skfem_ancf.linalg import BandMatrix
@@ -242,3 +242,29 @@ def test_choice_refuses_unknown_fields():
     with pytest.raises(InputError, match="below 1"):
         Beam(mesh, "auto", StVenantKirchhoff(1.0, 0.3), 0.1, tolerance=2.0)
     assert not Beam(mesh, ElementBeamCable(), StVenantKirchhoff(1.0, 0.3), 0.1).has_sections
+
+
+def test_which_scheme_a_motion_takes():
+    """By joints, damping, stiffness, contact and tolerance; the plan says which, and why."""
+    def rod(height=0.1, **options):
+        beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), height), ElementBeamANCF(2),
+                    StVenantKirchhoff(1e5, 0.3, 1000.0), 0.1, **options)
+        return Scene(beam).gravity((0, -9.81))
+
+    held, hinged, touching = rod().clamp("left"), rod(), rod().clamp("left")
+    hinged.joint("circle", at=(0, 0), center=(0, 1))
+    touching.obstacle(Line((0, -0.2), (0, 1)))
+    damped = rod(damping=KelvinVoigt(1e-3)).clamp("left")
+    for scene, rtol, name, why in (
+            (held, 1e-6, "gauss", "no joints"), (held, 1e-3, "energy-momentum", "nothing is lost"),
+            (hinged, 1e-6, "radau", "joints"), (damped, 1e-6, "radau", "damping"),
+            (damped, 1e-2, "generalized-alpha", "damping"),
+            (rod(1e-3).clamp("left"), 1e-6, "radau", "no step resolves"),
+            (touching, 1e-6, "energy-momentum", "obstacles")):
+        choice = choose_scheme(scene.system, rtol)
+        assert choice.scheme.name == name and why in choice.reason
+        item = scene.plan("dynamic")["scheme"]
+        assert repr(choose_scheme(scene.system).scheme) in item.reason
+    history = held.integrate(0.1, "auto", scheme="auto", rtol=1e-6)
+    other = held.integrate(0.1, "auto", scheme="gauss", rtol=1e-6)
+    assert np.array_equal(history.u, other.u) and len(history) == len(other)

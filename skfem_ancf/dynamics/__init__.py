@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..errors import require_option, taught
 from .base import Motion, Scheme
+from .choice import choose_scheme
 from .energy_momentum import EnergyMomentum
 from .gauss import Gauss
 from .generalized_alpha import HHT, GeneralizedAlpha, Newmark
@@ -31,4 +32,4 @@ def get_scheme(scheme: str | Scheme | type[Scheme]) -> Scheme:
 
 
 __all__ = ["HHT", "SCHEMES", "EnergyMomentum", "Gauss", "GeneralizedAlpha", "Motion", "Newmark",
-           "Radau", "Scheme", "get_scheme"]
+           "Radau", "Scheme", "choose_scheme", "get_scheme"]

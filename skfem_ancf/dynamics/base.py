@@ -78,8 +78,9 @@ class Scheme:
     adaptive : bool
         It estimates its error, which chooses steps with ``dt="auto"``.
     error_constant : float
-        The error that a step adds to the displacement is about this number times dt^2 times the
-        change of the acceleration.
+        The error that a step adds to the displacement is about this number times dt^(order + 1)
+        times the derivative of it of that order: for order 2, times dt^2 times the change of the
+        acceleration.
     """
 
     name = ""
@@ -166,6 +167,21 @@ class Scheme:
             Shape (N,).
         """
         return self.error_constant * dt**2 * (new.algorithmic - old.algorithmic)
+
+    def resolved(self, integrator: Integrator, du: Array) -> Array:
+        """What of a change of the displacement a step resolves, by its matrix as a filter.
+
+        Parameters
+        ----------
+        integrator
+            It has the factors of the last step.
+        du
+            Shape (N,).
+        """
+        if not integrator.ready:
+            return du
+        s = integrator.system
+        return integrator.solve(integrator.mass_factor() * s.mass.multiply(du) * s.free)
 
 
 def in_steps(scheme: Scheme) -> bool:

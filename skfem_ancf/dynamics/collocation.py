@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from math import factorial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 
+from ..band import solve_complex
 from ..errors import InputError
 from .base import Motion, Scheme
 from .integrator import StepFailed
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
     from ..types import Array
     from .integrator import Integrator
 
+#: Growth from one derivative to the next, times the size of the step, at most.
+GROWTH = 2.0
 #: Instants of a step at which supports are asked that move.
 SAMPLES = 9
 
@@ -69,6 +73,12 @@ class _Tableau:
         return np.ascontiguousarray((1.0 + ratio * self.points[:, None])**powers @ self.fit)
 
 
+def _difference(x, a):
+    """The derivative of the highest order of the polynomial of values a (n, ...) at x (n,)."""
+    weights = [1.0 / np.prod(np.delete(xi - x, i)) for i, xi in enumerate(x)]
+    return factorial(len(x) - 1) * np.tensordot(weights, a, 1)
+
+
 @lru_cache(16)
 def _tableau(points):
     return _Tableau(np.array(points))
@@ -100,7 +110,8 @@ class Collocation(Scheme):
     """
 
     tol = 1e-12
-    adaptive = False
+    #: What is added to the estimated error, as a factor, for what steps do not resolve.
+    safety = 1.0
 
     @property
     def points(self) -> Array:
@@ -122,6 +133,48 @@ class Collocation(Scheme):
         if system.forces.far:
             raise InputError(f"{self!r} is not for scenes with force elements between points far "
                              "apart: take 'energy-momentum' or 'generalized-alpha'")
+
+    def local_error(self, old: Motion, new: Motion, dt: float) -> Array:
+        """Estimate of the error that a step adds to the displacement, shape (N,).
+
+        From the highest divided difference of the accelerations at the points and the ends, and by
+        how much it differs from that of the step before; what is still missing to the order of the
+        method grows as it did from the last derivative to this one.
+
+        Parameters
+        ----------
+        old, new, dt
+            Start and end of the step, and its size.
+        """
+        method, memory = self._table.method, new.memory or {}
+        c, (u, v) = method.points, memory["start"]
+        W = method.second @ (memory["stages"] - u - dt * c[:, None] * v) / dt**2
+        x, a = np.append(0.0, c), np.vstack([old.acceleration, W])
+        if c[-1] < 1.0:
+            x, a = np.append(x, 1.0), np.vstack([a, new.acceleration])
+        if len(x) > self.order:
+            x, a = x[[0, -1]], a[[0, -1]]
+        k, before = len(x) - 1, (old.memory or {}).get("bend")
+        bend = _difference(x, a)
+        memory["bend"] = bend / dt**k
+        if k == self.order - 1:
+            return self.safety * self.error_constant * dt**2 * bend
+        lower = _difference(x[1:], a[1:])
+        if before is not None:
+            h = 0.5 * (dt + old.before)
+            lower, bend, k = bend, dt**(k + 1) * (memory["bend"] - before) / h, k + 1
+        size, least = np.linalg.norm(bend), np.linalg.norm(lower)
+        growth = min(size / least, GROWTH) if least > 0.0 else 0.0
+        return self.safety * self.error_constant * dt**2 * growth**(self.order - 1 - k) * bend
+
+    def resolved(self, integrator: Integrator, du: Array) -> Array:
+        s, w = integrator.system, integrator.room
+        k = int(np.argmin(np.abs(w.method.values[1])))
+        mu = complex(*w.method.values[:, k]) / integrator.dt
+        x = mu**2 * s.mass.multiply(du) * s.free
+        x, y = np.ascontiguousarray(x.real), np.ascontiguousarray(x.imag)
+        solve_complex(w.re[k], w.im[k], x, y)
+        return x
 
     def in_blocks(self, system: System) -> bool:
         return True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import factorial
 from typing import TYPE_CHECKING
 
 from ..errors import require_integer
@@ -38,10 +39,13 @@ class Gauss(Collocation):
 
     name = "gauss"
     joined = False
+    safety = 5.0  # it damps nothing
 
     def __init__(self, points: int = 3) -> None:
         self.number = require_integer("points", points, 1, 4)
-        self.order = 2 * self.number
+        n = self.number
+        self.order = 2 * n
+        self.error_constant = factorial(n)**2 / (factorial(2 * n) * factorial(2 * n + 1))
 
     @property
     def points(self) -> Array:

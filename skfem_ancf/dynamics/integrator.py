@@ -331,6 +331,11 @@ class Integrator:
     # factors
 
     @property
+    def dt(self) -> float:
+        """Size of the last step."""
+        return self._dt
+
+    @property
     def ready(self) -> bool:
         """True if there are factors of an iteration matrix."""
         return self._state[READY] != 0.0

@@ -30,6 +30,7 @@ class Radau(Collocation):
 
     name = "radau"
     order = 5
+    error_constant = 1.0 / 7200.0
 
     @property
     def points(self) -> Array:

@@ -39,7 +39,7 @@ class StepSize:
     * what the step does not resolve, by the iteration matrix as a filter,
     * vibrations whose phase is lost within the motion whatever the tolerance asks, by two
       averages over the time W in which they turn: after the time T a vibration of the frequency w
-      has lost the phase C w^3 dt^2 T, so W = (C dt^2 T)^(1/3) / 2.
+      has lost the phase C w^(p + 1) dt^p T, so W = (C dt^p T)^(1 / (p + 1)) / 2.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class StepSize:
             raise InputError(f"{scheme!r} does not estimate its error: give the step size dt, or "
                              "take 'energy-momentum' or 'generalized-alpha' with dt='auto'")
         self.system, self.scheme, self.rtol = system, scheme, rtol
-        self.span = t_end - t_start
+        self.span, self.phase = t_end - t_start, max(2, scheme.order)
         self._mass = sum(b.total_mass for b in system.members)
         self._averages = self._new = np.zeros((2, system.N))
         self.times = np.linspace(t_start, t_end, SAMPLES + 1)
@@ -136,13 +136,10 @@ class StepSize:
         float
             Above 1 it adds more than its share.
         """
-        s = self.system
-        de = self.scheme.local_error(old, new, dt)
-        if integrator.ready:
-            de = integrator.solve(integrator.mass_factor() * s.mass.multiply(de) * s.free)
-        width = 0.5 * (self.scheme.error_constant * dt**2 * self.span) ** (1.0 / 3.0)
+        de = self.scheme.resolved(integrator, self.scheme.local_error(old, new, dt))
+        order, power = self.phase, self.scheme.order + 1
+        width = 0.5 * (self.scheme.error_constant * dt**order * self.span) ** (1.0 / (order + 1.0))
         part = -np.expm1(-dt / width)
-        power = self.scheme.order + 1
         rate = de / dt**power  # of the motion, not of the step
         self._new = self._averages.copy()
         for average in self._new:
