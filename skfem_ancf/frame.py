@@ -12,9 +12,9 @@ from .errors import (InputError, require_finite, require_finite_scalar, require_
                      require_integer, require_names, require_option, require_options, shown,
                      teaching)
 from .joints.base import bind_joint
-from .joints.nodes import Nodes
+from .joints.nodes import Nodes, chain_ends
 from .joints.settlements import HELD
-from .loads import DeadLoad, EndMoment
+from .loads import DeadLoad, EndMoment, Load
 from .net import Net, mapping_of, net_from_meshio
 from .scene import Scene
 
@@ -34,11 +34,54 @@ MOST = 2**16
 REST = "lines"
 
 
-class NodeMoment(EndMoment):
-    """A moment on a section at a node, whose angle is counted from -pi to pi."""
+class NodeForce(DeadLoad):
+    """A dead force on each of some ends of a beam's lines.
 
-    def bind(self, beam: Beam) -> NodeMoment:
-        return self
+    Parameters
+    ----------
+    beam
+        The beam.
+    ends
+        Numbers of the ends, two for each line, shape (k,).
+    value
+        The force on each, shape (2,).
+    amplitude
+        As for :class:`~skfem_ancf.loads.Load`.
+    """
+
+    def __init__(self, beam: Beam, ends: Array, value: Array,
+                 amplitude: TimeFunction = None) -> None:
+        vector = np.zeros(beam.N)
+        vector.reshape(-1, beam.nd)[chain_ends(beam).ravel()[ends], :2] = value
+        super().__init__(beam, vector, amplitude)
+        self.ends, self.value = ends, value
+
+    def bind(self, beam: Beam) -> Load:
+        return self if beam is self.beam else NodeForce(beam, self.ends, self.value,
+                                                        self.amplitude)
+
+
+class NodeMoment(EndMoment):
+    """A moment on a section at a node, whose angle is counted from -pi to pi.
+
+    Parameters
+    ----------
+    beam
+        The beam.
+    end
+        Number of the end, two for each line.
+    M
+        The moment, counterclockwise.
+    amplitude
+        As for :class:`~skfem_ancf.loads.Load`.
+    """
+
+    def __init__(self, beam: Beam, end: int, M: float, amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, int(chain_ends(beam).ravel()[end]), M, amplitude)
+        self.end, self.boundary = end, None  # which means the same on other meshes
+
+    def bind(self, beam: Beam) -> Load:
+        return self if beam is self.beam else NodeMoment(beam, self.end, self.M, self.amplitude)
 
     def angle(self, u: Array) -> float:
         start = self.beam.q0_local[self.dofs] @ self.c @ [1.0, 1.0j]
@@ -80,7 +123,7 @@ class Frame(Scene):
 
     def __init__(self, net: Net, beams: Sequence[Beam], lines: Array, hinged: Array) -> None:
         super().__init__(*beams)
-        self.net, self._lines = net, lines
+        self.net, self._lines, self._hinged = net, lines, hinged
         ends = net.lines[:, lines].T.ravel()
         self._nodes = Nodes(ends, hinged[:, lines].T.ravel(),
                             np.zeros((net.points.shape[1], 3), dtype=bool), net, lines)
@@ -405,13 +448,9 @@ class Frame(Scene):
             super().point_force(force, at, beam, amplitude)
             return self
         force = require_finite("force", force, (2,))
-        number, node = self._ends_at(at)
-        loads = []
-        for k in np.unique(number):
-            vector = np.zeros(self.beams[k].N)
-            vector.reshape(-1, self.beams[k].nd)[node[number == k], :2] = force
-            loads.append((k, DeadLoad(self.beams[k], vector, amplitude)))
-        self._put(loads=loads)
+        number, end = self._ends_at(at)
+        self._put(loads=[(int(k), NodeForce(self.beams[k], end[number == k], force, amplitude))
+                         for k in np.unique(number)])
         return self
 
     def moment(self, boundary: Any, M: float, beam: WhichBeam = None,
@@ -443,19 +482,17 @@ class Frame(Scene):
         M = require_finite_scalar("M", M)
         self._require_rigid(self.nodes(boundary), "no line takes a moment there; leave one of them "
                             "rigid, by pairs (line, node) in hinges")
-        loads = [(k, NodeMoment(self.beams[k], int(node), M, amplitude))
-                 for k, node in zip(*self._ends_at(boundary))]
+        loads = [(k, NodeMoment(self.beams[k], int(end), M, amplitude))
+                 for k, end in zip(*self._ends_at(boundary))]
         self._put(loads=loads)
         return self
 
     def _ends_at(self, place):
-        """Of nodes the beams (k,) whose ends lead there, and the nodes of their meshes (k,)."""
-        joint = self._bound
-        first = joint.positions[joint.leading(self.nodes(place)), 0]
-        starts = np.array([self.offset(k) for k in range(len(self.beams))])
-        number = np.searchsorted(starts, first, side="right") - 1
-        nd = np.array([beam.nd for beam in self.beams])
-        return number, (first - starts[number]) // nd[number]
+        """Of nodes the beams (k,) whose ends lead there, and numbers of these ends (k,)."""
+        ends = self._bound.leading(self.nodes(place))
+        first = np.cumsum([0] + [chain_ends(beam).size for beam in self.beams])
+        number = np.searchsorted(first, ends, side="right") - 1
+        return number, ends - first[number]
 
     # results
 
@@ -473,10 +510,37 @@ class Frame(Scene):
         out[joint.nodes[rigid]] = np.angle(joint.turns(state.u)[rigid])
         return out
 
-    def with_beams(self, beams: Sequence[Beam]) -> Scene:
-        """Raises InputError: the lines of a frame have their meshes from its nodes."""
-        raise InputError("a frame is not put on other meshes: divide its lines finer, by "
-                         "elements= of Frame.from_lines")
+    def with_beams(self, beams: Sequence[Beam]) -> Frame:
+        """The same frame with other beams, whose lines end where they did.
+
+        Parameters
+        ----------
+        beams
+            As many beams, in the same order: of other elements, materials or sections, or on
+            meshes with other nodes between the ends of the lines.
+
+        Returns
+        -------
+        Frame
+
+        Raises
+        ------
+        InputError
+            If lines end elsewhere, or as :meth:`Scene.with_beams <skfem_ancf.Scene.with_beams>`.
+        """
+        self._require_beams(beams)
+        for old, new in zip(self.beams, beams):
+            a, b = (beam.mesh.p[:, chain_ends(beam)] for beam in (old, new))
+            if a.shape != b.shape or np.max(np.abs(a - b)) > 1e-9 * self.net.size:
+                raise InputError(f"{new!r} must have a chain for each line of {old!r}, from the "
+                                 "same point to the same point: nodes between them may be others")
+        frame = type(self)(self.net, beams, self._lines, self._hinged)
+        known = self._nodes
+        frame._nodes = Nodes(known.nodes, known.hinged, known.held, self.net, self._lines,
+                             known.settled)
+        frame._join()
+        self._put_on(frame, [joint for joint, _ in self._joints[1:]])
+        return frame
 
 
 def _no_beam(beam):

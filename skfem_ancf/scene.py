@@ -1250,13 +1250,18 @@ class Scene:
         MeshError
             If a place or a point is not found on the other mesh.
         """
-        if not isinstance(beams, (list, tuple)) or len(beams) != len(self._beams):
+        self._require_beams(beams)
+        return self._put_on(Scene(*beams, *self._bodies), [joint for joint, _ in self._joints])
+
+    def _require_beams(self, beams):
+        if (not isinstance(beams, (list, tuple)) or len(beams) != len(self._beams)
+                or not all(isinstance(beam, Beam) for beam in beams)):
             raise InputError(f"beams must be a list of {len(self._beams)} Beam(s), got "
                              f"{shown(beams)}")
-        scene = Scene(*beams, *self._bodies)
+
+    def _put_on(self, scene, joints):
+        """What this scene has, on another of as many beams and the same bodies."""
         scene._damping, scene._sensors = self._damping, self._sensors
-        if len(scene.beams) != len(self._beams):
-            raise InputError(f"the scene has {len(self._beams)} beams, got {len(scene.beams)}")
         changed = [a.mesh is not b.mesh for a, b in zip(self._beams, scene.beams)]
         changed += [False] * len(self._bodies)
 
@@ -1270,7 +1275,7 @@ class Scene:
             require_portable(support, changed[support.beam])
         for k, load, _ in self._loads:
             require_portable(load, changed[k])
-        for joint, _ in self._joints:
+        for joint in joints:
             require_portable(joint, any(changed))
         for element, _ in self._elements:
             require_portable(element, any(changed))
@@ -1279,7 +1284,7 @@ class Scene:
                 raise InputError("initial_velocity was given by coordinates and cannot be put on "
                                  "another mesh: give names or functions")
         return scene._put(self._supports, [(k, load) for k, load, _ in self._loads],
-                          [joint for joint, _ in self._joints],
+                          joints,
                           [(k, v) for k, (v, _) in self._velocities.items()],
                           [element for element, _ in self._elements])
 

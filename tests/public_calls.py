@@ -469,7 +469,7 @@ call("frame.hold", lambda place, what: frame().hold(place, what), dict(place=0, 
      place="nodes", what="other")
 call("frame.clamp", lambda **k: frame().clamp(**k), dict(boundary=0, thickness="free"),
      boundary="nodes", thickness="other")
-call("frame.settle", lambda **k: frame().clamp(0).settle(**k),
+call("frame.settle", lambda **k: frame(elements=4).clamp(0).settle(**k).solve_static(),
      dict(place=2, x=1e-3, y=1e-3, angle=0.1),
      {name: {"float class": "a function of a number"} for name in ("x", "y", "angle")},
      place="nodes", x="number?", y="number?", angle="number?")

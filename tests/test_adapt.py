@@ -168,3 +168,15 @@ def test_elements_of_ones_own_keep_their_degree():
         pass
 
     assert Own(5).raised() is None and OwnSections(2, 5).raised() is None
+
+
+def test_a_curve_is_followed_and_not_its_first_elements():
+    """An arch of one element: a higher degree alone converged to the cubic in its place."""
+    def arch(n):
+        mesh = MeshBeam.init_curve(lambda s: np.array([s, 0.5 * np.sin(np.pi * s)]),
+                                   np.linspace(0, 1, n + 1), 0.02)
+        beam = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(2e11, 0.3), width=0.02)
+        return Scene(beam).clamp("left").point_force((0, -100.0), at=(1, 0))
+
+    state, exact = arch(1).solve_static(adapt=1e-3), arch(64).solve_static()
+    assert_allclose(state.displacement((1, 0)), exact.displacement((1, 0)), rtol=1e-4)

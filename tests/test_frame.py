@@ -512,6 +512,48 @@ def test_settlements_that_cannot_be():
         pickle.dumps(moving)
 
 
+# adaption
+
+def loaded(elements=1, **options):
+    """A portal whose girder may be curved, with every kind of load and a settlement."""
+    frame = Frame.from_lines(*PORTAL, groups={"girder": [1]}, nodes={"ground": [0, 3]},
+                             elements=elements, material=STEEL, height=H, width=H, **options)
+    frame.clamp("ground").point_force((800.0, -300.0), at=1).moment(2, 200.0)
+    return frame.line_load((0, -500.0), beam="girder").settle(3, y=-0.05, angle=0.1)
+
+
+@pytest.mark.parametrize("options, degrees", [
+    ({}, True), ({"element": ElementBeamCable(3), "max_degree": 3}, False),
+    ({"curves": {1: lambda s: np.array([s, 1 + 0.1 * np.sin(np.pi * s)])}}, False)])
+def test_frames_adapt(options, degrees):
+    """By higher degrees, on finer lines, and on lines that follow their curves."""
+    fine = loaded(16, **{k: v for k, v in options.items() if k == "curves"})
+    exact = fine.solve_static()
+    most = {"max_degree": options["max_degree"]} if "max_degree" in options else {}
+    options = {k: v for k, v in options.items() if k != "max_degree"}
+    state = loaded(**options).solve_static(adapt=1e-3, **most)
+    frame = state.scene
+    assert isinstance(frame, Frame) and max(state.error_estimate.values()) <= 1e-3
+    girder = frame.beams[0]
+    assert (girder.element.axis_degree > 5) == degrees
+    assert (girder.mesh.nelements > 1) != degrees
+    for place in ((1, 1), (0, 1)):
+        assert_allclose(state.displacement(place), exact.displacement(place), atol=1e-5)
+    assert_allclose(frame.rotations(state), fine.rotations(exact), atol=1e-4)
+
+
+def test_a_frame_on_other_beams():
+    frame = loaded(2)
+    stiffer = frame.replace(beam="girder", material=STEEL.replace(E=4e11))
+    assert isinstance(stiffer, Frame) and len(stiffer.loads) == len(frame.loads)
+    twice = loaded(2, sections={"girder": {"material": STEEL.replace(E=4e11)}})
+    assert np.array_equal(stiffer.solve_static().u, twice.solve_static().u)
+    with pytest.raises(InputError, match="a chain for each line"):
+        frame.with_beams(frame.beams[::-1])
+    with pytest.raises(InputError, match="list of 2 Beam"):
+        frame.with_beams([frame.beams[0]])
+
+
 # its parts
 
 
@@ -644,7 +686,6 @@ def test_what_is_not_held_is_said():
     (lambda f: f.hold(0, "z"), NameUnknown, "what is held"),
     (lambda f: f.clamp(lambda x: x[0] > 7), MeshError, "selects none of the 4 nodes"),
     (lambda f: f.clamp(lambda x: 1), InputError, "returns n truth values"),
-    (lambda f: f.gravity((0, -1)).solve_static(adapt=1e-3), InputError, "elements="),
     (lambda f: Frame.from_meshio(meshio.Mesh([[0, 0]], []), material=STEEL), MeshError, "no lines"),
     (lambda f: Frame.from_meshio("nothing.msh", material=STEEL), FileError, "nothing.msh"),
     (lambda f: Frame.from_lines(*PORTAL, hinges="all", material=STEEL, height=H, width=H).clamp(0),

@@ -11,6 +11,7 @@ import numpy as np
 from ..elements.base import DEGREES
 from ..errors import (ConvergenceError, InputError, NameUnknown, require_integer, require_positive,
                       taught)
+from ..joints.nodes import chain_ends
 from ..quadrature import gauss, tensor
 
 if TYPE_CHECKING:
@@ -74,6 +75,7 @@ def solve_adaptive(scene: Scene, tol: float, max_elements: int = 20000, goal: st
     the displacement of the beams' ends relative to the size of the scene, and relative in the
     strain energy. Once the mesh resolves the solution, a method of order p leaves the finer
     solution an error of 1 / (2^p - 1) of it, a third or less, and a higher degree a tenth of it.
+    On a curve, of which elements have cubics, only halving brings their axes closer to it.
     Smooth beams take the higher degree for the next round; of the others the elements are halved
     that contribute most to the difference in the energy norm.
 
@@ -165,7 +167,9 @@ class _Rounds:
     def _raised(self, k):
         """The element of a beam of the next degree; None if its elements are to be split."""
         element = self.scene.beams[k].element
-        may = k not in self._rough and element.axis_degree + 2 <= self._most
+        # of a curve elements have cubics, which a higher degree brings no closer to it
+        may = (k not in self._rough and element.axis_degree + 2 <= self._most
+               and self.scene.beams[k].mesh.curve is None)
         return element.raised() if may else None
 
     def _small(self, error):
@@ -341,7 +345,8 @@ def _compare(coarse, state, fine, better):
     total, changes, energies = better.strain_energy, [], []
     for a, b in zip(coarse.beams, fine.beams):
         u, v = state.u_of(a), better.u_of(b)
-        ends = [v.reshape(-1, b.nd)[end, :2] - u.reshape(-1, a.nd)[end, :2] for end in (0, -1)]
+        there, here = (np.append([0, -1], chain_ends(beam)) for beam in (a, b))
+        ends = v.reshape(-1, b.nd)[here, :2] - u.reshape(-1, a.nd)[there, :2]
         changes.append(float(np.max(np.hypot(*np.transpose(ends)))) / coarse.system.size)
         energies.append(float(b.kernel.energy(v) - a.kernel.energy(u)) / (total or 1.0))
     estimate = {"displacement": max(changes, default=0.0),
