@@ -92,3 +92,12 @@ def test_goals_say_which_error_is_missed():
         ("BilinearForm by pairs", 1.0), ("batched form", 0.1), ("fused with the force", 0.02))]
     (tangent,) = bench.goals({"tangent": times})
     assert tangent[1:5] == ("16 elements", "100 times", "50", "missed")
+
+
+def test_points_are_measured_with_their_difference(capsys):
+    import points
+
+    points.main(["--quick", "--only", "strain", "raw stress"])
+    head, *rows = capsys.readouterr().out.splitlines()
+    assert len(rows) == 2 * len(points.ELEMENTS) * len(points.MESHES) and "difference" in head
+    assert all(float(row.rstrip("* ").split()[-1]) < 1e-13 for row in rows)
