@@ -463,7 +463,7 @@ class MappingBeam(Mapping):
         if isinstance(e, int):
             _, axis, director, _, _ = self._numbers(e)
         else:
-            axis, director = (c[:, :, e] for c in self._powers[:2])
+            axis, director = (c.take(e, axis=-1) for c in self._powers[:2])
         dx, dy = _polynomial(axis[0], xi)[1], _polynomial(axis[1], xi)[1]
         (nx, dnx), (ny, dny) = _polynomial(director[0], xi), _polynomial(director[1], xi)
         Y, size = eta - 0.5, (dx * dx + dy * dy) ** 0.5

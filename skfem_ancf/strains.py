@@ -371,11 +371,14 @@ class ElementStrain:
             at = np.arange(n)[part] if few else e[part]
             T = polynomials(X[1, part], max(self._shape[1] + 1, 2))
             slopes = self._slopes(turned, at, e[part], T)
+            frames = self._frames(e[part])
             if self.here:
-                slopes += self._slopes_here(free, at, e[part], X[:, part], T)
+                found, tangent = self._slopes_here(free, at, e[part], X[:, part], T)
+                slopes += found
+                frames.append(tangent)
             weights = list(self._weights @ chebyshev(X[0, part], self._weights.shape[1]))
             for row, values in zip(out, interpolated(
-                    self.terms, weights, slopes, self._frames(e[part], X[:, part]))):
+                    self.terms, weights, slopes, frames)):
                 row[part] = values
         return out
 
@@ -402,7 +405,7 @@ class ElementStrain:
         return out
 
     def _slopes_here(self, free, at, e, X, T):
-        """Derivatives at the points themselves, (2, n) each."""
+        """Derivatives at the points themselves, (2, n) each, and the tangent of the axis there."""
         (p, m), both = self._shape, []
         basis = (chebyshev(X[0], p)[:, None] * np.array(T[:m])).reshape(p * m, -1)
         for table in free:
@@ -412,18 +415,20 @@ class ElementStrain:
             both.append(value)
         mesh = self.beam.mesh
         if mesh.is_straight:
-            return [both[0] / mesh.lengths[e], both[1] / mesh.height]
-        return turned(_turning(*mesh.mapping().derivatives(e, *X)), *both)
+            return [both[0] / mesh.lengths[e], both[1] / mesh.height], self._tangents(e)
+        turning = _turning(*mesh.mapping().derivatives(e, *X))
+        return turned(turning, *both), turning[5:]
 
-    def _frames(self, e, X=None):
-        """The tangent of the axis at all places, and at points X."""
-        mesh, count = self.beam.mesh, len(self.places)
-        if mesh.is_straight:
-            return [mesh.p_X[:, mesh.t[0]].take(e, axis=-1)] * (count + self.here)
-        out = [self._map[5:, place, 0].take(e, axis=-1) for place in range(count)]
-        if self.here and X is not None:
-            out.append(mesh.mapping().derivatives(e, *X)[2])
-        return out
+    def _frames(self, e):
+        """The tangent of the axis at all places."""
+        if self.beam.mesh.is_straight:
+            return [self._tangents(e)] * len(self.places)
+        return [self._map[5:, place, 0].take(e, axis=-1) for place in range(len(self.places))]
+
+    def _tangents(self, e):
+        """Those of straight elements, (2, n)."""
+        mesh = self.beam.mesh
+        return mesh.p_X[:, mesh.t[0]].take(e, axis=-1)
 
     # at one point
 
@@ -523,6 +528,8 @@ class ElementStrain:
             table[-2:, :, :m, :p] = (self._free * (scale / size[:, None])[:, None]).swapaxes(
                 1, 2).reshape(2, -1, p, m).swapaxes(2, 3)
         frames = [tuple(f[:, 0].tolist()) for f in self._frames(at)]
+        if straight and self.here:
+            frames.append(tuple(self._tangents(at)[:, 0].tolist()))
         return table, shape, frames, None if straight else [
             tuple(self._map[0, place, :, e].tolist()) for place in self._at]
 
