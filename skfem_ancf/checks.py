@@ -95,6 +95,7 @@ class Screen:
         first = np.concatenate([[0], np.cumsum([b.N for b in beams])])
         node = np.concatenate([[0], np.cumsum([b.N // b.nd for b in beams])])
         self._x = np.concatenate([n + np.arange(2, b.N, b.nd) for n, b in zip(first, beams)])
+        self._y = self._x + 1
         self.start = np.concatenate([tangents(b, 0.0) for b in beams])
         self._left, self._right = np.hstack([n + b.mesh.t for n, b in zip(node, beams)])
         self.slender = np.concatenate([b.mesh.height / b.mesh.lengths for b in beams])
@@ -114,11 +115,12 @@ class Screen:
             return True
         start = self.start if start is None else start
         slender = self.slender if slender is None else slender
-        r = (u[..., self._x] + 1j * u[..., self._x + 1]) / start + 1.0
-        turn = np.abs(np.angle(r[..., self._right] * r[..., self._left].conj()))
+        r = (u[..., self._x] + 1j * u[..., self._y]) / start + 1.0
+        z = r[..., self._right] * r[..., self._left].conj()
+        turn = np.abs(np.arctan2(z.imag, z.real))
         # the largest curvature of an element is seldom more than twice its mean
-        return np.all(turn < self._limit, axis=-1) & (
-            np.min(np.abs(r), axis=-1) - np.max(turn * slender, axis=-1) > 1.1 * COMPRESSED)
+        return (turn < self._limit).all(axis=-1) & (
+            np.abs(r).min(axis=-1) - (turn * slender).max(axis=-1) > 1.1 * COMPRESSED)
 
 
 def warn_of(state: State, stacklevel: int) -> None:

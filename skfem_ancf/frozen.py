@@ -50,7 +50,8 @@ class Sealable:
         vars(self)["_sealed"] = True
 
     def __setattr__(self, name, value):
-        self._require_open(name)
+        if self._sealed:
+            self._require_open(name)
         super().__setattr__(name, value)
 
     def __delattr__(self, name):
