@@ -126,7 +126,8 @@ def test_balance_with_joints_and_all_kinds_at_once(extra):
     assert history.dissipated[-1] > 0.0
     assert np.ptp(history.total_energy + history.dissipated) < 2e-12 * history.kinetic_energy.max()
     # the others: to their order
-    for scheme in (name for name, cls in SCHEMES.items() if cls.joined):
+    for scheme in (name for name, cls in SCHEMES.items()
+                   if cls.joined and name != "energy-momentum-4"):
         gaps = []
         for dt in (2e-3, 1e-3):
             history = scene.integrate(0.05, dt, scheme=scheme)

@@ -198,6 +198,29 @@ def test_a_step_to_a_breakpoint_has_the_loads_before_it(scheme):
         assert_allclose(one, other, rtol=0, atol=1e-9 * np.abs(other).max())
 
 
+@pytest.mark.parametrize("hinged", [False, True])
+def test_fourth_order_that_conserves(hinged):
+    """Energy and angular momentum at round-off, and order 4, of a thrown rod and of two."""
+    def thrown():
+        rods = [soft(2, E=1e4, h=0.2, mesh=None if not k else MeshBeam.init_line(
+            [1.0, 1.5, 2.0], 0.2)) for k in range(1 + hinged)]
+        scene = Scene(*rods)
+        for k in range(len(rods)):
+            scene.initial_velocity(lambda x: np.array([1.0 - 2.0 * x[1], 3.0 * x[0]]), beam=k)
+        if hinged:
+            scene.hinge((1, 0))
+        return scene
+
+    fine = thrown().integrate(0.5, 1 / 400, scheme="radau").u[-1]
+    errors = []
+    for n in (60, 120):
+        history = thrown().integrate(0.5, 0.5 / n, scheme="energy-momentum-4")
+        errors.append(np.abs(history.u[-1] - fine).max())
+        for what in (history.total_energy, history.angular_momentum):
+            assert np.ptp(what) < 1e-11 * np.abs(what).max()
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4, abs=0.3)
+
+
 def test_gauss_conserves_momenta_and_keeps_the_energy():
     scene = Scene(soft(2, 2, E=1e4, h=0.2)).initial_velocity(
         lambda x: np.array([1.0 - 2.0 * x[1], 3.0 * x[0] * x[0]]))
@@ -216,6 +239,8 @@ def test_gauss_conserves_momenta_and_keeps_the_energy():
     (lambda s: s.joint("circle", at=(0, 0), center=(1, 1)) and s.integrate(1, 0.1, scheme="gauss"),
      "loses its order with joints .* take 'radau'"),
     (lambda s: Gauss(5), "points must be"),
+    (lambda s: s.damping(mass=0.1) and s.integrate(1, 0.1, scheme="energy-momentum-4"),
+     "goes back in time .* take 'energy-momentum'"),
 ])
 def test_schemes_say_what_they_are_not_for(call, message):
     with pytest.raises(InputError, match=message):
@@ -644,8 +669,8 @@ def test_get_scheme():
     assert isinstance(get_scheme("hht"), HHT) and isinstance(get_scheme(Newmark), Newmark)
     scheme = GeneralizedAlpha(0.3)
     assert get_scheme(scheme) is scheme
-    assert set(SCHEMES) == {"energy-momentum", "generalized-alpha", "hht", "newmark", "gauss",
-                            "radau"}
+    assert set(SCHEMES) == {"energy-momentum", "energy-momentum-4", "generalized-alpha", "hht",
+                            "newmark", "gauss", "radau"}
 
 
 # motions known from elsewhere

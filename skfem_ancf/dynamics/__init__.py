@@ -5,14 +5,14 @@ from __future__ import annotations
 from ..errors import require_option, taught
 from .base import Motion, Scheme
 from .choice import choose_scheme
-from .energy_momentum import EnergyMomentum
+from .energy_momentum import EnergyMomentum, EnergyMomentum4
 from .gauss import Gauss
 from .generalized_alpha import HHT, GeneralizedAlpha, Newmark
 from .radau import Radau
 
 #: The schemes by name.
-SCHEMES = {cls.name: cls for cls in (EnergyMomentum, GeneralizedAlpha, HHT, Newmark, Gauss,
-                                    Radau)}
+SCHEMES = {cls.name: cls for cls in (EnergyMomentum, EnergyMomentum4, GeneralizedAlpha, HHT,
+                                    Newmark, Gauss, Radau)}
 
 
 @taught
@@ -31,5 +31,5 @@ def get_scheme(scheme: str | Scheme | type[Scheme]) -> Scheme:
     return SCHEMES[require_option("scheme", scheme, SCHEMES)]()
 
 
-__all__ = ["HHT", "SCHEMES", "EnergyMomentum", "Gauss", "GeneralizedAlpha", "Motion", "Newmark",
-           "Radau", "Scheme", "choose_scheme", "get_scheme"]
+__all__ = ["HHT", "SCHEMES", "EnergyMomentum", "EnergyMomentum4", "Gauss", "GeneralizedAlpha",
+           "Motion", "Newmark", "Radau", "Scheme", "choose_scheme", "get_scheme"]
