@@ -120,6 +120,11 @@ def motion(p, scale=1, adaptive=True):
                 yield ours.run(p, "cable", degree, n, steps=steps, tol=1e-4)
             for steps in counts(16, most):
                 yield ours.run(p, "cable", degree, n, steps=steps, tol=1e-8)
+    for degree, n, most in ((5, 3, 50), (5, 4, 200), (5, 8, 400), (7, 5, 800), (7, 8, 800)):
+        for steps in (25, 50, 100, 200, 400, 800):
+            if steps <= most:
+                for scheme in ("radau", "gauss"):
+                    yield ours.run(p, "cable", degree, n, steps=steps, scheme=scheme, tol=1e-7)
     if adaptive:
         for n, rtol in ((4, 1e-4), (4, 1e-5), (6, 1e-6), (8, 1e-7)):
             yield ours.run(p, "cable", 5, n, rtol=rtol, tol=1e-6)
@@ -156,6 +161,9 @@ def spin_up(p):
             for steps in (250, 500, 1000, 2000):
                 yield ours.run(p, "cable", degree, n, steps=steps, scheme="energy-momentum",
                                tol=1e-6)
+    for degree, n in ((5, 2), (5, 4), (7, 4)):
+        for steps in (15, 25, 50, 100):
+            yield ours.run(p, "cable", degree, n, steps=steps, scheme="radau", tol=1e-7)
     for steps in (100, 500, 2000):
         yield ours.run(p, "cubic", 2, 4, steps=steps, tol=1e-6)
     if exudyn_beams.exudyn is None:

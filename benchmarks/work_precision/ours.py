@@ -56,7 +56,7 @@ def run(problem, kind, order, n, formulation="assumed", compiled=True, grade=1.0
     words = [f"{kind} {order}", formulation, *([] if compiled else ["NumPy"]),
              *([f"graded {grade:g}"] if grade != 1.0 else [])]
     if p.t_end is not None:
-        words.append({"energy-momentum": "EM", "generalized-alpha": "g-alpha"}[scheme])
+        words.append({"energy-momentum": "EM", "generalized-alpha": "g-alpha"}.get(scheme, scheme))
     words += [f"{k} {v:g}" for k, v in options.items()]
 
     def build():
