@@ -78,8 +78,7 @@ def _exchanging(A):
             row = c * ld + top + j - c
             x = flat[row]
             if x != 0.0:
-                for i in range(1, m + 1):
-                    flat[row + i] -= flat[at + i] * x
+                subtract(flat, row + 1, flat, at + 1, m, x)
     return True
 
 
@@ -92,9 +91,7 @@ def solve(A, x):
             p = A.pivots[j]
             reach = max(reach, A.width + p - j)  # of U: as far as rows were exchanged
             x[j], x[p] = x[p], x[j]
-        at, xj = j * ld + top, x[j]
-        for k in range(1, min(A.width, n - 1 - j) + 1):
-            x[j + k] -= flat[at + k] * xj
+        subtract(x, j + 1, flat, j * ld + top + 1, min(A.width, n - 1 - j), x[j])
     if top > 0:
         for j in range(n - 1, -1, -1):
             at = j * ld + top
