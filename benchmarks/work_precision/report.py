@@ -142,7 +142,8 @@ def goal_sweep(results):
     verdict = "missed" if any(line[-1] == "missed" for line in lines) else "met"
     return [f"**{SWEEP}**: {verdict if any(line[-1] for line in lines) else 'no peer took part'}. "
             "(By a clock on the wall, for each member; building, and the start of processes, are "
-            "in it; the start is what a few members took before.)", "",
+            "in it; the start is what a sweep before took, of two members or of all together.)",
+            "",
             *table(["what", "members", "elements", "error", "ms a member", "start (s)",
                     "times faster", EXUDYN, ""], lines)]
 
