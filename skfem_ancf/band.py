@@ -255,7 +255,31 @@ def diagonal(A, d):
         d[j] = rows[j, A.top]
 
 
-@source
+@primitive("primitives")
+def dot(a, b):
+    """The product of two vectors."""
+    return np.dot(a, b)
+
+
+@primitive("primitives")
+def total(x):
+    """The sum of a vector's numbers."""
+    return np.sum(x)
+
+
+@primitive("primitives")
+def smallest(x):
+    """The smallest number of a vector."""
+    return np.min(x)
+
+
+@primitive("primitives")
+def largest(x):
+    """The largest absolute value of a vector, 0 if it has none."""
+    return np.max(np.abs(x), initial=0.0)
+
+
+@primitive("primitives")
 def weighted(a, b, w):
     """The sum of a b w."""
     return np.dot(a * b, w)

@@ -12,9 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .band import Band, clear, copy, dense_solve, diagonal, factorize, multiply, solve, weighted
+from .band import (Band, clear, copy, dense_solve, diagonal, dot, factorize, multiply, solve,
+                   total, weighted)
 from .source import F1, F2, I1, lanes, source
 from .tables import add_products
+from .types import Array
 
 
 class Border(NamedTuple):
@@ -43,7 +45,11 @@ class Border(NamedTuple):
 
 
 class Factors(NamedTuple):
-    """A matrix with its border, factorised: the matrix before, its factors, and the border."""
+    """A matrix with its border, factorised: the matrix before, its factors, and the border.
+
+    Of work arrays ``rest`` and ``weight`` have (N,), ``closing`` and ``more`` (m,), ``y`` and
+    ``G`` the size of H.
+    """
 
     before: Band
     after: Band
@@ -52,6 +58,27 @@ class Factors(NamedTuple):
     Z: F2
     H: F2
     scale: F1
+    rest: F1
+    weight: F1
+    closing: F1
+    more: F1
+    y: F1
+    G: F2
+
+
+def factors_of(before: Band, after: Band, J: Array, S: Array) -> Factors:
+    """Room for the factors of a matrix with its border.
+
+    Parameters
+    ----------
+    before, after
+        The matrix and its factors.
+    J, S
+        The border, shapes (m, N) and (k, k).
+    """
+    (m, N), n = J.shape, len(S) + len(J)
+    return Factors(before, after, J, S, np.zeros((n, N)), np.zeros((n, n)), np.ones(m),
+                   *np.empty((2, N)), *np.empty((2, m)), np.empty(n), np.empty((n, n)))
 
 
 def new_factors(border: Border, A: Band, m: int, N: int) -> Factors:
@@ -69,8 +96,7 @@ def new_factors(border: Border, A: Band, m: int, N: int) -> Factors:
     else:
         k, n = border.picked.size, A.flat.size
     before = A._replace(flat=np.empty(n), pivots=np.empty(0, np.int64))
-    return Factors(before, A, np.zeros((m, N)), np.zeros((k, k)), np.zeros((k + m, N)),
-                   np.zeros((k + m, k + m)), np.ones(m))
+    return factors_of(before, A, np.zeros((m, N)), np.zeros((k, k)))
 
 
 @source
@@ -86,10 +112,12 @@ def add_curvature(joints, border, multipliers, free, A, S):
     add_products(flat, border.outside_at, np.ones(border.outside_at.size), value,
                  border.outside_of)
     diagonal(A, size)
-    mean = np.mean(np.abs(size))
+    for i in lanes(size.size):
+        size[i] = np.abs(size[i])
+    mean = total(size) / size.size
     for k in range(border.springs):
         at = border.picked[k]
-        stiffness = abs(size[at])
+        stiffness = size[at]
         if stiffness == 0.0 or k >= border.springs - border.loose:
             stiffness += mean
         A.flat[at * A.ld + A.top] += stiffness
@@ -124,29 +152,23 @@ def join(f, border, free):
     """Z, H and the scale of the multipliers, by the factors of the band."""
     J, Z, H, S = f.J, f.Z, f.H, f.S
     k, m, N = S.shape[0], J.shape[0], free.size
-    W = np.zeros((k, N))
-    for a in range(k):
-        W[a, border.picked[a]] = 1.0
-        solve(f.after, W[a])
-    solve_rows(f.after, J, free, Z[k:])
-    for b in range(m):
-        size, row = np.dot(J[b], Z[k + b]), Z[k + b]
-        f.scale[b] = 1.0 / np.sqrt(abs(size)) if size != 0.0 else 1.0
-        for i in lanes(N):
-            row[i] *= f.scale[b]
     for a in range(k):
         row = Z[a]
         clear(row)
         for c in range(k):
-            if S[c, a] != 0.0:
-                other = W[c]
-                for i in lanes(N):
-                    row[i] += S[c, a] * other[i]
+            row[border.picked[c]] += S[c, a]
+        solve(f.after, row)
+    solve_rows(f.after, J, free, Z[k:])
+    for b in range(m):
+        size, row = dot(J[b], Z[k + b]), Z[k + b]
+        f.scale[b] = 1.0 / np.sqrt(abs(size)) if size != 0.0 else 1.0
+        for i in lanes(N):
+            row[i] *= f.scale[b]
     for b in range(k + m):
         for a in range(k):
             H[a, b] = Z[b, border.picked[a]]
         for a in range(m):
-            H[k + a, b] = f.scale[a] * np.dot(J[a], Z[b])
+            H[k + a, b] = f.scale[a] * dot(J[a], Z[b])
     for a in range(k):
         H[a, a] += 1.0
 
@@ -155,13 +177,15 @@ def join(f, border, free):
 def _once(f, border, x, c, dm):
     """Solve in place of x for x and the multipliers; False if H is singular."""
     k, m = f.S.shape[0], c.size
-    y, H = np.empty(k + m), f.H.copy()
+    y, G = f.y, f.G
+    for a in range(k + m):
+        copy(f.H[a], G[a])
     solve(f.after, x)
     for a in range(k):
         y[a] = x[border.picked[a]]
     for b in range(m):
-        y[k + b] = f.scale[b] * (np.dot(f.J[b], x) - c[b])
-    if not dense_solve(H, y):
+        y[k + b] = f.scale[b] * (dot(f.J[b], x) - c[b])
+    if not dense_solve(G, y):
         return False
     for a in range(k + m):
         row = f.Z[a]
@@ -176,7 +200,7 @@ def _once(f, border, x, c, dm):
 def solve_bordered(f, border, b, c, x, dm):
     """x and dm with one refinement; returns its size relative to x, or -1 if H is singular."""
     N, m, picked = x.size, c.size, border.picked
-    r, rc, dl, weight = np.empty(N), np.empty(m), np.empty(m), np.empty(N)
+    r, rc, dl, weight = f.rest, f.closing, f.more, f.weight
     copy(b, x)
     if not _once(f, border, x, c, dm):
         return -1.0
@@ -190,7 +214,7 @@ def solve_bordered(f, border, b, c, x, dm):
         row = f.J[a]
         for i in lanes(N):
             r[i] -= row[i] * dm[a]
-        rc[a] = c[a] - np.dot(row, x)
+        rc[a] = c[a] - dot(row, x)
     if not _once(f, border, r, rc, dl):
         return -1.0
     diagonal(f.before, weight)

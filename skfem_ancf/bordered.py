@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse import coo_matrix
 
-from .border import Border, Factors, join, solve_bordered
+from .border import Border, factors_of, join, solve_bordered
 from .linalg import SINGULAR, SMALL, BandMatrix, Inertia, beside_zero
 
 if TYPE_CHECKING:
@@ -190,12 +190,11 @@ class BorderedMatrix:
     def __init__(self, K: BandMatrix, J: Array, i: Array, j: Array, values: Array,
                  springs: Array, loose: int = 0) -> None:
         picked, S = hold(K, i, j, values, springs, loose)
-        none, (m, n), k = np.zeros(0, np.int64), J.shape, len(picked)
+        none = np.zeros(0, np.int64)
         self._K, self._J = K, J
         self._border = Border(picked, len(springs), loose, none, none, none, none, 0)
-        self._f = Factors(K.band, K.factors, np.array(J), S, np.zeros((k + m, n)),
-                          np.zeros((k + m, k + m)), np.ones(m))
-        join(self._f, self._border, np.ones(n))
+        self._f = factors_of(K.band, K.factors, np.array(J), S)
+        join(self._f, self._border, np.ones(J.shape[1]))
         finite = np.all(np.isfinite(self._f.H))
         self._sign = int(np.linalg.slogdet(self._f.H)[0]) if finite else 0
         if self._sign == 0:

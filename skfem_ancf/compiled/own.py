@@ -44,7 +44,12 @@ def own_poses(handle, t, span, poses):
 
 
 @njit
-def own_solve(handle, t, u, multipliers, R, phi, du, dm):
+def _solve(handle, t, u, multipliers, R, phi, du, dm):
     with objmode(done="boolean"):
         done = own.own_solve(handle, t, u, multipliers, R, phi, du, dm)
     return done
+
+
+@jit
+def own_solve(handle, t, u, multipliers, R, phi, du, dm):
+    return _solve(handle, t, u, multipliers, R, phi, du, dm)

@@ -7,12 +7,12 @@ Numba does, but share the module of the entry, which is optimised once.
 
 from __future__ import annotations
 
+import dis
 import gc
 from contextlib import contextmanager
-from itertools import count
+from itertools import count, pairwise
 from typing import Any, NamedTuple
 
-import numpy as np
 from llvmlite.binding import parse_assembly
 from numba import types
 from numba.core import compiler
@@ -121,7 +121,7 @@ _LEFT_OUT = {"WithLifting", "InlineClosureLikes", "RewriteDynamicRaises", "Inlin
              "LiteralPropagationSubPipelinePass", "DeadBranchPrune", "RewriteSemanticConstants"}
 #: What texts take of NumPy, and of its arrays, without a need for another array.
 _OF_NUMBERS = {"abs", "arctan2", "ceil", "floor", "hypot", "inf", "int64", "log1p", "maximum",
-               "minimum", "nan", "shape", "sign", "size", "sqrt"}
+               "minimum", "nan", "sign", "sqrt"}
 #: The entries that are being compiled, the innermost last.
 _OPEN: list[_Open] = []
 _TYPING = _Typing(cpu_target.typing_context)
@@ -160,7 +160,7 @@ class Text:
         if not _makes_arrays(self.function):
             try:
                 made = self._compiled(args, entry, False)
-                if not isinstance(made.signature.return_type, (types.Array, types.BaseTuple)):
+                if not _has_arrays(made.signature.return_type):
                     return made
             except NumbaError:
                 pass  # said again, if it was not for the owners
@@ -181,10 +181,17 @@ class Text:
 
 def _makes_arrays(function):
     """True if it calls functions of arrays, of NumPy or of Numba, which may make others."""
-    given = function.__globals__
-    names = set(function.__code__.co_names)
-    of_numpy = {x for x in names & set(dir(np)) if x not in given} if "np" in names else set()
-    return not of_numpy <= _OF_NUMBERS or any(isinstance(given.get(x), Dispatcher) for x in names)
+    given, code = function.__globals__, dis.get_instructions(function)
+    of_numpy = {y.argval for x, y in pairwise(code)
+                if x.opname == "LOAD_GLOBAL" and x.argval == "np"}
+    return not of_numpy <= _OF_NUMBERS or any(
+        isinstance(given.get(x), Dispatcher) for x in function.__code__.co_names)
+
+
+def _has_arrays(kind):
+    if isinstance(kind, types.BaseTuple):
+        return any(_has_arrays(x) for x in kind)
+    return isinstance(kind, types.Array)
 
 
 class TextType(types.Callable):

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..band import Band, dense_solve, multiply, solve, subtract_rows
+from ..band import Band, dense_solve, dot, multiply, solve, subtract_rows
 from ..body import add_viscous_force, body_tangent
 from ..forces.texts import add_resisting_force
 from ..source import F2, lanes, source
@@ -65,7 +65,7 @@ def damping_force(e, dampers, M, t, u, v, out, room):
             out[i] += dampers.mass * room[i]
     for k in range(dampers.modes.shape[0]):
         row = dampers.modes[k]
-        size = np.dot(row, v)
+        size = dot(row, v)
         for i in lanes(out.size):
             out[i] += size * row[i]
 
@@ -99,7 +99,7 @@ def factorize_rows(A, rows, free):
         solve(A, out)
     for a in range(k):
         for b in range(k):
-            G[a, b] = np.dot(P[a], Z[b])
+            G[a, b] = dot(P[a], Z[b])
     for a in range(k):
         for b in range(k):
             H[a, b] = 1.0 if a == b else 0.0
@@ -115,7 +115,7 @@ def solve_rows(A, rows, x):
     if k > 0:
         y, z, H = np.empty(k), np.zeros(k), rows.H.copy()
         for a in range(k):
-            y[a] = np.dot(rows.P[a], x)
+            y[a] = dot(rows.P[a], x)
         for a in range(k):
             for c in range(k):
                 z[a] += rows.S[a, c] * y[c]

@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..band import Band, clear, copy, factorize, fix, multiply, solve_joined, subtract_rows
+from ..band import (Band, clear, copy, dot, factorize, fix, multiply, solve_joined, subtract_rows,
+                    total)
 from ..body import (add_force_of, body_carry, body_force, body_mean, body_mixed, body_stress,
                     body_tangent)
 from ..forces.texts import (add_contact_tangent, add_elastic_force, add_rubbing_tangent,
@@ -518,7 +519,7 @@ def _eliminated(joints, rule, s, w, at, b, x, state, exact):
 def _energy(M, v, room):
     """v . M v / 2."""
     multiply(M, v, room)
-    return 0.5 * np.dot(v, room)
+    return 0.5 * dot(v, room)
 
 
 # its iteration
@@ -683,7 +684,7 @@ def _resist(e, matrices, rule, s, w):
 def _power(e, matrices, t, u, v, w):
     """What damping takes in a unit of time."""
     damping_force(e, matrices.dampers, matrices.M, t, u, v, w.x.damping, w.x.room)
-    return np.dot(w.x.damping, v)
+    return dot(w.x.damping, v)
 
 
 @source
@@ -697,7 +698,7 @@ def _add_work(e, matrices, rule, s, w, state, power):
         u, u0, pace = w.x.u, w.y[0], w.x.pace
         for i in lanes(u.size):
             pace[i] = u[i] - u0[i]
-        work = np.dot(w.x.damping, pace)
+        work = dot(w.x.damping, pace)
     else:
         after = _power(e, matrices, s.t, w.x.u, w.x.v, w)
         work = 0.5 * s.dt * (power + after)
@@ -757,7 +758,7 @@ def _correct(joints, free, matrices, rule, s, w, state, anew):
         du[i] = R[i]
     if rule.solver == 0:
         solve_rows(A, rows, du)
-    work = abs(np.dot(R, du))
+    work = abs(dot(R, du))
     if l.size > 0:
         constraint(joints, s.joints.c[0], s.joints.g[0], s.t, u, phi)
         for k in lanes(l.size):
@@ -779,11 +780,11 @@ def _correct(joints, free, matrices, rule, s, w, state, anew):
             return FAILED
         for i in lanes(u.size):
             room[i] = np.abs(R[i] * du[i])
-        work = np.dot(room, free)
+        work = dot(room, free)
         for k in lanes(l.size):
             l[k] += dl[k]
             phi[k] = np.abs(phi[k] * dl[k])
-        work += np.sum(phi)
+        work += total(phi)
     for i in lanes(u.size):
         u[i] += du[i]
     state[LAST_SIZE], state[SIZE] = state[SIZE], np.sqrt(work)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..band import clear
+from ..band import clear, dot
 from ..own import own_elements, own_poses
 from ..source import F1, I1, lanes, primitive, shaped, source
 from ..tables import add_products
@@ -173,7 +173,7 @@ def add_rubbing_tangent(tables, t, factor, u, v, A):
 def contact_work(tables, t, u, du, f):
     """The product of the force at u and du; f is room, which is left at zero."""
     add_contact(tables.contacts, Question(FORCE, t, 0.0, 0.0, NONE, NONE), u, u, f)
-    work = np.dot(f, du)
+    work = dot(f, du)
     for i in lanes(f.size):
         f[i] = 0.0
     return work
@@ -233,13 +233,7 @@ def elastic(kinds, y0, y1, F):
         f[0, e], f[1, e] = c * (a[0, e] + b[0, e]), c * (a[1, e] + b[1, e])
     p, a, b, f = (_part(kinds, TORSION, NUMBERS, kinds.numbers), _part(kinds, TORSION, 4, y0),
                   _part(kinds, TORSION, 4, y1), _part(kinds, TORSION, 4, F))
-    g, turn = np.empty(a.shape), np.empty((2, a.shape[1]))
-    turned(p, a, turn[0])
-    turned(p, b, turn[1])
-    mean_turning(a, b, g)
-    for i in lanes(4):
-        for e in lanes(p.shape[1]):
-            f[i, e] = 0.5 * p[0, e] * (turn[0, e] + turn[1, e]) * g[i, e]
+    mean_moments(p, a, b, f)
     p, a, b, f = (_part(kinds, FOUNDATION, NUMBERS, kinds.numbers),
                   _part(kinds, FOUNDATION, 4, y0), _part(kinds, FOUNDATION, 4, y1),
                   _part(kinds, FOUNDATION, 4, F))
@@ -253,6 +247,18 @@ def elastic(kinds, y0, y1, F):
             1.0 - p[4, e] * (s0 + s1 < 0.0))
         c = 0.5 * p[0, e] * (p0 + p1) * share
         f[0, e], f[1, e] = c * p[2, e], c * p[3, e]
+
+
+@source
+def mean_moments(p, a, b, f):
+    """The forces of torsional springs, means between two states."""
+    turn = np.empty((2, a.shape[1]))
+    turned(p, a, turn[0])
+    turned(p, b, turn[1])
+    mean_turning(a, b, f)
+    for i in lanes(4):
+        for e in lanes(p.shape[1]):
+            f[i, e] *= 0.5 * p[0, e] * (turn[0, e] + turn[1, e])
 
 
 @source
@@ -317,12 +323,11 @@ def resisting(kinds, y, w, G):
         f[0, e], f[1, e] = c * d[0, e], c * d[1, e]
     p, d, v, f = (_part(kinds, TORSION, NUMBERS, kinds.numbers), _part(kinds, TORSION, 4, y),
                   _part(kinds, TORSION, 4, w), _part(kinds, TORSION, 4, G))
-    g = np.empty(d.shape)
-    turning(d, g)
+    turning(d, f)
     for e in lanes(p.shape[1]):
-        c = p[1, e] * (g[0, e] * v[0, e] + g[1, e] * v[1, e] + g[2, e] * v[2, e]
-                       + g[3, e] * v[3, e])
-        f[0, e], f[1, e], f[2, e], f[3, e] = c * g[0, e], c * g[1, e], c * g[2, e], c * g[3, e]
+        c = p[1, e] * (f[0, e] * v[0, e] + f[1, e] * v[1, e] + f[2, e] * v[2, e]
+                       + f[3, e] * v[3, e])
+        f[0, e], f[1, e], f[2, e], f[3, e] = c * f[0, e], c * f[1, e], c * f[2, e], c * f[3, e]
     p, d, v, f = (_part(kinds, FOUNDATION, NUMBERS, kinds.numbers),
                   _part(kinds, FOUNDATION, 4, y), _part(kinds, FOUNDATION, 4, w),
                   _part(kinds, FOUNDATION, 4, G))
@@ -355,21 +360,7 @@ def derivatives(kinds, y, w, factor, D):
         s[4, e] = c * d[0, e] * d[1, e]
     p, d, s = (_part(kinds, TORSION, NUMBERS, kinds.numbers), _part(kinds, TORSION, 4, y),
                _part(kinds, TORSION, 16, D))
-    g, turn = np.empty(d.shape), np.empty(d.shape[1])
-    turning(d, g)
-    turned(p, d, turn)
-    for i in range(4):
-        for j in range(4):
-            for e in lanes(p.shape[1]):
-                s[4 * i + j, e] = (p[0, e] + factor * p[1, e]) * g[i, e] * g[j, e]
-    for k in range(2):  # the second derivative of the angle of d, and minus that of e
-        for e in lanes(p.shape[1]):
-            x, z = d[2 * k, e], d[2 * k + 1, e]
-            c = (1.0 - 2.0 * k) * p[0, e] * turn[e] / (x * x + z * z) ** 2
-            s[10 * k, e] += 2.0 * c * x * z
-            s[10 * k + 5, e] -= 2.0 * c * x * z
-            s[10 * k + 1, e] += c * (z * z - x * x)
-            s[10 * k + 4, e] += c * (z * z - x * x)
+    moment_derivatives(p, d, factor, s)
     p, d, s = (_part(kinds, FOUNDATION, NUMBERS, kinds.numbers),
                _part(kinds, FOUNDATION, 4, y), _part(kinds, FOUNDATION, 16, D))
     for e in lanes(p.shape[1]):
@@ -386,6 +377,26 @@ def derivatives(kinds, y, w, factor, D):
         r = 2.0 * factor * p[0, e] * np.abs(v[1, e] * x - v[0, e] * z)
         s[0, e], s[5, e] = q * x * x + r * z * z, q * z * z + r * x * x
         s[1, e], s[4, e] = (q - r) * x * z, (q - r) * x * z
+
+
+@source
+def moment_derivatives(p, d, factor, s):
+    """The derivatives of torsional springs."""
+    g, turn = np.empty(d.shape), np.empty(d.shape[1])
+    turning(d, g)
+    turned(p, d, turn)
+    for i in range(4):
+        for j in range(4):
+            for e in lanes(p.shape[1]):
+                s[4 * i + j, e] = (p[0, e] + factor * p[1, e]) * g[i, e] * g[j, e]
+    for k in range(2):  # the second derivative of the angle of d, and minus that of e
+        for e in lanes(p.shape[1]):
+            x, z = d[2 * k, e], d[2 * k + 1, e]
+            c = (1.0 - 2.0 * k) * p[0, e] * turn[e] / (x * x + z * z) ** 2
+            s[10 * k, e] += 2.0 * c * x * z
+            s[10 * k + 5, e] -= 2.0 * c * x * z
+            s[10 * k + 1, e] += c * (z * z - x * x)
+            s[10 * k + 4, e] += c * (z * z - x * x)
 
 
 def potential(tables: ForceTables, y: np.ndarray) -> float:

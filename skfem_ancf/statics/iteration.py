@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..band import clear, copy, diagonal, factorize, fix, multiply, solve, weighted
+from ..band import (clear, copy, diagonal, dot, factorize, fix, largest, multiply, smallest, solve,
+                    total, weighted)
 from ..body import body_carry, body_force, body_tangent
 from ..border import (Factors, add_curvature, factorize_bordered, new_factors, solve_bordered)
 from ..forces.texts import (add_elastic_force, add_element_tangent, contact_along,
@@ -225,7 +226,7 @@ def _member(e, target, rules, x, w, record, members, before, least):
         if not factorize(e.K):
             return SINGULAR, number
     diagonal(e.K, w.scale)
-    if not np.min(w.scale) > 0.0:
+    if not smallest(w.scale) > 0.0:
         return SINGULAR, number
     return status, number
 
@@ -257,7 +258,7 @@ def iterate(e, target, rules, x, w, record):
     N, m = x.u.size, x.multipliers.size
     clear(w.dm)
     work = before = reference = np.inf
-    quiet, moving = False, np.dot(target.prescribed, target.prescribed) > 0.0
+    quiet, moving = False, dot(target.prescribed, target.prescribed) > 0.0
     for k in range(rules.iterations + 1):
         # after the last correction only the residual is wanted, not the tangent
         part = min(1.0, work / before) if k > 1 else 1.0
@@ -306,7 +307,7 @@ def iterate(e, target, rules, x, w, record):
 @source
 def reference_work(force, load, u):
     """The root of the work that corrections are compared with: that of the forces on the way."""
-    return np.sqrt(max(abs(np.dot(force, u)), abs(np.dot(load, u))))
+    return np.sqrt(max(abs(dot(force, u)), abs(dot(load, u))))
 
 
 @source
@@ -329,7 +330,7 @@ def _tangent(e, target, rules, x, w, k):
     diagonal(e.K, w.scale)
     for i in lanes(x.u.size):
         w.scale[i] = np.abs(w.scale[i])
-    least = SMALLEST * np.mean(w.scale)
+    least = SMALLEST * total(w.scale) / w.scale.size
     for i in lanes(x.u.size):
         w.scale[i] = 1.0 / (w.scale[i] + least)
 
@@ -343,7 +344,7 @@ def _residual(e, target, x, w):
     if w.phi.size > 0:
         constraint(e.joints, target.c, target.g, target.at, x.u, w.phi)
         add_joint_force(e.joints, target.g, target.at, x.u, x.multipliers, w.push)
-        opening = np.max(np.abs(w.phi))
+        opening = largest(w.phi)
     for i in lanes(x.u.size):
         w.R[i] = (w.load[i] - x.force[i] - target.gap[i] - w.push[i]) * e.free[i]
     return opening
@@ -367,7 +368,7 @@ def _correction(e, target, rules, x, w, moving):
     fix(e.K, e.free)
     if not _solved(e, target, rules, x, w):
         return -1.0
-    work = np.sqrt(abs(np.dot(w.R, w.du)) + abs(np.dot(w.phi, w.dm)))
+    work = np.sqrt(abs(dot(w.R, w.du)) + abs(dot(w.phi, w.dm)))
     for i in lanes(N):
         w.du[i] += w.push[i]
     return work
@@ -385,7 +386,7 @@ def _hold_back(e, t, x, w):
     Of the equations linearised without contact, and contact as it is, what is left along the
     correction has to be small, see Crisfield (1991), 9.2: without that points come and go.
     """
-    N, work, two = x.u.size, np.dot(w.R, w.du), np.empty(2)
+    N, work, two = x.u.size, dot(w.R, w.du), np.empty(2)
     there, room = np.empty(N), np.zeros(N)
     contact_along(e.forces, t, x.u, w.du, two)
     if not work > 0.0:
