@@ -77,8 +77,9 @@ def factors_of(before: Band, after: Band, J: Array, S: Array) -> Factors:
         The border, shapes (m, N) and (k, k).
     """
     (m, N), n = J.shape, len(S) + len(J)
+    (rest, weight), (closing, more) = np.empty((2, N)), np.empty((2, m))
     return Factors(before, after, J, S, np.zeros((n, N)), np.zeros((n, n)), np.ones(m),
-                   *np.empty((2, N)), *np.empty((2, m)), np.empty(n), np.empty((n, n)))
+                   rest, weight, closing, more, np.empty(n), np.empty((n, n)))
 
 
 def new_factors(border: Border, A: Band, m: int, N: int) -> Factors:

@@ -27,7 +27,7 @@ def main() -> None:
              "evaluate": lambda: system.internal_force(np.zeros(system.N)),
              "equilibrium": scene.solve_static,
              "steps": lambda: scene.integrate(0.02, 0.01, EnergyMomentum())}
-    with progress_bar(True, float(sum(COMPILING.values())), "compiling") as bar:
+    with progress_bar(True, sum(COMPILING[name] for name in works), "compiling") as bar:
         for name, work in works.items():
             work()
             if PROBLEMS:
