@@ -92,7 +92,7 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         "each iteration; the last evaluates the force only")
     add("mass", "constant" if dynamic else "skipped",
         "assembled and factorised once" if dynamic else "no inertia in statics")
-    for item in (_bodies(s), _damping(s, dynamic), _elements(s), _obstacles(s, dynamic)):
+    for item in (_bodies(s), _damping(s, dynamic), _elements(s), _obstacles(s)):
         add(*item)
     dead = [load for load in scene.loads if load.constant and load.amplitude is None]
     rest = len(scene.loads) - len(dead)
@@ -219,7 +219,7 @@ def _elements(s):
         + (", some couple points far apart" if forces.far else ""))
 
 
-def _obstacles(s, dynamic):
+def _obstacles(s):
     """Term, status and reason of contact."""
     contacts = s.forces.contacts
     if not contacts.obstacles:
@@ -228,7 +228,7 @@ def _obstacles(s, dynamic):
     elements = sum(group.elements for one in contacts.obstacles for group in one.groups)
     how = [text for text, there in (
         ("friction", contacts.anchored),
-        ("augmented Lagrangian", contacts.augmented and not dynamic),
+        ("augmented Lagrangian", contacts.augmented),
         ("moving", contacts.moving), ("a distance in Python", contacts.own)) if there]
     return "obstacles", "computed", (
         f"{len(contacts.obstacles)}, {points} points of the surface where one of {elements} "

@@ -1133,7 +1133,7 @@ class Scene:
             The beam, its name or its number; all of the scene by default.
         **options
             Those of :class:`~skfem_ancf.obstacles.Obstacle`: ``method``, ``position``, ``angle``,
-            ``damping``, ``points``, ``width``, ``tolerance``, ``slip_speed``.
+            ``damping``, ``points``, ``width``, ``tolerance``.
 
         Returns
         -------

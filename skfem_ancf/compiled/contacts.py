@@ -16,7 +16,7 @@ def contacts(what, number, ints, n_ints, floats, n_floats, poses, n_poses, memor
     given = carray(numbers, (3,))
     tables = ContactTables(number, carray(ints, (n_ints,)), carray(floats, (n_floats,)),
                            carray(poses, (n_poses,)), carray(memory, (n_memory,)),
-                           carray(counts, (2,)), moving, 0, 0)
+                           carray(counts, (2,)), moving, 0, 0, 0)
     asked = Question(what, given[0], given[1], given[2], ld, top)
     _of_contacts(tables, asked, carray(u, (n,)), carray(v, (n,)), carray(out, (size,)))
 

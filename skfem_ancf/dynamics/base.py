@@ -36,7 +36,8 @@ class Motion:
     before
         Size of the step before; 0 where there is none.
     memory
-        What else the scheme keeps for its next step: None, or a dict of numbers and arrays.
+        What else is kept for the next step, by the scheme and, as ``contacts``, of obstacles: None,
+        or a dict of numbers and arrays.
     dissipated
         The work of damping so far.
     """
@@ -55,6 +56,17 @@ class Motion:
     def __post_init__(self):
         if self.force is None:
             self.force = self.multipliers
+
+
+def contacts_of(y: Motion) -> Array | None:
+    """What points remember of obstacles, shape (k,), or None.
+
+    Parameters
+    ----------
+    y
+        A Motion.
+    """
+    return (y.memory or {}).get("contacts")
 
 
 class Scheme:

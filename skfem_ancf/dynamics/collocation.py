@@ -130,6 +130,9 @@ class Collocation(Scheme):
         if system.m and not self.joined:
             raise InputError(f"{self!r} loses its order with joints and rigid bodies: take "
                              "'radau', or 'energy-momentum', which conserves energy with them")
+        if system.forces.contacts.lasting:
+            raise InputError(f"{self!r} is not for obstacles with friction or method='augmented': "
+                             "take 'energy-momentum', or for friction 'generalized-alpha' too")
         if system.forces.far:
             raise InputError(f"{self!r} is not for scenes with force elements between points far "
                              "apart: take 'energy-momentum' or 'generalized-alpha'")

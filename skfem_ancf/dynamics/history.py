@@ -12,7 +12,7 @@ from ..errors import (InputError, require_finite, require_index, require_path, s
 from ..points import require_body
 from ..resultants import over_time
 from ..results import State
-from .base import Motion
+from .base import Motion, contacts_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -168,13 +168,14 @@ class History:
         kept
             What its run kept there, or None.
         """
-        inertia = self.system.mass.multiply(motion.acceleration)
+        inertia, memory = self.system.mass.multiply(motion.acceleration), contacts_of(motion)
         if self.system.damped:
-            inertia = inertia + self.system.damping_force(motion.u, motion.v, motion.t)
+            with self.system.forces.contacts.lent(memory):
+                inertia = inertia + self.system.damping_force(motion.u, motion.v, motion.t)
         return State(self.system, motion.u, load=1.0, converged=True, t=motion.t,
                      message=f"t = {motion.t:g}", multipliers=motion.multipliers,
                      inertia=inertia, acceleration=motion.acceleration, motion=motion,
-                     origin=(self.scheme, kept))
+                     origin=(self.scheme, kept), memory=memory)
 
     def states(self, instants: Iterable[int] | None = None) -> Iterator[State]:
         """States one after the other, whose fields are recovered many at once.

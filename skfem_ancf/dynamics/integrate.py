@@ -10,7 +10,6 @@ import numpy as np
 from ..errors import (AncfError, ConvergenceError, InputError, Interrupted, ModelWarning,
                       require_finite, require_finite_scalar, require_function, require_positive,
                       shown, taught)
-from ..forces.contact_texts import SLIPPING
 from ..progress import progress_bar
 from .checkpoint import Checkpoint, same_problem
 from .base import in_steps
@@ -120,7 +119,6 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     if not (in_steps(scheme) and system.by_nodes):
         _require_room(system)
     system.require_independent_joints()
-    system.forces.contacts.require_motion()
     system.constraints.require_motion()
     run = Run(system, scheme, task, sensors)
     if until is not None:
@@ -136,7 +134,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         run.go_on(motion, start._origin[1])
     else:
         v = v if motion is None else motion.v
-        run.begin(zero if u is None else u, zero if v is None else v)
+        run.begin(zero if u is None else u, zero if v is None else v, _contacts_at(start, system))
     if file is not None:
         file.begin()
     return follow(run, file, progress)
@@ -205,6 +203,11 @@ def _require_step(t_start, t_end, step):
                          f"{MAX_STEPS:.0e} are not taken")
 
 
+def _contacts_at(start, system):
+    """What points remember of obstacles in a State of the same scene, or None."""
+    return None if start is None or start.system is not system else start._memory
+
+
 def _goes_on(system, scheme, start, t):
     """True if an instant is one of the same motion: same scheme, same scene."""
     made_by, _ = start._origin
@@ -241,7 +244,7 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
                     file.update()
     except StepFailed as failure:
         raise ConvergenceError(f"the motion could not be continued beyond t = {run.y.t:.6g}: "
-                               f"{failure}; {_advice(run)}", history.close()) from None
+                               f"{failure}; try a smaller dt", history.close()) from None
     except AncfError as error:  # of a function of the caller's: what is done is kept
         vars(error)["state"] = history.close()
         raise
@@ -285,14 +288,3 @@ def _warn_of_turns(history):
 
 
 __all__ = ["Integrator", "integrate"]
-
-
-def _advice(run):
-    """What may help a motion that did not go on."""
-    speeds = [group.numbers[SLIPPING] for one in run.system.forces.contacts.obstacles
-              if one.friction > 0.0 for group in one.groups]
-    if speeds:
-        return ("where points stick to an obstacle, a larger slip_speed= of scene.obstacle, which "
-                f"is {min(speeds):.3g}: a tenth of the speed at which bodies meet it is enough. "
-                "Else a smaller dt")
-    return "try a smaller dt"

@@ -11,7 +11,7 @@ from ..band import Band, factorize, fix
 from ..eliminated import Eliminated, EliminatedMass
 from ..errors import InputError, SupportError, require_positive, shown
 from ..own import handle_of
-from .base import Motion, in_steps
+from .base import Motion, contacts_of, in_steps
 from .course import Courses
 from .rates import rates
 from .dampers import Dampers, Rows, solve_rows
@@ -68,6 +68,8 @@ class Integrator:
 
     def __init__(self, system: System, scheme: Scheme, tol: float | None = None) -> None:
         scheme.require(system)
+        if not scheme.conserving:
+            system.forces.contacts.require_penalty(scheme)
         self.system, self.scheme, self.limit = system, scheme, np.inf
         self.tol = scheme.tol if tol is None else require_positive("tol", tol)
         if self.tol >= 1.0:
@@ -92,7 +94,8 @@ class Integrator:
                                     0 if self._nodes else system.m)
         self._courses = Courses(system, scheme.conserving)
         self._state, self._dt, self.substeps, self._lost = np.zeros(STATE), np.nan, 0, ""
-        self.longest = int(np.clip(STORED // (4 * system.N), 1, BLOCK))
+        numbers = 4 * system.N + system.forces.contacts.tables.memory.size
+        self.longest = int(np.clip(STORED // numbers, 1, BLOCK))
         self.kept: dict[str, Array] = {}
         self.room: Any = None
         self.asked: Any = None, None
@@ -163,7 +166,8 @@ class Integrator:
                     + 2.0 * self._rates(lambda t: s.full_jacobian(u, t) @ v, t, dt, ahead)[0])
         return rate
 
-    def start(self, u: Array, v: Array, t: float, dt: float, ahead: bool = True) -> Motion:
+    def start(self, u: Array, v: Array, t: float, dt: float, ahead: bool = True,
+              memory: Array | None = None) -> Motion:
         """The Motion at the start, with consistent velocity, acceleration and multipliers.
 
         Where motions are given as functions of time, their rates are those in a step dt ahead.
@@ -176,8 +180,10 @@ class Integrator:
             Time, and the step in which functions of time are asked.
         ahead
             The step begins there; False where it ends.
+        memory
+            What points remember of obstacles there, shape (k,); None: nothing.
         """
-        s = self.system
+        s, contacts = self.system, self.system.forces.contacts
         y = Motion(t, u.copy(), v.copy(), np.zeros(s.N), np.zeros(s.N),
                    np.zeros(s.m))
         y.u[s.fixed] = s.values(1.0, t)
@@ -192,10 +198,14 @@ class Integrator:
                                      -self.constraint_rate(y.u, y.v, t, dt, ahead))[0]
             rate = -(self._constraint_acceleration(y.u, y.v, t, dt, ahead)
                      + s.full_jacobian(y.u, t) @ y.acceleration)
-        force = (s.external_force(y.u, t) - s.internal_force(y.u, t)
-                 - s.mass.multiply(y.acceleration))
-        if s.damped:
-            force = force - s.damping_force(y.u, y.v, t)
+        with contacts.lent(memory):
+            if contacts.lasting:
+                kept = contacts.begin(y.u, t) if memory is None else memory
+                y.memory = {"contacts": contacts.tables.memory.copy() if kept is None else kept}
+            force = (s.external_force(y.u, t) - s.internal_force(y.u, t)
+                     - s.mass.multiply(y.acceleration))
+            if s.damped:
+                force = force - s.damping_force(y.u, y.v, t)
         acceleration, y.multipliers = s.solve_mass(force, y.u, t, rate)
         y.acceleration = y.acceleration + acceleration
         y.algorithmic, y.force = y.acceleration.copy(), y.multipliers
@@ -231,21 +241,24 @@ class Integrator:
         -------
         The number of steps done, and a function that gives the Motion after each.
         """
-        s = self.system
+        s, contacts = self.system, self.system.forces.contacts
         course = self._courses.of(y.t if start is None else start, dt, first, n,
                                   (first, first + n) if block is None else block, self.limit)
         if self._nodes:
             self._nodes[1].lag = 0.5 * dt if self.scheme.conserving else 0.0
         rows, multiplier_rows, works = np.empty((n, 4, s.N)), np.empty((n, 2, s.m)), np.empty(n)
+        memories = np.empty((n, contacts.tables.memory.size if contacts.lasting else 0))
         work = self._work
         work.y[:] = y.u, y.v, y.acceleration, y.algorithmic
         work.m.l0[:], work.m.last[:] = y.multipliers, y.force
-        done = self.call(steps, y, dt, self.rule, course, self._state, work, rows,
-                         multiplier_rows, works)
+        with contacts.lent(contacts_of(y)):
+            done = self.call(steps, y, dt, self.rule, course, self._state, work, memories, rows,
+                             multiplier_rows, works)
 
         def motion(k):
             """After step k, counted from 0."""
             return Motion(float(course.times[k, 0]), *rows[k], *multiplier_rows[k], before=dt,
+                          memory={"contacts": memories[k]} if contacts.lasting else None,
                           dissipated=float(works[k]))
 
         return done, motion

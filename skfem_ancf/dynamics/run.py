@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from ..errors import AncfError, ask_number
-from .base import Motion, Scheme
+from .base import Motion, Scheme, contacts_of
 from .history import History
 from .integrator import Integrator, StepFailed
 from .sensors import Recorder
@@ -117,16 +117,18 @@ class Run:
 
     # the start
 
-    def begin(self, u: Array, v: Array) -> None:
+    def begin(self, u: Array, v: Array, memory: Array | None = None) -> None:
         """Begin with a displacement and a velocity.
 
         Parameters
         ----------
         u, v
             Of the coordinates, shape (N,).
+        memory
+            What points remember of obstacles there, shape (k,), or None.
         """
         self.system.sample(u, v, self.task.t_start, True)
-        self.y = self.integrator.start(u, v, self.task.t_start, self._first_step())
+        self.y = self.integrator.start(u, v, self.task.t_start, self._first_step(), memory=memory)
         self._store_start()
 
     def go_on(self, y: Motion, memory: dict[str, Any] | None = None) -> None:
@@ -196,7 +198,8 @@ class Run:
             self.size = 1e-4 * self.task.span
             self.sizes.begin()
         self.system.sample(y.u, y.v, self._begun, False)
-        turned = self.integrator.start(y.u, y.v, self._begun, self._first_step())
+        turned = self.integrator.start(y.u, y.v, self._begun, self._first_step(),
+                                       memory=contacts_of(y))
         turned.dissipated = y.dissipated
         return turned
 

@@ -20,8 +20,9 @@ from ..band import (Band, clear, copy, dot, factorize, fix, multiply, solve_join
                     total)
 from ..body import (add_force_of, body_carry, body_force, body_mean, body_mixed, body_stress,
                     body_tangent)
+from ..forces.contact_texts import PRESSURES
 from ..forces.texts import (add_contact_tangent, add_elastic_force, add_rubbing_tangent,
-                            element_stiffness)
+                            augment_contact, element_stiffness, pace_contact, settle_contact)
 from ..own import own_solve
 from ..source import F1, F2, F3, borrowed, by_place, lanes, source
 from ..tables import (add_constraint_rate, add_curvature_force, add_joint_force,
@@ -40,6 +41,8 @@ REUSED = 0.1
 CARRIED, LASTING = 0.3, 32.0
 #: Contraction expected of new factors, and the least that is expected of any.
 EXPECTED, LEAST = 0.1, 0.01
+#: How often pressures of obstacles are corrected in a step, at most.
+AUGMENTED = 50
 #: Growth of a correction, with new factors, beyond which the step is given up.
 DIVERGING = 2.0
 
@@ -269,7 +272,7 @@ def room_for_steps(N: int, m: int, stresses: int, dense: int) -> Work:
 
 
 @source
-def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
+def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, works):
     """Take steps from ``w.y`` and the multipliers in ``w.m`` on.
 
     Parameters
@@ -282,26 +285,30 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
         What is kept from step to step, shape (12,).
     w
         :class:`Work`.
-    rows, multiplier_rows, works
-        Written: of each step u, v, the acceleration and the scheme's acceleration w, shape
-        (n, 4, N), the multipliers at its end and where it took them, (n, 2, m), and the work of
-        damping up to its end, (n,).
+    memories, rows, multiplier_rows, works
+        Written: of each step what obstacles keep, (n, k), k zero where that is nothing, u, v, the
+        acceleration and the scheme's acceleration w, shape (n, 4, N), the multipliers at its end
+        and where it took them, (n, 2, m), and the work of damping up to its end, (n,).
 
     Returns
     -------
     The number of steps done; one that fails is the last.
     """
     course, state = borrowed(course), borrowed(state)
-    m, y = w.m.l.size, w.y
+    m, y, u = w.m.l.size, w.y, w.x.u
     joined, damped, power = m > 0, matrices.dampers.active > 0, 0.0
+    contacts, taken = e.forces.contacts, np.empty(1)
     if damped and rule.conserving == 0:
         power = _power(e, matrices, course.times[0, 0] - course.dt, y[0], y[1], w)
     for n in range(rows.shape[0]):
         s = _step(e.joints, rule, course, n)
         rough, wanted = _begin(e.free, matrices.M, rule, s, w, state)
-        told = GO_ON
+        told, left, deep = GO_ON, ITERATIONS, AUGMENTED
         _start(e, s, w, state)
-        for _ in range(ITERATIONS):
+        if contacts.lasting > 0:
+            pace_contact(e.forces, s.dt)
+        while left > 0:
+            left -= 1
             if state[READY] == 0.0:
                 _tangent(e, matrices, rule, s, w)
                 if not _factorize(e.free, matrices, rule, s, w, state):
@@ -322,6 +329,11 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
                 told = _correct(e.joints, e.free, matrices, rule, s, w, state, anew)
             if told == GO_ON:
                 told = _judged(e.body, rule, w, state, wanted, rough)
+            if told == DONE and contacts.lasting >= PRESSURES:
+                augment_contact(e.forces, s.t, u, taken)
+                if taken[0] > 0.0:
+                    told, deep, state[SIZE] = GO_ON, deep - 1, -1.0
+                    left = ITERATIONS if deep > 0 else 0
             if told == ASTRAY:
                 _start(e, s, w, state)
             elif told != GO_ON:
@@ -339,6 +351,10 @@ def steps(e, matrices, rule, course, state, w, rows, multiplier_rows, works):
             return n
         if damped:
             power = _add_work(e, matrices, rule, s, w, state, power)
+        if contacts.lasting > 0:
+            _settle(e.forces, rule, s, w, taken)
+            state[DISSIPATED] += taken[0]
+            copy(contacts.memory, memories[n])
         works[n] = state[DISSIPATED]
         _finish(e.free, matrices.M, s, w, state)
         for k in range(4):
@@ -636,6 +652,15 @@ def _add_obstacles(e, matrices, rule, s, w):
         _pace(e.free, rule, s, w)
         add_rubbing_tangent(e.forces, s.acting, s.damping_factor / s.stiffness_factor,
                             w.x.middle, w.x.pace, matrices.A)
+
+
+@source
+def _settle(forces, rule, s, w, taken):
+    """Anchors follow at the end of the step; what that has taken."""
+    if rule.conserving > 0:
+        settle_contact(forces, s.acting, s.dt, w.y[0], w.x.u, taken)
+    else:
+        settle_contact(forces, s.acting, 0.0, w.x.u, w.x.u, taken)
 
 
 @source

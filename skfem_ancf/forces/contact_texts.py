@@ -12,6 +12,15 @@ differentiable. Where a motion keeps the energy, the force is a mean between two
 is the change of the potential: the discrete gradient of Gonzalez (1996) of g, times the slope of S
 between them.
 
+Friction is a spring along the surface from an anchor to the point, which gives way at Coulomb's
+limit: the anchor then follows, where a load step or a time step is accepted. In a mean the spring
+is that of the end, so that what vibrates on it comes to rest.
+
+Of the augmented Lagrangian each point has a reach r, and the penetration is ``a = r - g``: where a
+point ends below the surface its reach grows by that, until its pressure holds it on the surface. In
+a motion this takes few corrections if the stiffness is not small beside that of the mass in a
+step: it is grown by ``INERTIA`` over the square of the step.
+
 Points are in groups: those of one beam at one obstacle. A search asks first for the distance of
 the middle of each element, and whether its points may be as far as that from it.
 """
@@ -27,7 +36,7 @@ from ..tables import add_each
 #: Shapes, by their number: circles and lines are polygons.
 OUTLINE, OWN = range(2)
 #: What is asked of all groups.
-FORCE, RESISTING, TANGENT, DAMPED_TANGENT, ALONG = map(np.int64, range(5))
+FORCE, RESISTING, TANGENT, DAMPED_TANGENT, ALONG, SETTLE, AUGMENT = map(np.int64, range(7))
 #: Of a group: its shape, obstacle, elements, points of each, pairs of coordinates of each, whether
 #: there are slopes; then where among the integers the first coordinates of its points begin, among
 #: the numbers the rest, and how many numbers the shape has; where its memory
@@ -36,20 +45,26 @@ FORCE, RESISTING, TANGENT, DAMPED_TANGENT, ALONG = map(np.int64, range(5))
  NUMBERS, SHAPES, SIZE, MEMORY, GROUP) = map(np.int64, range(17))
 HEADER = 17
 #: Numbers of a group: stiffness, width of the transition, friction, stiffness of sticking,
-#: damping, speed of slipping, largest distance of a point from the middle of its element without
-#: displacement, and 1 or -1 outside or inside of the shape.
-STIFFNESS, WIDTH, FRICTION, STICKING, DAMPING, SLIPPING, RADIUS, SIDE = range(8)
+#: damping, what a step in time adds to the stiffness, largest distance of a point from the middle
+#: of its element without displacement, 1 or -1 outside or inside of the shape, and the penetration
+#: that the augmented Lagrangian leaves, zero for the penalty.
+STIFFNESS, WIDTH, FRICTION, STICKING, DAMPING, INERTIA, RADIUS, SIDE, TOLERANCE = range(9)
 #: Where an obstacle is: its displacement, the cosine and sine of its angle, the point about which
 #: it turns, its velocities, and when. Of each there are three: at a time, and for a mean at the
 #: begin and the end.
 POSE, POSES = 10, 30
 NOW, BEGIN, END = map(np.int64, range(3))
-#: Memory: 1 if points stick to anchors; for each group how far pressure reaches beyond the
-#: surface; for each point that reach, and its anchor.
-ANCHORED = 0
+#: Memory: 1 if points stick to anchors; 1 / dt^2 of the last step in time; for each group how far
+#: pressure reaches beyond the surface; for each point that reach, its anchor, and how far it was
+#: from that along the surface at the last step.
+ANCHORED, RATE, REACHES = range(3)
+#: What is kept from step to step: anchors, reaches.
+ANCHORS, PRESSURES = 1, 2
 TINY = 1e-200
 #: The least square of a slope: sections have none, and levers of no length.
 SHORT = 1e-30
+#: How far from the surface anchors follow points in a motion, relative to an element.
+BEYOND = 4.0
 #: A change of places, relative to an element, below which a mean is that of the middle.
 CLOSE = 1e-5
 #: Rows of points: places and slopes, four each, at the begin, the end and the middle of a mean,
@@ -70,7 +85,9 @@ class Question(NamedTuple):
         no span, to a band. DAMPED_TANGENT: that of RESISTING by velocities times the factor,
         and by places. ALONG: the derivative of the work of FORCE at u along a direction v to
         ``out[0]``, and the largest way of an element along it, in lengths of elements, into
-        ``out[1]``.
+        ``out[1]``. SETTLE: anchors follow after a step from u to v, whose friction and augmented
+        pressures add their work to ``out[0]``. AUGMENT: where points at u are too deep pressures
+        reach on, and their number is added to ``out[0]``.
     t, span
         A time, and for a mean how long it is about it; zero at u alone.
     factor
@@ -99,11 +116,13 @@ class ContactTables(NamedTuple):
     poses
         Of each obstacle, at the time asked last.
     memory
-        What load steps leave behind.
+        What steps leave behind.
     counts
         Elements searched, points looked at.
     moving, own
         Whether poses depend on time; handle of what knows them, and shapes of one's own.
+    lasting
+        Sum of what is kept from step to step: ANCHORS, PRESSURES.
     address
         That of the compiled function of :mod:`skfem_ancf.compiled.contacts`; 0 for plain texts.
     """
@@ -116,6 +135,7 @@ class ContactTables(NamedTuple):
     counts: I1
     moving: int
     own: int
+    lasting: int = 0
     address: int = 0
 
 
@@ -190,9 +210,12 @@ def surface(floats, group, at, rows, r, x):
 
 
 @source
-def _near(tables, group, u, v, same):
+def _near(tables, group, what, u, v, same):
     """Numbers of the points of elements that may touch, at u or at v."""
-    n, points, reach = group[ELEMENTS], group[POINTS], tables.memory[1 + group[GROUP]]
+    n, points = group[ELEMENTS], group[POINTS]
+    reach, numbers = tables.memory[REACHES + group[GROUP]], group[NUMBERS]
+    if what == SETTLE and tables.floats[numbers + FRICTION] > 0.0:  # also what may touch next
+        reach = BEYOND * tables.floats[numbers + RADIUS] if tables.memory[RATE] > 0.0 else 1e300
     x, radius, found = np.empty((2, n)), np.empty(n), np.empty((6, n))
     flags = np.empty(n * points)
     for end in range(1 if same else 2):
@@ -330,14 +353,13 @@ def _of_group(tables, group, asked, u, v, out):
     rubs = what == RESISTING or what == DAMPED_TANGENT
     if what == ALONG:
         out[1] = max(out[1], _stride(tables, group, v))
-    if rubs and tables.floats[group[NUMBERS] + FRICTION] + tables.floats[
-            group[NUMBERS] + DAMPING] == 0.0:
+    if rubs and tables.floats[group[NUMBERS] + DAMPING] == 0.0:
         return
-    at = _near(tables, group, u, v, same)
+    at = _near(tables, group, what, u, v, same)
     if at.size == 0:
         return
     rows = np.empty((ROWS, at.size))
-    last = _ends(tables, group, u, v, same, at, rows)
+    last = _ends(tables, group, u, v, same, what >= SETTLE, at, rows)
     touching = np.nonzero(last)[0]
     if touching.size == 0:
         return
@@ -349,9 +371,12 @@ def _of_group(tables, group, asked, u, v, out):
             chosen[i] = row[touching[i]]
     for i in lanes(n):
         touching[i] = at[touching[i]]
+    if what == AUGMENT:
+        _reach_on(tables, group, touching, some, out)
+        return
     surface(tables.floats, group, touching, some, MIDDLE, x)
     distances(tables, group, NOW, True, x, found)
-    F, K, lever = np.empty((4, n)), np.empty((4, n)), np.empty((8, n))
+    F, K, lever = np.empty((5, n)), np.empty((4, n)), np.empty((8, n))
     levers(tables.floats, group, touching, some, lever)
     if what == ALONG or rubs:
         places(tables.ints, tables.floats, group, v, 0.0, touching, some, RATES)
@@ -360,16 +385,21 @@ def _of_group(tables, group, asked, u, v, out):
         resist(tables, group, asked.factor, touching, some, x, found, F, K)
     else:
         press(tables, group, touching, some, found, F, K)
-        if what == FORCE:
+        if what == FORCE or what == SETTLE:
             _keep_work(tables.floats[group[NUMBERS] + RADIUS], some, lever, F)
+        if what == SETTLE or tables.memory[ANCHORED] * tables.floats[
+                group[NUMBERS] + FRICTION] > 0.0:
+            stick(tables, group, what == SETTLE, same, touching, some, found, F, K, out)
+        if what == SETTLE:
+            return
     _add(tables.ints, tables.floats, group, asked, touching, some, lever, F, K, out)
 
 
 @source
-def _ends(tables, group, u, v, same, at, rows):
+def _ends(tables, group, u, v, same, every, at, rows):
     """Fill the rows of both ends and of the middle; returns which points touch at either end."""
     n, reach, now = at.size, group[MEMORY], group[OBSTACLE] * POSES
-    ends = 1 if same else 2
+    ends, part = 1 if same else 2, 1.0 / hardened(tables.floats, group, tables.memory[RATE])
     x, found, touches = np.empty((2, n)), np.empty((6, n)), np.empty(n)
     moves, q = tables.moving > 0 and not same, tables.poses[now:now + POSE]
     last_x, last_y = rows[LAST], rows[LAST + 1]
@@ -382,7 +412,7 @@ def _ends(tables, group, u, v, same, at, rows):
         cos, sin = q[2] * p[2] + q[3] * p[3], q[3] * p[2] - q[2] * p[3]
         depth, z_x, z_y = rows[DEPTH + end], rows[4 * end], rows[4 * end + 1]
         for i in lanes(n):
-            depth[i] = tables.memory[reach + at[i]] - found[0, i]
+            depth[i] = part * tables.memory[reach + at[i]] - found[0, i]
             last_x[i], last_y[i] = x[0, i], x[1, i]
             if moves:  # with the obstacle, from where it was or will be to where it is
                 a, b = x[0, i] - p[0] - p[4], x[1, i] - p[1] - p[5]
@@ -399,7 +429,7 @@ def _ends(tables, group, u, v, same, at, rows):
     first, last, depth = rows[DEPTH], rows[DEPTH + ends - 1], rows[DEPTH + 1]
     for i in lanes(n):
         depth[i] = last[i]
-        touches[i] = 1.0 * (np.maximum(first[i], last[i]) > 0.0)
+        touches[i] = 1.0 * (np.maximum(first[i], last[i]) > (-1e300 if every else 0.0))
     return touches
 
 
@@ -428,15 +458,17 @@ def slide(lever, rows):
 
 
 @source
-def press(tables, group, at, rows, found, F, K):
-    """The pressure and, in statics, friction: forces, pressure, and derivatives by the point.
+def hardened(floats, group, rate):
+    """By how much the stiffness is grown in a motion."""
+    return 1.0 + floats[group[NUMBERS] + INERTIA] * rate / floats[group[NUMBERS] + STIFFNESS]
 
-    These are xx, xy, yx, yy. Friction is a spring to the anchor, which gives way at the limit of
-    Coulomb.
-    """
-    numbers, area = tables.floats[group[NUMBERS]:group[NUMBERS] + 8], group[AREAS]
-    k, width = numbers[STIFFNESS], numbers[WIDTH]
-    before, after = rows[DEPTH], rows[DEPTH + 1]
+
+@source
+def press(tables, group, at, rows, found, F, K):
+    """The pressure: F is force, pressure twice and stiffness; K is xx, xy, yx, yy of the point."""
+    numbers, area = tables.floats[group[NUMBERS]:group[NUMBERS] + 9], group[AREAS]
+    k = numbers[STIFFNESS] * hardened(tables.floats, group, tables.memory[RATE])
+    width, before, after = numbers[WIDTH], rows[DEPTH], rows[DEPTH + 1]
     for i in lanes(at.size):
         a, b, scale = before[i], after[i], k * tables.floats[area + at[i]]
         jump, pressure = b - a, scale * mean_slope(a, b, width)
@@ -445,85 +477,106 @@ def press(tables, group, at, rows, found, F, K):
              + 2.0 * (scale * mean_slope(b, b, width) - pressure) * apart / (jump + (1.0 - apart)))
         x, y = found[1, i], found[2, i]
         F[0, i], F[1, i], F[2, i] = -pressure * x, -pressure * y, pressure
+        F[3, i], F[4, i] = pressure, c
         K[0, i], K[3, i] = c * x * x - pressure * found[3, i], c * y * y - pressure * found[5, i]
         K[1, i] = c * x * y - pressure * found[4, i]
         K[2, i] = K[1, i]
-    if tables.memory[ANCHORED] > 0.0 and numbers[FRICTION] > 0.0:
-        _stick(tables, group, at, rows, found, F, K)
 
 
 @source
-def _stick(tables, group, at, rows, found, F, K):
-    """Add friction in statics."""
-    numbers, area = tables.floats[group[NUMBERS]:group[NUMBERS] + 8], group[AREAS]
-    now, total, memory = group[OBSTACLE] * POSES, group[ELEMENTS] * group[POINTS], group[MEMORY]
-    pose, depth = tables.poses[now:now + POSE], rows[DEPTH + 1]
+def stick(tables, group, settles, same, at, rows, found, F, K, out):
+    """Add friction; or let anchors follow, and add to ``out[0]`` what is taken."""
+    numbers, area = tables.floats[group[NUMBERS]:group[NUMBERS] + 9], group[AREAS]
+    now, total, anchor = group[OBSTACLE] * POSES, group[ELEMENTS] * group[POINTS], group[MEMORY]
+    pose, friction = tables.poses[now:now + POSE], numbers[FRICTION] * tables.memory[ANCHORED]
     last_x, last_y = rows[LAST], rows[LAST + 1]
+    way_x, way_y = rows[WAY], rows[WAY + 1]
+    where, lost = np.empty(at.size, np.int64), np.empty(at.size)
+    augmented = numbers[TOLERANCE] > 0.0
+    # what vibrates on the springs comes to rest: in a mean by itself
+    calms = 1.0 if same and tables.memory[RATE] > 0.0 else 0.0
     for i in lanes(at.size):
-        tx, ty, scale = -found[2, i], found[1, i], tables.floats[area + at[i]]
-        slip = slip_of(pose, tables.memory[memory + total + at[i]],
-                       tables.memory[memory + 2 * total + at[i]], last_x[i], last_y[i], tx, ty)
-        limit, k = numbers[FRICTION] * F[2, i], numbers[STICKING] * scale
-        sticks = 1.0 * (np.abs(k * slip) < limit)
-        T = np.minimum(np.maximum(k * slip, -limit), limit)
-        change = (numbers[FRICTION] * np.sign(slip) * (1.0 - sticks) * numbers[STIFFNESS] * scale
-                  * curvature_of(depth[i], numbers[WIDTH]))
-        F[0, i] += T * tx
-        F[1, i] += T * ty
-        _add_friction(found, i, tx, ty, T, k * sticks, change, K)
+        nx, ny = found[1, i], found[2, i]
+        x, y = last_x[i] - pose[0] - pose[4], last_y[i] - pose[1] - pose[5]
+        a = tables.memory[anchor + total + at[i]] - pose[4]
+        b = tables.memory[anchor + 2 * total + at[i]] - pose[5]
+        slip = ((y - pose[3] * a - pose[2] * b) * nx - (x - pose[2] * a + pose[3] * b) * ny)
+        before = tables.memory[anchor + 3 * total + at[i]]
+        k, limit = numbers[STICKING] * tables.floats[area + at[i]], friction * F[3, i]
+        pull = k * (slip + calms * (slip - before))
+        T = np.minimum(np.maximum(pull, -limit), limit)
+        sticks = 1.0 * (np.abs(pull) < limit)
+        if settles:
+            where[i] = 0 * at[i]
+            lost[i] = T * (slip - before if same else way_y[i] * nx - way_x[i] * ny)
+            if augmented:
+                lost[i] += F[0, i] * way_x[i] + F[1, i] * way_y[i] + F[2, i] * F[4, i]
+            after = np.minimum(np.maximum(slip, -limit / k), limit / k)
+            x, y = x + after * ny, y - after * nx
+            tables.memory[anchor + 3 * total + at[i]] = after
+            tables.memory[anchor + total + at[i]] = pose[2] * x + pose[3] * y + pose[4]
+            tables.memory[anchor + 2 * total + at[i]] = pose[2] * y - pose[3] * x + pose[5]
+        change = friction * np.sign(pull) * (1.0 - sticks) * F[4, i]
+        c = (1.0 + calms if same else 2.0) * k * sticks
+        F[0, i] -= T * ny
+        F[1, i] += T * nx
+        K[0, i] += c * ny * ny + change * ny * nx - T * found[4, i]
+        K[1, i] += change * ny * ny - c * nx * ny - T * found[5, i]
+        K[2, i] += T * found[3, i] - c * nx * ny - change * nx * nx
+        K[3, i] += c * nx * nx - change * nx * ny + T * found[4, i]
+    if settles:
+        add_each(out, where, lost)
 
 
 @source
-def slip_of(pose, p, q, x, y, tx, ty):
-    """How far a point (x, y) is along t from its anchor (p, q), which moves with the obstacle."""
-    a, b = p - pose[4], q - pose[5]
-    return ((x - pose[0] - pose[4] - pose[2] * a + pose[3] * b) * tx
-            + (y - pose[1] - pose[5] - pose[3] * a - pose[2] * b) * ty)
-
-
-@source
-def _add_friction(found, i, tx, ty, T, k, change, K):
-    """Add the derivative of T t: k along t, ``change`` by the penetration, and the turn of t."""
-    K[0, i] += k * tx * tx - change * tx * found[1, i] - T * found[4, i]
-    K[1, i] += k * tx * ty - change * tx * found[2, i] - T * found[5, i]
-    K[2, i] += k * ty * tx - change * ty * found[1, i] + T * found[3, i]
-    K[3, i] += k * ty * ty - change * ty * found[2, i] + T * found[4, i]
+def _reach_on(tables, group, at, rows, out):
+    """Reaches grow by the penetration, and shrink by the distance, where these are too large."""
+    tolerance, first = tables.floats[group[NUMBERS] + TOLERANCE], group[MEMORY]
+    if tolerance == 0.0:
+        return
+    where, far, square = np.empty(at.size, np.int64), np.empty(at.size), np.empty(at.size)
+    depth, k = rows[DEPTH], hardened(tables.floats, group, tables.memory[RATE])
+    for i in lanes(at.size):
+        before = tables.memory[first + at[i]] / k
+        change = np.maximum(depth[i], 0.0) - before
+        where[i], far[i] = 0 * at[i], 1.0 * (np.abs(change) > tolerance)
+        after = k * (before + far[i] * change)
+        tables.memory[first + at[i]] = after
+        square[i] = after * after
+    add_each(out, where, far)
+    widest = tables.memory[REACHES + group[GROUP]:REACHES + group[GROUP] + 1]
+    widest[0] = 0.0
+    add_each(widest, where, square)
+    widest[0] = np.sqrt(widest[0])  # no less than the largest
 
 
 @source
 def resist(tables, group, factor, at, rows, x, found, F, K):
-    """Coulomb's friction, smooth about rest, and damping in proportion to the pressure.
-
-    Of friction the tangent takes its mean slope by the velocity from rest on, not its slope there,
-    and not that it grows with the pressure: so an iteration finds the rest from any velocity.
-    """
-    numbers, area = tables.floats[group[NUMBERS]:group[NUMBERS] + 8], group[AREAS]
+    """Damping in proportion to the pressure."""
+    numbers, area = tables.floats[group[NUMBERS]:group[NUMBERS] + 9], group[AREAS]
     now, rate_x, rate_y = group[OBSTACLE] * POSES, rows[WAY], rows[WAY + 1]
-    pose = tables.poses[now:now + POSE]
+    stiffness = numbers[STIFFNESS] * hardened(tables.floats, group, tables.memory[RATE])
+    pose, depth = tables.poses[now:now + POSE], rows[DEPTH]
     for i in lanes(at.size):
-        k = numbers[STIFFNESS] * tables.floats[area + at[i]]
-        a, nx, ny = -found[0, i], found[1, i], found[2, i]
-        pressure, tx, ty = k * mean_slope(a, a, numbers[WIDTH]), -ny, nx
+        k, a = stiffness * tables.floats[area + at[i]], depth[i]
+        nx, ny = found[1, i], found[2, i]
+        pressure = k * mean_slope(a, a, numbers[WIDTH])
         p = rate_x[i] + pose[8] * (x[1, i] - pose[1] - pose[5]) - pose[6]
         q = rate_y[i] - pose[8] * (x[0, i] - pose[0] - pose[4]) - pose[7]
-        along, apart = p * tx + q * ty, p * nx + q * ny
-        speed = np.sqrt(along * along + numbers[SLIPPING] * numbers[SLIPPING])
-        share = numbers[FRICTION] * along / speed
-        loss = np.minimum(numbers[DAMPING] * apart, 1.0)
-        F[0, i] = pressure * (share * tx + loss * nx)
-        F[1, i] = pressure * (share * ty + loss * ny)
+        loss = np.minimum(numbers[DAMPING] * (p * nx + q * ny), 1.0)
+        F[0, i], F[1, i], F[2, i] = pressure * loss * nx, pressure * loss * ny, 0.0
         c = (factor * pressure * numbers[DAMPING] * (loss < 1.0)
              - loss * k * curvature_of(a, numbers[WIDTH]))
         K[0, i], K[1, i] = c * nx * nx, c * nx * ny
         K[2, i], K[3, i] = c * ny * nx, c * ny * ny
-        F[2, i] = 0.0
-        _add_friction(found, i, tx, ty, pressure * share,
-                      factor * pressure * numbers[FRICTION] / speed, 0.0, K)
 
 
 @source
 def _keep_work(size, rows, lever, F):
-    """By how much of their way forces miss that their work is what the potential changes by."""
+    """By how much of their way forces miss that their work is what the potential changes by.
+
+    Into F in place of the first pressure; the square of the way in place of the stiffness.
+    """
     before, after = rows[DEPTH], rows[DEPTH + 1]
     p, q = rows[RATES], rows[RATES + 1]
     s, t = rows[RATES + 2], rows[RATES + 3]
@@ -533,6 +586,7 @@ def _keep_work(size, rows, lever, F):
         square = p[i] * p[i] + q[i] * q[i] + s[i] * s[i] + t[i] * t[i]
         missing = F[2, i] * (after[i] - before[i]) - F[0, i] * way_x[i] - F[1, i] * way_y[i]
         F[2, i] = missing * (square > close * close) / np.maximum(square, TINY)
+        F[4, i] = square
 
 
 # from points to coordinates

@@ -1,4 +1,4 @@
-"""The obstacles of a scene in its equations: their tables, and what load steps leave behind."""
+"""The obstacles of a scene in its equations: their tables, and what steps leave behind."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ import numpy as np
 from ..band import Band
 from ..errors import InputError
 from ..own import handle_of
-from .contact_texts import (ANCHORED, DEPTH, FRICTION, HEADER, LAST, MEMORY, MIDDLE, NOW, OWN, POSE,
-                            POSES, RATES, ROWS, STICKING, STIFFNESS, TANGENT, WIDTH, ContactTables,
-                            Question, distances, levers, mean_slope, of_contacts, places, press,
-                            resist, slide, slip_of, surface)
+from .contact_texts import (ANCHORED, ANCHORS, AUGMENT, DAMPING, DEPTH, FRICTION, HEADER, LAST,
+                            MEMORY, MIDDLE, NOW, OWN, POSE, POSES, PRESSURES, RATE, RATES, REACHES,
+                            ROWS, SETTLE, STIFFNESS, TANGENT, WIDTH, ContactTables, Question,
+                            distances, hardened, levers, of_contacts, places, press, resist, slide,
+                            stick, surface)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -40,7 +41,7 @@ class Group(NamedTuple):
     depth
         How deep a way from one state to the next may cut the obstacle.
     numbers
-        By the numbers of :mod:`skfem_ancf.forces.contact_texts`, shape (8,).
+        By the numbers of :mod:`skfem_ancf.forces.contact_texts`, shape (9,).
     """
 
     first: Any
@@ -111,7 +112,7 @@ class Contacts:
     def _make(self, poses):
         n = len(self._groups)
         ints, floats = _Pieces(HEADER * n), _Pieces(0)
-        headers, memory = np.zeros((n, HEADER), dtype=np.int64), 1 + n
+        headers, memory = np.zeros((n, HEADER), dtype=np.int64), REACHES + n
         for number, (k, group) in enumerate(self._groups):
             shape, none = self.obstacles[k].shape, np.zeros((0, len(group.first)))
             slopes = none if group.slopes is None else group.slopes
@@ -122,10 +123,11 @@ class Contacts:
                 floats.add(group.offsets), floats.add(group.starts), floats.add(_middle(group)),
                 floats.add(group.numbers), floats.add(shape.numbers), len(shape.numbers), memory,
                 number)
-            memory += 3 * len(group.first)
+            memory += 4 * len(group.first)
         return ContactTables(n, np.concatenate([headers.ravel(), ints.whole(np.int64)]),
                              floats.whole(float), poses, np.zeros(memory), np.zeros(2, np.int64),
-                             int(self.moving or self.own), handle_of(self))
+                             int(self.moving or self.own), handle_of(self),
+                             int(ANCHORS * self.anchored + PRESSURES * self.augmented))
 
     # what texts ask
 
@@ -169,6 +171,11 @@ class Contacts:
         return any(one.method == "augmented" for one in self.obstacles)
 
     @property
+    def lasting(self) -> int:
+        """What is kept from step to step; 0 for nothing."""
+        return self.tables.lasting
+
+    @property
     def anchored(self) -> bool:
         """True if an obstacle has friction."""
         return any(one.friction > 0.0 for one in self.obstacles)
@@ -177,9 +184,9 @@ class Contacts:
     def lent(self, memory: Array | None = None) -> Iterator[None]:
         """For the time of an evaluation points have the memory of a state.
 
-        States own their memories; tables have one only while a state, or a way of load steps, asks
+        States own their memories; tables have one only while a state, or a way of steps, asks
         something, and what they had before is put back. So the order in which states are asked
-        does not matter, and a motion has none.
+        does not matter.
 
         Parameters
         ----------
@@ -204,7 +211,7 @@ class Contacts:
         self.tables.memory[:] = 0.0 if memory is None else memory
 
     def remember(self) -> Array | None:
-        """What load steps have left behind; None where there is nothing of it."""
+        """What steps have left behind; None where there is nothing of it."""
         memory = self.tables.memory
         return memory.copy() if np.any(memory) else None
 
@@ -216,16 +223,17 @@ class Contacts:
         u
             Displacement of the coordinates, shape (N,).
         t
-            Load factor.
+            Load factor, or time.
         memory
             What :meth:`remember` gave at this displacement, shape (n,), to go on from; or None.
 
         Returns
         -------
         ndarray or None
-            The memory that load steps begin with, shape (n,).
+            The memory that steps begin with, shape (n,).
         """
         self.put_back(memory)
+        self.tables.memory[RATE] = 0.0
         if memory is None and self.anchored:
             self.settle(u, t)
             self.tables.memory[ANCHORED] = 1.0
@@ -238,16 +246,19 @@ class Contacts:
                 raise InputError(f"continuation knows obstacles that rest, without friction and by "
                                  f"penalty, not {one!r}: use solve_static")
 
-    def require_motion(self) -> None:
-        """Raise InputError if an obstacle is of load steps only."""
+    def require_penalty(self, scheme: Any) -> None:
+        """Raise InputError if an obstacle takes the augmented Lagrangian.
+
+        Parameters
+        ----------
+        scheme
+            What does not.
+        """
         for one in self.obstacles:
             if one.method == "augmented":
-                raise InputError(
-                    f"{one!r} has method='augmented', which corrects pressures after a load step: "
-                    "in a motion each correction would do work that nothing pays for. Take "
-                    "'penalty': a body that arrives with the speed v goes in by v sqrt(density "
-                    "height / stiffness), so stiffness = density height (v / penetration)^2, and "
-                    "dt about sqrt(density height / stiffness)")
+                raise InputError(f"{scheme!r} does not take method='augmented' of {one!r}: take "
+                                 "'energy-momentum', which keeps to its balance of "
+                                 "energy, or method='penalty'")
 
     def require_free(self, u: Array, what: str, instead: str) -> None:
         """Raise InputError if a linear solution enters an obstacle.
@@ -259,11 +270,11 @@ class Contacts:
         what, instead
             What it is of, and what to use.
         """
-        if self.potential(u, 1.0) > 0.0:
+        if any(found[0].min() < 0.0 for _, _, found in self.look(u, 1.0, False)):
             raise InputError(f"{what} knows no contact, and its solution enters an obstacle: use "
                              f"{instead}")
 
-    def settle(self, u: Array, t: float) -> None:
+    def settle(self, u: Array, t: float) -> float:
         """Anchors go after points that have slipped, to where these just do not slip.
 
         Parameters
@@ -271,21 +282,17 @@ class Contacts:
         u
             Displacement of the coordinates, shape (N,).
         t
-            Load factor.
-        """
-        for k, ((which, group), x, found) in enumerate(self.look(u, t)):
-            memory, numbers = self._reach(k), group.numbers
-            if numbers[FRICTION] == 0.0:
-                continue
-            pose = self.tables.poses[which * POSES:which * POSES + POSE]
-            along = np.array([-found[2], found[1]])
-            limit = (numbers[FRICTION] * numbers[STIFFNESS] / numbers[STICKING]
-                     * mean_slope(*2 * (memory[0] - found[0],), numbers[WIDTH]))
-            slip = np.clip(slip_of(pose, *memory[1:], *x, *along), -limit, limit)
-            memory[1:] = taken_back(pose, x - slip * along)
+            Load factor, or time.
 
-    def augment(self, u: Array, t: float) -> float:
-        """The largest penetration; where it is too large, pressures reach on by it.
+        Returns
+        -------
+        float
+            The work of friction since they did so last.
+        """
+        return float(self._ask(SETTLE, u, t)) if self.anchored else 0.0
+
+    def augment(self, u: Array, t: float) -> int:
+        """How many points are too deep; the pressures of these reach on by that.
 
         The augmented Lagrangian: where a point has come to rest below the surface, its pressure
         will hold it on the surface.
@@ -299,19 +306,18 @@ class Contacts:
 
         Returns
         -------
-        float
-            The largest penetration, or distance at which there is pressure, over the tolerance of
-            its obstacle.
+        int
+            The number of points whose penetration, or whose distance where there is pressure, is
+            more than the tolerance of their obstacle.
         """
-        looked = [(k, self.obstacles[which], self._reach(k)[0], found[0])
-                  for k, ((which, _), _, found) in enumerate(self.look(u, t, False))]
-        looked = [row for row in looked if row[1].method == "augmented"]
-        worst = max(float(np.abs(np.maximum(-gap, -reach)).max()) / one.tolerance
-                    for _, one, reach, gap in looked)
-        for k, _, reach, gap in looked if worst > 1.0 else ():
-            reach[:] = np.maximum(reach - gap, 0.0)
-            self.tables.memory[1 + k] = reach.max()
-        return worst
+        return int(self._ask(AUGMENT, u, t))
+
+    def _ask(self, what, u, t):
+        """The sum that a question at one state gives."""
+        self._place(t)
+        out = np.zeros(1)
+        of_contacts(self.tables, Question(what, t, 0.0, 0.0, 0, 0), u, u, out)
+        return out[0]
 
     # values
 
@@ -354,7 +360,7 @@ class Contacts:
 
     def _reach(self, k):
         header, n = self._header(k), len(self._groups[k][1].first)
-        return self.tables.memory[header[MEMORY]:header[MEMORY] + 3 * n].reshape(3, n)
+        return self.tables.memory[header[MEMORY]:header[MEMORY] + 4 * n].reshape(4, n)
 
     def pushes(self, u: Array, v: Array | None, t: float) -> list[tuple[Any, ...]]:
         """What obstacles do to points.
@@ -375,17 +381,20 @@ class Contacts:
         out = []
         for k, ((which, group), x, found) in enumerate(self.look(u, t)):
             n, header = len(group.first), self._header(k)
-            at, rows, lever = np.arange(n), np.empty((ROWS, n)), np.empty((8, n))
-            F, more, K = np.zeros((4, n)), np.zeros((4, n)), np.zeros((4, n))
-            rows[DEPTH:LAST], rows[LAST:LAST + 2] = self._reach(k)[0] - found[0], x
+            at, rows, lever = np.arange(n), np.zeros((ROWS, n)), np.empty((8, n))
+            F, more, K = np.zeros((5, n)), np.zeros((5, n)), np.zeros((4, n))
+            part = 1.0 / hardened(self.tables.floats, header, self.tables.memory[RATE])
+            rows[DEPTH:LAST], rows[LAST:LAST + 2] = part * self._reach(k)[0] - found[0], x
             press(self.tables, header, at, rows, found, F, K)
-            if v is not None:
+            if self.tables.memory[ANCHORED] * group.numbers[FRICTION] > 0.0:
+                stick(self.tables, header, False, True, at, rows, found, F, K, np.zeros(1))
+            if v is not None and group.numbers[DAMPING] > 0.0:
                 places(self.tables.ints, self.tables.floats, header, u, 1.0, at, rows, MIDDLE)
                 places(self.tables.ints, self.tables.floats, header, v, 0.0, at, rows, RATES)
                 levers(self.tables.floats, header, at, rows, lever)
                 slide(lever, rows)
                 resist(self.tables, header, 0.0, at, rows, x, found, more, K)
-            out.append((which, x, -F[:2] - more[:2], F[2] / group.areas, found[0]))
+            out.append((which, x, -F[:2] - more[:2], F[3] / group.areas, found[0]))
         return out
 
     def passed(self, a: tuple[Array, float], b: tuple[Array, float]) -> str | None:
@@ -413,7 +422,7 @@ class Contacts:
         return None
 
     def potential(self, u: Array, t: float) -> float:
-        """The potential of the penetration.
+        """The potential of the penetration; the augmented Lagrangian, which leaves none, has none.
 
         Parameters
         ----------
@@ -423,8 +432,10 @@ class Contacts:
             Time; in statics the load factor.
         """
         total = 0.0
-        for k, ((_, group), _, found) in enumerate(self.look(u, t, False)):
-            a, width = self._reach(k)[0] - found[0], group.numbers[WIDTH]
+        for (which, group), _, found in self.look(u, t, False):
+            if self.obstacles[which].method == "augmented":
+                continue
+            a, width = -found[0], group.numbers[WIDTH]
             S = (np.maximum(a, 0.0) ** 3 - np.maximum(a - width, 0.0) ** 3) / (6.0 * width)
             total += group.numbers[STIFFNESS] * float(group.areas @ S)
         return total

@@ -83,7 +83,7 @@ class Forces:
         self.masses = [element for element in self.elements if isinstance(element, PointMass)]
         self.contacts = Contacts(self.elements)
         self.resists = bool(self.own) or any(_resists(part) for part in self.parts) or any(
-            one.friction > 0.0 or one.damping > 0.0 for one in self.contacts.obstacles)
+            one.damping > 0.0 for one in self.contacts.obstacles)
 
     def _coupling(self, k):
         """Rows, columns, weights and places of the derivatives that element k adds."""

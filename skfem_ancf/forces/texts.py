@@ -14,8 +14,8 @@ from ..band import clear, dot
 from ..own import own_elements, own_poses
 from ..source import F1, I1, lanes, primitive, shaped, source
 from ..tables import add_products
-from .contact_texts import (ALONG, DAMPED_TANGENT, FORCE, TANGENT, ContactTables, Question,
-                            run_contacts)
+from .contact_texts import (ALONG, AUGMENT, DAMPED_TANGENT, FORCE, RATE, SETTLE, TANGENT,
+                            ContactTables, Question, run_contacts)
 from .contact_texts import RESISTING as RUBBING
 
 #: Kinds of elements.
@@ -184,6 +184,26 @@ def contact_along(tables, t, u, du, out):
     """Its derivative along du, and the largest way of an element, into out, shape (2,)."""
     out[0], out[1] = 0.0, 0.0
     add_contact(tables.contacts, Question(ALONG, t, 0.0, 0.0, NONE, NONE), u, du, out)
+
+
+@source
+def pace_contact(tables, dt):
+    """Tell obstacles the size of a step in time."""
+    tables.contacts.memory[RATE] = 1.0 / (dt * dt)
+
+
+@source
+def augment_contact(tables, t, u, out):
+    """Where points at u are too deep pressures reach on; their number is put into out, (1,)."""
+    out[0] = 0.0
+    add_contact(tables.contacts, Question(AUGMENT, t, 0.0, 0.0, NONE, NONE), u, u, out)
+
+
+@source
+def settle_contact(tables, t, span, u0, u1, out):
+    """Anchors follow at the end of a step; what it has taken is put into out, (1,)."""
+    out[0] = 0.0
+    add_contact(tables.contacts, Question(SETTLE, t, span, 0.0, NONE, NONE), u0, u1, out)
 
 
 @source

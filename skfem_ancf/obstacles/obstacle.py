@@ -28,8 +28,9 @@ WIDTH = 1e-3
 CUT = 1e-2
 #: Penetration that is left by the augmented Lagrangian, relative to the height.
 TOLERANCE = 1e-5
-#: Speed below which friction is less than Coulomb's, relative to that of sound.
-SLIPPING = 1e-5
+#: What the augmented Lagrangian adds to the stiffness in a step in time, relative to the mass of
+#: the body beside the surface over the square of the step.
+HARDER = 100.0
 #: Relative step in time for the velocity of an obstacle.
 STEP = 1e-6
 #: Points across an end.
@@ -61,9 +62,8 @@ class Obstacle(ForceElement):
     beam
         The beam, its name or its number; all of the scene by default.
     method
-        "penalty", or "augmented": in statics each load step is solved again with the pressures
-        that it has found, until the penetration is less than ``tolerance``. A motion takes the
-        penalty alone.
+        "penalty", or "augmented": each load step, or step in time, is solved again with the
+        pressures that it has found, until the penetration at its end is less than ``tolerance``.
     position
         A function of time that returns the displacement (x, y) of the shape from where it was
         given; in statics time is the load factor.
@@ -81,9 +81,7 @@ class Obstacle(ForceElement):
     **options
         ``width``: of the transition from no pressure to one in proportion to the penetration, a
         length, by default a thousandth of the height. ``tolerance``: the penetration that
-        "augmented" leaves, a length, by default 1e-5 of the height. ``slip_speed``: in a
-        motion friction is ``v / sqrt(v^2 + slip_speed^2)`` of Coulomb's at the speed v; by default
-        1e-5 of the speed of sound.
+        "augmented" leaves, a length, by default 1e-5 of the height.
 
     References
     ----------
@@ -262,10 +260,10 @@ class Obstacle(ForceElement):
         middle = starts[:2].mean(axis=2, keepdims=True)
         radius = float((np.hypot(*(starts[:2] - middle)) + np.abs(offsets)).max())
         E, density = _stiffest(beam.across, elements)
-        k, sound = self.penalty or E / h, np.sqrt(E / (density or E))
+        k, augmented = self.penalty or E / h, self.method == "augmented"
         numbers = np.array([k, self.options["width"] or WIDTH * h, self.friction, k, self.damping,
-                            self.options["slip_speed"] or SLIPPING * sound, radius,
-                            -1.0 if self.shape.hollow else 1.0])
+                            HARDER * density * h * augmented, radius,
+                            -1.0 if self.shape.hollow else 1.0, self.tolerance * augmented])
         return Group(np.repeat(nodes, m), weights.reshape(-1, n * m), slopes, areas.ravel(),
                      offsets.ravel(), starts.reshape(4, -1), n, m,
                      0.5 * min(h, self.shape.bend or h), numbers)
@@ -308,7 +306,11 @@ def _repeated(x, w, pieces):
 
 
 def _options(options):
-    known = ("width", "tolerance", "slip_speed")
+    if "slip_speed" in options:
+        warnings.warn("slip_speed= has no effect any more, leave it out: in a motion points stick "
+                      "as they do in statics", DeprecationWarning, stacklevel=4)
+        options = {name: x for name, x in options.items() if name != "slip_speed"}
+    known = ("width", "tolerance")
     for name in options:
         require_option("option of an obstacle", name, known)
     return {name: None if options.get(name) is None else require_positive(name, options[name])

@@ -272,7 +272,7 @@ def _augmented(system, result, load, options, record, at):
     if not contacts.augmented:
         return found
     for _ in range(AUGMENTED):
-        if contacts.augment(found[0], at) <= 1.0:
+        if contacts.augment(found[0], at) == 0:
             return found
         found = _from(found, system, result, load, options, record)
     raise _Failed(f"the penetration of obstacles is above its tolerance after {AUGMENTED} "
