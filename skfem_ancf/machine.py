@@ -29,7 +29,7 @@ logger = logging.getLogger(__name__)
 
 #: Seconds that compiling takes, about: the kernels that texts call, each if a scene has it, and
 #: each text; and loading what lies on disk.
-COMPILING = {"SectionPack": 4.5, "CablePack": 2.0, "elements": 2.0, "contacts": 3.5,
+COMPILING = {"SectionPack": 4.5, "CablePack": 2.0, "elements": 2.0, "contacts": 4.0,
              "equilibrium": 5.2, "steps": 6.5, "evaluate": 1.8}
 #: The same for texts that are compiled where they are used, not beforehand.
 WHERE_USED = {"collocate": 13.0}
