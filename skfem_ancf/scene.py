@@ -1625,7 +1625,10 @@ class Scene:
             v = beam.velocity_of(lambda x: ask_field("v(x)", v, x))
         elif callable(v):
             basis = beam.exact_basis()
-            v = basis.project(ask_field("v(x)", v, np.asarray(basis.global_coordinates())))
+            values = ask_field("v(x)", v, np.asarray(basis.global_coordinates()))
+            v = basis.project(values)
+            # once more: elements of high degree have ill-conditioned masses
+            v = v + basis.project(values - np.asarray(basis.interpolate(v)))
         return require_finite("v", v, (beam.N,))
 
     @_alone

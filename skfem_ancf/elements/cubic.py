@@ -1,8 +1,10 @@
 """ANCF beam elements whose sections vary cubically along the axis: fourth order."""
 
+from ..errors import teaching
 from .hermite import ElementBeamANCFHermite
 
 
+@teaching
 class ElementBeamANCFCubic(ElementBeamANCFHermite):
     """As :class:`ElementBeamANCF`, with Hermite functions along X for the section slopes too.
 
