@@ -387,7 +387,8 @@ class ElementStrain:
         flat = u_e.reshape(len(u_e), -1)
         fixed = (self._fixed @ flat).reshape(*self._fixed.shape[:3], 2, len(of))
         turned = self._turned(fixed, of)
-        return turned, (self._free @ flat).reshape(2, -1, 2, len(of)) if self.here else None
+        free = (self._free @ flat).reshape(*self._free.shape[:2], 2, len(of)) if self.here else None
+        return turned, free
 
     def _slopes(self, turned, at, e, T):
         """Derivatives at places, (2, n) each, from polynomials of elements, number ``at`` there."""

@@ -541,7 +541,9 @@ def test_initial_velocity_by_function_and_by_coordinates():
         q = beam.q0.reshape(-1, 2)
         spin = omega * np.column_stack([-q[:, 1], q[:, 0]]).ravel()
         by_function = Scene(beam).initial_velocity(lambda x: omega * np.array([-x[1], x[0]]))
-        assert np.allclose(by_function._velocities[0][1], spin, rtol=0, atol=1e-9)
+        # a fourth derivative along the axis is known to fewer digits than a position
+        atol = 1e-9 if getattr(beam.element, "axis_degree", 3) < 9 else 1e-7
+        assert np.allclose(by_function._velocities[0][1], spin, rtol=0, atol=atol)
         history = Scene(beam).initial_velocity(spin).integrate(1e-3, 1e-3)
         # that of the rigid body that the element makes of a quarter ring
         x = np.asarray(beam.exact_basis().global_coordinates())
