@@ -274,8 +274,8 @@ def amplification(scheme, dt):
     for u, v, w in np.eye(3):
         work, new = room_for_steps(1, 0, 0, 0), np.empty((1, 4, 1))
         work.y[:, 0] = u, v, -u, w
-        done = steps(equations, matrices, rule, course, np.zeros(STATE), work, new,
-                     np.zeros((1, 2, 0)), np.zeros(1))
+        done = steps(equations, matrices, rule, course, np.zeros(STATE), work, np.zeros((1, 0)),
+                     new, np.zeros((1, 2, 0)), np.zeros(1))
         assert done == 1
         rows.append(new[0, [0, 1, 3], 0])
     A = np.array(rows).T
@@ -647,7 +647,7 @@ def test_failure_keeps_the_history():
     (lambda s: s.integrate(0.0, 0.1), InputError, "t_end"),
     (lambda s: s.integrate(1.0, 0.1, t_start=2.0), InputError, "t_end"),
     (lambda s: s.integrate(1.0, 0.1, scheme="leapfrog"), NameUnknown,
-     "'leapfrog'; known: 'energy-momentum', 'generalized-alpha', 'hht', 'newmark'"),
+     "'leapfrog'; known: 'energy-momentum', 'energy-momentum-4', 'generalized-alpha', 'hht'"),
     (lambda s: s.integrate(1.0, 0.1, t_eval=[0.5, 1.1]), InputError, r"within \[0.0, 1.0\]"),
     (lambda s: s.integrate(1.0, 0.1, t_eval=[-0.1, 0.5]), InputError, "t_eval"),
     (lambda s: s.integrate(1.0, 0.1, t_eval=[0.5, 0.4]), InputError, "increase"),
