@@ -30,7 +30,7 @@ def _number_at(context, builder, signature, args):
 
 def _read(context, builder, signature, args, otherwise):
     kind, index = signature.args
-    if not _is_number(kind, index):
+    if not _is_number(context, kind, index):
         return otherwise(context, builder, signature, args)
     return load_item(context, builder, kind, _pointer(context, builder, kind, index, *args))
 
@@ -39,16 +39,17 @@ def _read(context, builder, signature, args, otherwise):
 @lower_builtin(operator.setitem, types.Array, types.BaseTuple, types.Number)
 def _write(context, builder, signature, args):
     (kind, index, given), value = signature.args, args[2]
-    if not _is_number(kind, index):
+    if not _is_number(context, kind, index):
         return setitem_array(context, builder, signature, args)
     value = context.cast(builder, value, given, kind.dtype)
     store_item(context, builder, kind, value, _pointer(context, builder, kind, index, *args[:2]))
 
 
-def _is_number(kind, index):
+def _is_number(context, kind, index):
+    """True if it is asked of a text; not where bounds are to be checked, which Numba does."""
     indices = tuple(index) if isinstance(index, types.BaseTuple) else (index,)
-    return (isinstance(ConfigStack.top_or_none(), Known) and len(indices) == kind.ndim
-            and all(isinstance(x, types.Integer) for x in indices))
+    return (isinstance(ConfigStack.top_or_none(), Known) and not context.enable_boundscheck
+            and len(indices) == kind.ndim and all(isinstance(x, types.Integer) for x in indices))
 
 
 def _pointer(context, builder, kind, index, array, at):
