@@ -11,6 +11,7 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
 from .errors import (ConvergenceError, InputError, SupportError, require_finite_scalar,
                      require_index, require_integer, teaching)
+from .linalg import NO_FACTORS
 from .results import State
 from .tangent import Inverse, StrainTangent, is_symmetric
 
@@ -216,7 +217,7 @@ def _shift(system, state):
             system.factorize(state.u, t, state.multipliers)
             if system.inertia().negative == 0:
                 return shift
-        except (np.linalg.LinAlgError, RuntimeError):
+        except NO_FACTORS:
             pass
         shift *= 4.0
     raise SupportError("the joints are not independent in this state")

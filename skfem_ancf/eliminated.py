@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .condensed import Condensed
+from .linalg import NO_FACTORS
 
 if TYPE_CHECKING:
     from .linalg import BandMatrix
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-#: What matrices that cannot be factorised raise.
-SINGULAR = np.linalg.LinAlgError, RuntimeError
 #: Contraction of a refinement and what round-off may leave, up to which factors are kept; the same
 #: of new ones.
 KEPT, NEW = (0.05, 1e-12), (0.5, 1e-6)
@@ -106,7 +105,7 @@ class Eliminated:
                 du[:], dm[:] = self._condensed.solve(R, phi)
             else:
                 self.factorize(u, multipliers)
-        except SINGULAR as error:
+        except NO_FACTORS as error:
             logger.debug("no factors: %s", error)
             return False
         return True
@@ -220,7 +219,7 @@ class EliminatedMass:
                 J = self._system.sparse_jacobian(du.copy(), t - self.lag)
             du[:], dm[:] = self.solve(u, t, 0.0 * R, phi, J, float(np.linalg.norm(R)),
                                       REFINEMENTS if len(multipliers) else ROUGHLY)
-        except SINGULAR as error:
+        except NO_FACTORS as error:
             logger.debug("no factors: %s", error)
             return False
         return True

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 INACCURATE = 1e-5
 #: Eigenvalue of a matrix of unit diagonal that is round-off.
 SINGULAR = 4.0 * np.finfo(float).eps
+#: What factors and eigenvalues raise: singular matrices, Arnoldi without convergence.
+NO_FACTORS = np.linalg.LinAlgError, RuntimeError
 #: Pivot of a matrix of unit diagonal below which its smallest eigenvalue may be round-off.
 SMALL = 1e-7
 #: Growth of the entries of a matrix of unit diagonal at which a pivot block is made larger.

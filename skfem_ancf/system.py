@@ -22,7 +22,7 @@ from .evaluation import CARRY, FORCE, MEAN, TANGENT, VISCOUS, evaluate
 from .forces.system import Forces
 from .forces.texts import add_resisting_force
 from .joints.director import UnitDirector
-from .linalg import INACCURATE, BandMatrix, Inertia, dense
+from .linalg import INACCURATE, NO_FACTORS, BandMatrix, Inertia, dense
 from .machine import Machine
 from .pickling import functions_of, require_picklable
 from .points import Points
@@ -553,7 +553,8 @@ class System:
         try:
             self.factorize(u, t, multipliers)
             du[:], dm[:] = self.solve(R, phi)
-        except (np.linalg.LinAlgError, RuntimeError):
+        except NO_FACTORS as error:
+            logger.debug("no factors: %s", error)
             return False
         return True
 

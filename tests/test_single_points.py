@@ -138,7 +138,7 @@ def test_a_point_of_a_parabola_is_found(xi, eta, bend, height, n, offset):
     (many,), X, (outside,) = find(x)
     one = find.one(*x[:, 0].tolist())
     assert outside == 0 and one and one[0] == many
-    assert_allclose(one[1:], X[:, 0], atol=1e-13 + 1e-15 * offset / height)
+    assert_allclose(one[1:], X[:, 0], atol=(2e-14 + 2e-15 * offset) / height)
     at = mesh.mapping().F(np.array([[one[1]], [one[2]]]), np.array([one[0]]))[:, 0]
     assert_allclose(at, x, atol=1e-14 + 1e-15 * offset)
 

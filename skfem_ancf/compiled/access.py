@@ -16,6 +16,7 @@ from numba.np.arrayobj import (getitem_array_tuple, getitem_arraynd_intp, load_i
                                store_item)
 
 from .flags import Known
+from .views import part
 
 
 @lower_builtin(operator.getitem, types.Array, types.Integer)
@@ -47,28 +48,21 @@ def _write(context, builder, signature, args):
 
 def _is_number(context, kind, index):
     """True if it is asked of a text; not where bounds are to be checked, which Numba does."""
-    indices = tuple(index) if isinstance(index, types.BaseTuple) else (index,)
+    found = _indices(index)
     return (isinstance(ConfigStack.top_or_none(), Known) and not context.enable_boundscheck
-            and len(indices) == kind.ndim and all(isinstance(x, types.Integer) for x in indices))
+            and len(found) == kind.ndim and all(isinstance(x, types.Integer) for x in found))
+
+
+def _indices(index):
+    """The types of an index."""
+    return tuple(index) if isinstance(index, types.BaseTuple) else (index,)
 
 
 def _pointer(context, builder, kind, index, array, at):
-    model = context.data_model_manager[kind]
-
-    def part(name):
-        return builder.extract_value(array, model.get_field_position(name))
-
     given = unpack_tuple(builder, at) if isinstance(index, types.BaseTuple) else [at]
-    found = tuple(index) if isinstance(index, types.BaseTuple) else (index,)
-    given = [context.cast(builder, x, of, types.int64) for x, of in zip(given, found)]
-    shape = unpack_tuple(builder, part("shape"))
-    given = [x if isinstance(x, ir.Constant) and x.constant >= 0 else _from_end(builder, x, n)
-             for x, n in zip(given, shape)]
-    strides = unpack_tuple(builder, part("strides")) if kind.layout == "A" else []
-    return get_item_pointer2(context, builder, part("data"), shape, strides, kind.layout, given)
-
-
-def _from_end(builder, x, n):
-    """A negative index counts from the end."""
-    negative = builder.icmp_signed("<", x, x.type(0))
-    return builder.select(negative, builder.add(n, x), x)
+    given = [context.cast(builder, x, of, types.int64) for x, of in zip(given, _indices(index))]
+    from_end = not all(isinstance(x, ir.Constant) and x.constant >= 0 for x in given)
+    data, *ends = (part(context, builder, kind, array, name)
+                   for name in ("data", "shape", "strides"))
+    shape, strides = (unpack_tuple(builder, x) for x in ends)
+    return get_item_pointer2(context, builder, data, shape, strides, kind.layout, given, from_end)

@@ -9,6 +9,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from .views import part
+
 _REAL, _WORD, _PLACE = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
 #: Numbers of a vector, and bytes that they are aligned to: those of one of them.
 WIDE, _ALIGNED = 4, 8
@@ -20,7 +22,7 @@ def subtract(typing, y, to, x, of, n, c):
     """y[to + i] -= c x[of + i] for n numbers."""
     def generate(context, builder, signature, args):
         _, to, _, of, n, c = args
-        ends = [builder.gep(context.make_array(kind)(context, builder, array).data, [at])
+        ends = [builder.gep(part(context, builder, kind, array, "data"), [at])
                 for kind, array, at in ((y, args[0], to), (x, args[2], of))]
         wide = ir.Constant(_VECTOR, ir.Undefined)
         for k in range(WIDE):
@@ -40,5 +42,5 @@ def _subtract(builder, places, factor):
     """One number, or one vector of them."""
     y, x = (builder.load(place) for place in places)
     y.align = x.align = _ALIGNED
-    part = builder.fmul(factor, x, flags=("contract",))
-    builder.store(builder.fsub(y, part, flags=("contract",)), places[0]).align = _ALIGNED
+    product = builder.fmul(factor, x, flags=("contract",))
+    builder.store(builder.fsub(y, product, flags=("contract",)), places[0]).align = _ALIGNED

@@ -18,8 +18,8 @@ def _without_owner(context, builder, kind, value):
         none = cgutils.get_null_value(context.get_value_type(types.voidptr))
         return _with(context, builder, kind, value, {"meminfo": none, "parent": none})
     if isinstance(kind, types.BaseTuple):
-        for k, part in enumerate(kind.types):
-            one = _without_owner(context, builder, part, builder.extract_value(value, k))
+        for k, of in enumerate(kind.types):
+            one = _without_owner(context, builder, of, builder.extract_value(value, k))
             value = builder.insert_value(value, one, k)
     return value
 
@@ -45,11 +45,16 @@ def array_at(context, builder, kind, pointer, shape):
         "strides": cgutils.pack_array(builder, strides), "nitems": count})
 
 
+def part(context, builder, kind, array, name):
+    """A part of an array: "data", "shape", "strides"."""
+    return builder.extract_value(array, context.data_model_manager[kind].get_field_position(name))
+
+
 def _with(context, builder, kind, array, parts):
     """An array with other parts."""
     model = context.data_model_manager[kind]
-    for name, part in parts.items():
-        array = builder.insert_value(array, part, model.get_field_position(name))
+    for name, value in parts.items():
+        array = builder.insert_value(array, value, model.get_field_position(name))
     return array
 
 
@@ -57,8 +62,8 @@ def _sizes(context, builder, shape, value):
     """The numbers of a shape, a number or a tuple of them."""
     if not isinstance(shape, types.BaseTuple):
         return [context.cast(builder, value, shape, types.int64)]
-    return [context.cast(builder, builder.extract_value(value, k), part, types.int64)
-            for k, part in enumerate(shape)]
+    return [context.cast(builder, builder.extract_value(value, k), of, types.int64)
+            for k, of in enumerate(shape)]
 
 
 def _kind(like, shape):
@@ -87,8 +92,7 @@ def shaped(typing, x, shape):
     found = _kind(x, shape)
 
     def generate(context, builder, signature, args):
-        place = context.data_model_manager[x].get_field_position("data")
-        return array_at(context, builder, found, builder.extract_value(args[0], place),
+        return array_at(context, builder, found, part(context, builder, x, args[0], "data"),
                         _sizes(context, builder, shape, args[1]))
 
     return found(x, shape), generate

@@ -19,8 +19,8 @@ from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, 
 from .dampers import add_damping, damping_force
 from .rates import JointMotion, JointMotions, acceleration_of_joints, drive_rate
 from .steps import (ASTRAY, BEFORE, CARRIED, COUNT, DEPENDENT, DISSIPATED, DONE, ENERGY, FACTORIZED,
-                    FAILED, FAILURE, FRESH, GO_ON, ITERATIONS, LAST_SIZE, LASTING, MIXED,
-                    NOT_CONVERGED, RATE, READY, SINGULAR, SIZE, judge, round_off)
+                    FAILED, FAILURE, FRESH, GO_ON, ITERATIONS, LAST_SIZE, MIXED,
+                    NOT_CONVERGED, RATE, READY, SINGULAR, SIZE, judged, round_off)
 
 #: Contraction up to which factors are kept.
 REUSED = 0.3
@@ -236,7 +236,10 @@ def _converges(e, matrices, method, rule, s, w, state, step):
         if not _correct(e.free, method, s, w, state):
             state[FAILURE] = DEPENDENT
             return False
-        told = _judged(e.body, w, state, wanted, rough)
+        if state[MIXED] > 0.0:
+            for k in range(n):
+                body_carry(e.body, w.origin, w.R[k], w.own[k], w.carried[k])
+        told = judged(state, wanted, rough, REUSED, CARRIED)
         if told == ASTRAY:
             _start(e.body, w, state)
         elif told != GO_ON:
@@ -475,24 +478,6 @@ def _join(method, s, w, k, r, q, x, y):
             x[i] -= f * re[i] - g * im[i]
             y[i] -= f * im[i] + g * re[i]
     return True
-
-
-@source
-def _judged(body, w, state, wanted, rough):
-    """What the last correction tells; as in steps of second order."""
-    fresh = state[FRESH] > 0.0
-    if state[MIXED] > 0.0:
-        for k in range(w.R.shape[0]):
-            body_carry(body, w.origin, w.R[k], w.own[k], w.carried[k])
-        told = judge(state, wanted, rough, CARRIED)
-        if told == GO_ON and not fresh and state[LAST_SIZE] < 0.0:
-            state[READY] = 0.0
-        return told
-    told = judge(state, wanted, rough, REUSED)
-    if fresh and (told == FAILED or told != DONE and state[READY] == 0.0):
-        state[MIXED], state[READY] = LASTING, 0.0
-        return ASTRAY
-    return told
 
 
 # its factors

@@ -396,6 +396,30 @@ def judge(state, wanted, rough, reused):
 
 
 @source
+def judged(state, wanted, rough, reused, carried):
+    """What a correction tells, of iterations with carried stresses too.
+
+    Parameters
+    ----------
+    state, wanted, rough, reused
+        As for :func:`judge`; MIXED may be written.
+    carried
+        Contraction up to which factors are kept where stresses are carried.
+    """
+    fresh = state[FRESH] > 0.0
+    if state[MIXED] > 0.0:
+        told = judge(state, wanted, rough, carried)
+        if told == GO_ON and not fresh and state[LAST_SIZE] < 0.0:
+            state[READY] = 0.0  # old ones have turned the beam
+        return told
+    told = judge(state, wanted, rough, reused)
+    if fresh and (told == FAILED or told != DONE and state[READY] == 0.0):
+        state[MIXED], state[READY] = LASTING, 0.0
+        return ASTRAY
+    return told
+
+
+@source
 def round_off(rule, stiffness_factor, mass_factor, noise):
     """The round-off of a correction, by that of the strains and of the mass times u, u."""
     return np.sqrt(rule.floor**2 * stiffness_factor + EPS * EPS * mass_factor * noise)
@@ -580,21 +604,13 @@ def _judged(body, rule, w, state, wanted, rough):
     iteration wants ever new ones. Carried stresses, ``S = D (eps(u) + B(origin) du)``, are as far
     off as the factors have turned, whatever D is.
     """
-    du, room, fresh = w.x.du, w.x.room, state[FRESH] > 0.0
+    du, room = w.x.du, w.x.room
     if state[MIXED] > 0.0:
         c = 0.5 if rule.conserving > 0 else 1.0
         for i in lanes(du.size):
             room[i] = c * du[i]
         body_carry(body, w.x.origin, room, w.stresses[4], w.stresses[3])
-        told = judge(state, wanted, rough, CARRIED if fresh else REUSED)
-        if told == GO_ON and not fresh and state[LAST_SIZE] < 0.0:
-            state[READY] = 0.0  # old ones have turned the beam
-        return told
-    told = judge(state, wanted, rough, REUSED)
-    if fresh and (told == FAILED or told != DONE and state[READY] == 0.0):
-        state[MIXED], state[READY] = LASTING, 0.0
-        return ASTRAY
-    return told
+    return judged(state, wanted, rough, REUSED, CARRIED if state[FRESH] > 0.0 else REUSED)
 
 
 @source

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import (CallbackError, ConvergenceError, InputError, Interrupted, ask,
                       require_function, require_integer, require_positive, shown, taught)
+from ..linalg import NO_FACTORS
 from ..progress import progress_bar
 from .critical import find_critical
 from .iteration import reference_work, settled
@@ -126,7 +127,7 @@ class Tracer:
             system.factorize(point.u, point.load, point.multipliers)
             if system.symmetric:
                 point.negative = system.inertia().negative
-        except (np.linalg.LinAlgError, RuntimeError):
+        except NO_FACTORS:
             raise Failed("the tangent is singular") from None
         return drive
 
@@ -225,7 +226,7 @@ class Tracer:
                 system.factorize(u, load, m)
                 dR, mR = system.solve(residual, -phi)
                 dF, mF = system.solve(drive, gap)
-            except (np.linalg.LinAlgError, RuntimeError):
+            except NO_FACTORS:
                 raise Failed("the tangent is singular") from None
             dF[system.fixed] += self.unit
             dl = increment(step, dR, dF)

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from ..linalg import NO_FACTORS
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -34,8 +36,6 @@ CUTS = 3
 DESCENT = 200
 #: Largest difference of a tangent from its transpose, relative, that is round-off.
 ROUND_OFF = 1e-10
-#: What factors and eigenvalues raise: matrices that are singular, Arnoldi without convergence.
-FAILURES = (np.linalg.LinAlgError, RuntimeError)
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def verdict(system: System, u: Array, load: float, multipliers: Array,
         system.assemble(u, load)
         system.factorize(u, load if t is None else t, multipliers)
         return verdict_of_factors(system)
-    except FAILURES:
+    except NO_FACTORS:
         return Verdict("singular", 0)
 
 
@@ -154,7 +154,7 @@ def holds(system: System, u: Array, load: float, multipliers: Array, t: float | 
     try:
         if system.stays(u, t, multipliers):
             return True
-    except FAILURES:
+    except NO_FACTORS:
         logger.debug("the last factors do not tell")
     return verdict(system, u, load, multipliers, t).stability != "unstable"
 
@@ -189,7 +189,7 @@ def heads_on(system: System, result: Any, u: Array, load: float, origin: tuple[A
     try:
         system.factorize(result.u, load, result.multipliers)
         du += system.solve(residual, -system.constraint(result.u, load) - J @ du)[0]
-    except FAILURES:
+    except NO_FACTORS:
         return True
     return bool(du @ (position_weights(system) * (u - result.u)) >= 0.0)
 
@@ -217,7 +217,7 @@ def gives_way(system: System, result: Any, load: float) -> bool:
             system.assemble(u, at)
             system.factorize(u, at, multipliers)
             ratio.append(descent.compliance())
-    except FAILURES:
+    except NO_FACTORS:
         return True
     return ratio[0] > SOFTER * ratio[1]
 
@@ -285,7 +285,7 @@ class Descent:
             return False
         try:
             du[:], dm[:] = self.correct(R, du, dm)
-        except FAILURES:
+        except NO_FACTORS:
             return False
         return True
 
@@ -359,7 +359,7 @@ def way_down(system: System, result: Any, load: float, full: float, at: float,
         descent = Descent(system, stride)
         try:
             found = descend(system, result, full, at, iterate, descent, failed)
-        except (failed, *FAILURES) as failure:
+        except (failed, *NO_FACTORS) as failure:
             logger.info("no descent at load %.6g: %s", load, failure)
             continue
         if heads_on(system, result, found[0], load, origin):
