@@ -118,7 +118,7 @@ def test_energy_is_that_of_the_body_with_its_thickness_stretch(name, plane):
         assert np.all(C33 == 1.0) and np.abs(S33).max() > 0.01 * E
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25, deadline=None, derandomize=True)
 @given(st.floats(-7, 7), st.lists(st.floats(-0.4, 0.4), min_size=4, max_size=4))
 def test_frame_indifference_and_isotropy(angle, H):
     F = (np.eye(2) + np.reshape(H, (2, 2)))[:, :, None]
