@@ -106,7 +106,8 @@ def run(out, names, quick):
                 rows = micro.scaling(sizes["scaling"], about, watch, memory)
                 figures.scaling(rows).savefig(out / "scaling.png")
             results[name] = rows
-            write(out / f"{name}.csv", runs.COLUMNS, ([r[c] for c in runs.COLUMNS] for r in rows))
+            write(out / f"{name}.csv", runs.COLUMNS,
+                  ([r.get(c, "") for c in runs.COLUMNS] for r in rows))
     write(out / "goals.csv", ("goal", "at", "wanted", "found", "verdict", OURS, "peer"),
           goals(results))
     text = report(results, about, loading, quick)

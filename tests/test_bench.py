@@ -101,3 +101,23 @@ def test_points_are_measured_with_their_difference(capsys):
     head, *rows = capsys.readouterr().out.splitlines()
     assert len(rows) == 2 * len(points.ELEMENTS) * len(points.MESHES) and "difference" in head
     assert all(float(row.rstrip("* ").split()[-1]) < 1e-13 for row in rows)
+
+
+def test_the_page_is_made_of_a_run(tmp_path):
+    """Of numbers made up: what is missed is marked, and what was not measured stays as it was."""
+    import page
+
+    text = (page.Path(__file__).parents[1] / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+    assert {m[2] for m in page.BLOCK.finditer(text)} == set(page.TABLES)
+    head = bench.runs.COLUMNS
+    rows = [dict(dict.fromkeys(head, ""), case="5.2", code=code, variant="cable 5", elements=4,
+                 error=error, seconds=seconds, whole_seconds=whole, machine="one", versions="two")
+            for code, error, seconds, whole in (("skfem-ancf", 1e-8, 2e-3, 8e-3),
+                                                ("Exudyn", 1e-8, 4e-3, 6e-3))]
+    rows[0]["cold_seconds"] = 1.5
+    bench.write(tmp_path / "5.2.csv", head, ([r[c] for c in head] for r in rows))
+    made = page.renewed("<!-- bench 5.2 -->\nold\n<!-- end -->\n<!-- bench thick -->\nold\n"
+                        "<!-- end -->\n<!-- bench about -->\n<!-- end -->", page.read(tmp_path))
+    assert ("| 1e-07 | 4 x cable 5 | 2 | 8 | 4 x cable 5 | 4 | 6 | 2 | 0.75, **missed** |" in made)
+    assert "Cold, a new process with nothing compiled: 1.5 s skfem-ancf" in made
+    assert made.count("old\n") == 1 and "Of 12 goals 6 were met, 6 missed" in made

@@ -1,5 +1,9 @@
 """The runs of each case: every code over meshes, steps and settings, its best among them."""
 
+import os
+
+from skfem_ancf.switch import VARIABLE
+
 from . import exudyn_beams, ours, stock
 from .problems import PROBLEMS
 
@@ -208,7 +212,7 @@ def runs_of(case, is_quick=False):
 
 
 def warm_up():
-    """Load what is loaded once a process: lazy imports, and the code compiled for each problem."""
+    """Load what is loaded once a process: lazy imports, and all compiled code, made if need be."""
     runs = [stock.q2(PROBLEMS["thick"], 2, 2), ours.run(PROBLEMS["5.2"], "ancf", 1, 16)]
     for p in PROBLEMS.values():
         for kind in ("cubic",) if p.name == "thick" else ("cable", "cubic"):
@@ -217,9 +221,17 @@ def warm_up():
             else:
                 runs += [ours.run(p, kind, 3, 4, steps=200, scheme=scheme, tol=1e-6)
                          for scheme in ("generalized-alpha", "energy-momentum")]
+    runs.append(ours.run(PROBLEMS["pendulum"], "cable", 5, 3, steps=100, scheme="radau", tol=1e-7))
     if exudyn_beams.exudyn is not None:
         runs += [exudyn_beams.run(PROBLEMS["5.2"], "ANCFCable2D", 3),
                  exudyn_beams.run(PROBLEMS["pendulum"], "ANCFCable2D", 8, 200, 1e-4)]
-    for run in runs:
-        solver = run.build()
-        solver.read(solver.solve())
+    before = os.environ.get(VARIABLE)
+    os.environ[VARIABLE] = "1"
+    try:
+        for run in runs:
+            solver = run.build()
+            solver.read(solver.solve())
+    finally:
+        del os.environ[VARIABLE]
+        if before is not None:
+            os.environ[VARIABLE] = before

@@ -19,7 +19,7 @@ from .problems import Problem
 
 COLUMNS = ("case", "code", "variant", "elements", "dofs", "steps", "error", "seconds",
            "whole_seconds", "cold_seconds", "iterations", "peak_mb", "setup_seconds", "runs",
-           "note", "versions", "machine")
+           "note", "versions", "machine", "cells")
 #: Seconds spent on the repetitions of one run, each of two passes, and how many there are at most.
 BUDGET, MOST = 0.1, 7
 #: A run that takes longer than this many seconds is made once.
