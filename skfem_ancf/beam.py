@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property, wraps
+from functools import cached_property, partial, wraps
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +27,7 @@ from .quadrature import gauss, tensor
 from .rigid import RigidBody
 from .sections import Across, Rectangle, Section
 from .series import Series
-from .strains import ElementStrain, TaperedStrain
+from .strains import ElementStrain
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -495,11 +495,10 @@ class Beam(Frozen):
         dofs, weights
             Shapes (2, n) and (n,).
         """
-        if self.mesh.heights is None:
-            weights = self.series.at(*map(float, X)) * self.scales[e]
-        else:
-            mapping, tind = self.mesh.mapping(), np.array([e])
-            weights = self.element.functions(mapping, X[:, None], tind)[0][:, 0, 0]
+        xi, eta = map(float, X)
+        weights = self.series.at(xi, eta) * self.scales[e]
+        if self.mesh.heights is not None:
+            weights *= self.series.swollen(self.mesh.mapping().relative_height(e, xi)[0])
         first = self.mesh.t[0, e] * self.nd
         return first + np.arange(2 * self.nd).reshape(-1, 2).T, weights
 
@@ -621,21 +620,17 @@ class Beam(Frozen):
             As for :meth:`gradients`, shapes (N,), (2, npoints) or (2, nelements, npoints), and
             (nelements,).
         """
-        def at(term: Term, xi: float | None = None, across: Rule | None = None) -> Array:
+        def strain_of(term: Term, xi: float | None = None, across: Rule | None = None) -> Array:
             if term is self.terms[0] and xi is None and across is None:
                 return strain
             of = self.strain_of(term, getattr(term.law, "rows", (0, 1, 2)))
-            x = X[0] if xi is None else 0.0 * X[0] + xi
-            eta, weights = ((X[1],), (1.0,)) if across is None else across
-            return sum((w * self._at_points(of, u, np.array([x, 0.0 * X[1] + y]), tind)
-                        for y, w in zip(eta, weights)), np.zeros((3, 1, 1)))
+            at = X if xi is None else np.array([0.0 * X[0] + xi, X[1]])
+            return self._at_points(partial(of, across=across), u, at, tind)
 
-        return at
+        return strain_of
 
     def strain_of(self, term: Term, rows: Sequence[int] = (0, 1, 2)) -> Any:
         """The strain of a term of the formulation, kept: an :class:`~.strains.ElementStrain`.
-
-        Of a tapered beam a :class:`~.strains.TaperedStrain`.
 
         Parameters
         ----------
@@ -646,8 +641,7 @@ class Beam(Frozen):
         """
         found = self._strains.get((id(term), rows))
         if found is None:
-            kind = ElementStrain if self.mesh.heights is None else TaperedStrain
-            found = self._strains[id(term), rows] = kind(self, term, rows)
+            found = self._strains[id(term), rows] = ElementStrain(self, term, rows)
         return found
 
     @cached_property

@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 #: the elements next to its nearest sample.
 SAMPLES, CANDIDATES = 4, 6
 
-#: Squares of the plane of which a finder remembers what is near, at most.
-CELLS = 2**14
+#: Squares of the plane of which a finder remembers what is near, at most: as single points and as
+#: many meet them.
+CELLS, MOST = 2**14, 2**20
 
 
 class Finder:
@@ -46,6 +47,8 @@ class Finder:
         #: Where single points begin, for squares of the plane, see :meth:`_start`.
         self._cells: dict = {}
         self._cell = 0.5 * float(np.min(mesh.lengths))
+        #: And for many, once there were more of them than squares.
+        self._of_squares: Array | None = None
         self._line = self._straight_line()
 
     def _straight_line(self):
@@ -122,8 +125,7 @@ class Finder:
                 return None
         xi = (along - left[e]) / lengths[e]
         if self.mesh.heights is not None:
-            at = np.array([[min(max(xi, 0.0), 1.0)]])
-            height = float(self.mapping.height(at, np.array([e]))[0][0, 0])
+            height *= self.mapping.relative_height(e, min(max(xi, 0.0), 1.0))[0]
         return e, xi, (dx * y - dy * x) / height + 0.5
 
     def _one_near(self, x, y, noise):
@@ -198,6 +200,34 @@ class Finder:
         outside[outside > 1.0] = np.inf
         return e, X, outside
 
+    def _nearest(self, x):
+        """Samples (n,) near points, and whether these are far from all.
+
+        Of many points the sample nearest to the middle of their square of the plane.
+        """
+        low, shape = self._squares
+        if self._of_squares is None and np.prod(shape) > min(x.shape[1], MOST):
+            distance, near = self._tree.query(x.T)
+            return near, distance > self._far
+        if self._of_squares is None:
+            middles = low[:, None, None] + self._cell * (0.5 + np.indices(shape.astype(int)))
+            distance, near = self._tree.query(middles.reshape(2, -1).T)
+            self._of_squares = np.where(distance > self._far + self._cell, -1, near).reshape(
+                middles.shape[1:])
+        place = (x - low[:, None]) / self._cell
+        inside = np.all((place >= 0.0) & (place < shape[:, None]), axis=0)
+        i, j = np.where(inside, place, 0.0).astype(int)
+        near = self._of_squares[i, j]
+        far = ~inside | (near < 0)
+        return np.where(far, 0, near), far
+
+    @cached_property
+    def _squares(self):
+        """The corner of those that hold the body, and how many there are each way."""
+        margin = self._far + self._cell
+        low, high = self._samples.min(axis=1) - margin, self._samples.max(axis=1) + margin
+        return low, np.ceil((high - low) / self._cell)
+
     @cached_property
     def _neighbours(self):
         return self._before.tolist(), self._after.tolist()
@@ -223,9 +253,8 @@ class Finder:
 
     def _near(self, x, noise):
         """From the nearest sample, and to the neighbour where the point is beyond a node."""
-        distance, near = self._tree.query(x.T)
+        near, far = self._nearest(x)
         e = near // SAMPLES
-        far = distance > self._far
         X, outside = np.full(x.shape, 0.5), np.full(x.shape[1], np.inf)
         todo = np.nonzero(~far)[0]
         xi = (near % SAMPLES + 0.5) / SAMPLES

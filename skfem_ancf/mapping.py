@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from .mesh import MeshBeam
     from .types import Array
 
-#: Corrections of Newton's method that are small enough.
-CLOSE = 1e-7
+#: Corrections of Newton's method that are small enough, and powers of xi in relative heights that
+#: are round-off.
+CLOSE, NOTHING = 1e-7, 2e-14
 
 _FACET_POINTS = (  # the point of the reference cell at X on facet bottom, right, top, left
     lambda s: (s, 0.0 * s), lambda s: (1.0 + 0.0 * s, s),
@@ -187,7 +188,9 @@ class MappingBeam(Mapping):
     @cached_property
     def _heights(self):
         """Coefficients of the heights of a tapered beam, relative to the largest."""
-        return powers(self.mesh.heights) / self.mesh.height
+        c = powers(self.mesh.heights) / self.mesh.height
+        c[np.abs(c) <= NOTHING] = 0.0  # of a height that is linear
+        return c
 
     def height(self, xi: Array, tind: Array | None = None) -> tuple[Any, Any]:
         """The height of the section and its derivative by xi.
@@ -215,6 +218,26 @@ class MappingBeam(Mapping):
             return 1.0, 0.0
         c = self._heights if tind is None else self._heights[:, tind]
         return _polynomial(c[:, :, None], np.asarray(xi))
+
+    def relative_height(self, e: Any, xi: Any) -> tuple[Any, Any]:
+        """The height of a tapered mesh over the largest, and its derivative by xi.
+
+        Parameters
+        ----------
+        e, xi
+            Element and place along it: numbers, or elements (n,) and places (..., n).
+
+        Returns
+        -------
+        tuple
+            Two numbers, or arrays (..., n).
+        """
+        c = self._known_heights[e] if isinstance(e, int) else self._heights.take(e, axis=-1)
+        return _polynomial(c, xi)
+
+    @cached_property
+    def _known_heights(self):
+        return self._heights.T.tolist()
 
     def offset(self, X: Array, tind: Array | None = None) -> Any:
         """Distance Y of reference points from the axis.
@@ -362,7 +385,8 @@ class MappingBeam(Mapping):
                                     / factorial(d) for d in range(2 * m)], 1)
                           for m, c in zip(self._orders, (axis, director)))
         if self.mesh.heights is not None:
-            director = _product(self._heights, director)
+            degree = np.max(np.nonzero(np.any(self._heights, axis=1)))
+            director = _product(self._heights[:degree + 1], director)
         crossed = _product(axis[1], director[0]) - _product(axis[0], director[1])
         return [axis, director, crossed]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -114,7 +115,7 @@ class Panels(Frozen):
         self.width = np.concatenate(width)
         ends = np.searchsorted(of_slab, np.arange(len(slabs) + 1))
         self.slabs = [slice(a, b) for a, b in zip(ends[:-1].tolist(), ends[1:].tolist())]
-        self._ends = np.array([p.high for p in self.panels[:-1]])
+        self._ends = [p.high for p in self.panels[:-1]]
         self.from_bottom, self.whole = np.zeros((first, first)), np.zeros(first)
         for panel in self.panels:
             self.from_bottom[panel.columns] += self.whole
@@ -125,34 +126,50 @@ class Panels(Frozen):
         self.from_axis = self.from_bottom - self._till_axis()
 
     def _till_axis(self):
-        panel = self.panels[np.searchsorted(self._ends, 0.5, side="right")]
+        panel = self.panels[bisect_right(self._ends, 0.5)]
         out = np.where(np.arange(len(self.eta)) < panel.columns.start, self.whole, 0.0)
         out[panel.columns] = panel.integrals(np.array([panel.local(0.5)]))
         return out
 
-    def values(self, eta: Any) -> Array:
-        """Weights of the values at the points for those at other places.
+    def values(self, eta: float) -> Array:
+        """Weights (m,) of the values at the points for that at a place.
 
         Parameters
         ----------
         eta
-            A place, or places (n,); one between two panels is in the upper.
+            The place; one between two panels is in the upper.
+        """
+        panel = self.panels[bisect_right(self._ends, eta)]
+        weights = panel.values(panel.local(eta))
+        if len(self.panels) == 1:
+            return weights
+        out = np.zeros(len(self.eta))
+        out[panel.columns] = weights
+        return out
+
+    def by_panel(self, eta: Array) -> list[tuple[Any, slice, Array]]:
+        """Weights of the values at the points of panels for those at many places.
+
+        Parameters
+        ----------
+        eta
+            The places (n,); those between two panels are in the upper.
 
         Returns
         -------
-        ndarray
-            Shape (m,), or (n, m).
+        list
+            For each panel with places in it which they are, (k,) or all; the columns of its
+            points, and the weights of these, (k, columns).
         """
         if len(self.panels) == 1:
             panel, = self.panels
-            return panel.values(panel.local(eta))
-        places = np.atleast_1d(eta)
-        which, out = np.searchsorted(self._ends, places, side="right"), np.zeros(
-            (len(places), len(self.eta)))
-        for k in np.unique(which):
-            on, panel = which == k, self.panels[k]
-            out[on, panel.columns] = panel.values(panel.local(places[on]))
-        return out.reshape(np.shape(eta) + out.shape[1:])
+            return [(slice(None), panel.columns, panel.values(panel.local(eta)))]
+        which, out = np.searchsorted(self._ends, eta, side="right"), []
+        for k, panel in enumerate(self.panels):
+            on = np.nonzero(which == k)[0]
+            if len(on):
+                out.append((on, panel.columns, panel.values(panel.local(eta[on]))))
+        return out
 
 
 def _panel(low, high, curved, order, alone, first):

@@ -76,10 +76,13 @@ class Part:
     def _table(self, which):
         """The local functions, 0, or their derivatives by xi, 1: (nb, n)."""
         beam, series = self.beam, self.beam.series
-        if beam.mesh.heights is not None:  # no polynomial of xi that elements share
-            rows = beam.element.of_mesh(beam.mesh.mapping(), self.at, self.e)
-            return rows[which][..., 0] * beam.scales[self.e].T
-        return series.values(series.tables[which], self.X) * beam.scales[self.e].T
+        table = series.values(series.tables[which], self.X)
+        if beam.mesh.heights is not None:
+            g, rate = beam.mesh.mapping().relative_height(self.e, self.X[0])
+            if which == 1:
+                table += series.swelling(g, rate) * series.values(series.value, self.X)
+            table *= series.swollen(g)
+        return table * beam.scales[self.e].T
 
     @cached_property
     def weights(self) -> Array:
@@ -151,9 +154,20 @@ class Part:
         u
             Coordinates of the scene, shape (N,).
         """
+        beam, strain = self.beam, self.strain(u)
+        if beam.across.plain:
+            return self._stress(strain, u, slice(None))
+        which = beam.across.which(self.X)
+        for k in range(len(beam.across.slabs)):
+            on = np.nonzero(which == k)[0]
+            strain[:, on] = self._stress(strain, u, on)
+        return strain
+
+    def _stress(self, strain, u, on):
+        """That of some of the points, all of one slab."""
         beam = self.beam
-        return beam.kinematics.stress(beam, self.strain(u)[..., None], u[self.coordinates], self.at,
-                                      self.e)[..., 0]
+        return beam.kinematics.stress(beam, strain[:, on, None], u[self.coordinates],
+                                      self.at[:, on], self.e[on])[..., 0]
 
     @cached_property
     def _levers(self):

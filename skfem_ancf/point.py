@@ -50,8 +50,8 @@ class Point:
         :data:`AGAIN` if it was asked for once.
     """
 
-    __slots__ = ("_both", "_dofs", "_lever", "_parts", "_scale", "_weights", "_x", "beam",
-                 "coordinates", "number", "off_axis", "place", "recovery", "strain_table")
+    __slots__ = ("_both", "_dofs", "_height", "_lever", "_parts", "_scale", "_weights", "_x",
+                 "beam", "coordinates", "number", "off_axis", "place", "recovery", "strain_table")
     one, n = True, 1
 
     def __init__(self, beam: Beam, number: int, coordinates: slice,
@@ -63,7 +63,7 @@ class Point:
         self._dofs, self._scale = of_element if of_element is not None else kept(
             beam.touched, place[0], self._of_element, ELEMENTS)
         self._weights: Any = None
-        self._both = self._lever = None
+        self._both = self._lever = self._height = None
         self._parts: list[Part] | None = None
         self.recovery: Any = None
         self.strain_table: Any = None
@@ -125,8 +125,9 @@ class Point:
         weights = self._weights
         if weights is None or weights is AGAIN:
             _, xi, eta = self.place
-            new = (self.beam.series.at(xi, eta) * self._scale
-                   if self.beam.mesh.heights is None else self.parts[0].weights[:, 0])
+            new = self.beam.series.at(xi, eta) * self._scale
+            if self.beam.mesh.heights is not None:
+                new *= self.beam.series.swollen(self._relative_height()[0])
             weights, self._weights = new, AGAIN if weights is None else new
         return weights
 
@@ -134,10 +135,17 @@ class Point:
         """Weights of the coordinates of the element in its position and its slope, (2, nb)."""
         if self._both is None:
             _, xi, eta = self.place
-            self._both = (self.beam.series.with_slopes(xi, eta) * self._scale
-                          if self.beam.mesh.heights is None else
-                          np.array([self.parts[0].weights[:, 0], self.parts[0].slopes[:, 0]]))
+            self._both = self.beam.series.with_slopes(xi, eta) * self._scale
+            if self.beam.mesh.heights is not None:
+                series, (g, rate) = self.beam.series, self._relative_height()
+                self._both[1] += series.swelling(g, rate) * self._both[0]
+                self._both *= series.swollen(g)
         return self._both
+
+    def _relative_height(self):
+        if self._height is None:
+            self._height = self.beam.mesh.mapping().relative_height(*self.place[:2])
+        return self._height
 
     def _moving(self, q):
         """Position and slope of changes q (..., 2, nb) of the coordinates, four components."""
@@ -150,8 +158,9 @@ class Point:
         """As :func:`~skfem_ancf.parts.carried` takes it."""
         if self._lever is None:
             mesh, eta = self.beam.mesh, self.place[2]
-            lever = (mesh.height * (eta - 0.5) if mesh.heights is None
-                     else float(mesh.mapping().offset(self.parts[0].at, self.parts[0].e)[0, 0]))
+            lever = mesh.height * (eta - 0.5)
+            if mesh.heights is not None:
+                lever *= self._relative_height()[0]
             slope = self.beam.q0_local[self._dofs].dot(self._with_slope()[1])
             self._lever = lever, *slope.tolist()
         return self._lever

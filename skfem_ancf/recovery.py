@@ -522,9 +522,9 @@ class _Table:
         return [((a * d + b) * d + c) * d + e
                 for a, b, c, e in zip(*self._c[:, k, rows].dot(weights).tolist())]
 
-    def many(self, s, weights, rows):
-        """The rows (rows, n) at places (n,), for weights (n, m)."""
-        c = np.ascontiguousarray(np.moveaxis(self._c[:, :, rows], 2, 1))
+    def many(self, s, weights, rows, columns):
+        """The rows (rows, n) at places (n,), for weights (n, k) of the points of some columns."""
+        c = np.ascontiguousarray(np.moveaxis(self._c[:, :, rows, columns], 2, 1))
         out = np.empty((c.shape[1], len(s)))
         for first in range(0, len(s), CHUNK):
             part = slice(first, first + CHUNK)
@@ -768,24 +768,28 @@ class Recovery:
     def _places(self, e, xi, eta):
         """What evaluation at points (n,) needs and does not change with the state.
 
-        Stations, whether they are the right end of their element, arc lengths, weights (n, m).
+        Stations, whether they are the right end of their element, arc lengths, and what lies
+        across: what :meth:`.panels.Panels.by_panel` returns.
         """
         end = xi > 1.0 - SNAP
         station = e + np.where(end, 1.0, np.where(xi < SNAP, 0.0, xi))
-        return station, end, self.arc(e, xi), self.panels.values(eta)
+        return station, end, self.arc(e, xi), self.panels.by_panel(eta)
 
     def _values(self, places, rows):
-        station, end, s, weights = places
+        station, end, s, panels = places
         # a point at a cut that is a node belongs to the piece of its own element
         piece = np.where(end, np.searchsorted(self._cuts, station),
                          np.searchsorted(self._cuts, station, side="right")) - 1
         piece = np.clip(piece, 0, len(self._tables) - 1)
-        if len(self._tables) == 1:
-            return self._tables[0].many(s, weights, rows)
         out = np.empty((len(range(*rows.indices(7))), len(s)))
-        for k in np.unique(piece):
-            on = piece == k
-            out[:, on] = self._tables[k].many(s[on], weights[on], rows)
+        for at, columns, weights in panels:
+            where, of = s[at], piece[at]
+            found = np.empty((len(out), len(where)))
+            alone = len(self._tables) == 1
+            for k in (0,) if alone else np.unique(of):
+                on = slice(None) if alone else of == k
+                found[:, on] = self._tables[k].many(where[on], weights[on], rows, columns)
+            out[:, at] = found
         return out
 
     @staticmethod

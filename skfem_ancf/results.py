@@ -15,6 +15,7 @@ from .fields import Values, find_field
 from .frozen import Frozen
 from .point import Point
 from .points import require_body
+from .raw import RawField
 from .recovery import actions, recover
 from .resultants import Resultants, resultants
 from .section_forces import NotRecovered
@@ -146,7 +147,7 @@ class State(Frozen):
                 raise NameUnknown("attribute of State", name, known)
         other = object.__new__(type(self))
         vars(other).update(vars(self), **changes)
-        for name in ("_recoveries", "_near", "actions", "together"):
+        for name in ("_recoveries", "_near", "_raw", "actions", "together"):
             vars(other).pop(name, None)
         if {"u", "multipliers", "system", "load", "t"} & set(changes):
             vars(other).update(_verdict=None, _checks=None)
@@ -322,8 +323,8 @@ class State(Frozen):
         at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
         if isinstance(at, Point):
             r = self._recovery_of(at.number) if recover else None
-            xx, yy, xy = (at.strain(self.u, self._near) if r is None else
-                          r.at_point(at, STRAIN))
+            xx, yy, xy = (self._raw[0](at, "strain", self._strain_alone, self._raw_strain)
+                          if r is None else r.at_point(at, STRAIN))
             return np.array([xx, yy, 0.5 * xy])
         values = at.gather([self._strain(part, recover) for part in at.parts])
         values[2] *= 0.5
@@ -342,10 +343,8 @@ class State(Frozen):
         at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
         if isinstance(at, Point):
             r = self._recovery_of(at.number) if recover else None
-            if r is not None:
-                return np.array(r.at_point(at, STRESS))
-            S = at.stress(self.u, self._near)
-            return S - self.eigen(at.parts[0], True)[:, 0] if self.eigenstrains(at.beam) else S
+            return np.array(self._raw[1](at, "stress", self._stress_alone, self._raw_stress)
+                            if r is None else r.at_point(at, STRESS))
         return at.gather([self._stress(part, recover) for part in at.parts])
 
     def field(self, field: Any, point: ArrayLike, beam: WhichBeam = None,
@@ -410,15 +409,24 @@ class State(Frozen):
 
     def _strain(self, part, recover):
         r = self._recovery_of(part.number) if recover else None
-        if r is not None:
-            return r.at(part, STRAIN)
-        return part.strain(self.u)
+        return self._raw_strain(part) if r is None else r.at(part, STRAIN)
 
     def _stress(self, part, recover):
         r = self._recovery_of(part.number) if recover else None
-        if r is not None:
-            return r.at(part, STRESS)
+        return self._raw_stress(part) if r is None else r.at(part, STRESS)
+
+    def _raw_strain(self, part):
+        return part.strain(self.u)
+
+    def _raw_stress(self, part):
         return part.stress(self.u) - self.eigen(part, True)
+
+    def _strain_alone(self, point):
+        return point.strain(self.u, self._near)
+
+    def _stress_alone(self, point):
+        S = point.stress(self.u, self._near)
+        return S - self.eigen(point.parts[0], True)[:, 0] if self.eigenstrains(point.beam) else S
 
     # recovered fields
 
@@ -477,6 +485,11 @@ class State(Frozen):
     def _near(self):
         """What single points have asked of elements, by beam and element."""
         return {}
+
+    @cached_property
+    def _raw(self):
+        """Strain and stress of the elements at single points."""
+        return RawField(), RawField()
 
     @cached_property
     def together(self) -> Sequence[State]:

@@ -67,17 +67,22 @@ def polynomials(x: Any, n: int) -> list[Any]:
 
 
 @lru_cache(64)
-def _places(n):
-    """The zeros of T_n on [0, 1]."""
+def places(n: int) -> Array:
+    """The zeros of the polynomial T_n of 2 x - 1, shape (n,)."""
     return read_only(0.5 - 0.5 * np.cos(np.pi * (np.arange(n) + 0.5) / n))
 
 
 @lru_cache(64)
 def _matrices(n):
-    """From values at :func:`_places` to coefficients, and from these to those of the slope."""
+    """From values at :func:`places` to coefficients, and from these to those of the slope."""
     slope = np.zeros((n, n))
     slope[:-1] = 2.0 * chebder(np.eye(n))
-    return np.linalg.inv(chebvander(2.0 * _places(n) - 1.0, n - 1)), slope
+    return np.linalg.inv(chebvander(2.0 * places(n) - 1.0, n - 1)), slope
+
+
+def transform(n: int) -> Array:
+    """From values at :func:`places` to coefficients of Chebyshev polynomials, shape (n, n)."""
+    return _matrices(n)[0]
 
 
 def along(function: Callable[[Array], Array], n: int) -> Array:
@@ -100,7 +105,7 @@ def along(function: Callable[[Array], Array], n: int) -> Array:
     >>> along(lambda xi: np.array([xi, 1.0 + 0.0 * xi]), 2).round(12).tolist()
     [[0.5, 0.5], [1.0, 0.0]]
     """
-    return function(_places(n)) @ _matrices(n)[0].T
+    return function(places(n)) @ _matrices(n)[0].T
 
 
 class Series:
@@ -120,14 +125,15 @@ class Series:
         (nb, p, m) each.
     tables
         The first two of them, (2, nb, p, m).
-    power
-        The power of the length that each takes, (nb,).
+    power, swell
+        The powers of the length, and of the height, that each takes, (nb,).
     """
 
     def __init__(self, element: ElementBeam, h: float) -> None:
         p = max(element.axis_degree, 3 if element.sections == "cubic" else 1) + 1
         m = max(element.order, 1) + 1
-        x, y = _places(p), _places(m)
+        self.swell = np.array([across for _, _, across in 2 * element.functionals])
+        x, y = places(p), places(m)
         values, _, _, self.power = element.local(
             np.array([np.repeat(x, m), np.tile(y, p)]), h)
         (Vx, Dx), (Vy, Dy) = _matrices(p), _matrices(m)
@@ -179,3 +185,31 @@ class Series:
     def scales(self, lengths: Array) -> Array:
         """The powers of the lengths (ne,) of elements that the functions take, (ne, nb)."""
         return lengths[:, None] ** self.power
+
+    def swollen(self, g: Any) -> Array:
+        """What functions of a height that varies are times those of one: ``h^m P(Y / h)``.
+
+        Parameters
+        ----------
+        g
+            The height over that of the functions: a number, or an array (...) of places.
+
+        Returns
+        -------
+        ndarray
+            Shape (nb, ...).
+        """
+        return g ** self._power_of_height(g)
+
+    def swelling(self, g: Any, rate: Any) -> Array:
+        """The derivative by xi of :meth:`swollen`, over it, shape (nb, ...).
+
+        Parameters
+        ----------
+        g, rate
+            As there, and its derivative by xi: numbers, or arrays (...).
+        """
+        return self._power_of_height(g) * (rate / g)
+
+    def _power_of_height(self, g):
+        return self.swell if type(g) is float else self.swell.reshape((-1,) + (1,) * np.ndim(g))

@@ -99,8 +99,8 @@ class PointStrain(NamedTuple):
         """(eps_xx, eps_yy, 2 eps_xy) of what :meth:`ElementStrain.polynomials` returns."""
         terms, along, across, weights, frames, inverse, _ = self
         slopes = polynomials.dot(along).reshape(-1, len(across)).dot(across).reshape(-1, 2).tolist()
-        return interpolated(terms, weights, slopes if inverse is None else self.slopes(slopes),
-                            frames)
+        return interpolated(terms, weights, sampled(
+            terms, slopes if inverse is None else self.slopes(slopes), frames))
 
     def slopes(self, values: list[Any]) -> list[Any]:
         """Derivatives along the axis and across it.
@@ -132,24 +132,35 @@ def turned(turning: Sequence[Any], by_xi: Any, by_eta: Any) -> list[Any]:
             ((c * by_xi[0] + d * by_eta[0]) / det, (c * by_xi[1] + d * by_eta[1]) / det)]
 
 
-def interpolated(terms: Sequence[Any], weights: Sequence[Any], slopes: Sequence[Any],
-                 frames: Sequence[Any]) -> list[Any]:
+def sampled(terms: Sequence[Any], slopes: Sequence[Any], frames: Sequence[Any]) -> list[Any]:
+    """The samples of the strain: of each term its component at its place.
+
+    Parameters
+    ----------
+    terms
+        As ``ElementStrain.terms``.
+    slopes
+        Derivatives of the displacement, each a pair of numbers or arrays (n,).
+    frames
+        The tangent of the stress-free axis at each place, pairs of numbers or arrays.
+    """
+    return [STRAINS[row](slopes[a], slopes[b], *frames[place]) for row, place, a, b in terms]
+
+
+def interpolated(terms: Sequence[Any], weights: Sequence[Any], samples: Sequence[Any]
+                 ) -> list[Any]:
     """The strain (eps_xx, eps_yy, 2 eps_xy): of each component the sum of weighted samples.
 
     Parameters
     ----------
     terms
         As ``ElementStrain.terms``.
-    weights
+    weights, samples
         Of each term, numbers or arrays (n,).
-    slopes
-        Derivatives of the displacement, each a pair of numbers or arrays (n,).
-    frames
-        The tangent of the stress-free axis at each place, pairs of numbers or arrays.
     """
     out: list[Any] = [0.0, 0.0, 0.0]
-    for weight, (row, place, a, b) in zip(weights, terms):
-        out[row] = out[row] + weight * STRAINS[row](slopes[a], slopes[b], *frames[place])
+    for weight, sample, (row, _, _, _) in zip(weights, samples, terms):
+        out[row] = out[row] + weight * sample
     return out
 
 
@@ -190,61 +201,7 @@ class SectionStrain(NamedTuple):
                     tangent = frame
                 for k, row in of.at_points:
                     means[k] += weight * STRAINS[row](*pair, *tangent)
-        out = [0.0, 0.0, 0.0]
-        for mean, weight, (row, _, _, _) in zip(means, of.weights(along), of.terms):
-            out[row] += weight * mean
-        return out
-
-
-class TaperedStrain:
-    """As :class:`ElementStrain`, of a tapered beam: its local functions are none of all elements.
-
-    Parameters
-    ----------
-    beam, term, rows
-        As for :class:`ElementStrain`.
-    """
-
-    def __init__(self, beam: Beam, term: Term, rows: Sequence[int] = (0, 1, 2)) -> None:
-        self.beam, self.term, self.rows = beam, term, rows
-
-    def __call__(self, u: Array, e: Array, X: Array) -> Array:
-        """(eps_xx, eps_yy, 2 eps_xy) at points.
-
-        Parameters
-        ----------
-        u
-            Displacement of the coordinates of the beam, shape (N,).
-        e, X
-            Elements (n,) and reference points (2, n).
-
-        Returns
-        -------
-        ndarray
-            Shape (3, n).
-        """
-        u_e = self.beam.kernel.gather(u, e)
-        found = {}
-
-        def at_place(xi):
-            key = None if xi is None else float(xi)
-            if key not in found:
-                at = X if xi is None else np.array([0.0 * X[0] + xi, X[1]])
-                H, g = (part[..., 0] for part in self.beam.element.gradients(
-                    self.beam.mesh.mapping(), at[:, :, None], e, u_e))
-                C = np.einsum("iJn,iKn->JKn", g + 0.5 * H, H)
-                found[key] = np.array([C[0, 0], C[1, 1], C[0, 1] + C[1, 0]])
-            return found[key]
-
-        out = []
-        for row, name in enumerate(COMPONENTS):
-            if row not in self.rows:
-                out.append(0.0 * X[0])
-                continue
-            weights = self.term.interpolation(name, X[0])
-            out.append(at_place(None)[row] if weights is None else sum(
-                w * at_place(xi)[row] for xi, w in zip(self.term.nodes(name), weights.T)))
-        return np.array(out)
+        return interpolated(of.terms, of.weights(along), means)
 
 
 class ElementStrain:
@@ -299,11 +256,17 @@ class ElementStrain:
                           if place == len(self.places)]
         # of length 1: by xi, by eta of each place: (places, 2, m, nb); of the points (2, p m, nb)
         both = series.along, series.across
-        self._fixed = np.array([[np.einsum("bpm,p->mb", table, chebyshev(
-            xi, table.shape[1])) for table in both] for xi in self.places]).reshape(
-                -1, 2, series.value.shape[2], len(series.value))
+        self._fixed = self._at_places(both)
         self._free = np.array([table.reshape(len(table), -1).T for table in both])
         self._shape = series.value.shape[1:]
+        #: Of straight elements of one height, whose map is linear.
+        self._linear = beam.mesh.is_straight and beam.mesh.heights is None
+
+    def _at_places(self, tables):
+        """Tables of the local functions (nb, p, m) at the places, (places, tables, m, nb)."""
+        n, p, m = tables[0].shape
+        return np.array([[np.einsum("bpm,p->mb", table, chebyshev(xi, p)) for table in tables]
+                         for xi in self.places]).reshape(-1, len(tables), m, n)
 
     def _pair(self, place, J):
         if (place, J) not in self._pairs:
@@ -329,7 +292,7 @@ class ElementStrain:
         mesh, at, which = self.beam.mesh, self._at, self._which
         if not len(at):
             return []
-        if mesh.is_straight:
+        if self._linear:
             size = np.array([mesh.lengths[e], np.full(len(e), mesh.height)])
             table = tables[at, which]
             return table / size[which].reshape(len(at), 1, 1, len(e))
@@ -345,7 +308,7 @@ class ElementStrain:
 
     # at many points
 
-    def __call__(self, u: Array, e: Array, X: Array) -> Array:
+    def __call__(self, u: Array, e: Array, X: Array, across: Rule | None = None) -> Array:
         """(eps_xx, eps_yy, 2 eps_xy) at points.
 
         Parameters
@@ -354,6 +317,8 @@ class ElementStrain:
             Displacement of the coordinates of the beam, shape (N,).
         e, X
             Elements (n,) and reference points (2, n).
+        across
+            Points and weights across sections, for the mean over those of the points.
 
         Returns
         -------
@@ -365,48 +330,102 @@ class ElementStrain:
         of = e if few else np.arange(beam.mesh.nelements)
         u_e = beam.kernel.gather(u, of).transpose(1, 2, 0) * beam.scales[of].T[:, None]
         turned, free = self._polynomials(u_e, of)
+        means = None if across is None else self._means(turned, of, across)
         out = np.empty((3, n), u_e.dtype)
         for first in range(0, n, CHUNK):
             part = slice(first, first + CHUNK)
             at = np.arange(n)[part] if few else e[part]
-            T = polynomials(X[1, part], max(self._shape[1] + 1, 2))
-            slopes = self._slopes(turned, at, e[part], T)
-            frames = self._frames(e[part])
-            if self.here:
-                found, tangent = self._slopes_here(free, at, e[part], X[:, part], T)
-                slopes += found
-                frames.append(tangent)
-            weights = list(self._weights @ chebyshev(X[0, part], self._weights.shape[1]))
-            for row, values in zip(out, interpolated(
-                    self.terms, weights, slopes, frames)):
+            if means is None:
+                samples = self._samples(turned, free, at, e[part], X[:, part])
+            else:
+                samples = [mean.take(at) for mean in means]
+                for (k, _), mean in zip(self.at_points, self._means_here(
+                        free, at, e[part], X[0, part], across)):
+                    samples[k] = mean
+            weights = self._weights @ chebyshev(X[0, part], self._weights.shape[1])
+            for row, values in zip(out, interpolated(self.terms, list(weights), samples)):
                 row[part] = values
         return out
+
+    def _samples(self, turned, free, at, e, X):
+        """The samples (n,) of each term at the places across of points."""
+        T = polynomials(X[1], self._shape[1] + 1)
+        slopes, frames = self._slopes(turned, at, e, T), self._frames(e)
+        if self.here:
+            found, tangent = self._slopes_here(free, at, e, X, T)
+            slopes += found
+            frames.append(tangent)
+        return sampled(self.terms, slopes, frames)
+
+    def _means(self, turned, of, across):
+        """The means over the section of samples at fixed places, for all elements (terms, ne)."""
+        at, frames = np.arange(len(of)), self._frames(of)
+        total = np.zeros((len(self.terms), len(of)), np.result_type(*turned, float))
+        for eta, weight in zip(*across):
+            slopes = self._slopes(turned, at, of, polynomials(0.0 * of + eta, self._shape[1] + 1))
+            for mean, (row, place, a, b) in zip(total, self.terms):
+                if place < len(self.places):
+                    mean += weight * STRAINS[row](slopes[a], slopes[b], *frames[place])
+        return total
+
+    def _means_here(self, free, at, e, xi, across):
+        """The means of what is evaluated at the points over their sections."""
+        if not self.here:
+            return []
+        (eta, weights), mesh = across, self.beam.mesh
+        X, (p, m) = (xi, np.reshape(eta, (-1, 1))), self._shape
+        if mesh.heights is not None:
+            both = self._slopes_of_taper(free, at, e, xi, 0.0 * xi + X[1])
+        else:  # of each section point a polynomial of xi
+            of_xi = np.einsum("dpmce,mk->dpcke", free.reshape(2, p, m, 2, -1),
+                              polynomials(np.asarray(eta), m))
+            both = [sum(c.take(at, axis=-1) * T for c, T in zip(table, polynomials(xi, p)))
+                    for table in of_xi]
+        turning = self._turning(e, *X)
+        slopes = turned(turning, *both)
+        return [weights @ STRAINS[row](*slopes, *turning[5:]) for _, row in self.at_points]
 
     def _polynomials(self, u_e, of):
         """Derivatives of displacements (nb, 2, n) of elements: at places, and by xi and eta."""
         flat = u_e.reshape(len(u_e), -1)
-        fixed = (self._fixed @ flat).reshape(*self._fixed.shape[:3], 2, len(of))
-        turned = self._turned(fixed, of)
-        free = (self._free @ flat).reshape(*self._free.shape[:2], 2, len(of)) if self.here else None
-        return turned, free
+        tapered = self.beam.mesh.heights is not None
+        fixed = self._swollen(u_e, of) if tapered and self.places else self._fixed @ flat
+        turned = self._turned(fixed.reshape(*self._fixed.shape[:3], 2, len(of)), of)
+        if tapered or not self.here:
+            return turned, u_e
+        return turned, (self._free @ flat).reshape(*self._free.shape[:2], 2, len(of))
+
+    def _swollen(self, u_e, of):
+        """Derivatives by xi and eta at places of tapered elements, (places, 2, m, 2 n)."""
+        g, rate = self.beam.mesh.mapping().relative_height(of, np.array(self.places)[:, None])
+        factor, ratio = (x.swapaxes(0, 1)[:, :, None] for x in (
+            self.beam.series.swollen(g), self.beam.series.swelling(g, rate)))
+        u = factor * u_e
+        flat = (*u.shape[:2], -1)
+        fixed = self._fixed @ u.reshape(flat)[:, None]
+        fixed[:, 0] += self._at_places([self.beam.series.value])[:, 0] @ (ratio * u).reshape(flat)
+        return fixed
 
     def _slopes(self, turned, at, e, T):
         """Derivatives at places, (2, n) each, from polynomials of elements, number ``at`` there."""
-        straight = self.beam.mesh.is_straight
-        inverse = [] if straight else [1.0 / (d[0].take(e) + T[1] * d[1].take(e))
-                                       for d in self._map[0]]
+        inverse = [] if self._linear else [1.0 / (d[0].take(e) + T[1] * d[1].take(e))
+                                           for d in self._map[0]]
         out = []
         for (place, _), table in zip(self._pairs, turned):
             value = table[0].take(at, axis=-1)
             for c, basis in zip(table[1:], T[1:]):
                 value += c.take(at, axis=-1) * basis
-            if not straight:
+            if not self._linear:
                 value *= inverse[place]
             out.append(value)
         return out
 
     def _slopes_here(self, free, at, e, X, T):
         """Derivatives at the points themselves, (2, n) each, and the tangent of the axis there."""
+        turning = self._turning(e, *X)
+        if self.beam.mesh.heights is not None:
+            both = self._slopes_of_taper(free, at, e, X[0], X[1:])[..., 0, :]
+            return turned(turning, *both), turning[5:]
         (p, m), both = self._shape, []
         basis = (chebyshev(X[0], p)[:, None] * np.array(T[:m])).reshape(p * m, -1)
         for table in free:
@@ -414,15 +433,40 @@ class ElementStrain:
             for c, of in zip(table[1:], basis[1:]):
                 value += c.take(at, axis=-1) * of
             both.append(value)
-        mesh = self.beam.mesh
-        if mesh.is_straight:
-            return [both[0] / mesh.lengths[e], both[1] / mesh.height], self._tangents(e)
-        turning = _turning(*mesh.mapping().derivatives(e, *X))
         return turned(turning, *both), turning[5:]
+
+    def _turning(self, e, xi, eta):
+        """What :func:`turned` takes, at points, and the tangent of the axis there."""
+        mesh = self.beam.mesh
+        if not self._linear:
+            return _turning(*mesh.mapping().derivatives(e, xi, eta))
+        return 1.0, 1.0 / mesh.lengths[e], 0.0, 0.0, 1.0 / mesh.height, *self._tangents(e)
+
+    @cached_property
+    def _tables(self):
+        series = self.beam.series
+        return np.concatenate([series.value, series.along, series.across])
+
+    def _slopes_of_taper(self, u_e, at, e, xi, eta):
+        """Derivatives by xi and eta of displacements (nb, 2, elements), number ``at`` there.
+
+        At places eta (k, n) across sections (n,): pairs of arrays (k, n).
+        """
+        series = self.beam.series
+        g, rate = self.beam.mesh.mapping().relative_height(e, xi)
+        factor, ratio = series.swollen(g), series.swelling(g, rate)
+        moved = [u * f for u, f in zip(u_e.take(at, axis=-1), factor[:, None])]
+        out = np.empty((2, 2, len(eta), len(xi)), u_e.dtype)
+        for k, y in enumerate(eta):
+            value, along, across = np.split(series.values(self._tables, np.array([xi, y])), 3)
+            along += ratio * value
+            for slopes, weights in zip(out, (along, across)):
+                slopes[:, k] = sum(w * u for w, u in zip(weights, moved))
+        return out
 
     def _frames(self, e):
         """The tangent of the axis at all places."""
-        if self.beam.mesh.is_straight:
+        if self._linear:
             return [self._tangents(e)] * len(self.places)
         return [self._map[5:, place, 0].take(e, axis=-1) for place in range(len(self.places))]
 
@@ -519,7 +563,7 @@ class ElementStrain:
         determinants, linear in 2 eta - 1.
         """
         mesh, scale, at = self.beam.mesh, self.beam.scales[e], np.array([e])
-        straight, (p, m) = mesh.is_straight, self._shape
+        straight, (p, m) = self._linear, self._shape
         shape = max(p if self.here else 1, self._degree), m if straight else m + 1
         table = np.zeros((len(self._pairs), len(scale), shape[1], shape[0]))
         for row, polynomial in zip(table, self._turned((self._fixed * scale)[..., None], at)):

@@ -181,8 +181,12 @@ def test_panels():
             assert_allclose(p.whole @ values, 1 / (k + 1), rtol=1e-10)
             assert_allclose(p.from_axis @ values, (p.eta**(k + 1) - 0.5**(k + 1)) / (k + 1),
                             atol=1e-10)
-            assert_allclose(p.values(np.array([0.0, 0.3, 0.1, 1.0])) @ values,
-                            np.array([0.0, 0.3, 0.1, 1.0])**k, atol=1e-9)
+            eta = np.array([0.0, 0.3, 0.1, 1.0])
+            many = np.empty(4)
+            for at, columns, weights in p.by_panel(eta):
+                many[at] = weights @ values[columns]
+            assert_allclose(many, eta**k, atol=1e-9)
+            assert_allclose([p.values(x) @ values for x in eta.tolist()], many, atol=1e-14)
             assert p.axis @ values == pytest.approx(0.5**k)
     whole = Panels(section.slabs(line(), material), 2)
     assert np.sum(whole.whole * whole.width) == pytest.approx(1.0, rel=1e-12)

@@ -14,7 +14,7 @@ FOLDERS = ["dynamics", "elements", "forces", "formulations", "io", "joints", "ma
            "obstacles", "sections", "statics"]
 #: Returned by public methods, and machinery all the same.
 MACHINERY = {"BandMatrix", "Finder", "Inertia", "Points", "Recovery", "Screen", "System", "Spread",
-             "ElementStrain", "TaperedStrain", "Law", "Amplitude", "BodyFields", "Link", "Part",
+             "ElementStrain", "Law", "Amplitude", "BodyFields", "Link", "Part",
              "Held", "Sampling", "Rule", "Series", "Point", "Critical", "Vector"}
 
 

@@ -11,6 +11,7 @@ from test_points import STEEL, inside
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
                         NeoHookean, Scene, Section, StVenantKirchhoff, finder)
 from skfem_ancf.elements import ELEMENTS
+from skfem_ancf.raw import Patch
 
 METHODS = ("displacement", "position", "velocity", "strain", "stress")
 MESHES = {"straight": lambda: MeshBeam.init_line([-1.0, -0.4, 0.3, 1.2], 0.1, angle=0.7),
@@ -120,8 +121,8 @@ def test_a_changed_state_is_another():
     none = state.replace(u=0.0 * state.u)
     assert_allclose(none.strain(x, recover=False), 0.0, atol=1e-15)
     assert_allclose(none.stress(x, recover=False), 0.0, atol=1e-9)
-    assert_array_equal(state.strain(x, recover=False), found[0])
-    assert_array_equal(state.stress(x, recover=False), found[1])
+    assert_allclose(state.strain(x, recover=False), found[0], atol=1e-13 * np.abs(found[0]).max())
+    assert_allclose(state.stress(x, recover=False), found[1], atol=1e-13 * np.abs(found[1]).max())
 
 
 @settings(**SETTINGS)
@@ -178,3 +179,52 @@ def test_single_points_outside(mesh):
     outside = find(x)[2] > 1e-6
     assert 100 < np.sum(outside) < 400
     assert not any(find.one(*p) for p in x[:, outside].T.tolist())
+
+
+@pytest.mark.parametrize("mesh", [quarter_arc(8, height=0.1), s_curve(0.1)], ids=["arc", "s"])
+def test_many_points_begin_in_squares_as_few_in_a_tree(mesh):
+    x = inside(mesh, 300)[2]
+    x = np.hstack([x, np.random.default_rng(5).uniform(-3.0, 3.0, (2, 3000))])
+    many = finder.Finder(mesh)
+    by_squares = many(x)
+    assert many._of_squares is not None
+    few = finder.Finder(mesh)
+    one_by_one = [few(p[:, None]) for p in x.T]
+    assert few._of_squares is None
+    for found, alone in zip(by_squares, zip(*one_by_one)):
+        alone = np.concatenate(alone, axis=-1)
+        inner = by_squares[2] == 0
+        assert_allclose(found[..., inner], alone[..., inner], atol=1e-12)
+    assert_array_equal(by_squares[2] > many.allowed,
+                       np.concatenate([alone[2] for alone in one_by_one]) > many.allowed)
+
+
+@pytest.mark.parametrize("kind", ["taper of arc", "taper", "kink", "step", "unloaded"])
+def test_fields_of_the_elements_at_points_asked_for_again(kind):
+    """Polynomials of them from the second point on, where there are some: 1e-13 of many points."""
+    mesh, element = MeshBeam.init_line(np.linspace(0.0, 1.2, 5), 0.1), ElementBeamANCF(3)
+    material, at = STEEL, (0.6, 0.0) if kind == "unloaded" else None
+    if kind.startswith("taper"):
+        mesh = TAPERS[kind == "taper"]()
+    elif kind != "unloaded":
+        material = StVenantKirchhoff(nu=0.3, E=(lambda x, y: 1e6 * (1.0 + np.abs(x - 0.5)))
+                                     if kind == "kink" else lambda x, y: 1e6 * (1.0 + (y > 0.01)))
+    scene = Scene(Beam(mesh, element, material, 0.1)).clamp("left")
+    state = scene.point_force((0.1, -0.4), at=mesh.p[:, -1] if at is None else at).solve_static()
+    agree(state, inside(mesh, 60)[2], names=("strain", "stress"))
+    made = [isinstance(patch, Patch) for patch in state._raw[1]._patches.values()]
+    assert sum(made) == {"taper of arc": 2, "taper": 2, "kink": 3, "step": 0, "unloaded": 4}[kind]
+
+
+@pytest.mark.parametrize("straight", [True, False])
+@pytest.mark.parametrize("element", [ElementBeamANCF(3), ElementBeamANCFCubic(2)], ids=repr)
+def test_strain_of_a_tapered_beam_is_that_of_its_displacement_gradient(element, straight):
+    beam = Beam(TAPERS[straight](), element, STEEL, 0.1, "continuum")
+    u = 0.05 * np.random.default_rng(2).standard_normal(beam.N)
+    e, X, _ = inside(beam.mesh)
+    H, frame = beam.gradients(u, X[:, :, None], e)
+    F = (H + frame)[..., 0]
+    C = np.einsum("iJn,iKn->JKn", F, F)
+    assert_allclose(beam.strain_of(beam.terms[0])(u, e, X),
+                    [0.5 * (C[0, 0] - 1.0), 0.5 * (C[1, 1] - 1.0), C[0, 1]],
+                    atol=1e-12 * np.abs(C).max())

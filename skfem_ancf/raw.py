@@ -1,0 +1,157 @@
+"""The fields of the elements at single points: polynomials, where an element is asked for again.
+
+The first point of an element in a state is evaluated by itself. At the second the fields of some
+elements are evaluated at the zeros of Chebyshev polynomials, by what serves many points: for the
+price of a few points they are known at all others. Where they are no polynomials, as on curves, the
+series is as long as round-off wants it; where it does not end, as of a modulus with a kink, points
+are evaluated by themselves.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from .parts import Part
+from .series import places, polynomials, transform
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .point import Point
+    from .types import Array
+
+#: Elements whose polynomials are made together, and those of which they are kept.
+BLOCK, ELEMENTS = 16, 4096
+
+#: Polynomials along the elements and across a slab at first, and at most.
+FIRST, MOST = (6, 4), 24
+
+#: The last two coefficients of a series that is long enough, relative to the largest of the block;
+#: those of one that no longer falls, as they are round-off; and those that are left out.
+ENDED, NOISE, NOTHING = 1e-14, 1e-12, 2e-16
+
+
+#: What is said of an element that was not asked for.
+UNKNOWN = object()
+
+
+class Patch(NamedTuple):
+    """A field of three components in one element.
+
+    Attributes
+    ----------
+    tops
+        The upper ends of the slabs but the last, places across.
+    slabs
+        Of each its lower end, its height and coefficients (3 along, across).
+    along, across
+        How many polynomials.
+    """
+
+    tops: list[float]
+    slabs: list[tuple[float, float, Array]]
+    along: int
+    across: int
+
+    def __call__(self, xi: float, eta: float) -> list[float]:
+        """The components at a reference point."""
+        tops, slabs, along, across = self
+        low, size, table = slabs[bisect_right(tops, eta) if tops else 0]
+        found = table.dot(np.array(polynomials((eta - low) / size, across)))
+        return found.reshape(3, along).dot(np.array(polynomials(xi, along))).tolist()
+
+
+class RawField:
+    """One field of the elements at single points of one state."""
+
+    def __init__(self) -> None:
+        #: By beam and element: None of one that was asked for once, False of one without a series.
+        self._patches: dict[tuple[int, int], Any] = {}
+
+    def __call__(self, point: Point, name: str, alone: Callable[[Point], Any],
+                 many: Callable[[Part], Array]) -> Any:
+        """The components (3,) at a point.
+
+        Parameters
+        ----------
+        point
+            The :class:`~skfem_ancf.point.Point`.
+        name
+            Of the field.
+        alone, many
+            Return the field at one point, three numbers, and at a
+            :class:`~skfem_ancf.parts.Part`, (3, n).
+        """
+        key = point.number, point.place[0]
+        patch = self._patches.get(key, UNKNOWN)
+        if patch is UNKNOWN:
+            self._patches[key] = False if _alone_is_quick(point.beam, name) else None
+            if len(self._patches) > ELEMENTS:
+                del self._patches[next(iter(self._patches))]
+        elif patch is None:
+            self._patches.update(patches(point, name, many))
+            patch = self._patches[key]
+        return patch(*point.place[1:]) if isinstance(patch, Patch) else alone(point)
+
+
+def _alone_is_quick(beam, name):
+    """True for the cables that :class:`~skfem_ancf.near.NearCable` knows."""
+    return not beam.has_sections and beam.mesh.heights is None and (
+        name == "strain" or beam.across.plain)
+
+
+def patches(point: Point, name: str, many: Callable[[Part], Array]
+            ) -> dict[tuple[int, int], Patch | bool]:
+    """The Patch of each element of the block around a point, or False.
+
+    Parameters
+    ----------
+    point, name, many
+        As for :class:`RawField`; ``many`` returns arrays (3, n).
+    """
+    beam, first = point.beam, point.place[0] // BLOCK * BLOCK
+    of = np.arange(first, min(first + BLOCK, beam.mesh.nelements))
+    shape = beam.touched.get(("raw", name), FIRST)
+    while True:
+        part = Part(beam, point.number, point.coordinates, None, *_grid(beam, of, shape))
+        with np.errstate(all="ignore"):
+            c = _series(many(part), len(of), shape)
+        size = np.max(np.abs(c))
+        ended = [_ended(np.max(np.abs(c), axis=axes), size) for axes in ((0, 2, 4), (0, 2, 3))]
+        if np.all(ended) or not np.isfinite(size) or all(
+                n >= MOST or np.all(end) for n, end in zip(shape, ended)):
+            break
+        shape = tuple(n if np.all(end) else min(n + n // 2, MOST) for n, end in zip(shape, ended))
+    good, used = ended[0] & ended[1], np.abs(c) > NOTHING * size
+    n, m = (1 + int(np.max(np.nonzero(np.any(used, axis=axes))[0], initial=1))
+            for axes in ((0, 1, 2, 4), (0, 1, 2, 3)))
+    beam.touched["raw", name] = min(n + 2, MOST), min(m + 2, MOST)
+    slabs = [slab.measure for slab in beam.across.slabs]
+    tops = [slab.high for slab in slabs[:-1]]
+    return {(point.number, e): good[k] and Patch(tops, [
+        (slab.low, slab.high - slab.low, np.ascontiguousarray(c[:, k, j, :n, :m]).reshape(-1, m))
+        for j, slab in enumerate(slabs)], n, m) for k, e in enumerate(of.tolist())}
+
+
+def _ended(c, size):
+    """True for the elements whose coefficients (elements, n) have fallen to round-off."""
+    before, last = np.max(c[:, -4:-2], axis=1), np.max(c[:, -2:], axis=1)
+    return (last <= ENDED * size) | ((last <= NOISE * size) & (last >= 0.1 * before))
+
+
+def _grid(beam, of, shape):
+    """Elements (n,) and reference points (2, n) at which series are found."""
+    x, z = (places(n) for n in shape)
+    eta = [slab.measure.low + (slab.measure.high - slab.measure.low) * z
+           for slab in beam.across.slabs]
+    X = np.array(np.broadcast_arrays(x[:, None], np.array(eta)[:, None])).reshape(2, -1)
+    return np.repeat(of, X.shape[1]), np.tile(X, len(of))
+
+
+def _series(values, n, shape):
+    """Coefficients (3, n, slabs, along, across) of values at the grid of n elements."""
+    values = values.reshape(3, n, -1, *shape)
+    return transform(shape[0]) @ values @ transform(shape[1]).T
