@@ -194,9 +194,12 @@ class Constraints:
 
     def _entries(self, u, t):
         """Rows, columns and values of :meth:`full_jacobian`."""
+        return self._in_order(joint.entries(u, t) for joint in self.joints)
+
+    def _in_order(self, entries):
+        """Those of the joints, one after the other, with rows of all equations."""
         first, parts = 0, [(*[np.zeros(0, dtype=int)] * 2, np.zeros(0))]
-        for joint in self.joints:
-            rows, columns, values = joint.entries(u, t)
+        for joint, (rows, columns, values) in zip(self.joints, entries):
             parts.append((first + rows, columns, values))
             first += len(joint.equations)
         return tuple(np.concatenate(column) for column in zip(*parts))
@@ -263,20 +266,36 @@ class Constraints:
         parts = [(none, none, np.zeros(0))] + [part for part in parts if part is not None]
         return tuple(np.concatenate(column) for column in zip(*parts))
 
-    def curvature_times(self, u: Array, t: float, multipliers: Array, v: Array) -> Array:
-        """:meth:`curvature` times a vector (N,).
+    def mean_jacobian(self, u0: Array, u1: Array, t: float) -> Array:
+        """Discrete gradients of :meth:`constraint` in a step, shape (m, N).
 
         Parameters
         ----------
-        u, t
-            Displacement of the coordinates, shape (N,), and time.
+        u0, u1, t
+            Displacements at its ends, shape (N,), and the time in its middle.
+        """
+        J = np.zeros((self.m, self.N))
+        rows, columns, values = self._in_order(joint.mean_entries(u0, u1, t)
+                                               for joint in self.joints)
+        np.add.at(J, (rows, columns), values)
+        return J
+
+    def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
+                     multipliers: Array) -> Array:
+        """What joints turn by in a step, see :meth:`~skfem_ancf.joints.Joint.mean_turning`.
+
+        Parameters
+        ----------
+        u0, u1, v0, v1
+            Displacements and velocities at its ends, shape (N,).
+        t
+            Time in the middle of it.
         multipliers
             Of the equations, shape (m,).
-        v
-            Vector, shape (N,).
         """
-        i, j, values = self._curvature(u, t, multipliers)
-        return np.bincount(i, values * v[j], self.N)
+        parts = zip(self.joints, self.multipliers_of(multipliers))
+        return sum((joint.mean_turning(u0, u1, v0, v1, t, part) for joint, part in parts),
+                   np.zeros(self.N))
 
     @cached_property
     def _limited(self) -> list[Joint]:

@@ -45,10 +45,7 @@ def own_load_stiffness(handle, t, scale, u, flat):
 
 @primitive("own")
 def own_joints(handle, what, t, u, v, out):
-    """Joints that are no tables: 0 Phi, 1 J v, 2 J^T v, 3 J, 4 the second derivative by v, v.
-
-    With multipliers and a vector in v, one behind the other, 5 is the second derivative by both.
-    """
+    """Joints that are no tables, see :meth:`skfem_ancf.system.System.add_own_joints`."""
     owner(handle).add_own_joints(what, t, u, v, out)
 
 

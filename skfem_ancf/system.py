@@ -177,7 +177,8 @@ class System:
     curvature = _of_constraints("curvature")
     lost = _of_constraints("lost")
     first_lost = _of_constraints("first_lost")
-    curvature_times = _of_constraints("curvature_times")
+    mean_jacobian = _of_constraints("mean_jacobian")
+    mean_turning = _of_constraints("mean_turning")
     multipliers_of = _of_constraints("multipliers_of")
     joint_force = _of_constraints("joint_force")
     springs = _of_constraints("springs")
@@ -518,7 +519,9 @@ class System:
         ----------
         what
             0: Phi. 1: J v. 2: J^T v, v of shape (m,). 3: J. 4: the second derivative of Phi in the
-            direction v. 5: (sum_k l_k H_k) w, v of l and w, shape (m + N,).
+            direction v. In a step that conserves energy, 5: J of u and v at its ends; 6: the force
+            of impulses, of u at its end and v of the velocities at its ends, u at its begin and
+            the impulses, shape (3 N + m,).
         t, u, v
             Time, displacement (N,) and a vector, (N,) where no other shape is said.
         out
@@ -534,8 +537,11 @@ class System:
             out += dense(self.full_jacobian(u, t)).ravel()
         elif what == 4:
             out += self.quadratic(u, t, v)
+        elif what == 5:
+            out += self.mean_jacobian(v, u, t).ravel()
         else:
-            out += self.curvature_times(u, t, v[:self.m], v[self.m:])
+            v0, v1, u0 = v[:3 * self.N].reshape(3, self.N)
+            out += self.mean_turning(u0, u, v0, v1, t, v[3 * self.N:])
 
     def solve_own(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
                   dm: Array) -> bool:

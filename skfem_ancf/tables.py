@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .band import clear, copy, mirror
+from .band import clear, mirror
 from .kernels.moments import (MomentPack, add_mean_moments, add_moment_stiffness,
                               add_moments)
 from .own import own_force, own_joints, own_load_stiffness, own_mean_force
@@ -133,14 +133,8 @@ def add_joint_force(joints, g, t, u, multipliers, out):
 
 
 @source
-def add_curvature_force(joints, t, u, multipliers, v, out):
-    """out += (sum over k of multipliers[k] H_k) v."""
-    if joints.own > 0:
-        both = np.empty(multipliers.size + v.size)
-        copy(multipliers, both[:multipliers.size])
-        copy(v, both[multipliers.size:])
-        own_joints(joints.own, np.int64(5), t, u, both, out)
-        return
+def add_curvature_force(joints, multipliers, v, out):
+    """out += (sum over k of multipliers[k] H_k) v, of joints that are tables."""
     add_triples(out, joints.hi, joints.hv, multipliers, joints.hk, v, joints.hj)
 
 

@@ -30,7 +30,9 @@ class EnergyMomentum(Scheme):
     stresses for St. Venant-Kirchhoff, the discrete gradient for other laws. The joints Phi are
     quadratic too, and their velocities J v bilinear in (u, v): the midpoint rule for the
     Hamiltonian to which both are joined by multipliers lambda and gamma conserves the energy
-    while it meets both at the end of every step. gamma is of the size of dt^2.
+    while it meets both at the end of every step. gamma is of the size of dt^2. Of a sleeve, which
+    is not quadratic, J is a discrete gradient, and what has gamma as a factor has the work that is
+    missing (:meth:`~skfem_ancf.joints.Joint.mean_entries`, ``mean_turning``).
 
     References
     ----------

@@ -9,7 +9,8 @@ A step of size h leads from 0 to 1, with eq. (7)-(9) of Arnold and Bruls (2007):
 
 The energy-momentum scheme solves the same with ``beta = 1/2``, ``gamma = 1`` and no alpha: then
 ``w_1`` is the acceleration in the middle of the step, where f and Q are means between 0 and 1, d
-is ``d((u_0 + u_1) / 2, (u_1 - u_0) / h)``, whose work is not negative, and J is that of the middle.
+is ``d((u_0 + u_1) / 2, (u_1 - u_0) / h)``, whose work is not negative, and J is that of the middle,
+or what else has ``J (u_1 - u_0) = Phi(u_1) - Phi(u_0)`` where Phi is not quadratic.
 """
 
 from typing import NamedTuple
@@ -23,7 +24,7 @@ from ..body import (add_force_of, body_carry, body_force, body_mean, body_mixed,
 from ..forces.contact_texts import PRESSURES
 from ..forces.texts import (add_contact_tangent, add_elastic_force, add_rubbing_tangent,
                             augment_contact, element_stiffness, pace_contact, settle_contact)
-from ..own import own_solve
+from ..own import own_joints, own_solve
 from ..source import F1, F2, F3, borrowed, by_place, lanes, source
 from ..tables import (add_constraint_rate, add_curvature_force, add_joint_force,
                       add_load_stiffness, add_products, constraint, joint_directions,
@@ -753,7 +754,12 @@ def _directions(joints, rule, s, w):
     _middle(rule, w)
     if rule.solver > 0:
         return
-    joint_directions(joints, s.joints.g[1], s.acting, w.x.middle, w.J[0])
+    if joints.own > 0 and rule.conserving > 0:
+        flat = w.J[0].reshape(w.J[0].size)
+        clear(flat)
+        own_joints(joints.own, np.int64(5), s.acting, w.x.u, w.y[0], flat)
+    else:
+        joint_directions(joints, s.joints.g[1], s.acting, w.x.middle, w.J[0])
     joint_directions(joints, s.joints.g[0], s.t, w.x.u, w.J[1])
 
 
@@ -781,11 +787,20 @@ def _residual(loads, joints, free, M, rule, s, w):
 def _add_impulses(joints, s, w):
     """R -= (impulse . Phi'') (v_0 + v_1) / 4: eq. of Gear, Leimkuhler and Gupta (1985)."""
     v0, v, room, share, impulse = w.y[1], w.x.v, w.x.room, w.m.phi, w.m.impulse
+    if joints.own > 0:
+        n = v.size
+        ends = np.empty(3 * n + impulse.size)
+        copy(v0, ends[:n])
+        copy(v, ends[n:2 * n])
+        copy(w.y[0], ends[2 * n:3 * n])
+        copy(impulse, ends[3 * n:])
+        own_joints(joints.own, np.int64(6), s.acting, w.x.u, ends, w.x.residual)
+        return
     for i in lanes(v.size):
         room[i] = v0[i] + v[i]
     for k in lanes(share.size):
         share[k] = -0.25 * impulse[k]
-    add_curvature_force(joints, s.acting, w.x.middle, share, room, w.x.residual)
+    add_curvature_force(joints, share, room, w.x.residual)
 
 
 @source

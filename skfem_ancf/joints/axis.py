@@ -81,6 +81,37 @@ class Axis:
         xi = (s - e - 0.5) ** np.arange(self._powers.shape[2])
         return self.first + self._local(e), (self._powers @ xi) * self._scales[e]
 
+    def between(self, s0: float, s1: float) -> tuple[Array, Array, Array]:
+        """Weights at two parameters, and quotients of their differences.
+
+        Parameters
+        ----------
+        s0, s1
+            The parameters.
+
+        Returns
+        -------
+        dofs, weights, quotients
+            Shapes (2, 2 nb), (2, 2, 2 nb) and (2, 2 nb): at each parameter those of the position
+            and its derivative by the length of the stress-free axis, and their differences over
+            the length between; the derivatives where that is none.
+        """
+        (one, a), (two, b) = self.weights(s0), self.weights(s1)
+        e, f = self.element(s0), self.element(s1)
+        nb = one.shape[1]
+        weights = np.zeros((2, 2, 2 * nb))
+        weights[0, :, :nb] = a[:2] / self.beam.mesh.lengths[e] ** np.arange(2)[:, None]
+        weights[1, :, nb:] = b[:2] / self.beam.mesh.lengths[f] ** np.arange(2)[:, None]
+        dofs = np.hstack([one, two])
+        if e != f:
+            return dofs, weights, (weights[1] - weights[0]) / (self.length(s1) - self.length(s0))
+        x, y, n = s0 - e - 0.5, s1 - e - 0.5, self._powers.shape[2]
+        powers = [sum(x**j * y**(k - 1 - j) for j in range(k)) for k in range(n)]
+        quotients = np.zeros((2, 2 * nb))
+        quotients[:, :nb] = ((self._powers[:2] @ powers) * self._scales[e]
+                             / self.beam.mesh.lengths[e] ** np.arange(1, 3)[:, None])
+        return dofs, weights, quotients
+
     def at(self, u: Array, s: float) -> Array:
         """The position and its first three derivatives by s, shape (4, 2).
 
@@ -92,7 +123,7 @@ class Axis:
             The parameter.
         """
         dofs, weights = self.weights(s)
-        return weights @ (self._start[dofs - self.first] + u[dofs]).T
+        return weights @ self.places(u, dofs).T
 
     def nearest(self, u: Array, p: Array) -> float:
         """The parameter of the point of the axis that is nearest to a point.
@@ -119,6 +150,16 @@ class Axis:
             if done:
                 break
         return s
+
+    def places(self, u: Array, dofs: Array) -> Array:
+        """Coordinates of the axis, of the body with a displacement.
+
+        Parameters
+        ----------
+        u, dofs
+            Displacement of the scene's coordinates, shape (N,), and numbers of some of them.
+        """
+        return self._start[dofs - self.first] + u[dofs]
 
     def length(self, s: float) -> float:
         """Length of the stress-free axis from its start to a parameter."""

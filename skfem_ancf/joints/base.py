@@ -131,8 +131,9 @@ class Joint(Sealable):
     equations : tuple of str
         What each equation holds.
     constant : bool
-        The derivative of Phi depends neither on u nor on t. Where it does, Phi is at most
-        quadratic in u: what :class:`~skfem_ancf.dynamics.EnergyMomentum` needs to be exact.
+        The derivative of Phi depends neither on u nor on t. Where it does,
+        :class:`~skfem_ancf.dynamics.EnergyMomentum` is exact if Phi is at most quadratic in u, or
+        if :meth:`mean_entries` and :meth:`mean_turning` are exact.
     moving : bool
         Phi depends on t.
     """
@@ -264,6 +265,54 @@ class Joint(Sealable):
             if second is not None:
                 out[k] = second[2] @ (v[second[0]] * v[second[1]])
         return out
+
+    def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:
+        """As :meth:`entries`, of a discrete gradient: ``D (u1 - u0) = Phi(u1) - Phi(u0)``.
+
+        That in the middle, which is one where Phi is quadratic.
+
+        Parameters
+        ----------
+        u0, u1
+            Displacements at the ends of a step, shape (N,).
+        t
+            Time in the middle of it.
+
+        Returns
+        -------
+        rows, columns, values
+            Shapes (k,).
+        """
+        return self.entries(0.5 * (u0 + u1), t)
+
+    def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
+                     multipliers: Array) -> Array:
+        """X with ``X . (u1 - u0) = multipliers . D (v1 - v0) / 2``, D of :meth:`mean_entries`.
+
+        By default ``-(multipliers . Phi'') (v0 + v1) / 4`` in the middle, which is one where Phi
+        is quadratic.
+
+        Parameters
+        ----------
+        u0, u1
+            Displacements at the ends of a step, shape (N,).
+        v0, v1
+            Velocities there that the joint allows, shape (N,).
+        t
+            Time in the middle of it.
+        multipliers
+            Shape (m,).
+
+        Returns
+        -------
+        ndarray
+            Shape (N,).
+        """
+        second, v = self.curvature(0.5 * (u0 + u1), t, multipliers), v0 + v1
+        if second is None:
+            return 0.0 * v
+        rows, columns, values = second
+        return -0.25 * np.bincount(rows, values * v[columns], len(v))
 
     def lost(self, u: Array) -> str:
         """Why the joint cannot hold in a converged state, in words; "" if it can.

@@ -12,6 +12,7 @@ from ..mapping import cross
 from .axis import Axis
 from .base import (GROUND, Joint, Vector, cross_terms, gradients, named_place, point, rotation,
                    section)
+from .spans import Family, Product, Span
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,6 +24,11 @@ if TYPE_CHECKING:
 
 #: How far beyond an end of a beam a sleeve may be, in elements.
 BEYOND = 1e-6
+
+
+def _dot(a: Array, b: Array) -> Array:
+    """a . b of vectors (2, ...)."""
+    return a[0] * b[0] + a[1] * b[1]
 
 
 def _pairs(A: Array, B: Array) -> Array:
@@ -70,8 +76,8 @@ class Sleeve(Joint):
     """
 
     constant = False
-    #: of the last displacement: the parameter, and derivatives
-    _known: dict[str, Any]
+    #: of the last two displacements: the parameter, and derivatives
+    _known: list[dict[str, Any]]
 
     def __init__(self, at: Any, on: WhichBeam, angle: bool = False,
                  name: str | None = None) -> None:
@@ -86,7 +92,7 @@ class Sleeve(Joint):
             raise InputError(f"{self!r}: a point of {beam!r} cannot slide along the beam itself")
         self.axis = Axis(beam, scene.offset(beam))
         zero = np.zeros(scene.N)
-        self._known = {}
+        self._known = []
         if self.angle:
             self.p, self.d = section(scene, which, at)
         else:
@@ -132,11 +138,18 @@ class Sleeve(Joint):
         return (f"{self!r} has left the beam {beam.name or ''!r} at its {end} end: "
                 "stop before, with until=, hold it by a spring or a support, or lengthen the beam")
 
+    def _at(self, u: Array) -> dict[str, Any]:
+        """What is known of a displacement, which comes to the front."""
+        for k, known in enumerate(self._known):
+            if np.array_equal(known["u"], u):
+                self._known.insert(0, self._known.pop(k))
+                return known
+        self._known[1:] = self._known[:1]
+        self._known[:1] = [{"u": u.copy(), "s": self.axis.nearest(u, self.p(u))}]
+        return self._known[0]
+
     def _parameter(self, u: Array) -> float:
-        known = self._known
-        if not known or not np.array_equal(known["u"], u):
-            known = self._known = {"u": u.copy(), "s": self.axis.nearest(u, self.p(u))}
-        return float(known["s"])
+        return float(self._at(u)["s"])
 
     def _terms(self, u: Array) -> tuple[Any, ...]:
         """Coordinates, position and derivatives of the axis, and what depends on coordinates."""
@@ -172,10 +185,10 @@ class Sleeve(Joint):
 
     def _slopes(self, u: Array) -> tuple[Any, ...]:
         """The derivatives of the equations and of s, and what they are made of."""
-        self._parameter(u)
-        if "slopes" not in self._known:
-            self._known["slopes"] = self._differentiate(u)
-        return self._known["slopes"]
+        known = self._at(u)
+        if "slopes" not in known:
+            known["slopes"] = self._differentiate(u)
+        return known["slopes"]
 
     def _differentiate(self, u: Array) -> tuple[Any, ...]:
         columns, c, e, E, C, D = self._terms(u)
@@ -213,6 +226,64 @@ class Sleeve(Joint):
                 + cross(d, Q @ c[3]) * np.outer(s_y, s_y) + first[1][0] * s_yy)
         n = len(columns)
         return np.repeat(columns, n), np.tile(columns, n), H.ravel()
+
+    # between two displacements
+
+    def _span(self, u0: Array, u1: Array) -> Span:
+        """The :class:`~skfem_ancf.joints.spans.Span` from one displacement to another."""
+        known = self._at(u1)
+        if "span" not in known or not np.array_equal(known["span"][0], u0):
+            known["span"] = u0.copy(), self._new_span((u0, u1))
+        return known["span"][1]
+
+    def _new_span(self, ends: tuple[Array, Array]) -> Span:
+        s = [self._parameter(u) for u in ends]
+        dofs, weights, quotients = self.axis.between(*s)
+        columns = np.concatenate([self.p.dofs.ravel(), self.d.dofs.ravel(), dofs.ravel()])
+        n, first = len(columns), 0
+        parts = []
+        for width in (self.p.dofs.shape[1], self.d.dofs.shape[1], dofs.shape[1]):
+            parts.append(first + np.arange(2 * width).reshape(2, width))
+            first += 2 * width
+
+        def rows(part: Array, of: Array) -> Array:
+            out = np.zeros((*of.shape[:-2], 2, n))
+            for k in range(2):
+                out[..., k, part[k]] = of[..., k % of.shape[-2], :]
+            return out
+
+        def held(part: Array, vector: Vector) -> Family:
+            at = np.array([vector(u) for u in ends])
+            matrix = rows(part, vector.weights)
+            return Family(np.array([matrix, matrix]), np.array([at, at]), 0.0 * matrix, 0.0 * at)
+
+        def along(order: int) -> Family:
+            places, w, q = [self.axis.places(u, dofs).T for u in ends], weights, quotients[order]
+            return Family(rows(parts[2], w[:, order, None]),
+                          np.array([[w[k, order] @ x for x in places] for k in range(2)]),
+                          rows(parts[2], q[None]), np.array([q @ x for x in places]))
+
+        c = along(1)
+        gap = held(parts[0], self.p).minus(along(0))
+        equations = [Product(cross, c, gap)]
+        if self.angle:
+            equations.append(Product(cross, held(parts[1], self.d), c.turned(self.Q)))
+        shares = [[by_s / slopes[6] for by_s, _ in slopes[8]]
+                  for slopes in (self._slopes(u) for u in ends)]
+        return Span(columns, (ends[1] - ends[0])[columns], s[1] - s[0], Product(_dot, c, gap),
+                    equations, np.array(shares).T)
+
+    def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:
+        span = self._span(u0, u1)
+        values, k = span.rows(), len(self.equations)
+        return (np.repeat(np.arange(k), len(span.columns)), np.tile(span.columns, k),
+                values.ravel())
+
+    def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
+                     multipliers: Array) -> Array:
+        span = self._span(u0, u1)
+        at = span.columns
+        return np.bincount(at, span.force(multipliers, v0[at], v1[at]), len(u0))
 
 
 @teaching
