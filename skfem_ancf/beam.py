@@ -363,7 +363,8 @@ class Beam(Frozen):
     @cached_property
     def origin(self) -> Array:
         """A point near the beam, from which positions are measured inside the package."""
-        return read_only(self.mesh.p.mean(axis=1))
+        p = self.mesh.p
+        return read_only(p.sum(axis=1) / p.shape[1])
 
     @cached_property
     def q0_local(self) -> Array:
@@ -383,7 +384,8 @@ class Beam(Frozen):
 
     def nodes(self, boundary: Place) -> Array:
         """Nodes at a place, see :meth:`dofs`."""
-        facets = np.unique(facets_of(self.mesh, boundary))
+        facets = facets_of(self.mesh, boundary)
+        facets = np.unique(facets) if len(facets) > 1 else np.asarray(facets)
         if facets[-1] < self.mesh.p.shape[1]:  # sections have the numbers of their nodes
             return facets
         return np.unique(self.mesh.facets[:, facets])
@@ -519,13 +521,24 @@ class Beam(Frozen):
         """Length of its axis."""
         return float(self.mesh.lengths.sum())
 
-    def rigid_motions(self) -> Array:
-        """Two translations and the rotation about :attr:`origin`: shape (N, 3)."""
-        q = self.q0_local.reshape(-1, self.nd // 2, 2)
-        out = np.zeros(q.shape + (3,))
-        out[:, 0, 0, 0] = out[:, 0, 1, 1] = 1.0
-        out[..., 0, 2], out[..., 1, 2] = -q[..., 1], q[..., 0]
-        return out.reshape(self.N, 3)
+    def rigid_motions(self, rows: Array | None = None) -> Array:
+        """Two translations and the rotation about :attr:`origin`.
+
+        Parameters
+        ----------
+        rows
+            Numbers of coordinates, shape (n,); None for all.
+
+        Returns
+        -------
+        ndarray
+            Shape (n, 3), or (N, 3).
+        """
+        rows = np.arange(self.N) if rows is None else rows
+        out, of_node, component = np.zeros((len(rows), 3)), rows % self.nd, rows % 2
+        out[:, 0], out[:, 1] = of_node == 0, of_node == 1
+        out[:, 2] = self.q0_local[rows + 1 - 2 * component] * (2.0 * component - 1.0)
+        return out
 
     # fields
 
@@ -710,7 +723,13 @@ class Beam(Frozen):
     def weight(self, g: ArrayLike) -> Array:
         """The dead load of an acceleration ``g`` (2,), shape (N,)."""
         g = require_finite("g", g, (2,))
-        load = self.inertia.weights(g)
+        across, mesh = self.across, self.mesh
+        if across.uniform and across.plain and not callable(across.slabs[0].density):
+            h, L = mesh.height, float(mesh.lengths[0])
+            mass = self.density * across.slabs[0].width * h * L
+            load = (mass * self.element.integrals(h, L))[None, :, None] * g
+        else:
+            load = self.inertia.weights(g)
         return self.kernel.scatter(np.ascontiguousarray(np.broadcast_to(
             load, (self.mesh.nelements,) + load.shape[1:])))
 

@@ -68,7 +68,7 @@ def body_of(beams: Sequence["Beam"], slices: Sequence[slice]) -> "Body":
     for beam, s in zip(beams, slices):
         for pack in beam.kernel.packs:
             shape = beam.kernel.texts.components, len(pack.weights), len(pack.start)
-            size = int(np.prod(shape))
+            size = shape[0] * shape[1] * shape[2]
             packs.append(pack)
             rows.append([PACKS.index(type(pack)), s.start, s.stop, at, at + size, *shape])
             at += size
@@ -97,7 +97,7 @@ def viscous_body_of(body: "Body", beams: Sequence["Beam"], times: Sequence[float
 
 def stress_size(body: "Body") -> int:
     """How many numbers the stresses of all integration points are."""
-    return int(np.max(body.table[:, END], initial=0))
+    return int(body.table[:, END].max(initial=0))
 
 
 @source

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -92,12 +93,12 @@ class Screen:
         self._none = not beams
         if self._none:
             return
-        first = np.concatenate([[0], np.cumsum([b.N for b in beams])])
-        node = np.concatenate([[0], np.cumsum([b.N // b.nd for b in beams])])
-        self._x = np.concatenate([n + np.arange(2, b.N, b.nd) for n, b in zip(first, beams)])
+        first = accumulate((b.N for b in beams), initial=0)
+        node = accumulate((b.N // b.nd for b in beams), initial=0)
+        self._x = np.concatenate([np.arange(n + 2, n + b.N, b.nd) for n, b in zip(first, beams)])
         self._y = self._x + 1
-        self.start = np.concatenate([tangents(b, 0.0) for b in beams])
-        self._left, self._right = np.hstack([n + b.mesh.t for n, b in zip(node, beams)])
+        self.start = np.concatenate([b.mesh.p_X[0] + 1j * b.mesh.p_X[1] for b in beams])
+        self._left, self._right = np.concatenate([n + b.mesh.t for n, b in zip(node, beams)], 1)
         self.slender = np.concatenate([b.mesh.height / b.mesh.lengths for b in beams])
         self._limit = np.concatenate([np.full(b.mesh.nelements, turning_limit(b)) for b in beams])
 

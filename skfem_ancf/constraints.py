@@ -79,8 +79,8 @@ class Constraints:
                 self.joints.append(joint)
                 continue
             dofs, factors = found
-            clash = np.sort(dofs[~self.free[dofs]])
-            if len(clash):
+            if not self.free[dofs].all():
+                clash = np.sort(dofs[~self.free[dofs]])
                 raise SupportError(
                     f"{joint!r} prescribes {self.describe_dof(clash[0])}, which a support or "
                     "another joint fixes already: remove one of them, as the second of two "
@@ -91,7 +91,7 @@ class Constraints:
             held.append(0.0 * factors if joint.moving else -joint.value(zero, 0.0) / factors)
             first += len(dofs)
         self.fixed, self._held = np.concatenate(fixed), np.concatenate(held)
-        self.given = np.append(values, np.zeros(first - len(values)))
+        self.given = np.concatenate([values, np.zeros(first - len(values))])
         self._moving = [item for item in self._fixing if item[0].moving]
         self.mask = self.free.astype(float)
         self.m = sum(len(joint.equations) for joint in self.joints)
@@ -391,10 +391,9 @@ class Constraints:
         """Of each beam and body, whether its own supports hold it."""
         found = []
         for beam, s in zip(self.members, self.slices):
-            held = np.flatnonzero(~self.free[s])
-            motions = unit_rows(beam.rigid_motions()[held] / [1.0, 1.0, self.size])
-            found.append(len(motions) > 2 and bool(
-                np.linalg.svd(motions, compute_uv=False)[2] > 1e-9))
+            held, = (~self.free[s]).nonzero()
+            found.append(len(held) > 2 and _has_full_rank(
+                beam.rigid_motions(held) / (1.0, 1.0, self.size)))
         return found
 
     @cached_property
@@ -529,12 +528,26 @@ def _describe(v, bodies):
     return " with ".join(parts)
 
 
+def _has_full_rank(A):
+    """True if the smallest singular value of a matrix (n, 3) of unit rows is not zero.
+
+    Its square is the determinant of A^T A over the product of the other two eigenvalues, which is
+    at most a quarter of their sum's square.
+    """
+    A = unit_rows(A)
+    (a, b, c), (_, d, e), (_, _, f) = A.T.dot(A).tolist()
+    trace = a + d + f
+    if a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d) > 1e-10 * trace**3:
+        return True
+    return len(A) > 2 and bool(np.linalg.svd(A, compute_uv=False)[2] > 1e-9)
+
+
 def _fixes(joint, zero):
     """Coordinates that the equations of a joint fix, and their factors; None if it does more."""
     rows, dofs, factors = joint.entries(zero, 0.0)
-    if len(rows) != len(joint.equations) or not np.all(factors):
+    if len(rows) != len(joint.equations) or not factors.all():
         return None
-    order = np.argsort(rows)
-    if np.any(rows[order] != np.arange(len(rows))):
+    order = rows.argsort()
+    if rows[order].tolist() != list(range(len(rows))):
         return None
     return dofs[order], factors[order]

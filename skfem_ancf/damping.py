@@ -79,3 +79,7 @@ class Damping(Frozen):
 
     def __repr__(self) -> str:
         return f"<Damping {self.mass:g} M, time {self.stiffness:g}, {len(self.modal)} modes>"
+
+
+#: That of a scene without any.
+UNDAMPED = Damping()

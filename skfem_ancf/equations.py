@@ -26,6 +26,12 @@ if TYPE_CHECKING:
     from .system import System
 
 
+#: Of a scene without them.
+_NO_INTS = np.zeros(0, np.int64)
+_NO_JOINTS = JointTables(_NO_INTS, _NO_INTS, _NO_INTS, np.zeros(0), _NO_INTS, _NO_INTS, 0)
+_NO_MOMENTS = MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)), np.zeros((0, 2)),
+                         np.zeros(0))
+
 #: Times at which joints are tried, whether tables give them.
 TRIED = 0.0, 0.37
 
@@ -112,12 +118,15 @@ class Tables:
         plain = self.plain
         addresses = {part: compiled.address(part) for part in self.parts}
         body = self._flat(_with_laws(plain.body, compiled.law), addresses)
-        same = plain.viscous is plain.body
+        same, forces = plain.viscous is plain.body, plain.forces
+        if "contacts" in addresses:
+            forces = forces._replace(
+                contacts=forces.contacts._replace(address=addresses["contacts"]))
+        if "elements" in addresses:
+            forces = forces._replace(address=addresses["elements"])
         return plain._replace(
             body=body, viscous=body if same else self._flat(plain.viscous, addresses),
-            forces=plain.forces._replace(
-                address=addresses.get("elements", 0),
-                contacts=plain.forces.contacts._replace(address=addresses.get("contacts", 0))))
+            forces=forces)
 
     @cached_property
     def parts(self) -> list[str]:
@@ -223,6 +232,9 @@ class Tables:
         for load in steady:
             row = 0 if load.amplitude is None else 1 + self._rows.index(load)
             vectors[row, s.of(load)] += load.force(None)
+        if not linear:
+            return LoadTables(vectors, self._moments(turning), _NO_INTS, _NO_INTS, np.zeros(0),
+                              _NO_INTS, self.handle if others else 0)
         entries, first = [[np.zeros(0)] * 4], len(vectors) + len(turning)
         for k, load in enumerate(linear):
             zero, at = np.zeros(load.beam.N), s.of(load)
@@ -234,6 +246,8 @@ class Tables:
                           v.astype(float), k.astype(np.int64), self.handle if others else 0)
 
     def _moments(self, turning):
+        if not turning:
+            return _NO_MOMENTS
         n, most = len(turning), max((load.dofs.shape[1] for load in turning), default=0)
         dofs, c = np.zeros((n, 2, most), dtype=np.int64), np.zeros((n, most))
         start = np.zeros((n, 2))
@@ -281,6 +295,8 @@ class Tables:
 
     def _joints(self):
         s, none = self.system, np.zeros(0)
+        if not s.joints:
+            return _NO_JOINTS
         second, first, at = [[none] * 4], [[none] * 2], 0
         for joint in s.joints:
             k, *entries = joint.second_entries(s.N)
@@ -326,7 +342,7 @@ class Tables:
             j.slope_entries(times, s.N)[2] for j in s.joints])
 
     def _border(self, joints):
-        s, none = self.system, np.zeros(0, dtype=np.int64)
+        s, none = self.system, _NO_INTS
         if not s.joints or not s.bordered or joints.own or s.forces.far:
             return Border(none, 0, 0, none, none, none, none, int(s.coupled))
         i, j, ns = joints.hi, joints.hj, len(s.springs)
@@ -342,6 +358,9 @@ class Tables:
 
 def _with_laws(body, address):
     """A Body whose laws have the addresses of their texts."""
+    if not any(isinstance(pack, SectionPack) for pack in body.packs):
+        return body
+
     def addressed(pack):
         if not isinstance(pack, SectionPack):
             return pack

@@ -36,20 +36,29 @@ class Finder:
 
     def __init__(self, mesh: MeshBeam) -> None:
         self.mesh, self.mapping = mesh, mesh.mapping()
-        self.size = float(np.max(np.abs(mesh.p)))
+        self.size = float(np.abs(mesh.p).max())
         # points of an exact curve may lie a little outside its cubic elements
         self.allowed = 1e-6 if mesh.is_straight else 1e-3
-        left, right = mesh.t
-        self._before = np.where(np.append(False, right[:-1] == left[1:]),
-                                np.arange(mesh.nelements) - 1, -1)
-        self._after = np.append(np.where(self._before[1:] >= 0, np.arange(1, mesh.nelements), -1),
-                                -1)
         #: Where single points begin, for squares of the plane, see :meth:`_start`.
         self._cells: dict = {}
-        self._cell = 0.5 * float(np.min(mesh.lengths))
         #: And for many, once there were more of them than squares.
         self._of_squares: Array | None = None
         self._line = self._straight_line()
+
+    @cached_property
+    def _cell(self):
+        return 0.5 * float(np.min(self.mesh.lengths))
+
+    @cached_property
+    def _before(self):
+        left, right = self.mesh.t
+        return np.where(np.append(False, right[:-1] == left[1:]),
+                        np.arange(self.mesh.nelements) - 1, -1)
+
+    @cached_property
+    def _after(self):
+        return np.append(np.where(self._before[1:] >= 0, np.arange(1, self.mesh.nelements), -1),
+                         -1)
 
     def _straight_line(self):
         """Start and direction of the one line of all elements, and their ends on it, or None."""
@@ -57,11 +66,12 @@ class Finder:
         if not mesh.is_straight:
             return None
         start, d = mesh.p[:, mesh.t[0, 0]], mesh.p_X[:, mesh.t[0, 0]]
-        along = d @ (mesh.p - start[:, None])
-        off = np.array([-d[1], d[0]]) @ (mesh.p - start[:, None])
-        noise = 16 * np.finfo(float).eps * (self.size + mesh.lengths.sum())
+        x, y = mesh.p - start[:, None]
+        along, off = d[0] * x + d[1] * y, d[0] * y - d[1] * x
+        noise = 16 * np.finfo(float).eps * (self.size + float(mesh.lengths.sum()))
         ends = along[mesh.t]
-        if np.max(np.abs(off)) > noise or np.any(np.diff(ends.T.ravel()) < -noise):
+        order = ends.T.ravel()
+        if np.abs(off).max() > noise or (order[1:] - order[:-1] < -noise).any():
             return None
         return start, d, ends
 

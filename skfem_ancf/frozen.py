@@ -69,7 +69,11 @@ class Sealable:
 
     def _unsealed(self):
         """A copy that may be changed."""
-        other = copy(self)
+        if hasattr(self, "__slots__"):
+            other = copy(self)
+        else:
+            other = object.__new__(type(self))
+            vars(other).update(vars(self))
         vars(other)["_sealed"] = False
         return other
 

@@ -104,7 +104,7 @@ def of_sections(beam: Beam) -> Inertia:
     parts = []
     for slab, rule in across.rules(beam.element.order + 1, inertia=True):
         X, W = tensor(axis, rule)
-        parts.append((beam.element.functions(beam.mesh.mapping(), X, tind)[0],
+        parts.append((beam.element.values(beam.mesh.mapping(), X, tind),
                       across.density(slab, X, tind) * across.volume(slab, X, W, tind)))
     return Inertia(*(np.concatenate(part, axis=-1) for part in zip(*parts)))
 
@@ -121,7 +121,9 @@ def of_cable(beam: Beam) -> Inertia:
     xi, w = gauss(points_along(beam))
     tind = np.array([0]) if across.uniform else None
     X = np.array([xi, 0.5 + 0.0 * xi])
-    N = beam.element.functions(mapping, X, tind)[0]
+    N = beam.element.values(mapping, X, tind)
+    if across.simple and across.uniform:
+        return Inertia(N, across.moments(xi[:1], tind, "mass")[0] * (w * beam.mesh.lengths[0]))
     # the length of the axis: directors that are interpolated between nodes are shorter than one
     speed = np.sqrt(np.sum(mapping.DF(X, tind)[:, 0] ** 2, axis=0))
     mass, *moments = across.moments(xi, tind, "mass") * w * speed

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
     from .types import Array, StrPath
 
+EPS = float(np.finfo(float).eps)
+
 #: Elements of the largest mesh that :meth:`MeshBeam.refined` makes.
 MAX_ELEMENTS = 2**24
 
@@ -144,14 +146,16 @@ class MeshBeam(Frozen, Mesh2D):
         angle = _radians(angle)
         if len(x) < 2:
             raise MeshError(f"a beam needs at least two nodes, got {len(x)}")
-        if not np.all(np.diff(x) > 0):
+        if not (x[1:] > x[:-1]).all():
             k = int(np.argmin(np.diff(x)))
             raise MeshError(
                 f"element {k} from x = {x[k]:.9g} to {x[k + 1]:.9g} has no positive length; the "
                 "nodes must increase along the axis")
         e1 = np.array([np.cos(angle), np.sin(angle)])
-        return cls._from_nodes(origin[:, None] + e1[:, None] * x, np.outer(e1, np.ones(len(x))),
-                               np.diff(x), height, s=x)
+        p = origin[:, None] + e1[:, None] * x
+        if not callable(height) and cls.__post_init__ is MeshBeam.__post_init__:
+            return cls._on_line(p, e1, x, require_positive("height", height))
+        return cls._from_nodes(p, np.outer(e1, np.ones(len(x))), np.diff(x), height, s=x)
 
     @classmethod
     def init_curve(cls, r: Callable[[Array], ArrayLike], s: ArrayLike,
@@ -223,6 +227,29 @@ class MeshBeam(Frozen, Mesh2D):
         return mesh
 
     @classmethod
+    def _on_line(cls, p, e1, x, height):
+        """A straight mesh of one height: of what __post_init__ asks only the lengths are open."""
+        mesh, n, lengths = object.__new__(cls), len(x), x[1:] - x[:-1]
+        nodes = np.arange(n, dtype=np.int32)
+        frame = np.empty((2, 2, n))
+        frame[0], frame[1, 0], frame[1, 1] = e1[:, None], 0.0 - e1[1], e1[0]
+        attributes = dict(doflocs=p, t=np.array([nodes[:-1], nodes[1:]]), height=height,
+                          p_X=frame[0], p_Y=frame[1], lengths=lengths, s=x.copy(),
+                          p_XY=np.zeros((2, n)))
+        for array in (frame, *attributes.values()):
+            if array is not height:
+                array.flags.writeable = False
+        vars(mesh).update(attributes)
+        d, far = p[:, 1:] - p[:, :-1], np.abs(p).max()
+        mesh._require_length(np.hypot(d[0], d[1]) > 4 * EPS * far)
+        mesh._boundaries = mesh._build_default_tags()
+        # of their definitions, which ask for more, this is left
+        low, high = lengths.min(), lengths.max()
+        vars(mesh).update(_is_straight=True, _is_uniform=bool(
+            high - low <= 1e-13 * high + 8 * EPS * far), _sealed=True)
+        return mesh
+
+    @classmethod
     def init_refdom(cls) -> MeshBeam:
         return cls.init_line([0.0, 1.0], height=1.0, origin=(0.0, 0.5))
 
@@ -274,7 +301,7 @@ class MeshBeam(Frozen, Mesh2D):
         self._mapping().check()
 
     def _require_length(self, has_length):
-        if not np.all(has_length):
+        if not has_length.all():
             k = int(np.argmin(has_length))
             a, b = self.p[:, self.t[:, k]].T.tolist()
             raise MeshError(f"element {k} has no length: its nodes are at {a} and {b}")
@@ -400,9 +427,10 @@ class MeshBeam(Frozen, Mesh2D):
         return self._f2t
 
     def _build_default_tags(self):
-        n, ne = self.p.shape[1], self.nelements
+        t, n = self.t, self.doflocs.shape[1]
+        ne = t.shape[1]
         elements = np.arange(ne, dtype=np.int32)
-        return {"left": self.t[0, :1].astype(np.int32), "right": self.t[1, -1:].astype(np.int32),
+        return {"left": t[0, :1].astype(np.int32), "right": t[1, -1:].astype(np.int32),
                 "bottom": n + elements, "top": n + ne + elements}
 
     def normalize_facets(self, facets: Any) -> Array:

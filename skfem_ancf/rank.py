@@ -190,6 +190,8 @@ def unit_rows(A: Array | sparse.csr_array) -> Array | sparse.csr_array:
     if not A.shape[0]:
         return A
     largest: Any = abs(A).max(axis=1)
+    if type(largest) is np.ndarray and largest.all():
+        return A / largest[:, None]
     norms = largest.toarray().ravel() if sparse.issparse(largest) else np.asarray(largest)
     A, scale = A[norms > 0], 1.0 / norms[norms > 0]
     return sparse.diags(scale) @ A if sparse.issparse(A) else scale[:, None] * A

@@ -167,12 +167,18 @@ class RigidBody(Frozen):
         n = np.array([-self.q0[3], self.q0[2]])
         return np.append(v[:, 0], n * (n @ (v[:, 1] - v[:, 0])) / self.size)
 
-    def rigid_motions(self) -> Array:
-        """Two translations and the rotation about :attr:`origin`: shape (4, 3)."""
+    def rigid_motions(self, rows: Any = slice(None)) -> Array:
+        """Two translations and the rotation about :attr:`origin`: shape (4, 3).
+
+        Parameters
+        ----------
+        rows
+            Numbers of coordinates, shape (n,), for as many rows; all by default.
+        """
         out = np.zeros((4, 3))
         out[0, 0] = out[1, 1] = 1.0
         out[2:, 2] = -self.q0[3], self.q0[2]
-        return out
+        return out[rows]
 
     def dofs(self, boundary: Any = None, names: str | Sequence[str] | None = None) -> Array:
         """Numbers of coordinates by their names, shape (n,).

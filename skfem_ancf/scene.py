@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from copy import copy
 from functools import cached_property, wraps
+from itertools import accumulate
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
@@ -215,7 +216,7 @@ class Scene:
     @cached_property
     def _places(self) -> dict:
         """Number and first coordinate of each beam, by the identity of the object."""
-        first = np.cumsum([0] + [b.N for b in self.members]).tolist()
+        first = accumulate((b.N for b in self.members), initial=0)
         return {id(b): (k, n) for k, (b, n) in enumerate(zip(self.members, first))}
 
     def _number(self, beam):
@@ -1218,7 +1219,7 @@ class Scene:
         """The discrete equations, built when first asked for."""
         with self._lock:
             if self._system is None:
-                offsets = np.concatenate([[0], np.cumsum([b.N for b in self.members])])
+                offsets = list(accumulate((b.N for b in self.members), initial=0))
                 fixed = np.array([offsets[k] + d for k, d in self._fixed], dtype=int)
                 values = np.array(list(self._fixed.values()), dtype=float)
                 self._system = System(self._beams, [*self.loads, *self._weights()], fixed, values,

@@ -4,7 +4,7 @@ follow from a table by products of matrices.
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -85,6 +85,31 @@ def transform(n: int) -> Array:
     return _matrices(n)[0]
 
 
+def coefficients(function: Callable[[Array], Array], p: int, m: int) -> Array:
+    """Polynomials of (xi, eta) as sums of products of Chebyshev polynomials.
+
+    Parameters
+    ----------
+    function
+        From reference points (2, p m) to the values of k polynomials, (k, p m).
+    p, m
+        How many Chebyshev polynomials of xi and of eta they need.
+
+    Returns
+    -------
+    ndarray
+        Those of eta come first, shape (k, m, p).
+
+    Examples
+    --------
+    >>> coefficients(lambda X: np.array([X[0] * X[1]]), 2, 2).round(12).tolist()
+    [[[0.25, 0.25], [0.25, 0.25]]]
+    """
+    X = np.array([np.repeat(places(p), m), np.tile(places(m), p)])
+    values = function(X).reshape(-1, p, m)
+    return np.ascontiguousarray((_matrices(p)[0] @ values @ _matrices(m)[0].T).swapaxes(-1, -2))
+
+
 def along(function: Callable[[Array], Array], n: int) -> Array:
     """Polynomials of xi as sums of Chebyshev polynomials.
 
@@ -130,19 +155,29 @@ class Series:
     """
 
     def __init__(self, element: ElementBeam, h: float) -> None:
-        p = max(element.axis_degree, 3 if element.sections == "cubic" else 1) + 1
-        m = max(element.order, 1) + 1
-        self.swell = np.array([across for _, _, across in 2 * element.functionals])
-        x, y = places(p), places(m)
-        values, _, _, self.power = element.local(
-            np.array([np.repeat(x, m), np.tile(y, p)]), h)
-        (Vx, Dx), (Vy, Dy) = _matrices(p), _matrices(m)
-        self.value = Vx @ values.reshape(-1, p, m) @ Vy.T
-        self.along, self.across = Dx @ self.value, self.value @ Dy.T
-        self.tables = np.stack([self.value, self.along])
-        self._shape = p, m
-        self._value, self._both = (np.ascontiguousarray(t.swapaxes(-1, -2))
-                                   for t in (self.value, self.tables))
+        unit, self.swell, self.power = element.series()
+        self._value = h ** self.swell[:, None, None] * unit if self.swell.any() else unit
+        self._shape = unit.shape[:0:-1]
+
+    @cached_property
+    def value(self) -> Array:
+        return np.ascontiguousarray(self._value.swapaxes(-1, -2))
+
+    @cached_property
+    def along(self) -> Array:
+        return _matrices(self._shape[0])[1] @ self.value
+
+    @cached_property
+    def across(self) -> Array:
+        return self.value @ _matrices(self._shape[1])[1].T
+
+    @cached_property
+    def tables(self) -> Array:
+        return np.stack([self.value, self.along])
+
+    @cached_property
+    def _both(self):
+        return np.ascontiguousarray(self.tables.swapaxes(-1, -2))
 
     def at(self, xi: float, eta: float) -> Array:
         """The functions at one point, shape (nb,).

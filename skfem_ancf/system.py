@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 from functools import cached_property
+from itertools import accumulate, pairwise
+from math import sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +17,7 @@ from .bordered import BorderedMatrix, border, border_negative, columns_product
 from .checks import Screen
 from .condensed import Condensed
 from .constraints import Constraints
-from .damping import Damping
+from .damping import UNDAMPED, Damping
 from .eliminated import EliminatedMass, condensed
 from .errors import InputError
 from .evaluation import CARRY, FORCE, MEAN, TANGENT, VISCOUS, evaluate
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 _NONE = np.zeros(0)
+EPS = float(np.finfo(float).eps)
 #: Equations of the nodes of a frame above which steps of a motion eliminate them.
 MANY = 48
 #: What a system has found that stays for other materials and widths; and for other loads, too.
@@ -91,16 +94,16 @@ class System:
             tuple(bodies))
         self.beams, self.bodies, self.loads = list(beams), list(bodies), list(loads)
         self.members: list[Beam | RigidBody] = [*beams, *bodies]
-        self.offsets = np.concatenate([[0], np.cumsum([b.N for b in self.members])])
-        self.N = int(self.offsets[-1])
-        self.slices = [slice(int(a), int(b)) for a, b in zip(self.offsets[:-1], self.offsets[1:])]
+        offsets = list(accumulate((b.N for b in self.members), initial=0))
+        self.offsets, self.N = np.array(offsets), offsets[-1]
+        self.slices = [slice(a, b) for a, b in pairwise(offsets)]
         self._index = {id(b): k for k, b in enumerate(self.members)}
         self.size = float(sum(b.size for b in self.beams)) or _extent(self.bodies)
         self.constraints = Constraints(self.members, self.slices, self.size, fixed, values,
                                        [*self._directors(fixed), *joints], self._held_by_elements)
         self.forces = Forces(elements, self.N, self.bandwidth)
         self._take_loads()
-        self.damping = Damping() if damping is None else damping
+        self.damping = UNDAMPED if damping is None else damping
         self.retardation = [self.damping.stiffness + (b.damping.time if b.damping else 0.0)
                             for b in self.beams]
         self.viscous = any(time > 0.0 for time in self.retardation)
@@ -420,7 +423,7 @@ class System:
     def stiffness_scale(self) -> float:
         """eps times the square root of modulus times volume: the round-off of strains of 1."""
         total = sum(b.kernel.scale for b in self.beams) or self.energy_of_bodies
-        return np.finfo(float).eps * np.sqrt(total)
+        return EPS * sqrt(total)
 
     @cached_property
     def energy_of_bodies(self) -> float:
@@ -440,14 +443,14 @@ class System:
         """
         if not self.beams:
             return self.stiffness_scale
-        total = sum(b.kernel.scale / np.sum(b.mesh.lengths) * np.sum(1.0 / b.mesh.lengths)
+        total = sum(b.kernel.scale / b.size * float((1.0 / b.mesh.lengths).sum())
                     for b in self.beams)
-        return np.finfo(float).eps * self.size * np.sqrt(total)
+        return EPS * self.size * sqrt(total)
 
     @cached_property
     def noise(self) -> float:
         """How much larger the round-off of a residual is than that of the strains."""
-        return np.sqrt(max(b.nd for b in self.members))
+        return sqrt(max(b.nd for b in self.members))
 
     def inverted(self, u: Array) -> bool:
         """True if a body is turned inside out somewhere."""

@@ -12,8 +12,9 @@ from skfem.element import DiscreteField, Element
 from ..errors import InputError, MeshError, shown
 from ..frozen import Content, Frozen, read_only
 from ..nodal import nodal_derivatives, turned
-from ..quadrature import gauss
+from ..quadrature import gauss, tensor
 from ..reference import SECTIONS, RefBeam, hermite_basis
+from ..series import coefficients
 from .sampling import Held, Sampling, default_sampling, missed
 
 if TYPE_CHECKING:
@@ -206,6 +207,32 @@ class ElementBeam(Frozen, Element):
             d_xi += power * rate / h * value
         return value, d_xi, d_eta, slope
 
+    def series(self) -> tuple[Array, Array, Array]:
+        """The local functions of height 1 and length 1 in products of Chebyshev polynomials.
+
+        Returns
+        -------
+        coefficients
+            As :func:`skfem_ancf.series.coefficients` returns them, which are kept.
+        height, length
+            The powers of both that the functions take, shape (2 nodal_dofs,) each.
+        """
+        p = max(self.axis_degree, 3 if self.sections == "cubic" else 1) + 1
+        m = max(self.order, 1) + 1
+        return (_series(self._along, self.functionals, self.section, p, m), *self._factors[3:])
+
+    def integrals(self, h: float, L: float) -> Array:
+        """The means of the local functions over a straight element of one height; (2 nodal_dofs,).
+
+        Parameters
+        ----------
+        h, L
+            Its height and length.
+        """
+        power, slope = self._factors[3:]
+        return h**power * L**slope * _integrals_of(
+            self._along, self.functionals, self.section, self.axis_degree, max(self.order, 1))
+
     def gbasis(self, mapping: MappingBeam, X: Array, i: int,
                tind: Array | None = None) -> tuple[DiscreteField, ...]:
         """A local function on the body, with its gradient: what scikit-fem's ``Basis`` asks for.
@@ -256,6 +283,19 @@ class ElementBeam(Frozen, Element):
         invDF = mapping.invDF(X, tind)
         grad = scale[:, None] * (invDF[0] * d_xi[:, None] + invDF[1] * d_eta[:, None])
         return scale * value, grad
+
+    def values(self, mapping: MappingBeam, X: Array, tind: Array | None = None) -> Array:
+        """All local functions on the body, without their gradients; shape (n, nelements, npoints).
+
+        Parameters
+        ----------
+        mapping, X, tind
+            As for :meth:`gbasis`, shapes (2, npoints) or (2, nelements, npoints), and
+            (nelements,).
+        """
+        value, _, _, slope = self.of_mesh(mapping, X, tind)
+        return self._scale(mapping.mesh, slope, tind)[:, :, None] * (
+            value[:, None] if value.ndim == 2 else value)
 
     def of_mesh(self, mapping: MappingBeam, X: Array, tind: Array | None = None,
                 i: int | slice = slice(None)) -> tuple[Array, Array, Array, Any]:
@@ -446,6 +486,21 @@ def _factors(along: tuple[int, int], functionals: Functionals, number: int) -> A
             of = m * node + slope if power == 0 else -1
             rows.append((of, n * node + slope, (k - m) % max(number, 1), power, slope))
     return read_only(np.array(rows).T)
+
+
+@lru_cache(64)
+def _series(along: tuple[int, int], functionals: Functionals, section: SectionFunctions, p: int,
+            m: int) -> Array:
+    factors = _factors(along, functionals, section.number)
+    return read_only(coefficients(lambda X: _unit_functions(along, factors, section, X)[0], p, m))
+
+
+@lru_cache(64)
+def _integrals_of(along: tuple[int, int], functionals: Functionals, section: SectionFunctions,
+                  degree: int, order: int) -> Array:
+    X, W = tensor(gauss(degree // 2 + 1), gauss(order // 2 + 1))
+    factors = _factors(along, functionals, section.number)
+    return read_only(_unit_functions(along, factors, section, X)[0] @ W)
 
 
 @lru_cache(256)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import teaching
+from ..frozen import read_only
+from ..quadrature import gauss
 from ..reference import SECTIONS, hermite_basis
 from .base import DEGREES, ElementBeam, SectionFunctions, require_degree
 from .sampling import Held, Sampling, missed
@@ -91,6 +93,24 @@ class ElementBeamCable(ElementBeam):
         """
         return hermite_basis(self.nodal_dofs, xi, derivative)
 
+    def derivatives_at_gauss_points(self, n: int) -> Array:
+        """The first and second derivatives of :meth:`axis` at n Gauss points, which are kept.
+
+        Parameters
+        ----------
+        n
+            Number of points.
+
+        Returns
+        -------
+        ndarray
+            One below the other, shape (2 n, 2 m).
+        """
+        if type(self) is ElementBeamCable:
+            return _derivatives(self.nodal_dofs, n)
+        xi = gauss(n)[0]
+        return np.concatenate([self.axis(xi, d).T for d in (1, 2)])
+
     @cached_property
     def sampling(self) -> Sampling:
         return Sampling(self.axis_degree - 1, {})
@@ -100,3 +120,8 @@ class ElementBeamCable(ElementBeam):
         # the mode that a higher degree misses in one element is held where two meet
         return () if self.axis_degree > 3 else tuple(
             Held(w, 300.0, "beam") for w in missed(2, self.sampling.points))
+
+
+@lru_cache(64)
+def _derivatives(m: int, n: int) -> Array:
+    return read_only(np.concatenate([hermite_basis(m, gauss(n)[0], d).T for d in (1, 2)]))

@@ -111,6 +111,10 @@ class Contacts:
 
     def _make(self, poses):
         n = len(self._groups)
+        if n == 0:
+            none = np.zeros(0)
+            return ContactTables(0, np.zeros(0, np.int64), none, poses, np.zeros(REACHES),
+                                 np.zeros(2, np.int64), 0, 0)
         ints, floats = _Pieces(HEADER * n), _Pieces(0)
         headers, memory = np.zeros((n, HEADER), dtype=np.int64), REACHES + n
         for number, (k, group) in enumerate(self._groups):
@@ -193,6 +197,9 @@ class Contacts:
         memory
             What :meth:`remember` gave, shape (n,), or None: no anchors, no reach.
         """
+        if not self.obstacles:
+            yield
+            return
         before = self.tables.memory.copy()
         try:
             self.put_back(memory)
@@ -212,6 +219,8 @@ class Contacts:
 
     def remember(self) -> Array | None:
         """What steps have left behind; None where there is nothing of it."""
+        if not self.obstacles:
+            return None
         memory = self.tables.memory
         return memory.copy() if np.any(memory) else None
 
@@ -232,6 +241,8 @@ class Contacts:
         ndarray or None
             The memory that steps begin with, shape (n,).
         """
+        if not self.obstacles:
+            return None
         self.put_back(memory)
         self.tables.memory[RATE] = 0.0
         if memory is None and self.anchored:

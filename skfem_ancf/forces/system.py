@@ -60,7 +60,8 @@ class Forces:
             else:
                 parts += found
         order = sorted(range(len(parts)), key=lambda k: parts[k].kind)
-        self.parts, self._place = [parts[k] for k in order], np.argsort(order)
+        self.parts = [parts[k] for k in order]
+        self._place = np.argsort(order) if order else np.zeros(0, np.int64)
         n = len(self.parts)
         vectors = [[part.d, part.e] for part in self.parts]
         own = [element.links for element in self.own]
@@ -121,6 +122,8 @@ class Forces:
         handle
             What finds elements of one's own.
         """
+        if not self.elements:
+            return _NO_TABLES._replace(contacts=self.contacts.tables)
         at, of, weight, start = [], [], [], np.zeros(self.rows)
         for links, rows, _ in self._blocks:
             for k, one in enumerate(links):
@@ -359,6 +362,16 @@ def _mean_force(element, x, y, t):
     if gain is None:
         return force
     return force - (gain + np.sum(force * d)) / square * d
+
+
+def _no_tables():
+    """The tables of no elements, but for obstacles."""
+    x, i = np.zeros(0), np.zeros(0, np.int64)
+    return ForceTables(x, i, i, x, 0, np.zeros(KINDS + 1, np.int64), x, 0, i, i, x, i, i, 0,
+                       None)
+
+
+_NO_TABLES = _no_tables()
 
 
 def _resists(part):

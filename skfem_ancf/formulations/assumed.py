@@ -91,6 +91,11 @@ class Assumed(Formulation):
         return [Term(LinearLaw(uncoupled), axis, section, samples),
                 Term(LinearLaw(coupling), axis, AXIS, samples, mean)]
 
+    def points_along(self, element: ElementBeam, material: Material) -> int:
+        if type(self).terms is not Assumed.terms:
+            return super().points_along(element, material)
+        return element.sampling.points
+
     @staticmethod
     def _volumetric_apart(whole: Term, element: ElementBeam, material: Material
                           ) -> list[Term] | None:
@@ -119,6 +124,8 @@ class Assumed(Formulation):
 
     def stabilisation(self, mesh: MeshBeam, element: ElementBeam, material: Material,
                       width: float) -> Array | None:
+        if not element.held:
+            return None
         tind = np.arange(1 if mesh.is_uniform else mesh.nelements)
         L, EI = mesh.lengths[tind], material.E * width * mesh.height**3 / 12.0
         per = {"element": L, "beam": mesh.chain_lengths[tind], "": np.ones(len(tind))}

@@ -114,6 +114,16 @@ class Formulation(Frozen):
         """
         raise NotImplementedError
 
+    def points_along(self, element: ElementBeam, material: Material) -> int:
+        """Number of points along an element of the first of the terms.
+
+        Parameters
+        ----------
+        element, material
+            As for :meth:`terms`.
+        """
+        return len(self.terms(element, material)[0].axis[0])
+
     def stabilisation(self, mesh: MeshBeam, element: ElementBeam, material: Material,
                       width: float) -> Array | None:
         """A constant element stiffness, added to that of the terms, or None for none.

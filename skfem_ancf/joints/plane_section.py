@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import require_label, teaching
-from .base import Joint, Vector, gradients
+from .base import Joint
 
 if TYPE_CHECKING:
     from ..scene import Scene
@@ -38,16 +38,17 @@ class PlaneSection(Joint):
         node = beam.section_node(self.at)
         t = beam.mesh.p_X[:, node]
         direction, held = beam.kinematics.plane(beam, t)
-        direction = np.where(np.abs(direction) < 1e-14, 0.0, direction)
+        self.direction = np.array([0.0 if abs(x) < 1e-14 else x for x in direction.tolist()])
         first = scene.offset(beam) + node * beam.nd
-        self.vectors = [Vector(np.zeros(2), np.array([[first + 2 * k], [first + 2 * k + 1]]),
-                               np.ones(1)) for k in held]
-        self.direction = direction
         self.equations = tuple(f"moment on {beam.element.dofnames[k]}" for k in held)
-        self.found = gradients(*([(v, direction)] for v in self.vectors))
+        parts = [c for c in (0, 1) if self.direction[c]]
+        dofs = np.array([[first + 2 * k + c for c in parts] for k in held])
+        self.found = (np.array([row for row in range(len(held)) for _ in parts]), dofs.ravel(),
+                      np.array([self.direction[c] for c in parts] * len(held)))
+        self.dofs, self.along = dofs, self.direction[parts]
 
     def value(self, u: Array, t: float) -> Array:
-        return np.array([self.direction @ v(u) for v in self.vectors])
+        return u[self.dofs] @ self.along
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         return self.found

@@ -301,6 +301,41 @@ def pair_tables(table: Array, pairs: Array, constant: Array, elements: int) -> P
                       places.signs, places.ends, *_held(places, constant, nb, elements))
 
 
+def scaled_pair_tables(table: Array, rows: Array, columns: Array, pairs: Array, constant: Array,
+                       elements: int) -> PairTables:
+    """As :func:`pair_tables`, of a table of one element whose rows and columns are multiplied.
+
+    Parameters
+    ----------
+    table
+        Before that, shape (rows, nb); what comes of it is kept.
+    rows, columns
+        Their factors, shapes (rows,) and (nb,).
+    pairs, constant, elements
+        As there, shapes (2, p) and (0, 1 or elements, 2 nb, 2 nb).
+    """
+    unit, ends = _unit_pairs(Content(table, pairs))
+    (a, b), (c, d), of_pair = unit.lower, unit.strictly, rows[pairs[0]] * rows[pairs[1]]
+    symmetric = unit.symmetric * of_pair * (columns[a] * columns[b])[:, None]
+    skew = unit.skew * of_pair[ends] * (columns[c] * columns[d])[:, None]
+    if len(constant):
+        held, held_skew, place = _held(_places(len(columns)), constant, len(columns), elements)
+    else:
+        held, held_skew, place = unit.held, unit.held_skew, np.zeros(elements, np.int64)
+    return unit._replace(symmetric=symmetric, skew=skew, held=held, held_skew=held_skew,
+                         held_place=place)
+
+
+@lru_cache(64)
+def _unit_pairs(content):
+    """The PairTables of a table, and of each column of ``skew`` a pair of its rows."""
+    table, pairs = content.arrays
+    nb = table.shape[1]
+    off = np.nonzero(pairs[0] != pairs[1])[0]
+    return (pair_tables(table[None], pairs, np.zeros((0, 2 * nb, 2 * nb)), 0),
+            np.append(off, 0))  # the last column is zero
+
+
 def with_constant(pairs: PairTables, constant: Array, elements: int) -> PairTables:
     """The tables with another stabilisation.
 

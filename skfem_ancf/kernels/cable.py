@@ -10,16 +10,18 @@ Rows of the table are those of d/dX, then of d^2/dX^2, at the points: ``a = r'``
 """
 
 from copy import copy
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..frozen import read_only
 from ..quadrature import gauss
 from ..source import F2, F3, I1, lanes, primitive, room, source
 from ..types import Array
 from .base import (CARRY, GIVEN, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
                    Texts, add_force, add_held_energy, add_tangent, block, copy_stress, load,
-                   packed, pair_tables, product, with_constant)
+                   packed, pair_tables, product, scaled_pair_tables, with_constant)
 
 if TYPE_CHECKING:
     from ..formulations.base import Formulation
@@ -290,7 +292,25 @@ def cable_energy(pack: CablePack, u: Array, out: Array) -> None:
     add_held_energy(pack, u, out)
 
 
+#: The middle of an element, and the first element.
+_MIDDLE, _FIRST = np.array([0.5]), np.zeros(1, int)
+
 CABLES = Texts(2, cable_evaluate, cable_energy)
+
+
+@lru_cache(64)
+def _pairs(n):
+    """Pairs (a, a), (a, b) and (b, b) of the rows of n points, a before b; shape (2, 3 n)."""
+    p = np.arange(n)
+    return read_only(np.array([np.concatenate([p, p, n + p]), np.concatenate([p, n + p, n + p])]))
+
+
+def _has_alone(t):
+    """True if an element has no neighbour."""
+    if t[0, -1] == t.shape[1] - 1:  # one chain
+        return t.shape[1] == 1
+    joined = t[0, 1:] == t[1, :-1]
+    return not np.all(np.append(False, joined) | np.append(joined, False))
 
 
 def _unit(pack):
@@ -332,10 +352,8 @@ class CableKernel(Chain):
         mesh, element = across.mesh, across.element
         super().__init__(mesh, element)
         self.constant = across.stabilisation(formulation)
-        n = len(formulation.terms(element, across.slabs[0].material)[0].axis[0])
-        joined = mesh.t[0, 1:] == mesh.t[1, :-1]
-        if self.constant is None and not np.all(np.append(False, joined)
-                                                | np.append(joined, False)):
+        n = formulation.points_along(element, across.slabs[0].material)
+        if self.constant is None and _has_alone(mesh.t):
             n = max(n, element.axis_degree)  # no neighbour holds a mode that fewer points miss
         self.points_number = n
         self.shared = mesh.is_uniform or np.ptp(mesh.lengths) <= 1e-13 * np.max(mesh.lengths)
@@ -343,6 +361,8 @@ class CableKernel(Chain):
         if before is not None and before.points_number == n:
             self.volume: float = before.volume
             self.packs = [self._renewed(*before.packs)]
+        elif mesh.is_uniform and across.simple:
+            self.packs = [self._uniform_pack(mesh, element, across, n)]
         else:
             self.packs = [self._pack(mesh, element, across, n)]
 
@@ -350,8 +370,8 @@ class CableKernel(Chain):
     def scale(self) -> float:
         """Modulus times volume."""
         pack, = self.packs
-        return float(np.sum(np.broadcast_to(pack.weights * pack.stiffness[0],
-                                            (len(pack.weights), pack.start.size))))
+        per = pack.weights * pack.stiffness[0]
+        return float(per.sum()) * (pack.start.size / per.shape[1])
 
     def outer_strain(self, u: Array) -> tuple[Array, Array]:
         """Extension of the axis, and what bending adds to it at a face; both (points, elements).
@@ -382,8 +402,6 @@ class CableKernel(Chain):
         square = np.sum(a * a, axis=1)
         none = np.zeros((0, 2 * self.nd, 2 * self.nd))
         constant = none if self.constant is None else self.constant
-        p = np.arange(n)
-        pairs = np.array([np.concatenate([p, p, n + p]), np.concatenate([p, n + p, n + p])])
         return CablePack(
             packed(table), packed(table.transpose(0, 2, 1)[:int(self.shared)]),
             packed(frame), packed(np.sqrt(square)),
@@ -392,7 +410,28 @@ class CableKernel(Chain):
             packed(np.arange(ne) * (frame.shape[2] > 1), np.int64),
             packed([EA, EI, -ES]), packed(constant),
             packed(mesh.t[0] * self.nd, np.int64), packed(np.arange(2 * self.nd), np.int64),
-            pair_tables(table, pairs, constant, ne))
+            pair_tables(table, _pairs(n), constant, ne))
+
+    def _uniform_pack(self, mesh, element, across, n):
+        """As :meth:`_pack` where all elements are equal, from what is kept of an element of length
+        1."""
+        ne, nd, L, w = mesh.nelements, self.nd, float(mesh.lengths[0]), gauss(n)[1]
+        unit, pairs = element.derivatives_at_gauss_points(n), _pairs(n)
+        columns = L ** np.arange(nd // 2)
+        columns, rows = np.concatenate([columns, columns]), np.repeat((1.0 / L, L**-2), n)
+        table = unit * columns * rows[:, None]
+        EA, ES, EI = across.moments(_MIDDLE, _FIRST)[:, 0]
+        self.volume = float(across.moments(_MIDDLE, _FIRST, "area")[0, 0, 0] * mesh.lengths.sum())
+        e = (mesh.p[:, 1] - mesh.p[:, 0]) / L
+        frame, stiffness = np.zeros((2 * n, 2, 1)), np.empty((3, n, 1))
+        frame[:n, :, 0], zeros = e, np.zeros(ne, np.int64)
+        stiffness[0], stiffness[1], stiffness[2] = EA, EI, -ES
+        constant = np.zeros((0, 2 * nd, 2 * nd)) if self.constant is None else self.constant
+        return CablePack(
+            table[None], np.ascontiguousarray(table.T)[None], frame,
+            np.full((n, 1), np.hypot(e[0], e[1])), np.zeros((n, 1)), (w * L)[:, None], zeros,
+            zeros, stiffness, packed(constant), packed(mesh.t[0] * nd, np.int64),
+            np.arange(2 * nd), scaled_pair_tables(unit, rows, columns, pairs, constant, ne))
 
     def in_proportion(self, across: "Across", stiffness: float, volume: float) -> "CableKernel":
         """The kernel of the same beam, stiffer, and wider.

@@ -42,8 +42,13 @@ class StVenantKirchhoff(Material):
         if any(getattr(cls, name) is not getattr(StVenantKirchhoff, name)
                for name in ("energy", "stress", "moduli")):
             return super().law(k_s)  # a subclass with a law of its own
-        k_s = require_positive("k_s", k_s)
-        return LinearLaw(self.D * np.diag([1.0, 1.0, k_s]) + self.D * (1 - np.eye(3)))
+        D = self.D
+        D[2, 2] *= require_positive("k_s", k_s)
+        return LinearLaw(D)
+
+    @property
+    def is_hooke(self) -> bool:
+        return type(self) is StVenantKirchhoff or super().is_hooke
 
     def volumetric_split(self, k_s: float = 1.0) -> tuple[Law, Law] | None:
         # a subclass may have other moduli
