@@ -408,15 +408,22 @@ class Beam(Frozen):
         NameUnknown
             If a name is not known; the message lists the known ones.
         """
+        nodes, rows = self.nodes(boundary), self._rows_named(names)
+        if len(nodes) == 1:
+            return nodes[0] * self.nd + rows
+        return np.sort((nodes[:, None] * self.nd + rows).ravel())
+
+    def _rows_named(self, names):
+        """Numbers of coordinates of a node by their names, increasing."""
+        both = self.element.dofnames
+        if isinstance(names, str) and both.count(names) == 1:
+            return 2 * both.index(names) + np.arange(2)
         known = self.dofnames
         if names is None:
-            rows: Array = np.arange(len(known))
-        else:
-            both = [name for name in self.element.dofnames if name not in known]
-            names = require_names("coordinate", names, known + both)
-            rows = np.array([k for k, full in enumerate(known)
-                             if full in names or full.rsplit("^", 1)[0] in names])
-        return np.sort((self.nodes(boundary)[:, None] * self.nd + rows).ravel())
+            return np.arange(len(known))
+        names = require_names("coordinate", names, [*known, *(n for n in both if n not in known)])
+        return np.array([k for k, full in enumerate(known)
+                         if full in names or full.rsplit("^", 1)[0] in names])
 
     def locate(self, point: ArrayLike) -> tuple[int, Array]:
         """Element and reference point of a material point.
@@ -520,6 +527,26 @@ class Beam(Frozen):
     def size(self) -> float:
         """Length of its axis."""
         return float(self.mesh.lengths.sum())
+
+    def held_by_a_section(self, held: Sequence[int]) -> bool:
+        """True if a node is held, and the direction of the axis there or its normal.
+
+        Parameters
+        ----------
+        held
+            Numbers of coordinates.
+        """
+        rows: dict[int, list[int]] = {}
+        for k in held:
+            rows.setdefault(k // self.nd, []).append(k % self.nd)
+        for node, of_node in rows.items():
+            if of_node[:2] == [0, 1]:
+                for k in of_node[2:]:
+                    of = self.element.functionals[k // 2][1:]
+                    vector = {(1, 0): self.mesh.p_X, (0, 1): self.mesh.p_Y}.get(of)
+                    if vector is not None and abs(vector[1 - k % 2, node]) > 1e-3:
+                        return True  # the other component would change as it turns
+        return False
 
     def rigid_motions(self, rows: Array | None = None) -> Array:
         """Two translations and the rotation about :attr:`origin`.
@@ -730,8 +757,9 @@ class Beam(Frozen):
             load = (mass * self.element.integrals(h, L))[None, :, None] * g
         else:
             load = self.inertia.weights(g)
-        return self.kernel.scatter(np.ascontiguousarray(np.broadcast_to(
-            load, (self.mesh.nelements,) + load.shape[1:])))
+        forces = np.empty((self.mesh.nelements,) + load.shape[1:])
+        forces[:] = load
+        return self.kernel.scatter(forces)
 
     def mass(self) -> csr_matrix:
         """The mass matrix, constant, sparse, shape (N, N)."""

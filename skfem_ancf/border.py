@@ -93,10 +93,11 @@ def new_factors(border: Border, A: Band, m: int, N: int) -> Factors:
         Numbers of multipliers and of coordinates.
     """
     if border.wide > 0 or m == 0:
-        m, N, k, n = 0, 0, 0, 0
-    else:
-        k, n = border.picked.size, A.flat.size
-    before = A._replace(flat=np.empty(n), pivots=np.empty(0, np.int64))
+        x, X = np.empty(0), np.empty((0, 0))
+        return Factors(A._replace(flat=x, pivots=np.empty(0, np.int64)), A, X, X, X, X, x, x, x, x,
+                       x, x, X)
+    before = A._replace(flat=np.empty(A.flat.size), pivots=np.empty(0, np.int64))
+    k = border.picked.size
     return factors_of(before, A, np.zeros((m, N)), np.zeros((k, k)))
 
 

@@ -95,12 +95,16 @@ class Screen:
             return
         first = accumulate((b.N for b in beams), initial=0)
         node = accumulate((b.N // b.nd for b in beams), initial=0)
-        self._x = np.concatenate([np.arange(n + 2, n + b.N, b.nd) for n, b in zip(first, beams)])
-        self._y = self._x + 1
+        x = np.concatenate([np.arange(n + 2, n + b.N, b.nd) for n, b in zip(first, beams)])
+        self._tangents = x[:, None] + np.arange(2)
         self.start = np.concatenate([b.mesh.p_X[0] + 1j * b.mesh.p_X[1] for b in beams])
         self._left, self._right = np.concatenate([n + b.mesh.t for n, b in zip(node, beams)], 1)
+        if len(self._left) == len(x) - 1:  # one chain
+            self._left, self._right = slice(len(x) - 1), slice(1, len(x))
         self.slender = np.concatenate([b.mesh.height / b.mesh.lengths for b in beams])
-        self._limit = np.concatenate([np.full(b.mesh.nelements, turning_limit(b)) for b in beams])
+        limits = [turning_limit(b) for b in beams]
+        self._limit = limits[0] if len(set(limits)) == 1 else np.repeat(
+            limits, [b.mesh.nelements for b in beams])
 
     def passes(self, u: Array, start: Array | None = None, slender: Array | None = None) -> Any:
         """False if a fibre may be compressed, or an element may turn, beyond the range.
@@ -116,7 +120,7 @@ class Screen:
             return True
         start = self.start if start is None else start
         slender = self.slender if slender is None else slender
-        r = (u[..., self._x] + 1j * u[..., self._y]) / start + 1.0
+        r = u[..., self._tangents].view(complex)[..., 0] / start + 1.0
         z = r[..., self._right] * r[..., self._left].conj()
         turn = np.abs(np.arctan2(z.imag, z.real))
         # the largest curvature of an element is seldom more than twice its mean

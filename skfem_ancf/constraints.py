@@ -392,6 +392,9 @@ class Constraints:
         found = []
         for beam, s in zip(self.members, self.slices):
             held, = (~self.free[s]).nonzero()
+            if beam.held_by_a_section(held.tolist()):
+                found.append(True)
+                continue
             found.append(len(held) > 2 and _has_full_rank(
                 beam.rigid_motions(held) / (1.0, 1.0, self.size)))
         return found

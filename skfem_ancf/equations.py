@@ -273,6 +273,11 @@ class Tables:
                          sample(load.amplitude, times).reshape(len(times)) for load in columns],
                         axis=1)
 
+    @property
+    def prestressed(self) -> bool:
+        """True if the first tangent has other factors of loads, see :meth:`static_factors`."""
+        return any(load.prestress for load in self._loads[2])
+
     def static_factors(self, scale: float, before: float | None = None) -> Array:
         """Factors of the loads in statics, where an amplitude counts as one; shape (k,).
 

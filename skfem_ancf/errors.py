@@ -343,7 +343,7 @@ def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = N
     """
     if not (type(array) is np.ndarray and array.dtype == np.float64):
         array = _real_array(name, array)
-    if shape is not None and (
+    if shape is not None and array.shape != shape and (
         array.ndim != len(shape)
         or any(n is not None and n != m for n, m in zip(shape, array.shape))
     ):

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import sys
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from contextlib import AbstractContextManager, contextmanager
+from typing import Any
 
 from .errors import InputError, MissingExtra, shown
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 
 class _NoBar:
     def update(self, amount: float) -> None:
         """Nothing to show."""
 
+    def __enter__(self):
+        return self
 
-@contextmanager
-def progress_bar(show: bool | None, total: float, desc: str) -> Iterator[Any]:
+    def __exit__(self, *_):
+        pass
+
+
+NO_BAR = _NoBar()
+
+
+def progress_bar(show: bool | None, total: float, desc: str) -> AbstractContextManager[Any]:
     """A bar with ``update(amount)``.
 
     Parameters
@@ -33,14 +38,19 @@ def progress_bar(show: bool | None, total: float, desc: str) -> Iterator[Any]:
     if show is not None and not isinstance(show, bool):
         raise InputError(f"progress must be True, False or None, got {shown(show)}")
     if show is False or (show is None and not sys.stderr.isatty()):
-        yield _NoBar()
-        return
+        return NO_BAR
+    return _bar(show, total, desc)
+
+
+@contextmanager
+def _bar(show, total, desc):
+    """The bar, where one is wanted."""
     try:
         from tqdm import tqdm
     except ImportError:
         if show:
             raise MissingExtra("tqdm", "progress") from None
-        yield _NoBar()
+        yield NO_BAR
         return
     with tqdm(total=total, desc=desc, delay=0.0 if show else 1.0,
               bar_format="{l_bar}{bar}| {n:.3g}/{total:.3g} [{elapsed}]") as bar:

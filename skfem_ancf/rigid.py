@@ -167,6 +167,16 @@ class RigidBody(Frozen):
         n = np.array([-self.q0[3], self.q0[2]])
         return np.append(v[:, 0], n * (n @ (v[:, 1] - v[:, 0])) / self.size)
 
+    def held_by_a_section(self, held: Sequence[int]) -> bool:
+        """False: of a body its motions are asked.
+
+        Parameters
+        ----------
+        held
+            Numbers of coordinates.
+        """
+        return False
+
     def rigid_motions(self, rows: Any = slice(None)) -> Array:
         """Two translations and the rotation about :attr:`origin`: shape (4, 3).
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import struct
-from ctypes import addressof, c_char
+import sys
+from ctypes import c_size_t
 from functools import cache
 from typing import get_type_hints
 
@@ -52,17 +53,29 @@ class Words:
 
 
 _KINDS = {"f": np.dtype(np.float64), "i": np.dtype(np.int64)}
-#: What empty arrays begin at: nothing is read there.
-_NOWHERE = np.zeros(1)
 
 
-def _address(x):
-    if not x.size:
-        x = _NOWHERE
-    try:
-        return addressof(c_char.from_buffer(x))  # four times faster
-    except TypeError:  # it may be read only
-        return x.__array_interface__["data"][0]
+def _asked(x):
+    """Where an array begins."""
+    return x.__array_interface__["data"][0]
+
+
+#: NumPy's arrays begin as every Python object does, and go on with the place of their numbers.
+_HEAD = object.__basicsize__
+
+
+def _read(x):
+    """The same, ten times faster, where arrays are laid out so."""
+    return c_size_t.from_address(id(x) + _HEAD).value
+
+
+def _is_there():
+    """True if they are: it is tried once."""
+    tried = np.zeros(3), np.zeros((2, 3))[1:]
+    return sys.implementation.name == "cpython" and all(_read(x) == _asked(x) for x in tried)
+
+
+_address = _read if _is_there() else _asked
 
 
 def _fill(x, out):

@@ -456,13 +456,18 @@ class ElementBeam(Frozen, Element):
             raise MeshError(f"the sections of {self!r} are {self.mesh_sections}, those of the "
                             f"curved mesh {mesh.sections}: use "
                             f"mesh.with_sections({self.mesh_sections!r})")
-        zero = np.zeros(mesh.p.shape)
-        known = {(1, 0): mesh.p_X, (0, 1): mesh.p_Y, (1, 1): mesh.p_XY}
+        known = {(1, 0): mesh.p_X, (0, 1): mesh.p_Y}
+        if mesh.p_XY is not None:
+            known[1, 1] = mesh.p_XY
         if mesh.p_XY is not None and not mesh.is_straight:
             more = dict(enumerate(nodal_derivatives(mesh, max(2, *self._along))[2:], 2))
             known |= {(k, 0): d for k, d in more.items()}
             known |= {(k - 1, 1): turned(d) for k, d in more.items() if k > 2}
-        return np.array([known.get(f[1:], zero) for f in self.functionals])
+        out = np.zeros((self.nodal_dofs, *mesh.p.shape))
+        for k, (_, along, across) in enumerate(self.functionals):
+            if (along, across) in known:
+                out[k] = known[along, across]
+        return out
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of order {self.order}, coordinates {self.dofnames}>"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from .contact_texts import (ANCHORED, ANCHORS, AUGMENT, DAMPING, DEPTH, FRICTION
                             stick, surface)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from ..types import Array
 
@@ -80,6 +80,9 @@ def taken_back(pose: Array, x: Array) -> Array:
     """
     turn = np.array([[pose[2], pose[3]], [-pose[3], pose[2]]])
     return turn @ (x - pose[4:6, None] - pose[:2, None]) + pose[4:6, None]
+
+#: For the time of it nothing is lent.
+NOTHING: AbstractContextManager[None] = nullcontext()
 
 
 class Contacts:
@@ -184,8 +187,7 @@ class Contacts:
         """True if an obstacle has friction."""
         return any(one.friction > 0.0 for one in self.obstacles)
 
-    @contextmanager
-    def lent(self, memory: Array | None = None) -> Iterator[None]:
+    def lent(self, memory: Array | None = None) -> AbstractContextManager[None]:
         """For the time of an evaluation points have the memory of a state.
 
         States own their memories; tables have one only while a state, or a way of steps, asks
@@ -197,9 +199,10 @@ class Contacts:
         memory
             What :meth:`remember` gave, shape (n,), or None: no anchors, no reach.
         """
-        if not self.obstacles:
-            yield
-            return
+        return self._lent(memory) if self.obstacles else NOTHING
+
+    @contextmanager
+    def _lent(self, memory):
         before = self.tables.memory.copy()
         try:
             self.put_back(memory)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from os import urandom
 from typing import TYPE_CHECKING, Any
-from uuid import uuid4
 
 import numpy as np
 
@@ -458,7 +458,8 @@ def bind_joint(joint: Joint, scene: Scene) -> Joint:
         If the joint does not keep to the interface of :class:`Joint`.
     """
     # by which it is known again: in a bound copy, on another mesh, in another process
-    vars(joint).setdefault("_key", uuid4().hex)
+    if "_key" not in vars(joint):
+        vars(joint)["_key"] = urandom(16).hex()
     bound = joint._unsealed()
     try:
         bound.bind(scene)

@@ -315,9 +315,9 @@ def scaled_pair_tables(table: Array, rows: Array, columns: Array, pairs: Array, 
         As there, shapes (2, p) and (0, 1 or elements, 2 nb, 2 nb).
     """
     unit, ends = _unit_pairs(Content(table, pairs))
-    (a, b), (c, d), of_pair = unit.lower, unit.strictly, rows[pairs[0]] * rows[pairs[1]]
-    symmetric = unit.symmetric * of_pair * (columns[a] * columns[b])[:, None]
-    skew = unit.skew * of_pair[ends] * (columns[c] * columns[d])[:, None]
+    of_pair = rows[pairs].prod(axis=0)
+    symmetric = unit.symmetric * (columns[unit.lower].prod(axis=0)[:, None] * of_pair)
+    skew = unit.skew * (columns[unit.strictly].prod(axis=0)[:, None] * of_pair[ends])
     if len(constant):
         held, held_skew, place = _held(_places(len(columns)), constant, len(columns), elements)
     else:
@@ -625,6 +625,10 @@ class Chain:
         out = np.zeros(self.N, dtype=force.dtype) if out is None else out
         nodes, t = out.reshape(-1, self.nd), self.t[:, elements]
         parts = force.reshape(t.shape[1], 2, self.nd)
+        if t.shape[1] == len(nodes) - 1:  # one chain
+            nodes[:-1] += parts[:, 0]
+            nodes[1:] += parts[:, 1]
+            return out
         nodes[t[0]] += parts[:, 0]  # a node is the left end of one element at most
         nodes[t[1]] += parts[:, 1]
         return out

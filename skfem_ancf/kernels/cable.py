@@ -292,9 +292,6 @@ def cable_energy(pack: CablePack, u: Array, out: Array) -> None:
     add_held_energy(pack, u, out)
 
 
-#: The middle of an element, and the first element.
-_MIDDLE, _FIRST = np.array([0.5]), np.zeros(1, int)
-
 CABLES = Texts(2, cable_evaluate, cable_energy)
 
 
@@ -303,6 +300,12 @@ def _pairs(n):
     """Pairs (a, a), (a, b) and (b, b) of the rows of n points, a before b; shape (2, 3 n)."""
     p = np.arange(n)
     return read_only(np.array([np.concatenate([p, p, n + p]), np.concatenate([p, n + p, n + p])]))
+
+
+@lru_cache(64)
+def _powers(m):
+    """Of the length that the functions of m coordinates a node take; shape (2 m,)."""
+    return read_only(np.tile(np.arange(float(m)), 2))
 
 
 def _has_alone(t):
@@ -417,11 +420,11 @@ class CableKernel(Chain):
         1."""
         ne, nd, L, w = mesh.nelements, self.nd, float(mesh.lengths[0]), gauss(n)[1]
         unit, pairs = element.derivatives_at_gauss_points(n), _pairs(n)
-        columns = L ** np.arange(nd // 2)
-        columns, rows = np.concatenate([columns, columns]), np.repeat((1.0 / L, L**-2), n)
-        table = unit * columns * rows[:, None]
-        EA, ES, EI = across.moments(_MIDDLE, _FIRST)[:, 0]
-        self.volume = float(across.moments(_MIDDLE, _FIRST, "area")[0, 0, 0] * mesh.lengths.sum())
+        columns, rows = L ** _powers(nd // 2), np.empty(2 * n)
+        rows[:n], rows[n:] = 1.0 / L, 1.0 / L**2
+        table = unit * (rows[:, None] * columns)
+        EA, ES, EI = across.simple_moments()
+        self.volume = across.simple_moments("area")[0] * float(mesh.lengths.sum())
         e = (mesh.p[:, 1] - mesh.p[:, 0]) / L
         frame, stiffness = np.zeros((2 * n, 2, 1)), np.empty((3, n, 1))
         frame[:n, :, 0], zeros = e, np.zeros(ne, np.int64)
@@ -430,7 +433,7 @@ class CableKernel(Chain):
         return CablePack(
             table[None], np.ascontiguousarray(table.T)[None], frame,
             np.full((n, 1), np.hypot(e[0], e[1])), np.zeros((n, 1)), (w * L)[:, None], zeros,
-            zeros, stiffness, packed(constant), packed(mesh.t[0] * nd, np.int64),
+            zeros, stiffness, packed(constant), mesh.t[0].astype(np.int64) * nd,
             np.arange(2 * nd), scaled_pair_tables(unit, rows, columns, pairs, constant, ne))
 
     def in_proportion(self, across: "Across", stiffness: float, volume: float) -> "CableKernel":

@@ -357,14 +357,12 @@ class Across(Frozen):
         ndarray
             Shape (3, nelements, npoints).
         """
-        mapping = self.mesh.mapping()
         ne, n = self.mesh.nelements if tind is None else len(tind), xi.shape[-1]
         if self.simple:
-            slab, h = self.slabs[0], self.mesh.height
-            size = slab.width * h * (1.0 if what == "area" else self.density(slab, xi)
-                                     if what == "mass" else getattr(slab.material, _MODULI[what]))
-            return np.broadcast_to(np.array([[[size]], [[0.0]], [[size * h**2 / 12.0]]]),
-                                   (3, ne, n))
+            found = np.empty((3, ne, n))
+            found[0], found[1], found[2] = self.simple_moments(what)
+            return found
+        mapping = self.mesh.mapping()
         out = np.zeros((3, ne, n))
         for slab, (eta, w) in self.rules(POINTS, what == "mass"):
             X = np.array(np.broadcast_arrays(np.repeat(xi, len(eta), -1), np.tile(eta, n)))
@@ -380,6 +378,19 @@ class Across(Frozen):
             out += np.array([np.sum(size * y**k, axis=-1) for k in range(3)])
         out[1, np.abs(out[1]) <= 1e-13 * np.sqrt(out[0] * out[2])] = 0.0  # as symmetric as it is
         return out
+
+    def simple_moments(self, what: str = "stiffness") -> tuple[float, float, float]:
+        """The numbers of :meth:`moments` where :attr:`simple` says that they are the same all over.
+
+        Parameters
+        ----------
+        what
+            As there.
+        """
+        slab, h = self.slabs[0], self.mesh.height
+        size = slab.width * h * (1.0 if what == "area" else self.density(slab, _NOWHERE)
+                                 if what == "mass" else getattr(slab.material, _MODULI[what]))
+        return size, 0.0, size * h**2 / 12.0
 
     @cached_property
     def bending(self) -> Array:
@@ -402,5 +413,6 @@ class Across(Frozen):
         return float(np.min(self.bending[:, None] / mass))
 
 
+_NOWHERE = np.zeros((2, 0))
 _MODULI = {"stiffness": "axial_modulus", "E": "E"}
 _NAMES = {"width": "width", "grade": "E", "density": "density"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -90,6 +90,20 @@ class StaticResult:
     doubt: str = ""
     memory: Array | None = None
     astray: bool = False
+
+    def followed_by(self, record: LoadStep, **changes: Any) -> StaticResult:
+        """The result after a load step more.
+
+        Parameters
+        ----------
+        record
+            The load step.
+        **changes
+            What it has changed.
+        """
+        other = object.__new__(type(self))
+        vars(other).update(vars(self), steps=[*self.steps, record], **changes)
+        return other
 
     @property
     def iterations(self) -> int:
@@ -207,8 +221,9 @@ def _load_steps(system, u, memory, stable, steps, options, progress):
             u, multipliers, force = found
             contacts.settle(u, _acting(options, load)[1])
             # one assignment: who interrupts finds the old result or the new one
-            result = replace(result, u=u, multipliers=multipliers, force=force, load=load,
-                             steps=[*result.steps, record], memory=contacts.remember())
+            result = result.followed_by(
+                record, u=u, multipliers=multipliers, force=force, load=load,
+                memory=contacts.remember())
             cuts = 0
             logger.info("load %.6g converged in %d iterations", load, record.iterations)
             if record.iterations <= max(8, max_iterations // 3):
@@ -424,6 +439,7 @@ def _target(system, result, load, start):
         gap = (1.0 - load) * gap
     times = np.array([at])
     before = full if gap is not None else result.load
-    return Target(tables.static_factors(full), tables.static_factors(full, before), full, at,
-                  tables.offsets(times)[0], tables.slopes(times)[0],
+    factors = tables.static_factors(full)
+    return Target(factors, tables.static_factors(full, before) if tables.prestressed else factors,
+                  full, at, tables.offsets(times)[0], tables.slopes(times)[0],
                   np.zeros(system.N) if gap is None else gap, values - result.u[system.fixed])
