@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property, partial, wraps
+from functools import partial, wraps
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from .errors import (InputError, MeshError, NameUnknown, require_finite, require
 from .finder import Finder
 from .formulations import get_formulation
 from .frozen import Frozen, read_only
+from .kept import cached_property
 from .kinematics import KINEMATICS
 from .materials import Material, StVenantKirchhoff
 from .mesh import MeshBeam

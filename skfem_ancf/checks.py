@@ -95,13 +95,13 @@ class Screen:
             return
         first = accumulate((b.N for b in beams), initial=0)
         node = accumulate((b.N // b.nd for b in beams), initial=0)
-        x = np.concatenate([np.arange(n + 2, n + b.N, b.nd) for n, b in zip(first, beams)])
-        self._tangents = x[:, None] + np.arange(2)
-        self.start = np.concatenate([b.mesh.p_X[0] + 1j * b.mesh.p_X[1] for b in beams])
-        self._left, self._right = np.concatenate([n + b.mesh.t for n, b in zip(node, beams)], 1)
+        x = _joined([np.arange(n + 2, n + b.N, b.nd) for n, b in zip(first, beams)])
+        self._tangents = x[:, None] + _BOTH
+        self.start = _joined([b.mesh.p_X[0] + 1j * b.mesh.p_X[1] for b in beams])
+        self._left, self._right = _joined([n + b.mesh.t for n, b in zip(node, beams)])
         if len(self._left) == len(x) - 1:  # one chain
             self._left, self._right = slice(len(x) - 1), slice(1, len(x))
-        self.slender = np.concatenate([b.mesh.height / b.mesh.lengths for b in beams])
+        self.slender = _joined([b.mesh.height / b.mesh.lengths for b in beams])
         limits = [turning_limit(b) for b in beams]
         self._limit = limits[0] if len(set(limits)) == 1 else np.repeat(
             limits, [b.mesh.nelements for b in beams])
@@ -126,6 +126,13 @@ class Screen:
         # the largest curvature of an element is seldom more than twice its mean
         return (turn < self._limit).all(axis=-1) & (
             np.abs(r).min(axis=-1) - (turn * slender).max(axis=-1) > 1.1 * COMPRESSED)
+
+
+_BOTH = np.arange(2)
+
+
+def _joined(arrays):
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays, axis=-1)
 
 
 def warn_of(state: State, stacklevel: int) -> None:

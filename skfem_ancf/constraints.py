@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from .errors import InputError, SupportError, shown
 from .joints.base import Joint, same_joint
 from .joints.nodes import Nodes, chain_ends
 from .joints.settlements import HELD
+from .kept import cached_property
 from .rank import first_dependent, null_space, unit_rows
 from .rigid import RigidBody
 

@@ -1,7 +1,6 @@
 """The equations of a scene as tables that texts take."""
 
 from copy import copy
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,6 +11,7 @@ from .body import FlatBody, body_of, stress_size, viscous_body_of
 from .border import Border
 from .compiled.words import Words
 from .forces.texts import ForceTables
+from .kept import cached_property
 from .kernels.law import OWN, text_of, with_text
 from .kernels.moments import MomentPack
 from .kernels.section import SectionPack, linearised

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
 
 from .errors import MeshError
-from .kept import kept
+from .kept import cached_property, kept
 
 if TYPE_CHECKING:
     from .mesh import MeshBeam
@@ -65,6 +64,8 @@ class Finder:
         mesh = self.mesh
         if not mesh.is_straight:
             return None
+        if mesh.on_line:
+            return mesh.p[:, 0], mesh.p_X[:, 0], (mesh.s - mesh.s[0])[mesh.t]
         start, d = mesh.p[:, mesh.t[0, 0]], mesh.p_X[:, mesh.t[0, 0]]
         x, y = mesh.p - start[:, None]
         along, off = d[0] * x + d[1] * y, d[0] * y - d[1] * x

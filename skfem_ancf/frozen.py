@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import inspect
 from copy import copy
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .errors import ImmutableError, InputError, NameUnknown
+from .kept import cached_property
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

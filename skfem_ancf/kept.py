@@ -2,8 +2,21 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Hashable
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    cached_property = functools.cached_property
+else:
+    class cached_property(functools.cached_property):
+        """That of ``functools``, without the lock that it has before Python 3.12."""
+
+        def __get__(self, instance, owner=None):
+            if instance is None:
+                return self
+            value = vars(instance)[self.attrname] = self.func(instance)
+            return value
 
 
 def kept(store: dict, key: Hashable, make: Callable[[], Any], most: int = 32) -> Any:

@@ -6,7 +6,7 @@ import logging
 import time
 from contextlib import contextmanager
 from copy import copy
-from functools import cached_property, wraps
+from functools import wraps
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from . import compiled
 from .compiled.words import Kept
 from .equations import Tables
+from .kept import cached_property
 from .kernels.law import with_text
 from .kernels.section import SectionPack
 from .materials.followed import NotFollowed

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from math import factorial
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from skfem.mapping import Mapping
 
 from .errors import MeshError
+from .kept import cached_property
 from .nodal import nodal_derivatives, turned
 from .reference import SECTIONS, hermite_basis
 from .taper import powers

@@ -245,7 +245,7 @@ class MeshBeam(Frozen, Mesh2D):
         mesh._boundaries = mesh._build_default_tags()
         # of their definitions, which ask for more, this is left
         low, high = lengths.min(), lengths.max()
-        vars(mesh).update(_is_straight=True, _is_uniform=bool(
+        vars(mesh).update(_on_one_line=True, _is_straight=True, _is_uniform=bool(
             high - low <= 1e-13 * high + 8 * EPS * far), _sealed=True)
         return mesh
 
@@ -504,6 +504,11 @@ class MeshBeam(Frozen, Mesh2D):
     def param(self) -> float:
         """Length of the longest element."""
         return float(np.max(self.lengths))
+
+    @property
+    def on_line(self) -> bool:
+        """True if it was made as one straight line, with ``s`` the lengths along it."""
+        return hasattr(self, "_on_one_line")
 
     @property
     def is_straight(self) -> bool:

@@ -7,13 +7,13 @@ two numbers; many are an array of shape (2, n), as scikit-fem has them, or a lis
 from __future__ import annotations
 
 from collections import OrderedDict
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .beam import select_beam, select_member
 from .errors import InputError, MeshError, require_finite, shown
+from .kept import cached_property
 from .parts import BodyPart, Part
 from .places import as_point
 from .point import Point

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import sys
 from contextlib import AbstractContextManager, contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .errors import InputError, MissingExtra, shown
+
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 
 class _NoBar:
     def update(self, amount: float) -> None:
         """Nothing to show."""
 
-    def __enter__(self):
+    def __enter__(self) -> _NoBar:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         pass
 
 
@@ -43,7 +47,7 @@ def progress_bar(show: bool | None, total: float, desc: str) -> AbstractContextM
 
 
 @contextmanager
-def _bar(show, total, desc):
+def _bar(show: bool | None, total: float, desc: str) -> Iterator[Any]:
     """The bar, where one is wanted."""
     try:
         from tqdm import tqdm

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from .errors import InputError, NameUnknown, require_flag, shown, teaching
 from .eigenstrain import EigenStrain
 from .fields import Values, find_field
 from .frozen import Frozen
+from .kept import cached_property
 from .point import Point
 from .points import require_body
 from .raw import RawField

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from copy import copy
-from functools import cached_property, wraps
+from functools import wraps
 from itertools import accumulate
 from threading import RLock
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ from .dynamics.checkpoint import resume
 from .dynamics.integrate import follow, integrate
 from .dynamics.sensors import Sensor
 from .eigenstrain import EigenStrain, Temperature, products, require_alone, takes_time
+from .kept import cached_property
 from .obstacles import Obstacle
 from .forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring, TorsionalSpring,
                      bind_force)

@@ -4,13 +4,14 @@ follow from a table by products of matrices.
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebvander
 
 from .frozen import read_only
+from .kept import cached_property
 
 if TYPE_CHECKING:
     from collections.abc import Callable

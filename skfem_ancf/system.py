@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from functools import cached_property
 from itertools import accumulate, pairwise
 from math import sqrt
 from typing import TYPE_CHECKING, Any
@@ -24,6 +23,7 @@ from .evaluation import CARRY, FORCE, MEAN, TANGENT, VISCOUS, evaluate
 from .forces.system import Forces
 from .forces.texts import add_resisting_force
 from .joints.director import UnitDirector
+from .kept import cached_property
 from .linalg import INACCURATE, NO_FACTORS, BandMatrix, Inertia, dense
 from .machine import Machine
 from .pickling import functions_of, require_picklable

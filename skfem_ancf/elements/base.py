@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from skfem.element import DiscreteField, Element
 
 from ..errors import InputError, MeshError, shown
 from ..frozen import Content, Frozen, read_only
+from ..kept import cached_property
 from ..nodal import nodal_derivatives, turned
 from ..quadrature import gauss, tensor
 from ..reference import SECTIONS, RefBeam, hermite_basis

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import teaching
 from ..frozen import read_only
+from ..kept import cached_property
 from ..quadrature import gauss
 from ..reference import SECTIONS, hermite_basis
 from .base import DEGREES, ElementBeam, SectionFunctions, require_degree

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError, shown
 from ..frozen import Frozen
+from ..kept import cached_property
 from .base import Rectangle, asked
 from .shear import shear_factor
 
