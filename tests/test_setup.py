@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, NeoHookean,
-                        Scene, StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
+                        MeshBeam, MeshError, NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.elements import base
+from skfem_ancf.finder import Finder
 from skfem_ancf.kernels import cable, section
 from skfem_ancf.loads import EndMoment, PointForce, Pressure, Weight
 from skfem_ancf.system import System
@@ -38,7 +39,70 @@ def test_local_functions_are_made_once_a_process(monkeypatch, element):
     assert scene.solve_static().displacement((1.2, 0.0))[1] < 0
     assert not functions and not facets
     assert section._layout.cache_info().misses == layouts
-    assert "vector_element" not in vars(scene.beams[0]) and "basis" not in vars(scene.beams[0])
+    assert not {"vector_element", "basis", "inertia", "q0_local"} & set(vars(scene.beams[0]))
+
+
+@pytest.mark.parametrize("degree", [3, 5, 9])
+@pytest.mark.parametrize("n, angle", [(1, 0.0), (3, 0.7)])
+def test_tables_of_equal_elements_are_those_of_each(degree, n, angle):
+    beam = cantilever(ElementBeamCable(degree), n, 1.7, 0.02, angle=angle).beams[0]
+    kernel, across = beam.kernel, beam.across
+    (pack,), whole = kernel.packs, kernel._pack(beam.mesh, beam.element, across,
+                                                kernel.points_number)
+    for name in ("table", "transposed", "weights", "stiffness", "constant", "start", "span"):
+        a, b = getattr(pack, name), getattr(whole, name)
+        assert a.shape == b.shape and np.allclose(a, b, rtol=1e-13,
+                                                  atol=1e-13 * np.max(abs(b), initial=0.0))
+    for name in pack.pairs._fields:
+        a, b = getattr(pack.pairs, name), getattr(whole.pairs, name)
+        assert a.shape == b.shape and np.allclose(a, b, rtol=1e-12,
+                                                  atol=1e-13 * np.max(abs(b), initial=0.0))
+    for name in ("frame", "length0", "kappa0"):
+        assert np.allclose(getattr(pack, name), getattr(whole, name), rtol=0, atol=1e-14)
+    u = 1e-2 * np.random.default_rng(0).standard_normal(beam.N)
+    force = kernel.force(u)
+    kernel.packs = [whole]
+    assert np.allclose(force, kernel.force(u), rtol=0, atol=1e-11 * np.max(np.abs(force)))
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(3), ElementBeamCable(9), ElementBeamANCF(1),
+                                     ElementBeamANCF(3), ElementBeamANCFCubic(2)])
+def test_weights_are_the_integrals_of_the_functions(element):
+    beam = cantilever(element, 3, 1.7, 0.3, angle=0.4).beams[0]
+    found, g = beam.weight((2.0, -3.0)), np.array([2.0, -3.0])
+    load = np.broadcast_to(beam.inertia.weights(g), (3, 2 * element.nodal_dofs, 2))
+    assert np.allclose(found, beam.kernel.scatter(load), rtol=1e-12,
+                       atol=1e-13 * np.max(np.abs(found)))
+    total = found.reshape(-1, element.nodal_dofs, 2)[:, 0].sum(axis=0)  # on the positions
+    assert np.allclose(total, beam.total_mass * g, rtol=1e-12)
+
+
+@pytest.mark.parametrize("origin, angle", [((0.0, 0.0), 0.0), ((3e3, -1.0), 0.7)])
+@pytest.mark.parametrize("x", [[0.0, 0.5], [0.5, 1.0, 1.5, 2.0], [0.0, 0.3, 1.0]])
+def test_a_line_is_the_mesh_that_its_nodes_make(x, origin, angle):
+    mesh = MeshBeam.init_line(x, 0.1, origin=origin, angle=angle)
+    anew = MeshBeam(mesh.p, mesh.t, height=0.1)
+    for name in ("p", "t", "p_X", "p_Y", "p_XY", "lengths"):
+        a, b = getattr(mesh, name), getattr(anew, name)
+        assert a.dtype == b.dtype and np.allclose(a, b, rtol=0, atol=1e-12) and (
+            not a.flags.writeable)
+    assert mesh.is_straight and anew.is_straight and mesh.is_uniform == anew.is_uniform
+    assert np.allclose(mesh.parameters, x)
+    point = mesh.p @ np.full(len(x), 1.0 / len(x)) + 0.03 * mesh.p_Y[:, 0]
+    (e, xi, eta), other = (Finder(m).one(*point) for m in (mesh, anew))
+    assert e == other[0] and np.allclose((xi, eta), other[1:], rtol=0, atol=1e-9)
+    with pytest.raises(MeshError, match="no length"):
+        MeshBeam.init_line([0.0, 1e-14], 0.1, origin=(3e3, 0.0))
+
+
+def test_supports_by_a_section_are_those_that_hold_motions():
+    beam = cantilever(ElementBeamANCF(2), 3, angle=0.3).beams[0]
+    for held in ([0, 1, 2], [0, 1, 5], [0, 1, 4, 7], [8, 9, 11], [0, 2, 9], [0, 1], [0, 8, 16],
+                 [0, 1, 6]):
+        rank = np.linalg.matrix_rank(beam.rigid_motions()[held], tol=1e-6)
+        assert np.array_equal(beam.rigid_motions(np.array(held)), beam.rigid_motions()[held])
+        assert rank == 3 or not beam.held_by_a_section(held)
+    assert beam.held_by_a_section([0, 1, 2]) and beam.held_by_a_section([8, 9, 12])
 
 
 def test_a_tapered_beam_has_slopes_of_its_height():
@@ -93,14 +157,15 @@ def test_a_replaced_material_is_that_of_a_scene_built_anew(element, angle, name,
 def test_a_replaced_material_keeps_tables(monkeypatch, element):
     scene = cantilever(element(), 16, E=2e8)
     state = scene.solve_static()
-    beam, mass = scene.beams[0], scene.beams[0].inertia
+    beam = scene.beams[0]
+    mass, start = beam.inertia, beam.q0_local
     tables = [counted(monkeypatch, module, "pair_tables") for module in (section, cable)]
     rows, asked = counted(monkeypatch, section, "_rows"), counted(
         monkeypatch, base.ElementBeam, "functions")
     changed = scene.replace(material=beam.material.replace(E=2.02e8))
     new = changed.solve_static(start=state)
     assert not tables[0] and not tables[1] and not rows and not asked
-    assert changed.beams[0].q0_local is beam.q0_local
+    assert changed.beams[0].q0_local is start
     assert changed.beams[0].inertia is mass
     assert state.iterations >= 6 and new.iterations <= 3
     assert np.allclose(new.u, changed.solve_static().u, rtol=0, atol=1e-9)
