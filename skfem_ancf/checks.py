@@ -120,7 +120,7 @@ class Screen:
             return True
         start = self.start if start is None else start
         slender = self.slender if slender is None else slender
-        r = u[..., self._tangents].view(complex)[..., 0] / start + 1.0
+        r = np.ascontiguousarray(u[..., self._tangents]).view(complex)[..., 0] / start + 1.0
         z = r[..., self._right] * r[..., self._left].conj()
         turn = np.abs(np.arctan2(z.imag, z.real))
         # the largest curvature of an element is seldom more than twice its mean
