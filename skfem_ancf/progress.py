@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import TYPE_CHECKING, Any
 
 from .errors import InputError, MissingExtra, shown
@@ -17,14 +17,8 @@ class _NoBar:
     def update(self, amount: float) -> None:
         """Nothing to show."""
 
-    def __enter__(self) -> _NoBar:
-        return self
 
-    def __exit__(self, *_: object) -> None:
-        pass
-
-
-NO_BAR = _NoBar()
+NO_BAR = nullcontext(_NoBar())
 
 
 def progress_bar(show: bool | None, total: float, desc: str) -> AbstractContextManager[Any]:
@@ -54,7 +48,7 @@ def _bar(show: bool | None, total: float, desc: str) -> Iterator[Any]:
     except ImportError:
         if show:
             raise MissingExtra("tqdm", "progress") from None
-        yield NO_BAR
+        yield _NoBar()
         return
     with tqdm(total=total, desc=desc, delay=0.0 if show else 1.0,
               bar_format="{l_bar}{bar}| {n:.3g}/{total:.3g} [{elapsed}]") as bar:
