@@ -140,7 +140,7 @@ class Constraints:
             values[:, first:first + len(factors)] = -joint.offset(times, self.N) / factors
         return values
 
-    @property
+    @cached_property
     def moves(self) -> bool:
         """True if a fixed coordinate has a displacement that is not zero, now or later."""
         return bool(self._moving) or bool(np.any(self.given + self._held))

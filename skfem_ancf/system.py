@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .beam import Beam
+    from .dynamics.integrator import Integrator
     from .forces.base import ForceElement
     from .joints.base import Joint
     from .loads import Load
@@ -401,10 +402,18 @@ class System:
         t
             Time, for obstacles that move; in statics the load factor.
         """
-        energy = sum(b.kernel.energy(u[s]) for b, s in zip(self.beams, self.slices))
+        energy = self._energy_of_beams(u) if np.any(u) else self._energy_at_rest
         if self.forces.elements:
             energy += self.forces.potential(self.machine.tables.plain.forces, u, t)
         return float(energy)
+
+    def _energy_of_beams(self, u):
+        return sum(b.kernel.energy(u[s]) for b, s in zip(self.beams, self.slices))
+
+    @cached_property
+    def _energy_at_rest(self):
+        """That of beams that are not displaced: they may be too warm."""
+        return self._energy_of_beams(np.zeros(self.N))
 
     def load_potential(self, u: Array, t: float | None = None) -> float:
         """Potential of the loads; loads without one count as zero.
@@ -622,6 +631,11 @@ class System:
         return x - Y @ multipliers, multipliers
 
     # tangent
+
+    @cached_property
+    def integrators(self) -> list[Integrator]:
+        """Those of motions that have ended, whose work arrays the next one takes."""
+        return []
 
     def new_band(self) -> BandMatrix:
         """An empty band matrix of the scene."""

@@ -93,9 +93,12 @@ class Scheme:
         The error that a step adds to the displacement is about this number times dt^(order + 1)
         times the derivative of it of that order: for order 2, times dt^2 times the change of the
         acceleration.
+    text : str
+        The text of its steps.
     """
 
     name = ""
+    text = "steps"
     order = 2
     tol = 1e-9
     parameters: tuple[float, ...] = (0.0, 0.0, 0.25, 0.5)
@@ -199,3 +202,8 @@ class Scheme:
 def in_steps(scheme: Scheme) -> bool:
     """True of a scheme whose steps are those of :mod:`skfem_ancf.dynamics.steps`."""
     return type(scheme).step is Scheme.step
+
+
+def same_scheme(a: Scheme, b: Scheme) -> bool:
+    """True of schemes of one class with the same numbers."""
+    return type(a) is type(b) and repr(vars(a)) == repr(vars(b))

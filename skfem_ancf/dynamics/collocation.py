@@ -39,6 +39,8 @@ class _Tableau:
 
     Attributes
     ----------
+    ends
+        The points, and 1, shape (n + 1,).
     method
         Its :class:`~skfem_ancf.dynamics.stages.Method`.
     fit
@@ -50,7 +52,7 @@ class _Tableau:
 
     def __init__(self, points: Array) -> None:
         c, n = points, len(points)
-        self.points = c
+        self.points, self.ends = c, np.append(c, 1.0)
         k = np.arange(1, n + 1)
         inverse = np.linalg.inv(np.vander(c, increasing=True))
         A, weights = (c[:, None]**k / k) @ inverse, (1.0 / k) @ inverse
@@ -110,6 +112,7 @@ class Collocation(Scheme):
     """
 
     tol = 1e-12
+    text = "collocate"
     #: What is added to the estimated error, as a factor, for what steps do not resolve.
     safety = 1.0
 
@@ -191,15 +194,17 @@ class Collocation(Scheme):
     def run(self, integrator: Integrator, y: Motion, dt: float, n: int,
             start: float | None = None, first: int = 0,
             block: tuple[int, int] | None = None) -> tuple[int, Callable[[int], Motion]]:
-        s, method, w = integrator.system, self._table.method, self._room(integrator)
+        s, table = integrator.system, self._table
+        method, w = table.method, self._room(integrator, table)
         begun = y.t if start is None else start
         block = (first, first + n) if block is None else block
         w.y[:2], w.first[:] = (y.u, y.v), y.multipliers
         w.guess[:] = 0.5 * (dt * method.points[:, None])**2 * y.acceleration
         if y.memory:
             w.U[:], w.before[:], w.first[:] = (y.memory[k] for k in ("stages", "start", "forces"))
-        given = self._given(integrator, begun, dt, first, n, block)._replace(
-            begun=int(bool(y.memory)), ahead=self._table.ahead(dt / y.before if y.memory else 1.0))
+        given = self._given(integrator, table, begun, dt, first, n, block)
+        if y.memory:
+            given = given._replace(begun=1, ahead=table.ahead(dt / y.before))
         rows, stages = np.empty((n, 3, s.N)), np.empty((n, len(method.points), s.N))
         forces, works = np.empty((n, len(method.points) + 1, s.m)), np.empty(n)
         done = integrator.call(collocate, y, dt, integrator.rule, given, w, integrator.state,
@@ -215,9 +220,9 @@ class Collocation(Scheme):
 
         return done, motion
 
-    def _room(self, integrator):
+    def _room(self, integrator, table):
         """Work arrays, in which factors are kept from step to step."""
-        table, s, kept = self._table, integrator.system, integrator.kept
+        s, kept = integrator.system, integrator.kept
         if integrator.room is None:
             M, size = s.mass.band, s.machine.tables.stresses.size
             integrator.room = room_for_points(table.method, s.N, s.m, size,
@@ -229,12 +234,14 @@ class Collocation(Scheme):
             kept[name] = getattr(w, name)
         return w
 
-    def _given(self, integrator, start, dt, first, n, block):
+    def _given(self, integrator, table, start, dt, first, n, block):
         """What is given of some steps of a block, whose functions of time are asked at once."""
-        key, points = (start, dt, block, integrator.limit), len(self._table.method.points) + 1
+        key, points = (start, dt, block, integrator.limit), len(table.method.points) + 1
         if integrator.asked[0] != key:
-            integrator.asked = key, self._interval(integrator, *key)
+            integrator.asked = key, self._interval(integrator, table, *key)
         whole = integrator.asked[1]
+        if block[1] - block[0] == n:
+            return whole
         part = slice((first - block[0]) * points, (first - block[0] + n) * points)
 
         def rows(x):
@@ -244,23 +251,24 @@ class Collocation(Scheme):
             times=whole.times[part], factors=rows(whole.factors), held=rows(whole.held),
             joints=JointMotions(rows(whole.joints.c), rows(whole.joints.g), whole.joints.drives))
 
-    def _interval(self, integrator, start, dt, block, limit):
+    def _interval(self, integrator, table, start, dt, block, limit):
         """What is given of a block of steps."""
-        s, table, h, steps = integrator.system, self._table, float(dt), np.arange(*block)[:, None]
-        times = start + h * (steps + np.append(table.method.points, 1.0)).ravel()
+        s, h, steps = integrator.system, float(dt), np.arange(*block)[:, None]
+        times = start + h * (steps + table.ends).ravel()
         times = np.minimum(times, limit)  # before what jumps at the end
-        at = np.minimum(start + h * (steps + table.samples).ravel(), limit)
         tables = s.machine.tables
 
         def moving(function):
             """Values at the times, and both rates, shape (number of times, 3, ...)."""
+            at = np.minimum(start + h * (steps + table.samples).ravel(), limit)
             samples = function(at).reshape(len(steps), len(table.samples), -1)
             first, second = np.einsum("kps,rsx->krpx", table.rates, samples).reshape(
                 2, len(times), -1)
             return np.stack([function(times), first / h, second / h**2], axis=1)
 
-        held = np.zeros((len(times) if s.moves else 1, 3, s.N))
-        if s.moves:
+        moves = s.moves
+        held = np.zeros((len(times) if moves else 1, 3, s.N))
+        if moves:
             held[:, :, s.fixed] = moving(s.values_at)
         joints, drives = tables.plain.joints, int(tables.motion_varies)
         c, g = np.zeros((1, 3, s.m)), np.zeros((1, 4, len(joints.gk)))

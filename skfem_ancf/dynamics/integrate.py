@@ -12,7 +12,7 @@ from ..errors import (AncfError, ConvergenceError, InputError, Interrupted, Mode
                       shown, taught)
 from ..progress import progress_bar
 from .checkpoint import Checkpoint, same_problem
-from .base import in_steps
+from .base import in_steps, same_scheme
 from .integrator import Integrator, StepFailed
 from .run import Run, Task
 
@@ -184,9 +184,11 @@ def _task(t_start, t_end, dt, t_eval, tol, rtol, breakpoints):
     rtol = require_positive("rtol", rtol)
     if rtol < MIN_RTOL:
         raise InputError(f"rtol must be at least {MIN_RTOL:g}, got {rtol!r}")
-    breaks = np.unique(require_finite("breakpoints", np.atleast_1d(breakpoints), (None,)))
-    inside = (breaks > t_start + 1e-9 * span) & (breaks < t_end - 1e-9 * span)
-    return Task(t_start, t_end, dt, tol, rtol, t_eval, tuple(breaks[inside].tolist()))
+    inside = []
+    if len(breakpoints):
+        breaks = np.unique(require_finite("breakpoints", breakpoints, (None,)))
+        inside = breaks[(breaks > t_start + 1e-9 * span) & (breaks < t_end - 1e-9 * span)].tolist()
+    return Task(t_start, t_end, dt, tol, rtol, t_eval, tuple(inside))
 
 
 def _require_step(t_start, t_end, step):
@@ -211,8 +213,8 @@ def _contacts_at(start, system):
 def _goes_on(system, scheme, start, t):
     """True if an instant is one of the same motion: same scheme, same scene."""
     made_by, _ = start._origin
-    return (not system.forces.sampled and type(made_by) is type(scheme)
-            and repr(vars(made_by)) == repr(vars(scheme)) and same_problem(system, start, t))
+    return (not system.forces.sampled and same_scheme(made_by, scheme)
+            and same_problem(system, start, t))
 
 
 def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = None) -> History:
@@ -253,6 +255,7 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
                           "state is the History up to there", history.close()) from None
     body.warn()
     _warn_of_turns(history.close())
+    run.give_back()
     return history
 
 
@@ -280,6 +283,8 @@ class _Body:
 def _warn_of_turns(history):
     """Give a ModelWarning where a torsional spring has passed the angle up to which it is one."""
     turns = history.system.forces.turns(history.u)
+    if not len(turns):
+        return
     jumps = np.nonzero(np.any(np.abs(np.diff(turns, axis=1)) > 1.5 * np.pi, axis=0))[0]
     if len(jumps):
         warnings.warn(f"at t = {history.t[jumps[0] + 1]:.6g} a torsional spring has turned by more "

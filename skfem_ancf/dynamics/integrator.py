@@ -11,7 +11,7 @@ from ..band import Band, factorize, fix
 from ..eliminated import Eliminated, EliminatedMass
 from ..errors import InputError, SupportError, require_positive, shown
 from ..own import handle_of
-from .base import Motion, contacts_of, in_steps
+from .base import Motion, contacts_of, in_steps, same_scheme
 from .course import Courses
 from .rates import rates
 from .dampers import Dampers, Rows, solve_rows
@@ -30,6 +30,9 @@ logger = logging.getLogger(__name__)
 DEPTH = 6  # how often a step is halved
 #: Steps of a block at most, and numbers that they may store.
 BLOCK, STORED = 256, 2_000_000
+#: Coordinates up to which work arrays are kept for the next motion: there making them takes longer
+#: than some steps.
+LENT = 1000
 
 
 class StepFailed(Exception):
@@ -70,20 +73,14 @@ class Integrator:
         scheme.require(system)
         if not scheme.conserving:
             system.forces.contacts.require_penalty(scheme)
-        self.system, self.scheme, self.limit = system, scheme, np.inf
-        self.tol = scheme.tol if tol is None else require_positive("tol", tol)
-        if self.tol >= 1.0:
-            raise InputError(f"tol is the error of a step's iteration, relative: less than 1, and "
-                             f"1e-6 is coarse already; got {shown(tol)}")
-        alpha_m, alpha_f, beta, gamma = map(float, scheme.parameters)
+        self.system = system
         M, A = system.mass.band, system.new_band()
         self.matrices = Matrices(M, _copy(M), A.band, *_damping(system))
         self._nodes: tuple[Eliminated, EliminatedMass] | None = None
         if in_steps(scheme) and system.by_nodes:
             self._nodes = Eliminated(system, A), EliminatedMass(system)
-        handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
-        self.rule = Rule(int(scheme.conserving), alpha_m, alpha_f, beta, gamma, self.tol,
-                         8.0 * system.stiffness_scale, *handles)
+        self._state, self.room = np.zeros(STATE), None
+        self._begin(scheme, tol)
         fix(self.matrices.mass, system.mask)
         if not factorize(self.matrices.mass):
             if system.forces.masses:
@@ -92,13 +89,47 @@ class Integrator:
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
         self._work = room_for_steps(system.N, system.m, system.machine.tables.stresses.size,
                                     0 if self._nodes else system.m)
-        self._courses = Courses(system, scheme.conserving)
-        self._state, self._dt, self.substeps, self._lost = np.zeros(STATE), np.nan, 0, ""
         numbers = 4 * system.N + system.forces.contacts.tables.memory.size
         self.longest = int(np.clip(STORED // numbers, 1, BLOCK))
+
+    def _begin(self, scheme, tol):
+        """As if nothing had been integrated yet."""
+        self.scheme, self.limit, system = scheme, np.inf, self.system
+        self.tol = scheme.tol if tol is None else require_positive("tol", tol)
+        if self.tol >= 1.0:
+            raise InputError(f"tol is the error of a step's iteration, relative: less than 1, and "
+                             f"1e-6 is coarse already; got {shown(tol)}")
+        handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
+        self.rule = Rule(int(scheme.conserving), *map(float, scheme.parameters), self.tol,
+                         8.0 * system.stiffness_scale, *handles)
+        self._courses = Courses(system, scheme.conserving)
+        self._state[:], self._dt, self.substeps, self._lost = 0.0, np.nan, 0, ""
         self.kept: dict[str, Array] = {}
-        self.room: Any = None
         self.asked: Any = None, None
+
+    @classmethod
+    def lent(cls, system: System, scheme: Scheme, tol: float | None = None) -> Integrator:
+        """One with the work arrays of a motion that has ended, if there is one.
+
+        Parameters
+        ----------
+        system, scheme, tol
+            As of the class.
+        """
+        free = system.integrators
+        try:
+            integrator = free.pop()
+        except IndexError:
+            return cls(system, scheme, tol)
+        if same_scheme(integrator.scheme, scheme):
+            integrator._begin(scheme, tol)
+            return integrator
+        return cls(system, scheme, tol)
+
+    def give_back(self) -> None:
+        """Its motion has ended: its work arrays are for another one, where they are small."""
+        if self._nodes is None and self.system.N <= LENT and len(self.system.integrators) < 2:
+            self.system.integrators.append(self)
 
     @property
     def iterations(self) -> int:
@@ -187,7 +218,7 @@ class Integrator:
         y = Motion(t, u.copy(), v.copy(), np.zeros(s.N), np.zeros(s.N),
                    np.zeros(s.m))
         y.u[s.fixed] = s.values(1.0, t)
-        gap = np.max(np.abs(s.constraint(y.u, t)), initial=0.0)
+        gap = np.max(np.abs(s.constraint(y.u, t))) if s.m else 0.0
         if gap > 1e-8 * s.size:
             raise SupportError(f"the joints are open by {gap:.3g} at the start: begin with beams "
                                "that fit, or from a static solution (start=)")

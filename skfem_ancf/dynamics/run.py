@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 CLOSE = 1e-6
 #: Seconds after which a block of steps is to be seen: by a progress bar, and on Ctrl-C.
 SHOWN = 0.2
+#: Coordinates times steps of the first block, compiled: some hundredths of a second.
+FIRST = 10_000
 #: Part of a step up to which the acceleration is interpolated, for the same reason.
 NEAR = 0.1
 #: Part of a step to which an event is found.
@@ -97,7 +99,7 @@ class Run:
     def __init__(self, system: System, scheme: Scheme, task: Task,
                  sensors: Sequence[tuple[str, Sensor]] = ()) -> None:
         self.system, self.scheme, self.task = system, scheme, task
-        self.integrator = Integrator(system, scheme, task.tol)
+        self.integrator = Integrator.lent(system, scheme, task.tol)
         self._side: Integrator | None = None
         self.sizes = None
         if task.dt is None:
@@ -112,7 +114,7 @@ class Run:
         self.until: Callable[[State], float] | None = None
         self.event: float | None = None
         self._value: float | None = None
-        self._in_blocks, self._pace = scheme.in_blocks(system), 1
+        self._in_blocks, self._pace = scheme.in_blocks(system), self._first_pace()
         self._limit()
 
     # the start
@@ -157,9 +159,20 @@ class Run:
             self.history.append(self.y)
             self._next = 1
 
+    def _first_pace(self):
+        """Steps of the first block."""
+        loaded = self.system.machine.choose(self.scheme.text).way == "loaded"
+        return max(1, FIRST // self.system.N) if loaded else 1
+
     def _first_step(self):
         """Size of the first step of a segment."""
         return min(self.size, self._end - self._begun)
+
+    def give_back(self) -> None:
+        """Leave the work arrays to the next motion: this one has ended."""
+        for one in (self.integrator, self._side):
+            if one is not None:
+                one.give_back()
 
     # segments between breakpoints
 
@@ -239,7 +252,7 @@ class Run:
             self._in_blocks = False
             return 0, None
         took = perf_counter() - begun
-        self._pace = max(1, min(size, 2 * number, int(SHOWN * number / took)))
+        self._pace = max(1, min(size, 4 * number, int(SHOWN * number / took)))
         return done, motion
 
     def _time(self, n):
@@ -354,7 +367,7 @@ class Run:
         if s < CLOSE:
             return interpolate(old, new, t)
         if self._side is None:
-            self._side = Integrator(self.system, self.scheme, self.task.tol)
+            self._side = Integrator.lent(self.system, self.scheme, self.task.tol)
         side = self._side
         side.forget()
         side.expect(self.integrator.energy)
