@@ -240,7 +240,9 @@ class Integrator:
         acceleration, y.multipliers = s.solve_mass(force, y.u, t, rate)
         y.acceleration = y.acceleration + acceleration
         y.algorithmic, y.force = y.acceleration.copy(), y.multipliers
-        self.expect(max(float(0.5 * y.v @ s.mass.multiply(y.v)), s.strain_energy(y.u, t)))
+        soon = y.v + dt * y.acceleration  # from rest there is no energy yet
+        self.expect(max(float(0.5 * v @ s.mass.multiply(v)) for v in (y.v, soon)))
+        self.expect(s.strain_energy(y.u, t))
         return y
 
     def expect(self, energy: float) -> None:

@@ -221,7 +221,9 @@ def _converges(e, matrices, method, rule, s, w, state, step):
     rough = round_off(rule, 1.0, largest, abs(np.dot(u0, room)))
     wanted = rule.tol * np.sqrt(state[ENERGY]) + rough
     state[FRESH], state[SIZE] = 0.0, -1.0
-    _start(e.body, w, state)
+    if state[MIXED] > 0.0:
+        state[READY] = 0.0  # old ones have turned the beam
+    _start(e.body, method, s, w, state, step)
     for _ in range(ITERATIONS):
         _states(e.free, method, s, w, step)
         if state[READY] == 0.0:
@@ -241,7 +243,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
                 body_carry(e.body, w.origin, w.R[k], w.own[k], w.carried[k])
         told = judged(state, wanted, rough, REUSED, CARRIED)
         if told == ASTRAY:
-            _start(e.body, w, state)
+            _start(e.body, method, s, w, state, step)
         elif told != GO_ON:
             break
     _states(e.free, method, s, w, step)
@@ -337,14 +339,23 @@ def _meet(mass, free, w, x):
 
 
 @source
-def _start(body, w, state):
-    """Where it begins."""
+def _start(body, method, s, w, state, step):
+    """Where it begins; with carried stresses by the mean acceleration of the step before.
+
+    A polynomial through points where a stiff beam vibrates leads far away.
+    """
     for k in range(w.Z.shape[0]):
         copy(w.guess[k], w.Z[k])
         copy(w.first[k], w.l[k])
     if state[MIXED] > 0.0:
         for k in range(w.Z.shape[0]):
             body_stress(body, w.y[0], w.carried[k])
+        if step > 0 or s.begun > 0:
+            v0, v = w.y[1], w.before[1]
+            for k in range(w.Z.shape[0]):
+                Z, c = w.Z[k], 0.5 * (s.h * method.points[k])**2 / state[BEFORE]
+                for i in lanes(v.size):
+                    Z[i] = c * (v0[i] - v[i])
 
 
 @source
