@@ -79,7 +79,8 @@ class Integrator:
         self._nodes: tuple[Eliminated, EliminatedMass] | None = None
         if in_steps(scheme) and system.by_nodes:
             self._nodes = Eliminated(system, A), EliminatedMass(system)
-        self._state, self.room = np.zeros(STATE), None
+        self._state = np.zeros(STATE)
+        self.room: Any = None
         self._begin(scheme, tol)
         fix(self.matrices.mass, system.mask)
         if not factorize(self.matrices.mass):
