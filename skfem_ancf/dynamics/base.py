@@ -205,5 +205,11 @@ def in_steps(scheme: Scheme) -> bool:
 
 
 def same_scheme(a: Scheme, b: Scheme) -> bool:
-    """True of schemes of one class with the same numbers."""
+    """True of schemes of one class with the same numbers.
+
+    Parameters
+    ----------
+    a, b
+        The schemes.
+    """
     return type(a) is type(b) and repr(vars(a)) == repr(vars(b))
