@@ -90,7 +90,7 @@ def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[i
     strain
         To start from, shape (3, ..., n, m); components not in ``unknown`` keep their values.
     unknown
-        Components to find.
+        Components to find, neighbours.
     tol
         Largest difference of the stress of a field, relative to its largest value.
 
@@ -107,8 +107,9 @@ def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[i
     k, field = list(unknown), (0, -2, -1)
     strain = np.array(strain, dtype=float)
     if isinstance(law, LinearLaw):
-        gap = (stress - law.stress(strain))[k]
-        strain[k] += np.tensordot(np.linalg.inv(law.D[np.ix_(k, k)]), gap, 1)
+        gap = (stress - law.stress(strain))[k[0]:k[-1] + 1]
+        strain[k[0]:k[-1] + 1] += law.compliance(tuple(unknown)).dot(
+            gap.reshape(len(k), -1)).reshape(gap.shape)
         return strain
     with np.errstate(all="ignore"):
         for _ in range(30):
@@ -250,9 +251,22 @@ class _Piece:
         return one
 
     @cached_property
-    def _derivative(self):
-        return kept(self.recovery.beam.tables, ("derivative", self.s.tobytes()),
-                    lambda: scipy.interpolate.CubicSpline(self.s, np.eye(len(self.s)))(self.s, 1))
+    def _matrices(self):
+        """Of values (n,) at the sections their derivative along the axis, by a cubic spline, the
+        integral of that spline, what :func:`smoothed` makes of them, and the spline.
+        """
+        def make():
+            one = np.eye(len(self.s))
+            spline = scipy.interpolate.CubicSpline(self.s, one)
+            return spline(self.s, 1), spline.antiderivative()(self.s), smoothed(
+                self.s, one, self._short), spline.c
+
+        return kept(self.recovery.beam.tables, ("sections", self.s.tobytes()), make)
+
+    @property
+    def _short(self):
+        """Waves that are shorter than this would grow from round to round."""
+        return 0.5 * self.recovery.beam.mesh.height
 
     @cached_property
     def _line(self):
@@ -264,7 +278,27 @@ class _Piece:
         """The derivative along the axis of values (..., n, m), by a cubic spline."""
         if len(self.s) > FEW:
             return scipy.interpolate.CubicSpline(self.s, values, axis=-2)(self.s, 1)
-        return self._derivative @ values
+        return self._matrices[0] @ values
+
+    def along(self, values):
+        """The integral along the axis of values (..., n), by a cubic spline."""
+        if len(self.s) > FEW:
+            spline = scipy.interpolate.CubicSpline(self.s, values, axis=-1)
+            return spline.antiderivative()(self.s)
+        return values @ self._matrices[1].T
+
+    def table(self, values):
+        """The _Table of values (7, ..., n, m)."""
+        if len(self.s) > FEW:
+            return _Table(self.s, scipy.interpolate.CubicSpline(
+                self.s, np.moveaxis(values, -2, 0)).c)
+        return _Table(self.s, np.tensordot(self._matrices[3], values, (2, -2)))
+
+    def smoothed(self, values):
+        """Values (..., n, m) without waves that are shorter than half the height."""
+        if len(self.s) > FEW:
+            return smoothed(self.s, values, self._short)
+        return self._matrices[2] @ values
 
     def integral(self, values):
         """The integral over the section, with the width, of values (..., n, m)."""
@@ -293,7 +327,7 @@ class _Piece:
         if self.stress_given:
             return self.E0 + r.strain_of(self.S / self.grade, self.eps - self.E0)
         self.eps[0] = 0.5 * (self.stretch**2 - 1.0)
-        eps = r.strain_of(self._fed / self.grade, self.eps - self.E0, (1, 2))
+        eps = r.strain_of(self._fed, self.eps - self.E0, (1, 2))
         self.S[0] = self.grade * r.by_law(lambda law, strain: law.stress(strain)[0], eps)
         return eps + self.E0
 
@@ -310,25 +344,21 @@ class _Piece:
         """Change S_xx linearly in Y until the section has its normal force and moment."""
         h = self.recovery.beam.mesh.height
         # short waves would grow from round to round: S_yy holds second derivatives of S_xx
-        self._fed = np.concatenate([0.0 * self.S[:1], smoothed(self.s, self.S[1:], 0.5 * h)])
-        t, n = (np.array([np.cos(self.phi), np.sin(self.phi)]),
-                np.array([-np.sin(self.phi), np.cos(self.phi)]))
-        N, self.Q = np.sum(self.R * t, axis=0), np.sum(self.R * n, axis=0)
+        self._fed = np.concatenate([0.0 * self.S[:1], self.smoothed(self.S[1:])]) / self.grade
+        cos, sin = np.cos(self.phi), np.sin(self.phi)
+        N, self.Q = cos * self.R[0] + sin * self.R[1], cos * self.R[1] - sin * self.R[0]
         going = np.ones(self.forces.states)
         for _ in range(times):
             self._section()
             E = self.grade * self.recovery.modulus(self.eps - self.E0)
             x, y = self.from_axis(self.rY)
-            missing = np.array([N - self.integral(self.P[0]),
-                                self.M - self.integral(x * self.P[1] - y * self.P[0])])
-            unit = np.array([1.0 + 0.0 * y, y / h]) / self.g
-            force = (self.S[0] + E * self.stretch**2) * unit
-            K = np.array([[self.integral(f) for f in force],
-                          [-self.integral(y * f) for f in force]])
-            det = K[0, 0] * K[1, 1] - K[0, 1] * K[1, 0]
-            a = (K[1, 1] * missing[0] - K[0, 1] * missing[1]) / det
-            b = (K[0, 0] * missing[1] - K[1, 0] * missing[0]) / det
-            change = (a[..., None] * unit[0] + b[..., None] * unit[1]) * going[..., None, None]
+            z, force = y / h, (self.S[0] + E * self.stretch**2) / self.g
+            # force and moment, and what a stretch and a bending of 1 / g and z / g add to them
+            found, moment, one, two, three = self.integral(np.array([
+                self.P[0], x * self.P[1] - y * self.P[0], force, z * force, z * z * force]))
+            n, m, det = N - found, (self.M - moment) / h, one * three - two * two
+            a, b = (three * n + two * m) / det, (-one * m - two * n) / det
+            change = (a[..., None] + b[..., None] * z) / self.g * going[..., None, None]
             self.stretch = self.stretch + change
             if self.stress_given:
                 self.S[0] += E * self.stretch * change
@@ -349,12 +379,12 @@ class _Piece:
         normal = (self.slope_from_axis(self.rY[1], dn)
                   + self.from_axis(self.rate[..., None] * self.rY[0]))
         self.alpha = np.arcsin(np.clip(normal / (self.g * self.stretch), -1.0, 1.0))
-        turned = (self.slope_from_axis(self.rY[0], smoothed(self.s, dt, 0.5 * r.beam.mesh.height))
+        turned = (self.slope_from_axis(self.rY[0], self.smoothed(dt))
                   - self.from_axis(self.rate[..., None] * self.rY[1]))
         self.stretch = ((along @ r.panels.axis)[..., None] + turned) / (
             self.g * np.cos(self.alpha))
         refuse(~np.all(np.isfinite(self.rate), axis=-1))
-        phi = scipy.interpolate.CubicSpline(self.s, self.rate, axis=-1).antiderivative()(self.s)
+        phi = self.along(self.rate)
         self.phi = phi + (self.raw_angle - phi) @ self._line
 
     # step 3
@@ -501,13 +531,12 @@ def _axial(law, strain):
 
 
 class _Table:
-    """Cubic splines along the axis of values (7, ..., n, m) at m points across n sections."""
+    """Cubic splines along the axis: coefficients (4, n - 1, 7, ..., m) between sections s (n,)."""
 
-    def __init__(self, s, values):
-        spline = scipy.interpolate.CubicSpline(s, np.moveaxis(values, -2, 0))
-        self.starts = spline.x[:-1]
+    def __init__(self, s, coefficients):
+        self.starts = s[:-1]
         self._list = self.starts.tolist()
-        self._c = spline.c  # (4, n - 1, 7, ..., m)
+        self._c = coefficients
 
     def of(self, k):
         """Those of one of several states."""
@@ -580,8 +609,8 @@ class Recovery:
         self.pieces = [_Piece(self, a, b) for a, b in zip(forces.cuts[:-1], forces.cuts[1:])]
         for piece in self.pieces:
             refuse(~np.all(np.isfinite(piece.strain), axis=(0, -2, -1)))
-        self._tables = [_Table(p.s, np.concatenate(
-            [p.strain, p.stress, p.angle[None]])) for p in self.pieces]
+        self._tables = [p.table(np.concatenate([p.strain, p.stress, p.angle[None]]))
+                        for p in self.pieces]
         self._cuts = forces.cuts.tolist()
 
     def modulus(self, strain: Array) -> Array:
@@ -823,13 +852,15 @@ def actions(state: State) -> list[list[float]]:
     t = state.load if state.t is None else state.t
     held = np.zeros(system.N)
     held[system.fixed] = 1.0
-    J = sparse.vstack([system.sparse_jacobian(state.u, t), system.forces.acting_rows()]).tocsc()
+    acting = system.forces.acting_rows()
+    J = sparse.vstack([system.sparse_jacobian(state.u, t), acting]).tocsc() if (
+        system.m or len(acting)) else None
     out: list[list[float]] = []
     for beam, s in zip(system.beams, system.slices):
         nodes = np.nonzero(np.any(held[s].reshape(-1, beam.nd) != 0, axis=1))[0]
         stations = [station_of_node(beam.mesh, int(k)) for k in nodes]
-        here = J[:, s]
-        for row in here[np.unique(here.indices)].toarray():
+        here = None if J is None else J[:, s]
+        for row in () if here is None else here[np.unique(here.indices)].toarray():
             if np.any(row):
                 # an equation between neighbouring nodes: at both
                 loaded = np.nonzero(np.any(row.reshape(-1, beam.nd) != 0, axis=1))[0]

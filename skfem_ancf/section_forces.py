@@ -262,8 +262,10 @@ class SectionForces:
             if whole:
                 eta, v = WHOLE
             inside = Sections(self, e, xi, eta, self.lifted)
-            size = beam.across.breadth(slab, inside.X, e, whole) * v * inside.volume
-            parts.append((inside, size * inside.body))
+            body = inside.body
+            if np.any(body):
+                size = beam.across.breadth(slab, inside.X, e, whole) * v * inside.volume
+                parts.append((inside, size * body))
         for side in (0, 1):
             if any(np.any(load.faces[side]) for _, load in self.faces) or any(
                     s.where == side for s in self.sampled):
@@ -273,12 +275,13 @@ class SectionForces:
         axis = middle.field(self.q)
         if any(s.where == AXIS for s in self.sampled):
             parts.append((middle, middle.sampled(AXIS)))
-        force = sum(f.sum(axis=-1) for _, f in parts)
-        moment = sum(cross(at.field(self.q) - axis, f).sum(axis=-1) for at, f in parts)
+        none = np.zeros(axis.shape[:-1])
+        force = sum((f.sum(axis=-1) for _, f in parts), none)
+        moment = sum((cross(at.field(self.q) - axis, f).sum(axis=-1) for at, f in parts), none[0])
         self._r, self._force, self._moment = (
             x.reshape(x.shape[:-1] + (ne, ALONG)) for x in (axis[..., 0], force, moment))
         w = np.tile(w, ne)
-        load = sum(at.spread(f * w[:, None]) for at, f in parts)
+        load: Any = sum(at.spread(f * w[:, None]) for at, f in parts)
         internal = _each(beam.kernel.forces, u)
         if self.viscous is not None:
             internal = internal + self.viscous

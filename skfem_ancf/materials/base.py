@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import (InputError, require_finite_scalar, require_like, require_option,
                       require_positive, shown, taught)
 from ..frozen import Frozen, rebuilt
+from ..kept import kept
 from ..pickling import require_picklable
 from ..quadrature import gauss
 
@@ -369,6 +370,22 @@ class LinearLaw:
         self.D = np.asarray(D)
         #: The components of the strain on which the stress depends.
         self.rows = tuple(k for k, column in enumerate(self.D.T) if np.any(column))
+        self._compliances: dict = {}
+
+    def compliance(self, rows: tuple[int, ...]) -> Array:
+        """The changes of some components of the strain with the stress of these alone.
+
+        Parameters
+        ----------
+        rows
+            The components; the others of the strain stay.
+
+        Returns
+        -------
+        ndarray
+            Shape (n, n).
+        """
+        return kept(self._compliances, rows, lambda: np.linalg.inv(self.D[np.ix_(rows, rows)]))
 
     def energy(self, strain: Array) -> Array:
         return 0.5 * np.sum(strain * self.stress(strain), axis=0)
