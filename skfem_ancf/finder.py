@@ -254,6 +254,12 @@ class Finder:
         return 0.75 * self.mesh.height + float(np.max(self.mesh.lengths))
 
     @cached_property
+    def box(self) -> tuple[float, float, float, float]:
+        """What holds the body, and more: least and largest x, least and largest y."""
+        (x0, y0), (x1, y1) = (f(self._samples, axis=1).tolist() for f in (np.min, np.max))
+        return x0 - self._far, x1 + self._far, y0 - self._far, y1 + self._far
+
+    @cached_property
     def _tree(self):
         return scipy.spatial.cKDTree(self._samples.T)
 

@@ -237,11 +237,16 @@ class Points:
         one, x = x.ndim == 1, np.reshape(x, (2, -1))
         left, parts = np.arange(x.shape[1]), list[Any]()
         for k, candidate in enumerate(self.beams):
-            e, X, outside = candidate.finder(x[:, left])
+            x0, x1, y0, y1 = candidate.finder.box
+            near = (x0 <= x[0, left]) & (x[0, left] <= x1) & (y0 <= x[1, left]) & (x[1, left] <= y1)
+            if x.size and not np.any(near):
+                continue
+            e, X, outside = candidate.finder(x[:, left[near]])
             on = outside <= candidate.finder.allowed
             if np.any(on) or not x.size:
-                parts.append(Part(candidate, k, self.slices[k], left[on], e[on], X[:, on]))
-                left = left[~on]
+                near[near] = on
+                parts.append(Part(candidate, k, self.slices[k], left[near], e[on], X[:, on]))
+                left = left[~near]
         for body in self.bodies:
             on = body.contains(x[:, left])
             if np.any(on):
@@ -267,15 +272,22 @@ class Points:
         if not abs(x) + abs(y) < HUGE:
             return None
         x, y = float(x), float(y)
-        wanted = None if beam is None else select_beam(self.beams, beam)
-        for k, b in enumerate(self.beams):
-            if wanted is None or b is wanted:
-                place = b.finder.one(x, y)
-                if place:
-                    return Point(b, k, self.slices[k], place, (x, y))
-                if place is None:
-                    return None
+        if beam is None:
+            near = [b for b, (x0, x1, y0, y1) in self._boxes if x0 <= x <= x1 and y0 <= y <= y1]
+        else:
+            near = [select_beam(self.beams, beam)]
+        for b in near:
+            place = b.finder.one(x, y)
+            if place:
+                k = self.beams.index(b)
+                return Point(b, k, self.slices[k], place, (x, y))
+            if place is None:
+                return None
         return None
+
+    @cached_property
+    def _boxes(self):
+        return [(b, b.finder.box) for b in self.beams]
 
 
 def _name(beam):

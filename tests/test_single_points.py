@@ -199,6 +199,14 @@ def test_many_points_begin_in_squares_as_few_in_a_tree(mesh):
                        np.concatenate([alone[2] for alone in one_by_one]) > many.allowed)
 
 
+@pytest.mark.parametrize("mesh", [quarter_arc(1, height=0.4), s_curve(0.4),
+                                  MeshBeam.init_line([0.0, 3.0], 0.4, angle=0.3)], ids=repr)
+def test_what_is_in_the_body_is_in_its_box(mesh):
+    x0, x1, y0, y1 = finder.Finder(mesh).box
+    x, y = inside(mesh, 500)[2]
+    assert x0 < x.min() and x.max() < x1 and y0 < y.min() and y.max() < y1
+
+
 @pytest.mark.parametrize("kind", ["taper of arc", "taper", "kink", "step", "unloaded"])
 def test_fields_of_the_elements_at_points_asked_for_again(kind):
     """Polynomials of them from the second point on, where there are some: 1e-13 of many points."""
