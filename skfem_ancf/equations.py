@@ -131,9 +131,10 @@ class Tables:
     @cached_property
     def parts(self) -> list[str]:
         """What of :data:`skfem_ancf.compiled.ADDRESSES` the scene has."""
-        packs = {type(pack).__name__ for pack in self.plain.body.packs}
-        return [*sorted(packs), *["elements"] * (self.plain.forces.number > 0),
-                *["contacts"] * (self.plain.forces.contacts.number > 0)]
+        packs, forces = {type(x).__name__ for x in self.plain.body.packs}, self.plain.forces
+        return ["common", *["kernels"] * bool(packs), *sorted(packs),
+                *["elements"] * (forces.number > 0),
+                *["contacts"] * (forces.contacts.number > 0)]
 
     @property
     def alone(self) -> str:

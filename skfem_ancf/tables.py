@@ -103,13 +103,15 @@ def subtract_from_band(A, i, j, v, x, k):
 @source
 def constraint(joints, c, g, t, u, phi):
     """Phi at u."""
-    for k in lanes(phi.size):
-        phi[k] = c[k]
     if joints.own > 0:
+        copy(c, phi)
         own_joints(joints.own, np.int64(0), t, u, u, phi)
         return
+    clear(phi)
+    add_triples(phi, joints.hk, joints.hv, u, joints.hi, u, joints.hj)
+    for k in lanes(phi.size):
+        phi[k] = c[k] + 0.5 * phi[k]
     add_products(phi, joints.gk, g, u, joints.gi)
-    add_triples(phi, joints.hk, 0.5 * joints.hv, u, joints.hi, u, joints.hj)
 
 
 @source

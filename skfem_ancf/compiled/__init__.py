@@ -7,20 +7,26 @@ Python objects. ``python -m skfem_ancf.compiled`` compiles everything beforehand
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import logging
 import os
 import sys
+from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 logger = logging.getLogger(__name__)
 
 #: What is compiled apart from the texts that call it, and the module that does so.
-ADDRESSES = {"SectionPack": "blocks", "CablePack": "blocks", "elements": "elements",
-             "contacts": "contacts"}
+ADDRESSES = {"common": "shared", "kernels": "shared", "SectionPack": "blocks",
+             "CablePack": "blocks", "elements": "elements", "contacts": "contacts"}
 #: Those of them that this process has.
 KNOWN: set[str] = set()
 #: Compiled functions that this process has, by the name of their text.
@@ -154,3 +160,15 @@ def load(text, args):
     LOADED[text.__name__] = compile_for(text, args)
     note(text.__name__)
     return LOADED[text.__name__]
+
+
+@contextmanager
+def nothing_collected() -> Iterator[None]:
+    """Collect no garbage: Numba makes millions of small objects that live as long as it works."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()

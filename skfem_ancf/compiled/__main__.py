@@ -5,7 +5,7 @@ from functools import partial
 
 from ..progress import progress_bar
 from ..switch import VARIABLE
-from . import ADDRESSES, PROBLEMS, address
+from . import ADDRESSES, PROBLEMS, address, nothing_collected
 
 
 def main() -> None:
@@ -27,7 +27,8 @@ def main() -> None:
              "evaluate": lambda: system.internal_force(np.zeros(system.N)),
              "equilibrium": scene.solve_static,
              "steps": lambda: scene.integrate(0.02, 0.01, EnergyMomentum())}
-    with progress_bar(True, sum(COMPILING[name] for name in works), "compiling") as bar:
+    whole = sum(COMPILING[name] for name in works)
+    with nothing_collected(), progress_bar(True, whole, "compiling") as bar:
         for name, work in works.items():
             work()
             if PROBLEMS:

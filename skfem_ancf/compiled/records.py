@@ -20,7 +20,8 @@ from .views import array_at
 from .words import hints
 
 _WORD = ir.IntType(64)
-_NUMBERS = {int: types.int64, float: types.float64}
+_NUMBERS = {int: types.int64, float: types.float64, bool: types.boolean,
+            type(None): types.none}
 _DTYPES = {"f": types.float64, "i": types.int64}
 
 
@@ -61,16 +62,16 @@ def record_type(kind, x=None):
     kind, x
         Class, and instance if there are fields of which the class does not say what they are.
     """
-    fields = []
-    for k, (name, hint) in enumerate(zip(kind._fields, hints(kind))):
-        if isinstance(hint, tuple):
-            hint = types.Array(_DTYPES[hint[0]], hint[1], "C")
-        elif hint in _NUMBERS:
-            hint = _NUMBERS[hint]
-        else:
-            hint = record_type(hint if x is None else type(x[k]), None if x is None else x[k])
-        fields.append((name, hint))
-    return Record(kind.__name__, tuple(fields))
+    return Record(kind.__name__, tuple(
+        (name, kind_of(hint, None if x is None else x[k]))
+        for k, (name, hint) in enumerate(zip(kind._fields, hints(kind)))))
+
+
+def kind_of(hint, x=None):
+    """The type of what a hint says, see :func:`~skfem_ancf.compiled.words.read`."""
+    if isinstance(hint, tuple):
+        return types.Array(_DTYPES[hint[0]], hint[1], "C")
+    return _NUMBERS.get(hint) or record_type(hint if x is None else type(x), x)
 
 
 @register_model(Record)

@@ -8,14 +8,13 @@ Numba does, but share the module of the entry, which is optimised once.
 from __future__ import annotations
 
 import dis
-import gc
-from contextlib import contextmanager
 from itertools import count, pairwise
 from typing import Any, NamedTuple
 
 from llvmlite.binding import parse_assembly
 from numba import types
-from numba.core import compiler
+from numba.core import cgutils, compiler
+from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_machinery import PassManager
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
@@ -23,19 +22,51 @@ from numba.core.registry import cpu_target
 from numba.core.imputils import lower_builtin, lower_constant
 from numba.extending import models, register_model, typeof_impl
 
+from . import nothing_collected
+
+
+class _Library(JITCodeLibrary):
+    """That of an entry: what has become part of its callers may be left out.
+
+    The linker leaves out what is not called yet: callers come first.
+    """
+
+    def __init__(self, codegen, name):
+        super().__init__(codegen, name)
+        self.modules = []
+
+    def add_llvm_module(self, module):
+        self.modules.append(module)
+
+    def finalize(self):
+        while self.modules:
+            super().add_llvm_module(self.modules.pop())
+        super().finalize()
+
+
 class _Part:
     """What a text puts into the library of an entry, for other entries that call it too."""
 
-    def __init__(self, library):
-        self._library, self.modules, self.linked, self.calls = library, [], [], {}
+    def __init__(self, library, brief):
+        self._library, self._brief = library, brief
+        self.modules, self.linked, self.calls = [], [], {}
 
     def __getattr__(self, name):
         return getattr(self._library, name)
 
     def add_ir_module(self, module):
-        read = parse_assembly(str(module))
+        if self._brief:
+            for function in module.functions:
+                if not function.is_declaration:
+                    function.attributes.add("optsize")
+        text = str(module)
+        read = parse_assembly(text)
         read.name = module.name
         read.verify()
+        if text.count("\n") < SHORT:
+            for function in read.functions:
+                if not function.is_declaration:
+                    function.linkage = "linkonce_odr"
         self.modules.append(read)
         self._library.add_llvm_module(read.clone())
 
@@ -45,10 +76,13 @@ class _Part:
 
 
 class _Open:
-    """The library of an entry, texts that are in it, and those being lowered, innermost last."""
+    """The library of an entry, texts that are in it, and those being lowered, innermost last.
 
-    def __init__(self, library):
-        self.library, self.texts, self.parts = library, set(), []
+    ``group`` is that of shared texts which it is made of; None for others.
+    """
+
+    def __init__(self, library, group):
+        self.library, self.group, self.texts, self.parts = library, group, set(), []
 
     def take(self, text, args):
         """Put in what a text has put elsewhere, and what it calls."""
@@ -108,13 +142,30 @@ class _Typing:
 
 
 class _Made(NamedTuple):
-    """A text for types of arguments: its signature, and what Numba knows it by."""
+    """A text for types of arguments: its signature, and what Numba knows it by.
+
+    One that is called in another library has no part and no descriptor.
+    """
 
     signature: Any
     key: object
-    part: _Part
+    part: _Part | None = None
+    descriptor: Any = None
 
 
+class Shared(NamedTuple):
+    """Where a text is for some types: its group, its name for the linker, and what it returns."""
+
+    group: str
+    symbol: str
+    returns: types.Type
+
+
+#: Lines of texts that become part of their callers; of longer ones LLVM wants to know what they do
+#: to what they are given, which it looks for only in what may not be left out.
+SHORT = 800
+#: Modules whose texts are compiled for size: their loops take less time than what they call.
+BRIEF = {"border", "forces.texts", "statics.iteration"}
 #: Passes for what texts have not: closures, contexts, lists of literals.
 _LEFT_OUT = {"WithLifting", "InlineClosureLikes", "RewriteDynamicRaises", "InlineInlinables",
              "MakeFunctionToJitFunction", "FindLiterallyCalls", "LiteralUnroll", "InlineOverloads",
@@ -142,10 +193,15 @@ class Text:
     def __init__(self, function, flags):
         self.function, self.flags, self.made = function, flags, {}
         self.number = next(_numbers)
+        self.shared, self._called = {}, {}
 
     def of(self, args):
         """Signature and key for types of arguments, in the entry that is being compiled."""
         entry = _OPEN[-1]
+        if args in self.shared and self.shared[args].group != entry.group:
+            if args not in self._called:
+                self._called[args] = _by_symbol(self.shared[args], args)
+            return self._called[args]
         if entry.parts:
             entry.parts[-1].calls[self, args] = None
         if args in self.made:
@@ -160,14 +216,15 @@ class Text:
         if not _makes_arrays(self.function):
             try:
                 made = self._compiled(args, entry, False)
-                if not _has_arrays(made.signature.return_type):
+                if not _has_arrays(made.signature.return_type) or _gives_none(self.function):
                     return made
             except NumbaError:
                 pass  # said again, if it was not for the owners
         return self._compiled(args, entry, True)
 
     def _compiled(self, args, entry, counts):
-        part, key = _Part(entry.library), object()
+        brief = self.function.__module__.partition(".")[2] in BRIEF
+        part, key = _Part(entry.library, brief), object()
         entry.parts.append(part)
         try:
             made = compiler.compile_extra(_TYPING, cpu_target.target_context,
@@ -176,7 +233,23 @@ class Text:
         finally:
             entry.parts.pop()
         cpu_target.target_context.insert_user_function(key, made.fndesc)
-        return _Made(made.signature, key, part)
+        return _Made(made.signature, key, part, made.fndesc)
+
+
+def _by_symbol(shared, args):
+    """A text that is compiled elsewhere."""
+    def call(context, builder, signature, values):
+        takes = signature.return_type, signature.args
+        function = cgutils.get_or_insert_function(
+            builder.module, context.call_conv.get_function_type(*takes), shared.symbol)
+        status, value = context.call_conv.call_function(builder, function, *takes, values)
+        with cgutils.if_unlikely(builder, status.is_error):
+            context.call_conv.return_status_propagate(builder, status)
+        return value
+
+    key = object()
+    cpu_target.target_context.insert_func_defn([(call, key, args)])
+    return _Made(shared.returns(*args), key)
 
 
 def _makes_arrays(function):
@@ -186,6 +259,11 @@ def _makes_arrays(function):
                 if x.opname == "LOAD_GLOBAL" and x.argval == "np"}
     return not of_numpy <= _OF_NUMBERS or any(
         isinstance(given.get(x), Dispatcher) for x in function.__code__.co_names)
+
+
+def _gives_none(function):
+    """True if the arrays that it returns are borrowed."""
+    return "borrowed" in function.__code__.co_names
 
 
 def _has_arrays(kind):
@@ -233,25 +311,15 @@ def _constant(context, builder, kind, text):
 class Entry(compiler.Compiler):
     """The compiler of a function that Python, or another entry by its address, calls."""
 
+    group: str | None = None
+
     def compile_extra(self, func):
-        library = self.state.targetctx.codegen().create_library(func.__qualname__)
+        library = _Library(self.state.targetctx.codegen(), func.__qualname__)
         library.enable_object_caching()
         self.state.library = library
-        _OPEN.append(_Open(library))
+        _OPEN.append(_Open(library, self.group))
         try:
-            with _nothing_collected():
+            with nothing_collected():
                 return super().compile_extra(func)
         finally:
             _OPEN.pop()
-
-
-@contextmanager
-def _nothing_collected():
-    """Numba makes millions of small objects that live as long as it works."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()

@@ -27,21 +27,13 @@ _SPOILT = OSError, EOFError, pickle.PickleError, KeyError, ValueError
 
 
 @cache
-def twin(function, entry=False):
-    """The compiled twin of a marked function.
+def twin(function):
+    """The compiled twin of a marked function: that of a primitive, or a Text.
 
     Parameters
     ----------
     function
         Marked by :func:`~skfem_ancf.source.source` or :func:`~skfem_ancf.source.primitive`.
-    entry
-        Python calls it: it is kept on disk. What compiled functions alone call has no entrance
-        for Python, which takes as long to compile as a small function.
-
-    Returns
-    -------
-    function
-        A Numba dispatcher.
     """
     if function is lanes:
         return range
@@ -49,11 +41,16 @@ def twin(function, entry=False):
         return _one
     if function.twin is not None:
         return getattr(import_module(f"{__package__}.{function.twin}"), function.__name__)
+    return jit(linked(function))
+
+
+def linked(function):
+    """A copy of a text that calls the twins of what it calls."""
     names = dict(function.__globals__)
     for name in _names(function.__code__):
         if hasattr(names.get(name), "twin"):
             names[name] = twin(names[name])
-    return jit(named(function, names), entry)
+    return named(function, names)
 
 
 def named(function, names=None):
@@ -65,25 +62,46 @@ def named(function, names=None):
     return text
 
 
-def jit(function, entry=False):
-    """Compile a function; ``entry`` as for :func:`twin`."""
-    if not entry:
-        return Text(function, _FLAGS)
+def jit(function):
+    """What compiled functions alone call.
+
+    It has no entrance for Python, which takes as long to compile as a small function.
+    """
+    return Text(function, _FLAGS)
+
+
+def entry_of(function, types, compiler=Entry):
+    """What Python calls, compiled for types of arguments or taken from disk.
+
+    Returns
+    -------
+    entry, dispatcher
+        The latter has objects of Python that the former needs: it has to live as long.
+    """
+    _prepare(function)
     try:
-        return njit(cache=True, pipeline_class=Entry, **ENTRY)(function)
-    except RuntimeError as error:  # there is no folder that can be written
+        dispatcher = njit(cache=True, pipeline_class=compiler, **ENTRY)(function)
+        return dispatcher.compile(types), dispatcher
+    except (RuntimeError, *_SPOILT) as error:  # no folder to write to, or what is in it
         logger.info("compiled code is not kept: %s", error)
-        return njit(pipeline_class=Entry, **ENTRY)(function)
+    dispatcher = njit(pipeline_class=compiler, **ENTRY)(function)
+    return dispatcher.compile(types), dispatcher
 
 
 def address_of(function, signature, kept=True):
     """The address of a function compiled as one of C, ``kept`` on disk."""
+    _prepare(function)
     if kept:
         try:
             return cfunc(signature, cache=True, pipeline_class=Entry, **OPTIONS)(function).address
-        except (RuntimeError, *_SPOILT) as error:  # no folder to write to, or what is in it
+        except (RuntimeError, *_SPOILT) as error:
             logger.info("compiled code is not kept: %s", error)
     return cfunc(signature, pipeline_class=Entry, **OPTIONS)(function).address
+
+
+def _prepare(function):
+    """Have what it shares with other entries."""
+    import_module(".shared", __package__).prepare(function)
 
 
 def compile_for(text, args):
@@ -92,17 +110,13 @@ def compile_for(text, args):
     Numba would compare them at each call, which takes longer than small scenes do. Named tuples
     marked ``by_place`` are given by the address of their words.
     """
-    function, types = twin(text, True), tuple(type_of(x) for x in args)
-    try:
-        entry = function.compile(types)
-    except _SPOILT as error:
-        logger.info("what was kept of compiled code cannot be used: %s", error)
-        entry = njit(pipeline_class=Entry, **ENTRY)(function.py_func).compile(types)
+    entry, dispatcher = entry_of(linked(text), tuple(type_of(x) for x in args))
 
     def run(*args):
         args = [Words(x) if hasattr(x, "by_place") else x for x in args]
         return entry(*(x.address if isinstance(x, Words) else x for x in args))
 
+    run.dispatcher = dispatcher
     return run
 
 

@@ -13,14 +13,16 @@ import numpy as np
 _NUMBER, _WORD = struct.Struct("d"), struct.Struct("q")
 
 
+def read(hint):
+    """What a hint says: letter and axes of an array, a number's type, or another class."""
+    code = getattr(hint, "__metadata__", [None])[0]
+    return (code[0], int(code[1])) if code else hint
+
+
 @cache
 def hints(kind):
-    """What the fields of a class are: letter and axes of an array, a number's type, or another."""
-    found = []
-    for hint in get_type_hints(kind, include_extras=True).values():
-        code = getattr(hint, "__metadata__", [None])[0]
-        found.append((code[0], int(code[1])) if code else hint)
-    return tuple(found)
+    """What the fields of a class are."""
+    return tuple(map(read, get_type_hints(kind, include_extras=True).values()))
 
 
 class Words:

@@ -452,10 +452,11 @@ def _step(joints, rule, course, n):
     """The :class:`Step` number n."""
     c, g = course.joints.c, course.joints.g
     constant = joints.hk.size == 0 and g.shape[0] == 1 and joints.own == 0
-    return Step(course.dt, course.times[n, 0], course.times[n, 1], _row(course.factors, n),
-                _row(course.supports, n), JointMotion(_row(c, n), _row(g, n), course.joints.drives),
-                mass_factor(rule, course.dt), damping_factor(rule, course.dt),
-                0.5 if rule.conserving > 0 else 1.0, constant)
+    joints_now = JointMotion(_row(c, n), _row(g, n), course.joints.drives)
+    return borrowed(Step(course.dt, course.times[n, 0], course.times[n, 1],
+                         _row(course.factors, n), _row(course.supports, n), joints_now,
+                         mass_factor(rule, course.dt), damping_factor(rule, course.dt),
+                         0.5 if rule.conserving > 0 else 1.0, constant))
 
 
 @source

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..frozen import Content
-from ..source import F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
+from ..source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
 from ..types import Array
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ PLACES = {"place": "weights", "frame_place": "frame"}
 class Destination(NamedTuple):
     """Entry (i, j), i >= j, of a tangent is added at ``flat[(start + j) * ld + i - j]``."""
 
-    flat: np.ndarray
+    flat: F1
     ld: int
     start: int
 
