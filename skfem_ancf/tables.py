@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .band import clear, mirror
+from .band import clear, copy, mirror
 from .kernels.moments import (MomentPack, add_mean_moments, add_moment_stiffness,
                               add_moments)
 from .own import own_force, own_joints, own_load_stiffness, own_mean_force

@@ -25,6 +25,13 @@ from numba.extending import models, register_model, typeof_impl
 from . import nothing_collected
 
 
+#: Lines of texts that become part of their callers; of longer ones LLVM wants to know what they do
+#: to what they are given, which it looks for only in what may not be left out.
+SHORT = 800
+#: Modules whose texts are compiled for size: their loops take less time than what they call.
+BRIEF = {"border", "forces.texts", "statics.iteration"}
+
+
 class _Library(JITCodeLibrary):
     """That of an entry: what has become part of its callers may be left out.
 
@@ -55,18 +62,17 @@ class _Part:
         return getattr(self._library, name)
 
     def add_ir_module(self, module):
+        functions = [x for x in module.functions if not x.is_declaration]
         if self._brief:
-            for function in module.functions:
-                if not function.is_declaration:
-                    function.attributes.add("optsize")
+            for function in functions:
+                function.attributes.add("optsize")
         text = str(module)
         read = parse_assembly(text)
         read.name = module.name
         read.verify()
         if text.count("\n") < SHORT:
-            for function in read.functions:
-                if not function.is_declaration:
-                    function.linkage = "linkonce_odr"
+            for function in functions:
+                read.get_function(function.name).linkage = "linkonce_odr"
         self.modules.append(read)
         self._library.add_llvm_module(read.clone())
 
@@ -161,11 +167,6 @@ class Shared(NamedTuple):
     returns: types.Type
 
 
-#: Lines of texts that become part of their callers; of longer ones LLVM wants to know what they do
-#: to what they are given, which it looks for only in what may not be left out.
-SHORT = 800
-#: Modules whose texts are compiled for size: their loops take less time than what they call.
-BRIEF = {"border", "forces.texts", "statics.iteration"}
 #: Passes for what texts have not: closures, contexts, lists of literals.
 _LEFT_OUT = {"WithLifting", "InlineClosureLikes", "RewriteDynamicRaises", "InlineInlinables",
              "MakeFunctionToJitFunction", "FindLiterallyCalls", "LiteralUnroll", "InlineOverloads",
