@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, NameUnknown,
+from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, NameUnknown,
                         Scene, StVenantKirchhoff)
 
 B, H, G, RHO = 0.02, 0.02, 9.81, 1000.0
@@ -119,6 +119,13 @@ def test_a_motion_goes_on_from_a_checkpoint(tmp_path, interrupted):
     interrupted(lambda: scene.integrate(0.03, 1e-3, scheme="generalized-alpha", checkpoint=path,
                                         every=7))
     assert np.array_equal(damped().resume(path).u, whole.u)
+
+
+def test_a_loop_that_drives_vibrations_says_what_to_do():
+    """A rate that is held, and nothing that damps: the scheme that conserves goes on."""
+    with pytest.raises(ConvergenceError, match="Sample more often, add damping"):
+        arm(dt=4e-3).integrate(0.03, 1e-3, scheme="generalized-alpha")
+    assert arm(dt=4e-3).integrate(0.03, 1e-3).steps == 30
 
 
 def test_they_pickle_and_are_in_the_plan():

@@ -130,6 +130,34 @@ def test_collocation_carries_stresses_of_stiff_beams():
     assert max(errors) < 2e-4
 
 
+@pytest.mark.parametrize("scheme, n, tol", [("radau", 15, 1e-3), ("gauss", 60, 1e-5)])
+def test_few_iterations_in_steps_that_turn_far(scheme, n, tol):
+    """A soft pendulum, up to a quarter of a turn in a step, where a polynomial leads far away."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 4), 0.01), ElementBeamCable(5),
+                StVenantKirchhoff(2e8, 0.3, 7800.0), 0.01)
+    scene = Scene(beam).pin("left").gravity(GRAVITY)
+    history = scene.integrate(1.0, 1.0 / n, scheme=scheme, tol=tol)
+    assert history.substeps == 0 and history.iterations < 3 * 8 * n  # of three points each
+    fine = scene.integrate(1.0, 1.0 / 400, scheme="radau", tol=1e-6)
+    assert np.abs(history.position((1, 0))[-1] - fine.position((1, 0))[-1]).max() < 1e-3
+
+
+@pytest.mark.parametrize("scheme", ["radau", "generalized-alpha"])
+def test_a_motion_is_the_same_after_another(scheme):
+    """Whose work arrays it takes."""
+    scene = driven_hub()
+    first = scene.integrate(0.2, 0.02, scheme=scheme)
+    other = scene.integrate(0.1, "auto", scheme=scheme, rtol=1e-3, t_eval=[0.03, 0.1])
+    again = scene.integrate(0.2, 0.02, scheme=scheme)
+    assert len(scene.system.integrators) == 2  # one took the instants within steps
+    for name in ("u", "v", "acceleration", "multipliers"):
+        assert np.array_equal(getattr(again, name), getattr(first, name))
+    assert (again.iterations, again.factorizations) == (first.iterations, first.factorizations)
+    assert np.array_equal(scene.integrate(0.3, 0.02, scheme=scheme, start=first.state(-1)).u[-1],
+                          scene.integrate(0.3, 0.02, scheme=scheme, start=again.state(-1)).u[-1])
+    assert len(other) == 2
+
+
 def driven_hub():
     scene = Scene(soft())
     scene.joint("position", at=(0, 0), r=lambda t: 0.1 * np.array([np.sin(2 * t) ** 3,

@@ -40,6 +40,7 @@ class Gauss(Collocation):
     name = "gauss"
     joined = False
     safety = 5.0  # it damps nothing
+    rough = 0.2
 
     def __init__(self, points: int = 3) -> None:
         self.number = require_integer("points", points, 1, 4)

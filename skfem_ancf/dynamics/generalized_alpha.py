@@ -23,7 +23,9 @@ class GeneralizedAlpha(Scheme):
     ----------
     rho_inf
         Spectral radius at infinite frequency, from 0 (annihilates it in one step) to 1 (no
-        damping).
+        damping). With 1 accelerations and reactions of what steps do not resolve alternate from
+        step to step: of a falling rod of L/h = 1e4 in steps of 0.01 s its pin's force by twice its
+        weight, whatever ``tol`` is, and with 0.8 by a hundredth.
 
     References
     ----------

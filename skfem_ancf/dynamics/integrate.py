@@ -246,7 +246,8 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
                     file.update()
     except StepFailed as failure:
         raise ConvergenceError(f"the motion could not be continued beyond t = {run.y.t:.6g}: "
-                               f"{failure}; try a smaller dt", history.close()) from None
+                               f"{failure}; try a smaller dt{_of_samples(run)}",
+                               history.close()) from None
     except AncfError as error:  # of a function of the caller's: what is done is kept
         vars(error)["state"] = history.close()
         raise
@@ -257,6 +258,16 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
     _warn_of_turns(history.close())
     run.give_back()
     return history
+
+
+def _of_samples(run):
+    """What else helps a motion that controls drive whose law is asked now and then."""
+    if not run.system.forces.sampled:
+        return ""
+    energy = max(run.integrator.energy, 0.0)
+    return (f". Energies of {energy:.3g} were seen: where the motion does not explain them, what "
+            f"the samples of {shown(run.system.forces.sampled[0])} hold drives vibrations. Sample "
+            "more often, add damping, or take scheme='energy-momentum'")
 
 
 class _Body:

@@ -21,6 +21,8 @@ HIDDEN = 0.1
 #: The largest error of a point's displacement, over the root of the mean square that is added up:
 #: a tip moves twice as far as the mean, and errors grow on their way.
 LARGEST = 3.0
+#: Tolerance at which the estimates of schemes are calibrated.
+CALIBRATED = 1e-5
 #: Part of ``rtol`` that a single step may add.
 SINGLE = 0.1
 #: Error, relative to its share, above which a step is taken again.
@@ -39,7 +41,7 @@ class StepSize:
     * what the step does not resolve, by the iteration matrix as a filter,
     * vibrations whose phase is lost within the motion whatever the tolerance asks, by two
       averages over the time W in which they turn: after the time T a vibration of the frequency w
-      has lost the phase C w^(p + 1) dt^p T, so W = (C dt^p T)^(1 / (p + 1)) / 2.
+      has lost the phase C w^(p + 1) dt^p T, so W = (C dt^p T)^(1 / (p + 1)).
 
     Parameters
     ----------
@@ -69,6 +71,7 @@ class StepSize:
                              "take 'energy-momentum' or 'generalized-alpha' with dt='auto'")
         self.system, self.scheme, self.rtol = system, scheme, rtol
         self.span, self.phase = t_end - t_start, max(2, scheme.order)
+        self._largest = LARGEST * (CALIBRATED / rtol)**scheme.rough
         self._mass = sum(b.total_mass for b in system.members)
         self._averages = self._new = np.zeros((2, system.N))
         self.times = np.linspace(t_start, t_end, SAMPLES + 1)
@@ -138,14 +141,14 @@ class StepSize:
         """
         de = self.scheme.resolved(integrator, self.scheme.local_error(old, new, dt))
         order, power = self.phase, self.scheme.order + 1
-        width = 0.5 * (self.scheme.error_constant * dt**order * self.span) ** (1.0 / (order + 1.0))
+        width = (self.scheme.error_constant * dt**order * self.span) ** (1.0 / (order + 1.0))
         part = -np.expm1(-dt / width)
         rate = de / dt**power  # of the motion, not of the step
         self._new = self._averages.copy()
         for average in self._new:
             average += part * (rate - average)
             rate = average
-        return LARGEST * max(self._size(rate) * dt**(power - 1) * self.span,
+        return self._largest * max(self._size(rate) * dt**(power - 1) * self.span,
                              self._size(de) / SINGLE)
 
     def begin(self) -> None:
