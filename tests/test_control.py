@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, NameUnknown,
-                        Scene, StVenantKirchhoff)
+from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamCable, InputError,
+                        MeshBeam, NameUnknown, Scene, StVenantKirchhoff)
 
 B, H, G, RHO = 0.02, 0.02, 9.81, 1000.0
 MASS = RHO * B * H

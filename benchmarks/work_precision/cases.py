@@ -129,9 +129,9 @@ def motion(p, scale=1, adaptive=True):
             if steps <= most:
                 for scheme in ("radau", "gauss"):
                     yield ours.run(p, "cable", degree, n, steps=steps, scheme=scheme, tol=1e-7)
-    for degree, n in ((5, 2), (5, 3), (5, 4), (7, 2), (9, 1)):  # each step turns the beam far
-        for steps in (16, 20, 24, 30, 40):
-            for tol in (5e-3, 1e-3, 1e-4, 1e-5):
+    for degree, n in ((5, 2), (5, 3), (5, 4), (7, 2)):  # each step turns the beam far
+        for steps in (16, 20, 30, 40):
+            for tol in (2e-3, 1e-4, 1e-5):
                 yield ours.run(p, "cable", degree, n, steps=steps, scheme="radau", tol=tol)
     if adaptive:
         for n, rtol in ((4, 1e-4), (4, 1e-5), (6, 1e-6), (8, 1e-7)):
