@@ -319,7 +319,7 @@ def families(columns: dict[str, Array], places: Sequence[int]
     at = np.array(places)
     floats = [name for name, x in columns.items() if x.dtype.kind == "f" and x.ndim == 1]
     others = [x for name, x in columns.items() if name not in floats]
-    groups: dict[Any, list[int]] = {} if others else {None: list(range(len(at)))}
+    groups: dict[Any, Any] = {} if others else {None: np.arange(len(at))}
     for k, place in enumerate(places) if others else ():
         groups.setdefault(tuple(_key(x[place]) for x in others), []).append(k)
     for found in groups.values():
@@ -337,10 +337,11 @@ def _key(value):
     return value
 
 
-def solve_together(build: Callable[..., Scene], readings: Readings, members: list[dict[str, Any]],
+def solve_together(build: Callable[..., Scene], readings: Readings,
+                   members: Sequence[dict[str, Any]],
                    columns: dict[str, Array], places: Sequence[int], threads: int, said: list[str]
-                   ) -> Iterator[tuple[list[int], list[dict[str, Array]]]]:
-    """Solve members of one topology together; yields their places and what was read.
+                   ) -> Iterator[tuple[Array, dict[str, Array]]]:
+    """Solve members of one topology together; yields their places and arrays of what was read.
 
     Parameters
     ----------
@@ -370,11 +371,10 @@ def solve_together(build: Callable[..., Scene], readings: Readings, members: lis
             continue
         counts = np.zeros(5, dtype=int)
         for which, values, good, doubtful, iterations in _spread(batch, threads):
-            rows = [dict(zip(values, row)) for row in zip(*values.values())]
             alone = np.flatnonzero(doubtful)[:max(0, WARNED - counts[4])]  # they will warn
-            keep = np.delete(np.arange(len(rows)), alone)
+            keep = np.delete(np.arange(len(doubtful)), alone)
             counts += len(good), len(keep), *iterations, doubtful.sum()
-            yield found[which[good][keep]].tolist(), [rows[k] for k in keep]
+            yield found[which[good][keep]], {name: x[keep] for name, x in values.items()}
         said.append(f"{counts[1]} of {counts[0]} members were solved together: "
                     f"{batch.family.asked} scenes were built to know all, {counts[2]} linear "
                     f"systems, {counts[3]} from zero"

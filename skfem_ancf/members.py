@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     from .types import Array, StrPath
 
+    Block = tuple[Array, dict[str, Array]]
+
 _FORMAT = 1
 _DAMAGED = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
 
@@ -52,6 +54,8 @@ class Sweep:
         For each member a dict of arrays, the text of an error, or None where it is not done.
     report
         How members were solved, in words.
+    blocks
+        What is found of many together: their places (k,), and from name to array (k, ...).
 
     Attributes
     ----------
@@ -80,21 +84,29 @@ class Sweep:
     """
 
     def __init__(self, parameters: dict[str, Array],
-                 found: Sequence[dict[str, Array] | str | None], report: str = "") -> None:
+                 found: Sequence[dict[str, Array] | str | None], report: str = "",
+                 blocks: Sequence[Block] = ()) -> None:
         self.parameters, self.report = parameters, report
-        self.found = _alike(found)
-        self.status = np.array(["open" if one is None else "done" if isinstance(one, dict)
-                                else "failed" for one in self.found])
-        self.values = _arrays(self.found)
+        self.status = np.full(len(found), "open", dtype="<U6")
+        if blocks and _of_blocks_alone(found, blocks):
+            places, self.values = _joined(blocks, len(found))
+            self.status[places] = "done"
+            self._errors: dict[int, str] = {}
+            return
+        found = _alike(_with_blocks(found, blocks))
+        self._errors = {k: one for k, one in enumerate(found) if isinstance(one, str)}
+        done = [k for k, one in enumerate(found) if isinstance(one, dict)]
+        self.status[list(self._errors)], self.status[done] = "failed", "done"
+        self.values = _arrays(found, done)
 
     @property
     def failures(self) -> list[Failure]:
         """Those that failed, with their parameters and errors."""
-        return [Failure(k, {name: column[k] for name, column in self.parameters.items()}, one)
-                for k, one in enumerate(self.found) if isinstance(one, str)]
+        return [Failure(k, {name: column[k] for name, column in self.parameters.items()}, error)
+                for k, error in self._errors.items()]
 
     def __len__(self) -> int:
-        return len(self.found)
+        return len(self.status)
 
     def __getitem__(self, name: str) -> Array:
         known = {**self.parameters, **self.values}
@@ -248,8 +260,32 @@ def _listed(values):
     return ", ".join(f"{name!r} of shape {value.shape}" for name, value in values.items())
 
 
-def _arrays(found):
-    done = [k for k, one in enumerate(found) if isinstance(one, dict)]
+def _of_blocks_alone(found, blocks):
+    """True if nothing else is found, and all have the same names and shapes."""
+    shapes = [{name: x.shape[1:] for name, x in columns.items()} for _, columns in blocks]
+    return all(one is None for one in found) and all(one == shapes[0] for one in shapes)
+
+
+def _joined(blocks, n):
+    """The places of blocks, and from name to array of all members, nan where nothing is found."""
+    places, arrays = np.concatenate([at for at, _ in blocks]), {}
+    for name in blocks[0][1]:
+        rows = np.concatenate([columns[name] for _, columns in blocks])
+        arrays[name] = np.full((n, *rows.shape[1:]), np.nan, dtype=rows.dtype)
+        arrays[name][places] = rows
+    return places, arrays
+
+
+def _with_blocks(found, blocks):
+    """A list with what is found in blocks, member by member."""
+    found = list(found)
+    for places, columns in blocks:
+        for k, row in zip(places.tolist(), zip(*columns.values())):
+            found[k] = dict(zip(columns, row))
+    return found
+
+
+def _arrays(found, done):
     arrays = {}
     for name in found[done[0]] if done else ():
         rows = np.array([found[k][name] for k in done])

@@ -129,7 +129,7 @@ def sweep(build: Callable[..., Any],
         workers = require_integer("workers", workers, 1)
     members = _members(parameters)
     _require_signature(build, members[0])
-    columns = {name: column_of([member[name] for member in members]) for name in members[0]}
+    columns = {name: column_of(members.rows(name)) for name in members[0]}
     record = _Record(columns, None if path is None else require_path("path", path, (".npz",)))
     task, places = Task(build, measure), record.places
     source = _source(task, members, places, workers, client, record)
@@ -153,12 +153,13 @@ def _source(task, members, places, workers, client, record):
         yield from on_cluster(task, members, places, client)
         return
     if isinstance(task.measure, Readings):
-        left = set(places)
+        left = np.zeros(len(members), dtype=bool)
+        left[places] = True
         for chunk, found in solve_together(task.build, task.measure, members, record.columns,
                                            places, threads_of(workers), record.said):
-            left -= set(chunk)
+            left[chunk] = False
             yield chunk, found
-        places = sorted(left)
+        places = np.flatnonzero(left).tolist()
     if places:
         yield from (here(task, members, places) if workers is None else
                     in_processes(task, members, places, workers))
@@ -171,6 +172,7 @@ class _Record:
         self.columns, self.path = columns, path
         self.said: list[str] = []
         self.found: list[dict[str, Array] | str | None] = [None] * len(next(iter(columns.values())))
+        self.blocks: list[tuple[Array, dict[str, Array]]] = []
         self.next = time.monotonic() + _SECONDS
         if path is not None:
             require_plain(columns)
@@ -179,9 +181,12 @@ class _Record:
         self.places = [k for k, one in enumerate(self.found) if one is None]
 
     def add(self, places, found):
-        """Take what was found of members; write, if it is time to."""
-        for k, one in zip(places, found):
-            self.found[k] = one
+        """Take what was found of members, one by one or in arrays; write, if it is time to."""
+        if isinstance(found, dict):
+            self.blocks.append((places, found))
+        else:
+            for k, one in zip(places, found):
+                self.found[k] = one
         if self.path is not None and time.monotonic() >= self.next:
             begun = time.monotonic()
             self.kept()
@@ -190,28 +195,45 @@ class _Record:
 
     def kept(self):
         """The Sweep so far, in its file too."""
-        result = Sweep(self.columns, self.found, "; ".join(self.said))
+        result = Sweep(self.columns, self.found, "; ".join(self.said), self.blocks)
         if self.path is not None:
             result.save(self.path)
         return result
 
     def stopped(self):
         """Where it was interrupted."""
-        done = sum(isinstance(one, dict) for one in self.found)
+        done = sum(isinstance(one, dict) for one in self.found) + sum(
+            len(places) for places, _ in self.blocks)
         return (f"interrupted with {done} of {len(self.found)} members done; " + (
             "they are in the state of this exception; with path= the next call would go on"
             if self.path is None else f"call again with {str(self.path)!r} to go on"))
 
 
+class _Members:
+    """Dicts of parameters, made when they are asked for: a sequence."""
+
+    def __init__(self, rows):
+        self._rows = rows
+
+    def rows(self, name):
+        """The values of a name, a list."""
+        return self._rows[name]
+
+    def __len__(self):
+        return len(next(iter(self._rows.values()), ()))
+
+    def __getitem__(self, k):
+        return {name: rows[k] for name, rows in self._rows.items()}
+
+
 def _members(parameters):
-    """A list of dicts, of one that is not empty and of equal names."""
+    """Members, at least one, of equal names, at least one."""
     if isinstance(parameters, Mapping):
         columns = {name: _rows(name, values) for name, values in parameters.items()}
         lengths = {name: len(rows) for name, rows in columns.items()}
         if len(set(lengths.values())) > 1:
             raise InputError(f"the parameters must have equal lengths, got {lengths}; for all "
                              "combinations hand a list of dicts, made by itertools.product")
-        members = [dict(zip(columns, row)) for row in zip(*columns.values())]
     else:
         if isinstance(parameters, str) or not hasattr(parameters, "__iter__"):
             raise InputError("parameters must be a dict of arrays or a list of dicts, got "
@@ -222,10 +244,12 @@ def _members(parameters):
                 raise InputError("parameters must be a dict of arrays, or a list of dicts with "
                                  f"equal names; the first has {shown(members[0])}, number {k} is "
                                  f"{shown(member)}")
-        members = [dict(member) for member in members]
-    if not members or not members[0]:
+        columns = {name: [member[name] for member in members]
+                   for name in (members[0] if members else ())}
+    found = _Members(columns)
+    if not len(found):
         raise InputError(f"there are no members in the parameters {shown(parameters)}")
-    return members
+    return found
 
 
 def _rows(name, values):
@@ -266,7 +290,8 @@ def _done(path, columns):
     if differ:
         raise FileError(f"{path} is of a sweep with other parameters: {differ}; give another path, "
                         "or delete the file")
-    return [one if isinstance(one, dict) else None for one in before.found]
+    return [{name: x[k] for name, x in before.values.items()} if status == "done" else None
+            for k, status in enumerate(before.status)]
 
 
 def _same(a, b):

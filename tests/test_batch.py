@@ -7,10 +7,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        MeshBeam, NeoHookean, Scene, StVenantKirchhoff, batch, sweep)
+                        MeshBeam, NeoHookean, Scene, StVenantKirchhoff, batch, members, sweep)
 from skfem_ancf.alike import Unlike
 from skfem_ancf.batch import Batch, Lane
 from skfem_ancf.errors import NameUnknown, SweepWarning
+from skfem_ancf.members import Sweep
 from skfem_ancf.obstacles import Circle
 from skfem_ancf.polynomials import Polynomial
 from skfem_ancf.readings import Readings
@@ -48,6 +49,29 @@ def drawn(n, **ranges):
 def alone(build, table, k):
     scene = build(**{name: values[k] for name, values in table.items()})
     return scene.solve_static().displacement(tuple(scene.beams[0].mesh.p[:, -1]))
+
+
+def test_what_is_solved_together_stays_in_arrays(monkeypatch):
+    apart, dicts = members._with_blocks, []
+    monkeypatch.setattr(members, "_with_blocks",
+                        lambda *args: dicts.append(args) or apart(*args))
+    result = sweep(cantilever, drawn(40, E=(2e8, 3e8)), TIP, workers=1)
+    assert not dicts and result["tip"].shape == (40, 2) and len(result) == 40
+    assert set(result.status) == {"done"} and not result.failures
+
+
+def test_blocks_and_members_by_themselves_are_one_sweep():
+    x = np.arange(5.0)
+    blocks = [(np.array([3, 0]), {"a": np.array([[3.0, 30.0], [0.0, 0.5]])})]
+    both = Sweep({"x": x}, [None, {"a": np.array([1.0, 10.0])}, "Error: why", None, None], "", blocks)
+    assert both.status.tolist() == ["done", "done", "failed", "done", "open"]
+    assert_array_equal(both["a"], [[0, 0.5], [1, 10], [np.nan] * 2, [3, 30], [np.nan] * 2])
+    assert [(f.member, f.error) for f in both.failures] == [(2, "Error: why")]
+    alone = Sweep({"x": x}, 5 * [None], "", blocks)
+    assert alone.status.tolist() == ["done", "open", "open", "done", "open"]
+    assert_array_equal(alone["a"][[0, 3, 4]], [[0, 0.5], [3, 30], [np.nan] * 2])
+    other = (np.array([1]), {"b": np.array([1.0])})
+    assert [f.member for f in Sweep({"x": x}, 5 * [None], "", [*blocks, other]).failures] == [1]
 
 
 def compare(build, table, n, rtol=1e-8, least=None):
