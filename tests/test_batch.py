@@ -63,7 +63,8 @@ def test_what_is_solved_together_stays_in_arrays(monkeypatch):
 def test_blocks_and_members_by_themselves_are_one_sweep():
     x = np.arange(5.0)
     blocks = [(np.array([3, 0]), {"a": np.array([[3.0, 30.0], [0.0, 0.5]])})]
-    both = Sweep({"x": x}, [None, {"a": np.array([1.0, 10.0])}, "Error: why", None, None], "", blocks)
+    found = [None, {"a": np.array([1.0, 10.0])}, "Error: why", None, None]
+    both = Sweep({"x": x}, found, "", blocks)
     assert both.status.tolist() == ["done", "done", "failed", "done", "open"]
     assert_array_equal(both["a"], [[0, 0.5], [1, 10], [np.nan] * 2, [3, 30], [np.nan] * 2])
     assert [(f.member, f.error) for f in both.failures] == [(2, "Error: why")]
