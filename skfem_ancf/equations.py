@@ -1,6 +1,5 @@
 """The equations of a scene as tables that texts take."""
 
-from copy import copy
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,7 +10,7 @@ from .body import FlatBody, body_of, stress_size, viscous_body_of
 from .border import Border
 from .compiled.words import Words
 from .forces.texts import ForceTables
-from .kept import cached_property
+from .kept import cached_property, twin_of
 from .kernels.law import OWN, text_of, with_text
 from .kernels.moments import MomentPack
 from .kernels.section import SectionPack, linearised
@@ -168,7 +167,7 @@ class Tables:
         system
             A :class:`~skfem_ancf.system.System` of the same coordinates and joints.
         """
-        tables, before = copy(self), self.plain
+        tables, before = twin_of(self), self.plain
         tables.system, tables._words, tables._own_handle = system, [], None
         for name in ("flat", "linearised", "parts", "_stress_size"):
             vars(tables).pop(name, None)
@@ -191,7 +190,7 @@ class Tables:
         plain
             In place of those of the system.
         """
-        tables = copy(self)
+        tables = twin_of(self)
         vars(tables).pop("flat", None)
         tables._words, tables.plain = [], plain
         return tables

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .errors import ImmutableError, InputError, NameUnknown
-from .kept import cached_property
+from .kept import cached_property, twin_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -70,11 +70,7 @@ class Sealable:
 
     def _unsealed(self):
         """A copy that may be changed."""
-        if hasattr(self, "__slots__"):
-            other = copy(self)
-        else:
-            other = object.__new__(type(self))
-            vars(other).update(vars(self))
+        other = copy(self) if hasattr(self, "__slots__") else twin_of(self)
         vars(other)["_sealed"] = False
         return other
 

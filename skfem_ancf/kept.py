@@ -19,6 +19,24 @@ else:
             return value
 
 
+def twin_of(thing: Any) -> Any:
+    """Another object with the same attributes: ``copy`` of one without slots, many times faster.
+
+    Examples
+    --------
+    >>> class Point:
+    ...     x = 1.0
+    >>> p = Point()
+    >>> p.y = 2.0
+    >>> q = twin_of(p)
+    >>> q is p, vars(q)
+    (False, {'y': 2.0})
+    """
+    other = object.__new__(type(thing))
+    vars(other).update(vars(thing))
+    return other
+
+
 def kept(store: dict, key: Hashable, make: Callable[[], Any], most: int = 32) -> Any:
     """What is kept under a key, or what ``make()`` returns, which is kept then.
 

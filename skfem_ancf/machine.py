@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import time
 from contextlib import contextmanager
-from copy import copy
 from functools import wraps
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,7 +13,7 @@ import numpy as np
 from . import compiled
 from .compiled.words import Kept
 from .equations import Tables
-from .kept import cached_property
+from .kept import cached_property, twin_of
 from .kernels.law import with_text
 from .kernels.section import SectionPack
 from .materials.followed import NotFollowed
@@ -133,7 +132,7 @@ class Machine:
         tables
             In place of its own.
         """
-        machine = copy(self)
+        machine = twin_of(self)
         machine.tables, machine._kept = tables, Kept()
         vars(machine).pop("linearised", None)
         return machine

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from functools import cache
 from itertools import accumulate, pairwise
 from math import sqrt
 from typing import TYPE_CHECKING, Any
@@ -153,9 +154,8 @@ class System:
         if system.symmetric != self.symmetric or before.asks:
             return None
         kept = _OF_BEAMS if beams == self.beams else _OF_PLACES
-        for name in list(vars(system)):
-            if name not in kept and isinstance(getattr(type(self), name, None), cached_property):
-                del vars(system)[name]
+        for name in _made_once(type(self)) - kept:
+            vars(system).pop(name, None)
         tables = before.renewed(system)
         if tables.asks:
             return None
@@ -893,6 +893,12 @@ class System:
             self._sparse = self._sparse_factors(self._factors.tocsc())
         x = self._sparse.solve(np.append(b, self._weight * phi))
         return x[:self.N], self._weight * x[self.N:]
+
+
+@cache
+def _made_once(cls):
+    """Names of attributes that are made when they are asked for."""
+    return frozenset(name for name in dir(cls) if isinstance(getattr(cls, name), cached_property))
 
 
 def _extent(bodies):

@@ -9,13 +9,13 @@ stabilised.
 Rows of the table are those of d/dX, then of d^2/dX^2, at the points: ``a = r'``, ``b = r''``.
 """
 
-from copy import copy
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..frozen import read_only
+from ..kept import twin_of
 from ..quadrature import gauss
 from ..source import F2, F3, I1, lanes, primitive, room, source
 from ..types import Array
@@ -446,7 +446,7 @@ class CableKernel(Chain):
         stiffness, volume
             Factors on the moduli, and on the volume.
         """
-        other, pack, both = copy(self), self.packs[0], stiffness * volume
+        other, pack, both = twin_of(self), self.packs[0], stiffness * volume
         other._across, other.volume = across, volume * self.volume
         if self.constant is not None:
             other.constant = both * self.constant

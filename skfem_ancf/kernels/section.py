@@ -6,7 +6,6 @@ integration, and forces go back the same way. With moduli between samples, which
 interpolation and the weights in them, the tangent is a sum over pairs of rows.
 """
 
-from copy import copy
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,6 +15,7 @@ from scipy import sparse
 
 from ..frozen import Content
 from ..materials import LinearLaw
+from ..kept import twin_of
 from ..source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
 from ..types import Array
 from .base import (CARRY, GIVEN, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables, Texts,
@@ -446,7 +446,7 @@ class TermTables:
         stiffness, volume
             As there.
         """
-        other, pack, both = copy(self), self.pack, stiffness * volume
+        other, pack, both = twin_of(self), self.pack, stiffness * volume
         other.law = LinearLaw(stiffness * pack.law.D)
         other.slab, other.w = slab, volume * self.w
         other.term = replace(self.term, law=other.law)
@@ -801,7 +801,7 @@ class Kernel(Chain):
         stiffness, volume
             Factors on the moduli, and on the volume.
         """
-        other = copy(self)
+        other = twin_of(self)
         other._across, slabs = across, dict(zip(map(id, self._across.slabs), across.slabs))
         if self.constant is not None:
             other.constant = stiffness * volume * self.constant
