@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        MeshBeam, MeshError, NeoHookean, Scene, StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
+                        ElementBeamCable, InputError, MeshBeam, MeshError, NeoHookean, Scene,
+                        StVenantKirchhoff)
 from skfem_ancf.elements import base
 from skfem_ancf.finder import Finder
 from skfem_ancf.kernels import cable, section
@@ -63,6 +64,33 @@ def test_tables_of_equal_elements_are_those_of_each(degree, n, angle):
     force = kernel.force(u)
     kernel.packs = [whole]
     assert np.allclose(force, kernel.force(u), rtol=0, atol=1e-11 * np.max(np.abs(force)))
+
+
+@pytest.mark.parametrize("plane, formulation", [("stress", "assumed"), ("strain", "assumed"),
+                                                ("stress", "continuum"), ("strain", "ecm")])
+@pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCF(3),
+                                     ElementBeamANCF(4, "equispaced"), ElementBeamANCFCubic(2),
+                                     ElementBeamANCFHermite(2, 5), ElementBeamCable(3)])
+def test_equal_elements_have_the_forces_of_elements_one_by_one(element, plane, formulation):
+    def beam(alike):
+        mesh = MeshBeam.init_line(np.linspace(0.5, 2.0, 4), 0.07, angle=0.6)
+        if not alike:
+            vars(mesh)["_is_uniform"] = False
+        return Beam(mesh, element, StVenantKirchhoff(2e9, 0.3, 7800.0, plane), 0.02, formulation)
+
+    one, other = beam(True), beam(False)
+    if element.order:
+        assert len(one.kernel.packs[0].table) == 1 < len(other.kernel.packs[0].table)
+    rng = np.random.default_rng(1)
+    scale = 0.07 ** np.array([f[1] + f[2] for f in element.functionals])
+    u = 0.02 * (rng.standard_normal((4, element.nodal_dofs, 2)) / scale[:, None]).ravel()
+    for make in (lambda k: k.force(u), lambda k: k.tangents(u), lambda k: k.energies(u),
+                 lambda k: np.array([k.volume, k.scale])):
+        a, b = make(one.kernel), make(other.kernel)
+        assert np.allclose(a, b, rtol=1e-11, atol=1e-11 * np.max(np.abs(b)))
+    assert np.allclose(one.weight((1.0, 2.0)), other.weight((1.0, 2.0)), rtol=1e-12, atol=1e-12)
+    a, b = (x.mass_elements() for x in (one, other))
+    assert np.allclose(a, b, rtol=1e-12, atol=1e-12 * np.max(np.abs(b)))
 
 
 @pytest.mark.parametrize("element", [ElementBeamCable(3), ElementBeamCable(9), ElementBeamANCF(1),

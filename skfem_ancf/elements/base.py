@@ -230,9 +230,41 @@ class ElementBeam(Frozen, Element):
         h, L
             Its height and length.
         """
-        power, slope = self._factors[3:]
-        return h**power * L**slope * _integrals_of(
+        return self.powers(h, L) * _integrals_of(
             self._along, self.functionals, self.section, self.axis_degree, max(self.order, 1))
+
+    @property
+    def by_reference(self) -> bool:
+        """True if all straight elements follow from one of length and height 1, by powers."""
+        return all(getattr(type(self), name) is getattr(ElementBeam, name)
+                   for name in ("local", "of_mesh", "functions", "slopes"))
+
+    def unit_slopes(self, X: Array, Y: Array) -> Array:
+        """Derivatives of the local functions of height 1 and length 1, which are kept.
+
+        Parameters
+        ----------
+        X, Y
+            Reference points of derivatives along the axis, shape (2, n), and of those across, (2,
+            m).
+
+        Returns
+        -------
+        ndarray
+            Shape (n + m, 2 nodal_dofs).
+        """
+        return _slopes(self._along, self.functionals, self.section, Content(X, Y))
+
+    def powers(self, h: float, L: float) -> Array:
+        """What height and length multiply the local functions by, shape (2 nodal_dofs,).
+
+        Parameters
+        ----------
+        h, L
+            Height and length of a straight element.
+        """
+        power, slope = self._factors[3:]
+        return h**power * L**slope
 
     def gbasis(self, mapping: MappingBeam, X: Array, i: int,
                tind: Array | None = None) -> tuple[DiscreteField, ...]:
@@ -507,6 +539,17 @@ def _integrals_of(along: tuple[int, int], functionals: Functionals, section: Sec
     X, W = tensor(gauss(degree // 2 + 1), gauss(order // 2 + 1))
     factors = _factors(along, functionals, section.number)
     return read_only(_unit_functions(along, factors, section, X)[0] @ W)
+
+
+@lru_cache(64)
+def _slopes(along: tuple[int, int], functionals: Functionals, section: SectionFunctions,
+            content: Content) -> Array:
+    factors, (X, Y) = _factors(along, functionals, section.number), content.arrays
+    out = np.concatenate([_unit_functions(along, factors, section, X)[1].T,
+                          _unit_functions(along, factors, section, Y)[2].T])
+    # the positions of both nodes together are a translation: exactly, or round-off resists it
+    out[:, len(functionals)] = -out[:, 0]
+    return read_only(out)
 
 
 @lru_cache(256)

@@ -126,7 +126,9 @@ class Assumed(Formulation):
                       width: float) -> Array | None:
         if not element.held:
             return None
-        tind = np.arange(1 if mesh.is_uniform else mesh.nelements)
+        if mesh.is_uniform:
+            return self._of_equal(mesh, element, material.E * width * mesh.height**3 / 12.0)
+        tind = np.arange(mesh.nelements)
         L, EI = mesh.lengths[tind], material.E * width * mesh.height**3 / 12.0
         per = {"element": L, "beam": mesh.chain_lengths[tind], "": np.ones(len(tind))}
         q = element.rigid(mesh)
@@ -149,3 +151,15 @@ class Assumed(Formulation):
             held = (k * L)[:, None, None] * (C.transpose(0, 2, 1) @ C)
             out = held if out is None else out + held
         return out
+
+    def _of_equal(self, mesh, element, EI):
+        """The same of straight elements that are equal: beta is zero."""
+        L, nb = float(mesh.lengths[0]), 2 * element.nodal_dofs
+        per = {"element": L, "beam": float(mesh.chain_lengths[0]), "": 1.0}
+        along, held = element.powers(1.0, L) / L, np.zeros((nb, nb))
+        for mode in element.held:
+            c = mode.weights * along
+            held += (self.alpha * mode.size * EI / per[mode.per] ** 2 * L) * np.outer(c, c)
+        out = np.zeros((1, nb, 2, nb, 2))
+        out[0, :, 0, :, 0] = out[0, :, 1, :, 1] = held
+        return out.reshape(1, 2 * nb, 2 * nb)

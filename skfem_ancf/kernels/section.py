@@ -20,7 +20,8 @@ from ..source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped,
 from ..types import Array
 from .base import (CARRY, GIVEN, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables, Texts,
                    add_force, add_held_energy, add_tangent, apart, block, copy_stress, in_rounds,
-                   load, packed, pair_numbers, pair_tables, product, with_constant)
+                   load, packed, pair_numbers, pair_tables, product,
+                   scaled_pair_tables, with_constant)
 from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
 
 if TYPE_CHECKING:
@@ -430,11 +431,11 @@ class TermTables:
         else:
             self.points, self.w = before.points, before.w
             self._rows, self._interpolation = before._rows, before._interpolation
-        G, frame, rows, self._sheared, self._along = self._rows
+        G, frame, rows, self._sheared, self._along, scaled = self._rows
         weights = self.w * across.grade(slab, self.points, tind, whole)
         self.pack: SectionPack = section_pack(
             G, frame, weights.T, rows, self._interpolation, law_tables(self.law, owner), constant,
-            mesh.t[0], None if before is None else before.pack)
+            mesh.t[0], None if before is None else before.pack, scaled)
 
     def in_proportion(self, slab: "Slab", stiffness: float, volume: float) -> "TermTables":
         """As :meth:`Kernel.in_proportion`.
@@ -510,26 +511,50 @@ def _same_places(a, b):
 
 
 def _rows(mesh, element, term, tind):
-    """Table and frame, g and h of each component's samples, and those of shear and of eps_xx."""
-    xi_x = np.unique(np.concatenate([term.nodes("xx"), term.nodes("xy")]))
-    xi_y = np.unique(np.concatenate([term.nodes("yy"), term.nodes("xy")]))
-    eta = term.section_nodes
+    """Table and frame, g and h of each component's samples, and those of shear and of eps_xx.
+
+    Of equal elements also the table of one of length and height 1, and what multiplies its rows and
+    columns.
+    """
+    points, xx, yy, xy = _samples(Content(*(term.nodes(name) for name in ("xx", "yy", "xy")),
+                                          term.section_nodes))
+    rows = (xx, xx), (yy, yy), xy
+    if tind is not None and element.by_reference:
+        return _equal_rows(mesh, element, points, rows, xy, xx)
     tables = []
-    for k, xi in enumerate((xi_x, xi_y)):
-        X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
+    for k, X in enumerate(points):
         G, frame = beam_gradients(mesh, element, X, tind)
         tables.append((G[k], frame[k].transpose(1, 2, 0)))
     G = np.concatenate([part for part, _ in tables], axis=1)
     frame = np.concatenate([part for _, part in tables])
+    return G, frame, rows, xy, xx, None
 
-    def where(name, xi):
-        return (np.searchsorted(xi, term.nodes(name))[:, None] * len(eta)
-                + np.arange(len(eta))).ravel()
 
-    n = tables[0][0].shape[1]
-    xx, yy = where("xx", xi_x), n + where("yy", xi_y)
-    xy = where("xy", xi_x), n + where("xy", xi_y)
-    return G, frame, ((xx, xx), (yy, yy), xy), xy, xx
+def _equal_rows(mesh, element, points, rows, sheared, along):
+    """What :func:`_rows` returns of straight elements that are equal."""
+    h, L, n = mesh.height, float(mesh.lengths[0]), points[0].shape[1]
+    unit = element.unit_slopes(*points)
+    of_rows, of_columns = np.empty(len(unit)), element.powers(h, L)
+    of_rows[:n], of_rows[n:] = 1.0 / L, 1.0 / h
+    (x, y), frame = (mesh.p[:, 1] - mesh.p[:, 0]) / L, np.empty((len(unit), 2, 1))
+    frame[:n, 0], frame[:n, 1], frame[n:, 0], frame[n:, 1] = x, y, -y, x
+    return ((unit * (of_rows[:, None] * of_columns))[None], frame, rows, sheared, along,
+            (unit, of_rows, of_columns))
+
+
+@lru_cache(64)
+def _samples(content):
+    """Points at which slopes along and across are sampled, and the rows of xx, yy, and of xy."""
+    at_xx, at_yy, at_xy, eta = content.arrays
+    xi_x, xi_y = (np.unique(np.concatenate([at, at_xy])) for at in (at_xx, at_yy))
+    points = [np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))]) for xi in (xi_x, xi_y)]
+
+    def where(at, xi):
+        return (np.searchsorted(xi, at)[:, None] * len(eta) + np.arange(len(eta))).ravel()
+
+    n = points[0].shape[1]
+    return (points, where(at_xx, xi_x), n + where(at_yy, xi_y),
+            (where(at_xy, xi_x), n + where(at_xy, xi_y)))
 
 
 def _interpolation(term):
@@ -544,7 +569,7 @@ def _interpolation(term):
 
 def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[Array],
                  law: LawTables, constant: Array, left: Array,
-                 before: SectionPack | None = None) -> SectionPack:
+                 before: SectionPack | None = None, scaled: Any = None) -> SectionPack:
     """The SectionPack of one term.
 
     Parameters
@@ -563,6 +588,8 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
         The left node of each element.
     before
         One of the same G, whose tables of pairs serve if the law couples the same strains.
+    scaled
+        A table (rows, nb) whose rows and columns two vectors multiply to make G; or None.
     """
     nb, ne, ns = G.shape[2], len(left), weights.shape[0] // len(along[0])
     (g, h), normal = (np.concatenate(part) for part in zip(*rows)), sum(len(x) for x, _ in rows[:2])
@@ -582,6 +609,8 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
     joined, ends = _joined(along, ns)
     if before is not None and before.rows is layout.rows:
         pairs = with_constant(before.pairs, constant, ne)
+    elif scaled is not None:
+        pairs = scaled_pair_tables(*scaled, layout.pairs, constant, ne)
     else:
         pairs = pair_tables(G, layout.pairs, constant, ne)
     return SectionPack(

@@ -150,6 +150,8 @@ class Across(Frozen):
         whole
             The points stand for their sections.
         """
+        if self.simple and self.uniform and tind is not None:
+            return slab.width * self.mesh.height * self.mesh.lengths[tind][:, None] * W
         return self.breadth(slab, X, tind, whole) * W * self.mesh.mapping().detDF(X, tind)
 
     def breadth(self, slab: Slab, X: Array, tind: Array | None = None, whole: bool = False) -> Any:
