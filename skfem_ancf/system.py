@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from functools import cache
 from itertools import accumulate, pairwise
 from math import sqrt
 from typing import TYPE_CHECKING, Any
@@ -154,7 +153,7 @@ class System:
         if system.symmetric != self.symmetric or before.asks:
             return None
         kept = _OF_BEAMS if beams == self.beams else _OF_PLACES
-        for name in _made_once(type(self)) - kept:
+        for name in _MADE_ONCE - kept:
             vars(system).pop(name, None)
         tables = before.renewed(system)
         if tables.asks:
@@ -895,10 +894,8 @@ class System:
         return x[:self.N], self._weight * x[self.N:]
 
 
-@cache
-def _made_once(cls):
-    """Names of attributes that are made when they are asked for."""
-    return frozenset(name for name in dir(cls) if isinstance(getattr(cls, name), cached_property))
+#: Names of attributes that are made when they are asked for.
+_MADE_ONCE = {name for name, value in vars(System).items() if isinstance(value, cached_property)}
 
 
 def _extent(bodies):

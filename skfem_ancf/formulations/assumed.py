@@ -152,7 +152,7 @@ class Assumed(Formulation):
             out = held if out is None else out + held
         return out
 
-    def _of_equal(self, mesh, element, EI):
+    def _of_equal(self, mesh: MeshBeam, element: ElementBeam, EI: float) -> Array:
         """The same of straight elements that are equal: beta is zero."""
         L, nb = float(mesh.lengths[0]), 2 * element.nodal_dofs
         per = {"element": L, "beam": float(mesh.chain_lengths[0]), "": 1.0}

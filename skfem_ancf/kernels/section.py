@@ -610,7 +610,8 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
     if before is not None and before.rows is layout.rows:
         pairs = with_constant(before.pairs, constant, ne)
     elif scaled is not None:
-        pairs = scaled_pair_tables(*scaled, layout.pairs, constant, ne)
+        unit, of_rows, of_columns = scaled
+        pairs = scaled_pair_tables(unit, of_rows, of_columns, layout.pairs, constant, ne)
     else:
         pairs = pair_tables(G, layout.pairs, constant, ne)
     return SectionPack(
