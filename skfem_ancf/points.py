@@ -272,7 +272,9 @@ class Points:
         if not abs(x) + abs(y) < HUGE:
             return None
         x, y = float(x), float(y)
-        if beam is None:
+        if beam is None and len(self.beams) == 1:
+            near = self.beams
+        elif beam is None:
             near = [b for b, (x0, x1, y0, y1) in self._boxes if x0 <= x <= x1 and y0 <= y <= y1]
         else:
             near = [select_beam(self.beams, beam)]

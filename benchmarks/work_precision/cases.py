@@ -44,7 +44,8 @@ def slender(p, tolerances=(1e-8, 1e-4), degrees=(3, 5, 7)):
                 yield ours.run(p, "cable", degree, n, tol=tol)
     for degree in (9, 11, 13, 15):
         for n in (1, 2, 3, 4):
-            yield ours.run(p, "cable", degree, n)
+            for tol in tolerances[:2]:
+                yield ours.run(p, "cable", degree, n, tol=tol)
     if exudyn_beams.exudyn is None:
         return
     for n in (4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192):
