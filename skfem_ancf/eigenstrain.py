@@ -153,10 +153,10 @@ class EigenStrain(Load):
         return self.beam.kernel.scatter(self.element_forces(u, self._size))
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
-        if self._growth is not None:  # Gonzalez (1996)
-            force, d = super().mean_force(u0, u1), u1 - u0
-            gain = self.potential(u0) - self.potential(u1)
-            return force + (gain - force @ d) / (d @ d) * d
+        if self._growth is not None:
+            gather = self.beam.kernel.gather
+            return self.beam.kernel.scatter(
+                self._growth.mean_forces(gather(u0), gather(u1), self._size))
         if self.beam.has_sections:
             return super().mean_force(u0, u1)
         out = np.zeros(self.beam.N)

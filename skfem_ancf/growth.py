@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .formulations import COMPONENTS
-from .kernels.law import law_evaluate
+from .kernels.law import conserve, law_evaluate
 from .kernels.section import with_unit_law
 
 if TYPE_CHECKING:
@@ -55,9 +55,26 @@ class Growth:
         u_e, factor
             As for :meth:`stresses`, u_e of shape (ne, nb, 2).
         """
-        S = self._geometric(u_e, self.stresses(u_e, factor))
-        q = self.beam.kernel.gather(self.beam.q0_local) + u_e
-        return np.einsum("eij,ej->ei", S, q.reshape(len(q), -1)).reshape(q.shape)
+        return self._forces(u_e, self.stresses(u_e, factor))
+
+    def mean_forces(self, u0: Array, u1: Array, factor: float) -> Array:
+        """Forces whose work from u0 to u1 is what :meth:`potential` loses, shape (ne, nb, 2).
+
+        The strain being quadratic, discrete gradients of the law at the points act as
+        stresses in the middle, and keep momenta too.
+
+        Parameters
+        ----------
+        u0, u1
+            Displacements of the elements' coordinates, shape (ne, nb, 2).
+        factor
+            On E0.
+        """
+        ends = zip(self._terms(u0), self._terms(u1))
+        return self._forces(0.5 * (u0 + u1), [
+            _mean_stress(pack, 0.5 * (A + B), B - A)
+            - _mean_stress(pack, 0.5 * (A + B) - factor * E0, B - A)
+            for (pack, A, E0), (_, B, _) in ends])
 
     def tangents(self, u_e: Array, factor: float) -> Array:
         """The derivatives of :meth:`forces`, shape (ne, 2 nb, 2 nb).
@@ -94,6 +111,12 @@ class Growth:
             self.beam.kernel.texts.stress(with_unit_law(pack), np.ascontiguousarray(u_e).ravel(), E)
             yield pack, E, E0
 
+    def _forces(self, u_e, stresses):
+        """The forces of given stresses at the points."""
+        q = self.beam.kernel.gather(self.beam.q0_local) + u_e
+        S = self._geometric(u_e, stresses)
+        return np.einsum("eij,ej->ei", S, q.reshape(len(q), -1)).reshape(q.shape)
+
     def _slopes(self, pack, u_e):
         """The derivative of the strain by each coordinate, (2 nb, 3, points, ne)."""
         u, out = np.ascontiguousarray(u_e).ravel(), []
@@ -121,6 +144,14 @@ def _loss(rows, pack, E, E0):
     for strain, values in zip((E, E - E0), out):
         law_evaluate(pack.law, np.ascontiguousarray(strain), values)
     return out[0] - out[1]
+
+
+def _mean_stress(pack, middle, change):
+    """The stress (3, points, ne) whose product with a change of the strain is that of W."""
+    S = np.empty(middle.shape)
+    law_evaluate(pack.law, np.ascontiguousarray(middle), S)
+    conserve(pack.law, middle, change, S)
+    return S
 
 
 def sampled(beam: Beam, table: Any, eigen: Any) -> Array:

@@ -135,6 +135,17 @@ def test_balance_with_joints_and_all_kinds_at_once(extra):
         assert gaps[1] < 0.35 * gaps[0] or gaps[1] < 1e-10
 
 
+def test_what_is_damped_within_a_step_is_counted():
+    """A strip that is heated at once: its axis comes to rest in some steps."""
+    law = StVenantKirchhoff(1e8, 0.3, 1000, thermal_expansion=1e-3)
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 4), 0.05), ElementBeamCable(3), law, 0.03)
+    scene = Scene(beam).clamp("left").temperature(10.0).damping(stiffness=1e-3)
+    history = scene.integrate(0.05, 1e-3, scheme="generalized-alpha")
+    lost = history.total_energy[0] - history.total_energy[-1]
+    assert lost == pytest.approx(7.5, rel=0.05)  # E A (alpha T)^2 L / 2
+    assert history.dissipated[-1] == pytest.approx(lost, rel=0.02)
+
+
 def test_spinning_and_flying_lose_nothing():
     beam = beam_of("sections", 0.1)
     scene = Scene(beam).initial_velocity(lambda x: np.array([1.0 - 0 * x[0], 2.0 + 0 * x[1]]))

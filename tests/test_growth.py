@@ -119,6 +119,29 @@ def test_a_motion_keeps_the_energy_and_follows_the_amplitude(element):
     assert np.abs((acting.force(half.u) - internal)[free]).max() < 1e-6 * np.abs(internal).max()
 
 
+@laws
+def test_muscles_of_a_free_body_keep_the_momenta(law):
+    beam = bar(law, ElementBeamANCF(2), 4)
+    scene = Scene(beam).eigenstrain(xx=lambda x, y, t: 2.0 * y * np.sin(20.0 * t) * (1.0 + x))
+    scene.initial_velocity(lambda x: np.array([1.0 - x[1], x[0]]))
+    history = scene.integrate(0.1, 5e-3)
+    assert np.ptp(history.total_energy) > 0.1 * history.total_energy[0]  # of what muscles do
+    assert np.ptp(history.momentum, axis=0).max() < 1e-12
+    assert np.ptp(history.angular_momentum) < 1e-12
+
+
+@pytest.mark.parametrize("plane", ["stress", "strain"])
+def test_rubber_expands_with_the_temperature(plane):
+    """To E_xx = alpha T, (1 + nu) alpha T in plane strain, without stress in the plane."""
+    law = RUBBER.replace(plane=plane, thermal_expansion=1e-3)
+    state = Scene(bar(law, ElementBeamANCF(2))).clamp("left", thickness="free").temperature(
+        20.0).solve_static()
+    size = 0.02 * (1.0 if plane == "stress" else 1.4)
+    assert state.displacement((1, 0))[0] == pytest.approx(np.sqrt(1 + 2 * size) - 1, rel=1e-9)
+    assert np.abs(state.stress((0.52, 0.01), recover=False)).max() < 1e-3
+    assert law.replace(E=2e6).thermal_expansion == 1e-3
+
+
 def test_two_do_not_add_up_and_are_refused():
     scene = Scene(bar(RUBBER, ELEMENTS[0])).clamp("left").eigenstrain(xx=0.1)
     with pytest.raises(InputError, match="do not add up"):

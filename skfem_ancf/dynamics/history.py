@@ -53,7 +53,8 @@ class History:
         Of the joints, shape (nt, m).
     dissipated
         The work of damping since the start, shape (nt,): that of its force with the
-        energy-momentum scheme, the integral of its power by the trapezoidal rule with others.
+        energy-momentum scheme, that of the mean of its forces at both ends of each step with
+        generalized-alpha, by the scheme's own rule with others.
     sensors
         What the sensors of the scene have read at every step, by name: a
         :class:`~skfem_ancf.dynamics.sensors.Readings` with its times ``t``.

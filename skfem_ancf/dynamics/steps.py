@@ -297,10 +297,11 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
     """
     course, state = borrowed(course), borrowed(state)
     m, y, u = w.m.l.size, w.y, w.x.u
-    joined, damped, power = m > 0, matrices.dampers.active > 0, 0.0
-    contacts, taken = e.forces.contacts, np.empty(1)
+    joined, damped = m > 0, matrices.dampers.active > 0
+    contacts, taken, before = e.forces.contacts, np.empty(1), np.empty(u.size)
     if damped and rule.conserving == 0:
-        power = _power(e, matrices, course.times[0, 0] - course.dt, y[0], y[1], w)
+        damping_force(e, matrices.dampers, matrices.M, course.times[0, 0] - course.dt, y[0], y[1],
+                      before, w.x.room)
     for n in range(rows.shape[0]):
         s = _step(e.joints, rule, course, n)
         rough, wanted = _begin(e.free, matrices.M, rule, s, w, state)
@@ -351,7 +352,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
         if told == FAILED:
             return n
         if damped:
-            power = _add_work(e, matrices, rule, s, w, state, power)
+            _add_work(e, matrices, rule, s, w, state, before)
         if contacts.lasting > 0:
             _settle(e.forces, rule, s, w, taken)
             state[DISSIPATED] += taken[0]
@@ -724,29 +725,22 @@ def _resist(e, matrices, rule, s, w):
 
 
 @source
-def _power(e, matrices, t, u, v, w):
-    """What damping takes in a unit of time."""
-    damping_force(e, matrices.dampers, matrices.M, t, u, v, w.x.damping, w.x.room)
-    return dot(w.x.damping, v)
+def _add_work(e, matrices, rule, s, w, state, before):
+    """Add what damping has taken in the step.
 
-
-@source
-def _add_work(e, matrices, rule, s, w, state, power):
-    """Add what damping has taken in the step; returns its power at the end.
-
-    In the conserving scheme that is the work of its force, else the mean of the powers.
+    In the conserving scheme that is the work of its force, else of the mean of the force
+    ``before``, which becomes that of the next step, and that at the end.
     """
-    after = 0.0
-    if rule.conserving > 0:
-        u, u0, pace = w.x.u, w.y[0], w.x.pace
-        for i in lanes(u.size):
-            pace[i] = u[i] - u0[i]
-        work = dot(w.x.damping, pace)
-    else:
-        after = _power(e, matrices, s.t, w.x.u, w.x.v, w)
-        work = 0.5 * s.dt * (power + after)
+    u, u0, d, change = w.x.u, w.y[0], w.x.damping, w.x.pace
+    if rule.conserving == 0:
+        damping_force(e, matrices.dampers, matrices.M, s.t, u, w.x.v, d, w.x.room)
+    for i in lanes(u.size):
+        change[i] = u[i] - u0[i]
+    work = dot(d, change)
+    if rule.conserving == 0:
+        work = 0.5 * (work + dot(before, change))
+        copy(d, before)
     state[DISSIPATED] += work
-    return after
 
 
 @source

@@ -108,6 +108,8 @@ class NeoHookean(TextMaterial):
         "stress" or "strain".
     shear_correction
         "auto", "paper" or a positive number, see :class:`~skfem_ancf.materials.base.Material`.
+    thermal_expansion
+        Strain for a degree of temperature, see :meth:`skfem_ancf.Scene.temperature`.
 
     References
     ----------
@@ -127,8 +129,8 @@ class NeoHookean(TextMaterial):
 
     @taught
     def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
-                 shear_correction: str | float = "auto") -> None:
-        super().__init__(E, nu, density, plane, shear_correction)
+                 shear_correction: str | float = "auto", thermal_expansion: float = 0.0) -> None:
+        super().__init__(E, nu, density, plane, shear_correction, thermal_expansion)
         if self.nu == 0.5:
             raise InputError("the compressible neo-Hookean law needs nu below 0.5, got 0.5")
 
