@@ -126,7 +126,7 @@ class Point:
         if weights is None or weights is AGAIN:
             _, xi, eta = self.place
             new = self.beam.series.at(xi, eta) * self._scale
-            if self.beam.mesh.heights is not None:
+            if self.beam.mesh.heights is not None and self.beam.has_sections:
                 new *= self.beam.series.swollen(self._relative_height()[0])
             weights, self._weights = new, AGAIN if weights is None else new
         return weights
@@ -136,7 +136,7 @@ class Point:
         if self._both is None:
             _, xi, eta = self.place
             self._both = self.beam.series.with_slopes(xi, eta) * self._scale
-            if self.beam.mesh.heights is not None:
+            if self.beam.mesh.heights is not None and self.beam.has_sections:
                 series, (g, rate) = self.beam.series, self._relative_height()
                 self._both[1] += series.swelling(g, rate) * self._both[0]
                 self._both *= series.swollen(g)

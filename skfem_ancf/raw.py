@@ -1,8 +1,8 @@
 """The fields of the elements at single points: polynomials, where an element is asked for again.
 
-The first point of an element in a state is evaluated by itself. At the second the fields of some
-elements are evaluated at the zeros of Chebyshev polynomials, by what serves many points: for the
-price of a few points they are known at all others. Where they are no polynomials, as on curves, the
+The first points of a state are evaluated by themselves. Once they took as long as that would, the
+fields of some elements are evaluated at the zeros of Chebyshev polynomials, by what serves many
+points: they are known at all others then. Where they are no polynomials, as on curves, the
 series is as long as round-off wants it; where it does not end, as of a modulus with a kink, points
 are evaluated by themselves.
 """
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from .materials import LinearLaw
 from .parts import Part
 from .series import places, polynomials, transform
 
@@ -36,6 +37,10 @@ ENDED, NOISE, NOTHING = 1e-14, 1e-12, 2e-16
 
 #: What is said of an element that was not asked for.
 UNKNOWN = object()
+
+#: Points of elements asked for again that polynomials are worth, and how many of these a point
+#: counts for that takes long by itself.
+WORTH, LONG = 64, 16
 
 
 class Patch(NamedTuple):
@@ -70,6 +75,8 @@ class RawField:
     def __init__(self) -> None:
         #: By beam and element: None of one that was asked for once, False of one without a series.
         self._patches: dict[tuple[int, int], Any] = {}
+        #: By beam what single points have taken since polynomials were made.
+        self._spent: dict[int, int] = {}
 
     def __call__(self, point: Point, name: str, alone: Callable[[Point], Any],
                  many: Callable[[Part], Array]) -> Any:
@@ -88,19 +95,24 @@ class RawField:
         key = point.number, point.place[0]
         patch = self._patches.get(key, UNKNOWN)
         if patch is UNKNOWN:
-            self._patches[key] = False if _alone_is_quick(point.beam, name) else None
+            known = not point.beam.has_sections and not _long(point.beam, name)
+            self._patches[key] = False if known else None  # cables say it at once
             if len(self._patches) > ELEMENTS:
                 del self._patches[next(iter(self._patches))]
         elif patch is None:
-            self._patches.update(patches(point, name, many))
-            patch = self._patches[key]
+            spent = self._spent.get(point.number, 0) + (LONG if _long(point.beam, name) else 1)
+            if spent >= WORTH:
+                spent = 0
+                self._patches.update(patches(point, name, many))
+                patch = self._patches[key]
+            self._spent[point.number] = spent
         return patch(*point.place[1:]) if isinstance(patch, Patch) else alone(point)
 
 
-def _alone_is_quick(beam, name):
-    """True for the cables that :class:`~skfem_ancf.near.NearCable` knows."""
-    return not beam.has_sections and beam.mesh.heights is None and (
-        name == "strain" or beam.across.plain)
+def _long(beam, name):
+    """True where a point by itself is evaluated as many are: a hundred microseconds and more."""
+    return beam.mesh.heights is not None or (name == "stress" and not (
+        beam.across.plain and isinstance(beam.law, LinearLaw)))
 
 
 def patches(point: Point, name: str, many: Callable[[Part], Array]

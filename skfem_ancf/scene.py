@@ -1412,6 +1412,10 @@ class Scene:
     def solve_linear(self) -> State:
         """The small-displacement solution: one assembly, one factorisation, one solve.
 
+        Its strain and stress are those that the displacement has as a large one. They are recovered
+        only while the load is so small that it is an equilibrium of the large displacement too,
+        see :attr:`State.recovered <skfem_ancf.results.State.recovered>`.
+
         Returns
         -------
         State

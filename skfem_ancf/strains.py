@@ -10,6 +10,7 @@ from numpy.polynomial.chebyshev import chebvander
 
 from .formulations import COMPONENTS
 from .kept import kept
+from .kernels.along import from_first_node
 from .series import chebyshev, polynomials
 
 if TYPE_CHECKING:
@@ -328,7 +329,8 @@ class ElementStrain:
         beam, n = self.beam, len(e)
         few = n < beam.mesh.nelements
         of = e if few else np.arange(beam.mesh.nelements)
-        u_e = beam.kernel.gather(u, of).transpose(1, 2, 0) * beam.scales[of].T[:, None]
+        u_e = from_first_node(beam.kernel.gather(u, of)).transpose(1, 2, 0)
+        u_e = u_e * beam.scales[of].T[:, None]
         turned, free = self._polynomials(u_e, of)
         means = None if across is None else self._means(turned, of, across)
         out = np.empty((3, n), u_e.dtype)
@@ -549,7 +551,7 @@ class ElementStrain:
         ndarray
             Coefficients, shape (pairs 2 across, along).
         """
-        table = np.tensordot(u_e, self._of(e)[0], (1, 1)).swapaxes(0, 1)
+        table = np.tensordot(from_first_node(u_e.T), self._of(e)[0], (0, 1)).swapaxes(0, 1)
         return table.reshape(-1, table.shape[-1])
 
     def _of(self, e):

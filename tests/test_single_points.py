@@ -1,5 +1,7 @@
 """One material point alone is where it is among many, and has the same fields: to 1e-13."""
 
+from unittest import mock
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -9,9 +11,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from conftest import quarter_arc, s_curve
 from test_points import STEEL, inside
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
-                        NeoHookean, Scene, Section, StVenantKirchhoff, finder)
+                        NeoHookean, Scene, Section, StVenantKirchhoff, finder, raw)
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.raw import Patch
+
 
 METHODS = ("displacement", "position", "velocity", "strain", "stress")
 MESHES = {"straight": lambda: MeshBeam.init_line([-1.0, -0.4, 0.3, 1.2], 0.1, angle=0.7),
@@ -27,12 +30,15 @@ def agree(state, x, tol=1e-13, names=METHODS, beam=None):
     """All that is known at points, one by one and together."""
     asked = [(name, {}) for name in names] + [
         (name, {"recover": False}) for name in names if name in ("strain", "stress")]
-    for name, options in asked:
-        ask = getattr(state, name)
-        many = ask(x, beam, **options)
-        one = np.array([ask(tuple(p), beam, **options) for p in x.T.tolist()]).T
-        assert_allclose(one, many, rtol=0, atol=tol * np.abs(many).max(),
-                        err_msg=f"{name} {options}")
+    for worth in (raw.WORTH, 0):  # by themselves, and by polynomials as soon as possible
+        with mock.patch.object(raw, "WORTH", worth):
+            for name, options in asked:
+                ask = getattr(state.replace(message=f"{worth}"), name)
+                many = ask(x, beam, **options)
+                one = np.array([ask(tuple(p), beam, **options) for p in x.T.tolist()]).T
+                assert_allclose(one, many, rtol=0, atol=tol * np.abs(many).max(),
+                                err_msg=f"{name} {options} {worth}")
+        asked = asked[len(names):]
 
 
 def loaded(beam):
@@ -208,7 +214,7 @@ def test_what_is_in_the_body_is_in_its_box(mesh):
 
 
 @pytest.mark.parametrize("kind", ["taper of arc", "taper", "kink", "step", "unloaded"])
-def test_fields_of_the_elements_at_points_asked_for_again(kind):
+def test_fields_of_the_elements_at_points_asked_for_again(kind, monkeypatch):
     """Polynomials of them from the second point on, where there are some: 1e-13 of many points."""
     mesh, element = MeshBeam.init_line(np.linspace(0.0, 1.2, 5), 0.1), ElementBeamANCF(3)
     material, at = STEEL, (0.6, 0.0) if kind == "unloaded" else None
@@ -219,7 +225,11 @@ def test_fields_of_the_elements_at_points_asked_for_again(kind):
                                      if kind == "kink" else lambda x, y: 1e6 * (1.0 + (y > 0.01)))
     scene = Scene(Beam(mesh, element, material, 0.1)).clamp("left")
     state = scene.point_force((0.1, -0.4), at=mesh.p[:, -1] if at is None else at).solve_static()
-    agree(state, inside(mesh, 60)[2], names=("strain", "stress"))
+    x = inside(mesh, 60)[2]
+    agree(state, x, names=("strain", "stress"))
+    monkeypatch.setattr(raw, "WORTH", 0)
+    for p in x.T.tolist():
+        state.stress(tuple(p), recover=False)
     made = [isinstance(patch, Patch) for patch in state._raw[1]._patches.values()]
     assert sum(made) == {"taper of arc": 2, "taper": 2, "kink": 3, "step": 0, "unloaded": 4}[kind]
 
@@ -236,3 +246,17 @@ def test_strain_of_a_tapered_beam_is_that_of_its_displacement_gradient(element, 
     assert_allclose(beam.strain_of(beam.terms[0])(u, e, X),
                     [0.5 * (C[0, 0] - 1.0), 0.5 * (C[1, 1] - 1.0), C[0, 1]],
                     atol=1e-12 * np.abs(C).max())
+
+
+@pytest.mark.parametrize("kind, points", [("straight", 65), ("taper", 5)])
+def test_polynomials_are_made_once_they_are_worth_it(kind, points):
+    """One point of an element, and so many that were in it again."""
+    mesh = MESHES["straight"]() if kind == "straight" else TAPERS[True]()
+    state = loaded(Beam(mesh, ElementBeamANCF(2), STEEL, 0.1))
+    X = np.array([np.linspace(0.1, 0.9, points), np.full(points, 0.3)])
+    x = mesh.mapping().F(X, np.array([1]))[:, 0]
+    for p in x.T[:-1].tolist():
+        state.stress(tuple(p), recover=False)
+    assert set(state._raw[1]._patches.values()) == {None}
+    state.stress(tuple(x[:, -1].tolist()), recover=False)
+    assert all(isinstance(patch, Patch) for patch in state._raw[1]._patches.values())
