@@ -63,7 +63,7 @@ class Constraints:
                  stiffness: Callable[[], Any]) -> None:
         self.members, self.slices, self.size, self._stiffness = members, slices, size, stiffness
         self.N = slices[-1].stop
-        self._supported = False
+        self._supported = self._independent = False
         self._eliminate(fixed, values, joints)
 
     def _eliminate(self, fixed, values, joints):
@@ -373,11 +373,12 @@ class Constraints:
 
     def require_independent_joints(self) -> None:
         """Raise SupportError if joints repeat or contradict each other or the supports."""
-        if not self.joints or self.condensable:
+        if self._independent or not self.joints or self.condensable:
             return
         zero = np.zeros(self.N)
         found = first_dependent(self.sparse_jacobian(zero, 0.0), self.free,
                                 self.constraint(zero, 0.0))
+        self._independent = found is None  # nothing of it changes in the life of a system
         if found is None:
             return
         k, gap = found

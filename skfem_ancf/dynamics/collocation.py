@@ -273,10 +273,13 @@ class Collocation(Scheme):
         joints, drives = tables.plain.joints, int(tables.motion_varies)
         c, g = np.zeros((1, 3, s.m)), np.zeros((1, 4, len(joints.gk)))
         if s.m and not joints.own:
-            c[:, 0], g[:, :2] = tables.offsets(times[:1]), tables.slopes(times[:1])
             if drives:
                 c = moving(tables.offsets)
-                if tables.turns:
-                    g = np.ascontiguousarray(moving(tables.slopes)[:, [0, 0, 1, 2]])
+            else:
+                c[:, 0] = tables.offsets(times[:1])
+            if drives and tables.turns:
+                g = np.ascontiguousarray(moving(tables.slopes)[:, [0, 0, 1, 2]])
+            else:
+                g[:, :2] = tables.slopes(times[:1])
         return Interval(h, 0, table.method.ahead, times, tables.factors(times), held,
                         JointMotions(c, g, drives))

@@ -165,38 +165,12 @@ class Integrator:
         Parameters
         ----------
         t, dt, ahead
-            As for :meth:`constraint_rate`.
+            As for :meth:`start`.
         """
         s = self.system
         if not s.moves:
             return np.zeros((2, len(s.fixed)))
         return rates(s.values_at, t, dt, ahead, self.limit)
-
-    def constraint_rate(self, u: Array, v: Array, t: float, dt: float,
-                        ahead: bool = True) -> Array:
-        """The rate of the joints' Phi, shape (m,); parameters are those of :meth:`start`.
-
-        Parameters
-        ----------
-        u, v
-            Displacement and velocity, shape (N,).
-        t, dt, ahead
-            Time, the step in which functions of time are asked, and whether it begins there.
-        """
-        s = self.system
-        rate = s.full_jacobian(u, t) @ v
-        if s.drives:
-            rate = rate + self._rates(lambda t: s.constraint(u, t), t, dt, ahead)[0]
-        return rate
-
-    def _constraint_acceleration(self, u, v, t, dt, ahead):
-        """The second rate of Phi without accelerations of the coordinates, shape (m,)."""
-        s = self.system
-        rate = s.quadratic(u, t, v)
-        if s.drives:
-            rate = (rate + self._rates(lambda t: s.constraint(u, t), t, dt, ahead)[1]
-                    + 2.0 * self._rates(lambda t: s.full_jacobian(u, t) @ v, t, dt, ahead)[0])
-        return rate
 
     def start(self, u: Array, v: Array, t: float, dt: float, ahead: bool = True,
               memory: Array | None = None) -> Motion:
@@ -226,10 +200,13 @@ class Integrator:
         y.v[s.fixed], y.acceleration[s.fixed] = self.support_rates(t, dt, ahead)
         rate = np.zeros(s.m)
         if s.joints:
-            y.v = y.v + s.solve_mass(np.zeros(s.N), y.u, t,
-                                     -self.constraint_rate(y.u, y.v, t, dt, ahead))[0]
-            rate = -(self._constraint_acceleration(y.u, y.v, t, dt, ahead)
-                     + s.full_jacobian(y.u, t) @ y.acceleration)
+            J, driven = s.full_jacobian(y.u, t), np.zeros((2, s.m))
+            if s.drives:
+                driven = self._rates(lambda t: s.constraint(y.u, t), t, dt, ahead)
+            y.v = y.v + s.solve_mass(np.zeros(s.N), y.u, t, -(J @ y.v + driven[0]))[0]
+            rate = -(s.quadratic(y.u, t, y.v) + driven[1] + J @ y.acceleration)
+            if s.drives:
+                rate -= 2.0 * self._rates(lambda t: s.full_jacobian(y.u, t) @ y.v, t, dt, ahead)[0]
         with contacts.lent(memory):
             if contacts.lasting:
                 kept = contacts.begin(y.u, t) if memory is None else memory
