@@ -11,7 +11,7 @@ from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 
 from ..band import solve_complex
 from ..errors import InputError
-from .base import Motion, Scheme
+from .base import Motion, Scheme, contacts_of
 from .integrator import StepFailed
 from .rates import JointMotions
 from .stages import Interval, Method, collocate, room_for_points
@@ -133,9 +133,6 @@ class Collocation(Scheme):
         if system.m and not self.joined:
             raise InputError(f"{self!r} loses its order with joints and rigid bodies: take "
                              "'radau', or 'energy-momentum', which conserves energy with them")
-        if system.forces.contacts.lasting:
-            raise InputError(f"{self!r} is not for obstacles with friction or method='augmented': "
-                             "take 'energy-momentum', or for friction 'generalized-alpha' too")
         if system.forces.far:
             raise InputError(f"{self!r} is not for scenes with force elements between points far "
                              "apart: take 'energy-momentum' or 'generalized-alpha'")
@@ -196,25 +193,28 @@ class Collocation(Scheme):
             block: tuple[int, int] | None = None) -> tuple[int, Callable[[int], Motion]]:
         s, table = integrator.system, self._table
         method, w = table.method, self._room(integrator, table)
-        begun = y.t if start is None else start
+        begun, contacts = y.t if start is None else start, s.forces.contacts
         block = (first, first + n) if block is None else block
         w.y[:2], w.first[:] = (y.u, y.v), y.multipliers
         w.guess[:] = 0.5 * (dt * method.points[:, None])**2 * y.acceleration
-        if y.memory:
-            w.U[:], w.before[:], w.first[:] = (y.memory[k] for k in ("stages", "start", "forces"))
         given = self._given(integrator, table, begun, dt, first, n, block)
-        if y.memory:
+        if y.memory and "stages" in y.memory:
+            w.U[:], w.before[:], w.first[:] = (y.memory[k] for k in ("stages", "start", "forces"))
             given = given._replace(begun=1, ahead=table.ahead(dt / y.before))
         rows, stages = np.empty((n, 3, s.N)), np.empty((n, len(method.points), s.N))
         forces, works = np.empty((n, len(method.points) + 1, s.m)), np.empty(n)
-        done = integrator.call(collocate, y, dt, integrator.rule, given, w, integrator.state,
-                               rows, stages, forces, works)
+        memories = np.empty((n, contacts.tables.memory.size if contacts.lasting else 0))
+        with contacts.lent(contacts_of(y)):
+            done = integrator.call(collocate, y, dt, integrator.rule, given, w, integrator.state,
+                                   memories, rows, stages, forces, works)
 
         def motion(k: int) -> Motion:
             """After step k, counted from 0."""
             (u, v, a), before = rows[k], rows[k - 1, :2] if k else np.array([y.u, y.v])
             memory = {"stages": stages[k].copy(), "start": before.copy(),
                       "forces": forces[k, :-1].copy()}
+            if contacts.lasting:
+                memory["contacts"] = memories[k].copy()
             return Motion(begun + dt * (first + k + 1), u, v, a, a, forces[k, -1], None, dt,
                           memory, float(works[k]))
 

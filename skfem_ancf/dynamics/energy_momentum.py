@@ -57,7 +57,7 @@ class EnergyMomentum4(EnergyMomentum):
 
     Five steps of :class:`EnergyMomentum` of 0.41, 0.41, -0.66, 0.41 and 0.41 times the size: a
     composition of symmetric steps conserves what each of them does, and the parts cancel the
-    error of second order. Going back in time, damping would drive: it is refused.
+    error of second order. Going back in time, damping and friction would drive: they are refused.
 
     Of a free rod that turns and bends, the energy has drifted by 5e-11 of itself after 1e5 steps,
     the angular momentum by 1e-11: by round-off, 1e-16 a part of a step.
@@ -83,9 +83,9 @@ class EnergyMomentum4(EnergyMomentum):
         return "<EnergyMomentum4>"
 
     def require(self, system: System) -> None:
-        if system.damped:
+        if system.damped or system.forces.contacts.lasting:
             raise InputError(f"{self!r} goes back in time in a part of each step, where damping "
-                             "drives: take 'energy-momentum', or 'radau' for high order")
+                             "and friction drive: take 'energy-momentum', or 'radau' for high order")
 
     def step(self, integrator: Integrator, y: Motion, dt: float) -> Motion:
         begin, lost = y.t, y.dissipated

@@ -12,7 +12,8 @@ import numpy as np
 from ..band import (Band, copy, dense_solve, factorize_complex, multiply, solve,
                     solve_complex, solve_joined)
 from ..body import (add_force_of, body_carry, body_force, body_mixed, body_stress, body_tangent)
-from ..forces.texts import add_elastic_force, add_element_tangent
+from ..forces.texts import (add_elastic_force, add_element_tangent, pace_contact,
+                            settle_contact)
 from ..source import F1, F2, F3, borrowed, by_place, lanes, source
 from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
                       external_force, joint_directions)
@@ -165,7 +166,7 @@ def room_for_points(method: Method, N: int, m: int, stresses: int, D: Band) -> P
 
 
 @source
-def collocate(e, matrices, rule, s, w, state, rows, stages, multiplier_rows, works):
+def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier_rows, works):
     """Take steps from ``w.y`` and ``w.first`` on.
 
     Parameters
@@ -177,16 +178,19 @@ def collocate(e, matrices, rule, s, w, state, rows, stages, multiplier_rows, wor
         As above; of w ``y`` and ``first``, with what was before, or ``guess``.
     state
         As of :func:`~skfem_ancf.dynamics.steps.steps`, shape (12,).
-    rows, stages, multiplier_rows, works
-        Written: of each step u, v and the acceleration, (s, 3, N), the displacements of its points,
-        (s, n, N), the multipliers of these and at the end, (s, n + 1, m), and the work of damping
-        up to there, (s,).
+    memories, rows, stages, multiplier_rows, works
+        Written: of each step what obstacles keep, (s, k), k zero where that is nothing, u, v and
+        the acceleration, (s, 3, N), the displacements of its points, (s, n, N), the multipliers of
+        these and at the end, (s, n + 1, m), and the work of damping up to there, (s,).
 
     Returns
     -------
     The number of steps done; one that fails is the last.
     """
     s, state, method = borrowed(s), borrowed(state), w.method
+    contacts, taken = e.forces.contacts, np.empty(1)
+    if contacts.lasting > 0:
+        pace_contact(e.forces, s.h)
     for k in range(rows.shape[0]):
         if k > 0 or s.begun > 0:
             _ahead(method, method.ahead if k > 0 else s.ahead, s.h, state[BEFORE], w)
@@ -197,6 +201,11 @@ def collocate(e, matrices, rule, s, w, state, rows, stages, multiplier_rows, wor
         if not _end(e, matrices, method, s, w, state, k):
             state[FAILURE] = DEPENDENT
             return k
+        if contacts.lasting > 0:
+            t = s.times[(k + 1) * (method.points.size + 1) - 1]
+            settle_contact(e.forces, t, 0.0, w.y[0], w.y[0], taken)
+            state[DISSIPATED] += taken[0]
+            copy(contacts.memory, memories[k])
         state[BEFORE], state[MIXED] = s.h, max(0.0, state[MIXED] - 1.0)
         for j in range(3):
             copy(w.y[j], rows[k, j])
