@@ -332,6 +332,37 @@ def test_friction_holds_what_sticks_and_gives_way_at_its_limit():
     assert slipped.displacement((0, 0))[0] > 1.0
 
 
+def test_a_thin_ring_on_the_floor_takes_tens_of_iterations():
+    """Half of it; pressed so far that it leaves the floor in the middle, as rings do."""
+    R, h, n = 0.5, 1e-3, 32
+    EI = 2e8 * 0.01 * h**3 / 12
+    s = np.linspace(0, np.pi * R, n + 1)
+    arc = Beam(MeshBeam.init_curve(
+        lambda s: np.array([R * np.sin(np.asarray(s) / R), R - R * np.cos(np.asarray(s) / R)]),
+        s, h), ElementBeamCable(5), StVenantKirchhoff(2e8, 0.3), width=0.01)
+    held = ["r^1", "r_X^2"]
+    scene = Scene(arc).fix("left", held).fix("right", held).spring(
+        1e-3 * EI / R**3, between=((0, 2 * R), (0, 3 * R)))
+    scene.point_force((0, -3 * EI / R**2), (0, 2 * R)).obstacle(Line((0, -h / 2)))
+    state = scene.solve_static()
+    contact = state.contact()
+    assert state.iterations < 70 and contact.penetration < 1e-2 * h
+    assert contact.points[0].min() > 0.1 * R and state.displacement((0, 0))[1] > 1e-2 * h
+    assert abs(contact.total[1] / (3 * EI / R**2) - 1) < 2e-3
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=["sections", "cable"])
+@pytest.mark.parametrize("h", [1e-2, 1e-3])
+def test_strips_that_lie_down_with_friction_take_tens_of_iterations(element, h):
+    b = Beam(MeshBeam.init_line(np.linspace(0, 1, 33), height=h), element,
+             StVenantKirchhoff(2e8, 0.3, 1000), width=0.01)
+    state = Scene(b).clamp("left").gravity((0, -2e8 * h**2 * 50 / 12 / 1000)).obstacle(
+        Line((0, -0.1)), friction=0.3).solve_static()
+    x, y = state.contact().force
+    assert state.iterations < 70 and len(x) > 10
+    assert np.all(np.abs(x) < (0.3 + 1e-9) * y) and np.abs(x).sum() > 0.2 * y.sum()
+
+
 def test_states_own_what_they_remember_of_obstacles():
     """Asked in any order, between load steps too, they say the same; nothing is left behind."""
     scene = Scene(beam(ElementBeamCable(5), 16)).clamp("left").gravity((0, -9.81)).point_force(

@@ -11,10 +11,10 @@ from ..band import Band
 from ..errors import InputError
 from ..own import handle_of
 from .contact_texts import (ANCHORED, ANCHORS, AUGMENT, DAMPING, DEPTH, FRICTION, HEADER, LAST,
-                            MEMORY, MIDDLE, NOW, OWN, POSE, POSES, PRESSURES, RATE, RATES, REACHES,
-                            ROWS, SETTLE, STIFFNESS, TANGENT, WIDTH, ContactTables, Question,
-                            distances, hardened, levers, of_contacts, places, press, resist, slide,
-                            stick, surface)
+                            MEMORY, MIDDLE, NOW, NUMBERS, OWN, POSE, POSES, PRESSURES, RATE, RATES,
+                            REACHES, ROWS, SETTLE, STIFFNESS, TANGENT, WIDTH, ContactTables,
+                            Question, distances, hardened, levers, of_contacts, places, press,
+                            resist, slide, stick, surface)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from ..types import Array
 
 
+#: Part of the stiffness with which an equilibrium is found where the whole does not lead to it.
+EASED = 1e-2
 #: Parts of a load step at which a way through an obstacle is looked for, at least and at most.
 PARTS, MOST_PARTS = 8, 100
 
@@ -209,6 +211,24 @@ class Contacts:
             yield
         finally:
             self.put_back(before)
+
+    @contextmanager
+    def eased(self) -> Iterator[None]:
+        """For the time of an evaluation there is no friction or, if there is none, less stiffness.
+
+        Iterations converge there that do not with the whole, to a place that is close to theirs.
+        """
+        floats, memory = self.tables.floats, self.tables.memory
+        at = [self._header(k)[NUMBERS] + STIFFNESS for k in range(len(self._groups))]
+        before, sticks = floats[at], memory[ANCHORED]
+        try:
+            if sticks:
+                memory[ANCHORED] = 0.0
+            else:
+                floats[at] = EASED * before
+            yield
+        finally:
+            floats[at], memory[ANCHORED] = before, sticks
 
     def put_back(self, memory: Array | None) -> None:
         """Go on with what :meth:`remember` gave, or with nothing: no anchors, no reach.

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from ..types import Array, WhichBeam
 
 METHODS = ("penalty", "augmented")
+#: The least length over which a strip that is pressed in one point sinks in, relative to its
+#: extent: shorter ones no mesh resolves, and Newton's method loses its way among single points.
+SPREAD = 1.0 / 200.0
 #: Width of the transition from no pressure to one in proportion to the penetration, relative to
 #: the height.
 WIDTH = 1e-3
@@ -58,7 +61,8 @@ class Obstacle(ForceElement):
         Coulomb's coefficient, zero or positive.
     stiffness
         Pressure per penetration, positive; by default ``E / height`` of each beam, that of half of
-        its own thickness or so.
+        its own thickness or so, but of strips thinner than a hundredth of their extent L no more
+        than ``E height^3 / (12 (L / 200)^4)``, so that they bend over lengths that meshes resolve.
     beam
         The beam, its name or its number; all of the scene by default.
     method
@@ -260,7 +264,7 @@ class Obstacle(ForceElement):
         middle = starts[:2].mean(axis=2, keepdims=True)
         radius = float((np.hypot(*(starts[:2] - middle)) + np.abs(offsets)).max())
         E, density = _stiffest(beam.across, elements)
-        k, augmented = self.penalty or E / h, self.method == "augmented"
+        k, augmented = self.penalty or _default(E, mesh), self.method == "augmented"
         numbers = np.array([k, self.options["width"] or WIDTH * h, self.friction, k, self.damping,
                             HARDER * density * h * augmented, radius,
                             -1.0 if self.shape.hollow else 1.0, self.tolerance * augmented])
@@ -270,6 +274,12 @@ class Obstacle(ForceElement):
 
     def __repr__(self) -> str:
         return f"<Obstacle {self.shape!r}>"
+
+
+def _default(E, mesh):
+    """The stiffness of a strip's own thickness, or less: that over which it bends far enough."""
+    h, extent = mesh.height, float(np.hypot(*np.ptp(mesh.p, axis=1)))
+    return E / h * min(1.0, h**4 / (12.0 * (SPREAD * extent)**4))
 
 
 def _stiffest(across, elements):

@@ -283,7 +283,7 @@ def _augmented(system, result, load, options, record, at):
     """The equilibrium, again until obstacles that ask for it are entered no deeper than that."""
     contacts = system.forces.contacts
     contacts.put_back(result.memory)
-    found = _found(system, result, load, options, record)
+    found = _touching(system, result, load, options, record)
     if not contacts.augmented:
         return found
     for _ in range(AUGMENTED):
@@ -292,6 +292,29 @@ def _augmented(system, result, load, options, record, at):
         found = _from(found, system, result, load, options, record)
     raise _Failed(f"the penetration of obstacles is above its tolerance after {AUGMENTED} "
                   "corrections of the pressure")
+
+
+def _touching(system, result, load, options, record):
+    """The equilibrium; where obstacles keep the iteration from it, from that with eased ones."""
+    contacts, (origin, method, tol, most) = system.forces.contacts, options
+    try:
+        return _found(system, result, load, options, record)
+    except _Failed:
+        if not contacts.obstacles:
+            raise
+        tried = replace(record)
+    with contacts.eased():
+        close = _found(system, result, load, (origin, method, max(tol, NEAR), most), record)
+    found = _from(close, system, result, load, options, record)
+    vars(record).update(vars(_both(tried, record)))
+    return found
+
+
+def _both(first, then):
+    """The records of two iterations of a load step as one."""
+    return LoadStep(then.load, first.iterations + then.iterations,
+                    first.force_residuals + then.force_residuals,
+                    first.energy_residuals + then.energy_residuals)
 
 
 def _found(system, result, load, options, record):
@@ -324,9 +347,7 @@ def _from(found, system, result, load, options, record, descent=None):
     one = LoadStep(load, 0)
     found = _iterate(system, replace(result, u=found[0], multipliers=found[1]), load, options, one,
                      descent)
-    record.iterations += one.iterations
-    record.force_residuals += one.force_residuals
-    record.energy_residuals += one.energy_residuals
+    vars(record).update(vars(_both(record, one)))
     return found
 
 
