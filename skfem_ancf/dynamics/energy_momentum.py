@@ -85,7 +85,8 @@ class EnergyMomentum4(EnergyMomentum):
     def require(self, system: System) -> None:
         if system.damped or system.forces.contacts.lasting:
             raise InputError(f"{self!r} goes back in time in a part of each step, where damping "
-                             "and friction drive: take 'energy-momentum', or 'radau' for high order")
+                             "and friction drive: take 'energy-momentum', or 'radau' for high "
+                             "order")
 
     def step(self, integrator: Integrator, y: Motion, dt: float) -> Motion:
         begin, lost = y.t, y.dissipated

@@ -17,7 +17,7 @@ from .contact_texts import (ANCHORED, ANCHORS, AUGMENT, DAMPING, DEPTH, FRICTION
                             resist, slide, stick, surface)
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from ..types import Array
 
