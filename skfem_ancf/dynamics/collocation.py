@@ -202,11 +202,11 @@ class Collocation(Scheme):
             w.U[:], w.before[:], w.first[:] = (y.memory[k] for k in ("stages", "start", "forces"))
             given = given._replace(begun=1, ahead=table.ahead(dt / y.before))
         rows, stages = np.empty((n, 3, s.N)), np.empty((n, len(method.points), s.N))
-        forces, works = np.empty((n, len(method.points) + 1, s.m)), np.empty(n)
-        memories = np.empty((n, contacts.tables.memory.size if contacts.lasting else 0))
+        forces = np.empty((n, len(method.points) + 1, s.m))
+        memories = np.empty((n, 1 + (contacts.tables.memory.size if contacts.lasting else 0)))
         with contacts.lent(contacts_of(y)):
             done = integrator.call(collocate, y, dt, integrator.rule, given, w, integrator.state,
-                                   memories, rows, stages, forces, works)
+                                   memories, rows, stages, forces)
 
         def motion(k: int) -> Motion:
             """After step k, counted from 0."""
@@ -214,9 +214,9 @@ class Collocation(Scheme):
             memory = {"stages": stages[k].copy(), "start": before.copy(),
                       "forces": forces[k, :-1].copy()}
             if contacts.lasting:
-                memory["contacts"] = memories[k].copy()
+                memory["contacts"] = memories[k, 1:].copy()
             return Motion(begun + dt * (first + k + 1), u, v, a, a, forces[k, -1], None, dt,
-                          memory, float(works[k]))
+                          memory, float(memories[k, 0]))
 
         return done, motion
 

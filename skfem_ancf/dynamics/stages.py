@@ -166,7 +166,7 @@ def room_for_points(method: Method, N: int, m: int, stresses: int, D: Band) -> P
 
 
 @source
-def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier_rows, works):
+def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier_rows):
     """Take steps from ``w.y`` and ``w.first`` on.
 
     Parameters
@@ -178,10 +178,10 @@ def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier
         As above; of w ``y`` and ``first``, with what was before, or ``guess``.
     state
         As of :func:`~skfem_ancf.dynamics.steps.steps`, shape (12,).
-    memories, rows, stages, multiplier_rows, works
-        Written: of each step what obstacles keep, (s, k), k zero where that is nothing, u, v and
-        the acceleration, (s, 3, N), the displacements of its points, (s, n, N), the multipliers of
-        these and at the end, (s, n + 1, m), and the work of damping up to there, (s,).
+    memories, rows, stages, multiplier_rows
+        Written: of each step the work of damping up to there and what obstacles keep, (s, 1 + k),
+        k zero where that is nothing, u, v and the acceleration, (s, 3, N), the displacements of its
+        points, (s, n, N), and the multipliers of these and at the end, (s, n + 1, m).
 
     Returns
     -------
@@ -205,7 +205,7 @@ def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier
             t = s.times[(k + 1) * (method.points.size + 1) - 1]
             settle_contact(e.forces, t, 0.0, w.y[0], w.y[0], taken)
             state[DISSIPATED] += taken[0]
-            copy(contacts.memory, memories[k])
+            copy(contacts.memory, memories[k, 1:])
         state[BEFORE], state[MIXED] = s.h, max(0.0, state[MIXED] - 1.0)
         for j in range(3):
             copy(w.y[j], rows[k, j])
@@ -214,7 +214,7 @@ def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier
             copy(w.l[j], w.first[j])
             copy(w.l[j], multiplier_rows[k, j])
         copy(w.shares, multiplier_rows[k, method.points.size])
-        works[k] = state[DISSIPATED]
+        memories[k, 0] = state[DISSIPATED]
     return rows.shape[0]
 
 
