@@ -9,7 +9,7 @@ from scipy.integrate import solve_bvp
 from skfem_ancf import (Beam, CallbackError, ConvergenceError, ElementBeamANCF,
                         ElementBeamANCFCubic, ElementBeamCable, InputError,
                         MeshBeam, ModelWarning, Scene, StVenantKirchhoff)
-from skfem_ancf.dynamics import Gauss, Radau
+from skfem_ancf.dynamics import Gauss, GeneralizedAlpha, Radau
 from skfem_ancf.forces import contact_texts as texts
 from skfem_ancf.forces.texts import add_contact
 from skfem_ancf.obstacles import Circle, Line, Polygon, SignedDistance
@@ -814,11 +814,26 @@ def test_a_beam_that_falls_on_a_circle_is_held_on_its_surface():
     assert np.allclose(rest.contact().total, static.contact().total, rtol=1e-2, atol=1e-2)
 
 
-@pytest.mark.parametrize("scheme", ["generalized-alpha", "radau"])
-def test_schemes_that_do_not_take_the_augmented_lagrangian_name_one_that_does(scheme):
+@pytest.mark.parametrize("scheme, why", [
+    ("generalized-alpha", "up to 3 times"), (GeneralizedAlpha(0.5), "up to 2.4 times"),
+    ("newmark", "up to 3 times"), ("radau", "do not correct")], ids=repr)
+def test_schemes_that_do_not_take_the_augmented_lagrangian_name_one_that_does(scheme, why):
     scene = Scene(beam()).obstacle(Line((0, -0.5)), method="augmented")
-    with pytest.raises(InputError, match="energy-momentum"):
+    with pytest.raises(InputError, match=f"{why}.*energy-momentum.*GeneralizedAlpha\\(0\\)"):
         scene.integrate(1e-3, 1e-3, scheme=scheme)
+
+
+@pytest.mark.parametrize("dt", [1e-3, 2.3e-4])
+def test_generalized_alpha_without_memory_takes_the_augmented_lagrangian(dt):
+    """A body leaves no faster than it came, and its energy is never above that of the begin."""
+    b = beam(ElementBeamCable(3), 4, height=0.02)
+    scene = Scene(b).gravity((1.0, -9.81)).obstacle(
+        Line((0, -0.02)), method="augmented", tolerance=1e-7, friction=0.3)
+    history = scene.integrate(0.1, dt, scheme=GeneralizedAlpha(0.0))
+    assert max(state.contact().penetration for state in history) < 1e-7
+    speed = history.momentum[:, 1] / (7800 * 0.02 * 0.01)
+    assert 0.1 * -speed.min() < speed.max() <= -speed.min()
+    assert history.total_energy.max() < 1e-9 * history.kinetic_energy.max()
 
 
 @pytest.mark.parametrize("radius", [0.05, 0.01])

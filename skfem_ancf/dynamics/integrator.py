@@ -72,7 +72,9 @@ class Integrator:
     def __init__(self, system: System, scheme: Scheme, tol: float | None = None) -> None:
         scheme.require(system)
         if not scheme.conserving:
-            system.forces.contacts.require_penalty(scheme)
+            alpha_m, alpha_f, beta, _ = scheme.parameters
+            kick = (1.0 - alpha_m) / ((1.0 - alpha_f) * beta)
+            system.forces.contacts.require_penalty(scheme, kick if in_steps(scheme) else np.inf)
         self.system = system
         M, A = system.mass.band, system.new_band()
         self.matrices = Matrices(M, _copy(M), A.band, *_damping(system))

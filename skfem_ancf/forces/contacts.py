@@ -280,19 +280,28 @@ class Contacts:
                 raise InputError(f"continuation knows obstacles that rest, without friction and by "
                                  f"penalty, not {one!r}: use solve_static")
 
-    def require_penalty(self, scheme: Any) -> None:
-        """Raise InputError if an obstacle takes the augmented Lagrangian.
+    def require_penalty(self, scheme: Any, kick: float) -> None:
+        """Raise InputError if the augmented Lagrangian would drive what it holds.
+
+        A force that stops a body at the end of a step acts on in those that follow, by the weights
+        that a scheme gives to accelerations: from the speed 1 it makes up to ``kick - 1``.
 
         Parameters
         ----------
         scheme
-            What does not.
+            A :class:`~skfem_ancf.dynamics.Scheme`.
+        kick
+            ``(1 - alpha_m) / ((1 - alpha_f) beta)``; infinite of steps without corrections.
         """
+        reason = "its steps do not correct pressures" if kick == np.inf else (
+            f"a body that is stopped in a step would leave up to {kick - 1.0:.2g} times as fast as "
+            "it came")
         for one in self.obstacles:
-            if one.method == "augmented":
-                raise InputError(f"{scheme!r} does not take method='augmented' of {one!r}: take "
-                                 "'energy-momentum', which keeps to its balance of "
-                                 "energy, or method='penalty'")
+            if one.method == "augmented" and kick > 2.0 + 1e-9:
+                raise InputError(
+                    f"{scheme!r} does not take method='augmented' of {one!r}: {reason}. Take "
+                    "'energy-momentum', which keeps to its balance of energy, "
+                    "GeneralizedAlpha(0), or method='penalty'")
 
     def require_free(self, u: Array, what: str, instead: str) -> None:
         """Raise InputError if a linear solution enters an obstacle.
