@@ -1494,8 +1494,7 @@ class Scene:
                 state = solve_adaptive(self, adapt, **options)
             else:
                 u = None if start is None else displacement(self.system, start)
-                # that of another scene is of other obstacles, perhaps
-                memory = None if start is None or start.system is not self.system else start._memory
+                memory = self.system.forces.contacts.of_state(start)
                 state = self._solve(u, memory=memory, **options)
             self._warn(state)
         return state

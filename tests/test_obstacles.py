@@ -389,6 +389,23 @@ def test_states_own_what_they_remember_of_obstacles():
     assert not np.any(memory)
 
 
+def test_anchors_go_with_a_state_to_scenes_like_its_own():
+    """One built again, or from a file, or with more load; not one whose obstacles are others."""
+    def lying(mu=0.4, pull=0.0):
+        made = Scene(beam(n=8)).clamp("left").gravity((0, -9.81))
+        return made.point_force((pull, 0), (1, 0)).obstacle(Line((0, -0.05)), friction=mu)
+
+    state = lying().solve_static()
+    again = lying().solve_static(start=pickle.loads(pickle.dumps(state)))
+    assert np.allclose(again.u, state.u, rtol=0, atol=1e-9)
+    assert np.allclose(again.contact().total, state.contact().total, rtol=1e-6)
+    pulled = lying(pull=1e-9).solve_static(start=state)
+    assert np.allclose(pulled.u, state.u, rtol=0, atol=1e-7)
+    rest = lying().integrate(2e-3, 1e-3, start=state)
+    assert np.allclose(rest.u[-1], state.u, rtol=0, atol=1e-7)
+    assert lying(mu=0.3).system.forces.contacts.of_state(state) is None
+
+
 def test_the_augmented_lagrangian_leaves_the_penetration_that_was_asked_for():
     def lying(**options):
         return Scene(beam(ElementBeamCable(5), 32)).clamp("left").gravity((0, -9.81)).obstacle(

@@ -134,7 +134,8 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         run.go_on(motion, start._origin[1])
     else:
         v = v if motion is None else motion.v
-        run.begin(zero if u is None else u, zero if v is None else v, _contacts_at(start, system))
+        run.begin(zero if u is None else u, zero if v is None else v,
+                  system.forces.contacts.of_state(start))
     if file is not None:
         file.begin()
     return follow(run, file, progress)
@@ -203,11 +204,6 @@ def _require_step(t_start, t_end, step):
     if steps > MAX_STEPS:
         raise InputError(f"dt = {step!r} takes {steps:.3g} steps to t_end = {t_end!r}: more than "
                          f"{MAX_STEPS:.0e} are not taken")
-
-
-def _contacts_at(start, system):
-    """What points remember of obstacles in a State of the same scene, or None."""
-    return None if start is None or start.system is not system else start._memory
 
 
 def _goes_on(system, scheme, start, t):

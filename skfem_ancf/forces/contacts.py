@@ -19,6 +19,7 @@ from .contact_texts import (ANCHORED, ANCHORS, AUGMENT, DAMPING, DEPTH, FRICTION
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from ..results import State
     from ..types import Array
 
 
@@ -246,6 +247,20 @@ class Contacts:
             return None
         memory = self.tables.memory
         return memory.copy() if np.any(memory) else None
+
+    def of_state(self, state: State | None) -> Array | None:
+        """What points of a state remember, shape (n,); None if its obstacles are others.
+
+        Parameters
+        ----------
+        state
+            A :class:`~skfem_ancf.results.State`, of this scene or of one like it, or None.
+        """
+        if state is None:
+            return None
+        ours, theirs = self.tables, state.system.forces.contacts.tables
+        same = np.array_equal(ours.ints, theirs.ints) and np.array_equal(ours.floats, theirs.floats)
+        return state._memory if same else None
 
     def begin(self, u: Array, t: float, memory: Array | None = None) -> Array | None:
         """Points stick from here on, and nothing reaches beyond the surface.
