@@ -53,7 +53,7 @@ class Sealable:
     def __setattr__(self, name, value):
         if self._sealed:
             self._require_open(name)
-        super().__setattr__(name, value)
+        object.__setattr__(self, name, value)
 
     def __delattr__(self, name):
         self._require_open(name)

@@ -6,10 +6,12 @@ import pytest
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
                         ElementBeamCable, InputError, MeshBeam, MeshError, NeoHookean, Scene,
                         StVenantKirchhoff)
+from skfem_ancf.compiled.words import Words
 from skfem_ancf.elements import base
 from skfem_ancf.finder import Finder
 from skfem_ancf.kernels import cable, section
 from skfem_ancf.loads import EndMoment, PointForce, Pressure, Weight
+from skfem_ancf.statics.iteration import ALONE
 from skfem_ancf.system import System
 
 
@@ -121,6 +123,20 @@ def test_a_line_is_the_mesh_that_its_nodes_make(x, origin, angle):
     assert e == other[0] and np.allclose((xi, eta), other[1:], rtol=0, atol=1e-9)
     with pytest.raises(MeshError, match="no length"):
         MeshBeam.init_line([0.0, 1e-14], 0.1, origin=(3e3, 0.0))
+
+
+def test_words_say_where_arrays_begin():
+    sealed = np.arange(6.0)[2:]
+    sealed.flags.writeable = False
+    given = ALONE._replace(noise=sealed, u=np.ones((2, 3)))
+    words = Words(given)
+    at = {name: getattr(given, name).__array_interface__["data"][0] for name in ("noise", "u")}
+    assert words.words.tolist().count(at["noise"]) == 1 and words.address != at["u"]
+    k = words.words.tolist().index(at["u"])
+    assert words.words[k + 1:k + 3].tolist() == [2, 3]
+    for wrong in (np.ones((4, 4))[:, ::2], np.ones(3), np.ones((2, 3), dtype=int)):
+        with pytest.raises(TypeError, match="Members takes contiguous arrays"):
+            Words(ALONE._replace(u=wrong))
 
 
 def test_supports_by_a_section_are_those_that_hold_motions():
