@@ -439,7 +439,8 @@ def levers(floats, group, at, rows, lever):
     p, q, offset = rows[MIDDLE + 2], rows[MIDDLE + 3], group[OFFSETS]
     for i in lanes(at.size):
         s, t = p[i], q[i]
-        c = floats[offset + at[i]] / np.maximum(s * s + t * t, SHORT)**1.5
+        square = np.maximum(s * s + t * t, SHORT)
+        c = floats[offset + at[i]] / square / np.sqrt(square)
         lever[0, i], lever[1, i] = 1.0, 0.0
         lever[2, i], lever[3, i] = c * s * t, -c * s * s
         lever[4, i], lever[5, i] = 0.0, 1.0
