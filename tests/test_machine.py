@@ -264,6 +264,46 @@ def test_single_numbers_of_arrays_are_read_and_written_as_by_numpy(needs_compile
             assert x.tolist() == y.tolist()
 
 
+@pytest.mark.parametrize("first, last", [(0, 4), (2, 4), (4, 2), (-2, 1), (3, 3)])
+def test_loops_run_as_in_python(needs_compiled, first, last):
+    """Loops of one end and of two, by steps, in lanes, and those in others that are left."""
+    from skfem_ancf.compiled.twin import compile_for
+
+    found, expected = np.zeros(5), np.zeros(5)
+    loops(first, last, expected)
+    compile_for(loops, (first, last, found))(first, last, found)
+    assert found.tolist() == expected.tolist() and (last <= 0 or expected[0] > 0.0)
+
+
+@source
+def loops(first, last, out):
+    for i in range(last):
+        out[0] += 1.0 + i
+    for i in range(first, last):
+        for k in range(5):
+            if k > 2:
+                break
+            out[1] += 10.0 * i + k
+    for i in range(last, first, -2):
+        out[2] += 1.0 + i
+    for i in range(first, last, 2):
+        out[3] += 1.0 + i
+    for i in lanes(3, 5):
+        out[i] += 100.0
+
+
+def test_shared_texts_are_found_by_their_types(needs_compiled):
+    """Each text of a group is called with the types that the group says."""
+    from skfem_ancf.compiled import shared, twin
+
+    compiled.address("common"), compiled.address("kernels")
+    for group, calls in shared.GROUPS.items():
+        for call in calls:
+            (found,) = twin.twin(call.text).shared.values()
+            assert found.group == group and call.text.__name__ in found.symbol
+            assert len(call.args) == call.text.__code__.co_argcount
+
+
 @source
 def exchange(a, places, y, flags):
     y[0] = a[1, 2, 1]

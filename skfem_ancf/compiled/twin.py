@@ -11,6 +11,7 @@ from numba import cfunc, njit, typeof
 from ..source import column, lanes
 from . import access, stamp  # noqa: F401
 from .flags import TextFlags
+from .loops import counted
 from .records import record_type
 from .together import Entry, Text
 from .words import Words
@@ -22,6 +23,8 @@ OPTIONS = {"fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "n
 #: Of what Python calls: other threads of Python go on meanwhile.
 ENTRY = {"nogil": True, **OPTIONS}
 _FLAGS = TextFlags(OPTIONS, False), TextFlags(OPTIONS, True)
+#: What texts call in place of ``range``.
+COUNTED = "range of texts"
 #: What reading a cache raises that holds something else.
 _SPOILT = OSError, EOFError, pickle.PickleError, KeyError, ValueError
 
@@ -36,7 +39,7 @@ def twin(function):
         Marked by :func:`~skfem_ancf.source.source` or :func:`~skfem_ancf.source.primitive`.
     """
     if function is lanes:
-        return range
+        return counted
     if function is column:
         return _one
     if function.twin is not None:
@@ -46,7 +49,7 @@ def twin(function):
 
 def linked(function):
     """A copy of a text that calls the twins of what it calls."""
-    names = dict(function.__globals__)
+    names = {**function.__globals__, COUNTED: counted}
     for name in _names(function.__code__):
         if hasattr(names.get(name), "twin"):
             names[name] = twin(names[name])
@@ -55,7 +58,11 @@ def linked(function):
 
 def named(function, names=None):
     """A copy, under a name by which Numba does not find code of other texts on disk."""
-    text = FunctionType(function.__code__, names or function.__globals__, function.__name__,
+    code = function.__code__
+    if names and COUNTED in names:  # Numba takes no other function by the name of a builtin
+        code = code.replace(co_names=tuple(
+            COUNTED if name == "range" else name for name in code.co_names))
+    text = FunctionType(code, names or function.__globals__, function.__name__,
                         function.__defaults__)
     text.__module__, text.__doc__ = function.__module__, function.__doc__
     text.__qualname__ = f"{function.__qualname__}_{stamp()}"
