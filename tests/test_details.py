@@ -256,6 +256,10 @@ def test_supports_hold_in_any_unit_of_length(unit):
     scene = Scene(beam).fix("left", ["r", "r_X^2"]).point_force((0, -0.01), at=(unit, 0))
     tip = scene.solve_linear().displacement((unit, 0))[1] / unit
     assert tip == pytest.approx(-4e-4, rel=0.05)  # P L^3 / (3 E I) = 4e-4
+    apart = Scene(beam).fix("left", ["r"]).fix("right", ["r_X^2"])  # the same, seen from the tip
+    apart.point_force((0, -0.01), at=(unit, 0))
+    assert apart.solve_linear().displacement((unit, 0))[1] / unit == pytest.approx(tip, rel=1e-6)
+    assert len(apart.system.springs) == 0
     two = [Beam(line(4, 0.1 * unit, L=unit, origin=(k * unit, 0)), ElementBeamCable(),
                 StVenantKirchhoff(1e6 / unit**2, 0.3), 0.1 * unit) for k in (0, 1)]
     joined = Scene(*two).clamp("left", beam=0)
