@@ -97,6 +97,7 @@ class Screen:
         node = accumulate((b.N // b.nd for b in beams), initial=0)
         x = _joined([np.arange(n + 2, n + b.N, b.nd) for n, b in zip(first, beams)])
         self._tangents = x[:, None] + _BOTH
+        self._q0 = _joined([b.q0 for b in beams])
         self.start = _joined([b.mesh.p_X[0] + 1j * b.mesh.p_X[1] for b in beams])
         self._left, self._right = _joined([n + b.mesh.t for n, b in zip(node, beams)])
         if len(self._left) == len(x) - 1:  # one chain
@@ -126,6 +127,24 @@ class Screen:
         # the largest curvature of an element is seldom more than twice its mean
         return (turn < self._limit).all(axis=-1) & (
             np.abs(r).min(axis=-1) - (turn * slender).max(axis=-1) > 1.1 * COMPRESSED)
+
+    def folded(self, u: Array) -> bool:
+        """True if the axis of an element turns back: its ends lie against a tangent of the axis.
+
+        An axis that does so turns by more than pi over the element, or has no length in it.
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (N,).
+        """
+        if self._none:
+            return False
+        x = np.ascontiguousarray((u + self._q0)[self._tangents]).view(complex)[..., 0]
+        r = np.ascontiguousarray((u + self._q0)[self._tangents - 2]).view(complex)[..., 0]
+        chord = r[self._right] - r[self._left]
+        return any(bool(np.any((chord * x[side].conj()).real < 0.0))
+                   for side in (self._left, self._right))
 
 
 _BOTH = np.arange(2)

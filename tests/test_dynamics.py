@@ -1,6 +1,7 @@
 """Time integration: order, dissipation, conservation, storage, and motions known from elsewhere."""
 
 import math
+import warnings
 from functools import lru_cache
 
 import numpy as np
@@ -889,3 +890,16 @@ def test_a_body_that_is_turned_inside_out_is_said():
     with pytest.warns(ModelWarning, match=r"inside out, at t = 0\.\d+ or before") as seen:
         scene.integrate(0.05, 2e-3)
     assert seen[0].filename == __file__
+
+
+def test_a_cable_that_is_folded_is_said_to_be():
+    """A pull at once, and steps nearly as long as the vibration along the axis, 13 ms."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.05), ElementBeamCable(3),
+                StVenantKirchhoff(1e8, 0.3, 1000), width=0.03)
+    scene = Scene(beam).clamp("left").damping(stiffness=1e-3).point_force((3e3, 0), (1, 0))
+    with pytest.warns(ModelWarning, match="inside out"):
+        scene.integrate(0.02, 1e-2, scheme="generalized-alpha")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        history = scene.integrate(0.2, 1e-2)
+    assert history.position((1, 0))[-1] == pytest.approx([1.02, 0.0], abs=2e-3)

@@ -276,15 +276,15 @@ class _Body:
         run = self.run
         if self.t is None and (run.steps >= self.next or run.done):
             self.next = run.steps + LOOKED
-            if run.system.inverted(run.y.u):
+            if run.system.inverted(run.y.u) or run.system.screen.folded(run.y.u):
                 self.t = run.y.t
 
     def warn(self):
         if self.t is not None:
             warnings.warn(f"the body is turned inside out, at t = {self.t:.6g} or before: it is "
                           "compressed or bent beyond what it can bear, and what follows means "
-                          "nothing. Use NeoHookean, more elements or a smaller load", ModelWarning,
-                          stacklevel=9)
+                          "nothing. Use NeoHookean, more elements, a smaller load or shorter steps",
+                          ModelWarning, stacklevel=9)
 
 
 def _warn_of_turns(history):
