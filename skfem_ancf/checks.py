@@ -140,8 +140,9 @@ class Screen:
         """
         if self._none:
             return False
-        x = np.ascontiguousarray((u + self._q0)[self._tangents]).view(complex)[..., 0]
-        r = np.ascontiguousarray((u + self._q0)[self._tangents - 2]).view(complex)[..., 0]
+        q = u[:len(self._q0)] + self._q0  # without rigid bodies, which come last
+        x = np.ascontiguousarray(q[self._tangents]).view(complex)[..., 0]
+        r = np.ascontiguousarray(q[self._tangents - 2]).view(complex)[..., 0]
         chord = r[self._right] - r[self._left]
         return any(bool(np.any((chord * x[side].conj()).real < 0.0))
                    for side in (self._left, self._right))
