@@ -41,7 +41,8 @@ class StepSize:
     * what the step does not resolve, by the iteration matrix as a filter,
     * vibrations whose phase is lost within the motion whatever the tolerance asks, by two
       averages over the time W in which they turn: after the time T a vibration of the frequency w
-      has lost the phase C w^(p + 1) dt^p T, so W = (C dt^p T)^(1 / (p + 1)).
+      has lost the phase C w^(p + 1) dt^p T, so W = (C dt^p T)^(1 / (p + 1)), half of that for
+      schemes of second order, whose steps are short enough to follow a blow.
 
     Parameters
     ----------
@@ -71,6 +72,7 @@ class StepSize:
                              "take 'energy-momentum' or 'generalized-alpha' with dt='auto'")
         self.system, self.scheme, self.rtol = system, scheme, rtol
         self.span, self.phase = t_end - t_start, max(2, scheme.order)
+        self._width = 0.5 if self.phase == 2 else 1.0
         self._largest = LARGEST * (CALIBRATED / rtol)**scheme.rough
         self._mass = sum(b.total_mass for b in system.members)
         self._averages = self._new = np.zeros((2, system.N))
@@ -141,7 +143,8 @@ class StepSize:
         """
         de = self.scheme.resolved(integrator, self.scheme.local_error(old, new, dt))
         order, power = self.phase, self.scheme.order + 1
-        width = (self.scheme.error_constant * dt**order * self.span) ** (1.0 / (order + 1.0))
+        width = self._width * (self.scheme.error_constant * dt**order * self.span) ** (
+            1.0 / (order + 1.0))
         part = -np.expm1(-dt / width)
         rate = de / dt**power  # of the motion, not of the step
         self._new = self._averages.copy()
