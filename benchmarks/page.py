@@ -42,7 +42,12 @@ def _number(name, text):
 
 
 def ms(seconds):
-    return f"{1e3 * seconds:.3g}"
+    return short(1e3 * seconds, 3)
+
+
+def short(value, digits=2):
+    """A number to so many digits, without an exponent."""
+    return f"{float(f'{value:.{digits}g}'):.9g}"
 
 
 def named(r):
@@ -56,7 +61,7 @@ def ratio(rows, peer, target, key, factor):
     if not mine or not its:
         return "-" if mine is its else "only here" if mine else "**missed**: none here"
     found = its[key] / mine[key]
-    return f"{found:.2g}" + (", **missed**" if factor and found < factor else "")
+    return short(found) + (", **missed**" if factor and found < factor else "")
 
 
 def factor(case, key, target):
@@ -109,15 +114,15 @@ def sweep(results):
     head = ["members", "what", "error", "microseconds a member", "times faster than Exudyn"]
     return table(head, [
         (r["note"].split()[0], f"{r['elements']} x {r['variant']}", f"{r['error']:.0e}",
-         f"{1e6 * r['seconds']:.3g}", f"{found:.3g}" + ", **missed**" * (verdict == "missed"))
+         short(1e6 * r["seconds"], 3), short(found, 3) + ", **missed**" * (verdict == "missed"))
         for r, found, its, verdict in sweeps(results["sweep"]) if its])
 
 
 def tangent(results):
     return table(["elements", "textbook pairs (ms)", "batched form (ms)", "compiled kernel (ms)",
                   "batched, kernel, times faster"], [
-        (n, ms(pairs), ms(batched), ms(fused),
-         f"{pairs / batched:.2g}, {pairs / fused:.2g}" + (", **missed**" * (verdict == "missed")))
+        (n, ms(pairs), ms(batched), ms(fused), f"{short(pairs / batched)}, {short(pairs / fused)}"
+         + ", **missed**" * (verdict == "missed"))
         for n, pairs, batched, fused, verdict in tangents(results["tangent"])])
 
 
