@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from skfem.helpers import dot
 
 from ..errors import InputError, require_finite, require_flag, require_label, shown, teaching
 from ..beam import select_beam
@@ -24,11 +25,6 @@ if TYPE_CHECKING:
 
 #: How far beyond an end of a beam a sleeve may be, in elements.
 BEYOND = 1e-6
-
-
-def _dot(a: Array, b: Array) -> Array:
-    """a . b of vectors (2, ...)."""
-    return a[0] * b[0] + a[1] * b[1]
 
 
 def _pairs(A: Array, B: Array) -> Array:
@@ -270,7 +266,7 @@ class Sleeve(Joint):
             equations.append(Product(cross, held(parts[1], self.d), c.turned(self.Q)))
         shares = [[by_s / slopes[6] for by_s, _ in slopes[8]]
                   for slopes in (self._slopes(u) for u in ends)]
-        return Span(columns, (ends[1] - ends[0])[columns], s[1] - s[0], Product(_dot, c, gap),
+        return Span(columns, (ends[1] - ends[0])[columns], s[1] - s[0], Product(dot, c, gap),
                     equations, np.array(shares).T)
 
     def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:
