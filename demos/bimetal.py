@@ -58,7 +58,7 @@ left.set(xlabel="x (m)", ylabel="y (m)")
 right.plot(1e-6 * stress, 1e3 * y)
 right.axhline(0, color="0.7", lw=0.8)
 right.axvline(0, color="0.7", lw=0.8)
-right.set(xlabel="$S_{xx}$ (MPa)", ylabel="Y (mm)", title="half way: Invar below, brass above")
+right.set(xlabel="$S_{xx}$ (MPa)", ylabel="Y (mm)", title="half way:\nInvar below, brass above")
 plt.show()
 
 # %%

@@ -80,7 +80,7 @@ for turns_per_second in (0.5, 8):
     axes["moment"].plot(phi / (2 * np.pi), M)
     assert turns_per_second > 1 or np.max(abs(error)) < 0.02
 assert np.max(abs(error)) > 0.2
-axes["angle"].set(ylabel="rocker less rigid one (degrees)")
+axes["angle"].set(ylabel="rocker less\nrigid one (degrees)")
 axes["angle"].legend(frameon=False)
 axes["moment"].set(xlabel="turns of the crank", ylabel="M half way (N m)")
 history.plot("S_xx", times=np.linspace(0.62, 1.0, 4) * history.t[-1], ax=axes["body"], unit="Pa",
