@@ -207,7 +207,7 @@ class EigenStrain(Load):
         """
         across = self.beam.across
         x, y = across.coordinates(X, e)
-        which, out = np.broadcast_to(across.which(X), x.shape), np.empty((3, *x.shape))
+        which, out = np.broadcast_to(across.which(X, e), x.shape), np.empty((3, *x.shape))
         for k, slab in enumerate(across.slabs):
             on = which == k
             out[:, on] = self.of_slab(slab, x[on], y[on])
@@ -343,7 +343,7 @@ def _bent_packs(beam, eigen):
     for slab, (eta, w) in across.rules(8):
         X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
         x, y = across.coordinates(X)
-        size = (slab.material.axial_modulus * across.grade(slab, X) * across.breadth(slab, X)
+        size = (slab.material.axial_modulus * across.breadth(slab, X, times="grade")
                 * beam.mesh.mapping().height(X[0])[0] * np.tile(w, len(xi)))
         S0 = size * eigen.of_slab(slab, x, y)[0]
         N0 += S0.reshape(*N0.shape, -1).sum(axis=-1)

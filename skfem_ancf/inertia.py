@@ -105,7 +105,7 @@ def of_sections(beam: Beam) -> Inertia:
     for slab, rule in across.rules(beam.element.order + 1, inertia=True):
         X, W = tensor(axis, rule)
         parts.append((beam.element.values(beam.mesh.mapping(), X, tind),
-                      across.density(slab, X, tind) * across.volume(slab, X, W, tind)))
+                      across.volume(slab, X, W, tind, times="density")))
     return Inertia(*(np.concatenate(part, axis=-1) for part in zip(*parts)))
 
 

@@ -294,7 +294,7 @@ class Cable(Sections):
 
     @classmethod
     def strain(cls, beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:
-        return cls._strain_of(beam, beam.mesh.mapping().offset(X, tind), beam.across.which(X),
+        return cls._strain_of(beam, beam.mesh.mapping().offset(X, tind), beam.across.which(X, tind),
                               *cls._section(beam, u, X, tind)[2:])
 
     @staticmethod

@@ -9,6 +9,7 @@ import numpy as np
 
 from .frozen import Frozen
 from .quadrature import gauss, lagrange
+from .sections.moving import Moving
 from .series import chebyshev
 
 if TYPE_CHECKING:
@@ -73,8 +74,36 @@ class Panel(NamedTuple):
         return np.array(out)
 
 
+class Moved(NamedTuple):
+    """Points of panels at sections of some heights; arrays (n, m).
+
+    Attributes
+    ----------
+    eta
+        Where they are across.
+    stretch
+        How long panels are there, relative to where they are longest.
+    drift, swell
+        Derivatives of eta and of the logarithm of the stretch by the height.
+    axis
+        From values at the points of a section to that on the axis.
+    till_axis
+        From values to their integral over eta from the lowest place to the axis.
+    """
+
+    eta: Array
+    stretch: Any
+    drift: Any
+    swell: Any
+    axis: Array
+    till_axis: Array
+
+
 class Panels(Frozen):
     """Points across a section, and the integrals and values of what is given there.
+
+    Where a section has other parts of the height from place to place, the places of panels are
+    those where it is highest, and :meth:`moved` says where they are elsewhere.
 
     Parameters
     ----------
@@ -97,6 +126,8 @@ class Panels(Frozen):
         From the axis to the points, (m, m).
     bottom, axis, top
         From values to those at the lowest place, eta = 1/2 and the highest place, shape (m,).
+    moving
+        A section has other parts of the height from place to place.
     """
 
     def __init__(self, slabs: Sequence[Slab], order: int) -> None:
@@ -123,13 +154,61 @@ class Panels(Frozen):
             self.whole[panel.columns] = panel.integrals(np.ones(1))
         self.bottom, self.axis, self.top = (
             self.values(eta) for eta in (parts[0][0].low, 0.5, parts[-1][0].high))
-        self.from_axis = self.from_bottom - self._till_axis()
+        self.from_axis = self.from_bottom - self._till(0.5)
+        measures = [slab.measure for slab in slabs]
+        self.moving = isinstance(measures[0], Moving)
+        self._measures = measures
 
-    def _till_axis(self):
-        panel = self.panels[bisect_right(self._ends, 0.5)]
+    def _till(self, eta):
+        """From values to their integral over eta from the lowest place to one, (m,)."""
+        panel = self.panels[bisect_right(self._ends, eta)]
         out = np.where(np.arange(len(self.eta)) < panel.columns.start, self.whole, 0.0)
-        out[panel.columns] = panel.integrals(np.array([panel.local(0.5)]))
+        out[panel.columns] = panel.integrals(np.array([panel.local(eta)]))
         return out
+
+    def _low_high(self, h):
+        """Ends of the panels at heights h (...), of shape (npanels, ...) both."""
+        found = [m.ends(h) for m in self._measures]
+        return (np.concatenate([ends[:-1] for ends in found]),
+                np.concatenate([ends[1:] for ends in found]))
+
+    def moved(self, h: Array) -> Moved:
+        """The points at sections of some heights.
+
+        Parameters
+        ----------
+        h
+            Heights, shape (n,).
+        """
+        of = np.repeat(np.arange(len(self.panels)), [len(p.nodes) for p in self.panels])
+        low, high = (np.array([getattr(p, end) for p in self.panels])[of]
+                     for end in ("low", "high"))
+        z, size = (self.eta - low) / (high - low), high - low
+        # a + b / h: twice the difference of that of 2 h, over h, is the derivative
+        (low, high), (low2, high2) = ((end[of].T for end in self._low_high(k * h))
+                                      for k in (1.0, 2.0))
+        low_rate, high_rate = (2.0 * (b - a) / h[:, None] for a, b in ((low, low2), (high, high2)))
+        stretch, at = (high - low) / size, [self.place(0.5, x) for x in h.tolist()]
+        inside = np.array([self._till(x) for x in at])
+        return Moved(low + (high - low) * z, stretch, low_rate + (high_rate - low_rate) * z,
+                     (high_rate - low_rate) / (high - low),
+                     np.array([self.values(x) for x in at]), inside * stretch)
+
+    def place(self, eta: Any, h: Any) -> Any:
+        """The place across, where the section is highest, of what is at another elsewhere.
+
+        Parameters
+        ----------
+        eta, h
+            Places, and heights of the sections there: numbers, or arrays (n,).
+        """
+        low, high = self._low_high(np.asarray(h, dtype=float))
+        which = np.sum(np.asarray(eta) >= high[:-1], axis=0)
+        low, high = (np.take_along_axis(x, which[None], 0)[0] for x in (low, high))
+        starts, ends = (np.array([getattr(p, end) for p in self.panels])[which]
+                        for end in ("low", "high"))
+        found = starts + (ends - starts) * (eta - low) / (high - low)
+        return found if np.ndim(found) else float(found)
 
     def values(self, eta: float) -> Array:
         """Weights (m,) of the values at the points for that at a place.

@@ -157,7 +157,7 @@ class Part:
         beam, strain = self.beam, self.strain(u)
         if beam.across.plain:
             return self._stress(strain, u, slice(None))
-        which = beam.across.which(self.X)
+        which = beam.across.which(self.at, self.e)
         for k in range(len(beam.across.slabs)):
             on = np.nonzero(which == k)[0]
             strain[:, on] = self._stress(strain, u, on)

@@ -105,10 +105,12 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         else f"{s.m} equations of {len(s.joints)} joint(s)" if s.m else
         "no joints" if not scene.joints else "the joints only fix coordinates")
     add("linear solver", "computed", _linear_solver(s, dynamic))
-    rules = sorted({(b.element.order, b.kernel.section_points) for b in beams if b.has_sections})
+    rules = sorted({(b.element.order, t.section_points, getattr(t.slab.measure, "spent", 0))
+                    for b in beams if b.has_sections for t in b.kernel.firsts})
+    layer = " a layer" if any(len(b.across.slabs) > 1 for b in beams) else ""
     add("section quadrature", "constant" if rules else "skipped",
-        "; ".join(f"order {n}: {p} points, exact for degree {2 * p - 1} of {4 * n}"
-                  for n, p in rules) or "a cable has EA and EI")
+        "; ".join(f"order {n}: {p} points{layer}, exact for degree {2 * p - 1 - spent} of {4 * n}"
+                  for n, p, spent in rules) or "a cable has EA and EI")
     if linear:
         add("compiled loop", "skipped", "one solve")
     else:

@@ -95,7 +95,8 @@ class RawField:
         key = point.number, point.place[0]
         patch = self._patches.get(key, UNKNOWN)
         if patch is UNKNOWN:
-            known = not point.beam.has_sections and not _long(point.beam, name)
+            known = point.beam.across.moving or (  # no polynomials where slabs have other places
+                not point.beam.has_sections and not _long(point.beam, name))
             self._patches[key] = False if known else None  # cables say it at once
             if len(self._patches) > ELEMENTS:
                 del self._patches[next(iter(self._patches))]

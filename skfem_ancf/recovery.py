@@ -38,7 +38,7 @@ from scipy.linalg import solve_banded
 from .formulations.ecm import EnhancedContinuum
 from .kept import kept
 from .materials import LinearLaw
-from .panels import Panels
+from .panels import Moved, Panels
 from .point import AGAIN
 from .quadrature import gauss
 from .mapping import cross
@@ -194,14 +194,22 @@ class _Piece:
             self.Rv, self.Mv = self._viscous()
             self.R, self.M = self.R - self.Rv, self.M - self.Mv
         eta, across = recovery.eta, recovery.beam.across
+        at = recovery.moved(self.e, xi)
+        if at is not None:
+            eta = at.eta
         sections = Sections(self.forces, self.e, xi, eta, self.forces.lifted)
         axis = Sections(self.forces, self.e, xi, np.array([0.5]))
         speed = np.hypot(*axis.J[:, 0, :, 0])
         h, slope = mesh.mapping().height(sections.X[0], self.e)
         self.Y, self.lean = h * (eta - 0.5), slope / speed[:, None] * (eta - 0.5)
-        self.height, self.swell = h, slope / (speed[:, None] * h)
-        self.width = recovery.panels.width * (
-            recovery.of_slabs(across.breadth, sections.X, self.e) + 0.0 * sections.X[0])
+        self.span, self.swell, self.moved = h, slope / (speed[:, None] * h), at
+        if at is None:
+            self.width = recovery.panels.width * (
+                recovery.of_slabs(across.breadth, sections.X, self.e) + 0.0 * sections.X[0])
+        else:
+            self.span, rate = h * at.stretch, slope / speed[:, None]
+            self.lean, self.swell = self.lean + h * rate * at.drift, self.swell + rate * at.swell
+            self.width = recovery.of_slabs(across.width, sections.X, self.e)
         self.grade = recovery.of_slabs(across.grade, sections.X, self.e)
         self.g = sections.volume / (speed[:, None] * h)
         self.E0 = sum(np.moveaxis(np.multiply.outer(factor, eigen.strain_at(sections.X, self.e)),
@@ -300,24 +308,42 @@ class _Piece:
             return smoothed(self.s, values, self._short)
         return self._matrices[2] @ values
 
+    def across(self, values):
+        """The integral over the height of values (..., n, m)."""
+        return (self.span * values) @ self.recovery.panels.whole
+
     def integral(self, values):
         """The integral over the section, with the width, of values (..., n, m)."""
-        return (self.width * self.height * values) @ self.recovery.panels.whole
+        return self.across(self.width * values)
 
     def from_bottom(self, values):
         """The integral from the bottom to each point of values (..., n, m)."""
-        return self.height * (values @ self.recovery.panels.from_bottom.T)
+        if self.moved is None:
+            return self.span * (values @ self.recovery.panels.from_bottom.T)
+        return (self.span * values) @ self.recovery.panels.from_bottom.T
 
     def from_axis(self, values):
         """The integral from the axis to each point of values (..., n, m)."""
-        return self.height * (values @ self.recovery.panels.from_axis.T)
+        if self.moved is None:
+            return self.span * (values @ self.recovery.panels.from_axis.T)
+        h = self.span / self.moved.stretch
+        return self.from_bottom(values) - np.sum(h * values * self.moved.till_axis, axis=-1)[
+            ..., None]
+
+    def at_axis(self, values):
+        """Values (..., n, m) on the axis, (..., n)."""
+        if self.moved is None:
+            return values @ self.recovery.panels.axis
+        return np.sum(values * self.moved.axis, axis=-1)
 
     def slope_from_axis(self, values, d_ds):
         """The integral from the axis of the derivative along it, at the same distance from it.
 
-        Values and their derivative are those of (..., n, m) points at the same parts of the height.
+        Values and their derivative are those of (..., n, m) points at the same parts of the height,
+        or of their panel.
         """
-        return self.from_axis(d_ds + self.swell * values) - self.lean * values
+        found = self.from_axis(d_ds + self.swell * values) - self.lean * values
+        return found if self.moved is None else found + self.at_axis(self.lean * values)[..., None]
 
     # step 2
 
@@ -371,7 +397,7 @@ class _Piece:
     def _turn(self):
         """The rate at which sections turn, the angles of fibres and of the frame."""
         r, along = self.recovery, self.g * self.rX[0]
-        total = (self.height * self.rY) @ r.panels.whole
+        total = self.across(self.rY)
         with_faces = along + self.lean * self.rY[0]
         self.rate = (self.d_ds(total[0][..., None])[..., 0]
                      - with_faces @ (r.panels.top - r.panels.bottom)) / total[1]
@@ -381,7 +407,7 @@ class _Piece:
         self.alpha = np.arcsin(np.clip(normal / (self.g * self.stretch), -1.0, 1.0))
         turned = (self.slope_from_axis(self.rY[0], self.smoothed(dt))
                   - self.from_axis(self.rate[..., None] * self.rY[1]))
-        self.stretch = ((along @ r.panels.axis)[..., None] + turned) / (
+        self.stretch = (self.at_axis(along)[..., None] + turned) / (
             self.g * np.cos(self.alpha))
         refuse(~np.all(np.isfinite(self.rate), axis=-1))
         phi = self.along(self.rate)
@@ -403,7 +429,7 @@ class _Piece:
             self.body, c[..., None], s[..., None])
         bottom, top = (turned(f, c, s)[..., None] for f in self.faces)
         dP = dP + self.swell * P  # with what leaves oblique faces
-        left = top + bottom + ((self.height * dP) @ self.recovery.panels.whole)[..., None]
+        left = top + bottom + self.across(dP)[..., None]
         P2 = left * self.below - bottom - self.from_bottom(dP) + self.lean * P
         P2 = P2 / (self.g * self.width)
         det = cross(self.rX, self.rY)
@@ -484,7 +510,7 @@ class _Piece:
         lengths = np.diff(r.lengths)[self.e]
         weight = np.zeros(len(self.s))
         for k in (0, -1):
-            h = np.max(np.broadcast_to(self.height, self.g.shape)[k])
+            h = np.max(np.broadcast_to(self.span, self.g.shape)[k])
             x = np.abs(self.s - self.s[k]) / h
             size = np.max(lengths[x <= LAYER]) / h
             fine = np.clip((COARSE - size) / (COARSE - FINE), 0.0, 1.0)
@@ -598,6 +624,7 @@ class Recovery:
             raise NotRecovered(f"{beam.section!r} has a measure that does not say its width: give "
                                "it pieces and mean, as Weighted has")
         self.panels = kept(beam.tables, "across", lambda: Panels(slabs, beam.element.order))
+        #: Where the points of :attr:`panels` are, of those that move where the section is highest.
         self.eta = self.panels.eta
         self.laws = [(columns, slab.material.law(slab.shear))
                      for slab, columns in zip(slabs, self.panels.slabs)]
@@ -612,6 +639,24 @@ class Recovery:
         self._tables = [p.table(np.concatenate([p.strain, p.stress, p.angle[None]]))
                         for p in self.pieces]
         self._cuts = forces.cuts.tolist()
+
+    def moved(self, e: Array, xi: Array) -> Moved | None:
+        """Where the points across are at sections, if not at :attr:`eta` in all of them.
+
+        Parameters
+        ----------
+        e, xi
+            Elements of the sections and places along them, shapes (n,).
+        """
+        if not self.panels.moving:
+            return None
+        return kept(self.beam.tables, ("moved", e.tobytes(), xi.tobytes()),
+                    lambda: self.panels.moved(self._height(e, xi)))
+
+    def _height(self, e, xi):
+        """Of sections on a tapered mesh: numbers or arrays (n,)."""
+        mesh = self.beam.mesh
+        return mesh.height * mesh.mapping().relative_height(e, xi)[0]
 
     def modulus(self, strain: Array) -> Array:
         """Change of S_xx with eps_xx while S_yy and S_xy stay, at strains (3, ...)."""
@@ -776,6 +821,8 @@ class Recovery:
         """As :meth:`_places`, of one point."""
         end = xi > 1.0 - SNAP
         station = e + (1.0 if end else 0.0 if xi < SNAP else xi)
+        if self.panels.moving:
+            eta = self.panels.place(eta, self._height(e, xi))
         return station, end, self._arc_of_one(e, xi), self.panels.values(eta)
 
     def _arc_of_one(self, e, xi):
@@ -802,6 +849,8 @@ class Recovery:
         """
         end = xi > 1.0 - SNAP
         station = e + np.where(end, 1.0, np.where(xi < SNAP, 0.0, xi))
+        if self.panels.moving:
+            eta = self.panels.place(eta, self._height(e, xi))
         return station, end, self.arc(e, xi), self.panels.by_panel(eta)
 
     def _values(self, places, rows):

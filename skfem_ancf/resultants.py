@@ -183,7 +183,7 @@ def _recovered(recovery, e, xi, after):
     s = recovery.arc(e, xi)
     for k in np.unique(piece):
         on = piece == k
-        spline = _axis(recovery, recovery.pieces[k])
+        spline = _axis(recovery.pieces[k])
         out[:, on] = spline(s[on]).T
     angle, stretch, shear, curvature = out
     t, n = _directions(angle)
@@ -191,32 +191,35 @@ def _recovered(recovery, e, xi, after):
                 stretch=stretch, shear=shear, angle=angle, force=R)
 
 
-def _axis(recovery, piece):
+def _axis(piece):
     """A spline of angle, stretch and shear of the axis, and the change of curvature.
 
     The direction of a section is that of 12 / h^3 int Y r dY, of which the derivatives across the
     section follow from its strain.
     """
-    eps, axis = piece.strain, recovery.panels.axis
-    phi, stretch = piece.angle @ axis, np.sqrt(1.0 + 2.0 * eps[0])
+    eps = piece.strain
+    phi, stretch = piece.at_axis(piece.angle), np.sqrt(1.0 + 2.0 * eps[0])
     lam_y = np.sqrt(1.0 + 2.0 * eps[1])
     across = piece.angle + np.arccos(np.clip(eps[2] / (stretch * lam_y), -1.0, 1.0))
     r_Y = lam_y * _directions(across)[0]
-    d = (piece.from_axis(r_Y) * piece.Y) @ recovery.panels.whole
+    d = piece.across(piece.from_axis(r_Y) * piece.Y)
     normal = np.unwrap(np.arctan2(d[1], d[0])) - 0.5 * np.pi
     shear = (phi - normal + np.pi) % (2.0 * np.pi) - np.pi
     # not the derivative of the angle, which is fitted to that of the elements
     start = (piece.g[:, 0] - piece.g[:, -1]) / (piece.Y[..., -1] - piece.Y[..., 0])
     curvature = piece.rate - start - piece.d_ds(shear)
-    values = np.array([phi, stretch @ axis, shear, curvature])
+    values = np.array([phi, piece.at_axis(stretch), shear, curvature])
     return scipy.interpolate.CubicSpline(piece.s, values.T)
 
 
 def _own(state, beam, e, xi):
     """From the stress of the elements, integrated across the section."""
     u, mapping = state.u_of(beam), beam.mesh.mapping()
-    eta, area = _rule(beam, e, xi)
-    X = np.array([np.repeat(xi[:, None], len(eta), 1), np.repeat(eta[None], len(xi), 0)])
+    eta, breadth = (np.concatenate(parts, axis=1) for parts in zip(*(
+        beam.across.points(slab, e, xi, max(beam.element.order, 1) + 2)
+        for slab in beam.across.slabs)))
+    X = np.array([xi[:, None] + 0.0 * eta, eta])
+    area = breadth * mapping.height(X[0], e)[0]
     S, eigen = beam.stress(u, X, e), state.eigenstrains(beam)
     for factor, load in eigen:
         S = S - load.stress_at(u, X, e, factor)
@@ -245,17 +248,6 @@ def _own(state, beam, e, xi):
         R = N * t + Q * normal
     return dict(N=N, Q=Q, M=M, curvature=curvature, stretch=stretch, shear=shear, angle=angle,
                 force=R)
-
-
-def _rule(beam, e, xi):
-    """Points across the sections, (m,), and what of their areas these stand for, (n, m)."""
-    points, areas = [], []
-    for slab, (eta, w) in beam.across.rules(max(beam.element.order, 1) + 2):
-        X = np.array([np.repeat(xi[:, None], len(eta), 1), np.repeat(eta[None], len(xi), 0)])
-        height = beam.mesh.mapping().height(X[0], e)[0]
-        points.append(eta)
-        areas.append(beam.across.breadth(slab, X, e) * height * w + 0.0 * X[0])
-    return np.concatenate(points), np.concatenate(areas, axis=1)
 
 
 def _cable_axis(beam, u, e, xi):

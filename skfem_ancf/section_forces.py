@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .beam import Beam
+    from .sections import Slab
     from .spread import Sampled
     from .types import Array
 
@@ -69,18 +70,20 @@ class Sections:
     e, xi
         Element of each section and its place there, shapes (n,).
     eta
-        Points across each section, shape (k,).
+        Points across each section, shape (k,) or (n, k).
     lifted
         Of a cable: points off its axis are at ``r + Y r_X``, the latter turned by 90 degrees, as
         its :class:`~skfem_ancf.inertia.Inertia` has them. If not, all are on the axis.
+    slab
+        The slab of which all points are; None for those that are there.
     """
 
     def __init__(self, forces: SectionForces, e: Array, xi: Array, eta: Array,
-                 lifted: bool = False) -> None:
-        self.forces, self.e = forces, e
+                 lifted: bool = False, slab: Slab | None = None) -> None:
+        self.forces, self.e, self._slab = forces, e, slab
         beam = forces.beam
-        self.shape = len(e), len(eta)
-        if len(e) * len(eta) > SMALL:
+        self.shape = len(e), eta.shape[-1]
+        if len(e) * self.shape[1] > SMALL:
             self.X, self._value, self._slope, self.J = self._tables(beam, e, xi, eta)
         else:
             key = e.tobytes(), xi.tobytes(), eta.tobytes()
@@ -149,6 +152,8 @@ class Sections:
     def density(self) -> Array:
         """Mass per volume, (n, k)."""
         across = self.forces.beam.across
+        if self._slab is not None:
+            return across.density(self._slab, self.X, self.e)
         zero = np.zeros(self.shape)
         return across.of_slabs(self.X, zero, [
             partial(across.density, slab, self.X, self.e) for slab in across.slabs], self.e,
@@ -156,7 +161,7 @@ class Sections:
 
     def sampled(self, where: int) -> Any:
         """The sum of :class:`~skfem_ancf.spread.Sampled` densities there, (2, ..., n, k); or 0."""
-        xi, eta = self.X[0, :, 0], self.X[1, 0]
+        xi, eta = self.X[0, :, 0], self.X[1]
         return sum(s.at(self.e, xi, eta, self.forces.beam.mesh.nelements)
                    .reshape((2,) + self.forces.states + (len(xi), -1))
                    for s in self.forces.sampled if s.where == where)
@@ -261,7 +266,7 @@ class SectionForces:
             whole = not (beam.has_sections or self.lifted)
             if whole:
                 eta, v = WHOLE
-            inside = Sections(self, e, xi, eta, self.lifted)
+            inside = Sections(self, e, xi, eta, self.lifted, slab)
             body = inside.body
             if np.any(body):
                 size = beam.across.breadth(slab, inside.X, e, whole) * v * inside.volume

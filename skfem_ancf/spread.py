@@ -65,7 +65,7 @@ class Sampled:
         e, xi
             Sections, shapes (n,).
         eta
-            Points across them, shape (k,).
+            Points across them, shape (n, k).
         nelements
             How many elements there are.
 
@@ -79,8 +79,11 @@ class Sampled:
         along = lagrange(self.xi, xi) * (row[e] >= 0)[:, None]
         if self.eta is None:
             return np.einsum("...np,np->...n", self.values[..., row[e], :], along)[..., None]
-        return np.einsum("...npq,np,kq->...nk", self.values[..., row[e], :, :], along,
-                         lagrange(self.eta, eta))
+        here = np.einsum("...npq,np->...nq", self.values[..., row[e], :, :], along)
+        if np.all(eta == eta[:1]):
+            return here @ lagrange(self.eta, eta[0]).T
+        across = lagrange(self.eta, eta.ravel()).reshape(eta.shape + (-1,))
+        return np.einsum("...nq,nkq->...nk", here, across)
 
     def changes(self, nelements: int) -> Array:
         """Stations between elements on which it acts and those on which it does not."""

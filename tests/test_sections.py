@@ -52,43 +52,48 @@ def cantilever(beam, force=None, moment=None):
     return scene.solve_static()
 
 
-def plane(pieces, length, force, n=(80, 4), height=None):
+def straight(pieces):
+    """Where pieces of a beam of constant height begin and end."""
+    y = np.array([pieces[0][0], *(p[1] for p in pieces)])
+    return lambda x: np.repeat(y[:, None], len(x), axis=1)
+
+
+def plane(pieces, length, force, n=(80, 4), ends=None):
     """Displacement and stress at points of a clamped body of linear elasticity, pulled at x = L.
 
-    pieces: (bottom, top, material, width), from the bottom; force: the whole of it; height: of the
-    body, less than that of the pieces by a factor that is a function of x.
+    pieces: (bottom, top, material, width), from the bottom; force: the whole of it; ends: a
+    function of x (n,) that returns where pieces begin and end, (npieces + 1, n), of tapers.
     """
-    y = np.concatenate([np.linspace(a, b, n[1] + 1)[:-1] for a, b, _, _ in pieces]
-                       + [[pieces[-1][1]]])
+    ends = ends or straight(pieces)
+    number = len(pieces)
+    y = np.linspace(0, number, number * n[1] + 1)  # by the piece
     mesh = MeshQuad.init_tensor(np.linspace(0, length, n[0] + 1), y).with_boundaries(
         {"left": lambda x: x[0] == 0, "right": lambda x: np.isclose(x[0], length)})
-    middle = mesh.p[1][mesh.t].mean(axis=0)
-    if height is not None:
-        mesh = replace(mesh, doflocs=np.array([mesh.p[0], mesh.p[1] * height(mesh.p[0])]))
+    of = mesh.p[1][mesh.t].mean(axis=0).astype(int)
+    k = np.minimum(mesh.p[1].astype(int), number - 1)
+    Y, z = ends(mesh.p[0]), mesh.p[1] - k
+    Y = (1 - z) * np.take_along_axis(Y, k[None], 0)[0] + z * np.take_along_axis(
+        Y, k[None] + 1, 0)[0]
+    mesh = replace(mesh, doflocs=np.array([mesh.p[0], Y]))
     basis = Basis(mesh, ElementVector(ElementQuad2()))
-
-    def at(y, of):
-        which = np.clip(np.searchsorted([p[1] for p in pieces], y), 0, len(pieces) - 1)
-        return np.array([of(p) for p in pieces])[which]
 
     def voigt(u):
         e = sym_grad(u)
         return np.array([e[0, 0], e[1, 1], 2 * e[0, 1]])
 
-    D = np.array([[at(middle, lambda p, i=i, j=j: p[3] * hooke(p[2].E, p[2].nu, "stress")[i, j])
-                   for j in range(3)] for i in range(3)])
+    D = np.moveaxis(np.array([p[3] * hooke(p[2].E, p[2].nu, "stress") for p in pieces])[of], 0, -1)
 
     @BilinearForm
     def stiffness(u, v, w):
         return np.sum(voigt(v) * np.einsum("ije,jeq->ieq", D, voigt(u)), axis=0)
 
-    area = sum((b - a) * width for a, b, _, width in pieces)
+    width = np.array([p[3] for p in pieces])
+    area = np.diff(ends(np.array([length]))[:, 0]) @ width
+    at = width[of[mesh.f2t[0, mesh.boundaries["right"]]], None] / area
 
     @LinearForm
     def load(v, w):
-        b = at(w.x[1] if height is None else w.x[1] / height(length), lambda p: p[3])
-        b = b if height is None else b / height(length)
-        return b / area * (force[0] * v[0] + force[1] * v[1])
+        return at * (force[0] * v[0] + force[1] * v[1])
 
     K = asm(stiffness, basis)
     f = asm(load, FacetBasis(mesh, ElementVector(ElementQuad2()), facets="right", intorder=6))
@@ -251,16 +256,15 @@ def _reference(beam, x):
     return np.array(X).T[:, :, None], np.array(e)
 
 
-def plane_stress(basis, u, x, pieces, height=None):
+def plane_stress(basis, u, x, pieces, ends=None):
     """Stress of the plane body at points, by the elements that hold them."""
     cells = basis.mesh.element_finder()(*x)
     X = basis.mapping.invF(x[:, :, None], tind=cells)
     grads = sum(u[basis.element_dofs[k, cells]][None, None, :, None] * basis.elem.gbasis(
         basis.mapping, X, k, tind=cells)[0].grad for k in range(basis.Nbfun))[..., 0]
     e = np.array([grads[0, 0], grads[1, 1], grads[0, 1] + grads[1, 0]])
-    level = x[1] if height is None else x[1] / height(x[0])
-    D = np.array([hooke(p[2].E, p[2].nu, "stress") for y in level for p in pieces
-                  if p[0] <= y < p[1]])
+    which = np.sum(x[1] >= (ends or straight(pieces))(x[0])[1:-1], axis=0)
+    D = np.array([hooke(p[2].E, p[2].nu, "stress") for p in pieces])[which]
     return np.einsum("nij,jn->in", D, e)
 
 

@@ -432,7 +432,8 @@ class TermTables:
             self.points, self.w = before.points, before.w
             self._rows, self._interpolation = before._rows, before._interpolation
         G, frame, rows, self._sheared, self._along, scaled = self._rows
-        weights = self.w * across.grade(slab, self.points, tind, whole)
+        weights = self.w if slab.grade is None else across.volume(
+            slab, *term.quadrature, tind, whole, "grade")
         self.pack: SectionPack = section_pack(
             G, frame, weights.T, rows, self._interpolation, law_tables(self.law, owner), constant,
             mesh.t[0], None if before is None else before.pack, scaled)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebinterpolate, chebval
 
 from ..errors import InputError, shown
 from ..frozen import Frozen
 from ..kept import cached_property
+from ..quadrature import gauss
 from .base import Rectangle, asked
+from .moving import Moving
 from .shear import shear_factor
 
 if TYPE_CHECKING:
@@ -24,6 +29,9 @@ if TYPE_CHECKING:
 
 #: Points across a slab for areas and moments.
 POINTS = 4
+
+#: Degree of the polynomial of the height that a shear factor is between the least and the largest.
+HEIGHTS = 7
 
 
 class Across(Frozen):
@@ -42,9 +50,14 @@ class Across(Frozen):
     def __init__(self, mesh: MeshBeam, element: ElementBeam, section: Section,
                  material: Material | None) -> None:
         self.mesh, self.element = mesh, element
-        self.slabs = tuple(section.slabs(mesh, material))
+        self.slabs = tuple(
+            replace(slab, measure=slab.measure.of_order(element.order))
+            if isinstance(slab.measure, Moving) else slab
+            for slab in section.slabs(mesh, material))
         #: A rectangle of one width and one material.
         self.plain = isinstance(section, Rectangle) and not self.slabs[0].varies
+        #: What jumps across it does so at other parts of the height from place to place.
+        self.moving = any(isinstance(s.measure, Moving) for s in self.slabs)
         varying = any(s.varies for s in self.slabs)
         #: That of a mesh of constant height.
         self.simple = self.plain and mesh.heights is None
@@ -60,6 +73,9 @@ class Across(Frozen):
             X = np.array(np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 9))).reshape(2, -1)
             for slab in self.slabs:
                 inside = X[:, (slab.measure.low <= X[1]) & (X[1] <= slab.measure.high)]
+                if isinstance(slab.measure, Moving):
+                    low, *_, high = slab.measure.ends(self._heights(X[0], None))
+                    inside = np.array([X[0] + 0.0 * low, low + (high - low) * X[1]])
                 for name in ("width", "grade", "density"):
                     if callable(getattr(slab, name)):
                         asked(_NAMES[name], getattr(slab, name), *self.coordinates(inside))
@@ -86,14 +102,25 @@ class Across(Frozen):
         x = a + np.asarray(X[0]) * (b - a)
         return x, np.broadcast_to(self.mesh.mapping().offset(X, tind), x.shape)
 
-    def which(self, X: Array) -> Array:
+    def _heights(self, xi, tind):
+        """Heights (nelements, npoints) at places along elements of a tapered mesh."""
+        return self.mesh.mapping().height(xi, tind)[0]
+
+    def which(self, X: Array, tind: Array | None = None) -> Array:
         """The number of the slab at each of reference points (2, ...); shape (...).
 
         Parameters
         ----------
         X
             Reference points, shape (2, ...); one between two slabs is in the upper.
+        tind
+            Where slabs have other parts of the height from place to place, the elements, shape
+            (nelements,), or None for all; points are (2, npoints) or (2, nelements, npoints).
         """
+        if self.moving:
+            h = self._heights(X[0], tind)
+            return sum((X[1] >= s.measure.ends(h)[-1] for s in self.slabs[:-1]),
+                       np.zeros(h.shape, dtype=int))
         tops = np.array([s.measure.high for s in self.slabs[:-1]])
         return np.searchsorted(tops, np.asarray(X[1]), side="right")
 
@@ -115,7 +142,7 @@ class Across(Frozen):
         """
         if self.plain:
             return values[0]()
-        which = np.broadcast_to(self.which(X), like.shape[-2:])
+        which = np.broadcast_to(self.which(X, tind), like.shape[-2:])
         out = np.empty(like.shape)
         for k, (slab, value) in enumerate(zip(self.slabs, values)):
             on = which == k
@@ -126,8 +153,8 @@ class Across(Frozen):
 
     def _mean(self, what, function, slab, X, tind, whole):
         """A function at points, or for points that stand for the section its mean there."""
-        if not whole:
-            return asked(what, function, *self.coordinates(X, tind))
+        if not whole or isinstance(slab.measure, Moving):
+            return asked(what, function, *self._inside(slab, X, tind))
         eta, w = slab.measure.gauss(POINTS + 4)
         points = np.array([np.repeat(X[0][..., None], len(eta), -1),
                            np.broadcast_to(eta, X[0].shape + eta.shape)])
@@ -136,7 +163,7 @@ class Across(Frozen):
         return values.reshape(values.shape[0], -1, len(eta)) @ w
 
     def volume(self, slab: Slab, X: Array, W: Array, tind: Array | None = None,
-               whole: bool = False) -> Array:
+               whole: bool = False, times: str = "") -> Array:
         """Volumes that the points of a rule of a slab stand for, shape (nelements, npoints).
 
         Parameters
@@ -149,17 +176,70 @@ class Across(Frozen):
             Elements, shape (nelements,), or None for all.
         whole
             The points stand for their sections.
+        times
+            "grade" or "density" for the integrals of these; "" for volumes.
         """
         if self.simple and self.uniform and tind is not None:
-            return slab.width * self.mesh.height * self.mesh.lengths[tind][:, None] * W
-        return self.breadth(slab, X, tind, whole) * W * self.mesh.mapping().detDF(X, tind)
+            size = slab.width * self.mesh.height * self.mesh.lengths[tind][:, None] * W
+            return size * self.density(slab, X, tind) if times == "density" else size
+        return self.breadth(slab, X, tind, whole, times) * W * self.mesh.mapping().detDF(X, tind)
 
-    def breadth(self, slab: Slab, X: Array, tind: Array | None = None, whole: bool = False) -> Any:
+    def breadth(self, slab: Slab, X: Array, tind: Array | None = None, whole: bool = False,
+                times: str = "") -> Any:
         """What the weights of a slab's rules, whose sum is 1, are multiplied by: area over height.
 
         Parameters
         ----------
         slab, X, tind, whole
+            As for :meth:`grade`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
+        times
+            As for :meth:`volume`.
+
+        Returns
+        -------
+        ndarray
+            Shape (nelements, npoints), or a number.
+        """
+        if isinstance(slab.measure, Moving):
+            return self._series(slab, X, tind, whole, times)
+        if callable(slab.width):
+            size = self._mean("width", slab.width, slab, X, tind, whole) * slab.part
+        elif slab.by_height and self.mesh.heights is not None:
+            size = slab.width * self._heights(X[0], tind) / self.mesh.height
+        else:
+            size = slab.width
+        if times:
+            size = size * getattr(self, times)(slab, X, tind, whole)
+        return size
+
+    def _series(self, slab, X, tind, whole, times):
+        """As :meth:`breadth`, of a slab that has other parts of the height from place to place."""
+        xi, ne = np.asarray(X[0]), self.mesh.nelements if tind is None else len(tind)
+        if times == "density":
+            self.density(slab, _NOWHERE)  # which it must have
+        back: Any = slice(None)
+        if xi.ndim == 1:
+            xi, back = np.unique(xi, return_inverse=True)
+        elif np.all(xi == xi[:, :1]):
+            xi, back = xi[:, :1], np.zeros(xi.shape[1], dtype=int)
+        factors = [(name, getattr(slab, name)) for name in ("width", times) if name]
+        fields = [(_NAMES[name], f) for name, f in factors if callable(f)]
+
+        def product(eta):
+            at = np.array([np.broadcast_to(xi[..., None], eta.shape), eta]).reshape(2, ne, -1)
+            x, y = self.coordinates(at, tind)
+            return np.prod([asked(name, f, x, y) for name, f in fields], axis=0).reshape(eta.shape)
+
+        c = slab.measure.moments(self._heights(xi, tind), product if fields else None)
+        c = c * np.prod([1.0 if f is None else f for _, f in factors if not callable(f)])
+        return c[0][:, back] if whole else slab.measure.series(c[:, :, back], X[1])
+
+    def width(self, slab: Slab, X: Array, tind: Array | None = None) -> Any:
+        """The width at points of a slab, that of its piece there.
+
+        Parameters
+        ----------
+        slab, X, tind
             As for :meth:`grade`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
 
         Returns
@@ -167,11 +247,18 @@ class Across(Frozen):
         ndarray
             Shape (nelements, npoints), or a number.
         """
-        if callable(slab.width):
-            return self._mean("width", slab.width, slab, X, tind, whole) * slab.part
-        if slab.by_height and self.mesh.heights is not None:
-            return slab.width * self.mesh.mapping().height(X[0], tind)[0] / self.mesh.height
-        return slab.width
+        if not isinstance(slab.measure, Moving):
+            return self.breadth(slab, X, tind) / slab.part
+        wide = asked("width", slab.width, *self._inside(slab, X, tind)) if callable(
+            slab.width) else slab.width
+        return wide * slab.measure.width(X[1], self._heights(X[0], tind))
+
+    def _inside(self, slab, X, tind):
+        """Material coordinates of points, of those beside a slab that moves at its ends."""
+        if isinstance(slab.measure, Moving):
+            low, *_, high = slab.measure.ends(self._heights(X[0], tind))
+            X = np.array([np.broadcast_to(X[0], low.shape), np.clip(X[1], low, high)])
+        return self.coordinates(X, tind)
 
     def grade(self, slab: Slab, X: Array, tind: Array | None = None, whole: bool = False) -> Any:
         """The factor on the energy of a slab at points.
@@ -238,7 +325,7 @@ class Across(Frozen):
         """
         slab = self.slabs[-side]
         if slab.face is None:
-            return self.breadth(slab, X, tind) / slab.part
+            return self.width(slab, X, tind)
         if slab.face[side] == 0.0:
             raise InputError("this section has no width at its bottom and its top: load the axis, "
                              "by scene.line_load")
@@ -258,9 +345,19 @@ class Across(Frozen):
         ndarray
             Shape (nelements, npoints), or a number.
         """
-        scale = [s.outer * s.part / s.width if s.outer else 1.0 for s in self.slabs]
-        return np.maximum.reduce([k * self.breadth(s, X, tind) / s.part + 0.0 * X[0]
-                                  for k, s in zip(scale, self.slabs)])
+        return np.maximum.reduce([self._outer(s, X, tind) + 0.0 * X[0] for s in self.slabs])
+
+    def _outer(self, slab, X, tind):
+        """The largest width of a slab, or where that is a function the one on the axis."""
+        if not isinstance(slab.measure, Moving):
+            scale = slab.outer * slab.part / slab.width if slab.outer else 1.0
+            return scale * self.breadth(slab, X, tind) / slab.part
+        if slab.by_height:  # a tube
+            return self._heights(X[0], tind)
+        if slab.outer:
+            return slab.outer
+        return asked("width", slab.width, *self._inside(slab, X, tind)) if callable(
+            slab.width) else slab.width
 
     # rules
 
@@ -276,6 +373,36 @@ class Across(Frozen):
         """
         return [(slab, (slab.inertia if inertia and slab.inertia is not None else
                         slab.measure).gauss(n)) for slab in self.slabs]
+
+    def points(self, slab: Slab, e: Array, xi: Array, n: int) -> tuple[Array, Array]:
+        """Points of a slab at sections, for fields that are its own.
+
+        Parameters
+        ----------
+        slab
+            One of :attr:`slabs`.
+        e, xi
+            Elements and places along them, shapes (nsections,).
+        n
+            Number of points, at least.
+
+        Returns
+        -------
+        eta, weights
+            Places across, and what of area over height they stand for, (nsections, q).
+        """
+        xi = xi[:, None]
+        if isinstance(slab.measure, Moving):
+            eta, w = slab.measure.points(self._heights(xi, e)[:, 0], n)
+            wide: Any = slab.width
+            if callable(wide):
+                wide = asked("width", wide, *self.coordinates(
+                    np.array([xi + 0.0 * eta, eta]), e))
+        else:
+            eta, w = slab.measure.gauss(n)
+            eta = np.repeat(eta[None], len(xi), 0)
+            wide = self.breadth(slab, np.array([xi + 0.0 * eta, eta]), e)
+        return eta, wide * w + 0.0 * eta
 
     def terms(self, formulation: Formulation) -> list[tuple[Slab, list[Term]]]:
         """The terms of the strain energy of each slab.
@@ -299,6 +426,13 @@ class Across(Frozen):
                                            slab.material))
             eta, w = slab.measure.gauss(2)
             for term in terms:
+                if self.element.order and term.section_samples is not None and isinstance(
+                        slab.measure, Moving):
+                    raise InputError(
+                        f"formulation {formulation.name!r} at order {self.element.order} takes the "
+                        "mean of the strain over a section, whose weights change along a taper "
+                        "with thicknesses that stay: take order 2 or more by the formulation "
+                        "'assumed' or 'continuum', or nu = 0")
                 x, v = term.section
                 if len(x) > 1 and abs(np.dot(v, x) - np.dot(w, eta)) > 1e-9:
                     raise InputError(
@@ -313,7 +447,25 @@ class Across(Frozen):
         """The shear factor for the element, None for that of a rectangle of one material."""
         if self.plain or self.element.order == 0 or any(s.varies for s in self.slabs):
             return None
-        return shear_factor(self.slabs, self.element.order)
+        return self._mean_shear() if self.moving else shear_factor(self.slabs, self.element.order)
+
+    def _mean_shear(self):
+        """The factor by which one shear force all along shears the beam as those of sections do."""
+        def at(height):
+            slabs = [replace(s, measure=m, width=s.width * m.mean) for s, m in (
+                (s, s.measure.at(height)) for s in self.slabs)]
+            return shear_factor(slabs, self.element.order), height * sum(
+                s.material.G * s.width for s in slabs)
+
+        high = self.mesh.height
+        low = min(float(np.min(self.mesh.heights)), (1.0 - 1e-6) * high)
+        factor, GA = (chebinterpolate(np.vectorize(partial(
+            lambda z, k: at(low + (high - low) * (z + 1.0) / 2.0)[k], k=k)), HEIGHTS)
+            for k in range(2))
+        x, w = gauss(POINTS)
+        z = np.clip(2.0 * (self._heights(x, None) - low) / (high - low) - 1.0, -1.0, 1.0)
+        soft = w * self.mesh.lengths[:, None] / chebval(z, GA)
+        return float(np.sum(soft) / np.sum(soft / chebval(z, factor)))
 
     def stabilisation(self, formulation: Formulation) -> Array | None:
         """The constant element stiffness of a formulation, for the section's own E I.
@@ -370,11 +522,9 @@ class Across(Frozen):
             X = np.array(np.broadcast_arrays(np.repeat(xi, len(eta), -1), np.tile(eta, n)))
             w = np.tile(w, n)
             h, y = mapping.height(X[0], tind)[0], mapping.offset(X, tind)
-            size = w * h * self.breadth(slab, X, tind)
-            if what == "mass":
-                size = size * self.density(slab, X, tind)
-            elif what != "area":
-                size = size * self.grade(slab, X, tind) * getattr(slab.material, _MODULI[what])
+            size = w * h * self.breadth(slab, X, tind, times=_TIMES.get(what, ""))
+            if what in _MODULI:
+                size = size * getattr(slab.material, _MODULI[what])
             size = np.broadcast_to(size, (ne, len(w))).reshape(ne, n, -1)
             y = np.broadcast_to(y, (ne, len(w))).reshape(size.shape)
             out += np.array([np.sum(size * y**k, axis=-1) for k in range(3)])
@@ -417,4 +567,5 @@ class Across(Frozen):
 
 _NOWHERE = np.zeros((2, 0))
 _MODULI = {"stiffness": "axial_modulus", "E": "E"}
+_TIMES = {"stiffness": "grade", "E": "grade", "mass": "density"}
 _NAMES = {"width": "width", "grade": "E", "density": "density"}

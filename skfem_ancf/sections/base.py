@@ -102,9 +102,10 @@ class Section(Frozen):
             "rectangle" (width), "I" and "T" (width, web, flange; the flange of a T is at the top),
             "box" (width, wall), "tube" (wall) or "circle".
         scaled
-            For a mesh whose height varies: sizes are those where it is largest. Flanges and the
-            lower and upper walls of a box are the same part of the height everywhere; webs and
-            widths stay. A tube is scaled as a whole, a circle always.
+            Of a mesh whose height varies. False: flanges and walls keep their thickness. True:
+            sizes are those where it is largest, and flanges and the lower and upper walls of a box
+            are the same part of the height everywhere; webs and widths stay. A tube is scaled as a
+            whole, a circle always.
         **sizes
             Width over all, thickness of the web, of a flange and of the walls.
 
@@ -140,7 +141,9 @@ class Section(Frozen):
         Parameters
         ----------
         *layers
-            Pairs of a thickness and a material; a third entry is the width of that layer.
+            Pairs of a thickness and a material; a third entry is the width of that layer. The
+            thickness of one may be None: it takes what the others leave of the height, which may
+            vary along the mesh.
         width
             Width of the others: a positive number, or a function of material coordinates (x, y).
 

@@ -9,7 +9,8 @@ import numpy as np
 from ..errors import InputError, require_positive, shown
 from ..materials import Material
 from .base import Section, Slab, slab_of
-from .measure import Uniform
+from .measure import Piece, Uniform
+from .moving import Moving
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,7 +27,8 @@ class Layers(Section):
     Parameters
     ----------
     *layers
-        Pairs of a thickness and a material; a third entry is the width of that layer.
+        Pairs of a thickness and a material; a third entry is the width of that layer. The
+        thickness of one may be None: what the others leave of the height.
     width
         Width of the others: a positive number, or a function of material coordinates (x, y).
     """
@@ -44,22 +46,40 @@ class Layers(Section):
                 raise InputError(f"layer {k} must be a thickness and a material, and perhaps a "
                                  f"width, as (0.001, steel), got {shown(layer)}")
             own = layer[2] if len(layer) == 3 else width
-            found.append((require_positive(f"the thickness of layer {k}", layer[0]), layer[1],
-                          own if callable(own) else require_positive(
-                              f"the width of layer {k}", own)))
+            found.append((
+                None if layer[0] is None else require_positive(f"the thickness of layer {k}",
+                                                               layer[0]),
+                layer[1],
+                own if callable(own) else require_positive(f"the width of layer {k}", own)))
+        if sum(thickness is None for thickness, _, _ in found) > 1:
+            raise InputError("only one layer can take what the others leave of the height: give "
+                             "the others a thickness in place of None")
         if len({material.plane for _, material, _ in found}) > 1:
             raise InputError("the layers of a section are all in plane stress or all in plane "
                              "strain")
         self.parts = tuple(found)
 
     def slabs(self, mesh: MeshBeam, material: Any) -> list[Slab]:
-        tops = np.cumsum([thickness for thickness, _, _ in self.parts])
+        given = [thickness for thickness, _, _ in self.parts]
+        total = sum(thickness for thickness in given if thickness is not None)
+        least = mesh.height if mesh.heights is None else float(np.min(mesh.heights))
+        if None in given and total >= least * (1.0 - FILLS):
+            raise InputError(f"the layers are {total:.9g} high together, and the mesh "
+                             f"{least:.9g}{' where it is least' * (mesh.heights is not None)}: "
+                             f"nothing is left for layer {given.index(None)}, whose thickness is "
+                             "None")
         if mesh.heights is not None:
-            raise InputError(f"{self!r} has thicknesses that stay, and does not fill a tapered "
-                             "mesh: use a mesh of constant height")
+            if None not in given:
+                raise InputError(f"{self!r} has thicknesses that stay, and does not fill a tapered "
+                                 "mesh: give one layer the thickness None, by which it takes what "
+                                 "the others leave, or use a mesh of constant height")
+            return [slab_of(law, width, Moving(_Layer(given, k), mesh.height))
+                    for k, (_, law, width) in enumerate(self.parts)]
+        tops = np.cumsum([mesh.height - total if x is None else x for x in given])
         if abs(tops[-1] - mesh.height) > FILLS * mesh.height:
             raise InputError(f"the layers are {tops[-1]:.9g} high together, and the mesh "
-                             f"{mesh.height:.9g}: they must fill it from the bottom to the top")
+                             f"{mesh.height:.9g}: they must fill it from the bottom to the top; "
+                             "one of the thickness None takes what the others leave")
         ends = np.append(0.0, tops / tops[-1])
         ends[-1] = 1.0
         return [slab_of(law, width if callable(width) else width * (b - a), Uniform(a, b))
@@ -72,4 +92,18 @@ class Layers(Section):
 
     def __repr__(self) -> str:
         return f"<{len(self.parts)} layers of " + ", ".join(
-            f"{thickness:g}" for thickness, _, _ in self.parts) + ">"
+            "the rest" if thickness is None else f"{thickness:g}"
+            for thickness, _, _ in self.parts) + ">"
+
+
+class _Layer:
+    """Where one of layers is, at heights (..., 1); of those one has the thickness None."""
+
+    def __init__(self, given, number):
+        self.given, self.number = given, number
+
+    def __call__(self, h):
+        k, rest = self.number, self.given.index(None)
+        low = sum(self.given[:k]) / h if k <= rest else 1.0 - sum(self.given[k:]) / h
+        high = sum(self.given[:k + 1]) / h if k < rest else 1.0 - sum(self.given[k + 1:]) / h
+        return [Piece(low, high, 1.0)]

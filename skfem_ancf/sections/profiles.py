@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import CallError, InputError, require_flag, require_option, require_positive
 from .base import Section, Slab, slab_of
 from .measure import Piece, Weighted
+from .moving import Moving
 
 if TYPE_CHECKING:
     from ..mesh import MeshBeam
@@ -26,7 +27,8 @@ class Profile(Section):
     name
         One of :data:`SIZES`.
     scaled
-        On a tapered mesh what lies across the height is the same part of it everywhere.
+        On a tapered mesh what lies across the height is the same part of it everywhere; else
+        flanges and walls keep their thickness.
     **sizes
         Its sizes.
     """
@@ -44,13 +46,13 @@ class Profile(Section):
             raise InputError(f"the web, {sizes['web']:g}, is wider than the profile, "
                              f"{sizes['width']:g}")
 
-    def pieces(self, h: float) -> list[Piece]:
+    def pieces(self, h: Any) -> list[Piece]:
         """The width, piece by piece from the bottom to the top.
 
         Parameters
         ----------
         h
-            Height.
+            Height, or several (..., 1): then ends of the pieces are of this shape.
 
         Raises
         ------
@@ -60,10 +62,11 @@ class Profile(Section):
         s, name = self.sizes, self.name
         width = s.get("width", h)
         thickness = s.get("flange", s.get("wall", 0.0)) / h
-        if thickness * (1 if name == "T" else 2) >= 1.0 or (
+        if np.any(thickness * (1 if name == "T" else 2) >= 1.0) or (
                 name == "box" and 2.0 * s["wall"] >= width):
-            raise InputError(f"{self!r} does not fit in a height of {h:g}: its walls or flanges of "
-                             f"{thickness * h:g} fill it; use thinner ones or a higher mesh")
+            raise InputError(f"{self!r} does not fit in a height of {np.min(h):g}: its walls or "
+                             f"flanges of {s.get('flange', s.get('wall')):g} fill it; use thinner "
+                             "ones or a higher mesh")
         if name == "rectangle":
             return [Piece(0.0, 1.0, width)]
         if name in ("circle", "tube"):
@@ -81,19 +84,17 @@ class Profile(Section):
 
     def slabs(self, mesh: MeshBeam, material: Any) -> list[Slab]:
         pieces = self.pieces(mesh.height)
-        fixed = self.name not in ("rectangle", "circle")
-        if fixed and mesh.heights is not None and not self.scaled:
-            raise InputError(
-                f"{self!r} has thicknesses that stay, and jumps of its width must be at one part "
-                "of the height all along: on a tapered mesh give scaled=True, by which flanges and "
-                "walls get thinner with the height, or weld beams of constant height")
         if self.name == "rectangle":
             return [slab_of(material, self.sizes["width"])]
-        measure = Weighted(pieces)
         round_ = self.name in ("circle", "tube")
         face = (0.0, 0.0) if round_ else (pieces[0].width, pieces[-1].width)
-        return [slab_of(material, measure.mean, measure, face=face, by_height=round_,
-                        outer=self.sizes.get("width", mesh.height))]
+        outer = self.sizes.get("width", mesh.height)
+        if mesh.heights is not None and not self.scaled and self.name != "circle":
+            self.pieces(mesh.heights)
+            return [slab_of(material, 1.0, Moving(self.pieces, mesh.height), face=face,
+                            by_height=round_, outer=outer)]
+        measure = Weighted(pieces)
+        return [slab_of(material, measure.mean, measure, face=face, by_height=round_, outer=outer)]
 
     def __repr__(self) -> str:
         sizes = "".join(f", {k}={v:g}" for k, v in self.sizes.items())
@@ -101,7 +102,7 @@ class Profile(Section):
 
 
 class _Chord:
-    """The width of a circle at eta, less that of a smaller one, in heights."""
+    """The width of a circle at eta, less that of a smaller one; radii in heights h."""
 
     def __init__(self, h, *radii):
         self.h, self.radii = h, radii

@@ -1,0 +1,191 @@
+"""Sections whose thicknesses stay on a tapered beam: what jumps across them moves along it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.polynomial.legendre import legval, legvander
+
+from ..frozen import Frozen
+from ..quadrature import gauss
+from .measure import MORE, Weighted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from ..types import Array, Rule
+    from .measure import Piece
+
+#: Least degree of the series of a width, and its points more where that is a square root.
+LEAST, ROUND = 8, 40
+
+
+class Moving(Frozen):
+    """The measure of a width whose pieces have ends ``a + b / h``: thicknesses that stay.
+
+    Rules across have the same points all along a beam, for strains are sampled along it at fixed
+    parts of the height. Their weights change instead: those of Gauss times the Legendre series of
+    the width there, cut after a degree. The series has all moments of the width up to this degree,
+    so that integrals of polynomials of at most this degree are exact, wherever the width jumps;
+    single weights may be negative.
+
+    Parameters
+    ----------
+    pieces_of
+        Called with heights h, (..., 1), it returns the pieces of the width from the bottom to the
+        top, with ends of this shape.
+    height
+        Where panels of recovered fields have their places: the largest.
+    degree
+        That of the series.
+
+    Attributes
+    ----------
+    pieces
+        Those at that height.
+    mean
+        Integral of their width over eta.
+    """
+
+    low, high = 0.0, 1.0
+
+    @property
+    def spent(self) -> int:
+        """Degree of exactness that rules spend on the width."""
+        return 2 * ((self.degree + 1) // 2)
+
+    def __init__(self, pieces_of: Callable[[Any], Sequence[Piece]], height: float,
+                 degree: int = LEAST) -> None:
+        self.pieces_of, self.height, self.degree = pieces_of, height, degree
+        largest = self.at(height)
+        self.pieces, self.mean = largest.pieces, largest.mean
+
+    def of_order(self, order: int) -> Moving:
+        """The measure for an element whose strain energy is of degree 4 N across.
+
+        Parameters
+        ----------
+        order
+            N.
+        """
+        return Moving(self.pieces_of, self.height, max(LEAST, 4 * order))
+
+    def at(self, height: float) -> Weighted:
+        """The measure of one section.
+
+        Parameters
+        ----------
+        height
+            Its height.
+        """
+        return Weighted(self.pieces_of(height))
+
+    def gauss(self, n: int) -> Rule:
+        """Points eta and weights, whose sum is 1, exact to degree 2 n - 1 times the series.
+
+        Parameters
+        ----------
+        n
+            Number of points that a constant width would take.
+        """
+        return gauss(n + (self.degree + 1) // 2)
+
+    def ends(self, h: Array) -> Array:
+        """Ends of the pieces, from the bottom to the top.
+
+        Parameters
+        ----------
+        h
+            Heights, shape (...).
+
+        Returns
+        -------
+        ndarray
+            Shape (npieces + 1, ...).
+        """
+        found = self.pieces_of(h[..., None])
+        return np.array([np.broadcast_to(end, h.shape + (1,))[..., 0]
+                         for end in (found[0].low, *(p.high for p in found))])
+
+    def width(self, eta: Any, h: Array) -> Array:
+        """The width at places.
+
+        Parameters
+        ----------
+        eta, h
+            Places across and heights there, shapes (...).
+
+        Returns
+        -------
+        ndarray
+            Shape (...).
+        """
+        eta, h = (x[..., None] for x in np.broadcast_arrays(eta, h))
+        found = self.pieces_of(h)
+        out = 0.0 * eta
+        for piece in found:
+            inside = (eta >= piece.low) & (eta < piece.high if piece is not found[-1] else True)
+            out = np.where(inside, piece.width(eta) if callable(piece.width) else piece.width, out)
+        return out[..., 0]
+
+    def points(self, h: Array, n: int) -> tuple[Array, Array]:
+        """Points in the pieces of sections, and what they stand for.
+
+        Parameters
+        ----------
+        h
+            Heights, shape (...).
+        n
+            Gauss points of a piece of constant width.
+
+        Returns
+        -------
+        eta, weights
+            Places across, and weights that have the width: shapes (..., q).
+        """
+        places, weights = [], []
+        for low, high, width in self.pieces_of(h[..., None]):
+            t, w = gauss(n + ROUND * callable(width))
+            if callable(width):  # its square roots at the ends are smooth in an angle
+                t, w = 0.5 - 0.5 * np.cos(np.pi * t), 0.5 * np.pi * np.sin(np.pi * t) * w
+            eta = low + (high - low) * t + 0.0 * h[..., None]
+            places.append(eta)
+            weights.append((high - low) * w * (width(eta) if callable(width) else width)
+                           + 0.0 * eta)
+        return np.concatenate(places, axis=-1), np.concatenate(weights, axis=-1)
+
+    def moments(self, h: Array, times: Callable[[Array], Any] | None = None) -> Array:
+        """Coefficients of the Legendre series of the width.
+
+        Parameters
+        ----------
+        h
+            Heights, shape (...).
+        times
+            What the width is multiplied by: a function of places eta (..., q), or None.
+
+        Returns
+        -------
+        ndarray
+            Shape (degree + 1, ...).
+        """
+        eta, w = self.points(h, self.degree // 2 + 1 + (0 if times is None else 2 * MORE))
+        if times is not None:
+            w = w * times(eta)
+        k = np.arange(self.degree + 1)
+        return np.moveaxis((2 * k + 1) * np.einsum("...q,...qk->...k", w, legvander(
+            2.0 * eta - 1.0, self.degree)), -1, 0)
+
+    @staticmethod
+    def series(moments: Array, eta: Any) -> Array:
+        """The series at places.
+
+        Parameters
+        ----------
+        moments
+            What :meth:`moments` returns, shape (degree + 1, ...).
+        eta
+            Places across, shape (...).
+        """
+        return legval(2.0 * np.asarray(eta) - 1.0, moments, tensor=False)
