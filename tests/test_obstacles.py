@@ -889,3 +889,72 @@ def test_sections_that_stick_at_an_impact_take_few_iterations_more_than_without_
 def test_the_speed_of_slipping_is_no_more_asked_for():
     with pytest.warns(DeprecationWarning, match="leave it out"):
         Scene(beam()).obstacle(Line((0, -0.5)), friction=0.3, slip_speed=0.1)
+
+# what lies in the way
+
+
+def turning_rod(pin, stiffness=None):
+    """A rod of 1 m turns about its left end at 10 rad/s, towards what stands in its way."""
+    rod = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.01), ElementBeamCable(3),
+               StVenantKirchhoff(2e9, 0.3, 1000), width=0.01)
+    return Scene(rod).pin("left").obstacle(pin, stiffness=stiffness).initial_velocity(
+        lambda x: 10.0 * np.array([-x[1], x[0]]))
+
+
+PIN = Circle((0.8 * np.cos(0.468), 0.8 * np.sin(0.468)), 0.002)
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+def test_a_pin_that_a_step_would_jump_over_stops_a_rod(scheme, monkeypatch):
+    """Of 2 mm, in steps in which the rod goes 40 mm there."""
+    found = {}
+    for sweeps in (True, False):
+        if not sweeps:
+            monkeypatch.setattr("skfem_ancf.forces.contacts.Contacts.sweeps", False)
+        history = turning_rod(PIN).integrate(0.06, 5e-3, scheme=scheme)
+        found[sweeps] = history.angular_momentum[-1], history.substeps
+    assert abs(found[False][0] - 1 / 3) < 1e-3 and found[False][1] == 0
+    assert found[True][0] < 0.1 and found[True][1] > 2
+
+
+def test_a_ball_that_is_shot_at_a_wire_pushes_it():
+    """It goes by more than its diameter in each step."""
+    wire = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.001), ElementBeamCable(3),
+                StVenantKirchhoff(2e9, 0.3, 1000), width=0.001)
+    scene = Scene(wire).obstacle(Circle((0.5, -0.105), 0.01),
+                                 position=lambda t: (0.0, 20.0 * t), stiffness=1e11)
+    history = scene.integrate(0.01, 1e-3)
+    assert history.substeps > 0 and history.u[:, 1::4].max() > 0.05
+
+
+def test_what_is_too_soft_to_stop_a_body_is_said():
+    with pytest.warns(ModelWarning, match=r"deep in .*Circle.*other side.*stiffness="):
+        history = turning_rod(PIN, 2e7).integrate(0.06, 2e-4)
+    assert history.angular_momentum[-1] > 0.33
+
+
+def test_a_sheet_that_no_step_stops_at_fails_and_says_so():
+    sheet = Polygon([(0.5, 0.5), (0.9, 0.5), (0.9, 0.5001), (0.5, 0.5001)])
+    with pytest.raises(ConvergenceError, match=r"jumps over it"):
+        turning_rod(sheet, 1e6).integrate(0.09, 5e-3)
+
+
+@pytest.mark.parametrize("shape, inner", [
+    (Circle((0, 0), 0.2), 0.2), (Circle((0, 0), 0.2, hollow=True), np.inf), (Line((0, 0)), np.inf),
+    (Polygon([(0, 0), (1, 0), (1, 0.1), (0, 0.1)]), 0.05),
+    (Polygon([(0, 0), (0, 0.1), (1, 0.1), (1, 0)], radius=0.01), 0.06),
+    (Polygon([(0, 0), (1, 0), (1, 1), (0, 1)], hollow=True), np.inf)], ids=repr)
+def test_how_thick_shapes_are(shape, inner):
+    assert shape.inner == inner or abs(shape.inner - inner) < 1e-12
+
+
+def test_short_steps_and_floors_cost_no_search_for_what_is_jumped_over():
+    b = beam(ElementBeamCable(3), 4)
+    floor = Scene(b).gravity((0, -9.81)).obstacle(Line((0, -0.02)))
+    assert not floor.system.forces.contacts.sweeps
+    scene = Scene(b).gravity((0, -9.81)).obstacle(Circle((0.5, -0.2), 0.1))
+    looked = []
+    path = scene.system.forces.contacts.sweep._paths[0]
+    path._passes = lambda elements, *ends: looked.append(len(elements))
+    scene.integrate(0.05, 5e-4)  # 12 mm of 100
+    assert len(looked) <= 3

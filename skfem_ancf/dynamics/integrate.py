@@ -230,6 +230,7 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
     History
     """
     history, task, body = run.history, run.task, _Body(run)
+    run.system.forces.contacts.sweep.begin()
     try:
         with progress_bar(progress, total=task.span, desc="time") as bar:
             bar.update(run.y.t - task.t_start)
@@ -252,6 +253,9 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
                           "state is the History up to there", history.close()) from None
     body.warn()
     _warn_of_turns(history.close())
+    deep = run.system.forces.contacts.sweep.deep()
+    if deep:
+        warnings.warn(deep, ModelWarning, stacklevel=9)
     run.give_back()
     return history
 

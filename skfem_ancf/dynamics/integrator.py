@@ -304,9 +304,18 @@ class Integrator:
             self._state[:], self._state[READY] = before, 0.0
             raise
         done, self._lost = s.first_lost(rows[:done, 0])
+        if done and s.forces.contacts.sweeps:
+            done, self._lost = self._swept(y, dt, rows[:done], self._lost)
         if done < len(rows):
             self._state[READY] = 0.0
         return done
+
+    def _swept(self, y, dt, rows, lost):
+        """How many steps of ``rows`` pass through no obstacle, and why there are no more."""
+        u, v = (np.concatenate([[x], rows[:, k]]) for k, x in enumerate((y.u, y.v)))
+        done, text = self.system.forces.contacts.sweep.first(
+            u, v, y.t + dt * np.arange(len(u)))
+        return done, f"no step that touches {text}, it jumps over it" if text else lost
 
     @property
     def state(self) -> Array:

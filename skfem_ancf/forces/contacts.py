@@ -9,12 +9,14 @@ import numpy as np
 
 from ..band import Band
 from ..errors import InputError
+from ..kept import cached_property
 from ..own import handle_of
 from .contact_texts import (ANCHORED, ANCHORS, AUGMENT, DAMPING, DEPTH, FRICTION, HEADER, LAST,
                             MEMORY, MIDDLE, NOW, NUMBERS, OWN, POSE, POSES, PRESSURES, RATE, RATES,
                             REACHES, ROWS, SETTLE, STIFFNESS, TANGENT, WIDTH, ContactTables,
                             Question, distances, hardened, levers, of_contacts, places, press,
                             resist, slide, stick, surface)
+from .swept import Sweep, middle_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -25,8 +27,6 @@ if TYPE_CHECKING:
 
 #: Part of the stiffness with which an equilibrium is found where the whole does not lead to it.
 EASED = 1e-2
-#: Parts of a load step at which a way through an obstacle is looked for, at least and at most.
-PARTS, MOST_PARTS = 8, 100
 
 
 class Group(NamedTuple):
@@ -59,31 +59,6 @@ class Group(NamedTuple):
     numbers: Any
 
 
-def carried(pose: Array, x: Array) -> Array:
-    """Where points of an obstacle are that were at x, shape (2, n), when it was given.
-
-    Parameters
-    ----------
-    pose
-        That of :meth:`~skfem_ancf.obstacles.obstacle.Obstacle.pose`, shape (10,).
-    x
-        Points, shape (2, n).
-    """
-    turn = np.array([[pose[2], -pose[3]], [pose[3], pose[2]]])
-    return turn @ (x - pose[4:6, None]) + pose[4:6, None] + pose[:2, None]
-
-
-def taken_back(pose: Array, x: Array) -> Array:
-    """The inverse of :func:`carried`.
-
-    Parameters
-    ----------
-    pose, x
-        As there, shapes (10,) and (2, n).
-    """
-    turn = np.array([[pose[2], pose[3]], [-pose[3], pose[2]]])
-    return turn @ (x - pose[4:6, None] - pose[:2, None]) + pose[4:6, None]
-
 #: For the time of it nothing is lent.
 NOTHING: AbstractContextManager[None] = nullcontext()
 
@@ -98,8 +73,8 @@ class Contacts:
 
     Attributes
     ----------
-    obstacles
-        These.
+    obstacles, groups
+        These, and pairs of the number of an obstacle and a :class:`Group`.
     tables
         A :class:`~skfem_ancf.forces.contact_texts.ContactTables`.
     moving, own
@@ -108,7 +83,7 @@ class Contacts:
 
     def __init__(self, elements: Sequence[Any]) -> None:
         self.obstacles = [element for element in elements if element.groups]
-        self._groups = [(k, group) for k, one in enumerate(self.obstacles) for group in one.groups]
+        self.groups = [(k, group) for k, one in enumerate(self.obstacles) for group in one.groups]
         self.moving = any(one.moves for one in self.obstacles)
         self.own = any(one.shape.kind == OWN for one in self.obstacles)
         poses = np.zeros(POSES * len(self.obstacles))
@@ -116,21 +91,21 @@ class Contacts:
         self.tables = self._make(poses)
 
     def _make(self, poses):
-        n = len(self._groups)
+        n = len(self.groups)
         if n == 0:
             none = np.zeros(0)
             return ContactTables(0, np.zeros(0, np.int64), none, poses, np.zeros(REACHES),
                                  np.zeros(2, np.int64), 0, 0)
         ints, floats = _Pieces(HEADER * n), _Pieces(0)
         headers, memory = np.zeros((n, HEADER), dtype=np.int64), REACHES + n
-        for number, (k, group) in enumerate(self._groups):
+        for number, (k, group) in enumerate(self.groups):
             shape, none = self.obstacles[k].shape, np.zeros((0, len(group.first)))
             slopes = none if group.slopes is None else group.slopes
             headers[number] = (
                 shape.kind, k, group.elements, group.points, len(group.weights),
                 group.slopes is not None, ints.add(group.first),
                 floats.add(np.concatenate([group.weights, slopes])), floats.add(group.areas),
-                floats.add(group.offsets), floats.add(group.starts), floats.add(_middle(group)),
+                floats.add(group.offsets), floats.add(group.starts), floats.add(middle_of(group)),
                 floats.add(group.numbers), floats.add(shape.numbers), len(shape.numbers), memory,
                 number)
             memory += 4 * len(group.first)
@@ -220,7 +195,7 @@ class Contacts:
         Iterations converge there that do not with the whole, to a place that is close to theirs.
         """
         floats, memory = self.tables.floats, self.tables.memory
-        at = [self._header(k)[NUMBERS] + STIFFNESS for k in range(len(self._groups))]
+        at = [self.header(k)[NUMBERS] + STIFFNESS for k in range(len(self.groups))]
         before, sticks = floats[at], memory[ANCHORED]
         try:
             if sticks:
@@ -403,8 +378,8 @@ class Contacts:
         """
         self._place(t)
         out = []
-        for k, (which, group) in enumerate(self._groups):
-            header = self._header(k)
+        for k, (which, group) in enumerate(self.groups):
+            header = self.header(k)
             at = np.arange(len(group.first))
             z, x, found = np.empty((4, at.size)), np.empty((2, at.size)), np.empty((6, at.size))
             places(self.tables.ints, self.tables.floats, header, u, 1.0, at, z, 0)
@@ -413,11 +388,18 @@ class Contacts:
             out.append(((which, group), x, found))
         return out
 
-    def _header(self, k):
+    def header(self, k: int) -> Array:
+        """The header of a group in the tables.
+
+        Parameters
+        ----------
+        k
+            Its number.
+        """
         return self.tables.ints[k * HEADER:(k + 1) * HEADER]
 
     def _reach(self, k):
-        header, n = self._header(k), len(self._groups[k][1].first)
+        header, n = self.header(k), len(self.groups[k][1].first)
         return self.tables.memory[header[MEMORY]:header[MEMORY] + 4 * n].reshape(4, n)
 
     def pushes(self, u: Array, v: Array | None, t: float) -> list[tuple[Any, ...]]:
@@ -438,7 +420,7 @@ class Contacts:
         """
         out = []
         for k, ((which, group), x, found) in enumerate(self.look(u, t)):
-            n, header = len(group.first), self._header(k)
+            n, header = len(group.first), self.header(k)
             at, rows, lever = np.arange(n), np.zeros((ROWS, n)), np.empty((8, n))
             F, more, K = np.zeros((5, n)), np.zeros((5, n)), np.zeros((4, n))
             part = 1.0 / hardened(self.tables.floats, header, self.tables.memory[RATE])
@@ -455,6 +437,16 @@ class Contacts:
             out.append((which, x, -F[:2] - more[:2], F[3] / group.areas, found[0]))
         return out
 
+    @property
+    def sweeps(self) -> bool:
+        """True if there is an obstacle that bodies may pass through between two instants."""
+        return any(group.depth < np.inf for _, group in self.groups)
+
+    @cached_property
+    def sweep(self) -> Sweep:
+        """What looks for obstacles that a body has passed through from one instant to the next."""
+        return Sweep(self)
+
     def passed(self, a: tuple[Array, float], b: tuple[Array, float]) -> str | None:
         """Which obstacle a body has passed through from one state to another, in words.
 
@@ -463,21 +455,10 @@ class Contacts:
         a, b
             Displacement, shape (N,), and time of each.
         """
-        if not self._groups:
+        if not self.obstacles:
             return None
-        ends = [self.look(*x, whole=False) for x in (a, b)]
-        ways = [float(np.hypot(*(y - x)).max()) / group.depth
-                for (_, x, _), ((_, group), y, _) in zip(*ends)]
-        parts = int(np.clip(np.ceil(max(ways)), PARTS, MOST_PARTS))
-        depths = []
-        for part in np.arange(parts + 1) / parts:
-            looked = self.look(a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), False)
-            depths.append([-found[0].min() for _, _, found in looked])
-        for k, (which, group) in enumerate(self._groups):
-            way = [row[k] for row in depths]
-            if max(way) > max(way[0], way[-1], 0.0) + group.depth:
-                return f"a body has passed through {self.obstacles[which]!r}"
-        return None
+        done, text = self.sweep.first(np.array([a[0], b[0]]), None, np.array([a[1], b[1]]))
+        return None if done else f"a body has passed through {text}"
 
     def potential(self, u: Array, t: float) -> float:
         """The potential of the penetration; the augmented Lagrangian, which leaves none, has none.
@@ -510,7 +491,7 @@ class Contacts:
         bandwidth
             Subdiagonals of the scene's band.
         """
-        if not self._groups:
+        if not self.groups:
             return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)
         ld = 2 * bandwidth + 1
         A = Band(np.zeros(ld * len(u)), np.zeros(0, dtype=np.int32), ld, bandwidth, bandwidth)
@@ -535,15 +516,3 @@ class _Pieces:
 
     def whole(self, kind):
         return np.concatenate([np.zeros(0), *self.parts]).astype(kind)
-
-
-def _middle(group):
-    """Place of the middle of each element; then weights, and how much they differ from these."""
-    n, m = group.elements, group.points
-    each = group.weights.reshape(-1, n, m)
-    mean, half = each.mean(axis=2), len(group.weights) // 2
-    spread = np.abs(each - mean[..., None]).max(axis=2)
-    spread[0] = 0.0  # both places together are a translation
-    spread[half] = np.maximum(spread[half], np.abs(each[0] - mean[0][:, None]).max(axis=1))
-    start = group.starts[:2].reshape(2, n, m).mean(axis=2)
-    return np.concatenate([start, np.stack([mean, spread], axis=1).reshape(-1, n)])

@@ -11,7 +11,8 @@ from ..errors import (InputError, MeshError, ModelWarning, ask_array, require_fu
                       require_integer, require_not_negative, require_option, require_positive,
                       shown, teaching)
 from ..forces.base import ForceElement, Link, Part
-from ..forces.contacts import Contacts, Group, carried, taken_back
+from ..forces.contacts import Contacts, Group
+from ..forces.poses import carried, taken_back
 from ..kernels.section import beam_gradients
 from ..quadrature import gauss_lobatto
 from .shapes import Shape
@@ -34,6 +35,9 @@ TOLERANCE = 1e-5
 #: What the augmented Lagrangian adds to the stiffness in a step in time, relative to the mass of
 #: the body beside the surface over the square of the step.
 HARDER = 100.0
+#: How deep the way of a point from one instant to the next may cut an obstacle unseen, relative to
+#: the height or to half of the obstacle's thickness.
+THROUGH = 0.1
 #: Relative step in time for the velocity of an obstacle.
 STEP = 1e-6
 #: Points across an end.
@@ -123,20 +127,22 @@ class Obstacle(ForceElement):
         """True if its place depends on time."""
         return self.position is not None or self.angle is not None
 
-    def pose(self, t: float) -> Array:
+    def pose(self, t: float, rates: bool = True) -> Array:
         """Where it is: displacement, cosine and sine, pivot, velocities, when; shape (10,).
 
         Parameters
         ----------
         t
             The time.
+        rates
+            With its velocities, else zero.
         """
         out = np.array([0.0, 0.0, 1.0, 0.0, *self.shape.pivot, 0.0, 0.0, 0.0, t])
         if self.moves:
-            h = STEP * max(1.0, abs(t))
-            now, before, after = (self._at(time) for time in (t, t - h, t + h))
+            now, h = self._at(t), STEP * max(1.0, abs(t))
             out[:2], out[2:4] = now[:2], (np.cos(now[2]), np.sin(now[2]))
-            out[6:9] = (after - before) / (2.0 * h)
+            if rates:
+                out[6:9] = (self._at(t + h) - self._at(t - h)) / (2.0 * h)
         return out
 
     def _at(self, t):
@@ -270,10 +276,15 @@ class Obstacle(ForceElement):
                             -1.0 if self.shape.hollow else 1.0, self.tolerance * augmented])
         return Group(np.repeat(nodes, m), weights.reshape(-1, n * m), slopes, areas.ravel(),
                      offsets.ravel(), starts.reshape(4, -1), n, m,
-                     0.5 * min(h, self.shape.bend or h), numbers)
+                     _deepest(self.shape, h), numbers)
 
     def __repr__(self) -> str:
         return f"<Obstacle {self.shape!r}>"
+
+
+def _deepest(shape, h):
+    """How deep a way may cut a shape; infinite of one that has no other side."""
+    return np.inf if shape.inner == np.inf else THROUGH * min(h, shape.inner)
 
 
 def _default(E, mesh):

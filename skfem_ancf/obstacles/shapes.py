@@ -27,6 +27,8 @@ STEP, COARSE = 1e-6, 1e-4
 STEEP = 0.05
 #: An edge without end, in its lengths.
 FAR = 1e300
+#: A thickness that is not known.
+UNKNOWN = 1e300
 _COMPLEX = getattr(np, "exceptions", np).ComplexWarning
 
 
@@ -46,10 +48,13 @@ class Shape(Sealable):
     bend
         The smallest radius of its surface; infinite where it is straight or that is not known, zero
         for sharp corners.
+    inner
+        How deep a point may be in it before it is closer to another side: half of its least
+        thickness; infinite if there is no other side, large if that is not known.
     """
 
     kind = OWN
-    bend = np.inf
+    bend = inner = np.inf
     numbers: Any = np.zeros(0)
     pivot: Any = np.zeros(2)
     hollow = False
@@ -184,6 +189,7 @@ class Circle(Shape):
         self.pivot = self.center
         self.numbers = np.array([self.radius, 0.0, 1.0, *self.center, 0.0, 0.0, 1.0])
         self.bend = self.radius
+        self.inner = np.inf if self.hollow else self.radius
 
     def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
         x = np.asarray(x, dtype=float)
@@ -247,6 +253,9 @@ class Polygon(Shape):
         turn = before[:, 0] * edges[:, 1] - before[:, 1] * edges[:, 0]
         sides = np.where(turn >= 0.0, 1.0, -1.0)
         self.numbers = np.append([self.radius, 0.0, 1.0], np.column_stack([corners, edges, sides]))
+        side = -1.0 if self.hollow else 1.0
+        inner = _thin(corners, edges, side) + side * self.radius
+        self.inner = inner if inner > 0.0 else np.inf
 
     def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
         x = np.asarray(x, dtype=float)
@@ -268,6 +277,21 @@ class Polygon(Shape):
 
     def __repr__(self) -> str:
         return f"<Polygon of {len(self.points)} corners>"
+
+
+def _thin(corners, edges, side):
+    """Half of the least way from the middle of an edge through what is solid to another edge."""
+    middle, normal = corners + 0.5 * edges, side * np.array([-edges[:, 1], edges[:, 0]]).T
+    apart = corners[None] - middle[:, None]  # corner_j + b edge_j = middle_i + a normal_i
+    det = _cross(normal[:, None], edges[None])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        a, b = _cross(apart, edges[None]) / det, _cross(apart, normal[:, None]) / det
+    met = (a > 1e-9) & (b >= 0.0) & (b <= 1.0)
+    return 0.5 * float(np.min(np.where(met, a * np.hypot(*normal.T)[:, None], np.inf)))
+
+
+def _cross(a, b):
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 def _require_simple(points):
@@ -332,6 +356,7 @@ class SignedDistance(Shape):
     """
 
     kind = OWN
+    inner = UNKNOWN
 
     def __init__(self, f: Callable[..., Any], gradient: Callable[..., Any] | None = None,
                  hessian: Callable[..., Any] | None = None, pivot: ArrayLike = (0.0, 0.0)) -> None:
