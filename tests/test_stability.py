@@ -7,10 +7,11 @@ import pytest
 import scipy.linalg
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
+from skfem import asm
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic,
+from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamCable, MeshBeam, ModelWarning, NeoHookean, Scene,
-                        StabilityWarning, StVenantKirchhoff)
+                        StabilityWarning, StVenantKirchhoff, forms)
 from skfem_ancf import constraints
 from skfem_ancf.linalg import dense
 from skfem_ancf.linalg import BandMatrix, Inertia
@@ -379,3 +380,22 @@ def test_a_mesh_too_coarse_for_the_curvature_is_said():
         assert any("too coarse" in text for text in state.checks.findings) == (n == 4)
     assert 0.05 < errors[4] < 0.15 and errors[12] < 2e-3
 
+
+def test_energy_that_is_not_positive_is_said_at_once():
+    """The strain split in plane strain at nu = 0.45: the stiffness at rest has negative values."""
+    def beam(formulation, nu=0.45):
+        law = StVenantKirchhoff(2e8, nu, 78.0, plane="strain")
+        mesh = MeshBeam.init_line(np.linspace(0.0, 1.0, 4), 0.3)
+        return Beam(mesh, ElementBeamANCF(5), law, 0.1, formulation)
+
+    def solve(beam):
+        scene = Scene(beam).clamp("left", thickness="fixed").point_force((0, -1e3), at=(1, 0))
+        return scene.solve_static()
+
+    split = beam("strain-split")
+    K = asm(forms.of(split).tangent, split.basis, r=split.q0).toarray()
+    assert np.linalg.eigvalsh(K)[0] < -1e-3 * np.abs(K).max()
+    with pytest.raises(ConvergenceError, match=r"at rest, without any load .*'strain-split'"):
+        solve(split)
+    for other in (beam("assumed"), beam("continuum"), beam("strain-split", nu=0.2)):
+        assert solve(other).converged

@@ -359,6 +359,9 @@ def _acting(options, load):
 def _rescue(system, result, load, options, record, failure):
     """What :func:`_step` returns, from where the path has lost its stability; or None."""
     full, at = _acting(options, load)
+    at_rest = isinstance(failure, _Unstable) and options[0][1] is None and not result.steps
+    if at_rest and (weak := stability.weak_at_rest(system)):
+        raise ConvergenceError(weak, result)
     if not isinstance(failure, _Unstable) and not stability.gives_way(system, result, load):
         return None
     if not stability.has_potential(system, result.u, full):

@@ -159,6 +159,31 @@ def holds(system: System, u: Array, load: float, multipliers: Array, t: float | 
     return verdict(system, u, load, multipliers, t).stability != "unstable"
 
 
+def weak_at_rest(system: System) -> str:
+    """Why a scene gives way without any load, if its strain energy is to blame; else empty.
+
+    A spring may push a scene out of rest, and a way leads down from there. Where a formulation
+    subtracts a part of the energy and leaves less than nothing, none does.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    """
+    at_rest = np.zeros((3, 1))
+    names = sorted({beam.formulation.name for beam in system.beams for term in beam.terms
+                    if np.linalg.eigvalsh(term.law.moduli(at_rest)[..., 0])[0] < 0.0})
+    if not names:
+        return ""
+    found = verdict(system, np.zeros(system.N), 0.0, np.zeros(system.m))
+    if found.stability != "unstable":
+        return ""
+    return (f"the scene gives way at rest, without any load ({found}): the strain energy of "
+            f"formulation {', '.join(map(repr, names))} is not positive for this order of the "
+            "element and this Poisson ratio. The formulations 'assumed' (the default) and "
+            "'continuum' have a positive one; so has a smaller nu or order")
+
+
 def heads_on(system: System, result: Any, u: Array, load: float, origin: tuple[Any, Any]) -> bool:
     """True if the scene moves from the last equilibrium to ``u`` as the load drives it there.
 
