@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
+from test_sections import axis_tip, plane
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, KelvinVoigt, MeshBeam,
-                        Scene, Section, StVenantKirchhoff, system, tangent)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, Frame,
+                        KelvinVoigt, MeshBeam, Scene, Section, StVenantKirchhoff, system, tangent)
 from skfem_ancf.condensed import Condensed
 from skfem_ancf.dynamics import integrate
 from skfem_ancf.errors import (FileError, InputError, MeshError, NameUnknown, PickleError,
@@ -125,6 +126,22 @@ def test_a_frame_is_that_of_welded_beams(element, elements):
     assert np.abs(expected).max() > 0.02
     assert_allclose(at_nodes(frame, state), expected, rtol=0, atol=1e-8)
     assert state.strain_energy == pytest.approx(other.strain_energy, rel=1e-8)
+
+
+def test_the_clamp_of_a_frame_lets_a_face_change_its_thickness():
+    """As a weld to the ground; a face that is held is stiffer, as in the plane: there L/h = 10."""
+    element, law, force = ElementBeamANCFCubic(2), STEEL.replace(E=2e8), (0.0, -1e-3)
+    _, basis, u = plane([(-0.05, 0.05, law, 0.1)], 1.0, force, (200, 8))
+    exact = axis_tip(basis, u, 1.0)[1]
+    frame = Frame.from_lines([(0, 0), (1, 0)], [(0, 1)], material=law, height=0.1, width=0.1,
+                             element=element, elements=32).clamp(0).point_force(force, at=1)
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 33), 0.1), element, law, 0.1)
+    weld, held = Scene(beam), Scene(beam).clamp("left")
+    weld.joint("weld", beams=("ground", 0), at=((0.0, 0.0), "left"))
+    tips = [scene.solve_linear().displacement((1.0, 0.0))[1] / exact - 1 for scene in (
+        frame, weld.point_force(force, at=(1, 0)), held.point_force(force, at=(1, 0)))]
+    assert tips[0] == pytest.approx(tips[1], abs=1e-9)
+    assert 2e-3 < tips[0] < 3e-3 and abs(tips[2]) < 1e-3
 
 
 def test_the_condensed_solution_solves_the_equations_with_multipliers():
