@@ -22,9 +22,8 @@ if TYPE_CHECKING:
     from .mesh import MeshBeam
     from .types import Array
 
-#: Corrections of Newton's method that are small enough, and powers of xi in relative heights that
-#: are round-off.
-CLOSE, NOTHING = 1e-7, 2e-14
+#: Corrections of Newton's method that are small enough.
+CLOSE = 1e-7
 
 _FACET_POINTS = (  # the point of the reference cell at X on facet bottom, right, top, left
     lambda s: (s, 0.0 * s), lambda s: (1.0 + 0.0 * s, s),
@@ -48,8 +47,8 @@ def cross(a: Array, b: Array) -> Array:
     return a[0] * b[1] - a[1] * b[0]
 
 
-def _polynomial(coefficients, xi):
-    """A polynomial, its lowest coefficient first, and its derivative, by Horner's rule."""
+def _with_slope(coefficients, xi):
+    """As :func:`polynomial`, and the derivative."""
     if len(coefficients) == 2:  # of nearly all directors, axes, and both, for single points
         a, b = coefficients
         return a + xi * b, b + 0.0 * xi
@@ -65,6 +64,28 @@ def _polynomial(coefficients, xi):
         slope = value + xi * slope
         value = c + xi * value
     return value, slope
+
+
+def polynomial(coefficients: Sequence[Any], x: Any) -> Any:
+    """A polynomial by Horner's rule.
+
+    Parameters
+    ----------
+    coefficients
+        The lowest first: numbers, or arrays (...).
+    x
+        A number, or an array (...).
+    """
+    if len(coefficients) == 2:
+        a, b = coefficients
+        return a + x * b
+    if len(coefficients) == 4:
+        a, b, c, d = coefficients
+        return a + x * (b + x * (c + x * d))
+    value = coefficients[-1]
+    for c in coefficients[-2::-1]:
+        value = c + x * value
+    return value
 
 
 def _product(a, b):
@@ -101,7 +122,7 @@ def beside_section(turning: list[Any], rest: list[Any], gap: Sequence[Any]) -> l
     return [c + (x * ny - y * nx) for c, nx, ny in turning] + rest
 
 
-def height_in_section(axis: Any, director: Any, gap: Sequence[Any], xi: Any) -> Any:
+def height_in_section(axis: Any, director: Any, gap: Sequence[Any], xi: Any, height: Any) -> Any:
     """The place eta of a point across the section that holds it.
 
     Parameters
@@ -113,12 +134,12 @@ def height_in_section(axis: Any, director: Any, gap: Sequence[Any], xi: Any) -> 
         arrays (...).
     gap
         As for :func:`beside_section`.
-    xi
-        The place of the section along the element.
+    xi, height
+        The place of the section along the element, and its height over that of the director.
     """
-    (rx, _), (ry, _) = _polynomial(axis[0], xi), _polynomial(axis[1], xi)
-    (nx, _), (ny, _) = _polynomial(director[0], xi), _polynomial(director[1], xi)
-    return 0.5 + ((gap[0] - rx) * nx + (gap[1] - ry) * ny) / (nx * nx + ny * ny)
+    rx, ry = polynomial(axis[0], xi), polynomial(axis[1], xi)
+    nx, ny = polynomial(director[0], xi), polynomial(director[1], xi)
+    return 0.5 + ((gap[0] - rx) * nx + (gap[1] - ry) * ny) / ((nx * nx + ny * ny) * height)
 
 
 class MappingBeam(Mapping):
@@ -188,9 +209,7 @@ class MappingBeam(Mapping):
     @cached_property
     def _heights(self):
         """Coefficients of the heights of a tapered beam, relative to the largest."""
-        c = powers(self.mesh.heights) / self.mesh.height
-        c[np.abs(c) <= NOTHING] = 0.0  # of a height that is linear
-        return c
+        return powers(self.mesh.heights) / self.mesh.height
 
     def height(self, xi: Array, tind: Array | None = None) -> tuple[Any, Any]:
         """The height of the section and its derivative by xi.
@@ -217,7 +236,7 @@ class MappingBeam(Mapping):
         if self.mesh.heights is None:
             return 1.0, 0.0
         c = self._heights if tind is None else self._heights[:, tind]
-        return _polynomial(c[:, :, None], np.asarray(xi))
+        return _with_slope(c[:, :, None], np.asarray(xi))
 
     def relative_height(self, e: Any, xi: Any) -> tuple[Any, Any]:
         """The height of a tapered mesh over the largest, and its derivative by xi.
@@ -233,7 +252,7 @@ class MappingBeam(Mapping):
             Two numbers, or arrays (..., n).
         """
         c = self._known_heights[e] if isinstance(e, int) else self._heights.take(e, axis=-1)
-        return _polynomial(c, xi)
+        return _with_slope(c, xi)
 
     @cached_property
     def _known_heights(self):
@@ -376,7 +395,8 @@ class MappingBeam(Mapping):
     def _powers(self):
         """Axis from the first node, and director, as polynomials of xi, (2, n, ne) both.
 
-        And minus their cross product, (n, ne).
+        And minus their cross product, (n, ne). The director is that of the largest height: where
+        the section is that holds a point does not depend on how high it is.
         """
         axis, director = self._all_coefficients
         axis = axis.copy()
@@ -384,9 +404,6 @@ class MappingBeam(Mapping):
         axis, director = (np.stack([self._sum(c, hermite_basis(m, np.zeros(1), d))[..., 0]
                                     / factorial(d) for d in range(2 * m)], 1)
                           for m, c in zip(self._orders, (axis, director)))
-        if self.mesh.heights is not None:
-            degree = np.max(np.nonzero(np.any(self._heights, axis=1)))
-            director = _product(self._heights[:degree + 1], director)
         crossed = _product(axis[1], director[0]) - _product(axis[0], director[1])
         return [axis, director, crossed]
 
@@ -419,14 +436,14 @@ class MappingBeam(Mapping):
         X = np.empty(x.shape)
         X[0] = xi
         for _ in range(max_iterations):
-            value, slope = _polynomial(beside, X[0])
+            value, slope = _with_slope(beside, X[0])
             change = value / slope
             X[0] -= np.clip(change, -1.0, 1.0)
             # the square of the last correction is left
             far = np.abs(change) > CLOSE * (1.0 + np.abs(X[0]))
             if not np.any(far):
                 break
-        X[1] = height_in_section(axis, director, gap, X[0])
+        X[1] = height_in_section(axis, director, gap, X[0], self._relative(X[0], tind)[0])
         X[:, far] = np.nan
         return X
 
@@ -446,13 +463,14 @@ class MappingBeam(Mapping):
         gap = x - x0, y - y0
         beside = beside_section(turning, rest, gap)
         for _ in range(8):  # as in invF
-            value, slope = _polynomial(beside, xi)
+            value, slope = _with_slope(beside, xi)
             if not abs(value) < abs(slope):
                 return None
             change = value / slope
             xi -= change
             if abs(change) <= CLOSE * (1.0 + abs(xi)):
-                return xi, height_in_section(axis, director, gap, xi)
+                height = 1.0 if self.mesh.heights is None else self.relative_height(e, xi)[0]
+                return xi, height_in_section(axis, director, gap, xi, height)
         return None
 
     def section_at(self, e: int, x: float, y: float, xi: float) -> tuple[float, float]:
@@ -468,8 +486,8 @@ class MappingBeam(Mapping):
             Its place along the element.
         """
         (x0, y0), _, director, turning, rest = self._numbers(e)
-        slope = _polynomial(beside_section(turning, rest, (x - x0, y - y0)), xi)[1]
-        return -_polynomial(director[1], xi)[0] / slope, _polynomial(director[0], xi)[0] / slope
+        slope = _with_slope(beside_section(turning, rest, (x - x0, y - y0)), xi)[1]
+        return -_with_slope(director[1], xi)[0] / slope, _with_slope(director[0], xi)[0] / slope
 
     def derivatives(self, e: Any, xi: Any, eta: Any) -> tuple[Any, Any, Any]:
         """The derivatives of the map by xi and eta, and the tangent of the axis.
@@ -488,8 +506,11 @@ class MappingBeam(Mapping):
             _, axis, director, _, _ = self._numbers(e)
         else:
             axis, director = (c.take(e, axis=-1) for c in self._powers[:2])
-        dx, dy = _polynomial(axis[0], xi)[1], _polynomial(axis[1], xi)[1]
-        (nx, dnx), (ny, dny) = _polynomial(director[0], xi), _polynomial(director[1], xi)
+        dx, dy = _with_slope(axis[0], xi)[1], _with_slope(axis[1], xi)[1]
+        (nx, dnx), (ny, dny) = _with_slope(director[0], xi), _with_slope(director[1], xi)
+        if self.mesh.heights is not None:
+            g, rate = self.relative_height(e, xi)
+            dnx, dny, nx, ny = g * dnx + rate * nx, g * dny + rate * ny, g * nx, g * ny
         Y, size = eta - 0.5, (dx * dx + dy * dy) ** 0.5
         return (dx + Y * dnx, dy + Y * dny), (nx, ny), (dx / size, dy / size)
 

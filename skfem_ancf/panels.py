@@ -10,7 +10,7 @@ import numpy as np
 from .frozen import Frozen
 from .quadrature import gauss, lagrange
 from .sections.moving import Moving
-from .series import chebyshev
+from .series import chebyshev, polynomials
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,7 +61,7 @@ class Panel(NamedTuple):
 
     def values(self, s: Any) -> Array:
         """Weights of values at the nodes for those at points s, shape (..., n)."""
-        return chebyshev(s, self.series.shape[0]).T.dot(self.series)
+        return np.array(polynomials(s, len(self.series))).T.dot(self.series)
 
     def integrals(self, ends: Array) -> Array:
         """From values at the nodes to the integrals over eta from s = 0 to ends, shape (k, n)."""

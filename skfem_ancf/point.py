@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .kept import kept
 from .parts import ON_AXIS, Part, carried, swung
+from .series import along_slopes, products
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,7 +52,7 @@ class Point:
         :data:`AGAIN` if it was asked for once.
     """
 
-    __slots__ = ("_both", "_dofs", "_height", "_lever", "_parts", "_scale", "_weights", "_x",
+    __slots__ = ("_dofs", "_lever", "_parts", "_table", "_weights", "_x",
                  "beam", "coordinates", "number", "off_axis", "place", "recovery", "strain_table")
     one, n = True, 1
 
@@ -59,19 +61,25 @@ class Point:
         self.beam, self.number, self.coordinates = beam, number, coordinates
         self.place, self._x = place, x
         self.off_axis = not beam.has_sections and abs(place[2] - 0.5) > ON_AXIS
-        of_element = beam.touched.get(place[0])
-        self._dofs, self._scale = of_element if of_element is not None else kept(
-            beam.touched, place[0], self._of_element, ELEMENTS)
+        key = place[0], self.off_axis
+        of_element = beam.touched.get(key)
+        self._dofs, self._table = of_element if of_element is not None else kept(
+            beam.touched, key, self._of_element, ELEMENTS)
         self._weights: Any = None
-        self._both = self._lever = self._height = None
+        self._lever: Any = None
         self._parts: list[Part] | None = None
         self.recovery: Any = None
         self.strain_table: Any = None
 
     def _of_element(self):
-        """Coordinates (2, nb) of the beam that move the element, and scales of its functions."""
+        """Coordinates (2, nb) of the beam that move the element, and a table of its functions."""
         e, beam = self.place[0], self.beam
-        return beam.mesh.t[0, e] * beam.nd + beam.rows, beam.scales[e]
+        heights = None if beam.mesh.heights is None else partial(
+            beam.mesh.mapping().relative_height, e)
+        table = beam.series.in_element(beam.scales[e], heights)
+        if self.off_axis:
+            table = np.stack([table, along_slopes(table)])
+        return beam.mesh.t[0, e] * beam.nd + beam.rows, table
 
     @property
     def parts(self) -> list[Part]:
@@ -103,7 +111,8 @@ class Point:
         """Displacements (..., 2) for coordinates ``u`` (..., N) of the scene."""
         if not self.off_axis:
             return self.own(u).dot(self._position())
-        found = carried(self._section(), *self._moving(self.own(u)))
+        weights = self._position()
+        found = carried(self._section(weights), *_moving(weights, self.own(u)))
         return np.array(found) if u.ndim == 1 else np.stack(found, -1)
 
     def velocity(self, u: Array, v: Array) -> Array:
@@ -116,52 +125,30 @@ class Point:
         """
         if not self.off_axis:
             return self.own(v).dot(self._position())
-        slope = self._moving(self.own(u))[2:]
-        found = swung(self._section(), *slope, *self._moving(self.own(v)))
+        weights = self._position()
+        slope = _moving(weights, self.own(u))[2:]
+        found = swung(self._section(weights), *slope, *_moving(weights, self.own(v)))
         return np.array(found) if v.ndim == 1 else np.stack(found, -1)
 
     def _position(self):
-        """Weights of the coordinates of the element in its position, (nb,)."""
+        """Weights of the coordinates of the element in its position, (nb,).
+
+        Off the axis of a cable those in the position of the axis and in its slope, (2, nb).
+        """
         weights = self._weights
         if weights is None or weights is AGAIN:
-            _, xi, eta = self.place
-            new = self.beam.series.at(xi, eta) * self._scale
-            if self.beam.mesh.heights is not None and self.beam.has_sections:
-                new *= self.beam.series.swollen(self._relative_height()[0])
+            new = products(self._table, *self.place[1:])
             weights, self._weights = new, AGAIN if weights is None else new
         return weights
 
-    def _with_slope(self):
-        """Weights of the coordinates of the element in its position and its slope, (2, nb)."""
-        if self._both is None:
-            _, xi, eta = self.place
-            self._both = self.beam.series.with_slopes(xi, eta) * self._scale
-            if self.beam.mesh.heights is not None and self.beam.has_sections:
-                series, (g, rate) = self.beam.series, self._relative_height()
-                self._both[1] += series.swelling(g, rate) * self._both[0]
-                self._both *= series.swollen(g)
-        return self._both
-
-    def _relative_height(self):
-        if self._height is None:
-            self._height = self.beam.mesh.mapping().relative_height(*self.place[:2])
-        return self._height
-
-    def _moving(self, q):
-        """Position and slope of changes q (..., 2, nb) of the coordinates, four components."""
-        moved = self._with_slope().dot(q.T) if q.ndim == 2 else np.moveaxis(
-            q.dot(self._with_slope().T), (-1, -2), (0, 1))
-        (x, y), (ax, ay) = moved.tolist() if q.ndim == 2 else moved
-        return x, y, ax, ay
-
-    def _section(self):
+    def _section(self, weights):
         """As :func:`~skfem_ancf.parts.carried` takes it."""
         if self._lever is None:
             mesh, eta = self.beam.mesh, self.place[2]
             lever = mesh.height * (eta - 0.5)
             if mesh.heights is not None:
-                lever *= self._relative_height()[0]
-            slope = self.beam.q0_local[self._dofs].dot(self._with_slope()[1])
+                lever *= mesh.mapping().relative_height(*self.place[:2])[0]
+            slope = self.beam.q0_local[self._dofs].dot(weights[1])
             self._lever = lever, *slope.tolist()
         return self._lever
 
@@ -195,3 +182,12 @@ class Point:
         found = near.get(key)
         return found if found is not None else kept(near, key, lambda: self.beam.kinematics.near(
             self.beam, key[1], self.own(u)), ELEMENTS)
+
+
+def _moving(weights, q):
+    """Position and slope of changes q (..., 2, nb) of the coordinates, four components."""
+    if q.ndim > 2:
+        (x, y), (ax, ay) = np.moveaxis(q.dot(weights.T), (-1, -2), (0, 1))
+    else:
+        (x, y), (ax, ay) = weights.dot(q.T).tolist()
+    return x, y, ax, ay

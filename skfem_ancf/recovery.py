@@ -26,12 +26,11 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from copy import copy
 from functools import cached_property, partial
-from operator import mul
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
-from numpy.polynomial.chebyshev import chebint, chebvander
+from numpy.polynomial.chebyshev import cheb2poly, chebint, chebvander
 from scipy import sparse
 from scipy.linalg import solve_banded
 
@@ -41,9 +40,8 @@ from .materials import LinearLaw
 from .panels import Moved, Panels
 from .point import AGAIN
 from .quadrature import gauss
-from .mapping import cross
+from .mapping import cross, polynomial
 from .section_forces import NotRecovered, SectionForces, Sections, viscous_forces
-from .series import polynomials
 from .spread import AXIS, SNAP, Sampled, station_of_node, stations_of_vector
 
 if TYPE_CHECKING:
@@ -570,12 +568,17 @@ class _Table:
         one._c = self._c[:, :, :, k]
         return one
 
+    @cached_property
+    def _cubics(self):
+        """The coefficients as single points take them, (n - 1, 7, 4, m)."""
+        return np.ascontiguousarray(np.moveaxis(self._c, 0, 2))
+
     def one(self, s, weights, rows):
         """The rows at one place, for the weights (m,) of the points across; a list of numbers."""
         k = max(bisect_right(self._list, s) - 1, 0)
         d = s - self._list[k]
         return [((a * d + b) * d + c) * d + e
-                for a, b, c, e in zip(*self._c[:, k, rows].dot(weights).tolist())]
+                for a, b, c, e in self._cubics[k, rows].dot(weights).tolist()]
 
     def many(self, s, weights, rows, columns):
         """The rows (rows, n) at places (n,), for weights (n, k) of the points of some columns."""
@@ -833,13 +836,16 @@ class Recovery:
         if found is None:
             found = kept(self._arcs, e, lambda: self._arc_in(e), ELEMENTS)
         start, inside = found
-        return start + sum(map(mul, inside, polynomials(xi, len(inside))))
+        return start + polynomial(inside, 2.0 * xi - 1.0)
 
     def _arc_in(self, e):
-        """Of one element the arc length where it begins, and in it, without terms of round-off."""
+        """Of one element the arc length where it begins, and in it, a polynomial of 2 xi - 1.
+
+        Without terms of round-off.
+        """
         inside = self._inside[e]
         last = np.max(np.nonzero(np.abs(inside) > 1e-17 * inside[0]))
-        return float(self.lengths[e]), inside[:last + 1].tolist()
+        return float(self.lengths[e]), cheb2poly(inside[:last + 1]).tolist()
 
     def _places(self, e, xi, eta):
         """What evaluation at points (n,) needs and does not change with the state.

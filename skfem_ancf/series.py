@@ -134,6 +134,25 @@ def along(function: Callable[[Array], Array], n: int) -> Array:
     return function(places(n)) @ _matrices(n)[0].T
 
 
+def products(table: Array, xi: float, eta: float) -> Array:
+    """Sums of products of Chebyshev polynomials at one point, shape (...).
+
+    Parameters
+    ----------
+    table
+        Their coefficients, shape (..., across, along).
+    xi, eta
+        The reference point.
+    """
+    m, p = table.shape[-2:]
+    return table.dot(np.array(polynomials(xi, p))).dot(np.array(polynomials(eta, m)))
+
+
+def along_slopes(table: Array) -> Array:
+    """The table of the derivatives by xi of what a table has, shape (..., across, along) both."""
+    return table @ _matrices(table.shape[-1])[1].T
+
+
 class Series:
     """The local functions of an element of length 1 as ``sum c_ij T_i(2 xi - 1) T_j(2 eta - 1)``.
 
@@ -176,10 +195,6 @@ class Series:
     def tables(self) -> Array:
         return np.stack([self.value, self.along])
 
-    @cached_property
-    def _both(self):
-        return np.ascontiguousarray(self.tables.swapaxes(-1, -2))
-
     def at(self, xi: float, eta: float) -> Array:
         """The functions at one point, shape (nb,).
 
@@ -188,21 +203,30 @@ class Series:
         xi, eta
             The reference point.
         """
-        return self._at(self._value, xi, eta)
+        return products(self._value, xi, eta)
 
-    def with_slopes(self, xi: float, eta: float) -> Array:
-        """The functions and their derivatives by xi at one point, shape (2, nb).
+    def in_element(self, scales: Array, heights: Callable[[Array], Any] | None) -> Array:
+        """A table of the functions of one element, of which :func:`products` are the values.
 
         Parameters
         ----------
-        xi, eta
-            The reference point.
-        """
-        return self._at(self._both, xi, eta)
+        scales
+            Of the functions, see :meth:`scales`, (nb,).
+        heights
+            From places xi (n,) to its height over that of the functions, cubic, and the derivative
+            of this; None where it is constant.
 
-    def _at(self, table, xi, eta):
-        p, m = self._shape
-        return table.dot(np.array(polynomials(xi, p))).dot(np.array(polynomials(eta, m)))
+        Returns
+        -------
+        ndarray
+            Shape (nb, across, along).
+        """
+        table = scales[:, None, None] * self._value
+        if heights is None or not self.swell.any():
+            return table
+        n = self._shape[0] + 3 * int(self.swell.max())
+        g = self.swollen(heights(places(n))[0])
+        return table @ chebyshev(places(n), self._shape[0]) * g[:, None] @ transform(n).T
 
     def values(self, table: Array, X: Array) -> Array:
         """The values at many points, shape (nb, n).
