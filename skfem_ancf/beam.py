@@ -697,7 +697,7 @@ class Beam(Frozen):
     @cached_property
     def series(self) -> Series:
         """The local functions of the elements as a :class:`~skfem_ancf.series.Series`."""
-        return Series(self.element, self.mesh.height)
+        return Series(self.element, self.mesh.height, self.mesh.mapping().height_degree)
 
     @cached_property
     def scales(self) -> Array:

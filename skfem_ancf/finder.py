@@ -191,7 +191,7 @@ class Finder:
 
     @staticmethod
     def _outside(X, noise):
-        out = np.max(np.abs(X - 0.5), axis=0) - 0.5
+        out = np.maximum(*np.abs(X - 0.5)) - 0.5
         out[out < noise] = 0.0
         out[np.isnan(out)] = np.finfo(float).max
         return out

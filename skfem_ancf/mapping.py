@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import factorial
 from typing import TYPE_CHECKING, Any
 
@@ -15,15 +16,16 @@ from .reference import SECTIONS, hermite_basis
 from .taper import powers
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike
 
     from .mesh import MeshBeam
     from .types import Array
 
-#: Corrections of Newton's method that are small enough.
-CLOSE = 1e-7
+#: Corrections of Newton's method that are small enough, and powers of xi in relative heights that
+#: are round-off.
+CLOSE, NOTHING = 1e-7, 2e-14
 
 _FACET_POINTS = (  # the point of the reference cell at X on facet bottom, right, top, left
     lambda s: (s, 0.0 * s), lambda s: (1.0 + 0.0 * s, s),
@@ -209,7 +211,9 @@ class MappingBeam(Mapping):
     @cached_property
     def _heights(self):
         """Coefficients of the heights of a tapered beam, relative to the largest."""
-        return powers(self.mesh.heights) / self.mesh.height
+        c = powers(self.mesh.heights) / self.mesh.height
+        c[np.abs(c) <= NOTHING] = 0.0  # of a height that is linear
+        return c
 
     def height(self, xi: Array, tind: Array | None = None) -> tuple[Any, Any]:
         """The height of the section and its derivative by xi.
@@ -254,6 +258,23 @@ class MappingBeam(Mapping):
         c = self._known_heights[e] if isinstance(e, int) else self._heights.take(e, axis=-1)
         return _with_slope(c, xi)
 
+    def heights_of(self, e: Any) -> Callable[[Any], tuple[Any, Any]] | None:
+        """From places along elements what :meth:`relative_height` says of them, or None.
+
+        Parameters
+        ----------
+        e
+            Elements, as there.
+        """
+        return None if self.mesh.heights is None else partial(self.relative_height, e)
+
+    @cached_property
+    def height_degree(self) -> int:
+        """That of the heights as polynomials of xi: 0 where they are constant."""
+        if self.mesh.heights is None:
+            return 0
+        return int(np.max(np.nonzero(np.any(self._heights, axis=1))))
+
     @cached_property
     def _known_heights(self):
         return self._heights.T.tolist()
@@ -272,6 +293,17 @@ class MappingBeam(Mapping):
             Shape (nelements, npoints), or as ``X[1]`` where the height is constant.
         """
         return self.height(X[0], tind)[0] * (X[1] - 0.5)
+
+    def lever(self, e: int, xi: float, eta: float) -> float:
+        """The distance of one point from the axis.
+
+        Parameters
+        ----------
+        e, xi, eta
+            Its element and reference point.
+        """
+        lever = self.mesh.height * (eta - 0.5)
+        return lever if self.mesh.heights is None else lever * self.relative_height(e, xi)[0]
 
     @staticmethod
     def _sum(coefficients, functions):

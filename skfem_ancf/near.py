@@ -30,7 +30,7 @@ class NearSections:
     Parameters
     ----------
     beam
-        A :class:`~skfem_ancf.Beam` of one height.
+        A :class:`~skfem_ancf.Beam`.
     e
         The element.
     u_e
@@ -123,7 +123,8 @@ class NearCable:
         eps = extension(a0, a1, da0, da1, square**0.5, square0**0.5)
         slab = beam.across.slabs[0 if beam.across.plain else int(beam.across.which(
             np.array([xi, eta])))]
-        return fibre(beam.mesh.height * (eta - 0.5), eps, kappa, slab.material.lateral_ratio)
+        return fibre(beam.mesh.mapping().lever(*point.place), eps, kappa,
+                     slab.material.lateral_ratio)
 
     def stress(self, point: Point) -> Array | None:
         """The stress (S_xx, S_yy, S_xy), shape (3,); None where only many points have it.

@@ -74,14 +74,11 @@ class Part:
         return first + np.arange(2 * beam.nd).reshape(-1, 2, 1)
 
     def _table(self, which):
-        """The local functions, 0, or their derivatives by xi, 1: (nb, n)."""
+        """The local functions, 0, or of a cable their derivatives by xi, 1: (nb, n)."""
         beam, series = self.beam, self.beam.series
         table = series.values(series.tables[which], self.X)
         if beam.mesh.heights is not None:
-            g, rate = beam.mesh.mapping().relative_height(self.e, self.X[0])
-            if which == 1:
-                table += series.swelling(g, rate) * series.values(series.value, self.X)
-            table *= series.swollen(g)
+            table *= series.swollen(beam.mesh.mapping().relative_height(self.e, self.X[0])[0])
         return table * beam.scales[self.e].T
 
     @cached_property
@@ -155,7 +152,7 @@ class Part:
             Coordinates of the scene, shape (N,).
         """
         beam, strain = self.beam, self.strain(u)
-        if beam.across.plain:
+        if len(beam.across.slabs) == 1:
             return self._stress(strain, u, slice(None))
         which = beam.across.which(self.at, self.e)
         for k in range(len(beam.across.slabs)):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -74,9 +73,7 @@ class Point:
     def _of_element(self):
         """Coordinates (2, nb) of the beam that move the element, and a table of its functions."""
         e, beam = self.place[0], self.beam
-        heights = None if beam.mesh.heights is None else partial(
-            beam.mesh.mapping().relative_height, e)
-        table = beam.series.in_element(beam.scales[e], heights)
+        table = beam.series.in_element(beam.scales[e], beam.mesh.mapping().heights_of(e))
         if self.off_axis:
             table = np.stack([table, along_slopes(table)])
         return beam.mesh.t[0, e] * beam.nd + beam.rows, table
@@ -144,12 +141,8 @@ class Point:
     def _section(self, weights):
         """As :func:`~skfem_ancf.parts.carried` takes it."""
         if self._lever is None:
-            mesh, eta = self.beam.mesh, self.place[2]
-            lever = mesh.height * (eta - 0.5)
-            if mesh.heights is not None:
-                lever *= mesh.mapping().relative_height(*self.place[:2])[0]
             slope = self.beam.q0_local[self._dofs].dot(weights[1])
-            self._lever = lever, *slope.tolist()
+            self._lever = self.beam.mesh.mapping().lever(*self.place), *slope.tolist()
         return self._lever
 
     def strain(self, u: Array, near: dict[Any, Any]) -> Sequence[float]:
@@ -162,8 +155,6 @@ class Point:
         near
             What points have asked for in this state, by beam and element.
         """
-        if self.beam.mesh.heights is not None:
-            return self.parts[0].strain(u)[:, 0].tolist()
         return self._near(u, near).strain(self)
 
     def stress(self, u: Array, near: dict[Any, Any]) -> Array:
@@ -174,7 +165,7 @@ class Point:
         u, near
             As for :meth:`strain`, u of shape (N,).
         """
-        found = None if self.beam.mesh.heights is not None else self._near(u, near).stress(self)
+        found = self._near(u, near).stress(self)
         return self.parts[0].stress(u)[:, 0] if found is None else found
 
     def _near(self, u, near):

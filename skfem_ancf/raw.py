@@ -1,10 +1,10 @@
-"""The fields of the elements at single points: polynomials, where an element is asked for again.
+"""The fields of the elements at single points: polynomials, where many are asked for one by one.
 
 The first points of a state are evaluated by themselves. Once they took as long as that would, the
-fields of some elements are evaluated at the zeros of Chebyshev polynomials, by what serves many
-points: they are known at all others then. Where they are no polynomials, as on curves, the
-series is as long as round-off wants it; where it does not end, as of a modulus with a kink, points
-are evaluated by themselves.
+fields of the elements around the next are evaluated at the zeros of Chebyshev polynomials, by what
+serves many points: they are known at all others then. Where they are no polynomials, as on
+curves, the series is as long as round-off wants it; where it does not end, as of a modulus with a
+kink, points are evaluated by themselves.
 """
 
 from __future__ import annotations
@@ -34,12 +34,8 @@ FIRST, MOST = (6, 4), 24
 #: those of one that no longer falls, as they are round-off; and those that are left out.
 ENDED, NOISE, NOTHING = 1e-14, 1e-12, 2e-16
 
-
-#: What is said of an element that was not asked for.
-UNKNOWN = object()
-
-#: Points of elements asked for again that polynomials are worth, and how many of these a point
-#: counts for that takes long by itself.
+#: Points that polynomials are worth, and how many of these a point counts for that takes long by
+#: itself: is evaluated as many are, in a hundred microseconds and more.
 WORTH, LONG = 64, 16
 
 
@@ -73,7 +69,7 @@ class RawField:
     """One field of the elements at single points of one state."""
 
     def __init__(self) -> None:
-        #: By beam and element: None of one that was asked for once, False of one without a series.
+        #: By beam and element; False of one without a series.
         self._patches: dict[tuple[int, int], Any] = {}
         #: By beam what single points have taken since polynomials were made.
         self._spent: dict[int, int] = {}
@@ -93,27 +89,24 @@ class RawField:
             :class:`~skfem_ancf.parts.Part`, (3, n).
         """
         key = point.number, point.place[0]
-        patch = self._patches.get(key, UNKNOWN)
-        if patch is UNKNOWN:
-            known = point.beam.across.moving or (  # no polynomials where slabs have other places
-                not point.beam.has_sections and not _long(point.beam, name))
-            self._patches[key] = False if known else None  # cables say it at once
-            if len(self._patches) > ELEMENTS:
-                del self._patches[next(iter(self._patches))]
-        elif patch is None:
-            spent = self._spent.get(point.number, 0) + (LONG if _long(point.beam, name) else 1)
-            if spent >= WORTH:
-                spent = 0
-                self._patches.update(patches(point, name, many))
-                patch = self._patches[key]
-            self._spent[point.number] = spent
-        return patch(*point.place[1:]) if isinstance(patch, Patch) else alone(point)
+        patch = self._patches.get(key)
+        if patch is None and self._worth(point, name):
+            if len(self._patches) >= ELEMENTS:
+                self._patches.clear()
+            self._patches.update(patches(point, name, many))
+            patch = self._patches[key]
+        return patch(*point.place[1:]) if patch else alone(point)
 
-
-def _long(beam, name):
-    """True where a point by itself is evaluated as many are: a hundred microseconds and more."""
-    return beam.mesh.heights is not None or (name == "stress" and not (
-        beam.across.plain and isinstance(beam.law, LinearLaw)))
+    def _worth(self, point, name):
+        """True if points of the beam that are evaluated by themselves take longer by now."""
+        beam = point.beam
+        count = LONG if name == "stress" and not (
+            beam.across.plain and isinstance(beam.law, LinearLaw)) else 1
+        if beam.across.moving or (count == 1 and not beam.has_sections):
+            return False  # no polynomials where slabs have other places; cables say it at once
+        spent = self._spent.get(point.number, 0) + count
+        self._spent[point.number] = spent if spent < WORTH else 0
+        return spent >= WORTH
 
 
 def patches(point: Point, name: str, many: Callable[[Part], Array]
@@ -141,7 +134,7 @@ def patches(point: Point, name: str, many: Callable[[Part], Array]
     good, used = ended[0] & ended[1], np.abs(c) > NOTHING * size
     n, m = (1 + int(np.max(np.nonzero(np.any(used, axis=axes))[0], initial=1))
             for axes in ((0, 1, 2, 4), (0, 1, 2, 3)))
-    beam.touched["raw", name] = min(n + 2, MOST), min(m + 2, MOST)
+    beam.touched["raw", name] = min(n + 2, shape[0]), min(m + 2, shape[1])
     slabs = [slab.measure for slab in beam.across.slabs]
     tops = [slab.high for slab in slabs[:-1]]
     return {(point.number, e): good[k] and Patch(tops, [

@@ -148,6 +148,25 @@ def products(table: Array, xi: float, eta: float) -> Array:
     return table.dot(np.array(polynomials(xi, p))).dot(np.array(polynomials(eta, m)))
 
 
+def derivatives(c: Array) -> Array:
+    """The derivatives by xi and by eta of polynomials.
+
+    Parameters
+    ----------
+    c
+        Coefficients, shape (along, across, ...).
+
+    Returns
+    -------
+    ndarray
+        Theirs, (2, along, across, ...).
+    """
+    p, m = c.shape[:2]
+    along = _matrices(p)[1] @ c.reshape(p, -1)
+    return np.array([along, (_matrices(m)[1] @ c.reshape(p, m, -1)).reshape(p, -1)]).reshape(
+        2, *c.shape)
+
+
 def along_slopes(table: Array) -> Array:
     """The table of the derivatives by xi of what a table has, shape (..., across, along) both."""
     return table @ _matrices(table.shape[-1])[1].T
@@ -161,23 +180,27 @@ class Series:
     element
         A beam element.
     h
-        Height of the section.
+        Height of the section, the largest.
+    degree
+        That of the heights of an element as a polynomial of xi.
 
     Attributes
     ----------
-    value, along, across
-        Coefficients c of the functions and of their derivatives by xi and by eta, shape
-        (nb, p, m) each.
+    value, along
+        Coefficients c of the functions and of their derivatives by xi, shape (nb, p, m) each.
     tables
-        The first two of them, (2, nb, p, m).
+        Both of them, (2, nb, p, m).
     power, swell
         The powers of the length, and of the height, that each takes, (nb,).
+    shape
+        How many polynomials of xi and of eta the functions of an element are, its height included.
     """
 
-    def __init__(self, element: ElementBeam, h: float) -> None:
+    def __init__(self, element: ElementBeam, h: float, degree: int = 0) -> None:
         unit, self.swell, self.power = element.series()
         self._value = h ** self.swell[:, None, None] * unit if self.swell.any() else unit
         self._shape = unit.shape[:0:-1]
+        self.shape = self._shape[0] + degree * int(self.swell.max()), self._shape[1]
 
     @cached_property
     def value(self) -> Array:
@@ -186,10 +209,6 @@ class Series:
     @cached_property
     def along(self) -> Array:
         return _matrices(self._shape[0])[1] @ self.value
-
-    @cached_property
-    def across(self) -> Array:
-        return self.value @ _matrices(self._shape[1])[1].T
 
     @cached_property
     def tables(self) -> Array:
@@ -205,6 +224,37 @@ class Series:
         """
         return products(self._value, xi, eta)
 
+    def in_elements(self, q: Array, heights: Callable[[Array], Any] | None) -> Array:
+        """Sums of the functions of elements of length 1: polynomials, as :func:`chebyshev` says.
+
+        Parameters
+        ----------
+        q
+            Factors, shape (nb, k, n) of n elements.
+        heights
+            From places xi (p, 1) along the elements to their heights (p, n) over that of the
+            functions, and the derivatives of these; None where it is constant.
+
+        Returns
+        -------
+        ndarray
+            Shape (along, across, k, n), as :attr:`shape`.
+        """
+        if heights is None:
+            found = self.value.reshape(len(q), -1).T @ q.reshape(len(q), -1)
+        else:
+            n = self.shape[0]
+            swollen = self.swollen(heights(places(n)[:, None])[0]).swapaxes(0, 1)
+            moved = (swollen[:, :, None] * q).reshape(n, len(q), -1)
+            found = transform(n) @ (self._at_places @ moved).reshape(n, -1)
+        return found.reshape(*self.shape, *q.shape[1:])
+
+    @cached_property
+    def _at_places(self):
+        """The functions at as many places along an element as it has polynomials, (n, m, nb)."""
+        n, p = self.shape[0], self._shape[0]
+        return (chebyshev(places(n), p).T @ self.value).transpose(1, 2, 0)
+
     def in_element(self, scales: Array, heights: Callable[[Array], Any] | None) -> Array:
         """A table of the functions of one element, of which :func:`products` are the values.
 
@@ -213,20 +263,17 @@ class Series:
         scales
             Of the functions, see :meth:`scales`, (nb,).
         heights
-            From places xi (n,) to its height over that of the functions, cubic, and the derivative
-            of this; None where it is constant.
+            As for :meth:`in_elements`.
 
         Returns
         -------
         ndarray
             Shape (nb, across, along).
         """
-        table = scales[:, None, None] * self._value
-        if heights is None or not self.swell.any():
-            return table
-        n = self._shape[0] + 3 * int(self.swell.max())
-        g = self.swollen(heights(places(n))[0])
-        return table @ chebyshev(places(n), self._shape[0]) * g[:, None] @ transform(n).T
+        if heights is None:
+            return scales[:, None, None] * self._value
+        return np.ascontiguousarray(
+            self.in_elements(np.diag(scales)[:, :, None], heights)[..., 0].T)
 
     def values(self, table: Array, X: Array) -> Array:
         """The values at many points, shape (nb, n).
@@ -260,16 +307,6 @@ class Series:
             Shape (nb, ...).
         """
         return g ** self._power_of_height(g)
-
-    def swelling(self, g: Any, rate: Any) -> Array:
-        """The derivative by xi of :meth:`swollen`, over it, shape (nb, ...).
-
-        Parameters
-        ----------
-        g, rate
-            As there, and its derivative by xi: numbers, or arrays (...).
-        """
-        return self._power_of_height(g) * (rate / g)
 
     def _power_of_height(self, g):
         return self.swell if type(g) is float else self.swell.reshape((-1,) + (1,) * np.ndim(g))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from operator import mul
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.polynomial.chebyshev import chebvander
 from .formulations import COMPONENTS
 from .kept import kept
 from .kernels.along import from_first_node
-from .series import chebyshev, polynomials
+from .series import chebyshev, derivatives, polynomials
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from .types import Array, Rule
 
 #: Points that are evaluated at once.
-CHUNK = 2048
+CHUNK = 3072
 
 #: Elements of which tables for single points are kept.
 ELEMENTS = 1024
@@ -255,19 +256,11 @@ class ElementStrain:
         #: The terms, and their components, that are evaluated at the points themselves.
         self.at_points = [(k, row) for k, (row, place, _, _) in enumerate(self.terms)
                           if place == len(self.places)]
-        # of length 1: by xi, by eta of each place: (places, 2, m, nb); of the points (2, p m, nb)
-        both = series.along, series.across
-        self._fixed = self._at_places(both)
-        self._free = np.array([table.reshape(len(table), -1).T for table in both])
-        self._shape = series.value.shape[1:]
+        self._shape = series.shape
+        self._basis = np.array([chebyshev(xi, series.shape[0]) for xi in self.places]).reshape(
+            -1, series.shape[0])
         #: Of straight elements of one height, whose map is linear.
         self._linear = beam.mesh.is_straight and beam.mesh.heights is None
-
-    def _at_places(self, tables):
-        """Tables of the local functions (nb, p, m) at the places, (places, tables, m, nb)."""
-        n, p, m = tables[0].shape
-        return np.array([[np.einsum("bpm,p->mb", table, chebyshev(xi, p)) for table in tables]
-                         for xi in self.places]).reshape(-1, len(tables), m, n)
 
     def _pair(self, place, J):
         if (place, J) not in self._pairs:
@@ -302,10 +295,14 @@ class ElementStrain:
     @cached_property
     def _map(self):
         """What :func:`_turning` says of the places, linear in 2 eta - 1, (7, places, 2, ne)."""
-        xi, e = np.array(self.places)[:, None], np.arange(self.beam.mesh.nelements)
+        return self._turning_across(np.arange(self.beam.mesh.nelements),
+                                    np.array(self.places)[:, None])
+
+    def _turning_across(self, e, xi):
+        """What :func:`_turning` says at places (..., n) of elements (n,): (7, ..., 2, n)."""
         low, high = (np.array(_turning(*self.beam.mesh.mapping().derivatives(e, xi, eta)))
                      for eta in (0.0, 1.0))
-        return np.stack([0.5 * (low + high), 0.5 * (high - low)], axis=2)
+        return np.stack([0.5 * (low + high), 0.5 * (high - low)], axis=-2)
 
     # at many points
 
@@ -331,7 +328,8 @@ class ElementStrain:
         of = e if few else np.arange(beam.mesh.nelements)
         u_e = from_first_node(beam.kernel.gather(u, of)).transpose(1, 2, 0)
         u_e = u_e * beam.scales[of].T[:, None]
-        turned, free = self._polynomials(u_e, of)
+        fixed, free = self._derivatives(u_e, of)
+        turned = self._turned(fixed, of)
         means = None if across is None else self._means(turned, of, across)
         out = np.empty((3, n), u_e.dtype)
         for first in range(0, n, CHUNK):
@@ -374,39 +372,28 @@ class ElementStrain:
         """The means of what is evaluated at the points over their sections."""
         if not self.here:
             return []
-        (eta, weights), mesh = across, self.beam.mesh
-        X, (p, m) = (xi, np.reshape(eta, (-1, 1))), self._shape
-        if mesh.heights is not None:
-            both = self._slopes_of_taper(free, at, e, xi, 0.0 * xi + X[1])
-        else:  # of each section point a polynomial of xi
-            of_xi = np.einsum("dpmce,mk->dpcke", free.reshape(2, p, m, 2, -1),
-                              polynomials(np.asarray(eta), m))
-            both = [sum(c.take(at, axis=-1) * T for c, T in zip(table, polynomials(xi, p)))
-                    for table in of_xi]
-        turning = self._turning(e, *X)
-        slopes = turned(turning, *both)
-        return [weights @ STRAINS[row](*slopes, *turning[5:]) for _, row in self.at_points]
+        turning, tables, means = self._turning_across(e, xi), {}, [0.0] * len(self.at_points)
+        by_xi, by_eta = (self._at_xi(table, at, xi)[None] for table in free)
+        for J in {J for _, row in self.at_points for J in NEEDS[row]}:
+            a, b = turning[1 + 2 * J:3 + 2 * J, None]
+            tables[J] = (_times(a, by_xi) + _times(b, by_eta))[0]
+        for eta, weight in zip(*across):
+            T = polynomials(eta, self._shape[1] + 1)
+            inverse = 1.0 / (turning[0, 0] + T[1] * turning[0, 1])
+            slopes = {J: inverse * sum(map(mul, table, T)) for J, table in tables.items()}
+            for k, (_, row) in enumerate(self.at_points):
+                means[k] += weight * STRAINS[row](slopes.get(0), slopes.get(1), *turning[5:, 0])
+        return means
 
-    def _polynomials(self, u_e, of):
-        """Derivatives of displacements (nb, 2, n) of elements: at places, and by xi and eta."""
-        flat = u_e.reshape(len(u_e), -1)
-        tapered = self.beam.mesh.heights is not None
-        fixed = self._swollen(u_e, of) if tapered and self.places else self._fixed @ flat
-        turned = self._turned(fixed.reshape(*self._fixed.shape[:3], 2, len(of)), of)
-        if tapered or not self.here:
-            return turned, u_e
-        return turned, (self._free @ flat).reshape(*self._free.shape[:2], 2, len(of))
+    def _derivatives(self, u_e, e):
+        """Derivatives by xi and eta of displacements (nb, k, n) of elements, polynomials.
 
-    def _swollen(self, u_e, of):
-        """Derivatives by xi and eta at places of tapered elements, (places, 2, m, 2 n)."""
-        g, rate = self.beam.mesh.mapping().relative_height(of, np.array(self.places)[:, None])
-        factor, ratio = (x.swapaxes(0, 1)[:, :, None] for x in (
-            self.beam.series.swollen(g), self.beam.series.swelling(g, rate)))
-        u = factor * u_e
-        flat = (*u.shape[:2], -1)
-        fixed = self._fixed @ u.reshape(flat)[:, None]
-        fixed[:, 0] += self._at_places([self.beam.series.value])[:, 0] @ (ratio * u).reshape(flat)
-        return fixed
+        At the places (places, 2, m, k, n), and everywhere (2, p, m, k, n). Elements e are an array
+        (n,), or a number.
+        """
+        heights = self.beam.mesh.mapping().heights_of(e)
+        free = derivatives(self.beam.series.in_elements(u_e, heights))
+        return np.tensordot(self._basis, free, (1, 1)), free
 
     def _slopes(self, turned, at, e, T):
         """Derivatives at places, (2, n) each, from polynomials of elements, number ``at`` there."""
@@ -422,19 +409,21 @@ class ElementStrain:
             out.append(value)
         return out
 
+    def _at_xi(self, table, at, xi):
+        """Of a table (p, m, 2, elements) polynomials across, (m, 2, n), at places xi (n,)."""
+        value = table[0].take(at, axis=-1)
+        for c, T in zip(table[1:], polynomials(xi, len(table))[1:]):
+            value += c.take(at, axis=-1) * T
+        return value
+
     def _slopes_here(self, free, at, e, X, T):
         """Derivatives at the points themselves, (2, n) each, and the tangent of the axis there."""
-        turning = self._turning(e, *X)
-        if self.beam.mesh.heights is not None:
-            both = self._slopes_of_taper(free, at, e, X[0], X[1:])[..., 0, :]
-            return turned(turning, *both), turning[5:]
-        (p, m), both = self._shape, []
-        basis = (chebyshev(X[0], p)[:, None] * np.array(T[:m])).reshape(p * m, -1)
+        turning, both = self._turning(e, *X), []
         for table in free:
-            value = table[0].take(at, axis=-1)
-            for c, of in zip(table[1:], basis[1:]):
-                value += c.take(at, axis=-1) * of
-            both.append(value)
+            first, *others = self._at_xi(table, at, X[0])
+            for c, basis in zip(others, T[1:]):
+                first += c * basis
+            both.append(first)
         return turned(turning, *both), turning[5:]
 
     def _turning(self, e, xi, eta):
@@ -443,28 +432,6 @@ class ElementStrain:
         if not self._linear:
             return _turning(*mesh.mapping().derivatives(e, xi, eta))
         return 1.0, 1.0 / mesh.lengths[e], 0.0, 0.0, 1.0 / mesh.height, *self._tangents(e)
-
-    @cached_property
-    def _tables(self):
-        series = self.beam.series
-        return np.concatenate([series.value, series.along, series.across])
-
-    def _slopes_of_taper(self, u_e, at, e, xi, eta):
-        """Derivatives by xi and eta of displacements (nb, 2, elements), number ``at`` there.
-
-        At places eta (k, n) across sections (n,): pairs of arrays (k, n).
-        """
-        series = self.beam.series
-        g, rate = self.beam.mesh.mapping().relative_height(e, xi)
-        factor, ratio = series.swollen(g), series.swelling(g, rate)
-        moved = [u * f for u, f in zip(u_e.take(at, axis=-1), factor[:, None])]
-        out = np.empty((2, 2, len(eta), len(xi)), u_e.dtype)
-        for k, y in enumerate(eta):
-            value, along, across = np.split(series.values(self._tables, np.array([xi, y])), 3)
-            along += ratio * value
-            for slopes, weights in zip(out, (along, across)):
-                slopes[:, k] = sum(w * u for w, u in zip(weights, moved))
-        return out
 
     def _frames(self, e):
         """The tangent of the axis at all places."""
@@ -502,8 +469,8 @@ class ElementStrain:
                                            inverse, turning))
 
     def tangent(self, e: int) -> tuple[float, float] | None:
-        """That of a straight element, or None."""
-        return self._of(e)[2][0] if self.beam.mesh.is_straight else None
+        """That of a straight element of one height, or None."""
+        return self._of(e)[2][0] if self._linear else None
 
     def weights(self, along: Array) -> list[float]:
         """Those of the samples, for the Chebyshev polynomials of a place along elements."""
@@ -568,12 +535,12 @@ class ElementStrain:
         straight, (p, m) = self._linear, self._shape
         shape = max(p if self.here else 1, self._degree), m if straight else m + 1
         table = np.zeros((len(self._pairs), len(scale), shape[1], shape[0]))
-        for row, polynomial in zip(table, self._turned((self._fixed * scale)[..., None], at)):
+        fixed, free = self._derivatives(np.diag(scale)[:, :, None], e)
+        for row, polynomial in zip(table, self._turned(fixed, at)):
             row[..., 0] = polynomial[..., 0].T
         if self.here:
             size = np.array([mesh.lengths[e], mesh.height]) if straight else np.ones(2)
-            table[-2:, :, :m, :p] = (self._free * (scale / size[:, None])[:, None]).swapaxes(
-                1, 2).reshape(2, -1, p, m).swapaxes(2, 3)
+            table[-2:, :, :m, :p] = free[..., 0].transpose(0, 3, 2, 1) / size[:, None, None, None]
         frames = [tuple(f[:, 0].tolist()) for f in self._frames(at)]
         if straight and self.here:
             frames.append(tuple(self._tangents(at)[:, 0].tolist()))

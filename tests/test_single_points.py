@@ -215,7 +215,7 @@ def test_what_is_in_the_body_is_in_its_box(mesh):
 
 @pytest.mark.parametrize("kind", ["taper of arc", "taper", "kink", "step", "unloaded"])
 def test_fields_of_the_elements_at_points_asked_for_again(kind, monkeypatch):
-    """Polynomials of them from the second point on, where there are some: 1e-13 of many points."""
+    """Polynomials of them where there are some: 1e-13 of many points."""
     mesh, element = MeshBeam.init_line(np.linspace(0.0, 1.2, 5), 0.1), ElementBeamANCF(3)
     material, at = STEEL, (0.6, 0.0) if kind == "unloaded" else None
     if kind.startswith("taper"):
@@ -248,15 +248,25 @@ def test_strain_of_a_tapered_beam_is_that_of_its_displacement_gradient(element, 
                     atol=1e-12 * np.abs(C).max())
 
 
-@pytest.mark.parametrize("kind, points", [("straight", 65), ("taper", 5)])
-def test_polynomials_are_made_once_they_are_worth_it(kind, points):
-    """One point of an element, and so many that were in it again."""
-    mesh = MESHES["straight"]() if kind == "straight" else TAPERS[True]()
-    state = loaded(Beam(mesh, ElementBeamANCF(2), STEEL, 0.1))
+@pytest.mark.parametrize("law, points", [(STEEL, 64), (NeoHookean(1e6, 0.3), 4)], ids=repr)
+def test_polynomials_are_made_once_they_are_worth_it(law, points):
+    """After some points, and after fewer that take longer by themselves."""
+    mesh = MESHES["straight"]()
+    state = loaded(Beam(mesh, ElementBeamANCF(2), law, 0.1))
     X = np.array([np.linspace(0.1, 0.9, points), np.full(points, 0.3)])
     x = mesh.mapping().F(X, np.array([1]))[:, 0]
     for p in x.T[:-1].tolist():
         state.stress(tuple(p), recover=False)
-    assert set(state._raw[1]._patches.values()) == {None}
+    assert not state._raw[1]._patches
     state.stress(tuple(x[:, -1].tolist()), recover=False)
-    assert all(isinstance(patch, Patch) for patch in state._raw[1]._patches.values())
+    assert [isinstance(patch, Patch) for patch in state._raw[1]._patches.values()] == 3 * [True]
+
+
+def test_few_polynomials_are_kept(monkeypatch):
+    for name, number in (("WORTH", 0), ("BLOCK", 1), ("ELEMENTS", 2)):
+        monkeypatch.setattr(raw, name, number)
+    state = loaded(Beam(MESHES["arc"](), ElementBeamANCF(2), STEEL, 0.1))
+    for x in state.beams[0].mesh.mapping().F(np.array([[0.3], [0.2]]))[..., 0].T.tolist():
+        many = state.strain([x, x], recover=False)[:, 0]
+        assert_allclose(state.strain(x, recover=False), many, atol=1e-13 * np.abs(many).max())
+        assert 1 <= len(state._raw[0]._patches) <= 2

@@ -140,8 +140,9 @@ class Across(Frozen):
         graded
             It is proportional to the energy.
         """
-        if self.plain:
-            return values[0]()
+        if len(self.slabs) == 1:
+            graded = graded and self.slabs[0].grade is not None
+            return values[0]() * self.grade(self.slabs[0], X, tind) if graded else values[0]()
         which = np.broadcast_to(self.which(X, tind), like.shape[-2:])
         out = np.empty(like.shape)
         for k, (slab, value) in enumerate(zip(self.slabs, values)):
