@@ -51,7 +51,7 @@ class Point:
         :data:`AGAIN` if it was asked for once.
     """
 
-    __slots__ = ("_dofs", "_lever", "_parts", "_table", "_weights", "_x",
+    __slots__ = ("_dofs", "_lever", "_parts", "_start", "_table", "_weights", "_x",
                  "beam", "coordinates", "number", "off_axis", "place", "recovery", "strain_table")
     one, n = True, 1
 
@@ -62,7 +62,7 @@ class Point:
         self.off_axis = not beam.has_sections and abs(place[2] - 0.5) > ON_AXIS
         key = place[0], self.off_axis
         of_element = beam.touched.get(key)
-        self._dofs, self._table = of_element if of_element is not None else kept(
+        self._dofs, self._table, self._start = of_element if of_element is not None else kept(
             beam.touched, key, self._of_element, ELEMENTS)
         self._weights: Any = None
         self._lever: Any = None
@@ -71,12 +71,16 @@ class Point:
         self.strain_table: Any = None
 
     def _of_element(self):
-        """Coordinates (2, nb) of the beam that move the element, and a table of its functions."""
+        """Coordinates (2, nb) of the beam that move the element, and a table of its functions.
+
+        Off the axis of a cable their values without stress, (2, nb), besides.
+        """
         e, beam = self.place[0], self.beam
         table = beam.series.in_element(beam.scales[e], beam.mesh.mapping().heights_of(e))
-        if self.off_axis:
-            table = np.stack([table, along_slopes(table)])
-        return beam.mesh.t[0, e] * beam.nd + beam.rows, table
+        dofs = beam.mesh.t[0, e] * beam.nd + beam.rows
+        if not self.off_axis:
+            return dofs, table, None
+        return dofs, np.stack([table, along_slopes(table)]), beam.q0_local[dofs]
 
     @property
     def parts(self) -> list[Part]:
@@ -141,8 +145,8 @@ class Point:
     def _section(self, weights):
         """As :func:`~skfem_ancf.parts.carried` takes it."""
         if self._lever is None:
-            slope = self.beam.q0_local[self._dofs].dot(weights[1])
-            self._lever = self.beam.mesh.mapping().lever(*self.place), *slope.tolist()
+            self._lever = (self.beam.mesh.mapping().lever(*self.place),
+                           *self._start.dot(weights[1]).tolist())
         return self._lever
 
     def strain(self, u: Array, near: dict[Any, Any]) -> Sequence[float]:
