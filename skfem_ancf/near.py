@@ -113,7 +113,7 @@ class NearCable:
         point
             A point of the element.
         """
-        beam, (_, xi, eta) = self._beam, point.place
+        beam, (e, xi, eta) = self._beam, point.place
         T = np.array(polynomials(xi, self._polynomials.shape[1]))
         da0, da1, db0, db1, x, y, bx, by = self._polynomials.dot(T).tolist()
         square0, a0, a1 = x * x + y * y, x + da0, y + da1
@@ -121,8 +121,8 @@ class NearCable:
         kappa = (curvature(a0, a1, bx + db0, by + db1, square)
                  - curvature(x, y, bx, by, square0))
         eps = extension(a0, a1, da0, da1, square**0.5, square0**0.5)
-        slab = beam.across.slabs[0 if beam.across.plain else int(beam.across.which(
-            np.array([xi, eta])))]
+        slab = beam.across.slabs[0 if beam.across.plain else beam.across.which(
+            np.array([[xi], [eta]]), np.array([e])).item()]
         return fibre(beam.mesh.mapping().lever(*point.place), eps, kappa,
                      slab.material.lateral_ratio)
 
