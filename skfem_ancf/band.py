@@ -1,6 +1,7 @@
 """Band matrices as texts and LAPACK see them.
 
-Symmetric: the lower half, entry (i, j) at ``j * ld + i - j``; its factors L D L^T take its place.
+Symmetric: the lower half, entry (i, j) at ``j * ld + i - j``, and :data:`SPARE` zeros behind each
+column; its factors L D L^T take its place.
 Else entry (i, j) at ``j * ld + top + i - j``, LAPACK's storage for ``gbtrf``, whose factors take
 its place.
 """
@@ -17,6 +18,9 @@ from .source import F1, I1, by_place, lanes, primitive, source
 if TYPE_CHECKING:
     from .types import Array
 
+#: Zeros behind each column of a lower half: compiled code works on four columns at once, by
+#: vectors that may end there.
+SPARE = 6
 #: A pivot that small beside what it came from is round-off.
 LOST = 1e-13
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import blas, eigh, lapack
 from scipy.sparse import coo_matrix, issparse
 
-from .band import Band, solve
+from .band import SPARE, Band, solve
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -76,9 +76,8 @@ class BandMatrix:
 
     def __init__(self, n: int, bandwidth: int, symmetric: bool = True) -> None:
         self.n, self.bandwidth, self.symmetric = n, bandwidth, symmetric
-        # gbtrf wants room for the pivots; the lower half wants one spare row, so that the upper
-        # half of an element matrix falls on places that no other entry of it has
-        self._ld = bandwidth + 2 if symmetric else 3 * bandwidth + 1
+        # gbtrf wants room for the pivots, the lower half zeros that vectors may reach to
+        self._ld = bandwidth + 1 + SPARE if symmetric else 3 * bandwidth + 1
         self._diagonal = 0 if symmetric else 2 * bandwidth
         self._flat = np.zeros(n * self._ld)
         #: What texts take: a view of the entries, and room for their factors.
@@ -90,7 +89,7 @@ class BandMatrix:
     def ab(self) -> Array:
         """LAPACK's band storage, a view of shape (rows, n)."""
         ab = self._flat.reshape(self.n, self._ld).T
-        return ab[:-1] if self.symmetric else ab
+        return ab[:-SPARE] if self.symmetric else ab
 
     def clear(self) -> None:
         """Set every entry to zero."""
@@ -245,7 +244,7 @@ class BandMatrix:
         if self._factor[0] == "pb":
             c, lower = self._factor[1], np.zeros((self.n, self._ld))
             lower[:, 0] = c[0] ** 2
-            lower[:, 1:-1] = (c[1:] / c[0]).T
+            lower[:, 1:len(c)] = (c[1:] / c[0]).T
             return Band(lower.ravel(), self.band.pivots, self._ld, self.bandwidth, 0)
         _, lu, pivots = self._factor
         return Band(np.ascontiguousarray(lu.T).ravel(), pivots, len(lu), self.bandwidth,

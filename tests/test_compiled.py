@@ -1,5 +1,7 @@
 """The texts compiled by Numba do what they do as plain NumPy, step by step, to round-off."""
 
+import itertools
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -11,7 +13,7 @@ from skfem_ancf.joints import JOINTS, Joint
 from skfem_ancf.joints.base import point
 from skfem_ancf import band
 from skfem_ancf.batch import Batch
-from skfem_ancf.band import factorize as factorize_band
+from skfem_ancf.band import factorize as factorize_band, solve as solve_band
 from skfem_ancf.linalg import BandMatrix
 from skfem_ancf.materials import LinearLaw
 from skfem_ancf.readings import Readings
@@ -348,33 +350,61 @@ def test_restart_under_another_load_is_compiled():
     assert_allclose(results[1].u, results[0].u, rtol=0, atol=1e-9)
 
 
-def test_indefinite_tangents_have_factors():
-    """L D L^T without pivots, and its refusal where a leading part is singular."""
+@pytest.fixture(scope="module")
+def bands():
+    """What factorises and solves, plain and compiled."""
     from skfem_ancf.compiled.twin import compile_for
-    rng = np.random.default_rng(3)
-    n, bw = 12, 3
-    dense = np.triu(np.tril(rng.standard_normal((n, n)), bw), -bw)
-    dense = dense + dense.T
+    A = BandMatrix(2, 1).band
+    return ((band.factorize, band.solve),
+            (compile_for(factors_of, (A,)), compile_for(solution_of, (A, np.zeros(2)))))
+
+
+@pytest.mark.parametrize("n, width", [(1, 0), (3, 0), (2, 1), (3, 2), (4, 1), (5, 3), (6, 5),
+                                      (7, 2), (12, 3), (13, 4), (23, 19), (40, 11)])
+@pytest.mark.parametrize("definite", [True, False])
+def test_factors_and_solutions(bands, n, width, definite):
+    """L D L^T without pivots, of indefinite matrices too."""
+    rng = np.random.default_rng(n)
+    dense = np.triu(np.tril(rng.standard_normal((n, n)), width), -width)
+    dense = dense + dense.T + (4 * width + 8 if definite else 0) * np.eye(n)
     i, j = np.nonzero(np.tril(dense))
-    assert np.linalg.eigvalsh(dense)[0] < 0
-    singular = BandMatrix(2, 1)
-    for factorize in (band.factorize, compile_for(factors_of, (singular.band,))):
-        K = BandMatrix(n, bw)
+    b = rng.standard_normal(n)
+    for factorize, solve in bands:
+        K, x = BandMatrix(n, width), b.copy()
         K.add(i, j, dense[i, j])
         assert factorize(K.band)
+        assert np.all(K.ab[0] > 0.0) == np.all(np.linalg.eigvalsh(dense) > 0.0)
         L = np.eye(n)
-        for k in range(1, bw + 1):
+        for k in range(1, width + 1):
             L[np.arange(k, n), np.arange(n - k)] = K.ab[k, :n - k]
-        assert_allclose(L @ np.diag(K.ab[0]) @ L.T, dense, rtol=0,
-                        atol=1e-11 * np.abs(dense).max())
-        singular.clear()
-        singular.add([0, 1, 1], [0, 0, 1], [1.0, 1.0, 1.0])
-        assert not factorize(singular.band)
+        size = np.max(np.abs(L)) ** 2 * np.max(np.abs(K.ab[0]))
+        assert_allclose(L @ np.diag(K.ab[0]) @ L.T, dense, rtol=0, atol=1e-14 * n * size)
+        assert not K.band.flat.reshape(n, -1)[:, width + 1:].any()
+        solve(K.band, x)
+        assert_allclose(L @ (K.ab[0] * (L.T @ x)), b, rtol=0, atol=1e-14 * n * size * (
+            np.max(np.abs(x)) + 1.0))
+
+
+@pytest.mark.parametrize("n", [2, 5, 7])
+def test_lost_pivots_are_no_factors(bands, n):
+    """Zero, round-off of what they came from, or no numbers: of each row."""
+    for (factorize, _), at, lost in itertools.product(
+            bands, range(n), [0.0, 1.0, np.nan]):
+        K = BandMatrix(n, 1)
+        K.add(np.arange(n), np.arange(n), np.where(np.arange(n) == at, lost, 1.0))
+        if lost == 1.0:
+            K.add([max(at, 1)], [max(at, 1) - 1], [1.0 + 1e-15])
+        assert not factorize(K.band)
 
 
 @source
 def factors_of(A):
     return factorize_band(A)
+
+
+@source
+def solution_of(A, x):
+    solve_band(A, x)
 
 
 @pytest.mark.parametrize("mesh", ["equal", "unequal"])

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..band import LOST
 from .twin import jit
-from .vectors import subtract
+from .vectors import products, scale, subtract, subtract_columns
 
 
 @jit
@@ -28,29 +28,68 @@ def multiply(A, x, y):
 
 @jit
 def factorize(A):
-    """L D L^T, or L U with exchanges of rows, in place; False if a pivot is lost."""
+    """L D L^T, or L U with exchanges of rows, in place; False if a pivot is lost.
+
+    Four columns at a time. The places between columns, which are zero, let vectors end behind them.
+    """
     if A.top > 0:
         return _exchanging(A)
     flat, ld, n = A.flat, A.ld, A.flat.size // A.ld
-    for j in range(n):
-        at = j * ld
-        d = flat[at]
-        if not abs(d) > 0.0 or not abs(d) < np.inf:
+    last = n - n % 4
+    for j in range(0, last, 4):
+        if not _four_columns(flat, ld, A.width, j, min(A.width + 3, n - 1 - j)):
             return False
-        m = min(A.width, n - 1 - j)
-        inverse = 1.0 / d
-        for k in range(1, m + 1):
-            c = flat[at + k]
-            if c != 0.0:
-                c *= inverse
-                other = (j + k) * ld
-                before = flat[other]
-                subtract(flat, other, flat, at + k, m + 1 - k, c)
-                if abs(flat[other]) < LOST * abs(before):
-                    return False
-        for k in range(1, m + 1):
-            flat[at + k] *= inverse
+    for j in range(last, n):
+        at = j * ld
+        inverse = _inverse(flat[at], flat[at])
+        for k in range(1, n - j):
+            other = at + k * ld
+            before = flat[other]
+            subtract_columns(flat, other, n - j - k, (at + k,), (flat[at + k] * inverse,))
+            if abs(flat[other]) < LOST * abs(before):
+                return False
+        if inverse == 0.0:
+            return False
+        scale(flat, at + 1, n - 1 - j, inverse)
     return True
+
+
+@jit
+def _four_columns(flat, ld, width, j, last):
+    """Eliminate columns j to j + 3, which reach to row j + last; False if a pivot is lost."""
+    a = j * ld
+    b, c, d = a + ld, a + 2 * ld, a + 3 * ld
+    ia, before = _inverse(flat[a], flat[a]), flat[b]
+    subtract_columns(flat, b, width, (a + 1,), (flat[a + 1] * ia,))
+    ib, before = _inverse(flat[b], before), flat[c]
+    subtract_columns(flat, c, width, (a + 2, b + 1), (flat[a + 2] * ia, flat[b + 1] * ib))
+    ic, before = _inverse(flat[c], before), flat[d]
+    subtract_columns(flat, d, width, (a + 3, b + 2, c + 1),
+                     (flat[a + 3] * ia, flat[b + 2] * ib, flat[c + 1] * ic))
+    id_ = _inverse(flat[d], before)
+    if ia == 0.0 or ib == 0.0 or ic == 0.0 or id_ == 0.0:
+        return False
+    for k in range(4, last + 1):
+        to = a + k * ld
+        before = flat[to]
+        subtract_columns(
+            flat, to, last + 1 - k, (a + k, b + k - 1, c + k - 2, d + k - 3),
+            (flat[a + k] * ia, flat[b + k - 1] * ib, flat[c + k - 2] * ic, flat[d + k - 3] * id_))
+        if abs(flat[to]) < LOST * abs(before):
+            return False
+    scale(flat, a + 1, width, ia)
+    scale(flat, b + 1, width, ib)
+    scale(flat, c + 1, width, ic)
+    scale(flat, d + 1, width, id_)
+    return True
+
+
+@jit
+def _inverse(pivot, before):
+    """1 / pivot; 0 if it is lost: round-off of what it came from, or not finite."""
+    if abs(pivot) > LOST * abs(before) and abs(pivot) < np.inf:
+        return 1.0 / pivot
+    return 0.0
 
 
 @jit
@@ -78,34 +117,59 @@ def _exchanging(A):
             row = c * ld + top + j - c
             x = flat[row]
             if x != 0.0:
-                subtract(flat, row + 1, flat, at + 1, m, x)
+                subtract(flat, row + 1, flat, (at + 1,), m, (x,))
     return True
 
 
 @jit
 def solve(A, x):
-    """Solve in place with the factors."""
+    """Solve in place with the factors, of a lower half four columns at a time."""
+    if A.top > 0:
+        _solve_exchanged(A, x)
+        return
+    flat, ld, n = A.flat, A.ld, x.size
+    last = n - n % 4
+    for j in range(0, last, 4):
+        a, m = j * ld, min(A.width, n - 4 - j)
+        b, c, d = a + ld, a + 2 * ld, a + 3 * ld
+        x[j + 1] -= flat[a + 1] * x[j]
+        x[j + 2] -= flat[a + 2] * x[j] + flat[b + 1] * x[j + 1]
+        x[j + 3] -= flat[a + 3] * x[j] + flat[b + 2] * x[j + 1] + flat[c + 1] * x[j + 2]
+        subtract(x, j + 4, flat, (a + 4, b + 3, c + 2, d + 1), m,
+                 (x[j], x[j + 1], x[j + 2], x[j + 3]))
+    for j in range(last, n):
+        for k in range(1, n - j):
+            x[j + k] -= flat[j * ld + k] * x[j]
+    for j in range(n - 1, last - 1, -1):
+        x[j] /= flat[j * ld]
+        for k in range(1, n - j):
+            x[j] -= flat[j * ld + k] * x[j + k]
+    for j in range(last - 4, -1, -4):
+        a, m = j * ld, min(A.width, n - 4 - j)
+        b, c, d = a + ld, a + 2 * ld, a + 3 * ld
+        p, q, r, s = products(x, j + 4, m, flat, (a + 4, b + 3, c + 2, d + 1))
+        s = x[j + 3] / flat[d] - s
+        r = x[j + 2] / flat[c] - r - flat[c + 1] * s
+        q = x[j + 1] / flat[b] - q - flat[b + 1] * r - flat[b + 2] * s
+        p = x[j] / flat[a] - p - flat[a + 1] * q - flat[a + 2] * r - flat[a + 3] * s
+        x[j], x[j + 1], x[j + 2], x[j + 3] = p, q, r, s
+
+
+@jit
+def _solve_exchanged(A, x):
+    """As LAPACK's gbtrs."""
     flat, ld, top, n, reach = A.flat, A.ld, A.top, x.size, A.width
     for j in range(n):
-        if top > 0:
-            p = A.pivots[j]
-            reach = max(reach, A.width + p - j)  # of U: as far as rows were exchanged
-            x[j], x[p] = x[p], x[j]
-        subtract(x, j + 1, flat, j * ld + top + 1, min(A.width, n - 1 - j), x[j])
-    if top > 0:
-        for j in range(n - 1, -1, -1):
-            at = j * ld + top
-            x[j] /= flat[at]
-            xj = x[j]
-            for i in range(j - min(reach, j), j):
-                x[i] -= flat[at - j + i] * xj
-        return
+        p = A.pivots[j]
+        reach = max(reach, A.width + p - j)  # of U: as far as rows were exchanged
+        x[j], x[p] = x[p], x[j]
+        subtract(x, j + 1, flat, (j * ld + top + 1,), min(A.width, n - 1 - j), (x[j],))
     for j in range(n - 1, -1, -1):
-        at = j * ld
-        s = x[j] / flat[at]
-        for k in range(1, min(A.width, n - 1 - j) + 1):
-            s -= flat[at + k] * x[j + k]
-        x[j] = s
+        at = j * ld + top
+        x[j] /= flat[at]
+        xj = x[j]
+        for i in range(j - min(reach, j), j):
+            x[i] -= flat[at - j + i] * xj
 
 
 @jit

@@ -459,12 +459,14 @@ class TermTables:
                                       held_skew=both * pack.pairs.held_skew))
         return other
 
-    def _gradients(self, pack, u):
+    def _gradients(self, pack, u, rows):
+        """Some rows of the deformation gradient, shape (rows, 2, elements)."""
         U = np.empty((pack.table.shape[2], 2, pack.start.size))
-        r = np.empty((pack.table.shape[1],) + U.shape[1:])
+        r = np.empty((len(rows),) + U.shape[1:])
         load(pack.start, pack.span, 0, u, U)
-        product(pack.table, 0, U, r)
-        return pack.frame + r
+        product(packed(pack.table[:, rows]), 0, U, r)
+        r += pack.frame[rows]
+        return r
 
     def inverted(self, pack: SectionPack, u: Array) -> bool:
         """True if the body is turned inside out at a sample: det F is not positive.
@@ -486,8 +488,9 @@ class TermTables:
         pack, u
             The tables, and the displacement, shape (N,).
         """
-        r = self._gradients(pack, u)
-        rx, ry = r[self._sheared[0]], r[self._sheared[1]]
+        n = len(self._sheared[0])
+        r = self._gradients(pack, u, np.concatenate(self._sheared))
+        rx, ry = r[:n], r[n:]
         return rx[:, 0] * ry[:, 1] > rx[:, 1] * ry[:, 0]
 
     def shortest(self, pack: SectionPack, u: Array) -> Any:
@@ -500,7 +503,7 @@ class TermTables:
         u
             Displacement, shape (N,).
         """
-        rx = self._gradients(pack, u)[self._along]
+        rx = self._gradients(pack, u, self._along)
         return np.sqrt(np.min(np.sum(rx * rx, axis=1)))
 
 

@@ -75,6 +75,9 @@ class Rules(NamedTuple):
         Corrections at least, where the residual at the start is not round-off.
     wary
         1 if it ends where the first corrections do not get smaller.
+    near
+        1 if it starts at an equilibrium, nearly: a correction is the last one if it is small and
+        the residual before it, too.
     """
 
     mixed: int
@@ -87,6 +90,7 @@ class Rules(NamedTuple):
     solver: int
     least: int
     wary: int
+    near: int
 
 
 class Unknowns(NamedTuple):
@@ -217,7 +221,8 @@ def _member(e, target, rules, x, w, record, members, before, least):
         e, Target(target.factors, before, target.scale, target.at, target.c, target.g, target.gap,
                   target.prescribed),
         Rules(rules.mixed, rules.iterations, rules.tol, floor, floor * members.spread[0],
-              CLOSED * members.noise[1], rules.inaccurate, rules.solver, least, rules.wary),
+              CLOSED * members.noise[1], rules.inaccurate, rules.solver, least, rules.wary,
+              2 - least),
         x, w, record)
     if status != CONVERGED:
         return status, number
@@ -286,6 +291,8 @@ def iterate(e, target, rules, x, w, record):
             break
         if last:
             _tangent(e, target, rules, x, w, k)
+        near = rules.near > 0 and not moving and opening <= rules.closed
+        near = near and rho <= rules.tol * size + rules.force_floor
         before, work = work, _correction(e, target, rules, x, w, moving)
         if not (0.0 <= work < 1e300):
             return SINGULAR, k
@@ -299,6 +306,8 @@ def iterate(e, target, rules, x, w, record):
             x.multipliers[i] += w.dm[i]
         reference = reference_work(x.force, w.load, x.u)
         record[k, 1] = work / reference if reference > 0.0 else 0.0
+        if near and settled(work, reference, rules):
+            return CONVERGED, k + 1
         if rules.wary > 0 and k == 2 and record[k, 1] > ASTRAY:
             return NOT_CONVERGED, k + 1
     return NOT_CONVERGED, rules.iterations

@@ -446,7 +446,7 @@ def rules_of(system: System, method: str, tol: float, max_iterations: int) -> Ru
     floor = 8.0 * system.work_noise
     # the residual sums the noise of all coordinates, the work that of the strains
     return Rules(int(method == "mixed"), max_iterations, tol, floor, floor * system.noise,
-                 CLOSED * system.size, INACCURATE, 0, 2, 0)
+                 CLOSED * system.size, INACCURATE, 0, 2, 0, 0)
 
 
 _ENDS = {SINGULAR: "the tangent is singular", NOT_FINITE: "the strain is not finite",
