@@ -39,7 +39,7 @@ TRIED, OF, NEAR = 2, 2500, 1e-6
 #: Error of a start that is given, relative, and how large it may be for a start to be given at
 #: all; members for each one that is solved to find starts, and for each that is solved from zero,
 #: too, to see whether a start leads to what zero leads to.
-START, USEFUL, STARTS, CHECKED = 1e-10, 1e-2, 16, 512
+START, USEFUL, STARTS, CHECKED = 1e-10, 1e-2, 16, 1000
 #: Method, tolerance and most iterations of ``solve_static``.
 OPTIONS = "mixed", 1e-8, 30
 #: Members that are solved alone since they may be out of the range of law or mesh, about.
@@ -199,8 +199,9 @@ class Batch:
             begun = np.ascontiguousarray(self.start(x))
             u = begun.copy()
             found = lane.solve(values, u, True)
-            far = _apart(u, begun) > USEFUL
-            if np.any(far):  # it may have come to another branch
+            more = np.flatnonzero(found[:, 1] > 1)  # those of one correction have not come far
+            far = more[_apart(u[more], begun[more]) > USEFUL]
+            if len(far):  # it may have come to another branch
                 u[far], found[far] = self._from_zero(lane, values[far])
         good = found[:, 0] == CONVERGED
         u[~good] = 0.0
