@@ -10,6 +10,7 @@ from skfem_ancf.compiled.words import Words
 from skfem_ancf.elements import base
 from skfem_ancf.finder import Finder
 from skfem_ancf.kernels import cable, section
+from skfem_ancf.kernels.base import pair_tables
 from skfem_ancf.loads import EndMoment, PointForce, Pressure, Weight
 from skfem_ancf.statics.iteration import ALONE
 from skfem_ancf.system import System
@@ -46,26 +47,26 @@ def test_local_functions_are_made_once_a_process(monkeypatch, element):
 
 
 @pytest.mark.parametrize("degree", [3, 5, 9])
-@pytest.mark.parametrize("n, angle", [(1, 0.0), (3, 0.7)])
-def test_tables_of_equal_elements_are_those_of_each(degree, n, angle):
-    beam = cantilever(ElementBeamCable(degree), n, 1.7, 0.02, angle=angle).beams[0]
-    kernel, across = beam.kernel, beam.across
-    (pack,), whole = kernel.packs, kernel._pack(beam.mesh, beam.element, across,
-                                                kernel.points_number)
-    for name in ("table", "transposed", "weights", "stiffness", "constant", "start", "span"):
-        a, b = getattr(pack, name), getattr(whole, name)
-        assert a.shape == b.shape and np.allclose(a, b, rtol=1e-13,
-                                                  atol=1e-13 * np.max(abs(b), initial=0.0))
-    for name in pack.pairs._fields:
-        a, b = getattr(pack.pairs, name), getattr(whole.pairs, name)
+@pytest.mark.parametrize("x", [[0.0, 1.7], [0.0, 0.4, 0.8], [0.0, 0.3, 1.0]])
+def test_tables_of_cables_are_derivatives_along_the_axis(degree, x):
+    mesh, element = MeshBeam.init_line(x, 0.02, angle=0.7), ElementBeamCable(degree)
+    kernel = Beam(mesh, element, StVenantKirchhoff(2e9, 0.3), 0.01).kernel
+    pack, step, xi = kernel.packs[0], 1e-30j, kernel.points
+    L, slope = mesh.lengths[:len(pack.table), None, None], np.array([
+        f[1] for f in element.functionals] * 2)
+    d_xi = element.local(np.array([xi + step, 0.5 + 0.0 * xi]), 0.02)[1].T * L**(slope - 1.0)
+    both = np.concatenate([d_xi.real, d_xi.imag / step.imag / L], axis=1)
+    assert np.allclose(pack.table, both, rtol=1e-12, atol=1e-12 * np.max(np.abs(both)))
+    assert len(pack.table) == len(pack.transposed) == 1 or (len(pack.transposed) == 0
+                                                            and len(pack.table) == mesh.nelements)
+    again = pair_tables(pack.table, pack.pairs.pairs[:2], pack.constant, mesh.nelements)
+    for a, b in zip(pack.pairs, again):
         assert a.shape == b.shape and np.allclose(a, b, rtol=1e-12,
-                                                  atol=1e-13 * np.max(abs(b), initial=0.0))
-    for name in ("frame", "length0", "kappa0"):
-        assert np.allclose(getattr(pack, name), getattr(whole, name), rtol=0, atol=1e-14)
-    u = 1e-2 * np.random.default_rng(0).standard_normal(beam.N)
-    force = kernel.force(u)
-    kernel.packs = [whole]
-    assert np.allclose(force, kernel.force(u), rtol=0, atol=1e-11 * np.max(np.abs(force)))
+                                                  atol=1e-13 * np.max(np.abs(b), initial=0.0))
+    assert np.allclose(pack.frame[:len(xi), :, 0], [np.cos(0.7), np.sin(0.7)], rtol=0, atol=1e-14)
+    assert not np.any(pack.frame[len(xi):]) and not np.any(pack.kappa0)
+    assert np.allclose(pack.length0, 1.0, rtol=0, atol=1e-14)
+    assert kernel.volume == pytest.approx(0.01 * 0.02 * x[-1], rel=1e-13)
 
 
 @pytest.mark.parametrize("plane, formulation", [("stress", "assumed"), ("strain", "assumed"),
@@ -73,7 +74,8 @@ def test_tables_of_equal_elements_are_those_of_each(degree, n, angle):
 @pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCF(3),
                                      ElementBeamANCF(4, "equispaced"), ElementBeamANCFCubic(2),
                                      ElementBeamANCFHermite(2, 5), ElementBeamCable(3)])
-def test_equal_elements_have_the_forces_of_elements_one_by_one(element, plane, formulation):
+def test_equal_elements_have_the_forces_of_elements_one_by_one(monkeypatch, element, plane,
+                                                                formulation):
     def beam(alike):
         mesh = MeshBeam.init_line(np.linspace(0.5, 2.0, 4), 0.07, angle=0.6)
         if not alike:
@@ -81,6 +83,11 @@ def test_equal_elements_have_the_forces_of_elements_one_by_one(element, plane, f
         return Beam(mesh, element, StVenantKirchhoff(2e9, 0.3, 7800.0, plane), 0.02, formulation)
 
     one, other = beam(True), beam(False)
+    apart = other.kernel
+    monkeypatch.setattr(base.ElementBeam, "by_reference", False)  # by the mapping of the mesh
+    other = beam(False)
+    a, b = apart.packs[0].table, other.kernel.packs[0].table
+    assert a.shape == b.shape and np.allclose(a, b, rtol=1e-12, atol=1e-13 * np.max(np.abs(b)))
     if element.order:
         assert len(one.kernel.packs[0].table) == 1 < len(other.kernel.packs[0].table)
     rng = np.random.default_rng(1)

@@ -255,13 +255,13 @@ class ElementBeam(Frozen, Element):
         """
         return _slopes(self._along, self.functionals, self.section, Content(X, Y))
 
-    def powers(self, h: float, L: float) -> Array:
-        """What height and length multiply the local functions by, shape (2 nodal_dofs,).
+    def powers(self, h: float, L: float | Array) -> Array:
+        """What height and length multiply the local functions by, shape (..., 2 nodal_dofs).
 
         Parameters
         ----------
         h, L
-            Height and length of a straight element.
+            Height and length of a straight element; of several lengths of shape (..., 1).
         """
         power, slope = self._factors[3:]
         return h**power * L**slope

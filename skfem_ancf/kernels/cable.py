@@ -362,12 +362,15 @@ class CableKernel(Chain):
         self.shared = mesh.is_uniform or np.ptp(mesh.lengths) <= 1e-13 * np.max(mesh.lengths)
         self._across, self.points = across, gauss(n)[0]
         if before is not None and before.points_number == n:
-            self.volume: float = before.volume
             self.packs = [self._renewed(*before.packs)]
-        elif mesh.is_uniform and across.simple:
-            self.packs = [self._uniform_pack(mesh, element, across, n)]
         else:
             self.packs = [self._pack(mesh, element, across, n)]
+
+    @property
+    def volume(self) -> float:
+        """Volume of the body."""
+        w, area = gauss(self.points_number)[1], self._across.moments(self.points, what="area")[0]
+        return float(area @ w @ self._across.mesh.lengths)
 
     @property
     def scale(self) -> float:
@@ -389,52 +392,24 @@ class CableKernel(Chain):
         return eps, 0.5 * np.transpose(h) * np.abs(kappa)
 
     def _pack(self, mesh, element, across, n):
-        ne = mesh.nelements
-        xi, w = gauss(n)
-        L = mesh.lengths[:1] if self.shared else mesh.lengths
-        few = self.shared and across.constant
-        EA, ES, EI = self._stiffness(few)
-        weights = np.broadcast_to(w[:, None] * L, EA.shape if self.shared else (n, ne))
-        area = across.moments(xi, what="area")[0]
-        self.volume = float(np.sum(area.T * w[:, None] * mesh.lengths))
-        scale = L ** np.tile(np.arange(element.nodal_dofs), 2)[:, None]
-        table = np.concatenate([element.axis(xi, d).T[:, :, None] * scale / L**d for d in (1, 2)]
-                               ).transpose(2, 0, 1)
-        frame = self._stress_free(mesh, element, xi, table)
-        a, b = frame[:n], frame[n:]
-        square = np.sum(a * a, axis=1)
-        none = np.zeros((0, 2 * self.nd, 2 * self.nd))
-        constant = none if self.constant is None else self.constant
-        return CablePack(
-            packed(table), packed(table.transpose(0, 2, 1)[:int(self.shared)]),
-            packed(frame), packed(np.sqrt(square)),
-            packed((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / square), packed(weights),
-            packed(np.arange(ne) * (not few), np.int64),
-            packed(np.arange(ne) * (frame.shape[2] > 1), np.int64),
-            packed([EA, EI, -ES]), packed(constant),
-            packed(mesh.t[0] * self.nd, np.int64), packed(np.arange(2 * self.nd), np.int64),
-            pair_tables(table, _pairs(n), constant, ne))
-
-    def _uniform_pack(self, mesh, element, across, n):
-        """As :meth:`_pack` where all elements are equal, from what is kept of an element of length
-        1."""
-        ne, nd, L, w = mesh.nelements, self.nd, float(mesh.lengths[0]), gauss(n)[1]
+        """The tables of the reference element times powers of the lengths, of one or of each."""
+        ne, nb = mesh.nelements, self.nd
+        L = (mesh.lengths[:1] if self.shared else mesh.lengths)[:, None]
         unit, pairs = element.derivatives_at_gauss_points(n), _pairs(n)
-        columns, rows = L ** _powers(nd // 2), np.empty(2 * n)
-        rows[:n], rows[n:] = 1.0 / L, 1.0 / L**2
-        table = unit * (rows[:, None] * columns)
-        EA, ES, EI = across.simple_moments()
-        self.volume = across.simple_moments("area")[0] * float(mesh.lengths.sum())
-        e = (mesh.p[:, 1] - mesh.p[:, 0]) / L
-        frame, stiffness = np.zeros((2 * n, 2, 1)), np.empty((3, n, 1))
-        frame[:n, :, 0], zeros = e, np.zeros(ne, np.int64)
-        stiffness[0], stiffness[1], stiffness[2] = EA, EI, -ES
-        constant = np.zeros((0, 2 * nd, 2 * nd)) if self.constant is None else self.constant
+        columns, rows = L ** _powers(nb // 2), np.empty((len(L), 2 * n))
+        rows[:, :n], rows[:, n:] = 1.0 / L, 1.0 / L**2
+        table = unit * (rows[:, :, None] * columns[:, None])
+        frame, length0, kappa0 = self._stress_free(mesh, element, n, table)
+        stiffness, where = self._stiffness(), np.arange(ne)
+        weights = np.empty(stiffness.shape[1:])
+        weights[:] = gauss(n)[1][:, None] * L.T
+        constant = np.zeros((0, 2 * nb, 2 * nb)) if self.constant is None else packed(self.constant)
         return CablePack(
-            table[None], np.ascontiguousarray(table.T)[None], frame,
-            np.full((n, 1), np.hypot(e[0], e[1])), np.zeros((n, 1)), (w * L)[:, None], zeros,
-            zeros, stiffness, packed(constant), mesh.t[0].astype(np.int64) * nd,
-            np.arange(2 * nd), scaled_pair_tables(unit, rows, columns, pairs, constant, ne))
+            table, np.ascontiguousarray(table[:int(self.shared)].transpose(0, 2, 1)), frame,
+            length0, kappa0, weights, where * (weights.shape[1] > 1), where * (frame.shape[2] > 1),
+            stiffness, constant, mesh.t[0].astype(np.int64) * nb, np.arange(2 * nb),
+            scaled_pair_tables(unit, rows[0], columns[0], pairs, constant, ne) if self.shared else
+            pair_tables(table, pairs, constant, ne))
 
     def in_proportion(self, across: "Across", stiffness: float, volume: float) -> "CableKernel":
         """The kernel of the same beam, stiffer, and wider.
@@ -447,7 +422,7 @@ class CableKernel(Chain):
             Factors on the moduli, and on the volume.
         """
         other, pack, both = twin_of(self), self.packs[0], stiffness * volume
-        other._across, other.volume = across, volume * self.volume
+        other._across = across
         if self.constant is not None:
             other.constant = both * self.constant
         other.packs = [pack._replace(
@@ -456,28 +431,38 @@ class CableKernel(Chain):
                                       held_skew=both * pack.pairs.held_skew))]
         return other
 
-    def _stiffness(self, few):
-        """EA, ES and EI at the points, (3, points, elements), or (3, points, 1) of one element."""
-        found = self._across.moments(self.points, np.zeros(1, int) if few else None)
-        return np.swapaxes(found, 1, 2)
+    def _stiffness(self):
+        """EA, EI and - ES at the points, (3, points, 1 or elements)."""
+        few = np.zeros(1, int) if self.shared and self._across.constant else None
+        EA, ES, EI = self._across.moments(self.points, few)
+        out = np.empty((3, *EA.T.shape))
+        out[0], out[1], out[2] = EA.T, EI.T, -ES.T
+        return out
 
     def _renewed(self, pack):
         """A pack of another material with the stiffnesses of this one."""
-        EA, ES, EI = self._stiffness(self.shared and self._across.constant)
         constant = pack.constant[:0] if self.constant is None else self.constant
-        return pack._replace(stiffness=packed([EA, EI, -ES]), constant=packed(constant),
+        return pack._replace(stiffness=self._stiffness(), constant=packed(constant),
                              pairs=with_constant(pack.pairs, constant, pack.start.size))
 
-    def _stress_free(self, mesh, element, xi, table):
-        """a and b in the stress-free state, (rows, 2, 1 or elements)."""
+    def _stress_free(self, mesh, element, n, table):
+        """a and b in the stress-free state, (rows, 2, 1 or elements), its lengths and curvatures.
+
+        The last two of shape (points, 1 or elements).
+        """
         if mesh.is_straight:
-            X = np.array([xi, 0.5 + 0.0 * xi])
-            a = np.moveaxis(mesh.mapping().frame(X), 0, -1)[0].transpose(1, 2, 0)
-            return np.concatenate([a, np.zeros_like(a)])
+            t = mesh.t[:, :1] if mesh.is_uniform else mesh.t
+            e = (mesh.p[:, t[1]] - mesh.p[:, t[0]]) / mesh.lengths[:t.shape[1]]
+            frame, length0 = np.zeros((2 * n, *e.shape)), np.empty((n, t.shape[1]))
+            frame[:n], length0[:] = e, np.hypot(e[0], e[1])
+            return frame, length0, np.zeros(length0.shape)
         q0 = element.rigid(mesh)
         q0[0] = mesh.p - mesh.p.mean(axis=1, keepdims=True)
         q_e = self.gather(np.ascontiguousarray(q0.transpose(2, 0, 1)).ravel())
-        return (table @ q_e).transpose(1, 2, 0)
+        frame = packed((table @ q_e).transpose(1, 2, 0))
+        a, b = frame[:n], frame[n:]
+        square = np.sum(a * a, axis=1)
+        return frame, np.sqrt(square), (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / square
 
     def strain(self, u_e: Array, elements: slice = slice(None)) -> Array:
         """Extension and change of curvature at the integration points, shape (2, points, ne).

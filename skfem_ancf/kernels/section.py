@@ -517,14 +517,16 @@ def _same_places(a, b):
 def _rows(mesh, element, term, tind):
     """Table and frame, g and h of each component's samples, and those of shear and of eps_xx.
 
-    Of equal elements also the table of one of length and height 1, and what multiplies its rows and
-    columns.
+    Of one table for all elements also that of an element of length and height 1, and what
+    multiplies its rows and columns.
     """
     points, xx, yy, xy = _samples(Content(*(term.nodes(name) for name in ("xx", "yy", "xy")),
                                           term.section_nodes))
     rows = (xx, xx), (yy, yy), xy
-    if tind is not None and element.by_reference:
-        return _equal_rows(mesh, element, points, rows, xy, xx)
+    if mesh.is_straight and mesh.heights is None and element.by_reference:
+        G, frame, scaled = _straight_tables(mesh, element, points, slice(None) if tind is None else
+                                            tind)
+        return G, frame, rows, xy, xx, scaled if len(G) == 1 else None
     tables = []
     for k, X in enumerate(points):
         G, frame = beam_gradients(mesh, element, X, tind)
@@ -534,16 +536,15 @@ def _rows(mesh, element, term, tind):
     return G, frame, rows, xy, xx, None
 
 
-def _equal_rows(mesh, element, points, rows, sheared, along):
-    """What :func:`_rows` returns of straight elements that are equal."""
-    h, L, n = mesh.height, float(mesh.lengths[0]), points[0].shape[1]
-    unit = element.unit_slopes(*points)
-    of_rows, of_columns = np.empty(len(unit)), element.powers(h, L)
-    of_rows[:n], of_rows[n:] = 1.0 / L, 1.0 / h
-    (x, y), frame = (mesh.p[:, 1] - mesh.p[:, 0]) / L, np.empty((len(unit), 2, 1))
+def _straight_tables(mesh, element, points, tind):
+    """Tables of straight elements from that of length and height 1, times powers of both."""
+    h, L, t, n = mesh.height, mesh.lengths[tind][:, None], mesh.t[:, tind], points[0].shape[1]
+    unit, columns = element.unit_slopes(*points), element.powers(h, L)
+    rows, frame = np.empty((len(L), len(unit))), np.empty((len(unit), 2, len(L)))
+    rows[:, :n], rows[:, n:] = 1.0 / L, 1.0 / h
+    x, y = (mesh.p[:, t[1]] - mesh.p[:, t[0]]) / L.T
     frame[:n, 0], frame[:n, 1], frame[n:, 0], frame[n:, 1] = x, y, -y, x
-    return ((unit * (of_rows[:, None] * of_columns))[None], frame, rows, sheared, along,
-            (unit, of_rows, of_columns))
+    return unit * (rows[:, :, None] * columns[:, None]), frame, (unit, rows[0], columns[0])
 
 
 @lru_cache(64)
