@@ -77,8 +77,12 @@ def _coordinates(mesh, element, p):
     return np.ascontiguousarray(q.transpose(2, 0, 1)).ravel()
 
 
+#: Attributes of a beam that do not depend on material and width.
+_PLACES = frozenset(("mesh", "element", "formulation", "name", "compiled", "damping", "kinematics",
+                     "nd", "N"))
 #: Attributes of a beam that are made once and depend on its mesh and element only.
-_GEOMETRY = ("vector_element", "q0", "origin", "q0_local", "rows", "finder", "series", "scales")
+_GEOMETRY = ("vector_element", "q0", "origin", "q0_local", "rows", "finder", "series", "scales",
+             "size")
 
 
 def _fields(method):
@@ -150,6 +154,21 @@ class Beam(Frozen):
     (170, 0.78)
     """
 
+    mesh: MeshBeam
+    element: ElementBeam
+    material: Material
+    section: Section
+    width: Any
+    across: Across
+    formulation: Formulation
+    name: str | None
+    compiled: bool
+    damping: KelvinVoigt | None
+    kinematics: Any
+    _given: Material | None
+    nd: int
+    N: int
+
     def __init__(self, mesh: MeshBeam, element: ElementBeam | str,
                  material: Material | None = None,
                  width: float | Callable[..., ArrayLike] | None = None,
@@ -159,32 +178,30 @@ class Beam(Frozen):
                  section: Section | None = None) -> None:
         if not isinstance(mesh, MeshBeam):
             raise InputError(f"mesh must be a MeshBeam, got {shown(mesh)}")
-        self.section, self._given = _section(section, width), material
-        if (material is None) != self.section.has_materials or not isinstance(
-                material, (Material, type(None))):
-            raise InputError(f"material must be None, for {self.section!r} has its own, got "
-                             f"{shown(material)}" if self.section.has_materials else
-                             f"material must be a Material, got {shown(material)}")
-        self.material: Material = material or self.section.slabs(mesh, None)[0].material
+        section = _section(section, width)
+        found = _material(section, material, mesh)
         if isinstance(element, str) and element == "auto":
-            element = choose_element(mesh, self.material.reference()[0], fields, tolerance)
+            element = choose_element(mesh, found.reference()[0], fields, tolerance)
         if not isinstance(element, ElementBeam):
             raise InputError(f"element must be a ElementBeam, got {shown(element)}")
-        self.mesh: MeshBeam = element.fitted(mesh)
-        self.element, self.width = element, getattr(self.section, "width", None)
-        self.across = Across(self.mesh, element, self.section, material)
-        self.formulation = get_formulation(formulation)
-        self.name = require_label("name", name)
-        self.compiled = require_flag("compiled", compiled)
         if damping is not None and not isinstance(damping, KelvinVoigt):
             raise InputError("damping must be a KelvinVoigt, as KelvinVoigt(1e-4), or None, got "
                              f"{shown(damping)}")
-        self.damping = damping
-        self.kinematics = KINEMATICS[element.kinematics]
-        for slab in self.across.slabs:
+        nd = 2 * element.nodal_dofs
+        vars(self).update(
+            mesh=element.fitted(mesh), element=element, formulation=get_formulation(formulation),
+            name=require_label("name", name), compiled=require_flag("compiled", compiled),
+            damping=damping, kinematics=KINEMATICS[element.kinematics], nd=nd,
+            N=nd * mesh.p.shape[1])
+        self._fill(section, found, material)
+
+    def _fill(self, section, material, given):
+        """Set what depends on section and material, of which ``given`` is the beam's own."""
+        across = Across(self.mesh, self.element, section, given)
+        for slab in across.slabs:
             self.kinematics.require_law(slab.material)
-        self.nd = 2 * element.nodal_dofs
-        self.N = self.nd * mesh.p.shape[1]
+        vars(self).update(section=section, material=material, _given=given, across=across,
+                          width=getattr(section, "width", None))
 
     def __repr__(self):
         return (f"<Beam {self.name or ''}: {self.mesh.nelements} elements of order "
@@ -222,6 +239,9 @@ class Beam(Frozen):
         for name in changes:
             if name not in known + ("fields", "tolerance"):
                 raise NameUnknown("argument of Beam", name, known)
+        if type(self) is Beam and not set(changes) - {"material", "width"} and type(
+                self.section) is Rectangle:
+            return self._of(changes.get("material", self._given), changes.get("width", self.width))
         given = {name: getattr(self, name) for name in known} | {"material": self._given}
         given["width" if "section" in changes or not isinstance(self.section, Rectangle) else
               "section"] = None
@@ -230,10 +250,23 @@ class Beam(Frozen):
             self._share(other)
         return other
 
+    def _of(self, material, width):
+        """The same beam of another material and width."""
+        other, section = object.__new__(Beam), self.section
+        if width is not self.width:
+            section = _section(None, width)
+        vars(other).update({name: value for name, value in vars(self).items() if name in _PLACES})
+        other._fill(section, _material(section, material, self.mesh), material)
+        self._share(other)
+        other._seal()
+        return other
+
     def _share(self, other):
         """Hand on what depends on mesh and element, and to another material of one section more."""
         mine, its = vars(self), vars(other)
-        its.update((name, mine[name]) for name in _GEOMETRY if name in mine)
+        for name in _GEOMETRY:
+            if name in mine:
+                its[name] = mine[name]
         if (other.formulation is not self.formulation
                 or not (self.across.plain and other.across.plain)):
             return
@@ -482,7 +515,23 @@ class Beam(Frozen):
         dofs, weights
             Shapes (2, n) and (n,): ``q[dofs] @ weights`` is the position.
         """
-        e, X = self.locate(point)
+        return self.probe_at(point, *self.locate(point))
+
+    def probe_at(self, point: ArrayLike, e: int, X: Array) -> tuple[Array, Array]:
+        """As :meth:`probe`, for a point that :meth:`locate` has found.
+
+        Parameters
+        ----------
+        point
+            Its position in the stress-free body, shape (2,).
+        e, X
+            Its element, and its point (xi, eta) of the reference cell, shape (2,).
+
+        Returns
+        -------
+        dofs, weights
+            Shapes (2, n) and (n,).
+        """
         if not self.has_sections and abs(X[1] - 0.5) > 1e-6:
             raise InputError(
                 f"the point {tuple(map(float, np.ravel(point)))} is off the axis of a cable, whose "
@@ -512,6 +561,18 @@ class Beam(Frozen):
         first = self.mesh.t[0, e] * self.nd
         return first + np.arange(2 * self.nd).reshape(-1, 2).T, weights
 
+    def first_of_node(self, e: int, xi: float, eta: float) -> int:
+        """The first coordinate of the node that a point of an element is; -1 if it is none.
+
+        Parameters
+        ----------
+        e, xi, eta
+            The element, and the point of its reference cell.
+        """
+        if eta != 0.5 or (xi != 0.0 and xi != 1.0):
+            return -1
+        return int(self.mesh.t[int(xi), e]) * self.nd
+
     def section_node(self, boundary: Place) -> int:
         """The node of a place that is one section, see :meth:`dofs`."""
         facets = np.asarray(facets_of(self.mesh, boundary))
@@ -524,7 +585,7 @@ class Beam(Frozen):
         """Coordinates (2, n) and weights (n,) of the direction 12 / h^3 int Y r dY of a section."""
         return self.kinematics.direction(self, node)
 
-    @property
+    @cached_property
     def size(self) -> float:
         """Length of its axis."""
         return float(self.mesh.lengths.sum())
@@ -782,6 +843,16 @@ def _section(section, width):
         raise InputError('section must be a Section, as Section.profile("I", width=0.05, '
                          f"web=0.005, flange=0.008), got {shown(section)}")
     return section
+
+
+def _material(section, material, mesh):
+    """The material of a beam: what was given, or the first of a section that has its own."""
+    if (material is None) != section.has_materials or not isinstance(
+            material, (Material, type(None))):
+        raise InputError(f"material must be None, for {section!r} has its own, got "
+                         f"{shown(material)}" if section.has_materials else
+                         f"material must be a Material, got {shown(material)}")
+    return material or section.slabs(mesh, None)[0].material
 
 
 def select_beam(beams: Sequence[Beam], beam: WhichMember) -> Beam:

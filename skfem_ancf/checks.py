@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .errors import ModelWarning
+from .kept import cached_property
 from .materials import LinearLaw
 
 if TYPE_CHECKING:
@@ -93,12 +94,12 @@ class Screen:
         self._none = not beams
         if self._none:
             return
+        self._beams = beams
         first = accumulate((b.N for b in beams), initial=0)
         node = accumulate((b.N // b.nd for b in beams), initial=0)
         x = _joined([np.arange(n + 2, n + b.N, b.nd) for n, b in zip(first, beams)])
         self._tangents = x[:, None] + _BOTH
-        self._q0 = _joined([b.q0 for b in beams])
-        self.start = _joined([b.mesh.p_X[0] + 1j * b.mesh.p_X[1] for b in beams])
+        self.start = _joined([_complex(b.mesh.p_X.T) for b in beams])
         self._left, self._right = _joined([n + b.mesh.t for n, b in zip(node, beams)])
         if len(self._left) == len(x) - 1:  # one chain
             self._left, self._right = slice(len(x) - 1), slice(1, len(x))
@@ -106,6 +107,10 @@ class Screen:
         limits = [turning_limit(b) for b in beams]
         self._limit = limits[0] if len(set(limits)) == 1 else np.repeat(
             limits, [b.mesh.nelements for b in beams])
+
+    @cached_property
+    def _q0(self):
+        return _joined([b.q0 for b in self._beams])
 
     def passes(self, u: Array, start: Array | None = None, slender: Array | None = None) -> Any:
         """False if a fibre may be compressed, or an element may turn, beyond the range.
@@ -121,7 +126,7 @@ class Screen:
             return True
         start = self.start if start is None else start
         slender = self.slender if slender is None else slender
-        r = np.ascontiguousarray(u[..., self._tangents]).view(complex)[..., 0] / start + 1.0
+        r = _complex(u.take(self._tangents, axis=-1)) / start + 1.0
         z = r[..., self._right] * r[..., self._left].conj()
         turn = np.abs(np.arctan2(z.imag, z.real))
         # the largest curvature of an element is seldom more than twice its mean
@@ -141,14 +146,18 @@ class Screen:
         if self._none:
             return False
         q = u[:len(self._q0)] + self._q0  # without rigid bodies, which come last
-        x = np.ascontiguousarray(q[self._tangents]).view(complex)[..., 0]
-        r = np.ascontiguousarray(q[self._tangents - 2]).view(complex)[..., 0]
+        x, r = _complex(q[self._tangents]), _complex(q[self._tangents - 2])
         chord = r[self._right] - r[self._left]
         return any(bool(np.any((chord * x[side].conj()).real < 0.0))
                    for side in (self._left, self._right))
 
 
 _BOTH = np.arange(2)
+
+
+def _complex(pairs):
+    """Vectors (..., 2) as complex numbers, (...)."""
+    return np.ascontiguousarray(pairs).view(complex)[..., 0]
 
 
 def _joined(arrays):

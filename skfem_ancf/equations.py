@@ -8,7 +8,8 @@ from scipy import sparse
 from .band import Band
 from .body import FlatBody, body_of, stress_size, viscous_body_of
 from .border import Border
-from .compiled.words import Words
+from .compiled.words import Words, constant
+from .forces.system import NO_FORCES
 from .forces.texts import ForceTables
 from .kept import cached_property, twin_of
 from .kernels.law import OWN, text_of, with_text
@@ -27,9 +28,12 @@ if TYPE_CHECKING:
 
 #: Of a scene without them.
 _NO_INTS = np.zeros(0, np.int64)
-_NO_JOINTS = JointTables(_NO_INTS, _NO_INTS, _NO_INTS, np.zeros(0), _NO_INTS, _NO_INTS, 0)
-_NO_MOMENTS = MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)), np.zeros((0, 2)),
-                         np.zeros(0))
+_NO_JOINTS = constant(JointTables(_NO_INTS, _NO_INTS, _NO_INTS, np.zeros(0), _NO_INTS, _NO_INTS,
+                                  0))
+_NO_MOMENTS = constant(MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)),
+                                  np.zeros((0, 2)), np.zeros(0)))
+_NO_BORDER = constant(Border(_NO_INTS, 0, 0, _NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, 0))
+constant(NO_FORCES)
 
 #: Times at which joints are tried, whether tables give them.
 TRIED = 0.0, 0.37
@@ -348,6 +352,8 @@ class Tables:
 
     def _border(self, joints):
         s, none = self.system, _NO_INTS
+        if not s.coupled:
+            return _NO_BORDER
         if not s.joints or not s.bordered or joints.own or s.forces.far:
             return Border(none, 0, 0, none, none, none, none, int(s.coupled))
         i, j, ns = joints.hi, joints.hj, len(s.springs)

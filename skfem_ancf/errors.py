@@ -14,6 +14,7 @@ import pickle
 import warnings
 from contextlib import contextmanager
 from functools import wraps
+from math import isfinite
 from pathlib import Path
 from threading import RLock
 from types import FunctionType
@@ -34,6 +35,9 @@ _FILTERS = RLock()
 
 #: Longest text of a value in a message.
 WIDTH = 80
+
+#: Numbers of an array up to which Python looks at them one by one, as that is faster.
+FEW = 32
 
 
 class AncfError(Exception):
@@ -349,7 +353,8 @@ def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = N
     ):
         wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
         raise InputError(f"{name} must have shape {wanted}, got {array.shape}")
-    if not np.isfinite(array).all():
+    if not (all(map(isfinite, array.ravel().tolist())) if array.size <= FEW else
+            np.isfinite(array).all()):
         bad = array[~np.isfinite(array)][0]
         raise InputError(f"{name} has a value that is NaN or infinite: {bad}")
     return array

@@ -321,12 +321,18 @@ class PointForce(Load):
         self.total, self.at = require_finite("force", force, (2,)), at
 
     def bind(self, beam: Beam | RigidBody) -> Load:
-        dofs, weights = beam.probe(self.at)
         vector = np.zeros(beam.N)
-        np.add.at(vector, dofs, self.total[:, None] * weights)
         if isinstance(beam, RigidBody):
+            dofs, weights = beam.probe(self.at)
+            np.add.at(vector, dofs, self.total[:, None] * weights)
             return DeadLoad(beam, vector, self.amplitude)
         e, X = beam.locate(self.at)
+        first = beam.first_of_node(e, *X.tolist())
+        if first < 0:
+            dofs, weights = beam.probe_at(self.at, e, X)
+            vector[dofs] = self.total[:, None] * weights  # those of an element, each once
+        else:
+            vector[first:first + 2] = self.total
         return DeadLoad(beam, vector, self.amplitude, Spread(stations=(e + float(X[0]),)))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import wraps
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -207,7 +207,8 @@ class Machine:
         if choice.way == "plain":
             return CLOCK.timed(text), self.tables.plain
         try:
-            with _announced([part for part in self.tables.parts if part not in compiled.KNOWN]):
+            parts = self.tables.parts
+            with _announced([part for part in parts if part not in compiled.KNOWN]):
                 equations = self.tables.flat
         except compiled.TextProblem as error:
             self._plain = str(error)
@@ -244,13 +245,18 @@ def _load(text, args):
     return compiled.LOADED[name]
 
 
-@contextmanager
-def _announced(names: Sequence[str]) -> Iterator[None]:
+#: Nothing is said.
+_SILENT: AbstractContextManager[None] = nullcontext()
+
+
+def _announced(names: Sequence[str]) -> AbstractContextManager[None]:
     """Say what is compiled, if it is not there."""
     names = [name for name in names if not compiled.on_disk(name)]
-    if not names:
-        yield
-        return
+    return _saying(names) if names else _SILENT
+
+
+@contextmanager
+def _saying(names: Sequence[str]) -> Iterator[None]:
     said = f"compiling once, about {sum(SECONDS[name] for name in names):g} s, kept on disk"
     logger.info("%s: %s", ", ".join(names), said)
     with progress_bar(None, 1.0, said) as bar:

@@ -427,11 +427,12 @@ class MeshBeam(Frozen, Mesh2D):
         return self._f2t
 
     def _build_default_tags(self):
-        t, n = self.t, self.doflocs.shape[1]
-        ne = t.shape[1]
-        elements = np.arange(ne, dtype=np.int32)
-        return {"left": t[0, :1].astype(np.int32), "right": t[1, -1:].astype(np.int32),
-                "bottom": n + elements, "top": n + ne + elements}
+        ne, n = self.t.shape[1], self.doflocs.shape[1]
+        facets = np.arange(n + 2 * ne, dtype=np.int32)
+        facets.flags.writeable = False
+        # the first node is the left end, the last one the right
+        return {"left": facets[:1], "right": facets[n - 1:n], "bottom": facets[n:n + ne],
+                "top": facets[n + ne:]}
 
     def normalize_facets(self, facets: Any) -> Array:
         if isinstance(facets, str) and facets not in (self.boundaries or {}):

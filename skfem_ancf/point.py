@@ -51,8 +51,8 @@ class Point:
         :data:`AGAIN` if it was asked for once.
     """
 
-    __slots__ = ("_dofs", "_lever", "_parts", "_start", "_table", "_weights", "_x",
-                 "beam", "coordinates", "number", "off_axis", "place", "recovery", "strain_table")
+    __slots__ = ("_lever", "_node", "_of_element", "_parts", "_weights", "_x", "beam",
+                 "coordinates", "number", "off_axis", "place", "recovery", "strain_table")
     one, n = True, 1
 
     def __init__(self, beam: Beam, number: int, coordinates: slice,
@@ -60,21 +60,28 @@ class Point:
         self.beam, self.number, self.coordinates = beam, number, coordinates
         self.place, self._x = place, x
         self.off_axis = not beam.has_sections and abs(place[2] - 0.5) > ON_AXIS
-        key = place[0], self.off_axis
-        of_element = beam.touched.get(key)
-        self._dofs, self._table, self._start = of_element if of_element is not None else kept(
-            beam.touched, key, self._of_element, ELEMENTS)
+        #: First coordinate of the beam of the node that it is, or -1.
+        self._node = beam.first_of_node(*place)
+        self._of_element: Any = None
         self._weights: Any = None
         self._lever: Any = None
         self._parts: list[Part] | None = None
         self.recovery: Any = None
         self.strain_table: Any = None
 
-    def _of_element(self):
+    def _element(self):
         """Coordinates (2, nb) of the beam that move the element, and a table of its functions.
 
         Off the axis of a cable their values without stress, (2, nb), besides.
         """
+        if self._of_element is None:
+            touched, key = self.beam.touched, (self.place[0], self.off_axis)
+            found = touched.get(key)
+            self._of_element = found if found is not None else kept(
+                touched, key, self._made, ELEMENTS)
+        return self._of_element
+
+    def _made(self):
         e, beam = self.place[0], self.beam
         table = beam.series.in_element(beam.scales[e], beam.mesh.mapping().heights_of(e))
         dofs = beam.mesh.t[0, e] * beam.nd + beam.rows
@@ -105,11 +112,14 @@ class Point:
 
     def own(self, u: Array) -> Array:
         """Of coordinates ``u`` (..., N) of the scene those of the element, (..., 2, nb)."""
-        u = u[..., self.coordinates]
-        return u[self._dofs] if u.ndim == 1 else u[..., self._dofs]
+        u, dofs = u[..., self.coordinates], self._element()[0]
+        return u[dofs] if u.ndim == 1 else u[..., dofs]
 
     def displacement(self, u: Array) -> Array:
         """Displacements (..., 2) for coordinates ``u`` (..., N) of the scene."""
+        if self._node >= 0:
+            first = self.coordinates.start + self._node
+            return u[..., first:first + 2].copy()
         if not self.off_axis:
             return self.own(u).dot(self._position())
         weights = self._position()
@@ -125,7 +135,7 @@ class Point:
             Displacement of the coordinates of the scene and its rate, shapes (..., N).
         """
         if not self.off_axis:
-            return self.own(v).dot(self._position())
+            return self.displacement(v)
         weights = self._position()
         slope = _moving(weights, self.own(u))[2:]
         found = swung(self._section(weights), *slope, *_moving(weights, self.own(v)))
@@ -138,7 +148,7 @@ class Point:
         """
         weights = self._weights
         if weights is None or weights is AGAIN:
-            new = products(self._table, *self.place[1:])
+            new = products(self._element()[1], *self.place[1:])
             weights, self._weights = new, AGAIN if weights is None else new
         return weights
 
@@ -146,7 +156,7 @@ class Point:
         """As :func:`~skfem_ancf.parts.carried` takes it."""
         if self._lever is None:
             self._lever = (self.beam.mesh.mapping().lever(*self.place),
-                           *self._start.dot(weights[1]).tolist())
+                           *self._element()[2].dot(weights[1]).tolist())
         return self._lever
 
     def strain(self, u: Array, near: dict[Any, Any]) -> Sequence[float]:

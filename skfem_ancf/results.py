@@ -107,6 +107,25 @@ class State(Frozen):
         Where and how the way to it left the path from the stress-free state; empty if it did not.
     """
 
+    system: System
+    u: Array
+    load: float
+    converged: bool
+    iterations: int
+    message: str
+    steps: tuple[Any, ...]
+    t: float | None
+    acceleration: Array | None
+    multipliers: Array
+    doubt: str
+    _force: Array | None
+    _inertia: Array | float
+    _motion: Any
+    _origin: Any
+    _verdict: Verdict | None
+    _checks: Checks | None
+    _memory: Array | None
+
     def __init__(self, system: System, u: Array, load: float = 1.0, force: Array | None = None,
                  converged: bool = True, iterations: int = 0, message: str = "",
                  steps: Iterable[Any] = (), multipliers: Array | None = None,
@@ -114,21 +133,18 @@ class State(Frozen):
                  acceleration: Array | None = None, motion: Any = None, origin: Any = None,
                  verdict: Verdict | None = None, doubt: str = "",
                  memory: Array | None = None) -> None:
-        self.system, self.u, self.load = system, u, load
-        self.converged, self.iterations, self.message = converged, iterations, message
-        self.steps = tuple(steps)
-        self._force, self.t, self._inertia = force, t, inertia
-        self.acceleration = acceleration
-        # the Motion of an instant, its scheme, and what a run of it keeps
-        self._motion, self._origin = motion, origin
-        self.multipliers = np.zeros(system.m) if multipliers is None else multipliers
-        self.doubt, self._verdict = doubt, verdict
-        self._checks: Checks | None = None
-        self._memory = memory
-        for name, size in (("u", system.N), ("multipliers", system.m)):
-            if np.shape(getattr(self, name)) != (size,):
+        multipliers = np.zeros(system.m) if multipliers is None else multipliers
+        for name, value, size in (("u", u, system.N), ("multipliers", multipliers, system.m)):
+            if np.shape(value) != (size,):
                 raise InputError(f"{name} must have shape ({size},) in this scene, got "
-                                 f"{np.shape(getattr(self, name))}")
+                                 f"{np.shape(value)}")
+        # at once, as each by itself is looked at whether it may be set; _motion, _origin are the
+        # Motion of an instant, its scheme, and what a run of it keeps
+        vars(self).update(
+            system=system, u=u, load=load, converged=converged, iterations=iterations,
+            message=message, steps=tuple(steps), t=t, acceleration=acceleration,
+            multipliers=multipliers, doubt=doubt, _force=force, _inertia=inertia, _motion=motion,
+            _origin=origin, _verdict=verdict, _checks=None, _memory=memory)
 
     def replace(self, **changes: Any) -> State:
         """The same state with other attributes, as ``replace(message="guess")``.

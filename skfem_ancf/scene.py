@@ -221,6 +221,8 @@ class Scene:
         return {id(b): (k, n) for k, (b, n) in enumerate(zip(self.members, first))}
 
     def _number(self, beam):
+        if beam is None and len(self._beams) + len(self._bodies) == 1:
+            return 0
         if isinstance(beam, Beam):  # without asking all the others
             found = self._places.get(id(beam))
             if found is not None:

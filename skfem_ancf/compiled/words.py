@@ -6,7 +6,7 @@ import struct
 import sys
 from ctypes import c_size_t
 from functools import cache
-from typing import get_type_hints
+from typing import TypeVar, get_type_hints
 
 import numpy as np
 
@@ -48,8 +48,11 @@ class Words:
     __slots__ = "address", "of", "words"
 
     def __init__(self, x):
-        found: list[int] = []
-        _fill(x, found)
+        known, found = _CONSTANT.get(id(x)), list[int]()
+        if known is None:
+            _fill(x, found)
+        else:
+            found = known[1]
         self.of, self.words = x, np.array(found, dtype=np.int64)
         self.address = _asked(self.words)
 
@@ -97,7 +100,31 @@ def _fill(x, out):
         elif kind is float:
             out.append(_WORD.unpack(_NUMBER.pack(value))[0])
         else:
-            _fill(value, out)
+            known = _CONSTANT.get(id(value))
+            if known is None:
+                _fill(value, out)
+            else:
+                out += known[1]
+
+
+#: Tuples that modules keep, by identity, with their words.
+_CONSTANT: dict[int, tuple[tuple, list[int]]] = {}
+
+_Tuple = TypeVar("_Tuple", bound=tuple)
+
+
+def constant(x: _Tuple) -> _Tuple:
+    """A tuple that a module keeps, for scenes that have none of its kind: found once are its words.
+
+    Parameters
+    ----------
+    x
+        As :class:`Words` takes it. Its arrays stay where they are.
+    """
+    found: list[int] = []
+    _fill(x, found)
+    _CONSTANT[id(x)] = x, found
+    return x
 
 
 class Kept:

@@ -59,6 +59,9 @@ class Group(NamedTuple):
     numbers: Any
 
 
+#: Of scenes without obstacles.
+NO_CONTACTS = ContactTables(0, np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(REACHES),
+                            np.zeros(2, np.int64), 0, 0)
 #: For the time of it nothing is lent.
 NOTHING: AbstractContextManager[None] = nullcontext()
 
@@ -93,9 +96,7 @@ class Contacts:
     def _make(self, poses):
         n = len(self.groups)
         if n == 0:
-            none = np.zeros(0)
-            return ContactTables(0, np.zeros(0, np.int64), none, poses, np.zeros(REACHES),
-                                 np.zeros(2, np.int64), 0, 0)
+            return NO_CONTACTS
         ints, floats = _Pieces(HEADER * n), _Pieces(0)
         headers, memory = np.zeros((n, HEADER), dtype=np.int64), REACHES + n
         for number, (k, group) in enumerate(self.groups):
@@ -214,7 +215,8 @@ class Contacts:
         memory
             Shape (n,), or None.
         """
-        self.tables.memory[:] = 0.0 if memory is None else memory
+        if self.obstacles:
+            self.tables.memory[:] = 0.0 if memory is None else memory
 
     def remember(self) -> Array | None:
         """What steps have left behind; None where there is nothing of it."""

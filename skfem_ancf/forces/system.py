@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .base import Part
-from .contacts import Contacts
+from .contacts import NO_CONTACTS, Contacts
 from .control import Control
 from .masses import PointMass
 from .texts import (ELASTIC, NUMBERS, RESISTING, TORSION, ForceTables, element_stiffness,
@@ -123,7 +123,7 @@ class Forces:
             What finds elements of one's own.
         """
         if not self.elements:
-            return _NO_TABLES._replace(contacts=self.contacts.tables)
+            return NO_FORCES
         at, of, weight, start = [], [], [], np.zeros(self.rows)
         for links, rows, _ in self._blocks:
             for k, one in enumerate(links):
@@ -365,13 +365,14 @@ def _mean_force(element, x, y, t):
 
 
 def _no_tables():
-    """The tables of no elements, but for obstacles."""
+    """The tables of no elements."""
     x, i = np.zeros(0), np.zeros(0, np.int64)
     return ForceTables(x, i, i, x, 0, np.zeros(KINDS + 1, np.int64), x, 0, i, i, x, i, i, 0,
-                       None)
+                       NO_CONTACTS)
 
 
-_NO_TABLES = _no_tables()
+#: Of scenes without force elements.
+NO_FORCES = _no_tables()
 
 
 def _resists(part):

@@ -315,9 +315,10 @@ def scaled_pair_tables(table: Array, rows: Array, columns: Array, pairs: Array, 
         As there, shapes (2, p) and (0, 1 or elements, 2 nb, 2 nb).
     """
     unit, ends = _unit_pairs(Content(table, pairs))
-    of_pair = rows[pairs].prod(axis=0)
-    symmetric = unit.symmetric * (columns[unit.lower].prod(axis=0)[:, None] * of_pair)
-    skew = unit.skew * (columns[unit.strictly].prod(axis=0)[:, None] * of_pair[ends])
+    of_pair = rows.take(pairs[0]) * rows.take(pairs[1])
+    (a, b), (c, d) = unit.lower, unit.strictly
+    symmetric = unit.symmetric * ((columns.take(a) * columns.take(b))[:, None] * of_pair)
+    skew = unit.skew * ((columns.take(c) * columns.take(d))[:, None] * of_pair.take(ends))
     if len(constant):
         held, held_skew, place = _held(_places(len(columns)), constant, len(columns), elements)
     else:
@@ -349,6 +350,23 @@ def with_constant(pairs: PairTables, constant: Array, elements: int) -> PairTabl
     nb = constant.shape[1] // 2
     held, held_skew, place = _held(_places(nb), constant, nb, elements)
     return pairs._replace(held=held, held_skew=held_skew, held_place=place)
+
+
+def times_held(pack: Any, factor: float) -> dict[str, Any]:
+    """The fields of a pack, of a :class:`Chain`, that a stabilisation so many times larger changes.
+
+    Parameters
+    ----------
+    pack
+        The tables.
+    factor
+        The number.
+    """
+    if not len(pack.constant):
+        return {}
+    held, skew = factor * pack.pairs.held, factor * pack.pairs.held_skew
+    return {"constant": factor * pack.constant,
+            "pairs": pack.pairs._replace(held=held, held_skew=skew)}
 
 
 def _held(places, constant, nb, elements):

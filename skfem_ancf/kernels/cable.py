@@ -21,7 +21,7 @@ from ..source import F2, F3, I1, lanes, primitive, room, source
 from ..types import Array
 from .base import (CARRY, GIVEN, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
                    Texts, add_force, add_held_energy, add_tangent, block, copy_stress, load,
-                   packed, pair_tables, product, scaled_pair_tables, with_constant)
+                   packed, pair_tables, product, scaled_pair_tables, times_held, with_constant)
 
 if TYPE_CHECKING:
     from ..formulations.base import Formulation
@@ -425,10 +425,7 @@ class CableKernel(Chain):
         other._across = across
         if self.constant is not None:
             other.constant = both * self.constant
-        other.packs = [pack._replace(
-            stiffness=both * pack.stiffness, constant=both * pack.constant,
-            pairs=pack.pairs._replace(held=both * pack.pairs.held,
-                                      held_skew=both * pack.pairs.held_skew))]
+        other.packs = [pack._replace(stiffness=both * pack.stiffness, **times_held(pack, both))]
         return other
 
     def _stiffness(self):
@@ -451,11 +448,12 @@ class CableKernel(Chain):
         The last two of shape (points, 1 or elements).
         """
         if mesh.is_straight:
-            t = mesh.t[:, :1] if mesh.is_uniform else mesh.t
-            e = (mesh.p[:, t[1]] - mesh.p[:, t[0]]) / mesh.lengths[:t.shape[1]]
-            frame, length0 = np.zeros((2 * n, *e.shape)), np.empty((n, t.shape[1]))
+            p, k = mesh.p, 1 if mesh.is_uniform else mesh.nelements
+            left, right = (0, 1) if k == 1 else mesh.t
+            e = (p[:, right] - p[:, left]).reshape(2, k) / mesh.lengths[:k]
+            frame, length0 = np.zeros((2 * n, 2, k)), np.empty((n, k))
             frame[:n], length0[:] = e, np.hypot(e[0], e[1])
-            return frame, length0, np.zeros(length0.shape)
+            return frame, length0, np.zeros((n, k))
         q0 = element.rigid(mesh)
         q0[0] = mesh.p - mesh.p.mean(axis=1, keepdims=True)
         q_e = self.gather(np.ascontiguousarray(q0.transpose(2, 0, 1)).ravel())

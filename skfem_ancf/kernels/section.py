@@ -8,20 +8,20 @@ interpolation and the weights in them, the tangent is a sum over pairs of rows.
 
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from scipy import sparse
 
 from ..frozen import Content
-from ..materials import LinearLaw
 from ..kept import twin_of
+from ..materials import LinearLaw
 from ..source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
 from ..types import Array
 from .base import (CARRY, GIVEN, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables, Texts,
                    add_force, add_held_energy, add_tangent, apart, block, copy_stress, in_rounds,
                    load, packed, pair_numbers, pair_tables, product,
-                   scaled_pair_tables, with_constant)
+                   scaled_pair_tables, times_held, with_constant)
 from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
 
 if TYPE_CHECKING:
@@ -449,14 +449,13 @@ class TermTables:
             As there.
         """
         other, pack, both = twin_of(self), self.pack, stiffness * volume
-        other.law = LinearLaw(stiffness * pack.law.D)
-        other.slab, other.w = slab, volume * self.w
-        other.term = replace(self.term, law=other.law)
-        other.pack = pack._replace(
-            law=pack.law._replace(D=stiffness * pack.law.D), weights=volume * pack.weights,
-            moduli=both * pack.moduli, constant=both * pack.constant,
-            pairs=pack.pairs._replace(held=both * pack.pairs.held,
-                                      held_skew=both * pack.pairs.held_skew))
+        law = cast("LinearLaw", self.law).times(stiffness)
+        other.law, other.slab, other.term = law, slab, twin_of(self.term)
+        vars(other.term)["law"] = law
+        changes: dict[str, Any] = {"law": pack.law._replace(D=law.D), "moduli": both * pack.moduli}
+        if volume != 1.0:
+            other.w, changes["weights"] = volume * self.w, volume * pack.weights
+        other.pack = pack._replace(**changes, **times_held(pack, both))
         return other
 
     def _gradients(self, pack, u, rows):

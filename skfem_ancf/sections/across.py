@@ -45,40 +45,54 @@ class Across(Frozen):
         A Section.
     material
         That of the beam; None if the section has its own.
+
+    Attributes
+    ----------
+    slabs
+        The parts of the section, a tuple of :class:`~skfem_ancf.sections.base.Slab`.
+    plain, simple : bool
+        A rectangle of one width and one material; and that on a mesh of one height.
+    constant, uniform : bool
+        It is the same all along the beam; and one table serves all elements.
+    moving : bool
+        What jumps across it does so at other parts of the height from place to place.
     """
+
+    mesh: MeshBeam
+    element: ElementBeam
+    slabs: tuple[Slab, ...]
+    plain: bool
+    simple: bool
+    constant: bool
+    uniform: bool
+    moving: bool
 
     def __init__(self, mesh: MeshBeam, element: ElementBeam, section: Section,
                  material: Material | None) -> None:
-        self.mesh, self.element = mesh, element
-        self.slabs = tuple(
+        slabs = tuple(
             replace(slab, measure=slab.measure.of_order(element.order))
             if isinstance(slab.measure, Moving) else slab
             for slab in section.slabs(mesh, material))
-        #: A rectangle of one width and one material.
-        self.plain = isinstance(section, Rectangle) and not self.slabs[0].varies
-        #: What jumps across it does so at other parts of the height from place to place.
-        self.moving = any(isinstance(s.measure, Moving) for s in self.slabs)
-        varying = any(s.varies for s in self.slabs)
-        #: That of a mesh of constant height.
-        self.simple = self.plain and mesh.heights is None
-        #: It is the same all along the beam.
-        self.constant = mesh.heights is None and not varying
-        #: One table serves all elements.
-        self.uniform = mesh.is_uniform and self.constant
-        self._check()
+        varying, even = any(s.varies for s in slabs), mesh.heights is None
+        plain = isinstance(section, Rectangle) and not varying
+        vars(self).update(mesh=mesh, element=element, slabs=slabs, plain=plain,
+                          simple=plain and even, constant=even and not varying,
+                          uniform=even and not varying and mesh.is_uniform,
+                          moving=any(isinstance(s.measure, Moving) for s in slabs))
+        if varying:
+            self._check()
 
     def _check(self):
         """Ask functions all over the body, so that they fail when the beam is made."""
-        if any(s.varies for s in self.slabs):
-            X = np.array(np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 9))).reshape(2, -1)
-            for slab in self.slabs:
-                inside = X[:, (slab.measure.low <= X[1]) & (X[1] <= slab.measure.high)]
-                if isinstance(slab.measure, Moving):
-                    low, *_, high = slab.measure.ends(self._heights(X[0], None))
-                    inside = np.array([X[0] + 0.0 * low, low + (high - low) * X[1]])
-                for name in ("width", "grade", "density"):
-                    if callable(getattr(slab, name)):
-                        asked(_NAMES[name], getattr(slab, name), *self.coordinates(inside))
+        X = np.array(np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 9))).reshape(2, -1)
+        for slab in self.slabs:
+            inside = X[:, (slab.measure.low <= X[1]) & (X[1] <= slab.measure.high)]
+            if isinstance(slab.measure, Moving):
+                low, *_, high = slab.measure.ends(self._heights(X[0], None))
+                inside = np.array([X[0] + 0.0 * low, low + (high - low) * X[1]])
+            for name in ("width", "grade", "density"):
+                if callable(getattr(slab, name)):
+                    asked(_NAMES[name], getattr(slab, name), *self.coordinates(inside))
 
     # points
 

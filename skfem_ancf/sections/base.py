@@ -11,7 +11,7 @@ from ..errors import InputError, ask_array, require_positive, shown
 from ..frozen import Frozen
 from ..materials import Material
 from ..pickling import require_picklable
-from .measure import MORE, Uniform
+from .measure import MORE, WHOLE, Uniform
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -258,7 +258,7 @@ def slab_of(material: Material, width: Any, measure: Any = None, **more: Any) ->
     """
     uneven = callable(width) or material.graded
     if measure is None:
-        measure = Uniform(more=MORE * uneven)
+        measure = Uniform(more=MORE) if uneven else WHOLE
     elif uneven and isinstance(measure, Uniform):
         measure = Uniform(measure.low, measure.high, MORE)
     reference, grade = material.reference()

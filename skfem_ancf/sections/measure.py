@@ -64,6 +64,10 @@ class Uniform(Frozen):
                 self.low + (self.high - self.low) * x), w
 
 
+#: That of a full section.
+WHOLE = Uniform()
+
+
 class Weighted(Frozen):
     """The measure of a width that varies across: Gauss rules that have the width in their weights.
 

@@ -12,6 +12,7 @@ from ..body import body_carry, body_force, body_tangent
 from ..border import (Factors, add_curvature, factorize_bordered, new_factors, solve_bordered)
 from ..forces.texts import (add_elastic_force, add_element_tangent, contact_along,
                             contact_work)
+from ..compiled.words import constant
 from ..own import own_solve
 from ..source import F1, F2, I1, I2, borrowed, by_place, lanes, source
 from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
@@ -237,8 +238,9 @@ def _member(e, target, rules, x, w, record, members, before, least):
 
 
 #: Of a scene that is solved alone.
-ALONE = Members(np.zeros(0), np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros(0),
-                np.zeros(0), np.zeros(0), np.zeros(0), np.zeros((0, 0)), np.zeros((0, 3), np.int64))
+ALONE = constant(Members(
+    np.zeros(0), np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros(0), np.zeros(0),
+    np.zeros(0), np.zeros(0), np.zeros((0, 0)), np.zeros((0, 3), np.int64)))
 
 
 @source

@@ -397,7 +397,7 @@ def _iterate(system, result, load, options, record, descent=None, machine=None, 
     machine = machine or system.machine
     tables = machine.tables
     target = _target(system, result, load, start)
-    rules = rules_of(system, method, tol, max_iterations)._replace(wary=int(wary))
+    rules = rules_of(system, method, tol, max_iterations, wary)
     room, solver = machine.room(room_for_iterations, system.m), None
     if descent is not None:
         solver = descent
@@ -433,7 +433,8 @@ def _iterate(system, result, load, options, record, descent=None, machine=None, 
     return x.u, x.multipliers, x.force
 
 
-def rules_of(system: System, method: str, tol: float, max_iterations: int) -> Rules:
+def rules_of(system: System, method: str, tol: float, max_iterations: int,
+             wary: bool = False) -> Rules:
     """When an iteration of a system has converged.
 
     Parameters
@@ -442,11 +443,13 @@ def rules_of(system: System, method: str, tol: float, max_iterations: int) -> Ru
         A :class:`~skfem_ancf.system.System`.
     method, tol, max_iterations
         As for :func:`solve_static`.
+    wary
+        It ends where the first corrections do not get smaller.
     """
     floor = 8.0 * system.work_noise
     # the residual sums the noise of all coordinates, the work that of the strains
     return Rules(int(method == "mixed"), max_iterations, tol, floor, floor * system.noise,
-                 CLOSED * system.size, INACCURATE, 0, 2, 0, 0)
+                 CLOSED * system.size, INACCURATE, 0, 2, int(wary), 0)
 
 
 _ENDS = {SINGULAR: "the tangent is singular", NOT_FINITE: "the strain is not finite",
