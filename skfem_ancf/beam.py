@@ -78,8 +78,7 @@ def _coordinates(mesh, element, p):
 
 
 #: Attributes of a beam that do not depend on material and width.
-_PLACES = frozenset(("mesh", "element", "formulation", "name", "compiled", "damping", "kinematics",
-                     "nd", "N"))
+_PLACES = ("mesh", "element", "formulation", "name", "compiled", "damping", "kinematics", "nd", "N")
 #: Attributes of a beam that are made once and depend on its mesh and element only.
 _GEOMETRY = ("vector_element", "q0", "origin", "q0_local", "rows", "finder", "series", "scales",
              "size")
@@ -255,10 +254,12 @@ class Beam(Frozen):
         other, section = object.__new__(Beam), self.section
         if width is not self.width:
             section = _section(None, width)
-        vars(other).update({name: value for name, value in vars(self).items() if name in _PLACES})
+        mine, its = vars(self), vars(other)
+        for name in _PLACES:
+            its[name] = mine[name]
         other._fill(section, _material(section, material, self.mesh), material)
         self._share(other)
-        other._seal()
+        vars(other)["_sealed"] = True
         return other
 
     def _share(self, other):

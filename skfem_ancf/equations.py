@@ -163,25 +163,30 @@ class Tables:
         body = body._replace(packs=tuple(packs))
         return self.with_equations(self.plain._replace(body=body, viscous=body))
 
-    def renewed(self, system: "System") -> "Tables":
+    def renewed(self, system: "System", same_loads: bool = False) -> "Tables":
         """Those of a system that differs by its loads, or by its beams' materials and widths.
 
         Parameters
         ----------
         system
             A :class:`~skfem_ancf.system.System` of the same coordinates and joints.
+        same_loads
+            Its loads are constant and have the same vectors.
         """
         tables, before = twin_of(self), self.plain
         tables.system, tables._words, tables._own_handle = system, [], None
         for name in ("flat", "linearised", "parts", "_stress_size"):
             vars(tables).pop(name, None)
         tables._sort(system.loads)
-        plain = before._replace(loads=tables._load_tables())
+        loads = before.loads if same_loads else tables._load_tables()
         if system.beams != self.system.beams:
             body = body_of(system.beams, system.slices)
-            plain = plain._replace(body=body, viscous=viscous_body_of(
+            plain = before._replace(body=body, loads=loads, viscous=viscous_body_of(
                 body, system.beams, system.retardation))
-        elif "flat" in vars(self):
+            tables.plain = plain
+            return tables
+        plain = before._replace(loads=loads)
+        if "flat" in vars(self):
             tables._words, tables.flat = self._words, self.flat._replace(loads=plain.loads)
         tables.plain = plain
         return tables

@@ -21,6 +21,7 @@ from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number
                      require_function, shown, warnings_as_errors)
 from .frozen import Sealable, read_only
 from .kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
+from .kept import twin_of
 from .pickling import picklable_form
 from .places import facets_of
 from .rigid import RigidBody
@@ -500,9 +501,8 @@ class DeadLoad(Load):
         beam
             A :class:`~skfem_ancf.Beam`.
         """
-        other = self._unsealed()
-        other.beam = beam
-        other._seal()
+        other = twin_of(self)
+        vars(other)["beam"] = beam
         return other
 
     def force(self, u: Array) -> Array:

@@ -540,6 +540,8 @@ class MeshBeam(Frozen, Mesh2D):
     @property
     def chain_lengths(self) -> Array:
         """Length of the chain that each element is in, shape (nelements,)."""
+        if self.t.shape[1] == self.doflocs.shape[1] - 1:  # one chain
+            return np.full(self.t.shape[1], self.lengths.sum())
         chain = np.cumsum(np.append(False, self.t[0, 1:] != self.t[1, :-1]))
         return np.bincount(chain, self.lengths)[chain]
 

@@ -91,14 +91,14 @@ def lagrange(nodes: ArrayLike, x: ArrayLike) -> Array:
         Shape (m, n).
     """
     nodes, x = require_finite("nodes", nodes, (None,)), require_finite("x", x, (None,))
-    if len(np.unique(nodes)) < len(nodes):
-        raise InputError(f"nodes must be different, got {shown(nodes)}")
     return _lagrange(Content(nodes, x)).copy()
 
 
 @lru_cache(64)
 def _lagrange(content: Content) -> Array:
     nodes, x = content.arrays
+    if len(np.unique(nodes)) < len(nodes):
+        raise InputError(f"nodes must be different, got {shown(nodes)}")
     out = np.ones((len(x), len(nodes)))
     for i, a in enumerate(nodes):
         for j, b in enumerate(nodes):

@@ -156,7 +156,9 @@ class Scene:
 
     def __copy__(self):
         other = object.__new__(type(self))
-        other.__setstate__(self._parts())  # none of them changes
+        vars(other).update(vars(self), _lock=RLock(), _system=None)  # none of the others changes
+        for name in ("_places", "N"):
+            vars(other).pop(name, None)
         return other
 
     def __deepcopy__(self, memo):
@@ -1231,6 +1233,8 @@ class Scene:
 
     def _weights(self):
         """Loads by which gravity acts on point masses."""
+        if not self._elements:
+            return []
         masses = [x for x in self.elements if isinstance(x, PointMass) and x.mass]
         return [bind_load(PointForce(mass.mass * load.g, tuple(mass.at), None, load.amplitude),
                           self.members[k])
@@ -1376,16 +1380,18 @@ class Scene:
                            for joint in self.joints)):
             return None
         same = new.width == old.width and new.material.density == old.material.density
-        loads = tuple((n, load, bound if n != k else bound.moved(new) if same and isinstance(
-            bound, DeadLoad) else bind_load(load, new)) for n, load, bound in self._loads)
-        return self._sharing(loads, beams)
+        moved = [n != k or (same and isinstance(bound, DeadLoad)) for n, _, bound in self._loads]
+        loads = tuple((n, load, bound if n != k else bound.moved(new) if of else
+                       bind_load(load, new)) for (n, load, bound), of in zip(self._loads, moved))
+        return self._sharing(loads, beams, all(moved))
 
-    def _sharing(self, loads, beams):
+    def _sharing(self, loads, beams, same_loads=False):
         """A scene that shares what does not depend on loads, materials and widths."""
         other, system = copy(self), self._system
         other._beams, other._loads = tuple(beams), loads
         if system is not None and not system.forces.contacts.obstacles:
-            other._system = system.renewed([*other.loads, *other._weights()], beams)
+            bound = [load for _, _, load in loads]
+            other._system = system.renewed([*bound, *other._weights()], beams, same_loads)
             if other._system is not None:
                 other._lock = self._lock
         return other

@@ -109,18 +109,20 @@ class System:
                             for b in self.beams]
         self.viscous = any(time > 0.0 for time in self.retardation)
 
-    def _take_loads(self):
+    def _take_loads(self, same_loads=False):
         self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
+        steady = [load.constant and load.amplitude is None for load in self.loads]
+        self._varying: list[Any] = [load for load, of in zip(self.loads, steady) if not of]
+        if same_loads:
+            return
         self.constant_force = np.zeros(self.N)
-        self._varying: list[Any] = []
-        for load in self.loads:
-            if load.constant and load.amplitude is None:
+        for load, of in zip(self.loads, steady):
+            if of:
                 s = self.of(load)
                 self.constant_force[s] += load.force(np.zeros(s.stop - s.start))
-            else:
-                self._varying.append(load)
 
-    def renewed(self, loads: Sequence[Load], beams: Sequence[Beam]) -> System | None:
+    def renewed(self, loads: Sequence[Load], beams: Sequence[Beam],
+                same_loads: bool = False) -> System | None:
         """That of other loads, or of other materials and widths: work arrays are shared.
 
         Parameters
@@ -129,6 +131,8 @@ class System:
             The loads of all beams.
         beams
             Beams whose meshes and elements are those of this system; or its own.
+        same_loads
+            The loads have the vectors of those of this system.
 
         Returns
         -------
@@ -142,20 +146,16 @@ class System:
         beams = list(beams)
         system.loads, system.beams, system.members = list(loads), beams, [*beams, *self.bodies]
         system._index = {id(b): k for k, b in enumerate(system.members)}
-        system._take_loads()
-        system.retardation = [system.damping.stiffness + (b.damping.time if b.damping else 0.0)
-                              for b in beams]
-        system.viscous = any(time > 0.0 for time in system.retardation)
-        before = self.machine.tables
-        if beams != self.beams and not (self.machine.shareable and all(
+        system._take_loads(same_loads)
+        before, same_beams = self.machine.tables, beams == self.beams
+        if not same_beams and not (self.machine.shareable and all(
                 beam.kernel.linear for beam in beams)):
             return None
         if system.symmetric != self.symmetric or before.asks:
             return None
-        kept = _OF_BEAMS if beams == self.beams else _OF_PLACES
-        for name in _MADE_ONCE - kept:
+        for name in _NOT_OF_BEAMS if same_beams else _NOT_OF_PLACES:
             vars(system).pop(name, None)
-        tables = before.renewed(system)
+        tables = before.renewed(system, same_loads)
         if tables.asks:
             return None
         system.machine = self.machine.with_tables(tables)
@@ -896,6 +896,8 @@ class System:
 
 #: Names of attributes that are made when they are asked for.
 _MADE_ONCE = {name for name, value in vars(System).items() if isinstance(value, cached_property)}
+#: Those that do not stay for other loads, and for other materials and widths.
+_NOT_OF_BEAMS, _NOT_OF_PLACES = tuple(_MADE_ONCE - _OF_BEAMS), tuple(_MADE_ONCE - _OF_PLACES)
 
 
 def _extent(bodies):

@@ -298,3 +298,63 @@ def test_what_cannot_be_shared_is_built_anew():
     for wrong in (2.0, [(0.0, -2.0)]):
         with pytest.raises(InputError, match="list of Loads"):
             scene.replace(loads=wrong)
+
+
+def changed_at_random(rng, given):
+    """One argument of a scene changed, and the arguments of the same scene built anew."""
+    kind = rng.choice(["E", "nu", "density", "plane", "width", "weight", "force", "more", "pushed",
+                       "mesh", "both"])
+    x, given = float(rng.uniform(0.5, 1.5)), dict(given)
+    material = given["material"]
+    new = {"E": dict(E=2e9 * x), "nu": dict(nu=0.25 * x), "density": dict(density=5000.0 * x),
+           "plane": dict(plane="strain" if material.plane == "stress" else "stress"),
+           "both": dict(E=3e9 * x, density=4000.0 * x)}.get(kind)
+    changes = {}
+    if new is not None:
+        changes["material"] = material.replace(**new)
+    if kind in ("width", "both"):
+        changes["width"] = 0.01 * x
+    if kind == "mesh":
+        changes["mesh"] = MeshBeam.init_line(np.linspace(0, 1, int(3 + 2 * x)), 0.02 * x, angle=0.3)
+    tip = np.array([np.cos(0.3), np.sin(0.3)])
+    loads = {"weight": lambda beam: [Weight((0.4, -6.0 * x))],
+             "force": lambda beam: [PointForce((0.1, -0.2 * x), at=tip)],
+             "more": lambda beam: [Weight((0.0, -4.0)), PointForce((0.1, 0.2 * x), at=0.3 * tip)],
+             "pushed": lambda beam: [Pressure(beam, "top", 20.0 * x),
+                                     EndMoment(beam, "right", 0.01 * x)]}
+    if kind in loads:
+        changes["loads"] = loads[kind]
+    return changes, {**given, **changes}
+
+
+@pytest.mark.parametrize("element", [lambda: ElementBeamANCF(3), lambda: ElementBeamCable(3),
+                                     lambda: ElementBeamCable(7)])
+@pytest.mark.parametrize("seed", range(4))
+def test_any_changes_one_after_the_other_are_a_scene_built_anew(element, seed):
+    def built(mesh, material, width, loads):
+        scene = Scene(Beam(mesh, element(), material, width)).clamp("left", thickness="free")
+        for load in loads(scene.beams[0]):
+            scene.add(load)
+        return scene
+
+    rng = np.random.default_rng(seed)
+    given = dict(mesh=MeshBeam.init_line(np.linspace(0, 1, 5), 0.02, angle=0.3), width=0.01,
+                 material=StVenantKirchhoff(2e9, 0.3, 7800.0), loads=lambda beam: [
+                     Weight((0.0, -9.81))])
+    scenes = [(built(**given), given)]
+    for _ in range(8):
+        scene, before = scenes[rng.integers(len(scenes))]  # branches share what they came from
+        if rng.random() < 0.7:
+            scene.solve_static()
+        changes, given = changed_at_random(rng, before)
+        if "loads" in changes:
+            changes["loads"] = given["loads"](scene.beams[0])
+        scenes.append((scene.replace(**changes), given))
+    for k in rng.permutation(len(scenes)):
+        scene, given = scenes[k]
+        a, b = scene.solve_static(), built(**given).solve_static()
+        assert a.iterations == b.iterations and np.allclose(a.u, b.u, rtol=0, atol=1e-8)
+        assert np.allclose(a.reactions("left").force, b.reactions("left").force, rtol=1e-6,
+                           atol=1e-6)
+        assert scene.beams[0].total_mass == pytest.approx(built(**given).beams[0].total_mass)
+        assert a.strain_energy == pytest.approx(b.strain_energy, rel=1e-6)

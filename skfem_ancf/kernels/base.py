@@ -260,6 +260,8 @@ def packed(values: Any, dtype: Any = np.float64) -> Array:
     dtype
         Their type.
     """
+    if type(values) is np.ndarray and values.dtype == dtype and values.flags.carray:
+        return values
     return np.require(values, dtype, ["C", "W"])
 
 
@@ -373,9 +375,11 @@ def _held(places, constant, nb, elements):
     """``held``, ``held_skew`` and ``held_place`` of PairTables."""
     (a, b), (c, d) = places.lower, places.strictly
     C = constant.reshape(-1, nb, 2, nb, 2)
-    held = np.stack([C[:, a, 0, b, 0], C[:, a, 1, b, 1],
-                     0.5 * (C[:, a, 0, b, 1] + C[:, b, 0, a, 1])], axis=2)
-    held_skew = 0.5 * (C[:, c, 0, d, 1] - C[:, d, 0, c, 1])
+    x, y, cross = C[:, :, 0, :, 0], C[:, :, 1, :, 1], C[:, :, 0, :, 1]
+    held = np.empty((len(C), len(a), 3))
+    held[:, :, 0], held[:, :, 1] = x[:, a, b], y[:, a, b]
+    held[:, :, 2] = 0.5 * (cross[:, a, b] + cross[:, b, a])
+    held_skew = 0.5 * (cross[:, c, d] - cross[:, d, c])
     return (packed(held.reshape(len(C), 3 * len(a)).T), packed(held_skew.T),
             packed(np.arange(elements) * (len(C) > 1), np.int64))
 

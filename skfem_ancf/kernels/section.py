@@ -8,6 +8,7 @@ interpolation and the weights in them, the tangent is a sum over pairs of rows.
 
 from dataclasses import replace
 from functools import lru_cache
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
@@ -603,7 +604,7 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
     terms, mixing, sizes = _terms(content, weights.shape[0])
     keep, moduli = np.ones(terms.shape[1], bool), np.zeros((terms.shape[1], 1))
     if linear:
-        D = np.kron(law.D.reshape(9, 1), weights)
+        D = (law.D.reshape(9, 1, 1) * weights).reshape(-1, weights.shape[1])
         moduli = mixing @ D
         keep = np.any(np.abs(moduli) > 1e-14 * (sizes @ np.abs(D)), axis=1)  # else orthogonal
     layout = _layout(content, weights.shape[0], Content(keep), linear)
@@ -668,7 +669,7 @@ def _joined(along, ns):
     out = np.zeros((3, len(along[0]), max(sizes)))
     for x, L in zip(out, along):
         x[:, :L.shape[1]] = L
-    return out, packed(np.cumsum([0, *sizes]) * ns, np.int64)
+    return out, np.array([0, *accumulate(sizes)], np.int64) * ns
 
 
 class _Layout(NamedTuple):

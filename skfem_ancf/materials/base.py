@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import (InputError, require_finite_scalar, require_like, require_option,
                       require_positive, shown, taught)
 from ..frozen import Frozen, rebuilt
-from ..kept import kept, twin_of
+from ..kept import cached_property, kept, twin_of
 from ..pickling import require_picklable
 from ..quadrature import gauss
 
@@ -368,9 +368,12 @@ class LinearLaw:
 
     def __init__(self, D: ArrayLike) -> None:
         self.D = np.asarray(D)
-        #: The components of the strain on which the stress depends.
-        self.rows = tuple(k for k, column in enumerate(self.D.T) if np.any(column))
         self._compliances: dict = {}
+
+    @cached_property
+    def rows(self) -> tuple[int, ...]:
+        """The components of the strain on which the stress depends."""
+        return tuple(k for k, column in enumerate(self.D.T) if np.any(column))
 
     def times(self, factor: float) -> LinearLaw:
         """The law of a material that is so many times stiffer."""
