@@ -94,8 +94,8 @@ class Numbers:
         tables, screen = system.machine.tables, system.screen
         self.scene, self.located = scene, [reading.located(scene) for reading in readings]
         self.solved = Solved(
-            tables.plain._replace(K=cast(Any, ()), viscous=()), tables.static_factors(1.0),
-            tables.static_factors(1.0, 0.0), system.values(1.0),
+            tables.plain._replace(K=cast(Any, ()), viscous=(), copies=()),
+            tables.static_factors(1.0), tables.static_factors(1.0, 0.0), system.values(1.0),
             np.array([system.work_noise**2, system.size]), np.array([system.noise]),
             np.array([screen.start.real, screen.start.imag]), screen.slender,
             tuple(tuple((part.dofs, part.weights, part.start, int(part.off_axis))

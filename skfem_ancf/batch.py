@@ -63,7 +63,8 @@ class Lane:
         self.family, self.numbers = family, np.empty(len(family.scale))
         solved = family.solved(self.numbers)
         band = BandMatrix(system.N, system.bandwidth, True).band
-        equations = solved.equations._replace(K=band, viscous=solved.equations.body)
+        body = solved.equations.body
+        equations = solved.equations._replace(K=band, viscous=body, copies=body)
         tables = system.machine.tables.with_equations(equations)
         self._machine = system.machine.with_tables(tables)
         self._solved, N, none = solved, system.N, np.zeros(0)

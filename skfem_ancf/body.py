@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .band import clear
-from .kernels.base import CARRY, FORCE, GIVEN, MEAN, STRESS, TANGENT, VISCOUS, Destination
+from .kernels.base import (CARRY, FORCE, GIVEN, MEAN, STRESS, TANGENT, VISCOUS, Destination,
+                           repeated)
 from .kernels.cable import CablePack, cable_evaluate
 from .kernels.section import SectionPack, section_evaluate
 from .source import I1, I2, primitive, shaped, source
@@ -93,6 +94,25 @@ def viscous_body_of(body: "Body", beams: Sequence["Beam"], times: Sequence[float
             rows += list(body.table[first:last])
         first = last
     return Body(tuple(packs), np.array(rows)) if packs else body
+
+
+def copies_of(body: "Body", n: int, N: int) -> "Body":
+    """The Body of ``n`` times the same beams, whose coordinates are one behind the other.
+
+    What takes few elements at a time takes less than n times as long for them. There are no
+    tangents of it: they would be n times as long.
+
+    Parameters
+    ----------
+    body
+        What :func:`body_of` has made.
+    n, N
+        How often, and the number of all coordinates.
+    """
+    table = body.table.copy()
+    table[:, LAST] += (n - 1) * N
+    table[:, [BEGIN, END, ELEMENTS]] *= n
+    return Body(tuple(repeated(pack, n, N) for pack in body.packs), table)
 
 
 def stress_size(body: "Body") -> int:

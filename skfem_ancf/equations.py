@@ -6,7 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from .band import Band
-from .body import FlatBody, body_of, stress_size, viscous_body_of
+from .body import FlatBody, body_of, copies_of, stress_size, viscous_body_of
 from .border import Border
 from .compiled.words import Words, constant
 from .forces.system import NO_FORCES
@@ -58,6 +58,9 @@ class Equations(NamedTuple):
         :class:`~skfem_ancf.forces.texts.ForceTables`.
     viscous
         As ``body``, of what resists the rates of strains; the same where nothing does.
+    copies
+        As ``body``, of several times all coordinates, one behind the other; see
+        :meth:`Tables.copied`, the same where nobody has asked.
     """
 
     body: Any
@@ -69,6 +72,7 @@ class Equations(NamedTuple):
     border: Border
     viscous: Any
     forces: ForceTables
+    copies: Any
 
 
 class Tables:
@@ -100,7 +104,7 @@ class Tables:
                                system.fixed, system.mask, system.K.band,
                                self._border(joints),
                                viscous_body_of(body, system.beams, system.retardation),
-                               self._forces())
+                               self._forces(), body)
 
     def _sort(self, loads):
         # of the constant kind, moments, linear ones, others
@@ -121,7 +125,7 @@ class Tables:
         plain = self.plain
         addresses = {part: compiled.address(part) for part in self.parts}
         body = self._flat(_with_laws(plain.body, compiled.law), addresses)
-        same, forces = plain.viscous is plain.body, plain.forces
+        same, alone, forces = plain.viscous is plain.body, plain.copies is plain.body, plain.forces
         if "contacts" in addresses:
             forces = forces._replace(
                 contacts=forces.contacts._replace(address=addresses["contacts"]))
@@ -129,6 +133,7 @@ class Tables:
             forces = forces._replace(address=addresses["elements"])
         return plain._replace(
             body=body, viscous=body if same else self._flat(plain.viscous, addresses),
+            copies=body if alone else self._flat(_with_laws(plain.copies, compiled.law), addresses),
             forces=forces)
 
     @cached_property
@@ -161,7 +166,18 @@ class Tables:
         if all(one is other for one, other in zip(packs, body.packs)):
             return None
         body = body._replace(packs=tuple(packs))
-        return self.with_equations(self.plain._replace(body=body, viscous=body))
+        return self.with_equations(self.plain._replace(body=body, viscous=body, copies=body))
+
+    def copied(self, n: int) -> "Tables":
+        """The same with ``n`` copies of all coordinates, whose forces a text finds together.
+
+        Parameters
+        ----------
+        n
+            Their number.
+        """
+        return self.with_equations(self.plain._replace(
+            copies=copies_of(self.plain.body, n, self.system.N)))
 
     def renewed(self, system: "System", same_loads: bool = False) -> "Tables":
         """Those of a system that differs by its loads, or by its beams' materials and widths.
@@ -181,7 +197,7 @@ class Tables:
         loads = before.loads if same_loads else tables._load_tables()
         if system.beams != self.system.beams:
             body = body_of(system.beams, system.slices)
-            plain = before._replace(body=body, loads=loads, viscous=viscous_body_of(
+            plain = before._replace(body=body, copies=body, loads=loads, viscous=viscous_body_of(
                 body, system.beams, system.retardation))
             tables.plain = plain
             return tables

@@ -15,11 +15,10 @@ def multiply(A, x, y):
         y[i] = 0.0
     for j in range(n):
         at, last, s, xj = j * ld, min(A.width, n - 1 - j), 0.0, x[j]
-        for k in range(1, last + 1):
-            y[j + k] += flat[at + k] * xj
+        subtract(y, j + 1, flat, at + 1, last, -xj)
         if A.top > 0:
-            for i in range(j - min(A.width, j), j + 1):
-                y[i] += flat[at - j + i] * xj
+            up = min(A.width, j)
+            subtract(y, j - up, A.flat, A.top + at - up, up + 1, -xj)
             continue
         for k in range(last + 1):
             s += flat[at + k] * x[j + k]
@@ -173,8 +172,19 @@ def _solve_exchanged(A, x):
 
 
 @jit
+def _subtract_complex(x, y, to, re, im, of, n, a, b):
+    """x + i y less a + i b times n numbers, from the places on."""
+    subtract(x, to, re, of, n, a)
+    subtract(x, to, im, of, n, -b)
+    subtract(y, to, im, of, n, a)
+    subtract(y, to, re, of, n, b)
+
+
+@jit
 def factorize_complex(re, im, width):
     """L D L^T of a complex symmetric band, in place; False if there is none."""
+    if im.size == 0:
+        return _factorize_real(re, width)
     ld = width + 1
     n = re.size // ld
     for j in range(n):
@@ -187,10 +197,8 @@ def factorize_complex(re, im, width):
         for k in range(1, m + 1):
             x, y = re[at + k], im[at + k]
             c, d = (x * a + y * b) / size, (y * a - x * b) / size
-            other = (j + k) * ld - k
-            for i in range(k, m + 1):
-                re[other + i] -= c * re[at + i] - d * im[at + i]
-                im[other + i] -= c * im[at + i] + d * re[at + i]
+            other = (j + k) * ld
+            _subtract_complex(re, im, other, re, im, at + k, m + 1 - k, c, d)
         for k in range(1, m + 1):
             x, y = re[at + k], im[at + k]
             re[at + k], im[at + k] = (x * a + y * b) / size, (y * a - x * b) / size
@@ -198,15 +206,46 @@ def factorize_complex(re, im, width):
 
 
 @jit
+def _factorize_real(flat, width):
+    ld = width + 1
+    n = flat.size // ld
+    for j in range(n):
+        at, m = j * ld, min(width, n - 1 - j)
+        d = flat[at]
+        if not abs(d) > 0.0 or not abs(d) < np.inf:
+            return False
+        inverse = 1.0 / d
+        for k in range(1, m + 1):
+            subtract(flat, (j + k) * ld, flat, at + k, m + 1 - k, flat[at + k] * inverse)
+        for k in range(1, m + 1):
+            flat[at + k] *= inverse
+    return True
+
+
+@jit
+def _solve_real(flat, x):
+    n = x.size
+    ld = flat.size // n
+    for j in range(n):
+        subtract(x, j + 1, flat, j * ld + 1, min(ld - 1, n - 1 - j), x[j])
+    for j in range(n - 1, -1, -1):
+        at = j * ld
+        s = x[j] / flat[at]
+        for k in range(1, min(ld, n - j)):
+            s -= flat[at + k] * x[j + k]
+        x[j] = s
+
+
+@jit
 def solve_complex(re, im, x, y):
     """Solve in place with the factors; x + i y is (n,)."""
+    if im.size == 0:
+        _solve_real(re, x)
+        return
     n = x.size
     ld = re.size // n
     for j in range(n):
-        at, a, b = j * ld, x[j], y[j]
-        for k in range(1, min(ld, n - j)):
-            x[j + k] -= re[at + k] * a - im[at + k] * b
-            y[j + k] -= re[at + k] * b + im[at + k] * a
+        _subtract_complex(x, y, j + 1, re, im, j * ld + 1, min(ld, n - j) - 1, x[j], y[j])
     for j in range(n - 1, -1, -1):
         at = j * ld
         a, b = re[at], im[at]

@@ -176,7 +176,7 @@ class Collocation(Scheme):
         mu = complex(*w.method.values[:, k]) / integrator.dt
         x = mu**2 * s.mass.multiply(du) * s.free
         x, y = np.ascontiguousarray(x.real), np.ascontiguousarray(x.imag)
-        solve_complex(w.re[k], w.im[k], x, y)
+        solve_complex(w.re[k], w.im[k] if mu.imag else w.im[k, :0], x, y)
         return x
 
     def in_blocks(self, system: System) -> bool:
@@ -224,9 +224,10 @@ class Collocation(Scheme):
         """Work arrays, in which factors are kept from step to step."""
         s, kept = integrator.system, integrator.kept
         if integrator.room is None:
-            M, size = s.mass.band, s.machine.tables.stresses.size
+            M, size, n = s.mass.band, s.machine.tables.stresses.size, len(table.points)
             integrator.room = room_for_points(table.method, s.N, s.m, size,
                                               M._replace(flat=np.zeros(M.flat.size)))
+            integrator.machine = s.machine.with_tables(s.machine.tables.copied(n))
         w = integrator.room
         for name in ("re", "im", "J", "Y", "origin"):
             if name in kept and kept[name] is not getattr(w, name):  # of a motion that goes on

@@ -67,6 +67,8 @@ class Integrator:
         it.
     room, asked
         Its work arrays, and functions of time asked for a block of steps.
+    machine
+        What runs texts: that of the system, or one with other tables.
     """
 
     def __init__(self, system: System, scheme: Scheme, tol: float | None = None) -> None:
@@ -83,6 +85,7 @@ class Integrator:
             self._nodes = Eliminated(system, A), EliminatedMass(system)
         self._state = np.zeros(STATE)
         self.room: Any = None
+        self.machine = system.machine
         self._begin(scheme, tol)
         fix(self.matrices.mass, system.mask)
         if not factorize(self.matrices.mass):
@@ -296,7 +299,7 @@ class Integrator:
         if dt != self._dt:
             self._dt, self._state[READY] = dt, 0.0
         self._state[[BEFORE, FAILURE, DISSIPATED]] = y.before, 0.0, y.dissipated
-        function, equations = s.machine.of(text)
+        function, equations = self.machine.of(text)
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 done = function(equations, self.matrices, *args)

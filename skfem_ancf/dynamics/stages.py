@@ -9,22 +9,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..band import (Band, copy, dense_solve, factorize_complex, multiply, solve,
+from ..band import (Band, clear, copy, dense_solve, factorize_complex, multiply, solve,
                     solve_complex, solve_joined)
 from ..body import (add_force_of, body_carry, body_force, body_mixed, body_stress, body_tangent)
 from ..forces.texts import (add_elastic_force, add_element_tangent, pace_contact,
                             settle_contact)
-from ..source import F1, F2, F3, borrowed, by_place, lanes, source
+from ..source import F1, F2, F3, borrowed, by_place, lanes, shaped, source
 from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
                       external_force, joint_directions)
 from .dampers import add_damping, damping_force
 from .rates import JointMotion, JointMotions, acceleration_of_joints, drive_rate
-from .steps import (ASTRAY, BEFORE, CARRIED, COUNT, DEPENDENT, DISSIPATED, DONE, ENERGY, FACTORIZED,
-                    FAILED, FAILURE, FRESH, GO_ON, ITERATIONS, LAST_SIZE, MIXED,
-                    NOT_CONVERGED, RATE, READY, SINGULAR, SIZE, judged, round_off)
+from .steps import (ASTRAY, BEFORE, COUNT, DEPENDENT, DISSIPATED, DONE, ENERGY, FACTORIZED, FAILED,
+                    FAILURE, FRESH, GO_ON, ITERATIONS, LAST_SIZE, MIXED, NOT_CONVERGED, RATE,
+                    READY, SINGULAR, SIZE, judged, round_off)
 
-#: Contraction up to which factors are kept.
-REUSED = 0.3
+#: Contraction up to which factors are kept, and where stresses are carried: new ones at points
+#: as far apart turn as far from them.
+REUSED, CARRIED = 0.3, 0.5
 #: Corrections that close joints at the end of a step.
 CLOSINGS = 2
 
@@ -95,16 +96,18 @@ class Points(NamedTuple):
     Z, U, V, W, R, guess
         The unknowns, displacement, velocity, acceleration, residual and correction, and where the
         iteration begins, shape (n, N).
-    l, first, gaps
-        Multipliers, those at the begin of the iteration, and what rates of joints miss, (n, m).
-    carried, own
-        Stresses that are carried, and those of the displacement, shape (n, s).
+    l, dl, first, gaps
+        Multipliers, their correction, those at the begin of the iteration, and what rates of
+        joints miss, (n, m).
+    carried, own, missing
+        Stresses that are carried, those of the displacement, and the difference, shape (n s,): as
+        a body has them of which there are n.
     stresses
         Room, shape (3, s), the first row zero.
-    x
-        Room, shape (6, N).
+    x, r, q
+        Room, shape (4, N), (2 m,) and (2 m, 2 m).
     origin
-        Where the factors were made, shape (N,).
+        Where the factors were made, n times, shape (n, N).
     re, im
         Factors, shape (k, N (width + 1)).
     J, Y
@@ -127,13 +130,17 @@ class Points(NamedTuple):
     R: F2
     guess: F2
     l: F2
+    dl: F2
     first: F2
     gaps: F2
-    carried: F2
-    own: F2
+    carried: F1
+    own: F1
+    missing: F1
     stresses: F2
     x: F2
-    origin: F1
+    r: F1
+    q: F2
+    origin: F2
     re: F2
     im: F2
     J: F2
@@ -159,9 +166,9 @@ def room_for_points(method: Method, N: int, m: int, stresses: int, D: Band) -> P
     """
     n, k, size = method.points.size, method.values.shape[1], N * (D.width + 1)
     return Points._make([
-        np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((3, n, m)),
-        *np.zeros((2, n, stresses)), np.zeros((3, stresses)), np.zeros((6, N)), np.zeros(N),
-        *np.zeros((2, k, size)), np.zeros((m, N)), np.zeros((2 * k, m, N)), np.zeros((2, m, N)),
+        np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((4, n, m)),
+        *np.zeros((3, n * stresses)), np.zeros((3, stresses)), np.zeros((4, N)), np.zeros(2 * m),
+        np.zeros((2 * m, 2 * m)), np.zeros((n, N)), *np.zeros((2, k, size)), np.zeros((m, N)), np.zeros((2 * k, m, N)), np.zeros((2, m, N)),
         np.zeros((m, m)), np.zeros(m), D, method])
 
 
@@ -172,8 +179,8 @@ def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier
     Parameters
     ----------
     e, matrices, rule
-        :class:`~skfem_ancf.equations.Equations`, :class:`~skfem_ancf.dynamics.steps.Matrices`,
-        :class:`~skfem_ancf.dynamics.steps.Rule`.
+        :class:`~skfem_ancf.equations.Equations` with as many copies as there are points,
+        :class:`~skfem_ancf.dynamics.steps.Matrices`, :class:`~skfem_ancf.dynamics.steps.Rule`.
     s, w
         As above; of w ``y`` and ``first``, with what was before, or ``guess``.
     state
@@ -232,7 +239,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
     state[FRESH], state[SIZE] = 0.0, -1.0
     if state[MIXED] > 0.0:
         state[READY] = 0.0  # old ones have turned the beam
-    _start(e.body, method, s, w, state, step)
+    _start(e.copies, method, s, w, state, step)
     for _ in range(ITERATIONS):
         _states(e.free, method, s, w, step)
         if state[READY] == 0.0:
@@ -241,18 +248,18 @@ def _converges(e, matrices, method, rule, s, w, state, step):
                 return False
             state[FACTORIZED] += method.values.shape[1]
             state[READY], state[RATE], state[FRESH], state[SIZE] = 1.0, REUSED, 1.0, -1.0
+        _internal(e.copies, w, state)
         for k in range(n):
-            _residual(e, matrices, method, s, w, state, step, k)
+            _residual(e, matrices, method, s, w, step, k)
         state[COUNT] += n
         if not _correct(e.free, method, s, w, state):
             state[FAILURE] = DEPENDENT
             return False
         if state[MIXED] > 0.0:
-            for k in range(n):
-                body_carry(e.body, w.origin, w.R[k], w.own[k], w.carried[k])
+            body_carry(e.copies, _flat(w.origin), _flat(w.R), w.own, w.carried)
         told = judged(state, wanted, rough, REUSED, CARRIED)
         if told == ASTRAY:
-            _start(e.body, method, s, w, state, step)
+            _start(e.copies, method, s, w, state, step)
         elif told != GO_ON:
             break
     _states(e.free, method, s, w, step)
@@ -348,7 +355,13 @@ def _meet(mass, free, w, x):
 
 
 @source
-def _start(body, method, s, w, state, step):
+def _flat(x):
+    """The coordinates of all points in one row, a view."""
+    return shaped(x, (x.size,))
+
+
+@source
+def _start(copies, method, s, w, state, step):
     """Where it begins; with carried stresses by the mean acceleration of the step before.
 
     A polynomial through points where a stiff beam vibrates leads far away.
@@ -357,8 +370,9 @@ def _start(body, method, s, w, state, step):
         copy(w.guess[k], w.Z[k])
         copy(w.first[k], w.l[k])
     if state[MIXED] > 0.0:
-        for k in range(w.Z.shape[0]):
-            body_stress(body, w.y[0], w.carried[k])
+        for k in range(w.R.shape[0]):
+            copy(w.y[0], w.R[k])
+        body_stress(copies, _flat(w.R), w.carried)
         if step > 0 or s.begun > 0:
             v0, v = w.y[1], w.before[1]
             for k in range(w.Z.shape[0]):
@@ -401,19 +415,27 @@ def _motion(joints, k):
 
 
 @source
-def _residual(e, matrices, method, s, w, state, step, k):
-    """What is missing in the equation of motion at a point, and in the rates of joints."""
-    u, v, R, f, Q, d, room = w.U[k], w.V[k], w.R[k], w.x[0], w.x[1], w.x[2], w.x[3]
-    at = step * (method.points.size + 1) + k
-    t = s.times[at]
+def _internal(copies, w, state):
+    """The internal forces of all points at once, into R."""
+    U, f, missing, own, carried = _flat(w.U), _flat(w.R), w.missing, w.own, w.carried
     if state[MIXED] > 0.0:
-        missing, own, carried = w.stresses[1], w.own[k], w.carried[k]
-        body_mixed(e.body, False, u, u, f, carried, own)
+        body_mixed(copies, False, U, U, f, carried, own)
         for i in lanes(missing.size):
             missing[i] = own[i] - carried[i]
-        add_force_of(e.body, w.origin, missing, f)
+        add_force_of(copies, _flat(w.origin), missing, f)
     else:
-        body_force(e.body, u, f)
+        body_force(copies, U, f)
+
+
+@source
+def _residual(e, matrices, method, s, w, step, k):
+    """What is missing in the equation of motion at a point, and in the rates of joints.
+
+    R has the internal force.
+    """
+    u, v, f, Q, d, room = w.U[k], w.V[k], w.R[k], w.x[0], w.x[1], w.x[2]
+    at = step * (method.points.size + 1) + k
+    t = s.times[at]
     add_elastic_force(e.forces, t, 0.0, u, u, f)
     if matrices.dampers.active > 0:
         damping_force(e, matrices.dampers, matrices.M, t, u, v, d, room)
@@ -430,15 +452,19 @@ def _residual(e, matrices, method, s, w, state, step, k):
         drive_rate(e.joints, motion, t, s.h * method.points[k], u, gap)
         add_constraint_rate(e.joints, g[0], t, u, v, gap)
     for i in lanes(f.size):
-        R[i] = (Q[i] - f[i]) * e.free[i]
+        f[i] = (Q[i] - f[i]) * e.free[i]
 
 
 @source
 def _correct(free, method, s, w, state):
-    """Correct Z and the multipliers; R becomes the correction. False if joints are dependent."""
+    """Correct Z and the multipliers; R becomes the correction. False if joints are dependent.
+
+    The velocities' place is room for it.
+    """
     n, N, m, work, closing = method.points.size, free.size, w.l.shape[1], 0.0, 0.0
-    D, dl = np.zeros((n, N)), np.zeros((n, m))
-    x, y, r, q = w.x[0], w.x[1], np.empty(2 * m), np.empty((2 * m, 2 * m))
+    D, dl, x, y, r, q = w.V, w.dl, w.x[0], w.x[1], w.r, w.q
+    clear(_flat(D))
+    clear(_flat(dl))
     for k in range(method.values.shape[1]):
         for i in lanes(N):
             x[i] = 0.0
@@ -448,7 +474,7 @@ def _correct(free, method, s, w, state):
             for i in lanes(N):
                 x[i] += a * R[i]
                 y[i] += b * R[i]
-        solve_complex(w.re[k], w.im[k], x, y)
+        solve_complex(w.re[k], _imaginary(method, w, k), x, y)
         if m > 0 and not _join(method, s, w, k, r, q, x, y):
             return False
         for j in range(n):
@@ -506,7 +532,7 @@ def _join(method, s, w, k, r, q, x, y):
 @source
 def _factorize(e, matrices, method, s, w, step):
     """Factors of the iteration matrices at the mean of the points; False if there are none."""
-    origin, f, S, yes = w.origin, w.x[0], w.stresses, w.x.size > 0
+    origin, f, S, yes = w.origin[0], w.x[0], w.stresses, w.x.size > 0
     at = step * (method.points.size + 1)
     for i in lanes(origin.size):
         origin[i] = 0.0
@@ -514,6 +540,8 @@ def _factorize(e, matrices, method, s, w, step):
         U, c = w.U[k], method.weights[k]
         for i in lanes(origin.size):
             origin[i] += c * U[i]
+    for k in range(1, method.points.size):
+        copy(origin, w.origin[k])
     body_stress(e.body, w.y[0], S[1])
     body_tangent(e.body, origin, f, S[1], yes, S[2], e.K)
     add_load_stiffness(e.loads, _row(s.factors, at), s.times[at], 1.0, origin, e.K)
@@ -531,8 +559,10 @@ def _factorize(e, matrices, method, s, w, step):
                 J[i] *= e.free[i]
     for k in range(method.values.shape[1]):
         a, b = method.values[0, k] / s.h, method.values[1, k] / s.h
-        re, im = w.re[k], w.im[k]
-        _combine(e.K, matrices.M, w.D, e.free, a * a - b * b, 2.0 * a * b, a, b, re, im)
+        re, im = w.re[k], _imaginary(method, w, k)
+        _combine(e.K, matrices.M, w.D, e.free, a * a - b * b, a, re)
+        if im.size > 0:
+            _combine_imaginary(matrices.M, w.D, e.free, 2.0 * a * b, b, im)
         if not factorize_complex(re, im, e.K.width):
             return False
         for j in range(w.J.shape[0]):
@@ -545,26 +575,48 @@ def _factorize(e, matrices, method, s, w, step):
 
 
 @source
-def _combine(K, M, D, free, c, d, a, b, re, im):
-    """``K + (c + i d) M + (a + i b) D`` with the supports fixed, the lower half of each column.
+def _imaginary(method, w, k):
+    """The imaginary part of the factors for an eigenvalue: empty if that is real."""
+    return w.im[k] if method.values[1, k] != 0.0 else w.im[k, :0]
+
+
+@source
+def _combine(K, M, D, free, c, a, out):
+    """``K + c M + a D`` with the supports fixed, the lower half of each column.
 
     Of a matrix that is not symmetric the mean of both halves: the iteration corrects the rest.
     """
     n, top, width = free.size, K.top, K.width
     k, m, r = K.flat.reshape(n, K.ld), M.flat.reshape(n, K.ld), D.flat.reshape(n, K.ld)
-    x, y = re.reshape(n, width + 1), im.reshape(n, width + 1)
+    x = out.reshape(n, width + 1)
     for h in range(width + 1):
         p = top + h
         for j in lanes(n):
             x[j, h] = k[j, p] + c * m[j, p] + a * r[j, p]
-            y[j, h] = d * m[j, p] + b * r[j, p]
         if top > 0 and h < n:
             later = k[h:]
             for j in lanes(n - h):
                 x[j, h] += 0.5 * (later[j, top - h] - k[j, p])
-        after = free[min(h, n):]
-        for j in lanes(after.size):
-            x[j, h] *= free[j] * after[j]
-            y[j, h] *= free[j] * after[j]
+        _fix_row(free, h, x)
     for j in lanes(n):
         x[j, 0] += 1.0 - free[j]
+
+
+@source
+def _combine_imaginary(M, D, free, d, b, out):
+    """``d M + b D`` alike."""
+    n = free.size
+    m, r, y = M.flat.reshape(n, M.ld), D.flat.reshape(n, M.ld), out.reshape(n, M.width + 1)
+    for h in range(M.width + 1):
+        p = M.top + h
+        for j in lanes(n):
+            y[j, h] = d * m[j, p] + b * r[j, p]
+        _fix_row(free, h, y)
+
+
+@source
+def _fix_row(free, h, x):
+    """Zeros for what is fixed, h below the diagonal."""
+    after = free[min(h, free.size):]
+    for j in lanes(after.size):
+        x[j, h] *= free[j] * after[j]

@@ -979,3 +979,24 @@ def apart(pack: Any, elements: slice) -> Any:
             held=packed(held[:, elements]), held_skew=packed(pack.pairs.held_skew[:, elements]),
             held_place=np.arange(number))
     return pack._replace(**changes)
+
+
+def repeated(pack: Any, n: int, N: int) -> Any:
+    """A pack of ``n`` times its elements, each time with coordinates that begin N later.
+
+    Parameters
+    ----------
+    pack
+        The tables, of a :class:`Chain`.
+    n, N
+        How often, and how far apart.
+    """
+    total = pack.start.size
+    changes = {"start": (pack.start + N * np.arange(n)[:, None]).ravel(),
+               "pairs": pack.pairs._replace(held_place=np.tile(pack.pairs.held_place, n))}
+    for name, table in pack._asdict().items():
+        if name in MATRICES and len(table) == total > 1:
+            changes[name] = np.tile(table, (n, 1, 1))
+        elif name in PLACES:
+            changes[name] = np.tile(table, n)
+    return pack._replace(**changes)
