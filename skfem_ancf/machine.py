@@ -222,7 +222,7 @@ class Machine:
                 function = _load(text, args)
             except Exception as error:
                 return _given_up(text, error)(self.tables.plain, *args[1:])
-            return function(*(self._kept(x) for x in args))
+            return function(*map(self._kept, args))
 
         return run, equations
 

@@ -261,7 +261,14 @@ class System:
             Time, for force elements; in statics the load factor in place of it.
         """
         self._require_coordinates(u)
+        if not self.forces.elements and not np.any(u):
+            return self._force_at_rest.copy()
         return self._evaluate(FORCE, u, load=load, t=t)
+
+    @cached_property
+    def _force_at_rest(self):
+        """That of beams that are not displaced."""
+        return self._evaluate(FORCE, np.zeros(self.N))
 
     def mean_internal_force(self, u0: Array, u1: Array, t: float | None = None) -> Array:
         """The internal force whose work from u0 to u1 is the change of the strain energy.
@@ -604,7 +611,7 @@ class System:
         return M.factorize()
 
     def solve_mass(self, b: Array, u: Array | None = None, t: float = 0.0,
-                   rate: Array | None = None) -> tuple[Array, Array]:
+                   rate: Array | None = None, J: Any = None) -> tuple[Array, Array]:
         """x and l with M x + J^T l = b at free coordinates and J x = rate; x is zero at fixed ones.
 
         Parameters
@@ -615,6 +622,8 @@ class System:
             Where J is taken, shape (N,), and when.
         rate
             Shape (m,).
+        J
+            :meth:`full_jacobian` there, shape (m, N), where it is known.
         """
         if self.by_nodes:
             mass = self._mass_by_nodes
@@ -624,7 +633,7 @@ class System:
         x = self.mass_factors.solve(b * self.free)
         if not self.joints:
             return x, np.zeros(0)
-        J = self.jacobian(u, t)
+        J = J * self.mask if isinstance(J, np.ndarray) else self.jacobian(u, t)
         Y = self.mass_factors.solve(dense(J.T))
         multipliers = np.linalg.solve(J @ Y, J @ x - rate)
         return x - Y @ multipliers, multipliers

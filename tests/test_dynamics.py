@@ -289,7 +289,7 @@ def oscillator():
     M, mass, A = (Band(np.array([1.0, 0.0]), zero, 2, 0, 0) for _ in range(3))
     body, row = Body((), np.zeros((0, 8), np.int64)), np.zeros((0, 1))
     forces = Forces([], 1, 0).tables(lambda i, j: i, True, 0)
-    equations = Equations(body, spring, joints, none, one, A, None, body, forces)
+    equations = Equations(body, spring, joints, none, one, A, None, body, forces, body)
     return equations, Matrices(M, mass, A, Rows(row, row, row, row), Dampers(0, 0, 0, 0.0, A, row))
 
 

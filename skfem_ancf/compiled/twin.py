@@ -121,7 +121,7 @@ def compile_for(text, args):
 
     def run(*args):
         args = [Words(x) if hasattr(x, "by_place") else x for x in args]
-        return entry(*(x.address if isinstance(x, Words) else x for x in args))
+        return entry(*[x.address if type(x) is Words else x for x in args])
 
     run.dispatcher = dispatcher
     return run

@@ -259,13 +259,17 @@ class Collocation(Scheme):
         times = np.minimum(times, limit)  # before what jumps at the end
         tables = s.machine.tables
 
+        # where the functions are asked, those times first
+        at = np.append(times, np.minimum(start + h * (steps + table.samples).ravel(), limit))
+
         def moving(function):
             """Values at the times, and both rates, shape (number of times, 3, ...)."""
-            at = np.minimum(start + h * (steps + table.samples).ravel(), limit)
-            samples = function(at).reshape(len(steps), len(table.samples), -1)
-            first, second = np.einsum("kps,rsx->krpx", table.rates, samples).reshape(
-                2, len(times), -1)
-            return np.stack([function(times), first / h, second / h**2], axis=1)
+            found = function(at)
+            values, samples = found[:len(times)], found[len(times):]
+            first, second = np.einsum(
+                "kps,rsx->krpx", table.rates,
+                samples.reshape(len(steps), len(table.samples), -1)).reshape(2, len(times), -1)
+            return np.stack([values, first / h, second / h**2], axis=1)
 
         moves = s.moves
         held = np.zeros((len(times) if moves else 1, 3, s.N))

@@ -164,6 +164,27 @@ class Integrator:
         return rates(lambda times: np.array([function(t) for t in times]), t, dt, ahead,
                      self.limit)
 
+    def _driven(self, u, t, dt, ahead):
+        """Both rates of Phi at rest, and a function of v: the first rate of J v at rest."""
+        s, tables = self.system, self.system.machine.tables
+        joints, m = tables.plain.joints, s.m
+        if not s.drives:
+            return *np.zeros((2, m)), lambda v: np.zeros(m)
+        if joints.own:
+            return *self._rates(lambda t: s.constraint(u, t), t, dt, ahead), lambda v: self._rates(
+                lambda t: s.full_jacobian(u, t) @ v, t, dt, ahead)[0]
+        first, second = rates(lambda times: np.hstack([tables.offsets(times),
+                                                       tables.slopes(times)]),
+                              t, dt, ahead, self.limit)
+
+        def added(c, g, x):
+            out = c.copy()
+            np.add.at(out, joints.gk, g * x[joints.gi])
+            return out
+
+        return (added(first[:m], first[m:], u), added(second[:m], second[m:], u),
+                lambda v: added(np.zeros(m), first[m:], v))
+
     def support_rates(self, t: float, dt: float, ahead: bool = True) -> Any:
         """Velocity and acceleration of the fixed coordinates, shape (nfixed,) each.
 
@@ -203,15 +224,12 @@ class Integrator:
             raise SupportError(f"the joints are open by {gap:.3g} at the start: begin with beams "
                                "that fit, or from a static solution (start=)")
         y.v[s.fixed], y.acceleration[s.fixed] = self.support_rates(t, dt, ahead)
-        rate = np.zeros(s.m)
+        rate, J = np.zeros(s.m), None
         if s.joints:
-            J, driven = s.full_jacobian(y.u, t), np.zeros((2, s.m))
-            if s.drives:
-                driven = self._rates(lambda t: s.constraint(y.u, t), t, dt, ahead)
-            y.v = y.v + s.solve_mass(np.zeros(s.N), y.u, t, -(J @ y.v + driven[0]))[0]
+            J, driven = s.full_jacobian(y.u, t), self._driven(y.u, t, dt, ahead)
+            y.v = y.v + s.solve_mass(np.zeros(s.N), y.u, t, -(J @ y.v + driven[0]), J)[0]
             rate = -(s.quadratic(y.u, t, y.v) + driven[1] + J @ y.acceleration)
-            if s.drives:
-                rate -= 2.0 * self._rates(lambda t: s.full_jacobian(y.u, t) @ y.v, t, dt, ahead)[0]
+            rate -= 2.0 * driven[2](y.v)
         with contacts.lent(memory):
             if contacts.lasting:
                 kept = contacts.begin(y.u, t) if memory is None else memory
@@ -220,7 +238,7 @@ class Integrator:
                      - s.mass.multiply(y.acceleration))
             if s.damped:
                 force = force - s.damping_force(y.u, y.v, t)
-        acceleration, y.multipliers = s.solve_mass(force, y.u, t, rate)
+        acceleration, y.multipliers = s.solve_mass(force, y.u, t, rate, J)
         y.acceleration = y.acceleration + acceleration
         y.algorithmic, y.force = y.acceleration.copy(), y.multipliers
         soon = y.v + dt * y.acceleration  # from rest there is no energy yet

@@ -88,10 +88,11 @@ class PrescribedAngle(Joint):
         self.angle = require_function("angle", angle, "of time that returns radians")
         self.at, self.beam = on_body(at, beam)
         self.name = require_label("name", name)
+        self._asked: Any = None, None
 
     def bind(self, scene: Scene) -> None:
         _, self.d = section(scene, self.beam, self.at)
-        self.start = np.arctan2(*self.d.start[::-1])
+        self.start, self._asked = np.arctan2(*self.d.start[::-1]), (None, None)
 
     def _angle(self, t: float) -> float:
         return ask_number("angle(t={:g})", self.angle, t)
@@ -105,8 +106,10 @@ class PrescribedAngle(Joint):
         return gradients([(self.d, (-np.sin(a), np.cos(a)))])
 
     def _normals(self, times: Array) -> Array:
-        a = self.start + sample(self.angle, times, "angle", ())
-        return np.array([-np.sin(a), np.cos(a)]).T
+        if self._asked[0] is not times:  # offsets and slopes are asked at the same times
+            a = self.start + sample(self.angle, times, "angle", ())
+            self._asked = times, np.array([-np.sin(a), np.cos(a)]).T
+        return self._asked[1]
 
     def offset(self, times: Array, N: int) -> Array:
         return self._normals(times) @ self.d.start[:, None]
