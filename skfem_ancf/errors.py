@@ -598,8 +598,8 @@ def ask_number(what: str, function: Callable[..., Any], *args: Any) -> float:
         As for :func:`ask`.
     """
     value = ask(what, function, *args)
-    if type(value) is float and -np.inf < value < np.inf:
-        return value
+    if isinstance(value, float) and -np.inf < value < np.inf:
+        return float(value)
     return _returned(require_finite_scalar, what, value, args)
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import ask_array, require_finite, require_function, taught
+from .errors import ask_array, ask_number, require_finite, require_function, taught
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -54,6 +54,8 @@ def sample(function: Callable[[Any], Any], times: ArrayLike, name: str = "functi
     what, n = name + "(t={:g})", len(times)
 
     def one_by_one(times: Array) -> Array:
+        if shape == ():
+            return np.array([ask_number(what, function, t) for t in times])
         return np.array([ask_array(what, shape, function, t) for t in times])
 
     if n > FEW:

@@ -85,13 +85,16 @@ class Courses:
         c, g = np.zeros((1, 3, self._system.m)), np.zeros((1, 4, len(joints.gk)))
         if joints.own or not self._system.m:  # asked by the step itself
             return JointMotions(c, g, drives)
-        c[:, 0], g[:, :2] = tables.offsets(times[:1]), tables.slopes(times[:1])
         if drives:
             _, *found = step_rates(tables.offsets, times, dt)
             c = np.stack(found, axis=1)
-            if tables.turns:
-                middle, end, *found = step_rates(tables.slopes, times, dt)
-                g = np.stack([end, middle if self._conserving else end, *found], axis=1)
+        else:
+            c[:, 0] = tables.offsets(times[:1])
+        if drives and tables.turns:
+            middle, end, *found = step_rates(tables.slopes, times, dt)
+            g = np.stack([end, middle if self._conserving else end, *found], axis=1)
+        else:
+            g[:, :2] = tables.slopes(times[:1])
         return JointMotions(c, g, drives)
 
 

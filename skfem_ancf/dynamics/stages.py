@@ -168,8 +168,8 @@ def room_for_points(method: Method, N: int, m: int, stresses: int, D: Band) -> P
     return Points._make([
         np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((4, n, m)),
         *np.zeros((3, n * stresses)), np.zeros((3, stresses)), np.zeros((4, N)), np.zeros(2 * m),
-        np.zeros((2 * m, 2 * m)), np.zeros((n, N)), *np.zeros((2, k, size)), np.zeros((m, N)), np.zeros((2 * k, m, N)), np.zeros((2, m, N)),
-        np.zeros((m, m)), np.zeros(m), D, method])
+        np.zeros((2 * m, 2 * m)), np.zeros((n, N)), *np.zeros((2, k, size)), np.zeros((m, N)),
+        np.zeros((2 * k, m, N)), np.zeros((2, m, N)), np.zeros((m, m)), np.zeros(m), D, method])
 
 
 @source
