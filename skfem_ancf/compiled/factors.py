@@ -14,15 +14,13 @@ def multiply(A, x, y):
     for i in range(n):
         y[i] = 0.0
     for j in range(n):
-        at, last, s, xj = j * ld, min(A.width, n - 1 - j), 0.0, x[j]
-        subtract(y, j + 1, flat, at + 1, last, -xj)
+        at, last, xj = j * ld, min(A.width, n - 1 - j), x[j]
+        subtract(y, j + 1, flat, (at + 1,), last, (-xj,))
         if A.top > 0:
             up = min(A.width, j)
-            subtract(y, j - up, A.flat, A.top + at - up, up + 1, -xj)
+            subtract(y, j - up, A.flat, (A.top + at - up,), up + 1, (-xj,))
             continue
-        for k in range(last + 1):
-            s += flat[at + k] * x[j + k]
-        y[j] += s
+        y[j] += products(x, j, last + 1, flat, (at,))[0]
 
 
 @jit
@@ -174,10 +172,10 @@ def _solve_exchanged(A, x):
 @jit
 def _subtract_complex(x, y, to, re, im, of, n, a, b):
     """x + i y less a + i b times n numbers, from the places on."""
-    subtract(x, to, re, of, n, a)
-    subtract(x, to, im, of, n, -b)
-    subtract(y, to, im, of, n, a)
-    subtract(y, to, re, of, n, b)
+    subtract(x, to, re, (of,), n, (a,))
+    subtract(x, to, im, (of,), n, (-b,))
+    subtract(y, to, im, (of,), n, (a,))
+    subtract(y, to, re, (of,), n, (b,))
 
 
 @jit
@@ -216,7 +214,7 @@ def _factorize_real(flat, width):
             return False
         inverse = 1.0 / d
         for k in range(1, m + 1):
-            subtract(flat, (j + k) * ld, flat, at + k, m + 1 - k, flat[at + k] * inverse)
+            subtract(flat, (j + k) * ld, flat, (at + k,), m + 1 - k, (flat[at + k] * inverse,))
         for k in range(1, m + 1):
             flat[at + k] *= inverse
     return True
@@ -227,13 +225,10 @@ def _solve_real(flat, x):
     n = x.size
     ld = flat.size // n
     for j in range(n):
-        subtract(x, j + 1, flat, j * ld + 1, min(ld - 1, n - 1 - j), x[j])
+        subtract(x, j + 1, flat, (j * ld + 1,), min(ld - 1, n - 1 - j), (x[j],))
     for j in range(n - 1, -1, -1):
-        at = j * ld
-        s = x[j] / flat[at]
-        for k in range(1, min(ld, n - j)):
-            s -= flat[at + k] * x[j + k]
-        x[j] = s
+        at, m = j * ld, min(ld - 1, n - 1 - j)
+        x[j] = x[j] / flat[at] - products(x, j + 1, m, flat, (at + 1,))[0]
 
 
 @jit
