@@ -11,7 +11,7 @@ from skfem_ancf.evaluation import CARRY, FORCE, MEAN, STRESS, TANGENT, evaluate
 from skfem_ancf.formulations import get_formulation
 from skfem_ancf.kernels import CableKernel, Kernel, law
 from skfem_ancf.kernels import base as kinds_of
-from skfem_ancf.kernels.base import GIVEN, nowhere
+from skfem_ancf.kernels.base import GIVEN, nowhere, repeated
 from skfem_ancf.kernels.cable import _unit
 from skfem_ancf.kernels.section import with_unit_law
 from skfem_ancf.linalg import BandMatrix
@@ -165,6 +165,27 @@ def test_work_of_given_stresses_is_that_on_the_change_of_the_strain(kind, mesh):
         k.texts.evaluate(free, kinds_of.MEAN, u, v, same, own, own.copy(), nowhere(same))
         k.texts.mean(free, u, v, mean)
         close(same, mean)
+
+
+@pytest.mark.parametrize("mesh", ["one", "graded", "curved"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_forces_and_stresses_of_copies_are_those_of_each(kind, mesh):
+    k, n = kernel(kind, mesh), 3
+    N, gap = k.packs[0].start[-1] + k.packs[0].span.size, 5
+    u = 1e-3 * np.random.default_rng(2).standard_normal((n, N + gap))
+    for pack in k.packs:
+        copies, size = repeated(pack, n, N + gap), pack.start.size
+        shape = k.texts.components, len(pack.weights)
+        f, stress = np.zeros(u.shape), np.empty((*shape, n * size))
+        k.texts.force(copies, u.ravel(), f.ravel())
+        k.texts.stress(copies, u.ravel(), stress)
+        for j in range(n):
+            one, own = np.zeros(N + gap), np.empty((*shape, size))
+            k.texts.force(pack, u[j], one)
+            k.texts.stress(pack, u[j], own)
+            assert_allclose(f[j], one, rtol=0, atol=1e-12 * abs(one).max())
+            assert_allclose(stress[:, :, j * size:(j + 1) * size], own, rtol=0,
+                            atol=1e-12 * abs(own).max())
 
 
 def test_a_law_of_ones_own_goes_with_its_kernel():
