@@ -343,7 +343,7 @@ class Tables:
     def _is_quadratic(self, tables):
         """True if the tables give Phi and its derivative: joints of others may not be quadratic."""
         s = self.system
-        if not s.joints:
+        if not s.m:
             return True
         k, i, j, v, gk, gi, _ = tables
         for t, u in zip(TRIED, 0.1 * np.random.default_rng(0).standard_normal((2, s.N))):

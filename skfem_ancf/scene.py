@@ -872,9 +872,12 @@ class Scene:
         Raises
         ------
         InputError
-            If a function of (x, y, t) is no sum of few products of one of (x, y) and one of t, or
-            if the beam has another stress-free strain, and a law that is not linear.
+            If no component is given, if a function of (x, y, t) is no sum of few products of one
+            of (x, y) and one of t, or if the beam has another stress-free strain, and a law that is
+            not linear.
         """
+        if xx is None and yy is None and xy is None:
+            raise InputError("a stress-free strain has a component: give xx, yy or xy")
         k, at, loads = self._number(beam), self._beams[self._number(beam)], []
         given: dict[str, Any] = {}
         for name, value in (("xx", xx), ("yy", yy), ("xy", xy)):

@@ -178,6 +178,7 @@ def test_pickles_and_refines():
     (lambda s: s.temperature("hot"), "number or a function"),
     (lambda s: s.temperature(np.nan), "number or a function"),
     (lambda s: s.eigenstrain(xx=lambda x, y: np.nan * x), "finite"),
+    (lambda s: s.eigenstrain(), "give xx, yy or xy"),
     (lambda s: s.eigenstrain(xx=lambda x, y: np.zeros(3)), "shape"),
     (lambda s: s.eigenstrain(xx=lambda x, y, t: np.tanh(50.0 * (x - t))), "no sum of at most"),
 ])

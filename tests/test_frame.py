@@ -692,6 +692,12 @@ def test_what_is_not_held_is_said():
                                  hinges="all", material=STEEL, height=H, width=H).pin([0, 1])
     with pytest.raises(SupportError, match=r"rotation about.*frame\.hold\(\(0, 0\), 'y'\)"):
         mechanism.point_force((1, 0), at=2).solve_static()
+    alone = Frame.from_lines([(0, 0), (1, 0)], [(0, 1)], material=STEEL, height=H, width=H)
+    with pytest.raises(SupportError, match=r"translation along \(1, 0\)"):
+        alone.point_force((1, 0), at=1).solve_static()
+    flight = alone.point_force((3.0, 0), at=0).integrate(0.01, 1e-3)
+    assert flight.position((0.5, 0))[-1, 0] - 0.5 == pytest.approx(
+        0.5 * 4.0 / (7800 * H**2) * 1e-4, rel=1e-2)
 
 
 @pytest.mark.parametrize("call, error, message", [

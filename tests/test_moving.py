@@ -10,6 +10,7 @@ from test_sections import BRASS, FOAM, PLAIN, STEEL, H, cantilever, plane, plane
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
                         KelvinVoigt, MeshBeam, NeoHookean, Scene, Section)
+from skfem_ancf.formulations import Formulation, Term
 from skfem_ancf.quadrature import gauss
 from skfem_ancf.sections.moving import Moving
 
@@ -237,7 +238,18 @@ def test_they_are_pickled_refined_and_drawn(tmp_path):
         assert "exact for degree 9 of 8" in str(scene.plan())
 
 
+class Few(Formulation):
+    """With a rule across that does not know the section."""
+
+    name = "few"
+
+    def terms(self, element, material):
+        return [Term(material.law(), gauss(4), gauss(3))]
+
+
 @pytest.mark.parametrize("make, words", [
+    (lambda: Beam(taper(), ElementBeamANCF(2), STEEL, section=I, formulation=Few()).kernel,
+     "rule across the section.*thicknesses stay.*full_rules"),
     (lambda: Section.layers((None, STEEL), (None, BRASS), width=1.0), "only one layer"),
     (lambda: Beam(taper(), ElementBeamANCF(2), section=Section.layers(
         (0.05, STEEL), (0.05, BRASS), width=1.0)), "give one layer the thickness None"),

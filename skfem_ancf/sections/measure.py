@@ -63,6 +63,9 @@ class Uniform(Frozen):
         return (x if (self.low, self.high) == (0.0, 1.0) else
                 self.low + (self.high - self.low) * x), w
 
+    def __repr__(self) -> str:
+        return f"<one width from {self.low:.4g} to {self.high:.4g} of the height>"
+
 
 #: That of a full section.
 WHOLE = Uniform()
@@ -96,6 +99,9 @@ class Weighted(Frozen):
 
     def __reduce__(self):
         return Weighted, (self.pieces,)
+
+    def __repr__(self) -> str:
+        return f"<{len(self.pieces)} widths, one above the other>"
 
     def _discrete(self, n):
         """Points and weights of the measure, enough for polynomials of degree n."""

@@ -50,6 +50,9 @@ class Moving(Frozen):
 
     low, high = 0.0, 1.0
 
+    def __repr__(self) -> str:
+        return f"<{len(self.pieces)} widths, whose thicknesses stay along a taper>"
+
     @property
     def spent(self) -> int:
         """Degree of exactness that rules spend on the width."""
