@@ -9,8 +9,9 @@ from numpy.testing import assert_allclose
 from test_sections import BRASS, FOAM, PLAIN, STEEL, H, cantilever, plane, plane_stress
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        KelvinVoigt, MeshBeam, NeoHookean, Scene, Section)
+                        KelvinVoigt, MeshBeam, NeoHookean, RigidBody, Scene, Section)
 from skfem_ancf.formulations import Formulation, Term
+from skfem_ancf.obstacles import Line
 from skfem_ancf.quadrature import gauss
 from skfem_ancf.sections.moving import Moving
 
@@ -165,6 +166,22 @@ def test_motion_keeps_its_energy_but_for_what_is_damped(element, name):
         balance = history.total_energy + history.dissipated
         assert np.ptp(balance) < 1e-11 * np.max(history.kinetic_energy)
         assert (history.dissipated[-1] > 1e-9 * history.kinetic_energy[-1]) == (damping is not None)
+
+
+@pytest.mark.parametrize("name", ["T", "core"])
+def test_they_slide_and_lie_on_the_ground(name):
+    section, material, _ = SECTIONS[name]
+    for element in (ElementBeamCable(5), ElementBeamANCFCubic(2)):
+        beam, body = Beam(taper(6), element, material, section=section), RigidBody(1, 0.1, (0.3, 0))
+        scene = Scene(beam, body).pin("left", beam=beam).pin("right", beam=beam).gravity((0, -9.81))
+        scene.initial_velocity(lambda x: np.array([1.0 + 0 * x[0], 0 * x[0]]), beam=body)
+        scene.slider(body, beam)
+        history = scene.integrate(0.05, 2e-3)
+        assert np.ptp(history.total_energy) < 1e-12 * history.kinetic_energy.max()
+        scene = Scene(Beam(taper(6), element, material, section=section)).clamp("left")
+        scene.point_force((0, -300), at=(1, 0)).obstacle(Line((0, -0.055), (0, 1)))
+        bottom = scene.solve_static().position((1.0, -0.025))
+        assert bottom[1] == pytest.approx(-0.055, abs=1e-3)
 
 
 def graded(x, y):

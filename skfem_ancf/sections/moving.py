@@ -90,8 +90,11 @@ class Moving(Frozen):
         Parameters
         ----------
         n
-            Number of points that a constant width would take.
+            Number of points that a constant width would take; for 1 it is a place of the section
+            where it is highest.
         """
+        if n == 1:
+            return np.array([0.5 * (self.pieces[0].low + self.pieces[-1].high)]), np.ones(1)
         return gauss(n + (self.degree + 1) // 2)
 
     def ends(self, h: Array) -> Array:
