@@ -58,7 +58,8 @@ class Polynomial:
     asked : int
         How often it has been.
     rest : float
-        The largest surplus at the border of the indices: about the error, where 1 is small enough.
+        The largest surplus at the border of the indices, and of those behind which there are no
+        more points: about the error, where 1 is small enough.
 
     Examples
     --------
@@ -76,7 +77,10 @@ class Polynomial:
         self.surplus = np.array([function(self._point(self.indices[0]))])
         inside, border = {tuple(self.indices[0])}, {}
         fresh, largest = tuple(self.indices[0]), np.abs(self.surplus[0])
+        self.rest, left = 0.0, np.inf
         while True:
+            if max(fresh) + 1 == MOST:
+                self.rest = max(self.rest, left)
             for d in range(len(low)):
                 new = *fresh[:d], fresh[d] + 1, *fresh[d + 1:]
                 below = [(*new[:k], new[k] - 1, *new[k + 1:]) for k in range(len(low)) if new[k]]
@@ -92,10 +96,10 @@ class Polynomial:
             fresh = max(border, key=border.__getitem__, default=fresh)
             if border.get(fresh, 0.0) <= 1.0 or len(self.surplus) == most:
                 break
-            del border[fresh]
+            left = border.pop(fresh)
             inside.add(fresh)
         self.asked = len(self.surplus)
-        self.rest = float(max(border.values(), default=0.0))
+        self.rest = float(max([self.rest, *border.values()]))
 
     def _point(self, index):
         return self.low + 0.5 * (1.0 + leja()[index]) * (self.high - self.low)

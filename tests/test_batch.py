@@ -1,6 +1,7 @@
 """Members of one topology, solved together: against themselves alone, and closed forms."""
 
 import itertools
+import warnings
 
 import numpy as np
 import pytest
@@ -10,10 +11,10 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         MeshBeam, NeoHookean, Scene, StVenantKirchhoff, batch, members, sweep)
 from skfem_ancf.alike import Unlike
 from skfem_ancf.batch import Batch, Lane
-from skfem_ancf.errors import NameUnknown, SweepWarning
+from skfem_ancf.errors import NameUnknown, StabilityWarning, SweepWarning
 from skfem_ancf.members import Sweep
 from skfem_ancf.obstacles import Circle
-from skfem_ancf.polynomials import Polynomial
+from skfem_ancf.polynomials import MOST, Polynomial
 from skfem_ancf.readings import Readings
 
 TIP = {"tip": ("displacement", "right"), "end": ("position", "right")}
@@ -135,6 +136,33 @@ def test_no_branch_is_changed(monkeypatch):
         assert_allclose(result["value"][k], alone(column, {"force": forces}, k), rtol=1e-7)
 
 
+def upright(load, kind):
+    """Pushed along its axis, by a part of Euler's load."""
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 4), height=0.02)
+    beam = Beam(mesh, ELEMENTS[kind], StVenantKirchhoff(2e8, 0.3), width=0.01)
+    return Scene(beam).clamp("left").point_force((-load * EULER, 0), at=(1, 0))
+
+
+EULER = np.pi**2 / 4 * 2e8 * 0.01 * 0.02**3 / 12
+
+
+@pytest.mark.parametrize("kind", ["section", "cable"])
+def test_a_sweep_through_a_buckling_load_says_what_each_member_says_alone(kind):
+    """The straight column is in equilibrium, and its tangent the one thing that tells."""
+    loads = np.append(np.linspace(0.5, 0.98, 41), np.linspace(1.06, 1.2, 9))
+    with pytest.warns(StabilityWarning) as said:
+        result = sweep(lambda load: upright(load, kind), {"load": loads}, ("position", "right"))
+    assert "41 of 50 members were solved together" in result.report and not result.failures
+    assert len([w for w in said if w.category is StabilityWarning]) == 9
+    aside = np.abs(result["value"][:, 1])
+    assert np.all(aside[:41] < 1e-12) and np.all(aside[41:] > 0.2)
+    for k in (20, 41, 49):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", StabilityWarning)
+            its = upright(loads[k], kind).solve_static().displacement((1, 0)) + [1, 0]
+        assert_allclose(result["value"][k], its, rtol=1e-7, atol=1e-12)
+
+
 def test_a_start_far_from_the_branch_is_not_followed():
     """Starts that are wrong are seen, and those members are solved from zero."""
     x = np.linspace(1e8, 2e8, 300)[:, None]
@@ -232,6 +260,9 @@ def test_polynomials_grow_where_they_have_to():
     x = np.random.default_rng(0).uniform(0, 2, (20, 3))
     assert_allclose(p(x), np.array([1.0 + np.prod(x, axis=1), np.exp(x[:, 1])]).T, rtol=1e-12)
     assert p.rest <= 1.0 and len(asked) == p.asked < 45  # of 17 along one axis
+    steep = Polynomial(lambda x: np.array([np.sqrt(max(x[0], 0.0))]), -np.ones(1), np.ones(1),
+                       lambda surplus, largest: np.max(np.abs(surplus)) / 1e-13, 200)
+    assert steep.asked == MOST and steep.rest > 1e10  # there are no more points, and it is far off
     few = Polynomial(function, np.zeros(3), np.full(3, 2.0),
                      lambda surplus, largest: np.max(np.abs(surplus)) / 1e-13, 10)
     assert few.asked == 10 and few.rest > 1.0
