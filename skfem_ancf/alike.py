@@ -33,6 +33,10 @@ class Unlike(Exception):
     """Scenes that cannot be solved together; the message says why."""
 
 
+class NotBuilt(Unlike):
+    """One of them could not be built, or what is read of it not be found."""
+
+
 class Solved(NamedTuple):
     """All that a static solution takes of a scene.
 
@@ -199,7 +203,7 @@ class Family:
         except Unlike:
             raise
         except Exception as error:  # of the caller's function, which may raise anything
-            raise Unlike(f"build, or what is read, failed for {x}: {error!r}") from error
+            raise NotBuilt(f"build, or what is read, failed for {x}: {error!r}") from error
         if self.one is None:
             self.one = found
             sizes = [x.size for x in found.arrays.values()]

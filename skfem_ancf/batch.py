@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from functools import partial
 from queue import SimpleQueue
 from threading import Lock
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import compiled
-from .alike import Family, Unlike
+from .alike import Family, NotBuilt, Unlike
 from .kernels.section import SectionPack, side_by_side
 from .linalg import BandMatrix
 from .polynomials import Polynomial
@@ -44,6 +45,8 @@ START, USEFUL, STARTS, CHECKED = 1e-10, 1e-2, 16, 1000
 OPTIONS = "mixed", 1e-8, 30
 #: Members that are solved alone since they may be out of the range of law or mesh, about.
 WARNED = 4
+#: How often members at the ends of a parameter are left out, if they cannot be built.
+ROUNDS = 4
 #: What is compiled in one thread at a time.
 _LOCK = Lock()
 
@@ -128,7 +131,7 @@ class Batch:
     def __init__(self, build: Callable[[Array], Scene], readings: Sequence[Reading], x: Array
                  ) -> None:
         if len(x) < LEAST:
-            raise Unlike(f"{len(x)} members are fewer than {LEAST}")
+            raise Unlike(f"fewer than {LEAST} are alike")
         low, high = np.min(x, axis=0), np.max(x, axis=0)
         self.x, self._readings = x, readings
         self.family = Family(build, readings, low, high, len(x) // EACH)
@@ -301,7 +304,7 @@ def threads_of(workers: int | None) -> int:
 
 
 def families(columns: dict[str, Array], places: Sequence[int]
-             ) -> Iterator[tuple[Array, list[str], Array]]:
+             ) -> Iterator[tuple[Array, list[tuple[str, int]], Array]]:
     """Members that may be of one topology: equal but for floats.
 
     Parameters
@@ -314,20 +317,22 @@ def families(columns: dict[str, Array], places: Sequence[int]
     Yields
     ------
     places, names, x
-        Some of the places, names of floats that differ among them, and their values, (n, d).
+        Some of the places; of floats that differ among them the name, and the number in what that
+        is for a member; and their values, (n, d).
     """
     if not len(places):
         return
     at = np.array(places)
-    floats = [name for name, x in columns.items() if x.dtype.kind == "f" and x.ndim == 1]
+    floats = {name: x.reshape(len(x), -1) for name, x in columns.items() if x.dtype.kind == "f"}
     others = [x for name, x in columns.items() if name not in floats]
     groups: dict[Any, Any] = {} if others else {None: np.arange(len(at))}
     for k, place in enumerate(places) if others else ():
         groups.setdefault(tuple(_key(x[place]) for x in others), []).append(k)
     for found in groups.values():
         mine = at[found]
-        names = [name for name in floats if np.any(columns[name][mine] != columns[name][mine[0]])]
-        yield mine, names, np.array([columns[name][mine] for name in names]).reshape(
+        names = [(name, int(k)) for name, x in floats.items()
+                 for k in np.flatnonzero(np.any(x[mine] != x[mine[0]], axis=0))]
+        yield mine, names, np.array([floats[name][mine, k] for name, k in names]).reshape(
             len(names), len(mine)).T
 
 
@@ -337,6 +342,43 @@ def _key(value):
     except TypeError:
         return value.tobytes() if isinstance(value, np.ndarray) else repr(value)
     return value
+
+
+def _built(build, member, names, values):
+    """The scene of a member some of whose floats are others."""
+    member = dict(member)
+    for (name, k), value in zip(names, values):
+        given = member[name]
+        if np.ndim(given):
+            x = np.array(given, dtype=float)
+            x.reshape(-1)[k] = value
+            member[name] = x if isinstance(given, np.ndarray) else type(given)(x.tolist())
+        else:
+            member[name] = float(value)
+    return build(**member)
+
+
+def _batch(build, items, x):
+    """A Batch of members, and which they are: without those at the ends that cannot be built."""
+    keep = np.arange(len(x))
+    for left in range(ROUNDS, -1, -1):
+        try:
+            return Batch(build, items, x[keep]), keep
+        except NotBuilt:
+            ends = np.unique([np.argmin(x[keep], axis=0), np.argmax(x[keep], axis=0)])
+            out = [k for k in ends if _fails(build, x[keep[k]])]
+            if not out or not left:
+                raise
+            keep = np.delete(keep, out)
+    raise AssertionError
+
+
+def _fails(build, x):
+    try:
+        build(x)
+    except Exception:  # of the caller's function, which may raise anything
+        return True
+    return False
 
 
 def solve_together(build: Callable[..., Scene], readings: Readings,
@@ -359,32 +401,48 @@ def solve_together(build: Callable[..., Scene], readings: Readings,
     if not readings.at_points:
         said.append("each member was solved alone: what is read is a function of the State")
         return
+    alone: dict[str, int] = {}
     for found, names, x in families(columns, places):
-        def build_at(values, first=members[found[0]], names=names):
-            return build(**{**first, **dict(zip(names, map(float, values)))})
-
-        try:
-            if not np.all(np.isfinite(x)):
-                raise Unlike("a parameter is not finite")
-            batch = Batch(build_at, readings.items, x)
-        except Unlike as reason:
-            said.append(f"{len(found)} members were solved alone: {reason}")
-            logger.info(said[-1])
+        finite = np.all(np.isfinite(x), axis=1)
+        _count(alone, "a parameter is not finite", np.sum(~finite))
+        found, x = found[finite], x[finite]
+        if not len(found):
             continue
+        try:
+            build_at = partial(_built, build, members[found[0]], names)
+            batch, kept = _batch(build_at, readings.items, x)
+        except Unlike as reason:
+            _count(alone, str(reason), len(found))
+            continue
+        _count(alone, "build, or what is read, fails at an end of a parameter",
+               len(found) - len(kept))
+        found = found[kept]
         counts = np.zeros(5, dtype=int)
         for which, values, good, doubtful, iterations in _spread(batch, threads):
-            alone = np.flatnonzero(doubtful)[:max(0, WARNED - counts[4])]  # they will warn
-            keep = np.delete(np.arange(len(doubtful)), alone)
+            warned = np.flatnonzero(doubtful)[:max(0, WARNED - counts[4])]  # alone they will warn
+            keep = np.delete(np.arange(len(doubtful)), warned)
             counts += len(good), len(keep), *iterations, doubtful.sum()
             yield found[which[good][keep]], {name: x[keep] for name, x in values.items()}
-        said.append(f"{counts[1]} of {counts[0]} members were solved together: "
-                    f"{batch.family.asked} scenes were built to know all, {counts[2]} linear "
-                    f"systems, {counts[3]} from zero"
-                    + (f", the others from a polynomial of {batch.start.asked} solutions"
-                       if batch.start is not None else "")
-                    + (f"; {counts[4]} may be out of the range of law or mesh, some of which were "
-                       "solved alone, with a warning where they are" if counts[4] else ""))
+        said.append(_report(batch, counts))
         logger.info(said[-1])
+    said += [f"{count} members were solved alone: {reason}" for reason, count in alone.items()]
+
+
+def _count(alone, reason, members):
+    """Add up members by the reason why they are solved alone."""
+    if members:
+        alone[reason] = alone.get(reason, 0) + int(members)
+        logger.info("%d members are solved alone: %s", members, reason)
+
+
+def _report(batch, counts):
+    """How members were solved together, in words."""
+    return (f"{counts[1]} of {counts[0]} members were solved together: {batch.family.asked} scenes "
+            f"were built to know all, {counts[2]} linear systems, {counts[3]} from zero"
+            + (f", the others from a polynomial of {batch.start.asked} solutions"
+               if batch.start is not None else "")
+            + (f"; {counts[4]} may be out of the range of law or mesh, some of which were solved "
+               "alone, with a warning where they are" if counts[4] else ""))
 
 
 def _spread(batch, threads):

@@ -102,8 +102,8 @@ class Sweep:
     @property
     def failures(self) -> list[Failure]:
         """Those that failed, with their parameters and errors."""
-        return [Failure(k, {name: column[k] for name, column in self.parameters.items()}, error)
-                for k, error in self._errors.items()]
+        return [Failure(k, {name: _plain(column[k]) for name, column in self.parameters.items()},
+                        error) for k, error in self._errors.items()]
 
     def __len__(self) -> int:
         return len(self.status)
@@ -197,6 +197,11 @@ class Sweep:
         return cls(columns["parameters"], [
             {name: column[k] for name, column in columns["values"].items()} if done[k]
             else str(errors[k]) if k in errors else None for k in range(len(done))])
+
+
+def _plain(x):
+    """A number of NumPy as one of Python, which is shown as it is written."""
+    return x.item() if isinstance(x, np.generic) else x
 
 
 def column_of(values: Sequence[Any]) -> Array:

@@ -17,7 +17,7 @@ from .batch import solve_together, threads_of
 from .members import Sweep, column_of, require_plain
 from .progress import progress_bar
 from .readings import Readings, measured
-from .workers import Task, here, in_processes, on_cluster
+from .workers import Task, here, in_processes, on_cluster, sendable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -159,7 +159,11 @@ def _source(task, members, places, workers, client, record):
                                            places, threads_of(workers), record.said):
             left[chunk] = False
             yield chunk, found
-        places = np.flatnonzero(left).tolist()
+        some, places = len(places) > np.sum(left), np.flatnonzero(left).tolist()
+        if some and places and workers is not None and not sendable(task):
+            record.said.append("the others were solved in this process: functions that cannot be "
+                               "pickled are known in no other one")
+            workers = None
     if places:
         yield from (here(task, members, places) if workers is None else
                     in_processes(task, members, places, workers))

@@ -134,6 +134,21 @@ def on_cluster(task: Task, members: list[dict[str, Any]], places: Iterable[int],
     yield from _spread(partial(client.submit, pure=False), lanes, task, members, places)
 
 
+def sendable(task: Task) -> bool:
+    """True if the functions can be sent to another process.
+
+    Parameters
+    ----------
+    task
+        What is done with each.
+    """
+    try:
+        _require_sendable(task)
+    except PickleError:
+        return False
+    return True
+
+
 def _require_sendable(task):
     named = [("build", task.build), ("measure", task.measure)]
     require_picklable(named)

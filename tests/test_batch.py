@@ -11,7 +11,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         MeshBeam, NeoHookean, Scene, StVenantKirchhoff, batch, members, sweep)
 from skfem_ancf.alike import Unlike
 from skfem_ancf.batch import Batch, Lane
-from skfem_ancf.errors import NameUnknown, StabilityWarning, SweepWarning
+from skfem_ancf.errors import NameUnknown, PickleError, StabilityWarning, SweepWarning
 from skfem_ancf.members import Sweep
 from skfem_ancf.obstacles import Circle
 from skfem_ancf.polynomials import MOST, Polynomial
@@ -181,7 +181,7 @@ def test_what_is_not_alike_is_grouped_or_alone():
     table = [dict(E=E, n=n) for n, E in itertools.product([1, 2], np.linspace(1e9, 2e9, 20))]
     result = sweep(cantilever, [*table, dict(E=1e9, n=3)], TIP)
     assert result.report.count("20 of 20 members") == 2
-    assert "1 members were solved alone: 1 members are fewer than 16" in result.report
+    assert "1 members were solved alone: fewer than 16 are alike" in result.report
     assert_allclose(result["tip"][25], alone(cantilever, {"E": [1e9 + 5e9 / 19], "n": [2]}, 0))
     assert not result.failures and "sweep" in str(cantilever().plan())
 
@@ -213,18 +213,59 @@ def test_why_members_are_alone(build, reason):
         Batch(lambda x: build(float(x[0])), Readings(TIP).items, x)
 
 
-def test_what_fails_alone_is_listed():
-    """Members that have no value of a parameter, and those whose scene is refused."""
-    def build(E):
-        return cantilever(E) if E < 1.9e9 else cantilever(E).replace(width=-1.0)
+def up_to(E):
+    return cantilever(E) if E < 1.9e9 else cantilever(E).replace(width=-1.0)
 
-    E = np.append(np.linspace(1e9, 1.8e9, 20), np.nan)
+
+@pytest.mark.parametrize("build, bad, text", [
+    (cantilever, [np.nan, np.inf], "2 members were solved alone: a parameter is not finite"),
+    (cantilever, [-1e9], "1 members were solved alone: build, or what is read, fails at an end"),
+    (up_to, [2e9, 2.1e9], "2 members were solved alone: build, or what is read, fails at an end")])
+def test_what_fails_alone_is_listed_and_the_others_stay_together(build, bad, text):
+    """Members that have no value of a parameter, and those whose scene is refused."""
+    E = np.insert(np.linspace(1e9, 1.8e9, 20), 7, bad)
+    with pytest.warns(SweepWarning, match=f"{len(bad)} of {len(E)} members failed"):
+        result = sweep(build, {"E": E}, TIP)
+    assert [f.member for f in result.failures] == list(range(7, 7 + len(bad)))
+    assert [str(f.parameters["E"]) for f in result.failures] == [str(x) for x in bad]
+    assert np.isnan(result["tip"][7]).all() and np.isfinite(np.delete(
+        result["tip"], np.s_[7:7 + len(bad)], axis=0)).all()
+    assert "20 of 20 members were solved together" in result.report and text in result.report
+
+
+def test_many_that_cannot_be_built_are_tried_alone():
+    def build(E):
+        return cantilever(E if E < 1.5e9 else -E)
+
+    with pytest.warns(SweepWarning, match="20 of 40"):
+        result = sweep(build, {"E": np.linspace(1e9, 2e9, 40)}, TIP)
+    assert "40 members were solved alone: build, or what is read, failed" in result.report
+    assert np.isfinite(result["tip"][:20]).all() and len(result.failures) == 20
+
+
+def test_nothing_is_lost_where_functions_cannot_be_sent():
+    """What is left of members solved together is solved here, though processes are asked for."""
     with pytest.warns(SweepWarning, match="1 of 21 members failed"):
-        result = sweep(cantilever, {"E": E}, TIP)
-    assert np.isnan(result["tip"][-1]).all() and "not finite" in result.report
-    with pytest.warns(SweepWarning, match="width"):
-        result = sweep(build, {"E": np.linspace(1e9, 2e9, 20)}, TIP)
-    assert len(result.failures) == 2 and "width" in result.report
+        result = sweep(lambda E: cantilever(E), {"E": [*np.linspace(1e9, 2e9, 20), np.nan]}, TIP,
+                       workers=2)
+    assert np.isfinite(result["tip"][:20]).all() and "cannot be pickled" in result.report
+    with pytest.raises(PickleError, match="cannot be pickled"):
+        sweep(lambda E: cantilever(E), {"E": [1e9, 2e9]}, TIP, workers=2)
+
+
+@pytest.mark.parametrize("kind", [np.array, tuple, list])
+def test_parameters_that_are_vectors(kind):
+    def build(force, E):
+        assert isinstance(force, np.ndarray if kind is np.array else kind)
+        return cantilever(E).point_force(tuple(force), at=(1, 0))
+
+    forces = np.random.default_rng(0).uniform(-0.01, 0.01, (40, 2))
+    table = [dict(force=kind(force), E=1e9 + 1e7 * k) for k, force in enumerate(forces)]
+    result = sweep(build, table, ("displacement", "right"))
+    assert "40 of 40 members were solved together" in result.report
+    for k in (0, 39):
+        assert_allclose(result["value"][k],
+                        build(**table[k]).solve_static().displacement((1, 0)), rtol=1e-8)
 
 
 def test_functions_of_the_state_and_a_file(tmp_path):

@@ -2,11 +2,15 @@
 
 import itertools
 import os
+import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+import skfem_ancf
 from skfem_ancf import (Beam, CallbackError, CallError, ElementBeamCable, FileError, InputError,
                         MeshBeam, MissingExtra, NameUnknown, Scene, StVenantKirchhoff, sweep)
 from skfem_ancf.errors import Interrupted, PickleError, SweepWarning
@@ -131,6 +135,33 @@ def test_an_interrupted_sweep_goes_on(tmp_path):
     again = Sweep.load(path)
     assert_array_equal(again["value"], result["value"])
     assert again.failures == result.failures
+
+
+KILLED = """
+import os, signal
+import numpy as np
+import skfem_ancf.sweeps
+
+skfem_ancf.sweeps._SECONDS = skfem_ancf.sweeps._RARER = 0.0
+
+def measure(x):
+    if x == 3.0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return x**0.5
+
+skfem_ancf.sweep(lambda x: x, {"x": np.arange(6.0)}, measure, path="roots.npz")
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="of POSIX")
+def test_a_killed_sweep_goes_on(tmp_path):
+    path, asked = tmp_path / "roots.npz", []
+    done = subprocess.run([sys.executable, "-c", KILLED], check=False, cwd=tmp_path, env={
+        **os.environ, "PYTHONPATH": os.path.dirname(os.path.dirname(skfem_ancf.__file__))})
+    assert done.returncode == -signal.SIGKILL
+    result = sweep(just, {"x": np.arange(6.0)}, lambda x: asked.append(x) or root(x), path=path)
+    assert asked == [3.0, 4.0, 5.0]
+    assert_allclose(result["value"], np.arange(6.0)**0.5)
 
 
 def test_the_file_is_of_one_table(tmp_path):
