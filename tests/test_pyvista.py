@@ -9,6 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 pv = pytest.importorskip("pyvista", reason="pyvista is not installed (the extra 'view')")
 
+from vtkmodules.vtkCommonCore import vtkLogger
+
 from conftest import quarter_arc
 from test_io import bent
 from skfem_ancf import (Beam, ElementBeamANCF, InputError, MeshBeam, MissingExtra,
@@ -130,6 +132,16 @@ def test_view_says_that_the_section_is_enlarged(history):
     again = history.state(5).view(plotter=(own := pv.Plotter(off_screen=True)))
     assert again is own
     own.close()
+
+
+def test_no_display_is_no_warning(state, monkeypatch, capfd):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    said = vtkLogger.GetCurrentVerbosityCutoff()
+    plotter = state.view("eps_yy")
+    assert plotter.off_screen and vtkLogger.GetCurrentVerbosityCutoff() == said
+    plotter.close()
+    assert "WARN" not in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("backend", ["pyvista", "matplotlib"])

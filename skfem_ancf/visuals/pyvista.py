@@ -461,10 +461,17 @@ def new_plotter(pv: Any, off_screen: bool | None, window_size: tuple[int, int]) 
     window_size
         As for :func:`view`, shape (2,).
     """
-    if off_screen is None:
-        off_screen = not has_display()
-    return pv.Plotter(off_screen=require_flag("off_screen", off_screen),
-                      window_size=pixels("window_size", window_size))
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    hidden = not has_display()
+    off_screen = hidden if off_screen is None else require_flag("off_screen", off_screen)
+    size, said = pixels("window_size", window_size), vtkLogger.GetCurrentVerbosityCutoff()
+    if hidden and off_screen:  # that there is no display, which VTK looks for all the same
+        vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
+    try:
+        return pv.Plotter(off_screen=off_screen, window_size=size)
+    finally:
+        vtkLogger.SetStderrVerbosity(said)
 
 
 def pixels(name: str, size: Any) -> tuple[int, int]:
