@@ -41,6 +41,7 @@ from .panels import Moved, Panels
 from .point import AGAIN
 from .quadrature import gauss
 from .mapping import cross, polynomial
+from .sections.jumps import beside
 from .section_forces import NotRecovered, SectionForces, Sections, viscous_forces
 from .spread import AXIS, SNAP, Sampled, station_of_node, stations_of_vector
 
@@ -196,21 +197,21 @@ class _Piece:
         if at is not None:
             eta = at.eta
         sections = Sections(self.forces, self.e, xi, eta, self.forces.lifted)
-        axis = Sections(self.forces, self.e, xi, np.array([0.5]))
+        axis, X = Sections(self.forces, self.e, xi, np.array([0.5])), beside(sections.X)
         speed = np.hypot(*axis.J[:, 0, :, 0])
         h, slope = mesh.mapping().height(sections.X[0], self.e)
         self.Y, self.lean = h * (eta - 0.5), slope / speed[:, None] * (eta - 0.5)
         self.span, self.swell, self.moved = h, slope / (speed[:, None] * h), at
         if at is None:
             self.width = recovery.panels.width * (
-                recovery.of_slabs(across.breadth, sections.X, self.e) + 0.0 * sections.X[0])
+                recovery.of_slabs(across.breadth, X, self.e) + 0.0 * X[0])
         else:
             self.span, rate = h * at.stretch, slope / speed[:, None]
             self.lean, self.swell = self.lean + h * rate * at.drift, self.swell + rate * at.swell
-            self.width = recovery.of_slabs(across.width, sections.X, self.e)
-        self.grade = recovery.of_slabs(across.grade, sections.X, self.e)
+            self.width = recovery.of_slabs(across.width, X, self.e)
+        self.grade = recovery.of_slabs(across.grade, X, self.e)
         self.g = sections.volume / (speed[:, None] * h)
-        self.E0 = sum(np.moveaxis(np.multiply.outer(factor, eigen.strain_at(sections.X, self.e)),
+        self.E0 = sum(np.moveaxis(np.multiply.outer(factor, eigen.strain_at(X, self.e)),
                                   np.ndim(factor), 0) for factor, eigen in self.forces.eigen)
         area = self.integral(1.0)[:, None]
         self.below = self.from_bottom(self.width) / area

@@ -19,6 +19,7 @@ from .kept import kept
 from .kernels.base import apart
 from .mapping import cross
 from .quadrature import gauss, lagrange
+from .sections.jumps import beside, jumps
 from .spread import AXIS, BODY, SNAP, station_of_node
 
 if TYPE_CHECKING:
@@ -154,9 +155,9 @@ class Sections:
         across = self.forces.beam.across
         if self._slab is not None:
             return across.density(self._slab, self.X, self.e)
-        zero = np.zeros(self.shape)
-        return across.of_slabs(self.X, zero, [
-            partial(across.density, slab, self.X, self.e) for slab in across.slabs], self.e,
+        zero, X = np.zeros(self.shape), beside(self.X)
+        return across.of_slabs(X, zero, [
+            partial(across.density, slab, X, self.e) for slab in across.slabs], self.e,
             graded=False) + zero
 
     def sampled(self, where: int) -> Any:
@@ -185,13 +186,18 @@ class Sections:
             else:
                 t = load.traction
                 if callable(t):
-                    x = f.beam.mesh.mapping().F(self.X, self.e)
-                    t = np.array([np.broadcast_to(c, self.shape) for c in t(x)])
+                    t = _traction(f.beam, t, beside(self.X), self.e)
                 else:
                     t = np.asarray(t, dtype=float)[:, None, None]
                 out += on * (t * np.hypot(*self.J[:, 0])).reshape(
                     (2,) + (1,) * len(f.states) + (len(self.e), -1))
         return out
+
+
+def _traction(beam, traction, X, e):
+    """What a function of places returns at points of the stress-free body, (2, n, k)."""
+    return np.array([np.broadcast_to(c, X.shape[1:])
+                     for c in traction(beam.mesh.mapping().F(X, e))])
 
 
 class SectionForces:
@@ -375,10 +381,16 @@ class SectionForces:
         stations += [station_of_node(mesh, k) for k in np.concatenate(ends)]
         gaps = np.nonzero(mesh.t[1, :-1] != mesh.t[0, 1:])[0] + 1.0
         for _, load in self.faces:
-            for face in load.faces:
+            for side, face in enumerate(load.faces):
                 stations += list(np.nonzero(face[1:] != face[:-1])[0] + 1.0)
+                if callable(load.traction) and np.any(face):
+                    stations += list(jumps(partial(_traction, self.beam, load.traction),
+                                           mesh.nelements, np.array([float(side)])))
         for s in self.sampled:
-            stations += list(s.changes(mesh.nelements))
+            stations += [*s.changes(mesh.nelements), *s.jumps(mesh.nelements)]
+        stations += list(self.beam.across.jumps)
+        for _, eigen in self.eigen:
+            stations += list(jumps(eigen.strain_at, mesh.nelements, np.linspace(0.0, 1.0, 5)))
         cuts = np.concatenate([stations, gaps, [0.0, mesh.nelements]])
         self.cuts = np.unique(self._at_nodes(cuts))
         for station in self._acted[self._acted % 1.0 != 0]:

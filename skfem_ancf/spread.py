@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .quadrature import lagrange
+from .sections.jumps import jumps
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -89,6 +90,20 @@ class Sampled:
         """Stations between elements on which it acts and those on which it does not."""
         on = np.isin(np.arange(nelements), self.elements)
         return np.nonzero(on[1:] != on[:-1])[0] + 1.0
+
+    def jumps(self, nelements: int) -> Array:
+        """Stations at which it is another one on both sides, by a tenth of its largest value.
+
+        Less is from element to element what polynomials miss of a smooth density.
+
+        Parameters
+        ----------
+        nelements
+            How many elements there are.
+        """
+        eta = np.array([0.0]) if self.eta is None else self.eta
+        return jumps(lambda X, e: self.at(e, X[0, :, 0], X[1], nelements), nelements, eta,
+                     0.1 * float(np.max(np.abs(self.values), initial=0.0)))
 
 
 class Facets(NamedTuple):

@@ -15,6 +15,7 @@ from ..frozen import Frozen
 from ..kept import cached_property
 from ..quadrature import gauss
 from .base import Rectangle, asked
+from .jumps import KINK, jumps
 from .moving import Moving
 from .shear import shear_factor
 
@@ -94,6 +95,26 @@ class Across(Frozen):
             for name in ("width", "grade", "density"):
                 if callable(getattr(slab, name)):
                     asked(_NAMES[name], getattr(slab, name), *self.coordinates(inside))
+
+    @cached_property
+    def jumps(self) -> Array:
+        """Stations, see :func:`~.jumps.jumps`, at which something of the section jumps.
+
+        A width, a modulus, a density, or the slope of the height.
+        """
+        n, found = self.mesh.nelements, [np.zeros(0)]
+        for slab in self.slabs:
+            eta = np.linspace(slab.measure.low, slab.measure.high, POINTS + 1)
+            found += [jumps(partial(self._given, name, slab), n, eta)
+                      for name in _NAMES if callable(getattr(slab, name))]
+        if self.mesh.heights is not None:
+            found.append(jumps(lambda X, e: self.mesh.mapping().height(X[0], e)[1]
+                               / self.mesh.lengths[e, None], n, np.array([0.5]), KINK))
+        return np.unique(np.concatenate(found))
+
+    def _given(self, name, slab, X, tind):
+        """What a function of a slab, one of ``_NAMES``, returns at points."""
+        return asked(_NAMES[name], getattr(slab, name), *self._inside(slab, X, tind))
 
     # points
 

@@ -1,0 +1,65 @@
+"""Nodes at which a function of material coordinates jumps along the axis, and its values beside."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..types import Array
+
+#: How far from its ends an element is asked for what may jump there, relative to its length.
+SIDE = 1e-7
+
+#: Changes from element to element that are jumps: of a function, relative to its largest value,
+#: and of the slope of the height.
+JUMP, KINK = 1e-3, 0.02
+
+
+def beside(X: Array) -> Array:
+    """Points of elements, those at ends moved into them: what jumps there is that of the element.
+
+    Parameters
+    ----------
+    X
+        Reference points, shape (2, ...).
+
+    Examples
+    --------
+    >>> beside(np.array([[0.0, 0.5], [1.0, 1.0]])).tolist()
+    [[1e-07, 0.5], [1.0, 1.0]]
+    """
+    return np.array([np.clip(X[0], SIDE, 1.0 - SIDE), X[1]])
+
+
+def jumps(ask: Callable[[Array, Array], Array], n: int, eta: Array, size: float | None = None
+          ) -> Array:
+    """The numbers of the elements that begin where a function jumps, as stations.
+
+    Parameters
+    ----------
+    ask
+        From reference points (2, n, k) and elements (n,) to its values there, (..., n, k).
+    n
+        How many elements there are.
+    eta
+        Places across sections, shape (k,).
+    size
+        A change that is a jump; a thousandth of the largest value by default.
+
+    Examples
+    --------
+    >>> jumps(lambda X, e: 1.0 + (X[0] + e[:, None] > 2.0), 4, np.array([0.5]))
+    array([2.])
+    """
+    e = np.arange(n)
+    left, right = (ask(np.array([np.full((n, len(eta)), xi), np.tile(eta, (n, 1))]), e)
+                   for xi in (SIDE, 1.0 - SIDE))
+    axes = tuple(k for k in range(left.ndim) if k != left.ndim - 2)
+    if size is None:
+        size = JUMP * max(np.max(np.abs(left)), np.max(np.abs(right)))
+    gap = np.max(np.abs(left[..., 1:, :] - right[..., :-1, :]), axis=axes, initial=0.0)
+    return np.nonzero(gap > size)[0] + 1.0

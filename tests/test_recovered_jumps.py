@@ -1,0 +1,98 @@
+"""Recovered fields where a modulus, a width, a temperature, a height or a load jumps at a node."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
+                        Scene, StVenantKirchhoff)
+from skfem_ancf.sections.jumps import jumps
+
+E, B, H, M, ALPHA = 1e6, 0.05, 0.06, 0.05, 1e-3
+elements = pytest.mark.parametrize(
+    "element", [ElementBeamANCF(3), ElementBeamANCFCubic(2), ElementBeamCable(3)], ids=repr)
+
+
+def step(x, y=0.0):
+    return 1.0 + 2.0 * (x > 0.5) + 0.0 * y
+
+
+def cantilever(element, modulus=E, width=B, height=H):
+    mesh = MeshBeam.init_line(np.linspace(0.0, 1.0, 17), height=height)
+    material = StVenantKirchhoff(E=modulus, nu=0.3, thermal_expansion=ALPHA)
+    return Scene(Beam(mesh, element, material, width)).clamp("left")
+
+
+def strains(state, y=0.02):
+    """eps_xx just before the jump, just behind it, and well behind it."""
+    return state.strain([(0.49, y), (0.51, y), (0.8, y)])[0]
+
+
+@elements
+@pytest.mark.parametrize("what", ["modulus", "width"])
+def test_a_bent_beam_of_two_moduli_or_widths(element, what):
+    """Each half is bent as if it were alone: -y M / (E I)."""
+    given = {what: lambda x, y: {"modulus": E, "width": B}[what] * step(x, y)}
+    state = cantilever(element, **given).moment("right", M).solve_static()
+    before, behind, far = strains(state)
+    exact = -0.02 * M / (E * B * H**3 / 12)
+    assert_allclose([before, behind], [exact, exact / 3.0], rtol=2e-3)
+    assert behind == pytest.approx(far, rel=1e-6)
+
+
+@elements
+def test_a_beam_that_is_heated_from_its_middle_on(element):
+    """It bends freely there, and not before: eps_xx = alpha T."""
+    scene = cantilever(element).temperature(lambda x, y: 40.0 * (x > 0.5) * y / H)
+    before, behind, far = strains(scene.solve_static())
+    assert before == pytest.approx(0.0, abs=1e-10)
+    assert behind == pytest.approx(ALPHA * 40.0 * 0.02 / H, rel=5e-3)
+    assert behind == pytest.approx(far, rel=1e-6)
+
+
+@elements
+def test_a_face_that_is_loaded_from_its_middle_on(element):
+    q = 50.0
+    scene = cantilever(element).traction(
+        "top", lambda x: np.array([0.0 * x[0], -q * (x[0] > 0.5)]))
+    S = scene.solve_static().stress([(0.48, H / 2), (0.52, H / 2), (0.56, H / 2)])[1]
+    assert abs(S[0]) < 1e-6 * q
+    assert_allclose(S[1:], -q, rtol=0.07)  # the face has turned and stretched
+    assert S[1] == pytest.approx(S[2], rel=0.01)
+
+
+def test_a_line_load_from_the_middle_on():
+    """The section force is that of the part behind it."""
+    q = 5.0
+    scene = cantilever(ElementBeamANCF(3)).line_load(
+        lambda x: np.array([0.0 * x[0], -q * (x[0] > 0.5)]))
+    state = scene.solve_static()
+    assert list(state.recovery().forces.cuts) == [0.0, 8.0, 16.0]
+    r = state.resultants([(x, 0.0) for x in (0.3, 0.49, 0.75)])
+    assert_allclose(np.hypot(r.N, r.Q), q * np.array([0.5, 0.5, 0.25]), rtol=1e-8)
+
+
+def test_where_heights_have_a_kink():
+    """The fields of both parts are those of wedges: as if the other one were not there."""
+    kinked = cantilever(ElementBeamANCF(3), height=lambda x: H * (1.0 - np.maximum(x - 0.5, 0.0)))
+    state = kinked.moment("right", M).solve_static()
+    assert list(state.recovery().forces.cuts) == [0.0, 8.0, 16.0]
+    assert_allclose(strains(state)[0], -0.02 * M / (E * B * H**3 / 12), rtol=2e-3)
+
+
+def test_smooth_functions_do_not_jump():
+    scene = cantilever(ElementBeamANCF(3), lambda x, y: E * np.exp(3.0 * x),
+                       lambda x, y: B * (1.0 + x * x), lambda x: H * np.cos(x))
+    scene = scene.temperature(lambda x, y: 10.0 * np.sin(9.0 * x)).line_load(
+        lambda x: np.array([x[0], np.sin(9.0 * x[0])]))
+    state = scene.solve_static()
+    assert list(state.recovery().forces.cuts) == [0.0, 16.0]
+
+
+def test_jumps_are_found_by_their_size():
+    def ask(X, e):
+        return 1.0 + X[0] + np.array([0.0, 1.0, 2.0, 3.5])[e][:, None]
+
+    assert jumps(ask, 4, np.zeros(1)).tolist() == [3.0]
+    assert jumps(ask, 4, np.zeros(1), 1.0).tolist() == []
+    assert jumps(lambda X, e: X[0], 1, np.zeros(1)).tolist() == []
