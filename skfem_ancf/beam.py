@@ -192,11 +192,10 @@ class Beam(Frozen):
             name=require_label("name", name), compiled=require_flag("compiled", compiled),
             damping=damping, kinematics=KINEMATICS[element.kinematics], nd=nd,
             N=nd * mesh.p.shape[1])
-        self._fill(section, found, material)
+        self._fill(section, found, material, Across(self.mesh, element, section, material))
 
-    def _fill(self, section, material, given):
+    def _fill(self, section, material, given, across):
         """Set what depends on section and material, of which ``given`` is the beam's own."""
-        across = Across(self.mesh, self.element, section, given)
         for slab in across.slabs:
             self.kinematics.require_law(slab.material)
         vars(self).update(section=section, material=material, _given=given, across=across,
@@ -257,7 +256,8 @@ class Beam(Frozen):
         mine, its = vars(self), vars(other)
         for name in _PLACES:
             its[name] = mine[name]
-        other._fill(section, _material(section, material, self.mesh), material)
+        other._fill(section, _material(section, material, self.mesh), material,
+                    self.across.of_material(section, material))
         self._share(other)
         vars(other)["_sealed"] = True
         return other
@@ -813,16 +813,23 @@ class Beam(Frozen):
     def weight(self, g: ArrayLike) -> Array:
         """The dead load of an acceleration ``g`` (2,), shape (N,)."""
         g = require_finite("g", g, (2,))
-        across, mesh = self.across, self.mesh
-        if across.uniform and across.plain and not callable(across.slabs[0].density):
-            h, L = mesh.height, float(mesh.lengths[0])
-            mass = self.density * across.slabs[0].width * h * L
-            load = (mass * self.element.integrals(h, L))[None, :, None] * g
-        else:
-            load = self.inertia.weights(g)
+        if self.across.uniform and self.across.plain:
+            return (self._masses[:, None] * g).ravel()
+        load = self.inertia.weights(g)
         forces = np.empty((self.mesh.nelements,) + load.shape[1:])
         forces[:] = load
         return self.kernel.scatter(forces)
+
+    @cached_property
+    def _masses(self):
+        """Of equal elements the weight over the acceleration, (N / 2,)."""
+        mesh, nd, width = self.mesh, self.element.nodal_dofs, self.across.slabs[0].width
+        h, L = mesh.height, float(mesh.lengths[0])
+        load = self.density * width * h * L * self.element.integrals(h, L)
+        out, (left, right) = np.zeros((mesh.p.shape[1], nd)), mesh.t
+        out[left] = load[:nd]  # a node is the left end of one element at most
+        out[right] += load[nd:]
+        return out.ravel()
 
     def mass(self) -> csr_matrix:
         """The mass matrix, constant, sparse, shape (N, N)."""

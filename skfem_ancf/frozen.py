@@ -196,8 +196,15 @@ def rebuilt(thing: Any, changes: dict[str, Any], more: Sequence[str] = ()) -> An
     for name in changes:
         if name not in names:
             raise NameUnknown(f"argument of {type(thing).__name__}", name, names)
-    missing = [name for name in names if name not in changes and not hasattr(thing, name)]
-    if missing:
-        raise InputError(f"{thing!r} does not keep the argument {missing[0]!r} it was made with: "
-                         "keep it as an attribute of that name, or give it to replace")
-    return type(thing)(**{name: changes.get(name, getattr(thing, name, None)) for name in names})
+    given = dict(changes)
+    for name in names:
+        if name not in given:
+            given[name] = getattr(thing, name, _MISSING)
+            if given[name] is _MISSING:
+                raise InputError(
+                    f"{thing!r} does not keep the argument {name!r} it was made with: keep it as "
+                    "an attribute of that name, or give it to replace")
+    return type(thing)(**given)
+
+
+_MISSING = object()

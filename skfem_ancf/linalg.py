@@ -273,7 +273,7 @@ class BandMatrix:
         if self._factor is None or not self.symmetric:
             return False
         if self._factor[0] == "ldl":
-            return bool(np.min(self._flat[::self._ld]) > 0.0)
+            return bool(self._flat[::self._ld].min() > 0.0)
         return self._factor[0] == "pb"
 
     def inertia(self) -> Inertia:

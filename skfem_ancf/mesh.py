@@ -242,11 +242,12 @@ class MeshBeam(Frozen, Mesh2D):
         vars(mesh).update(attributes)
         d, far = p[:, 1:] - p[:, :-1], np.abs(p).max()
         mesh._require_length(np.hypot(d[0], d[1]) > 4 * EPS * far)
-        mesh._boundaries = mesh._build_default_tags()
         # of their definitions, which ask for more, this is left
         low, high = lengths.min(), lengths.max()
-        vars(mesh).update(_on_one_line=True, _is_straight=True, _is_uniform=bool(
-            high - low <= 1e-13 * high + 8 * EPS * far), _sealed=True)
+        vars(mesh).update(
+            _boundaries=ReadOnlyDict(mesh._build_default_tags()), _on_one_line=True,
+            _is_straight=True, _is_uniform=bool(high - low <= 1e-13 * high + 8 * EPS * far),
+            _sealed=True)
         return mesh
 
     @classmethod

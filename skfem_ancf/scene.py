@@ -1379,8 +1379,8 @@ class Scene:
         if (system is None or set(changes) - {"material", "width"} or self._elements
                 or type(self).with_beams is not Scene.with_beams
                 or new.element is not old.element or "kernel" not in vars(new)
-                or not all(type(joint).__module__.startswith(f"{__package__}.")
-                           for joint in self.joints)):
+                or not all(type(joint).__module__.startswith(_OURS)
+                           for _, joint in self._joints)):
             return None
         same = new.width == old.width and new.material.density == old.material.density
         moved = [n != k or (same and isinstance(bound, DeadLoad)) for n, _, bound in self._loads]
@@ -1869,6 +1869,10 @@ class Scene:
         return State(self.system, result.u, result.load, result.force, result.converged,
                      result.iterations, result.message, result.steps, result.multipliers,
                      doubt=result.doubt, memory=result.memory)
+
+
+#: How the names of modules of the package begin.
+_OURS = f"{__package__}."
 
 
 def _branch(point, system):

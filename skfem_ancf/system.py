@@ -143,11 +143,12 @@ class System:
         vars(system).update(vars(self))
         _, _, *others = self._given
         system._given = (tuple(beams), tuple(loads), *others)
-        beams = list(beams)
-        system.loads, system.beams, system.members = list(loads), beams, [*beams, *self.bodies]
-        system._index = {id(b): k for k, b in enumerate(system.members)}
-        system._take_loads(same_loads)
+        beams, system.loads = list(beams), list(loads)
         before, same_beams = self.machine.tables, beams == self.beams
+        if not same_beams:
+            system.beams, system.members = beams, [*beams, *self.bodies]
+            system._index = {id(b): k for k, b in enumerate(system.members)}
+        system._take_loads(same_loads)
         if not same_beams and not (self.machine.shareable and all(
                 beam.kernel.linear for beam in beams)):
             return None

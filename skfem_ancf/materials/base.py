@@ -71,24 +71,31 @@ class Material(Frozen):
         If ``plane`` or ``shear_correction`` is a name that is not known.
     """
 
+    E: Any
+    nu: float
+    density: Any
+    plane: str
+    shear_correction: str | float
+    thermal_expansion: float
+
     @taught
     def __init__(self, E: float, nu: float, density: float | None = None, plane: str = "stress",
                  shear_correction: str | float = "auto", thermal_expansion: float = 0.0) -> None:
-        self.E = _number_or_function("E", E)
-        self.nu = require_finite_scalar("nu", nu)
-        self.density = None if density is None else _number_or_function("density", density)
-        self.plane = require_option("plane", plane, PLANES)
-        if not (-1.0 < self.nu < 0.5 or (self.nu == 0.5 and plane == "stress")):
+        E, nu = _number_or_function("E", E), require_finite_scalar("nu", nu)
+        density = None if density is None else _number_or_function("density", density)
+        plane = require_option("plane", plane, PLANES)
+        if not (-1.0 < nu < 0.5 or (nu == 0.5 and plane == "stress")):
             raise InputError(
                 f"the Poisson ratio nu must lie in (-1, 0.5), or be 0.5 in plane stress, got "
-                f"{self.nu!r} in plane {plane}")
-        self.shear_correction: str | float
+                f"{nu!r} in plane {plane}")
         if isinstance(shear_correction, str):
-            self.shear_correction = require_option("shear correction", shear_correction,
-                                                   ("auto", "paper"))
+            shear_correction = require_option("shear correction", shear_correction,
+                                              ("auto", "paper"))
         else:
-            self.shear_correction = require_positive("shear_correction", shear_correction)
-        self.thermal_expansion = require_finite_scalar("thermal_expansion", thermal_expansion)
+            shear_correction = require_positive("shear_correction", shear_correction)
+        vars(self).update(
+            E=E, nu=nu, density=density, plane=plane, shear_correction=shear_correction,
+            thermal_expansion=require_finite_scalar("thermal_expansion", thermal_expansion))
 
     @property
     def graded(self) -> bool:

@@ -12,7 +12,7 @@ from numpy.polynomial.legendre import legvander
 
 from ..errors import InputError
 from ..frozen import Frozen
-from ..kept import cached_property
+from ..kept import cached_property, twin_of
 from ..quadrature import gauss
 from .base import Rectangle, asked
 from .jumps import KINK, jumps
@@ -34,6 +34,10 @@ POINTS = 4
 
 #: Degree of the polynomial of the height that a shear factor is between the least and the largest.
 HEIGHTS = 7
+
+
+#: Attributes of a plain section that do not depend on its material and width.
+_OF_PLACES = "mesh", "element", "plain", "simple", "constant", "uniform", "moving"
 
 
 class Across(Frozen):
@@ -83,6 +87,23 @@ class Across(Frozen):
                           moving=any(isinstance(s.measure, Moving) for s in slabs))
         if varying:
             self._check()
+
+    def of_material(self, section: Section, material: Material | None) -> Across:
+        """The same body of another material and width.
+
+        Parameters
+        ----------
+        section, material
+            As for the constructor.
+        """
+        if (not self.plain or type(section) is not Rectangle or material is None
+                or material.graded or callable(section.width)):
+            return Across(self.mesh, self.element, section, material)
+        other, slab = object.__new__(type(self)), twin_of(self.slabs[0])
+        vars(slab).update(material=material, width=section.width, density=material.density)
+        vars(other).update({name: vars(self)[name] for name in _OF_PLACES}, slabs=(slab,),
+                           _sealed=True)
+        return other
 
     def _check(self):
         """Ask functions all over the body, so that they fail when the beam is made."""
