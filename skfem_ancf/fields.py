@@ -430,7 +430,7 @@ def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Va
     beam
         One of its beams.
     X
-        Reference points (xi, eta) in [0, 1], shape (2, npoints).
+        Reference points (xi, eta) in [0, 1], shape (2, npoints) or (2, nelements, npoints).
     recover
         Recovered strain and stress, where the state has them.
 
@@ -441,8 +441,8 @@ def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Va
     """
     ne = beam.mesh.nelements
     part = kept(beam.grids, X.tobytes(), lambda: Part(
-        beam, 0, slice(0, beam.N), None, np.repeat(np.arange(ne), X.shape[1]), np.tile(X, ne)),
-        GRIDS)
+        beam, 0, slice(0, beam.N), None, np.repeat(np.arange(ne), X.shape[-1]),
+        np.tile(X, ne) if X.ndim == 2 else X.reshape(2, -1)), GRIDS)
     find = None
     if recover and hasattr(state, "recovery"):
         def find():

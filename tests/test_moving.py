@@ -3,6 +3,8 @@
 import pickle
 from itertools import pairwise
 
+import matplotlib.pyplot as plt
+import meshio
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -253,6 +255,31 @@ def test_they_are_pickled_refined_and_drawn(tmp_path):
         assert state.beams[0].total_mass == pytest.approx(beam.total_mass, rel=1e-9)
         state.save(tmp_path / "beam.vtu")
         assert "exact for degree 9 of 8" in str(scene.plan())
+
+
+@pytest.mark.parametrize("mesh, section", [
+    (MeshBeam.init_line(np.linspace(0, 1, 5), height=H), Section.layers(
+        (0.09, BRASS), (0.01, STEEL), width=0.02)), (taper(4), SECTIONS["coating"][0])])
+def test_files_and_pictures_have_both_sides_of_a_jump(mesh, section, tmp_path):
+    """S_xx over E is continuous; the quads are the body, none of them of two layers."""
+    state = cantilever(Beam(mesh, ElementBeamANCFCubic(3), section=section), (0.0, -P))
+    state.save(tmp_path / "a.vtu", fields=["S_xx", "eps_xx"], undeformed=True, subdivide=(4, 3))
+    grid = meshio.read(tmp_path / "a.vtu")
+    quads = grid.cells[0].data
+    eps = grid.point_data["eps_xx"]
+    E = (grid.point_data["S_xx"] / eps)[quads]
+    E = E[np.abs(eps[quads]).min(axis=1) > 0.1 * np.abs(eps).max()]
+    middle = np.median(E, axis=1)  # transverse strains have a part in S_xx, too
+    assert_allclose(E, middle[:, None] + 0 * E, rtol=0.2)
+    assert np.all(np.isclose(middle, STEEL.E, rtol=0.1) | np.isclose(middle, BRASS.E, rtol=0.1))
+    assert middle.min() < 0.6 * middle.max()
+    d = grid.points[quads[:, 2:]] - grid.points[quads[:, :2]]
+    area = 0.5 * (d[:, 0, 0] * d[:, 1, 1] - d[:, 1, 0] * d[:, 0, 1])
+    assert area.min() > 0.0 and area.sum() == pytest.approx(
+        H if mesh.heights is None else 0.75 * H)
+    axes = state.plot("S_xx")
+    assert axes.has_data()
+    plt.close(axes.figure)
 
 
 class Few(Formulation):

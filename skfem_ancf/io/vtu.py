@@ -33,6 +33,9 @@ PRECISIONS = {"double": np.float64, "single": np.float32}
 #: VTK evaluates Lagrange cells up to this degree.
 MAX_LAGRANGE_DEGREE = 10
 
+#: Of the height of a piece, how far points beside a jump are from it.
+BESIDE = 1e-9
+
 #: Subdivisions of an element along or across, and points of a whole body, at most.
 MAX_SUBDIVISION, MAX_POINTS = 1000, 10**8
 
@@ -105,7 +108,7 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
         if lagrange:
             X, local = lagrange_cell(beam)
         else:
-            X, local = grid(m, n), quads(m, n)
+            X, local = layout(beam, m, n)
         values = values_on_grid(state, beam, X, recover)
         x = values.x if undeformed else values.x + values.u
         points.append(_rows(x))
@@ -114,7 +117,7 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
             data.setdefault(field.name, []).append(
                 value if field.components == 1 else _rows(value) if field.components == 2 else
                 value.T)
-        ne, npoints = beam.mesh.nelements, X.shape[1]
+        ne, npoints = beam.mesh.nelements, X.shape[-1]
         start = first + npoints * np.arange(ne)
         cells.append(("VTK_LAGRANGE_QUADRILATERAL" if lagrange else "quad",
                       (start[:, None, None] + local).reshape(-1, local.shape[1])))
@@ -390,6 +393,37 @@ def quads(m: int, n: int) -> Array:
     """
     k = np.arange((m + 1) * (n + 1)).reshape(m + 1, n + 1)
     return np.stack([k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]], -1).reshape(-1, 4)
+
+
+def layout(beam: Beam, m: int, n: int) -> tuple[Array, Array]:
+    """Points and quads of an element; where fields jump across it has points on both sides.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    m, n
+        Intervals along and across, of these at least one for each piece of the section.
+
+    Returns
+    -------
+    X, quads
+        Points of the reference cell, shape (2, npoints), or (2, nelements, npoints) where pieces
+        have other parts of the height from place to place, and rows of 4 points.
+    """
+    sizes = np.diff(beam.across.ends())
+    if len(sizes) == 1:
+        return grid(m, n), quads(m, n)
+    xi, last = np.linspace(0, 1, m + 1), len(sizes) - 1
+    at = beam.across.ends(xi)[..., None]
+    rows = [low + (high - low) * np.linspace(BESIDE * (k > 0), 1 - BESIDE * (k < last),
+                                             max(1, round(n * size)) + 1)
+            for k, (low, high, size) in enumerate(zip(at[:-1], at[1:], sizes))]
+    eta = np.concatenate(rows, axis=-1)
+    X = np.array(np.broadcast_arrays(xi[:, None], eta))
+    between = np.cumsum([row.shape[-1] for row in rows])[:-1] - 1
+    cells = quads(m, eta.shape[-1] - 1).reshape(m, -1, 4)
+    return X.reshape(X.shape[:-2] + (-1,)), np.delete(cells, between, axis=1).reshape(-1, 4)
 
 
 def lagrange_cell(beam: Beam) -> tuple[Array, Array]:

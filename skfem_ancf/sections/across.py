@@ -417,6 +417,29 @@ class Across(Frozen):
         return asked("width", slab.width, *self._inside(slab, X, tind)) if callable(
             slab.width) else slab.width
 
+    def ends(self, xi: Array | None = None) -> Array:
+        """Where pieces of one law and width begin and end, from the bottom to the top.
+
+        Parameters
+        ----------
+        xi
+            Places along the elements, shape (npoints,), for sections that have other parts of the
+            height from place to place; None for where these are highest.
+
+        Returns
+        -------
+        ndarray
+            Places eta, shape (npieces + 1,), or (npieces + 1, nelements, npoints).
+        """
+        measures = [slab.measure for slab in self.slabs]
+        if self.moving and xi is not None:
+            h = self._heights(xi, None)
+            found = [m.ends(h) for m in measures]
+        else:
+            found = [np.array([m.low, *(p.high for p in getattr(m, "pieces", [m]))])
+                     for m in ((m.at(m.height) if isinstance(m, Moving) else m) for m in measures)]
+        return np.concatenate([found[0][:1], *(end[1:] for end in found)])
+
     # rules
 
     def rules(self, n: int, inertia: bool = False) -> list[tuple[Slab, Rule]]:

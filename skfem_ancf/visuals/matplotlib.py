@@ -10,7 +10,7 @@ from ..errors import (InputError, MissingExtra, require_finite_scalar, require_f
                       require_integer, require_like, require_option, require_path, require_positive,
                       require_text, shown, taught)
 from ..fields import DRAWN, Field, find_field, values_on_grid
-from ..io.vtu import _subdivision, grid, quads, replacing
+from ..io.vtu import _subdivision, layout, replacing
 from ..obstacles.pictures import AROUND, around, outlines
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
         ax.add_collection(PolyCollection(rigid, facecolor=_RIGID, edgecolor=_INK, linewidth=0.5,
                                          zorder=1.5), autolim=True)
     if bodies:
-        image = ax.tripcolor(_triangulation(bodies, m, n, factor), values, shading="gouraud",
+        image = ax.tripcolor(_triangulation(bodies, factor), values, shading="gouraud",
                              cmap=cmap or ("RdYlBu_r" if drawn.signed else "viridis"),
                              vmin=low, vmax=high, zorder=2)
     ax.add_collection(LineCollection([np.vstack([line, line[:1]]) for line in edges],
@@ -155,15 +155,13 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     return ax
 
 
-def _triangulation(bodies, m, n, factor):
+def _triangulation(bodies, factor):
     """Two triangles for each quad."""
     from matplotlib.tri import Triangulation
 
     points = np.concatenate([b.points(b.deformed, factor).reshape(2, -1) for b in bodies], axis=1)
     first = np.concatenate([[0], np.cumsum([b.values.size for b in bodies])])
-    cells = np.concatenate([
-        (f + np.arange(0, b.values.size, (m + 1) * (n + 1))[:, None, None]
-         + quads(m, n)).reshape(-1, 4) for f, b in zip(first, bodies)])
+    cells = np.concatenate([f + b.cells for f, b in zip(first, bodies)])
     return Triangulation(*points, np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]]))
 
 
@@ -207,9 +205,12 @@ class _Body:
     """One beam on a grid: the deformed and the stress-free place of each point, and the field."""
 
     def __init__(self, state, beam, field, m, n, recover):
-        values = values_on_grid(state, beam, grid(m, n), recover)
-        self.n, self.height = n, beam.mesh.height
-        self.shape = (2, beam.mesh.nelements, m + 1, n + 1)
+        X, quads = layout(beam, m, n)
+        values, rows = values_on_grid(state, beam, X, recover), X.shape[-1] // (m + 1)
+        self.rows, self.height = rows, beam.mesh.height
+        self.shape = (2, beam.mesh.nelements, m + 1, rows)
+        #: Quads as rows of points, shape (nc, 4).
+        self.cells = (np.arange(0, values.n, X.shape[-1])[:, None, None] + quads).reshape(-1, 4)
         # the axis is at eta = 1/2, which is on the grid only if n is even
         ends = np.array([np.linspace(0, 1, m + 1), np.full(m + 1, 0.5)])
         flat = self.shape[:2] + (-1,)
@@ -221,7 +222,7 @@ class _Body:
             self.values = np.sqrt(np.sum(self.values**2, axis=0))
 
     def points(self, body, factor):
-        """Positions (2, nelements, m + 1, n + 1) with the section drawn ``factor`` thicker."""
+        """Positions (2, nelements, m + 1, rows) with the section drawn ``factor`` thicker."""
         x, axis = body
         axis = axis[..., None]
         return axis + factor * (x.reshape(self.shape) - axis)
@@ -233,7 +234,7 @@ class _Body:
                           > 1e-6 * self.height)[0] + 1
         out = []
         for part in np.split(np.arange(x.shape[1]), cuts):
-            run = x[:, part].reshape(2, -1, self.n + 1)
+            run = x[:, part].reshape(2, -1, self.rows)
             out.append(np.hstack([run[:, :, 0], run[:, -1, 1:], run[:, -2::-1, -1],
                                   run[:, 0, -2:0:-1]]).T)
         return out

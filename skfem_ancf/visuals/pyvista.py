@@ -12,7 +12,7 @@ from ..errors import (InputError, MissingExtra, require_flag, require_index, req
                       require_like, require_options, require_path, require_text, shown, taught,
                       teaching)
 from ..fields import DRAWN, FIELDS, Field, find_field, find_fields, values_on_grid
-from ..io.vtu import _subdivision, grid, lagrange_cell, quads, replacing
+from ..io.vtu import _subdivision, lagrange_cell, layout, replacing
 from ..obstacles.pictures import around, obstacles_of, outlines
 from .matplotlib import _Body, _colormap, _limits, _thickness, unit_of
 
@@ -86,9 +86,9 @@ class _Grid:
 
     def __init__(self, beam, subdivide, lagrange):
         self.beam = beam
-        X, local = lagrange_cell(beam) if lagrange else (grid(*subdivide), quads(*subdivide))
+        X, local = lagrange_cell(beam) if lagrange else layout(beam, *subdivide)
         self.X, ne = X, beam.mesh.nelements
-        start = X.shape[1] * np.arange(ne)
+        start = X.shape[-1] * np.arange(ne)
         cells = (start[:, None, None] + local).reshape(-1, local.shape[1])
         self.cells = np.hstack([np.full((len(cells), 1), cells.shape[1]), cells]).ravel()
         self.types = np.full(len(cells), LAGRANGE if lagrange else QUAD, np.uint8)
@@ -274,7 +274,7 @@ class Scenery:
                  subdivide: tuple[int, int], recover: bool) -> None:
         self.field: Field = find_field(field, DRAWN)
         m, n = _subdivision(subdivide)
-        self.size, recover = (m, n), require_flag("recover", recover)
+        recover = require_flag("recover", recover)
         self.frames = [[_Body(state, beam, self.field, m, n, recover) for beam in state.beams]
                        for state in states]
         self.rigid = [[(body, state.u_of(body)) for body in getattr(state, "bodies", ())]
@@ -322,11 +322,9 @@ class Scenery:
     @property
     def cells(self) -> Any:
         """Quads as rows of points, shape (nc, 4)."""
-        m, n = self.size
         first = np.cumsum([0] + [b.values.size for b in self.frames[0]])
         return np.concatenate([np.zeros((0, 4), dtype=int), *(
-            (f + np.arange(0, b.values.size, (m + 1) * (n + 1))[:, None, None]
-             + quads(m, n)).reshape(-1, 4) for f, b in zip(first, self.frames[0]))])
+            f + b.cells for f, b in zip(first, self.frames[0]))])
 
     @property
     def faces(self) -> Any:
