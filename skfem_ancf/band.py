@@ -294,6 +294,12 @@ def largest(x):
 
 
 @primitive("primitives")
+def differs(a, b):
+    """True if two vectors of one size are not the same."""
+    return bool(np.any(a != b))
+
+
+@primitive("primitives")
 def weighted(a, b, w):
     """The sum of a b w."""
     return np.dot(a * b, w)

@@ -542,9 +542,36 @@ def test_far_from_obstacles_only_the_search_is_paid():
     u = np.zeros(scene.system.N)
     scene.system.internal_force(u)
     # one point of each element, bottom and top together, and one of each end
-    assert asked == [n, 1, 1] and counts.tolist() == [n + 2, 0]
+    assert asked == [n + 2] and counts[:2].tolist() == [n + 2, 0]
     np.testing.assert_allclose(scene.solve_static().u, free.u, rtol=0, atol=1e-12)
     assert counts[1] == 0
+
+
+def test_what_was_seen_is_not_looked_at_again():
+    """At the same displacement; and the answers are those of a scene that has seen nothing."""
+    def forces(contacts, pairs, span):
+        out = np.zeros((len(pairs), contacts.N))
+        for row, (a, b) in zip(out, pairs):
+            add_contact(contacts.forces.contacts.tables, asked(texts.FORCE, 0.0, span), a, b, row)
+        return out
+
+    def system():
+        return Scene(beam(ElementBeamCable(3), 4)).obstacle(SHAPES["line"]).system
+
+    u = 1e-3 * np.random.default_rng(3).standard_normal((3, system().N))
+    u[:, 1::4] -= 0.02
+    pairs = [(u[i], u[j]) for i, j in ((0, 1), (0, 2), (2, 1), (1, 0), (0, 2), (1, 2))]
+    new = [2, 1, 1, 1, 1, 2]  # the end of a step is the begin of the next
+    known = system()
+    counts = known.forces.contacts.tables.counts
+    counts[:2] = 0
+    found = forces(known, pairs, 1e-3)
+    assert np.abs(found).max(axis=1).min() > 0 and counts[0] == 6 * sum(new)
+    for row, pair in zip(found, pairs):
+        assert np.array_equal(row, forces(system(), [pair], 1e-3)[0])
+    counts[:2] = 0
+    forces(known, [(u[1], u[1])] * 3, 0.0)
+    assert counts[0] == 6
 
 
 def test_without_obstacles_nothing_is_paid(monkeypatch):

@@ -11,19 +11,20 @@ _of_contacts = twin(of_contacts)
 
 
 def contacts(what, number, ints, n_ints, floats, n_floats, poses, n_poses, memory, n_memory,
-             counts, moving, numbers, u, v, n, out, size, ld, top):
+             looks, n_looks, counts, moving, numbers, u, v, n, out, size, ld, top):
     """Arrays by their addresses and sizes; time, span and factor are an array of three."""
     given = carray(numbers, (3,))
     tables = ContactTables(number, carray(ints, (n_ints,)), carray(floats, (n_floats,)),
                            carray(poses, (n_poses,)), carray(memory, (n_memory,)),
-                           carray(counts, (2,)), moving, 0, 0, 0)
+                           carray(looks, (n_looks,)), carray(counts, (2 + number,)), moving, 0, 0,
+                           0)
     asked = Question(what, given[0], given[1], given[2], ld, top)
     _of_contacts(tables, asked, carray(u, (n,)), carray(v, (n,)), carray(out, (size,)))
 
 
 _F, _I, _N = types.CPointer(types.float64), types.CPointer(types.int64), types.int64
-_SIGNATURE = types.void(_N, _N, _I, _N, _F, _N, _F, _N, _F, _N, _I, _N, _F, _F, _F, _N, _F, _N,
-                        _N, _N)
+_SIGNATURE = types.void(_N, _N, _I, _N, _F, _N, _F, _N, _F, _N, _F, _N, _I, _N, _F, _F, _F, _N,
+                        _F, _N, _N, _N)
 
 
 def address(name):
@@ -39,5 +40,6 @@ def run_contacts(tables, asked, u, v, out):
         asked.what, tables.number, tables.ints.ctypes.data, tables.ints.size,
         tables.floats.ctypes.data, tables.floats.size, tables.poses.ctypes.data,
         tables.poses.size, tables.memory.ctypes.data, tables.memory.size,
+        tables.looks.ctypes.data, tables.looks.size,
         tables.counts.ctypes.data, tables.moving, numbers.ctypes.data, u.ctypes.data,
         v.ctypes.data, u.size, out.ctypes.data, out.size, asked.ld, asked.top))

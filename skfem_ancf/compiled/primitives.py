@@ -132,3 +132,11 @@ def largest(x):
     for i in range(x.size):
         found = np.maximum(found, abs(x[i]))
     return found
+
+
+@jit
+def differs(a, b):
+    for i in range(a.size):
+        if a[i] != b[i]:
+            return True
+    return False

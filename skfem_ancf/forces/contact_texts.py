@@ -29,6 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..band import clear, copy, differs
 from ..own import own_distance
 from ..source import F1, I1, lanes, primitive, source
 from ..tables import add_each
@@ -40,10 +41,11 @@ FORCE, RESISTING, TANGENT, DAMPED_TANGENT, ALONG, SETTLE, AUGMENT = map(np.int64
 #: Of a group: its shape, obstacle, elements, points of each, pairs of coordinates of each, whether
 #: there are slopes; then where among the integers the first coordinates of its points begin, among
 #: the numbers the rest, and how many numbers the shape has; where its memory
-#: begins, and its number.
+#: begins, and its number; where its looks are, how large each is, the first coordinate of its
+#: elements, and how many there are.
 (SHAPE, OBSTACLE, ELEMENTS, POINTS, PAIRS, SLOPES, FIRST, WEIGHTS, AREAS, OFFSETS, STARTS, MIDDLES,
- NUMBERS, SHAPES, SIZE, MEMORY, GROUP) = map(np.int64, range(17))
-HEADER = 17
+ NUMBERS, SHAPES, SIZE, MEMORY, GROUP, LOOKS, LOOK, LOWEST, SPAN) = map(np.int64, range(21))
+HEADER = 21
 #: Numbers of a group: stiffness, width of the transition, friction, stiffness of sticking,
 #: damping, what a step in time adds to the stiffness, largest distance of a point from the middle
 #: of its element without displacement, 1 or -1 outside or inside of the shape, and the penetration
@@ -67,11 +69,15 @@ SHORT = 1e-30
 BEYOND = 4.0
 #: A change of places, relative to an element, below which a mean is that of the middle.
 CLOSE = 1e-5
-#: Rows of points: places and slopes, four each, at the begin, the end and the middle of a mean,
-#: and their rates or ways; the penetration at both ends, and the place on the surface at the end;
-#: the rate or way of the surface.
-BEFORE, AFTER, MIDDLE, RATES, DEPTH, LAST, WAY = map(np.int64, (0, 4, 8, 12, 16, 18, 20))
-ROWS = 22
+#: Rows of points: places and slopes, four each, in the middle of a mean, and their rates or ways;
+#: the penetration at both ends, and the place on the surface at the end; the rate or way of the
+#: surface.
+MIDDLE, RATES, DEPTH, LAST, WAY = map(np.int64, (0, 4, 8, 10, 12))
+ROWS = 14
+#: What is seen of each point: place, slope, point of the surface, distance, and that it was looked
+#: at. Of both ends of a mean and of a single state a group keeps a look: of which coordinates and
+#: pose, of each element the distance less the radius, then what was seen.
+SEEN, ALONE = 8, np.int64(2)
 
 
 class Question(NamedTuple):
@@ -117,8 +123,10 @@ class ContactTables(NamedTuple):
         Of each obstacle, at the time asked last.
     memory
         What steps leave behind.
+    looks
+        What was seen last, so that it is not looked at again.
     counts
-        Elements searched, points looked at.
+        Elements searched, points looked at, and of each group which look is that of the begin.
     moving, own
         Whether poses depend on time; handle of what knows them, and shapes of one's own.
     lasting
@@ -132,6 +140,7 @@ class ContactTables(NamedTuple):
     floats: F1
     poses: F1
     memory: F1
+    looks: F1
     counts: I1
     moving: int
     own: int
@@ -182,7 +191,10 @@ def _middles(ints, floats, group, u, factor, x, radius):
 
 @source
 def places(ints, floats, group, u, factor, at, rows, r):
-    """Places and slopes at points ``at`` of a group, without displacement times a factor."""
+    """Places and slopes at points ``at`` of a group, without displacement times a factor.
+
+    Pairs of coordinates are two of each node, or more in twos.
+    """
     total = group[ELEMENTS] * group[POINTS]
     weights, start, first = group[WEIGHTS], group[STARTS], group[FIRST]
     for c in range(4):
@@ -191,12 +203,13 @@ def places(ints, floats, group, u, factor, at, rows, r):
             row[i] = factor * floats[start + c * total + at[i]]
     for part in range(1 + group[SLOPES]):
         p, q = rows[r + 2 * part], rows[r + (2 * part + 1)]
-        for k in range(group[PAIRS]):
+        for k in range(group[PAIRS] // 2):
             for i in lanes(at.size):
-                dof, weight = ints[first + at[i]] + 2 * k, floats[weights + at[i]]
-                p[i] += weight * u[dof]
-                q[i] += weight * u[dof + 1]
-            weights += total
+                dof = ints[first + at[i]] + 4 * k
+                a, b = floats[weights + at[i]], floats[weights + total + at[i]]
+                p[i] += a * u[dof] + b * u[dof + 2]
+                q[i] += a * u[dof + 1] + b * u[dof + 3]
+            weights += 2 * total
 
 
 @source
@@ -210,34 +223,93 @@ def surface(floats, group, at, rows, r, x):
 
 
 @source
-def _near(tables, group, what, u, v, same):
-    """Numbers of the points of elements that may touch, at u or at v."""
+def _looked(tables, group, look, which, u, anew):
+    """Where a look begins, and whether it was of u; if ``anew`` it is now."""
+    n, span, low = group[ELEMENTS], group[SPAN], group[LOWEST]
+    begin, now = group[LOOKS] + look * group[LOOK], group[OBSTACLE] * POSES + which * POSE
+    at, pose = u[low:low + span], tables.poses[now:now + POSE]
+    of, when = tables.looks[begin:begin + span], tables.looks[begin + span:begin + span + POSE]
+    known = not (differs(at, of) or differs(pose, when))
+    if anew and not known:
+        copy(at, of)
+        copy(pose, when)
+        rows = np.empty((9, n))
+        x, found, radius = rows[:2], rows[2:8], rows[8]
+        _middles(tables.ints, tables.floats, group, u, 1.0, x, radius)
+        distances(tables, group, which, False, x, found)
+        total, gap = n * group[POINTS], tables.looks[begin + span + POSE:]
+        for e in lanes(n):
+            gap[e] = found[0, e] - radius[e]
+        clear(gap[n + (SEEN - 1) * total:n + SEEN * total])
+        tables.counts[0] += n
+    return begin + span + POSE, known
+
+
+@source
+def _both(tables, group, same, u, v):
+    """Where the looks of u and v are; the end of a step is the begin of the next."""
+    if same:
+        begin, _ = _looked(tables, group, ALONE, NOW, u, True)
+        return begin, begin
+    turn = 2 + group[GROUP]
+    begin, known = _looked(tables, group, tables.counts[turn], BEGIN, u, False)
+    if not known:
+        tables.counts[turn] = 1 - tables.counts[turn]
+        begin, _ = _looked(tables, group, tables.counts[turn], BEGIN, u, True)
+    end, _ = _looked(tables, group, 1 - tables.counts[turn], END, v, True)
+    return begin, end
+
+
+@source
+def _near(tables, group, what, begin, end):
+    """Numbers of the points of elements that may touch at either end."""
     n, points = group[ELEMENTS], group[POINTS]
     reach, numbers = tables.memory[REACHES + group[GROUP]], group[NUMBERS]
     if what == SETTLE and tables.floats[numbers + FRICTION] > 0.0:  # also what may touch next
         reach = BEYOND * tables.floats[numbers + RADIUS] if tables.memory[RATE] > 0.0 else 1e300
-    x, radius, found = np.empty((2, n)), np.empty(n), np.empty((6, n))
-    flags = np.empty(n * points)
-    for end in range(1 if same else 2):
-        _middles(tables.ints, tables.floats, group, v if end > 0 else u, 1.0, x, radius)
-        distances(tables, group, NOW if same else BEGIN + end, False, x, found)
-        for p in range(points):
-            flag = flags[p::points]
-            for e in lanes(n):
-                flag[e] = (flag[e] if end > 0 else 0.0) + 1.0 * (
-                    found[0, e] - radius[e] <= reach)
-    at = np.nonzero(flags)[0]
-    tables.counts[0] += n
-    tables.counts[1] += at.size
-    return at
+    flags, gap, last = np.empty(n * points), tables.looks[begin:begin + n], tables.looks[
+        end:end + n]
+    for p in range(points):
+        flag = flags[p::points]
+        for e in lanes(n):
+            flag[e] = 1.0 * (np.minimum(gap[e], last[e]) <= reach)
+    return np.nonzero(flags)[0]
+
+
+@source
+def _see(tables, group, which, look, u, near):
+    """Look at those of some points that were not looked at yet."""
+    total, begin = group[ELEMENTS] * group[POINTS], look + group[ELEMENTS]
+    seen, flags = tables.looks[begin:begin + SEEN * total], np.empty(near.size)
+    for i in lanes(near.size):
+        flags[i] = 1.0 - seen[7 * total + near[i]]
+    new = np.nonzero(flags)[0]
+    if new.size == 0:
+        return
+    for i in lanes(new.size):
+        new[i] = near[new[i]]
+    rows = np.empty((12, new.size))
+    z, x, found = rows[:4], rows[4:6], rows[6:]
+    places(tables.ints, tables.floats, group, u, 1.0, new, z, 0)
+    surface(tables.floats, group, new, z, 0, x)
+    distances(tables, group, which, False, x, found)
+    for c in range(4):
+        row, part = seen[c * total:(c + 1) * total], z[c]
+        for i in lanes(new.size):
+            row[new[i]] = part[i]
+    for i in lanes(new.size):
+        seen[4 * total + new[i]], seen[5 * total + new[i]] = x[0, i], x[1, i]
+        seen[6 * total + new[i]], seen[7 * total + new[i]] = found[0, i], 1.0
+    tables.counts[1] += new.size
 
 
 @source
 def _stride(tables, group, u):
     """The largest way of the middle of an element, relative to how far its points are from it."""
     n, way = group[ELEMENTS], 0.0
-    x, radius = np.empty((2, n)), np.empty(n)
-    _middles(tables.ints, tables.floats, group, u, 0.0, x, radius)
+    rows = np.empty((3, n))
+    x = rows[:2]
+    _middles(tables.ints, tables.floats, group, u, 0.0, x, rows[2])
     for e in range(n):
         way = max(way, x[0, e] * x[0, e] + x[1, e] * x[1, e])
     return np.sqrt(way) / tables.floats[group[NUMBERS] + RADIUS]
@@ -355,28 +427,26 @@ def _of_group(tables, group, asked, u, v, out):
         out[1] = max(out[1], _stride(tables, group, v))
     if rubs and tables.floats[group[NUMBERS] + DAMPING] == 0.0:
         return
-    at = _near(tables, group, what, u, v, same)
+    begin, end = _both(tables, group, same, u, v)
+    at = _near(tables, group, what, begin, end)
     if at.size == 0:
         return
-    rows = np.empty((ROWS, at.size))
-    last = _ends(tables, group, u, v, same, what >= SETTLE, at, rows)
-    touching = np.nonzero(last)[0]
-    if touching.size == 0:
-        return
+    _see(tables, group, NOW if same else BEGIN, begin, u, at)
+    if not same:
+        _see(tables, group, END, end, v, at)
+    touching = at if what >= SETTLE else _touching(tables, group, begin, end, at)
     n = touching.size
-    some, x, found = np.empty((ROWS, n)), np.empty((2, n)), np.empty((6, n))
-    for k in range(MIDDLE, WAY):
-        row, chosen = rows[k], some[k]
-        for i in lanes(n):
-            chosen[i] = row[touching[i]]
-    for i in lanes(n):
-        touching[i] = at[touching[i]]
+    if n == 0:
+        return
+    rows = np.empty((ROWS + 25, n))
+    some, x, found = rows[:ROWS], rows[ROWS:ROWS + 2], rows[ROWS + 2:ROWS + 8]
+    F, K, lever = rows[ROWS + 8:ROWS + 13], rows[ROWS + 13:ROWS + 17], rows[ROWS + 17:]
+    _ends(tables, group, begin, end, same, touching, some)
     if what == AUGMENT:
         _reach_on(tables, group, touching, some, out)
         return
     surface(tables.floats, group, touching, some, MIDDLE, x)
     distances(tables, group, NOW, True, x, found)
-    F, K, lever = np.empty((5, n)), np.empty((4, n)), np.empty((8, n))
     levers(tables.floats, group, touching, some, lever)
     if what == ALONG or rubs:
         places(tables.ints, tables.floats, group, v, 0.0, touching, some, RATES)
@@ -396,41 +466,71 @@ def _of_group(tables, group, asked, u, v, out):
 
 
 @source
-def _ends(tables, group, u, v, same, every, at, rows):
-    """Fill the rows of both ends and of the middle; returns which points touch at either end."""
-    n, reach, now = at.size, group[MEMORY], group[OBSTACLE] * POSES
-    ends, part = 1 if same else 2, 1.0 / hardened(tables.floats, group, tables.memory[RATE])
-    x, found, touches = np.empty((2, n)), np.empty((6, n)), np.empty(n)
-    moves, q = tables.moving > 0 and not same, tables.poses[now:now + POSE]
-    last_x, last_y = rows[LAST], rows[LAST + 1]
-    for end in range(ends):
-        which = NOW if same else BEGIN + end
-        places(tables.ints, tables.floats, group, v if end > 0 else u, 1.0, at, rows, 4 * end)
-        surface(tables.floats, group, at, rows, 4 * end, x)
-        distances(tables, group, which, False, x, found)
-        p = tables.poses[now + which * POSE:now + (which + 1) * POSE]
-        cos, sin = q[2] * p[2] + q[3] * p[3], q[3] * p[2] - q[2] * p[3]
-        depth, z_x, z_y = rows[DEPTH + end], rows[4 * end], rows[4 * end + 1]
-        for i in lanes(n):
-            depth[i] = part * tables.memory[reach + at[i]] - found[0, i]
-            last_x[i], last_y[i] = x[0, i], x[1, i]
-            if moves:  # with the obstacle, from where it was or will be to where it is
-                a, b = x[0, i] - p[0] - p[4], x[1, i] - p[1] - p[5]
-                last_x[i] = q[0] + q[4] + cos * a - sin * b
-                last_y[i] = q[1] + q[5] + sin * a + cos * b
-                z_x[i] += last_x[i] - x[0, i]
-                z_y[i] += last_y[i] - x[1, i]
+def _touching(tables, group, begin, end, at):
+    """Those of some points that touch at either end."""
+    n, total = group[ELEMENTS], group[ELEMENTS] * group[POINTS]
+    first, last = begin + n + 6 * total, end + n + 6 * total
+    part = 1.0 / hardened(tables.floats, group, tables.memory[RATE])
+    reach, flags = group[MEMORY], np.empty(at.size)
+    for i in lanes(at.size):
+        flags[i] = 1.0 * (np.minimum(tables.looks[first + at[i]], tables.looks[last + at[i]])
+                          < part * tables.memory[reach + at[i]])
+    touching = np.nonzero(flags)[0]
+    for i in lanes(touching.size):
+        touching[i] = at[touching[i]]
+    return touching
+
+
+@source
+def _ends(tables, group, begin, end, same, at, rows):
+    """Fill the rows of points by what is seen at both ends."""
+    n, total = group[ELEMENTS], group[ELEMENTS] * group[POINTS]
+    reach, part = group[MEMORY], 1.0 / hardened(tables.floats, group, tables.memory[RATE])
     for c in range(4):
-        first, last = rows[BEFORE + c], rows[BEFORE + 4 * (ends - 1) + c]
+        first, last = begin + n + c * total, end + n + c * total
         middle, way = rows[MIDDLE + c], rows[RATES + c]
-        for i in lanes(n):
-            way[i] = last[i] - first[i]
-            middle[i] = first[i] + 0.5 * way[i]
-    first, last, depth = rows[DEPTH], rows[DEPTH + ends - 1], rows[DEPTH + 1]
-    for i in lanes(n):
-        depth[i] = last[i]
-        touches[i] = 1.0 * (np.maximum(first[i], last[i]) > (-1e300 if every else 0.0))
-    return touches
+        for i in lanes(at.size):
+            middle[i] = tables.looks[first + at[i]]
+            way[i] = tables.looks[last + at[i]] - middle[i]
+    before, after = rows[DEPTH], rows[DEPTH + 1]
+    last_x, last_y = rows[LAST], rows[LAST + 1]
+    first, last = begin + n + 4 * total, end + n + 4 * total
+    for i in lanes(at.size):
+        more = part * tables.memory[reach + at[i]]
+        before[i] = more - tables.looks[first + 2 * total + at[i]]
+        after[i] = more - tables.looks[last + 2 * total + at[i]]
+        last_x[i], last_y[i] = tables.looks[last + at[i]], tables.looks[last + total + at[i]]
+    if same:
+        return
+    if tables.moving > 0:
+        _carry(tables, group, first, BEGIN, at, rows)
+        _carry(tables, group, last, END, at, rows)
+    for c in range(4):
+        middle, way = rows[MIDDLE + c], rows[RATES + c]
+        for i in lanes(at.size):
+            middle[i] += 0.5 * way[i]
+
+
+@source
+def _carry(tables, group, where, which, at, rows):
+    """Move points with the obstacle, from where it was or will be to where it is."""
+    now, total = group[OBSTACLE] * POSES, group[ELEMENTS] * group[POINTS]
+    p = tables.poses[now + which * POSE:now + (which + 1) * POSE]
+    q, end = tables.poses[now:now + POSE], 1.0 * (which == END)
+    cos, sin = q[2] * p[2] + q[3] * p[3], q[3] * p[2] - q[2] * p[3]
+    middle_x, middle_y = rows[MIDDLE], rows[MIDDLE + 1]
+    way_x, way_y = rows[RATES], rows[RATES + 1]
+    last_x, last_y = rows[LAST], rows[LAST + 1]
+    for i in lanes(at.size):
+        x, y = tables.looks[where + at[i]], tables.looks[where + total + at[i]]
+        a, b = x - p[0] - p[4], y - p[1] - p[5]
+        x, y = q[0] + q[4] + cos * a - sin * b - x, q[1] + q[5] + sin * a + cos * b - y
+        middle_x[i] += (1.0 - end) * x
+        middle_y[i] += (1.0 - end) * y
+        way_x[i] += (2.0 * end - 1.0) * x
+        way_y[i] += (2.0 * end - 1.0) * y
+        last_x[i] += end * x
+        last_y[i] += end * y
 
 
 @source
@@ -599,8 +699,8 @@ def _add(ints, floats, group, asked, at, rows, lever, F, K, out):
     pairs, slopes, total = group[PAIRS], group[SLOPES], group[ELEMENTS] * group[POINTS]
     what, first, weights = asked.what, group[FIRST], group[WEIGHTS]
     n, offset, further = at.size, group[OFFSETS], pairs * total * slopes
-    V, H, G = np.empty((4 * pairs, n)), np.empty((3, n)), np.empty((4, n))
-    where, value = np.empty(n, np.int64), np.empty(n)
+    work, where = np.empty((8 + 4 * pairs, n)), np.empty(n, np.int64)
+    value, H, G, V = work[0], work[1:4], work[4:8], work[8:]
     forces = what == FORCE or what == RESISTING
     if forces:
         for c in range(4):

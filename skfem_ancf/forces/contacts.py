@@ -12,10 +12,10 @@ from ..errors import InputError
 from ..kept import cached_property
 from ..own import handle_of
 from .contact_texts import (ANCHORED, ANCHORS, AUGMENT, DAMPING, DEPTH, FRICTION, HEADER, LAST,
-                            MEMORY, MIDDLE, NOW, NUMBERS, OWN, POSE, POSES, PRESSURES, RATE, RATES,
-                            REACHES, ROWS, SETTLE, STIFFNESS, TANGENT, WIDTH, ContactTables,
-                            Question, distances, hardened, levers, of_contacts, places, press,
-                            resist, slide, stick, surface)
+                            LOOK, MEMORY, MIDDLE, NOW, NUMBERS, OWN, POSE, POSES, PRESSURES, RATE,
+                            RATES, REACHES, ROWS, SEEN, SETTLE, STIFFNESS, TANGENT, WIDTH,
+                            ContactTables, Question, distances, hardened, levers, of_contacts,
+                            places, press, resist, slide, stick, surface)
 from .swept import Sweep, middle_of
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ class Group(NamedTuple):
 
 #: Of scenes without obstacles.
 NO_CONTACTS = ContactTables(0, np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros(REACHES),
-                            np.zeros(2, np.int64), 0, 0)
+                            np.zeros(0), np.zeros(2, np.int64), 0, 0)
 #: For the time of it nothing is lent.
 NOTHING: AbstractContextManager[None] = nullcontext()
 
@@ -98,7 +98,7 @@ class Contacts:
         if n == 0:
             return NO_CONTACTS
         ints, floats = _Pieces(HEADER * n), _Pieces(0)
-        headers, memory = np.zeros((n, HEADER), dtype=np.int64), REACHES + n
+        headers, memory, looks = np.zeros((n, HEADER), dtype=np.int64), REACHES + n, 0
         for number, (k, group) in enumerate(self.groups):
             shape, none = self.obstacles[k].shape, np.zeros((0, len(group.first)))
             slopes = none if group.slopes is None else group.slopes
@@ -108,10 +108,12 @@ class Contacts:
                 floats.add(np.concatenate([group.weights, slopes])), floats.add(group.areas),
                 floats.add(group.offsets), floats.add(group.starts), floats.add(middle_of(group)),
                 floats.add(group.numbers), floats.add(shape.numbers), len(shape.numbers), memory,
-                number)
+                number, looks, *_look(group))
             memory += 4 * len(group.first)
+            looks += 3 * headers[number, LOOK]
         return ContactTables(n, np.concatenate([headers.ravel(), ints.whole(np.int64)]),
-                             floats.whole(float), poses, np.zeros(memory), np.zeros(2, np.int64),
+                             floats.whole(float), poses, np.zeros(memory), np.zeros(looks),
+                             np.zeros(2 + n, np.int64),
                              int(self.moving or self.own), handle_of(self),
                              int(ANCHORS * self.anchored + PRESSURES * self.augmented))
 
@@ -503,6 +505,13 @@ class Contacts:
         at, = np.nonzero(A.flat)
         j, i = np.divmod(at, ld)
         return i + j - bandwidth, j, A.flat[at]
+
+
+def _look(group):
+    """How large a look at a group is, its first coordinate, and how many it has."""
+    low = int(group.first.min())
+    span = int(group.first.max()) + 2 * len(group.weights) - low
+    return span + POSE + group.elements + SEEN * len(group.first), low, span
 
 
 class _Pieces:

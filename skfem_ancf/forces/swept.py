@@ -28,7 +28,7 @@ LONGER, BENT = 1.6, 0.3
 WIDER = 1.2
 #: The way after which short steps are looked at again, and the depth that is said, in what is half
 #: of the thickness of an obstacle.
-AGAIN, DEEP = 0.25, 0.5
+AGAIN, DEEP = 1.0, 0.5
 #: Cosine of the angle between the normals at both ends up to which a point is on another side: a
 #: chord that cuts a circle by a tenth of its radius has 0.62.
 ASIDE = 0.62
@@ -105,30 +105,28 @@ class _Path:
         self._range = slice(int(first.min()), int(first.max()) + self._dofs.shape[1])
         middle = middle_of(group)
         self._start, self._mean, self._spread = middle[:2], middle[2::2], middle[3::2]
-        bound = np.abs(group.weights)
+        bound, half = np.abs(group.weights), len(group.weights) // 2
+        self._bound = self._spread = self._spread.max(axis=1)[1:]
         if group.slopes is not None:  # normals turn by no more than twice the change of a slope
-            bound = bound + 2.0 * np.abs(group.offsets * group.slopes)
-        self.deepest, self.gone = 0.0, 0.0
-        self._bound = bound.max(axis=1).reshape(2, -1).sum(axis=0)
+            turned = 2.0 * np.abs(group.offsets * group.slopes)
+            bound, self._bound = bound + turned, self._bound + turned.max(axis=1)[1:]
+        self._most = (bound[:half] + bound[half:]).max(axis=1)
+        self._by_time = self.obstacle.moves or self.obstacle.shape.kind == OWN
+        self._turns = 0.0 if self.obstacle.angle is None else 2.0
+        self.deepest = self.gone = 0.0
 
     def first(self, u, v, t):
         """The first step on which a point passes through the obstacle, or how many there are."""
-        last, begin = len(t) - 1, 0
-        rests = not self.obstacle.moves and self.obstacle.shape.kind != OWN
-        if rests:
-            ways = LONGER * self._longest(u, v, t)
-            looked = self._looked(ways)
-            if not looked.any():
-                return last
-            begin, end = (int(k) for k in np.nonzero(looked)[0][[0, -1]])
-            u, t, v = u[begin:end + 2], t[begin:end + 2], v[begin:end + 2]
-        near, way = self._near(u, v, t)
-        looked = looked[begin:end + 1] if rests else self._looked(np.where(near, way, 0.0).max(1))
-        for k in np.nonzero(looked & near.any(axis=1))[0]:
-            two = slice(k, k + 2)
-            if self._passes(np.nonzero(near[k])[0], u[two], v[two], t[two]):
-                return int(begin + k)
-        return last
+        steps = np.arange(len(t) - 1)
+        if not self._by_time:
+            steps, = np.nonzero(self._looked(LONGER * self._longest(u, v, t)))
+        if len(steps):
+            ends = [np.array([x[steps], x[steps + 1]]) for x in (u, v, t)]
+            near = self._near(*ends)
+            for k in np.nonzero(near.any(axis=1))[0]:
+                if self._passes(np.nonzero(near[k])[0], *(x[:, k] for x in ends)):
+                    return int(steps[k])
+        return len(t) - 1
 
     def _looked(self, ways):
         """Which steps are looked at: long ones, and now and then one of many that are short."""
@@ -139,41 +137,52 @@ class _Path:
         return looked
 
     def _longest(self, u, v, t):
-        """The largest of displacements, and of what rates would make, in each step; (n,)."""
+        """No less than the largest of displacements, and of what rates would make; shape (n,)."""
         h = np.diff(t)[:, None]
         way = np.abs(np.diff(u[:, self._range], axis=0))
         for rate in (v[:-1], v[1:]) if v.size else ():
             way = np.maximum(way, np.abs(h * rate[:, self._range]))
-        return self._most(way)
-
-    def _most(self, change):
-        """How far any point goes, at most, of absolute changes of coordinates (n, m); (n,)."""
-        types = 2 * len(self._bound)
-        size = change.reshape(len(change), -1, types).max(axis=1)
-        return np.sqrt(2.0) * (size.reshape(len(size), -1, 2).max(axis=2) @ self._bound)
-
-    def _bent(self, u, v, t):
-        """How much longer than straight the ways of points are, at most; shape (n,)."""
-        if not v.size:
-            return np.zeros(len(t) - 1)
-        x, h, out = np.diff(u[:, self._range], axis=0), np.diff(t)[:, None], 0.0
-        for rate in (v[:-1], v[1:]):
-            out = out + BENT * self._most(np.abs(h * rate[:, self._range] - x))
-        return out
+        types = 2 * len(self._most)
+        size = way.reshape(len(way), -1, types).max(axis=1).reshape(len(way), -1, 2).max(axis=2)
+        return np.sqrt(2.0) * (size @ self._most)
 
     def _near(self, u, v, t):
-        """Which elements may have been in the obstacle in each step, and ways; (n, elements)."""
-        pairs = u[:, self._dofs].reshape(len(u), len(self._start[0]), -1, 2)
-        x = self._start + np.einsum("tepc,pe->tce", pairs, self._mean)
-        half = len(self._mean) // 2
-        pairs[:, :, half] -= pairs[:, :, 0]
-        far = self._group.numbers[RADIUS] + np.einsum(
-            "tep,pe->te", np.hypot(pairs[..., 0], pairs[..., 1]), self._spread)
-        x = np.array([self._seen(one, time) for one, time in zip(x, t)])
-        gap = np.array([self._asked(one, time)[0] for one, time in zip(x, t)])
+        """Which elements may pass through the obstacle in each step, or be deep in it.
+
+        Of both ends of n steps, the first axis; shape (n, elements).
+        """
+        x, change = self._middles(u)
+        wide = self._group.numbers[RADIUS] + _sizes(change) @ self._spread
+        if self._by_time:
+            x = np.array([[self._seen(*each) for each in zip(*end)] for end in zip(x, t)])
+            gap = np.array([[self._asked(*each)[0] for each in zip(*end)] for end in zip(x, t)])
+        else:
+            gap = self._asked(np.moveaxis(x, 2, 0).reshape(2, -1), 0.0)[0].reshape(wide.shape)
         self._tables.counts[0] += gap.size
-        way = np.hypot(*np.moveaxis(np.diff(x, axis=0), 1, 0)) + self._bent(u, v, t)[:, None]
-        return gap[1:] + gap[:-1] - way < 2.0 * WIDER * np.maximum(far[1:], far[:-1]), way
+        way = np.hypot(*np.moveaxis(x[1] - x[0], 1, 0)) + self._bent(u, v, t)
+        wide = WIDER * np.maximum(wide[1], wide[0])
+        passes = way + self._turns * wide + _sizes(change[1] - change[0]) @ self._bound > (
+            2.0 * self._group.depth)
+        deep = gap[1] - wide < -DEEP * self.obstacle.shape.inner
+        return (gap[1] + gap[0] - way < 2.0 * wide) & (passes | deep)
+
+    def _middles(self, u):
+        """Middles of elements, and pairs of coordinates, the places of both nodes as one way."""
+        pairs = u[..., self._dofs].reshape(*u.shape[:2], len(self._dofs), -1, 2)
+        x = np.einsum("ntepc,pe->ntce", pairs, self._mean)
+        pairs[..., len(self._mean) // 2, :] -= pairs[..., 0, :]
+        return self._start + x, pairs[..., 1:, :]
+
+    def _bent(self, u, v, t):
+        """How much longer than straight the ways of points are, at most; (n, elements)."""
+        if not v.size:
+            return 0.0
+        h, out = (t[1] - t[0])[:, None], 0.0
+        for rate in v:
+            x, change = self._middles((h * rate - (u[1] - u[0]))[None])
+            out = out + BENT * (np.hypot(*np.moveaxis(x[0] - self._start, 1, 0))
+                                + _sizes(change[0]) @ self._bound)
+        return out
 
     def _passes(self, elements, u, v, t):
         """True if a point of some elements passes through the obstacle in a step."""
@@ -181,7 +190,9 @@ class _Path:
         at = (elements[:, None] * m + np.arange(m)).ravel()
         ends = [self._points(at, *end) for end in zip(u, t)]
         found = [self._asked(x, time, True) for x, time in zip(ends, t)]
-        way = np.hypot(*(ends[1] - ends[0])) + self._bent(u, v, t)[0]
+        way = np.hypot(*(ends[1] - ends[0]))
+        if v.size:
+            way += np.repeat(self._bent(*(x[:, None] for x in (u, v, t)))[0, elements], m)
         least, deep = self._group.depth, -np.minimum(found[0][0], found[1][0])
         self.deepest = max(self.deepest, float(deep.max()))
         most = least + np.maximum(deep, 0.0)
@@ -226,6 +237,10 @@ class _Path:
         else:
             out[0] = shape.distance(x, t)
         return -out if shape.hollow else out
+
+
+def _sizes(pairs):
+    return np.hypot(pairs[..., 0], pairs[..., 1])
 
 
 def _between(u, v, t, s):

@@ -218,15 +218,17 @@ class Obstacle(ForceElement):
     # points of the surface
 
     def _groups_of(self, beam, first):
-        """The groups of bottom and top, and of both ends."""
+        """The group of bottom, top and both ends, which count as an element each."""
         xi, along = self._along(beam)
-        eta, across = _lobatto(ACROSS)
         sides = np.array([np.tile(xi, 2), np.repeat([0.0, 1.0], len(xi))]), np.tile(along, 2)
-        last = beam.mesh.nelements - 1
-        ends = [(np.array([np.full(ACROSS, end), eta]), across, np.array([e]))
+        m, last = 2 * len(xi), beam.mesh.nelements - 1
+        eta, across = _lobatto(ACROSS)  # as many points as an element has: some are shared
+        which = np.arange(m) % ACROSS
+        eta, across = eta[which], across[which] / np.bincount(which)[which]
+        ends = [(np.array([np.full(m, end), eta]), across, np.array([e]))
                 for end, e in ((0.0, 0), (1.0, last))]
-        return [self._group(beam, first, *sides, None)] + [
-            self._group(beam, first, *end) for end in ends]
+        return [_joined([self._group(beam, first, *sides, None)] + [
+            self._group(beam, first, *end) for end in ends])]
 
     def _along(self, beam):
         """Points and weights along the elements of a beam."""
@@ -280,6 +282,18 @@ class Obstacle(ForceElement):
 
     def __repr__(self) -> str:
         return f"<Obstacle {self.shape!r}>"
+
+
+def _joined(groups):
+    """Some groups of one beam as one."""
+    first = groups[0]
+    arrays = {name: np.concatenate([getattr(group, name) for group in groups], axis=-1)
+              for name in ("first", "weights", "areas", "offsets", "starts")}
+    slopes = None if first.slopes is None else np.concatenate(
+        [group.slopes for group in groups], axis=-1)
+    numbers = np.max([group.numbers for group in groups], axis=0)  # but for the radius the same
+    return first._replace(**arrays, slopes=slopes, numbers=numbers,
+                          elements=sum(group.elements for group in groups))
 
 
 def _deepest(shape, h):
