@@ -455,7 +455,8 @@ class Inverse:
             size, step = self._norm(x), self._norm(dx)
             if k == 0:
                 self.left = step / size if size > 0.0 else np.inf
-            if not step > REFINED * size:
+            # the next correction is that part of this one that this is of the one before
+            if not step * step > REFINED * size * min(size, before):
                 break
             if not step < SLOW * before:
                 return x, l, step <= accepted * size
