@@ -244,7 +244,7 @@ class Beam(Frozen):
         given["width" if "section" in changes or not isinstance(self.section, Rectangle) else
               "section"] = None
         other = type(self)(**{**given, **changes})
-        if other.mesh is self.mesh and other.element is self.element:
+        if other.element is self.element:
             self._share(other)
         return other
 
@@ -265,6 +265,13 @@ class Beam(Frozen):
     def _share(self, other):
         """Hand on what depends on mesh and element, and to another material of one section more."""
         mine, its = vars(self), vars(other)
+        if other.mesh is not self.mesh:
+            if ("kernel" in mine and other.formulation is self.formulation
+                    and other.material is self.material):
+                found = self.kernel.on_mesh(other.across, other.formulation)
+                if found is not None:
+                    its["kernel"] = found
+            return
         for name in _GEOMETRY:
             if name in mine:
                 its[name] = mine[name]
@@ -823,13 +830,11 @@ class Beam(Frozen):
     @cached_property
     def _masses(self):
         """Of equal elements the weight over the acceleration, (N / 2,)."""
-        mesh, nd, width = self.mesh, self.element.nodal_dofs, self.across.slabs[0].width
+        mesh, width = self.mesh, self.across.slabs[0].width
         h, L = mesh.height, float(mesh.lengths[0])
-        load = self.density * width * h * L * self.element.integrals(h, L)
-        out, (left, right) = np.zeros((mesh.p.shape[1], nd)), mesh.t
-        out[left] = load[:nd]  # a node is the left end of one element at most
-        out[right] += load[nd:]
-        return out.ravel()
+        loads = np.empty((mesh.nelements, self.nd, 2))
+        loads[:] = (self.density * width * h * L * self.element.integrals(h, L))[:, None]
+        return self.kernel.scatter(loads)[::2]
 
     def mass(self) -> csr_matrix:
         """The mass matrix, constant, sparse, shape (N, N)."""

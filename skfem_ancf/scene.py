@@ -229,6 +229,8 @@ class Scene:
             found = self._places.get(id(beam))
             if found is not None:
                 return found[0]
+        if type(beam) is int and 0 <= beam < len(self._beams):
+            return beam
         return self._places[id(select_member(self._beams, self._bodies, beam))][0]
 
     def _number_at(self, at, beam):

@@ -236,6 +236,30 @@ def test_a_replaced_width_or_mesh_is_no_old_one():
         scene.solve_static().displacement((1, 0))[1])
 
 
+@pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCF(3),
+                                     ElementBeamANCFCubic(2)])
+def test_a_replaced_mesh_of_equal_elements_scales_tables(monkeypatch, element):
+    beam = cantilever(element, 5, angle=0.3).beams[0]
+    u = 1e-3 * np.random.default_rng(0).standard_normal(beam.N)
+    force, mesh = beam.kernel.force(u), MeshBeam.init_line(np.linspace(1, 3, 6), 0.03, angle=-0.2)
+    terms = counted(monkeypatch, section, "_terms")
+    changed = beam.replace(mesh=mesh)
+    found = [make(changed.kernel) for make in (
+        lambda k: k.force(u), lambda k: k.tangents(u), lambda k: k.energies(u),
+        lambda k: k.volume)]
+    assert not terms and np.array_equal(beam.kernel.force(u), force)
+    anew = Beam(mesh, element, beam.material, width=0.01).kernel
+    for a, b in zip(found, (anew.force(u), anew.tangents(u), anew.energies(u), anew.volume)):
+        assert np.allclose(a, b, rtol=1e-12, atol=1e-12 * np.max(np.abs(b)))
+    for other in (mesh.replace(height=lambda x: 0.03 - 0.001 * x),
+                  MeshBeam.init_line([1, 2, 2.2, 2.4, 2.6, 3], 0.03),
+                  MeshBeam.init_line(np.linspace(1, 3, 7), 0.03)):
+        one, other = beam.replace(mesh=other), Beam(other, element, beam.material, width=0.01)
+        u = 1e-3 * np.random.default_rng(0).standard_normal(one.N)
+        a, b = one.kernel.force(u), other.kernel.force(u)
+        assert np.allclose(a, b, rtol=0, atol=1e-12 * np.max(np.abs(b)))
+
+
 def same(a, b):
     """Solutions, and what is read of them, of scenes made in two ways."""
     x, y = a.solve_static(), b.solve_static()
@@ -315,15 +339,17 @@ def changed_at_random(rng, given):
     if kind in ("width", "both"):
         changes["width"] = 0.01 * x
     if kind == "mesh":
-        changes["mesh"] = MeshBeam.init_line(np.linspace(0, 1, int(3 + 2 * x)), 0.02 * x, angle=0.3)
-    tip = np.array([np.cos(0.3), np.sin(0.3)])
+        nodes = np.linspace(0.0, 1.0, int(4.5 + x))
+        nodes[1] += 0.05 * (x > 1.2)  # unequal elements
+        changes["mesh"] = MeshBeam.init_line((0.9 + 0.1 * x) * nodes, 0.02 * x, angle=0.3 * x)
+    tip = given["mesh"].p[:, -1]
     loads = {"weight": lambda beam: [Weight((0.4, -6.0 * x))],
              "force": lambda beam: [PointForce((0.1, -0.2 * x), at=tip)],
              "more": lambda beam: [Weight((0.0, -4.0)), PointForce((0.1, 0.2 * x), at=0.3 * tip)],
              "pushed": lambda beam: [Pressure(beam, "top", 20.0 * x),
                                      EndMoment(beam, "right", 0.01 * x)]}
-    if kind in loads:
-        changes["loads"] = loads[kind]
+    if kind in loads or kind == "mesh":  # where points are that were loaded, there may be none
+        changes["loads"] = loads.get(kind, loads["weight"])
     return changes, {**given, **changes}
 
 

@@ -618,6 +618,18 @@ class Chain:
         self.t = mesh.t
         self.N = self.nd * mesh.p.shape[1]
 
+    def on_mesh(self, across: Any, formulation: Any) -> "Chain | None":
+        """The kernel of the same beam on another mesh; None if it is made anew.
+
+        Parameters
+        ----------
+        across
+            The section on it, a :class:`~skfem_ancf.sections.Across`.
+        formulation
+            That of the beam.
+        """
+        return None
+
     def gather(self, u: Array, elements: Any = slice(None)) -> Array:
         """Element values (ne, nb, 2) of a coordinate vector (N,).
 

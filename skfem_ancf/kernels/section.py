@@ -418,6 +418,7 @@ class TermTables:
     def __init__(self, across: "Across", slab: "Slab", term: "Term", constant: Array,
                  owner: Any, before: "TermTables | None" = None) -> None:
         self.law, self.term, self.slab, mesh = term.law, term, slab, across.mesh
+        self._mesh = mesh
         self.shared = across.uniform
         tind = np.array([0]) if self.shared else None
         self.section_points = len(term.section[0])
@@ -457,6 +458,31 @@ class TermTables:
         if volume != 1.0:
             other.w, changes["weights"] = volume * self.w, volume * pack.weights
         other.pack = pack._replace(**changes, **times_held(pack, both))
+        return other
+
+    def on_mesh(self, across: "Across", constant: Array) -> "TermTables":
+        """As :meth:`Kernel.on_mesh`.
+
+        Parameters
+        ----------
+        across
+            As there.
+        constant
+            The stabilisation there, shape (0 or 1, 2 nb, 2 nb).
+        """
+        other, pack, mesh = twin_of(self), self.pack, across.mesh
+        *_, (unit, _, _, n) = self._rows
+        G, frame, scaled = _scaled(mesh, across.element, unit, n, np.zeros(1, int))
+        other._rows = G, frame, *self._rows[2:5], scaled
+        before, other.slab = self._mesh, across.slabs[0]
+        larger = mesh.height * mesh.lengths[0] / (before.height * before.lengths[0])
+        other._mesh, other.w = mesh, larger * self.w
+        _, rows, columns, _ = scaled
+        other.pack = pack._replace(
+            table=G, transposed=packed(G.transpose(0, 2, 1)), frame=frame,
+            weights=larger * pack.weights, moduli=larger * pack.moduli, constant=packed(constant),
+            pairs=scaled_pair_tables(unit, rows, columns, pack.pairs.pairs[:2], constant,
+                                     mesh.nelements))
         return other
 
     def _gradients(self, pack, u, rows):
@@ -517,15 +543,15 @@ def _same_places(a, b):
 def _rows(mesh, element, term, tind):
     """Table and frame, g and h of each component's samples, and those of shear and of eps_xx.
 
-    Of one table for all elements also that of an element of length and height 1, and what
-    multiplies its rows and columns.
+    Of one table for all elements also that of an element of length and height 1, what multiplies
+    its rows and columns, and how many of its rows are along the axis.
     """
     points, xx, yy, xy = _samples(Content(*(term.nodes(name) for name in ("xx", "yy", "xy")),
                                           term.section_nodes))
     rows = (xx, xx), (yy, yy), xy
     if mesh.is_straight and mesh.heights is None and element.by_reference:
-        G, frame, scaled = _straight_tables(mesh, element, points, slice(None) if tind is None else
-                                            tind)
+        G, frame, scaled = _scaled(mesh, element, element.unit_slopes(*points), points[0].shape[1],
+                                   slice(None) if tind is None else tind)
         return G, frame, rows, xy, xx, scaled if len(G) == 1 else None
     tables = []
     for k, X in enumerate(points):
@@ -536,15 +562,15 @@ def _rows(mesh, element, term, tind):
     return G, frame, rows, xy, xx, None
 
 
-def _straight_tables(mesh, element, points, tind):
-    """Tables of straight elements from that of length and height 1, times powers of both."""
-    h, L, t, n = mesh.height, mesh.lengths[tind][:, None], mesh.t[:, tind], points[0].shape[1]
-    unit, columns = element.unit_slopes(*points), element.powers(h, L)
+def _scaled(mesh, element, unit, n, tind):
+    """Tables of straight elements: that of length and height 1, n rows along, times powers."""
+    h, L, t = mesh.height, mesh.lengths[tind][:, None], mesh.t[:, tind]
+    columns = element.powers(h, L)
     rows, frame = np.empty((len(L), len(unit))), np.empty((len(unit), 2, len(L)))
     rows[:, :n], rows[:, n:] = 1.0 / L, 1.0 / h
     x, y = (mesh.p[:, t[1]] - mesh.p[:, t[0]]) / L.T
     frame[:n, 0], frame[:n, 1], frame[n:, 0], frame[n:, 1] = x, y, -y, x
-    return unit * (rows[:, :, None] * columns[:, None]), frame, (unit, rows[0], columns[0])
+    return unit * (rows[:, :, None] * columns[:, None]), frame, (unit, rows[0], columns[0], n)
 
 
 @lru_cache(64)
@@ -594,7 +620,8 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
     before
         One of the same G, whose tables of pairs serve if the law couples the same strains.
     scaled
-        A table (rows, nb) whose rows and columns two vectors multiply to make G; or None.
+        A table (rows, nb) whose rows and columns two vectors multiply to make G, and how many of
+        its rows are along the axis; or None.
     """
     nb, ne, ns = G.shape[2], len(left), weights.shape[0] // len(along[0])
     (g, h), normal = (np.concatenate(part) for part in zip(*rows)), sum(len(x) for x, _ in rows[:2])
@@ -615,7 +642,7 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
     if before is not None and before.rows is layout.rows:
         pairs = with_constant(before.pairs, constant, ne)
     elif scaled is not None:
-        unit, of_rows, of_columns = scaled
+        unit, of_rows, of_columns, _ = scaled
         pairs = scaled_pair_tables(unit, of_rows, of_columns, layout.pairs, constant, ne)
     else:
         pairs = pair_tables(G, layout.pairs, constant, ne)
@@ -841,6 +868,38 @@ class Kernel(Chain):
         if self.constant is not None:
             other.constant = stiffness * volume * self.constant
         other.tables = [t.in_proportion(slabs[id(t.slab)], stiffness, volume) for t in self.tables]
+        other.firsts = [other.tables[self.tables.index(t)] for t in self.firsts]
+        other.packs = [t.pack for t in other.tables]
+        return other
+
+    def on_mesh(self, across: "Across", formulation: "Formulation") -> "Kernel | None":
+        """The kernel of the same beam on another mesh, of as many elements.
+
+        Parameters
+        ----------
+        across
+            Its section.
+        formulation
+            That of the beam.
+
+        Returns
+        -------
+        Kernel or None
+            None if more than the length and the height of equal elements is another.
+        """
+        mine = self._across
+        if not (mine.simple and mine.uniform and across.simple and across.uniform and self.linear
+                and mine.slabs[0].width == across.slabs[0].width
+                and np.array_equal(mine.mesh.t, across.mesh.t)
+                and all(table._rows[5] is not None for table in self.tables)):
+            return None
+        other = twin_of(self)
+        other._across, other.t = across, across.mesh.t
+        other.constant = across.stabilisation(formulation)
+        none = np.zeros((0, 2 * self.nd, 2 * self.nd))
+        first = none if other.constant is None else other.constant
+        other.tables = [table.on_mesh(across, none if k else first)
+                        for k, table in enumerate(self.tables)]
         other.firsts = [other.tables[self.tables.index(t)] for t in self.firsts]
         other.packs = [t.pack for t in other.tables]
         return other
