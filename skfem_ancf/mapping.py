@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from math import factorial
+from math import factorial, perm
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -545,6 +545,19 @@ class MappingBeam(Mapping):
             dnx, dny, nx, ny = g * dnx + rate * nx, g * dny + rate * ny, g * nx, g * ny
         Y, size = eta - 0.5, (dx * dx + dy * dy) ** 0.5
         return (dx + Y * dnx, dy + Y * dny), (nx, ny), (dx / size, dy / size)
+
+    def curvature(self, X: Array, tind: Array) -> Array:
+        """Curvature of the axis, shape (nelements, npoints).
+
+        Parameters
+        ----------
+        X, tind
+            As for :meth:`F`, shapes (2, nelements, npoints) and (nelements,).
+        """
+        axis = self._powers[0].take(tind, axis=-1)[..., None]
+        (x, y), (dx, dy) = ([polynomial([perm(k, d) * c for k, c in enumerate(row)][d:], X[0])
+                             for row in axis] for d in (1, 2))
+        return (x * dy - y * dx) / (x * x + y * y) ** 1.5
 
     def _numbers(self, e):
         """Of one element: where its axis begins, axis and director, :func:`_sorted` of these."""

@@ -80,6 +80,38 @@ def test_where_heights_have_a_kink():
     assert_allclose(strains(state)[0], -0.02 * M / (E * B * H**3 / 12), rtol=2e-3)
 
 
+def hook(element, n):
+    """S_xx of a line that becomes an arc at 0.5, bent at its end, at places along it."""
+    radius, height, y = 0.25, 0.1, 0.045
+
+    def curve(s, y=0.0):
+        angle = np.maximum(s - 0.5, 0.0) / radius
+        return np.array([np.minimum(s, 0.5) + (radius - y) * np.sin(angle),
+                         radius - (radius - y) * np.cos(angle)])
+
+    mesh = MeshBeam.init_curve(curve, np.linspace(0.0, 1.0, n + 1), height=height)
+    beam = Beam(mesh, element, StVenantKirchhoff(E=E, nu=0.3), B)
+    state = Scene(beam).clamp("left").moment("right", 2e-4).solve_static()
+    return state.stress(curve(np.array([0.3, 0.45, 0.48, 0.49, 0.51, 0.52, 0.55, 0.7]), y))[0]
+
+
+@pytest.mark.parametrize("element, n", [(ElementBeamANCF(2), 16), (ElementBeamANCF(3), 16),
+                                        (ElementBeamCable(5), 32)], ids=repr)
+def test_a_line_that_becomes_an_arc(element, n):
+    """Each is bent as if it were alone, the arc as Winkler says."""
+    height, radius, y = 0.1, 0.25, 0.045
+    neutral = height / np.log((radius + height / 2) / (radius - height / 2))
+    straight = -2e-4 * y / (B * height**3 / 12)
+    bent = 2e-4 * (radius - y - neutral) / (B * height * (radius - neutral) * (radius - y))
+    assert_allclose(hook(element, n), 4 * [straight] + 4 * [bent], rtol=1e-2)
+
+
+def test_short_elements_see_the_layer_between_a_line_and_an_arc():
+    """That of the plane body: stock scikit-fem, 64 x 6 isoparametric quads of order 3."""
+    plane = [-2.160, -2.154, -2.183, -2.221, -2.344, -2.383, -2.418, -2.412]
+    assert_allclose(hook(ElementBeamANCF(3), 32), plane, rtol=1.2e-2)
+
+
 def test_smooth_functions_do_not_jump():
     scene = cantilever(ElementBeamANCF(3), lambda x, y: E * np.exp(3.0 * x),
                        lambda x, y: B * (1.0 + x * x), lambda x: H * np.cos(x))
@@ -87,6 +119,15 @@ def test_smooth_functions_do_not_jump():
         lambda x: np.array([x[0], np.sin(9.0 * x[0])]))
     state = scene.solve_static()
     assert list(state.recovery().forces.cuts) == [0.0, 16.0]
+
+
+@pytest.mark.parametrize("n", [4, 9])
+@pytest.mark.parametrize("b", [0.3, 1.0, 2.0])
+def test_smooth_curves_do_not_jump(n, b):
+    mesh = MeshBeam.init_curve(lambda s: np.array([np.cos(s), b * np.sin(s)]),
+                               np.linspace(0.0, 1.5, n), height=0.05)
+    beam = Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(E=E, nu=0.3), B)
+    assert list(beam.across.jumps) == []
 
 
 def test_jumps_are_found_by_their_size():

@@ -15,7 +15,7 @@ from ..frozen import Frozen
 from ..kept import cached_property, twin_of
 from ..quadrature import gauss
 from .base import Rectangle, asked
-from .jumps import KINK, jumps
+from .jumps import BEND, KINK, jumps
 from .moving import Moving
 from .shear import shear_factor
 
@@ -121,7 +121,7 @@ class Across(Frozen):
     def jumps(self) -> Array:
         """Stations, see :func:`~.jumps.jumps`, at which something of the section jumps.
 
-        A width, a modulus, a density, or the slope of the height.
+        A width, a modulus, a density, the slope of the height, or the curvature of the axis.
         """
         n, found = self.mesh.nelements, [np.zeros(0)]
         for slab in self.slabs:
@@ -131,6 +131,9 @@ class Across(Frozen):
         if self.mesh.heights is not None:
             found.append(jumps(lambda X, e: self.mesh.mapping().height(X[0], e)[1]
                                / self.mesh.lengths[e, None], n, np.array([0.5]), KINK))
+        if not self.mesh.is_straight:
+            found.append(jumps(self.mesh.mapping().curvature, n, np.array([0.5]),
+                               BEND / self.mesh.height))
         return np.unique(np.concatenate(found))
 
     def _given(self, name, slab, X, tind):

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 #: How far from its ends an element is asked for what may jump there, relative to its length.
 SIDE = 1e-7
 
-#: Changes from element to element that are jumps: of a function, relative to its largest value,
-#: and of the slope of the height.
-JUMP, KINK = 1e-3, 0.02
+#: Changes from element to element that are jumps: of a function, relative to its largest value, of
+#: the slope of the height, and of the height times the curvature of the axis.
+JUMP, KINK, BEND = 1e-3, 0.02, 0.05
 
 
 def beside(X: Array) -> Array:
