@@ -121,7 +121,8 @@ class NearCable:
         kappa = (curvature(a0, a1, bx + db0, by + db1, square)
                  - curvature(x, y, bx, by, square0))
         eps = extension(a0, a1, da0, da1, square**0.5, square0**0.5)
-        slab = beam.across.slabs[0 if beam.across.plain else beam.across.which(
+        slabs = beam.across.slabs
+        slab = slabs[0 if len(slabs) == 1 else beam.across.which(
             np.array([[xi], [eta]]), np.array([e])).item()]
         return fibre(beam.mesh.mapping().lever(*point.place), eps, kappa,
                      slab.material.lateral_ratio)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .frozen import Frozen
+from .kept import cached_property
 from .quadrature import gauss, lagrange
 from .sections.moving import Moving
 from .series import chebyshev, polynomials
@@ -157,7 +158,15 @@ class Panels(Frozen):
         self.from_axis = self.from_bottom - self._till(0.5)
         measures = [slab.measure for slab in slabs]
         self.moving = isinstance(measures[0], Moving)
-        self._measures = measures
+        if self.moving:
+            self._lines = self._ends_of(measures)
+
+    def _ends_of(self, measures):
+        """a and b of the ends ``a + b / h`` of panels: of the lower ones and the upper ones."""
+        h = np.array([measures[0].height, 2.0 * measures[0].height])
+        found = [m.ends(h) for m in measures]
+        ends = [np.concatenate([e[:-1] for e in found]), np.concatenate([e[1:] for e in found])]
+        return [(2.0 * two - one, h[1] * (one - two)) for one, two in (e.T for e in ends)]
 
     def _till(self, eta):
         """From values to their integral over eta from the lowest place to one, (m,)."""
@@ -168,9 +177,14 @@ class Panels(Frozen):
 
     def _low_high(self, h):
         """Ends of the panels at heights h (...), of shape (npanels, ...) both."""
-        found = [m.ends(h) for m in self._measures]
-        return (np.concatenate([ends[:-1] for ends in found]),
-                np.concatenate([ends[1:] for ends in found]))
+        return [a + b / h for a, b in (np.expand_dims(line, tuple(range(2, 2 + h.ndim)))
+                                       for line in self._lines)]
+
+    @cached_property
+    def _numbers(self):
+        """Of each panel both ends of :attr:`_lines`, where it begins, and its size."""
+        return [(*low, *high, p.low, p.high - p.low) for low, high, p in zip(
+            *(np.transpose(line).tolist() for line in self._lines), self.panels)]
 
     def moved(self, h: Array) -> Moved:
         """The points at sections of some heights.
@@ -202,13 +216,18 @@ class Panels(Frozen):
         eta, h
             Places, and heights of the sections there: numbers, or arrays (n,).
         """
-        low, high = self._low_high(np.asarray(h, dtype=float))
+        if isinstance(h, float):
+            for a, b, c, d, start, size in self._numbers:
+                low, high = a + b / h, c + d / h
+                if eta < high:
+                    break
+            return start + size * (eta - low) / (high - low)
+        low, high = self._low_high(h)
         which = np.sum(np.asarray(eta) >= high[:-1], axis=0)
         low, high = (np.take_along_axis(x, which[None], 0)[0] for x in (low, high))
         starts, ends = (np.array([getattr(p, end) for p in self.panels])[which]
                         for end in ("low", "high"))
-        found = starts + (ends - starts) * (eta - low) / (high - low)
-        return found if np.ndim(found) else float(found)
+        return starts + (ends - starts) * (eta - low) / (high - low)
 
     def values(self, eta: float) -> Array:
         """Weights (m,) of the values at the points for that at a place.

@@ -102,7 +102,8 @@ class RawField:
         beam = point.beam
         count = LONG if name == "stress" and not (
             beam.across.plain and isinstance(beam.law, LinearLaw)) else 1
-        if beam.across.moving or (count == 1 and not beam.has_sections):
+        slabs = beam.across.slabs
+        if (beam.across.moving and len(slabs) > 1) or (count == 1 and not beam.has_sections):
             return False  # no polynomials where slabs have other places; cables say it at once
         spent = self._spent.get(point.number, 0) + count
         self._spent[point.number] = spent if spent < WORTH else 0

@@ -65,18 +65,19 @@ def test_every_formulation(mesh, formulation, order, plane):
 
 
 @pytest.mark.parametrize("mesh", ["straight", "arc"])
-@pytest.mark.parametrize("kind", ["taper", "profile", "layers", "law"])
+@pytest.mark.parametrize("kind", ["taper", "profile", "layers", "law", "tapered profile",
+                                  "tapered layers"])
 @pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)], ids=repr)
 def test_other_sections_and_laws(kind, element, mesh):
     mesh, material, section = MESHES[mesh](), STEEL, None
-    if kind == "taper":
+    if "taper" in kind:
         mesh = TAPERS[mesh.is_straight]()
-    elif kind == "profile":
-        section = Section.profile("I", width=0.1, web=0.01, flange=0.01)
-    elif kind == "layers":
-        material, section = None, Section.layers((0.03, STEEL), (0.07, STEEL.replace(E=3e6)),
-                                                 width=0.1)
-    elif element.order:
+    if "profile" in kind:
+        section = Section.profile("I", width=0.1, web=0.04, flange=0.01)
+    elif "layers" in kind:
+        material, section = None, Section.layers(
+            (0.02, STEEL), (None if "taper" in kind else 0.08, STEEL.replace(E=3e6)), width=0.1)
+    elif kind == "law" and element.order:
         material = NeoHookean(1e6, 0.3)
     beam = Beam(mesh, element, material, None if section else 0.1, section=section)
     agree(loaded(beam), inside(mesh, 30)[2])
