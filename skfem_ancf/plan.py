@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -99,10 +100,10 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
     add("dead loads", "constant" if dead else "skipped",
         f"{len(dead)} assembled when given" if dead else "there are none")
     add("varying loads", "computed" if rest else "skipped",
-        f"{rest} depend on displacement or time" if rest else "no follower load, no amplitude")
+        f"{_kinds(load for load in scene.loads if load not in dead)}: they depend on displacement "
+        "or time" if rest else "no follower load, no amplitude")
     add("multipliers", "computed" if s.m else "skipped",
-        f"{s.m} equations of {len(s.joints)} joint(s) and directors of rigid bodies" if s.bodies
-        else f"{s.m} equations of {len(s.joints)} joint(s)" if s.m else
+        f"{s.m} equations of {_kinds(s.joints)}" if s.m else
         "no joints" if not scene.joints else "the joints only fix coordinates")
     add("linear solver", "computed", _linear_solver(s, dynamic))
     rules = sorted({(b.element.order, t.section_points, getattr(t.slab.measure, "spent", 0))
@@ -207,6 +208,12 @@ def _bodies(s):
                                         "multiplier for the length of the director")
 
 
+def _kinds(things):
+    """How many there are of each kind, in words."""
+    return ", ".join(f"{n} {name}" for name, n in Counter(
+        type(thing).__name__.lstrip("_") for thing in things).items())
+
+
 def _elements(s):
     """Term, status and reason of force elements."""
     forces = s.forces
@@ -214,9 +221,9 @@ def _elements(s):
         return "force elements", "skipped", "no springs, no masses"
     ours = sum(type(element).__module__.startswith(__package__) for element in forces.own)
     return "force elements", "computed", (
-        f"{len(forces.elements)}: {len(forces.parts)} in tables, {len(forces.contacts.obstacles)} "
-        f"obstacles, {len(forces.own) - ours} of your own, {ours} by functions asked in Python, "
-        f"{len(forces.masses)} in the mass"
+        f"{_kinds(forces.elements)}: {len(forces.parts)} in tables, "
+        f"{len(forces.contacts.obstacles)} obstacles, {len(forces.own) - ours} of your own, "
+        f"{ours} by functions asked in Python, {len(forces.masses)} in the mass"
         + (f", {len(forces.sampled)} sampled" if forces.sampled else "")
         + (", some couple points far apart" if forces.far else ""))
 

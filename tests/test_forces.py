@@ -421,7 +421,11 @@ def test_copies_files_other_meshes_and_adaptive_solutions(tmp_path):
 
 def test_plan_and_recovered_fields():
     scene = weighing("sections").spring(20.0, ((0.6, 0), (0.6, 0.5)))
-    assert "1 in tables" in scene.plan()["force elements"].reason
+    assert "1 Spring: 1 in tables" in scene.plan()["force elements"].reason
+    other = weighing().follower_force((0, -1), at=(1, 0))
+    other.joint("weld", beams=("ground", 0), at=((1, 0), "right"))
+    assert "1 FollowerForce" in other.plan()["varying loads"].reason
+    assert "1 Weld" in other.plan()["multipliers"].reason
     assert weighing().plan()["force elements"].status == "skipped"
     assert "far apart" in SCENES["far apart"](weighing()).plan()["force elements"].reason
     assert "dashpots" in SCENES["torsion"](weighing()).plan("dynamic")["damping"].reason
