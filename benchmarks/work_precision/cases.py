@@ -125,14 +125,21 @@ def motion(p, scale=1, adaptive=True):
                 yield ours.run(p, "cable", degree, n, steps=steps, tol=1e-4)
             for steps in counts(16, most):
                 yield ours.run(p, "cable", degree, n, steps=steps, tol=1e-8)
-    for degree, n, most in ((5, 3, 50), (5, 4, 200), (5, 8, 400), (7, 5, 800), (7, 8, 800)):
-        for steps in (25, 50, 100, 200, 400, 800):
+    for degree, n, most in ((5, 3, 50), (5, 4, 100), (5, 8, 400), (7, 5, 400)):
+        for steps in (50, 100, 200, 400):
             if steps <= most:
                 for scheme in ("radau", "gauss"):
                     yield ours.run(p, "cable", degree, n, steps=steps, scheme=scheme, tol=1e-7)
-    for degree, n in ((5, 2), (5, 3), (5, 4), (7, 2)):  # each step turns the beam far
-        for steps in (16, 20, 30, 40):
-            for tol in (2e-3, 1e-4, 1e-5):
+    for degree, n, steps, tol in ((5, 5, 60, 1e-5), (5, 5, 60, 1e-6), (7, 4, 70, 1e-6),
+                                  (7, 5, 150, 1e-6), (9, 6, 300, 1e-6), (9, 6, 400, 1e-6),
+                                  (9, 6, 600, 1e-7), (9, 8, 1500, 1e-7), (7, 12, 2000, 1e-7)):
+        yield ours.run(p, "cable", degree, n, steps=steps, scheme="gauss", points=4, tol=tol)
+    for degree, n, tol in ((7, 4, 1e-4), (7, 5, 1e-5)):
+        yield ours.run(p, "cable", degree, n, steps=400, scheme="radau", tol=tol)
+    yield ours.run(p, "cable", 5, 4, steps=100, scheme="gauss", points=2, tol=2e-3)
+    for degree, n in ((5, 1), (5, 2), (5, 3), (5, 4), (7, 2), (9, 1)):  # each step turns it far
+        for steps in (14, 16, 18, 20, 30, 40):
+            for tol in (1e-3, 5e-4, 1e-5):
                 yield ours.run(p, "cable", degree, n, steps=steps, scheme="radau", tol=tol)
     if adaptive:
         for n, rtol in ((4, 1e-4), (4, 1e-5), (6, 1e-6), (8, 1e-7)):
@@ -173,6 +180,9 @@ def spin_up(p):
     for degree, n in ((5, 2), (5, 4), (7, 4)):
         for steps in (15, 25, 50, 100):
             yield ours.run(p, "cable", degree, n, steps=steps, scheme="radau", tol=1e-7)
+    for steps in (15, 20, 25):
+        yield ours.run(p, "cable", 3, 2, steps=steps, tol=1e-3)
+        yield ours.run(p, "cable", 5, 1, steps=steps, scheme="radau", tol=1e-3)
     for steps in (100, 500, 2000):
         yield ours.run(p, "cubic", 2, 4, steps=steps, tol=1e-6)
     if exudyn_beams.exudyn is None:

@@ -4,6 +4,7 @@ import numpy as np
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
                         Scene, StVenantKirchhoff)
+from skfem_ancf.dynamics import Gauss
 
 from .problems import GRAVITY, THROW_ALONG, arm_angle, throw
 from .runs import Run, Solver, grading
@@ -47,8 +48,11 @@ def element_of(kind, order):
 
 
 def run(problem, kind, order, n, formulation="assumed", compiled=True, grade=1.0, steps=None,
-        scheme="generalized-alpha", **options):
-    """A Run: static, or in ``steps`` time steps (None with rtol: of automatic size)."""
+        scheme="generalized-alpha", points=None, **options):
+    """A Run: static, or in ``steps`` time steps (None with rtol: of automatic size).
+
+    ``points`` are those of a method of Gauss.
+    """
     p = problem
     element, model = element_of(kind, order)
     if model == "section 1" or formulation not in ("assumed", "continuum") and kind != "cable":
@@ -56,7 +60,8 @@ def run(problem, kind, order, n, formulation="assumed", compiled=True, grade=1.0
     words = [f"{kind} {order}", formulation, *([] if compiled else ["NumPy"]),
              *([f"graded {grade:g}"] if grade != 1.0 else [])]
     if p.t_end is not None:
-        words.append({"energy-momentum": "EM", "generalized-alpha": "g-alpha"}.get(scheme, scheme))
+        words.append({"energy-momentum": "EM", "generalized-alpha": "g-alpha"}.get(scheme, scheme)
+                     + (f" of {points}" if points else ""))
     words += [f"{k} {v:g}" for k, v in options.items()]
 
     def build():
@@ -72,8 +77,8 @@ def run(problem, kind, order, n, formulation="assumed", compiled=True, grade=1.0
             dt = "auto" if steps is None else p.t_end / steps
 
             def solve():
-                return s.integrate(p.t_end, dt, scheme=scheme, t_eval=[p.t_end], progress=False,
-                                   **options)
+                return s.integrate(p.t_end, dt, scheme=Gauss(points) if points else scheme,
+                                   t_eval=[p.t_end], progress=False, **options)
 
             def read(history):
                 return history.displacement(p.tip)[-1], steps, history.iterations
@@ -82,5 +87,5 @@ def run(problem, kind, order, n, formulation="assumed", compiled=True, grade=1.0
 
     recipe = "ours", (kind, order, n), dict(
         options, formulation=formulation, compiled=compiled, grade=grade, steps=steps,
-        scheme=scheme)
+        scheme=scheme, points=points)
     return Run(p, CODE, ", ".join(words), n, model, build, steps, recipe)
