@@ -148,7 +148,7 @@ class Screen:
         q = u[:len(self._q0)] + self._q0  # without rigid bodies, which come last
         x, r = _complex(q[self._tangents]), _complex(q[self._tangents - 2])
         chord = r[self._right] - r[self._left]
-        return any(bool(np.any((chord * x[side].conj()).real < 0.0))
+        return any(bool(((chord * x[side].conj()).real < 0.0).any())
                    for side in (self._left, self._right))
 
 

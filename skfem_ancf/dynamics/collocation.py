@@ -259,8 +259,9 @@ class Collocation(Scheme):
         times = np.minimum(times, limit)  # before what jumps at the end
         tables = s.machine.tables
 
-        # where the functions are asked, those times first
-        at = np.append(times, np.minimum(start + h * (steps + table.samples).ravel(), limit))
+        moves, drives, at = s.moves, int(tables.motion_varies), times
+        if moves or drives:  # where the functions are asked, those times first
+            at = np.append(times, np.minimum(start + h * (steps + table.samples).ravel(), limit))
 
         def moving(function):
             """Values at the times, and both rates, shape (number of times, 3, ...)."""
@@ -271,11 +272,10 @@ class Collocation(Scheme):
                 samples.reshape(len(steps), len(table.samples), -1)).reshape(2, len(times), -1)
             return np.stack([values, first / h, second / h**2], axis=1)
 
-        moves = s.moves
         held = np.zeros((len(times) if moves else 1, 3, s.N))
         if moves:
             held[:, :, s.fixed] = moving(s.values_at)
-        joints, drives = tables.plain.joints, int(tables.motion_varies)
+        joints = tables.plain.joints
         c, g = np.zeros((1, 3, s.m)), np.zeros((1, 4, len(joints.gk)))
         if s.m and not joints.own:
             if drives:

@@ -177,7 +177,8 @@ def _task(t_start, t_end, dt, t_eval, tol, rtol, breakpoints):
     _require_step(t_start, t_end, 1e-4 * span if auto else dt)
     if t_eval is not None:
         t_eval = require_finite("t_eval", t_eval, (None,))
-        if (not len(t_eval) or (t_eval[1:] <= t_eval[:-1]).any() or t_eval[0] < t_start
+        if (not len(t_eval) or len(t_eval) > 1 and (t_eval[1:] <= t_eval[:-1]).any()
+                or t_eval[0] < t_start
                 or t_eval[-1] > t_end * (1 + 1e-12)):
             raise InputError(f"t_eval must increase within [{t_start}, {t_end}], got "
                              f"{shown(t_eval)}")
