@@ -985,3 +985,65 @@ def test_short_steps_and_floors_cost_no_search_for_what_is_jumped_over():
     path._passes = lambda elements, *ends: looked.append(len(elements))
     scene.integrate(0.05, 5e-4)  # 12 mm of 100
     assert len(looked) <= 3
+
+
+# driven against friction
+
+
+def driven_arm(scheme, **motor):
+    """An arm turned about its left end, whose tip rubs on a ring: its history, and the motor."""
+    arm = Beam(MeshBeam.init_line([0, 0.5, 1], height=0.05), ElementBeamCable(3),
+               StVenantKirchhoff(2e9, 0.3, 1000), width=0.01)
+    scene = Scene(arm).pin("left").damping(stiffness=2e-4).obstacle(
+        Circle((0, 0), np.hypot(1, 0.025), hollow=True), friction=0.2, stiffness=1e9)
+    made = scene.motor((arm, "left"), **motor)
+    return scene.integrate(0.05, 2e-4, scheme=scheme), made
+
+
+def rubbing_moment(history, window):
+    """mu N R of the tip, its mean: Coulomb's law by the pressures alone."""
+    found = [history.state(k).contact() for k in window]
+    normal = [-np.sum(c.points * c.force) / np.hypot(1, 0.025) for c in found]
+    return 0.2 * np.hypot(1, 0.025) * np.mean(normal)
+
+
+def turned(history):
+    """The angle of the arm's left end."""
+    return np.unwrap(np.arctan2(history.u[:, 3], 1.0 + history.u[:, 2]))
+
+
+@pytest.mark.parametrize("scheme, small", [("energy-momentum", 1e-12), ("generalized-alpha", 5e-3)])
+def test_a_torque_that_drives_against_friction_is_in_the_balance(scheme, small):
+    """Its work is what vibrates, moves and is lost; its moment turns the arm and rubs."""
+    history, _ = driven_arm(scheme, torque=60.0)
+    work = 60.0 * turned(history)
+    energy = history.kinetic_energy + history.strain_energy + history.dissipated
+    assert work[-1] > 10.0 and history.dissipated[-1] > 1.0
+    assert np.abs(energy - energy[0] - work).max() < small * work[-1]
+    window = slice(-60, None)
+    L, t = history.angular_momentum[window], history.t[window]
+    rubs = rubbing_moment(history, range(len(history.t) - 60, len(history.t)))
+    assert rubs > 0.5 and abs(60.0 - (L[-1] - L[0]) / (t[-1] - t[0]) - rubs) < 0.03 * rubs
+
+
+@pytest.mark.parametrize("motor", [
+    dict(speed=lambda t: 20.0 * min(1.0, t / 0.02)**2),
+    dict(angle=lambda t: 20.0 * (t**3 / 0.0012 if t < 0.02 else t - 0.04 / 3))],
+    ids=["speed", "angle"])
+def test_a_motion_that_is_driven_against_friction_is_in_the_balance(motor):
+    history, made = driven_arm("energy-momentum", **motor)
+    moment = history.joint_force(made)[:, 0]
+    work = np.sum(0.5 * (moment[1:] + moment[:-1]) * np.diff(turned(history)))
+    energy = history.kinetic_energy + history.strain_energy + history.dissipated
+    assert abs(energy[-1] - energy[0] - work) < 1e-2 * work and history.dissipated[-1] > 1.0
+
+
+def test_pressures_that_do_not_settle_fail_soon_and_say_what_helps(monkeypatch):
+    monkeypatch.setattr("skfem_ancf.dynamics.steps.AUGMENTED", 3)
+    b = Beam(MeshBeam.init_line([0, 0.5, 1], height=0.02), ElementBeamCable(3),
+             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01, compiled=False)
+    scene = Scene(b).gravity((0, -9.81)).obstacle(
+        Circle((0.5, -0.2105), 0.2), friction=0.3, method="augmented",
+        position=lambda t: (0.3 * t, 0.1 * t))
+    with pytest.raises(ConvergenceError, match=r"do not settle .*tolerance="):
+        scene.integrate(0.02, 1e-3, scheme=GeneralizedAlpha(0))

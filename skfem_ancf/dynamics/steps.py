@@ -42,8 +42,9 @@ REUSED = 0.1
 CARRIED, LASTING = 0.3, 32.0
 #: Contraction expected of new factors, and the least that is expected of any.
 EXPECTED, LEAST = 0.1, 0.01
-#: How often pressures of obstacles are corrected in a step, at most.
-AUGMENTED = 50
+#: Iterations of a step in which pressures of obstacles are corrected, at most: those that end take
+#: up to two hundred.
+AUGMENTED = 300
 #: Growth of a correction, with new factors, beyond which the step is given up.
 DIVERGING = 2.0
 
@@ -58,8 +59,10 @@ STATE = 12
 #: By the number in ``state[FAILURE]``.
 FAILURES = ("", "the iteration matrix is singular", "the residual is not finite",
             "the iteration diverges", f"no convergence in {ITERATIONS} iterations",
-            "the joints depend on each other")
-SINGULAR, NOT_FINITE, DIVERGES, NOT_CONVERGED, DEPENDENT = range(1, 6)
+            "the joints depend on each other",
+            f"the pressures of method='augmented' do not settle in {AUGMENTED} iterations (a "
+            "larger tolerance= of the obstacle, or method='penalty', helps)")
+SINGULAR, NOT_FINITE, DIVERGES, NOT_CONVERGED, DEPENDENT, UNSETTLED = range(1, 7)
 #: How impulses of joints are found that are eliminated.
 ROUGHLY, EXACTLY = range(2)
 #: What a correction tells.
@@ -305,12 +308,12 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
     for n in range(rows.shape[0]):
         s = _step(e.joints, rule, course, n)
         rough, wanted = _begin(e.free, matrices.M, rule, s, w, state)
-        told, left, deep = GO_ON, ITERATIONS, AUGMENTED
+        told, left, most = GO_ON, ITERATIONS, AUGMENTED
         _start(e, s, w, state)
         if contacts.lasting > 0:
             pace_contact(e.forces, s.dt)
         while left > 0:
-            left -= 1
+            left, most = left - 1, most - 1
             if state[READY] == 0.0:
                 _tangent(e, matrices, rule, s, w)
                 if not _factorize(e.free, matrices, rule, s, w, state):
@@ -334,8 +337,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
             if told == DONE and contacts.lasting >= PRESSURES:
                 augment_contact(e.forces, s.t, u, taken)
                 if taken[0] > 0.0:
-                    told, deep, state[SIZE] = GO_ON, deep - 1, -1.0
-                    left = ITERATIONS if deep > 0 else 0
+                    told, left, state[SIZE] = GO_ON, min(ITERATIONS, most), -1.0
             if told == ASTRAY:
                 _start(e, s, w, state)
             elif told != GO_ON:
@@ -348,7 +350,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
             if told == GO_ON and joined and rule.conserving == 0:
                 told = _close_acceleration(e.joints, e.free, matrices.mass, rule, s, w, state)
         elif told != FAILED:
-            told, state[FAILURE] = FAILED, NOT_CONVERGED
+            told, state[FAILURE] = FAILED, NOT_CONVERGED if most > 0 else UNSETTLED
         if told == FAILED:
             return n
         if damped:
