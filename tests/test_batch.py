@@ -177,6 +177,49 @@ def test_a_start_far_from_the_branch_is_not_followed():
     assert_allclose(again, u, rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.parametrize("kind", ["section", "cubic"])
+def test_members_turned_inside_out_are_those_that_their_beams_call_so(kind):
+    """Of lengths, heights and directions of their own: tables and frames differ."""
+    def build(x):
+        mesh = MeshBeam.init_line(np.linspace(0, x[0], 3), height=x[1], angle=x[2])
+        return Scene(Beam(mesh, ELEMENTS[kind], StVenantKirchhoff(2e8, 0.3), 0.01)).clamp("left")
+
+    rng = np.random.default_rng(4)
+    x = rng.uniform([0.9, 0.018, -0.1], [1.1, 0.022, 0.1], (400, 3))
+    made = Batch(build, Readings(TIP).items, x)
+    which = np.arange(40)
+    u = rng.standard_normal((40, made.family.one.scene.system.N)) * np.linspace(0, 1, 40)[:, None]
+    good, _ = made._checked(u, made.family.values(x[which]))
+    alone = [not build(x[k]).beams[0].kernel.inverted(u[k]) for k in which]
+    assert_array_equal(good, alone)
+    assert 3 < np.sum(good) < 37
+
+
+def test_how_far_solutions_are_apart():
+    u, v = np.array([[[1.0, 2.0], [0.0, 0.0], [0.1, 0.0]], [[1.0, 4.0], [0.0, 0.0], [0.0, 0.0]]])
+    found = batch._apart(u, v)
+    assert_allclose(found[:2], [0.5, 0.0])
+    assert found[2] > 1e10
+
+
+def test_points_of_one_of_several_beams():
+    """By the name of an end, which each beam has, with the beam behind it."""
+    def build(E):
+        low, high = (Beam(MeshBeam.init_line(np.linspace(0, L, 3), 0.02), ELEMENTS["cable"],
+                          StVenantKirchhoff(E, 0.3), 0.01, name=name)
+                     for L, name in ((1.0, "low"), (0.5, "high")))
+        scene = Scene(low, high).clamp("left", beam="low").clamp("left", beam="high")
+        return scene.moment("right", 0.01, beam="low").moment("right", 0.01, beam="high")
+
+    table = {"E": np.linspace(1e8, 2e8, 20)}
+    result = sweep(build, table, {"low": ("displacement", "right", "low"),
+                                  "high": ("displacement", "right", "high")})
+    assert "20 of 20 members were solved together" in result.report
+    kappa = 0.01 / (table["E"] * 0.01 * 0.02**3 / 12)
+    for name, L in (("low", 1.0), ("high", 0.5)):
+        assert_allclose(result[name][:, 1], (1 - np.cos(kappa * L)) / kappa, rtol=1e-3)
+
+
 def test_what_is_not_alike_is_grouped_or_alone():
     table = [dict(E=E, n=n) for n, E in itertools.product([1, 2], np.linspace(1e9, 2e9, 20))]
     result = sweep(cantilever, [*table, dict(E=1e9, n=3)], TIP)

@@ -232,7 +232,6 @@ def baseline(again):
     changed so much that its lines have moved.
     """
     import coverage
-    OUT.mkdir(parents=True, exist_ok=True)
     data, times = OUT / "coverage", OUT / "times.json"
     durations = json.loads(times.read_text()) if times.exists() and not again else {}
     known = {nodeid.split("::")[0] for nodeid in durations}
@@ -336,6 +335,7 @@ def main():
 
     sys.modules["numba"] = None
     sys.path.insert(0, str(ROOT))
+    OUT.mkdir(parents=True, exist_ok=True)
     found, durations = (None, None) if arguments.named else baseline(arguments.again)
     import matplotlib
     matplotlib.use("Agg")
