@@ -102,8 +102,8 @@ class RawField:
         beam = point.beam
         count = LONG if name == "stress" and not (
             beam.across.plain and isinstance(beam.law, LinearLaw)) else 1
-        slabs = beam.across.slabs
-        if (beam.across.moving and len(slabs) > 1) or (count == 1 and not beam.has_sections):
+        if (beam.across.moving and len(_ends(beam, name)) > 1) or (
+                count == 1 and not beam.has_sections):
             return False  # no polynomials where slabs have other places; cables say it at once
         spent = self._spent.get(point.number, 0) + count
         self._spent[point.number] = spent if spent < WORTH else 0
@@ -121,9 +121,9 @@ def patches(point: Point, name: str, many: Callable[[Part], Array]
     """
     beam, first = point.beam, point.place[0] // BLOCK * BLOCK
     of = np.arange(first, min(first + BLOCK, beam.mesh.nelements))
-    shape = beam.touched.get(("raw", name), FIRST)
+    shape, ends = beam.touched.get(("raw", name), FIRST), _ends(beam, name)
     while True:
-        part = Part(beam, point.number, point.coordinates, None, *_grid(beam, of, shape))
+        part = Part(beam, point.number, point.coordinates, None, *_grid(ends, of, shape))
         with np.errstate(all="ignore"):
             c = _series(many(part), len(of), shape)
         size = np.max(np.abs(c))
@@ -136,11 +136,17 @@ def patches(point: Point, name: str, many: Callable[[Part], Array]
     n, m = (1 + int(np.max(np.nonzero(np.any(used, axis=axes))[0], initial=1))
             for axes in ((0, 1, 2, 4), (0, 1, 2, 3)))
     beam.touched["raw", name] = min(n + 2, shape[0]), min(m + 2, shape[1])
-    slabs = [slab.measure for slab in beam.across.slabs]
-    tops = [slab.high for slab in slabs[:-1]]
+    tops = [high for _, high in ends[:-1]]
     return {(point.number, e): good[k] and Patch(tops, [
-        (slab.low, slab.high - slab.low, np.ascontiguousarray(c[:, k, j, :n, :m]).reshape(-1, m))
-        for j, slab in enumerate(slabs)], n, m) for k, e in enumerate(of.tolist())}
+        (low, high - low, np.ascontiguousarray(c[:, k, j, :n, :m]).reshape(-1, m))
+        for j, (low, high) in enumerate(ends)], n, m) for k, e in enumerate(of.tolist())}
+
+
+def _ends(beam, name):
+    """Both ends of the parts of the section in which a field is smooth."""
+    if name == "strain" and beam.has_sections:
+        return [(0.0, 1.0)]
+    return [(slab.measure.low, slab.measure.high) for slab in beam.across.slabs]
 
 
 def _ended(c, size):
@@ -149,11 +155,10 @@ def _ended(c, size):
     return (last <= ENDED * size) | ((last <= NOISE * size) & (last >= 0.1 * before))
 
 
-def _grid(beam, of, shape):
+def _grid(ends, of, shape):
     """Elements (n,) and reference points (2, n) at which series are found."""
     x, z = (places(n) for n in shape)
-    eta = [slab.measure.low + (slab.measure.high - slab.measure.low) * z
-           for slab in beam.across.slabs]
+    eta = [low + (high - low) * z for low, high in ends]
     X = np.array(np.broadcast_arrays(x[:, None], np.array(eta)[:, None])).reshape(2, -1)
     return np.repeat(of, X.shape[1]), np.tile(X, len(of))
 
