@@ -1,5 +1,6 @@
 """Contact of beams with obstacles."""
 
+import itertools
 import pickle
 
 import numpy as np
@@ -11,6 +12,7 @@ from skfem_ancf import (Beam, CallbackError, ConvergenceError, ElementBeamANCF,
                         MeshBeam, ModelWarning, Scene, StVenantKirchhoff)
 from skfem_ancf.dynamics import Gauss, GeneralizedAlpha, Radau
 from skfem_ancf.forces import contact_texts as texts
+from skfem_ancf.forces.contacts import BY_POINTS
 from skfem_ancf.forces.texts import add_contact
 from skfem_ancf.obstacles import Circle, Line, Polygon, SignedDistance
 
@@ -856,6 +858,35 @@ def test_a_beam_that_falls_on_a_circle_is_held_on_its_surface():
     rest = scene.integrate(0.02, 1e-3, start=static).state(-1)
     assert np.allclose(rest.position((1, 0)), static.position((1, 0)), rtol=0, atol=1e-6)
     assert np.allclose(rest.contact().total, static.contact().total, rtol=1e-2, atol=1e-2)
+
+
+def held_at(points, A, u, v):
+    """Accelerations at the points of a step, no less than zero, that hold a place at zero or more.
+
+    One of the sets of points at which it is held; the step has the size 1.
+    """
+    for held in itertools.product([False, True], repeat=len(points)):
+        free = u + points * v
+        W, at = np.zeros(len(points)), np.array(held)
+        W[at] = np.linalg.solve((A @ A)[np.ix_(at, at)], -free[at])
+        if W.min() > -1e-12 and (free + A @ A @ W).min() > -1e-12:
+            return W
+    raise AssertionError("no set holds it")
+
+
+@pytest.mark.parametrize("scheme, most", [
+    (Gauss(1), 3.0), (Gauss(2), 4.1), (Gauss(3), 5.6), (Radau(), 4.3)], ids=repr)
+def test_how_fast_a_mass_leaves_that_is_held_at_the_points_of_steps(scheme, most):
+    """As the refusal says; it comes with the speed 1 to a wall, anywhere within a step."""
+    method = scheme._table.method
+    A, speeds = np.linalg.inv(method.first), []
+    for u in np.linspace(0.001, 0.999, 100):
+        v = -1.0
+        for _ in range(8):
+            W = held_at(method.points, A, u, v)
+            u, v = u + method.weights @ (v + A @ W), v + method.weights @ W
+        speeds.append(v)
+    assert abs(max(speeds) - most) < 0.1 and f"{most:.2g}" in BY_POINTS
 
 
 @pytest.mark.parametrize("scheme, why", [
