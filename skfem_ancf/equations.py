@@ -1,6 +1,7 @@
 """The equations of a scene as tables that texts take."""
 
 from typing import TYPE_CHECKING, Any, NamedTuple
+from weakref import ref
 
 import numpy as np
 from scipy import sparse
@@ -92,7 +93,8 @@ class Tables:
     """
 
     def __init__(self, system: "System") -> None:
-        self.system = system
+        # the system has the tables: without a circle both go when nobody asks for them any more
+        self._system = ref(system)
         self._own_handle: int | None = None
         self._words: list[Words] = []
         self._sort(system.loads)
@@ -105,6 +107,13 @@ class Tables:
                                self._border(joints),
                                viscous_body_of(body, system.beams, system.retardation),
                                self._forces(), body)
+
+    @property
+    def system(self) -> "System":
+        """Whose they are."""
+        system = self._system()
+        assert system is not None
+        return system
 
     def _sort(self, loads):
         # of the constant kind, moments, linear ones, others
@@ -190,7 +199,7 @@ class Tables:
             Its loads are constant and have the same vectors.
         """
         tables, before = twin_of(self), self.plain
-        tables.system, tables._words, tables._own_handle = system, [], None
+        tables._system, tables._words, tables._own_handle = ref(system), [], None
         for name in ("flat", "linearised", "parts", "_stress_size"):
             vars(tables).pop(name, None)
         tables._sort(system.loads)

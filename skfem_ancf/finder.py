@@ -12,6 +12,7 @@ from .errors import MeshError
 from .kept import cached_property, kept
 
 if TYPE_CHECKING:
+    from .mapping import MappingBeam
     from .mesh import MeshBeam
     from .types import Array
 
@@ -34,7 +35,7 @@ class Finder:
     """
 
     def __init__(self, mesh: MeshBeam) -> None:
-        self.mesh, self.mapping = mesh, mesh.mapping()
+        self.mesh = mesh
         self.size = float(np.abs(mesh.p).max())
         # points of an exact curve may lie a little outside its cubic elements
         self.allowed = 1e-6 if mesh.is_straight else 1e-3
@@ -43,6 +44,11 @@ class Finder:
         #: And for many, once there were more of them than squares.
         self._of_squares: Array | None = None
         self._line = self._straight_line()
+
+    @property
+    def mapping(self) -> MappingBeam:
+        """That of the mesh, which keeps it."""
+        return self.mesh.mapping()
 
     @cached_property
     def _cell(self):

@@ -285,19 +285,20 @@ class Scene:
 
     def _portable(self, joint):
         """A copy of a joint as it was given, with beams by number: it fits other meshes."""
-        def numbered(value):
-            if isinstance(value, Beam):  # rigid bodies stay the same on other meshes
-                return self._number(value)
-            if not isinstance(value, (tuple, list)):
-                return value
-            inner = [numbered(v) for v in value]
-            return value if all(a is b for a, b in zip(inner, value)) else tuple(inner)
-
         joint = joint._unsealed()
         for name, value in vars(joint).items():
-            vars(joint)[name] = numbered(value)
+            vars(joint)[name] = self._numbered(value)
         joint._seal()
         return joint
+
+    def _numbered(self, value):
+        """The number of a Beam, tuples and lists with numbers in place of them, or the value."""
+        if isinstance(value, Beam):  # rigid bodies stay the same on other meshes
+            return self._number(value)
+        if not isinstance(value, (tuple, list)):
+            return value
+        inner = [self._numbered(v) for v in value]
+        return value if all(a is b for a, b in zip(inner, value)) else tuple(inner)
 
     def add(self, thing: Load | Joint | ForceElement) -> Scene:
         """Add a load, a joint or a force element, of the package's or of your own.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from functools import partial
 from itertools import accumulate, pairwise
 from math import sqrt
 from typing import TYPE_CHECKING, Any
@@ -101,7 +102,9 @@ class System:
         self._index = {id(b): k for k, b in enumerate(self.members)}
         self.size = float(sum(b.size for b in self.beams)) or _extent(self.bodies)
         self.constraints = Constraints(self.members, self.slices, self.size, fixed, values,
-                                       [*self._directors(fixed), *joints], self._held_by_elements)
+                                       [*self._directors(fixed), *joints],
+                                       self._held_by_elements if elements else
+                                       partial(_not_held, self.N))
         self.forces = Forces(elements, self.N, self.bandwidth)
         self._take_loads()
         self.damping = UNDAMPED if damping is None else damping
@@ -908,6 +911,11 @@ class System:
 _MADE_ONCE = {name for name, value in vars(System).items() if isinstance(value, cached_property)}
 #: Those that do not stay for other loads, and for other materials and widths.
 _NOT_OF_BEAMS, _NOT_OF_PLACES = tuple(_MADE_ONCE - _OF_BEAMS), tuple(_MADE_ONCE - _OF_PLACES)
+
+
+def _not_held(N):
+    """The stiffness of no force elements, sparse."""
+    return sparse.csr_array((N, N))
 
 
 def _extent(bodies):

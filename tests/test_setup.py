@@ -1,5 +1,8 @@
 """What making and solving a scene computes, by counts of calls."""
 
+import gc
+from weakref import ref
+
 import numpy as np
 import pytest
 
@@ -258,6 +261,24 @@ def test_a_replaced_mesh_of_equal_elements_scales_tables(monkeypatch, element):
         u = 1e-3 * np.random.default_rng(0).standard_normal(one.N)
         a, b = one.kernel.force(u), other.kernel.force(u)
         assert np.allclose(a, b, rtol=0, atol=1e-12 * np.max(np.abs(b)))
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)])
+def test_scenes_go_when_nobody_asks_for_them(element):
+    """No circle of references is left for the garbage collection, which many scenes would wait for.
+    """
+    gc.disable()
+    try:
+        scene = cantilever(element)
+        state = scene.solve_static()
+        state.displacement((1.0, 0.0))
+        gone = [ref(scene), ref(scene.system), ref(state)]
+        changed = scene.replace(material=scene.beams[0].material.replace(E=3e9))
+        del scene, state
+        assert changed.solve_static().system.machine.tables.system is changed.system
+        assert [x() for x in gone] == 3 * [None]
+    finally:
+        gc.enable()
 
 
 def same(a, b):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 import sys
+from array import array
 from ctypes import c_size_t
 from functools import cache
 from typing import TypeVar, get_type_hints
@@ -53,8 +54,8 @@ class Words:
             _fill(x, found)
         else:
             found = known[1]
-        self.of, self.words = x, np.array(found, dtype=np.int64)
-        self.address = _asked(self.words)
+        self.of, self.words = x, array("q", found)
+        self.address = self.words.buffer_info()[0]
 
 
 _KINDS = {"f": np.dtype(np.float64), "i": np.dtype(np.int64)}
