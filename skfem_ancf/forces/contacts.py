@@ -16,7 +16,7 @@ from .contact_texts import (ANCHORED, ANCHORS, AUGMENT, DAMPING, DEPTH, FRICTION
                             RATES, REACHES, ROWS, SEEN, SETTLE, STIFFNESS, TANGENT, WIDTH,
                             ContactTables, Question, distances, hardened, levers, of_contacts,
                             places, press, resist, slide, stick, surface)
-from .swept import Sweep, middle_of
+from .swept import Passage, middle_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -452,9 +452,9 @@ class Contacts:
         return any(group.depth < np.inf for _, group in self.groups)
 
     @cached_property
-    def sweep(self) -> Sweep:
+    def sweep(self) -> Passage:
         """What looks for obstacles that a body has passed through from one instant to the next."""
-        return Sweep(self)
+        return Passage(self)
 
     def passed(self, a: tuple[Array, float], b: tuple[Array, float]) -> str | None:
         """Which obstacle a body has passed through from one state to another, in words.

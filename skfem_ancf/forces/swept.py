@@ -34,7 +34,7 @@ AGAIN, DEEP = 1.0, 0.5
 ASIDE = 0.62
 
 
-class Sweep:
+class Passage:
     """Looks for points that have passed through an obstacle between two instants.
 
     Parameters
@@ -270,4 +270,4 @@ def middle_of(group: Group) -> Array:
     return np.concatenate([start, np.stack([mean, spread], axis=1).reshape(-1, n)])
 
 
-__all__ = ["Sweep", "middle_of"]
+__all__ = ["Passage", "middle_of"]
