@@ -28,8 +28,12 @@ from . import nothing_collected
 #: Lines of texts that become part of their callers; of longer ones LLVM wants to know what they do
 #: to what they are given, which it looks for only in what may not be left out.
 SHORT = 800
-#: Modules whose texts are compiled for size: their loops take less time than what they call.
-BRIEF = {"border", "forces.texts", "statics.iteration"}
+#: Modules whose texts are compiled for size: their loops take less time than what they call; and
+#: texts of others.
+BRIEF = {"border", "forces.texts", "statics.iteration"} | {
+    f"forces.contact_texts.{name}" for name in (
+        "_carry", "_keep_work", "_near", "_of_group", "_reach_on", "_stride", "distances",
+        "levers", "press", "resist", "stick")}
 
 
 class _Library(JITCodeLibrary):
@@ -224,7 +228,8 @@ class Text:
         return self._compiled(args, entry, True)
 
     def _compiled(self, args, entry, counts):
-        brief = self.function.__module__.partition(".")[2] in BRIEF
+        module = self.function.__module__.partition(".")[2]
+        brief = not BRIEF.isdisjoint((module, f"{module}.{self.function.__name__}"))
         part, key = _Part(entry.library, brief), object()
         entry.parts.append(part)
         try:
