@@ -174,6 +174,8 @@ def warn_of(state: State, stacklevel: int) -> None:
     stacklevel
         Of the caller's line, as for ``warnings.warn``.
     """
+    for text in state.system.forces.contacts.sunk(state.u, state.load):
+        warnings.warn(text, ModelWarning, stacklevel=stacklevel)
     if state.system.screen.passes(state.u):
         return
     for beam in state.beams:

@@ -2,6 +2,7 @@
 
 import itertools
 import pickle
+import re
 
 import numpy as np
 import pytest
@@ -351,6 +352,29 @@ def test_a_thin_ring_on_the_floor_takes_tens_of_iterations():
     assert state.iterations < 70 and contact.penetration < 1e-2 * h
     assert contact.points[0].min() > 0.1 * R and state.displacement((0, 0))[1] > 1e-2 * h
     assert abs(contact.total[1] / (3 * EI / R**2) - 1) < 2e-3
+
+
+def test_a_taut_belt_says_what_stiffness_holds_it():
+    """The default is that of bending: the belt lies heights deep, which is said, and mended."""
+    R, h, end = 0.5, 2e-4, 0.5 * np.pi
+
+    def belt(stiffness):
+        axis = MeshBeam.init_curve(lambda s: (R + h / 2) * np.array([np.sin(s), np.cos(s)]),
+                                   np.linspace(0, end, 17), h)
+        band = Beam(axis, ElementBeamCable(5), StVenantKirchhoff(2e8, 0.0), width=1.0)
+        scene = Scene(band).fix("left", ["r^1", "r_X^2"]).fix("right", "r_X^1")
+        scene.fix("right", "r^2", -1e-2)
+        return scene.obstacle(Circle((0, 0), R - 1e-6), stiffness=stiffness)
+
+    with pytest.warns(ModelWarning, match=r"times its height: .* Give stiffness=\S+, with") as said:
+        soft = belt(None).solve_static()
+    assert soft.contact().penetration > 2 * h
+    asked = float(re.search(r"Give stiffness=(\S+),", str(said[0].message)).group(1))
+    firm = belt(asked).solve_static()
+    assert 0.05 * h < firm.contact().penetration < 0.2 * h
+    assert abs(soft.reactions("right").force[1]) < 0.95 * abs(firm.reactions("right").force[1])
+    tension = abs(firm.reactions("right").force[1])  # over the radius, it is the pressure
+    assert np.median(firm.contact().pressure) * R == pytest.approx(tension, rel=2e-2)
 
 
 @pytest.mark.parametrize("element", ELEMENTS, ids=["sections", "cable"])

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from ..types import Array
 
 
+#: Penetration, relative to the height, from which on an obstacle is too soft, and that which a
+#: stiffness is said for.
+SUNK, FIRM = 0.5, 0.1
 #: Part of the stiffness with which an equilibrium is found where the whole does not lead to it.
 EASED = 1e-2
 
@@ -41,8 +44,8 @@ class Group(NamedTuple):
         Area, distance from the axis, (n,), and place and slope without displacement, (4, n).
     elements, points
         How many elements, and points of each.
-    depth
-        How deep a way from one state to the next may cut the obstacle.
+    depth, height
+        How deep a way from one state to the next may cut the obstacle; the beam's height.
     numbers
         By the numbers of :mod:`skfem_ancf.forces.contact_texts`, shape (9,).
     """
@@ -56,6 +59,7 @@ class Group(NamedTuple):
     elements: int
     points: int
     depth: float
+    height: float
     numbers: Any
 
 
@@ -455,6 +459,27 @@ class Contacts:
     def sweep(self) -> Passage:
         """What looks for obstacles that a body has passed through from one instant to the next."""
         return Passage(self)
+
+    def sunk(self, u: Array, t: float) -> list[str]:
+        """Which bodies are deep in obstacles of the default stiffness, in words.
+
+        Parameters
+        ----------
+        u, t
+            Displacement, shape (N,), and time.
+        """
+        out = []
+        for (which, group), _, found in self.look(np.array(u), t, False) if self.groups else ():
+            one, deep, h = self.obstacles[which], -float(found[0].min()), group.height
+            if one.penalty is None and deep > SUNK * h:
+                k = group.numbers[STIFFNESS]
+                firm = k * (deep + max(0.0, deep - h)) / (FIRM * h)  # both sides of it are in
+                out.append(
+                    f"a body is {deep:.3g} deep in {one!r}, {deep / h:.2g} times its height: it is "
+                    f"pressed harder than its bending does, for which the default stiffness, "
+                    f"{k:.3g}, is. Give stiffness={firm:.2g}, with which this "
+                    "pressure leaves a tenth of the height")
+        return out
 
     def passed(self, a: tuple[Array, float], b: tuple[Array, float]) -> str | None:
         """Which obstacle a body has passed through from one state to another, in words.

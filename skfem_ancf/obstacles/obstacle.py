@@ -278,7 +278,7 @@ class Obstacle(ForceElement):
                             -1.0 if self.shape.hollow else 1.0, self.tolerance * augmented])
         return Group(np.repeat(nodes, m), weights.reshape(-1, n * m), slopes, areas.ravel(),
                      offsets.ravel(), starts.reshape(4, -1), n, m,
-                     _deepest(self.shape, h), numbers)
+                     _deepest(self.shape, h), h, numbers)
 
     def __repr__(self) -> str:
         return f"<Obstacle {self.shape!r}>"
