@@ -102,7 +102,7 @@ def others(results):
         return None
 
     def both(case, target):
-        found = [ratio(results[case], EXUDYN, target, key, None)
+        found = [ratio(results[case], EXUDYN, target, key, factor(case, key, target))
                  for key in ("seconds", "whole_seconds")]
         return found[0] if found[0] == found[1] else " / ".join(found)
 
