@@ -183,13 +183,11 @@ def factorize_complex(re, im, width):
     Parameters
     ----------
     re, im
-        Real and imaginary parts, entry (i, j) at ``j (width + 1) + i - j``; the latter empty if the
-        matrix is real.
+        Real and imaginary parts, entry (i, j) at ``j (width + 1) + i - j``.
     width
         Half bandwidth.
     """
-    value = re + 1j * im if im.size else re
-    flat, ld = np.append(value, np.zeros(width * (width + 2))), width + 1
+    flat, ld = np.append(re + 1j * im, np.zeros(width * (width + 2))), width + 1
     for j in range(re.size // ld):
         column = flat[j * ld:(j + 1) * ld]
         d = column[0]
@@ -200,21 +198,13 @@ def factorize_complex(re, im, width):
         later = np.lib.stride_tricks.as_strided(flat[(j + 1) * ld:], (width, width),
                                                 (width * flat.itemsize, flat.itemsize))
         later -= np.triu(np.outer(column[1:], below))  # entries (i, k) of column j + 1 + k
-    re[:], im[:] = flat[:re.size].real, flat[:im.size].imag
+    re[:], im[:] = flat[:re.size].real, flat[:re.size].imag
     return True
 
 
 @primitive("factors")
 def solve_complex(re, im, x, y):
-    """Solve in place with the factors of :func:`factorize_complex`; x + i y is (n,).
-
-    Of real factors, with ``im`` empty, y is not touched.
-    """
-    if not im.size:
-        ab = re.reshape(x.size, -1).T
-        z = lapack.dtbtrs(ab, x, uplo="L", diag="U")[0].ravel() / ab[0]
-        x[:] = lapack.dtbtrs(ab, z, uplo="L", trans="T", diag="U")[0].ravel()
-        return
+    """Solve in place with the factors of :func:`factorize_complex`; x + i y is (n,)."""
     ab = (re + 1j * im).reshape(x.size, -1).T
     z = lapack.ztbtrs(ab, x + 1j * y, uplo="L", diag="U")[0].ravel() / ab[0]
     z = lapack.ztbtrs(ab, z, uplo="L", trans="T", diag="U")[0].ravel()

@@ -181,8 +181,6 @@ def _subtract_complex(x, y, to, re, im, of, n, a, b):
 @jit
 def factorize_complex(re, im, width):
     """L D L^T of a complex symmetric band, in place; False if there is none."""
-    if im.size == 0:
-        return _factorize_real(re, width)
     ld = width + 1
     n = re.size // ld
     for j in range(n):
@@ -204,39 +202,8 @@ def factorize_complex(re, im, width):
 
 
 @jit
-def _factorize_real(flat, width):
-    ld = width + 1
-    n = flat.size // ld
-    for j in range(n):
-        at, m = j * ld, min(width, n - 1 - j)
-        d = flat[at]
-        if not abs(d) > 0.0 or not abs(d) < np.inf:
-            return False
-        inverse = 1.0 / d
-        for k in range(1, m + 1):
-            subtract(flat, (j + k) * ld, flat, (at + k,), m + 1 - k, (flat[at + k] * inverse,))
-        for k in range(1, m + 1):
-            flat[at + k] *= inverse
-    return True
-
-
-@jit
-def _solve_real(flat, x):
-    n = x.size
-    ld = flat.size // n
-    for j in range(n):
-        subtract(x, j + 1, flat, (j * ld + 1,), min(ld - 1, n - 1 - j), (x[j],))
-    for j in range(n - 1, -1, -1):
-        at, m = j * ld, min(ld - 1, n - 1 - j)
-        x[j] = x[j] / flat[at] - products(x, j + 1, m, flat, (at + 1,))[0]
-
-
-@jit
 def solve_complex(re, im, x, y):
     """Solve in place with the factors; x + i y is (n,)."""
-    if im.size == 0:
-        _solve_real(re, x)
-        return
     n = x.size
     ld = re.size // n
     for j in range(n):

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 
-from ..band import solve_complex
 from ..errors import InputError
 from .base import Motion, Scheme, contacts_of
 from .integrator import StepFailed
 from .rates import JointMotions
-from .stages import Interval, Method, collocate, room_for_points
+from .stages import Interval, Method, collocate, room_for_points, solve_for
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -176,7 +175,7 @@ class Collocation(Scheme):
         mu = complex(*w.method.values[:, k]) / integrator.dt
         x = mu**2 * s.mass.multiply(du) * s.free
         x, y = np.ascontiguousarray(x.real), np.ascontiguousarray(x.imag)
-        solve_complex(w.re[k], w.im[k] if mu.imag else w.im[k, :0], x, y)
+        solve_for(w, k, x, y)
         return x
 
     def in_blocks(self, system: System) -> bool:
@@ -229,10 +228,12 @@ class Collocation(Scheme):
                                               M._replace(flat=np.zeros(M.flat.size)))
             integrator.machine = s.machine.with_tables(s.machine.tables.copied(n))
         w = integrator.room
-        for name in ("re", "im", "J", "Y", "origin"):
-            if name in kept and kept[name] is not getattr(w, name):  # of a motion that goes on
-                getattr(w, name)[...] = kept[name]
-            kept[name] = getattr(w, name)
+        factors = {"re": w.re, "im": w.im, "real": w.real.flat, "J": w.J, "Y": w.Y,
+                   "origin": w.origin}
+        for name, room in factors.items():
+            if name in kept and kept[name] is not room:  # of a motion that goes on
+                room[...] = kept[name]
+            kept[name] = room
         return w
 
     def _given(self, integrator, table, start, dt, first, n, block):

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..band import (Band, clear, copy, dense_solve, factorize_complex, multiply, solve,
-                    solve_complex, solve_joined)
+from ..band import (SPARE, Band, clear, copy, dense_solve, factorize, factorize_complex, multiply,
+                    solve, solve_complex, solve_joined)
 from ..body import (add_force_of, body_carry, body_force, body_mixed, body_stress, body_tangent)
 from ..forces.texts import (add_elastic_force, add_element_tangent, pace_contact,
                             settle_contact)
@@ -108,8 +108,9 @@ class Points(NamedTuple):
         Room, shape (4, N), (2 m,) and (2 m, 2 m).
     origin
         Where the factors were made, n times, shape (n, N).
-    re, im
-        Factors, shape (k, N (width + 1)).
+    re, im, real
+        Factors of complex eigenvalues, shape (k, N (width + 1)), and of the real one, of which an
+        odd number of points has one.
     J, Y
         The joints' directions there, (m, N), and the solutions for them, (2 k, m, N).
     end, S, shares
@@ -143,6 +144,7 @@ class Points(NamedTuple):
     origin: F2
     re: F2
     im: F2
+    real: Band
     J: F2
     Y: F3
     end: F3
@@ -165,11 +167,14 @@ def room_for_points(method: Method, N: int, m: int, stresses: int, D: Band) -> P
         A band matrix of its own.
     """
     n, k, size = method.points.size, method.values.shape[1], N * (D.width + 1)
+    ld = D.width + 1 + SPARE
+    real = Band(np.zeros(N * ld), np.zeros(0, np.int64), ld, D.width, 0)
     return Points._make([
         np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((4, n, m)),
         *np.zeros((3, n * stresses)), np.zeros((3, stresses)), np.zeros((4, N)), np.zeros(2 * m),
-        np.zeros((2 * m, 2 * m)), np.zeros((n, N)), *np.zeros((2, k, size)), np.zeros((m, N)),
-        np.zeros((2 * k, m, N)), np.zeros((2, m, N)), np.zeros((m, m)), np.zeros(m), D, method])
+        np.zeros((2 * m, 2 * m)), np.zeros((n, N)), *np.zeros((2, k, size)), real,
+        np.zeros((m, N)), np.zeros((2 * k, m, N)), np.zeros((2, m, N)), np.zeros((m, m)),
+        np.zeros(m), D, method])
 
 
 @source
@@ -474,7 +479,7 @@ def _correct(free, method, s, w, state):
             for i in lanes(N):
                 x[i] += a * R[i]
                 y[i] += b * R[i]
-        solve_complex(w.re[k], _imaginary(method, w, k), x, y)
+        solve_for(w, k, x, y)
         if m > 0 and not _join(method, s, w, k, r, q, x, y):
             return False
         for j in range(n):
@@ -559,25 +564,31 @@ def _factorize(e, matrices, method, s, w, step):
                 J[i] *= e.free[i]
     for k in range(method.values.shape[1]):
         a, b = method.values[0, k] / s.h, method.values[1, k] / s.h
-        re, im = w.re[k], _imaginary(method, w, k)
-        _combine(e.K, matrices.M, w.D, e.free, a * a - b * b, a, re)
-        if im.size > 0:
-            _combine_imaginary(matrices.M, w.D, e.free, 2.0 * a * b, b, im)
-        if not factorize_complex(re, im, e.K.width):
+        if b != 0.0:
+            _combine(e.K, matrices.M, w.D, e.free, a * a - b * b, a, w.re[k])
+            _combine_imaginary(matrices.M, w.D, e.free, 2.0 * a * b, b, w.im[k])
+            done = factorize_complex(w.re[k], w.im[k], e.K.width)
+        else:
+            _combine(e.K, matrices.M, w.D, e.free, a * a, a, w.real.flat)
+            done = factorize(w.real)
+        if not done:
             return False
         for j in range(w.J.shape[0]):
             x, y = w.Y[2 * k, j], w.Y[2 * k + 1, j]
             copy(w.J[j], x)
             for i in lanes(y.size):
                 y[i] = 0.0
-            solve_complex(re, im, x, y)
+            solve_for(w, k, x, y)
     return True
 
 
 @source
-def _imaginary(method, w, k):
-    """The imaginary part of the factors for an eigenvalue: empty if that is real."""
-    return w.im[k] if method.values[1, k] != 0.0 else w.im[k, :0]
+def solve_for(w, k, x, y):
+    """Solve in place with the factors for the eigenvalue k; y is not touched if that is real."""
+    if w.method.values[1, k] != 0.0:
+        solve_complex(w.re[k], w.im[k], x, y)
+    else:
+        solve(w.real, x)
 
 
 @source
@@ -588,7 +599,7 @@ def _combine(K, M, D, free, c, a, out):
     """
     n, top, width = free.size, K.top, K.width
     k, m, r = K.flat.reshape(n, K.ld), M.flat.reshape(n, K.ld), D.flat.reshape(n, K.ld)
-    x = out.reshape(n, width + 1)
+    x = out.reshape(n, out.size // n)
     for h in range(width + 1):
         p = top + h
         for j in lanes(n):
