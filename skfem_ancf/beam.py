@@ -77,6 +77,8 @@ def _coordinates(mesh, element, p):
     return np.ascontiguousarray(q.transpose(2, 0, 1)).ravel()
 
 
+#: Arguments of a beam that change neither its coordinates nor its strains.
+_MATTER = frozenset({"material", "width"})
 #: Attributes of a beam that do not depend on material and width.
 _PLACES = ("mesh", "element", "formulation", "name", "compiled", "damping", "kinematics", "nd", "N")
 #: Attributes of a beam that are made once and depend on its mesh and element only.
@@ -232,14 +234,13 @@ class Beam(Frozen):
         >>> beam.width, stiffer.width, stiffer.material.E
         (0.1, 0.2, 2.0)
         """
+        if type(self) is Beam and _MATTER.issuperset(changes) and type(self.section) is Rectangle:
+            return self._of(changes.get("material", self._given), changes.get("width", self.width))
         known = ("mesh", "element", "material", "width", "formulation", "name", "compiled",
                  "damping", "section")
         for name in changes:
             if name not in known + ("fields", "tolerance"):
                 raise NameUnknown("argument of Beam", name, known)
-        if type(self) is Beam and not set(changes) - {"material", "width"} and type(
-                self.section) is Rectangle:
-            return self._of(changes.get("material", self._given), changes.get("width", self.width))
         given = {name: getattr(self, name) for name in known} | {"material": self._given}
         given["width" if "section" in changes or not isinstance(self.section, Rectangle) else
               "section"] = None

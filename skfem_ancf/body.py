@@ -73,7 +73,8 @@ def body_of(beams: Sequence["Beam"], slices: Sequence[slice]) -> "Body":
             packs.append(pack)
             rows.append([PACKS.index(type(pack)), s.start, s.stop, at, at + size, *shape])
             at += size
-    return Body(tuple(packs), np.array(rows, dtype=np.int64).reshape(-1, ELEMENTS + 1))
+    table = np.array(rows, np.int64) if rows else np.zeros((0, ELEMENTS + 1), np.int64)
+    return Body(tuple(packs), table)
 
 
 def viscous_body_of(body: "Body", beams: Sequence["Beam"], times: Sequence[float]) -> "Body":

@@ -200,15 +200,16 @@ class Tables:
         """
         tables, before = twin_of(self), self.plain
         tables._system, tables._words, tables._own_handle = ref(system), [], None
+        its = vars(tables)
         for name in ("flat", "linearised", "parts", "_stress_size"):
-            vars(tables).pop(name, None)
+            if name in its:
+                del its[name]
         tables._sort(system.loads)
         loads = before.loads if same_loads else tables._load_tables()
         if system.beams != self.system.beams:
             body = body_of(system.beams, system.slices)
-            plain = before._replace(body=body, copies=body, loads=loads, viscous=viscous_body_of(
-                body, system.beams, system.retardation))
-            tables.plain = plain
+            viscous = viscous_body_of(body, system.beams, system.retardation)
+            tables.plain = before._replace(body=body, copies=body, loads=loads, viscous=viscous)
             return tables
         plain = before._replace(loads=loads)
         if "flat" in vars(self):

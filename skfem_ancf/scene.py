@@ -156,9 +156,10 @@ class Scene:
 
     def __copy__(self):
         other = object.__new__(type(self))
-        vars(other).update(vars(self), _lock=RLock(), _system=None)  # none of the others changes
-        for name in ("_places", "N"):
-            vars(other).pop(name, None)
+        its = vars(other)
+        its.update(vars(self), _lock=RLock(), _system=None)  # none of the others changes
+        its.pop("_places", None)
+        its.pop("N", None)
         return other
 
     def __deepcopy__(self, memo):
@@ -1387,13 +1388,13 @@ class Scene:
             return None
         same = new.width == old.width and new.material.density == old.material.density
         moved = [n != k or (same and isinstance(bound, DeadLoad)) for n, _, bound in self._loads]
-        loads = tuple((n, load, bound if n != k else bound.moved(new) if of else
-                       bind_load(load, new)) for (n, load, bound), of in zip(self._loads, moved))
+        loads = tuple([(n, load, bound if n != k else bound.moved(new) if of else
+                        bind_load(load, new)) for (n, load, bound), of in zip(self._loads, moved)])
         return self._sharing(loads, beams, all(moved))
 
     def _sharing(self, loads, beams, same_loads=False):
         """A scene that shares what does not depend on loads, materials and widths."""
-        other, system = copy(self), self._system
+        other, system = self.__copy__(), self._system
         other._beams, other._loads = tuple(beams), loads
         if system is not None and not system.forces.contacts.obstacles:
             bound = [load for _, _, load in loads]

@@ -113,11 +113,11 @@ class System:
         self.viscous = any(time > 0.0 for time in self.retardation)
 
     def _take_loads(self, same_loads=False):
-        self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
         steady = [load.constant and load.amplitude is None for load in self.loads]
         self._varying: list[Any] = [load for load, of in zip(self.loads, steady) if not of]
         if same_loads:
             return
+        self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
         self.constant_force = np.zeros(self.N)
         for load, of in zip(self.loads, steady):
             if of:
@@ -157,8 +157,10 @@ class System:
             return None
         if system.symmetric != self.symmetric or before.asks:
             return None
+        made = vars(system)
         for name in _NOT_OF_BEAMS if same_beams else _NOT_OF_PLACES:
-            vars(system).pop(name, None)
+            if name in made:
+                del made[name]
         tables = before.renewed(system, same_loads)
         if tables.asks:
             return None

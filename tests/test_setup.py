@@ -12,6 +12,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
 from skfem_ancf.compiled.words import Words
 from skfem_ancf.elements import base
 from skfem_ancf.finder import Finder
+from skfem_ancf.formulations import FORMULATIONS
 from skfem_ancf.kernels import cable, section
 from skfem_ancf.kernels.base import pair_tables
 from skfem_ancf.loads import EndMoment, PointForce, Pressure, Weight
@@ -223,6 +224,37 @@ def test_a_replaced_material_keeps_tables(monkeypatch, element):
     assert changed.beams[0].inertia is mass
     assert state.iterations >= 6 and new.iterations <= 3
     assert np.allclose(new.u, changed.solve_static().u, rtol=0, atol=1e-9)
+
+
+def numbers(x):
+    """All numbers of a tuple of tuples and arrays."""
+    return np.concatenate([numbers(part) for part in x]) if isinstance(x, tuple) else (
+        np.ravel(np.asarray(x, dtype=float)))
+
+
+@pytest.mark.parametrize("formulation", list(FORMULATIONS))
+@pytest.mark.parametrize("nu", [0.0, 0.3])
+@pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCF(3),
+                                     ElementBeamANCFHermite(2), ElementBeamCable(5)])
+def test_every_number_of_a_replaced_modulus_is_that_of_a_beam_made_anew(element, nu, formulation):
+    mesh, width = MeshBeam.init_line(np.linspace(0, 1, 4), 0.02, angle=0.3), 0.01
+
+    def made(E, width):
+        return Beam(mesh, element, StVenantKirchhoff(E, nu, 7800.0), width, formulation)
+
+    beam = made(2e9, width)
+    assert beam.kernel.linear
+    for E, wide in ((3e9, width), (3e9, 0.5 * width)):
+        one, other = beam.replace(material=made(E, wide).material, width=wide), made(E, wide)
+        assert "kernel" in vars(one)
+        for a, b in zip(one.kernel.packs, other.kernel.packs, strict=True):
+            assert np.allclose(numbers(a), numbers(b), rtol=1e-13, atol=1e-9)
+        assert one.kernel.scale == pytest.approx(other.kernel.scale, rel=1e-13)
+        assert one.kernel.volume == pytest.approx(other.kernel.volume, rel=1e-13)
+        assert (one.kernel.constant is None) == (other.kernel.constant is None)
+        if one.kernel.constant is not None:
+            assert np.allclose(one.kernel.constant, other.kernel.constant, rtol=1e-13)
+        assert np.allclose(one.mass_elements(), other.mass_elements(), rtol=1e-13)
 
 
 def test_a_replaced_width_or_mesh_is_no_old_one():

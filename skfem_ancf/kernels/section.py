@@ -450,14 +450,14 @@ class TermTables:
         stiffness, volume
             As there.
         """
-        other, pack, both = twin_of(self), self.pack, stiffness * volume
+        other, term, pack, both = twin_of(self), twin_of(self.term), self.pack, stiffness * volume
         law = cast("LinearLaw", self.law).times(stiffness)
-        other.law, other.slab, other.term = law, slab, twin_of(self.term)
-        vars(other.term)["law"] = law
-        changes: dict[str, Any] = {"law": pack.law._replace(D=law.D), "moduli": both * pack.moduli}
+        vars(term)["law"], weights = law, pack.weights
+        other.law, other.slab, other.term = law, slab, term
         if volume != 1.0:
-            other.w, changes["weights"] = volume * self.w, volume * pack.weights
-        other.pack = pack._replace(**changes, **times_held(pack, both))
+            other.w, weights = volume * self.w, volume * weights
+        other.pack = pack._replace(law=pack.law._replace(D=law.D), moduli=both * pack.moduli,
+                                   weights=weights, **times_held(pack, both))
         return other
 
     def on_mesh(self, across: "Across", constant: Array) -> "TermTables":
@@ -859,17 +859,16 @@ class Kernel(Chain):
         Parameters
         ----------
         across
-            Its section.
+            Its section, of one slab.
         stiffness, volume
             Factors on the moduli, and on the volume.
         """
-        other = twin_of(self)
-        other._across, slabs = across, dict(zip(map(id, self._across.slabs), across.slabs))
+        other, (slab,) = twin_of(self), across.slabs
+        other._across = across
+        other.tables = tables = [t.in_proportion(slab, stiffness, volume) for t in self.tables]
+        other.firsts, other.packs = tables[:1], [t.pack for t in tables]
         if self.constant is not None:
-            other.constant = stiffness * volume * self.constant
-        other.tables = [t.in_proportion(slabs[id(t.slab)], stiffness, volume) for t in self.tables]
-        other.firsts = [other.tables[self.tables.index(t)] for t in self.firsts]
-        other.packs = [t.pack for t in other.tables]
+            other.constant = other.packs[0].constant
         return other
 
     def on_mesh(self, across: "Across", formulation: "Formulation") -> "Kernel | None":

@@ -99,9 +99,9 @@ class Across(Frozen):
         if (not self.plain or type(section) is not Rectangle or material is None
                 or material.graded or callable(section.width)):
             return Across(self.mesh, self.element, section, material)
-        other, slab = object.__new__(type(self)), twin_of(self.slabs[0])
+        other, slab, mine = object.__new__(type(self)), twin_of(self.slabs[0]), vars(self)
         vars(slab).update(material=material, width=section.width, density=material.density)
-        vars(other).update({name: vars(self)[name] for name in _OF_PLACES}, slabs=(slab,),
+        vars(other).update([(name, mine[name]) for name in _OF_PLACES], slabs=(slab,),
                            _sealed=True)
         return other
 
