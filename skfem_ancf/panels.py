@@ -10,7 +10,6 @@ import numpy as np
 from .frozen import Frozen
 from .kept import cached_property
 from .quadrature import gauss, lagrange
-from .sections.moving import Moving
 from .series import chebyshev, polynomials
 
 if TYPE_CHECKING:
@@ -157,7 +156,7 @@ class Panels(Frozen):
             self.values(eta) for eta in (parts[0][0].low, 0.5, parts[-1][0].high))
         self.from_axis = self.from_bottom - self._till(0.5)
         measures = [slab.measure for slab in slabs]
-        self.moving = isinstance(measures[0], Moving)
+        self.moving = measures[0].moves
         if self.moving:
             self._lines = self._ends_of(measures)
 

@@ -107,6 +107,17 @@ def test_drag_is_that_of_the_width(body):
             assert abs(force.sum()) == pytest.approx(0.5 * 10.0 * 1.2 * BODIES[body][3] * 9.0)
 
 
+@pytest.mark.parametrize("thickness, h", [(0.015, H), (None, height)])
+def test_drag_is_that_of_the_widest_layer(thickness, h):
+    """One of a width that is a function, 0.01 to 0.03 along the beam, one of 0.02."""
+    layers = Section.layers((thickness, STEEL, lambda x, y: 0.01 + 0.02 * x), (0.005, BRASS, 0.02))
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 5), h)
+    scene = Scene(Beam(mesh, ElementBeamCable(5), section=layers)).drag(10.0, 1.2)
+    rise = scene.beams[0].rigid_motions()[:, 1]
+    force = scene.system.part_forces(0.0 * rise, 3.0 * rise)
+    assert abs(force.sum()) == pytest.approx(0.5 * 10.0 * 1.2 * 0.0225 * 9.0)
+
+
 def test_a_blade_comes_to_rest_where_statics_say():
     beam = beam_of("coating", ElementBeamCable(5), 0.02)
     scene = Scene(beam).clamp("left").gravity((0, -9.81)).damping(mass=5.0)

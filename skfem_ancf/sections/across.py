@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
+from functools import partial, reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,10 +14,11 @@ from ..errors import InputError
 from ..frozen import Frozen
 from ..kept import cached_property, twin_of
 from ..quadrature import gauss
-from .base import Rectangle, asked
+from .base import Rectangle
 from .jumps import BEND, KINK, jumps
-from .moving import Moving
+from .measure import measure_of
 from .shear import shear_factor
+from .within import NAMES, Within
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -75,16 +76,13 @@ class Across(Frozen):
 
     def __init__(self, mesh: MeshBeam, element: ElementBeam, section: Section,
                  material: Material | None) -> None:
-        slabs = tuple(
-            replace(slab, measure=slab.measure.of_order(element.order))
-            if isinstance(slab.measure, Moving) else slab
-            for slab in section.slabs(mesh, material))
+        slabs = tuple(_for(element, slab) for slab in section.slabs(mesh, material))
         varying, even = any(s.varies for s in slabs), mesh.heights is None
         plain = isinstance(section, Rectangle) and not varying
         vars(self).update(mesh=mesh, element=element, slabs=slabs, plain=plain,
                           simple=plain and even, constant=even and not varying,
                           uniform=even and not varying and mesh.is_uniform,
-                          moving=any(isinstance(s.measure, Moving) for s in slabs))
+                          moving=any(s.measure.moves for s in slabs))
         if varying:
             self._check()
 
@@ -109,13 +107,11 @@ class Across(Frozen):
         """Ask functions all over the body, so that they fail when the beam is made."""
         X = np.array(np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 9))).reshape(2, -1)
         for slab in self.slabs:
-            inside = X[:, (slab.measure.low <= X[1]) & (X[1] <= slab.measure.high)]
-            if isinstance(slab.measure, Moving):
-                low, *_, high = slab.measure.ends(self._heights(X[0], None))
-                inside = np.array([X[0] + 0.0 * low, low + (high - low) * X[1]])
-            for name in ("width", "grade", "density"):
+            low, *_, high = self._ends(slab, X[0])
+            inside = Within(self, slab, np.array([X[0] + 0.0 * low, low + (high - low) * X[1]]))
+            for name in NAMES:
                 if callable(getattr(slab, name)):
-                    asked(_NAMES[name], getattr(slab, name), *self.coordinates(inside))
+                    inside.asked(name)
 
     @cached_property
     def jumps(self) -> Array:
@@ -127,7 +123,7 @@ class Across(Frozen):
         for slab in self.slabs:
             eta = np.linspace(slab.measure.low, slab.measure.high, POINTS + 1)
             found += [jumps(partial(self._given, name, slab), n, eta)
-                      for name in _NAMES if callable(getattr(slab, name))]
+                      for name in NAMES if callable(getattr(slab, name))]
         if self.mesh.heights is not None:
             found.append(jumps(lambda X, e: self.mesh.mapping().height(X[0], e)[1]
                                / self.mesh.lengths[e, None], n, np.array([0.5]), KINK))
@@ -137,8 +133,8 @@ class Across(Frozen):
         return np.unique(np.concatenate(found))
 
     def _given(self, name, slab, X, tind):
-        """What a function of a slab, one of ``_NAMES``, returns at points."""
-        return asked(_NAMES[name], getattr(slab, name), *self._inside(slab, X, tind))
+        """What a function of a slab, one of ``NAMES``, returns at points."""
+        return slab.measure.values(Within(self, slab, X, tind), name)
 
     # points
 
@@ -163,8 +159,12 @@ class Across(Frozen):
         return x, np.broadcast_to(self.mesh.mapping().offset(X, tind), x.shape)
 
     def _heights(self, xi, tind):
-        """Heights (nelements, npoints) at places along elements of a tapered mesh."""
+        """Heights (nelements, npoints) at places along elements."""
         return self.mesh.mapping().height(xi, tind)[0]
+
+    def _ends(self, slab, xi):
+        """Ends of the pieces of a slab at places along the elements, (npieces + 1, ...)."""
+        return slab.measure.ends(self._heights(xi, None)) if self.moving else slab.measure.highest
 
     def which(self, X: Array, tind: Array | None = None) -> Array:
         """The number of the slab at each of reference points (2, ...); shape (...).
@@ -212,17 +212,6 @@ class Across(Frozen):
                 out[..., on] = np.broadcast_to(found, like.shape)[..., on]
         return out
 
-    def _mean(self, what, function, slab, X, tind, whole):
-        """A function at points, or for points that stand for the section its mean there."""
-        if not whole or isinstance(slab.measure, Moving):
-            return asked(what, function, *self._inside(slab, X, tind))
-        eta, w = slab.measure.gauss(POINTS + 4)
-        points = np.array([np.repeat(X[0][..., None], len(eta), -1),
-                           np.broadcast_to(eta, X[0].shape + eta.shape)])
-        values = asked(what, function, *self.coordinates(
-            points.reshape(X.shape[:-1] + (-1,)), tind))
-        return values.reshape(values.shape[0], -1, len(eta)) @ w
-
     def volume(self, slab: Slab, X: Array, W: Array, tind: Array | None = None,
                whole: bool = False, times: str = "") -> Array:
         """Volumes that the points of a rule of a slab stand for, shape (nelements, npoints).
@@ -261,39 +250,7 @@ class Across(Frozen):
         ndarray
             Shape (nelements, npoints), or a number.
         """
-        if isinstance(slab.measure, Moving):
-            return self._series(slab, X, tind, whole, times)
-        if callable(slab.width):
-            size = self._mean("width", slab.width, slab, X, tind, whole) * slab.part
-        elif slab.by_height and self.mesh.heights is not None:
-            size = slab.width * self._heights(X[0], tind) / self.mesh.height
-        else:
-            size = slab.width
-        if times:
-            size = size * getattr(self, times)(slab, X, tind, whole)
-        return size
-
-    def _series(self, slab, X, tind, whole, times):
-        """As :meth:`breadth`, of a slab that has other parts of the height from place to place."""
-        xi, ne = np.asarray(X[0]), self.mesh.nelements if tind is None else len(tind)
-        if times == "density":
-            self.density(slab, _NOWHERE)  # which it must have
-        back: Any = slice(None)
-        if xi.ndim == 1:
-            xi, back = np.unique(xi, return_inverse=True)
-        elif np.all(xi == xi[:, :1]):
-            xi, back = xi[:, :1], np.zeros(xi.shape[1], dtype=int)
-        factors = [(name, getattr(slab, name)) for name in ("width", times) if name]
-        fields = [(_NAMES[name], f) for name, f in factors if callable(f)]
-
-        def product(eta):
-            at = np.array([np.broadcast_to(xi[..., None], eta.shape), eta]).reshape(2, ne, -1)
-            x, y = self.coordinates(at, tind)
-            return np.prod([asked(name, f, x, y) for name, f in fields], axis=0).reshape(eta.shape)
-
-        c = slab.measure.moments(self._heights(xi, tind), product if fields else None)
-        c = c * np.prod([1.0 if f is None else f for _, f in factors if not callable(f)])
-        return c[0][:, back] if whole else slab.measure.series(c[:, :, back], X[1])
+        return slab.measure.breadth(Within(self, slab, X, tind), whole, times)
 
     def width(self, slab: Slab, X: Array, tind: Array | None = None) -> Any:
         """The width at points of a slab, that of its piece there.
@@ -308,18 +265,7 @@ class Across(Frozen):
         ndarray
             Shape (nelements, npoints), or a number.
         """
-        if not isinstance(slab.measure, Moving):
-            return self.breadth(slab, X, tind) / slab.part
-        wide = asked("width", slab.width, *self._inside(slab, X, tind)) if callable(
-            slab.width) else slab.width
-        return wide * slab.measure.width(X[1], self._heights(X[0], tind))
-
-    def _inside(self, slab, X, tind):
-        """Material coordinates of points, of those beside a slab that moves at its ends."""
-        if isinstance(slab.measure, Moving):
-            low, *_, high = slab.measure.ends(self._heights(X[0], tind))
-            X = np.array([np.broadcast_to(X[0], low.shape), np.clip(X[1], low, high)])
-        return self.coordinates(X, tind)
+        return slab.measure.width(Within(self, slab, X, tind))
 
     def grade(self, slab: Slab, X: Array, tind: Array | None = None, whole: bool = False) -> Any:
         """The factor on the energy of a slab at points.
@@ -335,9 +281,7 @@ class Across(Frozen):
         ndarray
             Shape (nelements, npoints), or 1.
         """
-        if slab.grade is None:
-            return 1.0
-        return self._mean("E", slab.grade, slab, X, tind, whole)
+        return Within(self, slab, X, tind).factor("grade", whole)
 
     def density(self, slab: Slab, X: Array, tind: Array | None = None, whole: bool = False) -> Any:
         """Mass per volume of a slab at points; arguments as for :meth:`grade`.
@@ -357,11 +301,7 @@ class Across(Frozen):
         InputError
             If its material has none.
         """
-        if slab.density is None:
-            raise InputError(f"{slab.material!r} has no density: give one to use mass or gravity")
-        if callable(slab.density):
-            return self._mean("density", slab.density, slab, X, tind, whole)
-        return slab.density
+        return Within(self, slab, X, tind).factor("density", whole)
 
     def face(self, side: int, X: Array, tind: Array | None = None) -> Any:
         """The width of the bottom (0) or the top (1).
@@ -406,19 +346,8 @@ class Across(Frozen):
         ndarray
             Shape (nelements, npoints), or a number.
         """
-        return np.maximum.reduce([self._outer(s, X, tind) + 0.0 * X[0] for s in self.slabs])
-
-    def _outer(self, slab, X, tind):
-        """The largest width of a slab, or where that is a function the one on the axis."""
-        if not isinstance(slab.measure, Moving):
-            scale = slab.outer * slab.part / slab.width if slab.outer else 1.0
-            return scale * self.breadth(slab, X, tind) / slab.part
-        if slab.by_height:  # a tube
-            return self._heights(X[0], tind)
-        if slab.outer:
-            return slab.outer
-        return asked("width", slab.width, *self._inside(slab, X, tind)) if callable(
-            slab.width) else slab.width
+        widths = (s.measure.outline(Within(self, s, X, tind)) for s in self.slabs)
+        return reduce(np.maximum, widths, 0.0 * X[0])
 
     def ends(self, xi: Array | None = None) -> Array:
         """Where pieces of one law and width begin and end, from the bottom to the top.
@@ -434,13 +363,8 @@ class Across(Frozen):
         ndarray
             Places eta, shape (npieces + 1,), or (npieces + 1, nelements, npoints).
         """
-        measures = [slab.measure for slab in self.slabs]
-        if self.moving and xi is not None:
-            h = self._heights(xi, None)
-            found = [m.ends(h) for m in measures]
-        else:
-            found = [np.array([m.low, *(p.high for p in getattr(m, "pieces", [m]))])
-                     for m in ((m.at(m.height) if isinstance(m, Moving) else m) for m in measures)]
+        found = [slab.measure.highest if xi is None else self._ends(slab, xi)
+                 for slab in self.slabs]
         return np.concatenate([found[0][:1], *(end[1:] for end in found)])
 
     # rules
@@ -475,18 +399,8 @@ class Across(Frozen):
         eta, weights
             Places across, and what of area over height they stand for, (nsections, q).
         """
-        xi = xi[:, None]
-        if isinstance(slab.measure, Moving):
-            eta, w = slab.measure.points(self._heights(xi, e)[:, 0], n)
-            wide: Any = slab.width
-            if callable(wide):
-                wide = asked("width", wide, *self.coordinates(
-                    np.array([xi + 0.0 * eta, eta]), e))
-        else:
-            eta, w = slab.measure.gauss(n)
-            eta = np.repeat(eta[None], len(xi), 0)
-            wide = self.breadth(slab, np.array([xi + 0.0 * eta, eta]), e)
-        return eta, wide * w + 0.0 * eta
+        at = Within(self, slab, np.repeat(xi[None, :, None], 2, 0), e)
+        return slab.measure.sampled(at, n)
 
     def terms(self, formulation: Formulation) -> list[tuple[Slab, list[Term]]]:
         """The terms of the strain energy of each slab.
@@ -510,15 +424,13 @@ class Across(Frozen):
                                            slab.material))
             eta, w = slab.measure.gauss(2)
             for term in terms:
-                if self.element.order and term.section_samples is not None and isinstance(
-                        slab.measure, Moving):
+                if self.element.order and term.section_samples is not None and slab.measure.moves:
                     raise InputError(
                         f"formulation {formulation.name!r} at order {self.element.order} takes the "
                         "mean of the strain over a section, whose weights change along a taper "
                         "with thicknesses that stay: take order 2 or more by the formulation "
                         "'assumed' or 'continuum', or nu = 0")
-                x, v = term.section
-                degree = getattr(slab.measure, "spent", 1)
+                (x, v), degree = term.section, max(slab.measure.spent, 1)
                 if len(x) > 1 and np.max(np.abs((v @ legvander(2.0 * x - 1.0, degree))
                                                 - w @ legvander(2.0 * eta - 1.0, degree))) > 1e-9:
                     raise InputError(
@@ -654,4 +566,9 @@ class Across(Frozen):
 _NOWHERE = np.zeros((2, 0))
 _MODULI = {"stiffness": "axial_modulus", "E": "E"}
 _TIMES = {"stiffness": "grade", "E": "grade", "mass": "density"}
-_NAMES = {"width": "width", "grade": "E", "density": "density"}
+
+
+def _for(element, slab):
+    """A slab with the measure for an element."""
+    measure = measure_of(slab.measure).of_order(element.order)
+    return slab if measure is slab.measure else replace(slab, measure=measure)

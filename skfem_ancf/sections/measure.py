@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh_tridiagonal
@@ -15,9 +15,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from ..types import Array, Rule
+    from .within import Within
 
 #: Points more, where the weight is no polynomial of Y.
 MORE = 4
+
+#: Points across a slab for means of functions.
+MEAN = 8
 
 
 class Piece(NamedTuple):
@@ -36,7 +40,215 @@ class Piece(NamedTuple):
     width: float | Callable[[Array], Array]
 
 
-class Uniform(Frozen):
+class Measure(Frozen):
+    """What a slab has across: rules with its width in their weights, and what these stand for.
+
+    Its ends are the same parts of the height all along a beam, and its width but for a factor.
+
+    Attributes
+    ----------
+    low, high : float
+        Its ends, places eta.
+    spent : int
+        Degree of exactness that rules spend on the width.
+    moves : bool
+        Its ends are other parts of the height from place to place.
+    """
+
+    low: float
+    high: float
+    pieces: tuple[Piece, ...]
+    spent: int = 0
+    moves = False
+
+    def gauss(self, n: int) -> Rule:
+        """Points eta (m,) and weights (m,), whose sum is 1, exact to degree 2 n - 1.
+
+        Parameters
+        ----------
+        n
+            Number of points asked for.
+        """
+        raise NotImplementedError
+
+    def of_order(self, order: int) -> Measure:
+        """The measure for an element whose strain energy is of degree 4 N across.
+
+        Parameters
+        ----------
+        order
+            N.
+        """
+        return self
+
+    def at(self, height: float) -> Measure:
+        """The measure of one section.
+
+        Parameters
+        ----------
+        height
+            Its height.
+        """
+        return self
+
+    @property
+    def highest(self) -> Array:
+        """Ends of the pieces, from the bottom to the top, where the beam is highest, (n + 1,)."""
+        return np.array([self.pieces[0].low, *(p.high for p in self.pieces)])
+
+    def ends(self, h: Array) -> Array:
+        """Ends of the pieces, from the bottom to the top.
+
+        Parameters
+        ----------
+        h
+            Heights, shape (...).
+
+        Returns
+        -------
+        ndarray
+            Shape (npieces + 1, ...).
+        """
+        return np.multiply.outer(self.highest, np.ones(h.shape))
+
+    def values(self, at: Within, name: str, whole: bool = False) -> Array:
+        """A function of the slab at points, or the means of their sections.
+
+        Parameters
+        ----------
+        at
+            The points; one beside a slab that moves stands for the slab's end.
+        name
+            One of :data:`~skfem_ancf.sections.within.NAMES`.
+        whole
+            They stand for their sections.
+
+        Returns
+        -------
+        ndarray
+            Shape (nelements, npoints).
+        """
+        if not whole:
+            return at.asked(name)
+        X, (eta, w) = at.X, self.gauss(MEAN)
+        points = np.array([np.repeat(X[0][..., None], len(eta), -1),
+                           np.broadcast_to(eta, X[0].shape + eta.shape)])
+        values = at.moved(points.reshape(X.shape[:-1] + (-1,))).asked(name)
+        return values.reshape(values.shape[0], -1, len(eta)) @ w
+
+    def breadth(self, at: Within, whole: bool = False, times: str = "") -> Any:
+        """What the weights of rules are multiplied by: area over height.
+
+        Parameters
+        ----------
+        at
+            Points of the slab.
+        whole
+            They stand for their sections.
+        times
+            "grade" or "density" for the integrals of these, "" for the area.
+
+        Returns
+        -------
+        ndarray
+            Shape (nelements, npoints), or a number.
+        """
+        slab, mesh, size = at.slab, at.body.mesh, at.factor("width", whole)
+        if callable(slab.width):
+            size = size * slab.part
+        elif slab.by_height and mesh.heights is not None:
+            size = size * at.heights / mesh.height
+        return size * at.factor(times, whole) if times else size
+
+    def width(self, at: Within) -> Any:
+        """The width at points of the slab.
+
+        Parameters
+        ----------
+        at
+            The points.
+
+        Returns
+        -------
+        ndarray
+            Shape (nelements, npoints), or a number.
+        """
+        return self.breadth(at) / at.slab.part
+
+    def outline(self, at: Within) -> Any:
+        """The largest width of sections, or where that is a function the one at points.
+
+        Parameters
+        ----------
+        at
+            Points of the axis.
+
+        Returns
+        -------
+        ndarray
+            Shape (nelements, npoints), or a number.
+        """
+        slab = at.slab
+        scale = slab.outer * slab.part / slab.width if slab.outer else 1.0
+        return scale * self.breadth(at) / slab.part
+
+    def sampled(self, at: Within, n: int) -> tuple[Array, Array]:
+        """Points of sections, for fields that are the slab's own.
+
+        Parameters
+        ----------
+        at
+            One point of each section, (2, nsections, 1).
+        n
+            Number of points, at least.
+
+        Returns
+        -------
+        eta, weights
+            Places across, and what of area over height they stand for, (nsections, q).
+        """
+        eta, w = self.gauss(n)
+        eta = np.repeat(eta[None], at.X.shape[1], 0)
+        return eta, self.breadth(at.moved(np.array([at.X[0] + 0.0 * eta, eta]))) * w + 0.0 * eta
+
+
+class Ruled(Measure):
+    """A measure of one's own, of which only the rules are known.
+
+    Parameters
+    ----------
+    rules
+        With ``low``, ``high`` and ``gauss(n)``; it may have ``pieces`` and ``mean``.
+    """
+
+    def __init__(self, rules: Any) -> None:
+        self.rules, self.low, self.high = rules, rules.low, rules.high
+        vars(self).update({name: getattr(rules, name) for name in ("pieces", "mean", "spent")
+                           if hasattr(rules, name)})
+
+    def gauss(self, n: int) -> Rule:
+        return self.rules.gauss(n)
+
+    @property
+    def highest(self) -> Array:
+        return super().highest if hasattr(self, "pieces") else np.array([self.low, self.high])
+
+    def __repr__(self) -> str:
+        return repr(self.rules)
+
+
+def measure_of(given: Any) -> Measure:
+    """A measure, which may be one's own.
+
+    Parameters
+    ----------
+    given
+        A Measure, or what :class:`Ruled` takes.
+    """
+    return given if isinstance(given, Measure) else Ruled(given)
+
+
+class Uniform(Measure):
     """The measure of a constant width from ``low`` to ``high``: its rules are those of Gauss.
 
     Parameters
@@ -52,13 +264,6 @@ class Uniform(Frozen):
         self.pieces, self.mean = (Piece(low, high, 1.0),), high - low
 
     def gauss(self, n: int) -> Rule:
-        """Points eta (m,) and weights (m,), whose sum is 1, exact to degree 2 n - 1.
-
-        Parameters
-        ----------
-        n
-            Number of points asked for.
-        """
         x, w = gauss(n + self.more if n > 1 else n)
         return (x if (self.low, self.high) == (0.0, 1.0) else
                 self.low + (self.high - self.low) * x), w
@@ -71,7 +276,7 @@ class Uniform(Frozen):
 WHOLE = Uniform()
 
 
-class Weighted(Frozen):
+class Weighted(Measure):
     """The measure of a width that varies across: Gauss rules that have the width in their weights.
 
     They are exact, to round-off, for polynomials of degree 2 n - 1 times the width, jumps and
@@ -117,13 +322,6 @@ class Weighted(Frozen):
         return np.concatenate(points), np.concatenate(weights)
 
     def gauss(self, n: int) -> Rule:
-        """Points eta (n,) and weights (n,), whose sum is 1, exact to degree 2 n - 1.
-
-        Parameters
-        ----------
-        n
-            Number of points.
-        """
         x, w = self._rules(n)
         return x.copy(), w.copy()
 

@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.polynomial.legendre import legval, legvander
 
-from ..frozen import Frozen
 from ..quadrature import gauss
-from .measure import MORE, Weighted
+from .measure import MORE, Measure, Weighted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from ..types import Array, Rule
     from .measure import Piece
+    from .within import Within
 
 #: Least degree of the series of a width, and its points more where that is a square root.
 LEAST, ROUND = 8, 40
 
 
-class Moving(Frozen):
+class Moving(Measure):
     """The measure of a width whose pieces have ends ``a + b / h``: thicknesses that stay.
 
     Rules across have the same points all along a beam, for strains are sampled along it at fixed
@@ -48,40 +48,22 @@ class Moving(Frozen):
         Integral of their width over eta.
     """
 
-    low, high = 0.0, 1.0
+    low, high, moves = 0.0, 1.0, True
 
     def __repr__(self) -> str:
         return f"<{len(self.pieces)} widths, whose thicknesses stay along a taper>"
-
-    @property
-    def spent(self) -> int:
-        """Degree of exactness that rules spend on the width."""
-        return 2 * ((self.degree + 1) // 2)
 
     def __init__(self, pieces_of: Callable[[Any], Sequence[Piece]], height: float,
                  degree: int = LEAST) -> None:
         self.pieces_of, self.height, self.degree = pieces_of, height, degree
         largest = self.at(height)
         self.pieces, self.mean = largest.pieces, largest.mean
+        self.spent = 2 * ((degree + 1) // 2)
 
     def of_order(self, order: int) -> Moving:
-        """The measure for an element whose strain energy is of degree 4 N across.
-
-        Parameters
-        ----------
-        order
-            N.
-        """
         return Moving(self.pieces_of, self.height, max(LEAST, 4 * order))
 
     def at(self, height: float) -> Weighted:
-        """The measure of one section.
-
-        Parameters
-        ----------
-        height
-            Its height.
-        """
         return Weighted(self.pieces_of(height))
 
     def gauss(self, n: int) -> Rule:
@@ -98,42 +80,56 @@ class Moving(Frozen):
         return gauss(n + (self.degree + 1) // 2)
 
     def ends(self, h: Array) -> Array:
-        """Ends of the pieces, from the bottom to the top.
-
-        Parameters
-        ----------
-        h
-            Heights, shape (...).
-
-        Returns
-        -------
-        ndarray
-            Shape (npieces + 1, ...).
-        """
         found = self.pieces_of(h[..., None])
         return np.array([np.broadcast_to(end, h.shape + (1,))[..., 0]
                          for end in (found[0].low, *(p.high for p in found))])
 
-    def width(self, eta: Any, h: Array) -> Array:
-        """The width at places.
+    def _inside(self, at):
+        """The points, and in place of those beside the slab points at its ends."""
+        low, *_, high = self.ends(at.heights)
+        return at.moved(np.array([np.broadcast_to(at.X[0], low.shape),
+                                  np.clip(at.X[1], low, high)]))
 
-        Parameters
-        ----------
-        eta, h
-            Places across and heights there, shapes (...).
+    def values(self, at: Within, name: str, whole: bool = False) -> Array:
+        return self._inside(at).asked(name)
 
-        Returns
-        -------
-        ndarray
-            Shape (...).
-        """
-        eta, h = (x[..., None] for x in np.broadcast_arrays(eta, h))
+    def width(self, at: Within) -> Array:
+        eta, h = (x[..., None] for x in np.broadcast_arrays(at.X[1], at.heights))
         found = self.pieces_of(h)
         out = 0.0 * eta
         for piece in found:
             inside = (eta >= piece.low) & (eta < piece.high if piece is not found[-1] else True)
             out = np.where(inside, piece.width(eta) if callable(piece.width) else piece.width, out)
-        return out[..., 0]
+        return at.factor("width") * out[..., 0]
+
+    def outline(self, at: Within) -> Any:
+        if at.slab.by_height:  # a tube
+            return at.heights
+        return at.slab.outer or at.factor("width")
+
+    def breadth(self, at: Within, whole: bool = False, times: str = "") -> Array:
+        xi, mesh = np.asarray(at.X[0]), at.body.mesh
+        back: Any = slice(None)
+        if xi.ndim == 1:
+            xi, back = np.unique(xi, return_inverse=True)
+        elif np.all(xi == xi[:, :1]):
+            xi, back = xi[:, :1], np.zeros(xi.shape[1], dtype=int)
+        names = ("width", times) if times else ("width",)
+        functions = [name for name in names if callable(getattr(at.slab, name))]
+        c = np.prod([at.factor(name) for name in names if name not in functions])
+
+        def product(eta):
+            X = np.array([np.broadcast_to(xi[..., None], eta.shape), eta])
+            there = at.moved(X.reshape(2, len(eta), -1))
+            return np.prod([there.asked(name) for name in functions], axis=0).reshape(eta.shape)
+
+        c = c * self.moments(mesh.mapping().height(xi, at.tind)[0], product if functions else None)
+        return c[0][:, back] if whole else self.series(c[:, :, back], at.X[1])
+
+    def sampled(self, at: Within, n: int) -> tuple[Array, Array]:
+        eta, w = self.points(at.heights[:, 0], n)
+        there = at.moved(np.array([at.X[0] + 0.0 * eta, eta]))
+        return eta, w * (there.asked("width") if callable(at.slab.width) else at.slab.width)
 
     def points(self, h: Array, n: int) -> tuple[Array, Array]:
         """Points in the pieces of sections, and what they stand for.
