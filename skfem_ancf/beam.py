@@ -23,6 +23,7 @@ from .kept import cached_property
 from .kinematics import KINEMATICS
 from .materials import Material, StVenantKirchhoff
 from .mesh import MeshBeam
+from .origin import ours
 from .places import as_point, facets_of
 from .quadrature import gauss, tensor
 from .rigid import RigidBody
@@ -295,7 +296,7 @@ class Beam(Frozen):
         if (type(a) is not StVenantKirchhoff or type(b) is not StVenantKirchhoff
                 or (a.nu, a.plane, a.shear_correction) != (b.nu, b.plane, b.shear_correction)
                 or a.graded or b.graded or callable(width) or callable(other.width)
-                or not type(self.formulation).__module__.startswith(f"{__package__}.")):
+                or not ours(self.formulation)):
             return None
         return b.E / a.E, other.width / width
 

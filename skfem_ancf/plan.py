@@ -10,6 +10,7 @@ import numpy as np
 from .dynamics.choice import choose_scheme
 from .eigenstrain import EigenStrain
 from .errors import NameUnknown, require_option
+from .origin import ours
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -106,7 +107,7 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         f"{s.m} equations of {_kinds(s.joints)}" if s.m else
         "no joints" if not scene.joints else "the joints only fix coordinates")
     add("linear solver", "computed", _linear_solver(s, dynamic))
-    rules = sorted({(b.element.order, t.section_points, getattr(t.slab.measure, "spent", 0))
+    rules = sorted({(b.element.order, t.section_points, t.slab.measure.spent)
                     for b in beams if b.has_sections for t in b.kernel.firsts})
     layer = " a layer" if any(len(b.across.slabs) > 1 for b in beams) else ""
     add("section quadrature", "constant" if rules else "skipped",
@@ -219,11 +220,11 @@ def _elements(s):
     forces = s.forces
     if not forces.elements:
         return "force elements", "skipped", "no springs, no masses"
-    ours = sum(type(element).__module__.startswith(__package__) for element in forces.own)
+    known = sum(ours(element) for element in forces.own)
     return "force elements", "computed", (
         f"{_kinds(forces.elements)}: {len(forces.parts)} in tables, "
-        f"{len(forces.contacts.obstacles)} obstacles, {len(forces.own) - ours} of your own, "
-        f"{ours} by functions asked in Python, {len(forces.masses)} in the mass"
+        f"{len(forces.contacts.obstacles)} obstacles, {len(forces.own) - known} of your own, "
+        f"{known} by functions asked in Python, {len(forces.masses)} in the mass"
         + (f", {len(forces.sampled)} sampled" if forces.sampled else "")
         + (", some couple points far apart" if forces.far else ""))
 

@@ -35,6 +35,7 @@ from .joints.base import both_of, is_ground, members_at, named_place
 from .joints.prescribed import Turned
 from .loads import (DeadLoad, EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight,
                     bind_load)
+from .origin import ours
 from .path import CriticalPoint, Path
 from .pickling import functions_of, require_picklable
 from .places import on_other_mesh
@@ -1383,8 +1384,7 @@ class Scene:
         if (system is None or set(changes) - {"material", "width"} or self._elements
                 or type(self).with_beams is not Scene.with_beams
                 or new.element is not old.element or "kernel" not in vars(new)
-                or not all(type(joint).__module__.startswith(_OURS)
-                           for _, joint in self._joints)):
+                or not all(ours(joint) for _, joint in self._joints)):
             return None
         same = new.width == old.width and new.material.density == old.material.density
         moved = [n != k or (same and isinstance(bound, DeadLoad)) for n, _, bound in self._loads]
@@ -1873,10 +1873,6 @@ class Scene:
         return State(self.system, result.u, result.load, result.force, result.converged,
                      result.iterations, result.message, result.steps, result.multipliers,
                      doubt=result.doubt, memory=result.memory)
-
-
-#: How the names of modules of the package begin.
-_OURS = f"{__package__}."
 
 
 def _branch(point, system):

@@ -4,6 +4,7 @@ from functools import cache
 
 from numba import carray, types
 
+from ..origin import ours
 from .calls import call
 from .twin import address_of, jit, named, twin
 
@@ -26,8 +27,7 @@ def address(text):
     """
     function = named(law, {"carray": carray, "text": twin(text)})
     function.__qualname__ = f"{function.__qualname__}_{text.__module__}_{text.__qualname__}"
-    ours = str(text.__module__).startswith(__package__.split(".")[0] + ".")
-    return address_of(function, _SIGNATURE, ours)
+    return address_of(function, _SIGNATURE, ours(text))
 
 
 @jit

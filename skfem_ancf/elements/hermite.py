@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..errors import teaching
+from ..origin import ours
 from .ancf import ElementBeamANCF
 from .base import DEGREES, require_degree
 
@@ -46,8 +47,7 @@ class ElementBeamANCFHermite(ElementBeamANCF):
 
     def raised(self) -> ElementBeamANCFHermite | None:
         # the subclass of degree 3 is of this family; one's own is another element
-        own = type(self).__module__.split(".")[0] != __name__.split(".")[0]
-        if own or self.axis_degree == DEGREES[-1]:
+        if not ours(self) or self.axis_degree == DEGREES[-1]:
             return None
         return ElementBeamANCFHermite(self.order, self.axis_degree + 2, self._points)
 

@@ -75,7 +75,6 @@ class Passage:
                 break
         return done, text
 
-
     def deep(self) -> str:
         """Which obstacle points were so deep in that they may leave it on its other side, or ""."""
         for path in self._paths:

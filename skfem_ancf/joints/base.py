@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import AncfError, InputError, MeshError, require_finite, shown
 from ..frozen import Sealable
 from ..loads import require_entries
+from ..origin import ours
 from ..places import as_point, is_place, is_point
 from ..rigid import RigidBody
 
@@ -464,12 +465,12 @@ def bind_joint(joint: Joint, scene: Scene) -> Joint:
     try:
         bound.bind(scene)
         bound._seal()
-        if type(joint).__module__.rpartition(".")[0] != __package__:
+        if not ours(joint):
             _try(bound, scene.N)
     except AncfError:
         raise
     except Exception as error:
-        if type(joint).__module__.rpartition(".")[0] == __package__:
+        if ours(joint):
             raise
         raise InputError(  # it is the user's: it may raise anything
             f"{joint!r} fails in the stress-free state: {type(error).__name__}: {error}; a joint "

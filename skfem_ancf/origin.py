@@ -1,0 +1,25 @@
+"""Whose a class or a function is: the package's own, or one that came by its doors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def ours(thing: Any) -> bool:
+    """True if a function, or the class of an object, is the package's own.
+
+    Parameters
+    ----------
+    thing
+        An object, or a function.
+
+    Examples
+    --------
+    >>> from skfem_ancf import ElementBeamCable
+    >>> class Own(ElementBeamCable):
+    ...     pass
+    >>> ours(ElementBeamCable(5)), ours(Own(5)), ours(ours)
+    (True, False, True)
+    """
+    named = thing if isinstance(getattr(thing, "__qualname__", None), str) else type(thing)
+    return str(named.__module__).partition(".")[0] == __package__
