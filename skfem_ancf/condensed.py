@@ -196,56 +196,63 @@ class Condensed:
         Parameters
         ----------
         b, phi
-            Forces (N,), and what the equations of the nodes should change by, (m,).
+            Forces (N,), and what the equations of the nodes should change by, (m,); or columns of
+            them, shapes (N, k) and (m, k), which together take half as long.
 
         Returns
         -------
         x, multipliers
-            Shapes (N,) and (m,).
+            Of these shapes.
         """
-        at, lu = self._unknowns, self._nodes[1]
-        v, x = self._offsets(phi).reshape(-1, 6), np.zeros(len(b))
+        at, lu, k = self._unknowns, self._nodes[1], b[:1].size
+        v, x = self._offsets(phi.reshape(-1, k)).reshape(-1, 6, k), np.zeros((len(b), k))
         f = np.empty(v.shape)
         for part in self._parts:
-            f[part.group.members] = part.reduce(b)
+            f[part.group.members] = part.reduce(b.reshape(x.shape))
         for turned in self._released:
             turned.reduce(f)
         if lu is not None:
-            left = f - (self._ends @ v[..., None])[..., 0]
-            nodes = np.bincount(at.ravel(), left.ravel(), self.size + 1)
+            left = f - self._ends @ v
+            nodes = _summed(at.ravel(), left.reshape(-1, k), self.size + 1)
             nodes[:-1] = lu.solve(nodes[:-1])
             nodes[-1] = 0.0
-            v += nodes[at].reshape(-1, 6)
-        forces = (f - (self._ends @ v[..., None])[..., 0]).reshape(-1, 3)
+            v += nodes[at].reshape(v.shape)
+        forces = (f - self._ends @ v).reshape(-1, 3, k)
         forces[self.nodes.hinged, 2] = 0.0
         for turned in reversed(self._released):
             turned.expand(f, v)
         for part in self._parts:
             part.expand(v[part.group.members], x)
-        return x, self._multipliers(forces)
+        return x.reshape(b.shape), self._multipliers(forces).reshape(phi.shape)
 
     def _offsets(self, phi):
-        """By how much ends move apart from the unknowns of their nodes, (ends, 3)."""
-        nodes, out = self.nodes, np.zeros((len(self._turns), 3))
+        """By how much ends move apart from the unknowns of their nodes, (ends, 3, columns)."""
+        nodes, out = self.nodes, np.zeros((len(self._turns), 3, phi.shape[1]))
         forces, moments, x, y, angle = nodes.split(phi)
         out[nodes.held_x, 0], out[nodes.held_y, 1] = x, y
-        out[nodes.held_angle, 2] = angle / np.abs(self._turns[nodes.held_angle])
+        out[nodes.held_angle, 2] = angle / np.abs(self._turns[nodes.held_angle, None])
         follower, leader, scale = self._pairs
         out[nodes.followers, :2] = out[nodes.leader[nodes.followers], :2] - forces
-        out[follower, 2] = out[leader, 2] - moments / scale
+        out[follower, 2] = out[leader, 2] - moments / scale[:, None]
         return out
 
     def _multipliers(self, forces):
-        """Those that leave the forces (ends, 3) at the ends."""
+        """Those that leave the forces (ends, 3, columns) at the ends."""
         nodes = self.nodes
-        number = len(nodes.held)
-        total = np.array([np.bincount(nodes.nodes, f, number) for f in forces.T])
+        total = _summed(nodes.nodes, forces.reshape(len(forces), -1), len(nodes.held))
+        total = total.reshape(-1, *forces.shape[1:])
         follower, _, scale = self._pairs
         held = nodes.held_x, nodes.held_y, nodes.held_angle
-        x, y, angle = (total[k, nodes.nodes[ends]] for k, ends in enumerate(held))
+        x, y, angle = (total[nodes.nodes[ends], k] for k, ends in enumerate(held))
         return np.concatenate([
-            *(0.0 - forces[nodes.followers, :2].T), -forces[follower, 2] / scale, x, y,
-            angle / np.abs(self._turns[nodes.held_angle])])
+            *(0.0 - forces[nodes.followers, k] for k in range(2)),
+            -forces[follower, 2] / scale[:, None], x, y,
+            angle / np.abs(self._turns[nodes.held_angle, None])])
+
+
+def _summed(at, values, n):
+    """The sums of the rows (rows, columns) that go to each of n places."""
+    return np.stack([np.bincount(at, column, n) for column in values.T], axis=1)
 
 
 def _order(nodes):
@@ -281,15 +288,15 @@ class _Release:
         S[members] = some
 
     def reduce(self, f: Array) -> None:
-        """Eliminate them from forces (members, 6); in their place is what is known of them."""
-        own = f[self.members, self.k] / self.pivot
-        f[self.members] -= self.row * own[:, None]
+        """Eliminate them from forces (members, 6, columns); what is known of them is there then."""
+        own = f[self.members, self.k] / self.pivot[:, None]
+        f[self.members] -= self.row[:, :, None] * own[:, None]
         f[self.members, self.k] = own
 
     def expand(self, f: Array, v: Array) -> None:
-        """Find them, zero in v (members, 6), from what :meth:`reduce` left in f."""
-        v[self.members, self.k] = (f[self.members, self.k]
-                                   - np.sum(self.row * v[self.members], axis=1) / self.pivot)
+        """Find them, zero in v (members, 6, columns), from what :meth:`reduce` left in f."""
+        along = np.sum(self.row[:, :, None] * v[self.members], axis=1)
+        v[self.members, self.k] = f[self.members, self.k] - along / self.pivot[:, None]
 
 
 class _Basis:
@@ -410,34 +417,34 @@ class _Part:
         return Inertia(negative, singular)
 
     def reduce(self, b: Array) -> Array:
-        """Forces (M, 6) at the ends from those on the coordinates, (N,)."""
-        nd = self.group.nd
-        f = b[self._places].reshape(len(self._places), -1, nd)
+        """Forces (M, 6, k) at the ends from those on the coordinates, columns (N, k)."""
+        nd, columns = self.group.nd, b.shape[1]
+        f = b[self._places].reshape(len(self._places), -1, nd, columns)
         self._known = []
         first, last = f[:, 0], f[:, 1]
         for k, (A, inverse, X) in enumerate(self._inner):
-            self._known.append(_solved(A, inverse, last[:, :, None])[:, :, 0])
-            both = _times(X.transpose(0, 2, 1), last)
+            self._known.append(_solved(A, inverse, last))
+            both = X.transpose(0, 2, 1) @ last
             first, last = first - both[:, :nd], f[:, k + 2] - both[:, nd:]
-        g = np.stack([_times(T.transpose(0, 2, 1), x) for T, x in zip(self._T, (first, last))], 1)
+        g = np.stack([T.transpose(0, 2, 1) @ x for T, x in zip(self._T, (first, last))], 1)
         A, inverse, X = self._outer
-        own = g[:, :, SHARED:].reshape(len(g), -1)
-        self._known.append(_solved(A, inverse, own[:, :, None])[:, :, 0])
-        return g[:, :, :SHARED].reshape(-1, 6) - _times(X.transpose(0, 2, 1), own)
+        own = g[:, :, SHARED:].reshape(len(g), -1, columns)
+        self._known.append(_solved(A, inverse, own))
+        return g[:, :, :SHARED].reshape(-1, 6, columns) - X.transpose(0, 2, 1) @ own
 
     def expand(self, v: Array, x: Array) -> None:
-        """All displacements from those at the ends, (M, 6), after :meth:`reduce`; x is (N,)."""
-        group, nd = self.group, self.group.nd
-        ends = np.empty((len(v), 2, nd))
-        ends[:, :, :SHARED] = v.reshape(-1, 2, SHARED)
-        ends[:, :, SHARED:] = (self._known[-1] - _times(self._outer[2], v)
-                               ).reshape(-1, 2, nd - SHARED)
-        out = np.empty((len(v), group.elements + 1, nd))
-        out[:, 0], out[:, -1] = (_times(T, ends[:, k]) for k, T in enumerate(self._T))
+        """All displacements from those at the ends, (M, 6, k), after :meth:`reduce`; x is (N, k)."""
+        group, nd, columns = self.group, self.group.nd, v.shape[2]
+        ends = np.empty((len(v), 2, nd, columns))
+        ends[:, :, :SHARED] = v.reshape(-1, 2, SHARED, columns)
+        ends[:, :, SHARED:] = (self._known[-1] - self._outer[2] @ v
+                               ).reshape(-1, 2, nd - SHARED, columns)
+        out = np.empty((len(v), group.elements + 1, nd, columns))
+        out[:, 0], out[:, -1] = (T @ ends[:, k] for k, T in enumerate(self._T))
         for k in range(group.elements - 1, 0, -1):
             around = np.concatenate([out[:, 0], out[:, k + 1]], axis=1)
-            out[:, k] = self._known[k - 1] - _times(self._inner[k - 1][2], around)
-        x[self._places] = out.reshape(len(v), -1)
+            out[:, k] = self._known[k - 1] - self._inner[k - 1][2] @ around
+        x[self._places] = out.reshape(len(v), -1, columns)
 
 
 def _inverse(A):
@@ -451,11 +458,6 @@ def _solved(A, inverse, B):
     """A^-1 B, as accurate as by factors: of what an inverse alone gives A leaves too much."""
     X = inverse @ B
     return X + inverse @ (B - A @ X)
-
-
-def _times(A, x):
-    """Matrices (M, i, j) times vectors (M, j)."""
-    return (A @ x[:, :, None])[:, :, 0]
 
 
 def _between(S, A, T):

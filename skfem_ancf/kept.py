@@ -33,7 +33,7 @@ def twin_of(thing: Any) -> Any:
     (False, {'y': 2.0})
     """
     other = object.__new__(type(thing))
-    other.__dict__.update(thing.__dict__)  # vars() takes as long as all the rest
+    other.__dict__.update(thing.__dict__)
     return other
 
 

@@ -379,16 +379,11 @@ class BandMatrix:
                     for k in range(1, min(self.bandwidth + 1, self.n))), default=0.0), size
 
     def tocsc(self) -> csc_matrix:
-        """The matrix as a scipy.sparse array in CSC format."""
-        k: Array = np.arange(-self.bandwidth, self.bandwidth + 1)
-        if self.symmetric:
-            k = k[k >= 0]
-        j: Array = np.arange(self.n)
-        i = j + k[:, None]
-        j = np.broadcast_to(j, i.shape)
-        inside = (i >= 0) & (i < self.n)
-        i, j = i[inside], j[inside]
-        v = self._flat[self._position(i, j)]
+        """The matrix as a scipy.sparse array in CSC format, without the zeros of the band."""
+        first = max(self._diagonal - self.bandwidth, 0)
+        columns = self._flat.reshape(self.n, self._ld)[:, first:self._diagonal + self.bandwidth + 1]
+        j, k = np.nonzero(columns)
+        i, v = j + (k + first - self._diagonal), columns[j, k]
         if self.symmetric:
             off = i > j
             i, j, v = (np.concatenate([i, j[off]]), np.concatenate([j, i[off]]),

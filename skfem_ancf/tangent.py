@@ -383,8 +383,7 @@ class Inverse:
 
     def _once(self, b, c):
         if self._nodes is not None and not self._by_strains:
-            x, l = zip(*(self._nodes.solve(*columns) for columns in zip(b.T, c.T)))
-            return np.array(x).T, np.array(l).T
+            return self._nodes.solve(b, c)
         b, c = self._d[:, None] * b, self._e[:, None] * c
         if self._by_strains:
             none = np.zeros((self._tangent.B.shape[0], b.shape[1]))
