@@ -174,7 +174,7 @@ def _modes(system, state, k):
     M = _free_mass(system, tangent)
     n, m = tangent.size
     k = _count(k, n - m)
-    shift, small = _shift(system, state), n <= DENSE or 2 * k > n - m
+    shift, small = _shift(tangent, state), n <= DENSE or 2 * k > n - m
     tangent.balance(M, shift)
     if tangent.symmetric:
         values, X = (_dense if small else _sparse)(tangent, M, k, shift)
@@ -189,10 +189,8 @@ def _modes(system, state, k):
 
 def _free_mass(system, tangent):
     """The mass matrix between the free coordinates, sparse."""
-    M = system.mass.tocsc()
-    if len(tangent.free) < system.N:
-        M = M[tangent.free][:, tangent.free]
-    return M.tocsr()
+    M = system.mass.tocsc().T  # it is symmetric: in rows, as it is
+    return M[tangent.free][:, tangent.free] if len(tangent.free) < system.N else M
 
 
 def _bending_eigenvalue(system):
@@ -207,20 +205,28 @@ def _bending_eigenvalue(system):
     return stiffness * (np.pi / system.size) ** 4
 
 
-def _shift(system, state):
+def _shift(tangent, state):
     """A number s for which K + s M is positive definite between the free coordinates."""
-    shift, t = _bending_eigenvalue(system), state.load if state.t is None else state.t
+    shift = _bending_eigenvalue(tangent.system)
     for _ in range(80):
-        system.assemble(state.u, state.load, t=state.t)
-        system.K.combine(1.0, system.K, shift, system.mass)
         try:
-            system.factorize(state.u, t, state.multipliers)
-            if system.inertia().negative == 0:
+            if _inertia(tangent, state, shift).negative == 0:
                 return shift
         except NO_FACTORS:
             pass
         shift *= 4.0
     raise SupportError("the joints are not independent in this state")
+
+
+def _inertia(tangent, state, shift):
+    """The inertia of K + shift M between the free coordinates."""
+    system = tangent.system
+    if system.condensed is not None:
+        return tangent.condense(system.condensed, shift).inertia()
+    system.assemble(state.u, state.load, t=state.t)
+    system.K.combine(1.0, system.K, shift, system.mass)
+    system.factorize(state.u, state.load if state.t is None else state.t, state.multipliers)
+    return system.inertia()
 
 
 def _dense(tangent, M, k, shift):

@@ -19,6 +19,7 @@ from scipy.sparse.linalg import splu
 from .condensed import Condensed
 from .errors import ConvergenceError, SupportError
 from .forces.texts import add_elastic_force
+from .kept import twin_of
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -60,9 +61,12 @@ class StrainTangent:
         rigid = system.N - sum(beam.N for beam in system.beams)
         if rigid:  # whose coordinates no strain depends on
             parts.append((*2 * [sparse.csr_matrix((0, rigid))], np.zeros(0)))
-        self._rows = [sparse.block_diag([part[k] for part in parts], format="csr")
-                      for k in range(2)]
-        self.B, self.CB = (rows[:, self.free] for rows in self._rows)
+        self._rows = [_joined([part[k] for part in parts]) for k in range(2)]
+        self.B, self.CB = self._rows
+        if len(self.free) < system.N:
+            self.B, self.CB = (rows[:, self.free] for rows in self._rows)
+        #: shift and multipliers of a frame's factors, and they
+        self._condensed: Any = 0.0, None, None
         self.stress = np.concatenate([part[2] for part in parts])
         self.J = sparse.csr_matrix(system.jacobian(u, self._at[-1])[:, self.free])
         self._set_stress(self.stress, multipliers)
@@ -110,7 +114,7 @@ class StrainTangent:
         rigid = self.system.N - sum(part.shape[0] for part in S)
         if rigid:
             S.append(sparse.csr_matrix((rigid, rigid)))
-        S = (sparse.block_diag(S, format="csr") + load_stiffness(self.system, u, load, t)
+        S = (_joined(S) + load_stiffness(self.system, u, load, t)
              + self.system.curvature(u, time, multipliers))
         return S[self.free][:, self.free]
 
@@ -163,6 +167,8 @@ class StrainTangent:
     def condense(self, condensed: Condensed, shift: float) -> Condensed:
         """Factors of the tangent of a frame, condensed to its nodes, with the mass times a number.
 
+        Those of the last shift are kept.
+
         Parameters
         ----------
         condensed
@@ -171,12 +177,14 @@ class StrainTangent:
             What the mass is multiplied by.
         """
         (u, load, t, _), system = self._at, self.system
-        own = Condensed(system.beams, system.slices, condensed.nodes)
-        system.assemble(u, load, t=t)
-        if shift:
-            system.K.combine(1.0, system.K, shift, system.mass)
-        own.factorize(system.K, u, self.multipliers)
-        return own
+        if self._condensed[0] != shift or self._condensed[1] is not self.multipliers:
+            own = twin_of(condensed)
+            system.assemble(u, load, t=t)
+            if shift:
+                system.K.combine(1.0, system.K, shift, system.mass)
+            own.factorize(system.K, u, self.multipliers)
+            self._condensed = shift, self.multipliers, own
+        return self._condensed[2]
 
     @property
     def symmetric(self) -> bool:
@@ -226,29 +234,35 @@ class StrainTangent:
         return self.material_energies(X) + np.sum(X * (self.S @ X), axis=0)
 
 
+def _joined(parts):
+    """The sparse matrices of all beams as one."""
+    return parts[0] if len(parts) == 1 else sparse.block_diag(parts, format="csr")
+
+
 def _beam_rows(beam, u):
     """B and C B of one beam as sparse matrices, and its weighted stresses."""
-    kernel, rows, cols, first = beam.kernel, [], [], 0
+    kernel, columns = beam.kernel, []
     values = [], [], []
     for part in kernel.chunks():
         found = kernel.factors(kernel.gather(u, part), part)
-        ne, m, n = found[0].shape
+        n = found[0].shape[2]
         dofs = beam.nd * beam.mesh.t[0, part][:, None, None] + np.arange(n)
-        number = first + np.arange(ne * m).reshape(ne, m, 1)
-        first += ne * m
-        rows.append(np.broadcast_to(number, (ne, m, n)).ravel())
-        cols.append(np.broadcast_to(dofs, (ne, m, n)).ravel())
+        columns.append(np.broadcast_to(dofs, found[0].shape).ravel())
         for all_values, new in zip(values, found):
             all_values.append(new.ravel())
     B, CB, stress = map(np.concatenate, values)
-    where, shape = (np.concatenate(rows), np.concatenate(cols)), (first, beam.N)
-    return (*(sparse.csr_matrix((v, where), shape=shape) for v in (B, CB)), stress)
+    j, first = np.concatenate(columns), n * np.arange(len(stress) + 1)
+    shape = len(stress), beam.N
+    return (*(sparse.csr_matrix((v, j, first), shape=shape) for v in (B, CB)), stress)
 
 
 def _beam_geometric(beam, u, stress, first):
     """The geometric part of one beam, sparse, and where the stresses of the next one begin."""
     kernel, i, j, values = beam.kernel, [], [], []
     rows = len(kernel.factors(kernel.gather(u, slice(0, 1)), slice(0, 1))[2][0])
+    last = first + rows * beam.mesh.nelements
+    if not np.any(stress[first:last]):
+        return sparse.csr_matrix((beam.N, beam.N)), last
     for part in kernel.chunks():
         u_e = kernel.gather(u, part)
         last = first + rows * len(u_e)
