@@ -433,7 +433,7 @@ class _Part:
         return g[:, :, :SHARED].reshape(-1, 6, columns) - X.transpose(0, 2, 1) @ own
 
     def expand(self, v: Array, x: Array) -> None:
-        """All displacements from those at the ends, (M, 6, k), after :meth:`reduce`; x is (N, k)."""
+        """All displacements x (N, k) from those at the ends, (M, 6, k), after :meth:`reduce`."""
         group, nd, columns = self.group, self.group.nd, v.shape[2]
         ends = np.empty((len(v), 2, nd, columns))
         ends[:, :, :SHARED] = v.reshape(-1, 2, SHARED, columns)
