@@ -9,8 +9,8 @@ import numpy as np
 from .beam import Beam
 from .elements import ElementBeamCable
 from .errors import (InputError, require_finite, require_finite_scalar, require_function,
-                     require_integer, require_names, require_option, require_options, shown,
-                     teaching)
+                     require_integer, require_names, require_option, require_options,
+                     require_positive, shown, teaching)
 from .joints.base import bind_joint
 from .joints.nodes import Nodes, chain_ends
 from .joints.settlements import HELD
@@ -161,7 +161,11 @@ class Frame(Scene):
         **beam
             ``height``, and the arguments of :class:`~skfem_ancf.Beam`: ``material`` and ``width``
             or ``section``, and where they differ from these ``element`` (``ElementBeamCable(5)``),
-            ``formulation``, ``damping``.
+            ``formulation``, ``damping``. The height is a number, or of tapered lines a function of
+            s (n,), which runs from 0 to 1 along each line from its first point to its second, that
+            returns heights (n,), with kinks at nodes of the elements; or a list with one of these
+            for each line, in ``sections`` for each line of the group. Functions of material
+            coordinates (x, y), as of a width or a modulus, take this s for x.
 
         Returns
         -------
@@ -177,8 +181,22 @@ class Frame(Scene):
 
         Examples
         --------
+        A portal with haunches, whose girder is of constant height in the middle:
+
         >>> import numpy as np
         >>> from skfem_ancf import Frame, StVenantKirchhoff
+        >>> hall = Frame.from_lines(
+        ...     [(0, 0), (0, 4), (10, 4), (10, 0)], [(0, 1), (1, 2), (3, 2)], elements=4,
+        ...     groups={"columns": [0, 2], "girder": [1]}, width=0.2, sections={
+        ...         "columns": {"height": lambda s: 0.3 + 0.3 * s},
+        ...         "girder": {"height": lambda s: 0.4 + 0.8 * np.maximum(abs(s - 0.5) - 0.25, 0)}},
+        ...     material=StVenantKirchhoff(E=2.1e11, nu=0.3))
+        >>> state = hall.clamp([0, 3]).line_load((0, -1e5), beam="girder").solve_static()
+        >>> round(float(hall.rotations(state)[1]), 5)
+        -0.00085
+
+        An arch:
+
         >>> arch = Frame.from_lines([(-1, 0), (1, 0)], [(0, 1)], elements=8, height=0.01, width=0.1,
         ...                         curves={0: lambda s: np.array([-np.cos(np.pi * s),
         ...                                                        np.sin(np.pi * s)])},
@@ -254,7 +272,11 @@ class Frame(Scene):
             if "height" not in given:
                 raise InputError("the lines need a height of their section: give height=, or one "
                                  f"for each group in sections, as {{{name!r}: {{'height': 0.1}}}}")
-            mesh = net.mesh(lines, elements, require_finite_scalar("height", given.pop("height")))
+            numbers = lines if "height" in sections.get(name, {}) else np.arange(m)
+            height = _heights(given.pop("height"), numbers)
+            if isinstance(height, list):
+                height = [height[k] for k in np.searchsorted(numbers, lines)]
+            mesh = net.mesh(lines, elements, height)
             beams.append(Beam(mesh, name=name, **given))
         net.curves = {}  # the meshes have them
         return cls(net, beams, np.concatenate(list(groups.values())), _hinged(net, hinges))
@@ -558,6 +580,20 @@ def _elements(elements, m):
         raise InputError(f"elements is an integer from 1 to {MOST}, or one for each line, got "
                          f"{shown(elements)}")
     return found.astype(np.int64)
+
+
+def _heights(height, lines):
+    """A number or a function; or a list of them, one for each of some lines."""
+    if callable(height):
+        return height
+    if not isinstance(height, (list, tuple)) and np.ndim(height) != 1:
+        return require_finite_scalar("height", height)
+    if len(height) != len(lines):
+        raise InputError(f"height has {len(height)} entries for {len(lines)} line(s): give a "
+                         "number, a function of s from 0 to 1 along each line, or a list with one "
+                         "of these for each line; one given in sections for each of the group")
+    return [one if callable(one) else require_positive(f"height of line {k}", one)
+            for k, one in zip(lines, height)]
 
 
 def _hinged(net, hinges):

@@ -357,8 +357,11 @@ class MeshBeam(Frozen, Mesh2D):
                                   ("height", "curve"))
         if "height" in changes:
             names = ("height", "heights", "taper")
-            changes |= zip(names, heights_of(changes["height"], self.parameters, self.t))
+            changes |= zip(names, self._heights_of(changes["height"]))
         return replace(self, **changes)
+
+    def _heights_of(self, height):
+        return heights_of(height, self.parameters, self.t)
 
     def node_height(self, node: int) -> float:
         """The height of the section of a node.

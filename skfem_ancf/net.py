@@ -11,6 +11,7 @@ import scipy
 
 from .errors import (FileError, InputError, MeshError, NameUnknown, ask, ask_field,
                      require_finite, require_integer, require_label, require_path, shown)
+from .lines import Axes, MeshLines, heights_of_chains
 from .mesh import MeshBeam
 from .places import is_point
 
@@ -176,7 +177,7 @@ class Net:
         return np.array([require_integer("the number of a line", given, 0,
                                          self.lines.shape[1] - 1)])
 
-    def mesh(self, lines: Array, elements: Array, height: float) -> MeshBeam:
+    def mesh(self, lines: Array, elements: Array, height: Any) -> MeshBeam:
         """A mesh with a chain of elements for each of some lines, in their order.
 
         Parameters
@@ -186,7 +187,8 @@ class Net:
         elements
             How many each of all lines is divided into, shape (m,).
         height
-            Of the section.
+            Of the section: a number, a function of parameters s (n,) from 0 to 1 along each line
+            that returns heights (n,), or a list with one of these for each of the lines.
         """
         n = elements[lines]
         first = np.concatenate([[0], np.cumsum(n + 1)])
@@ -201,14 +203,17 @@ class Net:
         arcs: dict[int, Curve] = {}
         for k in map(int, np.flatnonzero(np.isin(lines, list(self.curves)))):
             nodes = np.arange(first[k], first[k + 1])
-            arc = self._arc(int(lines[k]), int(n[k]), height)
+            arc = self._arc(int(lines[k]), int(n[k]),
+                            height[k] if isinstance(height, list) else height)
             p[:, nodes], tangent[:, nodes], turning[:, nodes] = arc.p, arc.p_X, arc.p_XY
             lengths[np.searchsorted(left, nodes[:-1])] = arc.lengths
             arcs[k] = cast("Curve", arc.curve)
-        axes = {"curve": Axes(arcs, a, d), "s": 2 * line + s} if arcs else {}
-        mesh = MeshBeam(np.ascontiguousarray(p), np.array([left, left + 1]), height=height,
-                        p_X=tangent, p_Y=np.array([0.0 - tangent[1], tangent[0]]),
-                        lengths=lengths, p_XY=turning, **axes)
+        s, t = 2 * line + s, np.array([left, left + 1])
+        largest, heights, taper = heights_of_chains(height, s, t, lines)
+        mesh = MeshLines(np.ascontiguousarray(p), t, height=largest, heights=heights, taper=taper,
+                         p_X=tangent, p_Y=np.array([0.0 - tangent[1], tangent[0]]),
+                         lengths=lengths, p_XY=turning, s=s,
+                         curve=cast("Curve", Axes(arcs, a, d)) if arcs else None)
         mesh._boundaries = mesh._build_default_tags()
         return mesh
 
@@ -221,76 +226,6 @@ class Net:
                             f"{_at(found[:, 1])}, its points are at {_at(ends[:, 0])} and "
                             f"{_at(ends[:, 1])}: a curve is a function of s from 0 to 1")
         return MeshBeam.init_curve(curve, np.linspace(0.0, 1.0, n + 1), height)
-
-
-class Axes:
-    """The axes of the chains of a mesh, that of chain k for parameters from 2 k to 2 k + 1.
-
-    What a mesh asks of a :class:`~skfem_ancf.curve.Curve`.
-
-    Parameters
-    ----------
-    arcs
-        By the number of a chain its curve, for parameters from 0 to 1; others are straight.
-    start, way
-        Where each begins, and from there to its end, shapes (2, chains).
-    """
-
-    def __init__(self, arcs: Mapping[int, Curve], start: Array, way: Array) -> None:
-        self.arcs, self.start, self.way = dict(arcs), start, way
-
-    def _parts(self, s):
-        """Chain and parameter there of each of some parameters, and which are on which arc."""
-        chain = np.floor(0.5 * s).astype(int)
-        return chain, s - 2 * chain, [(arc, chain == k) for k, arc in self.arcs.items()
-                                      if np.any(chain == k)]
-
-    def nodes(self, s: Array) -> tuple[Array, Array]:
-        """Positions and unit tangents at parameters ``s``, both of shape (2, n)."""
-        chain, s, parts = self._parts(s)
-        way = self.way[:, chain]
-        p, tangent = self.start[:, chain] + s * way, way / np.hypot(*way)
-        for arc, here in parts:
-            p[:, here], tangent[:, here] = arc.nodes(s[here])
-        return p, tangent
-
-    def turning(self, s: Array) -> Array:
-        """Derivative of the unit normal by the arc length at parameters ``s``, shape (2, n)."""
-        _, s, parts = self._parts(s)
-        out = np.zeros((2, len(s)))
-        for arc, here in parts:
-            out[:, here] = arc.turning(s[here])
-        return out
-
-    def lengths(self, a: Array, b: Array) -> Array:
-        """Arc lengths from parameters ``a`` to ``b``, both of shape (n,).
-
-        Parameters
-        ----------
-        a, b
-            Parameters of the same chains, shapes (n,).
-        """
-        chain, x, parts = self._parts(a)
-        y = b - 2 * chain
-        out = (y - x) * np.hypot(*self.way[:, chain])
-        for arc, here in parts:
-            out[here] = arc.lengths(x[here], y[here])
-        return out
-
-    def moved(self, A: Array, shift: Array) -> Axes:
-        """The axes ``A r(s) + shift``.
-
-        Parameters
-        ----------
-        A, shift
-            Shapes (2, 2) and (2,).
-        """
-        return Axes({k: arc.moved(A, shift) for k, arc in self.arcs.items()},
-                    A @ self.start + shift[:, None], A @ self.way)
-
-    def functions(self) -> list[tuple[str, Callable[[Array], Any]]]:
-        """Pairs of a description and a function, for those that the curves were given."""
-        return [item for arc in self.arcs.values() for item in arc.functions()]
 
 
 def mapping_of(name: str, given: Any) -> Mapping[Any, Any]:

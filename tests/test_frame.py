@@ -14,8 +14,8 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         KelvinVoigt, MeshBeam, Scene, Section, StVenantKirchhoff, system, tangent)
 from skfem_ancf.condensed import Condensed
 from skfem_ancf.dynamics import integrate
-from skfem_ancf.errors import (FileError, InputError, MeshError, NameUnknown, PickleError,
-                               SupportError)
+from skfem_ancf.errors import (CallbackError, FileError, InputError, MeshError, NameUnknown,
+                               PickleError, SupportError)
 from skfem_ancf.system import System
 
 E, H = 2e11, 0.02
@@ -569,6 +569,145 @@ def test_a_frame_on_other_beams():
         frame.with_beams(frame.beams[::-1])
     with pytest.raises(InputError, match="list of 2 Beam"):
         frame.with_beams([frame.beams[0]])
+
+
+# tapers
+
+
+def haunch(s):
+    """0.04 at both ends, 0.02 in between."""
+    return 0.02 + 0.08 * np.maximum(np.abs(s - 0.5) - 0.25, 0.0)
+
+
+def slim(s):
+    return 0.02 * (1.0 - 0.5 * s)
+
+
+def flexibility_method(points, lines, heights, held, force):
+    """Displacements (n, 3) by beam theory, whose members are integrals over their lengths."""
+    points = np.array(points, dtype=float)
+    K = np.zeros((3 * len(points),) * 2)
+    x, w = np.polynomial.legendre.leggauss(30)
+    s = (np.arange(4)[:, None] + 0.5 * (x + 1)).ravel() / 4
+    for (i, j), height in zip(lines, heights):
+        d, h = points[j] - points[i], height(s)
+        L = np.hypot(*d)
+        arm, dx = L * (1 - s), np.tile(w, 4) * L / 8
+        a, b = dx / (E * H * h), dx / (E * H * h**3 / 12)  # of the end j, with i held
+        F = np.array([[a.sum(), 0, 0], [0, b @ arm**2, b @ arm], [0, b @ arm, b.sum()]])
+        to_i = np.array([[-1.0, 0, 0], [0, -1, 0], [0, -L, -1]])  # forces at i of those at j
+        T = np.kron(np.eye(2), [[d[0] / L, d[1] / L, 0], [-d[1] / L, d[0] / L, 0], [0, 0, 1]])
+        B = np.vstack([to_i, np.eye(3)])
+        at = np.append(3 * i + np.arange(3), 3 * j + np.arange(3))
+        K[np.ix_(at, at)] += T.T @ B @ np.linalg.solve(F, B.T) @ T
+    free = np.setdiff1d(np.arange(len(K)), held)
+    u = np.zeros(len(K))
+    u[free] = np.linalg.solve(K[np.ix_(free, free)], force[free])
+    return u.reshape(-1, 3)
+
+
+@pytest.mark.parametrize("sections", [
+    {"columns": {"height": slim}, "lines": {"height": haunch}}, None])
+def test_tapered_frames_by_integrals(sections):
+    """A haunched portal, its columns thin at their feet; heights by group, and line by line."""
+    points, lines = [(0, 1), (0, 0), (1.5, 1.2), (1.5, 0)], [(0, 1), (0, 2), (2, 3)]
+    law, heights = STEEL.replace(nu=0.0), [slim, haunch, slim]
+    frame = Frame.from_lines(points, lines, groups={"columns": [0, 2]}, elements=8, material=law,
+                             height=heights, width=H, sections=sections).clamp([1, 3])
+    state = frame.point_force((3.0, -5.0), at=0).moment(2, 0.5).solve_linear()
+    force = np.zeros(12)
+    force[[0, 1, 8]] = 3.0, -5.0, 0.5
+    exact = flexibility_method(points, lines, heights, [3, 4, 5, 9, 10, 11], force)
+    assert_allclose(at_nodes(frame, state), exact[:, :2], rtol=0, atol=2e-7 * np.abs(exact).max())
+    assert_allclose(frame.rotations(state), exact[:, 2], rtol=0, atol=2e-7 * np.abs(exact).max())
+
+
+def wide(x, y):
+    return 0.01 + 0.02 * x + 0.1 * y
+
+
+LAYERS = Section.layers((0.002, STEEL), (None, STEEL.replace(E=7e10)), width=wide)
+PROFILE = Section.profile("I", width=0.03, web=0.004, flange=0.003)
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCF(2)])
+def test_a_tapered_frame_of_any_section_is_that_of_welded_beams(element):
+    """Profiles, layers and graded moduli by group, large displacements, heat."""
+    graded = STEEL.replace(E=Graded())
+    given = {"columns": {"height": slim, "section": PROFILE, "material": STEEL},
+             "girder": {"height": [haunch], "section": LAYERS},
+             "brace": {"height": 0.01, "width": 0.01, "material": graded}}
+    points, lines = [*PORTAL[0], (0.5, 0.6)], [*PORTAL[1], (1, 4)]
+    frame = Frame.from_lines(points, lines, groups={"columns": [0, 2], "girder": [1], "brace": [
+        3]}, elements=4, element=element, sections=given, nodes={"ground": [0, 3]})
+    frame.clamp("ground").point_force((1500.0, -300.0), at=1).point_force((0, -5), at=4)
+    frame.eigenstrain(xx=Graded(1e-3), beam="columns")
+    beams = []
+    for (i, j), name in zip(lines, ("columns", "girder", "columns", "brace")):
+        a, d = frame.points[:, i], frame.points[:, j] - frame.points[:, i]
+        options = dict(given[name])
+        height = options.pop("height")
+        mesh = MeshBeam.init_curve(lambda s, a=a, d=d: a[:, None] + d[:, None] * s, np.linspace(
+            0, 1, 5), height[0] if name == "girder" else height)
+        beams.append(Beam(mesh, element, **options))
+    scene = Scene(*beams)
+    for pair, at in ((("ground", 0), ((0.0, 0.0), "left")), ((0, 1), ("right", "left")),
+                     ((1, 2), ("right", "left")), (("ground", 2), ((1.0, 0.0), "right")),
+                     ((1, 3), ("left", "left"))):
+        scene.joint("weld", beams=pair, at=at)
+    for k in (0, 2):
+        scene.eigenstrain(xx=Graded(1e-3), beam=k)
+    scene.point_force((1500.0, -300.0), at=(0.0, 1.0), beam=0)
+    scene.point_force((0, -5), at=(0.5, 0.6), beam=3)
+    state, other = (s.solve_static(tol=1e-10) for s in (frame, scene))
+    assert isinstance(frame.system.condensed, Condensed) and state.recovered == dict.fromkeys(
+        ("columns", "girder", "brace"), "")
+    assert np.abs(state.displacement((0, 1))).max() > 0.02
+    for x, beam, k in (((0, 1), "columns", 0), ((1, 1), "columns", 2), ((0.4, 1), "girder", 1)):
+        assert_allclose(state.displacement(x, beam=beam), other.displacement(x, beam=k),
+                        rtol=0, atol=1e-8)
+    x = (0.4, 1.004)
+    assert_allclose(state.stress(x, beam="girder"), other.stress(x, beam=1), rtol=1e-6, atol=1e3)
+    again = pickle.loads(pickle.dumps(frame))
+    assert np.array_equal(again.solve_static(tol=1e-10).u, state.u)
+
+
+class Graded:
+    """A function of the own parameter of a line."""
+
+    def __init__(self, size=E):
+        self.size = size
+
+    def __call__(self, x, y):
+        return self.size * (1.0 + 0.5 * x)
+
+
+def test_refined_tapers_have_the_heights_of_their_functions():
+    def height(s):
+        return 0.02 + 0.01 * np.sin(3.0 * s)
+
+    frame = Frame.from_lines(*PORTAL, elements=2, height=[height, 0.02, slim], width=H,
+                             material=STEEL)
+    mesh = frame.beams[0].mesh.refined(2)
+    at = np.linspace(0, 1, 8, endpoint=False) + np.arange(4)[:, None] / 24
+    assert_allclose(mesh.heights[:, :8], height(at), rtol=1e-15)
+    assert_allclose(mesh.heights[:, 8:16], 0.02)
+    assert_allclose(mesh.heights[:, 16:], slim(at), rtol=1e-15)
+    mesh = mesh.replace(height=lambda s: 2 * slim(s))
+    assert_allclose(mesh.heights, np.tile(2 * slim(at), 3), rtol=1e-15)
+    assert frame.clamp([0, 3]).point_force((10.0, 0.0), at=1).solve_static(adapt=1e-6).converged
+
+
+@pytest.mark.parametrize("height, error, message", [
+    ([0.1, 0.2], InputError, "height has 2 entries for 3"),
+    ([0.1, 0.2, "x"], InputError, "height of line 2"), ([0.1, -0.2, 0.1], InputError, "line 1"),
+    (lambda s: s - 0.5, MeshError, "-0.5 at 0: end the mesh"),
+    ([0.1, 0.1, lambda s: 0.1 + (s > 0.5)], MeshError, "line 2: .*no smooth function"),
+    (lambda s: 1 / 0, CallbackError, "ZeroDivisionError")])
+def test_heights_that_cannot_be(height, error, message):
+    with pytest.raises(error, match=message):
+        Frame.from_lines(*PORTAL, groups={"columns": [0, 2]}, height=height, width=H,
+                         material=STEEL)
 
 
 # its parts
