@@ -1,7 +1,7 @@
 """Forces, tangents and stresses of all beams of a scene."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -57,17 +57,20 @@ def cable_pack(body, k):
     return body.packs[k]
 
 
-def body_of(beams: Sequence["Beam"], slices: Sequence[slice]) -> "Body":
+def body_of(beams: Sequence["Beam"], slices: Sequence[slice],
+            own: Sequence[Sequence[Any]] | None = None) -> "Body":
     """The Body of beams with their slices of the coordinates.
 
     Parameters
     ----------
     beams, slices
         The beams, and the coordinates of each.
+    own
+        The packs of each; those of its kernel by default.
     """
     packs, rows, at = [], [], 0
-    for beam, s in zip(beams, slices):
-        for pack in beam.kernel.packs:
+    for beam, s, its in zip(beams, slices, own or [beam.kernel.packs for beam in beams]):
+        for pack in its:
             shape = beam.kernel.texts.components, len(pack.weights), len(pack.start)
             size = shape[0] * shape[1] * shape[2]
             packs.append(pack)

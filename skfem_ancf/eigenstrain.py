@@ -17,7 +17,7 @@ from scipy import sparse
 from .errors import InputError, ask_array, require_finite_scalar, require_function, shown
 from .formulations import COMPONENTS
 from .growth import Growth, sampled
-from .kernels.base import apart
+from .kernels.base import GIVEN, MEAN, apart, no_stresses, nowhere
 from .kernels.law import LINEAR
 from .loads import Load
 from .spread import Spread
@@ -56,7 +56,6 @@ class EigenStrain(Load):
     prestress = True
     # of a bound one: a matrix for each element, with sections
     _elements: Any = None
-    _packs: Any = None
     _matrix: Any = None
     _spread: Any = None
     # of laws that are not linear: what it does, and the factor in a motion
@@ -106,7 +105,7 @@ class EigenStrain(Load):
             bound._matrix = sparse.coo_matrix((K.ravel(), (i.ravel(), j.ravel())),
                                               shape=(beam.N, beam.N)).tocsr()
         else:
-            bound._packs, bound.linear = _bent_packs(beam, self), False
+            bound.pushes, bound.linear = _resultants(beam, self), False
         return bound
 
     @property
@@ -144,8 +143,20 @@ class EigenStrain(Load):
             q = beam.kernel.gather(beam.q0_local) + u_e
             return factor * np.einsum("eij,ej->ei", self._elements,
                                       q.reshape(len(q), -1)).reshape(q.shape)
-        return factor * np.asarray(sum(sign * beam.kernel.forces_of([apart(pack, slice(None))], u_e)
-                              for pack, sign in self._packs))
+        return self._pushed(GIVEN, u_e.ravel(), u_e.ravel(), factor,
+                            apart(self._pack, slice(None))).reshape(u_e.shape)
+
+    @property
+    def _pack(self):
+        """The cable without stiffness."""
+        return self.beam.kernel.viscous_packs(0.0)[0]
+
+    def _pushed(self, what, u, v, factor, pack):
+        """The force, or the mean force, of the stresses of a cable."""
+        out = np.zeros(u.size)
+        self.beam.kernel.texts.evaluate(pack, what, u, v, out, factor * self.pushes,
+                                        no_stresses(pack), nowhere(out))
+        return out
 
     def force(self, u: Array) -> Array:
         if self._matrix is not None:
@@ -159,21 +170,17 @@ class EigenStrain(Load):
                 self._growth.mean_forces(gather(u0), gather(u1), self._size))
         if self.beam.has_sections:
             return super().mean_force(u0, u1)
-        out = np.zeros(self.beam.N)
-        for pack, sign in self._packs:
-            force = np.zeros(self.beam.N)
-            self.beam.kernel.texts.mean(pack, u0, u1, force)
-            out += sign * force
-        return out
+        return self._pushed(MEAN, u0, u1, 1.0, self._pack)
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
         if self._matrix is not None:
             A = self._matrix.tocoo()
             return A.row, A.col, A.data
         u_e = self.beam.kernel.gather(u)
-        K = sum(sign * self.beam.kernel.tangents_of([apart(pack, slice(None))], u_e)
-                for pack, sign in self._packs) if self._growth is None else (
-                    self._growth.tangents(u_e, self._size))
+        if self._growth is not None:
+            K = self._growth.tangents(u_e, self._size)
+        else:
+            K = self.beam.kernel.tangents_of([apart(self._pack, slice(None))], u_e, [self.pushes])
         rows, columns = _entries(self.beam)
         return rows.ravel(), columns.ravel(), np.ravel(K)
 
@@ -184,13 +191,9 @@ class EigenStrain(Load):
                 0.0 * u_e, self._size)
         if self.beam.has_sections:
             return -float(u @ (self._matrix @ (self.beam.q0_local + 0.5 * u)))
-        energy = np.zeros(self.beam.mesh.nelements)
-        for pack, sign in self._packs:
-            for state, less in ((u, 1.0), (0.0 * u, -1.0)):
-                one = np.zeros_like(energy)
-                self.beam.kernel.texts.strain_energy(pack, state, one)
-                energy += less * sign * one
-        return -float(np.sum(energy))
+        kernel = self.beam.kernel
+        return -float(np.sum(kernel.packs[0].weights * self.pushes * kernel.strain(
+            kernel.gather(u))))
 
     def spread(self, u: Array) -> Spread:
         return self._spread
@@ -332,13 +335,10 @@ def _pushed_apart(beam, eigen):
                            for part in (slice(k.start, min(k.stop, ne)) for k in kernel.chunks())])
 
 
-def _bent_packs(beam, eigen):
-    """Packs of a cable, and signs, whose energies differ by N0 eps + M0 kappa and a constant.
-
-    One has a stress-free curvature that is less by 1, M0 for E I, and N0 for what couples both.
-    """
-    pack, xi = beam.kernel.packs[0], beam.kernel.points
-    N0, M0 = np.zeros((2, beam.mesh.nelements, len(xi)))
+def _resultants(beam, eigen):
+    """Normal forces and moments of a cable that a strain would take, (2, points, elements)."""
+    xi = beam.kernel.points
+    out = np.zeros((2, beam.mesh.nelements, len(xi)))
     across = beam.across
     for slab, (eta, w) in across.rules(8):
         X = np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))])
@@ -346,15 +346,9 @@ def _bent_packs(beam, eigen):
         size = (slab.material.axial_modulus * across.breadth(slab, X, times="grade")
                 * beam.mesh.mapping().height(X[0])[0] * np.tile(w, len(xi)))
         S0 = size * eigen.of_slab(slab, x, y)[0]
-        N0 += S0.reshape(*N0.shape, -1).sum(axis=-1)
-        M0 -= (S0 * y).reshape(*M0.shape, -1).sum(axis=-1)
-    n, ne = N0.T.shape
-    none = pack.constant[:0]
-    plain = pack._replace(
-        stiffness=np.array([np.zeros((n, ne)), M0.T, N0.T]), place=np.arange(ne),
-        weights=np.ascontiguousarray(np.broadcast_to(pack.weights, (n, ne))), constant=none,
-        pairs=pack.pairs._replace(held=np.ascontiguousarray(pack.pairs.held[:, :0])))
-    return (plain._replace(kappa0=pack.kappa0 - 1.0), 1.0), (plain, -1.0)
+        for k, moment in enumerate((S0, -S0 * y)):
+            out[k] += moment.reshape(*out[k].shape, -1).sum(axis=-1)
+    return np.ascontiguousarray(out.transpose(0, 2, 1))
 
 
 # functions of time too

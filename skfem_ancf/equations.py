@@ -7,7 +7,7 @@ import numpy as np
 from scipy import sparse
 
 from .band import Band
-from .body import FlatBody, body_of, copies_of, stress_size, viscous_body_of
+from .body import ELEMENTS, FlatBody, body_of, copies_of, stress_size, viscous_body_of
 from .border import Border
 from .compiled.words import Words, constant
 from .forces.system import NO_FORCES
@@ -33,6 +33,8 @@ _NO_JOINTS = constant(JointTables(_NO_INTS, _NO_INTS, _NO_INTS, np.zeros(0), _NO
                                   0))
 _NO_MOMENTS = constant(MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)),
                                   np.zeros((0, 2)), np.zeros(0)))
+_NO_BODY = constant(FlatBody(_NO_INTS, np.zeros((0, ELEMENTS + 1), np.int64)))
+_NO_STRESSES = np.zeros((0, 0))
 _NO_BORDER = constant(Border(_NO_INTS, 0, 0, _NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, 0))
 constant(NO_FORCES)
 
@@ -97,6 +99,7 @@ class Tables:
         self._system = ref(system)
         self._own_handle: int | None = None
         self._words: list[Words] = []
+        self._words_of_loads: list[Words] = []
         self._sort(system.loads)
         self.motion_varies = any(joint.moving for joint in system.joints)
         self.turns = any(joint.turning for joint in system.joints)
@@ -116,8 +119,8 @@ class Tables:
         return system
 
     def _sort(self, loads):
-        # of the constant kind, moments, linear ones, others
-        self._loads: list[list[Any]] = [[], [], [], []]
+        # of the constant kind, moments, linear ones, given stresses, others
+        self._loads: list[list[Any]] = [[], [], [], [], []]
         for load in loads:
             self._loads[_kind(load)].append(load)
 
@@ -143,7 +146,7 @@ class Tables:
         return plain._replace(
             body=body, viscous=body if same else self._flat(plain.viscous, addresses),
             copies=body if alone else self._flat(_with_laws(plain.copies, compiled.law), addresses),
-            forces=forces)
+            forces=forces, loads=self._flat_loads())
 
     @cached_property
     def parts(self) -> list[str]:
@@ -200,7 +203,7 @@ class Tables:
         """
         tables, before = twin_of(self), self.plain
         tables._system, tables._words, tables._own_handle = ref(system), [], None
-        its = vars(tables)
+        tables._words_of_loads, its = [], vars(tables)
         for name in ("flat", "linearised", "parts", "_stress_size"):
             if name in its:
                 del its[name]
@@ -211,10 +214,10 @@ class Tables:
             viscous = viscous_body_of(body, system.beams, system.retardation)
             tables.plain = before._replace(body=body, copies=body, loads=loads, viscous=viscous)
             return tables
-        plain = before._replace(loads=loads)
+        tables.plain = before._replace(loads=loads)
         if "flat" in vars(self):
-            tables._words, tables.flat = self._words, self.flat._replace(loads=plain.loads)
-        tables.plain = plain
+            tables._words = self._words
+            tables.flat = self.flat._replace(loads=tables._flat_loads())
         return tables
 
     def with_equations(self, plain: Equations) -> "Tables":
@@ -227,15 +230,25 @@ class Tables:
         """
         tables = twin_of(self)
         vars(tables).pop("flat", None)
-        tables._words, tables.plain = [], plain
+        tables._words, tables._words_of_loads, tables.plain = [], [], plain
         return tables
 
     def _flat(self, body, addresses):
         """The FlatBody of a Body."""
-        words = [Words(pack._replace(address=addresses[type(pack).__name__]))
-                 for pack in body.packs]
+        found, words = _flat(body, addresses)
         self._words += words  # it has their places only
-        return FlatBody(np.array([x.address for x in words], dtype=np.int64), body.table)
+        return found
+
+    def _flat_loads(self):
+        """The loads for compiled texts."""
+        from . import compiled
+
+        loads = self.plain.loads
+        if not len(loads.pushes):
+            return loads
+        pushed, self._words_of_loads = _flat(
+            loads.pushed, {"CablePack": compiled.address("CablePack")})
+        return loads._replace(pushed=pushed)
 
     def _forces(self):
         s = self.system
@@ -261,15 +274,16 @@ class Tables:
 
     def _load_tables(self):
         s = self.system
-        steady, turning, linear, others = self._loads
+        steady, turning, linear, pushing, others = self._loads
         self._rows = [load for load in steady if load.amplitude is not None]
         vectors = np.zeros((1 + len(self._rows) + len(linear), s.N))
         for load in steady:
             row = 0 if load.amplitude is None else 1 + self._rows.index(load)
             vectors[row, s.of(load)] += load.force(None)
+        pushed = self._pushed(pushing)
         if not linear:
             return LoadTables(vectors, self._moments(turning), _NO_INTS, _NO_INTS, np.zeros(0),
-                              _NO_INTS, self.handle if others else 0)
+                              _NO_INTS, *pushed, self.handle if others else 0)
         entries, first = [[np.zeros(0)] * 4], len(vectors) + len(turning)
         for k, load in enumerate(linear):
             zero, at = np.zeros(load.beam.N), s.of(load)
@@ -278,7 +292,22 @@ class Tables:
             entries.append((at.start + i, at.start + j, v, np.full(len(v), first + k)))
         i, j, v, k = (np.concatenate(column) for column in zip(*entries))
         return LoadTables(vectors, self._moments(turning), *(x.astype(np.int64) for x in (i, j)),
-                          v.astype(float), k.astype(np.int64), self.handle if others else 0)
+                          v.astype(float), k.astype(np.int64), *pushed,
+                          self.handle if others else 0)
+
+    def _pushed(self, loads):
+        """The cables that stresses push apart, and these stresses, a row for each load."""
+        if not loads:
+            return _NO_BODY, _NO_STRESSES
+        of = {id(load.beam): load.beam for load in loads}
+        beams = list(of.values())
+        body = body_of(beams, [self.system.of(beam) for beam in beams],
+                       [beam.kernel.viscous_packs(0.0) for beam in beams])
+        rows = np.zeros((len(loads), stress_size(body)))
+        for row, load in zip(rows, loads):
+            _, _, _, begin, end, *_ = body.table[list(of).index(id(load.beam))]
+            row[begin:end] = load.pushes.ravel()
+        return body, rows
 
     def _moments(self, turning):
         if not turning:
@@ -296,12 +325,17 @@ class Tables:
     @property
     def own_loads(self) -> list["Load"]:
         """Loads that are no tables."""
-        return self._loads[3]
+        return self._loads[-1]
+
+    @property
+    def _columns(self):
+        """The load of each factor; None for all that are constant."""
+        _, turning, linear, pushing, _ = self._loads
+        return [None, *self._rows, *linear, *turning, *linear, *pushing]
 
     def factors(self, times: Array) -> Array:
         """Factors of the loads, shape (n, k); of one row where none has an amplitude."""
-        _, turning, linear, _ = self._loads
-        columns = [None, *self._rows, *linear, *turning, *linear]
+        columns = self._columns
         if all(load is None or load.amplitude is None for load in columns):
             return np.ones((1, len(columns)))
         return np.stack([np.ones(len(times)) if load is None or load.amplitude is None else
@@ -311,7 +345,7 @@ class Tables:
     @property
     def prestressed(self) -> bool:
         """True if the first tangent has other factors of loads, see :meth:`static_factors`."""
-        return any(load.prestress for load in self._loads[2])
+        return any(load.prestress for load in [*self._loads[2], *self._loads[3]])
 
     def static_factors(self, scale: float, before: float | None = None) -> Array:
         """Factors of the loads in statics, where an amplitude counts as one; shape (k,).
@@ -323,12 +357,11 @@ class Tables:
         before
             That of the state to start from, for the first tangent, of loads that prestress.
         """
-        _, turning, linear, _ = self._loads
-        columns = [None, *self._rows, *linear, *turning, *linear]
-        out = scale * np.array([1.0 if load is None else load.at_rest for load in columns])
-        for k, load in enumerate(linear):
+        out = scale * np.array([1.0 if load is None else load.at_rest for load in self._columns])
+        last = [*self._loads[2], *self._loads[3]]
+        for k, load in enumerate(last, len(out) - len(last)):
             if before is not None and load.prestress:
-                out[len(out) - len(linear) + k] = before * load.at_rest
+                out[k] = before * load.at_rest
         return out
 
     # joints
@@ -419,4 +452,12 @@ def _kind(load):
         return 0
     if load.turning:
         return 1
-    return 2 if load.linear else 3
+    if load.linear:
+        return 2
+    return 4 if load.pushes is None else 3
+
+
+def _flat(body, addresses):
+    """The FlatBody of a Body, and the words that it has the places of."""
+    words = [Words(pack._replace(address=addresses[type(pack).__name__])) for pack in body.packs]
+    return FlatBody(np.array([x.address for x in words], dtype=np.int64), body.table), words

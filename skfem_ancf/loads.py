@@ -117,6 +117,8 @@ class Load(Sealable):
     at_rest = 1.0
     #: Its derivative belongs to a stress that it causes, which the first tangent does not have yet.
     prestress = False
+    #: The stresses at the points of integration of a cable whose force it is, (2, points, elements).
+    pushes: Array | None = None
     for_bodies = False
 
     def __init__(self, beam: WhichBeam = None, amplitude: TimeFunction = None) -> None:

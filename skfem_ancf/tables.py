@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .band import clear, copy, mirror
+from .body import FlatBody, evaluate_body
+from .kernels.base import GIVEN, MEAN, TANGENT
 from .kernels.moments import (MomentPack, add_mean_moments, add_moment_stiffness,
                               add_moments)
 from .own import own_force, own_joints, own_load_stiffness, own_mean_force
@@ -37,7 +39,7 @@ class JointTables(NamedTuple):
 
 
 class LoadTables(NamedTuple):
-    """The loads of a scene; each row of factors has those of vectors, of moments and of linear.
+    """The loads of a scene; each row of factors has those of all kinds, one behind the other.
 
     Attributes
     ----------
@@ -47,6 +49,9 @@ class LoadTables(NamedTuple):
         A :class:`~skfem_ancf.kernels.moments.MomentPack`.
     rows, columns, values, which
         Forces linear in the displacement, as entries and the number of the factor.
+    pushed, pushes
+        Cables, without stiffness, and stresses at their points of integration whose force is a
+        load: that of stress-free strains. A :class:`~skfem_ancf.body.Body`, and shape (k, n).
     own
         Handle of what has loads of other kinds; 0 for none.
     """
@@ -57,6 +62,8 @@ class LoadTables(NamedTuple):
     columns: I1
     values: F1
     which: I1
+    pushed: FlatBody
+    pushes: F2
     own: int
 
 
@@ -173,12 +180,42 @@ def _of_moments(loads, factors):
 
 
 @source
+def push(loads, what, factors, sign, u, v, f, flat, ld):
+    """Evaluate the cables for ``sign`` times the stresses of all stress-free strains.
+
+    Parameters
+    ----------
+    loads
+        :class:`LoadTables`.
+    what
+        GIVEN: the force at u. MEAN: that whose work from u to v is theirs. TANGENT: the derivative
+        of the force at u.
+    factors, sign
+        Of the loads, those of the stresses last, and a number.
+    u, v, f
+        Displacements, and the force that is added to, shape (N,); of no use for a tangent.
+    flat, ld
+        The tangent as :func:`~skfem_ancf.body.evaluate_body` takes it.
+    """
+    stresses = np.empty(loads.pushes.shape[1])
+    clear(stresses)
+    first = factors.size - loads.pushes.shape[0]
+    for k in range(loads.pushes.shape[0]):
+        c, one = sign * factors[first + k], loads.pushes[k]
+        for i in lanes(stresses.size):
+            stresses[i] += c * one[i]
+    evaluate_body(loads.pushed, what, u, v, f, stresses, np.int64(1), stresses[:0], flat, ld)
+
+
+@source
 def external_force(loads, factors, t, scale, u, out):
     """The force of all loads; ``scale`` is on those of one's own, the others have factors."""
     _dead_force(loads, factors, out)
     add_moments(loads.moments, _of_moments(loads, factors), u, out)
     if loads.rows.size > 0:
         add_triples(out, loads.rows, loads.values, factors, loads.which, u, loads.columns)
+    if loads.pushes.shape[0] > 0:
+        push(loads, np.int64(GIVEN), factors, 1.0, u, u, out, out[:0], np.int64(0))
     if loads.own > 0:
         own_force(loads.own, t, scale, u, out)
 
@@ -196,6 +233,8 @@ def mean_external_force(loads, factors, t, u0, u1, out):
         for i in lanes(out.size):
             middle[i] = 0.5 * (u0[i] + u1[i])
         add_triples(out, loads.rows, loads.values, factors, loads.which, middle, loads.columns)
+    if loads.pushes.shape[0] > 0:
+        push(loads, np.int64(MEAN), factors, 1.0, u0, u1, out, out[:0], np.int64(0))
     if loads.own > 0:
         own_mean_force(loads.own, t, u0, u1, out)
 
@@ -206,7 +245,10 @@ def add_load_stiffness(loads, factors, t, scale, u, A):
 
     Of the matrix the lower half is given; what is symmetric comes first, then the upper half.
     """
-    add_moment_stiffness(loads.moments, _of_moments(loads, factors), u, A.flat[A.top:], A.ld)
+    lower = A.flat[A.top:]
+    add_moment_stiffness(loads.moments, _of_moments(loads, factors), u, lower, A.ld)
+    if loads.pushes.shape[0] > 0:
+        push(loads, np.int64(TANGENT), factors, -1.0, u, u, np.empty(u.size), lower, A.ld)
     mirror(A)
     if loads.rows.size > 0:
         subtract_from_band(A, loads.rows, loads.columns, loads.values, factors, loads.which)
