@@ -16,7 +16,7 @@ from scipy import sparse
 
 from .errors import InputError, ask_array, require_finite_scalar, require_function, shown
 from .formulations import COMPONENTS
-from .growth import Growth, sampled
+from .growth import energy_lost, sampled
 from .kernels.base import GIVEN, MEAN, apart, no_stresses, nowhere
 from .kernels.law import LINEAR
 from .loads import Load
@@ -58,8 +58,9 @@ class EigenStrain(Load):
     _elements: Any = None
     _matrix: Any = None
     _spread: Any = None
-    # of laws that are not linear: what it does, and the factor in a motion
-    _growth: Growth | None = None
+    #: True under laws that are not linear: what it does is not in proportion to its size.
+    grows = False
+    # that in a motion
     _size = 1.0
 
     def __init__(self, xx: Any = None, yy: Any = None, xy: Any = None, beam: WhichBeam = None,
@@ -96,8 +97,8 @@ class EigenStrain(Load):
         if isinstance(function, Coefficient):
             bound.at_rest = function(1.0)
         if beam.has_sections and any(t.pack.law.kind != LINEAR for t in beam.kernel.tables):
-            bound._growth, bound.linear = Growth(beam, self), False
-            bound._size = bound.at_rest
+            bound.pushes = [sampled(beam, table, self) for table in beam.kernel.tables]
+            bound.grows, bound.linear, bound._size = True, False, bound.at_rest
         elif beam.has_sections:
             K = _pushed_apart(beam, self)
             bound._elements, bound.linear = K, True
@@ -105,16 +106,16 @@ class EigenStrain(Load):
             bound._matrix = sparse.coo_matrix((K.ravel(), (i.ravel(), j.ravel())),
                                               shape=(beam.N, beam.N)).tocsr()
         else:
-            bound.pushes, bound.linear = _resultants(beam, self), False
+            bound.pushes, bound.linear = [_resultants(beam, self)], False
         return bound
 
     @property
     def alone(self) -> bool:
         """True if what it does depends on other stress-free strains of its beam."""
-        return self._growth is not None
+        return self.grows
 
     def acting(self, t: float | None) -> tuple[float, Load]:
-        if self._growth is None:
+        if not self.grows:
             return super().acting(t)
         one = self._unsealed()
         one._size = self.factor(t)
@@ -137,26 +138,24 @@ class EigenStrain(Load):
         """
         beam = self.beam
         u_e = beam.kernel.gather(u)
-        if self._growth is not None:
-            return self._growth.forces(u_e, factor)
-        if beam.has_sections:
+        if self._elements is not None:
             q = beam.kernel.gather(beam.q0_local) + u_e
             return factor * np.einsum("eij,ej->ei", self._elements,
                                       q.reshape(len(q), -1)).reshape(q.shape)
-        return self._pushed(GIVEN, u_e.ravel(), u_e.ravel(), factor,
-                            apart(self._pack, slice(None))).reshape(u_e.shape)
+        u = np.ascontiguousarray(u_e).ravel()
+        return self._pushed(GIVEN, u, u, factor, self._apart()).reshape(u_e.shape)
 
-    @property
-    def _pack(self):
-        """The cable without stiffness."""
-        return self.beam.kernel.viscous_packs(0.0)[0]
+    def _apart(self):
+        """The packs of :attr:`pushes`, each element with coordinates of its own."""
+        return [apart(pack, slice(None)) for pack in self.beam.kernel.pushed_packs()]
 
-    def _pushed(self, what, u, v, factor, pack):
-        """The force, or the mean force, of the stresses of a cable."""
+    def _pushed(self, what, u, v, factor, packs):
+        """The force, or the mean force, of :attr:`pushes` times a factor."""
         out = np.zeros(u.size)
-        self.beam.kernel.texts.evaluate(pack, what, u, v, out, factor * self.pushes,
-                                        no_stresses(pack), nowhere(out))
-        return out
+        for pack, given in zip(packs, self.pushes):
+            self.beam.kernel.texts.evaluate(pack, what, u, v, out, -factor * given,
+                                            no_stresses(pack), nowhere(out))
+        return -out
 
     def force(self, u: Array) -> Array:
         if self._matrix is not None:
@@ -164,35 +163,28 @@ class EigenStrain(Load):
         return self.beam.kernel.scatter(self.element_forces(u, self._size))
 
     def mean_force(self, u0: Array, u1: Array) -> Array:
-        if self._growth is not None:
-            gather = self.beam.kernel.gather
-            return self.beam.kernel.scatter(
-                self._growth.mean_forces(gather(u0), gather(u1), self._size))
-        if self.beam.has_sections:
+        if self._matrix is not None:
             return super().mean_force(u0, u1)
-        return self._pushed(MEAN, u0, u1, 1.0, self._pack)
+        return self._pushed(MEAN, u0, u1, self._size, self.beam.kernel.pushed_packs())
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
         if self._matrix is not None:
             A = self._matrix.tocoo()
             return A.row, A.col, A.data
-        u_e = self.beam.kernel.gather(u)
-        if self._growth is not None:
-            K = self._growth.tangents(u_e, self._size)
-        else:
-            K = self.beam.kernel.tangents_of([apart(self._pack, slice(None))], u_e, [self.pushes])
+        kernel = self.beam.kernel
+        K = kernel.tangents_of(self._apart(), kernel.gather(u),
+                               [-self._size * given for given in self.pushes])
         rows, columns = _entries(self.beam)
-        return rows.ravel(), columns.ravel(), np.ravel(K)
+        return rows.ravel(), columns.ravel(), -K.ravel()
 
     def potential(self, u: Array) -> float:
-        if self._growth is not None:
-            u_e = self.beam.kernel.gather(u)
-            return self._growth.potential(u_e, self._size) - self._growth.potential(
-                0.0 * u_e, self._size)
-        if self.beam.has_sections:
+        if self.grows:
+            return energy_lost(self.beam, 0.0 * u, self.pushes, self._size) - energy_lost(
+                self.beam, u, self.pushes, self._size)
+        if self._matrix is not None:
             return -float(u @ (self._matrix @ (self.beam.q0_local + 0.5 * u)))
         kernel = self.beam.kernel
-        return -float(np.sum(kernel.packs[0].weights * self.pushes * kernel.strain(
+        return -float(np.sum(kernel.packs[0].weights * self.pushes[0] * kernel.strain(
             kernel.gather(u))))
 
     def spread(self, u: Array) -> Spread:
@@ -229,7 +221,7 @@ class EigenStrain(Load):
             On the strain.
         """
         beam, E0 = self.beam, self.strain_at(X, e)
-        E = beam.strain(u, X, e) if self._growth is not None else 0.0 * E0
+        E = beam.strain(u, X, e) if self.grows else 0.0 * E0
         if beam.has_sections:
             laws = [layer.material.law(layer.material.shear_factor(layer.element)).stress
                     for layer in beam.layers]

@@ -7,7 +7,7 @@ import numpy as np
 from scipy import sparse
 
 from .band import Band
-from .body import ELEMENTS, FlatBody, body_of, copies_of, stress_size, viscous_body_of
+from .body import BEGIN, ELEMENTS, FlatBody, body_of, copies_of, stress_size, viscous_body_of
 from .border import Border
 from .compiled.words import Words, constant
 from .forces.system import NO_FORCES
@@ -34,7 +34,7 @@ _NO_JOINTS = constant(JointTables(_NO_INTS, _NO_INTS, _NO_INTS, np.zeros(0), _NO
 _NO_MOMENTS = constant(MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)),
                                   np.zeros((0, 2)), np.zeros(0)))
 _NO_BODY = constant(FlatBody(_NO_INTS, np.zeros((0, ELEMENTS + 1), np.int64)))
-_NO_STRESSES = np.zeros((0, 0))
+_NO_PUSHES = np.zeros((0, 0))
 _NO_BORDER = constant(Border(_NO_INTS, 0, 0, _NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, 0))
 constant(NO_FORCES)
 
@@ -119,7 +119,7 @@ class Tables:
         return system
 
     def _sort(self, loads):
-        # of the constant kind, moments, linear ones, given stresses, others
+        # of the constant kind, moments, linear ones, stress-free strains, others
         self._loads: list[list[Any]] = [[], [], [], [], []]
         for load in loads:
             self._loads[_kind(load)].append(load)
@@ -247,7 +247,9 @@ class Tables:
         if not len(loads.pushes):
             return loads
         pushed, self._words_of_loads = _flat(
-            loads.pushed, {"CablePack": compiled.address("CablePack")})
+            _with_laws(loads.pushed, compiled.law), {
+                name: compiled.address(name) for name in {
+                    type(pack).__name__ for pack in loads.pushed.packs}})
         return loads._replace(pushed=pushed)
 
     def _forces(self):
@@ -296,17 +298,19 @@ class Tables:
                           self.handle if others else 0)
 
     def _pushed(self, loads):
-        """The cables that stresses push apart, and these stresses, a row for each load."""
+        """The beams with stress-free strains, and these, a row for each load."""
         if not loads:
-            return _NO_BODY, _NO_STRESSES
+            return _NO_BODY, _NO_PUSHES
         of = {id(load.beam): load.beam for load in loads}
         beams = list(of.values())
-        body = body_of(beams, [self.system.of(beam) for beam in beams],
-                       [beam.kernel.viscous_packs(0.0) for beam in beams])
+        packs = [beam.kernel.pushed_packs() for beam in beams]
+        body = body_of(beams, [self.system.of(beam) for beam in beams], packs)
+        first = np.cumsum([0, *map(len, packs)])[:-1]
+        begins = dict(zip(of, body.table[first, BEGIN]))
         rows = np.zeros((len(loads), stress_size(body)))
         for row, load in zip(rows, loads):
-            _, _, _, begin, end, *_ = body.table[list(of).index(id(load.beam))]
-            row[begin:end] = load.pushes.ravel()
+            begin, values = begins[id(load.beam)], np.concatenate([x.ravel() for x in load.pushes])
+            row[begin:begin + len(values)] = values
         return body, rows
 
     def _moments(self, turning):
@@ -454,7 +458,7 @@ def _kind(load):
         return 1
     if load.linear:
         return 2
-    return 4 if load.pushes is None else 3
+    return 3 if load.pushes else 4
 
 
 def _flat(body, addresses):

@@ -28,7 +28,7 @@ from .rigid import RigidBody
 from .spread import BODY, Sampled, Spread, facets_along, on_facets, stations_of_vector
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -117,8 +117,9 @@ class Load(Sealable):
     at_rest = 1.0
     #: Its derivative belongs to a stress that it causes, which the first tangent does not have yet.
     prestress = False
-    #: The stresses at the points of integration of a cable whose force it is, (2, points, elements).
-    pushes: Array | None = None
+    #: Of a stress-free strain: for each pack of the beam what is given for it, an array
+    #: (components, points, elements), see :meth:`~skfem_ancf.kernels.base.Chain.pushed_packs`.
+    pushes: Sequence[Array] = ()
     for_bodies = False
 
     def __init__(self, beam: WhichBeam = None, amplitude: TimeFunction = None) -> None:

@@ -169,9 +169,12 @@ def _sections(scene):
         yield "sections", "constant", ", ".join(sorted({_section(b) for b in uneven}))
     eigen = [load for load in scene.loads if isinstance(load, EigenStrain)]
     if eigen:
-        yield "stress-free strain", "computed", f"{len(eigen)}: " + (
-            "a constant matrix each" if all(load.linear for load in eigen) else
-            "of cables in Python")
+        linear, nonlinear = (sum(of) for of in zip(*((load.linear, load.grows) for load in eigen)))
+        kinds = (linear, "of sections, a constant matrix each"), (
+            len(eigen) - linear - nonlinear, "of cables, normal forces and moments at points"), (
+            nonlinear, "under laws that are not linear, asked twice at points")
+        yield "stress-free strain", "computed", "; ".join(
+            f"{number} {text}" for number, text in kinds if number) + ": compiled where beams are"
 
 
 def _section(beam):

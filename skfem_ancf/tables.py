@@ -50,8 +50,10 @@ class LoadTables(NamedTuple):
     rows, columns, values, which
         Forces linear in the displacement, as entries and the number of the factor.
     pushed, pushes
-        Cables, without stiffness, and stresses at their points of integration whose force is a
-        load: that of stress-free strains. A :class:`~skfem_ancf.body.Body`, and shape (k, n).
+        Beams with stress-free strains, a :class:`~skfem_ancf.body.Body` without stiffness of its
+        own, and for each such load the stresses of a cable that are lost to it, or the strain, at
+        the points of integration, shape (k, n); see
+        :meth:`~skfem_ancf.kernels.base.Chain.pushed_packs`.
     own
         Handle of what has loads of other kinds; 0 for none.
     """
@@ -180,8 +182,8 @@ def _of_moments(loads, factors):
 
 
 @source
-def push(loads, what, factors, sign, u, v, f, flat, ld):
-    """Evaluate the cables for ``sign`` times the stresses of all stress-free strains.
+def push(loads, what, factors, u, v, out, flat, ld):
+    """What stress-free strains change: internal forces become less, and their tangent.
 
     Parameters
     ----------
@@ -189,22 +191,25 @@ def push(loads, what, factors, sign, u, v, f, flat, ld):
         :class:`LoadTables`.
     what
         GIVEN: the force at u. MEAN: that whose work from u to v is theirs. TANGENT: the derivative
-        of the force at u.
-    factors, sign
-        Of the loads, those of the stresses last, and a number.
-    u, v, f
-        Displacements, and the force that is added to, shape (N,); of no use for a tangent.
+        at u.
+    factors
+        Of the loads, those of stress-free strains last.
+    u, v, out
+        Displacements, and the external force, which is added to, shape (N,); of none for a tangent.
     flat, ld
-        The tangent as :func:`~skfem_ancf.body.evaluate_body` takes it.
+        The tangent, which is added to, as :func:`~skfem_ancf.body.evaluate_body` takes it.
     """
-    stresses = np.empty(loads.pushes.shape[1])
-    clear(stresses)
+    given, f = np.empty(loads.pushes.shape[1]), np.empty(u.size)
+    clear(given)
+    clear(f)
     first = factors.size - loads.pushes.shape[0]
     for k in range(loads.pushes.shape[0]):
-        c, one = sign * factors[first + k], loads.pushes[k]
-        for i in lanes(stresses.size):
-            stresses[i] += c * one[i]
-    evaluate_body(loads.pushed, what, u, v, f, stresses, np.int64(1), stresses[:0], flat, ld)
+        c, one = factors[first + k], loads.pushes[k]
+        for i in lanes(given.size):
+            given[i] -= c * one[i]
+    evaluate_body(loads.pushed, what, u, v, f, given, np.int64(1), given[:0], flat, ld)
+    for i in lanes(out.size):
+        out[i] -= f[i]
 
 
 @source
@@ -215,7 +220,7 @@ def external_force(loads, factors, t, scale, u, out):
     if loads.rows.size > 0:
         add_triples(out, loads.rows, loads.values, factors, loads.which, u, loads.columns)
     if loads.pushes.shape[0] > 0:
-        push(loads, np.int64(GIVEN), factors, 1.0, u, u, out, out[:0], np.int64(0))
+        push(loads, np.int64(GIVEN), factors, u, u, out, out[:0], np.int64(0))
     if loads.own > 0:
         own_force(loads.own, t, scale, u, out)
 
@@ -234,7 +239,7 @@ def mean_external_force(loads, factors, t, u0, u1, out):
             middle[i] = 0.5 * (u0[i] + u1[i])
         add_triples(out, loads.rows, loads.values, factors, loads.which, middle, loads.columns)
     if loads.pushes.shape[0] > 0:
-        push(loads, np.int64(MEAN), factors, 1.0, u0, u1, out, out[:0], np.int64(0))
+        push(loads, np.int64(MEAN), factors, u0, u1, out, out[:0], np.int64(0))
     if loads.own > 0:
         own_mean_force(loads.own, t, u0, u1, out)
 
@@ -248,7 +253,7 @@ def add_load_stiffness(loads, factors, t, scale, u, A):
     lower = A.flat[A.top:]
     add_moment_stiffness(loads.moments, _of_moments(loads, factors), u, lower, A.ld)
     if loads.pushes.shape[0] > 0:
-        push(loads, np.int64(TANGENT), factors, -1.0, u, u, np.empty(u.size), lower, A.ld)
+        push(loads, np.int64(TANGENT), factors, u, u, u[:0], lower, A.ld)
     mirror(A)
     if loads.rows.size > 0:
         subtract_from_band(A, loads.rows, loads.columns, loads.values, factors, loads.which)

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        MeshBeam, Scene, Section, StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, Frame,
+                        InputError, MeshBeam, NeoHookean, Scene, Section, StVenantKirchhoff, sweep)
+from skfem_ancf.eigenstrain import Temperature
 from skfem_ancf.errors import CallbackError
+from skfem_ancf.switch import compiled_off
 
 STEEL = StVenantKirchhoff(E=2e11, nu=0.0, density=8000, thermal_expansion=12e-6)
 BRASS = StVenantKirchhoff(E=1e11, nu=0.0, density=8500, thermal_expansion=19e-6)
@@ -192,3 +194,122 @@ def test_what_cannot_expand_says_so():
     dull = Scene(Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(1e6, 0.3), width=0.1))
     with pytest.raises(InputError, match="thermal_expansion"):
         dull.temperature(1.0)
+
+
+RUBBER = NeoHookean(E=1e6, nu=0.4, density=1000, thermal_expansion=1e-3)
+SOFT = StVenantKirchhoff(E=1e6, nu=0.3, density=1000, thermal_expansion=1e-3)
+SQUARE = {"width": 0.02}
+POINTS = np.linspace(0, 1, 9)
+
+
+def quarter(height=0.02):
+    return MeshBeam.init_curve(lambda s: np.array([np.sin(s), 1 - np.cos(s)]), 1.5 * POINTS, height)
+
+
+BODIES = {
+    "cubic cable": lambda **o: Beam(MeshBeam.init_line(POINTS, 0.02), ElementBeamCable(3), SOFT,
+                                    **SQUARE, **o),
+    "tapered cable of degree 7": lambda **o: Beam(
+        MeshBeam.init_line(POINTS, lambda x: 0.03 - 0.01 * x), ElementBeamCable(7), SOFT, **SQUARE,
+        **o),
+    "quintic cable on an arc": lambda **o: Beam(quarter(), ElementBeamCable(5), SOFT, **SQUARE,
+                                                **o),
+    "cable of layers": lambda **o: Beam(
+        MeshBeam.init_line(POINTS, 0.02), ElementBeamCable(5), section=Section.layers(
+            (0.01, SOFT), (0.01, SOFT.replace(E=3e6)), width=0.02), **o),
+    "rubber": lambda **o: Beam(MeshBeam.init_line(POINTS, 0.05), ElementBeamANCF(2), RUBBER,
+                               **SQUARE, **o),
+    "rubber on Hooke's law": lambda **o: Beam(
+        MeshBeam.init_line(POINTS, 0.05), ElementBeamANCFCubic(2), section=Section.layers(
+            (0.02, SOFT), (0.03, RUBBER), width=0.02), **o)}
+
+
+@pytest.mark.skipif(compiled_off() is not None, reason="Numba is not there, or off")
+@pytest.mark.parametrize("body", BODIES)
+def test_compiled_and_plain_take_the_same_iterations_to_the_same(body, monkeypatch):
+    monkeypatch.setenv("SKFEM_ANCF_COMPILED", "1")
+    found = []
+    for way in (False, True):
+        beam = BODIES[body](compiled=way)
+        tip = tuple(beam.mesh.p[:, -1])
+        heat = ((lambda x, y, t: 5.0 * (1.0 + 30.0 * y) * np.sin(t)) if beam.has_sections else
+                (lambda x, y, t: 5.0 * t * (1.0 + x) + 150.0 * y * np.sin(t)))
+        scene = Scene(beam).clamp("left").point_force((0.0, -2e-4), at=tip).temperature(heat)
+        assert not scene.system.machine.tables.own_loads
+        assert "compiled where beams are" in scene.plan()["stress-free strain"].reason
+        assert (scene.system.machine.choose("equilibrium").way == "plain") is not way
+        state = scene.solve_static()
+        found.append([(state.iterations, state.displacement(tip), 1e-10)])
+        for scheme in ("energy-momentum", "generalized-alpha", "radau"):
+            history = scene.integrate(0.05, 5e-3, scheme)
+            found[-1].append((history.iterations, history.displacement(tip), 1e-7))
+    for (n, x, atol), (k, y, _) in zip(*found):
+        assert n == k
+        assert_allclose(y, x, rtol=0, atol=atol * np.abs(x).max())
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamCable(9)])
+def test_a_cable_of_uniform_curvature_is_a_circle_and_a_heated_arc_stays_similar(element):
+    kappa = 1.6 * np.pi
+    line = Beam(MeshBeam.init_line(np.linspace(0, 1, 17), height=0.01), element, STEEL, width=0.02)
+    state = Scene(line).clamp("left").eigenstrain(xx=lambda x, y: -kappa * y).solve_static()
+    for s in (0.5, 1.0):
+        x = state.displacement((s, 0.0)) + [s, 0.0]
+        assert_allclose(x, [np.sin(kappa * s) / kappa, (1 - np.cos(kappa * s)) / kappa], atol=1e-10)
+    arc = Beam(quarter(), element, STEEL, **SQUARE)
+    state = Scene(arc).clamp("left").temperature(5000.0).solve_static()  # by six per cent
+    for point in arc.mesh.p.T[1:]:
+        assert_allclose(state.displacement(tuple(point)), 0.06 * point, rtol=1e-8)
+    N = state.resultants(tuple(arc.mesh.p[:, 4]), recover=False).N
+    assert abs(N) < 1e-9 * 2e11 * 4e-4 * 0.06
+
+
+@pytest.mark.parametrize("degree", [3, 5, 7])
+def test_a_held_cable_buckles_when_heated_and_frames_of_cables_expand(degree):
+    """alpha T E A = 4 pi^2 E I / L^2 and, free to move, every place by alpha T of itself."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 17), height=0.01), ElementBeamCable(degree),
+                STEEL, width=0.02)
+    factor = Scene(beam).clamp("left").clamp("right").temperature(1.0).buckling(1).factors[0]
+    assert factor == pytest.approx(np.pi**2 * 1e-4 / 3 / 12e-6, rel=2e-3 if degree == 3 else 1e-8)
+    points = [(0, 0), (0, 1), (1, 1), (1, 0.2)]
+    frame = Frame.from_lines(points, [(0, 1), (1, 2), (2, 3)], nodes={"ground": [0]},
+                             material=STEEL, height=0.02, width=0.02, elements=2,
+                             element=ElementBeamCable(degree)).clamp("ground")
+    state = frame.temperature(100.0).solve_static()
+    for point in points[1:]:
+        assert_allclose(state.displacement(point), 1.2e-3 * np.array(point), atol=1e-12)
+
+
+def test_a_heated_cable_is_replaced_swept_pickled_and_gone_on_with(tmp_path):
+    """All by the force E A alpha T between walls, or the length alpha T L without them."""
+    def bar(T=5.0, E=2e11, held=False):
+        beam = Beam(MeshBeam.init_line(POINTS, 0.02), ElementBeamCable(5), STEEL.replace(E=E),
+                    width=0.02)
+        return (Scene(beam).pin("left").pin("right") if held else Scene(beam).pin("left").fix(
+            "right", "r^2")).temperature(T)
+
+    def force(scene):
+        return scene.solve_static().resultants((0.5, 0.0), recover=False).N
+
+    held = bar(held=True)
+    unit = -4e-4 * 12e-6
+    assert force(held) == pytest.approx(5 * 2e11 * unit, rel=1e-9)
+    stiffer = held.replace(material=STEEL.replace(E=3e11))
+    assert stiffer.system.machine.tables is not held.system.machine.tables
+    assert force(stiffer) == pytest.approx(5 * 3e11 * unit, rel=1e-9)
+    hotter = stiffer.replace(loads=[Temperature(7.0), Temperature(1.0)])
+    assert force(hotter) == pytest.approx(8 * 3e11 * unit, rel=1e-9)
+    assert force(pickle.loads(pickle.dumps(hotter))) == pytest.approx(8 * 3e11 * unit, rel=1e-9)
+    assert force(held) == pytest.approx(5 * 2e11 * unit, rel=1e-9)
+
+    T = np.linspace(1.0, 80.0, 40)
+    assert held.plan()["sweep"].status == "computed"
+    found = sweep(bar, {"T": T}, {"end": ("displacement", "right")}, workers=1)
+    assert set(found.status) == {"done"}
+    assert_allclose(found["end"][:, 0], 12e-6 * T, rtol=1e-10)
+
+    waves = bar().temperature(lambda x, y, t: 20.0 * np.sin(900.0 * t) * x)
+    whole = waves.integrate(0.01, 2e-4, checkpoint=tmp_path / "run.npz", every=9)
+    again = bar().temperature(lambda x, y, t: 20.0 * np.sin(900.0 * t) * x)
+    assert np.array_equal(again.resume(tmp_path / "run.npz").u, whole.u)
+    assert np.ptp(whole.displacement((1.0, 0.0))[:, 0]) > 1e-4

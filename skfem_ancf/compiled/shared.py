@@ -48,7 +48,7 @@ GROUPS = {
     "common": (
         Call(body.evaluate_body, (FlatBody, int, F1, F1, F1, F1, int, F1, F1, int)),
         Call(tables.add_load_stiffness, (LoadTables, F1, float, float, F1, Band)),
-        Call(tables.push, (LoadTables, int, F1, float, F1, F1, F1, F1, int)),
+        Call(tables.push, (LoadTables, int, F1, F1, F1, F1, F1, int)),
         Call(tables.constraint, (JointTables, F1, F1, float, F1, F1)),
         Call(tables.add_constraint_rate, _FROM_JOINTS),
         Call(tables.add_joint_force, _FROM_JOINTS),

@@ -941,6 +941,14 @@ class Chain:
         """
         raise NotImplementedError
 
+    def pushed_packs(self) -> list[Any]:
+        """Packs for what stress-free strains change, evaluated with what is given for them.
+
+        That is of a cable the stress that changes, and of other beams the strain. No part of them
+        is what the beam has without that: its material, where it is linear, its stabilisation.
+        """
+        raise NotImplementedError
+
     def without_material(self, pack: Any) -> Any:
         """The pack of a law without stiffness, for given stresses."""
         raise NotImplementedError

@@ -510,6 +510,9 @@ class CableKernel(Chain):
                               pairs=pack.pairs._replace(held=packed(pack.pairs.held[:, :0])))
                 for pack in self.packs]
 
+    def pushed_packs(self) -> list[CablePack]:
+        return self.viscous_packs(0.0)
+
     def without_material(self, pack: CablePack) -> CablePack:
         """The pack of a cable without stiffness, for given normal forces and moments."""
         return pack._replace(stiffness=np.zeros_like(pack.stiffness),

@@ -66,6 +66,9 @@ class SectionPack(NamedTuple):
     mixing, parts, mixing_rounds
         Of other laws: the term, the modulus (c, d) as 3 c + d and the point of each summand of a
         modulus, (3, m), and its factor, (m,).
+    grows
+        1 if what is given are strains, added to the one there is, and the stress is what that
+        changes; see :meth:`Kernel.pushed_packs`.
     address
         That of the compiled :func:`section_block`; 0 for the plain one.
     """
@@ -91,6 +94,7 @@ class SectionPack(NamedTuple):
     mixing: I2
     parts: F1
     mixing_rounds: I1
+    grows: int = 0
     address: int = 0
 
 
@@ -276,12 +280,12 @@ def section_block(pack, what, first, last, u, v, f, given, out, to):
     table, rows, law = pack.table, pack.rows, pack.law
     given, out = given[:, :, first:last], out[:, :, first:last]
     n, nr, nb, size = len(pack.weights), table.shape[1], table.shape[2], out.shape[2]
-    changes = what == MEAN or what == CARRY or what == VISCOUS
+    changes, grows = what == MEAN or what == CARRY or what == VISCOUS, pack.grows
     shift = 0.5 if what == MEAN else 0.0
     at = pack.place[first:first + size]
     U, vectors = room((2, nb, 2, size), u), room((4, nr, 2, size), u)
     x, r, d, T = vectors[0], vectors[1], vectors[2], vectors[3]
-    strains, w = room((3, 3, n, size), u), room((n, size), pack.weights)
+    strains, w = room((3 + grows, 3, n, size), u), room((n, size), pack.weights)
     strain, change, S = strains[0], strains[1], strains[2]
     samples = room((rows.shape[1], size), u)
     set_tables(pack.frame, pack.weights, at, x, w)
@@ -296,14 +300,23 @@ def section_block(pack, what, first, last, u, v, f, given, out, to):
     if what == MEAN:
         add_scaled(0.5, change, strain, strain)
         add_scaled(0.5, U[1], U[0], U[0])
-    D = room((9, n, size if what == CARRY or what == TANGENT and law.kind else 0), w)
-    for k in range(1 if what == CARRY or what == GIVEN else 0, 2 if D.size > 0 else 1):
-        law_evaluate(law, change if what == VISCOUS else strain, D if k else S)
-    if what == CARRY:
-        tangent_stress(D, change, S)
-        add_scaled(1.0, given, S, S)
-    elif what == MEAN and law.kind != LINEAR:
-        conserve(law, strain, change, S)
+    both = room((1 + grows, 9, n, size if what == CARRY or what == TANGENT and law.kind else 0), w)
+    D, none = both[0], what == CARRY or what == GIVEN and grows == 0
+    for part in range(1 + grows):
+        if part > 0:
+            add_scaled(1.0, given, strain, strain)
+        for k in range(1 if none else 0, 2 if D.size > 0 else 1):
+            law_evaluate(law, change if what == VISCOUS else strain,
+                         both[part] if k else strains[2 + part])
+        if what == CARRY:
+            tangent_stress(D, change, S)
+            add_scaled(1.0, given, S, S)
+        elif what == MEAN and law.kind != LINEAR:
+            conserve(law, strain, change, strains[2 + part])
+    if grows > 0:
+        given = given[:0]
+        add_scaled(-1.0, S, strains[3], S)
+        add_scaled(-1.0, D, both[1], D)
     if out.shape[0] > 0:
         copy_stress(S, out)
     if what == STRESS or what == CARRY:
@@ -968,6 +981,12 @@ class Kernel(Chain):
         return [_viscous(t.pack, time, none) if t.pack.law.kind == LINEAR else TermTables(
             self._across, t.slab, replace(t.term, law=LinearLaw(time * t.law.moduli(np.zeros(3)))),
             none, self).pack for t in self.tables]
+
+    def pushed_packs(self) -> list[SectionPack]:
+        return [pack._replace(
+            grows=1, constant=pack.constant[:0],
+            moduli=pack.moduli if pack.law.kind != LINEAR else np.zeros_like(pack.moduli),
+            pairs=pack.pairs._replace(held=packed(pack.pairs.held[:, :0]))) for pack in self.packs]
 
     def without_material(self, pack: SectionPack) -> SectionPack:
         """The pack of a law without stiffness, for given stresses."""
