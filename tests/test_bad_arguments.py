@@ -23,7 +23,7 @@ from skfem_ancf import (AncfError, ConvergenceError, ElementBeamANCF, MeshBeam, 
                         ModelWarning, NameUnknown, StVenantKirchhoff)
 from skfem_ancf.errors import CallbackError, CallError
 
-SECONDS = 5.0  # that a call with a bad argument may take on a loaded machine
+SECONDS = 5.0  # of the processor that a call with a bad argument may take
 
 
 class Hang(BaseException):
@@ -32,7 +32,7 @@ class Hang(BaseException):
 
 @contextlib.contextmanager
 def limit(seconds):
-    """Raise Hang after some seconds, where the system can."""
+    """Raise Hang after some seconds of the processor, where the system can."""
     main = threading.current_thread() is threading.main_thread()
     if not (main and hasattr(signal, "setitimer")):
         yield
@@ -41,13 +41,17 @@ def limit(seconds):
     def stop(*_):
         raise Hang
 
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    timers = ((signal.SIGPROF, signal.ITIMER_PROF, seconds),  # at work, whatever else runs
+              (signal.SIGALRM, signal.ITIMER_REAL, 12.0 * seconds))  # waiting for something
+    before = [signal.signal(number, stop) for number, *_ in timers]
+    for _, timer, length in timers:
+        signal.setitimer(timer, length)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        for (number, timer, _), handler in zip(timers, before):
+            signal.setitimer(timer, 0)
+            signal.signal(number, handler)
 
 
 def outcome(function, arguments):

@@ -8,7 +8,7 @@ import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, MeshBeam, Scene,
                         StVenantKirchhoff, eigen)
 from skfem_ancf.elements import ELEMENTS
-from skfem_ancf.errors import InputError, SupportError
+from skfem_ancf.errors import ConvergenceError, InputError, SupportError
 from skfem_ancf.formulations import FORMULATIONS
 from skfem_ancf.results import State
 
@@ -52,6 +52,27 @@ def test_slender_beam_against_euler_bernoulli(ends):
     scene, skip = held(straight(16, h, ElementBeamANCFCubic(1)), ends)
     found = scene.modes(3 + skip).frequencies[skip:]
     assert np.abs(found / known - 1).max() < 1e-3
+
+
+@pytest.mark.parametrize("ends", ["fixed-free", "pinned-pinned"])
+def test_beam_as_thin_as_a_hair(ends, caplog):
+    """A slenderness of 1e8: the stresses are unknowns beside the coordinates."""
+    h = 1e-8
+    scene, _ = held(straight(64, h, ElementBeamANCF(3)), ends)
+    with caplog.at_level("INFO", logger="skfem_ancf.tangent"):
+        found = scene.modes(3).frequencies
+    assert "stresses become unknowns" in caplog.text
+    # elements as long as 1 / 64: the same relative error as at a slenderness of 200
+    same, _ = held(straight(64, 0.005, ElementBeamANCF(3)), ends)
+    assert np.abs(found / theory(h, ends) - 1).max() < 3e-3
+    assert np.abs(found / h / same.modes(3).frequencies * 0.005 - 1).max() < 1e-3
+
+
+def test_modes_of_more_than_digits_hold_are_refused():
+    """Elements of 5e4 heights, two thousand of them: no digit of the bending is left."""
+    scene, _ = held(straight(2000, 1e-8, ElementBeamANCF(2)), "fixed-free")
+    with pytest.raises(ConvergenceError, match="too slender for elements so short"):
+        scene.modes(1)
 
 
 @pytest.mark.parametrize("ends", ENDS)
