@@ -79,6 +79,7 @@ mutants: $(VENV)/coverage.stamp
 	$(PY) benchmarks/mutation/mutation.py $(ARGS)
 
 coverage: $(VENV)/coverage.stamp
+	$(PY) -m skfem_ancf.compiled
 	$(PY) -m pytest -n 2 --cov --cov-report=term-missing:skip-covered --cov-fail-under=95 $(ARGS)
 
 # the scripts of the pages and the examples of the docstrings, the pages with every warning an
