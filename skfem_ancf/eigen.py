@@ -25,6 +25,7 @@ ROUND_OFF = 1e-7  # of the frequency of a rigid motion, over that of the slowest
 SLOW = 1e-6  # a velocity at which what is quadratic in it can be left out
 UNREFINED = 1e-7  # error of an inverse that Lanczos takes as it is
 LANCZOS = 1e-10  # its tolerance
+SAME = 1e-6  # relative distance of eigenvalues that are the same
 REAL = 1e-7  # imaginary over absolute value of an eigenvalue that counts as real
 
 
@@ -176,8 +177,10 @@ def _modes(system, state, k):
     k = _count(k, n - m)
     shift, small = _shift(tangent, state), n <= DENSE or 2 * k > n - m
     tangent.balance(M, shift)
-    if tangent.symmetric:
-        values, X = (_dense if small else _sparse)(tangent, M, k, shift)
+    if tangent.symmetric and not small:
+        values, X = _sparse(tangent, state, M, k, shift)
+    elif tangent.symmetric:
+        values, X = _dense(tangent, M, k, shift)
     else:
         values, X = _unsymmetric(tangent, M, k, shift, small)
     shapes = np.zeros((k, system.N), dtype=X.dtype)
@@ -210,7 +213,7 @@ def _shift(tangent, state):
     shift = _bending_eigenvalue(tangent.system)
     for _ in range(80):
         try:
-            if _inertia(tangent, state, shift).negative == 0:
+            if _negative(tangent, state, shift) == 0:
                 return shift
         except NO_FACTORS:
             pass
@@ -218,15 +221,18 @@ def _shift(tangent, state):
     raise SupportError("the joints are not independent in this state")
 
 
-def _inertia(tangent, state, shift):
-    """The inertia of K + shift M between the free coordinates."""
+def _negative(tangent, state, shift):
+    """How many eigenvalues of K + shift M between the free coordinates are negative."""
     system = tangent.system
     if system.condensed is not None:
-        return tangent.condense(system.condensed, shift).inertia()
+        return tangent.condense(system.condensed, shift).inertia().negative
     system.assemble(state.u, state.load, t=state.t)
     system.K.combine(1.0, system.K, shift, system.mass)
+    if shift < 0.0 and not system.coupled:  # as a rule indefinite: without factors
+        system.K.fix(system.fixed_positions)
+        return (system.K if system.symmetric else system.K.symmetric_part()).negative()
     system.factorize(state.u, state.load if state.t is None else state.t, state.multipliers)
-    return system.inertia()
+    return system.inertia().negative
 
 
 def _dense(tangent, M, k, shift):
@@ -254,23 +260,51 @@ def _dense(tangent, M, k, shift):
     return values[order], X[:, order]
 
 
-def _sparse(tangent, M, k, shift):
+def _sparse(tangent, state, M, k, shift):
     """The k lowest by Lanczos on the inverse, which need not be refined where it is good.
 
-    An error of a shape is squared in its quotient, after a step of subspace iteration.
+    An error of a shape is squared in its quotient, after a step of subspace iteration. Of equal
+    frequencies Lanczos may miss some: they are counted, and looked for beside those that are known.
     """
-    inverse = Inverse(tangent, M, shift)
-    start = inverse.solve(np.random.default_rng(0).standard_normal(M.shape[0]))
+    inverse, rng = Inverse(tangent, M, shift), np.random.default_rng(0)
+    start = inverse.solve(rng.standard_normal(M.shape[0]))
     apply = inverse.once if inverse.left < UNREFINED else inverse.solve
+    values, X = _polished(tangent, M, inverse, _lanczos(M, k, shift, apply, start))
+    while missing := _missing(tangent, state, shift, values):
+
+        def others(b, X=X, theta=1.0 / (values + shift)):
+            return apply(b) - X @ (theta * (X.T @ b))
+
+        start = others(rng.standard_normal(M.shape[0]))
+        more = np.column_stack([X, _lanczos(M, min(missing, k), shift, others, start)])
+        before, (values, X) = values, _polished(tangent, M, inverse, more)
+        values, X = values[:k], X[:, :k]
+        if not np.any(values < before - SAME * np.maximum(np.abs(before), shift)):
+            break  # what was counted was round-off
+    return values, X
+
+
+def _lanczos(M, k, shift, apply, start):
+    """The k lowest shapes, as columns; ``apply`` is the inverse of ``K + shift M``."""
     try:
-        _, X = eigsh(M, k=k, M=M, sigma=-shift, v0=start, tol=LANCZOS,
-                     OPinv=LinearOperator(M.shape, apply, dtype=float))
+        return eigsh(M, k=k, M=M, sigma=-shift, v0=start, tol=LANCZOS,
+                     OPinv=LinearOperator(M.shape, apply, dtype=float))[1]
     except ArpackNoConvergence as failure:
         raise ConvergenceError(f"of {k} modes Lanczos found {len(failure.eigenvalues)}; ask for "
                                "another number") from None
-    X, values = _polished(tangent, M, inverse, X)
-    order = np.argsort(values)
-    return values[order], X[:, order]
+
+
+def _missing(tangent, state, shift, values):
+    """How many eigenvalues below the largest of those found are not among them.
+
+    By Sylvester's law of inertia; 1 where there are no factors to tell.
+    """
+    below = values[-1] - SAME * max(abs(values[-1]), shift)
+    try:
+        number = _negative(tangent, state, -below)
+    except NO_FACTORS:
+        return 1
+    return max(number - int(np.sum(values < below)), 0)
 
 
 def _quotients(tangent, M, X):
@@ -280,10 +314,13 @@ def _quotients(tangent, M, X):
 
 
 def _polished(tangent, M, inverse, X):
-    """Columns X after a step of subspace iteration."""
-    Y = inverse.solve(M @ X)
-    theta, V = scipy.linalg.eigh(X.T @ (M @ Y), X.T @ (M @ X))
-    return _quotients(tangent, M, Y @ V / theta)
+    """Eigenvalues and columns X after a step of subspace iteration, the lowest first."""
+    MX = M @ X
+    Y = inverse.solve(MX)
+    theta, V = scipy.linalg.eigh(MX.T @ Y, X.T @ MX)
+    X, values = _quotients(tangent, M, Y @ V / theta)
+    order = np.argsort(values)
+    return values[order], X[:, order]
 
 
 def _unsymmetric(tangent, M, k, shift, small):

@@ -68,6 +68,8 @@ class StrainTangent:
         #: shift and multipliers of a frame's factors, and they
         self._condensed: Any = 0.0, None, None
         self.stress = np.concatenate([part[2] for part in parts])
+        #: where the stresses of the other beams begin
+        self._first = np.cumsum([len(part[2]) for part in parts[:len(system.beams)]])[:-1]
         self.J = sparse.csr_matrix(system.jacobian(u, self._at[-1])[:, self.free])
         self._set_stress(self.stress, multipliers)
 
@@ -107,10 +109,8 @@ class StrainTangent:
             Shape (n, n), n free coordinates.
         """
         u, _, t, time = self._at
-        first, S = 0, []
-        for beam, s in zip(self.system.beams, self.system.slices):
-            part, first = _beam_geometric(beam, u[s], stress, first)
-            S.append(part)
+        S = [_beam_geometric(beam, u[s], own) for beam, s, own in zip(
+            self.system.beams, self.system.slices, np.split(stress, self._first))]
         rigid = self.system.N - sum(part.shape[0] for part in S)
         if rigid:
             S.append(sparse.csr_matrix((rigid, rigid)))
@@ -256,13 +256,12 @@ def _beam_rows(beam, u):
     return (*(sparse.csr_matrix((v, j, first), shape=shape) for v in (B, CB)), stress)
 
 
-def _beam_geometric(beam, u, stress, first):
-    """The geometric part of one beam, sparse, and where the stresses of the next one begin."""
-    kernel, i, j, values = beam.kernel, [], [], []
-    rows = len(kernel.factors(kernel.gather(u, slice(0, 1)), slice(0, 1))[2][0])
-    last = first + rows * beam.mesh.nelements
-    if not np.any(stress[first:last]):
-        return sparse.csr_matrix((beam.N, beam.N)), last
+def _beam_geometric(beam, u, stress):
+    """The geometric part of one beam, sparse."""
+    kernel, i, j, values, first = beam.kernel, [], [], [], 0
+    if not np.any(stress):
+        return sparse.csr_matrix((beam.N, beam.N))
+    rows = len(stress) // beam.mesh.nelements
     for part in kernel.chunks():
         u_e = kernel.gather(u, part)
         last = first + rows * len(u_e)
@@ -273,7 +272,7 @@ def _beam_geometric(beam, u, stress, first):
         j.append(np.broadcast_to(dofs[:, None, :], S.shape).ravel())
         values.append(S.ravel())
     i, j, values = map(np.concatenate, (i, j, values))
-    return sparse.csr_matrix((values, (i, j)), shape=(beam.N, beam.N)), first
+    return sparse.csr_matrix((values, (i, j)), shape=(beam.N, beam.N))
 
 
 def is_symmetric(S: csr_matrix) -> bool:

@@ -164,6 +164,12 @@ def test_the_condensed_solution_solves_the_equations_with_multipliers():
     x, multipliers = equations.solve(b, c)
     error = (np.append(x, multipliers) - exact) / d
     assert np.abs(error).max() < 1e-8 * np.abs(exact / d).max()
+    columns = equations.condensed.solve(np.outer(b, [2.0, -1.0, 0.0]), np.outer(c, [2.0, 3.0, 1.0]))
+    both, alone = equations.condensed.solve(b, 0.0 * c), equations.condensed.solve(0.0 * b, c)
+    for found, of_b, of_c in zip(columns, both, alone):
+        for column, factors in zip(found.T, ((2.0, 2.0), (-1.0, 3.0), (0.0, 1.0))):
+            wanted = factors[0] * of_b + factors[1] * of_c
+            assert_allclose(column, wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
     negative, singular = equations.inertia()
     null = np.linalg.svd(J)[2][len(J):].T
     assert (negative, singular) == (np.sum(np.linalg.eigvalsh(null.T @ K @ null) < 0), False)
@@ -355,6 +361,49 @@ def test_modes_and_buckling_of_many_lines_are_those_with_multipliers(monkeypatch
         found.append([*frame.modes(3, state).frequencies, *frame.buckling(2).factors])
     assert frame.N > 600
     assert_allclose(found[0], found[1], rtol=1e-8)
+
+
+def test_modes_of_a_frame_factorise_twice(monkeypatch):
+    """For the inverse, and to count; what Lanczos has found is solved with at once."""
+    frame, factors, solutions = square(6), [], []
+    factorize, solve = Condensed.factorize, Condensed.solve
+
+    def factorized(self, *args):
+        factors.append(self)
+        return factorize(self, *args)
+
+    def solved(self, b, phi):
+        solutions.append(b[:1].size)
+        return solve(self, b, phi)
+
+    monkeypatch.setattr(Condensed, "factorize", factorized)
+    monkeypatch.setattr(Condensed, "solve", solved)
+    modes, mass = frame.modes(10), frame.system.mass.tocsc()
+    assert frame.N > 600 and len(factors) == 2
+    assert solutions.count(10) == 2 and 20 < solutions.count(1) == len(solutions) - 2 < 60
+    assert mass.nnz == np.count_nonzero(mass.toarray()) < 0.3 * 23 * frame.N
+    assert_allclose(modes.shapes @ (mass @ modes.shapes.T), np.eye(10), atol=1e-10)
+
+
+@pytest.mark.parametrize("k, factorisations", [(5, 2), (12, 3), (65, 4)])
+def test_equal_frames_side_by_side_have_equal_frequencies(k, factorisations, monkeypatch):
+    """Of equal frequencies the iteration sees a few: the others are counted and found."""
+    n, calls, factorize = 60, [], Condensed.factorize
+
+    def factorized(self, *args):
+        calls.append(self)
+        return factorize(self, *args)
+
+    monkeypatch.setattr(Condensed, "factorize", factorized)
+    points = [(float(i), y) for i in range(n) for y in (0.0, 1.0)]
+    frame = Frame.from_lines(points, [(2 * i, 2 * i + 1) for i in range(n)], height=H, width=H,
+                             material=STEEL).clamp(list(range(0, 2 * n, 2)))
+    modes = frame.modes(k)
+    assert len(calls) == factorisations
+    alone = Frame.from_lines(points[:2], [(0, 1)], height=H, width=H, material=STEEL).clamp(0)
+    assert_allclose(modes.frequencies, np.repeat(alone.modes(2).frequencies, n)[:k], rtol=1e-10)
+    found = modes.shapes @ (frame.system.mass.tocsc() @ modes.shapes.T)
+    assert_allclose(found, np.eye(k), atol=1e-8)
 
 
 def test_a_small_frame_moves_with_its_multipliers():

@@ -247,6 +247,36 @@ def test_sparse_branch_equals_dense_branch(monkeypatch, joined):
         assert abs(x @ y) == pytest.approx(1, abs=1e-8)
 
 
+@pytest.mark.parametrize("equal, k", [(1, 8), (3, 7), (5, 10), (5, 15)])
+def test_all_of_equal_frequencies_are_found(equal, k, monkeypatch):
+    monkeypatch.setattr(eigen, "DENSE", 10)
+    beams = [straight(16, origin=(0.0, float(i))) for i in range(equal)]
+    scene = Scene(*beams)
+    for beam in beams:
+        scene.clamp("left", beam=beam)
+    modes = scene.modes(k)
+    alone = Scene(beams[0]).clamp("left").modes(-(-k // equal)).frequencies
+    assert np.allclose(modes.frequencies, np.repeat(alone, equal)[:k], rtol=1e-10)
+    found = modes.shapes @ (scene.system.mass.tocsc() @ modes.shapes.T)
+    assert np.allclose(found, np.eye(k), atol=1e-8)
+
+
+def test_frequencies_are_looked_for_where_they_cannot_be_counted(monkeypatch):
+    """Nothing is missing, but the count is wrong, or there are no factors to count by."""
+    monkeypatch.setattr(eigen, "DENSE", 10)
+    scene = Scene(straight(16)).clamp("left")
+    known, negative = scene.modes(4).frequencies, eigen._negative
+
+    def refused(tangent, state, shift):
+        if shift < 0.0:
+            raise np.linalg.LinAlgError
+        return negative(tangent, state, shift)
+
+    for other in (refused, lambda *a: negative(*a) + 2 * (a[-1] < 0.0)):
+        monkeypatch.setattr(eigen, "_negative", other)
+        assert np.allclose(scene.modes(4).frequencies, known, rtol=1e-12)
+
+
 # buckling
 
 
