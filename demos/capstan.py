@@ -34,7 +34,7 @@ held, pulled = shape(nodes[0]), shape(nodes[-1])
 
 weight, way = 1.0, 4e-3
 scene = Scene(rope).fix("left", "r^1").fix("right", "r^1")
-scene.obstacle(Circle((0, 0), radius), friction=friction, stiffness=1e9)
+scene.obstacle(Circle((0, 0), radius), friction=friction)
 scene.point_force((0, -weight), at=held)
 scene.fix("right", "r^2", displacement=-way)
 state = scene.solve_static(first_step=0.1)

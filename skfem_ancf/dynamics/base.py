@@ -69,6 +69,22 @@ def contacts_of(y: Motion) -> Array | None:
     return (y.memory or {}).get("contacts")
 
 
+def kept(y: Motion, contacts: Array | None, **others: Array) -> dict[str, Array] | None:
+    """The memory of a Motion after a step, or None for nothing.
+
+    Parameters
+    ----------
+    y
+        The Motion before: how stiff obstacles are stays.
+    contacts
+        What points remember now, shape (k,); None if steps leave nothing behind.
+    **others
+        What else is kept, arrays of any shape (...,).
+    """
+    contacts = contacts_of(y) if contacts is None else contacts
+    return ({"contacts": contacts} if contacts is not None else {}) | others or None
+
+
 class Scheme:
     """A time integrator: a member of the family of :mod:`skfem_ancf.dynamics.steps`, by numbers.
 

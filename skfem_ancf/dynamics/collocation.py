@@ -10,7 +10,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 
 from ..errors import InputError
-from .base import Motion, Scheme, contacts_of
+from .base import Motion, Scheme, contacts_of, kept
 from .integrator import StepFailed
 from .rates import JointMotions
 from .stages import Interval, Method, collocate, room_for_points, solve_for
@@ -210,10 +210,9 @@ class Collocation(Scheme):
         def motion(k: int) -> Motion:
             """After step k, counted from 0."""
             (u, v, a), before = rows[k], rows[k - 1, :2] if k else np.array([y.u, y.v])
-            memory = {"stages": stages[k].copy(), "start": before.copy(),
-                      "forces": forces[k, :-1].copy()}
-            if contacts.lasting:
-                memory["contacts"] = memories[k, 1:].copy()
+            memory = kept(y, memories[k, 1:].copy() if contacts.lasting else None,
+                          stages=stages[k].copy(), start=before.copy(),
+                          forces=forces[k, :-1].copy())
             return Motion(begun + dt * (first + k + 1), u, v, a, a, forces[k, -1], None, dt,
                           memory, float(memories[k, 0]))
 

@@ -363,7 +363,11 @@ class History:
     @cached_property
     def strain_energy(self) -> Array:
         """Strain energy, with the potential of force elements, shape (nt,)."""
-        return np.array([self.system.strain_energy(u, t) for u, t in zip(self.u, self.t)])
+        system, out = self.system, []
+        for u, t, memory in zip(self.u, self.t, self._memories):
+            with system.forces.contacts.lent((memory or {}).get("contacts")):
+                out.append(system.strain_energy(u, t))
+        return np.array(out)
 
     @cached_property
     def kinetic_energy(self) -> Array:

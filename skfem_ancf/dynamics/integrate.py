@@ -12,7 +12,7 @@ from ..errors import (AncfError, ConvergenceError, InputError, Interrupted, Mode
                       shown, taught)
 from ..progress import progress_bar
 from .checkpoint import Checkpoint, same_problem
-from .base import in_steps, same_scheme
+from .base import contacts_of, in_steps, same_scheme
 from .integrator import Integrator, StepFailed
 from .run import Run, Task
 
@@ -257,6 +257,9 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
     deep = run.system.forces.contacts.sweep.deep()
     if deep:
         warnings.warn(deep, ModelWarning, stacklevel=9)
+    with run.system.forces.contacts.lent(contacts_of(run.y)):
+        for text in run.system.forces.contacts.sunk(run.y.u, run.y.t):
+            warnings.warn(text, ModelWarning, stacklevel=9)
     run.give_back()
     return history
 

@@ -11,7 +11,7 @@ from ..band import Band, factorize, fix
 from ..eliminated import Eliminated, EliminatedMass
 from ..errors import InputError, SupportError, require_positive, shown
 from ..own import handle_of
-from .base import Motion, contacts_of, in_steps, same_scheme
+from .base import Motion, contacts_of, in_steps, kept, same_scheme
 from .course import Courses
 from .rates import rates
 from .dampers import Dampers, Rows, solve_rows
@@ -231,9 +231,11 @@ class Integrator:
             rate = -(s.quadratic(y.u, t, y.v) + driven[1] + J @ y.acceleration)
             rate -= 2.0 * driven[2](y.v)
         with contacts.lent(memory):
-            if contacts.lasting:
-                kept = contacts.begin(y.u, t) if memory is None else memory
-                y.memory = {"contacts": contacts.tables.memory.copy() if kept is None else kept}
+            if memory is not None and not contacts.lasting:
+                y.memory = {"contacts": memory}  # how stiff obstacles are
+            elif contacts.lasting:
+                now = contacts.begin(y.u, t) if memory is None else memory
+                y.memory = {"contacts": contacts.tables.memory.copy() if now is None else now}
             force = (s.external_force(y.u, t) - s.internal_force(y.u, t)
                      - s.mass.multiply(y.acceleration))
             if s.damped:
@@ -292,7 +294,7 @@ class Integrator:
         def motion(k):
             """After step k, counted from 0."""
             return Motion(float(course.times[k, 0]), *rows[k], *multiplier_rows[k], before=dt,
-                          memory={"contacts": memories[k]} if contacts.lasting else None,
+                          memory=kept(y, memories[k] if contacts.lasting else None),
                           dissipated=float(works[k]))
 
         return done, motion

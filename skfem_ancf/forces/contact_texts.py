@@ -56,10 +56,11 @@ STIFFNESS, WIDTH, FRICTION, STICKING, DAMPING, INERTIA, RADIUS, SIDE, TOLERANCE 
 #: begin and the end.
 POSE, POSES = 10, 30
 NOW, BEGIN, END = map(np.int64, range(3))
-#: Memory: 1 if points stick to anchors; 1 / dt^2 of the last step in time; for each group how far
-#: pressure reaches beyond the surface; for each point that reach, its anchor, and how far it was
+#: Memory: 1 if points stick to anchors; 1 / dt^2 of the last step in time; 1 if points are held:
+#: where pressure reaches beyond the surface, it pulls there; for each group how far that is, and by
+#: how much it is stiffer than by default; for each point its reach, its anchor, and how far it was
 #: from that along the surface at the last step.
-ANCHORED, RATE, REACHES = range(3)
+ANCHORED, RATE, HOLDS, REACHES = range(4)
 #: What is kept from step to step: anchors, reaches.
 ANCHORS, PRESSURES = 1, 2
 TINY = 1e-200
@@ -470,7 +471,7 @@ def _touching(tables, group, begin, end, at):
     """Those of some points that touch at either end."""
     n, total = group[ELEMENTS], group[ELEMENTS] * group[POINTS]
     first, last = begin + n + 6 * total, end + n + 6 * total
-    part = 1.0 / hardened(tables.floats, group, tables.memory[RATE])
+    part = 1.0 / hardened(tables, group)
     reach, flags = group[MEMORY], np.empty(at.size)
     for i in lanes(at.size):
         flags[i] = 1.0 * (np.minimum(tables.looks[first + at[i]], tables.looks[last + at[i]])
@@ -485,7 +486,7 @@ def _touching(tables, group, begin, end, at):
 def _ends(tables, group, begin, end, same, at, rows):
     """Fill the rows of points by what is seen at both ends."""
     n, total = group[ELEMENTS], group[ELEMENTS] * group[POINTS]
-    reach, part = group[MEMORY], 1.0 / hardened(tables.floats, group, tables.memory[RATE])
+    reach, part = group[MEMORY], 1.0 / hardened(tables, group)
     for c in range(4):
         first, last = begin + n + c * total, end + n + c * total
         middle, way = rows[MIDDLE + c], rows[RATES + c]
@@ -559,20 +560,25 @@ def slide(lever, rows):
 
 
 @source
-def hardened(floats, group, rate):
-    """By how much the stiffness is grown in a motion."""
-    return 1.0 + floats[group[NUMBERS] + INERTIA] * rate / floats[group[NUMBERS] + STIFFNESS]
+def hardened(tables, group):
+    """How many times the stiffness is as large as given, by what a load has found or in a step."""
+    numbers = group[NUMBERS]
+    return (1.0 + tables.memory[REACHES + tables.number + group[GROUP]]
+            + tables.floats[numbers + INERTIA] * tables.memory[RATE]
+            / tables.floats[numbers + STIFFNESS])
 
 
 @source
 def press(tables, group, at, rows, found, F, K):
     """The pressure: F is force, pressure twice and stiffness; K is xx, xy, yx, yy of the point."""
     numbers, area = tables.floats[group[NUMBERS]:group[NUMBERS] + 9], group[AREAS]
-    k = numbers[STIFFNESS] * hardened(tables.floats, group, tables.memory[RATE])
+    part = hardened(tables, group)
+    k, holds, reach = numbers[STIFFNESS] * part, tables.memory[HOLDS] / part, group[MEMORY]
     width, before, after = numbers[WIDTH], rows[DEPTH], rows[DEPTH + 1]
     for i in lanes(at.size):
         a, b, scale = before[i], after[i], k * tables.floats[area + at[i]]
-        jump, pressure = b - a, scale * mean_slope(a, b, width)
+        jump = b - a
+        pressure = scale * (mean_slope(a, b, width) - holds * tables.memory[reach + at[i]])
         apart = 1.0 * (np.abs(jump) > 1e-3 * (width + np.abs(a) + np.abs(b)))
         c = (scale * curvature_of(0.5 * (a + b), width) * (1.0 - apart)
              + 2.0 * (scale * mean_slope(b, b, width) - pressure) * apart / (jump + (1.0 - apart)))
@@ -593,7 +599,8 @@ def stick(tables, group, settles, same, at, rows, found, F, K, out):
     last_x, last_y = rows[LAST], rows[LAST + 1]
     way_x, way_y = rows[WAY], rows[WAY + 1]
     where, lost = np.empty(at.size, np.int64), np.empty(at.size)
-    augmented = numbers[TOLERANCE] > 0.0
+    augmented, first = numbers[TOLERANCE] > 0.0, REACHES + tables.number + group[GROUP]
+    sticking = numbers[STICKING] * (1.0 + tables.memory[first])
     # what vibrates on the springs comes to rest: in a mean by itself
     calms = 1.0 if same and tables.memory[RATE] > 0.0 else 0.0
     for i in lanes(at.size):
@@ -603,7 +610,7 @@ def stick(tables, group, settles, same, at, rows, found, F, K, out):
         b = tables.memory[anchor + 2 * total + at[i]] - pose[5]
         slip = ((y - pose[3] * a - pose[2] * b) * nx - (x - pose[2] * a + pose[3] * b) * ny)
         before = tables.memory[anchor + 3 * total + at[i]]
-        k, limit = numbers[STICKING] * tables.floats[area + at[i]], friction * F[3, i]
+        k, limit = sticking * tables.floats[area + at[i]], friction * F[3, i]
         pull = k * (slip + calms * (slip - before))
         T = np.minimum(np.maximum(pull, -limit), limit)
         sticks = 1.0 * (np.abs(pull) < limit)
@@ -636,7 +643,7 @@ def _reach_on(tables, group, at, rows, out):
     if tolerance == 0.0:
         return
     where, far, square = np.empty(at.size, np.int64), np.empty(at.size), np.empty(at.size)
-    depth, k = rows[DEPTH], hardened(tables.floats, group, tables.memory[RATE])
+    depth, k = rows[DEPTH], hardened(tables, group)
     for i in lanes(at.size):
         before = tables.memory[first + at[i]] / k
         change = np.maximum(depth[i], 0.0) - before
@@ -656,7 +663,7 @@ def resist(tables, group, factor, at, rows, x, found, F, K):
     """Damping in proportion to the pressure."""
     numbers, area = tables.floats[group[NUMBERS]:group[NUMBERS] + 9], group[AREAS]
     now, rate_x, rate_y = group[OBSTACLE] * POSES, rows[WAY], rows[WAY + 1]
-    stiffness = numbers[STIFFNESS] * hardened(tables.floats, group, tables.memory[RATE])
+    stiffness = numbers[STIFFNESS] * hardened(tables, group)
     pose, depth = tables.poses[now:now + POSE], rows[DEPTH]
     for i in lanes(at.size):
         k, a = stiffness * tables.floats[area + at[i]], depth[i]

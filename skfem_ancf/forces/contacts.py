@@ -16,6 +16,7 @@ from .contact_texts import (ANCHORED, ANCHORS, AUGMENT, DAMPING, DEPTH, FRICTION
                             RATES, REACHES, ROWS, SEEN, SETTLE, STIFFNESS, TANGENT, WIDTH,
                             ContactTables, Question, distances, hardened, levers, of_contacts,
                             places, press, resist, slide, stick, surface)
+from .poses import taken_back
 from .swept import Passage, middle_of
 
 if TYPE_CHECKING:
@@ -48,6 +49,8 @@ class Group(NamedTuple):
         How deep a way from one state to the next may cut the obstacle; the beam's height.
     numbers
         By the numbers of :mod:`skfem_ancf.forces.contact_texts`, shape (9,).
+    firmest
+        How many times as stiff it is made at most where it is too soft.
     """
 
     first: Any
@@ -61,6 +64,7 @@ class Group(NamedTuple):
     depth: float
     height: float
     numbers: Any
+    firmest: float
 
 
 #: Why steps of several points do not hold a body on a wall: at each of them it would be held, and
@@ -107,7 +111,7 @@ class Contacts:
         if n == 0:
             return NO_CONTACTS
         ints, floats = _Pieces(HEADER * n), _Pieces(0)
-        headers, memory, looks = np.zeros((n, HEADER), dtype=np.int64), REACHES + n, 0
+        headers, memory, looks = np.zeros((n, HEADER), dtype=np.int64), REACHES + 2 * n, 0
         for number, (k, group) in enumerate(self.groups):
             shape, none = self.obstacles[k].shape, np.zeros((0, len(group.first)))
             slopes = none if group.slopes is None else group.slopes
@@ -320,6 +324,29 @@ class Contacts:
             raise InputError(f"{what} knows no contact, and its solution enters an obstacle: use "
                              f"{instead}")
 
+    @property
+    def firmness(self) -> Array:
+        """How much stiffer than by default obstacles are, shape (groups,), a view; 0: not."""
+        first = REACHES + len(self.groups)
+        return self.tables.memory[first:first + len(self.groups)]
+
+    def harden(self, firmness: Array, u: Array, t: float) -> None:
+        """Make obstacles stiffer than by default; what sticks pulls as before.
+
+        Parameters
+        ----------
+        firmness
+            By how much, shape (groups,).
+        u, t
+            Displacement at which anchors were left, shape (N,), and time.
+        """
+        for k, ((which, _), x, _) in enumerate(self.look(u, t, False)):
+            part = (1.0 + self.firmness[k]) / (1.0 + firmness[k])
+            at, points = self.reach(k), taken_back(self.obstacles[which].pose(t, False), x)
+            at[1:3] = points + part * (at[1:3] - points)
+            at[3] *= part
+        self.firmness[:] = firmness
+
     def settle(self, u: Array, t: float) -> float:
         """Anchors go after points that have slipped, to where these just do not slip.
 
@@ -411,7 +438,14 @@ class Contacts:
         """
         return self.tables.ints[k * HEADER:(k + 1) * HEADER]
 
-    def _reach(self, k):
+    def reach(self, k: int) -> Array:
+        """What points of a group remember: reach, anchor and way from it, (4, n), a view.
+
+        Parameters
+        ----------
+        k
+            Its number.
+        """
         header, n = self.header(k), len(self.groups[k][1].first)
         return self.tables.memory[header[MEMORY]:header[MEMORY] + 4 * n].reshape(4, n)
 
@@ -436,8 +470,8 @@ class Contacts:
             n, header = len(group.first), self.header(k)
             at, rows, lever = np.arange(n), np.zeros((ROWS, n)), np.empty((8, n))
             F, more, K = np.zeros((5, n)), np.zeros((5, n)), np.zeros((4, n))
-            part = 1.0 / hardened(self.tables.floats, header, self.tables.memory[RATE])
-            rows[DEPTH:LAST], rows[LAST:LAST + 2] = part * self._reach(k)[0] - found[0], x
+            part = 1.0 / hardened(self.tables, header)
+            rows[DEPTH:LAST], rows[LAST:LAST + 2] = part * self.reach(k)[0] - found[0], x
             press(self.tables, header, at, rows, found, F, K)
             if self.tables.memory[ANCHORED] * group.numbers[FRICTION] > 0.0:
                 stick(self.tables, header, False, True, at, rows, found, F, K, np.zeros(1))
@@ -469,16 +503,16 @@ class Contacts:
             Displacement, shape (N,), and time.
         """
         out = []
-        for (which, group), _, found in self.look(np.array(u), t, False) if self.groups else ():
+        seen = self.look(np.array(u), t, False) if self.groups else []
+        for firmness, ((which, group), _, found) in zip(self.firmness, seen):
             one, deep, h = self.obstacles[which], -float(found[0].min()), group.height
             if one.penalty is None and deep > SUNK * h:
-                k = group.numbers[STIFFNESS]
+                k = (1.0 + firmness) * group.numbers[STIFFNESS]
                 firm = k * (deep + max(0.0, deep - h)) / (FIRM * h)  # both sides of it are in
                 out.append(
                     f"a body is {deep:.3g} deep in {one!r}, {deep / h:.2g} times its height: it is "
-                    f"pressed harder than its bending does, for which the default stiffness, "
-                    f"{k:.3g}, is. Give stiffness={firm:.2g}, with which this "
-                    "pressure leaves a tenth of the height")
+                    f"pressed harder than its stiffness, {k:.3g}, holds. Give "
+                    f"stiffness={firm:.2g}, with which this pressure leaves a tenth of the height")
         return out
 
     def passed(self, a: tuple[Array, float], b: tuple[Array, float]) -> str | None:
@@ -505,12 +539,12 @@ class Contacts:
             Time; in statics the load factor.
         """
         total = 0.0
-        for (which, group), _, found in self.look(u, t, False):
+        for firmness, ((which, group), _, found) in zip(self.firmness, self.look(u, t, False)):
             if self.obstacles[which].method == "augmented":
                 continue
             a, width = -found[0], group.numbers[WIDTH]
             S = (np.maximum(a, 0.0) ** 3 - np.maximum(a - width, 0.0) ** 3) / (6.0 * width)
-            total += group.numbers[STIFFNESS] * float(group.areas @ S)
+            total += (1.0 + firmness) * group.numbers[STIFFNESS] * float(group.areas @ S)
         return total
 
     def entries(self, t: float, u: Array, bandwidth: int) -> tuple[Array, Array, Array]:

@@ -67,6 +67,7 @@ class Obstacle(ForceElement):
         Pressure per penetration, positive; by default ``E / height`` of each beam, that of half of
         its own thickness or so, but of strips thinner than a hundredth of their extent L no more
         than ``E height^3 / (12 (L / 200)^4)``, so that they bend over lengths that meshes resolve.
+        A static solution hardens that, up to ``E / height``, where bodies are pressed deep.
     beam
         The beam, its name or its number; all of the scene by default.
     method
@@ -273,12 +274,13 @@ class Obstacle(ForceElement):
         radius = float((np.hypot(*(starts[:2] - middle)) + np.abs(offsets)).max())
         E, density = _stiffest(beam.across, elements)
         k, augmented = self.penalty or _default(E, mesh), self.method == "augmented"
+        firmest = 1.0 if self.penalty or augmented else max(1.0, E / (h * k))
         numbers = np.array([k, self.options["width"] or WIDTH * h, self.friction, k, self.damping,
                             HARDER * density * h * augmented, radius,
                             -1.0 if self.shape.hollow else 1.0, self.tolerance * augmented])
         return Group(np.repeat(nodes, m), weights.reshape(-1, n * m), slopes, areas.ravel(),
                      offsets.ravel(), starts.reshape(4, -1), n, m,
-                     _deepest(self.shape, h), h, numbers)
+                     _deepest(self.shape, h), h, numbers, firmest)
 
     def __repr__(self) -> str:
         return f"<Obstacle {self.shape!r}>"

@@ -16,6 +16,7 @@ from ..progress import progress_bar
 from . import stability
 from .iteration import (ALONE, CLOSED, CONVERGED, NOT_CONVERGED, NOT_FINITE, SINGULAR, Rules,
                         Target, Unknowns, equilibrium, room_for_iterations)
+from .touching import found_touching
 
 if TYPE_CHECKING:
     from ..system import System
@@ -29,6 +30,8 @@ MAX_ITERATIONS = 10000
 AUGMENTED = 50
 #: Relative error of an equilibrium that is only a start.
 NEAR = 1e-2
+#: Iterations to a start, at most.
+SOON = 15
 METHODS = ("mixed", "newton")
 
 
@@ -295,19 +298,25 @@ def _augmented(system, result, load, options, record, at):
 
 
 def _touching(system, result, load, options, record):
-    """The equilibrium; where obstacles keep the iteration from it, from that with eased ones."""
+    """The equilibrium; where there are obstacles, by :mod:`skfem_ancf.statics.touching`."""
     contacts, (origin, method, tol, most) = system.forces.contacts, options
-    try:
+    if not contacts.obstacles:
         return _found(system, result, load, options, record)
-    except _Failed:
-        if not contacts.obstacles:
-            raise
-        tried = replace(record)
-    with contacts.eased():
-        close = _found(system, result, load, (origin, method, max(tol, NEAR), most), record)
-    found = _from(close, system, result, load, options, record)
-    vars(record).update(vars(_both(tried, record)))
-    return found
+    at = _acting(options, load)[1]
+
+    def solve(start, rough):
+        one, chosen = LoadStep(load, 0), options
+        if rough:
+            chosen = origin, method, max(tol, NEAR), min(most, SOON)
+        try:
+            if start is None:
+                return _found(system, result, load, chosen, one)
+            return _from(start, system, result, load, chosen, one)
+        finally:
+            vars(record).update(vars(_both(record, one)))
+
+    return found_touching(contacts, (result.u, _acting(options, result.load)[1]), at, solve,
+                          lambda u: system.strain_energy(u, at), _Failed)
 
 
 def _both(first, then):
@@ -345,10 +354,11 @@ def _found(system, result, load, options, record):
 def _from(found, system, result, load, options, record, descent=None):
     """Iterate on from what has been found; the record takes both."""
     one = LoadStep(load, 0)
-    found = _iterate(system, replace(result, u=found[0], multipliers=found[1]), load, options, one,
-                     descent)
-    vars(record).update(vars(_both(record, one)))
-    return found
+    try:
+        return _iterate(system, replace(result, u=found[0], multipliers=found[1]), load, options,
+                        one, descent)
+    finally:
+        vars(record).update(vars(_both(record, one)))
 
 
 def _acting(options, load):
