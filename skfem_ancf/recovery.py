@@ -284,7 +284,7 @@ class _Piece:
     def d_ds(self, values):
         """The derivative along the axis of values (..., n, m), by a cubic spline."""
         if len(self.s) > FEW:
-            return scipy.interpolate.CubicSpline(self.s, values, axis=-2)(self.s, 1)
+            return scipy.interpolate.make_interp_spline(self.s, values, axis=-2)(self.s, 1)
         return self._matrices[0] @ values
 
     def along(self, values):

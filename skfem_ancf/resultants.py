@@ -207,7 +207,7 @@ def _axis(piece):
     shear = (phi - normal + np.pi) % (2.0 * np.pi) - np.pi
     # not the derivative of the angle, which is fitted to that of the elements
     start = (piece.g[:, 0] - piece.g[:, -1]) / (piece.Y[..., -1] - piece.Y[..., 0])
-    curvature = piece.rate - start - piece.d_ds(shear)
+    curvature = piece.rate - start - piece.d_ds(shear[:, None])[:, 0]
     values = np.array([phi, piece.at_axis(stretch), shear, curvature])
     return scipy.interpolate.CubicSpline(piece.s, values.T)
 

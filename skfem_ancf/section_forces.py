@@ -84,26 +84,38 @@ class Sections:
         self.forces, self.e, self._slab = forces, e, slab
         beam = forces.beam
         self.shape = len(e), eta.shape[-1]
-        if len(e) * self.shape[1] > SMALL:
-            self.X, self._value, self._slope, self.J = self._tables(beam, e, xi, eta)
-        else:
-            key = e.tobytes(), xi.tobytes(), eta.tobytes()
-            self.X, self._value, self._slope, self.J = kept(
-                beam.tables, key, lambda: self._tables(beam, e, xi, eta))
+        self._xi = xi
+        self.X, self.J = self._kept("places", eta, lambda: self._places(xi, eta))
         self.volume = self.J[0, 0] * self.J[1, 1] - self.J[0, 1] * self.J[1, 0]
         self._arm: Any = 0.0
         if lifted:
             axis = Sections(forces, e, xi, np.array([0.5]))
             self._arm = beam.mesh.mapping().offset(self.X, e) / np.hypot(*axis.J[:, 0])
 
-    def _tables(self, beam, e, xi, eta):
-        """Reference points, local functions and their slopes, and the derivative of the map."""
+    def _kept(self, name, eta, make):
+        """Tables of places, made once for few of them."""
+        e = self.e
+        if self.shape[0] * self.shape[1] > SMALL:
+            return make()
+        return kept(self.forces.beam.tables, (name, e.tobytes(), self._xi.tobytes(),
+                                              eta.tobytes()), make)
+
+    def _places(self, xi, eta):
+        """Reference points, and the derivative of the map."""
         X = np.array([np.broadcast_to(xi[:, None], self.shape), np.broadcast_to(eta, self.shape)])
-        element = beam.element
-        value, slope, _, powers = element.of_mesh(beam.mesh.mapping(), X, e)
-        scale = (beam.mesh.lengths[e][:, None] ** powers).T[:, :, None]
-        value, slope = value * scale, slope * scale
-        return X, value, slope, beam.mesh.mapping().DF(X, e)
+        return X, self.forces.beam.mesh.mapping().DF(X, self.e)
+
+    @cached_property
+    def _functions(self):
+        """Local functions and their slopes."""
+        def make():
+            mesh = self.forces.beam.mesh
+            value, slope, _, powers = self.forces.beam.element.of_mesh(
+                mesh.mapping(), self.X, self.e)
+            scale = (mesh.lengths[self.e][:, None] ** powers).T[:, :, None]
+            return value * scale, slope * scale
+
+        return self._kept("functions", self.X[1], make)
 
     def field(self, q_e: Array, slope: bool = False) -> Array:
         """A field of element coordinates, or its derivative by xi.
@@ -125,16 +137,17 @@ class Sections:
                              optimize=True)
 
         if slope or not np.any(self._arm):
-            return of(self._slope if slope else self._value)
-        r_xi = of(self._slope)
-        return of(self._value) + self._arm * np.array([-r_xi[1], r_xi[0]])
+            return of(self._functions[1 if slope else 0])
+        r_xi = of(self._functions[1])
+        return of(self._functions[0]) + self._arm * np.array([-r_xi[1], r_xi[0]])
 
     def spread(self, values: Array) -> Array:
         """Element vectors (..., ne, nb, 2) of forces (2, ..., n, k), summed."""
-        parts = np.einsum("bnk,i...nk->n...bi", self._value, values, optimize=True)
+        parts = np.einsum("bnk,i...nk->n...bi", self._functions[0], values, optimize=True)
         if np.any(self._arm):
             turned = self._arm * np.array([values[1], -values[0]])
-            parts = parts + np.einsum("bnk,i...nk->n...bi", self._slope, turned, optimize=True)
+            parts = parts + np.einsum("bnk,i...nk->n...bi", self._functions[1], turned,
+                                      optimize=True)
         out = np.zeros((self.forces.beam.mesh.nelements,) + parts.shape[1:])
         np.add.at(out, self.e, parts)
         return np.moveaxis(out, 0, -3)
