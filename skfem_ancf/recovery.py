@@ -40,6 +40,7 @@ from .materials import LinearLaw
 from .panels import Moved, Panels
 from .point import AGAIN
 from .quadrature import gauss
+from .refinement import by_element
 from .mapping import cross, polynomial
 from .sections.jumps import beside
 from .section_forces import NotRecovered, SectionForces, Sections, viscous_forces
@@ -196,8 +197,10 @@ class _Piece:
         at = recovery.moved(self.e, xi)
         if at is not None:
             eta = at.eta
-        sections = Sections(self.forces, self.e, xi, eta, self.forces.lifted)
-        axis, X = Sections(self.forces, self.e, xi, np.array([0.5])), beside(sections.X)
+        sections = Sections(self.forces, self.e, xi, eta, self.forces.lifted,
+                            mapping=recovery.geometry)
+        axis, X = Sections(self.forces, self.e, xi, np.array([0.5]),
+                           mapping=recovery.geometry), beside(sections.X)
         speed = np.hypot(*axis.J[:, 0, :, 0])
         h, slope = mesh.mapping().height(sections.X[0], self.e)
         self.Y, self.lean = h * (eta - 0.5), slope / speed[:, None] * (eta - 0.5)
@@ -555,6 +558,15 @@ def _axial(law, strain):
         + D[0, 2] * (D[1, 1] * D[2, 0] - D[1, 0] * D[2, 1])) / det
 
 
+def _geometry(beam):
+    """The mapping to the body whose sections turn as its axis at jumps of the curvature, if that
+    is not the mapping of the mesh.
+    """
+    if beam.mesh.sections == "linear" or not len(beam.across.bends):
+        return None
+    return by_element(beam.mesh, beam.across.bends.astype(int)).mapping()
+
+
 class _Table:
     """Cubic splines along the axis: coefficients (4, n - 1, 7, ..., m) between sections s (n,)."""
 
@@ -633,6 +645,7 @@ class Recovery:
         self.laws = [(columns, slab.material.law(slab.shear))
                      for slab, columns in zip(slabs, self.panels.slabs)]
         self.lengths, self._inside, self._arcs = kept(beam.tables, "arc", self._arc_tables)
+        self.geometry = kept(beam.tables, "geometry", lambda: _geometry(beam))
         self.has_stress = (len(slabs) == 1 and slabs[0].face is None
                            and beam.element.carries_shear_parabola
                            and not isinstance(beam.formulation, EnhancedContinuum))

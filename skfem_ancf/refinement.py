@@ -65,6 +65,30 @@ def halved(mesh: MeshBeam, ix: Array) -> MeshBeam:
     return m
 
 
+def by_element(mesh: MeshBeam, at: Array) -> MeshBeam:
+    """The mesh of elements apart, whose sections turn as their axis beside some nodes.
+
+    Where sections are cubic along the elements, or of a higher degree, one rate of turning at a
+    node serves both sides: at a jump of the curvature it is that of neither.
+
+    Parameters
+    ----------
+    mesh
+        A curved :class:`~skfem_ancf.MeshBeam`.
+    at
+        Numbers of the elements that begin at these nodes, shape (k,).
+    """
+    mesh, n, node = mesh.with_sections("cubic"), mesh.nelements, mesh.t.T.ravel()
+    fields: dict[str, Any] = {name: getattr(mesh, name)[:, node]
+                              for name in ("doflocs", "p_X", "p_Y", "p_XY")}
+    ends = np.array([np.tile([0.0, 1.0], (n, 1)), np.full((n, 2), 0.5)])
+    bent = mesh.mapping().curvature(ends, np.arange(n)).ravel()
+    for k in (2 * at - 1, 2 * at):
+        fields["p_XY"][:, k] = -bent[k] * fields["p_X"][:, k]
+    fields.update(t=np.arange(2 * n).reshape(-1, 2).T, _boundaries=None, _subdomains=None)
+    return replace(mesh, s=None, curve=None, taper=None, **fields)
+
+
 def _midpoints(mesh, ix):
     """Position, gradients, parameter and, on a curve, lengths for the middle of elements."""
     out = {}

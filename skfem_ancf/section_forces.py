@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .beam import Beam
+    from .mapping import MappingBeam
     from .sections import Slab
     from .spread import Sampled
     from .types import Array
@@ -77,15 +78,20 @@ class Sections:
         its :class:`~skfem_ancf.inertia.Inertia` has them. If not, all are on the axis.
     slab
         The slab of which all points are; None for those that are there.
+    mapping
+        From the reference cell to the body; None for that of the mesh.
     """
 
     def __init__(self, forces: SectionForces, e: Array, xi: Array, eta: Array,
-                 lifted: bool = False, slab: Slab | None = None) -> None:
+                 lifted: bool = False, slab: Slab | None = None,
+                 mapping: MappingBeam | None = None) -> None:
         self.forces, self.e, self._slab = forces, e, slab
         beam = forces.beam
         self.shape = len(e), eta.shape[-1]
         self._xi = xi
-        self.X, self.J = self._kept("places", eta, lambda: self._places(xi, eta))
+        name = "places" if mapping is None else "places by each element"
+        self.X, self.J = self._kept(name, eta, lambda: self._places(
+            xi, eta, mapping or beam.mesh.mapping()))
         self.volume = self.J[0, 0] * self.J[1, 1] - self.J[0, 1] * self.J[1, 0]
         self._arm: Any = 0.0
         if lifted:
@@ -100,10 +106,10 @@ class Sections:
         return kept(self.forces.beam.tables, (name, e.tobytes(), self._xi.tobytes(),
                                               eta.tobytes()), make)
 
-    def _places(self, xi, eta):
+    def _places(self, xi, eta, mapping):
         """Reference points, and the derivative of the map."""
         X = np.array([np.broadcast_to(xi[:, None], self.shape), np.broadcast_to(eta, self.shape)])
-        return X, self.forces.beam.mesh.mapping().DF(X, self.e)
+        return X, mapping.DF(X, self.e)
 
     @cached_property
     def _functions(self):

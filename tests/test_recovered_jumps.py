@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
-                        Scene, StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
+                        ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff)
 from skfem_ancf.sections.jumps import jumps
 
 E, B, H, M, ALPHA = 1e6, 0.05, 0.06, 0.05, 1e-3
@@ -96,7 +96,10 @@ def hook(element, n):
 
 
 @pytest.mark.parametrize("element, n", [(ElementBeamANCF(2), 16), (ElementBeamANCF(3), 16),
-                                        (ElementBeamCable(5), 32)], ids=repr)
+                                        (ElementBeamCable(5), 32), (ElementBeamANCFCubic(2), 8),
+                                        (ElementBeamANCFCubic(2), 64),
+                                        (ElementBeamANCFCubic(3), 16),
+                                        (ElementBeamANCFHermite(2), 16)], ids=repr)
 def test_a_line_that_becomes_an_arc(element, n):
     """Each is bent as if it were alone, the arc as Winkler says."""
     height, radius, y = 0.1, 0.25, 0.045

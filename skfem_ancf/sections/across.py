@@ -127,10 +127,16 @@ class Across(Frozen):
         if self.mesh.heights is not None:
             found.append(jumps(lambda X, e: self.mesh.mapping().height(X[0], e)[1]
                                / self.mesh.lengths[e, None], n, np.array([0.5]), KINK))
-        if not self.mesh.is_straight:
-            found.append(jumps(self.mesh.mapping().curvature, n, np.array([0.5]),
-                               BEND / self.mesh.height))
-        return np.unique(np.concatenate(found))
+        return np.unique(np.concatenate([*found, self.bends]))
+
+    @cached_property
+    def bends(self) -> Array:
+        """Stations at which the curvature of the axis jumps, seen by its cubics."""
+        mesh = self.mesh
+        if mesh.is_straight:
+            return np.zeros(0)
+        axis = mesh if mesh.sections == "linear" else mesh.with_sections("cubic")
+        return jumps(axis.mapping().curvature, mesh.nelements, np.array([0.5]), BEND / mesh.height)
 
     def _given(self, name, slab, X, tind):
         """What a function of a slab, one of ``NAMES``, returns at points."""
