@@ -109,8 +109,11 @@ class Screen:
             limits, [b.mesh.nelements for b in beams])
 
     @cached_property
-    def _q0(self):
-        return _joined([b.q0 for b in self._beams])
+    def _ends(self):
+        """Where each element's ends and the tangents there are, and what at first, (4, ne, 2)."""
+        x = self._tangents
+        at = np.array([x[self._right] - 2, x[self._left] - 2, x[self._left], x[self._right]])
+        return at, _joined([b.q0 for b in self._beams])[at]
 
     def passes(self, u: Array, start: Array | None = None, slender: Array | None = None) -> Any:
         """False if a fibre may be compressed, or an element may turn, beyond the range.
@@ -145,11 +148,10 @@ class Screen:
         """
         if self._none:
             return False
-        q = u[:len(self._q0)] + self._q0  # without rigid bodies, which come last
-        x, r = _complex(q[self._tangents]), _complex(q[self._tangents - 2])
-        chord = r[self._right] - r[self._left]
-        return any(bool(((chord * x[side].conj()).real < 0.0).any())
-                   for side in (self._left, self._right))
+        at, start = self._ends
+        q = u.take(at) + start
+        along = (q[0] - q[1]) * q[2:]
+        return bool((along[..., 0] + along[..., 1]).min() < 0.0)
 
 
 _BOTH = np.arange(2)

@@ -1696,8 +1696,8 @@ class Scene:
         >>> bool(np.ptp(history.total_energy) < 1e-12)
         True
         """
-        velocity = np.concatenate([self._velocities[k][1] if k in self._velocities else
-                                   np.zeros(b.N) for k, b in enumerate(self.members)])
+        velocity = np.concatenate([self._velocities[k][1] if k in self._velocities else np.zeros(
+            b.N) for k, b in enumerate(self.members)]) if self._velocities else None
         u = None if start is None else displacement(self.system, start)
         if isinstance(scheme, str) and scheme == "auto":
             rtol = require_positive("rtol", options.get("rtol", RTOL))

@@ -49,7 +49,7 @@ def compiled_off() -> str | None:
     """
     if wanted() == "0":
         return f"{VARIABLE}=0"
-    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+    if "NUMBA_DISABLE_JIT" in os.environ and os.environ["NUMBA_DISABLE_JIT"] not in ("", "0"):
         return "NUMBA_DISABLE_JIT is set"
     return None if _installed() else "Numba is not installed: pip install skfem-ancf[fast]"
 

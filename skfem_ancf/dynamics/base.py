@@ -232,4 +232,4 @@ def same_scheme(a: Scheme, b: Scheme) -> bool:
     a, b
         The schemes.
     """
-    return type(a) is type(b) and repr(vars(a)) == repr(vars(b))
+    return type(a) is type(b) and (vars(a) == vars(b) == {} or repr(vars(a)) == repr(vars(b)))

@@ -38,8 +38,8 @@ class _Tableau:
 
     Attributes
     ----------
-    ends
-        The points, and 1, shape (n + 1,).
+    ends, half_square
+        The points, and 1, shape (n + 1,), and c^2 / 2, shape (n, 1).
     method
         Its :class:`~skfem_ancf.dynamics.stages.Method`.
     fit
@@ -51,7 +51,7 @@ class _Tableau:
 
     def __init__(self, points: Array) -> None:
         c, n = points, len(points)
-        self.points, self.ends = c, np.append(c, 1.0)
+        self.points, self.ends, self.half_square = c, np.append(c, 1.0), 0.5 * c[:, None]**2
         k = np.arange(1, n + 1)
         inverse = np.linalg.inv(np.vander(c, increasing=True))
         A, weights = (c[:, None]**k / k) @ inverse, (1.0 / k) @ inverse
@@ -194,10 +194,11 @@ class Collocation(Scheme):
         method, w = table.method, self._room(integrator, table)
         begun, contacts = y.t if start is None else start, s.forces.contacts
         block = (first, first + n) if block is None else block
-        w.y[:2], w.first[:] = (y.u, y.v), y.multipliers
-        w.guess[:] = 0.5 * (dt * method.points[:, None])**2 * y.acceleration
+        w.y[0], w.y[1], w.first[:] = y.u, y.v, y.multipliers
         given = self._given(integrator, table, begun, dt, first, n, block)
-        if y.memory and "stages" in y.memory:
+        if not y.memory or "stages" not in y.memory:
+            np.multiply(table.half_square * dt**2, y.acceleration, out=w.guess)
+        else:
             w.U[:], w.before[:], w.first[:] = (y.memory[k] for k in ("stages", "start", "forces"))
             given = given._replace(begun=1, ahead=table.ahead(dt / y.before))
         rows, stages = np.empty((n, 3, s.N)), np.empty((n, len(method.points), s.N))
@@ -209,9 +210,9 @@ class Collocation(Scheme):
 
         def motion(k: int) -> Motion:
             """After step k, counted from 0."""
-            (u, v, a), before = rows[k], rows[k - 1, :2] if k else np.array([y.u, y.v])
+            (u, v, a), before = rows[k], rows[k - 1, :2].copy() if k else np.array([y.u, y.v])
             memory = kept(y, memories[k, 1:].copy() if contacts.lasting else None,
-                          stages=stages[k].copy(), start=before.copy(),
+                          stages=stages[k].copy(), start=before,
                           forces=forces[k, :-1].copy())
             return Motion(begun + dt * (first + k + 1), u, v, a, a, forces[k, -1], None, dt,
                           memory, float(memories[k, 0]))
@@ -227,6 +228,8 @@ class Collocation(Scheme):
                                               M._replace(flat=np.zeros(M.flat.size)))
             integrator.machine = s.machine.with_tables(s.machine.tables.copied(n))
         w = integrator.room
+        if kept.get("origin") is w.origin:
+            return w
         factors = {"re": w.re, "im": w.im, "real": w.real.flat, "J": w.J, "Y": w.Y,
                    "origin": w.origin}
         for name, room in factors.items():
@@ -256,7 +259,8 @@ class Collocation(Scheme):
         """What is given of a block of steps."""
         s, h, steps = integrator.system, float(dt), np.arange(*block)[:, None]
         times = start + h * (steps + table.ends).ravel()
-        times = np.minimum(times, limit)  # before what jumps at the end
+        if limit < np.inf:  # before what jumps at the end
+            times = np.minimum(times, limit)
         tables = s.machine.tables
 
         moves, drives, at = s.moves, int(tables.motion_varies), times

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
     from ..types import Array, StrPath, WhichBeam, WhichMember
     from .base import Scheme
 
+#: What is stored of a Motion.
+COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before",
+           "dissipated")
+_COLUMNS_OF = attrgetter(*COLUMNS)
 #: Instants of a picture where none are named.
 STROBES = 8
 
@@ -70,9 +75,7 @@ class History:
         Residuals solved for, and tangents factorised, in all steps.
     """
 
-    #: What is stored of a Motion.
-    COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before",
-               "dissipated")
+    COLUMNS = COLUMNS
 
     def __init__(self, system: System, scheme: Scheme, run: Any) -> None:
         self.system, self.scheme, self._run = system, scheme, run
@@ -91,11 +94,11 @@ class History:
 
     def columns(self) -> dict[str, Array]:
         """What was stored, as arrays by their names in :attr:`COLUMNS`."""
-        n, N, m = len(self._rows), self.system.N, self.system.m
-        shapes = {"t": (), "before": (), "dissipated": (), "multipliers": (m,), "force": (m,)}
-        return {name: np.array([getattr(y, name) for y in self._rows],
-                               dtype=float).reshape(n, *shapes.get(name, (N,)))
-                for name in self.COLUMNS}
+        if not self._rows:
+            N, m = self.system.N, self.system.m
+            sizes = {"t": (), "before": (), "dissipated": (), "multipliers": (m,), "force": (m,)}
+            return {name: np.zeros((0, *sizes.get(name, (N,)))) for name in self.COLUMNS}
+        return dict(zip(self.COLUMNS, map(np.array, zip(*map(_COLUMNS_OF, self._rows)))))
 
     def restore(self, columns: dict[str, Array], memories: Sequence[Any]) -> None:
         """Fill an empty History with what :meth:`columns` gave.

@@ -127,14 +127,13 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
                              "checkpoint=, or integrate in parts, start=history.state(-1)")
         run.until = require_function("until", until, "of a State that returns a number")
     file = None if checkpoint is None else Checkpoint(checkpoint, every, run)
-    zero = np.zeros(system.N)
     if u is None and start is not None:
         u = start.u
     if start is not None and motion is not None and _goes_on(system, scheme, start, t_start):
         run.go_on(motion, start._origin[1])
     else:
         v = v if motion is None else motion.v
-        run.begin(zero if u is None else u, zero if v is None else v,
+        run.begin(np.zeros(system.N) if u is None else u, np.zeros(system.N) if v is None else v,
                   system.forces.contacts.of_state(start))
     if file is not None:
         file.begin()
@@ -143,6 +142,8 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
 
 def _samples(system, t_start, t_end):
     """The times at which controls are asked that hold what they say."""
+    if not system.forces.sampled:
+        return []
     start = require_finite_scalar("t_start", t_start)
     span = require_positive("t_end - t_start", require_finite_scalar("t_end", t_end) - start)
     found = []
@@ -297,7 +298,8 @@ class _Body:
 
 def _warn_of_turns(history):
     """Give a ModelWarning where a torsional spring has passed the angle up to which it is one."""
-    turns = history.system.forces.turns(history.u)
+    forces = history.system.forces
+    turns = forces.turns(history.u) if forces.elements else ()
     if not len(turns):
         return
     jumps = np.nonzero(np.any(np.abs(np.diff(turns, axis=1)) > 1.5 * np.pi, axis=0))[0]

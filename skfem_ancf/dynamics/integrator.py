@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,6 +34,8 @@ BLOCK, STORED = 256, 2_000_000
 #: Coordinates up to which work arrays are kept for the next motion: there making them takes longer
 #: than some steps.
 LENT = 1000
+#: Compiled code gives no warnings, and where plain texts give them is known.
+_ALOUD: AbstractContextManager[None] = nullcontext()
 
 
 class StepFailed(Exception):
@@ -218,12 +221,15 @@ class Integrator:
         s, contacts = self.system, self.system.forces.contacts
         y = Motion(t, u.copy(), v.copy(), np.zeros(s.N), np.zeros(s.N),
                    np.zeros(s.m))
-        y.u[s.fixed] = s.values(1.0, t)
+        if s.moves:
+            y.u[s.fixed] = s.values(1.0, t)
+            y.v[s.fixed], y.acceleration[s.fixed] = self.support_rates(t, dt, ahead)
+        else:
+            y.u[s.fixed] = y.v[s.fixed] = 0.0
         gap = np.max(np.abs(s.constraint(y.u, t))) if s.m else 0.0
         if gap > 1e-8 * s.size:
             raise SupportError(f"the joints are open by {gap:.3g} at the start: begin with beams "
                                "that fit, or from a static solution (start=)")
-        y.v[s.fixed], y.acceleration[s.fixed] = self.support_rates(t, dt, ahead)
         rate, J = np.zeros(s.m), None
         if s.joints:
             J, driven = s.full_jacobian(y.u, t), self._driven(y.u, t, dt, ahead)
@@ -236,15 +242,16 @@ class Integrator:
             elif contacts.lasting:
                 now = contacts.begin(y.u, t) if memory is None else memory
                 y.memory = {"contacts": contacts.tables.memory.copy() if now is None else now}
-            force = (s.external_force(y.u, t) - s.internal_force(y.u, t)
-                     - s.mass.multiply(y.acceleration))
+            force = s.external_force(y.u, t) - s.internal_force(y.u, t)
+            if s.moves:
+                force -= s.mass.multiply(y.acceleration)
             if s.damped:
                 force = force - s.damping_force(y.u, y.v, t)
         acceleration, y.multipliers = s.solve_mass(force, y.u, t, rate, J)
-        y.acceleration = y.acceleration + acceleration
+        y.acceleration += acceleration
         y.algorithmic, y.force = y.acceleration.copy(), y.multipliers
-        soon = y.v + dt * y.acceleration  # from rest there is no energy yet
-        self.expect(max(float(0.5 * v @ s.mass.multiply(v)) for v in (y.v, soon)))
+        for v in (y.v, y.v + dt * y.acceleration):  # from rest there is no energy yet
+            self.expect(0.5 * float(v @ s.mass.multiply(v)))
         self.expect(s.strain_energy(y.u, t))
         return y
 
@@ -320,8 +327,9 @@ class Integrator:
             self._dt, self._state[READY] = dt, 0.0
         self._state[[BEFORE, FAILURE, DISSIPATED]] = y.before, 0.0, y.dissipated
         function, equations = self.machine.of(text)
+        asks = self.machine.tables.asks
         try:
-            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            with np.errstate(all="ignore") if asks else _ALOUD:
                 done = function(equations, self.matrices, *args)
         except BaseException:  # also Ctrl-C: the motion may go on from y
             self._state[:], self._state[READY] = before, 0.0

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
+from math import ceil, ulp
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -104,7 +106,7 @@ class Run:
         self.sizes = None
         if task.dt is None:
             self.sizes = StepSize(system, scheme, task.rtol, task.t_start, task.t_end)
-        self._times = np.array([task.t_start, *task.breakpoints, task.t_end], dtype=float)
+        self._times = task.t_start, *task.breakpoints, task.t_end
         self.segment = self.n = self._next = self.steps = self.rejected = 0
         self.size = 1e-4 * task.span if task.dt is None else task.dt
         self.history = History(system, scheme, self)
@@ -178,11 +180,11 @@ class Run:
 
     @property
     def _begun(self):
-        return float(self._times[self.segment])
+        return self._times[self.segment]
 
     @property
     def _end(self):
-        return float(self._times[self.segment + 1])
+        return self._times[self.segment + 1]
 
     @property
     def _last(self):
@@ -195,10 +197,10 @@ class Run:
 
     def _limit(self):
         """Functions of time are asked before a breakpoint in the steps that end there."""
-        near = 16 * np.spacing(max(abs(self._begun), abs(self._end)))
+        near = 16 * ulp(max(abs(self._begun), abs(self._end)))
         self.integrator.limit = np.inf if self._last else self._end - near
-        self._count = 0 if self.sizes else max(1, int(np.ceil(
-            (self._end - self._begun) / self.size * (1 - 1e-12))))
+        self._count = 0 if self.sizes else max(1, ceil(
+            (self._end - self._begun) / self.size * (1 - 1e-12)))
         even = abs(self._begun + self._count * self.size - self._end) < 1e-9 * self.size
         # the last step may be shorter; the others are of one size, to keep the factors
         self._whole = self._count if even and self._last else self._count - 1
@@ -288,7 +290,7 @@ class Run:
                 self._look_beyond(new)
         else:
             self.n += 1
-        self._store(old, new)
+        self._store(partial(_same, old), new)
         self.recorder.record([new])
         self.y, self.steps = new, self.steps + 1
 
@@ -320,14 +322,14 @@ class Run:
         wanted = self.task.t_eval
         return np.inf if wanted is None or self._next == len(wanted) else wanted[self._next]
 
-    def _store(self, old, new):
-        """Keep what was asked for of the step from one Motion to the next."""
+    def _store(self, begin, new):
+        """Keep what was asked for of a step to a Motion; ``begin()`` is the one before it."""
         if self.task.t_eval is None:
             self.history.append(new)
             return
         until = new.t + 1e-14 * max(abs(self.task.t_start), abs(self.task.t_end))
-        while self._wanted() <= until:
-            self.history.append(self._between(old, new, float(self._wanted())))
+        while (t := float(self._wanted())) <= until:
+            self.history.append(new if t == new.t else self._between(begin(), new, t))
             self._next += 1
         if self.event is not None:
             self.history.end(new)
@@ -351,9 +353,9 @@ class Run:
                 wanted = self._wanted()
                 until = (wanted - self._begun) / self.size - 1 - first if wanted < np.inf else done
                 k = int(min(max(k, until - 1), done - 1))
-            before = last if k == old + 1 else instant(k - 1)
+            begin = partial(instant, k - 1) if k > old + 1 else partial(_same, last)
             last = instant(k)
-            self._store(before, last)
+            self._store(begin, last)
         self.n, self.steps, self.y = first + done, self.steps + done, last
 
     def _between(self, old, new, t):
@@ -412,6 +414,10 @@ class Run:
         self.segment, self.n, self._next, self.steps, self.rejected = map(int, memory["counts"])
         self.size = float(memory["size"])
         self._limit()
+
+
+def _same(y):
+    return y
 
 
 def interpolate(a: Motion, b: Motion, t: float) -> Motion:
