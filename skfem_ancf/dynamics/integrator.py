@@ -250,8 +250,8 @@ class Integrator:
         acceleration, y.multipliers = s.solve_mass(force, y.u, t, rate, J)
         y.acceleration += acceleration
         y.algorithmic, y.force = y.acceleration.copy(), y.multipliers
-        for v in (y.v, y.v + dt * y.acceleration):  # from rest there is no energy yet
-            self.expect(0.5 * float(v @ s.mass.multiply(v)))
+        for rate in (y.v, y.v + dt * y.acceleration):  # from rest there is no energy yet
+            self.expect(0.5 * float(rate @ s.mass.multiply(rate)))
         self.expect(s.strain_energy(y.u, t))
         return y
 
