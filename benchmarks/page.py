@@ -12,8 +12,8 @@ import re
 from pathlib import Path
 
 from work_precision import large
-from work_precision.report import (DECADES, EXUDYN, GOALS, OURS, Q2, fastest, goals, sweeps, table,
-                                   tangents)
+from work_precision.report import (DECADES, EXUDYN, GOALS, OURS, Q2, at, fastest, goals, places,
+                                   sweeps, table, tangents, weakest)
 
 NUMBERS = {"error": float, "seconds": float, "whole_seconds": float, "cold_seconds": float,
            "setup_seconds": float, "peak_mb": float, "elements": int, "dofs": int, "steps": int,
@@ -67,15 +67,16 @@ def ratio(rows, peer, target, key, factor):
 def factor(case, key, target):
     """The factor of the goal on a case at an error, or None."""
     return next((g.factor for g in GOALS if g.case == case and g.key == key
-                 and any(abs(t / target - 1.0) < 1e-6 for t in g.targets)), None)
+                 and (1.0 - 1e-6) * min(g.targets) < target < (1.0 + 1e-6) * max(g.targets)), None)
 
 
 def duel(case, peer):
     """Lines for a case: the solution and the whole of both, at each error."""
     def lines(results):
         rows, out = results[case], []
-        for target in sorted({t for g in GOALS if g.case == case for t in g.targets}, reverse=True):
-            cells = [f"{target:.0e}"]
+        ours = [g for g in GOALS if g.case == case]
+        for target in sorted({t for g in ours for t in places(rows, g)}, reverse=True):
+            cells = [at(target, ours[0].targets)]
             for code in (OURS, peer):
                 solved, whole = (fastest(rows, code, target, key)
                                  for key in ("seconds", "whole_seconds"))
@@ -97,7 +98,7 @@ def cold(rows):
 
 
 def others(results):
-    """Ratios of the other cases, solve and whole; None if one is missing."""
+    """Ratios of the other cases, solve and whole, and the least between; None if one is missing."""
     if not set(OTHERS) <= set(results):
         return None
 
@@ -106,8 +107,13 @@ def others(results):
                  for key in ("seconds", "whole_seconds")]
         return found[0] if found[0] == found[1] else " / ".join(found)
 
+    between = [f"{title}: {both(case, target)} at {target:.2e}" for case, title in OTHERS.items()
+               for goal in GOALS if goal.case == case
+               for target in weakest(results[case], goal)]
     return table(["case", *(f"{t:.0e}" for t in DECADES[1:])], [
-        [title, *(both(case, t) for t in DECADES[1:])] for case, title in OTHERS.items()])
+        [title, *(both(case, t) for t in DECADES[1:])] for case, title in OTHERS.items()]) + (
+        [f"Least between these errors: {'; '.join(between)}.", ""]
+        if between else [])
 
 
 def sweep(results):

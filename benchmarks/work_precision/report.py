@@ -1,5 +1,6 @@
 """The report: the goals as ratios within one run, and the fronts behind them."""
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ DECADES = 10.0 ** -np.arange(1.0, 8.0)
 
 
 class Goal(NamedTuple):
-    """So many times faster than a peer at each error of a case."""
+    """So many times faster than a peer at each error of a case, and everywhere between them."""
 
     wanted: str
     case: str
@@ -67,15 +68,53 @@ def named(r, key="seconds"):
     return f"{1e3 * r[key]:.3g} ms ({r['variant']}; {r['elements']} elements{steps})"
 
 
-def against(rows, peer, targets, factor=1.0, key="seconds"):
-    """Rows (target, ratio, verdict, ours, peer's) of one goal: factor times faster than a peer."""
+def lead(rows, peer, target, key="seconds"):
+    """How many times faster than a peer at an error; 0 if only the peer reaches it."""
+    mine, its = fastest(rows, OURS, target, key), fastest(rows, peer, target, key)
+    return 0.0 if mine is None else np.inf if its is None else its[key] / mine[key]
+
+
+def weakest(rows, goal):
+    """Errors between each of a goal's and the next at which it is missed or the lead is least.
+
+    Not where that is as at one of them. The lead falls, as the error grows, only where a run of the
+    peer becomes good enough.
+    """
+    def ahead(error):
+        return lead(rows, goal.peer, error, goal.key)
+
+    peer = [r for r in usable(rows) if r["code"] == goal.peer]
+    errors = [e for e in sorted({r["error"] for r in peer})
+              if fastest(peer, goal.peer, e, goal.key)["error"] == e]
     out = []
-    for target in targets:
-        mine, its = fastest(rows, OURS, target, key), fastest(rows, peer, target, key)
-        ratio = its[key] / mine[key] if mine and its else None
-        met = mine is not None and (its is None or ratio >= factor)
-        out.append((f"{target:.0e}", "" if ratio is None else f"{ratio:.3g}",
-                    "met" if met else "missed", named(mine, key), named(its, key)))
+    for high, low in pairwise(sorted(goal.targets, reverse=True)):
+        ends = ahead(low), ahead(high)
+        inside = {e: ahead(e) for e in errors if low < e < high and ahead(e) not in ends}
+        least = min(inside.values(), default=np.inf)
+        out += [e for e, found in inside.items()
+                if found < goal.factor or found == least < min(ends)]
+    return out
+
+
+def places(rows, goal):
+    """Errors at which a goal is judged, the largest first."""
+    return sorted([*goal.targets, *weakest(rows, goal)], reverse=True)
+
+
+def at(error, targets):
+    """An error in a few digits."""
+    return f"{error:.0e}" if error in targets else f"{error:.2e}"
+
+
+def against(rows, goal):
+    """Rows (error, ratio, verdict, ours, peer's) of one goal: factor times faster than a peer."""
+    out = []
+    for target in places(rows, goal):
+        mine, its = (fastest(rows, code, target, goal.key) for code in (OURS, goal.peer))
+        ratio = lead(rows, goal.peer, target, goal.key)
+        out.append((at(target, goal.targets), f"{ratio:.3g}" if mine and its else "",
+                    "met" if mine and ratio >= goal.factor else "missed",
+                    named(mine, goal.key), named(its, goal.key)))
     return out
 
 
@@ -85,7 +124,7 @@ def goal_against(results, goal):
         return [f"**{goal.wanted}**: not measured in this run.", ""]
     if not any(r["code"] == goal.peer for r in results[goal.case]):
         return [f"**{goal.wanted}**: not measured, {goal.peer} did not take part.", ""]
-    rows = against(results[goal.case], goal.peer, goal.targets, goal.factor, goal.key)
+    rows = against(results[goal.case], goal)
     met = sum(r[2] == "met" for r in rows)
     verdict = "met" if met == len(rows) else f"met at {met} of {len(rows)}" if met else "missed"
     return [f"**{goal.wanted}**: {verdict}.", "",
@@ -108,8 +147,7 @@ def goals(results):
         rows = results.get(goal.case, ())
         if any(r["code"] == goal.peer for r in rows) and all(goal.key in r for r in rows):
             out += [(goal.wanted, f"error {target}", f"{goal.factor:g} times", ratio, *rest)
-                    for target, ratio, *rest in against(rows, goal.peer, goal.targets, goal.factor,
-                                                        goal.key)]
+                    for target, ratio, *rest in against(rows, goal)]
     for n, pairs, _, fused, verdict in tangents(results.get("tangent", ())):
         out.append((TANGENT, f"{n} elements", "100 times", f"{pairs / fused:.3g}", verdict,
                     f"{1e3 * fused:.3g} ms", f"{1e3 * pairs:.3g} ms"))
