@@ -267,7 +267,7 @@ class System:
             Time, for force elements; in statics the load factor in place of it.
         """
         self._require_coordinates(u)
-        if not self.forces.elements and not np.any(u):
+        if not self.forces.elements and not u.any():
             return self._force_at_rest.copy()
         return self._evaluate(FORCE, u, load=load, t=t)
 
@@ -414,7 +414,7 @@ class System:
         t
             Time, for obstacles that move; in statics the load factor.
         """
-        energy = self._energy_of_beams(u) if np.any(u) else self._energy_at_rest
+        energy = self._energy_of_beams(u) if u.any() else self._energy_at_rest
         if self.forces.elements:
             energy += self.forces.potential(self.machine.tables.plain.forces, u, t)
         return float(energy)

@@ -325,7 +325,8 @@ class Integrator:
         s, before, rows = self.system, self._state.copy(), args[-3]
         if dt != self._dt:
             self._dt, self._state[READY] = dt, 0.0
-        self._state[[BEFORE, FAILURE, DISSIPATED]] = y.before, 0.0, y.dissipated
+        state = self._state
+        state[BEFORE], state[FAILURE], state[DISSIPATED] = y.before, 0.0, y.dissipated
         function, equations = self.machine.of(text)
         asks = self.machine.tables.asks
         try:
@@ -429,7 +430,7 @@ class Integrator:
         """Numbers and arrays from which :meth:`recall` goes on as if there had been no break."""
         memory = {"state": self._state.copy(), "dt": np.array(self._dt),
                   "substeps": np.array(self.substeps)}
-        if self.ready:
+        if self.ready and self.scheme.text == "steps":
             memory.update({name: array.copy() for name, array in self._factors().items()})
         if self._nodes:
             steps, mass = self._nodes
@@ -444,7 +445,7 @@ class Integrator:
         self.substeps = int(memory["substeps"])
         self.kept = {name[5:]: np.array(array) for name, array in memory.items()
                      if name.startswith("kept ")}
-        if self.ready:
+        if self.ready and self.scheme.text == "steps":
             for name, array in self._factors().items():
                 array[...] = memory[name]
         if self._nodes:

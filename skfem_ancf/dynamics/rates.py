@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 PARTS = 4
 _FIRST = np.array([25.0, -48.0, 36.0, -16.0, 3.0]) / 12.0
 _SECOND = np.array([35.0, -104.0, 114.0, -56.0, 11.0]) / 12.0
+_DIFFERENCES = np.array([_FIRST, _SECOND])
 
 
 def rates(function: Callable[[Array], Array], t: float, dt: float, ahead: bool = False,
@@ -46,8 +47,13 @@ def rates(function: Callable[[Array], Array], t: float, dt: float, ahead: bool =
         Shapes (...).
     """
     h = dt / PARTS if ahead else -dt / PARTS
-    f = function(np.minimum(t + h * np.arange(PARTS + 1), limit))
-    return np.tensordot(_FIRST, f, 1) / -h, np.tensordot(_SECOND, f, 1) / h**2
+    first, second = _both(function(np.minimum(t + h * np.arange(PARTS + 1), limit)))
+    return first / -h, second / h**2
+
+
+def _both(f):
+    """The differences of values (PARTS + 1, ...), from the last one back, as two arrays (...)."""
+    return (_DIFFERENCES @ f.reshape(PARTS + 1, -1)).reshape(2, *f.shape[1:])
 
 
 def step_rates(function: Callable[[Array], Array], times: Array,
@@ -70,9 +76,9 @@ def step_rates(function: Callable[[Array], Array], times: Array,
     """
     f, h = function(times), dt / PARTS
     n = len(f) - 1
-    back = [f[PARTS - k:n + 1 - k:PARTS] for k in range(PARTS + 1)]
-    return (f[PARTS // 2::PARTS], back[0], np.tensordot(_FIRST, back, 1) / h,
-            np.tensordot(_SECOND, back, 1) / h**2)
+    back = np.array([f[PARTS - k:n + 1 - k:PARTS] for k in range(PARTS + 1)])
+    first, second = _both(back)
+    return f[PARTS // 2::PARTS], back[0], first / h, second / h**2
 
 
 # of joints

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from ..types import Array
     from .sensors import Sensor
 
+#: Part of a step by which one may end before an instant that is looked for there.
+NEARLY = 1e-6
 #: Part of a step up to which an instant is interpolated: a step that short is all round-off.
 CLOSE = 1e-6
 #: Seconds after which a block of steps is to be seen: by a progress bar, and on Ctrl-C.
@@ -352,7 +354,7 @@ class Run:
             if self.task.t_eval is not None:
                 wanted = self._wanted()
                 until = (wanted - self._begun) / self.size - 1 - first if wanted < np.inf else done
-                k = int(min(max(k, until - 1), done - 1))
+                k = min(max(k, ceil(until - NEARLY)), done - 1)
             begin = partial(instant, k - 1) if k > old + 1 else partial(_same, last)
             last = instant(k)
             self._store(begin, last)

@@ -192,6 +192,8 @@ class Recorder:
 
     def readings(self) -> Readings:
         """What was read so far."""
+        if not self.sensors:
+            return Readings(np.zeros(0), {})
         return Readings(np.concatenate([np.zeros(0), *self._t]), {
             name: np.concatenate(read) if read else np.zeros(0)
             for (name, _), read in zip(self.sensors, self._read)})
