@@ -3,6 +3,7 @@
 import math
 import warnings
 from functools import lru_cache
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -533,6 +534,28 @@ def test_only_asked_instants_are_stored():
         assert np.allclose(some.v[k], every.v[n], rtol=0, atol=1e-13)
     assert len(some.multipliers) == len(some.acceleration) == 5
     assert len(scene.integrate(1.0, 0.01, t_eval=[0.7])) == 1
+
+
+@pytest.mark.parametrize("scheme", ["radau", "generalized-alpha"])
+def test_instants_beside_the_ends_of_steps(scheme, monkeypatch):
+    """Of a block only those steps are made to Motions that hold an instant."""
+    scene, made = smooth_scene(), []
+    every, at = scene.integrate(0.3, 0.01, scheme=scheme), np.array([0.02, 0.15, 0.3])
+    monkeypatch.setattr("skfem_ancf.dynamics.run.Run._first_pace", lambda self: 1000)
+    for name in ("collocation", "integrator"):
+        module = import_module(f"skfem_ancf.dynamics.{name}")
+        motion = module.Motion
+        monkeypatch.setattr(module, "Motion", lambda *args, motion=motion, **given: (
+            made.append(args[0]) or motion(*args, **given)))
+    for shift in (0.0, -1e-12, -3e-9, 3e-9):
+        made.clear()
+        t = at[:2] + shift if shift > 0.0 else at + shift
+        some = scene.integrate(0.3, 0.01, scheme=scheme, t_eval=t)
+        n = [2, 15, 30][:len(t)]
+        assert some.t.tolist() == t.tolist() and some.steps == 30
+        near = 1e-13 + 0.01 * abs(shift) * np.abs(every.v).max()
+        assert_allclose(some.u, every.u[n] + shift * every.v[n], rtol=0, atol=near)
+        assert shift or made == [0.0, *t]
 
 
 @pytest.mark.parametrize("options", [{"dt": 1e-3}, {"dt": "auto"}])

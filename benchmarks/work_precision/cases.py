@@ -112,7 +112,7 @@ def roll_up(p):
 def motion(p, scale=1, adaptive=True):
     """Meshes times step sizes; ``scale`` divides the numbers of steps."""
     def counts(least, most):
-        return [int(250 * f) // scale for f in (0.5, 1, 2, 4, 8, 16, 24, 32) if least <= f <= most]
+        return _counts(scale, least, most)
 
     for degree, meshes in ((3, ((6, 4), (8, 8), (16, 16), (32, 32))),
                            (5, ((3, 4), (4, 8), (8, 16), (12, 32))),
@@ -138,9 +138,12 @@ def motion(p, scale=1, adaptive=True):
         yield ours.run(p, "cable", degree, n, steps=400, scheme="radau", tol=tol)
     yield ours.run(p, "cable", 5, 4, steps=100, scheme="gauss", points=2, tol=2e-3)
     for degree, n in ((5, 1), (5, 2), (5, 3), (5, 4), (7, 2), (9, 1)):  # each step turns it far
-        for steps in (14, 16, 18, 20, 30, 40):
-            for tol in (1e-3, 5e-4, 1e-5):
+        for steps in (13, 14, 16, 18, 20, 22, 30, 40):
+            for tol in (8e-3, 3e-3, 1e-3, 3e-4, 1e-5):
                 yield ours.run(p, "cable", degree, n, steps=steps, scheme="radau", tol=tol)
+    for n in (4, 5, 6):
+        for steps in (80, 100):
+            yield ours.run(p, "cable", 3, n, steps=steps // scale, tol=1e-3)
     if adaptive:
         for n, rtol in ((4, 1e-4), (4, 1e-5), (6, 1e-6), (8, 1e-7)):
             yield ours.run(p, "cable", 5, n, rtol=rtol, tol=1e-6)
@@ -151,19 +154,34 @@ def motion(p, scale=1, adaptive=True):
         yield ours.run(p, "ancf", 2, n, steps=1000 // scale, tol=1e-6)
     for kind, order in (("cable", 5), ("cubic", 2)):
         yield ours.run(p, kind, order, 8, steps=1000 // scale, tol=1e-6, compiled=False)
-    if exudyn_beams.exudyn is None:
-        return
+    if exudyn_beams.exudyn is not None:
+        yield from peer_motion(p, scale)
+
+
+def _counts(scale, least, most):
+    return [int(250 * f) // scale for f in (0.5, 1, 2, 4, 8, 16, 24, 32) if least <= f <= most]
+
+
+def peer_motion(p, scale):
+    """The same of Exudyn."""
     for n, least, most in ((4, 0.5, 2), (6, 0.5, 2), (8, 0.5, 4), (12, 1, 8), (16, 1, 16),
                            (24, 2, 32), (32, 2, 32), (48, 4, 32), (64, 8, 32)):
         for rtol, low, high in ((1e-2, 0.5, 4), (1e-4, 0.5, 24), (1e-6, 4, 32)):
-            for steps in counts(max(least, low), min(most, high)):
+            for steps in _counts(scale, max(least, low), min(most, high)):
                 yield exudyn_beams.run(p, "ANCFCable2D", n, steps, rtol)
     for n in (8, 16, 32):
-        for steps in counts(1, n):
+        for steps in _counts(scale, 1, n):
             yield exudyn_beams.run(p, "GE2D quadratic", n, steps, 1e-4)
-    for steps in counts(1, 2):
-        yield exudyn_beams.run(p, "ANCFCable2D", 8, steps, 1e-4, dense=True)
-        yield exudyn_beams.run(p, "ANCFCable2D", 8, steps, 1e-4, modified=False)
+    for n in (4, 5, 6, 7, 8):  # small: dense factors, kept or new ones in each iteration
+        for steps in (100, 125, 150, 200, 250, 300, 400, 500):
+            for rtol, modified in ((1e-2, None), (1e-3, None), (1e-2, False)):
+                yield exudyn_beams.run(p, "ANCFCable2D", n, steps // scale, rtol, True, modified)
+    for n in (8, 9, 10, 12):
+        for steps in (400, 500, 600, 800, 1000):
+            yield exudyn_beams.run(p, "ANCFCable2D", n, steps // scale, 1e-3)
+    for n in (10, 12, 16, 24):
+        for steps in (500, 1000):
+            yield exudyn_beams.run(p, "ANCFCable2D", n, steps // scale, 1e-2, modified=False)
 
 
 def spin_up(p):
@@ -180,9 +198,12 @@ def spin_up(p):
     for degree, n in ((5, 2), (5, 4), (7, 4)):
         for steps in (15, 25, 50, 100):
             yield ours.run(p, "cable", degree, n, steps=steps, scheme="radau", tol=1e-7)
-    for steps in (15, 20, 25):
-        yield ours.run(p, "cable", 3, 2, steps=steps, tol=1e-3)
-        yield ours.run(p, "cable", 5, 1, steps=steps, scheme="radau", tol=1e-3)
+    for steps in (10, 12, 15, 20, 25):
+        for n in (2, 3):
+            yield ours.run(p, "cable", 3, n, steps=steps, tol=1e-3)
+            yield ours.run(p, "cable", 3, n, steps=steps, scheme="energy-momentum", tol=1e-3)
+        for tol in (1e-3, 1e-4):
+            yield ours.run(p, "cable", 5, 1, steps=steps, scheme="radau", tol=tol)
     for steps in (100, 500, 2000):
         yield ours.run(p, "cubic", 2, 4, steps=steps, tol=1e-6)
     if exudyn_beams.exudyn is None:
@@ -192,6 +213,11 @@ def spin_up(p):
             for rtol in (1e-4, 1e-6) if steps > 250 else (1e-2, 1e-4):
                 yield exudyn_beams.run(p, "ANCFCable2D", n, steps, rtol)
                 yield exudyn_beams.run(p, "GE2D quadratic", n, steps, rtol)
+    for kind in ("ANCFCable2D", "GE2D quadratic"):  # dense factors, kept or new in each iteration
+        for n in (1, 2, 3, 4):
+            for steps in (15, 20, 25, 35, 50, 75, 100, 150, 250, 500, 1000):
+                for rtol, modified in ((1e-3, False), (1e-4, False), (1e-4, None)):
+                    yield exudyn_beams.run(p, kind, n, steps, rtol, True, modified)
 
 
 def quick(p):
