@@ -34,8 +34,8 @@ BLOCK, STORED = 256, 2_000_000
 #: Coordinates up to which work arrays are kept for the next motion: there making them takes longer
 #: than some steps.
 LENT = 1000
-#: Compiled code gives no warnings, and where plain texts give them is known.
-_ALOUD: AbstractContextManager[None] = nullcontext()
+#: Of texts that ask no function in Python: what runs them sees to warnings.
+_NOTHING: AbstractContextManager[None] = nullcontext()
 
 
 class StepFailed(Exception):
@@ -330,7 +330,7 @@ class Integrator:
         function, equations = self.machine.of(text)
         asks = self.machine.tables.asks
         try:
-            with np.errstate(all="ignore") if asks else _ALOUD:
+            with np.errstate(all="ignore") if asks else _NOTHING:
                 done = function(equations, self.matrices, *args)
         except BaseException:  # also Ctrl-C: the motion may go on from y
             self._state[:], self._state[READY] = before, 0.0
