@@ -129,7 +129,8 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         add("scheme", "computed", f'scheme="auto" takes {scheme!r}: {reason}')
     sensors = scene.sensors if dynamic else {}
     add("sensors", "computed" if sensors else "skipped",
-        f"{len(sensors)} read at every step" if sensors else "there are none")
+        f"{len(sensors)} read at every step" if sensors else
+        "they record motions" if scene.sensors else "there are none")
     add("fields", "skipped", "strain and stress are computed where a State is asked for them")
     return Plan(items)
 

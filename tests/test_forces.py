@@ -14,6 +14,7 @@ from skfem_ancf import (HHT, Beam, ElementBeamANCF, ElementBeamANCFCubic, Elemen
 from skfem_ancf.errors import CheckpointError
 from skfem_ancf.forces import ForceElement, point, section
 from skfem_ancf.forces.texts import add_elastic_force, add_resisting_force
+from skfem_ancf.quadrature import gauss
 
 E, H = 2e8, 0.01
 EI, RHO_A = E * H**4 / 12, 7800 * H**2
@@ -460,6 +461,27 @@ def test_base_excitation_by_a_moving_support_moves_what_springs_hold():
     history = scene.integrate(0.2, 1e-3)
     assert_allclose(history.position((0, 0))[:, 1], 0.01 * np.sin(5 * history.t), atol=1e-12)
     assert history.dissipated[-1] > 0.0
+
+
+def test_a_shaken_cantilever_vibrates_as_its_modes():
+    """From rest by a base whose acceleration is a cos w t: five modes of Bernoulli's beam."""
+    h, modulus, rho, w, a = 0.01, 2e9, 1000.0, 9.0, 1e-2
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 13), h)
+    scene = Scene(Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(modulus, 0.0, rho), h))
+    scene.joint("position", at=(0, 0), r=lambda t: np.array([0.0, a / w**2 * (1 - np.cos(w * t))]))
+    scene.joint("angle", at="left", angle=lambda t: 0.0)
+    history = scene.integrate(0.8, 2e-3, scheme="generalized-alpha")
+    x, weights = gauss(60)
+    tip = np.zeros(len(history.t))
+    for start in 0.5, 3.5, 6.5, 9.5, 12.5:
+        b = brentq(lambda b: np.cos(b) * np.cosh(b) + 1, start, start + 3)
+        s = (np.sinh(b) - np.sin(b)) / (np.cosh(b) + np.cos(b))
+        mode, end = (np.cosh(z) - np.cos(z) - s * (np.sinh(z) - np.sin(z)) for z in (b * x, b))
+        own = b**2 * np.sqrt(modulus * h**2 / (12 * rho))
+        tip -= (weights @ mode) / (weights @ mode**2) * end * a * (
+            np.cos(w * history.t) - np.cos(own * history.t)) / (own**2 - w**2)
+    found = history.displacement((1, 0))[:, 1] - history.displacement((0, 0))[:, 1]
+    assert_allclose(found, tip, rtol=0, atol=2e-3 * np.abs(tip).max())
 
 
 class Listed(ForceElement):

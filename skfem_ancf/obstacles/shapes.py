@@ -157,7 +157,7 @@ class Line(Shape):
         return clipped(self.point, self._unit, box)
 
     def __repr__(self) -> str:
-        return f"<Line at {shown(self.point)}, normal {shown(self.normal)}>"
+        return f"<Line at {_pair(self.point)}, normal {_pair(self.normal)}>"
 
 
 @teaching
@@ -204,7 +204,7 @@ class Circle(Shape):
         return circle(self.center, self.radius, 96)
 
     def __repr__(self) -> str:
-        return f"<Circle about {shown(self.center)}, radius {self.radius:g}>"
+        return f"<Circle about {_pair(self.center)}, radius {self.radius:g}>"
 
 
 @teaching
@@ -279,6 +279,10 @@ class Polygon(Shape):
         return f"<Polygon of {len(self.points)} corners>"
 
 
+def _pair(x):
+    return f"({x[0]:g}, {x[1]:g})"
+
+
 def _thin(corners, edges, side):
     """Half of the least way from the middle of an edge through what is solid to another edge."""
     middle, normal = corners + 0.5 * edges, side * np.array([-edges[:, 1], edges[:, 0]]).T
@@ -300,7 +304,7 @@ def _require_simple(points):
     sides = np.roll(points, -1, axis=0) - points
     short, = np.nonzero(np.hypot(*sides.T) <= 1e-12 * np.abs(points).max())
     if len(short):
-        raise InputError(f"the corner {short[0]} of the polygon, {shown(points[short[0]])}, and "
+        raise InputError(f"the corner {short[0]} of the polygon, {_pair(points[short[0]])}, and "
                          "the next are one place: leave one of them out")
 
     def turn(a, b, c):
@@ -315,8 +319,8 @@ def _require_simple(points):
                 shared, p, q = (b, a, d) if j == i + 1 else (a, b, c)
                 crosses = turn(shared, p, q) == 0.0 and (p - shared) @ (q - shared) > 0.0
             if crosses:
-                raise InputError(f"the sides {i} and {j} of the polygon, from {shown(a)} to "
-                                 f"{shown(b)} and from {shown(c)} to {shown(d)}, cross: give its "
+                raise InputError(f"the sides {i} and {j} of the polygon, from {_pair(a)} to "
+                                 f"{_pair(b)} and from {_pair(c)} to {_pair(d)}, cross: give its "
                                  "corners in order, round what is solid")
 
 

@@ -46,6 +46,9 @@ class Layers(Section):
                 raise InputError(f"layer {k} must be a thickness and a material, and perhaps a "
                                  f"width, as (0.001, steel), got {shown(layer)}")
             own = layer[2] if len(layer) == 3 else width
+            if own is None:
+                raise InputError(f"layer {k} has no width: give width= for all layers, or one of "
+                                 f"its own, as ({shown(layer[0])}, material, 0.01)")
             found.append((
                 None if layer[0] is None else require_positive(f"the thickness of layer {k}",
                                                                layer[0]),
