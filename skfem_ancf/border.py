@@ -82,6 +82,10 @@ def factors_of(before: Band, after: Band, J: Array, S: Array) -> Factors:
                    rest, weight, closing, more, np.empty(n), np.empty((n, n)))
 
 
+#: No numbers: vectors, a matrix, and integers.
+_NONE = np.empty(0), np.empty((0, 0)), np.empty(0, np.int64)
+
+
 def new_factors(border: Border, A: Band, m: int, N: int) -> Factors:
     """Room for the factors of A with m multipliers; none where there is no border to make.
 
@@ -92,11 +96,10 @@ def new_factors(border: Border, A: Band, m: int, N: int) -> Factors:
     m, N
         Numbers of multipliers and of coordinates.
     """
+    x, X, none = _NONE
     if border.wide > 0 or m == 0:
-        x, X = np.empty(0), np.empty((0, 0))
-        return Factors(A._replace(flat=x, pivots=np.empty(0, np.int64)), A, X, X, X, X, x, x, x, x,
-                       x, x, X)
-    before = A._replace(flat=np.empty(A.flat.size), pivots=np.empty(0, np.int64))
+        return Factors(A._replace(flat=x, pivots=none), A, X, X, X, X, x, x, x, x, x, x, X)
+    before = A._replace(flat=np.empty(A.flat.size), pivots=none)
     k = border.picked.size
     return factors_of(before, A, np.zeros((m, N)), np.zeros((k, k)))
 

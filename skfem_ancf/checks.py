@@ -95,14 +95,15 @@ class Screen:
         if self._none:
             return
         self._beams = beams
-        first = accumulate((b.N for b in beams), initial=0)
-        node = accumulate((b.N // b.nd for b in beams), initial=0)
+        first = accumulate([b.N for b in beams], initial=0)
         x = _joined([np.arange(n + 2, n + b.N, b.nd) for n, b in zip(first, beams)])
         self._tangents = x[:, None] + _BOTH
         self.start = _joined([_complex(b.mesh.p_X.T) for b in beams])
-        self._left, self._right = _joined([n + b.mesh.t for n, b in zip(node, beams)])
-        if len(self._left) == len(x) - 1:  # one chain
+        if sum([b.mesh.nelements for b in beams]) == len(x) - 1:  # one chain
             self._left, self._right = slice(len(x) - 1), slice(1, len(x))
+        else:
+            node = accumulate([b.N // b.nd for b in beams], initial=0)
+            self._left, self._right = _joined([n + b.mesh.t for n, b in zip(node, beams)])
         self.slender = _joined([b.mesh.height / b.mesh.lengths for b in beams])
         limits = [turning_limit(b) for b in beams]
         self._limit = limits[0] if len(set(limits)) == 1 else np.repeat(

@@ -68,11 +68,19 @@ class Constraints:
 
     def _eliminate(self, fixed, values, joints):
         """Sort joints that only fix coordinates to the supports, the others to the multipliers."""
-        zero, self.free = np.zeros(self.N), np.ones(self.N, dtype=bool)
+        self.free = np.ones(self.N, dtype=bool)
         self.free[fixed] = False
-        self.all_joints, self.joints, self._fixing = list(joints), [], []
-        fixed, held = [np.array(fixed, dtype=np.int64)], [np.zeros(len(fixed))]
-        values, first = np.array(values, dtype=float), len(fixed[0])
+        self.fixed, self.given = np.array(fixed, np.int64), np.array(values, float)
+        self.all_joints, self.joints, self._held = list(joints), [], np.zeros(len(fixed))
+        self._fixing: list[Any] = []
+        self._moving: list[Any] = []
+        if joints:
+            self._eliminate_joints(joints)
+        self.mask = self.free.astype(float)
+        self.m = sum([len(joint.equations) for joint in self.joints])
+
+    def _eliminate_joints(self, joints):
+        zero, fixed, held, first = np.zeros(self.N), [self.fixed], [self._held], len(self.fixed)
         for joint in joints:
             found = _fixes(joint, zero) if joint.constant else None
             if found is None:
@@ -91,10 +99,8 @@ class Constraints:
             held.append(0.0 * factors if joint.moving else -joint.value(zero, 0.0) / factors)
             first += len(dofs)
         self.fixed, self._held = np.concatenate(fixed), np.concatenate(held)
-        self.given = np.concatenate([values, np.zeros(first - len(values))])
+        self.given = np.concatenate([self.given, np.zeros(first - len(self.given))])
         self._moving = [item for item in self._fixing if item[0].moving]
-        self.mask = self.free.astype(float)
-        self.m = sum(len(joint.equations) for joint in self.joints)
 
     def describe_dof(self, k: int) -> str:
         """What coordinate number k is, in words."""

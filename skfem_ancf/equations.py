@@ -13,7 +13,7 @@ from .compiled.words import Words, constant
 from .forces.system import NO_FORCES
 from .forces.texts import ForceTables
 from .kept import cached_property, twin_of
-from .kernels.law import OWN, text_of, with_text
+from .kernels.law import LINEAR, OWN, text_of, with_text
 from .kernels.moments import MomentPack
 from .kernels.section import SectionPack, linearised
 from .own import handle_of
@@ -279,8 +279,8 @@ class Tables:
         steady, turning, linear, pushing, others = self._loads
         self._rows = [load for load in steady if load.amplitude is not None]
         vectors = np.zeros((1 + len(self._rows) + len(linear), s.N))
-        for load in steady:
-            row = 0 if load.amplitude is None else 1 + self._rows.index(load)
+        vectors[0] = s.constant_force
+        for row, load in enumerate(self._rows, 1):
             vectors[row, s.of(load)] += load.force(None)
         pushed = self._pushed(pushing)
         if not linear:
@@ -437,17 +437,15 @@ class Tables:
 
 def _with_laws(body, address):
     """A Body whose laws have the addresses of their texts."""
-    if not any(isinstance(pack, SectionPack) for pack in body.packs):
-        return body
 
     def addressed(pack):
-        if not isinstance(pack, SectionPack):
-            return pack
         law = with_text(pack.law)
         text = text_of(law)
         return pack._replace(law=law if text is None else law._replace(address=address(text)))
 
-    return body._replace(packs=tuple(map(addressed, body.packs)))
+    return body._replace(packs=tuple([
+        addressed(pack) if isinstance(pack, SectionPack) and pack.law.kind != LINEAR else pack
+        for pack in body.packs]))
 
 
 def _kind(load):

@@ -100,7 +100,7 @@ class System:
         self.offsets, self.N = np.array(offsets), offsets[-1]
         self.slices = [slice(a, b) for a, b in pairwise(offsets)]
         self._index = {id(b): k for k, b in enumerate(self.members)}
-        self.size = float(sum(b.size for b in self.beams)) or _extent(self.bodies)
+        self.size = float(sum([b.size for b in self.beams])) or _extent(self.bodies)
         self.constraints = Constraints(self.members, self.slices, self.size, fixed, values,
                                        [*self._directors(fixed), *joints],
                                        self._held_by_elements if elements else
@@ -464,8 +464,8 @@ class System:
         """
         if not self.beams:
             return self.stiffness_scale
-        total = sum(b.kernel.scale / b.size * float((1.0 / b.mesh.lengths).sum())
-                    for b in self.beams)
+        total = sum([b.kernel.scale / b.size * float((1.0 / b.mesh.lengths).sum())
+                     for b in self.beams])
         return EPS * self.size * sqrt(total)
 
     @cached_property

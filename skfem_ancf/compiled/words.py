@@ -89,6 +89,7 @@ def _plan(kind):
 
 
 def _fill(x, out):
+    inner = {}  # some are there twice
     for value, kind, axes in zip(x, *_plan(type(x))):
         if axes >= 0:
             if value.dtype != kind or value.ndim != axes or not value.flags.c_contiguous:
@@ -101,9 +102,11 @@ def _fill(x, out):
         elif kind is float:
             out.append(_WORD.unpack(_NUMBER.pack(value))[0])
         else:
-            known = _CONSTANT.get(id(value))
+            known = _CONSTANT.get(id(value)) or inner.get(id(value))
             if known is None:
+                first = len(out)
                 _fill(value, out)
+                inner[id(value)] = value, out[first:]
             else:
                 out += known[1]
 

@@ -860,8 +860,8 @@ class Kernel(Chain):
     @property
     def scale(self) -> float:
         """Modulus times volume."""
-        return sum(float(np.sum(t.pack.weights)) * t.slab.material.E * (
-            self.t.shape[1] if t.shared else 1) for t in self.firsts)
+        return sum([float(t.pack.weights.sum()) * t.slab.material.E * (
+            self.t.shape[1] if t.shared else 1) for t in self.firsts])
 
     def inverted(self, u: Array) -> bool:
         return any(first.inverted(pack, u_e) for first, pack, u_e in self._of_firsts(u))
