@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from .errors import InputError, MeshError
+from .errors import InputError, MeshError, shown
 from .mesh import MeshBeam
 from .taper import heights_of
 
@@ -53,6 +53,9 @@ class Heights:
 
     def __init__(self, given: Sequence[float | Callable[[Array], Any]]) -> None:
         self.given = tuple(given)
+
+    def __repr__(self) -> str:
+        return ", ".join(map(shown, self.given))
 
     def __call__(self, s: Array) -> Array:
         chain, out = chain_of(s), np.empty(len(s))

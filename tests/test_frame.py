@@ -731,6 +731,8 @@ def test_a_tapered_frame_of_any_section_is_that_of_welded_beams(element):
     assert_allclose(state.stress(x, beam="girder"), other.stress(x, beam=1), rtol=1e-6, atol=1e3)
     again = pickle.loads(pickle.dumps(frame))
     assert np.array_equal(again.solve_static(tol=1e-10).u, state.u)
+    with pytest.raises(PickleError, match="height.*<lambda>"):
+        pickle.dumps(portal(height=lambda s: slim(s)))
 
 
 class Graded:
