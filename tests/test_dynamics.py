@@ -301,10 +301,11 @@ def oscillator():
     none, zero, one = np.zeros(0, np.int64), np.zeros(1, np.int64), np.ones(1)
     moments = MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)), np.zeros((0, 2)),
                          np.zeros(0))
-    spring = LoadTables(np.zeros((0, 1)), moments, zero, zero, -one, zero, 0)
+    body, row = Body((), np.zeros((0, 8), np.int64)), np.zeros((0, 1))
+    spring = LoadTables(np.zeros((0, 1)), moments, zero, zero, -one, zero, body, np.zeros((0, 0)),
+                        0)
     joints = JointTables(none, none, none, np.zeros(0), none, none, 0)
     M, mass, A = (Band(np.array([1.0, 0.0]), zero, 2, 0, 0) for _ in range(3))
-    body, row = Body((), np.zeros((0, 8), np.int64)), np.zeros((0, 1))
     forces = Forces([], 1, 0).tables(lambda i, j: i, True, 0)
     equations = Equations(body, spring, joints, none, one, A, None, body, forces, body)
     return equations, Matrices(M, mass, A, Rows(row, row, row, row), Dampers(0, 0, 0, 0.0, A, row))
