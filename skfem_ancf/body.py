@@ -10,7 +10,7 @@ from .kernels.base import (CARRY, FORCE, GIVEN, MEAN, STRESS, TANGENT, VISCOUS, 
                            repeated)
 from .kernels.cable import CablePack, cable_evaluate
 from .kernels.section import SectionPack, section_evaluate
-from .source import I1, I2, primitive, shaped, source
+from .source import I1, I2, lanes, primitive, shaped, source
 
 if TYPE_CHECKING:
     from .beam import Beam
@@ -176,6 +176,21 @@ def body_stress(body, u, stresses):
     """The stresses at u."""
     evaluate_body(body, np.int64(STRESS), u, u, u, stresses, np.int64(0), stresses,
                   u, np.int64(0))
+
+
+@source
+def body_mean_stress(body, copies, weights, stresses, out):
+    """The mean stresses of copies, with weights."""
+    clear(out)
+    for k in range(body.table.shape[0]):
+        all_of_them, mean = _stress(copies, k, stresses), _stress(body, k, out)
+        size = mean.shape[2]
+        for j in range(weights.size):
+            one, weight = all_of_them[:, :, j * size:(j + 1) * size], weights[j]
+            for c in lanes(mean.shape[0]):
+                for p in lanes(mean.shape[1]):
+                    for e in lanes(size):
+                        mean[c, p, e] += weight * one[c, p, e]
 
 
 @source

@@ -11,7 +11,8 @@ import numpy as np
 
 from ..band import (SPARE, Band, clear, copy, dense_solve, factorize, factorize_complex, multiply,
                     solve, solve_complex, solve_joined)
-from ..body import (add_force_of, body_carry, body_force, body_mixed, body_stress, body_tangent)
+from ..body import (add_force_of, body_carry, body_force, body_mean_stress, body_mixed,
+                    body_stress, body_tangent)
 from ..forces.texts import (add_elastic_force, add_element_tangent, pace_contact,
                             settle_contact)
 from ..source import F1, F2, F3, borrowed, by_place, lanes, shaped, source
@@ -248,7 +249,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
     for _ in range(ITERATIONS):
         _states(e.free, method, s, w, step)
         if state[READY] == 0.0:
-            if not _factorize(e, matrices, method, s, w, step):
+            if not _factorize(e, matrices, method, s, w, state, step):
                 state[FAILURE] = SINGULAR
                 return False
             state[FACTORIZED] += method.values.shape[1]
@@ -535,7 +536,7 @@ def _join(method, s, w, k, r, q, x, y):
 
 
 @source
-def _factorize(e, matrices, method, s, w, step):
+def _factorize(e, matrices, method, s, w, state, step):
     """Factors of the iteration matrices at the mean of the points; False if there are none."""
     origin, f, S, yes = w.origin[0], w.x[0], w.stresses, w.x.size > 0
     at = step * (method.points.size + 1)
@@ -547,7 +548,10 @@ def _factorize(e, matrices, method, s, w, step):
             origin[i] += c * U[i]
     for k in range(1, method.points.size):
         copy(origin, w.origin[k])
-    body_stress(e.body, w.y[0], S[1])
+    if state[MIXED] > 0.0:
+        body_mean_stress(e.body, e.copies, method.weights, w.carried, S[1])
+    else:
+        body_stress(e.body, w.y[0], S[1])
     body_tangent(e.body, origin, f, S[1], yes, S[2], e.K)
     add_load_stiffness(e.loads, _row(s.factors, at), s.times[at], 1.0, origin, e.K)
     add_element_tangent(e.forces, s.times[at], origin, e.K)

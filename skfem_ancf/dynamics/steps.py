@@ -315,7 +315,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
         while left > 0:
             left, most = left - 1, most - 1
             if state[READY] == 0.0:
-                _tangent(e, matrices, rule, s, w)
+                _tangent(e, matrices, rule, s, w, state)
                 if not _factorize(e.free, matrices, rule, s, w, state):
                     return n
             _internal_force(e.body, rule, w, state)
@@ -619,14 +619,18 @@ def _judged(body, rule, w, state, wanted, rough):
 
 
 @source
-def _tangent(e, matrices, rule, s, w):
-    """The iteration matrix, with the stresses at the begin of the step.
+def _tangent(e, matrices, rule, s, w, state):
+    """The iteration matrix, with the stresses at the begin of the step, or means that are carried.
 
-    Those of an iterate may be far off: turning by a straight predictor stretches.
+    Those of an iterate may be far off: turning by a straight predictor stretches; and so may be
+    those that are carried to the end of the step, where stretching is not resolved.
     """
     M, A, dampers, yes = matrices.M.flat, matrices.A.flat, matrices.dampers, w.x.u.size > 0
     stresses = w.stresses
-    body_stress(e.body, w.y[0], stresses[1])
+    if state[MIXED] > 0.0 and rule.conserving > 0:
+        copy(stresses[3], stresses[1])
+    else:
+        body_stress(e.body, w.y[0], stresses[1])
     if dampers.viscous > 0:
         body_carry(e.viscous, w.y[0], w.y[1], stresses[1], stresses[1])
     _middle(rule, w)
