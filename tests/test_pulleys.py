@@ -1,0 +1,117 @@
+"""Belts on pulleys that turn, and on those that a controller pulls them over, with friction."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+from skfem_ancf.obstacles import Circle
+
+RADIUS, HEIGHT, WIDTH, TAIL, DENSITY = 0.1, 1e-3, 0.01, 0.1, 1000.0
+AXIS = RADIUS + HEIGHT / 2
+LEFT, RIGHT = (-AXIS, -TAIL), (AXIS, -TAIL)
+FRICTION, WEIGHT, SPRING = 0.3, 1.0, 1e3
+SCHEMES = "energy-momentum", "generalized-alpha"
+
+
+def hung(angle=None):
+    """A belt over half of a pulley, its ends guided upright, a weight at the right one."""
+    end = TAIL + np.pi * AXIS
+
+    def axis(s):
+        s = np.asarray(s, dtype=float)
+        phi = np.clip((s - TAIL) / AXIS, 0, np.pi)
+        up, down = np.minimum(s - TAIL, 0), np.maximum(s - end, 0)
+        return np.array([-AXIS * np.cos(phi), AXIS * np.sin(phi) + up - down])
+
+    s = np.concatenate([[0, TAIL / 2], np.linspace(TAIL, end, 9), [end + TAIL / 2, end + TAIL]])
+    belt = Beam(MeshBeam.init_curve(axis, s, HEIGHT), ElementBeamCable(5),
+                StVenantKirchhoff(1e8, 0.0, DENSITY), width=WIDTH)
+    scene = Scene(belt).fix("left", "r^1").fix("right", "r^1").point_force((0, -WEIGHT), at=RIGHT)
+    return scene.obstacle(Circle((0, 0), RADIUS - 2e-6), friction=FRICTION, stiffness=1e8,
+                          angle=angle)
+
+
+def turning(rate, ramp):
+    """The angle of a pulley that turns clockwise from the time 1 on, the static solution's."""
+    def angle(t):
+        s = max(t - 1.0, 0.0)
+        return -rate * (s * s / (2 * ramp) if s < ramp else s - ramp / 2)
+    return angle
+
+
+def power_of_motor(history, rate, ramp):
+    """The pulley's speed times minus the moment of the belt on it."""
+    moments = []
+    for state in history:
+        (x, y), (p, q) = state.contact().points, state.contact().force
+        moments.append((x * q - y * p).sum())  # on the belt
+    return -np.array(moments) * rate * np.clip((history.t - 1.0) / ramp, 0, 1)
+
+
+def work_of(power, t):
+    return np.append(0.0, np.cumsum(0.5 * np.diff(t) * (power[1:] + power[:-1])))
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_driven_pulley_slips_under_a_belt_that_is_held(scheme):
+    """exp(mu pi) of Euler and Eytelwein; the motor's work is what is lost, stored and moves."""
+    rate, ramp = 0.5, 0.01
+    scene = hung(turning(rate, ramp)).spring(SPRING, between=(LEFT, (-AXIS, -2 * TAIL)))
+    scene.damping(mass=200.0)
+    history = scene.integrate(1.1, 4e-4, t_start=1.0, start=scene.solve_static(), scheme=scheme)
+    last = history.state(-1)
+    pull = SPRING * last.displacement(LEFT)[1]
+    assert pull == pytest.approx(WEIGHT * np.exp(FRICTION * np.pi), rel=1e-2)
+    assert np.abs(last.velocity((0, AXIS))).max() < 0.03 * rate * RADIUS  # the belt is at rest
+    power = power_of_motor(history, rate, ramp)
+    assert power[-1] == pytest.approx((pull - WEIGHT) * AXIS * rate, rel=1e-2)
+    lost = np.polyfit(history.t[-25:], history.dissipated[-25:], 1)[0]
+    assert lost == pytest.approx(power[-1], rel=1e-2)
+    gained = history.total_energy + history.dissipated
+    work = work_of(power, history.t)
+    assert_allclose(gained - gained[0], work, rtol=0, atol=1e-2 * work[-1])
+    assert history.dissipated[-1] > 0.5 * work[-1]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_belt_that_sticks_goes_with_the_rim(scheme):
+    """Weights at both ends, of less than the capstan's ratio; damped by its mass only."""
+    rate, ramp, loss, ratio = 1.0, 0.04, 100.0, 1.5
+    scene = hung(turning(rate, ramp)).point_force((0, -ratio * WEIGHT), at=LEFT)
+    scene.damping(mass=loss)
+    history = scene.integrate(1.08, 4e-4, t_start=1.0, start=scene.solve_static(), scheme=scheme)
+    last = history.state(-1)
+    for phi in (0.25 * np.pi, 0.5 * np.pi, 0.75 * np.pi):
+        v = last.velocity((-AXIS * np.cos(phi), AXIS * np.sin(phi)))
+        assert np.hypot(*v) == pytest.approx(rate * AXIS, rel=1e-2)
+    power = power_of_motor(history, rate, ramp)
+    length = 2 * TAIL + np.pi * AXIS
+    drag = loss * DENSITY * HEIGHT * WIDTH * length * rate * AXIS
+    assert power[-1] == pytest.approx(((ratio - 1) * WEIGHT + drag) * AXIS * rate, rel=2e-2)
+    gained, work = history.total_energy + history.dissipated, work_of(power, history.t)
+    assert_allclose(gained - gained[0], work, rtol=0, atol=1e-3 * work[-1])
+    way = work_of(np.full(len(history.t), 1.0), history.t)[-1] - ramp / 2
+    y = history.displacement(LEFT)[:, 1]
+    assert y[-1] - y[0] == pytest.approx(rate * AXIS * way, rel=1e-2)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_controller_pulls_a_belt_over_a_pulley(scheme):
+    """Its force becomes the capstan's; its work is what is lost, stored and moves."""
+    stiff, loss, speed = 2e3, 2.0, 0.05
+
+    def law(t, end):
+        return 0.0, stiff * (-speed * (t - 1.0) - end.position[1] + LEFT[1]) - loss * end.velocity[1]
+
+    scene = hung().control(law, at=LEFT, points={"end": LEFT}).damping(mass=50.0)
+    start = scene.solve_static()
+    history = scene.integrate(1.1, 4e-4, t_start=1.0, start=start, scheme=scheme)
+    y, v = history.displacement(LEFT)[:, 1], history.velocity(LEFT)[:, 1]
+    force = stiff * (-speed * (history.t - 1.0) - y)
+    pulled = np.mean((force - loss * v)[-25:])
+    assert -pulled == pytest.approx(WEIGHT * np.exp(FRICTION * np.pi), rel=2e-2)
+    assert np.mean(v[-25:]) == pytest.approx(-speed, rel=2e-2)
+    gained, work = history.total_energy + history.dissipated, work_of(force * v, history.t)
+    assert_allclose(gained - gained[0], work, rtol=0, atol=1e-2 * np.ptp(work))
+    assert history.dissipated[-1] > 0.3 * work[-1]
