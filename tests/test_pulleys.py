@@ -102,7 +102,8 @@ def test_a_controller_pulls_a_belt_over_a_pulley(scheme):
     stiff, loss, speed = 2e3, 2.0, 0.05
 
     def law(t, end):
-        return 0.0, stiff * (-speed * (t - 1.0) - end.position[1] + LEFT[1]) - loss * end.velocity[1]
+        missing = LEFT[1] - speed * (t - 1.0) - end.position[1]
+        return 0.0, stiff * missing - loss * end.velocity[1]
 
     scene = hung().control(law, at=LEFT, points={"end": LEFT}).damping(mass=50.0)
     start = scene.solve_static()
