@@ -409,6 +409,23 @@ def test_a_motion_goes_on_with_the_stiffness_that_holds_its_start(scheme):
         state.contact().penetration, rel=1e-3)
 
 
+def test_a_taut_string_is_lifted_by_a_circle_in_a_few_load_steps():
+    """The forces of its straight parts, tangents of the circle; the check of sides misled it."""
+    h, R, lift, E = 5e-4, 0.1, 0.05, 2e8
+    string = Beam(MeshBeam.init_line(np.linspace(0, 1, 33), h), ElementBeamCable(5),
+                  StVenantKirchhoff(E, 0.0), width=0.01)
+    scene = Scene(string).fix("left", "r").fix("right", "r")
+    scene.obstacle(Circle((0.5, -R - h / 2), R), position=lambda t: (0, lift * t))
+    state = scene.solve_static()
+    far, r = np.hypot(0.5, R + h / 2 - lift), R + h / 2  # to the middle of the circle
+    slope = np.arcsin(r / far) - np.arctan2(R + h / 2 - lift, 0.5)
+    tension = E * 0.01 * h * (2 * (np.sqrt(far**2 - r**2) + r * slope) - 1)
+    assert state.contact().total[1] == pytest.approx(2 * tension * np.sin(slope), rel=1e-2)
+    assert state.reactions("left").force[0] == pytest.approx(-tension * np.cos(slope), rel=1e-2)
+    assert len(state.steps) < 8 and state.iterations < 150
+    assert state.contact().penetration < 0.05 * h
+
+
 def hung_belt(element, h, mu, wrap, R=0.5, tail=0.3, stretch=1e-3, way=2e-2, **options):
     """A belt over a part of a pulley, its stress-free shape, weighted at one end and pulled."""
     r = R + h / 2

@@ -188,7 +188,7 @@ def heads_on(system: System, result: Any, u: Array, load: float, origin: tuple[A
     """True if the scene moves from the last equilibrium to ``u`` as the load drives it there.
 
     Close to a bifurcation an iteration may jump to the other side. The nodes' displacements are
-    compared with those of the tangent.
+    compared with those of the tangent, but where obstacles move.
 
     Parameters
     ----------
@@ -203,8 +203,8 @@ def heads_on(system: System, result: Any, u: Array, load: float, origin: tuple[A
     origin
         Displacement that the solution began with and its multipliers, or None for these.
     """
-    if origin[1] is not None or result.load == 0.0:
-        return True
+    if origin[1] is not None or result.load == 0.0 or system.forces.contacts.moving:
+        return True  # the tangent does not know where obstacles go
     du = np.zeros(system.N)
     du[system.fixed] = system.values(load) - result.u[system.fixed]
     force, _ = system.assemble(result.u, result.load)

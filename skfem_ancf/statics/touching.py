@@ -36,6 +36,8 @@ LET_GO = 0.1
 #: Penetration, relative to the height, and energy of it, relative to all other, up to which an
 #: obstacle is hard enough: what is deeper than the first, or than the second and stores more.
 DEEP, SEEN, STORED = 0.1, 0.02, 1e-3
+#: What is not asked for, relative to the height: what lies flat stores nothing else.
+LEAST = 1e-3
 #: What the harder one is to leave of each.
 LEFT = 0.5
 #: By how much obstacles are made harder at once.
@@ -138,10 +140,11 @@ def firm(contacts: Contacts, u: Array, t: float, energy: float) -> Array:
     now, stored = contacts.firmness, contacts.potential(u, t)
     out, share = np.maximum(now, 0.0), stored / max(energy - stored, 1e-300)
     for k, ((_, group), _, found) in enumerate(contacts.look(u, t, False)):
-        deep = -float(found[0].min()) / group.height
-        if deep > DEEP or (deep > SEEN and share > STORED):
-            more = max(deep / SEEN, share / STORED) / LEFT
-            out[k] = max(out[k], min(group.firmest, (1.0 + now[k]) * more) - 1.0)
+        part = (1.0 + now[k]) / (1.0 + out[k])  # what this pressure leaves if it is not harder
+        deep, stores = -part * float(found[0].min()) / group.height, part * share
+        if deep > DEEP or (deep > SEEN and stores > STORED):
+            more = max(deep / SEEN, min(stores / STORED, deep / LEAST)) / LEFT
+            out[k] = max(1.0, min(group.firmest, (1.0 + out[k]) * more)) - 1.0
     return out
 
 
