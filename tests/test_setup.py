@@ -12,6 +12,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
 from skfem_ancf.compiled.words import Words
 from skfem_ancf.elements import base
 from skfem_ancf.finder import Finder
+from skfem_ancf.forces import system as forces
 from skfem_ancf.formulations import FORMULATIONS
 from skfem_ancf.kernels import cable, section
 from skfem_ancf.kernels.base import pair_tables
@@ -42,10 +43,12 @@ def test_local_functions_are_made_once_a_process(monkeypatch, element):
     cantilever(element()).solve_static().displacement((1.0, 0.0))
     functions = counted(monkeypatch, base, "_unit_functions")
     layouts = section._layout.cache_info().misses
-    facets = counted(monkeypatch, MeshBeam, "_init_facets")
+    facets, maps = (counted(monkeypatch, MeshBeam, name) for name in ("_init_facets", "mapping"))
+    contacts = counted(monkeypatch, forces, "Contacts")
     scene = cantilever(element(), 7, length=1.2, height=0.02, E=3e9)  # all of it is another
     assert scene.solve_static().displacement((1.2, 0.0))[1] < 0
-    assert not functions and not facets and "box" not in vars(scene.beams[0].finder)
+    assert not functions and not facets and not maps and not contacts
+    assert "box" not in vars(scene.beams[0].finder)
     assert section._layout.cache_info().misses == layouts
     assert not {"vector_element", "basis", "inertia", "q0_local"} & set(vars(scene.beams[0]))
 

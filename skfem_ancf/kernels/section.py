@@ -446,7 +446,8 @@ class TermTables:
         else:
             self.points, self.w = before.points, before.w
             self._rows, self._interpolation = before._rows, before._interpolation
-        G, frame, rows, self._sheared, self._along, scaled = self._rows
+        G, frame, rows, sheared, self._along, scaled = self._rows
+        self._sheared = np.concatenate(sheared)
         weights = self.w if slab.grade is None else across.volume(
             slab, *term.quadrature, tind, whole, "grade")
         self.pack: SectionPack = section_pack(
@@ -503,8 +504,8 @@ class TermTables:
         U = np.empty((pack.table.shape[2], 2, pack.start.size))
         r = np.empty((len(rows),) + U.shape[1:])
         load(pack.start, pack.span, 0, u, U)
-        product(packed(pack.table[:, rows]), 0, U, r)
-        r += pack.frame[rows]
+        product(pack.table.take(rows, axis=1), 0, U, r)
+        r += pack.frame.take(rows, axis=0)
         return r
 
     def inverted(self, pack: SectionPack, u: Array) -> bool:
@@ -527,8 +528,8 @@ class TermTables:
         pack, u
             The tables, and the displacement, shape (N,).
         """
-        n = len(self._sheared[0])
-        r = self._gradients(pack, u, np.concatenate(self._sheared))
+        n = len(self._sheared) // 2
+        r = self._gradients(pack, u, self._sheared)
         rx, ry = r[:n], r[n:]
         return rx[:, 0] * ry[:, 1] > rx[:, 1] * ry[:, 0]
 
