@@ -109,9 +109,10 @@ class Scheme:
         The error that a step adds to the displacement is about this number times dt^(order + 1)
         times the derivative of it of that order: for order 2, times dt^2 times the change of the
         acceleration.
-    rough : float
-        Power of the tolerance by which the estimate of the error falls faster than the error: finer
-        ones find vibrations that the estimate at coarser ones has not seen. By measurement.
+    filtered : int
+        How often :meth:`resolved` is applied to the estimated error.
+    safety : float
+        Factor of the estimated error, as measured: ``benchmarks/tolerances.py``.
     text : str
         The text of its steps.
     """
@@ -124,7 +125,8 @@ class Scheme:
     conserving = False
     joined = adaptive = True
     error_constant = 1.0 / 12.0
-    rough = 0.0
+    filtered = 1
+    safety = 1.0
 
     def step(self, integrator: Integrator, y: Motion, dt: float) -> Motion:
         """Where the motion is one step later.
@@ -202,6 +204,20 @@ class Scheme:
             Shape (N,).
         """
         return self.error_constant * dt**2 * (new.algorithmic - old.algorithmic)
+
+    def lasting(self, integrator: Integrator, du: Array, time: float) -> Array:
+        """The mean of what is left of a change of the displacement while it is damped.
+
+        Parameters
+        ----------
+        integrator
+            As of :meth:`resolved`.
+        du
+            Shape (N,).
+        time
+            For how long.
+        """
+        return du
 
     def resolved(self, integrator: Integrator, du: Array) -> Array:
         """What of a change of the displacement a step resolves, by its matrix as a filter.

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from math import factorial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 
+from ..band import factorize, fix, solve
 from ..errors import InputError
 from .base import Motion, Scheme, contacts_of, kept
+from .differences import derivative, difference, grown
 from .integrator import StepFailed
 from .rates import JointMotions
 from .stages import Interval, Method, collocate, room_for_points, solve_for
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
     from ..types import Array
     from .integrator import Integrator
 
-#: Growth from one derivative to the next, times the size of the step, at most.
-GROWTH = 2.0
 #: Instants of a step at which supports are asked that move.
 SAMPLES = 9
 
@@ -74,12 +73,6 @@ class _Tableau:
         return np.ascontiguousarray((1.0 + ratio * self.points[:, None])**powers @ self.fit)
 
 
-def _difference(x, a):
-    """The derivative of the highest order of the polynomial of values a (n, ...) at x (n,)."""
-    weights = [1.0 / np.prod(np.delete(xi - x, i)) for i, xi in enumerate(x)]
-    return factorial(len(x) - 1) * np.tensordot(weights, a, 1)
-
-
 @lru_cache(16)
 def _tableau(points):
     return _Tableau(np.array(points))
@@ -112,8 +105,6 @@ class Collocation(Scheme):
 
     tol = 1e-12
     text = "collocate"
-    #: What is added to the estimated error, as a factor, for what steps do not resolve.
-    safety = 1.0
 
     @property
     def points(self) -> Array:
@@ -139,9 +130,10 @@ class Collocation(Scheme):
     def local_error(self, old: Motion, new: Motion, dt: float) -> Array:
         """Estimate of the error that a step adds to the displacement, shape (N,).
 
-        From the highest divided difference of the accelerations at the points and the ends, and by
-        how much it differs from that of the step before; what is still missing to the order of the
-        method grows as it did from the last derivative to this one.
+        From a derivative of the acceleration of as high an order as the method's: the divided
+        difference over the points of a step and one of its ends, and of those of the steps before.
+        With both ends of a step of Gauss it would vanish for all that is linear, as the residual
+        of collocation is odd or even. At the start the orders that are missing grow as the last.
 
         Parameters
         ----------
@@ -151,23 +143,16 @@ class Collocation(Scheme):
         method, memory = self._table.method, new.memory or {}
         c, (u, v) = method.points, memory["start"]
         W = method.second @ (memory["stages"] - u - dt * c[:, None] * v) / dt**2
-        x, a = np.append(0.0, c), np.vstack([old.acceleration, W])
         if c[-1] < 1.0:
-            x, a = np.append(x, 1.0), np.vstack([a, new.acceleration])
-        if len(x) > self.order:
-            x, a = x[[0, -1]], a[[0, -1]]
-        k, before = len(x) - 1, (old.memory or {}).get("bend")
-        bend = _difference(x, a)
-        memory["bend"] = bend / dt**k
-        if k == self.order - 1:
-            return self.safety * self.error_constant * dt**2 * bend
-        lower = _difference(x[1:], a[1:])
-        if before is not None:
-            h = 0.5 * (dt + old.before)
-            lower, bend, k = bend, dt**(k + 1) * (memory["bend"] - before) / h, k + 1
-        size, least = np.linalg.norm(bend), np.linalg.norm(lower)
-        growth = min(size / least, GROWTH) if least > 0.0 else 0.0
-        return self.safety * self.error_constant * dt**2 * growth**(self.order - 1 - k) * bend
+            x, a = np.append(c, 1.0), np.vstack([W, new.acceleration])
+        else:
+            x, a = np.append(0.0, c), np.vstack([old.acceleration, W])
+        k = len(x) - 1
+        bends = derivative(old, new, old.t + 0.5 * dt, difference(x, a) / dt**k, self.order - 1 - k)
+        sizes = [dt**(k + i) * bend for i, bend in enumerate(bends)]
+        lower = sizes[-2] if len(sizes) > 1 else difference(x[1:], a[1:])
+        de = grown(sizes[-1], lower, self.order - k - len(sizes))
+        return self.error_constant * dt**2 * de
 
     def resolved(self, integrator: Integrator, du: Array) -> Array:
         s, w = integrator.system, integrator.room
@@ -176,6 +161,18 @@ class Collocation(Scheme):
         x = mu**2 * s.mass.multiply(du) * s.free
         x, y = np.ascontiguousarray(x.real), np.ascontiguousarray(x.imag)
         solve_for(w, k, x, y)
+        return x
+
+    def lasting(self, integrator: Integrator, du: Array, time: float) -> Array:
+        s, M = integrator.system, integrator.system.mass.band
+        if not s.damped:
+            return du
+        A = M._replace(flat=M.flat + 0.5 * time * integrator.room.D.flat, pivots=M.pivots.copy())
+        fix(A, s.mask)
+        if not factorize(A):
+            return du
+        x = s.mass.multiply(du) * s.free
+        solve(A, x)
         return x
 
     def in_blocks(self, system: System) -> bool:

@@ -54,10 +54,11 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     t_end
         Time at the end.
     dt
-        Step size, or "auto": chosen so that the error of the displacement at the end is about
-        ``rtol`` times the size of the scene. Functions of time are asked ahead at 4097 times
-        between start and end, so that no step passes over an event that lasts longer than from one
-        of these to the next; name shorter ones by ``breakpoints``.
+        Step size, or "auto": chosen so that at any time the displacement of no point is off by more
+        than about ``rtol`` times the size of the scene, beside the exact motion of the same mesh.
+        Functions of time are asked ahead at 4097 times between start and end, so that no step
+        passes over an event that lasts longer than from one of these to the next; name shorter
+        ones by ``breakpoints``.
     scheme
         A :class:`~skfem_ancf.dynamics.Scheme`.
     u, v
@@ -72,7 +73,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     tol
         Tolerance of the iteration in a step; the scheme's own by default.
     rtol
-        Tolerance of the automatic step size.
+        Tolerance of the automatic step size: see ``dt``.
     progress
         Show a progress bar: True, False, or None for "if it takes long".
     start

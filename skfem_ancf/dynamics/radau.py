@@ -31,7 +31,7 @@ class Radau(Collocation):
     name = "radau"
     order = 5
     error_constant = 1.0 / 7200.0
-    safety = 0.8  # what steps do not resolve it damps
+    safety = 0.8
 
     @property
     def points(self) -> Array:

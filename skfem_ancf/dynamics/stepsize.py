@@ -21,8 +21,6 @@ HIDDEN = 0.1
 #: The largest error of a point's displacement, over the root of the mean square that is added up:
 #: a tip moves twice as far as the mean, and errors grow on their way.
 LARGEST = 3.0
-#: Tolerance at which the estimates of schemes are calibrated.
-CALIBRATED = 1e-5
 #: Part of ``rtol`` that a single step may add.
 SINGLE = 0.1
 #: Error, relative to its share, above which a step is taken again.
@@ -32,24 +30,27 @@ WORTH = 1.3
 
 
 class StepSize:
-    """Chooses steps so that the error of the displacement is about ``rtol`` at the end.
+    """Chooses steps so that no point is off by more than about ``rtol`` times the scene's size.
 
     The error that a step adds may be its share of ``rtol``, in proportion to its size: error per
-    unit step. It is estimated from the change of the scheme's acceleration, of which two things
-    are taken out, since the error of a vibration does not grow beyond its amplitude:
+    unit step. Errors are added up as root mean squares over the mass, and the largest of a point
+    is taken as :data:`LARGEST` times that. Of what a scheme estimates some things are taken out,
+    since they do not add up:
 
+    * what supports undo, and joints but for that of a single step,
     * what the step does not resolve, by the iteration matrix as a filter,
-    * vibrations whose phase is lost within the motion whatever the tolerance asks, by two
-      averages over the time W in which they turn: after the time T a vibration of the frequency w
-      has lost the phase C w^(p + 1) dt^p T, so W = (C dt^p T)^(1 / (p + 1)), half of that for
-      schemes of second order, whose steps are short enough to follow a blow.
+    * what is damped away, by collocation,
+    * in schemes of second order, whose steps are short enough to follow a blow, vibrations whose
+      phase is lost within the motion whatever the tolerance asks, by two averages over the time W
+      in which they turn: after the time T a vibration of the frequency w has lost the phase
+      C w^3 dt^2 T, so W = (C dt^2 T)^(1 / 3) / 2. Steps of higher order are longer than W.
 
     Parameters
     ----------
     system, scheme
         What is integrated, and how.
     rtol
-        Error of the displacement at ``t_end``, relative to the size of the scene.
+        Largest error of the displacement of a point, relative to the size of the scene.
     t_start, t_end
         Times of start and end.
 
@@ -69,11 +70,9 @@ class StepSize:
                  t_end: float) -> None:
         if not scheme.adaptive:
             raise InputError(f"{scheme!r} does not estimate its error: give the step size dt, or "
-                             "take 'energy-momentum' or 'generalized-alpha' with dt='auto'")
+                             "take one of the package's schemes with dt='auto', all of which do")
         self.system, self.scheme, self.rtol = system, scheme, rtol
-        self.span, self.phase = t_end - t_start, max(2, scheme.order)
-        self._width = 0.5 if self.phase == 2 else 1.0
-        self._largest = LARGEST * (CALIBRATED / rtol)**scheme.rough
+        self.span, self._averaged = t_end - t_start, scheme.order <= 2
         self._mass = sum(b.total_mass for b in system.members)
         self._averages = self._new = np.zeros((2, system.N))
         self.times = np.linspace(t_start, t_end, SAMPLES + 1)
@@ -141,18 +140,28 @@ class StepSize:
         float
             Above 1 it adds more than its share.
         """
-        de = self.scheme.resolved(integrator, self.scheme.local_error(old, new, dt))
-        order, power = self.phase, self.scheme.order + 1
-        width = self._width * (self.scheme.error_constant * dt**order * self.span) ** (
-            1.0 / (order + 1.0))
-        part = -np.expm1(-dt / width)
-        rate = de / dt**power  # of the motion, not of the step
-        self._new = self._averages.copy()
-        for average in self._new:
-            average += part * (rate - average)
-            rate = average
-        return self._largest * max(self._size(rate) * dt**(power - 1) * self.span,
-                             self._size(de) / SINGLE)
+        de = self.scheme.local_error(old, new, dt) * self.system.free
+        for _ in range(self.scheme.filtered):
+            de = self.scheme.resolved(integrator, de)
+        power = self.scheme.order + 1
+        rate = self._free(new, self.scheme.lasting(integrator, de, self.span)) / dt**power
+        if self._averaged:
+            width = 0.5 * (self.scheme.error_constant * dt**2 * self.span) ** (1.0 / 3.0)
+            part = -np.expm1(-dt / width)
+            self._new = self._averages.copy()
+            for average in self._new:
+                average += part * (rate - average)
+                rate = average
+        return LARGEST * self.scheme.safety * max(
+            self._size(rate) * dt**(power - 1) * self.span, self._size(de) / SINGLE)
+
+    def _free(self, y, de):
+        """What of a change of the displacement joints do not undo."""
+        s = self.system
+        if not s.m or s.by_nodes:
+            return de
+        J = s.full_jacobian(y.u, y.t)
+        return de + s.solve_mass(np.zeros(s.N), y.u, y.t, -(J @ de), J)[0]
 
     def begin(self) -> None:
         """Forget what was: at the start, and after a breakpoint."""

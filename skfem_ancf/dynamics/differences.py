@@ -1,0 +1,73 @@
+"""Derivatives of what is known at instants of a motion, of the size of its steps."""
+
+from __future__ import annotations
+
+from math import factorial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ..types import Array
+    from .base import Motion
+
+#: Growth from one derivative to the next, times the size of the step, at most.
+GROWTH = 2.0
+
+
+def difference(x: Array, a: Array) -> Array:
+    """The derivative of the highest order of a polynomial, shape (N,).
+
+    Parameters
+    ----------
+    x
+        Where it is known, shape (n,).
+    a
+        Its values there, shape (n, N).
+    """
+    gaps = x[:, None] - x
+    gaps.flat[::len(x) + 1] = 1.0
+    return (factorial(len(x) - 1) / gaps.prod(axis=1)) @ a
+
+
+def derivative(old: Motion, new: Motion, t: float, value: Array, order: int) -> list[Array]:
+    """Derivatives of a function of time from its value in a step and those in steps before.
+
+    Parameters
+    ----------
+    old, new
+        Start and end of the step. What the next step takes is written into the memory of new.
+    t, value
+        When the function has this value in the step, shape (N,).
+    order
+        The derivative wanted.
+
+    Returns
+    -------
+    list of ndarray
+        The derivatives from 0 on, shape (N,) each: up to the order wanted, or to what the steps
+        since the start allow.
+    """
+    before = old.memory or {}
+    values = np.vstack([value[None], *before.get("values", ())])[:order + 1]
+    times = np.append(t, before.get("times", ()))[:order + 1]
+    new.memory = {**(new.memory or {}), "values": values[:order], "times": times[:order]}
+    return [difference(times[:k], values[:k]) for k in range(1, len(times) + 1)]
+
+
+def grown(size: Array, lower: Array, missing: int) -> Array:
+    """A derivative times a power of the step, grown by those that are missing as from the last.
+
+    Parameters
+    ----------
+    size, lower
+        It and the one before, each times its power of the size of the step, shape (N,).
+    missing
+        By how many orders.
+    """
+    least = np.linalg.norm(lower)
+    growth = min(np.linalg.norm(size) / least, GROWTH) if least > 0.0 else 0.0
+    return growth**missing * size
+
+
+__all__ = ["derivative", "difference", "grown"]
