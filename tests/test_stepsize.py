@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
-from skfem_ancf.dynamics import SCHEMES, GeneralizedAlpha, Newmark
+from scipy.integrate import solve_ivp
+
+from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, RigidBody, Scene, StVenantKirchhoff
+from skfem_ancf.dynamics import (SCHEMES, EnergyMomentum4, Gauss, GeneralizedAlpha, Motion, Newmark,
+                                 Radau)
 from skfem_ancf.dynamics.base import in_steps
+from skfem_ancf.dynamics.energy_momentum import PARTS
+from skfem_ancf.dynamics.integrator import Integrator
 from skfem_ancf.dynamics.run import interpolate
 from skfem_ancf.errors import InputError
 
@@ -56,7 +61,7 @@ def test_error_is_in_proportion_to_the_tolerance(scheme, name):
         error = np.abs(history.u - u)[:, positions(scene)].max() / scene.system.size
         ratios.append(error / rtol)
     assert np.abs(u).max() > 0.1
-    assert 0.08 < min(ratios) and max(ratios) < 1.2, ratios
+    assert 0.12 < min(ratios) and max(ratios) < 1.2, ratios
 
 
 def test_first_order_schemes_too():
@@ -76,6 +81,116 @@ def test_high_order_takes_few_steps(scheme):
              for rtol in (1e-4, 1e-5)]
     second = swinging().integrate(0.5, "auto", scheme="generalized-alpha", rtol=1e-4).steps
     assert steps[1] < 3.0 * steps[0] and steps[0] < 0.5 * second
+
+
+def test_steps_of_fourth_order_keep_the_energy():
+    """Two rods on a hinge: of automatic size, a quarter of those of second order."""
+    def build():
+        a, b = (soft(2, 2, E=1e5, mesh=MeshBeam.init_line([k, k + 0.5, k + 1.0], 0.1), name=name)
+                for k, name in enumerate("ab"))
+        scene = Scene(a, b).pin("left", a).gravity(GRAVITY)
+        scene.hinge((a, (1, 0)), (b, (1, 0)))
+        return scene
+
+    history = build().integrate(0.5, "auto", scheme="energy-momentum-4", rtol=1e-4)
+    second = build().integrate(0.5, "auto", scheme="energy-momentum", rtol=1e-4)
+    assert np.ptp(history.total_energy) < 1e-12 * history.kinetic_energy.max()
+    gap = [history.position((1, 0), name) for name in "ab"]
+    assert_allclose(gap[0], gap[1], rtol=0, atol=1e-12)
+    assert history.steps < 0.25 * second.steps
+    scene = build()
+    fine = scene.integrate(0.5, 1.25e-3, scheme="radau")
+    off = np.abs(history.u[-1] - fine.u[-1])[positions(scene)].max()
+    assert 0.05 < off / (1e-4 * scene.system.size) < 1.0
+
+
+def one_step(scheme, u, v, x):
+    """A step, of the length 1, of the vibration of the frequency x: its end, and its stages."""
+    if scheme.name == "energy-momentum-4":  # rotations, by the midpoint rule
+        turn = np.prod([(1 + 0.5j * x * part) / (1 - 0.5j * x * part) for part in PARTS])
+        z = (u - 1j * v / x) * turn
+        return z.real, -x * z.imag, None
+    c = scheme.points
+    k = np.arange(1, len(c) + 1)
+    fit = np.linalg.inv(np.vander(c, increasing=True))
+    A, b = (c[:, None]**k / k) @ fit, (1.0 / k) @ fit
+    W = np.linalg.solve(np.eye(len(c)) + x * x * A @ A, -x * x * (u + c * v))
+    return u + v + b @ (A @ W), v + b @ W, (u + c * v + A @ A @ W)[:, None]
+
+
+@pytest.mark.parametrize("scheme", [*map(Gauss, (1, 2, 3, 4)), Radau(), EnergyMomentum4()],
+                         ids=repr)
+def test_estimates_are_the_errors_of_vibrations(scheme):
+    """The root mean square of some hundred steps, against the exact solution from each start."""
+    x, u, v = 0.5, 1.0, 0.0
+    old = Motion(0.0, *(np.array([a]) for a in (u, v, -x * x * u, 0.0)), np.zeros(0))
+    estimates, errors = [], []
+    for n in range(1, 200):
+        (u1, v1, stages), z = one_step(scheme, u, v, x), (u - 1j * v / x) * np.exp(1j * x)
+        memory = {"stages": stages, "start": np.array([[u], [v]])}
+        new = Motion(float(n), *(np.array([a]) for a in (u1, v1, -x * x * u1, 0.0)), np.zeros(0),
+                     before=1.0, memory=None if stages is None else memory)
+        estimates.append(scheme.local_error(old, new, 1.0)[0])
+        errors.append(u1 - z.real)
+        old, u, v = new, u1, v1
+    sizes = [np.sqrt(np.mean(np.square(e[8:]))) for e in (estimates, errors)]
+    assert sizes[0] == pytest.approx(sizes[1], rel=0.1)
+
+
+def test_what_joints_undo_is_not_added_up():
+    """A body whose angle is given is where it is said to be; what a step may be off still counts."""
+    body = RigidBody(1.0, 0.1, (0.5, 0))
+    scene = Scene(body).pin((0, 0), body)
+    scene.motor(body, angle=lambda t: 3.0 * t * t)
+    history = scene.integrate(2.0, "auto", scheme="generalized-alpha", rtol=1e-4)
+    assert_allclose(history.angle(body), 3.0 * history.t**2, rtol=0, atol=1e-9)
+    assert 100 < history.steps < 600  # 2700 if all were added up
+
+
+def test_what_is_damped_away_is_not_added_up():
+    """By a resistance alpha times the mass: 1 / (1 + alpha T / 2) is left in the mean of T."""
+    scene = swinging().damping(mass=40.0)
+    s = scene.system
+    integrator = Integrator(s, Radau())
+    y = integrator.start(np.zeros(s.N), np.zeros(s.N), 0.0, 0.01)
+    integrator.step(y, 0.01)
+    du = np.random.default_rng(2).normal(size=s.N) * s.free
+    assert_allclose(integrator.scheme.lasting(integrator, du, 0.5), du / 11.0, rtol=1e-9)
+    free = Integrator(swinging().system, Radau())
+    assert free.scheme.lasting(free, du, 0.5) is du
+
+
+@pytest.mark.parametrize("name, rtol, tol", [("swinging", 1e-6, 1e-3), ("vibrating", 1e-4, 1e-2)])
+def test_as_many_steps_as_scipy_at_the_same_error(name, rtol, tol):
+    """By its Radau, of the same order; its tolerances are of a step, of rates too."""
+    build, t_end = MOTIONS[name]
+    times, u = known(name)
+    scene = build()
+    history = scene.integrate(t_end, "auto", scheme="radau", rtol=rtol, t_eval=times)
+    s, free = scene.system, np.nonzero(scene.system.free)[0]
+    M = np.linalg.inv(s.mass.tocsc()[free][:, free].toarray())
+
+    def rate(t, y):
+        full = np.zeros(s.N)
+        full[free] = y[:len(free)]
+        force = s.external_force(full, t) - s.internal_force(full, t)
+        return np.append(y[len(free):], M @ force[free])
+
+    found = solve_ivp(rate, (0, t_end), np.zeros(2 * len(free)), "Radau", rtol=tol, atol=tol,
+                      dense_output=True)
+    theirs = np.zeros_like(u)
+    theirs[:, free] = found.sol(times)[:len(free)].T
+    off, other = (np.abs(x - u)[:, positions(scene)].max() for x in (history.u, theirs))
+    assert off < 2.0 * other and off < rtol * s.size
+    assert history.steps + history.rejected < 1.3 * len(found.t)
+
+
+def test_schemes_without_an_estimate_say_so():
+    class Mine(GeneralizedAlpha):
+        adaptive = False
+
+    with pytest.raises(InputError, match="give the step size dt, or take one of the package's"):
+        swinging().integrate(0.5, "auto", scheme=Mine())
 
 
 # events

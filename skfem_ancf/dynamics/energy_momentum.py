@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from .base import Motion, Scheme
+from .differences import derivative, grown
 
 if TYPE_CHECKING:
     from ..system import System
+    from ..types import Array
     from .integrator import Integrator
 
 #: Parts of a step of fourth order, all of whose ends lie within it.
@@ -77,7 +79,8 @@ class EnergyMomentum4(EnergyMomentum):
 
     name = "energy-momentum-4"
     order = 4
-    adaptive = False
+    filtered = 2
+    error_constant = abs(sum(part**5 for part in PARTS)) / 80.0
 
     def __repr__(self):
         return "<EnergyMomentum4>"
@@ -95,3 +98,22 @@ class EnergyMomentum4(EnergyMomentum):
         new = integrator.start(y.u, y.v, begin + dt, dt, ahead=False)
         new.dissipated = lost
         return new
+
+    def local_error(self, old: Motion, new: Motion, dt: float) -> Array:
+        """Estimate of the error that a step adds to the displacement, shape (N,).
+
+        Of a vibration of the frequency w the parts of a step, whose phases lag by (w part)^3 / 12 -
+        (w part)^5 / 80, lose (w dt)^5 / 80 times the sum of the fifth powers. So from the third
+        derivative of the acceleration at the ends of steps, not of their parts, where it has errors
+        of second order.
+
+        Parameters
+        ----------
+        old, new, dt
+            Start and end of the step, and its size.
+        """
+        if not old.memory:
+            derivative(old, old, old.t, old.acceleration, 3)
+        found = derivative(old, new, new.t, new.acceleration, 3)
+        sizes = [dt**k * a for k, a in enumerate(found)]
+        return self.error_constant * dt**2 * grown(sizes[-1], sizes[-2], 4 - len(sizes))
