@@ -112,7 +112,7 @@ class EnergyMomentum4(EnergyMomentum):
         old, new, dt
             Start and end of the step, and its size.
         """
-        if not old.memory:
+        if "values" not in (old.memory or {}):
             derivative(old, old, old.t, old.acceleration, 3)
         found = derivative(old, new, new.t, new.acceleration, 3)
         sizes = [dt**k * a for k, a in enumerate(found)]
