@@ -138,7 +138,7 @@ def test_estimates_are_the_errors_of_vibrations(scheme):
 
 
 def test_what_joints_undo_is_not_added_up():
-    """A body whose angle is given is where it is said to be; what a step may be off still counts."""
+    """A body whose angle is given is where it is said to be; a single step still counts."""
     body = RigidBody(1.0, 0.1, (0.5, 0))
     scene = Scene(body).pin((0, 0), body)
     scene.motor(body, angle=lambda t: 3.0 * t * t)
