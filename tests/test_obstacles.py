@@ -398,7 +398,8 @@ def test_a_body_that_is_deep_is_told_what_stiffness_holds_it():
     assert asked == pytest.approx(k * (1.5 + 0.5) / 0.1, rel=5e-2)  # less half of the other side
 
 
-@pytest.mark.parametrize("scheme", ["energy-momentum", Gauss(2), GeneralizedAlpha(0.8)], ids=repr)
+@pytest.mark.parametrize("scheme", ["energy-momentum", "energy-momentum-4", Gauss(2),
+                                    GeneralizedAlpha(0.8)], ids=repr)
 def test_a_motion_goes_on_with_the_stiffness_that_holds_its_start(scheme):
     scene = taut_belt()
     state = scene.solve_static()

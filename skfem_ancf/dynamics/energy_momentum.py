@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from .base import Motion, Scheme
+from .base import Motion, Scheme, contacts_of
 from .differences import derivative, grown
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ class EnergyMomentum4(EnergyMomentum):
         begin, lost = y.t, y.dissipated
         for part in PARTS:
             y = integrator.take(y, part * dt)
-        new = integrator.start(y.u, y.v, begin + dt, dt, ahead=False)
+        new = integrator.start(y.u, y.v, begin + dt, dt, ahead=False, memory=contacts_of(y))
         new.dissipated = lost
         return new
 
