@@ -138,8 +138,8 @@ def motion(p, scale=1, adaptive=True):
         yield ours.run(p, "cable", degree, n, steps=400, scheme="radau", tol=tol)
     yield ours.run(p, "cable", 5, 4, steps=100, scheme="gauss", points=2, tol=2e-3)
     for degree, n in ((5, 1), (5, 2), (5, 3), (5, 4), (7, 2), (9, 1)):  # each step turns it far
-        for steps in (14, 16, 18, 20, 22, 40):
-            for tol in (8e-3, 3e-3, 1e-3, 3e-4, 1e-5):
+        for steps in (13, 14, 16, 18, 20, 22, 40):
+            for tol in (8e-3, 5e-3, 3e-3, 1e-3, 3e-4, 1e-5):
                 yield ours.run(p, "cable", degree, n, steps=steps, scheme="radau", tol=tol)
     for n in (4, 5, 6):
         for steps in (80, 100):
