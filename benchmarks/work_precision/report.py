@@ -107,15 +107,23 @@ def at(error, targets):
 
 
 def against(rows, goal):
-    """Rows (error, ratio, verdict, ours, peer's) of one goal: factor times faster than a peer."""
-    out = []
-    for target in places(rows, goal):
-        mine, its = (fastest(rows, code, target, goal.key) for code in (OURS, goal.peer))
-        ratio = lead(rows, goal.peer, target, goal.key)
-        out.append((at(target, goal.targets), f"{ratio:.3g}" if mine and its else "",
-                    "met" if mine and ratio >= goal.factor else "missed",
-                    named(mine, goal.key), named(its, goal.key)))
-    return out
+    """Rows (error, ratio, verdict, ours, peer's) of one goal, where it is judged."""
+    return [one_against(rows, goal, target) for target in places(rows, goal)]
+
+
+def one_against(rows, goal, target):
+    """A row of :func:`against`: factor times faster than a peer."""
+    mine, its = (fastest(rows, code, target, goal.key) for code in (OURS, goal.peer))
+    ratio = lead(rows, goal.peer, target, goal.key)
+    return (at(target, goal.targets), f"{ratio:.3g}" if mine and its else "",
+            "met" if mine and ratio >= goal.factor else "missed",
+            named(mine, goal.key), named(its, goal.key))
+
+
+def decades(rows, case):
+    """Rows as :func:`against` at each decade, of a case that has no goal."""
+    goal = Goal("", case, EXUDYN, DECADES[1:], 1.0)
+    return [one_against(rows, goal, target) for target in goal.targets]
 
 
 def goal_against(results, goal):
@@ -320,7 +328,7 @@ def report(results, about, loading, quick):
                   "", *table(["case", *(f"{t:.0e}" for t in DECADES[1:])],
                              [[name, *(row[1] or ("only ours" if row[2] == "met" else "neither"
                                                   if row[3] == row[4] else "only Exudyn")
-                                       for row in against(results[name], EXUDYN, DECADES[1:]))]
+                                       for row in decades(results[name], name))]
                               for name in others])]
     if "frames" in results:
         lines += frames(results["frames"])
