@@ -384,7 +384,10 @@ class Integrator:
         """
         fresh = not self.ready or dt != self._dt
         try:
-            return self.scheme.step(self, y, dt)
+            new = self.scheme.step(self, y, dt)
+            if contacts_of(new) is None:  # a scheme of one's own may not hand it on
+                new.memory = kept(y, None, **(new.memory or {}))
+            return new
         except (StepFailed, np.linalg.LinAlgError) as failure:
             self.forget()
             if not fresh and depth == 0:  # by factors of other steps
