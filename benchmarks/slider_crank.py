@@ -2,8 +2,8 @@
 
     python benchmarks/slider_crank.py
 
-solves it with Exudyn's ANCFCable2D and ObjectRigidBody2D (nothing of skfem_ancf is imported) with
-two meshes and steps, and writes where the slider and the middle of the rod are to
+solves it with Exudyn's ANCFCable2D and ObjectRigidBody2D (nothing of skfem_ancf is imported for it)
+with two meshes and steps, and writes where the slider and the middle of the rod are to
 tests/data/slider_crank.npz, with the largest difference of the two.
 
 A rigid crank of length 0.15 turns by a given angle, from rest to 150 rad/s within 0.04 s, and goes
@@ -31,6 +31,24 @@ def angle(t):
     """The angle of the crank."""
     rise = 0.5 * SPEED * (t - RISE / np.pi * np.sin(np.pi * t / RISE))
     return np.where(t < RISE, rise, 0.5 * SPEED * RISE + SPEED * (t - RISE))
+
+
+def scene(elements):
+    """The same of skfem_ancf, with quintic cables: the scene, and its crank, rod and slider."""
+    from skfem_ancf import (Beam, ElementBeamCable, MeshBeam, RigidBody, Scene,
+                            StVenantKirchhoff)
+
+    x = np.linspace(CRANK, CRANK + ROD, elements + 1)
+    rod = Beam(MeshBeam.init_line(x, SIDE), ElementBeamCable(), StVenantKirchhoff(E, 0.0, DENSITY),
+               width=SIDE)
+    crank = RigidBody(CRANK_MASS, CRANK_INERTIA, (CRANK / 2, 0), name="crank")
+    slider = RigidBody(SLIDER_MASS, 1e-6, (x[-1], 0), name="slider")
+    out = Scene(crank, rod, slider).pin((0, 0), crank)
+    out.motor(crank, angle=angle)
+    out.hinge((crank, (x[0], 0)), (rod, (x[0], 0)))
+    out.hinge((rod, (x[-1], 0)), slider)
+    out.slider(slider, "ground", direction=(1, 0), angle=True)
+    return out, crank, rod, slider
 
 
 def solve(elements, steps):

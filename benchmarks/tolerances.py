@@ -22,7 +22,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
-import slider_crank as crank_case
+import slider_crank
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, KelvinVoigt, MeshBeam, RigidBody,
                         Scene, StVenantKirchhoff)
 from skfem_ancf.dynamics import SCHEMES, Gauss
@@ -54,21 +54,6 @@ def hinged():
     a, b = cable(4, name="a"), cable(4, start=1.0, name="b")
     scene = Scene(a, b).pin("left", a).gravity(GRAVITY)
     scene.hinge((a, (1, 0)), (b, (1, 0)))
-    return scene
-
-
-def slider_crank():
-    c = crank_case
-    x = np.linspace(c.CRANK, c.CRANK + c.ROD, 5)
-    rod = Beam(MeshBeam.init_line(x, c.SIDE), ElementBeamCable(),
-               StVenantKirchhoff(c.E, 0.0, c.DENSITY), width=c.SIDE)
-    crank = RigidBody(c.CRANK_MASS, c.CRANK_INERTIA, (c.CRANK / 2, 0), name="crank")
-    slider = RigidBody(c.SLIDER_MASS, 1e-6, (x[-1], 0), name="slider")
-    scene = Scene(crank, rod, slider).pin((0, 0), crank)
-    scene.motor(crank, angle=lambda t: c.angle(t))
-    scene.hinge((crank, (x[0], 0)), (rod, (x[0], 0)))
-    scene.hinge((rod, (x[-1], 0)), slider)
-    scene.slider(slider, "ground", direction=(1, 0), angle=True)
     return scene
 
 
@@ -109,7 +94,7 @@ MOTIONS = {
     "rod": (lambda: problem("free-rod", 5, 4), 0.5, 8000, False),
     "long pendulum": (lambda: problem("pendulum", 3, 4), 3.0, 6000, False),
     "hinged": (hinged, 0.8, 3000, True),
-    "slider-crank": (slider_crank, 0.08, 4000, True),
+    "slider-crank": (lambda: slider_crank.scene(4)[0], slider_crank.END, 4000, True),
     "tip mass": (tip_mass, 1.0, 4000, True),
     "damped": (lambda: Scene(cable(4, damping=KelvinVoigt(2e-3))).clamp("left").gravity(GRAVITY),
                1.5, 2000, False),

@@ -642,16 +642,7 @@ def test_a_flexible_slider_crank_as_by_exudyn(monkeypatch):
     monkeypatch.syspath_prepend(root / "benchmarks")
     case = pytest.importorskip("slider_crank")
     exudyn = np.load(root / "tests" / "data" / "slider_crank.npz")
-    x = np.linspace(case.CRANK, case.CRANK + case.ROD, 17)
-    rod = Beam(MeshBeam.init_line(x, case.SIDE), ElementBeamCable(),
-               StVenantKirchhoff(case.E, 0.0, case.DENSITY), width=case.SIDE)
-    crank = RigidBody(case.CRANK_MASS, case.CRANK_INERTIA, (case.CRANK / 2, 0), name="crank")
-    slider = RigidBody(case.SLIDER_MASS, 1e-6, (x[-1], 0), name="slider")
-    scene = Scene(crank, rod, slider).pin((0, 0), crank)
-    scene.motor(crank, angle=case.angle)
-    scene.hinge((crank, (x[0], 0)), (rod, (x[0], 0)))
-    scene.hinge((rod, (x[-1], 0)), slider)
-    scene.slider(slider, "ground", direction=(1, 0), angle=True)
+    scene, crank, rod, slider = case.scene(16)
     history = scene.integrate(case.END, 5e-5, scheme="generalized-alpha", t_eval=exudyn["t"])
     angle = case.angle(history.t)
     lean = np.arcsin(case.CRANK * np.sin(angle) / case.ROD)
@@ -661,7 +652,7 @@ def test_a_flexible_slider_crank_as_by_exudyn(monkeypatch):
     assert bent > 8e-3 * case.ROD and exudyn["error"] < 1e-4 * bent
     assert_allclose(history.angle(crank), angle, atol=1e-8)
     assert_allclose(history.position(slider)[:, 0], exudyn["slider"], rtol=0, atol=1e-3 * bent)
-    middle = history.position((x[8], 0), rod)
+    middle = history.position((case.CRANK + 0.5 * case.ROD, 0), rod)
     assert_allclose(middle, exudyn["middle"], rtol=0, atol=1e-3 * bent)
 
 

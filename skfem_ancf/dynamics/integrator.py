@@ -433,8 +433,7 @@ class Integrator:
         """Numbers and arrays from which :meth:`recall` goes on as if there had been no break."""
         memory = {"state": self._state.copy(), "dt": np.array(self._dt),
                   "substeps": np.array(self.substeps)}
-        if self.ready and self.scheme.text == "steps":
-            memory.update({name: array.copy() for name, array in self._factors().items()})
+        memory.update({name: array.copy() for name, array in self._factors().items()})
         if self._nodes:
             steps, mass = self._nodes
             memory.update({"at": steps.at[0], "multipliers at": steps.at[1],
@@ -448,9 +447,8 @@ class Integrator:
         self.substeps = int(memory["substeps"])
         self.kept = {name[5:]: np.array(array) for name, array in memory.items()
                      if name.startswith("kept ")}
-        if self.ready and self.scheme.text == "steps":
-            for name, array in self._factors().items():
-                array[...] = memory[name]
+        for name, array in self._factors().items():
+            array[...] = memory[name]
         if self._nodes:
             self._recall_nodes(memory)
 
@@ -462,6 +460,9 @@ class Integrator:
             mass.factorize(memory["mass at"])
 
     def _factors(self):
+        """The arrays of the factors of steps, by name; none where there are no such factors."""
+        if not self.ready or self.scheme.text != "steps":
+            return {}
         A, rows = self.matrices.A, self.matrices.rows
         beside = {"S": rows.S, "Z": rows.Z, "H": rows.H} if len(rows.P) else {}
         return {"A": A.flat, "pivots": A.pivots, "origin": self._work.x.origin, **beside}

@@ -164,13 +164,21 @@ class Across(Frozen):
         x = a + np.asarray(X[0]) * (b - a)
         return x, np.broadcast_to(self.mesh.mapping().offset(X, tind), x.shape)
 
-    def _heights(self, xi, tind):
-        """Heights (nelements, npoints) at places along elements."""
+    def heights(self, xi: Array, tind: Array | None = None) -> Array:
+        """Heights at places along elements, shape (nelements, npoints).
+
+        Parameters
+        ----------
+        xi
+            Reference coordinates along the axis, shape (npoints,) or (nelements, npoints).
+        tind
+            Elements, shape (nelements,), or None for all.
+        """
         return self.mesh.mapping().height(xi, tind)[0]
 
     def _ends(self, slab, xi):
         """Ends of the pieces of a slab at places along the elements, (npieces + 1, ...)."""
-        return slab.measure.ends(self._heights(xi, None)) if self.moving else slab.measure.highest
+        return slab.measure.ends(self.heights(xi)) if self.moving else slab.measure.highest
 
     def which(self, X: Array, tind: Array | None = None) -> Array:
         """The number of the slab at each of reference points (2, ...); shape (...).
@@ -184,7 +192,7 @@ class Across(Frozen):
             (nelements,), or None for all; points are (2, npoints) or (2, nelements, npoints).
         """
         if self.moving:
-            h = self._heights(X[0], tind)
+            h = self.heights(X[0], tind)
             return sum((X[1] >= s.measure.ends(h)[-1] for s in self.slabs[:-1]),
                        np.zeros(h.shape, dtype=int))
         tops = np.array([s.measure.high for s in self.slabs[:-1]])
@@ -467,7 +475,7 @@ class Across(Frozen):
             lambda z, k: at(low + (high - low) * (z + 1.0) / 2.0)[k], k=k)), HEIGHTS)
             for k in range(2))
         x, w = gauss(POINTS)
-        z = np.clip(2.0 * (self._heights(x, None) - low) / (high - low) - 1.0, -1.0, 1.0)
+        z = np.clip(2.0 * (self.heights(x) - low) / (high - low) - 1.0, -1.0, 1.0)
         soft = w * self.mesh.lengths[:, None] / chebval(z, GA)
         return float(np.sum(soft) / np.sum(soft / chebval(z, factor)))
 

@@ -108,7 +108,7 @@ class Moving(Measure):
         return at.slab.outer or at.factor("width")
 
     def breadth(self, at: Within, whole: bool = False, times: str = "") -> Array:
-        xi, mesh = np.asarray(at.X[0]), at.body.mesh
+        xi = np.asarray(at.X[0])
         back: Any = slice(None)
         if xi.ndim == 1:
             xi, back = np.unique(xi, return_inverse=True)
@@ -123,7 +123,7 @@ class Moving(Measure):
             there = at.moved(X.reshape(2, len(eta), -1))
             return np.prod([there.asked(name) for name in functions], axis=0).reshape(eta.shape)
 
-        c = c * self.moments(mesh.mapping().height(xi, at.tind)[0], product if functions else None)
+        c = c * self.moments(at.body.heights(xi, at.tind), product if functions else None)
         return c[0][:, back] if whole else self.series(c[:, :, back], at.X[1])
 
     def sampled(self, at: Within, n: int) -> tuple[Array, Array]:

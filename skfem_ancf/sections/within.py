@@ -50,7 +50,7 @@ class Within:
     @property
     def heights(self) -> Array:
         """Of the sections, shape (nelements, npoints)."""
-        return self.body.mesh.mapping().height(self.X[0], self.tind)[0]
+        return self.body.heights(self.X[0], self.tind)
 
     def asked(self, name: str) -> Array:
         """What a function of the slab returns there, shape (nelements, npoints).

@@ -88,24 +88,6 @@ def held(contacts: Contacts, flags: list[Array]) -> Iterator[None]:
         memory[:] = before
 
 
-@contextmanager
-def smooth(contacts: Contacts) -> Iterator[None]:
-    """For the time of it there is no friction.
-
-    Parameters
-    ----------
-    contacts
-        The obstacles of a scene.
-    """
-    memory = contacts.tables.memory
-    sticks = memory[ANCHORED]
-    try:
-        memory[ANCHORED] = 0.0
-        yield
-    finally:
-        memory[ANCHORED] = sticks
-
-
 def soft(contacts: Contacts, u: Array, t: float) -> Array:
     """The firmness with which the mean pressure presses all points in, shape (groups,).
 
@@ -174,30 +156,32 @@ def found_touching(contacts: Contacts, start: tuple[Array, float], t: float,
     climb = _Climb(contacts, start, t, solve, energy, failed)
     if flags is not None:
         try:
-            return climb.up(_let_go(contacts, flags, t, climb))
+            return climb.up(_let_go(climb, flags))
         except failed:
             contacts.tables.memory[:] = before
-    return climb.up(_directly(contacts, solve, failed))
+    return climb.up(_directly(climb))
 
 
-def _let_go(contacts, flags, t, climb):
+def _let_go(climb, flags):
     """What is found from bodies that are held, on obstacles that are soft."""
+    contacts = climb.contacts
     with held(contacts, flags):
         found = climb.solve(None, True)
-    contacts.harden(soft(contacts, found[0], t), *climb.start)
-    with smooth(contacts):
-        found = climb.solve(found, True)
-    return climb.solve(found, True) if contacts.anchored else found
+    contacts.harden(soft(contacts, found[0], climb.t), *climb.start)
+    if contacts.anchored:
+        with contacts.eased():  # no friction
+            found = climb.solve(found, True)
+    return climb.solve(found, True)
 
 
-def _directly(contacts, solve, failed):
+def _directly(climb):
     """What is found without more ado; where that fails, from obstacles that are eased."""
     try:
-        return solve(None, False)
-    except failed:
-        with contacts.eased():
-            found = solve(None, True)
-        return solve(found, False)
+        return climb.solve(None, False)
+    except climb.failed:
+        with climb.contacts.eased():
+            found = climb.solve(None, True)
+        return climb.solve(found, False)
 
 
 class _Climb:
@@ -240,4 +224,4 @@ class _Climb:
                 return found, True
 
 
-__all__ = ["firm", "found_touching", "held", "lies_near", "smooth", "soft"]
+__all__ = ["firm", "found_touching", "held", "lies_near", "soft"]
