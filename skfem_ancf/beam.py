@@ -78,6 +78,8 @@ def _coordinates(mesh, element, p):
     return np.ascontiguousarray(q.transpose(2, 0, 1)).ravel()
 
 
+#: Attributes of meshes that functionals of vectors at nodes are of, by their derivatives.
+_DIRECTIONS = {(1, 0): "p_X", (0, 1): "p_Y"}
 #: Arguments of a beam that change neither its coordinates nor its strains.
 _MATTER = frozenset({"material", "width"})
 #: Attributes of a beam that do not depend on material and width.
@@ -338,40 +340,13 @@ class Beam(Frozen):
         """
         if intorder is not None:
             intorder = require_integer("intorder", intorder, 0, 200)
-        order = 2 * max(self.element.axis_degree, self.element.order) + 2
         return FacetBasis(self.mesh, self.vector_element, facets=facets_of(self.mesh, facets),
-                          intorder=order if intorder is None else intorder)
+                          intorder=2 * self.facet_points - 2 if intorder is None else intorder)
 
-    def loaded_parts(self, facets: Place, intorder: int | None = None
-                     ) -> list[tuple[FacetBasis, Any]]:
-        """Bases of the parts of a place of one width, with the width at their points.
-
-        Parameters
-        ----------
-        facets, intorder
-            As for :meth:`facet_basis`.
-
-        Returns
-        -------
-        list
-            Pairs of a ``FacetBasis`` and its width: a number, or of the shape of its ``dx``.
-        """
-        if self.across.plain:
-            return [(self.facet_basis(facets, intorder), self.across.slabs[0].width)]
-        mesh, found = self.mesh, np.asarray(facets_of(self.mesh, facets))
-        n, ne, out = mesh.p.shape[1], mesh.nelements, []
-        for side, first in enumerate((n, n + ne)):
-            on = found[(found >= first) & (found < first + ne)]
-            if len(on):
-                basis = self.facet_basis(on, intorder)
-                tind, X = mesh.mapping().facet_points(basis.X, basis.find)
-                out.append((basis, self.across.face(side, X, tind) + 0.0 * basis.dx))
-        ends = found[found < n]
-        for slab, (eta, w) in self.across.rules(self.element.order + 3) if len(ends) else ():
-            basis = FacetBasis(mesh, self.vector_element, facets=ends, quadrature=(eta[None], w))
-            tind, X = mesh.mapping().facet_points(basis.X, basis.find)
-            out.append((basis, self.across.breadth(slab, X, tind) + 0.0 * basis.dx))
-        return out
+    @property
+    def facet_points(self) -> int:
+        """Gauss points of a facet, for products of two coordinates."""
+        return max(self.element.axis_degree, self.element.order) + 2
 
     @cached_property
     def kernel(self) -> Any:
@@ -608,16 +583,15 @@ class Beam(Frozen):
         held
             Numbers of coordinates.
         """
-        rows: dict[int, list[int]] = {}
-        for k in held:
-            rows.setdefault(k // self.nd, []).append(k % self.nd)
-        for node, of_node in rows.items():
-            if of_node[:2] == [0, 1]:
-                for k in of_node[2:]:
-                    of = self.element.functionals[k // 2][1:]
-                    vector = {(1, 0): self.mesh.p_X, (0, 1): self.mesh.p_Y}.get(of)
-                    if vector is not None and abs(vector[1 - k % 2, node]) > 1e-3:
-                        return True  # the other component would change as it turns
+        every = set(held)
+        for dof in held:
+            node, k = divmod(dof, self.nd)
+            first = dof - k
+            if k > 1 and first in every and first + 1 in every:
+                of = self.element.functionals[k // 2][1:]
+                if of in _DIRECTIONS and (
+                        abs(getattr(self.mesh, _DIRECTIONS[of])[1 - k % 2, node]) > 1e-3):
+                    return True  # the other component would change as it turns
         return False
 
     def rigid_motions(self, rows: Array | None = None) -> Array:

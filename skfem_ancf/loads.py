@@ -11,11 +11,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from scipy import sparse
 from skfem.assembly import FacetBasis, LinearForm, asm
 from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 
-from . import forms
 from .beam import Beam
 from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number, require_finite,
                      require_function, shown, warnings_as_errors)
@@ -26,6 +26,7 @@ from .pickling import picklable_form
 from .places import facets_of
 from .rigid import RigidBody
 from .spread import BODY, Sampled, Spread, facets_along, on_facets, stations_of_vector
+from .surfaces import add_nodal, surfaces_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -360,14 +361,16 @@ class Traction(Load):
         self.boundary, self.t = boundary, t if callable(t) else require_finite("t", t, (2,))
 
     def bind(self, beam: Beam) -> Load:
-        t, vector = self.t, np.zeros(beam.N)
-        parts = beam.loaded_parts(self.boundary, intorder=12 if callable(t) else None)
-        for basis, width in parts:
-            if callable(t):
-                ask_field("t(x)", t, np.asarray(basis.global_coordinates()))
-            vector += asm(forms.traction(t, width), basis)
+        t, vector, mapping = self.t, np.zeros(beam.N), beam.mesh.mapping()
+        found = surfaces_of(beam, self.boundary, 7 if callable(t) else beam.facet_points)
+        for one in found:
+            density = ask_field("t(x)", t, mapping.F(one.X, one.elements)) if callable(t) else (
+                t[:, None, None])
+            functions = beam.element.values(mapping, one.X, one.elements)
+            add_nodal(beam, one.elements, np.einsum("iep,cep->eic", functions,
+                                                    density * one.areas), vector)
         return DeadLoad(beam, vector, self.amplitude, on_facets(
-            beam.mesh, np.unique(np.concatenate([basis.find for basis, _ in parts])), traction=t))
+            beam.mesh, np.concatenate([one.facets for one in found]), traction=t))
 
 
 class FormLoad(Load):
@@ -546,9 +549,8 @@ class Pressure(Load):
                 f"a pressure at {boundary!r} of a cable would do nothing: its points across the "
                 "section are no coordinates. Use an element with sections, as ElementBeamANCF(2), "
                 "or for a force of constant direction scene.traction or scene.point_force")
-        self.matrix = sum(p * asm(forms.pressure(width), basis)
-                          for basis, width in beam.loaded_parts(facets)).tocoo()
-        self._rows = self.matrix.tocsr()
+        self._rows = _follower(beam, facets, p)
+        self.matrix = self._rows.tocoo()
         self._spread = on_facets(beam.mesh, facets, pressure=p)
 
     def spread(self, u: Array) -> Spread | None:
@@ -562,6 +564,23 @@ class Pressure(Load):
 
     def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
         return self.matrix.row, self.matrix.col, self.matrix.data
+
+
+def _follower(beam, facets, p):
+    """The force of a pressure over the position, ``-n da`` being its derivative, turned; sparse."""
+    mesh, nd, row, column, value = beam.mesh, beam.nd, [], [], []
+    for one in surfaces_of(beam, facets, beam.facet_points):
+        functions, grad = beam.element.functions(mesh.mapping(), one.X, one.elements)
+        slopes = grad[:, 0] * one.along[0] + grad[:, 1] * one.along[1]
+        both = p * np.einsum("iep,jep,ep->eij", functions, slopes, one.weights)
+        dofs = (mesh.t[:, one.elements].T[:, :, None] * nd + np.arange(0, nd, 2)).reshape(
+            len(one.elements), -1)
+        i, j = (x.ravel() for x in np.broadcast_arrays(dofs[:, :, None], dofs[:, None]))
+        row += [i, i + 1]
+        column += [j + 1, j]
+        value += [-both.ravel(), both.ravel()]
+    row, column, value = map(np.concatenate, (row, column, value))
+    return sparse.coo_array((value, (row, column)), shape=(beam.N, beam.N)).tocsr()
 
 
 class EndMoment(Load):

@@ -972,7 +972,7 @@ def distributed(states: Sequence[State], beam: Beam) -> tuple[list[Sampled], lis
         for group in facets:
             w = np.linalg.solve(np.vander(group.xi, increasing=True).T,
                                 1.0 / np.arange(1, len(group.xi) + 1))  # of its own rule
-            values = force[:, :, rows.reshape(-1, len(w))[group.chosen]] / w
+            values = force[:, :, rows[len(w) * group.chosen[:, None] + np.arange(len(w))]] / w
             sampled.append(Sampled(group.where, group.elements, group.xi,
                                    values.swapaxes(0, 1)))
     return sampled, stations

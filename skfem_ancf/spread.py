@@ -201,11 +201,11 @@ def on_facets(mesh: MeshBeam, facets: ArrayLike, **how: Any) -> Spread:
     **how
         ``traction`` or ``pressure`` of the :class:`Spread`.
     """
-    facets = np.asarray(facets)
     n, ne = mesh.p.shape[1], mesh.nelements
-    faces = tuple(np.isin(np.arange(ne) + n + side * ne, facets) for side in (0, 1))
-    stations = tuple(station_of_node(mesh, k) for k in facets[facets < n])
-    return Spread(faces=faces, stations=stations, **how)
+    on = np.zeros(n + 2 * ne, dtype=bool)
+    on[np.asarray(facets)] = True
+    stations = tuple(station_of_node(mesh, k) for k in on[:n].nonzero()[0].tolist())
+    return Spread(faces=(on[n:n + ne], on[n + ne:]), stations=stations, **how)
 
 
 def station_of_node(mesh: MeshBeam, node: int) -> float:

@@ -99,7 +99,7 @@ class ForceElement(Sealable):
         It acts all along a beam, not on a few points.
     along
         Of such a one, bound: the beam, where its parts are, and stations, as
-        :func:`skfem_ancf.spread.facets_along` returns them; None if that is not known.
+        :func:`skfem_ancf.surfaces.groups_of` returns them; None if that is not known.
     links
         What :meth:`bind` has returned, once it is bound.
     groups

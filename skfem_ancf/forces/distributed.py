@@ -10,7 +10,8 @@ from ..beam import select_beam
 from ..errors import require_flag, require_not_negative, teaching
 from ..kernels.section import beam_gradients
 from ..quadrature import gauss
-from ..spread import AXIS, Facets, facets_along
+from ..spread import AXIS, Facets
+from ..surfaces import groups_of, surfaces_of
 from .base import ForceElement, Link, Part, link
 from .texts import DRAG, FOUNDATION
 
@@ -49,17 +50,14 @@ class Foundation(ForceElement):
 
     def bind(self, scene: Scene) -> list[Link]:
         beam, first = select_beam(scene.beams, self.beam), scene.offset(self.beam)
-        self._at, parts = [], beam.loaded_parts(self.side)
-        self.along = (beam, *facets_along(beam.mesh, parts[0][0])) if len(parts) == 1 else None
-        for basis, width in parts:
-            normals, areas = np.asarray(basis.normals), width * basis.dx
-            X = beam.mesh.mapping().invF(np.asarray(basis.global_coordinates()), basis.tind)
-            if not beam.has_sections:
-                X[1] = 0.5
-            for e, points, dx, n in zip(basis.tind, X.transpose(1, 2, 0), areas,
-                                        normals.transpose(1, 2, 0)):
-                for x, area, normal in zip(points, dx, n):
-                    dofs, weights = beam.probe_reference(int(e), x)
+        self._at, found = [], surfaces_of(beam, self.side, beam.facet_points)
+        self.along = (beam, *groups_of(beam.mesh, found))
+        for one in found:
+            X = one.X if beam.has_sections else np.array([one.X[0], np.full(len(one.X[0]), 0.5)])
+            for e, areas, normals in zip(one.elements.tolist(), one.areas,
+                                         one.normals.transpose(1, 2, 0)):
+                for x, area, normal in zip(X.T, areas, normals):
+                    dofs, weights = beam.probe_reference(e, x)
                     self._at.append((link(Link(np.zeros(2), dofs + first, weights)), float(area),
                                      normal))
         return [place for place, _, _ in self._at]
