@@ -61,9 +61,21 @@ def tensor(axis: Rule, section: Rule) -> Rule:
         Points (2, n) and weights (n,), the section running fastest: as scikit-fem's
         ``Basis(quadrature=(X, W))`` wants them.
     """
-    (x, wx), (y, wy) = _rule("axis", axis), _rule("section", section)
-    X = np.array([np.repeat(x, len(y)), np.tile(y, len(x))])
-    return X, np.outer(wx, wy).ravel()
+    return product_rule(_rule("axis", axis), _rule("section", section))
+
+
+def product_rule(axis: Rule, section: Rule) -> Rule:
+    """As :func:`tensor`, of rules that are known to be good.
+
+    Parameters
+    ----------
+    axis, section
+        As there, of arrays.
+    """
+    (x, wx), (y, wy) = axis, section
+    X = np.empty((2, len(x), len(y)))
+    X[0], X[1] = x[:, None], y
+    return X.reshape(2, -1), (wx[:, None] * wy).ravel()
 
 
 def _rule(name: str, rule: Any) -> Rule:

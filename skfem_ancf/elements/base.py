@@ -179,7 +179,8 @@ class ElementBeam(Frozen, Element):
         X
             Reference points, shape (2, npoints) or (2, nelements, npoints).
         h
-            Height of the section; of a tapered one at each point, shape X.shape[1:].
+            Height of the section; of a tapered one at each point, shape X.shape[1:], or of each
+            element at the same points, shape (nelements, npoints).
         i
             Number of the local function, 0 to 2 nodal_dofs - 1, or a slice of them.
         rate
@@ -188,7 +189,8 @@ class ElementBeam(Frozen, Element):
         Returns
         -------
         value, d_xi, d_eta
-            Arrays of shape X.shape[1:], or (n,) + X.shape[1:] of a slice.
+            Arrays of shape X.shape[1:], or (n,) + X.shape[1:] of a slice; of the shape of h where
+            that has more axes.
         slope
             The power of L that a function takes: how many derivatives along X its coordinate is.
         """
@@ -202,10 +204,13 @@ class ElementBeam(Frozen, Element):
             unit = _kept_functions(self._along, self.functionals, self.section, Content(X))[:, i]
         else:
             unit = _unit_functions(self._along, self._factors[:, i], self.section, X)
-        power = power.reshape((-1,) + (1,) * (unit.ndim - 2))
-        value, d_xi, d_eta = h**power * unit
+        if np.ndim(h) == unit.ndim - 1:  # the same points of several elements
+            unit = unit[:, :, None]
+        factor = _powers(h, power)
+        value, d_xi, d_eta = factor.reshape(factor.shape[:1] + (
+            factor.shape[1:] or (1,) * (unit.ndim - 2))) * unit
         if np.ndim(h):  # h^p P(Y / h) of a height that varies
-            d_xi += power * rate / h * value
+            d_xi += np.multiply.outer(power, rate / h) * value
         return value, d_xi, d_eta, slope
 
     def series(self) -> tuple[Array, Array, Array]:
@@ -346,8 +351,7 @@ class ElementBeam(Frozen, Element):
             Of a tapered mesh with the axis of the elements: (n, nelements, npoints).
         """
         h, rate = mapping.height(X[0], tind)
-        return self.local(np.broadcast_to(np.reshape(X, (2, -1) + np.shape(X)[-1:]),
-                                          (2,) + np.shape(h)) if np.ndim(h) else X, h, i, rate)
+        return self.local(X, h, i, rate)
 
     @staticmethod
     def _scale(mesh: MeshBeam, slope: Array, tind: Array | None) -> Array:
@@ -559,6 +563,11 @@ def _kept_functions(along: tuple[int, int], functionals: Functionals, section: S
     X, = content.arrays
     return read_only(_unit_functions(along, _factors(along, functionals, section.number), section,
                                      X))
+
+
+def _powers(h: float | Array, power: Array) -> Array:
+    """h to several powers, each found once: shape (n,) + h.shape."""
+    return np.array([h**k for k in range(power.max(initial=0) + 1)])[power]
 
 
 def _unit_functions(along: tuple[int, int], factors: Array, section: SectionFunctions,

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import require_like
 from ..frozen import Frozen
-from ..quadrature import gauss, lagrange, tensor
+from ..quadrature import gauss, lagrange, product_rule
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -53,7 +53,7 @@ class Term:
     @property
     def quadrature(self) -> Rule:
         """Points (2, n) and weights (n,) for scikit-fem's Basis."""
-        return tensor(self.axis, self.section)
+        return product_rule(self.axis, self.section)
 
     def nodes(self, component: str) -> Array:
         """Where along the axis a component is sampled, shape (m,)."""

@@ -319,8 +319,10 @@ def scaled_pair_tables(table: Array, rows: Array, columns: Array, pairs: Array, 
     unit, ends = _unit_pairs(Content(table, pairs))
     of_pair = rows.take(pairs[0]) * rows.take(pairs[1])
     (a, b), (c, d) = unit.lower, unit.strictly
-    symmetric = unit.symmetric * ((columns.take(a) * columns.take(b))[:, None] * of_pair)
-    skew = unit.skew * ((columns.take(c) * columns.take(d))[:, None] * of_pair.take(ends))
+    symmetric = np.multiply.outer(columns.take(a) * columns.take(b), of_pair)[None]
+    skew = np.multiply.outer(columns.take(c) * columns.take(d), of_pair.take(ends))[None]
+    symmetric *= unit.symmetric
+    skew *= unit.skew
     if len(constant):
         held, held_skew, place = _held(_places(len(columns)), constant, len(columns), elements)
     else:

@@ -662,9 +662,9 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
         pairs = pair_tables(G, layout.pairs, constant, ne)
     return SectionPack(
         packed(G), packed(G.transpose(0, 2, 1)[:int(shared)]), packed(frame),
-        packed(weights), packed(np.zeros(ne) if shared else np.arange(ne), np.int64),
+        packed(weights), np.zeros(ne, np.int64) if shared else np.arange(ne, dtype=np.int64),
         layout.rows, factors, int(normal), joined, ends, law,
-        packed(constant), packed(left * nb, np.int64), packed(np.arange(2 * nb), np.int64),
+        packed(constant), left.astype(np.int64) * nb, np.arange(2 * nb, dtype=np.int64),
         pairs, layout.terms, layout.rounds, packed(moduli), layout.mixing, layout.parts,
         layout.mixing_rounds)
 
