@@ -94,13 +94,13 @@ class Screen:
         self._none = not beams
         if self._none:
             return
-        self._beams = beams
-        first = accumulate([b.N for b in beams], initial=0)
-        x = _joined([np.arange(n + 2, n + b.N, b.nd) for n, b in zip(first, beams)])
-        self._tangents = x[:, None] + _BOTH
+        self._beams, first = beams, accumulate([b.N for b in beams], initial=0)
+        # pairs of coordinates as complex numbers: positions of the nodes, and the tangents behind
+        self._places = [slice(n // 2, (n + b.N) // 2, b.nd // 2) for n, b in zip(first, beams)]
         self.start = _joined([_complex(b.mesh.p_X.T) for b in beams])
-        if sum([b.mesh.nelements for b in beams]) == len(x) - 1:  # one chain
-            self._left, self._right = slice(len(x) - 1), slice(1, len(x))
+        nodes = len(self.start)
+        if sum([b.mesh.nelements for b in beams]) == nodes - 1:  # one chain
+            self._left, self._right = slice(nodes - 1), slice(1, nodes)
         else:
             node = accumulate([b.N // b.nd for b in beams], initial=0)
             self._left, self._right = _joined([n + b.mesh.t for n, b in zip(node, beams)])
@@ -110,11 +110,14 @@ class Screen:
             limits, [b.mesh.nelements for b in beams])
 
     @cached_property
-    def _ends(self):
-        """Where each element's ends and the tangents there are, and what at first, (4, ne, 2)."""
-        x = self._tangents
-        at = np.array([x[self._right] - 2, x[self._left] - 2, x[self._left], x[self._right]])
-        return at, _joined([b.q0 for b in self._beams])[at]
+    def _positions(self):
+        """Of the nodes in the stress-free state, complex."""
+        return _joined([_complex(b.mesh.p.T) for b in self._beams])
+
+    def _at_nodes(self, u, k):
+        """Pair k of the coordinates of each node, complex."""
+        z = _paired(u)
+        return _joined([z[..., s.start + k:s.stop:s.step] for s in self._places])
 
     def passes(self, u: Array, start: Array | None = None, slender: Array | None = None) -> Any:
         """False if a fibre may be compressed, or an element may turn, beyond the range.
@@ -130,7 +133,7 @@ class Screen:
             return True
         start = self.start if start is None else start
         slender = self.slender if slender is None else slender
-        r = _complex(u.take(self._tangents, axis=-1)) / start + 1.0
+        r = self._at_nodes(u, 1) / start + 1.0
         z = r[..., self._right] * r[..., self._left].conj()
         turn = np.abs(np.arctan2(z.imag, z.real))
         # the largest curvature of an element is seldom more than twice its mean
@@ -149,18 +152,20 @@ class Screen:
         """
         if self._none:
             return False
-        at, start = self._ends
-        q = u.take(at) + start
-        along = (q[0] - q[1]) * q[2:]
-        return bool((along[..., 0] + along[..., 1]).min() < 0.0)
-
-
-_BOTH = np.arange(2)
+        r, t = self._at_nodes(u, 0) + self._positions, self._at_nodes(u, 1) + self.start
+        along = (r[self._right] - r[self._left]).conj()
+        return bool(min((along * t[self._left]).real.min(), (along * t[self._right]).real.min())
+                    < 0.0)
 
 
 def _complex(pairs):
     """Vectors (..., 2) as complex numbers, (...)."""
-    return np.ascontiguousarray(pairs).view(complex)[..., 0]
+    return _paired(pairs)[..., 0]
+
+
+def _paired(x):
+    """Numbers (..., 2 n) as n complex ones."""
+    return np.ascontiguousarray(x).view(complex)
 
 
 def _joined(arrays):

@@ -557,7 +557,10 @@ def _fixes(joint, zero):
     rows, dofs, factors = joint.entries(zero, 0.0)
     if len(rows) != len(joint.equations) or not factors.all():
         return None
+    inorder = list(range(len(rows)))
+    if rows.tolist() == inorder:
+        return dofs, factors
     order = rows.argsort()
-    if rows[order].tolist() != list(range(len(rows))):
+    if rows[order].tolist() != inorder:
         return None
     return dofs[order], factors[order]

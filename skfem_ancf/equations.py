@@ -1,5 +1,7 @@
 """The equations of a scene as tables that texts take."""
 
+from functools import cache
+from operator import is_
 from typing import TYPE_CHECKING, Any, NamedTuple
 from weakref import ref
 
@@ -151,10 +153,9 @@ class Tables:
     @cached_property
     def parts(self) -> list[str]:
         """What of :data:`skfem_ancf.compiled.ADDRESSES` the scene has."""
-        packs, forces = {type(x).__name__ for x in self.plain.body.packs}, self.plain.forces
-        return ["common", *["kernels"] * bool(packs), *sorted(packs),
-                *["elements"] * (forces.number > 0),
-                *["contacts"] * (forces.contacts.number > 0)]
+        forces = self.plain.forces
+        return [*_parts(frozenset(map(type, self.plain.body.packs)), forces.number > 0,
+                        forces.contacts.number > 0)]
 
     @property
     def alone(self) -> str:
@@ -175,7 +176,7 @@ class Tables:
         body = self.plain.body
         packs = [linearised(pack) if isinstance(pack, SectionPack) else pack
                  for pack in body.packs]
-        if all(one is other for one, other in zip(packs, body.packs)):
+        if all(map(is_, packs, body.packs)):
             return None
         body = body._replace(packs=tuple(packs))
         return self.with_equations(self.plain._replace(body=body, viscous=body, copies=body))
@@ -435,6 +436,13 @@ class Tables:
                       row * len(picked) + column, out, 0)
 
 
+@cache
+def _parts(packs, elements, contacts):
+    """As :attr:`Tables.parts`, of classes of packs and whether there are elements and contacts."""
+    return ("common", *["kernels"] * bool(packs), *sorted(x.__name__ for x in packs),
+            *["elements"] * elements, *["contacts"] * contacts)
+
+
 def _with_laws(body, address):
     """A Body whose laws have the addresses of their texts."""
 
@@ -443,9 +451,10 @@ def _with_laws(body, address):
         text = text_of(law)
         return pack._replace(law=law if text is None else law._replace(address=address(text)))
 
-    return body._replace(packs=tuple([
+    packs = tuple([
         addressed(pack) if isinstance(pack, SectionPack) and pack.law.kind != LINEAR else pack
-        for pack in body.packs]))
+        for pack in body.packs])
+    return body if all(map(is_, packs, body.packs)) else body._replace(packs=packs)
 
 
 def _kind(load):

@@ -77,6 +77,7 @@ class _Clock:
         return run
 
 
+_IS_LOADED = Choice("loaded", "compiled code is loaded")
 #: Of the process: what it has spent on one scene says that others will follow.
 CLOCK = _Clock()
 
@@ -170,7 +171,7 @@ class Machine:
         if self._off is not None:
             return Choice("plain", self._off)
         if name in compiled.LOADED:
-            return Choice("loaded", "compiled code is loaded")
+            return _IS_LOADED
         parts = self.tables.parts
         seconds = compiling(name, parts)
         if wanted() == "1":
@@ -207,8 +208,8 @@ class Machine:
         if choice.way == "plain":
             return CLOCK.timed(text), self.tables.plain
         try:
-            parts = self.tables.parts
-            with _announced([part for part in parts if part not in compiled.KNOWN]):
+            new = [part for part in self.tables.parts if part not in compiled.KNOWN]
+            with _announced(new) if new else _SILENT:
                 equations = self.tables.flat
         except compiled.TextProblem as error:
             self._plain = str(error)

@@ -464,7 +464,7 @@ class System:
         """
         if not self.beams:
             return self.stiffness_scale
-        total = sum([b.kernel.scale / b.size * float((1.0 / b.mesh.lengths).sum())
+        total = sum([b.kernel.scale / b.size * float(np.add.reduce(1.0 / b.mesh.lengths))
                      for b in self.beams])
         return EPS * self.size * sqrt(total)
 

@@ -1,6 +1,7 @@
 """What making and solving a scene computes, by counts of calls."""
 
 import gc
+from ctypes import c_double, c_int64
 from weakref import ref
 
 import numpy as np
@@ -139,7 +140,21 @@ def test_a_line_is_the_mesh_that_its_nodes_make(x, origin, angle):
         MeshBeam.init_line([0.0, 1e-14], 0.1, origin=(3e3, 0.0))
 
 
+def read_again(words, given):
+    """The arrays of a flat tuple by the words that say where they are."""
+    found, at = {}, 0
+    for name, value in zip(given._fields, given):
+        shape = tuple(words[at + 1:at + 1 + value.ndim])
+        kind = c_double if value.dtype.kind == "f" else c_int64
+        size = int(np.prod(shape))
+        found[name] = np.array((kind * size).from_address(words[at])).reshape(shape)
+        at += 1 + value.ndim
+    assert at == len(words)
+    return found
+
+
 def test_words_say_where_arrays_begin():
+    pytest.importorskip("numba")
     sealed = np.arange(6.0)[2:]
     sealed.flags.writeable = False
     given = ALONE._replace(noise=sealed, u=np.ones((2, 3)))
@@ -148,7 +163,10 @@ def test_words_say_where_arrays_begin():
     assert words.words.tolist().count(at["noise"]) == 1 and words.address != at["u"]
     k = words.words.tolist().index(at["u"])
     assert words.words[k + 1:k + 3].tolist() == [2, 3]
-    for wrong in (np.ones((4, 4))[:, ::2], np.ones(3), np.ones((2, 3), dtype=int)):
+    kept = read_again(words.words, given)
+    assert all(np.array_equal(x, getattr(given, name)) for name, x in kept.items())
+    for wrong in (np.ones((4, 4))[:, ::2], np.ones(3), np.ones((2, 3), dtype=int),
+                  np.ones((2, 3), dtype=np.float32), np.ones((2, 3)).astype(">f8")):
         with pytest.raises(TypeError, match="Members takes contiguous arrays"):
             Words(ALONE._replace(u=wrong))
 

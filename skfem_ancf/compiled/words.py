@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import struct
-import sys
 from array import array
-from ctypes import c_size_t
 from functools import cache
 from typing import TypeVar, get_type_hints
-
-import numpy as np
 
 _NUMBER, _WORD = struct.Struct("d"), struct.Struct("q")
 
@@ -49,70 +45,73 @@ class Words:
     __slots__ = "address", "of", "words"
 
     def __init__(self, x):
-        known, found = _CONSTANT.get(id(x)), list[int]()
-        if known is None:
-            _fill(x, found)
-        else:
-            found = known[1]
-        self.of, self.words = x, array("q", found)
+        arrays, codes, self.of, self.words = [], [], x, array("q")
+        _collect(x, arrays, codes, self.words)
         self.address = self.words.buffer_info()[0]
+        read, kinds = _reader()
+        places, asked = array("q", map(id, arrays)), array("q", codes)
+        wrong = read(places.buffer_info()[0], asked.buffer_info()[0], len(asked), self.address,
+                     *kinds)
+        if wrong >= 0:
+            code, value = [code for code in codes if code >= 0][wrong], arrays[wrong]
+            raise TypeError(f"{type(x).__name__} takes contiguous arrays of "
+                            f"{'integers' if code & 1 else 'floats'} with {code >> 1} axes, not "
+                            f"{value.dtype} with {value.ndim}")
 
 
-_KINDS = {"f": np.dtype(np.float64), "i": np.dtype(np.int64)}
+@cache
+def _reader():
+    from .heads import reader
 
-
-def _asked(x):
-    """Where an array begins."""
-    return x.__array_interface__["data"][0]
-
-
-#: NumPy's arrays begin as every Python object does, and go on with the place of their numbers.
-_HEAD, _at = object.__basicsize__, c_size_t.from_address
-
-
-def _is_there():
-    """True if arrays are laid out so, where reading it is ten times faster: it is tried once."""
-    tried = np.zeros(3), np.zeros((2, 3))[1:]
-    return sys.implementation.name == "cpython" and all(
-        _at(id(x) + _HEAD).value == _asked(x) for x in tried)
-
-
-_LAID_OUT = _is_there()
+    return reader()
 
 
 @cache
 def _plan(kind):
-    """As :func:`hints`, a type for each field, and its axes, -1 of what is no array."""
-    found = [(_KINDS[hint[0]], hint[1]) if isinstance(hint, tuple) else (hint, -1)
-             for hint in hints(kind)]
-    return tuple(zip(*found))
+    """Of a class its fields one by one: numbers, as int or float, and tuples; arrays in runs.
+
+    Each is what it is, where, and of a run the codes of :mod:`~skfem_ancf.compiled.heads` and words
+    to be written.
+    """
+    found, begun = [], 0
+    all_hints = *hints(kind), None
+    for k, hint in enumerate(all_hints):
+        if isinstance(hint, tuple):
+            continue
+        if k > begun:
+            run = all_hints[begun:k]
+            codes = [2 * axes + (letter == "i") for letter, axes in run]
+            found.append((array, slice(begun, k), codes,
+                          array("q", bytes(8 * sum(1 + axes for _, axes in run)))))
+        if k < len(all_hints) - 1:
+            found.append((hint, k, [-1], None))
+        begun = k + 1
+    return found
 
 
-def _fill(x, out):
-    inner = {}  # some are there twice
-    for value, kind, axes in zip(x, *_plan(type(x))):
-        if axes >= 0:
-            if value.dtype != kind or value.ndim != axes or not value.flags.c_contiguous:
-                raise TypeError(f"{type(x).__name__} takes contiguous arrays of {kind} with "
-                                f"{axes} axes, not {value.dtype} with {value.ndim}")
-            out.append(_at(id(value) + _HEAD).value if _LAID_OUT else _asked(value))
-            out += value.shape
+def _collect(x, arrays, codes, words):
+    """Find the arrays of a tuple, codes, and words, those of arrays yet to be read."""
+    for kind, at, code, room in _plan(type(x)):
+        value = x[at]
+        if kind is array:
+            arrays += value
+            words += room
         elif kind is int:
-            out.append(int(value))
+            words.append(int(value))
         elif kind is float:
-            out.append(_WORD.unpack(_NUMBER.pack(value))[0])
+            words.append(_WORD.unpack(_NUMBER.pack(value))[0])
+        elif id(value) in _CONSTANT:
+            known = _known(value)
+            words += known
+            code = [-len(known)]
         else:
-            known = _CONSTANT.get(id(value)) or inner.get(id(value))
-            if known is None:
-                first = len(out)
-                _fill(value, out)
-                inner[id(value)] = value, out[first:]
-            else:
-                out += known[1]
+            _collect(value, arrays, codes, words)
+            continue
+        codes += code
 
 
-#: Tuples that modules keep, by identity, with their words.
-_CONSTANT: dict[int, tuple[tuple, list[int]]] = {}
+#: Tuples that modules keep, by identity, and their words once they have been asked for.
+_CONSTANT: dict[int, tuple[tuple, array | None]] = {}
 
 _Tuple = TypeVar("_Tuple", bound=tuple)
 
@@ -125,10 +124,17 @@ def constant(x: _Tuple) -> _Tuple:
     x
         As :class:`Words` takes it. Its arrays stay where they are.
     """
-    found: list[int] = []
-    _fill(x, found)
-    _CONSTANT[id(x)] = x, found
+    _CONSTANT[id(x)] = x, None
     return x
+
+
+def _known(x):
+    """The words of a constant tuple."""
+    found = _CONSTANT[id(x)][1]
+    if found is None:
+        found = Words(x).words
+        _CONSTANT[id(x)] = x, found
+    return found
 
 
 class Kept:
