@@ -1673,7 +1673,7 @@ class Scene:
         **options
             Those of :func:`skfem_ancf.dynamics.integrate.integrate`: ``t_eval``, ``tol``,
             ``rtol``, ``t_start``, ``breakpoints``, ``checkpoint``, ``every``, ``progress``,
-            ``until``.
+            ``until``, ``check``.
 
         Returns
         -------

@@ -8,7 +8,8 @@ from numpy.testing import assert_allclose
 
 from scipy.integrate import solve_ivp
 
-from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, RigidBody, Scene, StVenantKirchhoff
+from skfem_ancf import (Beam, Circle, ElementBeamANCF, MeshBeam, RigidBody, Scene,
+                        StVenantKirchhoff)
 from skfem_ancf.dynamics import (SCHEMES, EnergyMomentum4, Gauss, GeneralizedAlpha, Motion, Newmark,
                                  Radau)
 from skfem_ancf.dynamics.base import in_steps
@@ -183,6 +184,93 @@ def test_as_many_steps_as_scipy_at_the_same_error(name, rtol, tol):
     off, other = (np.abs(x - u)[:, positions(scene)].max() for x in (history.u, theirs))
     assert off < 2.0 * other and off < rtol * s.size
     assert history.steps + history.rejected < 1.3 * len(found.t)
+
+
+# the error of the whole motion
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+@pytest.mark.parametrize("scheme", [name for name, cls in SCHEMES.items() if cls.adaptive])
+def test_the_estimated_error_is_the_error(scheme, name):
+    """Of the farthest node at the ends of steps, against SciPy."""
+    build, t_end = MOTIONS[name]
+    scene = build()
+    history = scene.integrate(t_end, "auto", scheme=scheme, rtol=1e-3)
+    times = history.t[1::len(history) // 8]
+    u = by_scipy(build(), times, rtol=1e-9, atol=1e-10)[0]
+    off = (np.isin(history.t, times).nonzero()[0], u)
+    off = (history.u[off[0]] - off[1])[:, positions(scene)].reshape(len(u), -1, 2)
+    most = np.hypot(*np.moveaxis(off, 2, 0)).max() / scene.system.size
+    assert 0.5 * history.error < most < 1.2 * history.error < 1.2e-3
+    assert history.passes <= 2
+
+
+@pytest.mark.filterwarnings("ignore:the body is turned inside out")  # so soft a beam folds
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_motion_that_is_off_by_more_is_taken_again(compiled):
+    """Steps of Gauss as for 1e-3 are off by more than that."""
+    def build():
+        beam = soft(2, 2, E=1e5, h=0.05, compiled=compiled)
+        return Scene(beam).pin("left").gravity(GRAVITY)
+
+    times, scene = np.linspace(0.25, 1.0, 4), build()
+    history, once = (scene.integrate(1.0, "auto", scheme="gauss", rtol=1e-3, t_eval=times,
+                                     check=check) for check in (None, False))
+    assert history.passes == 2 and history.error < 1e-3 and "taken 2 times" in repr(history)
+    assert once.passes == 1 and once.error is None and "taken" not in repr(once)
+    fine = build().integrate(1.0, 1.0 / 200, scheme=Gauss(4), t_eval=times)
+    off = [np.abs(h.u - fine.u)[:, positions(scene)].max() / scene.system.size
+           for h in (history, once)]
+    assert off[0] < 1e-3 < off[1]
+
+
+def test_the_error_does_not_depend_on_what_is_stored():
+    times = [0.0123, 0.2]
+    every, some = (swinging().integrate(0.2, "auto", rtol=1e-3, t_eval=t) for t in (None, times))
+    assert some.error == every.error and some.passes == every.passes
+    assert some.steps == every.steps
+
+
+def test_the_error_of_a_motion_with_breakpoints_and_of_one_that_ends_before():
+    """Both motions start afresh where the force jumps; one whose end is an event ends there."""
+    def build():
+        scene = Scene(soft(2, 1, E=1e4))
+        return scene.point_force((30.0, 0.0), (0.5, 0.1),
+                                 amplitude=lambda t: np.where(t >= 0.0333, 1.0, 0.0))
+
+    def far(state):
+        return state.position((1, 0))[0] - 1.002
+
+    scene = build()
+    history = scene.integrate(0.2, "auto", scheme="radau", rtol=1e-5, breakpoints=[0.0333],
+                              until=far)
+    assert 0.0333 in history.t and 0.1 < history.event < 0.2
+    fine = build().integrate(history.event, 1e-3, scheme="radau", breakpoints=[0.0333])
+    off = (history.u[-1] - fine.u[-1])[positions(scene)].reshape(-1, 2)
+    assert 0.0 < np.hypot(*off.T).max() / scene.system.size < 1.2 * history.error < 1.2e-5
+
+
+def test_the_error_from_an_instant_on():
+    scene = swinging()
+    half = scene.integrate(0.1, "auto", scheme="radau", rtol=1e-5)
+    rest = scene.integrate(0.3, "auto", scheme="radau", rtol=1e-5, start=half.state(-1))
+    fine = scene.integrate(0.3, 1e-3, scheme=Gauss(4), start=half.state(-1))
+    off = np.abs(rest.u[-1] - fine.u[-1])[positions(scene)].max() / scene.system.size
+    assert 0.0 < off < 1.2 * rest.error < 1.2e-5
+
+
+def test_errors_that_are_not_estimated_say_so(tmp_path):
+    assert swinging().integrate(0.1, 0.01).error is None
+    fallen = swinging().obstacle(Circle((0.0, -3.0), 1.0))
+    assert fallen.integrate(0.02, "auto", rtol=1e-2).error is None
+    kept = swinging().integrate(0.02, "auto", rtol=1e-2, checkpoint=tmp_path / "a.npz")
+    assert kept.error is None and kept.passes == 1
+    for build, options, text in (
+            (swinging, {"dt": 0.01}, "dt='auto'"),
+            (swinging, {"checkpoint": tmp_path / "b.npz"}, "not with a checkpoint"),
+            (lambda: fallen, {}, "not with obstacles"), (swinging, {"check": 1}, "True or False")):
+        with pytest.raises(InputError, match=text):
+            build().integrate(**{"t_end": 0.02, "dt": "auto", "check": True, **options})
 
 
 def test_schemes_without_an_estimate_say_so():

@@ -73,6 +73,12 @@ class History:
         Steps that the automatic step size took again.
     iterations, factorizations
         Residuals solved for, and tangents factorised, in all steps.
+    error
+        By how far a node or a rigid body is off at the end of a step, the farthest, over the size
+        of the scene, beside the exact motion of the same mesh: estimated, with ``dt="auto"``, by
+        ``integrate(..., check=)``; None elsewhere.
+    passes
+        How often the motion was taken, with a smaller tolerance each time, to be as exact as that.
     """
 
     COLUMNS = COLUMNS
@@ -133,6 +139,7 @@ class History:
         if self._rows and run.y is not None and self._rows[-1].t == run.y.t:
             self._kept = run.remember()  # of the last instant: the factors too
         self.steps, self.rejected = run.steps, run.rejected
+        self.error, self.passes = run.error, run.passes
         self.iterations = run.integrator.iterations
         self.factorizations = run.integrator.factorizations
         self.substeps = run.integrator.substeps
@@ -146,6 +153,7 @@ class History:
         span = f", t = {self.t[0]:g} to {self.t[-1]:g}" if len(self) else ""
         cut = "".join(f", {n} {what}" for n, what in (
             (self.substeps, "substeps"), (self.rejected, "rejected")) if n)
+        cut += f", taken {self.passes} times" if self.passes > 1 else ""
         return (f"<History of {len(self)} instants{span}, {self.scheme!r}, {self.steps} steps"
                 f"{cut}, {self.iterations} iterations, {self.factorizations} factorisations>")
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import (AncfError, ConvergenceError, InputError, Interrupted, ModelWarning,
-                      require_finite, require_finite_scalar, require_function, require_positive,
-                      shown, taught)
+                      require_finite, require_finite_scalar, require_flag, require_function,
+                      require_positive, shown, taught)
 from ..progress import progress_bar
 from .checkpoint import Checkpoint, same_problem
 from .base import contacts_of, in_steps, same_scheme
+from .companion import Companion
 from .integrator import Integrator, StepFailed
 from .run import Run, Task
 
@@ -34,6 +36,13 @@ LOOKED = 16
 #: Gigabytes of the joints' matrices, at most.
 LARGEST = 2.0
 MIN_RTOL = 1e-12
+#: Coordinates up to which the error of a motion is checked unasked: the motion itself goes step by
+#: step, what checks it in blocks of steps.
+CHECKED = 1000
+#: How often a motion is taken at most, and the part of the tolerance that is then aimed at.
+PASSES, AIM = 3, 0.6
+#: Part of the tolerance up to which an estimated error is let be: it is right to a tenth or so.
+ENOUGH = 0.9
 EPS = np.finfo(float).eps
 
 
@@ -43,7 +52,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
               tol: float | None = None, rtol: float = 1e-5, progress: bool | None = None,
               start: State | None = None, breakpoints: ArrayLike = (),
               checkpoint: StrPath | None = None, every: int | None = None,
-              until: Callable[[State], float] | None = None,
+              until: Callable[[State], float] | None = None, check: bool | None = None,
               sensors: Sequence[tuple[str, Sensor]] = ()) -> History:
     """Integrate the equation of motion.
 
@@ -94,6 +103,12 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         changes its sign, at an instant within a step that is found as those of ``t_eval``.
         ``history.event`` is its time, None if there was none up to ``t_end``. It is asked after
         each step, so that two changes within one are not seen. Not with ``checkpoint``.
+    check
+        With ``dt="auto"``, estimate the error of the motion by another one in steps half as long,
+        and take it again, at most twice, with a smaller tolerance where that is above ``rtol``:
+        ``history.error``, ``history.passes``. It is 1.5 to 2 times the iterations of a pass. None:
+        up to 1000 coordinates, where it takes a fraction of the time, if there are no obstacles,
+        no sampled controllers and no checkpoint, with which it is refused.
     sensors
         Pairs of name and :class:`~skfem_ancf.dynamics.sensors.Sensor`: those of the scene.
 
@@ -121,24 +136,70 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         _require_room(system)
     system.require_independent_joints()
     system.constraints.require_motion()
-    run = Run(system, scheme, task, sensors)
     if until is not None:
         if checkpoint is not None:
             raise InputError("a checkpoint cannot keep the function until(state): leave out "
                              "checkpoint=, or integrate in parts, start=history.state(-1)")
-        run.until = require_function("until", until, "of a State that returns a number")
-    file = None if checkpoint is None else Checkpoint(checkpoint, every, run)
+        require_function("until", until, "of a State that returns a number")
+    checked = _checked(check, system, task, checkpoint)
     if u is None and start is not None:
         u = start.u
-    if start is not None and motion is not None and _goes_on(system, scheme, start, t_start):
-        run.go_on(motion, start._origin[1])
-    else:
-        v = v if motion is None else motion.v
-        run.begin(np.zeros(system.N) if u is None else u, np.zeros(system.N) if v is None else v,
-                  system.forces.contacts.of_state(start))
-    if file is not None:
+
+    def begun(rtol):
+        """The motion at its start, with steps for a tolerance."""
+        run = Run(system, scheme, replace(task, rtol=rtol), sensors)
+        run.until = until
+        if checked:
+            run.companion = Companion(system, scheme, task.tol)
+        if start is not None and motion is not None and _goes_on(system, scheme, start, t_start):
+            run.go_on(motion, start._origin[1])
+        else:
+            run.begin(np.zeros(system.N) if u is None else u,
+                      np.zeros(system.N) if velocity is None else velocity,
+                      system.forces.contacts.of_state(start))
+        return run
+
+    velocity = v if motion is None else motion.v
+    if checked:
+        return _within(begun, task.rtol, progress)
+    run, file = begun(task.rtol), None
+    if checkpoint is not None:
+        file = Checkpoint(checkpoint, every, run)
         file.begin()
     return follow(run, file, progress)
+
+
+def _checked(check, system, task, checkpoint):
+    """True if the error of a motion is to be estimated."""
+    found = [text for text, there in (
+        ("obstacles", system.forces.contacts.obstacles), ("a checkpoint", checkpoint is not None),
+        ("controllers that are sampled", system.forces.sampled)) if there]
+    if check is None:
+        return task.dt is None and not found and system.N <= CHECKED
+    if require_flag("check", check) and (found or task.dt is not None):
+        raise InputError("check=True estimates the error of motions with dt='auto'"
+                         f"{', not with ' + ' and '.join(found) if found else ''}: leave it out, "
+                         "or compare with a motion in shorter steps")
+    return bool(check)
+
+
+def _within(begun, rtol, progress):
+    """The motion, again in shorter steps while its error is above the tolerance.
+
+    The error is in proportion to the tolerance by which steps are chosen (Lang, Verwer: "On global
+    error estimation and control for initial value problems", SIAM Journal on Scientific Computing
+    29 (2007)).
+    """
+    aim, before = rtol, np.inf
+    for passes in range(1, PASSES + 1):
+        run = begun(aim)
+        run.passes = passes
+        body = _go(run, None, progress)
+        error = run.error
+        if not ENOUGH * rtol < error < before or aim == MIN_RTOL:
+            break
+        before, aim = error, max(MIN_RTOL, aim * AIM * rtol / error)
+    return _ended(run, body)
 
 
 def _samples(system, t_start, t_end):
@@ -232,6 +293,11 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
     -------
     History
     """
+    return _ended(run, _go(run, file, progress))
+
+
+def _go(run, file, progress):
+    """Take the steps of a Run, and write its file: what has looked at the body."""
     history, task, body = run.history, run.task, _Body(run)
     run.system.forces.contacts.sweep.begin()
     try:
@@ -254,15 +320,21 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
     except KeyboardInterrupt:
         raise Interrupted(f"stopped at t = {run.y.t:.6g} of {task.t_end:.6g}; the exception's "
                           "state is the History up to there", history.close()) from None
+    run.give_back()
+    return body
+
+
+def _ended(run, body):
+    """The History of a Run that is done, and what there is to warn of."""
     body.warn()
-    _warn_of_turns(history.close())
+    history = run.history.close()
+    _warn_of_turns(history)
     deep = run.system.forces.contacts.sweep.deep()
     if deep:
         warnings.warn(deep, ModelWarning, stacklevel=9)
     with run.system.forces.contacts.lent(contacts_of(run.y)):
         for text in run.system.forces.contacts.sunk(run.y.u, run.y.t):
             warnings.warn(text, ModelWarning, stacklevel=9)
-    run.give_back()
     return history
 
 

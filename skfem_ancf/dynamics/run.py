@@ -13,6 +13,7 @@ import scipy
 
 from ..errors import AncfError, ask_number
 from .base import Motion, Scheme, contacts_of
+from .companion import Companion
 from .history import History
 from .integrator import Integrator, StepFailed
 from .sensors import Recorder
@@ -98,6 +99,11 @@ class Run:
         A function of a State whose change of sign ends the motion, or None.
     event
         The time at which it did, or None.
+    companion
+        What follows the motion to tell its error, a
+        :class:`~skfem_ancf.dynamics.companion.Companion`, or None.
+    passes
+        How often the motion has been begun.
     """
 
     def __init__(self, system: System, scheme: Scheme, task: Task,
@@ -118,6 +124,8 @@ class Run:
         self.until: Callable[[State], float] | None = None
         self.event: float | None = None
         self._value: float | None = None
+        self.companion: Companion | None = None
+        self.passes = 1
         self._in_blocks, self._pace = scheme.in_blocks(system), self._first_pace()
         self._limit()
 
@@ -157,6 +165,8 @@ class Run:
         self._store_start()
 
     def _store_start(self):
+        if self.companion is not None:
+            self.companion.begin(self.y, self.integrator.energy, self.integrator.limit)
         self.recorder.record([self.y])
         wanted = self.task.t_eval
         if wanted is None or wanted[0] <= self.task.t_start:
@@ -172,9 +182,18 @@ class Run:
         """Size of the first step of a segment."""
         return min(self.size, self._end - self._begun)
 
+    @property
+    def error(self) -> float | None:
+        """The largest error so far, as of the companion, or None."""
+        if self.companion is None:
+            return None
+        self.companion.catch_up()
+        return self.companion.error
+
     def give_back(self) -> None:
         """Leave the work arrays to the next motion: this one has ended."""
-        for one in (self.integrator, self._side):
+        beside = None if self.companion is None else self.companion.integrator
+        for one in (self.integrator, self._side, beside):
             if one is not None:
                 one.give_back()
 
@@ -280,7 +299,12 @@ class Run:
             return
         if h == left:
             new.t = self._end
+        segment = self.segment
         self._commit(y, new)
+        if self.companion is not None:
+            self.companion.follow(self.y, h if self.event is None else self.y.t - y.t)
+            if self.segment != segment:
+                self.companion.turn(self.y, self.integrator.energy, self.integrator.limit)
 
     def _commit(self, old, new):
         """A step is done."""
