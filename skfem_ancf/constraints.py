@@ -12,7 +12,7 @@ from .joints.base import Joint, same_joint
 from .joints.nodes import Nodes, chain_ends
 from .joints.settlements import HELD
 from .kept import cached_property
-from .rank import first_dependent, null_space, unit_rows
+from .rank import DENSE, first_dependent, null_space, unit_rows
 from .rigid import RigidBody
 
 if TYPE_CHECKING:
@@ -382,8 +382,8 @@ class Constraints:
         if self._independent or not self.joints or self.condensable:
             return
         zero = np.zeros(self.N)
-        found = first_dependent(self.sparse_jacobian(zero, 0.0), self.free,
-                                self.constraint(zero, 0.0))
+        derivative = self.full_jacobian if self.N <= DENSE else self.sparse_jacobian
+        found = first_dependent(derivative(zero, 0.0), self.free, self.constraint(zero, 0.0))
         self._independent = found is None  # nothing of it changes in the life of a system
         if found is None:
             return

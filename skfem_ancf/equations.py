@@ -18,6 +18,7 @@ from .kept import cached_property, twin_of
 from .kernels.law import LINEAR, OWN, text_of, with_text
 from .kernels.moments import MomentPack
 from .kernels.section import SectionPack, linearised
+from .origin import ours
 from .own import handle_of
 from .sampling import sample
 from .source import F1, I1, by_place
@@ -386,10 +387,18 @@ class Tables:
         gk, gi = (np.concatenate(x) for x in zip(*first))
         tables = JointTables(*(x.astype(np.int64) for x in (k, i, j)), v.astype(float),
                              gk.astype(np.int64), gi.astype(np.int64), 0)
-        return tables if self._is_quadratic(tables) else tables._replace(own=self.handle)
+        tabled = (all(joint.tabled for joint in s.joints) if all(map(ours, s.joints))
+                  else self.are_joints(tables))
+        return tables if tabled else tables._replace(own=self.handle)
 
-    def _is_quadratic(self, tables):
-        """True if the tables give Phi and its derivative: joints of others may not be quadratic."""
+    def are_joints(self, tables: JointTables) -> bool:
+        """True if the tables give Phi and its derivative: joints of others may not be quadratic.
+
+        Parameters
+        ----------
+        tables
+            Of the system's joints.
+        """
         s = self.system
         if not s.m:
             return True

@@ -23,13 +23,15 @@ DEPENDENT = 1e-9
 FREE = 1e-9
 #: Entries of L, of a matrix of unit diagonal, from which its pivots are not trusted.
 LARGEST = 1e6
-#: Columns up to which singular values are found by dense matrices.
+#: Columns up to which singular values, and equations that depend on others, are found by dense
+#: matrices.
 DENSE = 300
 #: Vectors of a null space that are looked for where it is not dense, and iterations for them.
 MOST, ITERATIONS = 8, 6
 
 
-def first_dependent(J: sparse.csr_array, free: Array, phi: Array) -> tuple[int, float] | None:
+def first_dependent(J: Array | sparse.csr_array, free: Array,
+                    phi: Array) -> tuple[int, float] | None:
     """The first equation that those before it hold already, or None.
 
     The rows of J fall apart into groups without a common coordinate. In each group QR
@@ -38,7 +40,7 @@ def first_dependent(J: sparse.csr_array, free: Array, phi: Array) -> tuple[int, 
     Parameters
     ----------
     J
-        Sparse, shape (m, N).
+        Shape (m, N).
     free
         Truth values of the coordinates that supports leave free, shape (N,).
     phi
@@ -49,9 +51,9 @@ def first_dependent(J: sparse.csr_array, free: Array, phi: Array) -> tuple[int, 
     tuple or None
         The number of the equation, and what it is open by where those before it are met.
     """
-    size = np.sqrt(np.asarray(J.multiply(J).sum(axis=1)).ravel())
+    size = np.sqrt((J * J).sum(axis=1))
     first = None
-    for rows, _, A in groups(J @ sparse.diags(free.astype(float))):
+    for rows, _, A in groups(J * free):
         if first is not None and rows[0] > first[0]:
             continue
         R = np.asarray(np.linalg.qr(A.T, mode="r"))
@@ -65,8 +67,8 @@ def first_dependent(J: sparse.csr_array, free: Array, phi: Array) -> tuple[int, 
     return first
 
 
-def groups(J: sparse.csr_array) -> Iterator[tuple[Array, Array, Array]]:
-    """The rows of a sparse matrix in groups without a common column.
+def groups(J: Array | sparse.csr_array) -> Iterator[tuple[Array, Array, Array]]:
+    """The rows of a sparse matrix in groups without a common column; of a dense one all at once.
 
     Yields
     ------
@@ -74,6 +76,10 @@ def groups(J: sparse.csr_array) -> Iterator[tuple[Array, Array, Array]]:
         Numbers of the rows, increasing, of the columns that are not zero in all of them, and the
         dense matrix between both.
     """
+    if isinstance(J, np.ndarray):
+        columns, = J.any(axis=0).nonzero()
+        yield np.arange(len(J)), columns, J[:, columns]
+        return
     J = sparse.csr_array(J)
     J.eliminate_zeros()
     (m, n), entries = J.shape, J.tocoo()

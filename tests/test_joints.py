@@ -62,6 +62,13 @@ def joint(request):
     return scene.joint(request.param, **CASES[request.param]), scene
 
 
+def test_joints_are_tables_where_they_say_so(joint):
+    joint, scene = joint
+    tables = scene.system.machine.tables
+    assert tables.are_joints(tables.plain.joints) == (joint.tabled or not scene.system.m)
+    assert bool(tables.plain.joints.own) == bool(scene.system.m and not joint.tabled)
+
+
 def test_value_is_zero_at_the_start(joint):
     joint, scene = joint
     assert np.abs(joint.value(np.zeros(scene.N), 0.0)).max() < 1e-15

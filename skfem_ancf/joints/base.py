@@ -137,11 +137,15 @@ class Joint(Sealable):
         if :meth:`mean_entries` and :meth:`mean_turning` are exact.
     moving : bool
         Phi depends on t.
+    tabled : bool
+        Of the package's own joints: Phi is at most quadratic in u, with second derivatives that do
+        not depend on t. Those of others are tried.
     """
 
     equations: tuple[str, ...] = ()
     constant = True
     moving = False
+    tabled = True
     name: str | None = None
 
     def __init_subclass__(cls, **options: Any) -> None:

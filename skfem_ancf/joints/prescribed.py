@@ -156,7 +156,7 @@ class PrescribedTurn(Joint):
     """
 
     equations = ("moment",)
-    constant = False
+    constant = tabled = False
     moving = True
 
     def __init__(self, at: Any, other: Any, angle: Callable[[float], float],

@@ -71,7 +71,7 @@ class Sleeve(Joint):
     Dynamics 26 (2011), who have s as a coordinate.
     """
 
-    constant = False
+    constant = tabled = False
     #: of the last two displacements: the parameter, and derivatives
     _known: list[dict[str, Any]]
 
