@@ -323,9 +323,12 @@ class Beam(Frozen):
 
     def exact_basis(self) -> Basis:
         """A ``Basis`` whose quadrature is exact for products of two coordinates, as in the mass."""
+        return Basis(self.mesh, self.vector_element, quadrature=self.exact_rule())
+
+    def exact_rule(self) -> Rule:
+        """Points and weights of the quadrature of :meth:`exact_basis`."""
         n = self.element.axis_degree + 1 + (0 if self.mesh.is_straight else 1)
-        return Basis(self.mesh, self.vector_element,
-                     quadrature=tensor(gauss(n), self.kinematics.section_rule(self.element)))
+        return tensor(gauss(n), self.kinematics.section_rule(self.element))
 
     def facet_basis(self, facets: Place, intorder: int | None = None) -> FacetBasis:
         """A scikit-fem ``FacetBasis`` of the position field at a place, see :meth:`dofs`.

@@ -6,9 +6,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from .linalg import BandMatrix
 from .quadrature import gauss, tensor
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from .beam import Beam
     from .types import Array
 
@@ -130,3 +133,33 @@ def of_cable(beam: Beam) -> Inertia:
     if across.simple:
         return Inertia(N, mass)
     return Inertia(N, mass, beam.element.slopes(mapping, X, tind)[0][:, 0], np.array(moments))
+
+
+def projected(beam: Beam, field: Callable[[Array], Array]) -> Array:
+    """Rates of the coordinates whose velocity is nearest to a field, in the mean over the body.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    field
+        Takes points of the stress-free body, shape (2, nelements, npoints), and returns its
+        components there.
+
+    Returns
+    -------
+    ndarray
+        Shape (N,).
+    """
+    X, W = beam.exact_rule()
+    mesh, mapping, element, nd = beam.mesh, beam.mesh.mapping(), beam.element, beam.nd
+    N, weights = element.values(mapping, X), mapping.detDF(X) * W
+    gram = BandMatrix(beam.N // 2, nd - 1)  # of one component
+    gram.add_elements(np.einsum("iep,jep->eij", N, N * weights), 0, nd // 2, mesh.t[0])
+    rest, v = field(mapping.F(X)), np.zeros((beam.N // 2, 2))
+    for _ in range(2):  # elements of high degree have ill-conditioned masses
+        parts = np.einsum("iep,cep->eic", N, rest * weights)
+        dv = gram.solve(beam.kernel.scatter(parts).reshape(-1, 2))
+        of_elements = np.hstack(dv.reshape(-1, nd)[mesh.t]).reshape(*parts.shape)
+        rest, v = rest - np.einsum("iep,eic->cep", N, of_elements), v + dv
+    return v.ravel()

@@ -23,6 +23,7 @@ from .dynamics.checkpoint import resume
 from .dynamics.integrate import follow, integrate
 from .dynamics.sensors import Sensor
 from .eigenstrain import EigenStrain, Temperature, products, require_alone, takes_time
+from .inertia import projected
 from .kept import cached_property
 from .obstacles import Obstacle
 from .forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring, TorsionalSpring,
@@ -1644,11 +1645,7 @@ class Scene:
         if callable(v) and isinstance(beam, RigidBody):
             v = beam.velocity_of(lambda x: ask_field("v(x)", v, x))
         elif callable(v):
-            basis = beam.exact_basis()
-            values = ask_field("v(x)", v, np.asarray(basis.global_coordinates()))
-            v = basis.project(values)
-            # once more: elements of high degree have ill-conditioned masses
-            v = v + basis.project(values - np.asarray(basis.interpolate(v)))
+            v = projected(beam, lambda x: ask_field("v(x)", v, x))
         return require_finite("v", v, (beam.N,))
 
     @_alone

@@ -623,6 +623,23 @@ def test_initial_velocity_by_function_and_by_coordinates():
         assert abs(history.strain_energy[0]) < 1e-20
 
 
+@pytest.mark.parametrize("element", [ElementBeamCable(3), ElementBeamCable(7), ElementBeamANCF(2),
+                                     ElementBeamANCFCubic(3)])
+def test_initial_velocity_is_the_projection_of_scikit_fem(element, monkeypatch):
+    def field(x):
+        return np.array([np.sin(3.0 * x[1]) + x[0] ** 2, np.exp(x[0]) * (1.0 - x[1])])
+
+    for mesh in quarter_arc(5, 0.1), MeshBeam.init_line([0.0, 0.4, 1.0], 0.1, angle=0.3):
+        beam = Beam(mesh, element, StVenantKirchhoff(1e6, 0.3, 1e3), 0.1)
+        basis = beam.exact_basis()
+        x = np.asarray(basis.global_coordinates())
+        with monkeypatch.context() as patched:
+            patched.setattr(Beam, "exact_basis", None)  # not made for it
+            v = Scene(beam).initial_velocity(field)._velocities[0][1]
+        found, known = (np.asarray(basis.interpolate(w)) for w in (v, basis.project(field(x))))
+        assert_allclose(found, known, rtol=0, atol=1e-10)
+
+
 def test_steady_spin():
     """A free rod in the stretched equilibrium of its rotation keeps turning in that shape."""
     omega, E, rho = 20.0, 2e8, 7800.0
