@@ -20,7 +20,7 @@ from .kernels.moments import MomentPack
 from .kernels.section import SectionPack, linearised
 from .origin import ours
 from .own import handle_of
-from .sampling import sample
+from .sampling import sampled
 from .source import F1, I1, by_place
 from .tables import JointTables, LoadTables
 from .types import Array
@@ -344,9 +344,11 @@ class Tables:
         columns = self._columns
         if all(load is None or load.amplitude is None for load in columns):
             return np.ones((1, len(columns)))
-        return np.stack([np.ones(len(times)) if load is None or load.amplitude is None else
-                         sample(load.amplitude, times).reshape(len(times)) for load in columns],
-                        axis=1)
+        out = np.ones((len(times), len(columns)))
+        for k, load in enumerate(columns):
+            if load is not None and load.amplitude is not None:
+                out[:, k] = sampled(load.amplitude, times, "amplitude").reshape(len(times))
+        return out
 
     @property
     def prestressed(self) -> bool:
@@ -418,15 +420,30 @@ class Tables:
         s = self.system
         if not s.joints:
             return np.zeros((len(times), 0))
-        return np.hstack([np.zeros((len(times), 0))] + [j.offset(times, s.N) for j in s.joints])
+        return _beside([joint.offset(times, s.N) for joint in s.joints])
 
     def slopes(self, times: Array) -> Array:
         """g of all joints at the times, shape (n, k)."""
         s = self.system
         if not s.joints:
             return np.zeros((len(times), 0))
-        return np.hstack([np.zeros((len(times), 0))] + [
-            j.slope_entries(times, s.N)[2] for j in s.joints])
+        return _beside([joint.slope_entries(times, s.N)[2] for joint in s.joints])
+
+    @cached_property
+    def still(self) -> tuple[Array, Array]:
+        """c and g of joints that do not move with both rates, (1, 3, m) and (1, 4, k).
+
+        g twice: at the end of a step and where the joints act. What moves, and joints that are no
+        tables, have zeros.
+        """
+        s, joints, first = self.system, self.plain.joints, np.zeros(1)
+        c, g = np.zeros((1, 3, s.m)), np.zeros((1, 4, len(joints.gk)))
+        if s.m and not joints.own:
+            if not self.motion_varies:
+                c[:, 0] = self.offsets(first)
+            if not self.turns:
+                g[:, :2] = self.slopes(first)
+        return c, g
 
     def _border(self, joints):
         s, none = self.system, _NO_INTS
@@ -450,6 +467,11 @@ def _parts(packs, elements, contacts):
     """As :attr:`Tables.parts`, of classes of packs and whether there are elements and contacts."""
     return ("common", *["kernels"] * bool(packs), *sorted(x.__name__ for x in packs),
             *["elements"] * elements, *["contacts"] * contacts)
+
+
+def _beside(arrays):
+    """Arrays (n, ...) beside each other."""
+    return arrays[0] if len(arrays) == 1 else np.hstack(arrays)
 
 
 def _with_laws(body, address):

@@ -160,6 +160,7 @@ def projected(beam: Beam, field: Callable[[Array], Array]) -> Array:
     for _ in range(2):  # elements of high degree have ill-conditioned masses
         parts = np.einsum("iep,cep->eic", N, rest * weights)
         dv = gram.solve(beam.kernel.scatter(parts).reshape(-1, 2))
-        of_elements = np.hstack(dv.reshape(-1, nd)[mesh.t]).reshape(*parts.shape)
+        left, right = dv.reshape(-1, nd)[mesh.t]
+        of_elements = np.concatenate([left, right], axis=1).reshape(parts.shape)
         rest, v = rest - np.einsum("iep,eic->cep", N, of_elements), v + dv
     return v.ravel()

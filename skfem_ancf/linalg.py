@@ -82,14 +82,11 @@ class BandMatrix:
         self._flat = np.zeros(n * self._ld)
         #: What texts take: a view of the entries, and room for their factors.
         self.band = Band(self._flat, np.zeros(n, np.int64), self._ld, bandwidth, self._diagonal)
+        ab = self._flat.reshape(n, self._ld).T
+        #: LAPACK's band storage, a view of shape (rows, n).
+        self.ab = ab[:-SPARE] if symmetric else ab
         self._factor: Any = None
         self.positive_definite: bool | None = None
-
-    @property
-    def ab(self) -> Array:
-        """LAPACK's band storage, a view of shape (rows, n)."""
-        ab = self._flat.reshape(self.n, self._ld).T
-        return ab[:-SPARE] if self.symmetric else ab
 
     def clear(self) -> None:
         """Set every entry to zero."""

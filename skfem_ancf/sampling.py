@@ -50,28 +50,45 @@ def sample(function: Callable[[Any], Any], times: ArrayLike, name: str = "functi
     [[0.0, 1.0], [1.0, 2.0]]
     """
     require_function(name, function, "of time")
-    times = require_finite("times", times, (None,))
-    what, n = name + "(t={:g})", len(times)
+    return sampled(function, require_finite("times", times, (None,)), name, shape)
 
-    def one_by_one(times: Array) -> Array:
-        if shape == ():
-            return np.array([ask_number(what, function, t) for t in times])
-        return np.array([ask_array(what, shape, function, t) for t in times])
 
-    if n > FEW:
-        values = _at_once(function, times)
-        if values is not None:
-            some = [0, n // 2, n - 1]
-            alone = one_by_one(times[some])
+def sampled(function: Callable[[Any], Any], times: Array, name: str,
+            shape: tuple[int, ...] | None = None) -> Array:
+    """As :func:`sample`, of a function and of times that are known to be good.
+
+    Parameters
+    ----------
+    function, name, shape
+        As there.
+    times
+        Shape (n,).
+    """
+    n = len(times)
+    values = _at_once(function, times) if n > FEW else None
+    if values is not None:
+        some = times[[0, n // 2, n - 1]]
+        alone = _one_by_one(function, some, name, shape)
+        if values.shape == (n,) + alone.shape[1:]:
             size = np.abs(alone)
-            if (values.shape == (n,) + alone.shape[1:] and np.isfinite(values).all()
-                    and (np.abs(values[some] - alone) <= 1e-13 * size + 1e-15 * size.max()).all()):
+            known = values[[0, n // 2, n - 1]]
+            if ((np.abs(known - alone) <= 1e-13 * size + 1e-15 * size.max()).all()
+                    and np.isfinite(values).all()):
                 return values
-    return one_by_one(times)
+    return _one_by_one(function, times, name, shape)
+
+
+def _one_by_one(function: Callable[[Any], Any], times: Array, name: str,
+                shape: tuple[int, ...] | None) -> Array:
+    what = name + "(t={:g})"
+    if shape == ():
+        return np.array([ask_number(what, function, t) for t in times])
+    return np.array([ask_array(what, shape, function, t) for t in times])
 
 
 def _at_once(function: Callable[[Any], Any], times: Array) -> Array | None:
     try:
-        return np.moveaxis(np.asarray(function(times), dtype=float), -1, 0)
+        values = np.asarray(function(times), dtype=float)
+        return values if values.ndim == 1 else np.moveaxis(values, -1, 0)
     except Exception:  # whatever it is, the function is not made for arrays
         return None

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
+from scipy.linalg import lapack
 from scipy.sparse.linalg import splu
 
 from . import eigen
@@ -33,7 +34,7 @@ from .rank import determinant_sign, null_basis, sparse_inertia
 from .results import State
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from .beam import Beam
     from .dynamics.integrator import Integrator
@@ -616,33 +617,42 @@ class System:
         M.fix(self.fixed_positions)
         return M.factorize()
 
-    def solve_mass(self, b: Array, u: Array | None = None, t: float = 0.0,
-                   rate: Array | None = None, J: Any = None) -> tuple[Array, Array]:
-        """x and l with M x + J^T l = b at free coordinates and J x = rate; x is zero at fixed ones.
+    def mass_solver(self, u: Array, t: float, J: Any = None
+                    ) -> Callable[[Array, Array], tuple[Array, Array]]:
+        """A function of b (N,) and rate (m,): x and l with M x + J^T l = b and J x = rate.
+
+        The first at free coordinates; x is zero at fixed ones.
 
         Parameters
         ----------
-        b
-            Shape (N,); its fixed coordinates are ignored.
         u, t
             Where J is taken, shape (N,), and when.
-        rate
-            Shape (m,).
         J
             :meth:`full_jacobian` there, shape (m, N), where it is known.
         """
         if self.by_nodes:
             mass = self._mass_by_nodes
-            mass.forget()
-            return mass.solve(np.zeros(self.N) if u is None else u, t, b,
-                              np.zeros(self.m) if rate is None else rate)
-        x = self.mass_factors.solve(b * self.free)
+
+            def solve_by_nodes(b: Array, rate: Array) -> tuple[Array, Array]:
+                mass.forget()
+                return mass.solve(u, t, b, rate)
+
+            return solve_by_nodes
+        M, free = self.mass_factors, self.free
         if not self.joints:
-            return x, np.zeros(0)
+            return lambda b, rate: (M.solve(b * free), _NONE)
         J = J * self.mask if isinstance(J, np.ndarray) else self.jacobian(u, t)
-        Y = self.mass_factors.solve(dense(J.T))
-        multipliers = np.linalg.solve(J @ Y, J @ x - rate)
-        return x - Y @ multipliers, multipliers
+        Y = M.solve(J.T if isinstance(J, np.ndarray) else dense(J.T))
+        lu, pivots, info = lapack.dgetrf(J @ Y)
+        if info != 0:
+            raise np.linalg.LinAlgError("the joints are not independent in this state")
+
+        def solve(b: Array, rate: Array) -> tuple[Array, Array]:
+            x = M.solve(b * free)
+            multipliers = lapack.dgetrs(lu, pivots, J @ x - rate)[0]
+            return x - Y @ multipliers, multipliers
+
+        return solve
 
     # tangent
 

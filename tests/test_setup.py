@@ -11,7 +11,10 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         ElementBeamCable, InputError, MeshBeam, MeshError, NeoHookean, Scene,
                         StVenantKirchhoff)
 from skfem_ancf.compiled.words import Words
+from skfem_ancf.constraints import Constraints
 from skfem_ancf.elements import base
+from skfem_ancf.equations import Tables
+from skfem_ancf.errors import CallbackError
 from skfem_ancf.finder import Finder
 from skfem_ancf.forces import system as forces
 from skfem_ancf.formulations import FORMULATIONS
@@ -458,3 +461,39 @@ def test_any_changes_one_after_the_other_are_a_scene_built_anew(element, seed):
                            atol=1e-6)
         assert scene.beams[0].total_mass == pytest.approx(built(**given).beams[0].total_mass)
         assert a.strain_energy == pytest.approx(b.strain_energy, rel=1e-6)
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+def test_a_driven_motion_asks_its_function_once(monkeypatch, scheme):
+    """For all times; and for three of them alone, whether that is the same."""
+    asked = []
+
+    def angle(t):
+        asked.append(np.shape(t))
+        return 0.1 * np.sin(3.0 * t) ** 2
+
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 3), height=0.02)
+    scene = Scene(Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(2e8, 0.3, 7800.0), width=0.02))
+    scene.pin("left").joint("angle", at="left", angle=angle)
+    tried, sparse = (counted(monkeypatch, owner, name) for owner, name in (
+        (Tables, "are_joints"), (Constraints, "sparse_jacobian")))
+    first = scene.integrate(0.1, 0.01, scheme=scheme)
+    assert not tried and not sparse
+    asked.clear()
+    again = scene.integrate(0.1, 0.01, scheme=scheme)
+    assert asked == [(41,), (), (), ()]
+    assert np.array_equal(first.u, again.u)
+
+
+def test_a_driven_motion_whose_function_fails_is_kept_up_to_there():
+    def angle(t):
+        if np.any(np.asarray(t) > 0.055):
+            raise ValueError("no more")
+        return 0.1 * t**2
+
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 3), height=0.02)
+    scene = Scene(Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(2e8, 0.3, 7800.0), width=0.02))
+    scene.pin("left").joint("angle", at="left", angle=angle)
+    with pytest.raises(CallbackError, match=r"angle\(t=0.0575\) raised ValueError: no") as failure:
+        scene.integrate(0.1, 0.01)
+    assert np.allclose(failure.value.state.t, 0.01 * np.arange(6))

@@ -276,16 +276,10 @@ class Collocation(Scheme):
         held = np.zeros((len(times) if moves else 1, 3, s.N))
         if moves:
             held[:, :, s.fixed] = moving(s.values_at)
-        joints = tables.plain.joints
-        c, g = np.zeros((1, 3, s.m)), np.zeros((1, 4, len(joints.gk)))
-        if s.m and not joints.own:
-            if drives:
-                c = moving(tables.offsets)
-            else:
-                c[:, 0] = tables.offsets(times[:1])
-            if drives and tables.turns:
+        c, g = tables.still
+        if drives and not tables.plain.joints.own:
+            c = moving(tables.offsets)
+            if tables.turns:
                 g = np.ascontiguousarray(moving(tables.slopes)[:, [0, 0, 1, 2]])
-            else:
-                g[:, :2] = tables.slopes(times[:1])
         return Interval(h, 0, table.method.ahead, times, tables.factors(times), held,
                         JointMotions(c, g, drives))

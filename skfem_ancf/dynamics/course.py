@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .rates import PARTS, JointMotions, step_rates
+from .rates import (END, MIDDLE, PARTS, RATE, JointMotion, JointMotions, of_step, steps_of,
+                    times_beside)
 from .steps import Course
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ class Courses:
     def __init__(self, system: System, conserving: bool) -> None:
         self._system, self._conserving = system, conserving
         self._asked: Any = None, None
+        self._begin: Any = None, None
 
     def of(self, start: float, dt: float, first: int, n: int, block: tuple[int, int],
            limit: float) -> Course:
@@ -64,38 +66,56 @@ class Courses:
     def _ask(self, start, dt, first, last, limit):
         times = start + dt * (first + np.arange(PARTS * (last - first) + 1) / PARTS)
         times = np.minimum(times, limit)
-        ends = times[PARTS::PARTS]
-        acting = times[PARTS // 2::PARTS] if self._conserving else ends
-        return Course(float(dt), np.stack([ends, acting], axis=1),
-                      self._system.machine.tables.factors(acting), self._supports(times, dt),
-                      self._joints(times, dt))
+        instants = np.empty((last - first, 2))
+        instants[:, 0] = times[PARTS::PARTS]
+        instants[:, 1] = times[PARTS // 2 if self._conserving else PARTS::PARTS]
+        joints = self._ask_joints(times)
+        self._begin = (times[0], dt, limit), [f[:PARTS + 1] for f in joints]
+        return Course(float(dt), instants, self._system.machine.tables.factors(instants[:, 1]),
+                      self._supports(times, dt), self._joints([*map(steps_of, joints)], dt))
 
     def _supports(self, times, dt):
         s = self._system
         if not s.moves:
             return np.zeros((1, 3, s.N))
-        _, *found = step_rates(s.values_at, times, dt)
-        out = np.zeros((len(found[0]), 3, s.N))
-        out[:, :, s.fixed] = np.stack(found, axis=1)
+        found = of_step(dt)[END:] @ steps_of(s.values_at(times))
+        out = np.zeros((len(found), 3, s.N))
+        out[:, :, s.fixed] = found
         return out
 
-    def _joints(self, times, dt):
+    def joints(self, t: float, dt: float, ahead: bool, limit: float) -> JointMotion:
+        """What of joints depends on time, at one time.
+
+        Parameters
+        ----------
+        t, dt, ahead, limit
+            As of :func:`~skfem_ancf.dynamics.rates.times_beside`.
+        """
+        if ahead and self._begin[0] == (t, dt, limit):
+            asked = self._begin[1]
+        else:
+            asked = self._ask_joints(times_beside(t, dt, ahead, limit))
+        found = self._joints([f[None, ::-1] for f in asked], -dt if ahead else dt)
+        return JointMotion(found.c[0], found.g[0], found.drives)
+
+    def _ask_joints(self, times):
+        """c and g at the times, each where it depends on them; of joints that are tables."""
         tables = self._system.machine.tables
-        joints, drives = tables.plain.joints, int(tables.motion_varies)
-        c, g = np.zeros((1, 3, self._system.m)), np.zeros((1, 4, len(joints.gk)))
-        if joints.own or not self._system.m:  # asked by the step itself
-            return JointMotions(c, g, drives)
-        if drives:
-            _, *found = step_rates(tables.offsets, times, dt)
-            c = np.stack(found, axis=1)
-        else:
-            c[:, 0] = tables.offsets(times[:1])
-        if drives and tables.turns:
-            middle, end, *found = step_rates(tables.slopes, times, dt)
-            g = np.stack([end, middle if self._conserving else end, *found], axis=1)
-        else:
-            g[:, :2] = tables.slopes(times[:1])
-        return JointMotions(c, g, drives)
+        if not tables.motion_varies or tables.plain.joints.own:
+            return []
+        return [tables.offsets(times), *([tables.slopes(times)] if tables.turns else ())]
+
+    def _joints(self, asked, dt):
+        """Of what :meth:`_ask_joints` gave in each step, in the order of time."""
+        tables = self._system.machine.tables
+        c, g = tables.still
+        if asked:
+            weights = of_step(dt)
+            c = weights[END:] @ asked[0]
+            if len(asked) > 1:
+                acting = MIDDLE if self._conserving else END
+                g = weights[[END, acting, RATE, RATE + 1]] @ asked[1]
+        return JointMotions(c, g, int(tables.motion_varies))
 
 
 def _rows(x, part):

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import logging
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..band import Band, factorize, fix
 from ..eliminated import Eliminated, EliminatedMass
-from ..errors import InputError, SupportError, require_positive, shown
+from ..errors import AncfError, InputError, SupportError, require_positive, shown
 from ..own import handle_of
 from .base import Motion, contacts_of, in_steps, kept, same_scheme
 from .course import Courses
 from .rates import rates
 from .dampers import Dampers, Rows, solve_rows
+from .joined import Joined
 from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, READY,
                     STATE, Matrices, Rule, mass_factor, room_for_steps, steps)
 
@@ -162,32 +163,6 @@ class Integrator:
 
     # the start
 
-    def _rates(self, function, t, dt, ahead):
-        """First and second derivative of a function of one time."""
-        return rates(lambda times: np.array([function(t) for t in times]), t, dt, ahead,
-                     self.limit)
-
-    def _driven(self, u, t, dt, ahead):
-        """Both rates of Phi at rest, and a function of v: the first rate of J v at rest."""
-        s, tables = self.system, self.system.machine.tables
-        joints, m = tables.plain.joints, s.m
-        if not s.drives:
-            return *np.zeros((2, m)), lambda v: np.zeros(m)
-        if joints.own:
-            return *self._rates(lambda t: s.constraint(u, t), t, dt, ahead), lambda v: self._rates(
-                lambda t: s.full_jacobian(u, t) @ v, t, dt, ahead)[0]
-        first, second = rates(lambda times: np.hstack([tables.offsets(times),
-                                                       tables.slopes(times)]),
-                              t, dt, ahead, self.limit)
-
-        def added(c, g, x):
-            out = c.copy()
-            np.add.at(out, joints.gk, g * x[joints.gi])
-            return out
-
-        return (added(first[:m], first[m:], u), added(second[:m], second[m:], u),
-                lambda v: added(np.zeros(m), first[m:], v))
-
     def support_rates(self, t: float, dt: float, ahead: bool = True) -> Any:
         """Velocity and acceleration of the fixed coordinates, shape (nfixed,) each.
 
@@ -200,6 +175,19 @@ class Integrator:
         if not s.moves:
             return np.zeros((2, len(s.fixed)))
         return rates(s.values_at, t, dt, ahead, self.limit)
+
+    def ask(self, start: float, dt: float, n: int) -> None:
+        """Ask the functions of joints for the first steps: the start has its rates from there.
+
+        Parameters
+        ----------
+        start, dt, n
+            Where the steps begin, their size, and how many there will be.
+        """
+        if self.scheme.text == "steps" and self.system.drives:
+            block = 0, min(n, self.longest)
+            with suppress(AncfError):  # what fails is said where the motion comes to it
+                self._courses.of(start, dt, 0, block[1], block, self.limit)
 
     def start(self, u: Array, v: Array, t: float, dt: float, ahead: bool = True,
               memory: Array | None = None) -> Motion:
@@ -226,16 +214,18 @@ class Integrator:
             y.v[s.fixed], y.acceleration[s.fixed] = self.support_rates(t, dt, ahead)
         else:
             y.u[s.fixed] = y.v[s.fixed] = 0.0
-        gap = np.max(np.abs(s.constraint(y.u, t))) if s.m else 0.0
-        if gap > 1e-8 * s.size:
-            raise SupportError(f"the joints are open by {gap:.3g} at the start: begin with beams "
-                               "that fit, or from a static solution (start=)")
-        rate, J = np.zeros(s.m), None
-        if s.joints:
-            J, driven = s.full_jacobian(y.u, t), self._driven(y.u, t, dt, ahead)
-            y.v = y.v + s.solve_mass(np.zeros(s.N), y.u, t, -(J @ y.v + driven[0]), J)[0]
-            rate = -(s.quadratic(y.u, t, y.v) + driven[1] + J @ y.acceleration)
-            rate -= 2.0 * driven[2](y.v)
+        rate, J = y.multipliers, None
+        joined = Joined(s, self._courses, y.u, (t, dt, ahead, self.limit)) if s.joints else None
+        if joined is not None:
+            gap = np.abs(joined.gap()).max(initial=0.0)
+            if gap > 1e-8 * s.size:
+                raise SupportError(f"the joints are open by {gap:.3g} at the start: begin with "
+                                   "beams that fit, or from a static solution (start=)")
+            J = joined.J
+        solve = s.mass_solver(y.u, t, J)
+        if joined is not None:
+            y.v = y.v + solve(np.zeros(s.N), -joined.rate(y.v))[0]
+            rate = -joined.bend(y.v, y.acceleration)
         with contacts.lent(memory):
             if memory is not None and not contacts.lasting:
                 y.memory = {"contacts": memory}  # how stiff obstacles are
@@ -247,12 +237,11 @@ class Integrator:
                 force -= s.mass.multiply(y.acceleration)
             if s.damped:
                 force = force - s.damping_force(y.u, y.v, t)
-        acceleration, y.multipliers = s.solve_mass(force, y.u, t, rate, J)
+        acceleration, y.multipliers = solve(force, rate)
         y.acceleration += acceleration
         y.algorithmic, y.force = y.acceleration.copy(), y.multipliers
-        for rate in (y.v, y.v + dt * y.acceleration):  # from rest there is no energy yet
-            self.expect(0.5 * float(rate @ s.mass.multiply(rate)))
-        self.expect(s.strain_energy(y.u, t))
+        self.expect(max(s.strain_energy(y.u, t), *(  # from rest there is no energy yet
+            0.5 * float(v @ s.mass.multiply(v)) for v in (y.v, y.v + dt * y.acceleration))))
         return y
 
     def expect(self, energy: float) -> None:

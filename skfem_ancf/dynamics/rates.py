@@ -23,62 +23,84 @@ if TYPE_CHECKING:
 PARTS = 4
 _FIRST = np.array([25.0, -48.0, 36.0, -16.0, 3.0]) / 12.0
 _SECOND = np.array([35.0, -104.0, 114.0, -56.0, 11.0]) / 12.0
-_DIFFERENCES = np.array([_FIRST, _SECOND])
+#: What makes of values in a step, in the order of time, that in its middle, that at its end, and
+#: both rates there, times the intervals and their square.
+_OF_STEP = np.array([[0.0, 0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1.0], _FIRST[::-1],
+                     _SECOND[::-1]])
+#: Rows of it.
+MIDDLE, END, RATE = range(3)
+
+
+def times_beside(t: float, dt: float, ahead: bool, limit: float) -> Array:
+    """Times within one step, first that of its end, shape (PARTS + 1,).
+
+    Parameters
+    ----------
+    t, dt
+        End and size of the step.
+    ahead
+        The rates at its start are looked for: t is its start, and the first of the times.
+    limit
+        Time beyond which no function is asked.
+    """
+    h = dt / PARTS if ahead else -dt / PARTS
+    return np.minimum(t + h * np.arange(PARTS + 1), limit)
 
 
 def rates(function: Callable[[Array], Array], t: float, dt: float, ahead: bool = False,
-          limit: float = np.inf) -> tuple[Array, Array]:
+          limit: float = np.inf) -> Array:
     """First and second derivative at one time, of a function of an array of times.
 
     Parameters
     ----------
     function
-        Takes times (n,), returns (n, ...).
-    t, dt
-        End and size of the step; its start with ``ahead``.
-    ahead
-        The rates at the start of the step, not at its end.
-    limit
-        Time beyond which the function is not asked.
+        Takes times (n,), returns (n, k).
+    t, dt, ahead, limit
+        As of :func:`times_beside`.
 
     Returns
     -------
-    first, second
-        Shapes (...).
+    ndarray
+        Shape (2, k).
     """
-    h = dt / PARTS if ahead else -dt / PARTS
-    first, second = _both(function(np.minimum(t + h * np.arange(PARTS + 1), limit)))
-    return first / -h, second / h**2
+    times = times_beside(t, dt, ahead, limit)
+    return of_step(-dt if ahead else dt)[RATE:] @ function(times)[::-1]
 
 
-def _both(f):
-    """The differences of values (PARTS + 1, ...), from the last one back, as two arrays (...)."""
-    return (_DIFFERENCES @ f.reshape(PARTS + 1, -1)).reshape(2, *f.shape[1:])
-
-
-def step_rates(function: Callable[[Array], Array], times: Array,
-               dt: float) -> tuple[Array, Array, Array, Array]:
-    """Values and rates at the ends of steps.
+def of_step(dt: float) -> Array:
+    """What makes of values in a step that in its middle, that at its end and both rates there.
 
     Parameters
     ----------
-    function
-        Takes times (n,), returns (n, ...).
-    times
-        The times at which the function is asked, ``PARTS`` in each step, shape (4 n + 1,).
     dt
-        Size of a step.
+        Size of the step.
 
     Returns
     -------
-    middle, value, first, second
-        Arrays (n, ...): the function in the middle and at the end of each step, and its rates.
+    ndarray
+        Shape (4, PARTS + 1), for values in the order of time.
     """
-    f, h = function(times), dt / PARTS
-    n = len(f) - 1
-    back = np.array([f[PARTS - k:n + 1 - k:PARTS] for k in range(PARTS + 1)])
-    first, second = _both(back)
-    return f[PARTS // 2::PARTS], back[0], first / h, second / h**2
+    h = dt / PARTS
+    return _OF_STEP / np.array([[1.0], [1.0], [h], [h * h]])
+
+
+def steps_of(values: Array) -> Array:
+    """The values in each step: the last one is the first of the next step.
+
+    Parameters
+    ----------
+    values
+        Of a function at ``PARTS`` times in each step, and at the end; shape (PARTS n + 1, k).
+
+    Returns
+    -------
+    ndarray
+        Shape (n, PARTS + 1, k).
+    """
+    f = np.ascontiguousarray(values, dtype=float)
+    along, across = f.strides
+    return np.ndarray((len(f) // PARTS, PARTS + 1, f.shape[1]), float, f, 0,
+                      (PARTS * along, along, across))
 
 
 # of joints

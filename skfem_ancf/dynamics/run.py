@@ -142,8 +142,14 @@ class Run:
             What points remember of obstacles there, shape (k,), or None.
         """
         self.system.sample(u, v, self.task.t_start, True)
-        self.y = self.integrator.start(u, v, self.task.t_start, self._first_step(), memory=memory)
+        self.y = self._start(u, v, memory)
         self._store_start()
+
+    def _start(self, u, v, memory):
+        """The Motion where a segment begins."""
+        if self._in_blocks and self.until is None and self._whole > 0:
+            self.integrator.ask(self._begun, self.size, self._whole)
+        return self.integrator.start(u, v, self._begun, self._first_step(), memory=memory)
 
     def go_on(self, y: Motion, memory: dict[str, Any] | None = None) -> None:
         """Begin where another run of the same scene was.
@@ -234,8 +240,7 @@ class Run:
             self.size = 1e-4 * self.task.span
             self.sizes.begin()
         self.system.sample(y.u, y.v, self._begun, False)
-        turned = self.integrator.start(y.u, y.v, self._begun, self._first_step(),
-                                       memory=contacts_of(y))
+        turned = self._start(y.u, y.v, contacts_of(y))
         turned.dissipated = y.dissipated
         return turned
 

@@ -161,7 +161,7 @@ class StepSize:
         if not s.m or s.by_nodes:
             return de
         J = s.full_jacobian(y.u, y.t)
-        return de + s.solve_mass(np.zeros(s.N), y.u, y.t, -(J @ de), J)[0]
+        return de + s.mass_solver(y.u, y.t, J)(np.zeros(s.N), -(J @ de))[0]
 
     def begin(self) -> None:
         """Forget what was: at the start, and after a breakpoint."""

@@ -411,9 +411,9 @@ class Joint(Sealable):
             Shapes (k,), (k,) and (n, k).
         """
         columns, values = self.slope(times, N)
-        m = len(self.equations)
-        return (np.repeat(np.arange(m), len(columns)), np.tile(columns, m),
-                values.reshape(len(times), m * len(columns)))
+        _, m, k = values.shape
+        entry = np.arange(m * k)
+        return entry // k, columns[entry % k], values.reshape(len(times), m * k)
 
     def second_entries(self, N: int) -> tuple[Array, Array, Array, Array]:
         """The second derivatives of Phi in the stress-free state, equation by equation.

@@ -10,7 +10,7 @@ import scipy
 from ..errors import (ask_array, ask_number, require_finite_scalar, require_function, require_label,
                       teaching)
 from ..rigid import on_body
-from ..sampling import sample
+from ..sampling import sampled
 from .base import Joint, both_of, cross_terms, gradients, point, rotation, section
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ class PrescribedPosition(Joint):
         return self.r(u) - ask_array("r(t={:g})", (2,), self.motion, t)
 
     def offset(self, times: Array, N: int) -> Array:
-        return self.r.start - sample(self.motion, times, "r", (2,))
+        return self.r.start - sampled(self.motion, times, "r", (2,))
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         return self.found
@@ -107,7 +107,7 @@ class PrescribedAngle(Joint):
 
     def _normals(self, times: Array) -> Array:
         if self._asked[0] is not times:  # offsets and slopes are asked at the same times
-            a = self.start + sample(self.angle, times, "angle", ())
+            a = self.start + sampled(self.angle, times, "angle", ())
             self._asked = times, np.array([-np.sin(a), np.cos(a)]).T
         return self._asked[1]
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..sampling import sample
+from ..sampling import sampled
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -74,5 +74,5 @@ class Settlements:
         out = np.multiply.outer(times, self.numbers[nodes, k])
         for function, (node, way) in zip(self.functions, self.at):
             if way == k:
-                out[:, np.searchsorted(nodes, node)] = sample(function, times, HELD[k], ())
+                out[:, np.searchsorted(nodes, node)] = sampled(function, times, HELD[k], ())
         return out

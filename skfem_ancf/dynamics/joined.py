@@ -1,0 +1,85 @@
+"""What joints ask of velocities and accelerations at one instant."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..kept import cached_property
+from ..tables import constraint, joint_directions
+from .rates import JointMotion, acceleration_of_joints, drive_rate, rates
+
+if TYPE_CHECKING:
+    from ..system import System
+    from ..types import Array
+    from .course import Courses
+
+
+class Joined:
+    """The joints at a displacement and a time.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    courses
+        Functions of time of its joints.
+    u
+        Displacement, shape (N,).
+    instant
+        t, dt, ahead and limit of :func:`~skfem_ancf.dynamics.rates.times_beside`.
+    """
+
+    def __init__(self, system: System, courses: Courses, u: Array,
+                 instant: tuple[float, float, bool, float]) -> None:
+        self._system, self._u, self._instant = system, u, instant
+        self._tables = system.machine.tables.plain.joints
+        motion = courses.joints(*instant)
+        if self._tables.own and motion.drives:
+            c = rates(lambda times: np.array([system.constraint(u, t) for t in times]), *instant)
+            motion = JointMotion(np.vstack([motion.c[:1], c]), motion.g, 0)
+        self._motion = motion
+
+    def gap(self) -> Array:
+        """Phi, shape (m,)."""
+        out, motion = np.empty(self._system.m), self._motion
+        constraint(self._tables, motion.c[0], motion.g[0], self._instant[0], self._u, out)
+        return out
+
+    @cached_property
+    def J(self) -> Any:
+        """The derivative of Phi, shape (m, N), as of ``full_jacobian``."""
+        s = self._system
+        if not s.bordered:
+            return s.sparse_jacobian(self._u, self._instant[0])
+        J = np.empty((s.m, s.N))
+        joint_directions(self._tables, self._motion.g[0], self._instant[0], self._u, J)
+        return J
+
+    def rate(self, v: Array) -> Array:
+        """That of Phi, shape (m,).
+
+        Parameters
+        ----------
+        v
+            Velocity, shape (N,).
+        """
+        out, (t, dt, *_) = np.empty(self._system.m), self._instant
+        drive_rate(self._tables, self._motion, t, dt, self._u, out)
+        return out + self.J @ v
+
+    def bend(self, v: Array, a: Array) -> Array:
+        """The second rate of Phi, shape (m,).
+
+        Parameters
+        ----------
+        v, a
+            Velocity and acceleration, shape (N,).
+        """
+        s, out, (t, dt, *_) = self._system, np.empty(self._system.m), self._instant
+        acceleration_of_joints(self._tables, self._motion, t, dt, self._u, v, out)
+        if self._tables.own and s.drives:
+            out += 2.0 * rates(lambda times: np.array([
+                s.full_jacobian(self._u, t) @ v for t in times]), *self._instant)[0]
+        return out + self.J @ a
