@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 
 from scipy.integrate import solve_ivp
 
-from skfem_ancf import (Beam, Circle, ElementBeamANCF, MeshBeam, RigidBody, Scene,
-                        StVenantKirchhoff)
+from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, KelvinVoigt, MeshBeam,
+                        RigidBody, Scene, StVenantKirchhoff)
 from skfem_ancf.dynamics import (SCHEMES, EnergyMomentum4, Gauss, GeneralizedAlpha, Motion, Newmark,
                                  Radau)
 from skfem_ancf.dynamics.base import in_steps
@@ -136,6 +136,15 @@ def test_estimates_are_the_errors_of_vibrations(scheme):
         old, u, v = new, u1, v1
     sizes = [np.sqrt(np.mean(np.square(e[8:]))) for e in (estimates, errors)]
     assert sizes[0] == pytest.approx(sizes[1], rel=0.1)
+
+
+def test_steps_that_do_not_converge_are_taken_in_shorter_ones():
+    """Not in halves: their estimate is that of the step."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(3),
+                StVenantKirchhoff(2e8, 0.3, 7800.0), 0.01, damping=KelvinVoigt(2e-3))
+    history = Scene(beam).clamp("left").gravity(GRAVITY).integrate(
+        0.4, "auto", scheme="radau", rtol=1e-3, check=False)
+    assert history.rejected > 0 and history.substeps == 0
 
 
 def test_what_joints_undo_is_not_added_up():

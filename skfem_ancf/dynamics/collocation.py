@@ -11,7 +11,7 @@ from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 from ..band import factorize, fix, solve
 from ..errors import InputError
 from .base import Motion, Scheme, contacts_of, kept
-from .differences import derivative, difference, grown
+from .differences import derivative, difference_row, grown
 from .integrator import StepFailed
 from .rates import JointMotions
 from .stages import Interval, Method, collocate, room_for_points, solve_for
@@ -43,6 +43,10 @@ class _Tableau:
         Its :class:`~skfem_ancf.dynamics.stages.Method`.
     fit
         Of a polynomial without its first two terms, from its values at c.
+    bends
+        Of the acceleration, times the square of the step: its highest derivative and the one below,
+        from Z and from the acceleration at the end, or at the begin if the last point is the end,
+        shape (2, n + 1).
     samples, rates
         Points in a step, (k,), and what makes both rates at c and at 1 of values there, (2, n + 1,
         k).
@@ -60,6 +64,10 @@ class _Tableau:
         values = np.where(abs(values.imag) > 1e-12 * abs(values), values, values.real)[picked]
         to, back = np.linalg.inv(T)[picked], T[:, picked] * np.where(values.imag > 0.0, 2.0, 1.0)
         self.fit = np.linalg.inv(c[:, None]**(k + 1))
+        one = np.append(c, 1.0) if c[-1] < 1.0 else np.append(0.0, c)
+        bends = np.array([difference_row(one), np.append(0.0, difference_row(one[1:]))])
+        bends = bends if c[-1] < 1.0 else np.roll(bends, -1, axis=1)
+        self.bends = np.hstack([bends[:, :n] @ first @ first, bends[:, n:]])
         parts = (np.ascontiguousarray([x.real, x.imag]) for x in (values, to, back))
         self.method = Method._make([c, weights, first, first @ first, *parts, self.ahead(1.0)])
         self.samples = 0.5 - 0.5 * np.cos(np.pi * np.arange(SAMPLES) / (SAMPLES - 1))
@@ -140,19 +148,16 @@ class Collocation(Scheme):
         old, new, dt
             Start and end of the step, and its size.
         """
-        method, memory = self._table.method, new.memory or {}
-        c, (u, v) = method.points, memory["start"]
-        W = method.second @ (memory["stages"] - u - dt * c[:, None] * v) / dt**2
-        if c[-1] < 1.0:
-            x, a = np.append(c, 1.0), np.vstack([W, new.acceleration])
-        else:
-            x, a = np.append(0.0, c), np.vstack([old.acceleration, W])
-        k = len(x) - 1
-        bends = derivative(old, new, old.t + 0.5 * dt, difference(x, a) / dt**k, self.order - 1 - k)
-        sizes = [dt**(k + i) * bend for i, bend in enumerate(bends)]
-        lower = sizes[-2] if len(sizes) > 1 else difference(x[1:], a[1:])
-        de = grown(sizes[-1], lower, self.order - k - len(sizes))
-        return self.error_constant * dt**2 * de
+        table, memory = self._table, new.memory or {}
+        c, k, (u, v) = table.points, len(table.points), memory["start"]
+        known = new.acceleration if c[-1] < 1.0 else old.acceleration
+        Z = memory["stages"] - u - dt * c[:, None] * v
+        bend, lower = table.bends[:, :k] @ Z + dt**2 * table.bends[:, k:] * known
+        n, high, low = derivative(old, new, old.t + 0.5 * dt, bend / dt**(k + 2),
+                                  self.order - 1 - k)
+        if low is not None:
+            lower = dt**(k + n + 1) * low
+        return self.error_constant * grown(dt**(k + n + 2) * high, lower, self.order - 1 - k - n)
 
     def resolved(self, integrator: Integrator, du: Array) -> Array:
         s, w = integrator.system, integrator.room
@@ -197,7 +202,8 @@ class Collocation(Scheme):
             np.multiply(table.half_square * dt**2, y.acceleration, out=w.guess)
         else:
             w.U[:], w.before[:], w.first[:] = (y.memory[k] for k in ("stages", "start", "forces"))
-            given = given._replace(begun=1, ahead=table.ahead(dt / y.before))
+            ahead = method.ahead if dt == y.before else table.ahead(dt / y.before)
+            given = given._replace(begun=1, ahead=ahead)
         rows, stages = np.empty((n, 3, s.N)), np.empty((n, len(method.points), s.N))
         forces = np.empty((n, len(method.points) + 1, s.m))
         memories = np.empty((n, 1 + (contacts.tables.memory.size if contacts.lasting else 0)))

@@ -25,12 +25,26 @@ def difference(x: Array, a: Array) -> Array:
     a
         Its values there, shape (n, N).
     """
+    return difference_row(x) @ a
+
+
+def difference_row(x: Array) -> Array:
+    """What makes the derivative of the highest order of a polynomial of its values, shape (n,).
+
+    Parameters
+    ----------
+    x
+        Where they are, shape (n,).
+    """
+    if len(x) < 3:
+        return np.ones(1) if len(x) == 1 else np.array([1.0, -1.0]) / (x[0] - x[1])
     gaps = x[:, None] - x
     gaps.flat[::len(x) + 1] = 1.0
-    return (factorial(len(x) - 1) / gaps.prod(axis=1)) @ a
+    return factorial(len(x) - 1) / gaps.prod(axis=1)
 
 
-def derivative(old: Motion, new: Motion, t: float, value: Array, order: int) -> list[Array]:
+def derivative(old: Motion, new: Motion, t: float, value: Array,
+               order: int) -> tuple[int, Array, Array | None]:
     """Derivatives of a function of time from its value in a step and those in steps before.
 
     Parameters
@@ -44,15 +58,17 @@ def derivative(old: Motion, new: Motion, t: float, value: Array, order: int) -> 
 
     Returns
     -------
-    list of ndarray
-        The derivatives from 0 on, shape (N,) each: up to the order wanted, or to what the steps
-        since the start allow.
+    k : int
+        The derivative's order: that wanted, or what the steps since the start allow.
+    high, lower : ndarray
+        The derivatives of the orders k and k - 1, shape (N,); None for k = 0.
     """
     before = old.memory or {}
-    values = np.vstack([value[None], *before.get("values", ())])[:order + 1]
+    values = np.concatenate([value[None], before.get("values", value[None][:0])])[:order + 1]
     times = np.append(t, before.get("times", ()))[:order + 1]
     new.memory = {**(new.memory or {}), "values": values[:order], "times": times[:order]}
-    return [difference(times[:k], values[:k]) for k in range(1, len(times) + 1)]
+    k = len(times) - 1
+    return k, difference(times, values), difference(times[:k], values[:k]) if k else None
 
 
 def grown(size: Array, lower: Array, missing: int) -> Array:
@@ -65,9 +81,11 @@ def grown(size: Array, lower: Array, missing: int) -> Array:
     missing
         By how many orders.
     """
+    if not missing:
+        return size
     least = np.linalg.norm(lower)
     growth = min(np.linalg.norm(size) / least, GROWTH) if least > 0.0 else 0.0
     return growth**missing * size
 
 
-__all__ = ["derivative", "difference", "grown"]
+__all__ = ["derivative", "difference", "difference_row", "grown"]

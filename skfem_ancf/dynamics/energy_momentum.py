@@ -114,6 +114,6 @@ class EnergyMomentum4(EnergyMomentum):
         """
         if "values" not in (old.memory or {}):
             derivative(old, old, old.t, old.acceleration, 3)
-        found = derivative(old, new, new.t, new.acceleration, 3)
-        sizes = [dt**k * a for k, a in enumerate(found)]
-        return self.error_constant * dt**2 * grown(sizes[-1], sizes[-2], 4 - len(sizes))
+        k, high, lower = derivative(old, new, new.t, new.acceleration, 3)
+        assert lower is not None  # of two ends at least
+        return self.error_constant * dt**2 * grown(dt**k * high, dt**(k - 1) * lower, 3 - k)

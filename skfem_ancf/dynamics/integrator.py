@@ -371,21 +371,35 @@ class Integrator:
         depth
             How often it is halved already.
         """
-        fresh = not self.ready or dt != self._dt
         try:
-            new = self.scheme.step(self, y, dt)
-            if contacts_of(new) is None:  # a scheme of one's own may not hand it on
-                new.memory = kept(y, None, **(new.memory or {}))
-            return new
-        except (StepFailed, np.linalg.LinAlgError) as failure:
-            self.forget()
-            if not fresh and depth == 0:  # by factors of other steps
-                return self.step(y, dt)
+            return self.attempt(y, dt)
+        except StepFailed as failure:
             if depth == DEPTH:
                 raise StepFailed(f"{failure}, nor with steps of {dt:.3g}") from None
             logger.info("step of %.3g at t = %.6g halved: %s", dt, y.t, failure)
         self.substeps += 1 if depth else 2
         return self.step(self.step(y, 0.5 * dt, depth + 1), 0.5 * dt, depth + 1)
+
+    def attempt(self, y: Motion, dt: float) -> Motion:
+        """One step, by new factors where others fail; raises StepFailed.
+
+        Parameters
+        ----------
+        y, dt
+            As of :meth:`step`.
+        """
+        while True:
+            fresh = not self.ready or dt != self._dt
+            try:
+                new = self.scheme.step(self, y, dt)
+            except (StepFailed, np.linalg.LinAlgError) as failure:
+                self.forget()
+                if fresh:
+                    raise StepFailed(str(failure)) from None
+                continue
+            if contacts_of(new) is None:  # a scheme of one's own may not hand it on
+                new.memory = kept(y, None, **(new.memory or {}))
+            return new
 
     # factors
 

@@ -37,6 +37,8 @@ SHOWN = 0.2
 FIRST = 10_000
 #: Part of a step up to which the acceleration is interpolated, for the same reason.
 NEAR = 0.1
+#: Part of the motion below which a step that fails is not taken again in one half as long.
+SHORTEST = 1e-7
 #: Part of a step to which an event is found.
 EXACT = 1e-10
 
@@ -296,9 +298,15 @@ class Run:
             h = left
         elif left < 2 * h:
             h = 0.5 * left
-        new = self.integrator.step(y, h)
-        error = self.sizes.error(self.integrator, y, new, h)
-        self.size, kept = self.sizes.next(error, h, self.size)
+        touches = self.system.forces.contacts.obstacles  # when, is found in parts of a step
+        try:
+            new = (self.integrator.step if touches else self.integrator.attempt)(y, h)
+            error = self.sizes.error(self.integrator, y, new, h)
+            self.size, kept = self.sizes.next(error, h, self.size)
+        except StepFailed:
+            if h < SHORTEST * self.task.span:
+                raise
+            self.size, kept = 0.5 * h, False
         if not kept:
             self.rejected += 1
             return
