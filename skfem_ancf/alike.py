@@ -22,11 +22,17 @@ if TYPE_CHECKING:
     from .scene import Scene
     from .types import Array
 
-#: Largest surplus of the numbers of an array, relative to the largest of them, that is round-off;
-#: and their largest error at scenes that were not asked.
-ROUND_OFF, EXACT = 2e-14, 1e-12
-#: Arrays whose round-off is that of another one, of the same tuple.
-BESIDE = {"held_skew": "held"}
+#: Largest surplus of a number, relative to the size of those beside it, that is round-off; their
+#: largest error at scenes that were not asked; and the round-off of a number, relative to itself,
+#: beyond which a member is solved alone.
+ROUND_OFF, EXACT, LOST = 2e-14, 1e-12, 1e-9
+#: Arrays whose round-off is that of another one, of the same tuple; those of quantities that have
+#: nothing to do with each other, all of them or along the first axis; and those whose rows and
+#: columns have units of their own.
+BESIDE, APART, FIRST = {"held_skew": "held"}, {"noise"}, {"stiffness"}
+MATRICES = {"table", "transposed", "constant", "symmetric", "skew"}
+#: How much larger the round-off of what is small in these may be, on curves.
+CURVED = 64.0
 
 
 class Unlike(Exception):
@@ -129,19 +135,29 @@ def _leaves(x: Any, place: tuple = ()) -> Iterator[tuple[tuple, Any]]:
         yield from _leaves(part, (*place, k))
 
 
-def _beside(solved, places, filled):
-    """For each array that has numbers the one whose size its round-off has."""
-    places = [places[k] for k in filled]
-    out = np.arange(len(places))
-    for k, place in enumerate(places):
-        parent = solved
-        for step in place[:-1]:
-            parent = parent[step]
-        names = getattr(parent, "_fields", ())
-        other = BESIDE.get(names[place[-1]]) if names else None
-        if other is not None:
-            out[k] = places.index((*place[:-1], names.index(other)))
-    return out
+def _name(solved, place):
+    """What its tuple calls an array, and the names of that tuple."""
+    for step in place[:-1]:
+        solved = solved[step]
+    fields = getattr(solved, "_fields", ())
+    return (fields[place[-1]] if fields else ""), fields
+
+
+def _sizes(x, name):
+    """What the round-off of each number of an array is compared with, of the same shape.
+
+    The largest of all. Of matrices at most :data:`CURVED` times the largest of the row times that
+    of the column, over that of all; or the number, if that is larger.
+    """
+    x = np.abs(x)
+    if name in APART:
+        return x
+    if name not in MATRICES:
+        axes = tuple(range(int(name in FIRST), x.ndim))
+        return np.broadcast_to(np.max(x, axis=axes, keepdims=True), x.shape)
+    rows, columns = (np.max(x, axis=k, keepdims=True) for k in (-1, -2))
+    top = np.max(rows, axis=-2, keepdims=True)
+    return np.maximum(x, np.minimum(top, CURVED * rows * (columns / (top + 1e-300))))
 
 
 def _with(x: Any, arrays: dict, place: tuple = ()) -> Any:
@@ -206,37 +222,38 @@ class Family:
             raise NotBuilt(f"build, or what is read, failed for {x}: {error!r}") from error
         if self.one is None:
             self.one = found
-            sizes = [x.size for x in found.arrays.values()]
-            self._ends = np.cumsum([0, *sizes])
-            self._filled = np.flatnonzero(sizes)
-            self._beside = _beside(found.solved, list(found.arrays), self._filled)
+            ends = np.cumsum([0] + [x.size for x in found.arrays.values()])
+            self._at = {place: slice(a, b) for place, a, b in zip(found.arrays, ends, ends[1:])
+                        if a < b}
+            self._names = {place: _name(found.solved, place) for place in self._at}
         elif found.same != self.one.same:
             raise Unlike("topologies differ")
         return found
 
-    def _largest(self, x):
-        """The largest of each array that has numbers."""
-        return np.maximum.reduceat(np.abs(x), self._ends[self._filled])
-
     def _scales(self, x):
-        """What the round-off of each of these arrays is compared with."""
-        largest = self._largest(x)
-        return np.maximum(largest, largest[self._beside])
+        """What the round-off of each number is compared with."""
+        out = np.empty_like(x)
+        for place, s in self._at.items():
+            name, beside = self._names[place]
+            out[s] = _sizes(x[s].reshape(self.one.arrays[place].shape), name).ravel()
+            if name in BESIDE:
+                other = self._at[place[:-1] + (beside.index(BESIDE[name]),)]
+                out[s] = np.maximum(out[s], np.max(np.abs(x[other])))
+        return out
 
     def _size(self, surplus, largest):
-        return float(np.max(self._largest(surplus) / (ROUND_OFF * self._scales(largest) + 1e-300)))
+        return float(np.max(np.abs(surplus) / (ROUND_OFF * self._scales(largest) + 1e-300)))
 
     def _sort(self, surplus):
         """Find the different functions among the numbers."""
-        sizes = np.diff(self._ends)[self._filled]
-        noise = np.repeat(self._scales(np.max(np.abs(surplus), axis=0)), sizes) * ROUND_OFF
+        noise = self._scales(np.max(np.abs(surplus), axis=0)) * ROUND_OFF
         surplus = surplus.copy()
         surplus[1:][np.abs(surplus[1:]) <= noise] = 0.0
-        varies = np.add.reduceat(np.any(surplus[1:] != 0.0, axis=0), self._ends[self._filled]) > 0
-        places = [list(self.one.arrays)[k] for k in self._filled]
-        self.places = [place for place, there in zip(places, varies) if there]
-        columns = surplus[:, np.repeat(varies, sizes)]
-        ends = np.cumsum([0, *sizes[varies]])
+        changes = np.any(surplus[1:] != 0.0, axis=0)
+        self.places = [place for place, s in self._at.items() if np.any(changes[s])]
+        columns, noise = (np.concatenate([x[..., self._at[place]] for place in self.places]
+                                         or [x[..., :0]], axis=-1) for x in (surplus, noise))
+        ends = np.cumsum([0] + [self.one.arrays[place].size for place in self.places])
         self._slices = {place: slice(a, b) for place, a, b in zip(self.places, ends, ends[1:])}
         top = np.argmax(np.abs(columns), axis=0)
         self.scale = columns[top, np.arange(columns.shape[1])]
@@ -247,13 +264,23 @@ class Family:
         _, first, which = np.unique(keys, return_index=True, return_inverse=True)
         which = which.ravel()
         apart = np.flatnonzero(np.any(np.abs(self.scale * (unit[:, first[which]] - unit))
-                                      > noise[np.repeat(varies, sizes)], axis=0))
+                                      > noise, axis=0))
         which[apart] = len(first) + np.arange(len(apart))
         self.which, self._functions = which.astype(np.int64), unit[:, np.append(first, apart)]
 
     def values(self, x: Array) -> Array:
         """The functions at parameters (n, d), shape (n, functions)."""
         return np.ascontiguousarray(self._polynomial.basis(x) @ self._functions)
+
+    def exact(self, x: Array) -> Array:
+        """Which of parameters (n, d) have numbers that are not lost beside those of others.
+
+        A number has the round-off of the largest that any member has in its place, unless its sign
+        changes: then it is small by chance.
+        """
+        values = self.values(x)
+        values = np.abs(values[:, np.all(values * values[0] >= 0.0, axis=0)])
+        return np.all(LOST * values >= ROUND_OFF * np.max(values, axis=0, initial=0.0), axis=1)
 
     def solved(self, numbers: Array) -> Solved:
         """A :class:`Solved` whose arrays are views of numbers."""
@@ -280,11 +307,10 @@ class Family:
     def tried(self, x: Array) -> Scene:
         """A scene of parameters (d,); raises Unlike if its numbers are others than these."""
         found, mine = self._numbers(x), self.one.vector.copy()
-        at = dict(zip(self.one.arrays, zip(self._ends, self._ends[1:])))
         values = self.values(x[None])[0]
         for place, s in self._slices.items():
-            mine[slice(*at[place])] = self.scale[s] * values[self.which[s]]
+            mine[self._at[place]] = self.scale[s] * values[self.which[s]]
         largest = self._scales(np.maximum(np.abs(found.vector), np.abs(mine)))
-        if np.any(self._largest(found.vector - mine) > EXACT * largest + 1e-300):
+        if np.any(np.abs(found.vector - mine) > EXACT * largest + 1e-300):
             raise Unlike("the numbers of the scenes are no polynomials of the parameters")
         return found.scene

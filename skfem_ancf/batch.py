@@ -47,6 +47,8 @@ OPTIONS = "mixed", 1e-8, 30
 WARNED = 4
 #: How often members at the ends of a parameter are left out, if they cannot be built.
 ROUNDS = 4
+#: Why members are alone.
+SMALL = "their numbers are so much smaller than those of others that digits would be lost"
 #: What is compiled in one thread at a time.
 _LOCK = Lock()
 
@@ -122,6 +124,11 @@ class Batch:
     x
         Their parameters, shape (n, d), all of which differ between some.
 
+    Attributes
+    ----------
+    kept
+        Which of them are members.
+
     Raises
     ------
     Unlike
@@ -133,14 +140,18 @@ class Batch:
         if len(x) < LEAST:
             raise Unlike(f"fewer than {LEAST} are alike")
         low, high = np.min(x, axis=0), np.max(x, axis=0)
-        self.x, self._readings = x, readings
         self.family = Family(build, readings, low, high, len(x) // EACH)
-        tried = np.random.default_rng(0).choice(len(x), max(TRIED, len(x) // OF), replace=False)
-        scenes = [self.family.tried(x[k]) for k in tried]
+        self.kept = np.flatnonzero(self.family.exact(x))
+        if len(self.kept) < LEAST:
+            raise Unlike(SMALL)
+        self.x, self._readings = x[self.kept], readings
+        tried = np.random.default_rng(0).choice(len(self.x), max(TRIED, len(x) // OF),
+                                                replace=False)
+        scenes = [self.family.tried(self.x[k]) for k in tried]
         self.lane = Lane(self.family)
         self.start: Polynomial | None = None
-        if len(x) >= STARTS * LEAST:
-            self._find_starts(build, low, high, len(x) // STARTS)
+        if len(self.x) >= STARTS * LEAST:
+            self._find_starts(build, low, high, len(self.x) // STARTS)
         self._compare(tried, scenes)
 
     def _find_starts(self, build, low, high, most):
@@ -303,14 +314,14 @@ def threads_of(workers: int | None) -> int:
         return os.cpu_count() or 1
 
 
-def families(columns: dict[str, Array], places: Sequence[int]
+def families(members: Sequence[dict[str, Any]], columns: dict[str, Array], places: Sequence[int]
              ) -> Iterator[tuple[Array, list[tuple[str, int]], Array]]:
     """Members that may be of one topology: equal but for floats.
 
     Parameters
     ----------
-    columns
-        From the name of a parameter to an array, one row for each member.
+    members, columns
+        Parameters of all, as dicts and as arrays by name, one row for each member.
     places
         Which of them are asked for.
 
@@ -322,12 +333,13 @@ def families(columns: dict[str, Array], places: Sequence[int]
     """
     if not len(places):
         return
-    at = np.array(places)
+    at, first = np.array(places), members[places[0]]
     floats = {name: x.reshape(len(x), -1) for name, x in columns.items() if x.dtype.kind == "f"}
-    others = [x for name, x in columns.items() if name not in floats]
+    others = [name for name in first if name not in floats]
     groups: dict[Any, Any] = {} if others else {None: np.arange(len(at))}
     for k, place in enumerate(places) if others else ():
-        groups.setdefault(tuple(_key(x[place]) for x in others), []).append(k)
+        member = members[place]
+        groups.setdefault(tuple(_key(member[name]) for name in others), []).append(k)
     for found in groups.values():
         mine = at[found]
         names = [(name, int(k)) for name, x in floats.items()
@@ -337,11 +349,16 @@ def families(columns: dict[str, Array], places: Sequence[int]
 
 
 def _key(value):
-    try:
-        hash(value)
-    except TypeError:
-        return value.tobytes() if isinstance(value, np.ndarray) else repr(value)
-    return value
+    """Equal only of values that are the same to every function; of unknown objects it is which."""
+    if value is None or type(value) in (bool, int, float, complex, str, bytes):
+        return type(value), repr(value)
+    if type(value) in (list, tuple):
+        return type(value), tuple(map(_key, value))
+    if type(value) is dict:
+        return dict, tuple((_key(name), _key(one)) for name, one in value.items())
+    if isinstance(value, np.generic) or type(value) is np.ndarray and not value.dtype.hasobject:
+        return value.dtype, value.shape, value.tobytes()
+    return type(value), id(value)
 
 
 def _built(build, member, names, values):
@@ -402,7 +419,7 @@ def solve_together(build: Callable[..., Scene], readings: Readings,
         said.append("each member was solved alone: what is read is a function of the State")
         return
     alone: dict[str, int] = {}
-    for found, names, x in families(columns, places):
+    for found, names, x in families(members, columns, places):
         finite = np.all(np.isfinite(x), axis=1)
         _count(alone, "a parameter is not finite", np.sum(~finite))
         found, x = found[finite], x[finite]
@@ -417,6 +434,8 @@ def solve_together(build: Callable[..., Scene], readings: Readings,
         _count(alone, "build, or what is read, fails at an end of a parameter",
                len(found) - len(kept))
         found = found[kept]
+        _count(alone, SMALL, len(found) - len(batch.kept))
+        found = found[batch.kept]
         counts = np.zeros(5, dtype=int)
         for which, values, good, doubtful, iterations in _spread(batch, threads):
             warned = np.flatnonzero(doubtful)[:max(0, WARNED - counts[4])]  # alone they will warn

@@ -205,17 +205,19 @@ def _plain(x):
 
 
 def column_of(values: Sequence[Any]) -> Array:
-    """An array (n, ...) of n values: of numbers or texts, else of objects.
+    """An array (n, ...) of n values: of numbers, texts or truth values, else of objects.
 
     Examples
     --------
     >>> from skfem_ancf.members import column_of
-    >>> column_of([1, 2.5]), column_of([None, (1, 2)]).dtype
-    (array([1. , 2.5]), dtype('O'))
+    >>> column_of([1, 2.5]), column_of([None, (1, 2)]).dtype, column_of([True, 2.5]).dtype
+    (array([1. , 2.5]), dtype('O'), dtype('O'))
     """
     try:
         column = np.array(values)
-        if column.dtype.kind in "biufcU":
+        types = {type(x) for x in values}
+        counts = (sum(issubclass(x, kinds) for x in types) for kinds in (str, (bool, np.bool_)))
+        if column.dtype.kind in "biufcU" and all(n in (0, len(types)) for n in counts):
             return column
     except (TypeError, ValueError):  # rows of different lengths, for one
         pass

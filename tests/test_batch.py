@@ -350,3 +350,76 @@ def test_polynomials_grow_where_they_have_to():
     few = Polynomial(function, np.zeros(3), np.full(3, 2.0),
                      lambda surplus, largest: np.max(np.abs(surplus)) / 1e-13, 10)
     assert few.asked == 10 and few.rest > 1.0
+
+
+def options(E, given, read):
+    return cantilever(E, F=1e-3 * read(given))
+
+
+class Load:
+    """Compared by its value, and shown without: not hashed."""
+
+    def __init__(self, F):
+        self.F = F
+
+    def __eq__(self, other):
+        return self.F == other.F
+
+    def __repr__(self):
+        return "<Load>"
+
+
+@pytest.mark.parametrize("values, read", [
+    ([{"F": np.where(np.arange(2000) == 1500, k, 0.0)} for k in (1, 2)], lambda x: x["F"][1500]),
+    ([Load(1), Load(2)], lambda x: x.F), ([True, 1, None], lambda x: 2 if x is True else 1),
+    ([True, 0.5], lambda x: 2 if x is True else 1), (["1", 1], lambda x: 2 if x == 1 else 1),
+    ([np.ones((1, 2)), np.ones((2, 1))], lambda x: x.shape[0])],
+    ids=["long arrays in a dict", "objects", "truth and one", "truth and floats", "texts and one",
+         "equal bytes"])
+def test_values_that_look_the_same_are_not_taken_for_each_other(values, read):
+    table = [dict(E=2e8 + 1e6 * k, given=values[k % len(values)]) for k in range(20 * len(values))]
+    result = sweep(lambda E, given: options(E, given, read), table, TIP)
+    for k in range(len(values)):
+        its = options(table[k]["E"], values[k], read).solve_static().displacement((1, 0))
+        assert_allclose(result["tip"][k], its, rtol=1e-8)
+
+
+@pytest.mark.parametrize("kind", ["cable", "section"])
+@pytest.mark.parametrize("unit", [1e-6, 1e3])
+@pytest.mark.parametrize("vary", ["h", "L"])
+def test_members_in_other_units_are_the_same(vary, unit, kind):
+    """Rows and columns of tables are powers of the unit then: the small ones are no round-off."""
+    def build(h=1.0, L=1.0):
+        mesh = MeshBeam.init_line(np.linspace(0, L * unit, 3), 0.1 * h * unit)
+        beam = Beam(mesh, ELEMENTS[kind], StVenantKirchhoff(1e9, 0.3), width=0.1 * unit)
+        force = 2e9 * 0.1 * unit * (0.1 * h * unit)**3 / 12 / unit**2
+        return Scene(beam).clamp("left").point_force((0, -force), at=(L * unit, 0))
+
+    table = drawn(100, **{vary: (0.8, 1.2)})
+    result = sweep(build, table, ("displacement", "right"))
+    assert "members were solved together" in result.report
+    for k in range(0, 100, 10):
+        scene = build(**{vary: table[vary][k]})
+        its = scene.solve_static().displacement(tuple(scene.beams[0].mesh.p[:, -1]))
+        assert_allclose(result["value"][k], its, rtol=1e-7, atol=1e-12 * unit)
+
+
+def test_small_numbers_beside_large_ones_keep_their_digits():
+    """Loads over twelve decades: those that would lose digits are solved alone."""
+    def build(F):
+        mesh = MeshBeam.init_line([0, 0.5, 1], height=0.02)
+        beam = Beam(mesh, ELEMENTS["cable"], StVenantKirchhoff(2e8, 0.3), width=0.01)
+        return Scene(beam).clamp("left").point_force((0, -F), at=(1, 0))
+
+    F = np.logspace(-14, -2, 240)
+    result = sweep(build, {"F": F}, ("displacement", "right"))
+    assert_allclose(-result["value"][:100, 1] / F[:100], 4 / (2e8 * 0.01 * 0.02**3), rtol=1e-8)
+    assert "digits would be lost" in result.report and "solved together" in result.report
+
+
+def test_parameters_stay_what_they_are():
+    values = [["1", 1], [True, 0.5], [(None, 1), (None, 2)]]
+    for given in values:
+        result = sweep(lambda x: 1.0, {"x": given}, lambda scene: scene)
+        assert result["x"].tolist() == given
+        assert [type(x) for x in result["x"]] == [type(x) for x in given]
