@@ -372,7 +372,7 @@ class Integrator:
             How often it is halved already.
         """
         try:
-            return self.attempt(y, dt)
+            return self.attempt(y, dt, depth == 0)
         except StepFailed as failure:
             if depth == DEPTH:
                 raise StepFailed(f"{failure}, nor with steps of {dt:.3g}") from None
@@ -380,13 +380,15 @@ class Integrator:
         self.substeps += 1 if depth else 2
         return self.step(self.step(y, 0.5 * dt, depth + 1), 0.5 * dt, depth + 1)
 
-    def attempt(self, y: Motion, dt: float) -> Motion:
-        """One step, by new factors where others fail; raises StepFailed.
+    def attempt(self, y: Motion, dt: float, again: bool = True) -> Motion:
+        """One step; raises StepFailed.
 
         Parameters
         ----------
         y, dt
             As of :meth:`step`.
+        again
+            By new factors where those of other steps fail.
         """
         while True:
             fresh = not self.ready or dt != self._dt
@@ -394,7 +396,7 @@ class Integrator:
                 new = self.scheme.step(self, y, dt)
             except (StepFailed, np.linalg.LinAlgError) as failure:
                 self.forget()
-                if fresh:
+                if fresh or not again:
                     raise StepFailed(str(failure)) from None
                 continue
             if contacts_of(new) is None:  # a scheme of one's own may not hand it on
