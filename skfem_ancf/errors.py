@@ -181,7 +181,9 @@ class CheckpointError(AncfError):
 
 
 class CheckpointWarning(UserWarning):
-    """A checkpoint could not be written; the run goes on, the last good file stays."""
+    """A checkpoint, or the file of a sweep, could not be written; the run goes on, the last good
+    file stays.
+    """
 
 
 class SweepWarning(UserWarning):

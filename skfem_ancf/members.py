@@ -122,6 +122,8 @@ class Sweep:
     def to_xarray(self) -> Any:
         """An ``xarray.Dataset``: values along "member", with the parameters as coordinates.
 
+        The coordinate "status" is :attr:`status`, unless a parameter or a value has that name.
+
         Raises
         ------
         MissingExtra
@@ -131,10 +133,11 @@ class Sweep:
             import xarray
         except ImportError:
             raise MissingExtra("xarray", "arrays") from None
+        status = {} if "status" in self.values else {"status": self.status}
         return xarray.Dataset(
             {name: _labelled(name, values) for name, values in self.values.items()},
             {name: _labelled(name, values)
-             for name, values in {**self.parameters, "status": self.status}.items()})
+             for name, values in {**status, **self.parameters}.items()})
 
     def save(self, path: StrPath) -> None:
         """Write a file that ``numpy.load`` reads too; one that is there is replaced at once.

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import (CallbackError, CallError, FileError, InputError, Interrupted, NameUnknown,
-                     SweepWarning, require_function, require_integer, require_path, shown, taught)
+from .errors import (CallbackError, CallError, CheckpointWarning, FileError, InputError,
+                     Interrupted, NameUnknown, SweepWarning, require_function, require_integer,
+                     require_path, shown, taught)
 from .batch import solve_together, threads_of
 from .members import Sweep, column_of, require_plain
 from .progress import progress_bar
@@ -54,7 +55,8 @@ def sweep(build: Callable[..., Any],
         From the parameters, by keyword, to a :class:`Scene`, or whatever ``measure`` takes. For
         members that are solved together it is asked at a few values between theirs.
     parameters
-        From name to an array of shape (n, ...), one row for each member; or a list of n dicts.
+        From name to an array of shape (n, ...), one row for each member; a table of pandas; or a
+        list of n dicts.
     measure
         From the scene to a number, an array of numbers, or a dict of them by name; of equal names
         and shapes for all members. Or what to read of the scene's ``solve_static()``: a pair
@@ -85,7 +87,7 @@ def sweep(build: Callable[..., Any],
     InputError
         If arguments do not fit; NameUnknown and CallError, if ``build`` takes other parameters.
     FileError
-        If the file is of another sweep.
+        If the file is of another sweep, or cannot be written.
     PickleError
         If functions cannot be sent to other processes.
     CallbackError
@@ -97,6 +99,8 @@ def sweep(build: Callable[..., Any],
     -----
     SweepWarning
         If members fail.
+    CheckpointWarning
+        If the file cannot be written any more: the results are in what is returned.
 
     Examples
     --------
@@ -183,6 +187,8 @@ class _Record:
             if path.exists():
                 self.found = _done(path, columns)
         self.places = [k for k, one in enumerate(self.found) if one is None]
+        if path is not None and self.places:
+            self.result().save(path)  # it can be written
 
     def add(self, places, found):
         """Take what was found of members, one by one or in arrays; write, if it is time to."""
@@ -197,11 +203,19 @@ class _Record:
             now = time.monotonic()
             self.next = now + max(_SECONDS, _RARER * (now - begun))
 
+    def result(self):
+        """The Sweep so far."""
+        return Sweep(self.columns, self.found, "; ".join(self.said), self.blocks)
+
     def kept(self):
-        """The Sweep so far, in its file too."""
-        result = Sweep(self.columns, self.found, "; ".join(self.said), self.blocks)
+        """The Sweep so far, in its file too; a warning where that cannot be written any more."""
+        result = self.result()
         if self.path is not None:
-            result.save(self.path)
+            try:
+                result.save(self.path)
+            except FileError as error:
+                warnings.warn(f"the results are not in the file, the sweep goes on: {error}",
+                              CheckpointWarning, stacklevel=5)
         return result
 
     def stopped(self):
@@ -232,7 +246,7 @@ class _Members:
 
 def _members(parameters):
     """Members, at least one, of equal names, at least one."""
-    if isinstance(parameters, Mapping):
+    if isinstance(parameters, Mapping) or hasattr(parameters, "columns"):  # of pandas
         columns = {name: _rows(name, values) for name, values in parameters.items()}
         lengths = {name: len(rows) for name, rows in columns.items()}
         if len(set(lengths.values())) > 1:

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import skfem_ancf
 from skfem_ancf import (Beam, CallbackError, CallError, ElementBeamCable, FileError, InputError,
                         MeshBeam, MissingExtra, NameUnknown, Scene, StVenantKirchhoff, sweep)
-from skfem_ancf.errors import Interrupted, PickleError, SweepWarning
+from skfem_ancf.errors import CheckpointWarning, Interrupted, PickleError, SweepWarning
 from skfem_ancf.members import Sweep
 
 MESH = MeshBeam.init_line([0.0, 0.5, 1.0], 0.01)
@@ -195,6 +195,34 @@ def test_the_file_is_written_as_results_come(tmp_path, monkeypatch):
     assert os.listdir(tmp_path) == ["roots.npz"]
 
 
+def test_a_file_that_cannot_be_written_loses_nothing(tmp_path, monkeypatch):
+    """Said before anything is computed; later the results are in what is returned."""
+    asked = []
+    with pytest.raises(FileError, match="cannot be written"):
+        sweep(just, {"x": [1.0, 2.0]}, asked.append, path=tmp_path / "none" / "roots.npz")
+    assert not asked
+    monkeypatch.setattr("skfem_ancf.sweeps._SECONDS", 0.0)
+    monkeypatch.setattr("skfem_ancf.sweeps._RARER", 0.0)
+    folder = tmp_path / "some"
+    folder.mkdir()
+
+    def measure(x):
+        if x == 2.0:
+            folder.rename(tmp_path / "gone")
+        return x
+
+    with pytest.warns(CheckpointWarning, match="the sweep goes on"):
+        result = sweep(just, {"x": [1.0, 2.0, 3.0]}, measure, path=folder / "roots.npz")
+    assert_array_equal(result["value"], [1.0, 2.0, 3.0])
+    assert_array_equal(Sweep.load(tmp_path / "gone" / "roots.npz")["value"], [1.0, np.nan, np.nan])
+
+
+def test_a_table_of_pandas():
+    pandas = pytest.importorskip("pandas")
+    result = sweep(just, pandas.DataFrame({"x": [1.0, 4.0]}), lambda x: x**0.5)
+    assert_array_equal(result["value"], [1.0, 2.0])
+
+
 @pytest.mark.parametrize("table, error, text", [
     ({"E": [1e9], "width": [0.01, 0.02]}, InputError, "equal lengths, got .*itertools.product"),
     ({"E": [1e9], "wdith": [0.1]}, NameUnknown, "'wdith'; known: 'E', 'width'; did you mean 'wid"),
@@ -250,3 +278,8 @@ def test_xarray_has_the_parameters_as_coordinates(monkeypatch):
     data = result.to_xarray()
     assert data["square"].swap_dims(member="x").sel(x=2.0) == 4.0
     assert data["pair"].dims == ("member", "pair_0")
+    assert data["status"].values.tolist() == ["done", "done"]
+    named = sweep(lambda status: status, {"status": [1.0, 2.0]}, abs).to_xarray()
+    assert named["status"].values.tolist() == [1.0, 2.0]
+    measured = sweep(just, {"x": [1.0, 2.0]}, lambda x: {"status": 3.0 * x}).to_xarray()
+    assert measured["status"].values.tolist() == [3.0, 6.0]
