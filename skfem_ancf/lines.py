@@ -31,6 +31,8 @@ def chain_of(s: Array) -> Array:
 class MeshLines(MeshBeam):
     """Chains of elements; ``s`` runs from 2 k to 2 k + 1 along chain k."""
 
+    kind = "lines"
+
     @property
     def parameters(self) -> Array:
         """Parameter of each node on its own chain, from 0 to 1, shape (nvertices,)."""

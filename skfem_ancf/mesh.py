@@ -21,6 +21,7 @@ from .errors import (CallbackError, FileError, InputError, MeshError, NameUnknow
                      teaching)
 from .frozen import Frozen, ReadOnlyDict
 from .mapping import MappingBeam
+from .origin import ours
 from .pickling import require_picklable
 from .places import is_point
 from .reference import SECTIONS, ElementBeamP1
@@ -104,6 +105,8 @@ class MeshBeam(Frozen, Mesh2D):
     sections: str = "linear"
     heights: ndarray | None = None
     taper: Callable[[Array], ArrayLike] | None = None
+    #: What files call the class.
+    kind = "beam"
 
     # construction
 
@@ -857,7 +860,7 @@ class MeshBeam(Frozen, Mesh2D):
         for name in ("p_X", "p_Y", "p_XY", "lengths", "s", "heights"):
             value = getattr(self, name)
             out[name] = None if value is None else value.T.tolist()
-        return {**out, "height": self.height, "sections": self.sections}
+        return {**out, "height": self.height, "sections": self.sections, "kind": self.kind}
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> MeshBeam:
@@ -890,8 +893,8 @@ class MeshBeam(Frozen, Mesh2D):
         for name in ("lengths", "s"):
             if data.get(name) is not None:
                 data[name] = np.array(data[name])
-        orientations = data.pop("orientations", {})
-        mesh = super().from_dict(data)
+        orientations, of = data.pop("orientations", {}), cls._of_kind(data.pop("kind", cls.kind))
+        mesh = super(MeshBeam, of).from_dict(data)
         if orientations:
             tags = dict(mesh._boundaries)
             for name, ori in orientations.items():
@@ -910,7 +913,8 @@ class MeshBeam(Frozen, Mesh2D):
              if getattr(self, name) is not None}
         try:
             np.savez(filename, doflocs=self.doflocs, t=self.t, height=self.height, p_X=self.p_X,
-                     p_Y=self.p_Y, lengths=self.lengths, sections=self.sections, **s, **tags)
+                     p_Y=self.p_Y, lengths=self.lengths, sections=self.sections, kind=self.kind,
+                     **s, **tags)
         except OSError as error:
             raise FileError(f"cannot write {str(filename)!r}: {error}") from error
 
@@ -944,11 +948,23 @@ class MeshBeam(Frozen, Mesh2D):
             tags = {k: OrientedBoundary(v, data[f"o_{k}"]) if f"o_{k}" in data.files else v
                     for k, v in tags.items()}
             parts = {k[2:]: data[k] for k in data.files if k.startswith("s_")}
-            return cls(data["doflocs"], data["t"], tags or None, parts or None,
-                       height=float(data["height"]), p_X=data["p_X"], p_Y=data["p_Y"],
-                       lengths=data["lengths"], sections=str(data["sections"]),
-                       **{name: data[name] for name in ("s", "p_XY", "heights")
-                          if name in data.files})
+            of = cls._of_kind(str(data["kind"]) if "kind" in data.files else cls.kind)
+            return of(data["doflocs"], data["t"], tags or None, parts or None,
+                      height=float(data["height"]), p_X=data["p_X"], p_Y=data["p_Y"],
+                      lengths=data["lengths"], sections=str(data["sections"]),
+                      **{name: data[name] for name in ("s", "p_XY", "heights")
+                         if name in data.files})
+
+    @classmethod
+    def _of_kind(cls, kind):
+        """The class of a mesh in a file: this one, or the one of the package that it was saved of.
+        """
+        known = {of.kind: of for of in (*MeshBeam.__subclasses__(), MeshBeam) if ours(of)}
+        if kind == cls.kind:
+            return cls
+        if kind not in known:
+            raise MeshError(f"a mesh of the kind {kind!r} is not known, only {sorted(known)}")
+        return known[kind]
 
     def save(self, filename: StrPath, point_data: dict[str, Any] | None = None,
              cell_data: dict[str, Any] | None = None, **kwargs: Any) -> None:

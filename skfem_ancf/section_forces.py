@@ -42,6 +42,8 @@ SMALL = 4096
 #: hold the equation of motion in the mean over a step only, and the mean of both sides is right.
 UNBALANCED, UNBALANCED_MOTION = 0.02, 0.5
 
+#: Strains below this times the coordinates over the length of an element are round-off.
+UNLOADED = 16 * np.finfo(float).eps
 #: Section forces below this part of those that stress-free strains have alone are round-off.
 BALANCED = 1e-4
 
@@ -332,6 +334,13 @@ class SectionForces:
         return (np.max(np.abs(R), axis=(0, -2, -1)) * self.beam.mesh.height
                 + np.max(np.abs(M), axis=(0, -1)))
 
+    def _round_off(self):
+        """What :meth:`_size` is of a beam without load: that of the strains times the stiffness."""
+        beam = self.beam
+        strain = UNLOADED * np.max(np.abs(self.q[..., 0, :]), axis=(-2, -1)) / np.min(
+            beam.mesh.lengths)
+        return strain * (beam.kernel.scale / beam.size * beam.mesh.height)
+
     def viscous_middles(self) -> tuple[Array, Array]:
         """The part of force and moment that resists the rate of the strain, in the middle of
         elements, where it is most accurate: shapes (2, ..., ne) and (..., ne).
@@ -446,8 +455,9 @@ class SectionForces:
         R[..., mesh.t[0], :] -= self.R[0]
         M[..., mesh.t[0]] -= self.M[0]
         size = np.maximum(self._size(self.R, self.M), BALANCED * self._pushed)
-        if np.any(size == 0.0):
-            raise NotRecovered("the beam carries no load", size == 0.0)
+        unloaded = size <= self._round_off()
+        if np.any(unloaded):
+            raise NotRecovered("the beam carries no load", unloaded)
         place = np.zeros(n)
         place[mesh.t[0]], place[mesh.t[1]] = np.arange(mesh.nelements), 1.0 + np.arange(
             mesh.nelements)

@@ -922,3 +922,35 @@ def test_what_is_not_held_is_said():
 def test_calls_that_mean_nothing(call, error, message):
     with pytest.raises(error, match=message):
         call(portal())
+
+
+@pytest.mark.parametrize("suffix", ["npz", "json"])
+def test_the_mesh_of_a_frame_is_loaded_as_what_it_was(tmp_path, suffix):
+    frame = portal(height=[lambda s: 0.02 + 0.01 * s, 0.02, 0.03], elements=3)
+    mesh, path = frame.beams[0].mesh, tmp_path / f"mesh.{suffix}"
+    mesh.save(path)
+    again = MeshBeam.load(path)
+    assert type(again) is type(mesh) is not MeshBeam
+    assert_allclose(again.parameters, mesh.parameters, rtol=0, atol=1e-15)
+    assert_allclose(again.heights, mesh.heights, rtol=1e-15)
+    plain = MeshBeam.init_line([0.0, 1.0], 0.1)
+    plain.save(path)
+    assert type(MeshBeam.load(path)) is MeshBeam
+    data = {**plain.to_dict(), "kind": "shell"}
+    with pytest.raises(MeshError, match="'shell' is not known, only .'beam', 'lines'."):
+        MeshBeam.from_dict(data)
+    del data["kind"]  # as of files that were written before
+    assert type(MeshBeam.from_dict(data)) is MeshBeam
+
+
+@pytest.mark.parametrize("force", [1e-7, 1.0, 300.0])
+def test_a_branch_without_load_is_said_to_have_none(force):
+    soft = StVenantKirchhoff(2e8, 0.3, 7800.0)
+    frame = Frame.from_lines([(0, 0), (0, 1), (1, 1), (0, 2), (1, 2.5)],
+                             [(0, 1), (1, 2), (1, 3), (3, 4)], elements=2, height=0.05, width=0.05,
+                             groups={"main": [0, 1], "branch": [2, 3]}, material=soft,
+                             sections={"main": {"width": 0.05}, "branch": {"width": 0.04}})
+    state = frame.clamp((0, 0)).point_force((0, -force), at=(1, 1)).solve_static()
+    assert state.recovered == {"main": "", "branch": "the beam carries no load"}
+    loaded, free = (np.max(np.abs(state.stress([x]))) for x in ((0.0, 0.5), (0.0, 1.5)))
+    assert free < 1e-6 and loaded > 100.0 * force
