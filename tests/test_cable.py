@@ -348,3 +348,16 @@ def test_pressure_on_a_curved_cable_acts_on_its_axis(place, sign):
     x, y = mesh.p[:, -1] - mesh.p[:, 0]
     total = load.force(np.zeros(beam.N)).reshape(-1, 2, 2)[:, 0].sum(axis=0)
     np.testing.assert_allclose(total, sign * 2.5 * np.array([y, -x]), rtol=1e-12)
+
+
+@pytest.mark.parametrize("height", [0.01, lambda s: 0.012 - 0.004 * s], ids=["line", "taper"])
+@pytest.mark.parametrize("degree", [5, 9, 15])
+def test_high_degrees_lose_no_digits_of_positions_and_strains(degree, height):
+    mesh = MeshBeam.init_line(np.linspace(0.0, 1.0, 5), height)
+    scene = Scene(cable(degree, mesh)).clamp("left").gravity((0.0, -9.81))
+    one = scene.solve_static(tol=1e-10)
+    other = scene.solve_static(start=scene.state(1.003 * one.u), tol=1e-10)  # other round-off
+    x = np.array([np.linspace(0, 1, 21), np.full(21, 0.003)])
+    for ask, digits in ((lambda s: s.displacement(x), 1e-12), (lambda s: s.strain(x)[0], 1e-10)):
+        a, b = ask(one), ask(other)
+        assert np.max(np.abs(a - b)) < digits * np.max(np.abs(a))
