@@ -240,15 +240,16 @@ def mirror(A):
 def fix(A, free):
     """Rows and columns where free is zero become those of the identity."""
     rows = A.flat.reshape(A.flat.size // A.ld, A.ld)
-    for k in range(1, min(A.width, free.size - 1) + 1):
-        later, after = rows[k:], free[k:]
-        for j in lanes(after.size):
-            rows[j, A.top + k] *= free[j] * after[j]
-        if A.top > 0:
-            for j in lanes(after.size):
-                later[j, A.top - k] *= free[j] * after[j]
-    for j in lanes(free.size):
-        rows[j, A.top] = rows[j, A.top] * free[j] + (1.0 - free[j])
+    for i in range(free.size):
+        if free[i] == 0.0:
+            for k in lanes(A.ld):
+                rows[i, k] = 0.0
+            for k in range(1, min(A.width, i) + 1):
+                rows[i - k, A.top + k] = 0.0
+            if A.top > 0:
+                for k in range(1, min(A.width, free.size - 1 - i) + 1):
+                    rows[i + k, A.top - k] = 0.0
+            rows[i, A.top] = 1.0
 
 
 @source
