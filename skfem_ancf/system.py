@@ -252,6 +252,11 @@ class System:
             out[s] += factor * acting.force(u[s])
         return out
 
+    @property
+    def depends_on_time(self) -> bool:
+        """True if supports, joints or loads may ask functions of time."""
+        return bool(self._varying) or self.moves or self.machine.tables.motion_varies
+
     def _require_coordinates(self, u):
         if u.shape != (self.N,):
             raise InputError(f"the displacement of the scene's coordinates has shape ({self.N},), "

@@ -89,6 +89,7 @@ class Integrator:
             self._nodes = Eliminated(system, A), EliminatedMass(system)
         self._state = np.zeros(STATE)
         self.room: Any = None
+        self.asked: Any = None
         self.machine = system.machine
         self._begin(scheme, tol)
         fix(self.matrices.mass, system.mask)
@@ -112,10 +113,10 @@ class Integrator:
         handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
         self.rule = Rule(int(scheme.conserving), *map(float, scheme.parameters), self.tol,
                          8.0 * system.stiffness_scale, *handles)
-        self._courses = Courses(system, scheme.conserving)
         self._state[:], self._dt, self.substeps, self._lost = 0.0, np.nan, 0, ""
         self.kept: dict[str, Array] = {}
-        self.asked: Any = None, None
+        if system.depends_on_time or self.asked is None:
+            self._courses, self.asked = Courses(system, scheme.conserving), (None, None)
 
     @classmethod
     def lent(cls, system: System, scheme: Scheme, tol: float | None = None) -> Integrator:
