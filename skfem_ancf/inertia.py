@@ -57,8 +57,8 @@ class Inertia(NamedTuple):
         size = 2 * len(N)
 
         def product(A, B, weights, turn):
-            scalar = np.einsum("iep,jep,ep->eij", A, B, weights, optimize=True)
-            return np.einsum("eij,ab->eiajb", scalar, turn).reshape(-1, size, size)
+            scalar = (A * weights).transpose(1, 0, 2) @ B.transpose(1, 2, 0)
+            return (scalar[:, :, None, :, None] * turn[:, None]).reshape(-1, size, size)
 
         out = product(N, N, m, np.eye(2))
         if self.slopes is not None:
@@ -155,7 +155,8 @@ def projected(beam: Beam, field: Callable[[Array], Array]) -> Array:
     mesh, mapping, element, nd = beam.mesh, beam.mesh.mapping(), beam.element, beam.nd
     N, weights = element.values(mapping, X), mapping.detDF(X) * W
     gram = BandMatrix(beam.N // 2, nd - 1)  # of one component
-    gram.add_elements(np.einsum("iep,jep->eij", N, N * weights), 0, nd // 2, mesh.t[0])
+    gram.add_elements((N * weights).transpose(1, 0, 2) @ N.transpose(1, 2, 0), 0, nd // 2,
+                      mesh.t[0])
     rest, v = field(mapping.F(X)), np.zeros((beam.N // 2, 2))
     for _ in range(2):  # elements of high degree have ill-conditioned masses
         parts = np.einsum("iep,cep->eic", N, rest * weights)

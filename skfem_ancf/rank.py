@@ -56,9 +56,9 @@ def first_dependent(J: Array | sparse.csr_array, free: Array,
     for rows, _, A in groups(J * free):
         if first is not None and rows[0] > first[0]:
             continue
-        R = np.asarray(np.linalg.qr(A.T, mode="r"))
+        R = scipy.linalg.lapack.dgeqrf(A.T)[0] if A.size else A.T  # and below it, what is not asked
         rest, k = np.zeros(len(rows)), min(R.shape)
-        rest[:k] = np.abs(np.diag(R))
+        rest[:k] = np.abs(R.diagonal())
         dependent = np.flatnonzero(rest <= DEPENDENT * size[rows])
         if len(dependent) and (first is None or rows[dependent[0]] < first[0]):
             k = dependent[0]

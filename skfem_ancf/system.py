@@ -279,8 +279,8 @@ class System:
 
     @cached_property
     def _force_at_rest(self):
-        """That of beams that are not displaced."""
-        return self._evaluate(FORCE, np.zeros(self.N))
+        """That of beams that are not displaced: of laws of one's own alone it may not be zero."""
+        return np.zeros(self.N) if self._linear else self._evaluate(FORCE, np.zeros(self.N))
 
     def mean_internal_force(self, u0: Array, u1: Array, t: float | None = None) -> Array:
         """The internal force whose work from u0 to u1 is the change of the strain energy.
@@ -430,8 +430,13 @@ class System:
 
     @cached_property
     def _energy_at_rest(self):
-        """That of beams that are not displaced: they may be too warm."""
-        return self._energy_of_beams(np.zeros(self.N))
+        """That of beams that are not displaced."""
+        return 0.0 if self._linear else self._energy_of_beams(np.zeros(self.N))
+
+    @property
+    def _linear(self):
+        """True if the laws of all beams are linear."""
+        return all([beam.kernel.linear for beam in self.beams])
 
     def load_potential(self, u: Array, t: float | None = None) -> float:
         """Potential of the loads; loads without one count as zero.

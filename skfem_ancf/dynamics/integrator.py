@@ -101,7 +101,7 @@ class Integrator:
         self._work = room_for_steps(system.N, system.m, system.machine.tables.stresses.size,
                                     0 if self._nodes else system.m)
         numbers = 4 * system.N + system.forces.contacts.tables.memory.size
-        self.longest = int(np.clip(STORED // numbers, 1, BLOCK))
+        self.longest = max(1, min(STORED // numbers, BLOCK))
 
     def _begin(self, scheme, tol):
         """As if nothing had been integrated yet."""
