@@ -451,10 +451,12 @@ class Tables:
             return _NO_BORDER
         if not s.joints or not s.bordered or joints.own or s.forces.far:
             return Border(none, 0, 0, none, none, none, none, int(s.coupled))
-        i, j, ns = joints.hi, joints.hj, len(s.springs)
+        i, j, ns, springs = joints.hi, joints.hj, len(s.springs), s.springs.astype(np.int64)
+        if not len(i):
+            return Border(springs, ns, s.loose, none, none, none, none, 0)
         outside = np.abs(i - j) > s.bandwidth
         far = np.unique(np.append(i[outside], j[outside]))
-        picked = np.append(s.springs.astype(np.int64), far)
+        picked = np.append(springs, far)
         out, = np.nonzero(outside)
         stored, = np.nonzero(~outside & ((i >= j) | (not s.symmetric)))
         row, column = (ns + np.searchsorted(far, x[out]) for x in (i, j))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -60,6 +61,12 @@ def beside_zero(negative: Callable[[float], int]) -> Inertia:
     return Inertia(above, below != above)
 
 
+@lru_cache(32)
+def _lower(m):
+    """The lower half of ones, shape (m, m)."""
+    return np.tri(m)
+
+
 class BandMatrix:
     """A square band matrix that is filled element by element and factorised by LAPACK.
 
@@ -96,9 +103,8 @@ class BandMatrix:
     def _blocks(self, start, step, m, count):
         """Diagonal blocks of size m at rows start, start + step, ...: a view (count, m, m)."""
         item, ld = self._flat.itemsize, self._ld
-        return np.lib.stride_tricks.as_strided(
-            self._flat[start * ld + self._diagonal:], (count, m, m),
-            (step * ld * item, item, (ld - 1) * item), writeable=True)
+        return np.ndarray((count, m, m), float, self._flat, (start * ld + self._diagonal) * item,
+                          (step * ld * item, item, (ld - 1) * item))
 
     def add_elements(self, K: Array, start: int, nd: int, left: Array) -> None:
         """Add element matrices that couple node k and k + 1 of a chain.
@@ -116,7 +122,7 @@ class BandMatrix:
         """
         m = 2 * nd
         if self.symmetric:  # the upper half falls on entries of other elements
-            K *= np.tri(m)
+            K *= _lower(m)
         view = self._blocks(start, nd, m, int(left[-1]) + 1)
         if left[-1] - left[0] == len(left) - 1:
             first = int(left[0])

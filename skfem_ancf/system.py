@@ -14,6 +14,7 @@ from scipy.linalg import lapack
 from scipy.sparse.linalg import splu
 
 from . import eigen
+from .band import fix
 from .bordered import BorderedMatrix, border, border_negative, columns_product
 from .checks import Screen
 from .condensed import Condensed
@@ -436,7 +437,7 @@ class System:
     @property
     def _linear(self):
         """True if the laws of all beams are linear."""
-        return all([beam.kernel.linear for beam in self.beams])
+        return all(beam.kernel.linear for beam in self.beams)
 
     def load_potential(self, u: Array, t: float | None = None) -> float:
         """Potential of the loads; loads without one count as zero.
@@ -624,7 +625,7 @@ class System:
     def mass_factors(self) -> BandMatrix:
         """The factors of the mass matrix with its supports fixed; made once."""
         M = self.new_band().combine(1.0, self.mass, 0.0, self.mass)
-        M.fix(self.fixed_positions)
+        fix(M.band, self.mask)
         return M.factorize()
 
     def mass_solver(self, u: Array, t: float, J: Any = None

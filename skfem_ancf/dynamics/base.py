@@ -248,4 +248,9 @@ def same_scheme(a: Scheme, b: Scheme) -> bool:
     a, b
         The schemes.
     """
-    return type(a) is type(b) and (vars(a) == vars(b) == {} or repr(vars(a)) == repr(vars(b)))
+    if type(a) is not type(b):
+        return False
+    mine, others = vars(a), vars(b)
+    return mine.keys() == others.keys() and all(
+        x == others[name] if type(x) is float else repr(x) == repr(others[name])
+        for name, x in mine.items())

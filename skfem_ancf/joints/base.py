@@ -40,7 +40,7 @@ class Vector:
     """
 
     def __init__(self, start: ArrayLike, dofs: Array, weights: Array) -> None:
-        weights = np.broadcast_to(weights, np.shape(dofs))
+        weights = weights + np.zeros(dofs.shape)
         size = np.abs(weights).max(axis=0, initial=0.0)
         keep = size > 1e-14 * size.max(initial=0.0)
         self.start, self.dofs, self.weights = np.asarray(start), dofs[:, keep], weights[:, keep]
