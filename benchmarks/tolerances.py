@@ -1,10 +1,13 @@
 """Motions with steps of automatic size: the error over the tolerance asked for.
 
-    python benchmarks/tolerances.py [--scheme radau gauss] [--motion pendulum rod] [--rtol 1e-4]
+    python benchmarks/tolerances.py [--others] [--once] [--scheme radau gauss] [--motion pendulum rod]
+                                    [--rtol 1e-4]
 
-The error is by how far a node or a rigid body is off, the farthest of the scene at 20 instants of
-the motion, over the scene's size; in brackets that at the end, then the steps. Motions are measured
-against many steps of collocation on the same mesh, kept in out/tolerances.npz. Two minutes.
+``--others`` takes the motions of ``other_motions.py``, by which nothing was chosen; ``--once`` leaves
+out the check that takes a motion again. The error is by how far a node or a rigid body is off, the farthest of the scene at 20 instants of
+the motion, over the scene's size; in brackets that at the end, then the steps, and a star for each
+time that it was taken again. Motions are measured against many steps of collocation on the same
+mesh, kept in out/. Three minutes.
 """
 
 import argparse
@@ -22,6 +25,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
+import other_motions
 import slider_crank
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, KelvinVoigt, MeshBeam, RigidBody,
                         Scene, StVenantKirchhoff)
@@ -30,7 +34,6 @@ from skfem_ancf.errors import AncfError, InputError
 from work_precision import ours
 from work_precision.problems import PROBLEMS
 
-KEPT = ROOT / "out" / "tolerances.npz"
 INSTANTS = 20
 GRAVITY = (0.0, -9.81)
 
@@ -111,6 +114,10 @@ MOTIONS = {
 RTOLS = {"radau": (1e-3, 1e-4, 1e-5, 1e-6, 1e-7), "gauss": (1e-3, 1e-4, 1e-5, 1e-6, 1e-7),
          "energy-momentum-4": (1e-3, 1e-4, 1e-5, 1e-6)}
 COARSE = 1e-3, 1e-4, 1e-5
+#: Of the motions here and of the others: where their references are, what they are, and the least
+#: tolerance that these are known for.
+SETS = {False: ("tolerances.npz", MOTIONS, 0.0),
+        True: ("other_motions.npz", other_motions.MOTIONS, 1e-6)}
 
 
 def places(scene, u):
@@ -123,8 +130,8 @@ def places(scene, u):
     return np.concatenate(found, axis=1)
 
 
-def fine(name, steps):
-    build, t_end, _, joined = MOTIONS[name]
+def fine(motion, steps):
+    build, t_end, _, joined = motion
     times = np.linspace(0.0, t_end, INSTANTS + 1)[1:]
     scene = build()
     scheme = "radau" if joined or scene.system.damped else Gauss(4)
@@ -134,53 +141,64 @@ def fine(name, steps):
     return times, places(scene, history.u[every::every])
 
 
-def references(names):
-    """Places of motions, from out/tolerances.npz or by many steps: name, (times, places)."""
-    kept = dict(np.load(KEPT)) if KEPT.exists() else {}
+def references(names, others=False):
+    """Places of motions, from a file in out/ or by many steps: name, (times, places)."""
+    file, motions = ROOT / "out" / SETS[others][0], SETS[others][1]
+    kept = dict(np.load(file)) if file.exists() else {}
     for name in names:
         if name in kept:
             continue
         begin = time.perf_counter()
-        (_, half), (times, full) = (fine(name, MOTIONS[name][2] // k) for k in (2, 1))
+        (_, half), (times, full) = (fine(motions[name], motions[name][2] // k) for k in (2, 1))
         kept[name], kept[f"{name} times"] = full, times
-        size = MOTIONS[name][0]().system.size
+        size = motions[name][0]().system.size
         print(f"{name}: known to {np.hypot(*np.moveaxis(full - half, 2, 0)).max() / size:.1e}, "
               f"{time.perf_counter() - begin:.1f} s", flush=True)
-        KEPT.parent.mkdir(exist_ok=True)
-        np.savez(KEPT, **kept)
+        file.parent.mkdir(exist_ok=True)
+        np.savez(file, **kept)
     return {name: (kept[f"{name} times"], kept[name]) for name in names}
 
 
-def measure(name, scheme, rtol, known):
+def measure(motion, scheme, rtol, known, check=None):
     """Largest error of the instants and error at the end, over rtol, and the history."""
-    scene, (times, exact) = MOTIONS[name][0](), known
+    scene, (times, exact) = motion[0](), known
     history = scene.integrate(times[-1], "auto", scheme=scheme, rtol=rtol, t_eval=times,
-                              progress=False)
+                              progress=False, check=check)
     off = np.hypot(*np.moveaxis(places(scene, history.u) - exact, 2, 0)) / scene.system.size
     return off.max() / rtol, off[-1].max() / rtol, history
 
 
-def table(scheme, names, rtols, known):
-    """Print the rows of a scheme, and how many errors are as they should be."""
-    print(f"\n{scheme}".ljust(16) + "".join(f"{rtol:>21g}" for rtol in rtols))
+def table(scheme, names, rtols, motions, known, check):
+    """Print the rows of a scheme, and how many errors are as they should be: its errors."""
+    print(f"\n{scheme}".ljust(18) + "".join(f"{rtol:>21g}" for rtol in rtols))
     errors = []
     for name in names:
         row = ""
         for rtol in rtols:
             try:
-                most, end, history = measure(name, scheme, rtol, known[name])
-                text = f"{most:.2g} ({end:.2g}) {history.steps}"
+                most, end, history = measure(motions[name], scheme, rtol, known[name], check)
+                text = f"{most:.2g} ({end:.2g}) {history.steps}" + "*" * (history.passes - 1)
+                errors.append((most, end, history.passes))
             except InputError:  # a scene that the scheme is not for
                 break
             except AncfError as error:
-                most, end, text = np.inf, np.inf, type(error).__name__
-            errors.append((most, end))
+                text = type(error).__name__
+                errors.append((np.inf, np.inf, 1))
             row += text.rjust(21)
         if row:
-            print(name.ljust(15) + row, flush=True)
-    for text, e in zip(("at any time", "at the end"), np.array(errors).T):
-        print(f"{text}: {np.sum((e >= 0.2) & (e <= 1.0))} of {len(e)} within 0.2 to 1, "
-              f"{np.sum(e > 1.0)} above, largest {e.max():.2g}, median {np.median(e):.2g}")
+            print(name.ljust(17) + row, flush=True)
+    summary(errors)
+    return errors
+
+
+def summary(errors):
+    for text, e in zip(("at any time", "at the end", "times taken"), np.array(errors).T):
+        if text == "times taken":
+            print(f"{text}: {e.mean():.2f} on average")
+        else:
+            print(f"{text}: {np.sum((e >= 0.2) & (e <= 1.0))} of {len(e)} within 0.2 to 1, "
+                  f"{np.sum(e < 0.2)} below, {np.sum(e > 1.0)} above, {np.sum(e > 1.2)} above 1.2, "
+                  f"largest {e.max():.2g}, median {np.median(e):.2g}")
 
 
 def main():
@@ -188,13 +206,21 @@ def main():
     parser.add_argument("--scheme", nargs="*", default=["radau", "gauss", "energy-momentum-4",
                                                         "generalized-alpha", "energy-momentum"],
                         choices=list(SCHEMES))
-    parser.add_argument("--motion", nargs="*", default=list(MOTIONS), choices=list(MOTIONS))
+    parser.add_argument("--motion", nargs="*")
     parser.add_argument("--rtol", nargs="*", type=float)
+    parser.add_argument("--others", action="store_true")
+    parser.add_argument("--once", action="store_true")
     args = parser.parse_args()
     warnings.simplefilter("ignore")  # of bodies that coarse steps turn inside out
-    known = references(args.motion)
+    _, motions, least = SETS[args.others]
+    names = args.motion or list(motions)
+    known = references(names, args.others)
+    errors = []
     for scheme in args.scheme:
-        table(scheme, args.motion, args.rtol or RTOLS.get(scheme, COARSE), known)
+        rtols = args.rtol or [x for x in RTOLS.get(scheme, COARSE) if x >= least]
+        errors += table(scheme, names, rtols, motions, known, False if args.once else None)
+    print("\nall")
+    summary(errors)
 
 
 if __name__ == "__main__":
