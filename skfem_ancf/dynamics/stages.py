@@ -13,8 +13,8 @@ from ..band import (SPARE, Band, clear, copy, dense_solve, factorize, factorize_
                     solve, solve_complex, solve_joined)
 from ..body import (add_force_of, body_carry, body_force, body_mean_stress, body_mixed,
                     body_stress, body_tangent)
-from ..forces.texts import (add_elastic_force, add_element_tangent, pace_contact,
-                            settle_contact)
+from ..forces.texts import (add_elastic_force, add_element_damping, add_element_tangent,
+                            pace_contact, settle_contact)
 from ..source import F1, F2, F3, borrowed, by_place, lanes, shaped, source
 from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
                       external_force, joint_directions)
@@ -560,6 +560,8 @@ def _factorize(e, matrices, method, s, w, state, step):
         D[i] = 0.0
     if matrices.dampers.active > 0:
         add_damping(e.viscous, matrices.dampers, matrices.M, 1.0, origin, S, f, w.D)
+        if matrices.dampers.elements > 0:
+            add_element_damping(e.forces, s.times[at], origin, w.y[1], w.D)
     if w.J.shape[0] > 0:
         joint_directions(e.joints, _row(s.joints.g, at)[0], s.times[at], origin, w.J)
         for a in range(w.J.shape[0]):

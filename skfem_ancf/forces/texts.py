@@ -227,6 +227,18 @@ def add_element_tangent(tables, t, u, A):
     add_contact_tangent(tables, t, 0.0, u, u, A)
 
 
+@source
+def add_element_damping(tables, t, u, v, A):
+    """Add the derivative of :func:`add_resisting_force` by v to a band matrix, for near elements."""
+    if tables.start.size > 0:
+        D, elastic = np.empty(tables.size), np.empty(tables.size)
+        element_stiffness(tables, t, u, v, 1.0, D)
+        element_stiffness(tables, t, u, v, 0.0, elastic)
+        for i in lanes(D.size):
+            D[i] -= elastic[i]
+        add_products(A.flat, tables.band_at, tables.band_weight, D, tables.band_of)
+
+
 # the kinds
 
 
