@@ -365,3 +365,13 @@ def test_compiled_steps_are_the_same(needs_compiled, body, monkeypatch):
     for plain, fast in zip(*runs):
         assert_allclose(fast.u, plain.u, rtol=0, atol=1e-10)
         assert_allclose(fast.dissipated, plain.dissipated, rtol=1e-7, atol=1e-15)
+
+
+@pytest.mark.parametrize("scheme", ["radau", "gauss"])
+def test_collocation_knows_dashpots(scheme):
+    """Of a section with little inertia: in halves of steps, and 19 times the iterations, else."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 4), 0.02), ElementBeamCable(5),
+                StVenantKirchhoff(5e7, 0.3, 1200.0), 0.02)
+    scene = Scene(beam).pin("left").gravity((0.0, -9.81)).torsional_spring(2.0, "left", 0.02)
+    history = scene.integrate(0.2, 4e-3, scheme=scheme)
+    assert history.substeps == 0 and history.iterations < 3 * 14 * history.steps
