@@ -1,7 +1,7 @@
 """Motions that no number of the step size was chosen by: ``tolerances.py --others``.
 
-Other elements, sections and slendernesses, curved axes, tapers, damping, joints, springs, loads that
-begin at once and pulses.
+Other elements, sections and slendernesses, curved axes, tapers, damping, joints, springs, pulses,
+and loads that begin at once.
 """
 
 import numpy as np

@@ -1,13 +1,13 @@
 """Motions with steps of automatic size: the error over the tolerance asked for.
 
-    python benchmarks/tolerances.py [--others] [--once] [--scheme radau gauss] [--motion pendulum rod]
-                                    [--rtol 1e-4]
+    python benchmarks/tolerances.py [--others] [--once] [--scheme radau gauss]
+                                    [--motion pendulum rod] [--rtol 1e-4]
 
-``--others`` takes the motions of ``other_motions.py``, by which nothing was chosen; ``--once`` leaves
-out the check that takes a motion again. The error is by how far a node or a rigid body is off, the farthest of the scene at 20 instants of
-the motion, over the scene's size; in brackets that at the end, then the steps, and a star for each
-time that it was taken again. Motions are measured against many steps of collocation on the same
-mesh, kept in out/. Three minutes.
+``--others`` takes the motions of ``other_motions.py``, by which nothing was chosen; ``--once``
+leaves out the check that takes a motion again. The error is by how far a node or a rigid body is
+off, the farthest of the scene at 20 instants of the motion, over the scene's size; in brackets that
+at the end, then the steps, and a star for each time that it was taken again. Motions are measured
+against many steps of collocation on the same mesh, kept in out/. Three minutes.
 """
 
 import argparse

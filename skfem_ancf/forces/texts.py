@@ -229,7 +229,7 @@ def add_element_tangent(tables, t, u, A):
 
 @source
 def add_element_damping(tables, t, u, v, A):
-    """Add the derivative of :func:`add_resisting_force` by v to a band matrix, for near elements."""
+    """Add the derivative of :func:`add_resisting_force` by v to a band, for near elements."""
     if tables.start.size > 0:
         D, elastic = np.empty(tables.size), np.empty(tables.size)
         element_stiffness(tables, t, u, v, 1.0, D)
