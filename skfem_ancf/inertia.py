@@ -153,15 +153,15 @@ def projected(beam: Beam, field: Callable[[Array], Array]) -> Array:
     """
     X, W = beam.exact_rule()
     mesh, mapping, element, nd = beam.mesh, beam.mesh.mapping(), beam.element, beam.nd
-    N, weights = element.values(mapping, X), mapping.detDF(X) * W
+    N = element.values(mapping, X).transpose(1, 0, 2)
+    weighted, back = N * (mapping.detDF(X) * W)[:, None], N.transpose(0, 2, 1)
     gram = BandMatrix(beam.N // 2, nd - 1)  # of one component
-    gram.add_elements((N * weights).transpose(1, 0, 2) @ N.transpose(1, 2, 0), 0, nd // 2,
-                      mesh.t[0])
-    rest, v = field(mapping.F(X)), np.zeros((beam.N // 2, 2))
+    gram.add_elements(weighted @ back, 0, nd // 2, mesh.t[0])
+    rest, v = field(mapping.F(X)).transpose(1, 2, 0), np.zeros((beam.N // 2, 2))
     for _ in range(2):  # elements of high degree have ill-conditioned masses
-        parts = np.einsum("iep,cep->eic", N, rest * weights)
+        parts = weighted @ rest
         dv = gram.solve(beam.kernel.scatter(parts).reshape(-1, 2))
         left, right = dv.reshape(-1, nd)[mesh.t]
         of_elements = np.concatenate([left, right], axis=1).reshape(parts.shape)
-        rest, v = rest - np.einsum("iep,eic->cep", N, of_elements), v + dv
+        rest, v = rest - back @ of_elements, v + dv
     return v.ravel()
