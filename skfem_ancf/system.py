@@ -650,7 +650,7 @@ class System:
 
             return solve_by_nodes
         M, free = self.mass_factors, self.free
-        if not self.joints:
+        if not self.m:
             return lambda b, rate: (M.solve(b * free), _NONE)
         J = J * self.mask if isinstance(J, np.ndarray) else self.jacobian(u, t)
         Y = M.solve(J.T if isinstance(J, np.ndarray) else dense(J.T))

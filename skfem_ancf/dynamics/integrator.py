@@ -216,7 +216,7 @@ class Integrator:
         else:
             y.u[s.fixed] = y.v[s.fixed] = 0.0
         rate, J = y.multipliers, None
-        joined = Joined(s, self._courses, y.u, (t, dt, ahead, self.limit)) if s.joints else None
+        joined = Joined(s, self._courses, y.u, (t, dt, ahead, self.limit)) if s.m else None
         if joined is not None:
             gap = np.abs(joined.gap()).max(initial=0.0)
             if gap > 1e-8 * s.size:
