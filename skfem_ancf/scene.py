@@ -1777,7 +1777,7 @@ class Scene:
         path
             The file of ``integrate(..., checkpoint=path)``, which goes on to be written.
         scheme
-            The scheme, if it is one of your own.
+            The scheme, if it is one of your own; the file knows those of the package.
         progress
             Show a progress bar: True, False, or None for "if it takes long".
 

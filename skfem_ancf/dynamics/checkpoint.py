@@ -201,7 +201,7 @@ def _scheme_text(scheme):
 def _scheme_of(text, given):
     from . import SCHEMES, get_scheme
 
-    if given is not None:
+    if given is not None and given != "auto":  # what that was is in the file
         scheme = get_scheme(given)
         if _scheme_text(scheme) != text:
             raise CheckpointError(f"the file is of a run by {text}, not by {scheme!r}")
