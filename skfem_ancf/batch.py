@@ -37,6 +37,8 @@ LEAST, EACH = 16, 4
 #: Members that are built and solved alone, too: at least, and for each so many one; and how far
 #: these solutions may differ, relative.
 TRIED, OF, NEAR = 2, 2500, 1e-6
+#: Members that are built only: so many in all, or for so many members one.
+BUILT, FOR = 16, 8
 #: Error of a start that is given, relative, and how large it may be for a start to be given at
 #: all; members for each one that is solved to find starts, and for each that is solved from zero,
 #: too, to see whether a start leads to what zero leads to.
@@ -148,6 +150,8 @@ class Batch:
         tried = np.random.default_rng(0).choice(len(self.x), max(TRIED, len(x) // OF),
                                                 replace=False)
         scenes = [self.family.tried(self.x[k]) for k in tried]
+        for k in evenly(self.x, min(BUILT, len(self.x) // FOR)):
+            self.family.tried(self.x[k])
         self.lane = Lane(self.family)
         self.start: Polynomial | None = None
         if len(self.x) >= STARTS * LEAST:
@@ -273,6 +277,27 @@ class Batch:
                 values.append(moved)
             out[item.name] = located.gather(values)
         return out
+
+
+def evenly(x: Array, count: int) -> Array:
+    """Members spread evenly over the values of each parameter, so that little hides between.
+
+    Parameters
+    ----------
+    x
+        Parameters, shape (n, d).
+    count
+        About how many, of all parameters together.
+
+    Returns
+    -------
+    ndarray
+        Their numbers.
+    """
+    n, d = x.shape
+    each = max(1, count // d)
+    places = ((np.arange(each) + 0.5) / each * n).astype(int)
+    return np.unique(np.argsort(x, axis=0)[places])
 
 
 def _apart(u, v):

@@ -256,6 +256,25 @@ def test_why_members_are_alone(build, reason):
         Batch(lambda x: build(float(x[0])), Readings(TIP).items, x)
 
 
+@pytest.mark.parametrize("first", np.linspace(1.02e9, 1.88e9, 7))
+def test_a_choice_for_a_tenth_of_the_members_is_seen(first):
+    """Between the places at which scenes are built to know all."""
+    def build(E):
+        return cantilever(E if not first < E < first + 1e8 else 2.0 * E)
+
+    x = np.linspace(1e9, 2e9, 200)[:, None]
+    with pytest.raises(Unlike, match="polynomials|did not suffice"):
+        Batch(lambda x: build(float(x[0])), Readings(TIP).items, x)
+
+
+def test_members_that_are_tried_are_spread_over_each_parameter():
+    x = np.random.default_rng(0).uniform(size=(400, 3))
+    some = batch.evenly(x, 16)
+    assert 10 <= len(some) <= 15
+    for column in x.T:
+        assert np.max(np.diff(np.sort(column[some]), prepend=0.0, append=1.0)) < 0.3
+
+
 def up_to(E):
     return cantilever(E) if E < 1.9e9 else cantilever(E).replace(width=-1.0)
 
