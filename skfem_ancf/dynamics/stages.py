@@ -21,8 +21,8 @@ from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, 
 from .dampers import add_damping, damping_force
 from .rates import JointMotion, JointMotions, acceleration_of_joints, drive_rate
 from .steps import (ASTRAY, BEFORE, COUNT, DEPENDENT, DISSIPATED, DONE, ENERGY, FACTORIZED, FAILED,
-                    FAILURE, FRESH, GO_ON, ITERATIONS, LAST_SIZE, MIXED, NOT_CONVERGED, RATE,
-                    READY, SINGULAR, SIZE, judged, round_off)
+                    FAILURE, FRESH, GO_ON, ITERATIONS, LASTING, LAST_SIZE, MIXED, NOT_CONVERGED,
+                    RATE, READY, SINGULAR, SIZE, judged, round_off)
 
 #: Contraction up to which factors are kept, and where stresses are carried: new ones at points
 #: as far apart turn as far from them.
@@ -264,6 +264,8 @@ def _converges(e, matrices, method, rule, s, w, state, step):
         if state[MIXED] > 0.0:
             body_carry(e.copies, _flat(w.origin), _flat(w.R), w.own, w.carried)
         told = judged(state, wanted, rough, REUSED, CARRIED)
+        if told == GO_ON and state[FRESH] > 0.0 and _is_lost(state):
+            state[MIXED], told = LASTING, ASTRAY  # its factors serve
         if told == ASTRAY:
             _start(e.copies, method, s, w, state, step)
         elif told != GO_ON:
@@ -385,6 +387,13 @@ def _start(copies, method, s, w, state, step):
                 Z, c = w.Z[k], 0.5 * (s.h * method.points[k])**2 / state[BEFORE]
                 for i in lanes(v.size):
                     Z[i] = c * (v0[i] - v[i])
+
+
+@source
+def _is_lost(state):
+    """True if the first correction has more energy than the motion: it would stretch far."""
+    return (state[MIXED] == 0.0 and state[LAST_SIZE] < 0.0
+            and state[SIZE] > np.sqrt(state[ENERGY]))
 
 
 @source
