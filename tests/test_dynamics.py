@@ -160,6 +160,15 @@ def test_few_iterations_in_steps_that_turn_far(scheme, n, tol):
     assert np.abs(history.position((1, 0))[-1] - fine.position((1, 0))[-1]).max() < 1e-3
 
 
+def test_factors_are_made_once_where_the_first_correction_stretches_far():
+    """It has more energy than the motion: stresses are carried at once, with the factors there."""
+    beam = Beam(MeshBeam.init_line([0, 1], 0.01), ElementBeamCable(5),
+                StVenantKirchhoff(2e8, 0.3, 7800.0), 0.01)
+    scene = Scene(beam).pin("left").gravity(GRAVITY)
+    history = scene.integrate(1.0 / 13.0, 1.0 / 13.0, scheme="radau", tol=8e-3)
+    assert history.factorizations == 2 and history.iterations <= 3 * 4  # one real and one pair
+
+
 @pytest.mark.parametrize("scheme", ["radau", "generalized-alpha"])
 def test_a_motion_is_the_same_after_another(scheme):
     """Whose work arrays it takes."""

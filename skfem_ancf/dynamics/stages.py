@@ -261,8 +261,6 @@ def _converges(e, matrices, method, rule, s, w, state, step):
         if not _correct(e.free, method, s, w, state):
             state[FAILURE] = DEPENDENT
             return False
-        if state[MIXED] > 0.0:
-            body_carry(e.copies, _flat(w.origin), _flat(w.R), w.own, w.carried)
         told = judged(state, wanted, rough, REUSED, CARRIED)
         if told == GO_ON and state[FRESH] > 0.0 and _is_lost(state):
             state[MIXED], told = LASTING, ASTRAY  # its factors serve
@@ -270,6 +268,8 @@ def _converges(e, matrices, method, rule, s, w, state, step):
             _start(e.copies, method, s, w, state, step)
         elif told != GO_ON:
             break
+        elif state[MIXED] > 0.0:
+            body_carry(e.copies, _flat(w.origin), _flat(w.R), w.own, w.carried)
     _states(e.free, method, s, w, step)
     if told != DONE and told != FAILED:
         state[FAILURE] = NOT_CONVERGED
