@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import logging
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
+#: Where differences are taken of a function, in steps.
+STENCIL = np.arange(-3, 4)
 #: Angle of a kink of a curve that is refused; one of a fine polygon is smaller.
 KINK = 1e-2
 
@@ -124,7 +127,7 @@ class Curve:
                 'scene.joint("weld", ...)')
 
     def _at_gauss_points(self, a, b):
-        x, w = np.polynomial.legendre.leggauss(12)
+        x, w = _legendre()
         at = a[:, None] + (b - a)[:, None] * (0.5 + 0.5 * x)
         return np.reshape(self.rate(at.ravel()), (2,) + at.shape), 0.5 * w
 
@@ -205,18 +208,30 @@ def derivative_of(r: Callable[[Array], Any], s0: float, s1: float) -> Callable[[
 def _differences(r, s, s0, s1):
     """Derivative of a function on [s0, s1] by seven-point differences, of sixth order."""
     d = 1e-3 * (s1 - s0)
-    k = np.arange(-3, 4)
+    k = STENCIL
     c = np.clip(s, s0 + 3 * d, s1 - 3 * d)  # the stencil stays inside
     values = np.array([np.asarray(r(c + i * d), dtype=np.float64) for i in k])
-    weights = np.array([_lagrange_derivative(k, i, (s - c) / d) for i in range(7)])
+    x = (s - c) / d
+    weights = np.zeros((len(k), len(x)))
+    for coefficients in _lagrange_derivatives().T:
+        weights = weights * x + coefficients[:, None]
     return np.einsum("is,ijs->js", weights, values) / d
 
 
-def _lagrange_derivative(nodes, i, x):
-    """Derivative at x of the Lagrange polynomial of ``nodes`` that is 1 at nodes[i]."""
-    others = [n for j, n in enumerate(nodes) if j != i]
-    polynomial = np.poly(others) / np.prod([nodes[i] - n for n in others])
-    return np.polyval(np.polyder(polynomial), x)
+@cache
+def _lagrange_derivatives():
+    """Of each Lagrange polynomial of the stencil the coefficients of its derivative, (7, 6)."""
+    out = []
+    for i, here in enumerate(STENCIL):
+        others = np.delete(STENCIL, i)
+        out.append(np.polyder(np.poly(others) / np.prod(here - others)))
+    return np.array(out)
+
+
+@cache
+def _legendre():
+    """Gauss points and weights of arc lengths, on [-1, 1]."""
+    return np.polynomial.legendre.leggauss(12)
 
 
 def check_curvature(curve: Curve, s: Array, height: float | Array) -> None:
