@@ -285,10 +285,12 @@ class Beam(Frozen):
         factors = self._in_proportion(other) if "kernel" in mine else None
         if factors is not None:
             its["kernel"] = self.kernel.in_proportion(other.across, *factors)
-        if other.width != self.width:
+        same, density = other.width == self.width, self.across.slabs[0].density
+        if ("inertia" in mine and other.across.slabs[0].density == density
+                and (same or not (callable(other.width) or callable(self.width)))):
+            its["inertia"] = self.inertia.times(1.0 if same else other.width / self.width)
+        if not same:
             return
-        if other.across.slabs[0].density == self.across.slabs[0].density and "inertia" in mine:
-            its["inertia"] = self.inertia
         if "kernel" in mine and "kernel" not in its:
             its["kernel"] = self.kinematics.kernel(other.across, other.formulation, self.kernel)
 

@@ -497,3 +497,21 @@ def test_a_driven_motion_whose_function_fails_is_kept_up_to_there():
     with pytest.raises(CallbackError, match=r"angle\(t=0.0575\) raised ValueError: no") as failure:
         scene.integrate(0.1, 0.01)
     assert np.allclose(failure.value.state.t, 0.01 * np.arange(6))
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)])
+@pytest.mark.parametrize("shape", ["taper", "arc"])
+def test_a_replaced_width_scales_masses(element, shape):
+    x = np.linspace(0, 1, 4)
+    mesh = MeshBeam.init_line(x, lambda s: 0.12 - 0.04 * s) if shape == "taper" else (
+        MeshBeam.init_curve(lambda s: np.array([np.sin(s), 1.0 - np.cos(s)]), x, 0.1))
+    law = StVenantKirchhoff(2e9, 0.3, 7800.0)
+    beam = Beam(mesh, element, law, 0.01)
+    assert beam.inertia and beam.kernel
+    wider, anew = beam.replace(width=0.025), Beam(mesh, element, law, 0.025)
+    assert "inertia" in vars(wider)
+    for a, b in ((wider.mass_elements(), anew.mass_elements()),
+                 (wider.weight((1.0, 2.0)), anew.weight((1.0, 2.0)))):
+        assert np.allclose(a, b, rtol=1e-13, atol=1e-14 * np.max(np.abs(b)))
+    denser = wider.replace(material=law.replace(density=1000.0))
+    assert denser.total_mass == pytest.approx(anew.total_mass * 1000.0 / 7800.0, rel=1e-13)
