@@ -9,7 +9,8 @@ import numpy as np
 from scipy import sparse
 
 from .band import Band
-from .body import BEGIN, ELEMENTS, FlatBody, body_of, copies_of, stress_size, viscous_body_of
+from .body import (BEGIN, ELEMENTS, FlatBody, body_of, copies_of, renewed_body, stress_size,
+                   viscous_body_of)
 from .border import Border
 from .compiled.words import Words, constant
 from .forces.system import NO_FORCES
@@ -212,7 +213,7 @@ class Tables:
         tables._sort(system.loads)
         loads = before.loads if same_loads else tables._load_tables()
         if system.beams != self.system.beams:
-            body = body_of(system.beams, system.slices)
+            body = renewed_body(before.body, system.beams, system.slices)
             viscous = viscous_body_of(body, system.beams, system.retardation)
             tables.plain = before._replace(body=body, copies=body, loads=loads, viscous=viscous)
             return tables
