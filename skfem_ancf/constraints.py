@@ -87,7 +87,7 @@ class Constraints:
                 self.joints.append(joint)
                 continue
             dofs, factors = found
-            if not self.free[dofs].all():
+            if not self.free.take(dofs).all():
                 clash = np.sort(dofs[~self.free[dofs]])
                 raise SupportError(
                     f"{joint!r} prescribes {self.describe_dof(clash[0])}, which a support or "
@@ -98,8 +98,9 @@ class Constraints:
             fixed.append(dofs)
             held.append(0.0 * factors if joint.moving else -joint.value(zero, 0.0) / factors)
             first += len(dofs)
-        self.fixed, self._held = np.concatenate(fixed), np.concatenate(held)
-        self.given = np.concatenate([self.given, np.zeros(first - len(self.given))])
+        if len(fixed) > 1:
+            self.fixed, self._held = np.concatenate(fixed), np.concatenate(held)
+            self.given = np.concatenate([self.given, np.zeros(first - len(self.given))])
         self._moving = [item for item in self._fixing if item[0].moving]
 
     def describe_dof(self, k: int) -> str:

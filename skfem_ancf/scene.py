@@ -1233,11 +1233,13 @@ class Scene:
         """The discrete equations, built when first asked for."""
         with self._lock:
             if self._system is None:
-                offsets = list(accumulate((b.N for b in self.members), initial=0))
+                offsets = [n for _, n in self._places.values()]
                 fixed = np.array([offsets[k] + d for k, d in self._fixed], dtype=int)
                 values = np.array(list(self._fixed.values()), dtype=float)
-                self._system = System(self._beams, [*self.loads, *self._weights()], fixed, values,
-                                      self.joints, self._damping, self.elements, self._bodies)
+                loads, joints, elements = ([item[-1] for item in items] for items in (
+                    self._loads, self._joints, self._elements))
+                self._system = System(self._beams, loads + self._weights(), fixed, values, joints,
+                                      self._damping, elements, self._bodies)
             return self._system
 
     def _weights(self):

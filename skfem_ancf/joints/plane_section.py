@@ -48,7 +48,7 @@ class PlaneSection(Joint):
         self.dofs, self.along = dofs, self.direction[parts]
 
     def value(self, u: Array, t: float) -> Array:
-        return u[self.dofs] @ self.along
+        return u.take(self.dofs).dot(self.along)
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         return self.found

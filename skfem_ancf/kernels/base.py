@@ -688,7 +688,10 @@ class Chain:
 
     def chunks(self) -> list[slice]:
         """Slices of the elements of which matrices are evaluated together."""
-        return [slice(k, k + CHUNK) for k in range(0, self.t.shape[1], CHUNK)]
+        n = self.t.shape[1]
+        if n <= CHUNK:
+            return [slice(0, CHUNK)]
+        return [slice(k, k + CHUNK) for k in range(0, n, CHUNK)]
 
     def stresses(self) -> list[Array]:
         """Room for the stresses of each pack, shape (components, points, elements)."""

@@ -518,7 +518,7 @@ class TermTables:
         u
             Displacement, shape (N,).
         """
-        return not np.all(self.upright(pack, u))
+        return not self.upright(pack, u).all()
 
     def upright(self, pack: SectionPack, u: Array) -> Any:
         """Where det F is positive, of each sample of the shear and each element.
@@ -937,10 +937,10 @@ class Kernel(Chain):
     def _of_firsts(self, u):
         """Each of the first tables with a pack of some elements and their coordinates."""
         parts = self.chunks()
-        for part in parts:
-            u_e = u if len(parts) == 1 else self.gather(u, part).ravel()
-            for first in self.firsts:
-                yield first, first.pack if len(parts) == 1 else apart(first.pack, part), u_e
+        if len(parts) == 1:
+            return [(first, first.pack, u) for first in self.firsts]
+        return ((first, apart(first.pack, part), self.gather(u, part).ravel())
+                for part in parts for first in self.firsts)
 
     def shortest(self, u: Array) -> Any:
         """Smallest stretch of the fibres along the axis, where eps_xx is sampled."""
