@@ -91,9 +91,9 @@ def renewed_body(before: "Body", beams: Sequence["Beam"], slices: Sequence[slice
         As for :func:`body_of`.
     """
     packs = [pack for beam in beams for pack in beam.kernel.packs]
-    if len(packs) == len(before.packs) and all([
+    if len(packs) == len(before.packs) and all(
             one.weights.shape[0] == other.weights.shape[0]
-            for one, other in zip(packs, before.packs)]):
+            for one, other in zip(packs, before.packs)):
         return Body(tuple(packs), before.table)
     return body_of(beams, slices)
 

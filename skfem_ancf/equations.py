@@ -8,6 +8,7 @@ from weakref import ref
 import numpy as np
 from scipy import sparse
 
+from . import compiled
 from .band import Band
 from .body import (BEGIN, ELEMENTS, FlatBody, body_of, copies_of, renewed_body, stress_size,
                    viscous_body_of)
@@ -136,8 +137,6 @@ class Tables:
 
     @cached_property
     def flat(self) -> Equations:
-        from . import compiled
-
         plain = self.plain
         addresses = {part: compiled.address(part) for part in self.parts}
         body = self._flat(_with_laws(plain.body, compiled.law), addresses)
@@ -244,8 +243,6 @@ class Tables:
 
     def _flat_loads(self):
         """The loads for compiled texts."""
-        from . import compiled
-
         loads = self.plain.loads
         if not len(loads.pushes):
             return loads

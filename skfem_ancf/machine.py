@@ -168,10 +168,11 @@ class Machine:
                            "skfem_ancf.materials.TextMaterial")
 
     def _chosen(self, name):
+        loaded = name in compiled.LOADED and not compiled.PROBLEMS
+        if loaded and self._plain is None and wanted() != "0":
+            return _IS_LOADED
         if self._off is not None:
             return Choice("plain", self._off)
-        if name in compiled.LOADED:
-            return _IS_LOADED
         parts = self.tables.parts
         seconds = compiling(name, parts)
         if wanted() == "1":
