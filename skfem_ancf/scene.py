@@ -1236,10 +1236,10 @@ class Scene:
                 offsets = [n for _, n in self._places.values()]
                 fixed = np.array([offsets[k] + d for k, d in self._fixed], dtype=int)
                 values = np.array(list(self._fixed.values()), dtype=float)
-                loads, joints, elements = ([item[-1] for item in items] for items in (
-                    self._loads, self._joints, self._elements))
-                self._system = System(self._beams, loads + self._weights(), fixed, values, joints,
-                                      self._damping, elements, self._bodies)
+                loads = [bound for _, _, bound in self._loads] + self._weights()
+                self._system = System(self._beams, loads, fixed, values,
+                                      [bound for _, bound in self._joints], self._damping,
+                                      [bound for _, bound in self._elements], self._bodies)
             return self._system
 
     def _weights(self):
