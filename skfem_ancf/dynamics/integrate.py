@@ -106,7 +106,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     check
         With ``dt="auto"``, estimate the error of the motion by another one in steps half as long,
         and take it again, at most twice, with a smaller tolerance where that is above ``rtol``:
-        ``history.error``, ``history.passes``. It is 1.5 to 2 times the iterations of a pass. None:
+        ``history.error``, ``history.passes``. It is 1.3 to 2 times the iterations of a pass. None:
         up to 1000 coordinates, where it takes a fraction of the time, if there are no obstacles,
         no sampled controllers and no checkpoint, with which it is refused.
     sensors
