@@ -141,6 +141,12 @@ def motion(p, scale=1, adaptive=True):
         for steps in (13, 14, 16, 18, 20, 22, 40):
             for tol in (8e-3, 5e-3, 3e-3, 1e-3, 3e-4, 1e-5):
                 yield ours.run(p, "cable", degree, n, steps=steps, scheme="radau", tol=tol)
+    for degree, n in ((5, 2), (5, 3), (7, 2)):
+        for steps in (28, 30, 35, 36, 38):
+            for tol in (5e-3, 1e-3, 3e-4, 1e-5, 3e-6):
+                yield ours.run(p, "cable", degree, n, steps=steps, scheme="radau", tol=tol)
+    for degree, steps, tol in ((5, 13, 2.5e-3), (5, 14, 1.5e-3), (11, 20, 1e-4)):
+        yield ours.run(p, "cable", degree, 1, steps=steps, scheme="radau", tol=tol)
     for n in (4, 5, 6):
         for steps in (80, 100):
             yield ours.run(p, "cable", 3, n, steps=steps // scale, tol=1e-3)
