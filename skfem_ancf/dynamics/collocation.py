@@ -273,11 +273,12 @@ class Collocation(Scheme):
         def moving(function):
             """Values at the times, and both rates, shape (number of times, 3, ...)."""
             found = function(at)
-            values, samples = found[:len(times)], found[len(times):]
-            first, second = np.einsum(
-                "kps,rsx->krpx", table.rates,
-                samples.reshape(len(steps), len(table.samples), -1)).reshape(2, len(times), -1)
-            return np.stack([values, first / h, second / h**2], axis=1)
+            samples = found[len(times):].reshape(len(steps), len(table.samples), -1)
+            out = np.empty((len(times), 3, found.shape[1]))
+            out[:, 0] = found[:len(times)]
+            for k, rates in enumerate(table.rates, 1):
+                out[:, k] = (rates / h**k @ samples).reshape(len(times), -1)
+            return out
 
         held = np.zeros((len(times) if moves else 1, 3, s.N))
         if moves:

@@ -241,8 +241,9 @@ class Integrator:
         acceleration, y.multipliers = solve(force, rate)
         y.acceleration += acceleration
         y.algorithmic, y.force = y.acceleration.copy(), y.multipliers
-        self.expect(max(s.strain_energy(y.u, t), *(  # from rest there is no energy yet
-            0.5 * float(v @ s.mass.multiply(v)) for v in (y.v, y.v + dt * y.acceleration))))
+        then = y.v + dt * y.acceleration  # from rest there is no energy yet
+        self.expect(max(s.strain_energy(y.u, t), 0.5 * float(y.v @ s.mass.multiply(y.v)),
+                        0.5 * float(then @ s.mass.multiply(then))))
         return y
 
     def expect(self, energy: float) -> None:
