@@ -276,11 +276,13 @@ class Family:
         """Which of parameters (n, d) have numbers that are not lost beside those of others.
 
         A number has the round-off of the largest that any member has in its place, unless its sign
-        changes: then it is small by chance.
+        changes: then it is small by chance, or it is nothing since a parameter is 0.
         """
         values = self.values(x)
         values = np.abs(values[:, np.all(values * values[0] >= 0.0, axis=0)])
-        return np.all(LOST * values >= ROUND_OFF * np.max(values, axis=0, initial=0.0), axis=1)
+        noise = ROUND_OFF * np.max(values, axis=0, initial=0.0)
+        nothing = (values <= noise) & np.any(x == 0.0, axis=1)[:, None]
+        return np.all((LOST * values >= noise) | nothing, axis=1)
 
     def solved(self, numbers: Array) -> Solved:
         """A :class:`Solved` whose arrays are views of numbers."""

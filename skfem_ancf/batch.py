@@ -141,6 +141,8 @@ class Batch:
                  ) -> None:
         if len(x) < LEAST:
             raise Unlike(f"fewer than {LEAST} are alike")
+        if not x.shape[1]:
+            raise Unlike("they are all the same")
         low, high = np.min(x, axis=0), np.max(x, axis=0)
         self.family = Family(build, readings, low, high, len(x) // EACH)
         self.kept = np.flatnonzero(self.family.exact(x))

@@ -423,17 +423,34 @@ def test_members_in_other_units_are_the_same(vary, unit, kind):
         assert_allclose(result["value"][k], its, rtol=1e-7, atol=1e-12 * unit)
 
 
+def pulled(F, E=2e8):
+    """Without a weight."""
+    beam = Beam(MeshBeam.init_line([0, 0.5, 1], height=0.02), ELEMENTS["cable"],
+                StVenantKirchhoff(E, 0.3), width=0.01)
+    return Scene(beam).clamp("left").point_force((0, -F), at=(1, 0))
+
+
 def test_small_numbers_beside_large_ones_keep_their_digits():
     """Loads over twelve decades: those that would lose digits are solved alone."""
-    def build(F):
-        mesh = MeshBeam.init_line([0, 0.5, 1], height=0.02)
-        beam = Beam(mesh, ELEMENTS["cable"], StVenantKirchhoff(2e8, 0.3), width=0.01)
-        return Scene(beam).clamp("left").point_force((0, -F), at=(1, 0))
-
     F = np.logspace(-14, -2, 240)
-    result = sweep(build, {"F": F}, ("displacement", "right"))
+    result = sweep(pulled, {"F": F}, ("displacement", "right"))
     assert_allclose(-result["value"][:100, 1] / F[:100], 4 / (2e8 * 0.01 * 0.02**3), rtol=1e-8)
     assert "digits would be lost" in result.report and "solved together" in result.report
+
+
+def test_members_without_a_load_are_solved_with_the_others():
+    """Of a parameter that is 0 numbers are nothing, and lose no digits."""
+    table = {"F": np.tile([0.0, 1e-3, 2e-3, 4e-3], 20), "E": np.linspace(1e8, 2e8, 80)}
+    result = sweep(pulled, table, TIP)
+    assert "80 of 80 members were solved together" in result.report
+    assert np.max(np.abs(result["tip"][::4])) < 1e-14
+    assert_allclose(result["tip"][1], alone(pulled, table, 1), rtol=1e-8)
+
+
+def test_members_that_are_all_the_same():
+    result = sweep(cantilever, {"E": np.full(20, 2e8)}, TIP)
+    assert "they are all the same" in result.report and not result.failures
+    assert_array_equal(result["tip"], np.tile(alone(cantilever, {"E": [2e8]}, 0), (20, 1)))
 
 
 def test_parameters_stay_what_they_are():
