@@ -366,7 +366,7 @@ class _Body:
             warnings.warn(f"the body is turned inside out, at t = {self.t:.6g} or before: it is "
                           "compressed or bent beyond what it can bear, and what follows means "
                           "nothing. Use NeoHookean, more elements, a smaller load or shorter steps",
-                          ModelWarning, stacklevel=9)
+                          ModelWarning, stacklevel=10)
 
 
 def _warn_of_turns(history):
@@ -379,7 +379,7 @@ def _warn_of_turns(history):
     if len(jumps):
         warnings.warn(f"at t = {history.t[jumps[0] + 1]:.6g} a torsional spring has turned by more "
                       "than half a turn: its angle is taken in (-pi, pi], so that its moment "
-                      "jumps there and the energy is not kept", ModelWarning, stacklevel=9)
+                      "jumps there and the energy is not kept", ModelWarning, stacklevel=10)
 
 
 __all__ = ["Integrator", "integrate"]
