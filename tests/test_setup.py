@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
-                        ElementBeamCable, InputError, MeshBeam, MeshError, NeoHookean, Scene,
-                        StVenantKirchhoff)
+                        ElementBeamCable, InputError, KelvinVoigt, MeshBeam, MeshError, NeoHookean,
+                        Scene, StVenantKirchhoff)
 from skfem_ancf.compiled.words import Words
 from skfem_ancf.constraints import Constraints
 from skfem_ancf.elements import base
@@ -515,3 +515,53 @@ def test_a_replaced_width_scales_masses(element, shape):
         assert np.allclose(a, b, rtol=1e-13, atol=1e-14 * np.max(np.abs(b)))
     denser = wider.replace(material=law.replace(density=1000.0))
     assert denser.total_mass == pytest.approx(anew.total_mass * 1000.0 / 7800.0, rel=1e-13)
+
+
+#: Arguments of a Beam, some of each.
+ARGUMENTS = {
+    "mesh": [MeshBeam.init_line([0, 0.4, 1], 0.08), MeshBeam.init_line([0, 0.3, 0.6, 1], 0.06),
+             MeshBeam.init_line([0, 0.5, 1], lambda x: 0.08 - 0.03 * x),
+             MeshBeam.init_curve(lambda t: (t, 0.2 * t * (1 - t)), [0, 0.5, 1], 0.07)],
+    "material": [StVenantKirchhoff(1e6, 0.3, 1000.0), StVenantKirchhoff(2e6, 0.0, 900.0),
+                 StVenantKirchhoff(1e6, 0.3, 1000.0, plane="strain"), NeoHookean(1e6, 0.3, 1000.0)],
+    "width": [0.05, 0.07, lambda x, y: 0.05 + 0.02 * x],
+    "formulation": ["assumed", "continuum"],
+    "damping": [None, KelvinVoigt(1e-2)],
+    "element": [ElementBeamANCF(2), ElementBeamANCFCubic(2), ElementBeamCable(5)]}
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_any_argument_of_a_beam_is_replaced_as_if_made_so(seed):
+    """Statics, stresses, frequencies and motions, with a spring, a follower or modal damping."""
+    def scene(given):
+        made = Scene(Beam(**given)).clamp("left", thickness="free").gravity((0.0, -1.0))
+        tip = (1.0, 0.0)
+        return [lambda: made.point_mass(0.1, at=tip),
+                lambda: made.follower_force((0, -0.1), at=tip),
+                lambda: made.damping(modal=[0.01, 0.02]),
+                lambda: made.foundation(5.0)][seed % 4]()
+
+    def found(made):
+        state = made.solve_static()
+        at = tuple(0.97 * made.beams[0].mesh.p[:, 1])
+        return [state.u, [state.strain_energy], state.stress(at), state.stress(at, recover=False),
+                np.abs(made.modes(2, state).frequencies), made.integrate(0.02, 0.005).u[-1]]
+
+    rng = np.random.default_rng(seed)
+    given = {name: values[0] for name, values in ARGUMENTS.items()}
+    scenes = [(scene(given), given)]
+    for _ in range(3):
+        made, before = scenes[rng.integers(len(scenes))]
+        if rng.random() < 0.7:
+            found(made)
+        names = rng.choice(list(ARGUMENTS), 2, replace=False)
+        changes = {str(k): ARGUMENTS[k][rng.integers(len(ARGUMENTS[k]))] for k in names}
+        given = {**before, **changes}
+        if isinstance(given["element"], ElementBeamCable) and (
+                given["formulation"] != "assumed" or isinstance(given["material"], NeoHookean)):
+            continue  # which cables have not
+        scenes.append((made.replace(**changes), given))
+    for k in rng.permutation(len(scenes)):
+        made, given = scenes[k]
+        for a, b in zip(found(made), found(scene(given))):
+            assert np.allclose(a, b, rtol=1e-7, atol=1e-7 * np.max(np.abs(b)))
