@@ -14,9 +14,9 @@ from skfem_ancf.dynamics import (SCHEMES, EnergyMomentum4, Gauss, GeneralizedAlp
                                  Radau)
 from skfem_ancf.dynamics.base import in_steps
 from skfem_ancf.dynamics.energy_momentum import PARTS
-from skfem_ancf.dynamics.integrator import Integrator
-from skfem_ancf.dynamics.run import interpolate
-from skfem_ancf.errors import InputError
+from skfem_ancf.dynamics.integrator import Integrator, StepFailed
+from skfem_ancf.dynamics.run import Run, interpolate
+from skfem_ancf.errors import AccuracyWarning, InputError
 
 from test_dynamics import GRAVITY, by_scipy, soft
 from test_restart import driven
@@ -214,22 +214,40 @@ def test_the_estimated_error_is_the_error(scheme, name):
     assert history.passes <= 2
 
 
+def stiffer(**options):
+    """Steps of Gauss as for 1e-4 are off by more than that."""
+    return Scene(soft(2, 2, E=1e6, h=0.1, **options)).pin("left").gravity(GRAVITY)
+
+
 @pytest.mark.parametrize("compiled", [True, False])
 def test_a_motion_that_is_off_by_more_is_taken_again(compiled):
-    """Steps of Gauss as for 1e-4 are off by more than that."""
-    def build(**options):
-        beam = soft(2, 2, E=1e6, h=0.1, **options)
-        return Scene(beam).pin("left").gravity(GRAVITY)
-
-    times, scene = np.linspace(0.25, 1.0, 4), build(compiled=compiled)
+    times, scene = np.linspace(0.25, 1.0, 4), stiffer(compiled=compiled)
     history, once = (scene.integrate(1.0, "auto", scheme="gauss", rtol=1e-4, t_eval=times,
                                      check=check) for check in (None, False))
     assert history.passes == 2 and history.error < 1e-4 and "taken 2 times" in repr(history)
     assert once.passes == 1 and once.error is None and "taken" not in repr(once)
-    fine = build().integrate(1.0, 1.0 / 400, scheme=Gauss(4), t_eval=times)
+    fine = stiffer().integrate(1.0, 1.0 / 400, scheme=Gauss(4), t_eval=times)
     off = [np.abs(h.u - fine.u)[:, positions(scene)].max() / scene.system.size
            for h in (history, once)]
     assert off[0] < 1e-4 < off[1]
+
+
+def test_a_motion_that_stays_off_by_more_is_said(monkeypatch):
+    """It is not taken again, or shorter steps fail: what there is stays."""
+    def advance(run):
+        if run.task.rtol < 1e-4:
+            raise StepFailed("as if")
+        run_advance(run)
+
+    run_advance = Run.advance
+    monkeypatch.setattr(Run, "advance", advance)
+    for most, passes in ((3, 2), (1, 1)):
+        monkeypatch.setattr("skfem_ancf.dynamics.integrate.PASSES", most)
+        with pytest.warns(AccuracyWarning, match="above rtol = 0.0001: name the times") as said:
+            history = stiffer().integrate(1.0, "auto", scheme="gauss", rtol=1e-4)
+        assert said[0].filename == __file__
+        assert history.t[-1] == 1.0 and history.passes == passes and history.error > 1e-4
+        assert f"off by about {history.error:.2g} times" in str(said[0].message)
 
 
 def test_the_error_does_not_depend_on_what_is_stored():

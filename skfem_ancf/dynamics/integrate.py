@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import (AncfError, ConvergenceError, InputError, Interrupted, ModelWarning,
-                      require_finite, require_finite_scalar, require_flag, require_function,
-                      require_positive, shown, taught)
+from ..errors import (AccuracyWarning, AncfError, ConvergenceError, InputError, Interrupted,
+                      ModelWarning, require_finite, require_finite_scalar, require_flag,
+                      require_function, require_positive, shown, taught)
 from ..progress import progress_bar
 from .checkpoint import Checkpoint, same_problem
 from .base import contacts_of, in_steps, same_scheme
@@ -126,6 +126,11 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         If the checkpoint cannot be written at the start.
     SupportError
         If joints repeat or contradict each other, or are open at the start.
+
+    Warns
+    -----
+    AccuracyWarning
+        If the error is above ``rtol`` still, as estimated with ``check``.
     """
     motion = None if start is None else start._motion
     if t_start is None:
@@ -184,22 +189,30 @@ def _checked(check, system, task, checkpoint):
 
 
 def _within(begun, rtol, progress):
-    """The motion, again in shorter steps while its error is above the tolerance.
+    """The motion, again in shorter steps while its error is above the tolerance; the most exact.
 
     The error is in proportion to the tolerance by which steps are chosen (Lang, Verwer: "On global
     error estimation and control for initial value problems", SIAM Journal on Scientific Computing
     29 (2007)).
     """
-    aim, before = rtol, np.inf
-    for passes in range(1, PASSES + 1):
-        run = begun(aim)
-        run.passes = passes
-        body = _go(run, None, progress)
-        error = run.error
-        if not ENOUGH * rtol < error < before or aim == MIN_RTOL:
+    aim, passes, best = rtol, 1, _go(begun(rtol), None, progress)
+    while best.history.error > ENOUGH * rtol and passes < PASSES and aim > MIN_RTOL:
+        aim, passes = max(MIN_RTOL, aim * AIM * rtol / best.history.error), passes + 1
+        try:
+            body = _go(begun(aim), None, progress)
+        except ConvergenceError:  # in shorter steps: what there is stays
             break
-        before, aim = error, max(MIN_RTOL, aim * AIM * rtol / error)
-    return _ended(run, body)
+        if not body.history.error < best.history.error:
+            break
+        best = body
+    history = _ended(best)
+    history.passes = passes
+    if history.error > rtol:
+        warnings.warn(f"the motion is off by about {history.error:.2g} times the size of the "
+                      f"scene, above rtol = {rtol:g}: name the times of jumps and kinks by "
+                      "breakpoints=, take another scheme, or a larger rtol", AccuracyWarning,
+                      stacklevel=8)
+    return history
 
 
 def _samples(system, t_start, t_end):
@@ -293,7 +306,7 @@ def follow(run: Run, file: Checkpoint | None = None, progress: bool | None = Non
     -------
     History
     """
-    return _ended(run, _go(run, file, progress))
+    return _ended(_go(run, file, progress))
 
 
 def _go(run, file, progress):
@@ -320,14 +333,15 @@ def _go(run, file, progress):
     except KeyboardInterrupt:
         raise Interrupted(f"stopped at t = {run.y.t:.6g} of {task.t_end:.6g}; the exception's "
                           "state is the History up to there", history.close()) from None
+    history.close()
     run.give_back()
     return body
 
 
-def _ended(run, body):
+def _ended(body):
     """The History of a Run that is done, and what there is to warn of."""
     body.warn()
-    history = run.history.close()
+    run, history = body.run, body.history
     _warn_of_turns(history)
     deep = run.system.forces.contacts.sweep.deep()
     if deep:
@@ -352,7 +366,7 @@ class _Body:
     """Sees now and then whether a body has been turned inside out."""
 
     def __init__(self, run):
-        self.run, self.next, self.t = run, 0, None
+        self.run, self.history, self.next, self.t = run, run.history, 0, None
 
     def look(self):
         run = self.run

@@ -104,8 +104,6 @@ class Run:
     companion
         What follows the motion to tell its error, a
         :class:`~skfem_ancf.dynamics.companion.Companion`, or None.
-    passes
-        How often the motion has been begun.
     """
 
     def __init__(self, system: System, scheme: Scheme, task: Task,
@@ -127,7 +125,6 @@ class Run:
         self.event: float | None = None
         self._value: float | None = None
         self.companion: Companion | None = None
-        self.passes = 1
         self._in_blocks, self._pace = scheme.in_blocks(system), self._first_pace()
         self._limit()
 
