@@ -7,9 +7,9 @@ from weakref import ref
 import numpy as np
 import pytest
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
-                        ElementBeamCable, InputError, KelvinVoigt, MeshBeam, MeshError, NeoHookean,
-                        Scene, StVenantKirchhoff)
+from skfem_ancf import (AncfError, Beam, ElementBeamANCF, ElementBeamANCFCubic,
+                        ElementBeamANCFHermite, ElementBeamCable, InputError, KelvinVoigt, MeshBeam,
+                        MeshError, NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.compiled.words import Words
 from skfem_ancf.constraints import Constraints
 from skfem_ancf.elements import base
@@ -172,6 +172,19 @@ def test_words_say_where_arrays_begin():
                   np.ones((2, 3), dtype=np.float32), np.ones((2, 3)).astype(">f8")):
         with pytest.raises(TypeError, match="Members takes contiguous arrays"):
             Words(ALONE._replace(u=wrong))
+
+
+def test_arrays_are_tried_before_their_heads_are_read(monkeypatch):
+    """Words at other places, as a NumPy might have that is yet to come, are seen."""
+    heads = pytest.importorskip("skfem_ancf.compiled.heads", exc_type=ImportError)
+    tried = np.arange(6)[2:], np.zeros((2, 3))[1:], np.zeros((2, 1, 3)), np.zeros(0)
+    assert all(map(heads.laid_out, tried))
+    for name, k in ("_PLACE", 2), ("_AXES", 2), ("_SHAPE", 3), ("_TYPE", 4), ("_FLAGS", 40):
+        with monkeypatch.context() as patch:
+            patch.setattr(heads, name, k)
+            assert not heads.laid_out(np.zeros((2, 3)))
+            with pytest.raises(AncfError, match="laid out in another way"):
+                heads.reader.__wrapped__()
 
 
 def test_supports_by_a_section_are_those_that_hold_motions():

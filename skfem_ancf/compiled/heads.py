@@ -11,6 +11,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
+from ..errors import AncfError
 from .twin import entry_of, named
 
 _WORD = ir.IntType(64)
@@ -68,12 +69,33 @@ def reader():
     Its arguments are addresses of the addresses of arrays, of codes, their number, and the address
     of the words to write. A code is ``2 axes`` of an array of floats, one more of integers, or
     minus the number of words that are there. It returns the number of the first array that is
-    another or not contiguous, or -1.
+    another or not contiguous, or -1. What is read is what C code built with NumPy reads; where it
+    is not there, an AncfError is raised.
     """
+    if not laid_out(np.zeros((2, 3))[1:]):
+        raise AncfError(f"arrays of NumPy {np.__version__} are laid out in another way than the "
+                        "compiled code reads them: take another NumPy, or compute without it by "
+                        "the environment variable SKFEM_ANCF_COMPILED=0")
     entry, _ = entry_of(named(_read), (types.int64,) * 6)
     kinds = [_at(id(np.zeros(0, kind).dtype) + _HEAD + 8 * _WHAT) & _KNOWN
              for kind in (float, np.int64)]
     return entry, kinds
+
+
+def laid_out(x):
+    """True if the head of a contiguous array is what is read here.
+
+    Parameters
+    ----------
+    x
+        The array.
+    """
+    head = id(x) + _HEAD
+    return (type(x).__basicsize__ >= _HEAD + 8 * (_FLAGS + 1)
+            and _at(head + 8 * _PLACE) == x.__array_interface__["data"][0]
+            and _at(head + 8 * _AXES) & _HALF == x.ndim
+            and _at(head + 8 * _TYPE) == id(x.dtype) and _at(head + 8 * _FLAGS) & _CONTIGUOUS == 1
+            and tuple(_at(_at(head + 8 * _SHAPE) + 8 * k) for k in range(x.ndim)) == x.shape)
 
 
 def _at(address):
