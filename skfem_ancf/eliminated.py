@@ -137,9 +137,17 @@ class EliminatedMass:
         self.at = u.copy()
         self._condensed.factorize(self._M, self.at, np.zeros(self._system.m))
 
-    def forget(self) -> None:
-        """Begin anew: what is solved next does not depend on what was solved before."""
-        self.at = self._last = None
+    def forget(self, factors: bool = True) -> None:
+        """Begin anew: what is solved next does not depend on what was solved before.
+
+        Parameters
+        ----------
+        factors
+            On the factors neither: False, if they are those of the same displacement.
+        """
+        self._last = None
+        if factors:
+            self.at = None
 
     def solve(self, u: Array, t: float, b: Array, rate: Array, forces: Any = None,
               scale: float = 0.0, most: int = REFINEMENTS) -> tuple[Array, Array]:

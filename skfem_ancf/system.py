@@ -643,9 +643,10 @@ class System:
         """
         if self.by_nodes:
             mass = self._mass_by_nodes
+            mass.forget()
 
             def solve_by_nodes(b: Array, rate: Array) -> tuple[Array, Array]:
-                mass.forget()
+                mass.forget(factors=False)
                 return mass.solve(u, t, b, rate)
 
             return solve_by_nodes

@@ -13,7 +13,8 @@ from test_sections import axis_tip, plane
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, Frame,
                         KelvinVoigt, MeshBeam, Scene, Section, StVenantKirchhoff, system, tangent)
 from skfem_ancf.condensed import Condensed
-from skfem_ancf.dynamics import integrate
+from skfem_ancf.dynamics import EnergyMomentum, integrate
+from skfem_ancf.dynamics.integrator import Integrator
 from skfem_ancf.errors import (CallbackError, FileError, InputError, MeshError, NameUnknown,
                                PickleError, SupportError)
 from skfem_ancf.system import System
@@ -438,6 +439,25 @@ def test_motion_by_elimination_is_that_by_multipliers(scheme, error, monkeypatch
     assert max(np.abs(ours.system.constraint(u, 0.0)).max() for u in ours.u) < 1e-11
     if scheme == "energy-momentum":
         assert np.ptp(ours.total_energy[1:]) < 1e-10 * ours.kinetic_energy.max()
+
+
+def test_a_start_by_elimination_makes_factors_once(monkeypatch):
+    """For velocities and accelerations; each start is as if there had been none before."""
+    def factorized(self, *args):
+        calls.append(len(args))
+        return factorize(self, *args)
+
+    calls, factorize = [], Condensed.factorize
+    monkeypatch.setattr(Condensed, "factorize", factorized)
+    monkeypatch.setattr(system, "MANY", 0)
+    made = square(2).point_force((3000.0, 0), at="side").system
+    integrator = Integrator(made, EnergyMomentum())
+    first, second = (integrator.start(np.zeros(made.N), np.zeros(made.N), 0.0, 1e-3)
+                     for _ in range(2))
+    assert made.by_nodes and len(calls) == 2
+    assert np.abs(first.acceleration).max() > 0.0
+    assert np.array_equal(first.acceleration, second.acceleration)
+    assert np.array_equal(first.multipliers, second.multipliers)
 
 
 def test_a_frame_swings_in_its_first_mode(monkeypatch):

@@ -149,6 +149,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     checked = _checked(check, system, task, checkpoint)
     if u is None and start is not None:
         u = start.u
+    velocity = v if motion is None else motion.v
 
     def begun(rtol):
         """The motion at its start, with steps for a tolerance."""
@@ -164,7 +165,6 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
                       system.forces.contacts.of_state(start))
         return run
 
-    velocity = v if motion is None else motion.v
     if checked:
         return _within(begun, task.rtol, progress)
     run, file = begun(task.rtol), None
