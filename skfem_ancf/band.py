@@ -239,17 +239,14 @@ def mirror(A):
 @source
 def fix(A, free):
     """Rows and columns where free is zero become those of the identity."""
-    rows = A.flat.reshape(A.flat.size // A.ld, A.ld)
-    for i in range(free.size):
-        if free[i] == 0.0:
-            for k in lanes(A.ld):
-                rows[i, k] = 0.0
-            for k in range(1, min(A.width, i) + 1):
-                rows[i - k, A.top + k] = 0.0
-            if A.top > 0:
-                for k in range(1, min(A.width, free.size - 1 - i) + 1):
-                    rows[i + k, A.top - k] = 0.0
-            rows[i, A.top] = 1.0
+    rows, step = A.flat.reshape(A.flat.size // A.ld, A.ld), max(1, A.ld - 1)
+    for i in np.nonzero(free == 0.0)[0]:
+        at = i * A.ld + A.top
+        clear(rows[i])
+        clear(A.flat[at - step * min(A.width, i):at:step])
+        if A.top > 0:
+            clear(A.flat[at + step:at + step * min(A.width, free.size - 1 - i) + 1:step])
+        A.flat[at] = 1.0
 
 
 @source

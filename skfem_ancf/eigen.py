@@ -9,6 +9,7 @@ import numpy as np
 import scipy.linalg
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
+from .band import fix
 from .errors import (ConvergenceError, InputError, SupportError, require_finite_scalar,
                      require_index, require_integer, teaching)
 from .linalg import NO_FACTORS
@@ -229,7 +230,7 @@ def _negative(tangent, state, shift):
     system.assemble(state.u, state.load, t=state.t)
     system.K.combine(1.0, system.K, shift, system.mass)
     if shift < 0.0 and not system.coupled:  # as a rule indefinite: without factors
-        system.K.fix(system.fixed_positions)
+        fix(system.K.band, system.mask)
         return (system.K if system.symmetric else system.K.symmetric_part()).negative()
     system.factorize(state.u, state.load if state.t is None else state.t, state.multipliers)
     return system.inertia().negative

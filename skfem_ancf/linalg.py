@@ -151,25 +151,6 @@ class BandMatrix:
             i, j, values = i[keep], j[keep], values[keep]
         np.add.at(self._flat, self._position(i, j), values)
 
-    def fixed_positions(self, dofs: ArrayLike) -> tuple[Array, Array]:
-        """Where rows and columns ``dofs`` are stored, and where their diagonal is."""
-        dofs = np.asarray(dofs, dtype=np.int64)
-        k = np.arange(-self.bandwidth, self.bandwidth + 1)
-        other = dofs[:, None] + k
-        inside = (other >= 0) & (other < self.n)
-        this = np.broadcast_to(dofs[:, None], other.shape)[inside]
-        other = other[inside]
-        i, j = np.concatenate([this, other]), np.concatenate([other, this])
-        if self.symmetric:
-            i, j = i[i >= j], j[i >= j]
-        return np.unique(self._position(i, j)), self._position(dofs, dofs)
-
-    def fix(self, positions: tuple[Array, Array]) -> None:
-        """Make the rows and columns of :meth:`fixed_positions` those of the identity."""
-        everywhere, diagonal = positions
-        self._flat[everywhere] = 0.0
-        self._flat[diagonal] = 1.0
-
     def diagonal(self) -> Array:
         """A copy of the diagonal."""
         return self._flat[self._diagonal::self._ld].copy()

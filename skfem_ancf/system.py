@@ -51,7 +51,7 @@ EPS = float(np.finfo(float).eps)
 #: Equations of the nodes of a frame above which steps of a motion eliminate them.
 MANY = 48
 #: What a system has found that stays for other materials and widths; and for other loads, too.
-_OF_PLACES = {"K", "fixed_positions", "noise", "screen"}
+_OF_PLACES = {"K", "noise", "screen"}
 _OF_BEAMS = _OF_PLACES | {"points", "mass", "mass_factors", "stiffness_scale", "work_noise",
                           "condensed"}
 
@@ -687,11 +687,6 @@ class System:
         """The tangent, filled by :meth:`assemble`."""
         return self.new_band()
 
-    @cached_property
-    def fixed_positions(self) -> Any:
-        """Where the fixed rows and columns are stored."""
-        return self.K.fixed_positions(self.fixed)
-
     def assemble(self, u: Array, load: float = 1.0, carried: Array | None = None,
                  geometric: bool = True, t: float | None = None) -> tuple[Array,
                  tuple[Array, Array]]:
@@ -758,7 +753,7 @@ class System:
         multipliers
             Theirs, shape (m,).
         """
-        self.K.fix(self.fixed_positions)
+        fix(self.K.band, self.mask)
         if not self.coupled:
             self.K.factorize()
             return

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from ..band import fix
 from ..linalg import NO_FACTORS
 
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ def has_potential(system: System, u: Array, load: float) -> bool:
     if system.symmetric:
         return True
     system.assemble(u, load)
-    system.K.fix(system.fixed_positions)
+    fix(system.K.band, system.mask)
     return _is_symmetric(system)
 
 
