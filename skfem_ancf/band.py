@@ -239,14 +239,17 @@ def mirror(A):
 @source
 def fix(A, free):
     """Rows and columns where free is zero become those of the identity."""
-    rows, step = A.flat.reshape(A.flat.size // A.ld, A.ld), max(1, A.ld - 1)
+    flat, ld, step = A.flat, A.ld, max(1, A.ld - 1)
     for i in np.nonzero(free == 0.0)[0]:
-        at = i * A.ld + A.top
-        clear(rows[i])
-        clear(A.flat[at - step * min(A.width, i):at:step])
+        at = i * ld + A.top
+        for k in lanes(i * ld, (i + 1) * ld):
+            flat[k] = 0.0
+        for k in lanes(at - step * min(A.width, i), at, step):
+            flat[k] = 0.0
         if A.top > 0:
-            clear(A.flat[at + step:at + step * min(A.width, free.size - 1 - i) + 1:step])
-        A.flat[at] = 1.0
+            for k in lanes(at + step, at + step * min(A.width, free.size - 1 - i) + 1, step):
+                flat[k] = 0.0
+        flat[at] = 1.0
 
 
 @source

@@ -14,6 +14,7 @@ from skfem_ancf.kernels import base as kinds_of
 from skfem_ancf.kernels.base import GIVEN, nowhere, repeated
 from skfem_ancf.kernels.cable import _unit
 from skfem_ancf.kernels.section import with_unit_law
+from skfem_ancf.band import fix
 from skfem_ancf.linalg import BandMatrix
 from skfem_ancf.materials import Material
 from skfem_ancf.sections import Across, Rectangle
@@ -244,3 +245,17 @@ def test_skew_size_of_a_band_matrix_is_that_of_the_dense_one(n, bandwidth):
                                                                              else (i > j))))
         dense = A.tocsc().toarray()
         assert_allclose(A.skew_size(), (np.max(abs(dense - dense.T)), np.max(abs(dense))))
+
+
+@pytest.mark.parametrize(("n", "bandwidth"), [(1, 0), (3, 4), (9, 2)])
+def test_fixed_rows_and_columns_of_a_band_matrix_are_those_of_the_identity(n, bandwidth):
+    i, j = np.nonzero(abs(np.arange(n)[:, None] - np.arange(n)) <= bandwidth)
+    for symmetric in (True, False):
+        for fixed in (0,), (n - 1,), (n // 2, n // 2 - 1), ():
+            A, free = BandMatrix(n, bandwidth, symmetric), np.ones(n)
+            inside = (i >= j) | (not symmetric)
+            A.add(i[inside], j[inside], 2.0 + np.sin(i + 7.0 * j)[inside])
+            free[list(fixed)] = 0.0
+            wanted = A.tocsc().toarray() * np.outer(free, free) + np.diag(1.0 - free)
+            fix(A.band, free)
+            assert_allclose(A.tocsc().toarray(), wanted, atol=0.0)
