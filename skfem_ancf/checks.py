@@ -110,9 +110,18 @@ class Screen:
             limits, [b.mesh.nelements for b in beams])
 
     @cached_property
-    def _positions(self):
-        """Of the nodes in the stress-free state, complex."""
-        return _joined([_complex(b.mesh.p.T) for b in self._beams])
+    def _ends(self):
+        """Numbers of the nodes of each element, shape (2, elements)."""
+        nodes = np.arange(len(self.start))
+        return np.array([nodes[self._left], nodes[self._right]])
+
+    @cached_property
+    def _chords(self):
+        """From end to end of the elements in the stress-free state, complex."""
+        return self._along(_joined([_complex(b.mesh.p.T) for b in self._beams]))
+
+    def _along(self, positions):
+        return positions[self._right] - positions[self._left]
 
     def _at_nodes(self, u, k):
         """Pair k of the coordinates of each node, complex."""
@@ -152,10 +161,9 @@ class Screen:
         """
         if self._none:
             return False
-        r, t = self._at_nodes(u, 0) + self._positions, self._at_nodes(u, 1) + self.start
-        along = (r[self._right] - r[self._left]).conj()
-        return bool(min((along * t[self._left]).real.min(), (along * t[self._right]).real.min())
-                    < 0.0)
+        along = self._along(self._at_nodes(u, 0)) + self._chords
+        tangents = (self._at_nodes(u, 1) + self.start)[self._ends]
+        return bool((along.conj() * tangents).real.min() < 0.0)
 
 
 def _complex(pairs):

@@ -73,9 +73,10 @@ class Damping(Frozen):
         if np.any(self.modal < 0.0):
             raise InputError("modal must be damping ratios, zero or positive, of the lowest modes, "
                              f"got {shown(modal)}")
+        self._acts = bool(self.mass or self.stiffness or np.any(self.modal))
 
     def __bool__(self) -> bool:
-        return bool(self.mass or self.stiffness or np.any(self.modal))
+        return self._acts
 
     def __repr__(self) -> str:
         return f"<Damping {self.mass:g} M, time {self.stiffness:g}, {len(self.modal)} modes>"

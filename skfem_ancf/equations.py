@@ -340,12 +340,11 @@ class Tables:
     def factors(self, times: Array) -> Array:
         """Factors of the loads, shape (n, k); of one row where none has an amplitude."""
         columns = self._columns
-        if all(load is None or load.amplitude is None for load in columns):
-            return np.ones((1, len(columns)))
-        out = np.ones((len(times), len(columns)))
-        for k, load in enumerate(columns):
-            if load is not None and load.amplitude is not None:
-                out[:, k] = sampled(load.amplitude, times, "amplitude").reshape(len(times))
+        varying = [(k, load.amplitude) for k, load in enumerate(columns)
+                   if load is not None and load.amplitude is not None]
+        out = np.ones((len(times) if varying else 1, len(columns)))
+        for k, amplitude in varying:
+            out[:, k] = sampled(amplitude, times, "amplitude").reshape(len(times))
         return out
 
     @property

@@ -90,8 +90,9 @@ class BandMatrix:
         #: What texts take: a view of the entries, and room for their factors.
         self.band = Band(self._flat, np.zeros(n, np.int64), self._ld, bandwidth, self._diagonal)
         ab = self._flat.reshape(n, self._ld).T
-        #: LAPACK's band storage, a view of shape (rows, n).
-        self.ab = ab[:-SPARE] if symmetric else ab
+        #: LAPACK's band storage, a view of shape (rows, n); the same with the zeros behind it, which
+        #: need not be copied to be multiplied.
+        self.ab, self._rows = ab[:-SPARE] if symmetric else ab, ab
         self._factor: Any = None
         self.positive_definite: bool | None = None
 
@@ -158,7 +159,7 @@ class BandMatrix:
     def multiply(self, v: Array) -> Array:
         """The matrix times a vector (n,)."""
         if self.symmetric:
-            return blas.dsbmv(self.bandwidth, 1.0, self.ab, v, lower=1)
+            return blas.dsbmv(self.bandwidth, 1.0, self._rows, v, lower=1)
         k = self.bandwidth
         if self.n <= 2 * k:  # scipy's wrapper refuses
             return self.tocsc() @ v

@@ -153,7 +153,8 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
 
     def begun(rtol):
         """The motion at its start, with steps for a tolerance."""
-        run = Run(system, scheme, replace(task, rtol=rtol), sensors)
+        its = task if rtol == task.rtol else replace(task, rtol=rtol)
+        run = Run(system, scheme, its, sensors)
         run.until = until
         if checked:
             run.companion = Companion(system, scheme, task.tol)

@@ -6,10 +6,12 @@ those of a motion that goes on, nor does a kink at the end of a step spoil those
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..frozen import read_only
 from ..own import own_joints
 from ..source import F2, F3, lanes, source
 from ..tables import add_products, add_triples
@@ -67,6 +69,7 @@ def rates(function: Callable[[Array], Array], t: float, dt: float, ahead: bool =
     return of_step(-dt if ahead else dt)[RATE:] @ function(times)[::-1]
 
 
+@lru_cache(16)
 def of_step(dt: float) -> Array:
     """What makes of values in a step that in its middle, that at its end and both rates there.
 
@@ -81,7 +84,7 @@ def of_step(dt: float) -> Array:
         Shape (4, PARTS + 1), for values in the order of time.
     """
     h = dt / PARTS
-    return _OF_STEP / np.array([[1.0], [1.0], [h], [h * h]])
+    return read_only(_OF_STEP / np.array([[1.0], [1.0], [h], [h * h]]))
 
 
 def steps_of(values: Array) -> Array:

@@ -108,11 +108,13 @@ class PrescribedAngle(Joint):
     def _normals(self, times: Array) -> Array:
         if self._asked[0] is not times:  # offsets and slopes are asked at the same times
             a = self.start + sampled(self.angle, times, "angle", ())
-            self._asked = times, np.array([-np.sin(a), np.cos(a)]).T
+            normals = np.empty((len(a), 2))
+            normals[:, 0], normals[:, 1] = -np.sin(a), np.cos(a)
+            self._asked = times, normals
         return self._asked[1]
 
     def offset(self, times: Array, N: int) -> Array:
-        return self._normals(times) @ self.d.start[:, None]
+        return (self._normals(times) @ self.d.start)[:, None]
 
     def slope(self, times: Array, N: int) -> tuple[Array, Array]:
         values = self._normals(times)[:, :, None] * self.d.weights[None]
