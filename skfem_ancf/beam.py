@@ -794,9 +794,14 @@ class Beam(Frozen):
 
     def mass_elements(self, elements: slice = slice(None)) -> Array:
         """Element mass matrices of a slice of the elements, shape (n, 2 nd, 2 nd)."""
-        n = len(range(*elements.indices(self.mesh.nelements)))
-        full = self.inertia.matrices(slice(None) if self.across.uniform else elements)
-        return np.repeat(full, n, axis=0) if self.across.uniform else full
+        n, across = len(range(*elements.indices(self.mesh.nelements))), self.across
+        if across.simple and across.uniform and self.element.by_reference:
+            m, h, L = self._equal
+            out = np.zeros((n, self.nd, 2, self.nd, 2))
+            out[:, :, 0, :, 0] = out[:, :, 1, :, 1] = m * self.element.products(h, L)
+            return out.reshape(n, 2 * self.nd, 2 * self.nd)
+        full = self.inertia.matrices(slice(None) if across.uniform else elements)
+        return np.repeat(full, n, axis=0) if across.uniform else full
 
     def weight(self, g: ArrayLike) -> Array:
         """The dead load of an acceleration ``g`` (2,), shape (N,)."""
@@ -811,11 +816,16 @@ class Beam(Frozen):
     @cached_property
     def _masses(self):
         """Of equal elements the weight over the acceleration, (N / 2,)."""
-        mesh, width = self.mesh, self.across.slabs[0].width
-        h, L = mesh.height, float(mesh.lengths[0])
-        loads = np.empty((mesh.nelements, self.nd, 2))
-        loads[:] = (self.density * width * h * L * self.element.integrals(h, L))[:, None]
+        m, h, L = self._equal
+        loads = np.empty((self.mesh.nelements, self.nd, 2))
+        loads[:] = (m * self.element.integrals(h, L))[:, None]
         return self.kernel.scatter(loads)[::2]
+
+    @property
+    def _equal(self):
+        """Mass, height and length of each of equal elements."""
+        h, L = self.mesh.height, float(self.mesh.lengths[0])
+        return self.density * self.across.slabs[0].width * h * L, h, L
 
     def mass(self) -> csr_matrix:
         """The mass matrix, constant, sparse, shape (N, N)."""

@@ -238,6 +238,18 @@ class ElementBeam(Frozen, Element):
         return self.powers(h, L) * _integrals_of(
             self._along, self.functionals, self.section, self.axis_degree, max(self.order, 1))
 
+    def products(self, h: float, L: float) -> Array:
+        """The means of products of two of them alike, shape (2 nodal_dofs, 2 nodal_dofs).
+
+        Parameters
+        ----------
+        h, L
+            As for :meth:`integrals`.
+        """
+        powers = self.powers(h, L)
+        return powers[:, None] * powers * _products_of(
+            self._along, self.functionals, self.section, self.axis_degree, max(self.order, 1))
+
     @property
     def by_reference(self) -> bool:
         """True if all straight elements follow from one of length and height 1, by powers."""
@@ -543,6 +555,14 @@ def _integrals_of(along: tuple[int, int], functionals: Functionals, section: Sec
     X, W = tensor(gauss(degree // 2 + 1), gauss(order // 2 + 1))
     factors = _factors(along, functionals, section.number)
     return read_only(_unit_functions(along, factors, section, X)[0] @ W)
+
+
+@lru_cache(64)
+def _products_of(along: tuple[int, int], functionals: Functionals, section: SectionFunctions,
+                 degree: int, order: int) -> Array:
+    X, W = tensor(gauss(degree + 1), gauss(order + 1))
+    N = _unit_functions(along, _factors(along, functionals, section.number), section, X)[0]
+    return read_only(N * W @ N.T)
 
 
 @lru_cache(64)
