@@ -14,14 +14,14 @@ from scipy.linalg import lapack
 from scipy.sparse.linalg import splu
 
 from . import eigen
-from .band import fix
+from .band import factorize, fix
 from .bordered import BorderedMatrix, border, border_negative, columns_product
 from .checks import Screen
 from .condensed import Condensed
 from .constraints import Constraints
 from .damping import UNDAMPED, Damping
 from .eliminated import EliminatedMass, condensed
-from .errors import InputError
+from .errors import InputError, shown
 from .evaluation import CARRY, FORCE, MEAN, TANGENT, VISCOUS, evaluate
 from .forces.system import Forces
 from .forces.texts import add_resisting_force
@@ -362,7 +362,7 @@ class System:
     def damped_modes(self) -> Array:
         """Rows (k, N): what resists v by damped modes is their product with that of rows and v."""
         ratios = self.damping.modal
-        if not np.any(ratios):
+        if not ratios.any():
             return np.zeros((0, self.N))
         rest = State(self, np.zeros(self.N), load=0.0)
         rigid = len(self.free_rigid_motions())  # they have no ratio, and are not counted
@@ -626,7 +626,15 @@ class System:
         """The factors of the mass matrix with its supports fixed; made once."""
         M = self.new_band().combine(1.0, self.mass, 0.0, self.mass)
         fix(M.band, self.mask)
-        return M.factorize()
+        if not factorize(M.band):
+            if self.forces.masses:
+                raise InputError("the mass matrix is singular to round-off: a mass or an inertia "
+                                 f"of {shown(self.forces.masses)} is too large beside the beams")
+            raise np.linalg.LinAlgError("the mass matrix is not positive definite")
+        M.take_factors()
+        if not self.by_nodes and M.definite:
+            M.to_cholesky()  # solved with by LAPACK at once; texts have those of the band
+        return M
 
     def mass_solver(self, u: Array, t: float, J: Any = None
                     ) -> Callable[[Array, Array], tuple[Array, Array]]:

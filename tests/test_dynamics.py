@@ -13,10 +13,12 @@ from scipy.integrate import solve_ivp
 import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, KelvinVoigt,
                         MeshBeam, NeoHookean, RigidBody, Scene, StVenantKirchhoff)
+from skfem_ancf import system
 from skfem_ancf.band import Band
 from skfem_ancf.body import Body
 from skfem_ancf.dynamics import (HHT, SCHEMES, EnergyMomentum, Gauss, GeneralizedAlpha, Newmark,
                                  get_scheme)
+from skfem_ancf.dynamics.integrator import Integrator
 from skfem_ancf.dynamics.rates import JointMotion
 from skfem_ancf.dynamics.dampers import Dampers, Rows
 from skfem_ancf.forces.system import Forces
@@ -447,15 +449,38 @@ def test_other_schemes_do_not_conserve():
 
 def test_mass_is_assembled_and_factorised_once(monkeypatch):
     assembled, factorised = [], []
-    assemble, factorize = Beam.mass_elements, BandMatrix.factorize
+    assemble, factorize = Beam.mass_elements, system.factorize
     monkeypatch.setattr(Beam, "mass_elements",
                         lambda b, *part: assembled.append(b) or assemble(b, *part))
-    monkeypatch.setattr(BandMatrix, "factorize", lambda A: factorised.append(A) or factorize(A))
+    monkeypatch.setattr(system, "factorize", lambda A: factorised.append(A) or factorize(A))
+    monkeypatch.setattr(BandMatrix, "factorize", lambda A: pytest.fail("factors made anew"))
     scene = Scene(soft(2, 2)).pin("left").gravity(GRAVITY)
     for scheme in SCHEMES:
         scene.integrate(0.05, 0.01, scheme=scheme)
     assert len(assembled) == 1
-    assert sum(A is scene.system.mass_factors for A in factorised) == 1
+    assert [A.flat is scene.system.mass_factors.band.flat for A in factorised] == [True]
+
+
+def test_the_start_from_a_place_is_kept(monkeypatch):
+    """Where nothing asks for the time; with other places, sizes of steps and times of the start."""
+    starts, start = [], Integrator._start
+    monkeypatch.setattr(Integrator, "_start", lambda *args: starts.append(args) or start(*args))
+    scene = Scene(soft(2, 2)).pin("left").gravity(GRAVITY)
+    first = scene.integrate(0.05, 0.01)
+    again, later = scene.integrate(0.05, 0.01), scene.integrate(1.02, 0.01, t_start=1.0)
+    assert len(starts) == 1
+    assert np.array_equal(first.u, again.u) and np.array_equal(first.u[:3], later.u)
+    assert later.t[0] == 1.0 and first.state(0).t == 0.0
+    assert again.iterations == first.iterations
+    half = scene.integrate(0.05, 0.005)
+    assert len(starts) == 1 and np.abs(half.u[2::2] - first.u[1:]).max() < 3e-4
+    bent = scene.integrate(0.05, 0.01, start=scene.state(first.u[2]))
+    assert len(starts) == 2 and np.array_equal(bent.u[0], first.u[2])
+    assert not np.allclose(bent.acceleration[0], first.acceleration[0], rtol=1e-3)
+    moved = Scene(soft(2, 2)).pin("left").gravity(GRAVITY, amplitude=lambda t: 1.0 + t)
+    starts.clear()
+    a, b = (moved.integrate(t + 0.02, 0.01, t_start=t).acceleration[0] for t in (0.0, 1.0))
+    assert len(starts) == 2 and np.allclose(b, 2.0 * a, rtol=1e-12, atol=1e-12 * np.abs(a).max())
 
 
 def test_factors_are_kept_from_step_to_step():

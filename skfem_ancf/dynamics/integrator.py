@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..band import Band, factorize, fix
 from ..eliminated import Eliminated, EliminatedMass
 from ..errors import AncfError, InputError, SupportError, require_positive, shown
-from ..kept import twin_of
+from ..kept import cached_property, twin_of
 from ..own import handle_of
 from .base import Motion, contacts_of, in_steps, kept, same_scheme
 from .course import Courses
@@ -84,7 +83,7 @@ class Integrator:
             system.forces.contacts.require_penalty(scheme, kick if in_steps(scheme) else np.inf)
         self.system = system
         M, A = system.mass.band, system.new_band()
-        self.matrices = Matrices(M, _copy(M), A.band, *_damping(system))
+        self.matrices = Matrices(M, system.mass_factors.band, A.band, *_damping(system))
         self._nodes: tuple[Eliminated, EliminatedMass] | None = None
         if in_steps(scheme) and system.by_nodes:
             self._nodes = Eliminated(system, A), EliminatedMass(system)
@@ -94,16 +93,15 @@ class Integrator:
         self._begun: Any = (None,)
         self.machine = system.machine
         self._begin(scheme, tol)
-        fix(self.matrices.mass, system.mask)
-        if not factorize(self.matrices.mass):
-            if system.forces.masses:
-                raise InputError("the mass matrix is singular to round-off: a mass or an inertia "
-                                 f"of {shown(system.forces.masses)} is too large beside the beams")
-            raise np.linalg.LinAlgError("the mass matrix is not positive definite")
-        self._work = room_for_steps(system.N, system.m, system.machine.tables.stresses.size,
-                                    0 if self._nodes else system.m)
         numbers = 4 * system.N + system.forces.contacts.tables.memory.size
         self.longest = max(1, min(STORED // numbers, BLOCK))
+
+    @cached_property
+    def _work(self):
+        """Work arrays of the steps of :mod:`~skfem_ancf.dynamics.steps`."""
+        s = self.system
+        return room_for_steps(s.N, s.m, s.machine.tables.stresses.size,
+                              0 if self._nodes else s.m)
 
     def _begin(self, scheme, tol):
         """As if nothing had been integrated yet."""
@@ -500,10 +498,6 @@ def _damping(system):
     return (Rows(rows, np.zeros((k, k)), np.zeros(rows.shape), np.zeros((k, k))),
             Dampers(int(system.damped), int(system.viscous), int(system.forces.resists),
                     system.damping.mass, D, modes))
-
-
-def _copy(A):
-    return Band(A.flat.copy(), A.pivots.copy(), A.ld, A.width, A.top)
 
 
 __all__ = ["Integrator", "StepFailed"]

@@ -1018,10 +1018,15 @@ def repeated(pack: Any, n: int, N: int) -> Any:
     """
     total = pack.start.size
     changes = {"start": (pack.start + N * np.arange(n)[:, None]).ravel(),
-               "pairs": pack.pairs._replace(held_place=np.tile(pack.pairs.held_place, n))}
+               "pairs": pack.pairs._replace(held_place=_many(pack.pairs.held_place, n))}
     for name, table in pack._asdict().items():
         if name in MATRICES and len(table) == total > 1:
-            changes[name] = np.tile(table, (n, 1, 1))
+            changes[name] = _many(table, n)
         elif name in PLACES:
-            changes[name] = np.tile(table, n)
+            changes[name] = _many(table, n)
     return pack._replace(**changes)
+
+
+def _many(x, n):
+    """n times an array, one behind the other along its first axis."""
+    return np.concatenate([x] * n)
