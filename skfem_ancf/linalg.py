@@ -90,9 +90,9 @@ class BandMatrix:
         #: What texts take: a view of the entries, and room for their factors.
         self.band = Band(self._flat, np.zeros(n, np.int64), self._ld, bandwidth, self._diagonal)
         ab = self._flat.reshape(n, self._ld).T
-        #: LAPACK's band storage, a view of shape (rows, n); the same with the zeros behind it, which
-        #: need not be copied to be multiplied.
-        self.ab, self._rows = ab[:-SPARE] if symmetric else ab, ab
+        #: LAPACK's band storage, a view of shape (rows, n).
+        self.ab = ab[:-SPARE] if symmetric else ab
+        self._rows = ab  # with the zeros behind it need not be copied to be multiplied
         self._factor: Any = None
         self.positive_definite: bool | None = None
 

@@ -1020,9 +1020,7 @@ def repeated(pack: Any, n: int, N: int) -> Any:
     changes = {"start": (pack.start + N * np.arange(n)[:, None]).ravel(),
                "pairs": pack.pairs._replace(held_place=_many(pack.pairs.held_place, n))}
     for name, table in pack._asdict().items():
-        if name in MATRICES and len(table) == total > 1:
-            changes[name] = _many(table, n)
-        elif name in PLACES:
+        if name in MATRICES and len(table) == total > 1 or name in PLACES:
             changes[name] = _many(table, n)
     return pack._replace(**changes)
 
