@@ -452,9 +452,9 @@ def test_a_start_by_elimination_makes_factors_once(monkeypatch):
     monkeypatch.setattr(system, "MANY", 0)
     made = square(2).point_force((3000.0, 0), at="side").system
     integrator = Integrator(made, EnergyMomentum())
-    first, second = (integrator.start(np.zeros(made.N), np.zeros(made.N), 0.0, 1e-3)
-                     for _ in range(2))
-    assert made.by_nodes and len(calls) == 2
+    first, _, second = (integrator.start(np.zeros(made.N), np.full(made.N, v), 0.0, 1e-3)
+                        for v in (0.0, 0.1, 0.0))
+    assert made.by_nodes and len(calls) == 3
     assert np.abs(first.acceleration).max() > 0.0
     assert np.array_equal(first.acceleration, second.acceleration)
     assert np.array_equal(first.multipliers, second.multipliers)
