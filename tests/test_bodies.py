@@ -698,6 +698,8 @@ def test_the_period_of_a_pendulum_alone(scheme, error):
 
 def test_two_masses_and_a_spring():
     a, b = RigidBody(1.0, 0.1, name="a"), RigidBody(2.0, 0.1, position=(1, 0), name="b")
+    turned = Scene(a, b).torsional_spring(5.0, a, other=b).modes(6).frequencies
+    assert_allclose(turned, [0.0] * 5 + [10.0], atol=1e-5)
     scene = Scene(a, b).spring(100.0, between=(a, b))
     omega = np.sqrt(100.0 * 1.5)
     modes = scene.modes(6)

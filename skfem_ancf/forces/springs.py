@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, require_finite_scalar, require_not_negative, shown, teaching
-from ..joints.base import GROUND, Vector, named_place, point, section
+from ..joints.base import GROUND, Vector, both_of, named_place, point, section
 from ..rigid import RigidBody, on_body
 from .base import ForceElement, Link, Part, difference, link
 from .laws import Law, force_of, number_or_law, potential_of, said, slope_of, work_of
@@ -140,7 +140,7 @@ class TorsionalSpring(ForceElement):
     beam
         The beam, its name or its number, in a scene of several.
     other
-        The other section as (beam, place); None for the ground.
+        The other section as (beam, place), or a RigidBody; None for the ground.
     angle
         The angle without moment, in [-pi, pi].
     """
@@ -150,10 +150,7 @@ class TorsionalSpring(ForceElement):
         self.k = number_or_law("k", k, "angle")
         self.damping = number_or_law("damping", damping, "angular rate")
         self.at, self.beam = on_body(at, beam)
-        if other is not None and (not isinstance(other, (tuple, list)) or len(other) != 2):
-            raise InputError("other must be a section of another beam, as (1, 'left'), got "
-                             f"{shown(other)}")
-        self.other = None if other is None else tuple(other)
+        self.other = None if other is None else both_of("other", other)
         self.angle = require_finite_scalar("angle", angle)
         if abs(self.angle) > np.pi:
             raise InputError(f"angle must lie in [-pi, pi], got {self.angle!r}: the angle of a "

@@ -338,7 +338,7 @@ class Slot(Joint):
                                 and scene.beam(which) is scene.beam(self.on)):
             raise InputError(f"{self!r}: a point cannot slide along a line of its own beam or body")
         gap = cross(self.direction, self.w.start)
-        size = min(beam.size for beam in scene.beams)
+        size = max(scene.beam(k).size for k in (which, self.on) if k != GROUND)
         if abs(gap) > 1e-6 * size:
             raise InputError(f"{self!r}: the point ({self.p.start[0]:.6g}, {self.p.start[1]:.6g}) "
                              f"is {abs(gap):.6g} off the line: give another through=")
