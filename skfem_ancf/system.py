@@ -53,7 +53,7 @@ MANY = 48
 #: What a system has found that stays for other materials and widths; and for other loads, too.
 _OF_PLACES = {"K", "noise", "screen"}
 _OF_BEAMS = _OF_PLACES | {"points", "mass", "mass_factors", "stiffness_scale", "work_noise",
-                          "condensed"}
+                          "inertia_of_places", "condensed"}
 
 
 def _of_constraints(name: str) -> Any:
@@ -466,6 +466,19 @@ class System:
         springs = abs(self._held_by_elements())
         force = np.max(np.abs(self.external_force(np.zeros(self.N))))
         return float((springs.max() if springs.nnz else 0.0) * self.size**2 + force * self.size)
+
+    @cached_property
+    def inertia_of_places(self) -> float:
+        """The mass times places and directions, squared; zero where no joint knows them.
+
+        Of rigid bodies, whose directions are unit vectors, and where functions of time are places:
+        joints close to eps times these, however little has moved.
+        """
+        if not self.bodies and not self.drives:
+            return 0.0
+        turn = np.concatenate([b.rigid_motions() @ (-b.origin[1], b.origin[0], 1.0)
+                               for b in self.members])
+        return float(turn @ self.mass.multiply(turn))
 
     @cached_property
     def work_noise(self) -> float:

@@ -715,6 +715,23 @@ def test_two_masses_and_a_spring():
     assert np.ptp(history.total_energy) < 1e-11
 
 
+@pytest.mark.parametrize("scheme, most", [("energy-momentum", 3), ("generalized-alpha", 3),
+                                          ("radau", 25)])
+@pytest.mark.parametrize("dt", [1e-2, 1e-3])
+def test_a_motor_that_starts_smoothly_turns_a_body_at_rest(scheme, most, dt):
+    """There is no energy yet, and directions are known to eps only."""
+    for power in (3, 4):
+        body = RigidBody(1.0, 0.1, (0.4, 0.3), name="arm")
+        scene = Scene(body).pin((0, 0))
+        motor = scene.motor(body, angle=lambda t: 3.0 * t**power)
+        history = scene.integrate(20 * dt, dt, scheme=scheme)
+        turn = 3.0 * history.t**power
+        assert_allclose(history.angle(body), turn, rtol=0, atol=1e-14)
+        assert history.substeps == 0 and history.iterations <= 20 * most
+        moment = 3.0 * power * (power - 1) * 0.35 * history.t[-1]**(power - 2)
+        assert_allclose(abs(history.joint_force(motor)[-1]), moment, rtol=0.2)
+
+
 def test_statics_of_bodies_alone():
     """A body on three springs sags as its stiffness says; it buckles on a weak turning spring."""
     body = RigidBody(1.0, 0.1, name="plate")

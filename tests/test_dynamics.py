@@ -325,7 +325,7 @@ def oscillator():
 def amplification(scheme, dt):
     """Eigenvalues of a step of size dt of u'' + u = 0."""
     equations, matrices = oscillator()
-    rule = Rule(int(scheme.conserving), *scheme.parameters, 1e-14, 0.0, 0, 0)
+    rule = Rule(int(scheme.conserving), *scheme.parameters, 1e-14, 0.0, 0.0, 0, 0)
     course = Course(dt, np.array([[dt, dt]]), np.ones((1, 1)), np.zeros((1, 3, 1)),
                     JointMotion(np.zeros((1, 3, 0)), np.zeros((1, 4, 0)), 0))
     rows = []

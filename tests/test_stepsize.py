@@ -454,6 +454,23 @@ def test_order_within_steps(scheme):
     assert np.all(rates < 3.5), rates
 
 
+@pytest.mark.parametrize("scheme", [Gauss(3), Radau()], ids=repr)
+@pytest.mark.parametrize("part", [0.003, 0.05, 0.5])
+def test_collocation_has_the_acceleration_everywhere_in_a_step(scheme, part):
+    """And the multipliers: the equation of motion holds as it does at the ends of steps."""
+    scene = swinging()
+    if scheme.joined:  # a line through the pin, which holds nothing but has a multiplier
+        scene = Scene(soft(2, 2, E=1e5, h=0.1)).gravity(GRAVITY).fix("left", "r^1")
+        scene.joint("line", at=(0, 0), direction=(1, 0.1))
+    history = scene.integrate(0.2, 0.02, scheme, t_eval=0.02 * (np.arange(1, 9) + part))
+    s = scene.system
+    for u, a, force in zip(history.u, history.acceleration, history.multipliers):
+        inertia, pushed = s.mass.multiply(a), s.external_force(u) - s.internal_force(u)
+        if s.m:
+            pushed = pushed - s.full_jacobian(u, 0.0).T @ force
+        assert np.abs((inertia - pushed)[s.free]).max() < 1e-10 * np.abs(pushed).max()
+
+
 def test_instants_close_to_a_step():
     scene = swinging()
     every = scene.integrate(0.1, 5e-3)

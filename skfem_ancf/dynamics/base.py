@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from ..types import Array
     from .integrator import Integrator
 
+#: Part of a step up to which an acceleration is interpolated, where it is a difference.
+NEAR = 0.1
+
 
 @dataclass
 class Motion:
@@ -204,6 +207,18 @@ class Scheme:
             Shape (N,).
         """
         return self.error_constant * dt**2 * (new.algorithmic - old.algorithmic)
+
+    def near(self, system: System) -> float:
+        """Part of a step up to which the acceleration is interpolated within it.
+
+        A shorter step to there has it by a difference that is all round-off.
+
+        Parameters
+        ----------
+        system
+            A :class:`~skfem_ancf.system.System`.
+        """
+        return NEAR
 
     def lasting(self, integrator: Integrator, du: Array, time: float) -> Array:
         """The mean of what is left of a change of the displacement while it is damped.

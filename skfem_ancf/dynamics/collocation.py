@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from ..types import Array
     from .integrator import Integrator
 
+#: Part of a step up to which accelerations are interpolated where something is driven.
+NEAR = 3e-3
 #: Instants of a step at which supports are asked that move.
 SAMPLES = 9
 
@@ -158,6 +160,18 @@ class Collocation(Scheme):
         if low is not None:
             lower = dt**(k + n + 1) * low
         return self.error_constant * grown(dt**(k + n + 2) * high, lower, self.order - 1 - k - n)
+
+    def near(self, system: System) -> float:
+        """As of :class:`Scheme`: accelerations are those of the equation of motion.
+
+        Only rates of what is driven are differences.
+
+        Parameters
+        ----------
+        system
+            A :class:`~skfem_ancf.system.System`.
+        """
+        return NEAR if system.moves or system.machine.tables.motion_varies else 0.0
 
     def resolved(self, integrator: Integrator, du: Array) -> Array:
         s, w = integrator.system, integrator.room

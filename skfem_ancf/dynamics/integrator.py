@@ -112,7 +112,7 @@ class Integrator:
                              f"1e-6 is coarse already; got {shown(tol)}")
         handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
         self.rule = Rule(int(scheme.conserving), *map(float, scheme.parameters), self.tol,
-                         8.0 * system.stiffness_scale, *handles)
+                         8.0 * system.stiffness_scale, system.inertia_of_places, *handles)
         self._state[:], self._dt, self.substeps, self._lost = 0.0, np.nan, 0, ""
         self.kept: dict[str, Array] = {}
         if system.depends_on_time or self.asked is None:

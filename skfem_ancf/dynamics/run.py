@@ -35,8 +35,6 @@ CLOSE = 1e-6
 SHOWN = 0.2
 #: Coordinates times steps of the first block, compiled: some hundredths of a second.
 FIRST = 10_000
-#: Part of a step up to which the acceleration is interpolated, for the same reason.
-NEAR = 0.1
 #: Part of the motion below which a step that fails is not taken again in one half as long.
 SHORTEST = 1e-7
 #: Part of a step to which an event is found.
@@ -413,7 +411,7 @@ class Run:
         found = side.step(old, s * h)
         self.integrator.count(side)
         found.t = t
-        if s < NEAR:
+        if s < self.scheme.near(self.system):
             smooth = interpolate(old, new, t)
             found.acceleration, found.multipliers = smooth.acceleration, smooth.multipliers
         return found

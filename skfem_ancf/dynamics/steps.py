@@ -80,8 +80,8 @@ class Rule(NamedTuple):
         As above.
     tol
         Tolerance of the iteration, relative, in the energy norm.
-    floor
-        Round-off of the strains in that norm.
+    floor, inertia
+        Round-off of the strains in that norm, and what the square of that of places is a factor of.
     solver, mass_solver
         Handles of what solves with the iteration matrix and with the mass where joints are
         eliminated, see :mod:`skfem_ancf.eliminated`; 0 where they are a border.
@@ -94,6 +94,7 @@ class Rule(NamedTuple):
     gamma: float
     tol: float
     floor: float
+    inertia: float
     solver: int
     mass_solver: int
 
@@ -426,7 +427,8 @@ def judged(state, wanted, rough, reused, carried):
 @source
 def round_off(rule, stiffness_factor, mass_factor, noise):
     """The round-off of a correction, by that of the strains and of the mass times u, u."""
-    return np.sqrt(rule.floor**2 * stiffness_factor + EPS * EPS * mass_factor * noise)
+    return np.sqrt(rule.floor**2 * stiffness_factor
+                   + EPS * EPS * mass_factor * (noise + rule.inertia))
 
 
 # one step
