@@ -706,11 +706,13 @@ def test_two_masses_and_a_spring():
     assert_allclose(modes.frequencies, [0.0] * 5 + [omega], atol=1e-6 * omega)
     scene.initial_velocity(lambda x: np.array([1.0 + 0.0 * x[0], 0.0 * x[0]]), a)
     dt = 2.0 * np.pi / omega / 800
-    scene.sensor("left", "position", at=a)
+    scene.sensor("left", "position", at=a).sensor("pull", "acceleration", at=a)
     history = scene.integrate(1.0, dt)
     exact = history.t / 3.0 + 2.0 / 3.0 * np.sin(omega * history.t) / omega
     assert_allclose(history.position(a)[:, 0], exact, rtol=0, atol=2e-5)
     assert_allclose(history.sensors["left"][:, 0], exact, rtol=0, atol=2e-5)
+    pull = -omega * 2.0 / 3.0 * np.sin(omega * history.t)
+    assert_allclose(history.sensors["pull"][:, 0], pull, rtol=0, atol=5e-3 * omega)
     assert_allclose(history.momentum, np.tile([1.0, 0.0], (len(history.t), 1)), atol=1e-12)
     assert np.ptp(history.total_energy) < 1e-11
 
