@@ -993,7 +993,7 @@ class Scene:
         beam
             The beam, its name or its number, in a scene of several.
         other
-            The section to which it is joined, as (beam, place), or a RigidBody; None for the ground.
+            The section to which it is joined, as (beam, place), or a RigidBody; None: the ground.
         angle
             The angle without moment, from the stress-free state.
 
