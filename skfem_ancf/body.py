@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .band import clear
-from .kernels.base import (CARRY, FORCE, GIVEN, MEAN, STRESS, TANGENT, VISCOUS, Destination,
-                           repeated)
+from .band import clear, copy
+from .kernels.base import (CARRY, FORCE, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, VISCOUS,
+                           Destination, add_changes, add_pushes, repeated)
 from .kernels.cable import CablePack, cable_evaluate
 from .kernels.section import SectionPack, section_evaluate
 from .source import I1, I2, lanes, primitive, shaped, source
@@ -19,8 +19,10 @@ if TYPE_CHECKING:
 PACKS = SectionPack, CablePack
 SECTION, CABLE = range(2)
 #: Columns of a table: kind, first coordinate and the one behind the last, first stress and the one
-#: behind the last, and the shape of the stresses.
-KIND, FIRST, LAST, BEGIN, END, COMPONENTS, POINTS, ELEMENTS = range(8)
+#: behind the last, the shape of the stresses, coordinates of an element, and first gradient and the
+#: one behind the last.
+(KIND, FIRST, LAST, BEGIN, END, COMPONENTS, POINTS, ELEMENTS, SPAN, BEGIN_GRADIENTS,
+ END_GRADIENTS) = range(11)
 
 
 class Body(NamedTuple):
@@ -68,15 +70,17 @@ def body_of(beams: Sequence["Beam"], slices: Sequence[slice],
     own
         The packs of each; those of its kernel by default.
     """
-    packs, rows, at = [], [], 0
+    packs, rows, at, place = [], [], 0, 0
     for beam, s, its in zip(beams, slices, own or [beam.kernel.packs for beam in beams]):
         for pack in its:
             shape = beam.kernel.texts.components, len(pack.weights), len(pack.start)
             size = shape[0] * shape[1] * shape[2]
             packs.append(pack)
-            rows.append([PACKS.index(type(pack)), s.start, s.stop, at, at + size, *shape])
-            at += size
-    table = np.array(rows, np.int64) if rows else np.zeros((0, ELEMENTS + 1), np.int64)
+            n = 2 * size * len(pack.span)
+            rows.append([PACKS.index(type(pack)), s.start, s.stop, at, at + size, *shape,
+                         len(pack.span), place, place + n])
+            at, place = at + size, place + n
+    table = np.array(rows, np.int64) if rows else np.zeros((0, END_GRADIENTS + 1), np.int64)
     return Body(tuple(packs), table)
 
 
@@ -142,6 +146,11 @@ def stress_size(body: "Body") -> int:
     return int(body.table[:, END].max(initial=0))
 
 
+def gradients_size(body: "Body") -> int:
+    """How many numbers :func:`body_gradients` finds."""
+    return int(body.table[:, END_GRADIENTS].max(initial=0))
+
+
 @source
 def _stress(body, k, stresses):
     """The stresses of pack k, shape (components, points, elements), a view; or of none."""
@@ -149,6 +158,24 @@ def _stress(body, k, stresses):
     if stresses.size == 0:
         return shaped(stresses, (np.int64(0), row[POINTS], row[ELEMENTS]))
     return shaped(stresses[row[BEGIN]:row[END]], (row[COMPONENTS], row[POINTS], row[ELEMENTS]))
+
+
+@source
+def _written(body, k, what, out):
+    """Where pack k writes: its stresses, or two gradients of each for each coordinate."""
+    row = body.table[k]
+    if what == GRADIENTS:
+        return shaped(out[row[BEGIN_GRADIENTS]:row[END_GRADIENTS]],
+                      (2 * row[SPAN] * row[COMPONENTS], row[POINTS], row[ELEMENTS]))
+    return _stress(body, k, out)
+
+
+@source
+def _gradients(body, k, gradients):
+    """What :func:`body_gradients` has found for pack k, (2, elements, stresses, coordinates)."""
+    row = body.table[k]
+    return shaped(gradients[row[BEGIN_GRADIENTS]:row[END_GRADIENTS]],
+                  (np.int64(2), row[ELEMENTS], row[COMPONENTS] * row[POINTS], row[SPAN]))
 
 
 @source
@@ -160,7 +187,7 @@ def evaluate_body(body, what, u, v, f, given, use_given, out, flat, ld):
     for k in range(body.table.shape[0]):
         a, b = body.table[k, FIRST], body.table[k, LAST]
         old = _stress(body, k, given if use_given > 0 else given[:0])
-        new = _stress(body, k, out)
+        new = _written(body, k, what, out)
         to = Destination(flat, ld, a)
         if body.table[k, KIND] == SECTION:
             section_evaluate(section_pack(body, k), what, u[a:b], v[a:b], f[a:b], old, new, to)
@@ -249,3 +276,36 @@ def add_force_of(body, u, stresses, f):
     """Add the force at u of given stresses."""
     none = f[:0]
     evaluate_body(body, np.int64(GIVEN), u, u, f, stresses, np.int64(1), none, none, np.int64(0))
+
+
+@source
+def body_gradients(body, u, gradients):
+    """The derivatives of the strains at u, times weights, and of the stresses, of each element."""
+    none = u[:0]
+    evaluate_body(body, np.int64(GRADIENTS), u, u, u, none, np.int64(0), gradients, none,
+                  np.int64(0))
+
+
+@source
+def carry_by(body, copies, gradients, du, stresses, carried):
+    """As :func:`body_carry`, of copies, by the gradients of the body."""
+    copy(stresses, carried)
+    for k in range(body.table.shape[0]):
+        B, new = _gradients(body, k, gradients)[1], _stress(copies, k, carried)
+        x = du[copies.table[k, FIRST]:copies.table[k, LAST]]
+        if body.table[k, KIND] == SECTION:
+            add_changes(B, section_pack(copies, k).start, x, new)
+        else:
+            add_changes(B, cable_pack(copies, k).start, x, new)
+
+
+@source
+def add_force_by(body, copies, gradients, stresses, f):
+    """As :func:`add_force_of`, of copies, by the gradients of the body."""
+    for k in range(body.table.shape[0]):
+        B, given = _gradients(body, k, gradients)[0], _stress(copies, k, stresses)
+        force = f[copies.table[k, FIRST]:copies.table[k, LAST]]
+        if body.table[k, KIND] == SECTION:
+            add_pushes(B, section_pack(copies, k).start, given, force)
+        else:
+            add_pushes(B, cable_pack(copies, k).start, given, force)

@@ -10,7 +10,7 @@ from scipy import sparse
 
 from . import compiled
 from .band import Band
-from .body import (BEGIN, ELEMENTS, FlatBody, body_of, copies_of, renewed_body, stress_size,
+from .body import (BEGIN, END_GRADIENTS, FlatBody, body_of, copies_of, renewed_body, stress_size,
                    viscous_body_of)
 from .border import Border
 from .compiled.words import Words, constant
@@ -38,7 +38,7 @@ _NO_JOINTS = constant(JointTables(_NO_INTS, _NO_INTS, _NO_INTS, np.zeros(0), _NO
                                   0))
 _NO_MOMENTS = constant(MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)),
                                   np.zeros((0, 2)), np.zeros(0)))
-_NO_BODY = constant(FlatBody(_NO_INTS, np.zeros((0, ELEMENTS + 1), np.int64)))
+_NO_BODY = constant(FlatBody(_NO_INTS, np.zeros((0, END_GRADIENTS + 1), np.int64)))
 _NO_PUSHES = np.zeros((0, 0))
 _NO_BORDER = constant(Border(_NO_INTS, 0, 0, _NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, 0))
 constant(NO_FORCES)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from .twin import jit
+from .vectors import products, subtract
 from .views import room, shaped
 
 #: Elements evaluated together: several vectors wide, with the work arrays still in cache; of
@@ -47,6 +48,37 @@ def turned_product(A, turned, first, B, out):
                 y[1, k] += A[first + e, g, k] * c
         for k in range(out.shape[0]):
             out[k, 0, e], out[k, 1, e] = y[0, k], y[1, k]
+
+
+@jit
+def add_by_rows(table, first, rows, X, out):
+    for e in range(out.shape[0]):
+        G = table[first + e if table.shape[0] > 1 else 0]
+        for s in range(out.shape[1]):
+            g, x, y = rows[s], X[s, 0, e], X[s, 1, e]
+            for k in range(out.shape[2]):
+                out[e, s, k, 0] += x * G[g, k]
+                out[e, s, k, 1] += y * G[g, k]
+
+
+@jit
+def add_changes(B, start, x, out):
+    flat, n, span = shaped(B, (B.size,)), B.shape[1], B.shape[2]
+    y = shaped(out, (n, start.size))
+    for e in range(start.size):
+        at = e % B.shape[0] * n * span
+        for s in range(n):
+            y[s, e] += products(x, start[e], span, flat, (at + s * span,))[0]
+
+
+@jit
+def add_pushes(B, start, S, f):
+    flat, n, span = shaped(B, (B.size,)), B.shape[1], B.shape[2]
+    y = shaped(S, (n, start.size))
+    for e in range(start.size):
+        at = e % B.shape[0] * n * span
+        for s in range(n):
+            subtract(f, start[e], flat, (at + s * span,), span, (-y[s, e],))
 
 
 @jit

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 
 from ..band import factorize, fix, solve
+from ..body import gradients_size
 from ..errors import InputError
 from .base import Motion, Scheme, contacts_of, kept
 from .differences import derivative, difference_row, grown
@@ -242,13 +243,13 @@ class Collocation(Scheme):
         if integrator.room is None:
             M, size, n = s.mass.band, s.machine.tables.stresses.size, len(table.points)
             integrator.room = room_for_points(table.method, s.N, s.m, size,
+                                              gradients_size(s.machine.tables.plain.body),
                                               M._replace(flat=np.zeros(M.flat.size)))
             integrator.machine = s.machine.with_tables(s.machine.tables.copied(n))
         w = integrator.room
-        if kept.get("origin") is w.origin:
+        if kept.get("re") is w.re:
             return w
-        factors = {"re": w.re, "im": w.im, "real": w.real.flat, "J": w.J, "Y": w.Y,
-                   "origin": w.origin}
+        factors = {"re": w.re, "im": w.im, "real": w.real.flat, "J": w.J, "Y": w.Y}
         for name, room in factors.items():
             if name in kept and kept[name] is not room:  # of a motion that goes on
                 room[...] = kept[name]

@@ -11,8 +11,8 @@ import numpy as np
 
 from ..band import (SPARE, Band, clear, copy, dense_solve, factorize, factorize_complex, multiply,
                     solve, solve_complex, solve_joined)
-from ..body import (add_force_of, body_carry, body_force, body_mean_stress, body_mixed,
-                    body_stress, body_tangent)
+from ..body import (add_force_by, body_force, body_gradients, body_mean_stress, body_mixed,
+                    body_stress, body_tangent, carry_by)
 from ..forces.texts import (add_elastic_force, add_element_damping, add_element_tangent,
                             pace_contact, settle_contact)
 from ..source import F1, F2, F3, borrowed, by_place, lanes, shaped, source
@@ -107,8 +107,8 @@ class Points(NamedTuple):
         Room, shape (3, s), the first row zero.
     x, r, q
         Room, shape (4, N), (2 m,) and (2 m, 2 m).
-    origin
-        Where the factors were made, n times, shape (n, N).
+    origin, B
+        Where the factors were made, shape (N,), and with carried stresses the gradients there.
     re, im, real
         Factors of complex eigenvalues, shape (k, N (width + 1)), and of the real one, of which an
         odd number of points has one.
@@ -142,7 +142,8 @@ class Points(NamedTuple):
     x: F2
     r: F1
     q: F2
-    origin: F2
+    origin: F1
+    B: F1
     re: F2
     im: F2
     real: Band
@@ -155,15 +156,16 @@ class Points(NamedTuple):
     method: Method
 
 
-def room_for_points(method: Method, N: int, m: int, stresses: int, D: Band) -> Points:
+def room_for_points(method: Method, N: int, m: int, stresses: int, gradients: int,
+                    D: Band) -> Points:
     """The Points of a method.
 
     Parameters
     ----------
     method
         Its numbers.
-    N, m, stresses
-        Numbers of coordinates, of equations of joints, and of stresses.
+    N, m, stresses, gradients
+        Numbers of coordinates, of equations of joints, of stresses, and of their gradients.
     D
         A band matrix of its own.
     """
@@ -173,7 +175,7 @@ def room_for_points(method: Method, N: int, m: int, stresses: int, D: Band) -> P
     return Points._make([
         np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((4, n, m)),
         *np.zeros((3, n * stresses)), np.zeros((3, stresses)), np.zeros((4, N)), np.zeros(2 * m),
-        np.zeros((2 * m, 2 * m)), np.zeros((n, N)), *np.zeros((2, k, size)), real,
+        np.zeros((2 * m, 2 * m)), np.zeros(N), np.zeros(gradients), *np.zeros((2, k, size)), real,
         np.zeros((m, N)), np.zeros((2 * k, m, N)), np.zeros((2, m, N)), np.zeros((m, m)),
         np.zeros(m), D, method])
 
@@ -254,7 +256,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
                 return False
             state[FACTORIZED] += method.values.shape[1]
             state[READY], state[RATE], state[FRESH], state[SIZE] = 1.0, REUSED, 1.0, -1.0
-        _internal(e.copies, w, state)
+        _internal(e, w, state)
         for k in range(n):
             _residual(e, matrices, method, s, w, step, k)
         state[COUNT] += n
@@ -264,12 +266,13 @@ def _converges(e, matrices, method, rule, s, w, state, step):
         told = judged(state, wanted, rough, REUSED, CARRIED)
         if told == GO_ON and state[FRESH] > 0.0 and _is_lost(state):
             state[MIXED], told = LASTING, ASTRAY  # its factors serve
+            body_gradients(e.body, w.origin, w.B)
         if told == ASTRAY:
             _start(e.copies, method, s, w, state, step)
         elif told != GO_ON:
             break
         elif state[MIXED] > 0.0:
-            body_carry(e.copies, _flat(w.origin), _flat(w.R), w.own, w.carried)
+            carry_by(e.body, e.copies, w.B, _flat(w.R), w.own, w.carried)
     _states(e.free, method, s, w, step)
     if told != DONE and told != FAILED:
         state[FAILURE] = NOT_CONVERGED
@@ -430,16 +433,16 @@ def _motion(joints, k):
 
 
 @source
-def _internal(copies, w, state):
+def _internal(e, w, state):
     """The internal forces of all points at once, into R."""
     U, f, missing, own, carried = _flat(w.U), _flat(w.R), w.missing, w.own, w.carried
     if state[MIXED] > 0.0:
-        body_mixed(copies, False, U, U, f, carried, own)
+        body_mixed(e.copies, False, U, U, f, carried, own)
         for i in lanes(missing.size):
             missing[i] = own[i] - carried[i]
-        add_force_of(copies, _flat(w.origin), missing, f)
+        add_force_by(e.body, e.copies, w.B, missing, f)
     else:
-        body_force(copies, U, f)
+        body_force(e.copies, U, f)
 
 
 @source
@@ -547,7 +550,7 @@ def _join(method, s, w, k, r, q, x, y):
 @source
 def _factorize(e, matrices, method, s, w, state, step):
     """Factors of the iteration matrices at the mean of the points; False if there are none."""
-    origin, f, S, yes = w.origin[0], w.x[0], w.stresses, w.x.size > 0
+    origin, f, S, yes = w.origin, w.x[0], w.stresses, w.x.size > 0
     at = step * (method.points.size + 1)
     for i in lanes(origin.size):
         origin[i] = 0.0
@@ -555,9 +558,8 @@ def _factorize(e, matrices, method, s, w, state, step):
         U, c = w.U[k], method.weights[k]
         for i in lanes(origin.size):
             origin[i] += c * U[i]
-    for k in range(1, method.points.size):
-        copy(origin, w.origin[k])
     if state[MIXED] > 0.0:
+        body_gradients(e.body, origin, w.B)
         body_mean_stress(e.body, e.copies, method.weights, w.carried, S[1])
     else:
         body_stress(e.body, w.y[0], S[1])

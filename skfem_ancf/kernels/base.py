@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 #: Elements of which Python evaluates matrices together; bounds the memory.
 CHUNK = 1024
 #: What a kernel finds; given as ``np.int64``, or Numba compiles for each.
-FORCE, TANGENT, MEAN, STRESS, CARRY, VISCOUS, GIVEN = range(7)
+FORCE, TANGENT, MEAN, STRESS, CARRY, VISCOUS, GIVEN, GRADIENTS = range(8)
 #: Fields of a pack whose first axis are the elements, where they have matrices of their own.
 MATRICES = {"table", "constant"}
 #: Those whose last axis are the elements, where they have tables of their own.
@@ -82,6 +82,27 @@ def turned_product(A, turned, first, B, out):
     else:
         own = np.ascontiguousarray(B.transpose(2, 0, 1))
         out.transpose(2, 0, 1)[...] = A[first:first + len(own)].transpose(0, 2, 1) @ own
+
+
+@primitive("primitives")
+def add_by_rows(table, first, rows, X, out):
+    """out[e, s, k, i] += X[s, i, e] G[g, k] with row g = rows[s] of each element's table."""
+    G = table if len(table) == 1 else table[first:first + len(out)]
+    out += X.transpose(2, 0, 1)[:, :, None] * G[:, rows][..., None]
+
+
+@primitive("primitives")
+def add_changes(B, start, x, out):
+    """out[s, e] += sum_k B[e, s, k] x[start[e] + k], B repeated for copies of the elements."""
+    x = x[start[:, None] + np.arange(B.shape[2])].reshape(-1, len(B), B.shape[2], 1)
+    out += (B @ x).reshape(len(start), -1).T.reshape(out.shape)
+
+
+@primitive("primitives")
+def add_pushes(B, start, S, f):
+    """f[start[e] + k] += sum_s B[e, s, k] S[s, e], B repeated for copies of the elements."""
+    S = S.reshape(-1, len(start)).T.reshape(-1, len(B), 1, B.shape[1])
+    np.add.at(f, start[:, None] + np.arange(B.shape[2]), (S @ B).reshape(len(start), -1))
 
 
 @source
@@ -239,6 +260,31 @@ def add_tangent(table, pairs, start, first, M, M_skew, to):
                 for e in lanes(size):
                     to.flat[column(below) + where[e]] += (column(x) * rows[k, e]
                                                           + column(y) * skew[m, e])
+
+
+@source
+def weigh(D, weights, P, Q):
+    """Q = D P with the moduli of each point, then P times weights, shape (elements, c, points, k).
+
+    Parameters
+    ----------
+    D, weights
+        Shape (c^2, points, elements), (points, elements).
+    P, Q
+        As said.
+    """
+    n = P.shape[1]
+    for c in range(n):
+        for p in range(P.shape[2]):
+            for d in range(n):
+                for e in lanes(len(P)):
+                    for k in lanes(P.shape[3]):
+                        Q[e, c, p, k] += column(D[n * c + d, p, e]) * P[e, d, p, k]
+    for c in range(n):
+        for p in range(P.shape[2]):
+            for e in lanes(len(P)):
+                for k in lanes(P.shape[3]):
+                    P[e, c, p, k] *= column(weights[p, e])
 
 
 @source

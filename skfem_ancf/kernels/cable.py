@@ -17,11 +17,12 @@ import numpy as np
 from ..frozen import read_only
 from ..kept import twin_of
 from ..quadrature import gauss
-from ..source import F2, F3, I1, lanes, primitive, room, source
+from ..source import F2, F3, I1, lanes, primitive, room, shaped, source
 from ..types import Array
-from .base import (CARRY, GIVEN, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
-                   Texts, add_force, add_held_energy, add_tangent, block, copy_stress, load,
-                   packed, pair_tables, product, scaled_pair_tables, times_held, with_constant)
+from .base import (CARRY, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
+                   Texts, add_by_rows, add_force, add_held_energy, add_tangent, block, copy_stress, load,
+                   packed, pair_tables, product, scaled_pair_tables, times_held, weigh,
+                   with_constant)
 
 if TYPE_CHECKING:
     from ..formulations.base import Formulation
@@ -203,6 +204,27 @@ def cable_factors(stiffness, weights, r, square, kappa, stress, M, skew):
 
 
 @source
+def cable_gradients(table, first, pairs, r, square, kappa, out):
+    """Derivatives of the strains into ``out``, (elements, 2, points, nb, 2).
+
+    Those of eps by a are a / |a|, of kappa k / s by a and (-a1, a0) / s by b.
+    """
+    n, size = square.shape[0], square.shape[1]
+    X, b = room((3, n, 2, size), r), r[n:]
+    for p in lanes(n):
+        for e in lanes(size):
+            a0, a1, s, k, z = r[p, 0, e], r[p, 1, e], square[p, e], kappa[p, e], np.sqrt(square[p, e])
+            X[0, p, 0, e], X[0, p, 1, e] = a0 / z, a1 / z
+            X[1, p, 0, e] = (b[p, 1, e] - 2.0 * k * a0) / s
+            X[1, p, 1, e] = (-b[p, 0, e] - 2.0 * k * a1) / s
+            X[2, p, 0, e], X[2, p, 1, e] = -a1 / s, a0 / s
+    a_rows, b_rows = pairs[0, n:2 * n], pairs[1, n:2 * n]
+    add_by_rows(table, first, a_rows, X[0], out[:, 0])
+    add_by_rows(table, first, a_rows, X[1], out[:, 1])
+    add_by_rows(table, first, b_rows, X[2], out[:, 1])
+
+
+@source
 def cable_evaluate(pack, what, u, v, f, given, out, to):
     """As :func:`~skfem_ancf.kernels.section.section_evaluate`."""
     most = block(pack.pairs.pairs.shape[1])
@@ -220,7 +242,7 @@ def run_cable(pack, what, first, last, u, v, f, given, out, to):
 @source
 def cable_block(pack, what, first, last, u, v, f, given, out, to):
     """As :func:`cable_evaluate`, for the elements from ``first`` to ``last``."""
-    given, out = given[:, :, first:last], out[:, :, first:last]
+    whole, given, out = out, given[:, :, first:last], out[:, :, first:last]
     n, nr, nb, size = len(pack.weights), pack.table.shape[1], pack.table.shape[2], out.shape[2]
     states = 2 if what == MEAN else 1
     U, d, T = room((2, nb, 2, size), u), room((2, nr, 2, size), u), room((nr, 2, size), u)
@@ -234,6 +256,18 @@ def cable_block(pack, what, first, last, u, v, f, given, out, to):
         if k < states:
             cable_strain(pack, first, d[k], r[k], weights, stiffness, square[k], kappa[k],
                          strain[k])
+    if what == GRADIENTS:
+        D = room((4, n, size), weights)
+        for p in lanes(n):
+            for e in lanes(size):
+                D[0, p, e], D[3, p, e] = stiffness[0, p, e], stiffness[1, p, e]
+                D[1, p, e], D[2, p, e] = stiffness[2, p, e], stiffness[2, p, e]
+        B = shaped(whole, (2, pack.start.size, 2, n, nb, 2))[:, first:last]
+        B[:] = 0.0
+        cable_gradients(pack.table, first, pack.pairs.pairs, r[0], square[0], kappa[0], B[0])
+        B = shaped(whole, (2, pack.start.size, 2, n, 2 * nb))[:, first:last]
+        weigh(D, weights, B[0], B[1])
+        return
     if what == CARRY:
         copy_stress(given, S)
         cable_changes(stiffness, r[0], d[1], square[0], kappa[0], S, strain[0])

@@ -19,10 +19,10 @@ from ..kept import twin_of
 from ..materials import LinearLaw
 from ..source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
 from ..types import Array
-from .base import (CARRY, GIVEN, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables, Texts,
-                   add_force, add_held_energy, add_tangent, apart, block, copy_stress, in_rounds,
+from .base import (CARRY, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
+                   Texts, add_by_rows, add_force, add_held_energy, add_tangent, apart, block, copy_stress, in_rounds,
                    load, packed, pair_numbers, pair_tables, product,
-                   scaled_pair_tables, times_held, with_constant)
+                   scaled_pair_tables, times_held, weigh, with_constant)
 from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
 
 if TYPE_CHECKING:
@@ -238,6 +238,33 @@ def pair_factors(rows, samples, terms, rounds, moduli, r, M, M_skew):
 
 
 @source
+def section_gradients(pack, first, r, B):
+    """Derivatives of the strains at the points into B, (elements, 3, points, 2 nb)."""
+    rows, size, ns = pack.rows, r.shape[2], B.shape[2] // pack.along.shape[1]
+    X, nb = room((2, rows.shape[1], 2, size), r), B.shape[3] // 2
+    samples = room((size, rows.shape[1], nb, 2), r)
+    for s in lanes(rows.shape[1]):
+        g, h, c = rows[0, s], rows[1, s], pack.factors[s]
+        for i in range(2):
+            for e in lanes(size):
+                X[0, s, i, e], X[1, s, i, e] = column(c) * r[h, i, e], column(c) * r[g, i, e]
+    samples[:] = 0.0
+    add_by_rows(pack.table, first, rows[0], X[0], samples)
+    add_by_rows(pack.table, first, rows[1], X[1], samples)
+    flat = shaped(samples, (size, rows.shape[1], 2 * nb))
+    for c in range(3):
+        for i in range(pack.along.shape[1]):
+            x = B[:, c, i * ns:(i + 1) * ns]
+            for k in range((pack.ends[c + 1] - pack.ends[c]) // ns):
+                factor, y = pack.along[c, i, k], flat[:, pack.ends[c] + k * ns:]
+                if factor != 0.0:
+                    for e in lanes(size):
+                        for j in lanes(ns):
+                            for m in lanes(2 * nb):
+                                x[e, j, m] += factor * y[e, j, m]
+
+
+@source
 def section_evaluate(pack, what, u, v, f, given, out, to):
     """Everything that depends on the strains, block by block.
 
@@ -278,7 +305,7 @@ def run_section(pack, what, first, last, u, v, f, given, out, to):
 def section_block(pack, what, first, last, u, v, f, given, out, to):
     """As :func:`section_evaluate`, for the elements from ``first`` to ``last``."""
     table, rows, law = pack.table, pack.rows, pack.law
-    given, out = given[:, :, first:last], out[:, :, first:last]
+    whole, given, out = out, given[:, :, first:last], out[:, :, first:last]
     n, nr, nb, size = len(pack.weights), table.shape[1], table.shape[2], out.shape[2]
     changes, grows = what == MEAN or what == CARRY or what == VISCOUS, pack.grows
     shift = 0.5 if what == MEAN else 0.0
@@ -300,14 +327,22 @@ def section_block(pack, what, first, last, u, v, f, given, out, to):
     if what == MEAN:
         add_scaled(0.5, change, strain, strain)
         add_scaled(0.5, U[1], U[0], U[0])
-    both = room((1 + grows, 9, n, size if what == CARRY or what == TANGENT and law.kind else 0), w)
-    D, none = both[0], what == CARRY or what == GIVEN and grows == 0
+    both = room((1 + grows, 9, n, size if what == CARRY or what == GRADIENTS
+                 or what == TANGENT and law.kind else 0), w)
+    D = both[0]
+    none = what == CARRY or what == GRADIENTS or what == GIVEN and grows == 0
     for part in range(1 + grows):
         if part > 0:
             add_scaled(1.0, given, strain, strain)
         for k in range(1 if none else 0, 2 if D.size > 0 else 1):
             law_evaluate(law, change if what == VISCOUS else strain,
                          both[part] if k else strains[2 + part])
+        if what == GRADIENTS:
+            B = shaped(whole, (2, pack.start.size, 3, n, 2 * nb))[:, first:last]
+            B[:] = 0.0
+            section_gradients(pack, first, r, B[0])
+            weigh(D, w, B[0], B[1])
+            return
         if what == CARRY:
             tangent_stress(D, change, S)
             add_scaled(1.0, given, S, S)
