@@ -177,38 +177,43 @@ def solve_many(A: Band, B: Array, X: Array) -> None:
 
 
 @primitive("factors")
-def factorize_complex(re, im, width):
+def factorize_complex(A, width):
     """L D L^T of a complex symmetric band, in place of its lower half; False if there is none.
 
     Parameters
     ----------
-    re, im
-        Real and imaginary parts, entry (i, j) at ``j (width + 1) + i - j``.
+    A
+        Real parts, then imaginary ones, each as of a symmetric :class:`Band`.
     width
         Half bandwidth.
     """
-    flat, ld = np.append(re + 1j * im, np.zeros(width * (width + 2))), width + 1
-    for j in range(re.size // ld):
-        column = flat[j * ld:(j + 1) * ld]
+    ld = width + 1 + SPARE
+    n, flat = A.size // (2 * ld), np.append(_complex(A), np.zeros((width + 1) * ld))
+    for j in range(n):
+        column = flat[j * ld:j * ld + width + 1]
         d = column[0]
         if not 0.0 < abs(d) < np.inf:
             return False
         below = column[1:].copy()
         column[1:] /= d
-        later = np.lib.stride_tricks.as_strided(flat[(j + 1) * ld:], (width, width),
-                                                (width * flat.itemsize, flat.itemsize))
+        later = np.lib.stride_tricks.as_strided(flat[(j + 1) * ld:], (width, width), (
+            (ld - 1) * flat.itemsize, flat.itemsize))
         later -= np.triu(np.outer(column[1:], below))  # entries (i, k) of column j + 1 + k
-    re[:], im[:] = flat[:re.size].real, flat[:re.size].imag
+    A[:A.size // 2], A[A.size // 2:] = flat[:n * ld].real, flat[:n * ld].imag
     return True
 
 
 @primitive("factors")
-def solve_complex(re, im, x, y):
+def solve_complex(A, width, x, y):
     """Solve in place with the factors of :func:`factorize_complex`; x + i y is (n,)."""
-    ab = (re + 1j * im).reshape(x.size, -1).T
+    ab = _complex(A).reshape(x.size, -1)[:, :width + 1].T
     z = lapack.ztbtrs(ab, x + 1j * y, uplo="L", diag="U")[0].ravel() / ab[0]
     z = lapack.ztbtrs(ab, z, uplo="L", trans="T", diag="U")[0].ravel()
     x[:], y[:] = z.real, z.imag
+
+
+def _complex(A):
+    return A[:A.size // 2] + 1j * A[A.size // 2:]
 
 
 @source

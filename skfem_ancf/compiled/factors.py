@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..band import LOST
+from ..band import LOST, SPARE
 from .twin import jit
 from .vectors import products, scale, subtract, subtract_columns
 
@@ -170,53 +170,44 @@ def _solve_exchanged(A, x):
 
 
 @jit
-def _subtract_complex(x, y, to, re, im, of, n, a, b):
-    """x + i y less a + i b times n numbers, from the places on."""
-    subtract(x, to, re, (of,), n, (a,))
-    subtract(x, to, im, (of,), n, (-b,))
-    subtract(y, to, im, (of,), n, (a,))
-    subtract(y, to, re, (of,), n, (b,))
-
-
-@jit
-def factorize_complex(re, im, width):
+def factorize_complex(A, width):
     """L D L^T of a complex symmetric band, in place; False if there is none."""
-    ld = width + 1
-    n = re.size // ld
+    ld, half = width + 1 + SPARE, A.size // 2
+    n = half // ld
     for j in range(n):
         at = j * ld
-        a, b = re[at], im[at]
+        a, b = A[at], A[half + at]
         size = a * a + b * b
         if not size > 0.0 or not size < np.inf:
             return False
-        m = min(width, n - 1 - j)
-        for k in range(1, m + 1):
-            x, y = re[at + k], im[at + k]
+        last = at + min(width, n - 1 - j)
+        for re in range(at + 1, last + 1):
+            x, y, im, to = A[re], A[half + re], half + re, at + (re - at) * ld
             c, d = (x * a + y * b) / size, (y * a - x * b) / size
-            other = (j + k) * ld
-            _subtract_complex(re, im, other, re, im, at + k, m + 1 - k, c, d)
-        for k in range(1, m + 1):
-            x, y = re[at + k], im[at + k]
-            re[at + k], im[at + k] = (x * a + y * b) / size, (y * a - x * b) / size
+            subtract_columns(A, to, last + 1 - re, (re, im), (c, -d))
+            subtract_columns(A, half + to, last + 1 - re, (im, re), (c, d))
+        for re in range(at + 1, last + 1):
+            x, y = A[re], A[half + re]
+            A[re], A[half + re] = (x * a + y * b) / size, (y * a - x * b) / size
     return True
 
 
 @jit
-def solve_complex(re, im, x, y):
+def solve_complex(A, width, x, y):
     """Solve in place with the factors; x + i y is (n,)."""
-    n = x.size
-    ld = re.size // n
+    n, half = x.size, A.size // 2
+    ld = half // n
     for j in range(n):
-        _subtract_complex(x, y, j + 1, re, im, j * ld + 1, min(ld, n - j) - 1, x[j], y[j])
+        m, re, im = min(width, n - 1 - j), j * ld + 1, half + j * ld + 1
+        subtract(x, j + 1, A, (re, im), m, (x[j], -y[j]))
+        subtract(y, j + 1, A, (im, re), m, (x[j], y[j]))
     for j in range(n - 1, -1, -1):
-        at = j * ld
-        a, b = re[at], im[at]
+        m, re, im = min(width, n - 1 - j), j * ld, half + j * ld
+        a, b, c, d = A[re], A[im], x[j], y[j]
         size = a * a + b * b
-        c, d = (x[j] * a + y[j] * b) / size, (y[j] * a - x[j] * b) / size
-        for k in range(1, min(ld, n - j)):
-            c -= re[at + k] * x[j + k] - im[at + k] * y[j + k]
-            d -= re[at + k] * y[j + k] + im[at + k] * x[j + k]
-        x[j], y[j] = c, d
+        p, q = products(x, j + 1, m, A, (re + 1, im + 1))
+        r, s = products(y, j + 1, m, A, (re + 1, im + 1))
+        x[j], y[j] = (c * a + d * b) / size - p + s, (d * a - c * b) / size - q - r
 
 
 @jit

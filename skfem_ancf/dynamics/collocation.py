@@ -247,9 +247,9 @@ class Collocation(Scheme):
                                               M._replace(flat=np.zeros(M.flat.size)))
             integrator.machine = s.machine.with_tables(s.machine.tables.copied(n))
         w = integrator.room
-        if kept.get("re") is w.re:
+        if kept.get("pairs") is w.pairs:
             return w
-        factors = {"re": w.re, "im": w.im, "real": w.real.flat, "J": w.J, "Y": w.Y}
+        factors = {"pairs": w.pairs, "real": w.real.flat, "J": w.J, "Y": w.Y}
         for name, room in factors.items():
             if name in kept and kept[name] is not room:  # of a motion that goes on
                 room[...] = kept[name]

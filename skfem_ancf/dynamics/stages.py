@@ -109,9 +109,9 @@ class Points(NamedTuple):
         Room, shape (4, N), (2 m,) and (2 m, 2 m).
     origin, B
         Where the factors were made, shape (N,), and with carried stresses the gradients there.
-    re, im, real
-        Factors of complex eigenvalues, shape (k, N (width + 1)), and of the real one, of which an
-        odd number of points has one.
+    pairs, real
+        Factors of complex eigenvalues, real parts and imaginary ones, shape (k, 2 N ld), and of
+        the real one, of which an odd number of points has one.
     J, Y
         The joints' directions there, (m, N), and the solutions for them, (2 k, m, N).
     end, S, shares
@@ -144,8 +144,7 @@ class Points(NamedTuple):
     q: F2
     origin: F1
     B: F1
-    re: F2
-    im: F2
+    pairs: F2
     real: Band
     J: F2
     Y: F3
@@ -169,13 +168,12 @@ def room_for_points(method: Method, N: int, m: int, stresses: int, gradients: in
     D
         A band matrix of its own.
     """
-    n, k, size = method.points.size, method.values.shape[1], N * (D.width + 1)
-    ld = D.width + 1 + SPARE
+    n, k, ld = method.points.size, method.values.shape[1], D.width + 1 + SPARE
     real = Band(np.zeros(N * ld), np.zeros(0, np.int64), ld, D.width, 0)
     return Points._make([
         np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((4, n, m)),
         *np.zeros((3, n * stresses)), np.zeros((3, stresses)), np.zeros((4, N)), np.zeros(2 * m),
-        np.zeros((2 * m, 2 * m)), np.zeros(N), np.zeros(gradients), *np.zeros((2, k, size)), real,
+        np.zeros((2 * m, 2 * m)), np.zeros(N), np.zeros(gradients), np.zeros((k, 2 * N * ld)), real,
         np.zeros((m, N)), np.zeros((2 * k, m, N)), np.zeros((2, m, N)), np.zeros((m, m)),
         np.zeros(m), D, method])
 
@@ -582,11 +580,13 @@ def _factorize(e, matrices, method, s, w, state, step):
     for k in range(method.values.shape[1]):
         a, b = method.values[0, k] / s.h, method.values[1, k] / s.h
         if b != 0.0:
-            _combine(e.K, matrices.M, w.D, e.free, a * a - b * b, a, w.re[k])
-            _combine_imaginary(matrices.M, w.D, e.free, 2.0 * a * b, b, w.im[k])
-            done = factorize_complex(w.re[k], w.im[k], e.K.width)
+            F = w.pairs[k]
+            half = F.size // 2
+            _combine(e.K, matrices.M, w.D, e.fixed, 1.0, a * a - b * b, a, F[:half])
+            _combine(e.K, matrices.M, w.D, e.fixed, 0.0, 2.0 * a * b, b, F[half:])
+            done = factorize_complex(F, e.K.width)
         else:
-            _combine(e.K, matrices.M, w.D, e.free, a * a, a, w.real.flat)
+            _combine(e.K, matrices.M, w.D, e.fixed, 1.0, a * a, a, w.real.flat)
             done = factorize(w.real)
         if not done:
             return False
@@ -603,48 +603,35 @@ def _factorize(e, matrices, method, s, w, state, step):
 def solve_for(w, k, x, y):
     """Solve in place with the factors for the eigenvalue k; y is not touched if that is real."""
     if w.method.values[1, k] != 0.0:
-        solve_complex(w.re[k], w.im[k], x, y)
+        solve_complex(w.pairs[k], w.real.width, x, y)
     else:
         solve(w.real, x)
 
 
 @source
-def _combine(K, M, D, free, c, a, out):
-    """``K + c M + a D`` with the supports fixed, the lower half of each column.
+def _combine(K, M, D, fixed, c, m, d, out):
+    """``c K + m M + d D`` with the supports fixed, the lower half of each column.
 
     Of a matrix that is not symmetric the mean of both halves: the iteration corrects the rest.
     """
-    n, top, width = free.size, K.top, K.width
-    k, m, r = K.flat.reshape(n, K.ld), M.flat.reshape(n, K.ld), D.flat.reshape(n, K.ld)
-    x = out.reshape(n, out.size // n)
-    for h in range(width + 1):
-        p = top + h
-        for j in lanes(n):
-            x[j, h] = k[j, p] + c * m[j, p] + a * r[j, p]
-        if top > 0 and h < n:
+    ld, top = K.width + 1 + SPARE, K.top
+    n, x, y, z = out.size // ld, K.flat, M.flat, D.flat
+    columns = shaped(out, (n, ld))
+    if top > 0:
+        k, l, r = shaped(x, (n, K.ld)), shaped(y, (n, K.ld)), shaped(z, (n, K.ld))
+        for h in range(min(K.width + 1, n)):
+            for j in lanes(n):
+                columns[j, h] = c * k[j, top + h] + m * l[j, top + h] + d * r[j, top + h]
             later = k[h:]
             for j in lanes(n - h):
-                x[j, h] += 0.5 * (later[j, top - h] - k[j, p])
-        _fix_row(free, h, x)
-    for j in lanes(n):
-        x[j, 0] += 1.0 - free[j]
-
-
-@source
-def _combine_imaginary(M, D, free, d, b, out):
-    """``d M + b D`` alike."""
-    n = free.size
-    m, r, y = M.flat.reshape(n, M.ld), D.flat.reshape(n, M.ld), out.reshape(n, M.width + 1)
-    for h in range(M.width + 1):
-        p = M.top + h
-        for j in lanes(n):
-            y[j, h] = d * m[j, p] + b * r[j, p]
-        _fix_row(free, h, y)
-
-
-@source
-def _fix_row(free, h, x):
-    """Zeros for what is fixed, h below the diagonal."""
-    after = free[min(h, free.size):]
-    for j in lanes(after.size):
-        x[j, h] *= free[j] * after[j]
+                columns[j, h] += 0.5 * c * (later[j, top - h] - k[j, top + h])
+    else:
+        for i in lanes(out.size):
+            out[i] = c * x[i] + m * y[i] + d * z[i]
+    for i in range(fixed.size):
+        j = fixed[i]
+        for h in lanes(ld):
+            columns[j, h] = 0.0
+        for h in range(1, min(K.width, j) + 1):
+            columns[j - h, h] = 0.0
+        columns[j, 0] = 1.0

@@ -54,10 +54,10 @@ class CableSections:
         q_e = from_first_node(q_e)
         a0, b0 = G1 @ q_e, (0.0 if mesh.is_straight else 1.0) * (G2 @ q_e)
         frame, (n, ne) = np.concatenate([a0, b0], axis=1).transpose(1, 2, 0), a0.shape[1::-1]
-        square0, each = np.sum(a0 * a0, axis=-1), np.arange(ne)
+        square0 = np.sum(a0 * a0, axis=-1)
         self._pack = kernel.packs[0]._replace(
             frame=frame, length0=np.sqrt(square0).T, kappa0=(cross(a0, b0) / square0).T,
-            weights=np.ones((n, ne)), stiffness=np.ones((3, n, ne)), place=each, frame_place=each)
+            frame_place=np.arange(ne))
         self._slopes, self._shape = np.concatenate([G1, G2], axis=1), (n, ne)
         self.tangent0 = np.moveaxis(a0 / np.sqrt(square0)[..., None], -1, 0)
 
@@ -71,8 +71,7 @@ class CableSections:
         """
         d, (n, ne) = (self._slopes @ from_first_node(u_e)).transpose(1, 2, 0), self._shape
         r, strain = np.empty(d.shape), np.empty((2, n, ne))
-        weights, square, kappa = np.empty((3, n, ne))
-        stiffness = np.empty((3, n, ne))
-        cable_strain(self._pack, 0, d, r, weights, stiffness, square, kappa, strain)
+        square, kappa = np.empty((2, n, ne))
+        cable_strain(self._pack, 0, d, r, square, kappa, strain)
         tangent = (r[:n] / np.sqrt(square)[:, None]).transpose(1, 2, 0)
         return tangent, strain.swapaxes(1, 2)

@@ -288,6 +288,15 @@ def weigh(D, weights, P, Q):
 
 
 @source
+def add_scaled(c, x, y, out):
+    """out = y + c x."""
+    for i in lanes(x.shape[0]):
+        for j in lanes(x.shape[1]):
+            for e in lanes(x.shape[2]):
+                out[i, j, e] = y[i, j, e] + c * x[i, j, e]
+
+
+@source
 def copy_stress(x, y):
     """Stresses of a block from or into those of all elements."""
     for c in lanes(x.shape[0]):

@@ -20,9 +20,9 @@ from ..quadrature import gauss
 from ..source import F2, F3, I1, lanes, primitive, room, shaped, source
 from ..types import Array
 from .base import (CARRY, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
-                   Texts, add_by_rows, add_force, add_held_energy, add_tangent, block, copy_stress, load,
-                   packed, pair_tables, product, scaled_pair_tables, times_held, weigh,
-                   with_constant)
+                   Texts, add_by_rows, add_force, add_held_energy, add_scaled, add_tangent, block,
+                   copy_stress, load, packed, pair_tables, product, scaled_pair_tables, times_held,
+                   weigh, with_constant)
 
 if TYPE_CHECKING:
     from ..formulations.base import Formulation
@@ -101,41 +101,46 @@ def extension(a0, a1, da0, da1, length, length0):
 
 
 @source
-def cable_strain(pack, first, d, r, weights, stiffness, square, kappa, strain):
+def cable_strain(pack, first, d, r, square, kappa, strain):
     """Strains of the elements from ``first`` on, without cancellation in the extension.
 
     Parameters
     ----------
     d
         Displacement parts of a and b, shape (rows, 2, elements).
-    r, weights, stiffness, square, kappa, strain
-        Written: a and b, the weights and stiffnesses of the points, |a|^2, the curvature, and (eps,
-        kappa - kappa_0).
+    r, square, kappa, strain
+        Written: a and b, |a|^2, the curvature, and (eps, kappa - kappa_0).
     """
     n, size = square.shape[0], square.shape[1]
-    at, at0 = pack.place[first:first + size], pack.frame_place[first:first + size]
+    at, b = pack.frame_place[first:first + size], r[n:]
     for g in lanes(r.shape[0]):
         for i in lanes(2):
             for e in lanes(size):
-                r[g, i, e] = pack.frame[g, i, at0[e]] + d[g, i, e]
-    b = r[n:]
+                r[g, i, e] = pack.frame[g, i, at[e]] + d[g, i, e]
     for p in lanes(n):
         for e in lanes(size):
             a0, a1, da0, da1 = r[p, 0, e], r[p, 1, e], d[p, 0, e], d[p, 1, e]
             s = a0 * a0 + a1 * a1
             k = curvature(a0, a1, b[p, 0, e], b[p, 1, e], s)
-            strain[0, p, e] = extension(a0, a1, da0, da1, np.sqrt(s), pack.length0[p, at0[e]])
-            strain[1, p, e] = k - pack.kappa0[p, at0[e]]
-            square[p, e], kappa[p, e], weights[p, e] = s, k, pack.weights[p, at[e]]
-    for c in lanes(3):
-        for p in lanes(n):
-            for e in lanes(size):
-                stiffness[c, p, e] = pack.stiffness[c, p, at[e]]
+            strain[0, p, e] = extension(a0, a1, da0, da1, np.sqrt(s), pack.length0[p, at[e]])
+            strain[1, p, e] = k - pack.kappa0[p, at[e]]
+            square[p, e], kappa[p, e] = s, k
 
 
 @source
-def cable_rows(stiffness, weights, r, square, kappa, strain, T):
-    """What the mean resultants of two states do on the gradients; both may be the same.
+def cable_stress(stiffness, at, strain, other, S):
+    """The mean resultants of two strains."""
+    EA, EI, ES = stiffness[0], stiffness[1], stiffness[2]
+    for p in lanes(S.shape[1]):
+        for e in lanes(S.shape[2]):
+            x, y = strain[0, p, e] + other[0, p, e], strain[1, p, e] + other[1, p, e]
+            S[0, p, e] = 0.5 * (EA[p, at[e]] * x + ES[p, at[e]] * y)
+            S[1, p, e] = 0.5 * (EI[p, at[e]] * y + ES[p, at[e]] * x)
+
+
+@source
+def cable_rows(weights, at, r, square, kappa, S, T):
+    """What mean resultants of two states do on the gradients; both may be the same.
 
     eps and kappa are not quadratic in the coordinates; their changes are still linear in the
     step: ``d eps = (a0 + a1) . da / (|a0| + |a1|)`` and, from ``s kappa = a x b``,
@@ -145,11 +150,9 @@ def cable_rows(stiffness, weights, r, square, kappa, strain, T):
     b, Tb = r[:, n:], T[n:]
     for p in lanes(n):
         for e in lanes(T.shape[2]):
-            EA, EI, C = stiffness[0, p, e], stiffness[1, p, e], stiffness[2, p, e]
-            s, z, w = square[0, p, e], square[k, p, e], weights[p, e]
-            x, y = strain[0, 0, p, e] + strain[k, 0, p, e], strain[0, 1, p, e] + strain[k, 1, p, e]
-            M = w * (EI * y + C * x) / (s + z)
-            N = (w * (EA * x + C * y) / (np.sqrt(s) + np.sqrt(z))
+            s, z, w = square[0, p, e], square[k, p, e], 2.0 * weights[p, at[e]]
+            M = w * S[1, p, e] / (s + z)
+            N = (w * S[0, p, e] / (np.sqrt(s) + np.sqrt(z))
                  - (kappa[0, p, e] + kappa[k, p, e]) * M)
             a0, a1 = 0.5 * (r[0, p, 0, e] + r[k, p, 0, e]), 0.5 * (r[0, p, 1, e] + r[k, p, 1, e])
             T[p, 0, e] = N * a0 + 0.5 * M * (b[0, p, 1, e] + b[k, p, 1, e])
@@ -158,8 +161,8 @@ def cable_rows(stiffness, weights, r, square, kappa, strain, T):
 
 
 @source
-def cable_changes(stiffness, r, d, square, kappa, before, out):
-    """Resultants, linearised, after displacement parts d of a and b, from those before."""
+def cable_rates(r, d, square, kappa, rates):
+    """Changes of the strains, linearised, by displacement parts d of a and b."""
     n = square.shape[0]
     b, db = r[n:], d[n:]
     for p in lanes(n):
@@ -168,22 +171,21 @@ def cable_changes(stiffness, r, d, square, kappa, before, out):
             along = a0 * d[p, 0, e] + a1 * d[p, 1, e]
             change = (d[p, 0, e] * b[p, 1, e] - d[p, 1, e] * b[p, 0, e] + a0 * db[p, 1, e]
                       - a1 * db[p, 0, e] - 2.0 * kappa[p, e] * along)
-            x, y = along / np.sqrt(s), change / s
-            out[0, p, e] = before[0, p, e] + stiffness[0, p, e] * x + stiffness[2, p, e] * y
-            out[1, p, e] = before[1, p, e] + stiffness[1, p, e] * y + stiffness[2, p, e] * x
+            rates[0, p, e], rates[1, p, e] = along / np.sqrt(s), change / s
 
 
 @source
-def cable_factors(stiffness, weights, r, square, kappa, stress, M, skew):
+def cable_factors(stiffness, weights, at, r, square, kappa, stress, M, skew):
     """Factors of the pairs (a, a), (a, b), (b, b) for N d^2 eps + M d^2 kappa and the stiffness."""
     n = square.shape[0]
     b, Maa, Mab, Mbb = r[n:], M[:n], M[n:2 * n], M[2 * n:]
+    EA, EI, ES = stiffness[0], stiffness[1], stiffness[2]
     for p in lanes(n):
         for e in lanes(M.shape[2]):
             a0, a1, b0, b1 = r[p, 0, e], r[p, 1, e], b[p, 0, e], b[p, 1, e]
-            s, k, w = square[p, e], kappa[p, e], weights[p, e]
-            x, y = w * stiffness[0, p, e] / s, w * stiffness[1, p, e] / (s * s)
-            z = w * stiffness[2, p, e] / (s * np.sqrt(s))
+            s, k, w = square[p, e], kappa[p, e], weights[p, at[e]]
+            x, y = w * EA[p, at[e]] / s, w * EI[p, at[e]] / (s * s)
+            z = w * ES[p, at[e]] / (s * np.sqrt(s))
             N, m = w * stress[0, p, e] / (s * np.sqrt(s)), 2.0 * w * stress[1, p, e] / (s * s)
             k0, k1, c = b1 - 2.0 * k * a0, -b0 - 2.0 * k * a1, k * s
             q = 4.0 * k * m  # derivatives of eps by a: a / |a|; of kappa: k / s by a, (-a1, a0) / s
@@ -213,8 +215,8 @@ def cable_gradients(table, first, pairs, r, square, kappa, out):
     X, b = room((3, n, 2, size), r), r[n:]
     for p in lanes(n):
         for e in lanes(size):
-            a0, a1, s, k, z = r[p, 0, e], r[p, 1, e], square[p, e], kappa[p, e], np.sqrt(square[p, e])
-            X[0, p, 0, e], X[0, p, 1, e] = a0 / z, a1 / z
+            a0, a1, s, k = r[p, 0, e], r[p, 1, e], square[p, e], kappa[p, e]
+            X[0, p, 0, e], X[0, p, 1, e] = a0 / np.sqrt(s), a1 / np.sqrt(s)
             X[1, p, 0, e] = (b[p, 1, e] - 2.0 * k * a0) / s
             X[1, p, 1, e] = (-b[p, 0, e] - 2.0 * k * a1) / s
             X[2, p, 0, e], X[2, p, 1, e] = -a1 / s, a0 / s
@@ -244,67 +246,64 @@ def cable_block(pack, what, first, last, u, v, f, given, out, to):
     """As :func:`cable_evaluate`, for the elements from ``first`` to ``last``."""
     whole, given, out = out, given[:, :, first:last], out[:, :, first:last]
     n, nr, nb, size = len(pack.weights), pack.table.shape[1], pack.table.shape[2], out.shape[2]
-    states = 2 if what == MEAN else 1
+    states, changes = 2 if what == MEAN else 1, what == CARRY or what == VISCOUS
+    at, stiffness, weights = pack.place[first:last], pack.stiffness, pack.weights
     U, d, T = room((2, nb, 2, size), u), room((2, nr, 2, size), u), room((nr, 2, size), u)
     r, square, kappa = room((2, nr, 2, size), u), room((2, n, size), u), room((2, n, size), u)
     strain, S = room((2, 2, n, size), u), room((2, n, size), u)
-    weights, stiffness = room((n, size), pack.weights), room((3, n, size), pack.weights)
-    one = room((3, n, size), pack.weights)
-    for k in range(2 if what == MEAN or what == CARRY or what == VISCOUS else 1):
+    for k in range(2 if what == MEAN or changes else 1):
         load(pack.start, pack.span, first, v if k else u, U[k])
         product(pack.table, first, U[k], d[k])
         if k < states:
-            cable_strain(pack, first, d[k], r[k], weights, stiffness, square[k], kappa[k],
-                         strain[k])
+            cable_strain(pack, first, d[k], r[k], square[k], kappa[k], strain[k])
     if what == GRADIENTS:
-        D = room((4, n, size), weights)
-        for p in lanes(n):
-            for e in lanes(size):
-                D[0, p, e], D[3, p, e] = stiffness[0, p, e], stiffness[1, p, e]
-                D[1, p, e], D[2, p, e] = stiffness[2, p, e], stiffness[2, p, e]
-        B = shaped(whole, (2, pack.start.size, 2, n, nb, 2))[:, first:last]
-        B[:] = 0.0
-        cable_gradients(pack.table, first, pack.pairs.pairs, r[0], square[0], kappa[0], B[0])
-        B = shaped(whole, (2, pack.start.size, 2, n, 2 * nb))[:, first:last]
-        weigh(D, weights, B[0], B[1])
+        _write_gradients(pack, first, at, r[0], square[0], kappa[0], whole)
         return
-    if what == CARRY:
-        copy_stress(given, S)
-        cable_changes(stiffness, r[0], d[1], square[0], kappa[0], S, strain[0])
-        copy_stress(strain[0], out)
-        return
-    if what == VISCOUS:  # rates in place of strains
-        S[:], one[:2], one[2:] = 0.0, 1.0, 0.0
-        cable_changes(one, r[0], d[1], square[0], kappa[0], S, strain[0])
     k = states - 1
+    if changes:
+        cable_rates(r[0], d[1], square[0], kappa[0], strain[0])
+    cable_stress(stiffness, at, strain[0], strain[k], S)
+    if what == CARRY:
+        add_scaled(1.0, given, S, S)
     if out.shape[0] > 0:
-        for c in range(2):
-            for p in lanes(n):
-                for e in lanes(size):
-                    x, y = strain[0, c, p, e], strain[0, 1 - c, p, e]
-                    x, y = x + strain[k, c, p, e], y + strain[k, 1 - c, p, e]
-                    out[c, p, e] = 0.5 * (stiffness[c, p, e] * x + stiffness[2, p, e] * y)
-    if what == STRESS:
+        copy_stress(S, out)
+    if what == STRESS or what == CARRY:
         return
-    if given.shape[0] > 0 and what != TANGENT:  # they are the strains of no law
-        stiffness[:2], stiffness[2:] = 1.0, 0.0
-        for j in range(states):
-            copy_stress(given, strain[j])
+    if given.shape[0] > 0 and what != TANGENT:
+        copy_stress(given, S)
     if what == MEAN:
         for k in lanes(nb):
             for i in lanes(2):
                 for e in lanes(size):
                     U[0, k, i, e] = 0.5 * (U[0, k, i, e] + U[1, k, i, e])
-    cable_rows(stiffness, weights, r[:states], square[:states], kappa[:states],
-               strain[:states], T)
+    cable_rows(weights, at, r[:states], square[:states], kappa[:states], S, T)
     held = pack.constant[:0] if what == GIVEN else pack.constant
     add_force(pack.table, pack.transposed, held, pack.start, pack.span, first, T, U[0], f)
     if what == TANGENT:
-        M, skew = room((3 * n, 3, size), weights), room((n + 1, 1, size), weights)
-        copy_stress(given if given.shape[0] > 0 else out, S)
+        M, skew = room((3 * n, 3, size), u), room((n + 1, 1, size), u)
+        if given.shape[0] > 0:
+            copy_stress(given, S)
         skew[n:] = 0.0
-        cable_factors(stiffness, weights, r[0], square[0], kappa[0], S, M, skew)
+        cable_factors(stiffness, weights, at, r[0], square[0], kappa[0], S, M, skew)
         add_tangent(pack.table, pack.pairs, pack.start, first, M, skew, to)
+
+
+@source
+def _write_gradients(pack, first, at, r, square, kappa, out):
+    """What :func:`~skfem_ancf.body.body_gradients` finds, of the elements from ``first`` on."""
+    n, nb, size, ne = len(pack.weights), pack.table.shape[2], at.size, pack.start.size
+    D, w = room((4, n, size), r), room((n, size), r)
+    EA, EI, ES = pack.stiffness[0], pack.stiffness[1], pack.stiffness[2]
+    for p in lanes(n):
+        for e in lanes(size):
+            w[p, e] = pack.weights[p, at[e]]
+            D[0, p, e], D[1, p, e] = EA[p, at[e]], ES[p, at[e]]
+            D[2, p, e], D[3, p, e] = ES[p, at[e]], EI[p, at[e]]
+    B = shaped(out, (2, ne, 2, n, nb, 2))[:, first:first + size]
+    B[:] = 0.0
+    cable_gradients(pack.table, first, pack.pairs.pairs, r, square, kappa, B[0])
+    B = shaped(out, (2, ne, 2, n, 2 * nb))[:, first:first + size]
+    weigh(D, w, B[0], B[1])
 
 
 def cable_energy(pack: CablePack, u: Array, out: Array) -> None:

@@ -20,8 +20,8 @@ from ..materials import LinearLaw
 from ..source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
 from ..types import Array
 from .base import (CARRY, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
-                   Texts, add_by_rows, add_force, add_held_energy, add_tangent, apart, block, copy_stress, in_rounds,
-                   load, packed, pair_numbers, pair_tables, product,
+                   Texts, add_by_rows, add_force, add_held_energy, add_scaled, add_tangent, apart,
+                   block, copy_stress, in_rounds, load, packed, pair_numbers, pair_tables, product,
                    scaled_pair_tables, times_held, weigh, with_constant)
 from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
 
@@ -108,15 +108,6 @@ def set_tables(frame, weights, at, x, w):
     for p in lanes(w.shape[0]):
         for e in lanes(at.size):
             w[p, e] = weights[p, at[e]]
-
-
-@source
-def add_scaled(c, x, y, out):
-    """out = y + c x."""
-    for i in lanes(x.shape[0]):
-        for j in lanes(x.shape[1]):
-            for e in lanes(x.shape[2]):
-                out[i, j, e] = y[i, j, e] + c * x[i, j, e]
 
 
 @source
