@@ -59,6 +59,12 @@ def multiply(A, x, y):
 
 
 @primitive("factors")
+def add_multiple(c, x, y):
+    """y += c x, of vectors; compiled for short ones."""
+    y += c * x
+
+
+@primitive("factors")
 def factorize(A):
     """Factorise in place; False if a pivot is lost.
 

@@ -10,17 +10,37 @@ from .vectors import products, scale, subtract, subtract_columns
 @jit
 def multiply(A, x, y):
     """y = A x."""
-    n, flat, ld = x.size, A.flat[A.top:], A.ld
+    n, flat, ld, top, width = x.size, A.flat, A.ld, A.top, A.width
     for i in range(n):
         y[i] = 0.0
-    for j in range(n):
-        at, last, xj = j * ld, min(A.width, n - 1 - j), x[j]
-        subtract(y, j + 1, flat, (at + 1,), last, (-xj,))
-        if A.top > 0:
-            up = min(A.width, j)
-            subtract(y, j - up, A.flat, (A.top + at - up,), up + 1, (-xj,))
-            continue
-        y[j] += products(x, j, last + 1, flat, (at,))[0]
+    if top > 0:
+        for j in range(n):
+            up = min(width, j)
+            subtract(y, j - up, flat, (top + j * ld - up,), up + 1 + min(width, n - 1 - j),
+                     (-x[j],))
+        return
+    last = n - n % 4
+    for j in range(0, last, 4):
+        a, m = j * ld, min(width, n - 4 - j)
+        b, c, d = a + ld, a + 2 * ld, a + 3 * ld
+        e, f, g, h = x[j], x[j + 1], x[j + 2], x[j + 3]
+        p, q, r, s = products(x, j + 4, m, flat, (a + 4, b + 3, c + 2, d + 1))
+        y[j] += p + flat[a] * e + flat[a + 1] * f + flat[a + 2] * g + flat[a + 3] * h
+        y[j + 1] += q + flat[a + 1] * e + flat[b] * f + flat[b + 1] * g + flat[b + 2] * h
+        y[j + 2] += r + flat[a + 2] * e + flat[b + 1] * f + flat[c] * g + flat[c + 1] * h
+        y[j + 3] += s + flat[a + 3] * e + flat[b + 2] * f + flat[c + 1] * g + flat[d] * h
+        subtract(y, j + 4, flat, (a + 4, b + 3, c + 2, d + 1), m, (-e, -f, -g, -h))
+    for j in range(last, n):
+        y[j] += flat[j * ld] * x[j]
+        for k in range(1, n - j):
+            y[j] += flat[j * ld + k] * x[j + k]
+            y[j + k] += flat[j * ld + k] * x[j]
+
+
+@jit
+def add_multiple(c, x, y):
+    """y += c x."""
+    subtract(y, 0, x, (0,), x.size, (-c,))
 
 
 @jit

@@ -64,21 +64,32 @@ def add_by_rows(table, first, rows, X, out):
 @jit
 def add_changes(B, start, x, out):
     flat, n, span = shaped(B, (B.size,)), B.shape[1], B.shape[2]
-    y = shaped(out, (n, start.size))
+    y, whole = shaped(out, (n, start.size)), n - n % 4
     for e in range(start.size):
-        at = e % B.shape[0] * n * span
-        for s in range(n):
-            y[s, e] += products(x, start[e], span, flat, (at + s * span,))[0]
+        at, of = e % B.shape[0] * n * span, start[e]
+        for s in range(0, whole, 4):
+            a = at + s * span
+            p, q, r, t = products(x, of, span, flat, (a, a + span, a + 2 * span, a + 3 * span))
+            y[s, e] += p
+            y[s + 1, e] += q
+            y[s + 2, e] += r
+            y[s + 3, e] += t
+        for s in range(whole, n):
+            y[s, e] += products(x, of, span, flat, (at + s * span,))[0]
 
 
 @jit
 def add_pushes(B, start, S, f):
     flat, n, span = shaped(B, (B.size,)), B.shape[1], B.shape[2]
-    y = shaped(S, (n, start.size))
+    y, whole = shaped(S, (n, start.size)), n - n % 4
     for e in range(start.size):
-        at = e % B.shape[0] * n * span
-        for s in range(n):
-            subtract(f, start[e], flat, (at + s * span,), span, (-y[s, e],))
+        at, to = e % B.shape[0] * n * span, start[e]
+        for s in range(0, whole, 4):
+            a = at + s * span
+            subtract(f, to, flat, (a, a + span, a + 2 * span, a + 3 * span), span,
+                     (-y[s, e], -y[s + 1, e], -y[s + 2, e], -y[s + 3, e]))
+        for s in range(whole, n):
+            subtract(f, to, flat, (at + s * span,), span, (-y[s, e],))
 
 
 @jit

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..band import (SPARE, Band, clear, copy, dense_solve, factorize, factorize_complex, multiply,
-                    solve, solve_complex, solve_joined)
+from ..band import (SPARE, Band, add_multiple, clear, copy, dense_solve, factorize,
+                    factorize_complex, multiply, solve, solve_complex, solve_joined)
 from ..body import (add_force_by, body_force, body_gradients, body_mean_stress, body_mixed,
                     body_stress, body_tangent, carry_by)
 from ..forces.texts import (add_elastic_force, add_element_damping, add_element_tangent,
@@ -235,6 +235,7 @@ def collocate(e, matrices, rule, s, w, state, memories, rows, stages, multiplier
 def _converges(e, matrices, method, rule, s, w, state, step):
     """Iterate to the points of a step: U, V and W are theirs then; False if there are none."""
     n, room, told, u0 = method.points.size, w.x[0], GO_ON, w.y[0]
+    rates = w.gaps.size > 0 or matrices.dampers.active > 0
     multiply(matrices.M, u0, room)
     largest = 0.0
     for k in range(method.values.shape[1]):
@@ -247,7 +248,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
         state[READY] = 0.0  # old ones have turned the beam
     _start(e.copies, method, s, w, state, step)
     for _ in range(ITERATIONS):
-        _states(e.free, method, s, w, step)
+        _states(e.free, method, s, w, step, rates)
         if state[READY] == 0.0:
             if not _factorize(e, matrices, method, s, w, state, step):
                 state[FAILURE] = SINGULAR
@@ -271,7 +272,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
             break
         elif state[MIXED] > 0.0:
             carry_by(e.body, e.copies, w.B, _flat(w.R), w.own, w.carried)
-    _states(e.free, method, s, w, step)
+    _states(e.free, method, s, w, step, True)
     if told != DONE and told != FAILED:
         state[FAILURE] = NOT_CONVERGED
     return told == DONE
@@ -286,9 +287,10 @@ def _ahead(method, ahead, h, before, w):
         for i in lanes(u.size):
             guess[i] = u[i] + (before + c) * v[i] - u0[i] - c * v0[i]
         for j in range(n):
-            U, p, b = w.U[j], ahead[k, j], before * method.points[j]
-            for i in lanes(u.size):
-                guess[i] += p * (U[i] - u[i] - b * v[i])
+            p = ahead[k, j]
+            add_multiple(p, w.U[j], guess)
+            add_multiple(-p, u, guess)
+            add_multiple(-p * before * method.points[j], v, guess)
 
 
 @source
@@ -302,9 +304,8 @@ def _end(e, matrices, method, s, w, state, step):
         if dampers.active > 0:
             damping_force(e, dampers, matrices.M, s.times[first + k], U, V, f, room)
             state[DISSIPATED] += c * np.dot(f, V)
-        for i in lanes(u.size):
-            u[i] += c * V[i]
-            v[i] += c * W[i]
+        add_multiple(c, V, u)
+        add_multiple(c, W, v)
     if method.points[n - 1] == 1.0:
         copy(w.U[n - 1], u)
         copy(w.V[n - 1], v)
@@ -398,24 +399,25 @@ def _is_lost(state):
 
 
 @source
-def _states(free, method, s, w, step):
-    """Displacements, velocities and accelerations of the points."""
+def _states(free, method, s, w, step, rates):
+    """Displacements, accelerations and, if asked for, velocities of the points."""
     u0, v0, n, N = w.y[0], w.y[1], method.points.size, free.size
     for k in range(n):
         U, V, W, Z, c = w.U[k], w.V[k], w.W[k], w.Z[k], s.h * method.points[k]
         held = _row(s.held, step * (n + 1) + k)
         for i in lanes(N):
             U[i] = (u0[i] + c * v0[i] + Z[i]) * free[i] + held[0, i]
-            V[i] = v0[i]
             W[i] = 0.0
         for j in range(n):
-            Z, p, q = w.Z[j], method.first[k, j] / s.h, method.second[k, j] / (s.h * s.h)
-            for i in lanes(N):
-                V[i] += p * Z[i]
-                W[i] += q * Z[i]
+            add_multiple(method.second[k, j] / (s.h * s.h), w.Z[j], W)
         for i in lanes(N):
-            V[i] = V[i] * free[i] + held[1, i]
             W[i] = W[i] * free[i] + held[2, i]
+        if rates:
+            copy(v0, V)
+            for j in range(n):
+                add_multiple(method.first[k, j] / s.h, w.Z[j], V)
+            for i in lanes(N):
+                V[i] = V[i] * free[i] + held[1, i]
 
 
 @source
@@ -486,17 +488,15 @@ def _correct(free, method, s, w, state):
             x[i] = 0.0
             y[i] = 0.0
         for j in range(n):
-            a, b, R = method.to[0, k, j], method.to[1, k, j], w.R[j]
-            for i in lanes(N):
-                x[i] += a * R[i]
-                y[i] += b * R[i]
+            add_multiple(method.to[0, k, j], w.R[j], x)
+            add_multiple(method.to[1, k, j], w.R[j], y)
         solve_for(w, k, x, y)
         if m > 0 and not _join(method, s, w, k, r, q, x, y):
             return False
         for j in range(n):
-            a, b, out = method.back[0, j, k], method.back[1, j, k], D[j]
-            for i in lanes(N):
-                out[i] += a * x[i] - b * y[i]
+            a, b = method.back[0, j, k], method.back[1, j, k]
+            add_multiple(a, x, D[j])
+            add_multiple(-b, y, D[j])
             for l in range(m):
                 dl[j, l] += a * r[l] - b * r[m + l]
     for j in range(n):
@@ -553,9 +553,7 @@ def _factorize(e, matrices, method, s, w, state, step):
     for i in lanes(origin.size):
         origin[i] = 0.0
     for k in range(method.points.size):
-        U, c = w.U[k], method.weights[k]
-        for i in lanes(origin.size):
-            origin[i] += c * U[i]
+        add_multiple(method.weights[k], w.U[k], origin)
     if state[MIXED] > 0.0:
         body_gradients(e.body, origin, w.B)
         body_mean_stress(e.body, e.copies, method.weights, w.carried, S[1])
