@@ -6,7 +6,9 @@ from numpy.testing import assert_allclose
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
                         NeoHookean, Scene, StVenantKirchhoff)
+from skfem_ancf import body
 from skfem_ancf.compiled import load
+from skfem_ancf.dynamics import stages
 from skfem_ancf.evaluation import CARRY, FORCE, MEAN, STRESS, TANGENT, evaluate
 from skfem_ancf.formulations import get_formulation
 from skfem_ancf.kernels import CableKernel, Kernel, law
@@ -187,6 +189,50 @@ def test_forces_and_stresses_of_copies_are_those_of_each(kind, mesh):
             assert_allclose(f[j], one, rtol=0, atol=1e-12 * abs(one).max())
             assert_allclose(stress[:, :, j * size:(j + 1) * size], own, rtol=0,
                             atol=1e-12 * abs(own).max())
+
+
+@kinds
+@every
+def test_gradients_carry_stresses_and_give_forces(kind, mesh):
+    """As the kernels do from the displacement, of three copies."""
+    _, element, formulation, name = KINDS[kind]
+    system = Scene(Beam(MESHES[mesh](), element(), LAWS[name](2e5, 0.3), 0.02, formulation)).system
+    tables, N, rng = system.machine.tables, system.N, np.random.default_rng(4)
+    plain, copies = tables.plain.body, tables.copied(3).plain.copies
+    u, _ = states(system)
+    du, S = rng.standard_normal(3 * N), rng.standard_normal(body.stress_size(copies))
+    gradients, carried, expected = np.zeros(body.gradients_size(plain)), S.copy(), S.copy()
+    f, g = np.zeros((2, 3 * N))
+    body.body_gradients(plain, u, gradients)
+    body.carry_by(plain, copies, gradients, du, S, carried)
+    body.body_carry(copies, np.tile(u, 3), du, S, expected)
+    close(carried, expected)
+    body.add_force_by(plain, copies, gradients, S, f)
+    body.add_force_of(copies, np.tile(u, 3), S, g)
+    close(f, g)
+
+
+@pytest.mark.skipif(compiled_off() is not None, reason="without Numba")
+@pytest.mark.parametrize("nodes", [[0, 0.2, 0.6, 1], np.linspace(0, 1, 35)])  # in several blocks
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if KINDS[kind][3] != "own"])
+def test_collocation_with_carried_stresses_is_the_same_compiled(kind, nodes, monkeypatch):
+    """Of a stiff pendulum that turns far in each step."""
+    _, element, formulation, name = KINDS[kind]
+    found, calls = [], []
+
+    def gradients(*args):
+        calls.append(args)
+        body.body_gradients(*args)
+
+    monkeypatch.setattr(stages, "body_gradients", gradients)  # of the plain text
+    for compiled in (False, True):
+        mesh = MeshBeam.init_line(nodes, height=0.05)
+        s = Scene(Beam(mesh, element(), LAWS[name](1e8, 0.3, 1000.0), 0.02, formulation,
+                       compiled=compiled)).pin("left").gravity((0.0, -9.81))
+        found.append(s.integrate(0.3, 0.1, scheme="radau", tol=1e-8, progress=False))
+    a, b = found
+    assert a.iterations == b.iterations and a.factorizations == b.factorizations and calls
+    close(b.u[-1], a.u[-1], 1e-9)
 
 
 def test_a_law_of_ones_own_goes_with_its_kernel():
