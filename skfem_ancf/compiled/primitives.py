@@ -52,13 +52,12 @@ def turned_product(A, turned, first, B, out):
 
 @jit
 def add_by_rows(table, first, rows, X, out):
-    for e in range(out.shape[0]):
-        G = table[first + e if table.shape[0] > 1 else 0]
-        for s in range(out.shape[1]):
-            g, x, y = rows[s], X[s, 0, e], X[s, 1, e]
+    for s in range(out.shape[0]):
+        for e in range(out.shape[1]):
+            at, g, x, y = first + e if table.shape[0] > 1 else 0, rows[s], X[s, 0, e], X[s, 1, e]
             for k in range(out.shape[2]):
-                out[e, s, k, 0] += x * G[g, k]
-                out[e, s, k, 1] += y * G[g, k]
+                out[s, e, k, 0] += x * table[at, g, k]
+                out[s, e, k, 1] += y * table[at, g, k]
 
 
 @jit

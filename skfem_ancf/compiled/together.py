@@ -30,7 +30,7 @@ from . import nothing_collected
 SHORT = 800
 #: Modules whose texts are compiled for size: their loops take less time than what they call; and
 #: texts of others.
-BRIEF = {"border", "forces.texts", "statics.iteration"} | {
+BRIEF = {"border", "forces.texts", "kernels.section.section_gradients", "statics.iteration"} | {
     f"forces.contact_texts.{name}" for name in (
         "_carry", "_keep_work", "_near", "_of_group", "_reach_on", "_stride", "distances",
         "levers", "press", "resist", "stick")}

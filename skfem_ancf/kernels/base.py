@@ -86,9 +86,9 @@ def turned_product(A, turned, first, B, out):
 
 @primitive("primitives")
 def add_by_rows(table, first, rows, X, out):
-    """out[e, s, k, i] += X[s, i, e] G[g, k] with row g = rows[s] of each element's table."""
-    G = table if len(table) == 1 else table[first:first + len(out)]
-    out += X.transpose(2, 0, 1)[:, :, None] * G[:, rows][..., None]
+    """out[s, e, k, i] += X[s, i, e] G[g, k] with row g = rows[s] of each element's table."""
+    G = table if len(table) == 1 else table[first:first + out.shape[1]]
+    out += X.transpose(0, 2, 1)[:, :, None] * G[:, rows].swapaxes(0, 1)[..., None]
 
 
 @primitive("primitives")
@@ -263,28 +263,27 @@ def add_tangent(table, pairs, start, first, M, M_skew, to):
 
 
 @source
-def weigh(D, weights, P, Q):
-    """Q = D P with the moduli of each point, then P times weights, shape (elements, c, points, k).
+def weigh(D, weights, X, P, Q):
+    """P = X times weights, and Q = D X with the moduli of each point.
 
     Parameters
     ----------
     D, weights
         Shape (c^2, points, elements), (points, elements).
-    P, Q
-        As said.
+    X, P, Q
+        Derivatives of the strains, shape (c, points, elements, k), and (elements, c, points, k).
     """
-    n = P.shape[1]
+    n = len(X)
+    Q[:] = 0.0
     for c in range(n):
-        for p in range(P.shape[2]):
+        for p in range(X.shape[1]):
+            for e in lanes(len(P)):
+                for k in lanes(P.shape[3]):
+                    P[e, c, p, k] = column(weights[p, e]) * X[c, p, e, k]
             for d in range(n):
                 for e in lanes(len(P)):
                     for k in lanes(P.shape[3]):
-                        Q[e, c, p, k] += column(D[n * c + d, p, e]) * P[e, d, p, k]
-    for c in range(n):
-        for p in range(P.shape[2]):
-            for e in lanes(len(P)):
-                for k in lanes(P.shape[3]):
-                    P[e, c, p, k] *= column(weights[p, e])
+                        Q[e, c, p, k] += column(D[n * c + d, p, e]) * X[d, p, e, k]
 
 
 @source

@@ -207,7 +207,7 @@ def cable_factors(stiffness, weights, at, r, square, kappa, stress, M, skew):
 
 @source
 def cable_gradients(table, first, pairs, r, square, kappa, out):
-    """Derivatives of the strains into ``out``, (elements, 2, points, nb, 2).
+    """Derivatives of the strains into ``out``, (2, points, elements, nb, 2).
 
     Those of eps by a are a / |a|, of kappa k / s by a and (-a1, a0) / s by b.
     """
@@ -220,10 +220,10 @@ def cable_gradients(table, first, pairs, r, square, kappa, out):
             X[1, p, 0, e] = (b[p, 1, e] - 2.0 * k * a0) / s
             X[1, p, 1, e] = (-b[p, 0, e] - 2.0 * k * a1) / s
             X[2, p, 0, e], X[2, p, 1, e] = -a1 / s, a0 / s
-    a_rows, b_rows = pairs[0, n:2 * n], pairs[1, n:2 * n]
-    add_by_rows(table, first, a_rows, X[0], out[:, 0])
-    add_by_rows(table, first, a_rows, X[1], out[:, 1])
-    add_by_rows(table, first, b_rows, X[2], out[:, 1])
+    out[:] = 0.0
+    for j in range(3):
+        g = pairs[j // 2, n:2 * n]
+        add_by_rows(table, first, g, X[j], out[(j + 1) // 2])
 
 
 @source
@@ -299,11 +299,10 @@ def _write_gradients(pack, first, at, r, square, kappa, out):
             w[p, e] = pack.weights[p, at[e]]
             D[0, p, e], D[1, p, e] = EA[p, at[e]], ES[p, at[e]]
             D[2, p, e], D[3, p, e] = ES[p, at[e]], EI[p, at[e]]
-    B = shaped(out, (2, ne, 2, n, nb, 2))[:, first:first + size]
-    B[:] = 0.0
-    cable_gradients(pack.table, first, pack.pairs.pairs, r, square, kappa, B[0])
+    X = room((2, n, size, nb, 2), r)
+    cable_gradients(pack.table, first, pack.pairs.pairs, r, square, kappa, X)
     B = shaped(out, (2, ne, 2, n, 2 * nb))[:, first:first + size]
-    weigh(D, w, B[0], B[1])
+    weigh(D, w, shaped(X, (2, n, size, 2 * nb)), B[0], B[1])
 
 
 def cable_energy(pack: CablePack, u: Array, out: Array) -> None:

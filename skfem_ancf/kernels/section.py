@@ -229,11 +229,10 @@ def pair_factors(rows, samples, terms, rounds, moduli, r, M, M_skew):
 
 
 @source
-def section_gradients(pack, first, r, B):
-    """Derivatives of the strains at the points into B, (elements, 3, points, 2 nb)."""
-    rows, size, ns = pack.rows, r.shape[2], B.shape[2] // pack.along.shape[1]
-    X, nb = room((2, rows.shape[1], 2, size), r), B.shape[3] // 2
-    samples = room((size, rows.shape[1], nb, 2), r)
+def section_gradients(pack, first, r, points):
+    """Derivatives of the strains at the points, shape (3, points, elements 2 nb)."""
+    rows, size, nb = pack.rows, r.shape[2], pack.table.shape[2]
+    X, samples = room((2, rows.shape[1], 2, size), r), room((rows.shape[1], size, nb, 2), r)
     for s in lanes(rows.shape[1]):
         g, h, c = rows[0, s], rows[1, s], pack.factors[s]
         for i in range(2):
@@ -242,17 +241,7 @@ def section_gradients(pack, first, r, B):
     samples[:] = 0.0
     add_by_rows(pack.table, first, rows[0], X[0], samples)
     add_by_rows(pack.table, first, rows[1], X[1], samples)
-    flat = shaped(samples, (size, rows.shape[1], 2 * nb))
-    for c in range(3):
-        for i in range(pack.along.shape[1]):
-            x = B[:, c, i * ns:(i + 1) * ns]
-            for k in range((pack.ends[c + 1] - pack.ends[c]) // ns):
-                factor, y = pack.along[c, i, k], flat[:, pack.ends[c] + k * ns:]
-                if factor != 0.0:
-                    for e in lanes(size):
-                        for j in lanes(ns):
-                            for m in lanes(2 * nb):
-                                x[e, j, m] += factor * y[e, j, m]
+    to_points(pack.along, pack.ends, shaped(samples, (rows.shape[1], 2 * nb * size)), points)
 
 
 @source
@@ -329,10 +318,10 @@ def section_block(pack, what, first, last, u, v, f, given, out, to):
             law_evaluate(law, change if what == VISCOUS else strain,
                          both[part] if k else strains[2 + part])
         if what == GRADIENTS:
+            X = room((3, n, 2 * nb * size), r)
+            section_gradients(pack, first, r, X)
             B = shaped(whole, (2, pack.start.size, 3, n, 2 * nb))[:, first:last]
-            B[:] = 0.0
-            section_gradients(pack, first, r, B[0])
-            weigh(D, w, B[0], B[1])
+            weigh(D, w, shaped(X, (3, n, size, 2 * nb)), B[0], B[1])
             return
         if what == CARRY:
             tangent_stress(D, change, S)
