@@ -17,6 +17,7 @@ from .compiled.words import Words, constant
 from .forces.system import NO_FORCES
 from .forces.texts import ForceTables
 from .kept import cached_property, twin_of
+from .kernels.base import packed
 from .kernels.law import LINEAR, OWN, text_of, with_text
 from .kernels.moments import MomentPack
 from .kernels.section import SectionPack, linearised
@@ -469,8 +470,8 @@ def _parts(packs, elements, contacts):
 
 
 def _beside(arrays):
-    """Arrays (n, ...) beside each other."""
-    return arrays[0] if len(arrays) == 1 else np.hstack(arrays)
+    """Arrays (n, ...) beside each other, as compiled code takes them."""
+    return packed(arrays[0] if len(arrays) == 1 else np.hstack(arrays))
 
 
 def _with_laws(body, address):

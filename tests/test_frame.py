@@ -585,6 +585,16 @@ def test_supports_that_shake(scheme, monkeypatch):
     assert_allclose(turns, 0.3 * np.sin(20 * ours.t[[10, 30]]) ** 2, atol=1e-9)
 
 
+@pytest.mark.parametrize("angle", [0.3, lambda t: 0.3 * t])
+def test_tables_of_settled_supports_are_as_compiled_code_takes_them(angle):
+    """Contiguous and writeable: others would be compiled for anew, or read as if they were."""
+    system = portal().settle(0, angle=angle).system
+    tables = system.machine.tables
+    for times in np.ones(1), np.linspace(0, 1, 3):
+        for table in tables.offsets(times), tables.slopes(times):
+            assert table.flags.carray and len(table) == len(times)
+
+
 def test_settlements_that_cannot_be():
     frame = portal(clamp=False, hinges=[0]).pin(0).clamp(3)
     with pytest.raises(InputError, match="give x=, y= or angle="):
