@@ -427,6 +427,14 @@ class Tables:
             return np.zeros((len(times), 0))
         return _beside([joint.slope_entries(times, s.N)[2] for joint in s.joints])
 
+    def at(self, t: float) -> tuple[Array, Array]:
+        """c and g of all joints at one time, shapes (m,) and (k,)."""
+        if not self.motion_varies and not self.plain.joints.own:
+            c, g = self.still
+            return c[0, 0], g[0, 0]
+        times = np.array([t])
+        return self.offsets(times)[0], self.slopes(times)[0]
+
     @cached_property
     def still(self) -> tuple[Array, Array]:
         """c and g of joints that do not move with both rates, (1, 3, m) and (1, 4, k).

@@ -125,6 +125,32 @@ def test_weights_are_the_integrals_of_the_functions(element):
     assert np.allclose(total, beam.total_mass * g, rtol=1e-12)
 
 
+@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCF(3),
+                                     ElementBeamANCFCubic(2)], ids=repr)
+def test_masses_of_equal_elements_are_integrals_of_products(monkeypatch, element):
+    mesh = MeshBeam.init_line(np.linspace(0.0, 2.0, 4), height=0.3)
+    beam = Beam(mesh, element, StVenantKirchhoff(2e9, 0.3, 7800.0), width=0.02)
+    one, = beam.inertia.matrices(slice(None))
+    maps = counted(monkeypatch, MeshBeam, "mapping")
+    found = beam.mass_elements(slice(1, 3))
+    assert found.shape == (2, *one.shape) and not maps
+    scale = np.sqrt(np.diag(one))
+    assert np.abs((found - one) / np.outer(scale, scale)).max() < 1e-14
+
+
+def test_joints_at_rest_are_asked_once(monkeypatch):
+    """Static solutions have their tables from the first; joints that move are asked at each."""
+    asked = counted(monkeypatch, Tables, "slopes")
+    scene, moved = cantilever(ElementBeamANCF(2)), cantilever(ElementBeamANCF(2))
+    scene.joint("line", at=(1.0, 0.0), direction=(1.0, 1.0))
+    first, second = scene.solve_static(), scene.solve_static()
+    assert len(asked) == 1 and np.array_equal(first.u, second.u)
+    moved.joint("angle", at=(1.0, 0.0), angle=lambda t: 0.1 * t)
+    asked.clear()
+    assert np.array_equal(moved.solve_static().u, moved.solve_static().u)
+    assert len(asked) > 1
+
+
 @pytest.mark.parametrize("origin, angle", [((0.0, 0.0), 0.0), ((3e3, -1.0), 0.7)])
 @pytest.mark.parametrize("x", [[0.0, 0.5], [0.5, 1.0, 1.5, 2.0], [0.0, 0.3, 1.0]])
 def test_a_line_is_the_mesh_that_its_nodes_make(x, origin, angle):

@@ -474,9 +474,8 @@ def _target(system, result, load, start):
     if gap is not None:
         values = u0[system.fixed] + load * (values - u0[system.fixed])
         gap = (1.0 - load) * gap
-    times = np.array([at])
     before = full if gap is not None else result.load
     factors = tables.static_factors(full)
     return Target(factors, tables.static_factors(full, before) if tables.prestressed else factors,
-                  full, at, tables.offsets(times)[0], tables.slopes(times)[0],
+                  full, at, *tables.at(at),
                   np.zeros(system.N) if gap is None else gap, values - result.u[system.fixed])
