@@ -50,6 +50,22 @@ def test_elements_go_where_the_beam_bends():
     assert state.scene is not scene and scene.beams[0].mesh.nelements == 4
 
 
+def test_elements_go_where_a_load_jumps():
+    """It bends all elements up to there, none of them as much as it is off by."""
+    EI = 2e8 * 0.01**4 / 12
+
+    def bent(element, x):
+        beam = Beam(MeshBeam.init_line(x, 0.01), element, StVenantKirchhoff(2e8, 0.3), 0.01)
+        return Scene(beam).clamp("left").line_load(
+            lambda x: (0.0 * x[0], np.where(x[0] < 0.37, -5.0 * EI, 0.0)))
+
+    known = bent(ElementBeamCable(9), [0, 0.185, 0.37, 1]).solve_static().displacement((1, 0))
+    state = bent(ElementBeamCable(3), np.linspace(0, 1, 5)).solve_static(adapt=1e-4)
+    assert_allclose(state.displacement((1, 0)), known, rtol=0, atol=1e-4)
+    x = state.beams[0].mesh.p[0]
+    assert len(x) < 200 and abs(x[np.argmin(np.diff(x))] - 0.37) < 1e-3
+
+
 def test_too_few_elements_keep_the_last_state():
     with pytest.raises(ConvergenceError, match="max_elements") as caught:
         cantilever(ElementBeamANCF(2), 4).solve_static(adapt=1e-6, max_elements=30)

@@ -331,15 +331,34 @@ def refine(scene: Scene, marked: Sequence[ArrayLike]) -> tuple[Scene, Callable[[
 
 def _prolong(old, new, marked, u):
     """The same displacement on the mesh with the marked elements halved: the spaces are nested."""
-    nb = old.element.nodal_dofs
-    nodes = u.reshape(-1, nb, 2)
-    slope = np.array([f[1] for f in old.element.functionals])
+    nodes = u.reshape(-1, old.element.nodal_dofs, 2)
     marked = np.unique(marked)
     t = old.mesh.t[:, marked]
-    L = old.mesh.lengths[marked][:, None, None]
-    q = np.concatenate([nodes[t[0]], nodes[t[1]]], axis=1) * L ** np.tile(slope, 2)[:, None]
-    middle = np.einsum("ij,ejc->eic", old.element.halving[nb:], q) / (0.5 * L) ** slope[:, None]
+    q = np.concatenate([nodes[t[0]], nodes[t[1]]], axis=1)
+    middle = np.einsum("eij,ejc->eic", _halving(old, marked), q)
     return np.insert(nodes, t[1], middle, axis=0).ravel()
+
+
+def _collect(old, marked, force):
+    """A force on the mesh with the marked elements halved, on that before: the transposed.
+
+    Of each node, (n, nb, 2), and which nodes of the finer mesh are new.
+    """
+    nb, t = old.element.nodal_dofs, old.mesh.t[:, marked]
+    there = np.insert(np.zeros(old.mesh.p.shape[1], dtype=bool), t[1], True)
+    nodes = force.reshape(-1, nb, 2)
+    out = nodes[~there]
+    shares = np.einsum("eij,eic->ejc", _halving(old, marked), nodes[there])
+    np.add.at(out, t[0], shares[:, :nb])
+    np.add.at(out, t[1], shares[:, nb:])
+    return out, there
+
+
+def _halving(beam, marked):
+    """What makes of coordinates at both ends those in the middle of elements, (n, nb, 2 nb)."""
+    nb, slope = beam.element.nodal_dofs, np.array([f[1] for f in beam.element.functionals])
+    L = beam.mesh.lengths[marked][:, None, None]
+    return (beam.element.halving[nb:] * L ** np.tile(slope, 2)) / (0.5 * L) ** slope[:, None]
 
 
 def _compare(coarse, state, fine, better):
@@ -360,17 +379,23 @@ def _mark(coarse, state, fine, better, split):
     """The elements of the coarse mesh that make up most of the difference in the energy norm.
 
     Of beams that are not ``split`` none: their elements were not halved, but of a higher degree.
+    Where the loads of both meshes differ, as those that jump within an element, the work of that
+    on the difference counts too: it bends elements far from there.
     """
+    before, after = coarse.system.external_force(state.u), fine.system.external_force(better.u)
     errors = []
     for a, b, s in zip(coarse.beams, fine.beams, split):
         if not s:
             errors.append(np.zeros(a.mesh.nelements))
             continue
-        v = better.u_of(b)
-        d = v - _prolong(a, b, np.arange(a.mesh.nelements), state.u_of(a))
+        u, v, every = state.u_of(a), better.u_of(b), np.arange(a.mesh.nelements)
+        d = v - _prolong(a, b, every, u)
+        force, new = _collect(a, every, after[fine.system.of(b)])
+        gap = force - before[coarse.system.of(a)].reshape(force.shape)
+        work = np.abs(np.sum(gap * d.reshape(len(new), *gap.shape[1:])[~new], axis=(1, 2)))
         d = b.kernel.gather(d).reshape(b.mesh.nelements, -1)
         local = np.abs(np.einsum("ei,eij,ej->e", d, b.kernel.tangents(v), d))
-        errors.append(local.reshape(-1, 2).sum(axis=1))
+        errors.append(local.reshape(-1, 2).sum(axis=1) + 0.5 * work[a.mesh.t].sum(axis=0))
     chosen = _largest(np.concatenate(errors), [len(e) for e in errors])
     return [c if s else np.arange(0) for c, s in zip(chosen, split)]
 
