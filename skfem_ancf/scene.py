@@ -381,9 +381,10 @@ class Scene:
         require_option("thickness", thickness, ("fixed", "free"))
         if isinstance(b, RigidBody):
             return self._put([Support(k, boundary)])
-        if thickness == "fixed" and b.has_sections:
-            return self._put([Support(k, boundary, tuple(b.element.welded))])
-        return self._put([Support(k, boundary, "r")],
+        welded = b.has_sections if thickness == "fixed" else None
+        if welded:
+            return self._put([Support(k, boundary, tuple(b.element.welded), welded=True)])
+        return self._put([Support(k, boundary, "r", welded=welded)],
                          joints=[get_joint("plane", at=boundary, beam=beam, name="of a clamp")])
 
     def pin(self, boundary: Place, beam: WhichBeam = None) -> Scene:

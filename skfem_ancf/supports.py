@@ -30,6 +30,9 @@ class Support:
         At full load.
     on_axis : bool
         What is held is on the axis: a point that names the place must be, too.
+    welded : bool or None
+        Of a welded face, whether the beam has sections: all their coordinates are held, of
+        whatever element it has.
     """
 
     beam: int
@@ -37,6 +40,7 @@ class Support:
     names: Any = None
     displacement: float = 0.0
     on_axis: bool = False
+    welded: bool | None = None
 
     def bind(self, beam: Beam, fixed: dict[tuple[int, int], float]) -> None:
         """Add what is held of a beam to what is held already.
@@ -50,10 +54,15 @@ class Support:
 
         Raises
         ------
+        InputError
+            If the face of a beam with sections was welded and this one has none, or the reverse.
         SupportError
             If a coordinate is given two displacements.
         """
-        dofs = beam.dofs(self.boundary, self.names)
+        if self.welded is not None and self.welded != beam.has_sections:
+            raise InputError("clamp holds beams with sections and cables by different equations: "
+                             f"describe the scene of {beam!r} anew")
+        dofs = beam.dofs(self.boundary, beam.element.welded if self.welded else self.names)
         if self.on_axis and is_point(self.boundary):
             self._require_on_axis(beam)
         for d in map(int, dofs):

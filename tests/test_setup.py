@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from skfem_ancf import (AncfError, Beam, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamANCFHermite, ElementBeamCable, InputError, KelvinVoigt, MeshBeam,
-                        MeshError, NeoHookean, Scene, StVenantKirchhoff)
+                        ElementBeamANCFHermite, ElementBeamCable, ElementBeamPatelShabana,
+                        InputError, KelvinVoigt, MeshBeam, MeshError, NeoHookean, Scene,
+                        StVenantKirchhoff)
 from skfem_ancf.compiled.words import Words
 from skfem_ancf.constraints import Constraints
 from skfem_ancf.elements import base
@@ -604,3 +605,20 @@ def test_any_argument_of_a_beam_is_replaced_as_if_made_so(seed):
         made, given = scenes[k]
         for a, b in zip(found(made), found(scene(given))):
             assert np.allclose(a, b, rtol=1e-7, atol=1e-7 * np.max(np.abs(b)))
+
+
+@pytest.mark.parametrize("before, after", [
+    (ElementBeamANCF(1), ElementBeamANCF(3)), (ElementBeamANCF(3), ElementBeamANCF(1)),
+    (ElementBeamANCF(2), ElementBeamPatelShabana())], ids=repr)
+def test_a_weld_holds_the_sections_of_another_element(before, after):
+    def clamped(element):
+        beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.1), element,
+                    StVenantKirchhoff(1e6, 0.3, 1000.0), 0.1)
+        return Scene(beam).clamp("left").gravity((0, -0.5))
+
+    scene, anew = clamped(before).replace(element=after), clamped(after)
+    assert np.allclose(scene.solve_static().u, anew.solve_static().u, rtol=1e-9, atol=1e-14)
+    with pytest.raises(InputError, match="clamp holds"):
+        scene.replace(element=ElementBeamCable(3))
+    with pytest.raises(InputError, match="clamp holds"):
+        clamped(ElementBeamCable(3)).replace(element=after)
