@@ -246,6 +246,25 @@ def body_carry(body, u, du, stresses, carried):
 
 
 @source
+def add_viscous_stress(viscous, body, copies, k, u, v, rooms, out):
+    """Add the stresses in proportion to the rates of the strains, to those of copy k.
+
+    ``rooms``, shape (2, s), is room, of which the first row is zero.
+    """
+    clear(rooms[1])
+    evaluate_body(viscous, np.int64(CARRY), u, v, u, rooms[0], np.int64(1), rooms[1], u,
+                  np.int64(0))
+    for j in range(body.table.shape[0]):
+        one, all_of_them = _stress(body, j, rooms[1]), _stress(copies, j, out)
+        size = one.shape[2]
+        its = all_of_them[:, :, k * size:(k + 1) * size]
+        for c in lanes(one.shape[0]):
+            for p in lanes(one.shape[1]):
+                for e in lanes(size):
+                    its[c, p, e] += one[c, p, e]
+
+
+@source
 def add_viscous_force(body, u, v, f):
     """Add the force of stresses in proportion to the rates of the strains."""
     none = f[:0]

@@ -375,3 +375,21 @@ def test_collocation_knows_dashpots(scheme):
     scene = Scene(beam).pin("left").gravity((0.0, -9.81)).torsional_spring(2.0, "left", 0.02)
     history = scene.integrate(0.2, 4e-3, scheme=scheme)
     assert history.substeps == 0 and history.iterations < 3 * 14 * history.steps
+
+
+@pytest.mark.parametrize("scheme", ["radau", "gauss"])
+@pytest.mark.parametrize("beams", [1, 2])
+def test_collocation_carries_viscous_stresses(scheme, beams):
+    """Of slender beams that turn: in parts of steps, with 6 to 8 times the iterations, else."""
+    def cable(start, **options):
+        mesh = MeshBeam.init_line(np.linspace(start, start + 1.0, 5), 0.01)
+        return Beam(mesh, ElementBeamCable(3), STEEL, 0.01, name=str(start), **options)
+
+    parts = [cable(2.0 * k) for k in range(beams - 1)]  # undamped, beside it
+    scene = Scene(*parts, cable(2.0 * beams, damping=KelvinVoigt(1e-2)))
+    for beam in scene.system.beams:
+        scene.clamp("left", beam)
+    history = scene.gravity((0.0, -9.81)).integrate(0.15, 0.0375, scheme=scheme)
+    fine = scene.integrate(0.15, 1.5e-3, scheme=scheme, t_eval=[0.15])
+    assert history.substeps == 0 and history.iterations < 3 * 12 * history.steps
+    assert np.abs(history.u[-1] - fine.u[-1])[-6::4].max() < 3e-4

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..band import Band, dense_solve, dot, multiply, solve, subtract_rows
+from ..band import Band, clear, dense_solve, dot, multiply, solve, subtract_rows
 from ..body import add_viscous_force, body_tangent
 from ..forces.texts import add_resisting_force
 from ..source import F2, lanes, source
@@ -53,10 +53,15 @@ class Dampers(NamedTuple):
 @source
 def damping_force(e, dampers, M, t, u, v, out, room):
     """The force at u that resists the velocity v, of the equations e."""
-    for i in lanes(out.size):
-        out[i] = 0.0
+    clear(out)
     if dampers.viscous > 0:
         add_viscous_force(e.viscous, u, v, out)
+    add_other_damping(e, dampers, M, t, u, v, out, room)
+
+
+@source
+def add_other_damping(e, dampers, M, t, u, v, out, room):
+    """Add what of that is not of materials."""
     if dampers.elements > 0:
         add_resisting_force(e.forces, t, u, v, out)
     if dampers.mass > 0.0:

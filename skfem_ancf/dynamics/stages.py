@@ -11,14 +11,14 @@ import numpy as np
 
 from ..band import (SPARE, Band, add_multiple, clear, copy, dense_solve, factorize,
                     factorize_complex, multiply, solve, solve_complex, solve_joined)
-from ..body import (add_force_by, body_force, body_gradients, body_mean_stress, body_mixed,
-                    body_stress, body_tangent, carry_by)
+from ..body import (add_force_by, add_viscous_stress, body_force, body_gradients, body_mean_stress,
+                    body_mixed, body_stress, body_tangent, carry_by)
 from ..forces.texts import (add_elastic_force, add_element_damping, add_element_tangent,
                             pace_contact, settle_contact)
 from ..source import F1, F2, F3, borrowed, by_place, lanes, shaped, source
 from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
                       external_force, joint_directions)
-from .dampers import add_damping, damping_force
+from .dampers import add_damping, add_other_damping, damping_force
 from .rates import JointMotion, JointMotions, acceleration_of_joints, drive_rate
 from .steps import (ASTRAY, BEFORE, COUNT, DEPENDENT, DISSIPATED, DONE, ENERGY, FACTORIZED, FAILED,
                     FAILURE, FRESH, GO_ON, ITERATIONS, LASTING, LAST_SIZE, MIXED, NOT_CONVERGED,
@@ -246,7 +246,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
     state[FRESH], state[SIZE] = 0.0, -1.0
     if state[MIXED] > 0.0:
         state[READY] = 0.0  # old ones have turned the beam
-    _start(e.copies, method, s, w, state, step)
+    _start(e, matrices, method, s, w, state, step)
     for _ in range(ITERATIONS):
         _states(e.free, method, s, w, step, rates)
         if state[READY] == 0.0:
@@ -255,9 +255,9 @@ def _converges(e, matrices, method, rule, s, w, state, step):
                 return False
             state[FACTORIZED] += method.values.shape[1]
             state[READY], state[RATE], state[FRESH], state[SIZE] = 1.0, REUSED, 1.0, -1.0
-        _internal(e, w, state)
+        _internal(e, matrices, w, state)
         for k in range(n):
-            _residual(e, matrices, method, s, w, step, k)
+            _residual(e, matrices, method, s, w, state, step, k)
         state[COUNT] += n
         if not _correct(e.free, method, s, w, state):
             state[FAILURE] = DEPENDENT
@@ -267,11 +267,13 @@ def _converges(e, matrices, method, rule, s, w, state, step):
             state[MIXED], told = LASTING, ASTRAY  # its factors serve
             body_gradients(e.body, w.origin, w.B)
         if told == ASTRAY:
-            _start(e.copies, method, s, w, state, step)
+            _start(e, matrices, method, s, w, state, step)
         elif told != GO_ON:
             break
         elif state[MIXED] > 0.0:
             carry_by(e.body, e.copies, w.B, _flat(w.R), w.own, w.carried)
+            if matrices.dampers.viscous > 0:
+                _carry_rates(e, method, s.h, w)
     _states(e.free, method, s, w, step, True)
     if told != DONE and told != FAILED:
         state[FAILURE] = NOT_CONVERGED
@@ -371,7 +373,7 @@ def _flat(x):
 
 
 @source
-def _start(copies, method, s, w, state, step):
+def _start(e, matrices, method, s, w, state, step):
     """Where it begins; with carried stresses by the mean acceleration of the step before.
 
     A polynomial through points where a stiff beam vibrates leads far away.
@@ -382,7 +384,11 @@ def _start(copies, method, s, w, state, step):
     if state[MIXED] > 0.0:
         for k in range(w.R.shape[0]):
             copy(w.y[0], w.R[k])
-        body_stress(copies, _flat(w.R), w.carried)
+        body_stress(e.copies, _flat(w.R), w.carried)
+        if matrices.dampers.viscous > 0:
+            for k in range(w.R.shape[0]):
+                add_viscous_stress(e.viscous, e.body, e.copies, k, w.y[0], w.y[1], w.stresses,
+                                   w.carried)
         if step > 0 or s.begun > 0:
             v0, v = w.y[1], w.before[1]
             for k in range(w.Z.shape[0]):
@@ -433,11 +439,14 @@ def _motion(joints, k):
 
 
 @source
-def _internal(e, w, state):
-    """The internal forces of all points at once, into R."""
+def _internal(e, matrices, w, state):
+    """The internal forces of all points at once, into R; carried stresses are viscous ones too."""
     U, f, missing, own, carried = _flat(w.U), _flat(w.R), w.missing, w.own, w.carried
     if state[MIXED] > 0.0:
         body_mixed(e.copies, False, U, U, f, carried, own)
+        if matrices.dampers.viscous > 0:
+            for k in range(w.U.shape[0]):
+                add_viscous_stress(e.viscous, e.body, e.copies, k, w.U[k], w.V[k], w.stresses, own)
         for i in lanes(missing.size):
             missing[i] = own[i] - carried[i]
         add_force_by(e.body, e.copies, w.B, missing, f)
@@ -446,7 +455,18 @@ def _internal(e, w, state):
 
 
 @source
-def _residual(e, matrices, method, s, w, step, k):
+def _carry_rates(e, method, h, w):
+    """Add what the correction R makes of viscous stresses to those that are carried."""
+    dv = w.x[0]
+    for k in range(w.R.shape[0]):
+        clear(dv)
+        for j in range(w.R.shape[0]):
+            add_multiple(method.first[k, j] / h, w.R[j], dv)
+        add_viscous_stress(e.viscous, e.body, e.copies, k, w.origin, dv, w.stresses, w.carried)
+
+
+@source
+def _residual(e, matrices, method, s, w, state, step, k):
     """What is missing in the equation of motion at a point, and in the rates of joints.
 
     R has the internal force.
@@ -456,7 +476,11 @@ def _residual(e, matrices, method, s, w, step, k):
     t = s.times[at]
     add_elastic_force(e.forces, t, 0.0, u, u, f)
     if matrices.dampers.active > 0:
-        damping_force(e, matrices.dampers, matrices.M, t, u, v, d, room)
+        if state[MIXED] > 0.0:
+            clear(d)
+            add_other_damping(e, matrices.dampers, matrices.M, t, u, v, d, room)
+        else:
+            damping_force(e, matrices.dampers, matrices.M, t, u, v, d, room)
         for i in lanes(f.size):
             f[i] += d[i]
     external_force(e.loads, _row(s.factors, at), t, 1.0, u, Q)
