@@ -141,9 +141,9 @@ def test_estimates_are_the_errors_of_vibrations(scheme):
 def test_steps_that_do_not_converge_are_taken_in_shorter_ones():
     """Not in halves: their estimate is that of the step."""
     beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(3),
-                StVenantKirchhoff(2e8, 0.3, 7800.0), 0.01, damping=KelvinVoigt(2e-3))
+                StVenantKirchhoff(2e8, 0.3, 7800.0), 0.01)
     history = Scene(beam).clamp("left").gravity(GRAVITY).integrate(
-        0.4, "auto", scheme="radau", rtol=1e-3, check=False)
+        0.8, "auto", scheme="radau", rtol=1e-2, check=False)
     assert history.rejected > 0 and history.substeps == 0
 
 
