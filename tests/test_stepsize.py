@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from scipy.integrate import solve_ivp
 
-from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, KelvinVoigt, MeshBeam,
+from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, MeshBeam,
                         RigidBody, Scene, StVenantKirchhoff)
 from skfem_ancf.dynamics import (SCHEMES, EnergyMomentum4, Gauss, GeneralizedAlpha, Motion, Newmark,
                                  Radau)
