@@ -13,6 +13,7 @@ from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, MeshBea
 from skfem_ancf.dynamics import (SCHEMES, EnergyMomentum4, Gauss, GeneralizedAlpha, Motion, Newmark,
                                  Radau)
 from skfem_ancf.dynamics.base import in_steps
+from skfem_ancf.dynamics.budget import Budget
 from skfem_ancf.dynamics.energy_momentum import PARTS
 from skfem_ancf.dynamics.integrator import Integrator, StepFailed
 from skfem_ancf.dynamics.run import Run, interpolate
@@ -46,7 +47,7 @@ MOTIONS = {"swinging": (swinging, 0.5), "vibrating": (vibrating, 0.25)}
 @lru_cache
 def known(name):
     build, t_end = MOTIONS[name]
-    times = np.linspace(0, t_end, 6)[1:]
+    times = np.linspace(0, t_end, 21)[1:]
     return times, by_scipy(build(), times, rtol=1e-9, atol=1e-10)[0]
 
 
@@ -205,7 +206,7 @@ def test_the_estimated_error_is_the_error(scheme, name):
     build, t_end = MOTIONS[name]
     scene = build()
     history = scene.integrate(t_end, "auto", scheme=scheme, rtol=1e-3)
-    times = history.t[1::len(history) // 8]
+    times = history.t[1::max(1, len(history) // 32)]
     u = by_scipy(build(), times, rtol=1e-9, atol=1e-10)[0]
     off = (np.isin(history.t, times).nonzero()[0], u)
     off = (history.u[off[0]] - off[1])[:, positions(scene)].reshape(len(u), -1, 2)
@@ -234,20 +235,73 @@ def test_a_motion_that_is_off_by_more_is_taken_again(compiled):
 
 def test_a_motion_that_stays_off_by_more_is_said(monkeypatch):
     """It is not taken again, or shorter steps fail: what there is stays."""
-    def advance(run):
-        if run.task.rtol < 1e-4:
-            raise StepFailed("as if")
-        run_advance(run)
+    def again(budget, error):
+        monkeypatch.setattr(Run, "advance", fail)
+        return budget_again(budget, error)
 
-    run_advance = Run.advance
-    monkeypatch.setattr(Run, "advance", advance)
+    def fail(run):
+        raise StepFailed("as if")
+
+    budget_again, advance = Budget.again, Run.advance
+    monkeypatch.setattr(Budget, "again", again)
     for most, passes in ((3, 2), (1, 1)):
         monkeypatch.setattr("skfem_ancf.dynamics.integrate.PASSES", most)
+        monkeypatch.setattr(Run, "advance", advance)
         with pytest.warns(AccuracyWarning, match="above rtol = 0.0001: name the times") as said:
             history = stiffer().integrate(1.0, "auto", scheme="gauss", rtol=1e-4)
         assert said[0].filename == __file__
         assert history.t[-1] == 1.0 and history.passes == passes and history.error > 1e-4
         assert f"off by about {history.error:.2g} times" in str(said[0].message)
+
+
+def spent(budget, error, steps=40, fill=0.45):
+    """The error of a motion whose error at t is ``error(x)``, x the sums of shares up to there."""
+    x, shares = [0.0], [budget.share]
+    for k in range(1, steps + 1):
+        x.append(x[-1] + budget.share * fill / steps)
+        budget.add(fill, 1.0 / steps)
+        if budget.due(k / steps):
+            budget.learn(k / steps, error(np.array(x)))
+        shares.append(budget.share)
+    return error(np.array(x)), shares
+
+
+def test_a_motion_that_adds_little_gets_longer_steps():
+    """As it adds as much as is expected, a tenth of it, three times, or what grows on its way."""
+    usual, shares = spent(Budget(0.0, 1.0), lambda x: 1.2 * x[-1])
+    assert usual == pytest.approx(0.54) and set(shares) == {1.0}
+    little, shares = spent(Budget(0.0, 1.0), lambda x: 0.12 * x[-1])
+    assert 0.2 < little < 0.4 and shares[-1] == 8.0
+    much, shares = spent(Budget(0.0, 1.0), lambda x: 3.0 * x[-1])
+    assert 0.6 < much < 0.9 and shares[-1] < 0.5
+    late, _ = spent(Budget(0.0, 1.0), lambda x: 2.4 * np.sum(x) / 40)  # twice integrated
+    assert 0.4 < late < 0.9
+    nothing, shares = spent(Budget(0.0, 1.0), lambda x: 0.0)
+    assert shares[-1] == 8.0 and np.isfinite(shares).all()
+
+
+def test_a_motion_whose_estimates_are_too_careful_gets_longer_steps():
+    """A rod that a spring with a damper holds, by Gauss: 0.1 of the tolerance, else."""
+    def build():
+        beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.01), ElementBeamCable(3),
+                    StVenantKirchhoff(2e8, 0.3, 7800.0), 0.01)
+        scene = Scene(beam).pin("left").gravity(GRAVITY)
+        return scene.spring(200.0, ((1, 0), ("ground", (1.0, 1.0))), damping=1.0)
+
+    history, once = (build().integrate(1.0, "auto", scheme="gauss", rtol=1e-3, check=check)
+                     for check in (None, False))
+    assert history.passes == 1 and 0.2e-3 < history.error < 0.9e-3
+    assert history.steps < once.steps
+
+
+def test_the_shares_of_a_motion_that_is_taken_again():
+    """As its error asks for, and at most twice that."""
+    first = Budget(0.0, 1.0)
+    error, _ = spent(first, lambda x: 1.2 * x[-1] * (x[-1] < 0.4) + 2.0 * (x[-1] >= 0.4))
+    assert error == 2.0
+    error, shares = spent(first.again(error), lambda x: 0.01 * x[-1])
+    assert shares[0] == pytest.approx(0.3) and shares[-1] == pytest.approx(0.6)
+    assert Budget(0.0, 1.0).again(3.0).share == pytest.approx(0.2)  # nothing was estimated
 
 
 def test_the_error_does_not_depend_on_what_is_stored():

@@ -78,7 +78,7 @@ class History:
         of the scene, beside the exact motion of the same mesh: estimated, with ``dt="auto"``, by
         ``integrate(..., check=)``; NaN where steps half as long have failed, None elsewhere.
     passes
-        How often the motion was taken, with a smaller tolerance each time; this is the most exact.
+        How often the motion was taken, in other steps each time; this is the most exact.
     """
 
     COLUMNS = COLUMNS

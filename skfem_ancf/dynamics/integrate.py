@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +13,7 @@ from ..errors import (AccuracyWarning, AncfError, ConvergenceError, InputError, 
 from ..progress import progress_bar
 from .checkpoint import Checkpoint, same_problem
 from .base import contacts_of, in_steps, same_scheme
+from .budget import ENOUGH
 from .companion import Companion
 from .integrator import Integrator, StepFailed
 from .run import Run, Task
@@ -39,10 +39,8 @@ MIN_RTOL = 1e-12
 #: Coordinates up to which the error of a motion is checked unasked: it is twice as long, or a
 #: little more, and in larger scenes that is a wait.
 CHECKED = 1000
-#: How often a motion is taken at most, and the part of the tolerance that is then aimed at.
-PASSES, AIM = 3, 0.6
-#: Part of the tolerance up to which an estimated error is let be: it is right to a tenth or so.
-ENOUGH = 0.9
+#: How often a motion is taken at most.
+PASSES = 3
 EPS = np.finfo(float).eps
 
 
@@ -105,8 +103,8 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         each step, so that two changes within one are not seen. Not with ``checkpoint``.
     check
         With ``dt="auto"``, estimate the error of the motion by another one in steps half as long,
-        and take it again, at most twice, with a smaller tolerance where that is above ``rtol``:
-        ``history.error``, ``history.passes``. A pass takes 1.6 to 2.7 times as long, most where
+        choose the steps to come by what it is so far, and take the motion again, at most twice,
+        where it is above ``rtol``: ``history.error``, ``history.passes``. A pass takes 1.6 to 2.7 times as long, most where
         nothing is compiled. None: up to 1000 coordinates, if there are no obstacles, no sampled
         controllers and no checkpoint, with which it is refused.
     sensors
@@ -151,13 +149,13 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         u = start.u
     velocity = v if motion is None else motion.v
 
-    def begun(rtol):
-        """The motion at its start, with steps for a tolerance."""
-        its = task if rtol == task.rtol else replace(task, rtol=rtol)
-        run = Run(system, scheme, its, sensors)
+    def begun(budget=None):
+        """The motion at its start."""
+        run = Run(system, scheme, task, sensors)
         run.until = until
         if checked:
             run.companion = Companion(system, scheme, task.tol)
+            run.budget = budget or run.budget
         if start is not None and motion is not None and _goes_on(system, scheme, start, t_start):
             run.go_on(motion, start._origin[1])
         else:
@@ -168,7 +166,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
 
     if checked:
         return _within(begun, task.rtol, progress)
-    run, file = begun(task.rtol), None
+    run, file = begun(), None
     if checkpoint is not None:
         file = Checkpoint(checkpoint, every, run)
         file.begin()
@@ -192,15 +190,15 @@ def _checked(check, system, task, checkpoint):
 def _within(begun, rtol, progress):
     """The motion, again in shorter steps while its error is above the tolerance; the most exact.
 
-    The error is in proportion to the tolerance by which steps are chosen (Lang, Verwer: "On global
+    The error is in proportion to the share that steps may add (Lang, Verwer: "On global
     error estimation and control for initial value problems", SIAM Journal on Scientific Computing
     29 (2007)).
     """
-    aim, passes, best = rtol, 1, _go(begun(rtol), None, progress)
-    while best.history.error > ENOUGH * rtol and passes < PASSES and aim > MIN_RTOL:
-        aim, passes = max(MIN_RTOL, aim * AIM * rtol / best.history.error), passes + 1
+    passes, best = 1, _go(begun(), None, progress)
+    while best.history.error > ENOUGH * rtol and passes < PASSES:
+        passes += 1
         try:
-            body = _go(begun(aim), None, progress)
+            body = _go(begun(best.run.budget.again(best.history.error / rtol)), None, progress)
         except ConvergenceError:  # in shorter steps: what there is stays
             break
         if not body.history.error < best.history.error:

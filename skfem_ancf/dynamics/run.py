@@ -13,6 +13,7 @@ import scipy
 
 from ..errors import AncfError, ask_number
 from .base import Motion, Scheme, contacts_of
+from .budget import Budget
 from .companion import Companion
 from .history import History
 from .integrator import Integrator, StepFailed
@@ -123,6 +124,7 @@ class Run:
         self.event: float | None = None
         self._value: float | None = None
         self.companion: Companion | None = None
+        self.budget = Budget(task.t_start, task.span)
         self._in_blocks, self._pace = scheme.in_blocks(system), self._first_pace()
         self._limit()
 
@@ -296,7 +298,7 @@ class Run:
         touches = self.system.forces.contacts.obstacles  # when, is found in parts of a step
         try:
             new = (self.integrator.step if touches else self.integrator.attempt)(y, h)
-            error = self.sizes.error(self.integrator, y, new, h)
+            error = self.sizes.error(self.integrator, y, new, h) / self.budget.share
             self.size, kept = self.sizes.next(error, h, self.size)
         except StepFailed:
             if h < SHORTEST * self.task.span:
@@ -311,8 +313,17 @@ class Run:
         self._commit(y, new)
         if self.companion is not None:
             self.companion.follow(self.y, h if self.event is None else self.y.t - y.t)
+            self.budget.add(error, h)
+            if self.budget.due(self.y.t):
+                self._look_at_error()
             if self.segment != segment:
                 self.companion.turn(self.y, self.integrator.energy, self.integrator.limit)
+
+    def _look_at_error(self):
+        """Steps as the error asks for that they have added so far."""
+        error = self.error / self.task.rtol
+        if not np.isnan(error):
+            self.size *= self.budget.learn(self.y.t, error) ** (1.0 / self.scheme.order)
 
     def _commit(self, old, new):
         """A step is done."""
