@@ -276,7 +276,7 @@ def test_a_motion_that_adds_little_gets_longer_steps():
     assert 0.6 < much < 0.9 and shares[-1] < 0.5
     late, _ = spent(Budget(0.0, 1.0), lambda x: 2.4 * np.sum(x) / 40)  # twice integrated
     assert 0.4 < late < 0.9
-    nothing, shares = spent(Budget(0.0, 1.0), lambda x: 0.0)
+    _, shares = spent(Budget(0.0, 1.0), lambda x: 0.0)
     assert shares[-1] == 8.0 and np.isfinite(shares).all()
 
 

@@ -104,9 +104,9 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     check
         With ``dt="auto"``, estimate the error of the motion by another one in steps half as long,
         choose the steps to come by what it is so far, and take the motion again, at most twice,
-        where it is above ``rtol``: ``history.error``, ``history.passes``. A pass takes 1.6 to 2.7 times as long, most where
-        nothing is compiled. None: up to 1000 coordinates, if there are no obstacles, no sampled
-        controllers and no checkpoint, with which it is refused.
+        where it is above ``rtol``: ``history.error``, ``history.passes``. A pass takes 1.6 to 2.7
+        times as long, most where nothing is compiled. None: up to 1000 coordinates, if there are
+        no obstacles, no sampled controllers and no checkpoint, with which it is refused.
     sensors
         Pairs of name and :class:`~skfem_ancf.dynamics.sensors.Sensor`: those of the scene.
 
