@@ -278,6 +278,8 @@ def test_a_motion_that_adds_little_gets_longer_steps():
     assert 0.4 < late < 0.9
     _, shares = spent(Budget(0.0, 1.0), lambda x: 0.0)
     assert shares[-1] == 8.0 and np.isfinite(shares).all()
+    _, shares = spent(Budget(0.0, 1.0), lambda x: 0.0, fill=0.01)  # at rest: a blow may come
+    assert set(shares) == {1.0}
 
 
 def test_a_motion_whose_estimates_are_too_careful_gets_longer_steps():

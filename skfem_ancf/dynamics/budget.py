@@ -7,8 +7,9 @@ from __future__ import annotations
 ENOUGH, AIM, LEAST, MOST = 0.9, 0.6, 0.4, 0.75
 #: Parts of the motion after which it is looked at the error, and the first of them.
 LOOKS, FIRST = 16, 2
-#: Error over estimate that is taken before any is seen, and the error that this counts for.
-GAIN, UNSEEN = 1.2, 0.1
+#: Error over estimate that is taken before any is seen, the error that this counts for, and the
+#: estimate up to which nothing is seen: what is at rest tells nothing of a blow that comes.
+GAIN, UNSEEN, REST = 1.2, 0.1, 0.015
 #: Part of its share that a step has at least in the mean: those at the start are shorter.
 FILLED = 0.4
 #: By how much a share may grow, in all and in a motion that is taken again, by how much it may
@@ -78,7 +79,7 @@ class Budget:
         self._next = int(LOOKS * done) + 1
         gain = (error + UNSEEN) / (self._added + UNSEEN / self._gain)
         ahead = gain * (1.0 - done) * max(FILLED, self._filled / done) * before
-        if ahead > 0.0 and error < ENOUGH:
+        if self._added > REST and error < ENOUGH and ahead > 0.0:
             wanted = max(ahead, LEAST - error)
             wanted = min(wanted, max(MOST - error, 0.5 * (ENOUGH - error)))
             share = before * min(FASTEST, max(1.0 / FASTEST, wanted / ahead))
