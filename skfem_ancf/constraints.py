@@ -12,7 +12,7 @@ from .joints.base import Joint, same_joint
 from .joints.nodes import Nodes, chain_ends
 from .joints.settlements import HELD
 from .kept import cached_property
-from .rank import DENSE, first_dependent, null_space, unit_rows
+from .rank import DENSE, first_dependent, null_space, row_sizes, unit_rows
 from .rigid import RigidBody
 
 if TYPE_CHECKING:
@@ -42,7 +42,8 @@ class Constraints:
     joints
         Joints, already bound.
     stiffness
-        A function that returns that of force elements in the stress-free state, sparse, (N, N).
+        A function that returns that of force elements in the stress-free state, sparse, (N, N);
+        None where there are none.
 
     Attributes
     ----------
@@ -60,7 +61,7 @@ class Constraints:
 
     def __init__(self, members: Sequence[Beam | RigidBody], slices: Sequence[slice], size: float,
                  fixed: Array, values: Array, joints: Sequence[Joint],
-                 stiffness: Callable[[], Any]) -> None:
+                 stiffness: Callable[[], Any] | None) -> None:
         self.members, self.slices, self.size, self._stiffness = members, slices, size, stiffness
         self.N = slices[-1].stop
         self._supported = self._independent = False
@@ -198,6 +199,10 @@ class Constraints:
         """
         rows, columns, values = self._entries(u, t)
         return sparse.csr_array((values, (rows, columns)), shape=(self.m, self.N))
+
+    def _small_jacobian(self, u):
+        """As :meth:`full_jacobian` at the time 0, sparse where the coordinates are many."""
+        return (self.full_jacobian if self.N <= DENSE else self.sparse_jacobian)(u, 0.0)
 
     def _entries(self, u, t):
         """Rows, columns and values of :meth:`full_jacobian`."""
@@ -383,8 +388,7 @@ class Constraints:
         if self._independent or not self.joints or self.condensable:
             return
         zero = np.zeros(self.N)
-        derivative = self.full_jacobian if self.N <= DENSE else self.sparse_jacobian
-        found = first_dependent(derivative(zero, 0.0), self.free, self.constraint(zero, 0.0))
+        found = first_dependent(self._small_jacobian(zero), self.free, self.constraint(zero, 0.0))
         self._independent = found is None  # nothing of it changes in the life of a system
         if found is None:
             return
@@ -453,22 +457,28 @@ class Constraints:
         if self.frame is None and all(self._standing):
             return []
         motions, joints, bodies = self._motions()
-        pushed = self._stiffness() @ motions
-        size = abs(pushed).max(axis=1).toarray().ravel() if pushed.nnz else np.zeros(self.N)
-        held = sparse.vstack([motions[self.fixed], joints,
-                              pushed[size > 1e-9 * size.max(initial=0.0)]])
+        parts = [motions[self.fixed], joints]
+        if self._stiffness is not None:
+            pushed = self._stiffness() @ motions
+            size = row_sizes(pushed)
+            parts.append(pushed[size > 1e-9 * size.max(initial=0.0)])
+        small = isinstance(motions, np.ndarray)
+        held = np.concatenate(parts) if small else sparse.vstack(parts)
+        if small and len(bodies) == 1 and _has_full_rank(held):
+            return []
         return [_describe(v, bodies) for v in null_space(unit_rows(held))]
 
     def _motions(self):
         """Rigid motions of the bodies, those that joints hold, and (who, origin, size) of each.
 
         Bodies are beams and rigid bodies, of a frame the parts whose lines are joined rigidly. The
-        columns of a body are two translations and the rotation, in units of its size.
+        columns of a body are two translations and the rotation, in units of its size; dense arrays
+        of few coordinates.
         """
         values = np.concatenate([member.rigid_motions() for member in self.members])
         sizes = [member.size for member in self.members]
         numbers = [member.N for member in self.members]
-        joints = self.sparse_jacobian(np.zeros(self.N), 0.0)
+        joints = self._small_jacobian(np.zeros(self.N))
         if self.frame is None:
             bodies = [(self._who(k), b.origin, b.size) for k, b in enumerate(self.members)]
             of_body = np.repeat(np.arange(len(bodies)), numbers)
@@ -484,6 +494,11 @@ class Constraints:
             bodies = [(name, origin, size) for name in self.frame.describe(parts)]
             sizes = [size] * len(self.members)
         values /= np.stack([np.ones(self.N), np.ones(self.N), np.repeat(sizes, numbers)], axis=1)
+        if self.frame is None and self.N <= DENSE:
+            motions = np.zeros((self.N, len(bodies), 3))
+            motions[np.arange(self.N), of_body] = values
+            motions = motions.reshape(self.N, -1)
+            return motions, joints @ motions, bodies
         motions = sparse.csr_array((values.ravel(), (3 * of_body[:, None] + np.arange(3)).ravel(),
                                     3 * np.arange(self.N + 1)), shape=(self.N, 3 * len(bodies)))
         if self.frame is None:

@@ -10,7 +10,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from .linalg import SMALL, Inertia, beside_zero
+from .linalg import SMALL, Inertia, beside_zero, dense
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -188,28 +188,32 @@ def determinant_sign(A: sparse.csr_array) -> int:
     return -1 if odd % 2 else 1
 
 
+def row_sizes(A: Array | sparse.csr_array) -> Array:
+    """The largest absolute value of each row of a matrix (m, n), shape (m,)."""
+    if isinstance(A, np.ndarray) or not A.nnz:
+        return np.zeros(A.shape[0]) if not A.size else np.abs(A).max(axis=1)
+    return np.asarray(abs(A).max(axis=1).toarray()).ravel()
+
+
 def unit_rows(A: Array | sparse.csr_array) -> Array | sparse.csr_array:
     """The rows of a matrix scaled to a largest entry of 1, without those that are zero.
 
     Rows for slopes have another unit than rows for positions.
     """
-    if not A.shape[0]:
-        return A
-    largest: Any = abs(A).max(axis=1)
-    if type(largest) is np.ndarray and largest.all():
-        return A / largest[:, None]
-    norms = largest.toarray().ravel() if sparse.issparse(largest) else np.asarray(largest)
-    A, scale = A[norms > 0], 1.0 / norms[norms > 0]
-    return sparse.diags(scale) @ A if sparse.issparse(A) else scale[:, None] * A
+    size = row_sizes(A)
+    keep = size > 0.0
+    if not keep.all():
+        A, size = A[keep], size[keep]
+    return A / size[:, None] if isinstance(A, np.ndarray) else sparse.diags(1.0 / size) @ A
 
 
-def null_space(H: sparse.csr_array) -> Array:
-    """Vectors that span the null space of a sparse matrix, as rows; of a large one some.
+def null_space(H: Array | sparse.csr_array) -> Array:
+    """Vectors that span the null space of a matrix, as rows; of a large one some.
 
     Parameters
     ----------
     H
-        Shape (r, n), rows of about unit size.
+        Shape (r, n), rows of about unit size; sparse where n is above :data:`DENSE`.
 
     Returns
     -------
@@ -220,7 +224,7 @@ def null_space(H: sparse.csr_array) -> Array:
     if not H.shape[0]:
         return np.eye(n)[:n if n <= DENSE else MOST]
     if n <= DENSE:
-        _, sigma, V = np.linalg.svd(np.linalg.qr(H.toarray(), mode="r"))
+        _, sigma, V = np.linalg.svd(np.linalg.qr(dense(H), mode="r"))
         return V[int(np.sum(sigma > FREE * sigma[0])):]
     # inverse iteration with H^T H + small^2, whose condition number is the square of this one's
     small = 0.1 * FREE

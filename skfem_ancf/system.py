@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from functools import partial
 from itertools import accumulate, pairwise
 from math import sqrt
 from typing import TYPE_CHECKING, Any
@@ -105,8 +104,7 @@ class System:
         self.size = float(sum([b.size for b in self.beams])) or _extent(self.bodies)
         self.constraints = Constraints(self.members, self.slices, self.size, fixed, values,
                                        [*self._directors(fixed), *joints],
-                                       self._held_by_elements if elements else
-                                       partial(_not_held, self.N))
+                                       self._held_by_elements if elements else None)
         self.forces = Forces(elements, self.N, self.bandwidth)
         self._take_loads()
         self.damping = UNDAMPED if damping is None else damping
@@ -881,9 +879,11 @@ class System:
             return False
         if not self.joints:
             return True
+        i, j, v = self.constraints.curvature_entries(u, t, multipliers)
+        if not len(self.springs) and np.all(np.abs(i - j) <= K.bandwidth):
+            return True  # what is definite is so on the tangent space of the joints
         K.to_cholesky()
         J = self.jacobian(u, t)
-        i, j, v = self.constraints.curvature_entries(u, t, multipliers)
         picked, S = border(K.bandwidth, i, j, v, self.springs,
                            0.5 * K.factored_diagonal(self.springs))
         return border_negative(0, columns_product(K, picked, J), S, self.m)[0] == 0
@@ -951,11 +951,6 @@ class System:
 _MADE_ONCE = {name for name, value in vars(System).items() if isinstance(value, cached_property)}
 #: Those that do not stay for other loads, and for other materials and widths.
 _NOT_OF_BEAMS, _NOT_OF_PLACES = tuple(_MADE_ONCE - _OF_BEAMS), tuple(_MADE_ONCE - _OF_PLACES)
-
-
-def _not_held(N):
-    """The stiffness of no force elements, sparse."""
-    return sparse.csr_array((N, N))
 
 
 def _extent(bodies):

@@ -6,11 +6,12 @@ from weakref import ref
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 from skfem_ancf import (AncfError, Beam, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamANCFHermite, ElementBeamCable, ElementBeamPatelShabana,
                         InputError, KelvinVoigt, MeshBeam, MeshError, NeoHookean, Scene,
-                        StVenantKirchhoff)
+                        StVenantKirchhoff, SupportError)
 from skfem_ancf.compiled.words import Words
 from skfem_ancf.constraints import Constraints
 from skfem_ancf.elements import base
@@ -56,6 +57,19 @@ def test_local_functions_are_made_once_a_process(monkeypatch, element):
     assert "box" not in vars(scene.beams[0].finder)
     assert section._layout.cache_info().misses == layouts
     assert not {"vector_element", "basis", "inertia", "q0_local"} & set(vars(scene.beams[0]))
+
+
+@pytest.mark.parametrize("element", [lambda: ElementBeamANCF(3), lambda: ElementBeamCable(5)])
+def test_a_beam_clamped_at_an_angle_needs_no_sparse_matrix(monkeypatch, element):
+    scene = cantilever(element(), angle=0.6)
+    made = counted(monkeypatch, sparse.csr_array, "__init__")
+    assert scene.solve_static().displacement(scene.beams[0].mesh.p[:, -1])[1] < 0
+    assert scene.system.joints and not made
+    loose = Scene(scene.beams[0])
+    loose.joint("angle", at="left", angle=lambda t: 0.1 * t)
+    with pytest.raises(SupportError, match="translation along .*; translation"):
+        loose.solve_static()
+    assert not made
 
 
 @pytest.mark.parametrize("degree", [3, 5, 9])
