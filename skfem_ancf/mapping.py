@@ -144,6 +144,12 @@ def height_in_section(axis: Any, director: Any, gap: Sequence[Any], xi: Any, hei
     return 0.5 + ((gap[0] - rx) * nx + (gap[1] - ry) * ny) / ((nx * nx + ny * ny) * height)
 
 
+def _frame(along):
+    """The frame of :meth:`MappingBeam.frame` from the derivative of the axis."""
+    x, y = along / np.sqrt(along[0] ** 2 + along[1] ** 2)
+    return np.array([[x, -y], [y, x]])
+
+
 class MappingBeam(Mapping):
     """Reference cell to body: a cubic axis and sections that turn linearly between the nodes.
 
@@ -349,14 +355,19 @@ class MappingBeam(Mapping):
         """
         if self._constant is not None:
             return self._everywhere(self._constant, X, tind)
+        a, across, _ = self._derivatives(X, tind)
+        return np.stack([a, across], 1)
+
+    def _derivatives(self, X, tind):
+        """Derivatives of :meth:`F` by xi and eta, and of the axis by xi, (2, ne, np) each."""
         axis, director = self._coefficients(tind)
         xi, eta = X
         turning = self._sum(director, (eta - 0.5) * self._director(xi, 1))
-        across = self._sum(director, self._director(xi))
+        across, along = self._sum(director, self._director(xi)), self._sum(axis, self._axis(xi, 1))
         if self.mesh.heights is not None:
             g, rate = self._relative(xi, tind)
             turning, across = g * turning + (eta - 0.5) * rate * across, g * across
-        return np.stack([self._sum(axis, self._axis(xi, 1)) + turning, across], 1)
+        return along + turning, across, along
 
     def detDF(self, X: Array, tind: Array | None = None) -> Array:
         """The determinant of :meth:`DF`.
@@ -371,8 +382,10 @@ class MappingBeam(Mapping):
         ndarray
             Shape (nelements, npoints).
         """
-        J = self.DF(X, tind)
-        return J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
+        if self._constant is not None:
+            return cross(*self.DF(X, tind).swapaxes(0, 1))
+        a, b, _ = self._derivatives(X, tind)
+        return cross(a, b)
 
     def invDF(self, X: Array, tind: Array | None = None) -> Array:
         """The inverse of :meth:`DF`.
@@ -419,9 +432,33 @@ class MappingBeam(Mapping):
             e1 = self._constant[:, 0] / self.mesh.lengths
             return self._everywhere(np.stack([e1, np.array([-e1[1], e1[0]])], 1), X, tind)
         axis, _ = self._coefficients(tind)
-        e1 = self._sum(axis, self._axis(X[0], 1))
-        e1 = e1 / np.sqrt(e1[0] ** 2 + e1[1] ** 2)
-        return np.stack([e1, np.array([-e1[1], e1[0]])], 1)
+        return _frame(self._sum(axis, self._axis(X[0], 1)))
+
+    def in_frame(self, X: Array, tind: Array | None = None) -> tuple[Array, Array]:
+        """Derivatives of xi and eta along the axis and across it, and the :meth:`frame`.
+
+        Parameters
+        ----------
+        X, tind
+            As for :meth:`F`, shapes (2, npoints) or (2, nelements, npoints), and (nelements,).
+
+        Returns
+        -------
+        rates, frame
+            Shape (2, 2, nelements, npoints) both: ``rates[0]`` those along the axis.
+        """
+        if self._constant is not None:
+            J, frame = self.DF(X, tind), self.frame(X, tind)
+            a, b = J[:, 0], J[:, 1]
+        else:
+            a, b, along = self._derivatives(X, tind)
+            frame = _frame(along)
+        x, y = frame[:, 0]
+        rates = np.empty_like(frame)
+        rates[0, 0], rates[0, 1] = x * b[1] - y * b[0], y * a[0] - x * a[1]
+        rates[1, 0], rates[1, 1] = -x * b[0] - y * b[1], x * a[0] + y * a[1]
+        rates /= cross(a, b)
+        return rates, frame
 
     @cached_property
     def _powers(self):

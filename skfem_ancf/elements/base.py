@@ -387,9 +387,13 @@ class ElementBeam(Frozen, Element):
             Shapes (n, 2, nelements, npoints) and (2, 2, nelements, npoints), see
             :meth:`MappingBeam.frame <skfem_ancf.mapping.MappingBeam.frame>`.
         """
-        frame = mapping.frame(X, tind)
-        grad = self.functions(mapping, X, tind)[1]
-        return np.einsum("kjep,jJep->kJep", grad, frame), frame
+        _, d_xi, d_eta, slope = self.of_mesh(mapping, X, tind)
+        if d_xi.ndim == 2:  # the same points of all elements
+            d_xi, d_eta = d_xi[:, None], d_eta[:, None]
+        rates, frame = mapping.in_frame(X, tind)
+        out = rates[:, 0] * d_xi[:, None] + rates[:, 1] * d_eta[:, None]
+        out *= self._scale(mapping.mesh, slope, tind)[:, None, :, None]
+        return out, frame
 
     def gradients(self, mapping: MappingBeam, X: Array, tind: Array | None, u_e: Array
                   ) -> tuple[Array, Array]:
@@ -413,9 +417,8 @@ class ElementBeam(Frozen, Element):
         points = "bp" if d_xi.ndim == 2 else "bep"
         u = np.multiply(u_e.T, self._scale(mesh, slope, tind), order="C")
         r_xi, r_eta = (np.einsum(f"ibe,{points}->iep", u, d) for d in (d_xi, d_eta))
-        frame = mapping.frame(X, tind)
-        along, across = np.einsum("Ijep,jJep->IJep", mapping.invDF(X, tind), frame)
-        return r_xi[:, None] * along + r_eta[:, None] * across, frame
+        rates, frame = mapping.in_frame(X, tind)
+        return r_xi[:, None] * rates[:, 0] + r_eta[:, None] * rates[:, 1], frame
 
     @cached_property
     def sampling(self) -> Sampling:

@@ -582,12 +582,10 @@ def _rows(mesh, element, term, tind):
         G, frame, scaled = _scaled(mesh, element, element.unit_slopes(*points), points[0].shape[1],
                                    slice(None) if tind is None else tind)
         return G, frame, rows, xy, xx, scaled if len(G) == 1 else None
-    tables = []
-    for k, X in enumerate(points):
-        G, frame = beam_gradients(mesh, element, X, tind)
-        tables.append((G[k], frame[k].transpose(1, 2, 0)))
-    G = np.concatenate([part for part, _ in tables], axis=1)
-    frame = np.concatenate([part for _, part in tables])
+    n = points[0].shape[1]
+    G, frame = beam_gradients(mesh, element, np.concatenate(points, axis=1), tind)
+    G, frame = (np.concatenate([both[0][:, :n], both[1][:, n:]], axis=1) for both in (G, frame))
+    frame = frame.transpose(1, 2, 0)
     return G, frame, rows, xy, xx, None
 
 

@@ -524,12 +524,10 @@ class Across(Frozen):
             Shape (3, nelements, npoints).
         """
         ne, n = self.mesh.nelements if tind is None else len(tind), xi.shape[-1]
-        if self.simple:
-            found = np.empty((3, ne, n))
-            found[0], found[1], found[2] = self.simple_moments(what)
-            return found
-        mapping = self.mesh.mapping()
-        out = np.zeros((3, ne, n))
+        mapping, out = self.mesh.mapping(), np.zeros((3, ne, n))
+        if self.plain:
+            out[0], _, out[2] = self._plain_moments(mapping.height(xi, tind)[0], what)
+            return out
         for slab, (eta, w) in self.rules(POINTS, what == "mass"):
             X = np.array(np.broadcast_arrays(np.repeat(xi, len(eta), -1), np.tile(eta, n)))
             w = np.tile(w, n)
@@ -551,7 +549,11 @@ class Across(Frozen):
         what
             As there.
         """
-        slab, h = self.slabs[0], self.mesh.height
+        return self._plain_moments(self.mesh.height, what)
+
+    def _plain_moments(self, h, what):
+        """Those of plain sections of heights h."""
+        slab = self.slabs[0]
         size = slab.width * h * (1.0 if what == "area" else self.density(slab, _NOWHERE)
                                  if what == "mass" else getattr(slab.material, _MODULI[what]))
         return size, 0.0, size * h**2 / 12.0
