@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .linalg import BandMatrix
-from .quadrature import gauss, tensor
+from .quadrature import gauss, product_rule
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -119,7 +119,7 @@ def of_sections(beam: Beam) -> Inertia:
     tind = np.array([0]) if across.uniform else None
     parts = []
     for slab, rule in across.rules(beam.element.order + 1, inertia=True):
-        X, W = tensor(axis, rule)
+        X, W = product_rule(axis, rule)
         parts.append((beam.element.values(beam.mesh.mapping(), X, tind),
                       across.volume(slab, X, W, tind, times="density")))
     return Inertia(*(np.concatenate(part, axis=-1) for part in zip(*parts)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import lru_cache, partial
 from math import factorial, perm
 from typing import TYPE_CHECKING, Any
 
@@ -10,9 +10,10 @@ import numpy as np
 from skfem.mapping import Mapping
 
 from .errors import MeshError
+from .frozen import Content, read_only
 from .kept import cached_property
 from .nodal import nodal_derivatives, turned
-from .reference import SECTIONS, hermite_basis
+from .reference import SECTIONS, few, hermite_basis
 from .taper import powers
 
 if TYPE_CHECKING:
@@ -142,6 +143,18 @@ def height_in_section(axis: Any, director: Any, gap: Sequence[Any], xi: Any, hei
     rx, ry = polynomial(axis[0], xi), polynomial(axis[1], xi)
     nx, ny = polynomial(director[0], xi), polynomial(director[1], xi)
     return 0.5 + ((gap[0] - rx) * nx + (gap[1] - ry) * ny) / ((nx * nx + ny * ny) * height)
+
+
+def _functions(orders, X):
+    """At points the derivatives of the functions of the axis by xi, the functions of the director,
+    and their derivatives times eta - 1/2."""
+    (m, n), (xi, eta) = orders, X
+    return hermite_basis(m, xi, 1), hermite_basis(n, xi), (eta - 0.5) * hermite_basis(n, xi, 1)
+
+
+@lru_cache(256)
+def _kept_functions(orders, content):
+    return tuple(map(read_only, _functions(orders, *content.arrays)))
 
 
 def _frame(along):
@@ -362,8 +375,10 @@ class MappingBeam(Mapping):
         """Derivatives of :meth:`F` by xi and eta, and of the axis by xi, (2, ne, np) each."""
         axis, director = self._coefficients(tind)
         xi, eta = X
-        turning = self._sum(director, (eta - 0.5) * self._director(xi, 1))
-        across, along = self._sum(director, self._director(xi)), self._sum(axis, self._axis(xi, 1))
+        slopes, functions, turned = _kept_functions(self._orders, Content(X)) if few(X) else (
+            _functions(self._orders, X))
+        along, across = self._sum(axis, slopes), self._sum(director, functions)
+        turning = self._sum(director, turned)
         if self.mesh.heights is not None:
             g, rate = self._relative(xi, tind)
             turning, across = g * turning + (eta - 0.5) * rate * across, g * across

@@ -14,7 +14,7 @@ from ..frozen import Content, Frozen, read_only
 from ..kept import cached_property
 from ..nodal import nodal_derivatives, turned
 from ..quadrature import gauss, tensor
-from ..reference import SECTIONS, RefBeam, hermite_basis
+from ..reference import SECTIONS, RefBeam, few, hermite_basis
 from ..series import coefficients
 from .sampling import Held, Sampling, default_sampling, missed
 
@@ -32,9 +32,6 @@ if TYPE_CHECKING:
 
 #: Degrees along the axis of the elements of the package.
 DEGREES = tuple(range(3, 16, 2))
-
-#: Points at most of which the local functions are kept.
-KEPT_POINTS = 512
 
 
 def require_degree(degree: object) -> int:
@@ -200,7 +197,7 @@ class ElementBeam(Frozen, Element):
             value, d_xi, d_eta, (slope,) = self.local(X, h, slice(i, i + 1), rate)
             return value[0], d_xi[0], d_eta[0], int(slope)
         power, slope = self._factors[3:, i]
-        if isinstance(X, np.ndarray) and X.ndim == 2 and X.shape[1] <= KEPT_POINTS:
+        if few(X):
             unit = _kept_functions(self._along, self.functionals, self.section, Content(X))[:, i]
         else:
             unit = _unit_functions(self._along, self._factors[:, i], self.section, X)

@@ -126,14 +126,13 @@ class Assumed(Formulation):
                       width: float) -> Array | None:
         if not element.held:
             return None
-        if mesh.is_uniform:
-            return self._of_equal(mesh, element, material.E * width * mesh.height**3 / 12.0)
-        tind = np.arange(mesh.nelements)
-        L, EI = mesh.lengths[tind], material.E * width * mesh.height**3 / 12.0
-        per = {"element": L, "beam": mesh.chain_lengths[tind], "": np.ones(len(tind))}
+        L, EI = mesh.lengths, material.E * width * mesh.height**3 / 12.0
+        if mesh.is_straight:
+            return self._of_straight(mesh, element, EI)
+        per = {"element": L, "beam": mesh.chain_lengths, "": 1.0}
         q = element.rigid(mesh)
         q[0] = mesh.p
-        q = np.concatenate([q[:, :, end] for end in mesh.t[:, tind]])  # (2 nb, 2, ne)
+        q = np.concatenate([q[:, :, end] for end in mesh.t])  # (2 nb, 2, ne)
         nb = element.nodal_dofs
         chord = (q[nb] - q[0]) / L
         along = np.array([slope for _, slope, _ in 2 * element.functionals])
@@ -146,20 +145,21 @@ class Assumed(Formulation):
             C = np.einsum("ek,ij->eikj", c, np.eye(2))
             C[:, :, 0] += beta / L[:, None, None]
             C[:, :, nb] -= beta / L[:, None, None]
-            C = C.reshape(len(tind), 2, -1)
+            C = C.reshape(len(L), 2, -1)
             k = self.alpha * mode.size * EI / per[mode.per] ** 2
             held = (k * L)[:, None, None] * (C.transpose(0, 2, 1) @ C)
             out = held if out is None else out + held
         return out
 
-    def _of_equal(self, mesh: MeshBeam, element: ElementBeam, EI: float) -> Array:
-        """The same of straight elements that are equal: beta is zero."""
-        L, nb = float(mesh.lengths[0]), 2 * element.nodal_dofs
-        per = {"element": L, "beam": float(mesh.chain_lengths[0]), "": 1.0}
-        along, held = element.powers(1.0, L) / L, np.zeros((nb, nb))
+    def _of_straight(self, mesh: MeshBeam, element: ElementBeam, EI: float) -> Array:
+        """The same of straight elements, of one if all are equal: beta is zero."""
+        L, nb = mesh.lengths[:1 if mesh.is_uniform else None], 2 * element.nodal_dofs
+        per = {"element": L, "beam": mesh.chain_lengths[:len(L)], "": 1.0}
+        along, held = element.powers(1.0, L[:, None]) / L[:, None], np.zeros((len(L), nb, nb))
         for mode in element.held:
             c = mode.weights * along
-            held += (self.alpha * mode.size * EI / per[mode.per] ** 2 * L) * np.outer(c, c)
-        out = np.zeros((1, nb, 2, nb, 2))
-        out[0, :, 0, :, 0] = out[0, :, 1, :, 1] = held
-        return out.reshape(1, 2 * nb, 2 * nb)
+            k = self.alpha * mode.size * EI / per[mode.per] ** 2 * L
+            held += (k[:, None] * c)[:, :, None] * c[:, None]
+        out = np.zeros((len(L), nb, 2, nb, 2))
+        out[:, :, 0, :, 0] = out[:, :, 1, :, 1] = held
+        return out.reshape(len(L), 2 * nb, 2 * nb)

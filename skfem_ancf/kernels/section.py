@@ -432,8 +432,8 @@ class TermTables:
     owner
         What is kept alive as long as a law of one's own is asked.
     before
-        Those of another material on the same mesh, element and section, whose tables serve; None
-        to make them.
+        Those of the same element of another material, whose tables serve on the same mesh; on
+        another one what does not depend on it. None to make them.
 
     Attributes
     ----------
@@ -453,21 +453,21 @@ class TermTables:
         whole = self.section_points == 1
         if before is not None and not _same_places(term, before.term):
             before = None
-        if before is None:
+        if before is not None and before._mesh is mesh:
+            self.points, self.w, self._rows = before.points, before.w, before._rows
+        else:
             self.points, W = term.quadrature
             self.w = across.volume(slab, self.points, W, tind, whole)
-            self._rows, self._interpolation = _rows(mesh, across.element, term, tind), (
-                _interpolation(term))
-        else:
-            self.points, self.w = before.points, before.w
-            self._rows, self._interpolation = before._rows, before._interpolation
+            self._rows = _rows(mesh, across.element, term, tind)
+        self._interpolation = before._interpolation if before is not None else _interpolation(term)
         G, frame, rows, sheared, self._along, scaled = self._rows
         self._sheared = np.concatenate(sheared)
         weights = self.w if slab.grade is None else across.volume(
             slab, *term.quadrature, tind, whole, "grade")
         self.pack: SectionPack = section_pack(
             G, frame, weights.T, rows, self._interpolation, law_tables(self.law, owner), constant,
-            mesh.t[0], None if before is None else before.pack, scaled)
+            mesh.t[0], before.pack if before is not None and (
+                before._mesh is mesh or not (before.shared or self.shared)) else None, scaled)
 
     def in_proportion(self, slab: "Slab", stiffness: float, volume: float) -> "TermTables":
         """As :meth:`Kernel.in_proportion`.
@@ -564,6 +564,8 @@ class TermTables:
 
 def _same_places(a, b):
     """True if two terms are sampled and integrated at the same places."""
+    if a is b:
+        return True
     rules = [(x.axis, x.section, x.section_samples or ()) for x in (a, b)]
     return a.samples == b.samples and all(
         len(x) == len(y) and all(map(np.array_equal, x, y)) for x, y in zip(*rules))
@@ -645,7 +647,8 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
     left
         The left node of each element.
     before
-        One of the same G, whose tables of pairs serve if the law couples the same strains.
+        One of the same G, or of as many rows of G for each element, whose tables of pairs serve if
+        the law couples the same strains.
     scaled
         A table (rows, nb) whose rows and columns two vectors multiply to make G, and how many of
         its rows are along the axis; or None.
@@ -822,13 +825,16 @@ class Kernel(Chain):
     formulation
         A :class:`~skfem_ancf.formulations.Formulation`.
     before
-        The kernel of the same beam of another material, whose tables serve; None to make them.
+        The kernel of the same beam of another material, or on another mesh, whose tables serve;
+        None to make them.
+    same_law
+        The law is the same, of a plain section.
     """
 
     texts = SECTIONS
 
     def __init__(self, across: "Across", formulation: "Formulation",
-                 before: "Kernel | None" = None) -> None:
+                 before: "Kernel | None" = None, same_law: bool = False) -> None:
         super().__init__(across.mesh, across.element)
         self.constant = across.stabilisation(formulation)
         known = [] if before is None else before.tables[:]
@@ -836,7 +842,8 @@ class Kernel(Chain):
         constants = [none if self.constant is None else self.constant]
         self.tables: list[TermTables] = []
         self._across = across
-        for slab, terms in across.terms(formulation):
+        for slab, terms in ([(across.slabs[0], [t.term for t in known])] if same_law else
+                            across.terms(formulation)):
             for term in terms:
                 constant = constants.pop() if constants else none
                 self.tables.append(TermTables(across, slab, term, constant, self,
@@ -899,7 +906,7 @@ class Kernel(Chain):
         return other
 
     def on_mesh(self, across: "Across", formulation: "Formulation") -> "Kernel | None":
-        """The kernel of the same beam on another mesh, of as many elements.
+        """The kernel of the same beam on another mesh.
 
         Parameters
         ----------
@@ -911,14 +918,16 @@ class Kernel(Chain):
         Returns
         -------
         Kernel or None
-            None if more than the length and the height of equal elements is another.
+            None if the section is not plain.
         """
         mine = self._across
+        if not (mine.plain and across.plain):
+            return None
         if not (mine.simple and mine.uniform and across.simple and across.uniform and self.linear
                 and mine.slabs[0].width == across.slabs[0].width
                 and np.array_equal(mine.mesh.t, across.mesh.t)
                 and all(table._rows[5] is not None for table in self.tables)):
-            return None
+            return Kernel(across, formulation, self, same_law=True)
         other = twin_of(self)
         other._across, other.t = across, across.mesh.t
         other.constant = across.stabilisation(formulation)
