@@ -19,10 +19,11 @@ from skfem_ancf.equations import Tables
 from skfem_ancf.errors import CallbackError
 from skfem_ancf.finder import Finder
 from skfem_ancf.forces import system as forces
-from skfem_ancf.formulations import FORMULATIONS
+from skfem_ancf.formulations import FORMULATIONS, Assumed
 from skfem_ancf.kernels import cable, section
 from skfem_ancf.kernels.base import pair_tables
 from skfem_ancf.loads import EndMoment, PointForce, Pressure, Weight
+from skfem_ancf.mapping import MappingBeam
 from skfem_ancf.statics.iteration import ALONE
 from skfem_ancf.system import System
 
@@ -569,6 +570,31 @@ def test_a_replaced_width_scales_masses(element, shape):
         assert np.allclose(a, b, rtol=1e-13, atol=1e-14 * np.max(np.abs(b)))
     denser = wider.replace(material=law.replace(density=1000.0))
     assert denser.total_mass == pytest.approx(anew.total_mass * 1000.0 / 7800.0, rel=1e-13)
+
+
+@pytest.mark.parametrize("shape", ["taper", "arc"])
+def test_on_another_mesh_only_what_depends_on_it_is_made(monkeypatch, shape):
+    def mesh(size):
+        x = size * np.linspace(0, 1, 5)
+        return MeshBeam.init_line(x, lambda s: 0.12 - 0.04 * s) if shape == "taper" else (
+            MeshBeam.init_curve(lambda s: np.array([np.sin(s), 1.0 - np.cos(s)]), x, 0.1))
+
+    def scene(mesh):
+        beam = Beam(mesh, ElementBeamANCF(3), StVenantKirchhoff(2e7, 0.3, 7800.0), 0.01)
+        return Scene(beam).clamp("left", thickness="free").gravity((0.0, -9.81))
+
+    first, larger = scene(mesh(1.0)), mesh(1.1)
+    first.solve_static()
+    terms, pairs, geometry = (counted(monkeypatch, owner, name) for owner, name in (
+        (Assumed, "terms"), (section, "pair_tables"), (MappingBeam, "_derivatives")))
+    other = first.replace(mesh=larger)
+    assert not terms and not pairs
+    assert len(geometry) == 3  # of the strains' samples, of their volumes, of the masses
+    a, b = other.solve_static(), scene(larger).solve_static()
+    assert a.iterations == b.iterations and np.allclose(a.u, b.u, rtol=0, atol=1e-10)
+    for one, two in zip(other.beams[0].kernel.packs, scene(larger).beams[0].kernel.packs):
+        for name in ("table", "frame", "weights", "moduli", "constant"):
+            assert np.array_equal(getattr(one, name), getattr(two, name))
 
 
 #: Arguments of a Beam, some of each.

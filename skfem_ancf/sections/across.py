@@ -524,10 +524,12 @@ class Across(Frozen):
             Shape (3, nelements, npoints).
         """
         ne, n = self.mesh.nelements if tind is None else len(tind), xi.shape[-1]
-        mapping, out = self.mesh.mapping(), np.zeros((3, ne, n))
+        out = np.zeros((3, ne, n))
         if self.plain:
-            out[0], _, out[2] = self._plain_moments(mapping.height(xi, tind)[0], what)
+            h = self.mesh.height if self.simple else self.heights(xi, tind)
+            out[0], _, out[2] = self._plain_moments(h, what)
             return out
+        mapping = self.mesh.mapping()
         for slab, (eta, w) in self.rules(POINTS, what == "mass"):
             X = np.array(np.broadcast_arrays(np.repeat(xi, len(eta), -1), np.tile(eta, n)))
             w = np.tile(w, n)
