@@ -129,7 +129,7 @@ class Assumed(Formulation):
         L, EI = mesh.lengths, material.E * width * mesh.height**3 / 12.0
         if mesh.is_straight:
             return self._of_straight(mesh, element, EI)
-        per = {"element": L, "beam": mesh.chain_lengths, "": 1.0}
+        per = {"element": L, "beam": mesh.chain_lengths, "": np.ones(1)}
         q = element.rigid(mesh)
         q[0] = mesh.p
         q = np.concatenate([q[:, :, end] for end in mesh.t])  # (2 nb, 2, ne)
@@ -154,7 +154,7 @@ class Assumed(Formulation):
     def _of_straight(self, mesh: MeshBeam, element: ElementBeam, EI: float) -> Array:
         """The same of straight elements, of one if all are equal: beta is zero."""
         L, nb = mesh.lengths[:1 if mesh.is_uniform else None], 2 * element.nodal_dofs
-        per = {"element": L, "beam": mesh.chain_lengths[:len(L)], "": 1.0}
+        per = {"element": L, "beam": mesh.chain_lengths[:len(L)], "": np.ones(1)}
         along, held = element.powers(1.0, L[:, None]) / L[:, None], np.zeros((len(L), nb, nb))
         for mode in element.held:
             c = mode.weights * along

@@ -443,6 +443,11 @@ class TermTables:
         :class:`SectionPack`.
     """
 
+    points: Array
+    w: Array
+    _rows: Any
+    _interpolation: list[Array]
+
     def __init__(self, across: "Across", slab: "Slab", term: "Term", constant: Array,
                  owner: Any, before: "TermTables | None" = None) -> None:
         self.law, self.term, self.slab, mesh = term.law, term, slab, across.mesh
