@@ -248,17 +248,23 @@ def mirror(A):
 
 
 @source
-def fix(A, free):
-    """Rows and columns where free is zero become those of the identity."""
-    flat, ld, step = A.flat, A.ld, max(1, A.ld - 1)
-    for i in np.nonzero(free == 0.0)[0]:
-        at = i * ld + A.top
+def fix(A, fixed):
+    """Rows and columns of these numbers become those of the identity."""
+    fix_stored(A.flat, A.ld, A.width, A.top, fixed)
+
+
+@source
+def fix_stored(flat, ld, width, top, fixed):
+    """The same of what a band stores."""
+    n, step = flat.size // ld, max(1, ld - 1)
+    for i in fixed:
+        at = i * ld + top
         for k in lanes(i * ld, (i + 1) * ld):
             flat[k] = 0.0
-        for k in lanes(at - step * min(A.width, i), at, step):
+        for k in lanes(at - step * min(width, i), at, step):
             flat[k] = 0.0
-        if A.top > 0:
-            for k in lanes(at + step, at + step * min(A.width, free.size - 1 - i) + 1, step):
+        if top > 0:
+            for k in lanes(at + step, at + step * min(width, n - 1 - i) + 1, step):
                 flat[k] = 0.0
         flat[at] = 1.0
 

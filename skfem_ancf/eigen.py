@@ -230,7 +230,7 @@ def _negative(tangent, state, shift):
     system.assemble(state.u, state.load, t=state.t)
     system.K.combine(1.0, system.K, shift, system.mass)
     if shift < 0.0 and not system.coupled:  # as a rule indefinite: without factors
-        fix(system.K.band, system.mask)
+        fix(system.K.band, system.fixed)
         return (system.K if system.symmetric else system.K.symmetric_part()).negative()
     system.factorize(state.u, state.load if state.t is None else state.t, state.multipliers)
     return system.inertia().negative

@@ -636,7 +636,7 @@ class System:
     def mass_factors(self) -> BandMatrix:
         """The factors of the mass matrix with its supports fixed; made once."""
         M = self.new_band().combine(1.0, self.mass, 0.0, self.mass)
-        fix(M.band, self.mask)
+        fix(M.band, self.fixed)
         if not factorize(M.band):
             if self.forces.masses:
                 raise InputError("the mass matrix is singular to round-off: a mass or an inertia "
@@ -772,7 +772,7 @@ class System:
         multipliers
             Theirs, shape (m,).
         """
-        fix(self.K.band, self.mask)
+        fix(self.K.band, self.fixed)
         if not self.coupled:
             self.K.factorize()
             return

@@ -300,10 +300,11 @@ def test_fixed_rows_and_columns_of_a_band_matrix_are_those_of_the_identity(n, ba
     i, j = np.nonzero(abs(np.arange(n)[:, None] - np.arange(n)) <= bandwidth)
     for symmetric in (True, False):
         for fixed in (0,), (n - 1,), (n // 2, n // 2 - 1), ():
-            A, free = BandMatrix(n, bandwidth, symmetric), np.ones(n)
+            A, free, fixed = (BandMatrix(n, bandwidth, symmetric), np.ones(n),
+                              np.array(fixed, np.int64))
             inside = (i >= j) | (not symmetric)
             A.add(i[inside], j[inside], 2.0 + np.sin(i + 7.0 * j)[inside])
-            free[list(fixed)] = 0.0
+            free[fixed] = 0.0
             wanted = A.tocsc().toarray() * np.outer(free, free) + np.diag(1.0 - free)
-            fix(A.band, free)
+            fix(A.band, fixed)
             assert_allclose(A.tocsc().toarray(), wanted, atol=0.0)

@@ -62,7 +62,7 @@ GROUPS = {
         Call(band.factorize, (Band,), bool),
         Call(band.solve, (Band, F1)),
         Call(band.dense_solve, (F2, F1), bool),
-        Call(band.fix, (Band, F1))),
+        Call(band.fix, (Band, I1))),
     "kernels": (
         Call(base.load, (I1, I1, int, F1, F3)),
         Call(base.add_force, (F3, F3, F3, I1, I1, int, F3, F3, F1)),

@@ -188,7 +188,7 @@ class Collocation(Scheme):
         if not s.damped:
             return du
         A = M._replace(flat=M.flat + 0.5 * time * integrator.room.D.flat, pivots=M.pivots.copy())
-        fix(A, s.mask)
+        fix(A, s.fixed)
         if not factorize(A):
             return du
         x = s.mass.multiply(du) * s.free

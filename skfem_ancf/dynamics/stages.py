@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..band import (SPARE, Band, add_multiple, clear, copy, dense_solve, factorize,
-                    factorize_complex, multiply, solve, solve_complex, solve_joined)
+                    factorize_complex, fix_stored, multiply, solve, solve_complex, solve_joined)
 from ..body import (add_force_by, add_viscous_stress, body_force, body_gradients, body_mean_stress,
                     body_mixed, body_stress, body_tangent, carry_by)
 from ..forces.texts import (add_elastic_force, add_element_damping, add_element_tangent,
@@ -650,10 +650,4 @@ def _combine(K, M, D, fixed, c, m, d, out):
     else:
         for i in lanes(out.size):
             out[i] = c * x[i] + m * y[i] + d * z[i]
-    for i in range(fixed.size):
-        j = fixed[i]
-        for h in lanes(ld):
-            columns[j, h] = 0.0
-        for h in range(1, min(K.width, j) + 1):
-            columns[j - h, h] = 0.0
-        columns[j, 0] = 1.0
+    fix_stored(out, ld, K.width, 0, fixed)

@@ -317,7 +317,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
             left, most = left - 1, most - 1
             if state[READY] == 0.0:
                 _tangent(e, matrices, rule, s, w, state)
-                if not _factorize(e.free, matrices, rule, s, w, state):
+                if not _factorize(e, matrices, rule, s, w, state):
                     return n
             _internal_force(e.body, rule, w, state)
             _add_elastic(e.forces, rule, s, w)
@@ -701,9 +701,9 @@ def _add_elastic(forces, rule, s, w):
 
 
 @source
-def _factorize(free, matrices, rule, s, w, state):
+def _factorize(e, matrices, rule, s, w, state):
     """Factors of the iteration matrix; False if it has none."""
-    fix(matrices.A, free)
+    fix(matrices.A, e.fixed)
     state[FACTORIZED] += 1.0
     if rule.solver > 0:  # asked without a right-hand side: with what multipliers do at u
         l, dl, none = w.m.l, w.m.dl, w.x.du[:0]
@@ -716,7 +716,7 @@ def _factorize(free, matrices, rule, s, w, state):
         state[FAILURE] = SINGULAR
         return False
     if rule.solver == 0:
-        factorize_rows(matrices.A, matrices.rows, free)
+        factorize_rows(matrices.A, matrices.rows, e.free)
     state[READY], state[RATE], state[FRESH], state[SIZE] = 1.0, EXPECTED, 1.0, -1.0
     return True
 

@@ -228,7 +228,7 @@ def _member(e, target, rules, x, w, record, members, before, least):
     if status != CONVERGED:
         return status, number
     if number == 0:  # the tangent is there, its factors are not
-        fix(e.K, e.free)
+        fix(e.K, e.fixed)
         if not factorize(e.K):
             return SINGULAR, number
     diagonal(e.K, w.scale)
@@ -376,7 +376,7 @@ def _correction(e, target, rules, x, w, moving):
             add_constraint_rate(e.joints, target.g, target.at, x.u, w.push, w.phi)
     for k in lanes(m):
         w.phi[k] = -w.phi[k]
-    fix(e.K, e.free)
+    fix(e.K, e.fixed)
     if not _solved(e, target, rules, x, w):
         return -1.0
     work = np.sqrt(abs(dot(w.R, w.du)) + abs(dot(w.phi, w.dm)))

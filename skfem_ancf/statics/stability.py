@@ -133,7 +133,7 @@ def has_potential(system: System, u: Array, load: float) -> bool:
     if system.symmetric:
         return True
     system.assemble(u, load)
-    fix(system.K.band, system.mask)
+    fix(system.K.band, system.fixed)
     return _is_symmetric(system)
 
 
