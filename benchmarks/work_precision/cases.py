@@ -131,7 +131,8 @@ def motion(p, scale=1, adaptive=True):
                 for scheme in ("radau", "gauss"):
                     yield ours.run(p, "cable", degree, n, steps=steps, scheme=scheme, tol=1e-7)
     for degree, n, steps, tol in ((5, 5, 60, 1e-5), (5, 5, 60, 1e-6), (7, 4, 70, 1e-6),
-                                  (7, 5, 150, 1e-6), (9, 6, 300, 1e-6), (9, 6, 400, 1e-6),
+                                  (7, 5, 150, 1e-6), (9, 4, 150, 1e-6), (9, 5, 150, 1e-6),
+                                  (9, 6, 150, 1e-6), (9, 6, 300, 1e-6), (9, 6, 400, 1e-6),
                                   (9, 6, 600, 1e-7), (9, 8, 1500, 1e-7), (7, 12, 2000, 1e-7)):
         yield ours.run(p, "cable", degree, n, steps=steps, scheme="gauss", points=4, tol=tol)
     for degree, n, tol in ((7, 4, 1e-4), (7, 5, 1e-5)):
@@ -150,6 +151,11 @@ def motion(p, scale=1, adaptive=True):
     for n in (4, 5, 6):
         for steps in (80, 100):
             yield ours.run(p, "cable", 3, n, steps=steps // scale, tol=1e-3)
+    for degree, n, steps in ((7, 1, 96), (7, 1, 100), (5, 3, 180)):
+        yield ours.run(p, "cable", degree, n, steps=steps // scale, scheme="energy-momentum",
+                       tol=1e-3)
+    for degree, steps, tol in ((7, 35, 3e-3), (9, 35, 3e-3)):
+        yield ours.run(p, "cable", degree, 2, steps=steps, scheme="radau", tol=tol)
     if adaptive:
         for n, rtol in ((4, 1e-4), (4, 1e-5), (6, 1e-6), (8, 1e-7)):
             yield ours.run(p, "cable", 5, n, rtol=rtol, tol=1e-6)
@@ -208,8 +214,9 @@ def spin_up(p):
         for n in (2, 3):
             yield ours.run(p, "cable", 3, n, steps=steps, tol=1e-3)
             yield ours.run(p, "cable", 3, n, steps=steps, scheme="energy-momentum", tol=1e-3)
-        for tol in (1e-3, 1e-4):
-            yield ours.run(p, "cable", 5, 1, steps=steps, scheme="radau", tol=tol)
+        for degree in (5, 7):
+            for tol in (1e-2, 1e-3, 1e-4):
+                yield ours.run(p, "cable", degree, 1, steps=steps, scheme="radau", tol=tol)
     for steps in (100, 500, 2000):
         yield ours.run(p, "cubic", 2, 4, steps=steps, tol=1e-6)
     if exudyn_beams.exudyn is None:
