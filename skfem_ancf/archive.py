@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import zipfile
+import zlib
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +17,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from .types import Array
+
+#: What reading a file raises that is damaged, or none of these.
+DAMAGED = (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, MemoryError,
+           RuntimeError, OverflowError, zipfile.BadZipFile, zlib.error)
 
 
 def find_h5py() -> Any:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import zipfile
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .archive import write
+from .archive import DAMAGED, write
 from .errors import (FileError, InputError, MissingExtra, NameUnknown, require_path, shown,
                      teaching)
 
@@ -19,7 +18,8 @@ if TYPE_CHECKING:
     Block = tuple[Array, dict[str, Array]]
 
 _FORMAT = 1
-_DAMAGED = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
+#: Arrays of a file beside those of parameters and values.
+_OWN = ("format", "done", "failed", "errors")
 
 
 class Failure(NamedTuple):
@@ -186,16 +186,20 @@ class Sweep:
         """
         path = require_path("path", path, (".npz",))
         try:
-            with np.load(path, allow_pickle=False) as file:
+            with open(path, "rb") as content, np.load(content, allow_pickle=False) as file:
                 if int(file["format"]) != _FORMAT:
                     raise ValueError("it is of another version")
                 columns: dict[str, dict[str, Array]] = {"parameters": {}, "values": {}}
                 for key in file.files:
-                    folder, _, name = key.partition("/")
-                    if name:
+                    if key not in _OWN:
+                        folder, _, name = key.partition("/")
                         columns[folder][name] = file[key]
                 done, errors = file["done"], dict(zip(file["failed"].tolist(), file["errors"]))
-        except _DAMAGED as error:
+                if {len(x) for part in columns.values() for x in part.values()} - {len(done)}:
+                    raise ValueError("its arrays are not of equal length")
+                if not columns["parameters"] or done.any() and not columns["values"]:
+                    raise ValueError("arrays are missing")
+        except DAMAGED as error:
             raise FileError(f"{path} cannot be read as a sweep: {error}") from error
         return cls(columns["parameters"], [
             {name: column[k] for name, column in columns["values"].items()} if done[k]

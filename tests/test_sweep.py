@@ -181,6 +181,26 @@ def test_the_file_is_of_one_table(tmp_path):
         sweep(just, {"x": [MESH]}, id, path=tmp_path / "other.npz")
 
 
+def test_a_damaged_file_is_said(tmp_path):
+    """Cut, with bits changed in what NumPy reads first, or with arrays renamed or cut."""
+    path, bad = tmp_path / "squares.npz", tmp_path / "bad.npz"
+    result = sweep(just, {"x": np.arange(8.0)}, lambda x: {"square": x**2}, path=path)
+    content = path.read_bytes()
+    for at in range(0, len(content), 3):
+        for found in (content[:at], content[:at] + bytes([content[at] ^ 32]) + content[at + 1:]):
+            bad.write_bytes(found)
+            try:
+                assert_array_equal(Sweep.load(bad)["square"], result["square"])
+            except FileError as error:
+                assert "cannot be read as a sweep" in str(error)
+    arrays = dict(np.load(path))
+    short = {**arrays, "values/square": arrays["values/square"][:-1]}
+    for wrong in ({**arrays, "values-cube": arrays["values/square"]}, short):
+        np.savez(bad, **wrong)
+        with pytest.raises(FileError, match="cannot be read as a sweep"):
+            Sweep.load(bad)
+
+
 def test_the_file_is_written_as_results_come(tmp_path, monkeypatch):
     monkeypatch.setattr("skfem_ancf.sweeps._SECONDS", 0.0)
     monkeypatch.setattr("skfem_ancf.sweeps._RARER", 0.0)

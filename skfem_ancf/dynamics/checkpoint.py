@@ -7,13 +7,11 @@ import json
 import logging
 import time
 import warnings
-import zipfile
-import zlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..archive import find_h5py
+from ..archive import DAMAGED, find_h5py
 from ..archive import write as _write
 from ..errors import (CheckpointError, CheckpointWarning, InputError, require_integer,
                       require_path, shown)
@@ -40,8 +38,6 @@ PLACES = 32
 #: Seconds between two files by default, and the part of the time that writing may take.
 SECONDS, SHARE = 60.0, 0.05
 _MAGIC = "skfem-ancf checkpoint"
-_DAMAGED = (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, MemoryError,
-            RuntimeError, OverflowError, zipfile.BadZipFile, zlib.error)
 
 
 # the scene
@@ -237,7 +233,7 @@ def read(path: StrPath) -> tuple[dict[str, Array], dict[str, Any]]:
         raise CheckpointError(f"there is no file {str(path)!r}")
     try:
         arrays = _load(path)
-    except _DAMAGED as error:
+    except DAMAGED as error:
         raise CheckpointError(f"{str(path)!r} cannot be read, it is no checkpoint or damaged: "
                               f"{type(error).__name__}: {error}") from None
     checksum = arrays.pop("checksum", None)
