@@ -591,7 +591,11 @@ class State(Frozen):
 
     @property
     def strain_energy(self) -> float:
-        """Strain energy of the scene."""
+        """Strain energy of the scene.
+
+        It is W(E) of all the strain, also under temperatures and eigenstrains E0: these are loads,
+        and their potential is what W(E - E0), the field "energy", has less.
+        """
         with self.contact_memory():
             return self.system.strain_energy(self.u, self.load if self.t is None else self.t)
 
