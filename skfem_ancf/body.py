@@ -7,10 +7,10 @@ import numpy as np
 
 from .band import clear, copy
 from .kernels.base import (CARRY, FORCE, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, VISCOUS,
-                           Destination, add_changes, add_pushes, repeated)
+                           Destination, add_changes, add_pushes, add_scaled, repeated)
 from .kernels.cable import CablePack, cable_evaluate
 from .kernels.section import SectionPack, section_evaluate
-from .source import I1, I2, lanes, primitive, shaped, source
+from .source import I1, I2, primitive, shaped, source
 
 if TYPE_CHECKING:
     from .beam import Beam
@@ -231,11 +231,7 @@ def body_mean_stress(body, copies, weights, stresses, out):
         all_of_them, mean = _stress(copies, k, stresses), _stress(body, k, out)
         size = mean.shape[2]
         for j in range(weights.size):
-            one, weight = all_of_them[:, :, j * size:(j + 1) * size], weights[j]
-            for c in lanes(mean.shape[0]):
-                for p in lanes(mean.shape[1]):
-                    for e in lanes(size):
-                        mean[c, p, e] += weight * one[c, p, e]
+            add_scaled(weights[j], all_of_them[:, :, j * size:(j + 1) * size], mean, mean)
 
 
 @source
@@ -258,10 +254,7 @@ def add_viscous_stress(viscous, body, copies, k, u, v, rooms, out):
         one, all_of_them = _stress(body, j, rooms[1]), _stress(copies, j, out)
         size = one.shape[2]
         its = all_of_them[:, :, k * size:(k + 1) * size]
-        for c in lanes(one.shape[0]):
-            for p in lanes(one.shape[1]):
-                for e in lanes(size):
-                    its[c, p, e] += one[c, p, e]
+        add_scaled(1.0, one, its, its)
 
 
 @source
@@ -306,16 +299,20 @@ def body_gradients(body, u, gradients):
 
 
 @source
+def _starts(body, k):
+    """The first coordinate of each element of pack k, in those of its beam."""
+    if body.table[k, KIND] == SECTION:
+        return section_pack(body, k).start
+    return cable_pack(body, k).start
+
+
+@source
 def carry_by(body, copies, gradients, du, stresses, carried):
     """As :func:`body_carry`, of copies, by the gradients of the body."""
     copy(stresses, carried)
     for k in range(body.table.shape[0]):
         B, new = _gradients(body, k, gradients)[1], _stress(copies, k, carried)
-        x = du[copies.table[k, FIRST]:copies.table[k, LAST]]
-        if body.table[k, KIND] == SECTION:
-            add_changes(B, section_pack(copies, k).start, x, new)
-        else:
-            add_changes(B, cable_pack(copies, k).start, x, new)
+        add_changes(B, _starts(copies, k), du[copies.table[k, FIRST]:copies.table[k, LAST]], new)
 
 
 @source
@@ -323,8 +320,4 @@ def add_force_by(body, copies, gradients, stresses, f):
     """As :func:`add_force_of`, of copies, by the gradients of the body."""
     for k in range(body.table.shape[0]):
         B, given = _gradients(body, k, gradients)[0], _stress(copies, k, stresses)
-        force = f[copies.table[k, FIRST]:copies.table[k, LAST]]
-        if body.table[k, KIND] == SECTION:
-            add_pushes(B, section_pack(copies, k).start, given, force)
-        else:
-            add_pushes(B, cable_pack(copies, k).start, given, force)
+        add_pushes(B, _starts(copies, k), given, f[copies.table[k, FIRST]:copies.table[k, LAST]])

@@ -157,10 +157,15 @@ def _kept_functions(orders, content):
     return tuple(map(read_only, _functions(orders, *content.arrays)))
 
 
-def _frame(along):
-    """The frame of :meth:`MappingBeam.frame` from the derivative of the axis."""
-    x, y = along / np.sqrt(along[0] ** 2 + along[1] ** 2)
+def _frame(tangent):
+    """The frame of :meth:`MappingBeam.frame` of unit tangents."""
+    x, y = tangent
     return np.array([[x, -y], [y, x]])
+
+
+def _unit(d):
+    """Vectors (2, ...) of length 1."""
+    return d / np.sqrt(d[0] ** 2 + d[1] ** 2)
 
 
 class MappingBeam(Mapping):
@@ -416,8 +421,7 @@ class MappingBeam(Mapping):
             Shape (2, 2, nelements, npoints).
         """
         J = self.DF(X, tind)
-        det = J[0, 0] * J[1, 1] - J[0, 1] * J[1, 0]
-        return np.array([[J[1, 1], -J[0, 1]], [-J[1, 0], J[0, 0]]]) / det
+        return np.array([[J[1, 1], -J[0, 1]], [-J[1, 0], J[0, 0]]]) / cross(J[:, 0], J[:, 1])
 
     def turning(self, X: Array, tind: Array | None = None) -> Array:
         """Derivative by xi of the unit-height section director, shape (2, nelements, npoints).
@@ -444,10 +448,9 @@ class MappingBeam(Mapping):
             Shape (2, 2, nelements, npoints), orthonormal, the same across a section.
         """
         if self._constant is not None:
-            e1 = self._constant[:, 0] / self.mesh.lengths
-            return self._everywhere(np.stack([e1, np.array([-e1[1], e1[0]])], 1), X, tind)
+            return self._everywhere(_frame(self._constant[:, 0] / self.mesh.lengths), X, tind)
         axis, _ = self._coefficients(tind)
-        return _frame(self._sum(axis, self._axis(X[0], 1)))
+        return _frame(_unit(self._sum(axis, self._axis(X[0], 1))))
 
     def in_frame(self, X: Array, tind: Array | None = None) -> tuple[Array, Array]:
         """Derivatives of xi and eta along the axis and across it, and the :meth:`frame`.
@@ -467,7 +470,7 @@ class MappingBeam(Mapping):
             a, b = J[:, 0], J[:, 1]
         else:
             a, b, along = self._derivatives(X, tind)
-            frame = _frame(along)
+            frame = _frame(_unit(along))
         x, y = frame[:, 0]
         rates = np.empty_like(frame)
         rates[0, 0], rates[0, 1] = x * b[1] - y * b[0], y * a[0] - x * a[1]

@@ -225,7 +225,7 @@ class BodyPart:
         Positions at the start, (2, n).
     """
 
-    off_axis = True  # not of one table of weights for both components
+    off_axis = False  # its points move linearly in its coordinates
 
     def __init__(self, body: RigidBody, coordinates: slice, index: Array | None,
                  start: Array) -> None:

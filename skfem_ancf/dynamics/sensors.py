@@ -12,7 +12,6 @@ from ..errors import (CheckpointError, InputError, NameUnknown, ask_array, requi
 from ..fields import FIELDS, find_field
 from ..frozen import Frozen
 from ..joints.base import Joint
-from ..parts import BodyPart
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -82,8 +81,7 @@ class Sensor(Frozen):
         if self.what in SECTION and len(found.parts) != 1:
             raise InputError("the points of a sensor of sections must be in one beam: make one for "
                              "each")
-        if self.what == "acceleration" and any(
-                part.off_axis and not isinstance(part, BodyPart) for part in found.parts):
+        if self.what == "acceleration" and any(part.off_axis for part in found.parts):
             raise InputError("the acceleration of a cable is known on its axis: off it sections "
                              "turn with the tangent; put the sensor on the axis")
 
