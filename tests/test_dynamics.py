@@ -162,6 +162,23 @@ def test_few_iterations_in_steps_that_turn_far(scheme, n, tol):
     assert np.abs(history.position((1, 0))[-1] - fine.position((1, 0))[-1]).max() < 1e-3
 
 
+@pytest.mark.parametrize("joined", [False, True])
+def test_radau_does_not_multiply_errors_of_the_iteration_by_the_stiffness(joined):
+    """Accelerations at the ends of steps: by the forces there they would be 40 times too large."""
+    def pendulum(first):
+        return Beam(MeshBeam.init_line(np.linspace(first, first + 1, 3), 0.02), ElementBeamCable(5),
+                    StVenantKirchhoff(2e11, 0.3, 7800.0), 0.02)
+
+    scene = Scene(*(pendulum(k) for k in range(1 + joined))).gravity(GRAVITY)
+    scene.pin("left", beam=0)
+    if joined:
+        scene.hinge((0, "right"), (1, "left"))
+    exactly, roughly = (scene.integrate(0.4, 0.02, scheme="radau", tol=x) for x in (1e-11, 1e-5))
+    for name in ("acceleration", "multipliers"):
+        known, found = getattr(exactly, name)[-1], getattr(roughly, name)[-1]
+        assert_allclose(found, known, rtol=0, atol=1e-3 * np.abs(known).max(initial=0.0))
+
+
 def test_factors_are_made_once_where_the_first_correction_stretches_far():
     """It has more energy than the motion: stresses are carried at once, with the factors there."""
     beam = Beam(MeshBeam.init_line([0, 1], 0.01), ElementBeamCable(5),

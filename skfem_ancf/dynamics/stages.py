@@ -300,7 +300,7 @@ def _end(e, matrices, method, s, w, state, step):
     """The end of the step into ``w.y``, and the work of damping; False if joints are dependent."""
     n, dampers, first = method.points.size, matrices.dampers, step * (method.points.size + 1)
     t = s.times[first + n]
-    u, v, a, f, Q, room = w.y[0], w.y[1], w.y[2], w.x[0], w.x[1], w.x[2]
+    u, v, a, f, room = w.y[0], w.y[1], w.y[2], w.x[0], w.x[2]
     for k in range(n):
         c, U, V, W = s.h * method.weights[k], w.U[k], w.V[k], w.W[k]
         if dampers.active > 0:
@@ -308,34 +308,51 @@ def _end(e, matrices, method, s, w, state, step):
             state[DISSIPATED] += c * np.dot(f, V)
         add_multiple(c, V, u)
         add_multiple(c, W, v)
-    if method.points[n - 1] == 1.0:
+    ends = method.points[n - 1] == 1.0
+    if ends:
         copy(w.U[n - 1], u)
         copy(w.V[n - 1], v)
-    held, motion = _row(s.held, first + n), _motion(s.joints, first + n)
+        copy(w.W[n - 1], a)
+    held, motion, joined = _row(s.held, first + n), _motion(s.joints, first + n), w.shares.size > 0
     for i in lanes(u.size):
         u[i] = u[i] * e.free[i] + held[0, i]
         v[i] = v[i] * e.free[i] + held[1, i]
-        a[i] = held[2, i]
-    if w.shares.size > 0 and not _close(e, matrices, s, w, motion, t):
+    if joined and not _close(e, matrices, s, w, motion, t):
         return False
-    multiply(matrices.M, a, room)
-    body_force(e.body, u, f)
-    add_elastic_force(e.forces, t, 0.0, u, u, f)
-    external_force(e.loads, _row(s.factors, first + n), t, 1.0, u, Q)
-    for i in lanes(a.size):
-        a[i] += (Q[i] - f[i] - room[i]) * e.free[i]
-    if dampers.active > 0:
-        damping_force(e, dampers, matrices.M, t, u, v, f, room)
-        for i in lanes(a.size):
-            a[i] -= f[i] * e.free[i]
-    solve(matrices.mass, a)
-    if w.shares.size > 0:
+    if not ends:
+        _balance(e, matrices, s, w, first + n)
+    if joined:
         acceleration_of_joints(e.joints, motion, t, s.h, u, v, w.shares)
         if not _meet(matrices.mass, e.free, w, a):
             return False
+        if ends:
+            add_multiple(1.0, w.l[n - 1], w.shares)
     multiply(matrices.M, v, room)
     state[ENERGY] = max(state[ENERGY], 0.5 * np.dot(v, room))
     return True
+
+
+@source
+def _balance(e, matrices, s, w, at):
+    """The acceleration at the end of the step by the forces there, without those of joints.
+
+    A method whose last point is the end has it from its points: there errors of the iteration are
+    not multiplied by the stiffness.
+    """
+    u, v, a, f, Q, room = w.y[0], w.y[1], w.y[2], w.x[0], w.x[1], w.x[2]
+    held, t = _row(s.held, at), s.times[at]
+    copy(held[2], a)
+    multiply(matrices.M, a, room)
+    body_force(e.body, u, f)
+    add_elastic_force(e.forces, t, 0.0, u, u, f)
+    external_force(e.loads, _row(s.factors, at), t, 1.0, u, Q)
+    for i in lanes(a.size):
+        a[i] += (Q[i] - f[i] - room[i]) * e.free[i]
+    if matrices.dampers.active > 0:
+        damping_force(e, matrices.dampers, matrices.M, t, u, v, f, room)
+        for i in lanes(a.size):
+            a[i] -= f[i] * e.free[i]
+    solve(matrices.mass, a)
 
 
 @source
