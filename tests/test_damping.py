@@ -393,3 +393,20 @@ def test_collocation_carries_viscous_stresses(scheme, beams):
     fine = scene.integrate(0.15, 1.5e-3, scheme=scheme, t_eval=[0.15])
     assert history.substeps == 0 and history.iterations < 3 * 12 * history.steps
     assert np.abs(history.u[-1] - fine.u[-1])[-6::4].max() < 3e-4
+
+
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
+@pytest.mark.parametrize("element", [ElementBeamCable(3), ElementBeamANCF(2)], ids=repr)
+def test_steps_carry_viscous_stresses(scheme, element):
+    """Of slender beams that turn: in parts of steps, with 3 to 7 times the iterations, else."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0.0, 1.0, 9), 1e-3), element,
+                StVenantKirchhoff(2e10, 0.3, 7800.0), 0.01, damping=KelvinVoigt(0.1))
+    scene = Scene(beam).pin("left").gravity((0.0, -9.81))
+    history = scene.integrate(0.2, 0.01, scheme=scheme, tol=1e-8)
+    assert history.substeps == 0 and history.iterations < 8 * history.steps
+    assert history.factorizations < 2 * history.steps
+    if scheme == "energy-momentum":
+        total = history.total_energy + history.dissipated
+        assert np.ptp(total) < 1e-6 * history.kinetic_energy.max()  # by the tolerance
+    fine = scene.integrate(0.2, 1e-3, scheme=scheme, tol=1e-8)
+    assert np.abs(history.position((1, 0))[-1] - fine.position((1, 0))[-1]).max() < 2e-3

@@ -402,10 +402,6 @@ def _start(e, matrices, method, s, w, state, step):
         for k in range(w.R.shape[0]):
             copy(w.y[0], w.R[k])
         body_stress(e.copies, _flat(w.R), w.carried)
-        if matrices.dampers.viscous > 0:
-            for k in range(w.R.shape[0]):
-                add_viscous_stress(e.viscous, e.body, e.copies, k, w.y[0], w.y[1], w.stresses,
-                                   w.carried)
         if step > 0 or s.begun > 0:
             v0, v = w.y[1], w.before[1]
             for k in range(w.Z.shape[0]):

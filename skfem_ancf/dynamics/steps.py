@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..band import (Band, clear, copy, dot, factorize, fix, multiply, solve_joined, subtract_rows,
-                    total)
+from ..band import (Band, add_multiple, clear, copy, dot, factorize, fix, multiply, solve_joined,
+                    subtract_rows, total)
 from ..body import (add_force_of, body_carry, body_force, body_mean, body_mixed, body_stress,
                     body_tangent)
 from ..forces.contact_texts import PRESSURES
@@ -29,7 +29,8 @@ from ..source import F1, F2, F3, borrowed, by_place, lanes, source
 from ..tables import (add_constraint_rate, add_curvature_force, add_joint_force,
                       add_load_stiffness, add_products, constraint, joint_directions,
                       mean_external_force)
-from .dampers import (Dampers, Rows, add_damping, damping_force, factorize_rows, solve_rows)
+from .dampers import (Dampers, Rows, add_damping, add_other_damping, damping_force,
+                      factorize_rows, solve_rows)
 from .rates import JointMotion, JointMotions, acceleration_of_joints, drive_rate
 
 EPS = 2.2e-16
@@ -247,8 +248,8 @@ class Work(NamedTuple):
     S
         ``J1 A^-1 J^T``, shape (m, m), or of none.
     stresses
-        Of all beams: zero, those at the begin, others, carried ones, those of the iterate, shape
-        (5, k).
+        Of all beams: zero, those at the begin, others, carried ones, those of the iterate, and the
+        last two of rates of strains, shape (7, k).
     """
 
     y: F2
@@ -273,7 +274,7 @@ def room_for_steps(N: int, m: int, stresses: int, dense: int) -> Work:
     """
     x, shares = np.zeros((len(Vectors._fields), N)), np.zeros((len(Shares._fields), m))
     return Work(np.zeros((4, N)), Vectors(*x), Shares(*shares), np.zeros((3, dense, N)),
-                np.zeros((dense, dense)), np.zeros((5, stresses)))
+                np.zeros((dense, dense)), np.zeros((7, stresses)))
 
 
 @source
@@ -310,7 +311,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
         s = _step(e.joints, rule, course, n)
         rough, wanted = _begin(e.free, matrices.M, rule, s, w, state)
         told, left, most = GO_ON, ITERATIONS, AUGMENTED
-        _start(e, s, w, state)
+        _start(e, w, state)
         if contacts.lasting > 0:
             pace_contact(e.forces, s.dt)
         while left > 0:
@@ -319,10 +320,10 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
                 _tangent(e, matrices, rule, s, w, state)
                 if not _factorize(e, matrices, rule, s, w, state):
                     return n
-            _internal_force(e.body, rule, w, state)
+            _internal_force(e, matrices.dampers, rule, s, w, state)
             _add_elastic(e.forces, rule, s, w)
             if damped:
-                _resist(e, matrices, rule, s, w)
+                _resist(e, matrices, rule, s, w, state)
             anew = joined and (not s.constant or state[SIZE] < 0.0)
             if anew:
                 _directions(e.joints, rule, s, w)
@@ -334,13 +335,13 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
             if told == GO_ON:
                 told = _correct(e.joints, e.free, matrices, rule, s, w, state, anew)
             if told == GO_ON:
-                told = _judged(e.body, rule, w, state, wanted, rough)
+                told = _judged(e, matrices.dampers, rule, s, w, state, wanted, rough)
             if told == DONE and contacts.lasting >= PRESSURES:
                 augment_contact(e.forces, s.t, u, taken)
                 if taken[0] > 0.0:
                     told, left, state[SIZE] = GO_ON, min(ITERATIONS, most), -1.0
             if told == ASTRAY:
-                _start(e, s, w, state)
+                _start(e, w, state)
             elif told != GO_ON:
                 break
         if told == DONE:
@@ -573,38 +574,48 @@ def _energy(M, v, room):
 
 
 @source
-def _start(e, s, w, state):
+def _start(e, w, state):
     """Where the iteration begins; with carried stresses on a straight way."""
     copy(w.x.straight if state[MIXED] > 0.0 else w.x.guess, w.x.u)
     copy(w.m.l0, w.m.l)
     if state[MIXED] > 0.0:
         body_stress(e.body, w.y[0], w.stresses[3])
+        clear(w.stresses[5])
 
 
 @source
-def _internal_force(body, rule, w, state):
-    """The internal force of the iterate.
+def _internal_force(e, dampers, rule, s, w, state):
+    """The internal force of the iterate, without damping.
 
     With carried stresses S, what is missing in ``S = D eps(u)`` acts as the factors take it, in the
     directions of where they were made::
 
         f = B(u)^T S + B(origin)^T (D eps(u) - S)
+
+    and stresses of the rates of strains likewise.
     """
-    u0, u, f, carried, own, missing = (w.y[0], w.x.u, w.x.force, w.stresses[3], w.stresses[4],
-                                       w.stresses[2])
+    u0, u, f, S = w.y[0], w.x.u, w.x.force, w.stresses
+    missing, carried, own, slow, rates = S[2], S[3], S[4], S[5], S[6]
     if state[MIXED] > 0.0:
-        body_mixed(body, rule.conserving > 0, u0, u, f, carried, own)
+        body_mixed(e.body, rule.conserving > 0, u0, u, f, carried, own)
         for i in lanes(missing.size):
             missing[i] = own[i] - carried[i]
-        add_force_of(body, w.x.origin, missing, f)
+        if dampers.viscous > 0:
+            _middle(rule, w)
+            _pace(e.free, rule, s, w)
+            body_carry(e.viscous, w.x.middle, w.x.pace, S[0], rates)
+            add_force_of(e.body, w.x.middle, slow, f)
+            for i in lanes(missing.size):
+                missing[i] += rates[i] - slow[i]
+        add_force_of(e.body, w.x.origin, missing, f)
     elif rule.conserving > 0:
-        body_mean(body, u0, u, f)
+        body_mean(e.body, u0, u, f)
     else:
-        body_force(body, u, f)
+        body_force(e.body, u, f)
 
 
 @source
-def _judged(body, rule, w, state, wanted, rough):
+def _judged(e, dampers, rule, s, w, state, wanted, rough):
     """What the last correction tells, of iterations with carried stresses and without.
 
     A stiff and slender beam turned by old factors is stretched by what they take for bending: its
@@ -613,10 +624,13 @@ def _judged(body, rule, w, state, wanted, rough):
     """
     du, room = w.x.du, w.x.room
     if state[MIXED] > 0.0:
-        c = 0.5 if rule.conserving > 0 else 1.0
         for i in lanes(du.size):
-            room[i] = c * du[i]
-        body_carry(body, w.x.origin, room, w.stresses[4], w.stresses[3])
+            room[i] = s.stiffness_factor * du[i]
+        body_carry(e.body, w.x.origin, room, w.stresses[4], w.stresses[3])
+        if dampers.viscous > 0:
+            for i in lanes(du.size):
+                room[i] = s.damping_factor * du[i]
+            body_carry(e.viscous, w.x.origin, room, w.stresses[6], w.stresses[5])
     return judged(state, wanted, rough, REUSED, CARRIED if state[FRESH] > 0.0 else REUSED)
 
 
@@ -631,10 +645,11 @@ def _tangent(e, matrices, rule, s, w, state):
     stresses = w.stresses
     if state[MIXED] > 0.0 and rule.conserving > 0:
         copy(stresses[3], stresses[1])
+        add_multiple(1.0, stresses[5], stresses[1])
     else:
         body_stress(e.body, w.y[0], stresses[1])
-    if dampers.viscous > 0:
-        body_carry(e.viscous, w.y[0], w.y[1], stresses[1], stresses[1])
+        if dampers.viscous > 0:
+            body_carry(e.viscous, w.y[0], w.y[1], stresses[1], stresses[1])
     _middle(rule, w)
     copy(w.x.middle, w.x.origin)
     body_tangent(e.body, w.x.middle, w.x.force, stresses[1], yes, stresses[2], matrices.A)
@@ -722,12 +737,17 @@ def _factorize(e, matrices, rule, s, w, state):
 
 
 @source
-def _resist(e, matrices, rule, s, w):
-    """Add the damping force of the iterate to the internal one."""
+def _resist(e, matrices, rule, s, w, state):
+    """Add the damping force of the iterate to the internal one, which has what is carried."""
     d, f = w.x.damping, w.x.force
     _middle(rule, w)
     _pace(e.free, rule, s, w)
-    damping_force(e, matrices.dampers, matrices.M, s.acting, w.x.middle, w.x.pace, d, w.x.room)
+    if state[MIXED] > 0.0:
+        clear(d)
+        add_other_damping(e, matrices.dampers, matrices.M, s.acting, w.x.middle, w.x.pace, d,
+                          w.x.room)
+    else:
+        damping_force(e, matrices.dampers, matrices.M, s.acting, w.x.middle, w.x.pace, d, w.x.room)
     for i in lanes(f.size):
         f[i] += d[i]
 
@@ -740,7 +760,11 @@ def _add_work(e, matrices, rule, s, w, state, before):
     ``before``, which becomes that of the next step, and that at the end.
     """
     u, u0, d, change = w.x.u, w.y[0], w.x.damping, w.x.pace
-    if rule.conserving == 0:
+    if rule.conserving > 0:
+        _middle(rule, w)
+        _pace(e.free, rule, s, w)
+        damping_force(e, matrices.dampers, matrices.M, s.acting, w.x.middle, change, d, w.x.room)
+    else:
         damping_force(e, matrices.dampers, matrices.M, s.t, u, w.x.v, d, w.x.room)
     for i in lanes(u.size):
         change[i] = u[i] - u0[i]
