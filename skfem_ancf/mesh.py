@@ -20,6 +20,7 @@ from .errors import (CallbackError, FileError, InputError, MeshError, NameUnknow
                      require_option, require_options, require_path, require_positive, shown,
                      teaching)
 from .frozen import Frozen, ReadOnlyDict
+from .kept import twin_of
 from .mapping import MappingBeam
 from .origin import ours
 from .pickling import require_picklable
@@ -156,9 +157,7 @@ class MeshBeam(Frozen, Mesh2D):
                 "nodes must increase along the axis")
         e1 = np.array([np.cos(angle), np.sin(angle)])
         p = origin[:, None] + e1[:, None] * x
-        if not callable(height) and cls.__post_init__ is MeshBeam.__post_init__:
-            return cls._on_line(p, e1, x, require_positive("height", height))
-        return cls._from_nodes(p, np.outer(e1, np.ones(len(x))), np.diff(x), height, s=x)
+        return cls._from_nodes(p, e1[:, None], x[1:] - x[:-1], height, x.copy())
 
     @classmethod
     def init_curve(cls, r: Callable[[Array], ArrayLike], s: ArrayLike,
@@ -209,48 +208,42 @@ class MeshBeam(Frozen, Mesh2D):
         if dr is None:
             dr = derivative_of(r, s[0], s[-1])
         curve = Curve(r, require_function("dr", dr, what), (s[0], s[-1]))
-        p, tangent = curve.nodes(s)
-        curve.check(s)
-        curve.check_kinks(s)
-        largest, heights, _ = heights_of(height, s, np.array([np.arange(len(s) - 1), np.arange(
-            1, len(s))]))
-        check_curvature(curve, s, largest if heights is None else np.max(heights, axis=0))
-        return cls._from_nodes(p, tangent, curve.lengths(s[:-1], s[1:]), height, s=s, curve=curve,
-                               p_XY=curve.turning(s))
+        p, tangent, lengths, turning, bent = curve.elements(s)
+        height = heights_of(height, s, _chain(len(s)))
+        check_curvature(bent, s, height[0] if height[1] is None else np.max(height[1], axis=0))
+        return cls._from_nodes(p, tangent, lengths, height, s.copy(), curve, turning)
 
     @classmethod
-    def _from_nodes(cls, p, tangent, lengths, height, s=None, curve=None, p_XY=None):
-        n = p.shape[1]
-        t = np.array([np.arange(n - 1), np.arange(1, n)])
-        height, heights, taper = heights_of(height, s, t)
-        mesh = cls(p, t, height=height, p_X=tangent,
-                   p_Y=np.array([0.0 - tangent[1], tangent[0]]), lengths=lengths, s=s, curve=curve,
-                   p_XY=np.zeros(p.shape) if p_XY is None else p_XY, heights=heights, taper=taper)
-        mesh._boundaries = mesh._build_default_tags()
-        return mesh
+    def _from_nodes(cls, p, tangent, lengths, height, s, curve=None, turning=None):
+        """The mesh of one chain whose values are finite: __post_init__ asks for more than is open.
 
-    @classmethod
-    def _on_line(cls, p, e1, x, height):
-        """A straight mesh of one height: of what __post_init__ asks only the lengths are open."""
-        mesh, n, lengths = object.__new__(cls), len(x), x[1:] - x[:-1]
-        nodes = np.arange(n, dtype=np.int32)
-        frame = np.empty((2, 2, n))
-        frame[0], frame[1, 0], frame[1, 1] = e1[:, None], 0.0 - e1[1], e1[0]
-        attributes = dict(doflocs=p, t=np.array([nodes[:-1], nodes[1:]]), height=height,
-                          p_X=frame[0], p_Y=frame[1], lengths=lengths, s=x.copy(),
-                          p_XY=np.zeros((2, n)))
-        for array in (frame, *attributes.values()):
-            if array is not height:
+        Without a curve the axis is straight, and ``lengths`` are those between the nodes.
+        """
+        n, t, frame = len(s), _chain(len(s)), np.empty((2, *p.shape))
+        frame[0], frame[1, 0], frame[1, 1] = tangent, 0.0 - tangent[1], tangent[0]
+        height, heights, taper = height if type(height) is tuple else heights_of(height, s, t)
+        given = dict(doflocs=p, t=t, height=height, p_X=frame[0], p_Y=frame[1], lengths=lengths,
+                     s=s, curve=curve, p_XY=np.zeros((2, n)) if turning is None else turning,
+                     heights=heights, taper=taper)
+        if cls.__post_init__ is not MeshBeam.__post_init__:
+            mesh = cls(**given)
+            mesh._boundaries = mesh._build_default_tags()
+            return mesh
+        for array in (frame, *given.values()):
+            if isinstance(array, np.ndarray):
                 array.flags.writeable = False
-        vars(mesh).update(attributes)
+        mesh = object.__new__(cls)
+        vars(mesh).update(given, _sealed=True)
+        mesh._boundaries = mesh._build_default_tags()
         d, far = p[:, 1:] - p[:, :-1], np.abs(p).max()
-        mesh._require_length(np.hypot(d[0], d[1]) > 4 * EPS * far)
-        # of their definitions, which ask for more, this is left
-        low, high = lengths.min(), lengths.max()
-        vars(mesh).update(
-            _boundaries=ReadOnlyDict(mesh._build_default_tags()), _on_one_line=True,
-            _is_straight=True, _is_uniform=bool(high - low <= 1e-13 * high + 8 * EPS * far),
-            _sealed=True)
+        mesh._require_length((np.hypot(d[0], d[1]) > 4 * EPS * far) & (lengths > 0.0))
+        low, high = lengths.min(), require_finite("lengths", lengths).max()
+        if curve is None:
+            even = heights is None
+            vars(mesh).update(_is_straight=True, _on_one_line=even, _is_uniform=even and bool(
+                high - low <= 1e-13 * high + 8 * EPS * far))
+        if curve is not None or heights is not None:
+            mesh._mapping().check()
         return mesh
 
     @classmethod
@@ -297,11 +290,14 @@ class MeshBeam(Frozen, Mesh2D):
         require_option("interpolation of the sections", self.sections, SECTIONS)
         if self.p_XY is not None:
             self.p_XY = require_finite("p_XY", self.p_XY, p.shape)
-        elif self.sections != "linear":
-            raise MeshError("the mesh does not know how its sections turn (p_XY): build it with "
-                            "MeshBeam.init_line or MeshBeam.init_curve")
         self.lengths = require_finite("lengths", self.lengths, (t.shape[1],))
         self._require_length(self.lengths > 0)
+        self._check_sections()
+
+    def _check_sections(self):
+        if self.p_XY is None and self.sections != "linear":
+            raise MeshError("the mesh does not know how its sections turn (p_XY): build it with "
+                            "MeshBeam.init_line or MeshBeam.init_curve")
         self._mapping().check()
 
     def _require_length(self, has_length):
@@ -336,7 +332,13 @@ class MeshBeam(Frozen, Mesh2D):
         ``Beam`` chooses for itself; it makes no difference for straight beams.
         """
         require_option("interpolation of the sections", sections, SECTIONS)
-        return self if sections == self.sections else replace(self, sections=sections)
+        if sections == self.sections:
+            return self
+        mesh = twin_of(self)
+        vars(mesh).update(sections=sections)
+        vars(mesh).pop("_cached_mapping", None)
+        mesh._check_sections()
+        return mesh
 
     def replace(self, **changes: Any) -> MeshBeam:
         """The mesh with another ``height``, a number or a function, or without its ``curve``.
@@ -516,7 +518,7 @@ class MeshBeam(Frozen, Mesh2D):
     @property
     def on_line(self) -> bool:
         """True if it was made as one straight line, with ``s`` the lengths along it."""
-        return hasattr(self, "_on_one_line")
+        return getattr(self, "_on_one_line", False)
 
     @property
     def is_straight(self) -> bool:
@@ -1033,6 +1035,12 @@ def _read(path, read):
     except Exception as error:  # whatever is in the file
         raise MeshError(f"{str(path)!r} holds no beam, or is damaged: {type(error).__name__}: "
                         f"{error}") from error
+
+
+def _chain(n):
+    """The nodes of the elements of one chain of n nodes, (2, n - 1)."""
+    nodes = np.arange(n, dtype=np.int32)
+    return np.array([nodes[:-1], nodes[1:]])
 
 
 def _satisfying(test, x):

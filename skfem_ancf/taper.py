@@ -71,7 +71,7 @@ def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, An
         k = np.unravel_index(np.argmin(found), found.shape)
         raise MeshError(f"the height of a beam is positive, the function returns {found[k]:.6g} "
                         f"at {at[k]:.6g}: end the mesh before it gets thin there")
-    heights, between = found[:4], found[4:]
+    heights, between = found[:4].copy(), found[4:]
     gap = np.abs(lagrange(PLACES, BETWEEN) @ heights - between) / between
     if np.max(gap) > FITS:
         e = int(np.argmax(np.max(gap, axis=0)))

@@ -185,6 +185,43 @@ def test_a_line_is_the_mesh_that_its_nodes_make(x, origin, angle):
         MeshBeam.init_line([0.0, 1e-14], 0.1, origin=(3e3, 0.0))
 
 
+def test_curves_are_asked_at_all_points_at_once():
+    asked = []
+
+    def r(s):
+        asked.append(np.iscomplexobj(s))
+        return np.array([np.sin(s), 1.0 - np.cos(s)])
+
+    x = np.linspace(0, 1, 6)
+    mesh = MeshBeam.init_curve(r, x, 0.1)
+    assert asked == [True, False, False, True]  # the complex step tried, places, derivatives
+    asked.clear()
+    other = MeshBeam.init_curve(r, x, 0.1, dr=lambda s: np.array([np.cos(s), np.sin(s)]))
+    assert asked == [False] and np.allclose(mesh.lengths, other.lengths, rtol=1e-15)
+    for name in ("p", "p_X", "p_Y", "p_XY", "lengths", "s"):
+        kept = getattr(mesh, name)
+        assert not kept.flags.writeable and kept.flags.c_contiguous
+    assert np.allclose(mesh.p_XY, mesh.curve.turning(x), rtol=1e-15, atol=1e-15)
+    assert np.allclose(mesh.lengths, mesh.curve.lengths(x[:-1], x[1:]), rtol=1e-15)
+
+
+def test_meshes_made_by_their_class_are_not_asked_again(monkeypatch):
+    """What a class of one's own asks for is asked: it has all that is known by then."""
+    class Own(MeshBeam):
+        def __post_init__(self):
+            super().__post_init__()
+            self.seen = self.lengths.sum()
+
+    asked = counted(monkeypatch, MeshBeam, "__post_init__")
+    arc = (lambda s: np.array([np.sin(s), 1.0 - np.cos(s)]), np.linspace(0, 1, 4), 0.1)
+    mesh = MeshBeam.init_curve(*arc).with_sections("cubic")
+    MeshBeam.init_line([0, 1, 2], lambda x: 0.2 - 0.05 * x)
+    assert not asked
+    own = Own.init_curve(*arc)
+    assert len(asked) == 1 and own.seen == pytest.approx(1.0) and own.boundaries
+    assert np.array_equal(own.p, mesh.p) and np.array_equal(own.p_XY, mesh.p_XY)
+
+
 def read_again(words, given):
     """The arrays of a flat tuple by the words that say where they are."""
     found, at = {}, 0
