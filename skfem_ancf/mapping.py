@@ -13,7 +13,7 @@ from .errors import MeshError
 from .frozen import Content, read_only
 from .kept import cached_property
 from .nodal import nodal_derivatives, turned
-from .reference import SECTIONS, few, hermite_basis
+from .reference import KEPT_POINTS, SECTIONS, few, hermite_basis
 from .taper import powers
 
 if TYPE_CHECKING:
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 #: Corrections of Newton's method that are small enough, and powers of xi in relative heights that
 #: are round-off.
 CLOSE, NOTHING = 1e-7, 2e-14
+
+#: Points of both faces where a body is looked at for folds.
+_FACES = np.array([np.tile(np.linspace(0.0, 1.0, 9), 2), np.repeat([0.0, 1.0], 9)])
 
 _FACET_POINTS = (  # the point of the reference cell at X on facet bottom, right, top, left
     lambda s: (s, 0.0 * s), lambda s: (1.0 + 0.0 * s, s),
@@ -154,7 +157,22 @@ def _functions(orders, X):
 
 @lru_cache(256)
 def _kept_functions(orders, content):
-    return tuple(map(read_only, _functions(orders, *content.arrays)))
+    """Those as one matrix, by which axis and director of an element are multiplied, one behind the
+    other, for the three."""
+    slopes, *of_director = _functions(orders, *content.arrays)
+    out = np.zeros((2 * sum(orders), 3, slopes.shape[1]))
+    out[:len(slopes), 0] = slopes
+    out[len(slopes):, 1], out[len(slopes):, 2] = of_director
+    return read_only(out.reshape(len(out), -1))
+
+
+@lru_cache(256)
+def _kept_powers(content):
+    """Of 1, xi, xi^2 and xi^3 the values at places (n,), and behind them the derivatives; (4, 2 n).
+    """
+    xi, = content.arrays
+    value = xi ** np.arange(4)[:, None]
+    return read_only(np.append(value, np.arange(4)[:, None] * np.roll(value, 1, axis=0), axis=1))
 
 
 def _frame(tangent):
@@ -200,10 +218,16 @@ class MappingBeam(Mapping):
         m, (k, n) = self.mesh, self._orders
         axis = nodal_derivatives(m, max(k - 1, n if n > 2 else 1))
         directors = [m.p_Y, m.p_XY, *(turned(d) for d in axis[3:])]
-        axis, directors = (np.stack([m.lengths**j * d[:, end] for end in m.t
-                                     for j, d in enumerate(values)], 1)
-                           for values in (axis[:k], directors[:n]))
+        axis, directors = (
+            (np.array(values)[:, :, m.t] * (m.lengths ** np.arange(len(values))[:, None])[
+                :, None, None]).transpose(1, 2, 0, 3).reshape(2, 2 * len(values), -1)
+            for values in (axis[:k], directors[:n]))
         return axis, m.height * directors
+
+    @cached_property
+    def _matrices(self):
+        """Both in one matrix for each element, (2, ne, n)."""
+        return np.concatenate(self._all_coefficients, axis=1).transpose(0, 2, 1)
 
     @property
     def _orders(self):
@@ -263,8 +287,11 @@ class MappingBeam(Mapping):
         """The height over the largest, and its derivative, (ne, np); 1 and 0 where constant."""
         if self.mesh.heights is None:
             return 1.0, 0.0
-        c = self._heights if tind is None else self._heights[:, tind]
-        return _with_slope(c[:, :, None], np.asarray(xi))
+        c, xi = self._heights if tind is None else self._heights[:, tind], np.asarray(xi)
+        if xi.ndim == 1 and xi.size <= KEPT_POINTS:
+            both = c.T @ _kept_powers(Content(xi))
+            return both[:, :xi.size], both[:, xi.size:]
+        return _with_slope(c[:, :, None], xi)
 
     def relative_height(self, e: Any, xi: Any) -> tuple[Any, Any]:
         """The height of a tapered mesh over the largest, and its derivative by xi.
@@ -378,12 +405,16 @@ class MappingBeam(Mapping):
 
     def _derivatives(self, X, tind):
         """Derivatives of :meth:`F` by xi and eta, and of the axis by xi, (2, ne, np) each."""
-        axis, director = self._coefficients(tind)
         xi, eta = X
-        slopes, functions, turned = _kept_functions(self._orders, Content(X)) if few(X) else (
-            _functions(self._orders, X))
-        along, across = self._sum(axis, slopes), self._sum(director, functions)
-        turning = self._sum(director, turned)
+        if few(X):
+            of = self._matrices if tind is None else self._matrices[:, tind]
+            found = of @ _kept_functions(self._orders, Content(X))
+            along, across, turning = found.reshape(*of.shape[:2], 3, -1).transpose(2, 0, 1, 3)
+        else:
+            axis, director = self._coefficients(tind)
+            slopes, functions, turned = _functions(self._orders, X)
+            along, across = self._sum(axis, slopes), self._sum(director, functions)
+            turning = self._sum(director, turned)
         if self.mesh.heights is not None:
             g, rate = self._relative(xi, tind)
             turning, across = g * turning + (eta - 0.5) * rate * across, g * across
@@ -720,10 +751,9 @@ class MappingBeam(Mapping):
         J = self._constant
         if J is not None and np.all(cross(J[:, 0], J[:, 1]) > 0.0):
             return  # they are rectangles
-        xi, eta = np.meshgrid(np.linspace(0, 1, 9), [0.0, 1.0])
-        det = self.detDF(np.array([xi.ravel(), eta.ravel()]))
-        bad = np.nonzero(~(det.min(axis=1) > 0))[0]
-        if len(bad):
+        least = self.detDF(_FACES).min(axis=1)
+        if not least.min() > 0.0:
+            bad = np.nonzero(~(least > 0.0))[0]
             at = self.mesh.p[:, self.mesh.t[0, bad[0]]]
             raise MeshError(
                 f"the body folds in element {bad[0]}, which starts at ({at[0]:.6g}, {at[1]:.6g}): "

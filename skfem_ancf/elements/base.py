@@ -366,7 +366,7 @@ class ElementBeam(Frozen, Element):
     def _scale(mesh: MeshBeam, slope: Array, tind: Array | None) -> Array:
         """The lengths of elements to the powers of local functions, shape (n, nelements)."""
         lengths = mesh.lengths if tind is None else mesh.lengths[tind]
-        return np.array([lengths**k for k in range(np.max(slope, initial=0) + 1)])[slope]
+        return np.array([lengths**k for k in range(slope.max(initial=0) + 1)])[slope]
 
     def slopes(self, mapping: MappingBeam, X: Array, tind: Array | None = None
                ) -> tuple[Array, Array]:
@@ -509,7 +509,8 @@ class ElementBeam(Frozen, Element):
         if mesh.p_XY is not None:
             known[1, 1] = mesh.p_XY
         if mesh.p_XY is not None and not mesh.is_straight:
-            more = dict(enumerate(nodal_derivatives(mesh, max(2, *self._along))[2:], 2))
+            more = dict(enumerate(nodal_derivatives(
+                mesh, max(2, self._along[0] - 1, self._along[1]))[2:], 2))
             known |= {(k, 0): d for k, d in more.items()}
             known |= {(k - 1, 1): turned(d) for k, d in more.items() if k > 2}
         out = np.zeros((self.nodal_dofs, *mesh.p.shape))
