@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse import coo_matrix
 
-from .border import Border, factors_of, join, solve_bordered
+from .border import Border, Factors, factors_of, join, solve_bordered
 from .linalg import SINGULAR, SMALL, BandMatrix, Inertia, beside_zero
 
 if TYPE_CHECKING:
@@ -98,6 +98,30 @@ def border_inertia(K: BandMatrix, picked: Array, S: Array, J: Array) -> Inertia:
         return border_negative(beside.negative(), columns_product(beside, picked, J), S, len(J))[0]
 
     return beside_zero(of)
+
+
+def gives_way(f: Factors) -> bool:
+    """False if a matrix, symmetric with a border, is positive definite where J x = 0.
+
+    As in :func:`border_inertia`, where K is positive definite; the matrix of the border times S
+    from both sides is ``[S, 0; 0, 1] H``, which factors have. What is too close to zero to tell
+    gives way.
+
+    Parameters
+    ----------
+    f
+        A :class:`~skfem_ancf.border.Factors`.
+    """
+    k = len(f.S)
+    size = np.sqrt(np.abs(f.S).max(axis=1, initial=0.0))
+    size[size == 0.0] = 1.0
+    S, G = f.S / (size[:, None] * size), f.H.copy()
+    G[:k] = (f.S @ f.H[:k]) / size[:, None]
+    G[k:, :k] = G[:k, k:].T
+    G[:k, :k] /= size
+    positive = [int(np.sum(values > SINGULAR * np.abs(values).max(initial=0.0)))
+                for values in map(np.linalg.eigvalsh, (G, S))]
+    return positive[0] - positive[1] != len(f.J)
 
 
 def columns_product(K: BandMatrix, picked: Array, J: Array) -> Array:
@@ -193,17 +217,17 @@ class BorderedMatrix:
         none = np.zeros(0, np.int64)
         self._K, self._J = K, J
         self._border = Border(picked, len(springs), loose, none, none, none, none, 0)
-        self._f = factors_of(K.band, K.factors, np.array(J), S)
-        join(self._f, self._border, np.ones(J.shape[1]))
-        finite = np.all(np.isfinite(self._f.H))
-        self._sign = int(np.linalg.slogdet(self._f.H)[0]) if finite else 0
+        self.factors = factors_of(K.band, K.factors, np.array(J), S)
+        join(self.factors, self._border, np.ones(J.shape[1]))
+        finite = np.all(np.isfinite(self.factors.H))
+        self._sign = int(np.linalg.slogdet(self.factors.H)[0]) if finite else 0
         if self._sign == 0:
             raise np.linalg.LinAlgError("the matrix is singular")
 
     def inertia(self) -> Inertia:
         """The :class:`Inertia` of A where J x = 0; of its symmetric part if K is not symmetric."""
         K = self._K if self._K.symmetric else self._K.symmetric_part()
-        return border_inertia(K, self._border.picked, self._f.S, self._J)
+        return border_inertia(K, self._border.picked, self.factors.S, self._J)
 
     def determinant_sign(self) -> int:
         """The sign of the determinant of A where J x = 0: 1 or -1."""
@@ -211,7 +235,7 @@ class BorderedMatrix:
 
     def tocsc(self) -> csc_matrix:
         """A as a scipy.sparse array in CSC format."""
-        picked, S = self._border.picked, self._f.S
+        picked, S = self._border.picked, self.factors.S
         rows = np.broadcast_to(picked[:, None], S.shape)
         outside = coo_matrix((S.ravel(), (rows.ravel(), rows.T.ravel())), (self._K.n, self._K.n))
         return self._K.tocsc() + outside.tocsc()
@@ -232,7 +256,7 @@ class BorderedMatrix:
             Shapes (n,) and (m,), and a number.
         """
         x, l = np.empty(len(b)), np.empty(len(c))
-        error = float(solve_bordered(self._f, self._border, b, c, x, l))
+        error = float(solve_bordered(self.factors, self._border, b, c, x, l))
         if error < 0.0:
             raise np.linalg.LinAlgError("the matrix is singular")
         return x, l, error

@@ -246,12 +246,6 @@ class BandMatrix:
             c[0] = np.sqrt(self.ab[0])
             self._factor = ("pb", np.asfortranarray(c))
 
-    def factored_diagonal(self, rows: ArrayLike) -> Array:
-        """Entries of the diagonal, by the factors of Cholesky."""
-        c, rows = self._factor[1], np.asarray(rows, dtype=int)
-        k = np.arange(self.bandwidth + 1)[:, None]
-        return np.sum(np.where(k <= rows, c[k, np.maximum(rows - k, 0)], 0.0) ** 2, axis=0)
-
     @property
     def definite(self) -> bool:
         """True if it has factors that are those of a positive definite symmetric matrix."""

@@ -14,7 +14,7 @@ from scipy.sparse.linalg import splu
 
 from . import eigen
 from .band import factorize, fix
-from .bordered import BorderedMatrix, border, border_negative, columns_product
+from .bordered import BorderedMatrix, gives_way
 from .checks import Screen
 from .condensed import Condensed
 from .constraints import Constraints
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from .beam import Beam
+    from .border import Factors
     from .dynamics.integrator import Integrator
     from .forces.base import ForceElement
     from .joints.base import Joint
@@ -787,6 +788,7 @@ class System:
         self._outside, self._sparse = (i, j, v), None
         if self.bordered:
             self._factors = BorderedMatrix(self.K, self._J, i, j, v, self.springs, self.loose)
+            self._border = self._factors.factors
         else:
             self._sparse = self._sparse_factors(self._whole())
 
@@ -861,15 +863,21 @@ class System:
         K = self._reduced()
         return sparse_inertia(0.5 * (K + K.T))
 
-    def stays(self, u: Array, t: float | None, multipliers: Array) -> bool:
-        """True if the factors left by an iteration say that no direction gives way.
-
-        Those of its last tangent, which is that of the solution but for the last correction.
+    def take_factors(self, factors: Factors) -> None:
+        """Note that an iteration has left factors in :attr:`K`, and about it.
 
         Parameters
         ----------
-        u, t, multipliers
-            The solution: shape (N,), time, shape (m,).
+        factors
+            Those of the border.
+        """
+        self.K.take_factors()
+        self._border = factors
+
+    def stays(self) -> bool:
+        """True if the factors left by an iteration say that no direction gives way.
+
+        Those of its last tangent, which is that of the solution but for the last correction.
         """
         K = self.K
         if self.condensed is not None:
@@ -877,16 +885,8 @@ class System:
         if (not K.definite or self.forces.far or self.bodies
                 or (self.joints and not self.bordered)):
             return False
-        if not self.joints:
-            return True
-        i, j, v = self.constraints.curvature_entries(u, t, multipliers)
-        if not len(self.springs) and np.all(np.abs(i - j) <= K.bandwidth):
-            return True  # what is definite is so on the tangent space of the joints
-        K.to_cholesky()
-        J = self.jacobian(u, t)
-        picked, S = border(K.bandwidth, i, j, v, self.springs,
-                           0.5 * K.factored_diagonal(self.springs))
-        return border_negative(0, columns_product(K, picked, J), S, self.m)[0] == 0
+        # what is definite is so on the tangent space of the joints
+        return not self.joints or not len(self._border.S) or not gives_way(self._border)
 
     def determinant_sign(self) -> int:
         """The sign of the determinant of what :meth:`inertia` counts: 1 or -1.

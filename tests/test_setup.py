@@ -12,6 +12,7 @@ from skfem_ancf import (AncfError, Beam, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamANCFHermite, ElementBeamCable, ElementBeamPatelShabana,
                         InputError, KelvinVoigt, MeshBeam, MeshError, NeoHookean, Scene,
                         StVenantKirchhoff, SupportError)
+from skfem_ancf.bordered import BorderedMatrix, gives_way
 from skfem_ancf.compiled.words import Words
 from skfem_ancf.constraints import Constraints
 from skfem_ancf.elements import base
@@ -22,6 +23,7 @@ from skfem_ancf.forces import system as forces
 from skfem_ancf.formulations import FORMULATIONS, Assumed
 from skfem_ancf.kernels import cable, section
 from skfem_ancf.kernels.base import pair_tables
+from skfem_ancf.linalg import BandMatrix
 from skfem_ancf.loads import EndMoment, PointForce, Pressure, Weight
 from skfem_ancf.mapping import MappingBeam
 from skfem_ancf.statics.iteration import ALONE
@@ -699,3 +701,34 @@ def test_a_weld_holds_the_sections_of_another_element(before, after):
         scene.replace(element=ElementBeamCable(3))
     with pytest.raises(InputError, match="clamp holds"):
         clamped(ElementBeamCable(3)).replace(element=after)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_factors_tell_whether_what_a_border_holds_gives_way(seed):
+    """As the inertia by columns of its own says, with springs to let go and entries far apart."""
+    rng = np.random.default_rng(seed)
+    n, m, springs = 12, 1 + seed % 3, np.arange(seed % 4)
+    K, x = BandMatrix(n, 2), 10.0 ** rng.uniform(-3, 3, n)  # in other units
+    d = np.where(rng.random(n) < 0.2, rng.uniform(-0.5, 0.0, n), rng.uniform(0.0, 3.0, n))
+    d[springs.size:] = np.abs(d[springs.size:]) + 1.0
+    i = np.arange(n - 1)
+    K.add(np.arange(n), np.arange(n), d * x * x)
+    K.add(i + 1, i, rng.uniform(-0.3, 0.3, n - 1) * x[1:] * x[:-1])
+    far, value = rng.choice(n, (2, seed % 3)), rng.standard_normal(seed % 3)
+    far = far[:, np.abs(far[0] - far[1]) > 2]
+    value = value[:far.shape[1]] * x[far[0]] * x[far[1]] * (seed % 5 > 0)
+    i, j, v = np.append(far[0], far[1]), np.append(far[1], far[0]), np.tile(value, 2)
+    try:
+        found = BorderedMatrix(K, rng.standard_normal((m, n)) * x, i, j, v, springs)
+    except np.linalg.LinAlgError:
+        pytest.skip("singular")
+    if K.definite:
+        assert gives_way(found.factors) == (found.inertia().negative > 0)
+
+
+def test_later_solutions_held_at_an_angle_ask_factors_alone(monkeypatch):
+    scene = cantilever(ElementBeamCable(5), angle=0.6)
+    first = scene.solve_static()
+    assert scene.system.joints and len(scene.system.springs)
+    asked = [counted(monkeypatch, Constraints, name) for name in ("_entries", "_curvature")]
+    assert np.array_equal(scene.solve_static().u, first.u) and not any(asked)

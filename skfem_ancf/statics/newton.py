@@ -437,7 +437,7 @@ def _iterate(system, result, load, options, record, descent=None, machine=None, 
         raise _Failed(system.lost(x.u))
     if solver is None:
         if n:
-            system.K.take_factors()
+            system.take_factors(room.factors)
         else:
             system.K.clear()
     return x.u, x.multipliers, x.force

@@ -153,7 +153,7 @@ def holds(system: System, u: Array, load: float, multipliers: Array, t: float | 
         Load factor, and the time of joints that move.
     """
     try:
-        if system.stays(u, t, multipliers):
+        if system.stays():
             return True
     except NO_FACTORS:
         logger.debug("the last factors do not tell")
