@@ -157,7 +157,9 @@ class MeshBeam(Frozen, Mesh2D):
                 "nodes must increase along the axis")
         e1 = np.array([np.cos(angle), np.sin(angle)])
         p = origin[:, None] + e1[:, None] * x
-        return cls._from_nodes(p, e1[:, None], x[1:] - x[:-1], height, x.copy())
+        t = _chain(len(x))
+        return cls._from_nodes(p, t, e1[:, None], x[1:] - x[:-1], heights_of(height, x, t),
+                               x.copy())
 
     @classmethod
     def init_curve(cls, r: Callable[[Array], ArrayLike], s: ArrayLike,
@@ -209,21 +211,22 @@ class MeshBeam(Frozen, Mesh2D):
             dr = derivative_of(r, s[0], s[-1])
         curve = Curve(r, require_function("dr", dr, what), (s[0], s[-1]))
         p, tangent, lengths, turning, bent = curve.elements(s)
-        height = heights_of(height, s, _chain(len(s)))
-        check_curvature(bent, s, height[0] if height[1] is None else np.max(height[1], axis=0))
-        return cls._from_nodes(p, tangent, lengths, height, s.copy(), curve, turning)
+        t = _chain(len(s))
+        largest, heights, taper = heights_of(height, s, t)
+        check_curvature(bent, s, largest if heights is None else np.max(heights, axis=0))
+        return cls._from_nodes(p, t, tangent, lengths, (largest, heights, taper), s.copy(), curve,
+                               turning)
 
     @classmethod
-    def _from_nodes(cls, p, tangent, lengths, height, s, curve=None, turning=None):
+    def _from_nodes(cls, p, t, tangent, lengths, heights, s, curve=None, turning=None):
         """The mesh of one chain whose values are finite: __post_init__ asks for more than is open.
 
         Without a curve the axis is straight, and ``lengths`` are those between the nodes.
         """
-        n, t, frame = len(s), _chain(len(s)), np.empty((2, *p.shape))
+        frame, (height, heights, taper) = np.empty((2, *p.shape)), heights
         frame[0], frame[1, 0], frame[1, 1] = tangent, 0.0 - tangent[1], tangent[0]
-        height, heights, taper = height if type(height) is tuple else heights_of(height, s, t)
         given = dict(doflocs=p, t=t, height=height, p_X=frame[0], p_Y=frame[1], lengths=lengths,
-                     s=s, curve=curve, p_XY=np.zeros((2, n)) if turning is None else turning,
+                     s=s, curve=curve, p_XY=np.zeros(p.shape) if turning is None else turning,
                      heights=heights, taper=taper)
         if cls.__post_init__ is not MeshBeam.__post_init__:
             mesh = cls(**given)
