@@ -23,6 +23,7 @@ from numba.core.imputils import lower_builtin, lower_constant
 from numba.extending import models, register_model, typeof_impl
 
 from . import nothing_collected
+from .passes import OWN
 
 
 #: Lines of texts that become part of their callers; of longer ones LLVM wants to know what they do
@@ -114,7 +115,8 @@ class _Compiler(compiler.CompilerBase):
     def define_pipelines(self):
         whole = compiler.DefaultPassBuilder.define_nopython_pipeline(self.state)
         some = PassManager("text")
-        some.passes.extend(x for x in whole.passes if x[0].__name__ not in _LEFT_OUT)
+        some.passes.extend((OWN.get(kind.__name__, kind), what) for kind, what in whole.passes
+                           if kind.__name__ not in _LEFT_OUT)
         some.finalize()
         return [some]
 
@@ -174,7 +176,9 @@ class Shared(NamedTuple):
 #: Passes for what texts have not: closures, contexts, lists of literals.
 _LEFT_OUT = {"WithLifting", "InlineClosureLikes", "RewriteDynamicRaises", "InlineInlinables",
              "MakeFunctionToJitFunction", "FindLiterallyCalls", "LiteralUnroll", "InlineOverloads",
-             "LiteralPropagationSubPipelinePass", "DeadBranchPrune", "RewriteSemanticConstants"}
+             "LiteralPropagationSubPipelinePass", "DeadBranchPrune", "RewriteSemanticConstants",
+             "NopythonRewrites", "NoPythonSupportedFeatureValidation", "AnnotateTypes",
+             "DumpParforDiagnostics"}
 #: What texts take of NumPy, and of its arrays, without a need for another array.
 _OF_NUMBERS = {"abs", "arctan2", "ceil", "floor", "hypot", "inf", "int64", "log1p", "maximum",
                "minimum", "nan", "sign", "sqrt"}

@@ -9,7 +9,7 @@ from types import FunctionType
 from numba import cfunc, njit, typeof
 
 from ..source import column, lanes
-from . import access, stamp  # noqa: F401
+from . import stamp
 from .flags import TextFlags
 from .loops import counted
 from .records import record_type
