@@ -14,7 +14,7 @@ from numba.core import analysis, cgutils, lowering
 from numba.core.ir import Assign, Expr
 from numba.np.arrayobj import load_item, store_item
 
-from .views import array_at, part
+from .views import part
 
 #: Parts of pairs, by what Numba calls them, and of arrays, by their attributes.
 _OF_PAIRS = {"pair_first": 0, "pair_second": 1}

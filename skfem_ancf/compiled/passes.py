@@ -1,19 +1,20 @@
-"""The passes by which Numba compiles a text: without those for what texts have not."""
+"""The passes by which texts become instructions: Numba's, without what texts have not.
 
-from numba.core import ir_utils, ssa, transforms
-from numba.core.compiler_machinery import register_pass
+Numba finds after each of its passes where variables end. That matters where owners of arrays are
+counted, and there it is found before the last one.
+"""
+
+from numba.core import compiler, ir_utils, ssa, transforms
+from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.typed_passes import IRLegalization, NativeLowering, PreLowerStripPhis
 from numba.core.untyped_passes import IRProcessing, ReconstructSSA
 
 from .lowering import TextLower
 
 
-# lifetimes of variables matter where owners are counted, which asks for them again
-
-
 @register_pass(mutates_CFG=True, analysis_only=False)
 class TextProcessing(IRProcessing):
-    """Numba's IRProcessing."""
+    """Blocks in order."""
 
     _name = "text_processing"
 
@@ -24,31 +25,29 @@ class TextProcessing(IRProcessing):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class TextSSA(ReconstructSSA):
-    """Numba's ReconstructSSA."""
+    """A name for each value that a variable is given."""
 
     _name = "text_ssa"
 
     def run_pass(self, state):
         ssa.reconstruct_ssa(state.func_ir)
-        state.func_ir._definitions = ir_utils.build_definitions(state.func_ir.blocks)
-        return True
+        return _defined(state)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class TextStripPhis(PreLowerStripPhis):
-    """Numba's PreLowerStripPhis."""
+    """Where such names meet, assignments."""
 
     _name = "text_strip_phis"
 
     def run_pass(self, state):
         state.func_ir = self._strip_phi_nodes(state.func_ir)
-        state.func_ir._definitions = ir_utils.build_definitions(state.func_ir.blocks)
-        return True
+        return _defined(state)
 
 
 @register_pass(mutates_CFG=False, analysis_only=True)
 class TextLegalization(IRLegalization):
-    """Where variables end, where it matters."""
+    """Where variables end, if owners are counted."""
 
     _name = "text_legalization"
 
@@ -58,7 +57,7 @@ class TextLegalization(IRLegalization):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class TextLowering(NativeLowering):
-    """Numba's NativeLowering."""
+    """Instructions."""
 
     _name = "text_lowering"
 
@@ -67,7 +66,31 @@ class TextLowering(NativeLowering):
         return TextLower
 
 
+def _defined(state):
+    state.func_ir._definitions = ir_utils.build_definitions(state.func_ir.blocks)
+    return True
+
+
 #: In place of Numba's.
-OWN = {"IRProcessing": TextProcessing, "ReconstructSSA": TextSSA,
-       "PreLowerStripPhis": TextStripPhis, "IRLegalization": TextLegalization,
-       "NativeLowering": TextLowering}
+_OWN = {"IRProcessing": TextProcessing, "ReconstructSSA": TextSSA,
+        "PreLowerStripPhis": TextStripPhis, "IRLegalization": TextLegalization,
+        "NativeLowering": TextLowering}
+#: For what texts have not: closures, contexts, lists of literals, arithmetic of whole arrays; and
+#: for what nobody reads.
+_LEFT_OUT = {"WithLifting", "InlineClosureLikes", "RewriteDynamicRaises", "InlineInlinables",
+             "MakeFunctionToJitFunction", "FindLiterallyCalls", "LiteralUnroll", "InlineOverloads",
+             "LiteralPropagationSubPipelinePass", "DeadBranchPrune", "RewriteSemanticConstants",
+             "NopythonRewrites", "NoPythonSupportedFeatureValidation", "AnnotateTypes",
+             "DumpParforDiagnostics"}
+
+
+class TextCompiler(compiler.CompilerBase):
+    """Numba's, with fewer passes."""
+
+    def define_pipelines(self):
+        whole = compiler.DefaultPassBuilder.define_nopython_pipeline(self.state)
+        some = PassManager("text")
+        some.passes.extend((_OWN.get(kind.__name__, kind), what) for kind, what in whole.passes
+                           if kind.__name__ not in _LEFT_OUT)
+        some.finalize()
+        return [some]

@@ -15,7 +15,6 @@ from llvmlite.binding import parse_assembly
 from numba import types
 from numba.core import cgutils, compiler
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler_machinery import PassManager
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
 from numba.core.registry import cpu_target
@@ -23,7 +22,7 @@ from numba.core.imputils import lower_builtin, lower_constant
 from numba.extending import models, register_model, typeof_impl
 
 from . import nothing_collected
-from .passes import OWN
+from .passes import TextCompiler
 
 
 #: Lines of texts that become part of their callers; of longer ones LLVM wants to know what they do
@@ -109,18 +108,6 @@ class _Open:
             self.library.add_llvm_module(module.clone())
 
 
-class _Compiler(compiler.CompilerBase):
-    """Numba's, with fewer passes."""
-
-    def define_pipelines(self):
-        whole = compiler.DefaultPassBuilder.define_nopython_pipeline(self.state)
-        some = PassManager("text")
-        some.passes.extend((OWN.get(kind.__name__, kind), what) for kind, what in whole.passes
-                           if kind.__name__ not in _LEFT_OUT)
-        some.finalize()
-        return [some]
-
-
 class _Typing:
     """Numba's context of types, which tries no function again for types that it knew before."""
 
@@ -173,12 +160,6 @@ class Shared(NamedTuple):
     returns: types.Type
 
 
-#: Passes for what texts have not: closures, contexts, lists of literals.
-_LEFT_OUT = {"WithLifting", "InlineClosureLikes", "RewriteDynamicRaises", "InlineInlinables",
-             "MakeFunctionToJitFunction", "FindLiterallyCalls", "LiteralUnroll", "InlineOverloads",
-             "LiteralPropagationSubPipelinePass", "DeadBranchPrune", "RewriteSemanticConstants",
-             "NopythonRewrites", "NoPythonSupportedFeatureValidation", "AnnotateTypes",
-             "DumpParforDiagnostics"}
 #: What texts take of NumPy, and of its arrays, without a need for another array.
 _OF_NUMBERS = {"abs", "arctan2", "ceil", "floor", "hypot", "inf", "int64", "log1p", "maximum",
                "minimum", "nan", "sign", "sqrt"}
@@ -239,7 +220,7 @@ class Text:
         try:
             made = compiler.compile_extra(_TYPING, cpu_target.target_context,
                                           self.function, args, None, self.flags[counts], {},
-                                          library=part, pipeline_class=_Compiler)
+                                          library=part, pipeline_class=TextCompiler)
         finally:
             entry.parts.pop()
         cpu_target.target_context.insert_user_function(key, made.fndesc)
