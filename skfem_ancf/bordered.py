@@ -113,15 +113,17 @@ def gives_way(f: Factors) -> bool:
         A :class:`~skfem_ancf.border.Factors`.
     """
     k = len(f.S)
-    size = np.sqrt(np.abs(f.S).max(axis=1, initial=0.0))
+    n = len(f.H)
+    size = np.ones(n)
+    size[:k] = np.sqrt(np.abs(f.S).max(axis=1, initial=0.0))
     size[size == 0.0] = 1.0
-    S, G = f.S / (size[:, None] * size), f.H.copy()
-    G[:k] = (f.S @ f.H[:k]) / size[:, None]
-    G[k:, :k] = G[:k, k:].T
-    G[:k, :k] /= size
-    positive = [int(np.sum(values > SINGULAR * np.abs(values).max(initial=0.0)))
-                for values in map(np.linalg.eigvalsh, (G, S))]
-    return positive[0] - positive[1] != len(f.J)
+    both = np.zeros((n + k, n + k))  # with -S beside it, for the directions that S adds
+    both[:n, :n], both[n:, n:] = f.H, -f.S / (size[:k, None] * size[:k])
+    both[:k, :n] = f.S @ f.H[:k]
+    both[:n, :n] /= size[:, None] * size
+    values = np.linalg.eigvalsh(both, "U")
+    least = SINGULAR * max(-values[0], values[-1])
+    return np.sum(values > least) - np.sum(values < -least) != len(f.J)
 
 
 def columns_product(K: BandMatrix, picked: Array, J: Array) -> Array:

@@ -200,9 +200,11 @@ class Constraints:
         rows, columns, values = self._entries(u, t)
         return sparse.csr_array((values, (rows, columns)), shape=(self.m, self.N))
 
-    def _small_jacobian(self, u):
-        """As :meth:`full_jacobian` at the time 0, sparse where the coordinates are many."""
-        return (self.full_jacobian if self.N <= DENSE else self.sparse_jacobian)(u, 0.0)
+    @cached_property
+    def _at_rest(self):
+        """:meth:`full_jacobian` in the stress-free state, sparse where the coordinates are many."""
+        return (self.full_jacobian if self.N <= DENSE else self.sparse_jacobian)(
+            np.zeros(self.N), 0.0)
 
     def _entries(self, u, t):
         """Rows, columns and values of :meth:`full_jacobian`."""
@@ -388,7 +390,7 @@ class Constraints:
         if self._independent or not self.joints or self.condensable:
             return
         zero = np.zeros(self.N)
-        found = first_dependent(self._small_jacobian(zero), self.free, self.constraint(zero, 0.0))
+        found = first_dependent(self._at_rest, self.free, self.constraint(zero, 0.0))
         self._independent = found is None  # nothing of it changes in the life of a system
         if found is None:
             return
@@ -426,7 +428,8 @@ class Constraints:
             if stands:
                 continue
             p = beam.mesh.p
-            far = int(np.argmax(np.sum((p - p[:, :1]) ** 2, axis=0)))
+            x, y = p - p[:, :1]
+            far = int((x * x + y * y).argmax())
             found += [s.start + node * beam.nd + k for node in (0, far) for k in range(2)]
         out = np.array(found, dtype=int)
         return out[self.free[out]]
@@ -478,7 +481,7 @@ class Constraints:
         values = np.concatenate([member.rigid_motions() for member in self.members])
         sizes = [member.size for member in self.members]
         numbers = [member.N for member in self.members]
-        joints = self._small_jacobian(np.zeros(self.N))
+        joints = self._at_rest
         if self.frame is None:
             bodies = [(self._who(k), b.origin, b.size) for k, b in enumerate(self.members)]
             of_body = np.repeat(np.arange(len(bodies)), numbers)
@@ -493,7 +496,7 @@ class Constraints:
                 of_body[s], first = np.repeat(number, beam.nd), first + len(ends)
             bodies = [(name, origin, size) for name in self.frame.describe(parts)]
             sizes = [size] * len(self.members)
-        values /= np.stack([np.ones(self.N), np.ones(self.N), np.repeat(sizes, numbers)], axis=1)
+        values[:, 2] /= np.repeat(sizes, numbers)
         if self.frame is None and self.N <= DENSE:
             motions = np.zeros((self.N, len(bodies), 3))
             motions[np.arange(self.N), of_body] = values
