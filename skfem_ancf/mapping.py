@@ -409,7 +409,8 @@ class MappingBeam(Mapping):
         if few(X):
             of = self._matrices if tind is None else self._matrices[:, tind]
             found = of @ _kept_functions(self._orders, Content(X))
-            along, across, turning = found.reshape(*of.shape[:2], 3, -1).transpose(2, 0, 1, 3)
+            along, across, turning = found.reshape(*of.shape[:2], 3, X.shape[1]).transpose(
+                2, 0, 1, 3)
         else:
             axis, director = self._coefficients(tind)
             slopes, functions, turned = _functions(self._orders, X)
