@@ -160,7 +160,7 @@ def _kept_functions(orders, content):
     """Those as one matrix, by which axis and director of an element are multiplied, one behind the
     other, for the three."""
     slopes, *of_director = _functions(orders, *content.arrays)
-    out = np.zeros((2 * sum(orders), 3, slopes.shape[1]))
+    out = np.zeros((2 * sum(orders), 3, slopes.shape[1]), slopes.dtype)
     out[:len(slopes), 0] = slopes
     out[len(slopes):, 1], out[len(slopes):, 2] = of_director
     return read_only(out.reshape(len(out), -1))
