@@ -18,7 +18,8 @@ Rules of such a text, where ``e`` is an index of lanes:
   indexed by it does: ``left[e] * nd + k``,
 * lanes may be nested where the arrays broadcast: ``for s in lanes(n): for e in lanes(m):`` with
   ``column(c[s]) * x[s, e]``,
-* ``out[at[e]] += x[e]`` needs ``at`` without repetitions.
+* ``out[at[e]] += x[e]`` needs ``at`` without repetitions,
+* an index is not negative in a text of the package: compiled code does not ask.
 """
 
 from collections.abc import Callable

@@ -20,6 +20,12 @@ class Known(compiler.Flags):
         return compiler.Flags(self)
 
 
+class KnownOfOthers(Known):
+    """Those of texts of others, in which -1 may be the last number of an array."""
+
+    __slots__ = ()
+
+
 class TextFlags(compiler.Flags):
     """Numba's flags for texts: each is compiled with the same copy of them.
 
@@ -29,16 +35,18 @@ class TextFlags(compiler.Flags):
         Those of ``numba.njit``.
     counts
         Whether owners of arrays are counted.
+    kind
+        Known, or KnownOfOthers.
     """
 
     __slots__ = ("known",)
 
-    def __init__(self, options, counts):
+    def __init__(self, options, counts, kind):
         super().__init__()
         cpu_target.options.parse_as_flags(self, {"nopython": True, **options})
         self.nrt = counts
         self.no_compile = self.no_cpython_wrapper = self.no_cfunc_wrapper = True
-        self.known = Known(self)
+        self.known = kind(self)
 
     def copy(self):
         return self.known

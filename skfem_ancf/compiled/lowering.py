@@ -2,7 +2,8 @@
 
 Numba keeps a variable on the stack, clears it where it ends, and copies an array there for each
 look at its shape or one of its numbers. In texts a variable that is given once is the value that
-it was given, and of an array they take what they ask for. What is not said here is Numba's.
+it was given, and of an array they take what they ask for. Indices count from the begin, but in
+texts of others. What is not said here is Numba's.
 """
 
 from collections import Counter
@@ -14,6 +15,7 @@ from numba.core import analysis, cgutils, lowering
 from numba.core.ir import Assign, Expr
 from numba.np.arrayobj import load_item, store_item
 
+from .flags import KnownOfOthers
 from .views import part
 
 #: Parts of pairs, by what Numba calls them, and of arrays, by their attributes.
@@ -123,16 +125,17 @@ class TextLower(lowering.Lower):
             given = self.loadvar(index.name)
             given = [given] if kinds == (of,) else cgutils.unpack_tuple(self.builder, given)
         given = [self.context.cast(self.builder, x, k, types.int64) for x, k in zip(given, kinds)]
-        return _at(self.context, self.builder, kind, self.loadvar(array.name), given)
+        return _at(self.context, self.builder, kind, self.loadvar(array.name), given,
+                   isinstance(self.flags, KnownOfOthers))
 
 
-def _at(context, builder, kind, array, given):
-    """The address of a number of an array."""
+def _at(context, builder, kind, array, given, from_end):
+    """The address of a number of an array; ``from_end`` if an index may be negative."""
     data, shape, strides = (part(context, builder, kind, array, name)
                             for name in ("data", "shape", "strides"))
     places = []
     for axis, at in enumerate(given):
-        if not (isinstance(at, ir.Constant) and at.constant >= 0):
+        if from_end and not (isinstance(at, ir.Constant) and at.constant >= 0):
             length = builder.extract_value(shape, axis)
             negative = builder.icmp_signed("<", at, at.type(0))
             at = builder.select(negative, builder.add(at, length), at)

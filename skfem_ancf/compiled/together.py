@@ -11,9 +11,10 @@ import dis
 from itertools import count, pairwise
 from typing import Any, NamedTuple
 
-from llvmlite.binding import parse_assembly
+from llvmlite.binding import (create_pass_builder, create_pipeline_tuning_options,
+                              parse_assembly)
 from numba import types
-from numba.core import cgutils, compiler
+from numba.core import cgutils, compiler, config
 from numba.core.codegen import JITCodeLibrary
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
@@ -48,6 +49,17 @@ class _Library(JITCodeLibrary):
 
     def add_llvm_module(self, module):
         self.modules.append(module)
+
+    def _optimize_final_module(self):
+        """As Numba, but loops are not unrolled: in small scenes they run a few times."""
+        for sums in (False, True):
+            options = create_pipeline_tuning_options(config.OPT)
+            options.loop_vectorization, options.loop_unrolling = config.LOOP_VECTORIZE, False
+            options.slp_vectorization = sums and config.SLP_VECTORIZE
+            builder = create_pass_builder(self._codegen._tm, options)
+            passes = builder.getModulePassManager()
+            passes.add_refprune_pass()
+            passes.run(self._final_module, builder)
 
     def finalize(self):
         while self.modules:

@@ -8,9 +8,10 @@ from types import FunctionType
 
 from numba import cfunc, njit, typeof
 
+from ..origin import ours
 from ..source import column, lanes
 from . import stamp
-from .flags import TextFlags
+from .flags import Known, KnownOfOthers, TextFlags
 from .loops import counted
 from .records import record_type
 from .together import Entry, Text
@@ -22,7 +23,8 @@ logger = logging.getLogger(__name__)
 OPTIONS = {"fastmath": {"contract", "reassoc", "nsz", "arcp"}, "error_model": "numpy"}
 #: Of what Python calls: other threads of Python go on meanwhile.
 ENTRY = {"nogil": True, **OPTIONS}
-_FLAGS = TextFlags(OPTIONS, False), TextFlags(OPTIONS, True)
+_FLAGS, _OTHERS = ([TextFlags(OPTIONS, counts, kind) for counts in (False, True)]
+                   for kind in (Known, KnownOfOthers))
 #: What texts call in place of ``range``.
 COUNTED = "range of texts"
 #: What reading a cache raises that holds something else.
@@ -74,7 +76,7 @@ def jit(function):
 
     It has no entrance for Python, which takes as long to compile as a small function.
     """
-    return Text(function, _FLAGS)
+    return Text(function, _FLAGS if ours(function) else _OTHERS)
 
 
 def entry_of(function, types, compiler=Entry):
