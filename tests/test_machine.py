@@ -1,5 +1,6 @@
 """Where texts run: NumPy at first, compiled where that pays, and the same either way."""
 
+import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -257,7 +258,8 @@ def test_single_numbers_of_arrays_are_read_and_written_as_by_numpy(needs_compile
 
     expected = given()
     exchange(*expected)
-    for run in (compile_for(exchange, given()), njit(exchange)):
+    for run in (compile_for(exchange, given()), compile_for(exchange_within, given()),
+                njit(exchange)):
         found = given()
         run(*found)
         for x, y in zip(found, expected):
@@ -315,6 +317,26 @@ def exchange(a, places, y, flags):
     flags[-3] = y[0] > 1.0
     if flags[1]:
         y[5] = a[2, 0, 0] - 1
+
+
+@source
+def exchange_within(a, places, y, flags):
+    exchange(a, places, y, flags)
+
+
+def test_texts_of_the_package_count_indices_from_the_begin():
+    """Compiled, they do not ask for negative ones."""
+    found = set()
+    for path in (ROOT / "skfem_ancf").rglob("*.py"):
+        for text in ast.walk(ast.parse(path.read_text())):
+            marks = {getattr(x, "id", "") for x in getattr(text, "decorator_list", ())}
+            if marks & {"source", "jit"}:
+                found.add(text.name)
+                for x in ast.walk(text):
+                    if isinstance(x, ast.Subscript):
+                        parts = x.slice.elts if isinstance(x.slice, ast.Tuple) else [x.slice]
+                        assert not any(isinstance(y, ast.UnaryOp) for y in parts), text.name
+    assert {"collocate", "equilibrium", "cable_block"} < found
 
 
 @source
