@@ -319,10 +319,11 @@ class BandMatrix:
                 last = after
 
     def _dense(self, i0, i1, j0, j1, scale):
-        """Rows i0 to i1 and columns j0 to j1 of a symmetric matrix, scaled on both sides."""
-        i, j = np.arange(i0, i1)[:, None], np.arange(j0, j1)
-        row, column = np.maximum(i, j), np.minimum(i, j)
-        inside = row - column <= self.bandwidth
+        """Rows i0 to i1 and columns j0 to j1, scaled on both sides."""
+        row, column = np.arange(i0, i1)[:, None], np.arange(j0, j1)
+        inside = np.abs(row - column) <= self.bandwidth
+        if self.symmetric:
+            row, column = np.maximum(row, column), np.minimum(row, column)
         out = np.where(inside, self._flat[np.where(inside, self._position(row, column), 0)], 0.0)
         return scale[i0:i1, None] * out * scale[j0:j1]
 
@@ -356,6 +357,10 @@ class BandMatrix:
             return 0.0, size
         return max((float(np.max(np.abs(ab[top + k, :self.n - k] - ab[top - k, k:])))
                     for k in range(1, min(self.bandwidth + 1, self.n))), default=0.0), size
+
+    def toarray(self) -> Array:
+        """The matrix as an array, shape (n, n)."""
+        return self._dense(0, self.n, 0, self.n, np.ones(self.n))
 
     def tocsc(self) -> csc_matrix:
         """The matrix as a scipy.sparse array in CSC format, without the zeros of the band."""

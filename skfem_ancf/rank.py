@@ -102,8 +102,8 @@ def _members(group, number):
     return [order[last - n:last] for n, last in zip(count, ends)], place
 
 
-def null_basis(J: sparse.csr_array) -> sparse.csr_array:
-    """A sparse matrix whose columns span the null space of a sparse J of full rank.
+def null_basis(J: Array | sparse.csr_array) -> Array | sparse.csr_array:
+    """A matrix whose columns span the null space of a J of full rank, sparse if J is.
 
     In each of the :func:`groups` of its rows as many coordinates as there are rows are given by
     the others: those that QR with pivots takes first.
@@ -115,7 +115,7 @@ def null_basis(J: sparse.csr_array) -> sparse.csr_array:
 
     Returns
     -------
-    scipy.sparse.csr_array
+    ndarray or scipy.sparse.csr_array
         Shape (N, N - m): every other coordinate is an unknown of its own.
 
     Raises
@@ -139,15 +139,19 @@ def null_basis(J: sparse.csr_array) -> sparse.csr_array:
     own = np.delete(np.arange(n), pivots)
     number = np.empty(n, dtype=int)
     number[own] = np.arange(len(own))
-    return sparse.csr_array(
-        (np.append(values, np.ones(len(own))),
-         (np.append(rows, own), np.append(number[columns], number[own]))), shape=(n, len(own)))
+    rows, columns = np.append(rows, own), np.append(number[columns], number[own])
+    values, shape = np.append(values, np.ones(len(own))), (n, len(own))
+    if not isinstance(J, np.ndarray):
+        return sparse.csr_array((values, (rows, columns)), shape=shape)
+    out = np.zeros(shape)
+    out[rows, columns] = values
+    return out
 
 
-def sparse_inertia(A: sparse.csr_array) -> Inertia:
-    """The :class:`~skfem_ancf.linalg.Inertia` of a sparse symmetric matrix.
+def inertia_of(A: Array | sparse.csr_array) -> Inertia:
+    """The :class:`~skfem_ancf.linalg.Inertia` of a symmetric matrix.
 
-    From the signs of the pivots of ``L D L^T``, by Sylvester's law.
+    Of a sparse one from the signs of the pivots of ``L D L^T``, by Sylvester's law.
 
     Raises
     ------
@@ -156,6 +160,10 @@ def sparse_inertia(A: sparse.csr_array) -> Inertia:
     """
     size = np.abs(A.diagonal())
     size[size == 0.0] = np.max(size)
+    if isinstance(A, np.ndarray):
+        root = np.sqrt(size)
+        values = np.linalg.eigvalsh(A / (root[:, None] * root))
+        return beside_zero(lambda shift: int(np.sum(values < -shift)))
     scale = sparse.diags(1.0 / np.sqrt(size))
     A = scale @ A @ scale
     try:
@@ -179,8 +187,10 @@ def _pivots(A):
     raise np.linalg.LinAlgError("the matrix is singular")
 
 
-def determinant_sign(A: sparse.csr_array) -> int:
-    """The sign of the determinant of a sparse matrix: 1 or -1."""
+def determinant_sign(A: Array | sparse.csr_array) -> int:
+    """The sign of the determinant of a matrix: 1 or -1."""
+    if isinstance(A, np.ndarray):
+        return -1 if np.linalg.slogdet(A)[0] < 0.0 else 1
     lu, one = splu(A.tocsc()), sparse.eye(A.shape[0], format="csr")
     odd = np.sum(lu.U.diagonal() < 0.0)
     for order in (lu.perm_r, lu.perm_c):  # a cycle of k is k - 1 exchanges

@@ -30,7 +30,7 @@ from .linalg import INACCURATE, NO_FACTORS, BandMatrix, Inertia, dense
 from .machine import Machine
 from .pickling import functions_of, require_picklable
 from .points import Points
-from .rank import determinant_sign, null_basis, sparse_inertia
+from .rank import determinant_sign, inertia_of, null_basis
 from .results import State
 
 if TYPE_CHECKING:
@@ -50,6 +50,8 @@ _NONE = np.zeros(0)
 EPS = float(np.finfo(float).eps)
 #: Equations of the nodes of a frame above which steps of a motion eliminate them.
 MANY = 48
+#: Coordinates up to which the tangent on the tangent space of joints is a dense matrix.
+DENSE = 100
 #: What a system has found that stays for other materials and widths; and for other loads, too.
 _OF_PLACES = {"K", "noise", "screen"}
 _OF_BEAMS = _OF_PLACES | {"points", "mass", "mass_factors", "stiffness_scale", "work_noise",
@@ -858,10 +860,10 @@ class System:
             return K.inertia()
         if self.condensed is not None:
             return self.condensed.inertia()
-        if self.bordered:
-            return self._factors.inertia()
+        if self.bordered and self._factors.is_definite():
+            return Inertia(0, False)
         K = self._reduced()
-        return sparse_inertia(0.5 * (K + K.T))
+        return inertia_of(0.5 * (K + K.T))
 
     def take_factors(self, factors: Factors) -> None:
         """Note that an iteration has left factors in :attr:`K`, and about it.
@@ -897,18 +899,25 @@ class System:
             return self.K.determinant_sign()
         if self.condensed is not None:
             return -1 if self.condensed.inertia().negative % 2 else 1
-        if self.bordered:
-            return self._factors.determinant_sign()
         return determinant_sign(self._reduced())
 
     def _whole(self):
         """The tangent with what joints add to it, sparse."""
+        if self.bordered:
+            return self._factors.tocsc()
         i, j, v = self._outside
         return self.K.tocsc() + sparse.csc_array((v, (i, j)), shape=(self.N, self.N))
 
     def _reduced(self):
-        """The tangent on the tangent space of the joints, sparse."""
-        T = null_basis(self._J)
+        """The tangent on the tangent space of the joints, sparse of many coordinates.
+
+        What stiff springs hold in a border lets go of with the round-off of their stiffness: of
+        slender beams that is more than bending.
+        """
+        if self.bordered and self.N <= DENSE:
+            T = null_basis(self._J)
+            return T.T @ self._factors.toarray() @ T
+        T = null_basis(sparse.csr_array(self._J))
         return (T.T @ self._whole() @ T).tocsc()
 
     def _sparse_factors(self, K):

@@ -144,7 +144,7 @@ def test_inertia_and_determinant_of_sparse_matrices(seed):
     A = sparse.random(60, 60, 0.05, random_state=seed)
     A = A + A.T + sparse.diags(rng.standard_normal(60))
     values = np.linalg.eigvalsh(A.toarray())
-    assert rank.sparse_inertia(A) == (np.sum(values < 0), False)
+    assert rank.inertia_of(A) == (np.sum(values < 0), False)
     P = sparse.eye(60, format="csr")[rng.permutation(60)]
     assert rank.determinant_sign(P @ A) == np.sign(np.linalg.slogdet((P @ A).toarray())[0])
 
@@ -152,7 +152,7 @@ def test_inertia_and_determinant_of_sparse_matrices(seed):
 def test_a_singular_matrix_is_called_so():
     A = np.diag([2.0, 3.0, 1.0])
     A[0, 1] = A[1, 0] = np.sqrt(6.0)
-    assert rank.sparse_inertia(sparse.csr_array(A)).singular
+    assert rank.inertia_of(sparse.csr_array(A)).singular
 
 
 # frames
