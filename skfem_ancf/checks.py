@@ -94,9 +94,8 @@ class Screen:
         self._none = not beams
         if self._none:
             return
-        self._beams, first = beams, accumulate([b.N for b in beams], initial=0)
         # pairs of coordinates as complex numbers: positions of the nodes, and the tangents behind
-        self._places = [slice(n // 2, (n + b.N) // 2, b.nd // 2) for n, b in zip(first, beams)]
+        self._beams, self._positions, self._tangents = beams, *_nodes_of(beams)
         self.start = _joined([_complex(b.mesh.p_X.T) for b in beams])
         nodes = len(self.start)
         if sum([b.mesh.nelements for b in beams]) == nodes - 1:  # one chain
@@ -123,11 +122,6 @@ class Screen:
     def _along(self, positions):
         return positions[self._right] - positions[self._left]
 
-    def _at_nodes(self, u, k):
-        """Pair k of the coordinates of each node, complex."""
-        z = _paired(u)
-        return _joined([z[..., s.start + k:s.stop:s.step] for s in self._places])
-
     def passes(self, u: Array, start: Array | None = None, slender: Array | None = None) -> Any:
         """False if a fibre may be compressed, or an element may turn, beyond the range.
 
@@ -142,12 +136,12 @@ class Screen:
             return True
         start = self.start if start is None else start
         slender = self.slender if slender is None else slender
-        r = self._at_nodes(u, 1) / start + 1.0
+        r = _paired(u)[..., self._tangents] / start + 1.0
         z = r[..., self._right] * r[..., self._left].conj()
         turn = np.abs(np.arctan2(z.imag, z.real))
         # the largest curvature of an element is seldom more than twice its mean
-        return (turn < self._limit).all(axis=-1) & (
-            np.abs(r).min(axis=-1) - (turn * slender).max(axis=-1) > 1.1 * COMPRESSED)
+        shortest = np.minimum.reduce(np.abs(r), -1) - np.maximum.reduce(turn * slender, -1)
+        return np.logical_and.reduce(turn < self._limit, -1) & (shortest > 1.1 * COMPRESSED)
 
     def folded(self, u: Array) -> bool:
         """True if the axis of an element turns back: its ends lie against a tangent of the axis.
@@ -161,9 +155,21 @@ class Screen:
         """
         if self._none:
             return False
-        along = self._along(self._at_nodes(u, 0)) + self._chords
-        tangents = (self._at_nodes(u, 1) + self.start)[self._ends]
-        return bool((along.conj() * tangents).real.min() < 0.0)
+        z = _paired(u)
+        along = self._along(z[self._positions]) + self._chords
+        tangents = (z[self._tangents] + self.start)[self._ends]
+        return bool(np.minimum.reduce((along.conj() * tangents).real, None) < 0.0)
+
+
+def _nodes_of(beams):
+    """Places of the first and the second pair of coordinates of each node, one beam after another.
+    """
+    steps, pairs = [b.nd // 2 for b in beams], sum([b.N for b in beams]) // 2
+    if len(set(steps)) == 1:
+        return slice(0, pairs, steps[0]), slice(1, pairs, steps[0])
+    first = accumulate([b.N // 2 for b in beams], initial=0)
+    at = np.concatenate([np.arange(n, n + b.N // 2, k) for n, b, k in zip(first, beams, steps)])
+    return at, at + 1
 
 
 def _complex(pairs):

@@ -58,12 +58,15 @@ _OF_BEAMS = _OF_PLACES | {"points", "mass", "mass_factors", "stiffness_scale", "
                           "inertia_of_places", "condensed"}
 
 
-def _of_constraints(name: str) -> Any:
-    """What the constraints have by this name, as an attribute of the system."""
-    def get(self: System) -> Any:
-        return getattr(self.constraints, name)
+class _OfConstraints(cached_property):
+    """What the constraints have by its name, which is found once; they do not change."""
 
-    return property(get, doc=f"See :class:`~skfem_ancf.constraints.Constraints`, ``{name}``.")
+    def __init__(self) -> None:
+        super().__init__(lambda system: getattr(system.constraints, self.attrname))
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        super().__set_name__(owner, name)
+        self.__doc__ = f"See :class:`~skfem_ancf.constraints.Constraints`, ``{name}``."
 
 
 class System:
@@ -170,35 +173,35 @@ class System:
         system.machine = self.machine.with_tables(tables)
         return system
 
-    fixed = _of_constraints("fixed")
-    free = _of_constraints("free")
-    mask = _of_constraints("mask")
-    values = _of_constraints("values")
-    values_at = _of_constraints("values_at")
-    given = _of_constraints("given")
-    moves = _of_constraints("moves")
-    all_joints = _of_constraints("all_joints")
-    joints = _of_constraints("joints")
-    m = _of_constraints("m")
-    constraint = _of_constraints("constraint")
-    drives = _of_constraints("drives")
-    full_jacobian = _of_constraints("full_jacobian")
-    sparse_jacobian = _of_constraints("sparse_jacobian")
-    jacobian = _of_constraints("jacobian")
-    quadratic = _of_constraints("quadratic")
-    curvature = _of_constraints("curvature")
-    lost = _of_constraints("lost")
-    first_lost = _of_constraints("first_lost")
-    mean_jacobian = _of_constraints("mean_jacobian")
-    mean_turning = _of_constraints("mean_turning")
-    multipliers_of = _of_constraints("multipliers_of")
-    joint_force = _of_constraints("joint_force")
-    springs = _of_constraints("springs")
-    loose = _of_constraints("loose")
-    bordered = _of_constraints("bordered")
-    free_rigid_motions = _of_constraints("free_rigid_motions")
-    require_independent_joints = _of_constraints("require_independent_joints")
-    require_supports = _of_constraints("require_supports")
+    fixed: Any = _OfConstraints()
+    free: Any = _OfConstraints()
+    mask: Any = _OfConstraints()
+    values: Any = _OfConstraints()
+    values_at: Any = _OfConstraints()
+    given: Any = _OfConstraints()
+    moves: Any = _OfConstraints()
+    all_joints: Any = _OfConstraints()
+    joints: Any = _OfConstraints()
+    m: Any = _OfConstraints()
+    constraint: Any = _OfConstraints()
+    drives: Any = _OfConstraints()
+    full_jacobian: Any = _OfConstraints()
+    sparse_jacobian: Any = _OfConstraints()
+    jacobian: Any = _OfConstraints()
+    quadratic: Any = _OfConstraints()
+    curvature: Any = _OfConstraints()
+    lost: Any = _OfConstraints()
+    first_lost: Any = _OfConstraints()
+    mean_jacobian: Any = _OfConstraints()
+    mean_turning: Any = _OfConstraints()
+    multipliers_of: Any = _OfConstraints()
+    joint_force: Any = _OfConstraints()
+    springs: Any = _OfConstraints()
+    loose: Any = _OfConstraints()
+    bordered: Any = _OfConstraints()
+    free_rigid_motions: Any = _OfConstraints()
+    require_independent_joints: Any = _OfConstraints()
+    require_supports: Any = _OfConstraints()
 
     def _directors(self, fixed):
         """The conditions of the bodies' directors, but of those that are held fast."""
@@ -957,7 +960,8 @@ class System:
 
 
 #: Names of attributes that are made when they are asked for.
-_MADE_ONCE = {name for name, value in vars(System).items() if isinstance(value, cached_property)}
+_MADE_ONCE = {name for name, value in vars(System).items()
+              if isinstance(value, cached_property) and not isinstance(value, _OfConstraints)}
 #: Those that do not stay for other loads, and for other materials and widths.
 _NOT_OF_BEAMS, _NOT_OF_PLACES = tuple(_MADE_ONCE - _OF_BEAMS), tuple(_MADE_ONCE - _OF_PLACES)
 

@@ -319,7 +319,7 @@ class Checkpoint:
 
     def _write(self):
         run, y = self.run, self.run.y
-        arrays = {f"run.{k}": v for k, v in run.remember().items()}
+        arrays = {f"run.{k}": np.asarray(v) for k, v in run.remember().items()}
         arrays.update({f"history.{k}": v for k, v in run.history.columns().items()})
         for name in run.history.COLUMNS:
             arrays[f"now.{name}"] = np.asarray(getattr(y, name), dtype=float)

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before",
            "dissipated")
 _COLUMNS_OF = attrgetter(*COLUMNS)
+#: Attributes of a motion that has ended that are made when one of them is asked for.
+_LATE = {"t", "u", "v", "acceleration", "multipliers", "dissipated", "_others", "_memories"}
 #: Instants of a picture where none are named.
 STROBES = 8
 
@@ -82,11 +84,18 @@ class History:
     """
 
     COLUMNS = COLUMNS
+    t: Array
+    u: Array
+    v: Array
+    acceleration: Array
+    multipliers: Array
+    dissipated: Array
+    _others: tuple[Array, ...]
+    _memories: list[Any]
 
     def __init__(self, system: System, scheme: Scheme, run: Any) -> None:
         self.system, self.scheme, self._run = system, scheme, run
         self._rows: list[Motion] = []
-        self._memories: list[Any] = []
         self._kept: Any = None
 
     def append(self, y: Motion) -> None:
@@ -128,14 +137,9 @@ class History:
         return [y.memory for y in self._rows]
 
     def close(self) -> History:
-        """Turn what was stored into arrays."""
-        columns, run = self.columns(), self._run
-        self.t, self.u, self.v = columns["t"], columns["u"], columns["v"]
-        self.acceleration, self.multipliers = columns["acceleration"], columns["multipliers"]
-        self.dissipated, self.event = columns["dissipated"], run.event
-        self.sensors = run.recorder.readings()
-        self._others = columns["algorithmic"], columns["force"], columns["before"]
-        self._memories = self.memories
+        """Nothing more comes: what was stored are arrays from now on."""
+        run = self._run
+        self.event, self.sensors = run.event, run.recorder.readings()
         if self._rows and run.y is not None and self._rows[-1].t == run.y.t:
             self._kept = run.remember()  # of the last instant: the factors too
         self.steps, self.rejected = run.steps, run.rejected
@@ -143,8 +147,20 @@ class History:
         self.iterations = run.integrator.iterations
         self.factorizations = run.integrator.factorizations
         self.substeps = run.integrator.substeps
-        self._rows, self._run = [], None
+        self._run = None
         return self
+
+    def __getattr__(self, name):
+        """Arrays are made of what was stored where one of them is asked for."""
+        made = vars(self)
+        if name not in _LATE or made.get("_run", self) is not None:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        columns, memories = self.columns(), self.memories
+        if name not in made:  # another thread may have made them
+            made["_others"] = tuple([columns.pop(x) for x in ("algorithmic", "force", "before")])
+            made.update(columns, _memories=memories)
+            self._rows = []
+        return made[name]
 
     def __len__(self):
         return len(self.t)

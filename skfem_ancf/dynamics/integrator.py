@@ -305,9 +305,10 @@ class Integrator:
 
         def motion(k):
             """After step k, counted from 0."""
-            return Motion(float(course.times[k, 0]), *rows[k], *multiplier_rows[k], before=dt,
-                          memory=kept(y, memories[k] if contacts.lasting else None),
-                          dissipated=float(works[k]))
+            memory = kept(y, memories[k] if contacts.lasting else None)
+            # copies, so that one instant does not keep the block
+            return Motion(float(course.times[k, 0]), *rows[k].copy(), *multiplier_rows[k].copy(),
+                          dt, memory, float(works[k]))
 
         return done, motion
 
@@ -450,11 +451,10 @@ class Integrator:
 
     # what a motion goes on with
 
-    def remember(self) -> dict[str, Array]:
+    def remember(self) -> dict[str, Any]:
         """Numbers and arrays from which :meth:`recall` goes on as if there had been no break."""
-        memory = {"state": self._state.copy(), "dt": np.array(self._dt),
-                  "substeps": np.array(self.substeps)}
-        memory.update({name: array.copy() for name, array in self._factors().items()})
+        memory = {name: array.copy() for name, array in self._factors().items()}
+        memory.update(state=self._state.copy(), dt=self._dt, substeps=self.substeps)
         if self._nodes:
             steps, mass = self._nodes
             memory.update({"at": steps.at[0], "multipliers at": steps.at[1],
@@ -462,7 +462,7 @@ class Integrator:
         memory.update({f"kept {name}": array.copy() for name, array in self.kept.items()})
         return memory
 
-    def recall(self, memory: dict[str, Array]) -> None:
+    def recall(self, memory: dict[str, Any]) -> None:
         """Go on with what :meth:`remember` gave."""
         self._state[:], self._dt = memory["state"], float(memory["dt"])
         self.substeps = int(memory["substeps"])

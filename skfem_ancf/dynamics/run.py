@@ -434,10 +434,10 @@ class Run:
         memory = self.integrator.remember()
         if self.sizes is not None:
             memory.update(self.sizes.remember())
-        memory["size"] = np.array(self.size)
+        memory["size"] = self.size
         for k, control in enumerate(self.system.forces.sampled):
             memory[f"held {k}"] = control.held
-        memory["counts"] = np.array([self.segment, self.n, self._next, self.steps, self.rejected])
+        memory["counts"] = self.segment, self.n, self._next, self.steps, self.rejected
         return memory
 
     def recall(self, y: Motion, memory: dict[str, Any]) -> None:
