@@ -109,18 +109,20 @@ class Screen:
             limits, [b.mesh.nelements for b in beams])
 
     @cached_property
-    def _ends(self):
-        """Numbers of the nodes of each element, shape (2, elements)."""
-        nodes = np.arange(len(self.start))
-        return np.array([nodes[self._left], nodes[self._right]])
+    def _marks(self):
+        """Numbers of coordinates of each element, and their values in the stress-free state.
 
-    @cached_property
-    def _chords(self):
-        """From end to end of the elements in the stress-free state, complex."""
-        return self._along(_joined([_complex(b.mesh.p.T) for b in self._beams]))
-
-    def _along(self, positions):
-        return positions[self._right] - positions[self._left]
+        The end, the begin, and the tangents at both, shape (4, 2, elements).
+        """
+        nodes, pairs = np.arange(len(self.start)), np.arange(sum([b.N for b in self._beams]) // 2)
+        begin, end = nodes[self._left], nodes[self._right]
+        at = [pairs[places][ends] for places, ends in (
+            (self._positions, end), (self._positions, begin), (self._tangents, begin),
+            (self._tangents, end))]
+        rest = _joined([_complex(b.mesh.p.T) for b in self._beams])
+        start = np.array([rest[end], rest[begin], self.start[begin], self.start[end]])
+        return (2 * np.array(at)[:, None] + np.arange(2)[:, None],
+                np.stack([start.real, start.imag], 1))
 
     def passes(self, u: Array, start: Array | None = None, slender: Array | None = None) -> Any:
         """False if a fibre may be compressed, or an element may turn, beyond the range.
@@ -155,10 +157,10 @@ class Screen:
         """
         if self._none:
             return False
-        z = _paired(u)
-        along = self._along(z[self._positions]) + self._chords
-        tangents = (z[self._tangents] + self.start)[self._ends]
-        return bool(np.minimum.reduce((along.conj() * tangents).real, None) < 0.0)
+        at, rest = self._marks
+        r = u[at] + rest
+        along = (r[0] - r[1]) * r[2:]
+        return bool(np.minimum.reduce(along[:, 0] + along[:, 1], None) < 0.0)
 
 
 def _nodes_of(beams):

@@ -257,7 +257,7 @@ class System:
             out[s] += factor * acting.force(u[s])
         return out
 
-    @property
+    @cached_property
     def depends_on_time(self) -> bool:
         """True if supports, joints or loads may ask functions of time."""
         return bool(self._varying) or self.moves or self.machine.tables.motion_varies
@@ -504,7 +504,12 @@ class System:
 
     def inverted(self, u: Array) -> bool:
         """True if a body is turned inside out somewhere."""
-        return any(b.kernel.inverted(u[s]) for b, s in zip(self.beams, self.slices))
+        return any(kernel.inverted(u[s]) for kernel, s in self._turning_over)
+
+    @cached_property
+    def _turning_over(self):
+        """Kernels of beams that may be turned inside out, and their coordinates: not of cables."""
+        return [(b.kernel, s) for b, s in zip(self.beams, self.slices) if b.has_sections]
 
     @cached_property
     def machine(self) -> Machine:

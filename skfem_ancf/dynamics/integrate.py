@@ -133,8 +133,10 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     motion = None if start is None else start._motion
     if t_start is None:
         t_start = 0.0 if motion is None else motion.t
+    if not isinstance(breakpoints, tuple):
+        breakpoints = np.atleast_1d(breakpoints)
     task = _task(t_start, t_end, dt, t_eval, tol, rtol, [
-        *np.atleast_1d(breakpoints), *_samples(system, t_start, t_end)])
+        *breakpoints, *_samples(system, t_start, t_end)])
     if not (in_steps(scheme) and system.by_nodes):
         _require_room(system)
     system.require_independent_joints()
@@ -175,11 +177,13 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
 
 def _checked(check, system, task, checkpoint):
     """True if the error of a motion is to be estimated."""
+    if check is None and task.dt is not None:
+        return False
     found = [text for text, there in (
         ("obstacles", system.forces.contacts.obstacles), ("a checkpoint", checkpoint is not None),
         ("controllers that are sampled", system.forces.sampled)) if there]
     if check is None:
-        return task.dt is None and not found and system.N <= CHECKED
+        return not found and system.N <= CHECKED
     if require_flag("check", check) and (found or task.dt is not None):
         raise InputError("check=True estimates the error of motions with dt='auto'"
                          f"{', not with ' + ' and '.join(found) if found else ''}: leave it out, "

@@ -92,6 +92,7 @@ class Integrator:
         self.asked: Any = None
         self._begun: Any = (None,)
         self.machine = system.machine
+        self._ruled: Any = None
         self._begin(scheme, tol)
         numbers = 4 * system.N + system.forces.contacts.tables.memory.size
         self.longest = max(1, min(STORED // numbers, BLOCK))
@@ -110,9 +111,12 @@ class Integrator:
         if self.tol >= 1.0:
             raise InputError(f"tol is the error of a step's iteration, relative: less than 1, and "
                              f"1e-6 is coarse already; got {shown(tol)}")
-        handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
-        self.rule = Rule(int(scheme.conserving), *map(float, scheme.parameters), self.tol,
-                         8.0 * system.stiffness_scale, system.inertia_of_places, *handles)
+        ruled = scheme.conserving, scheme.parameters, self.tol
+        if self._ruled != ruled:
+            handles = [handle_of(one) for one in self._nodes or ()] or (0, 0)
+            self._ruled, self.rule = ruled, Rule(
+                int(scheme.conserving), *map(float, scheme.parameters), self.tol,
+                8.0 * system.stiffness_scale, system.inertia_of_places, *handles)
         self._state[:], self._dt, self.substeps, self._lost = 0.0, np.nan, 0, ""
         self.kept: dict[str, Array] = {}
         if system.depends_on_time or self.asked is None:

@@ -6,10 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..frozen import read_only
 from .collocation import Collocation
 
 if TYPE_CHECKING:
     from ..types import Array
+
+
+POINTS = read_only(np.array([0.4 - 0.1 * np.sqrt(6.0), 0.4 + 0.1 * np.sqrt(6.0), 1.0]))
 
 
 class Radau(Collocation):
@@ -35,5 +39,4 @@ class Radau(Collocation):
 
     @property
     def points(self) -> Array:
-        root = np.sqrt(6.0)
-        return np.array([0.4 - 0.1 * root, 0.4 + 0.1 * root, 1.0])
+        return POINTS

@@ -484,7 +484,7 @@ class Contacts:
             out.append((which, x, -F[:2] - more[:2], F[3] / group.areas, found[0]))
         return out
 
-    @property
+    @cached_property
     def sweeps(self) -> bool:
         """True if there is an obstacle that bodies may pass through between two instants."""
         return any(group.depth < np.inf for _, group in self.groups)
@@ -502,8 +502,10 @@ class Contacts:
         u, t
             Displacement, shape (N,), and time.
         """
-        out = []
-        seen = self.look(np.array(u), t, False) if self.groups else []
+        out: list[str] = []
+        if not self.groups:
+            return out
+        seen = self.look(np.array(u), t, False)
         for firmness, ((which, group), _, found) in zip(self.firmness, seen):
             one, deep, h = self.obstacles[which], -float(found[0].min()), group.height
             if one.penalty is None and deep > SUNK * h:

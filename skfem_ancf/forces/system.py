@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..kept import cached_property
 from .base import Part
 from .contacts import NO_CONTACTS, Contacts
 from .control import Control
@@ -222,7 +223,7 @@ class Forces:
             element.potential(y[rows].reshape(-1, 2)) or 0.0
             for element, (rows, _) in zip(self.own, self._slices))
 
-    @property
+    @cached_property
     def sampled(self) -> list[Control]:
         """Controls whose law is asked now and then, and its value held."""
         return [e for e in self.own if isinstance(e, Control) and e.dt is not None]
