@@ -29,6 +29,9 @@ COMPRESSED = 1.0 / np.sqrt(3.0)
 #: 1.6 rad, of degree 7 by 2.4e-8 at 2, of degree 9 by 5e-11 at 2.5.
 TURNING = {3: 1.0, 5: 1.6, 7: 2.0}
 TURNING_SMOOTH = 2.5
+#: Elements up to which they are looked at one by one.
+FEW = 8
+TINY = 1e-300
 
 
 @dataclass(frozen=True)
@@ -94,35 +97,53 @@ class Screen:
         self._none = not beams
         if self._none:
             return
-        # pairs of coordinates as complex numbers: positions of the nodes, and the tangents behind
-        self._beams, self._positions, self._tangents = beams, *_nodes_of(beams)
+        self._beams = beams
         self.start = _joined([_complex(b.mesh.p_X.T) for b in beams])
-        nodes = len(self.start)
-        if sum([b.mesh.nelements for b in beams]) == nodes - 1:  # one chain
-            self._left, self._right = slice(nodes - 1), slice(1, nodes)
-        else:
-            node = accumulate([b.N // b.nd for b in beams], initial=0)
-            self._left, self._right = _joined([n + b.mesh.t for n, b in zip(node, beams)])
         self.slender = _joined([b.mesh.height / b.mesh.lengths for b in beams])
-        limits = [turning_limit(b) for b in beams]
-        self._limit = limits[0] if len(set(limits)) == 1 else np.repeat(
-            limits, [b.mesh.nelements for b in beams])
 
     @cached_property
-    def _marks(self):
-        """Numbers of coordinates of each element, and their values in the stress-free state.
+    def _ends(self):
+        """Nodes at the begin and the end of each element, shape (2, elements)."""
+        node = accumulate([b.N // b.nd for b in self._beams], initial=0)
+        return _joined([n + b.mesh.t for n, b in zip(node, self._beams)])
 
-        The end, the begin, and the tangents at both, shape (4, 2, elements).
-        """
-        nodes, pairs = np.arange(len(self.start)), np.arange(sum([b.N for b in self._beams]) // 2)
-        begin, end = nodes[self._left], nodes[self._right]
-        at = [pairs[places][ends] for places, ends in (
-            (self._positions, end), (self._positions, begin), (self._tangents, begin),
-            (self._tangents, end))]
-        rest = _joined([_complex(b.mesh.p.T) for b in self._beams])
-        start = np.array([rest[end], rest[begin], self.start[begin], self.start[end]])
-        return (2 * np.array(at)[:, None] + np.arange(2)[:, None],
-                np.stack([start.real, start.imag], 1))
+    @cached_property
+    def _places(self):
+        """Of these nodes the first two coordinates, the position, as a number of a complex one."""
+        first = accumulate([b.N // 2 for b in self._beams], initial=0)
+        return _joined([n + b.nd // 2 * b.mesh.t for n, b in zip(first, self._beams)])
+
+    @cached_property
+    def _turns(self):
+        """What tells of turns: places of tangents, these at rest, and the limits of elements."""
+        limits = [turning_limit(b) for b in self._beams]
+        limit = np.repeat(limits, [b.mesh.nelements for b in self._beams])
+        widest = 2.0 * np.sin(0.5 * limit)
+        return 1 + self._places, self.start[self._ends], widest, limit / widest * self.slender
+
+    @cached_property
+    def _folds(self):
+        """What tells of folds: places of end, begin and a tangent, each with both; at rest."""
+        (begin, end), rest = self._places, _joined([_complex(b.mesh.p.T) for b in self._beams])
+        left, right = self._ends
+        return (np.array([[end, end], [begin, begin], [1 + begin, 1 + end]]).reshape(3, -1),
+                np.array([[rest[right]] * 2, [rest[left]] * 2,
+                          [self.start[left], self.start[right]]]).reshape(3, -1))
+
+    @cached_property
+    def _turns_of_few(self):
+        """The same for each element, none of many."""
+        return self._one_by_one(self._turns)
+
+    @cached_property
+    def _folds_of_few(self):
+        """The same for each element and tangent, none of many."""
+        return self._one_by_one(self._folds)
+
+    def _one_by_one(self, what):
+        if len(self.slender) > FEW:
+            return None
+        return [*zip(*[column for x in what for column in x.reshape(-1, x.shape[-1]).tolist()])]
 
     def passes(self, u: Array, start: Array | None = None, slender: Array | None = None) -> Any:
         """False if a fibre may be compressed, or an element may turn, beyond the range.
@@ -136,14 +157,19 @@ class Screen:
         """
         if self._none:
             return True
-        start = self.start if start is None else start
-        slender = self.slender if slender is None else slender
-        r = _paired(u)[..., self._tangents] / start + 1.0
-        z = r[..., self._right] * r[..., self._left].conj()
-        turn = np.abs(np.arctan2(z.imag, z.real))
-        # the largest curvature of an element is seldom more than twice its mean
-        shortest = np.minimum.reduce(np.abs(r), -1) - np.maximum.reduce(turn * slender, -1)
-        return np.logical_and.reduce(turn < self._limit, -1) & (shortest > 1.1 * COMPRESSED)
+        if u.ndim == 1 and self._turns_of_few:
+            z = _paired(u).tolist()
+            p, q, turns, bends = zip(*[_changes(z[i], z[j], *numbers)
+                                       for i, j, *numbers in self._turns_of_few])
+            least = max(bends) + 1.1 * COMPRESSED
+            return all([x < 1.0 for x in turns]) and all([x > least for x in p + q])
+        places, rest, widest, thick = self._turns
+        z, rest = _paired(u)[..., places], rest if start is None else start[..., self._ends]
+        thick = thick if slender is None else thick / self.slender * slender
+        p, q, turns, bends = _changes(z[..., 0, :], z[..., 1, :], rest[..., 0, :], rest[..., 1, :],
+                                      widest, thick)
+        return (turns < 1.0).all(axis=-1) & (
+            np.minimum(p, q).min(axis=-1) > bends.max(axis=-1) + 1.1 * COMPRESSED)
 
     def folded(self, u: Array) -> bool:
         """True if the axis of an element turns back: its ends lie against a tangent of the axis.
@@ -157,21 +183,33 @@ class Screen:
         """
         if self._none:
             return False
-        at, rest = self._marks
-        r = u[at] + rest
-        along = (r[0] - r[1]) * r[2:]
-        return bool(np.minimum.reduce(along[:, 0] + along[:, 1], None) < 0.0)
+        if self._folds_of_few:
+            z = _paired(u).tolist()
+            return min([_along(z[i], z[j], z[k], *rest)
+                        for i, j, k, *rest in self._folds_of_few]) < 0.0
+        places, rest = self._folds
+        return bool(_along(*_paired(u)[places], *rest).min() < 0.0)
 
 
-def _nodes_of(beams):
-    """Places of the first and the second pair of coordinates of each node, one beam after another.
+# of numbers for few elements, as arrays take longer, and of arrays
+
+
+def _changes(begin, end, first, last, widest, thick):
+    """What changes of tangents at both ends of an element say.
+
+    How long the tangents are over what they were, ``2 sin(turn / 2)`` of the angle between them
+    over the widest, and the largest strain of bending: the largest curvature of an element is
+    seldom more than twice its mean.
     """
-    steps, pairs = [b.nd // 2 for b in beams], sum([b.N for b in beams]) // 2
-    if len(set(steps)) == 1:
-        return slice(0, pairs, steps[0]), slice(1, pairs, steps[0])
-    first = accumulate([b.N // 2 for b in beams], initial=0)
-    at = np.concatenate([np.arange(n, n + b.N // 2, k) for n, b, k in zip(first, beams, steps)])
-    return at, at + 1
+    begin, end = begin / first + 1.0, end / last + 1.0
+    p, q = abs(begin), abs(end)
+    apart = abs(p * end - q * begin) / (p * q + TINY)
+    return p, q, apart / widest, apart * thick
+
+
+def _along(end, begin, tangent, last, first, slope):
+    """How far an element reaches along a tangent of it, of changes and of what is at rest."""
+    return ((end + last - begin - first).conjugate() * (tangent + slope)).real
 
 
 def _complex(pairs):
