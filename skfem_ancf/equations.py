@@ -207,7 +207,7 @@ class Tables:
         tables, before = twin_of(self), self.plain
         tables._system, tables._words, tables._own_handle = ref(system), [], None
         tables._words_of_loads, its = [], vars(tables)
-        for name in ("flat", "linearised", "parts", "_stress_size"):
+        for name in ("flat", "linearised", "parts", "_stress_size", "prestressed", "_at_rest"):
             if name in its:
                 del its[name]
         tables._sort(system.loads)
@@ -348,7 +348,7 @@ class Tables:
             out[:, k] = sampled(amplitude, times, "amplitude").reshape(len(times))
         return out
 
-    @property
+    @cached_property
     def prestressed(self) -> bool:
         """True if the first tangent has other factors of loads, see :meth:`static_factors`."""
         return any(load.prestress for load in [*self._loads[2], *self._loads[3]])
@@ -363,12 +363,19 @@ class Tables:
         before
             That of the state to start from, for the first tangent, of loads that prestress.
         """
-        out = scale * np.array([1.0 if load is None else load.at_rest for load in self._columns])
+        out = scale * self._at_rest
+        if before is None or not self.prestressed:
+            return out
         last = [*self._loads[2], *self._loads[3]]
         for k, load in enumerate(last, len(out) - len(last)):
-            if before is not None and load.prestress:
+            if load.prestress:
                 out[k] = before * load.at_rest
         return out
+
+    @cached_property
+    def _at_rest(self):
+        """Factors of the loads in statics at full load."""
+        return np.array([1.0 if load is None else load.at_rest for load in self._columns])
 
     # joints
 

@@ -208,9 +208,7 @@ class Machine:
         if _too_early(name) or self.choose(name).way == "plain":
             return CLOCK.timed(text), self.tables.plain
         try:
-            new = [part for part in self.tables.parts if part not in compiled.KNOWN]
-            with _announced(new) if new else _SILENT:
-                equations = self.tables.flat
+            equations = vars(self.tables).get("flat") or self._flattened()
         except compiled.TextProblem as error:
             self._plain = str(error)
             logger.info(self._plain)
@@ -226,6 +224,12 @@ class Machine:
             return function(*map(self._kept, args))
 
         return run, equations
+
+    def _flattened(self):
+        """The equations that compiled texts take, made for the first time."""
+        new = [part for part in self.tables.parts if part not in compiled.KNOWN]
+        with _announced(new) if new else _SILENT:
+            return self.tables.flat
 
 
 def _too_early(name):
