@@ -434,13 +434,26 @@ class Tables:
             return np.zeros((len(times), 0))
         return _beside([joint.slope_entries(times, s.N)[2] for joint in s.joints])
 
+    def driven(self, times: Array) -> Array:
+        """c of all joints at the times and behind them g, shape (n, m + k).
+
+        Of joints whose derivatives do not depend on time c alone, shape (n, m).
+        """
+        s = self.system
+        if not self.turns:
+            return self.offsets(times)
+        found = [(joint.driven(times, s.N), len(joint.equations)) for joint in s.joints]
+        return found[0][0] if len(found) == 1 else np.hstack([
+            *[x[:, :m] for x, m in found], *[x[:, m:] for x, m in found]])
+
     def at(self, t: float) -> tuple[Array, Array]:
         """c and g of all joints at one time, shapes (m,) and (k,)."""
         if not self.motion_varies and not self.plain.joints.own:
             c, g = self.still
             return c[0, 0], g[0, 0]
-        times = np.array([t])
-        return self.offsets(times)[0], self.slopes(times)[0]
+        times, m = np.array([t]), self.system.m
+        found = self.driven(times)[0]
+        return found[:m], found[m:] if self.turns else self.slopes(times)[0]
 
     @cached_property
     def still(self) -> tuple[Array, Array]:

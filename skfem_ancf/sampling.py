@@ -69,12 +69,18 @@ def sampled(function: Callable[[Any], Any], times: Array, name: str,
     if values is not None:
         some = [0, n // 2, n - 1]
         alone = _one_by_one(function, times[some], name, shape)
-        if values.shape == (n,) + alone.shape[1:]:
-            size = np.abs(alone)
-            off = np.abs(values[some] - alone) - 1e-13 * size
-            if off.max() <= 1e-15 * size.max() and np.isfinite(values).all():
-                return values
+        if (values.shape == (n,) + alone.shape[1:] and _are_close(values[some], alone)
+                and np.logical_and.reduce(np.isfinite(values), None)):
+            return values
     return _one_by_one(function, times, name, shape)
+
+
+def _are_close(found, alone):
+    """True if a few numbers are the same to round-off."""
+    numbers = alone.ravel().tolist()
+    size = 1e-15 * max(map(abs, numbers), default=0.0)
+    return all([abs(x - y) <= 1e-13 * abs(y) + size
+                for x, y in zip(found.ravel().tolist(), numbers)])
 
 
 def _one_by_one(function: Callable[[Any], Any], times: Array, name: str,

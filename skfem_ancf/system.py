@@ -62,7 +62,10 @@ class _OfConstraints(cached_property):
     """What the constraints have by its name, which is found once; they do not change."""
 
     def __init__(self) -> None:
-        super().__init__(lambda system: getattr(system.constraints, self.attrname))
+        def found(system: System) -> Any:
+            return getattr(system.constraints, self.attrname)
+
+        super().__init__(found)
 
     def __set_name__(self, owner: type, name: str) -> None:
         super().__set_name__(owner, name)
@@ -260,7 +263,12 @@ class System:
     @cached_property
     def depends_on_time(self) -> bool:
         """True if supports, joints or loads may ask functions of time."""
-        return bool(self._varying) or self.moves or self.machine.tables.motion_varies
+        return self.varies or self.machine.tables.motion_varies
+
+    @cached_property
+    def varies(self) -> bool:
+        """True if supports or loads may ask functions of time."""
+        return bool(self._varying) or self.moves
 
     def _require_coordinates(self, u):
         if u.shape != (self.N,):

@@ -300,8 +300,9 @@ class Collocation(Scheme):
             held[:, :, s.fixed] = moving(s.values_at)
         c, g = tables.still
         if drives and not tables.plain.joints.own:
-            c = moving(tables.offsets)
+            found = moving(tables.driven)
+            c = found[:, :, :s.m].copy()
             if tables.turns:
-                g = np.ascontiguousarray(moving(tables.slopes)[:, [0, 0, 1, 2]])
+                g = np.ascontiguousarray(found[:, [0, 0, 1, 2], s.m:])
         return Interval(h, 0, table.method.ahead, times, tables.factors(times), held,
                         JointMotions(c, g, drives))

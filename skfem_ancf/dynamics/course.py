@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..frozen import read_only
 from .rates import (END, MIDDLE, PARTS, RATE, JointMotion, JointMotions, of_step, steps_of,
                     times_beside)
 from .steps import Course
@@ -64,15 +66,15 @@ class Courses:
             joints=JointMotions(_rows(joints.c, part), _rows(joints.g, part), joints.drives))
 
     def _ask(self, start, dt, first, last, limit):
-        times = start + dt * (first + np.arange(PARTS * (last - first) + 1) / PARTS)
-        times = np.minimum(times, limit)
-        instants = np.empty((last - first, 2))
-        instants[:, 0] = times[PARTS::PARTS]
-        instants[:, 1] = times[PARTS // 2 if self._conserving else PARTS::PARTS]
+        # what is given to functions of others and to texts is theirs
+        times, instants = (x.copy() for x in _times(start, dt, first, last, limit,
+                                                    self._conserving))
         joints = self._ask_joints(times)
-        self._begin = (times[0], dt, limit), [f[:PARTS + 1] for f in joints]
+        if joints is not None:
+            self._begin = (start + dt * first, dt, limit), joints[:PARTS + 1]
+            joints = steps_of(joints)
         return Course(float(dt), instants, self._system.machine.tables.factors(instants[:, 1]),
-                      self._supports(times, dt), self._joints([*map(steps_of, joints)], dt))
+                      self._supports(times, dt), self._joints(joints, dt))
 
     def _supports(self, times, dt):
         s = self._system
@@ -95,27 +97,43 @@ class Courses:
             asked = self._begin[1]
         else:
             asked = self._ask_joints(times_beside(t, dt, ahead, limit))
-        found = self._joints([f[None, ::-1] for f in asked], -dt if ahead else dt)
+        found = self._joints(asked if asked is None else asked[None, ::-1], -dt if ahead else dt)
         return JointMotion(found.c[0], found.g[0], found.drives)
 
     def _ask_joints(self, times):
-        """c and g at the times, each where it depends on them; of joints that are tables."""
+        """c and g at the times, as of ``Tables.driven``; None where they are no tables, or steady.
+        """
         tables = self._system.machine.tables
         if not tables.motion_varies or tables.plain.joints.own:
-            return []
-        return [tables.offsets(times), *([tables.slopes(times)] if tables.turns else ())]
+            return None
+        return tables.driven(times)
 
     def _joints(self, asked, dt):
         """Of what :meth:`_ask_joints` gave in each step, in the order of time."""
         tables = self._system.machine.tables
         c, g = tables.still
-        if asked:
-            weights = of_step(dt)
-            c = weights[END:] @ asked[0]
-            if len(asked) > 1:
-                acting = MIDDLE if self._conserving else END
-                g = weights[[END, acting, RATE, RATE + 1]] @ asked[1]
+        if asked is not None:
+            found, m = _weights(dt, self._conserving) @ asked, c.shape[2]
+            c = found[:, :3, :m].copy()
+            if tables.turns:
+                g = found[:, 3:, m:].copy()
         return JointMotions(c, g, int(tables.motion_varies))
+
+
+@lru_cache(16)
+def _times(start, dt, first, last, limit, conserving):
+    """Times in the steps of a block, and two of each step: its end, and when forces act."""
+    times = start + dt * (first + np.arange(PARTS * (last - first) + 1) / PARTS)
+    times = np.minimum(times, limit)
+    return read_only(times), read_only(np.array([
+        times[PARTS::PARTS], times[PARTS // 2 if conserving else PARTS::PARTS]]).T)
+
+
+@lru_cache(16)
+def _weights(dt, conserving):
+    """Rows of :func:`~skfem_ancf.dynamics.rates.of_step` for c of joints, and behind them for g."""
+    acting = MIDDLE if conserving else END
+    return of_step(dt)[[END, RATE, RATE + 1, END, acting, RATE, RATE + 1]]
 
 
 def _rows(x, part):

@@ -212,11 +212,14 @@ class Integrator:
             What points remember of obstacles there, shape (k,); None: nothing.
         """
         s = self.system
-        # where nothing asks for the time, it is that of the motion before from the same place
-        steady = not (s.depends_on_time or s.forces.elements or s.machine.tables.asks)
-        key = (u.tobytes(), v.tobytes()) if steady else None
+        instant = t, dt, ahead, self.limit
+        given = self._courses.joints(*instant) if s.m else None
+        # it is that of the motion before from the same place with the same motion of joints
+        steady = not (s.varies or s.forces.elements or s.machine.tables.asks)
+        key = (u.tobytes(), v.tobytes(), *(() if given is None else (
+            given.c.tobytes(), given.g.tobytes()))) if steady else None
         if key is None or self._begun[0] != key:
-            self._begun = key, *self._start(u, v, t, dt, ahead, memory)
+            self._begun = key, *self._start(u, v, instant, given, memory)
         _, y, (strain, kinetic, power, change) = self._begun
         y = twin_of(y)
         y.t = t
@@ -224,9 +227,9 @@ class Integrator:
         self.expect(max(strain, kinetic, kinetic + dt * power + dt**2 * change))
         return y
 
-    def _start(self, u, v, t, dt, ahead, memory):
+    def _start(self, u, v, instant, given, memory):
         """The same, with the strain energy, the kinetic one and half its two derivatives."""
-        s, contacts = self.system, self.system.forces.contacts
+        s, contacts, (t, dt, ahead, _) = self.system, self.system.forces.contacts, instant
         y = Motion(t, u.copy(), v.copy(), np.zeros(s.N), np.zeros(s.N),
                    np.zeros(s.m))
         if s.moves:
@@ -235,7 +238,7 @@ class Integrator:
         else:
             y.u[s.fixed] = y.v[s.fixed] = 0.0
         rate, J = y.multipliers, None
-        joined = Joined(s, self._courses, y.u, (t, dt, ahead, self.limit)) if s.m else None
+        joined = Joined(s, given, y.u, instant) if s.m else None
         if joined is not None:
             gap = np.abs(joined.gap()).max(initial=0.0)
             if gap > 1e-8 * s.size:

@@ -13,7 +13,6 @@ from .rates import JointMotion, acceleration_of_joints, drive_rate, rates
 if TYPE_CHECKING:
     from ..system import System
     from ..types import Array
-    from .course import Courses
 
 
 class Joined:
@@ -23,19 +22,18 @@ class Joined:
     ----------
     system
         A :class:`~skfem_ancf.system.System`.
-    courses
-        Functions of time of its joints.
+    motion
+        What of its joints depends on time, at that time.
     u
         Displacement, shape (N,).
     instant
         t, dt, ahead and limit of :func:`~skfem_ancf.dynamics.rates.times_beside`.
     """
 
-    def __init__(self, system: System, courses: Courses, u: Array,
+    def __init__(self, system: System, motion: JointMotion, u: Array,
                  instant: tuple[float, float, bool, float]) -> None:
         self._system, self._u, self._instant = system, u, instant
         self._tables = system.machine.tables.plain.joints
-        motion = courses.joints(*instant)
         if self._tables.own and motion.drives:
             c = rates(lambda times: np.array([system.constraint(u, t) for t in times]), *instant)
             motion = JointMotion(np.vstack([motion.c[:1], c]), motion.g, 0)

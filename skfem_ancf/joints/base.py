@@ -418,6 +418,25 @@ class Joint(Sealable):
         entry = np.arange(m * k)
         return entry // k, columns[entry % k], values.reshape(len(times), m * k)
 
+    def driven(self, times: Array, N: int) -> Array:
+        """:meth:`offset`, and beside it the values of :meth:`slope_entries`.
+
+        A joint that moves may override it to ask for its motion once.
+
+        Parameters
+        ----------
+        times
+            Times, shape (n,).
+        N
+            Number of the scene's coordinates.
+
+        Returns
+        -------
+        ndarray
+            Shape (n, m + k).
+        """
+        return np.hstack([self.offset(times, N), self.slope_entries(times, N)[2]])
+
     def second_entries(self, N: int) -> tuple[Array, Array, Array, Array]:
         """The second derivatives of Phi in the stress-free state, equation by equation.
 

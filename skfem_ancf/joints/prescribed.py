@@ -88,11 +88,13 @@ class PrescribedAngle(Joint):
         self.angle = require_function("angle", angle, "of time that returns radians")
         self.at, self.beam = on_body(at, beam)
         self.name = require_label("name", name)
-        self._asked: Any = None, None
 
     def bind(self, scene: Scene) -> None:
         _, self.d = section(scene, self.beam, self.at)
-        self.start, self._asked = np.arctan2(*self.d.start[::-1]), (None, None)
+        self.start = np.arctan2(*self.d.start[::-1])
+        n = self.d.dofs.shape[1]
+        of = self._of_normal = np.zeros((2, 1 + 2 * n))  # offset and slope, see driven
+        of[:, 0], (of[0, 1:1 + n], of[1, 1 + n:]) = self.d.start, self.d.weights
 
     def _angle(self, t: float) -> float:
         return ask_number("angle(t={:g})", self.angle, t)
@@ -105,20 +107,17 @@ class PrescribedAngle(Joint):
         a = self.start + self._angle(t)
         return gradients([(self.d, (-np.sin(a), np.cos(a)))])
 
-    def _normals(self, times: Array) -> Array:
-        if self._asked[0] is not times:  # offsets and slopes are asked at the same times
-            a = self.start + sampled(self.angle, times, "angle", ())
-            normals = np.empty((len(a), 2))
-            normals[:, 0], normals[:, 1] = -np.sin(a), np.cos(a)
-            self._asked = times, normals
-        return self._asked[1]
+    def driven(self, times: Array, N: int) -> Array:
+        a = self.start + sampled(self.angle, times, "angle", ())
+        normals = np.empty((len(a), 2))
+        normals[:, 0], normals[:, 1] = -np.sin(a), np.cos(a)
+        return normals @ self._of_normal
 
     def offset(self, times: Array, N: int) -> Array:
-        return (self._normals(times) @ self.d.start)[:, None]
+        return self.driven(times, N)[:, :1]
 
     def slope(self, times: Array, N: int) -> tuple[Array, Array]:
-        values = self._normals(times)[:, :, None] * self.d.weights[None]
-        return self.d.dofs.ravel(), values.reshape(len(times), 1, -1)
+        return self.d.dofs.ravel(), self.driven(times, N)[:, None, 1:]
 
 
 class Turned:
