@@ -162,7 +162,7 @@ class Screen:
             p, q, turns, bends = zip(*[_changes(z[i], z[j], *numbers)
                                        for i, j, *numbers in self._turns_of_few])
             least = max(bends) + 1.1 * COMPRESSED
-            return all([x < 1.0 for x in turns]) and all([x > least for x in p + q])
+            return all(x < 1.0 for x in turns) and all(x > least for x in p + q)
         places, rest, widest, thick = self._turns
         z, rest = _paired(u)[..., places], rest if start is None else start[..., self._ends]
         thick = thick if slender is None else thick / self.slender * slender

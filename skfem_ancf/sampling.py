@@ -75,12 +75,12 @@ def sampled(function: Callable[[Any], Any], times: Array, name: str,
     return _one_by_one(function, times, name, shape)
 
 
-def _are_close(found, alone):
+def _are_close(found: Array, alone: Array) -> bool:
     """True if a few numbers are the same to round-off."""
     numbers = alone.ravel().tolist()
     size = 1e-15 * max(map(abs, numbers), default=0.0)
-    return all([abs(x - y) <= 1e-13 * abs(y) + size
-                for x, y in zip(found.ravel().tolist(), numbers)])
+    return all(abs(x - y) <= 1e-13 * abs(y) + size
+               for x, y in zip(found.ravel().tolist(), numbers))
 
 
 def _one_by_one(function: Callable[[Any], Any], times: Array, name: str,

@@ -63,7 +63,7 @@ class _OfConstraints(cached_property):
 
     def __init__(self) -> None:
         def found(system: System) -> Any:
-            return getattr(system.constraints, self.attrname)
+            return getattr(system.constraints, str(self.attrname))
 
         super().__init__(found)
 
