@@ -354,8 +354,7 @@ def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = N
     if not (type(array) is np.ndarray and array.dtype == np.float64):
         array = _real_array(name, array)
     if shape is not None and array.shape != shape and (
-        array.ndim != len(shape)
-        or any(n is not None and n != m for n, m in zip(shape, array.shape))
+        array.ndim != len(shape) or any(map(_differs, shape, array.shape))
     ):
         wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
         raise InputError(f"{name} must have shape {wanted}, got {array.shape}")
@@ -366,11 +365,17 @@ def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = N
     return array
 
 
+def _differs(wanted, n):
+    return wanted is not None and wanted != n
+
+
 def _real_array(name, value):
     try:
         array = np.asarray(value)
     except (TypeError, ValueError, OverflowError):  # rows of different lengths, for one
         raise InputError(f"{name} must be an array of numbers, got {shown(value)}") from None
+    if type(value) in (list, tuple) and array.dtype == np.float64:
+        return array
     if array.dtype.kind == "c":
         raise InputError(f"{name} must be real, got complex numbers: {shown(value)}")
     if array.dtype.kind == "O" and all(map(_is_real, array.flat)):  # fractions, or large integers

@@ -214,7 +214,7 @@ class Collocation(Scheme):
         w.y[0], w.y[1], w.first[:] = y.u, y.v, y.multipliers
         given = self._given(integrator, table, begun, dt, first, n, block)
         if not y.memory or "stages" not in y.memory:
-            np.multiply(table.half_square * dt**2, y.acceleration, out=w.guess)
+            np.multiply(integrator.asked[2], y.acceleration, out=w.guess)
         else:
             w.U[:], w.before[:], w.first[:] = (y.memory[k] for k in ("stages", "start", "forces"))
             ahead = method.ahead if dt == y.before else table.ahead(dt / y.before)
@@ -228,11 +228,13 @@ class Collocation(Scheme):
 
         def motion(k: int) -> Motion:
             """After step k, counted from 0."""
-            (u, v, a), before = rows[k], rows[k - 1, :2].copy() if k else np.array([y.u, y.v])
+            # copies, so that one instant does not keep the block
+            u, v, a = rows[k].copy()
+            before = rows[k - 1, :2].copy() if k else np.array([y.u, y.v])
+            shares = forces[k].copy()
             memory = kept(y, memories[k, 1:].copy() if contacts.lasting else None,
-                          stages=stages[k].copy(), start=before,
-                          forces=forces[k, :-1].copy())
-            return Motion(begun + dt * (first + k + 1), u, v, a, a, forces[k, -1], None, dt,
+                          stages=stages[k].copy(), start=before, forces=shares[:-1])
+            return Motion(begun + dt * (first + k + 1), u, v, a, a, shares[-1], None, dt,
                           memory, float(memories[k, 0]))
 
         return done, motion
@@ -249,7 +251,8 @@ class Collocation(Scheme):
         w = integrator.room
         if kept.get("pairs") is w.pairs:
             return w
-        factors = {"pairs": w.pairs, "real": w.real.flat, "J": w.J, "Y": w.Y}
+        factors = {"pairs": w.pairs, "real": w.real.flat} | (
+            {"J": w.J, "Y": w.Y} if s.m else {})
         for name, room in factors.items():
             if name in kept and kept[name] is not room:  # of a motion that goes on
                 room[...] = kept[name]
@@ -260,7 +263,8 @@ class Collocation(Scheme):
         """What is given of some steps of a block, whose functions of time are asked at once."""
         key, points = (start, dt, block, integrator.limit), len(table.method.points) + 1
         if integrator.asked[0] != key:
-            integrator.asked = key, self._interval(integrator, table, *key)
+            integrator.asked = (key, self._interval(integrator, table, *key),
+                                table.half_square * dt**2)
         whole = integrator.asked[1]
         if block[1] - block[0] == n:
             return whole

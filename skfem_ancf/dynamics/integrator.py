@@ -117,10 +117,11 @@ class Integrator:
             self._ruled, self.rule = ruled, Rule(
                 int(scheme.conserving), *map(float, scheme.parameters), self.tol,
                 8.0 * system.stiffness_scale, system.inertia_of_places, *handles)
-        self._state[:], self._dt, self.substeps, self._lost = 0.0, np.nan, 0, ""
+        self._state.fill(0.0)
+        self._dt, self.substeps, self._lost = np.nan, 0, ""
         self.kept: dict[str, Array] = {}
         if system.depends_on_time or self.asked is None:
-            self._courses, self.asked = Courses(system, scheme.conserving), (None, None)
+            self._courses, self.asked = Courses(system, scheme.conserving), (None,)
 
     @classmethod
     def lent(cls, system: System, scheme: Scheme, tol: float | None = None) -> Integrator:

@@ -365,7 +365,7 @@ class Run:
     def _wanted(self):
         """The next time to store."""
         wanted = self.task.t_eval
-        return np.inf if wanted is None or self._next == len(wanted) else wanted[self._next]
+        return np.inf if wanted is None or self._next == len(wanted) else float(wanted[self._next])
 
     def _store(self, begin, new):
         """Keep what was asked for of a step to a Motion; ``begin()`` is the one before it."""
@@ -373,7 +373,7 @@ class Run:
             self.history.append(new)
             return
         until = new.t + 1e-14 * max(abs(self.task.t_start), abs(self.task.t_end))
-        while (t := float(self._wanted())) <= until:
+        while (t := self._wanted()) <= until:
             self.history.append(new if t == new.t else self._between(begin(), new, t))
             self._next += 1
         if self.event is not None:
