@@ -1,6 +1,7 @@
 """Time integration: order, dissipation, conservation, storage, and motions known from elsewhere."""
 
 import math
+import pickle
 import warnings
 from functools import lru_cache
 from importlib import import_module
@@ -18,6 +19,7 @@ from skfem_ancf.band import Band
 from skfem_ancf.body import Body
 from skfem_ancf.dynamics import (HHT, SCHEMES, EnergyMomentum, Gauss, GeneralizedAlpha, Newmark,
                                  get_scheme)
+from skfem_ancf.dynamics.history import History
 from skfem_ancf.dynamics.integrator import Integrator
 from skfem_ancf.dynamics.rates import JointMotion
 from skfem_ancf.dynamics.dampers import Dampers, Rows
@@ -498,6 +500,82 @@ def test_the_start_from_a_place_is_kept(monkeypatch):
     starts.clear()
     a, b = (moved.integrate(t + 0.02, 0.01, t_start=t).acceleration[0] for t in (0.0, 1.0))
     assert len(starts) == 2 and np.allclose(b, 2.0 * a, rtol=1e-12, atol=1e-12 * np.abs(a).max())
+
+
+def driven_arm(angle):
+    """A section that turns by a function of time."""
+    scene = Scene(soft(2, 2, E=1e5, h=0.1)).pin("left")
+    scene.joint("angle", at="left", angle=angle)
+    return scene
+
+
+def test_the_start_is_kept_where_joints_move_as_before(monkeypatch):
+    """Their functions are asked for it at each motion: they may say something else."""
+    starts, start, speed = [], Integrator._start, [1.0]
+    monkeypatch.setattr(Integrator, "_start", lambda *args: starts.append(args) or start(*args))
+    scene = driven_arm(lambda t: speed[0] * np.sin(3.0 * t))
+    first, again = scene.integrate(0.05, 0.01), scene.integrate(0.05, 0.01)
+    assert len(starts) == 1 and np.array_equal(first.u, again.u)
+    speed[0] = 2.0
+    faster = scene.integrate(0.05, 0.01)
+    assert len(starts) == 2
+    alone = driven_arm(lambda t: 2.0 * np.sin(3.0 * t)).integrate(0.05, 0.01)
+    assert np.array_equal(faster.u, alone.u) and np.array_equal(faster.v, alone.v)
+    assert np.array_equal(faster.acceleration, alone.acceleration)
+
+
+@pytest.mark.parametrize("scheme, times", [("generalized-alpha", 4 * 50 + 1), ("radau", 650)])
+def test_a_driven_angle_is_asked_once_for_a_block(scheme, times):
+    """All times of 50 steps at once, where the functions take arrays, and three of them alone."""
+    asked = []
+    scene = driven_arm(lambda t: asked.append(np.size(t)) or np.sin(t))
+    scene.integrate(0.1, 0.01, scheme=scheme)
+    asked.clear()
+    scene.integrate(0.5, 0.01, scheme=scheme)
+    assert asked[:4] == [times, 1, 1, 1]
+    assert sum(n > 1 for n in asked) == 1 and len(asked) <= 4 + 5
+
+
+def test_joints_that_turn_beside_others():
+    """Driven in one table: the motion is that of each joint by itself."""
+    arms = [Scene(soft(2, 2, E=1e5, h=0.1), soft(2, 2, E=1e5, h=0.1, mesh=MeshBeam.init_line(
+        np.linspace(2, 3, 3), 0.1))) for _ in range(3)]
+    for k, scene in enumerate(arms):
+        scene.pin("left", beam=0).pin("left", beam=1)
+        if k != 1:
+            scene.joint("angle", at="left", beam=0, angle=lambda t: t**2)
+        if k != 0:
+            scene.joint("angle", at="left", beam=1, angle=lambda t: math.sin(t))
+    one, other, both = (scene.integrate(0.1, 0.01, scheme="radau") for scene in arms)
+    half = one.u.shape[1] // 2
+    assert np.allclose(both.u[:, :half], one.u[:, :half], rtol=0, atol=1e-9)
+    assert np.allclose(both.u[:, half:], other.u[:, half:], rtol=0, atol=1e-9)
+    assert np.ptp(both.u[:, :half]) > 1e-3 and np.ptp(both.u[:, half:]) > 1e-3
+
+
+def test_arrays_of_a_motion_are_made_when_they_are_asked_for(monkeypatch):
+    """All at once; a copy and a file of the motion have them as well."""
+    made, columns = [], History.columns
+    monkeypatch.setattr(History, "columns", lambda self: made.append(1) or columns(self))
+    scene = Scene(soft(2, 2)).pin("left").gravity(GRAVITY)
+    history = scene.integrate(0.05, 0.01)
+    assert not made and history.steps == 5
+    other = pickle.loads(pickle.dumps(history))
+    assert len(history) == 6 and history.u.shape == history.acceleration.shape
+    assert len(made) == 1 and history.v is history.v
+    assert np.array_equal(other.u, history.u) and np.array_equal(other.t, history.t)
+    assert np.array_equal(other.state(-1).u, history.u[-1])
+    with pytest.raises(AttributeError, match="'History' object has no attribute 'w'"):
+        history.w
+
+
+@pytest.mark.parametrize("scheme", ["radau", "generalized-alpha"])
+def test_what_is_stored_does_not_keep_the_other_steps(scheme):
+    """Views of a block would hold all of its steps."""
+    history = Scene(soft(2, 2)).pin("left").integrate(0.5, 0.01, scheme=scheme, t_eval=[0.5])
+    y, = history._rows
+    sizes = [x.base.size if x.base is not None else x.size for x in (y.u, y.v, y.multipliers)]
+    assert max(sizes) <= 4 * y.u.size
 
 
 def test_factors_are_kept_from_step_to_step():
