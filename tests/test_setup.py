@@ -637,6 +637,20 @@ def test_on_another_mesh_only_what_depends_on_it_is_made(monkeypatch, shape):
             assert np.array_equal(getattr(one, name), getattr(two, name))
 
 
+def test_terms_that_are_sampled_at_the_same_places_share_their_tables(monkeypatch):
+    """And places are asked for once where slopes along the axis and across are wanted there."""
+    asked = counted(monkeypatch, section, "beam_gradients")
+    mesh = MeshBeam.init_line([0, 0.5, 1], lambda x: 0.1 - 0.02 * x)
+    law = StVenantKirchhoff(2e7, 0.3)
+    first, mean, rest = Beam(mesh, ElementBeamANCF(3), law, 0.1, "strain-split").kernel.packs
+    assert len(asked) == 2 and first.table is mean.table is not rest.table
+    assert [call[2].shape[1] for call in asked] == [5 * 7, 5 * 8]
+    assert first.table.shape[1] == 2 * 5 * 7
+    asked.clear()
+    whole, part = Beam(mesh, ElementBeamANCF(2), law.replace(plane="strain"), 0.1).kernel.packs
+    assert len(asked) == 1 and whole.table is part.table
+
+
 #: Arguments of a Beam, some of each.
 ARGUMENTS = {
     "mesh": [MeshBeam.init_line([0, 0.4, 1], 0.08), MeshBeam.init_line([0, 0.3, 0.6, 1], 0.06),

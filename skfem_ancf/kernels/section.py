@@ -434,6 +434,8 @@ class TermTables:
     before
         Those of the same element of another material, whose tables serve on the same mesh; on
         another one what does not depend on it. None to make them.
+    rows
+        Tables of other terms there, by where they are sampled; it is added to.
 
     Attributes
     ----------
@@ -449,7 +451,8 @@ class TermTables:
     _interpolation: list[Array]
 
     def __init__(self, across: "Across", slab: "Slab", term: "Term", constant: Array,
-                 owner: Any, before: "TermTables | None" = None) -> None:
+                 owner: Any, before: "TermTables | None" = None,
+                 rows: dict[Content, Any] | None = None) -> None:
         self.law, self.term, self.slab, mesh = term.law, term, slab, across.mesh
         self._mesh = mesh
         self.shared = across.uniform
@@ -463,14 +466,18 @@ class TermTables:
         else:
             self.points, W = term.quadrature
             self.w = across.volume(slab, self.points, W, tind, whole)
-            self._rows = _rows(mesh, across.element, term, tind)
+            at = Content(*(term.nodes(name) for name in ("xx", "yy", "xy")), term.section_nodes)
+            rows = {} if rows is None else rows
+            if at not in rows:
+                rows[at] = _rows(mesh, across.element, at, tind)
+            self._rows = rows[at]
         self._interpolation = before._interpolation if before is not None else _interpolation(term)
-        G, frame, rows, sheared, self._along, scaled = self._rows
+        G, frame, samples, sheared, self._along, scaled = self._rows
         self._sheared = np.concatenate(sheared)
         weights = self.w if slab.grade is None else across.volume(
             slab, *term.quadrature, tind, whole, "grade")
         self.pack: SectionPack = section_pack(
-            G, frame, weights.T, rows, self._interpolation, law_tables(self.law, owner), constant,
+            G, frame, weights.T, samples, self._interpolation, law_tables(self.law, owner), constant,
             mesh.t[0], before.pack if before is not None and (
                 before._mesh is mesh or not (before.shared or self.shared)) else None, scaled)
 
@@ -576,24 +583,22 @@ def _same_places(a, b):
         len(x) == len(y) and all(map(np.array_equal, x, y)) for x, y in zip(*rules))
 
 
-def _rows(mesh, element, term, tind):
+def _rows(mesh, element, at, tind):
     """Table and frame, g and h of each component's samples, and those of shear and of eps_xx.
 
     Of one table for all elements also that of an element of length and height 1, what multiplies
     its rows and columns, and how many of its rows are along the axis.
     """
-    points, xx, yy, xy = _samples(Content(*(term.nodes(name) for name in ("xx", "yy", "xy")),
-                                          term.section_nodes))
+    points, xx, yy, xy = _samples(at)
     rows = (xx, xx), (yy, yy), xy
     if mesh.is_straight and mesh.heights is None and element.by_reference:
         G, frame, scaled = _scaled(mesh, element, element.unit_slopes(*points), points[0].shape[1],
                                    slice(None) if tind is None else tind)
         return G, frame, rows, xy, xx, scaled if len(G) == 1 else None
-    n = points[0].shape[1]
-    G, frame = beam_gradients(mesh, element, np.concatenate(points, axis=1), tind)
-    G, frame = (np.concatenate([both[0][:, :n], both[1][:, n:]], axis=1) for both in (G, frame))
-    frame = frame.transpose(1, 2, 0)
-    return G, frame, rows, xy, xx, None
+    n, same = points[0].shape[1], np.array_equal(*points)
+    both = beam_gradients(mesh, element, points[0] if same else np.concatenate(points, axis=1), tind)
+    G, frame = (np.concatenate([x[0][:, :n], x[1][:, -points[1].shape[1]:]], axis=1) for x in both)
+    return G, frame.transpose(1, 2, 0), rows, xy, xx, None
 
 
 def _scaled(mesh, element, unit, n, tind):
@@ -672,8 +677,7 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
     layout = _layout(content, weights.shape[0], Content(keep), linear)
     if linear:
         moduli = moduli[layout.order]
-    shared = len(G) == 1
-    joined, ends = _joined(along, ns)
+    shared, (joined, ends) = len(G) == 1, _joined(content, ns)
     if before is not None and before.rows is layout.rows:
         pairs = with_constant(before.pairs, constant, ne)
     elif scaled is not None:
@@ -725,8 +729,10 @@ def linearised(pack: SectionPack) -> SectionPack:
     return pack._replace(law=pack.law._replace(kind=LINEAR), moduli=packed(moduli))
 
 
-def _joined(along, ns):
+@lru_cache(64)
+def _joined(content, ns):
     """The matrices as one array, and the first of the samples of each, which come ns at a time."""
+    _, _, *along = content.arrays
     sizes = [L.shape[1] for L in along]
     out = np.zeros((3, len(along[0]), max(sizes)))
     for x, L in zip(out, along):
@@ -846,13 +852,14 @@ class Kernel(Chain):
         none = np.zeros((0, 2 * self.nd, 2 * self.nd))
         constants = [none if self.constant is None else self.constant]
         self.tables: list[TermTables] = []
+        rows: dict[Content, Any] = {}
         self._across = across
         for slab, terms in ([(across.slabs[0], [t.term for t in known])] if same_law else
                             across.terms(formulation)):
             for term in terms:
                 constant = constants.pop() if constants else none
                 self.tables.append(TermTables(across, slab, term, constant, self,
-                                              known.pop(0) if known else None))
+                                              known.pop(0) if known else None, rows))
         self.packs = [t.pack for t in self.tables]
         slabs = [id(t.slab) for t in self.tables]
         #: The tables of the first term of each slab.
