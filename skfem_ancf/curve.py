@@ -110,7 +110,7 @@ class Curve:
         -------
         p, tangent, lengths, turning, bent
             As :meth:`nodes`, :meth:`lengths` and :meth:`turning` return them, and the curvature of
-            each sixteenth of the elements, shape (16 (n - 1),).
+            each sixteenth of the elements, shape (16 n - 16,).
 
         Raises
         ------
@@ -300,7 +300,7 @@ def check_curvature(bent: Array, s: Array, height: float | Array) -> None:
     Parameters
     ----------
     bent
-        The curvature of sixteenths of the elements, shape (16 (n - 1),).
+        The curvature of sixteenths of the elements, shape (16 n - 16,).
     s
         Parameters of the nodes, shape (n,).
     height

@@ -477,8 +477,8 @@ class TermTables:
         weights = self.w if slab.grade is None else across.volume(
             slab, *term.quadrature, tind, whole, "grade")
         self.pack: SectionPack = section_pack(
-            G, frame, weights.T, samples, self._interpolation, law_tables(self.law, owner), constant,
-            mesh.t[0], before.pack if before is not None and (
+            G, frame, weights.T, samples, self._interpolation, law_tables(self.law, owner),
+            constant, mesh.t[0], before.pack if before is not None and (
                 before._mesh is mesh or not (before.shared or self.shared)) else None, scaled)
 
     def in_proportion(self, slab: "Slab", stiffness: float, volume: float) -> "TermTables":
@@ -596,8 +596,10 @@ def _rows(mesh, element, at, tind):
                                    slice(None) if tind is None else tind)
         return G, frame, rows, xy, xx, scaled if len(G) == 1 else None
     n, same = points[0].shape[1], np.array_equal(*points)
-    both = beam_gradients(mesh, element, points[0] if same else np.concatenate(points, axis=1), tind)
-    G, frame = (np.concatenate([x[0][:, :n], x[1][:, -points[1].shape[1]:]], axis=1) for x in both)
+    X = points[0] if same else np.concatenate(points, axis=1)
+    both = beam_gradients(mesh, element, X, tind)
+    G, frame = (np.concatenate([x[0][:, :n], x[1][:, X.shape[1] - points[1].shape[1]:]], axis=1)
+                for x in both)
     return G, frame.transpose(1, 2, 0), rows, xy, xx, None
 
 
