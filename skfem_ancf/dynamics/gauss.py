@@ -23,7 +23,9 @@ class Gauss(Collocation):
     Momentum and angular momentum are conserved to the tolerance of the iteration, as all that is
     quadratic in the state; the energy stays close to what it was for very long times. n = 1 is the
     implicit midpoint rule. Nothing is damped, so that a stiff beam goes on vibrating with what it
-    has: see :class:`Radau` for those.
+    has: see :class:`Radau` for those, above all where accelerations are read. At the end of a step
+    they are by the forces there, which for a pendulum of steel in 40 steps are those of vibrations
+    that no step resolves, 240 times those of the swing.
 
     Parameters
     ----------
