@@ -67,8 +67,9 @@ def test_from_every_file_bit_for_bit(name, build, tmp_path, monkeypatch):
         assert_identical(scene.resume(copy), whole)
 
 
+@pytest.mark.parametrize("scheme", ["energy-momentum", "radau"])
 @pytest.mark.parametrize("name", ["equal steps", "automatic"])
-def test_what_is_beside_the_band_is_kept(name, tmp_path, monkeypatch):
+def test_what_is_beside_the_band_is_kept(name, scheme, tmp_path, monkeypatch):
     """Damped modes, and a spring between points far apart: rows of the iteration matrix."""
     def build():
         scene = swinging().damping(modal=[0.05, 0.05])
@@ -77,7 +78,7 @@ def test_what_is_beside_the_band_is_kept(name, tmp_path, monkeypatch):
 
     path = tmp_path / "run.npz"
     copies = stages(monkeypatch, path)
-    whole = build().integrate(0.1, checkpoint=path, **OPTIONS[name])
+    whole = build().integrate(0.1, checkpoint=path, **{**OPTIONS[name], "scheme": scheme})
     for copy in copies[::2]:
         again = build().resume(copy)
         assert_identical(again, whole)

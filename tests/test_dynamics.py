@@ -120,11 +120,12 @@ def test_order(scheme, build):
 
 @pytest.mark.parametrize("scheme", [Gauss(1), Gauss(4), SCHEMES["radau"]()], ids=repr)
 def test_collocation_in_numpy_and_compiled(scheme, needs_compiled):
-    """Damping, a force in time, a moving support, and with joints a driven angle."""
+    """Damping, springs, a force in time, a moving support, and with joints a driven angle."""
     found = []
     for flag in (False, True):
         beam = soft(2, E=1e4, h=0.2, compiled=flag, damping=KelvinVoigt(1e-3))
-        scene = Scene(beam).damping(mass=0.3).gravity((0, -3.0), amplitude=np.cos)
+        scene = Scene(beam).damping(mass=0.3, modal=[0.1]).gravity((0, -3.0), amplitude=np.cos)
+        scene.spring(2.0, ((0.1, 0), (1, 0)), length=0.8, damping=0.1)
         scene.joint("position", at=(0, 0), r=lambda t: (0.1 * np.sin(3 * t), 0.0))
         if scheme.joined:
             scene.joint("angle", at="left", angle=lambda t: t**2)

@@ -10,7 +10,8 @@ from scipy.optimize import brentq
 
 from skfem_ancf import (HHT, Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         EnergyMomentum, GeneralizedAlpha, InputError, MeshBeam, MeshError,
-                        ModelWarning, Newmark, Scene, StVenantKirchhoff, SupportError)
+                        ModelWarning, Newmark, RigidBody, Scene, StVenantKirchhoff,
+                        SupportError)
 from skfem_ancf.errors import CheckpointError
 from skfem_ancf.forces import ForceElement, point, section
 from skfem_ancf.forces.texts import add_elastic_force, add_resisting_force
@@ -147,6 +148,62 @@ def test_two_beams_on_a_spring_keep_their_momenta():
     assert np.ptp(history.total_energy + history.dissipated) < 1e-12
     assert np.abs(history.momentum - history.momentum[0]).max() < 1e-13
     assert np.ptp(history.angular_momentum) < 1e-13
+
+
+@pytest.mark.parametrize("damping", [0.0, 3.0])
+def test_bodies_on_a_spring_by_collocation(damping):
+    """Order 5 of Radau, against the equations of two points."""
+    k, length, masses = 40.0, 0.7, np.array([2.0, 1.0])
+    places = np.array([[0.0, 0.0], [1.0, 0.2]])
+    bodies = [RigidBody(m, 0.1, position=x, name=str(m)) for m, x in zip(masses, places)]
+    between = [RigidBody(1.0, 0.1, position=(x, 5.0), name=f"at {x}") for x in range(3)]
+    scene = Scene(bodies[0], *between, bodies[1]).gravity((0.0, -9.81))
+    scene.spring(k, ((bodies[0], places[0]), (bodies[1], places[1])), length=length,
+                 damping=damping)
+    scene.initial_velocity(lambda x: np.array([0.0, 2.0])[:, None] + 0.0 * x, bodies[1])
+
+    def rates(t, y):
+        x, v = y.reshape(2, 2, 2)
+        d, w = x[1] - x[0], v[1] - v[0]
+        size = np.sqrt(d @ d)
+        f = (k * (size - length) + damping * (d @ w) / size) / size * d
+        return np.concatenate([v, np.array([f, -f]) / masses[:, None] + [0.0, -9.81]]).ravel()
+
+    start = np.array([places, [[0.0, 0.0], [0.0, 2.0]]]).ravel()
+    known = solve_ivp(rates, (0.0, 1.0), start, "DOP853", rtol=1e-12, atol=1e-13).y[:4, -1]
+    errors = []
+    for n in (20, 40):
+        history = scene.integrate(1.0, 1.0 / n, scheme="radau")
+        found = [history.position(x, body)[-1] for x, body in zip(places, bodies)]
+        errors.append(np.abs(np.ravel(found) - known).max())
+        assert history.substeps == 0 and history.iterations < 3 * 15 * n
+    assert scene.system.forces.far and errors[1] < 1e-5
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(5, abs=0.5)
+
+
+@pytest.mark.parametrize("scheme", ["radau", "gauss"])
+@pytest.mark.parametrize("own", [False, True])
+def test_collocation_with_far_springs(scheme, own):
+    """Against another scheme, with as few iterations as without."""
+    scene, ends = weighing(), []
+    if own:
+        scene.add(Own(5.0, 0.5, 0.8, ((0.1, 0), (1, 0))))
+    else:
+        SCENES["far apart"](scene)
+    history = scene.integrate(0.1, 5e-3, scheme=scheme, tol=1e-8)
+    assert history.substeps == 0 and history.iterations < 3 * 10 * history.steps
+    for dt in (1e-3, 5e-4):
+        ends.append(scene.integrate(0.1, dt, scheme="energy-momentum").position((1, 0))[-1])
+    assert_allclose(history.position((1, 0))[-1], (4.0 * ends[1] - ends[0]) / 3.0, rtol=0,
+                    atol=5e-5)
+
+
+@pytest.mark.parametrize("scheme, iterations", [("radau", 10), ("gauss", 14)])
+def test_collocation_knows_modal_damping(scheme, iterations):
+    """Of three modes that creep; 150 iterations a step in parts of steps, else."""
+    scene = weighing().damping(modal=[5.0, 5.0, 5.0])
+    history = scene.integrate(0.3, 1e-2, scheme=scheme, tol=1e-9)
+    assert history.substeps == 0 and history.iterations < 3 * iterations * history.steps
 
 
 # statics

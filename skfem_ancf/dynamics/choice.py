@@ -33,10 +33,9 @@ class Choice(NamedTuple):
 def choose_scheme(system: System, rtol: float = RTOL) -> Choice:
     """The scheme for a scene.
 
-    Obstacles and force elements between points far apart take the scheme that conserves energy with
-    them; so do coarse tolerances of scenes that lose nothing, others generalised-alpha. Finer ones
-    take collocation: Radau, which damps what steps do not resolve, where there are joints, damping
-    or stiff beams, and Gauss else.
+    Obstacles take the scheme that conserves energy with them; so do coarse tolerances of scenes that
+    lose nothing, others generalised-alpha. Finer ones take collocation: Radau, which damps what
+    steps do not resolve, where there are joints, damping or stiff beams, and Gauss else.
 
     Parameters
     ----------
@@ -59,8 +58,6 @@ def choose_scheme(system: System, rtol: float = RTOL) -> Choice:
     asked = f"rtol = {rtol:g}"
     if system.forces.contacts.obstacles:
         return Choice(EnergyMomentum(), "obstacles: touching is a kink, and energy is kept")
-    if system.forces.far:
-        return Choice(EnergyMomentum(), "force elements between points far apart")
     if system.by_nodes:
         return Choice(EnergyMomentum(), "a frame: its nodes are eliminated")
     if rtol > FINE:

@@ -134,9 +134,6 @@ class Collocation(Scheme):
         if system.m and not self.joined:
             raise InputError(f"{self!r} loses its order with joints and rigid bodies: take "
                              "'radau', or 'energy-momentum', which conserves energy with them")
-        if system.forces.far:
-            raise InputError(f"{self!r} is not for scenes with force elements between points far "
-                             "apart: take 'energy-momentum' or 'generalized-alpha'")
 
     def local_error(self, old: Motion, new: Motion, dt: float) -> Array:
         """Estimate of the error that a step adds to the displacement, shape (N,).
@@ -244,7 +241,8 @@ class Collocation(Scheme):
         s, kept = integrator.system, integrator.kept
         if integrator.room is None:
             M, size, n = s.mass.band, s.machine.tables.stresses.size, len(table.points)
-            integrator.room = room_for_points(table.method, s.N, s.m, size,
+            rows = len(integrator.matrices.rows.P)
+            integrator.room = room_for_points(table.method, s.N, s.m, rows, size,
                                               gradients_size(s.machine.tables.plain.body),
                                               M._replace(flat=np.zeros(M.flat.size)))
             integrator.machine = s.machine.with_tables(s.machine.tables.copied(n))
@@ -252,7 +250,7 @@ class Collocation(Scheme):
         if kept.get("pairs") is w.pairs:
             return w
         factors = {"pairs": w.pairs, "real": w.real.flat} | (
-            {"J": w.J, "Y": w.Y} if s.m else {})
+            {"J": w.J, "Y": w.Y, "S": w.S} if len(w.J) else {})
         for name, room in factors.items():
             if name in kept and kept[name] is not room:  # of a motion that goes on
                 room[...] = kept[name]

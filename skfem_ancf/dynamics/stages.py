@@ -14,7 +14,8 @@ from ..band import (SPARE, Band, add_multiple, clear, copy, dense_solve, factori
 from ..body import (add_force_by, add_viscous_stress, body_force, body_gradients, body_mean_stress,
                     body_mixed, body_stress, body_tangent, carry_by)
 from ..forces.texts import (add_elastic_force, add_element_damping, add_element_tangent,
-                            pace_contact, settle_contact)
+                            element_damping, element_stiffness, pace_contact, put_between,
+                            settle_contact)
 from ..source import F1, F2, F3, borrowed, by_place, lanes, shaped, source
 from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
                       external_force, joint_directions)
@@ -106,15 +107,17 @@ class Points(NamedTuple):
     stresses
         Room, shape (3, s), the first row zero.
     x, r, q
-        Room, shape (4, N), (2 m,) and (2 m, 2 m).
+        Room, shape (4, N), (2 b,) and (2 b, 2 b), with b rows beside the band.
     origin, B
         Where the factors were made, shape (N,), and with carried stresses the gradients there.
     pairs, real
         Factors of complex eigenvalues, real parts and imaginary ones, shape (k, 2 N ld), and of
         the real one, of which an odd number of points has one.
-    J, Y
-        The joints' directions there, (m, N), and the solutions for them, (2 k, m, N).
-    end, S, shares
+    J, Y, S
+        The rows beside the band there, the joints' directions before those of the Matrices, (b, N),
+        the solutions for them, (2 k, b, N), and what is between the latter by displacement and by
+        velocity, (2, b - m, b - m).
+    end, shared, shares
         The joints' directions at the end of the step, and solutions by the mass, (2, m, N), both
         together, (m, m), and multipliers there, (m,).
     D
@@ -148,14 +151,15 @@ class Points(NamedTuple):
     real: Band
     J: F2
     Y: F3
+    S: F3
     end: F3
-    S: F2
+    shared: F2
     shares: F1
     D: Band
     method: Method
 
 
-def room_for_points(method: Method, N: int, m: int, stresses: int, gradients: int,
+def room_for_points(method: Method, N: int, m: int, rows: int, stresses: int, gradients: int,
                     D: Band) -> Points:
     """The Points of a method.
 
@@ -163,19 +167,20 @@ def room_for_points(method: Method, N: int, m: int, stresses: int, gradients: in
     ----------
     method
         Its numbers.
-    N, m, stresses, gradients
-        Numbers of coordinates, of equations of joints, of stresses, and of their gradients.
+    N, m, rows, stresses, gradients
+        Numbers of coordinates, of equations of joints, of other rows beside the band, of stresses,
+        and of their gradients.
     D
         A band matrix of its own.
     """
-    n, k, ld = method.points.size, method.values.shape[1], D.width + 1 + SPARE
+    n, k, ld, b = method.points.size, method.values.shape[1], D.width + 1 + SPARE, m + rows
     real = Band(np.zeros(N * ld), np.zeros(0, np.int64), ld, D.width, 0)
     return Points._make([
         np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((4, n, m)),
-        *np.zeros((3, n * stresses)), np.zeros((3, stresses)), np.zeros((4, N)), np.zeros(2 * m),
-        np.zeros((2 * m, 2 * m)), np.zeros(N), np.zeros(gradients), np.zeros((k, 2 * N * ld)), real,
-        np.zeros((m, N)), np.zeros((2 * k, m, N)), np.zeros((2, m, N)), np.zeros((m, m)),
-        np.zeros(m), D, method])
+        *np.zeros((3, n * stresses)), np.zeros((3, stresses)), np.zeros((4, N)), np.zeros(2 * b),
+        np.zeros((2 * b, 2 * b)), np.zeros(N), np.zeros(gradients), np.zeros((k, 2 * N * ld)), real,
+        np.zeros((b, N)), np.zeros((2 * k, b, N)), np.zeros((2, rows, rows)), np.zeros((2, m, N)),
+        np.zeros((m, m)), np.zeros(m), D, method])
 
 
 @source
@@ -377,7 +382,7 @@ def _close(e, matrices, s, w, motion, t):
 def _meet(mass, free, w, x):
     """Change x so that J x becomes minus ``w.shares``, which become the multipliers for it."""
     J, yes = w.end[0], w.shares.size > 0
-    return solve_joined(mass, J, J, free, yes, w.end[1], w.S, w.shares, x)
+    return solve_joined(mass, J, J, free, yes, w.end[1], w.shared, w.shares, x)
 
 
 # the iteration
@@ -516,7 +521,8 @@ def _correct(free, method, s, w, state):
 
     The velocities' place is room for it.
     """
-    n, N, m, work, closing = method.points.size, free.size, w.l.shape[1], 0.0, 0.0
+    n, N, m, b, work, closing = (method.points.size, free.size, w.l.shape[1], w.J.shape[0], 0.0,
+                                 0.0)
     D, dl, x, y, r, q = w.V, w.dl, w.x[0], w.x[1], w.r, w.q
     clear(_flat(D))
     clear(_flat(dl))
@@ -528,14 +534,14 @@ def _correct(free, method, s, w, state):
             add_multiple(method.to[0, k, j], w.R[j], x)
             add_multiple(method.to[1, k, j], w.R[j], y)
         solve_for(w, k, x, y)
-        if m > 0 and not _join(method, s, w, k, r, q, x, y):
+        if b > 0 and not _join(method, s, w, k, r, q, x, y):
             return False
         for j in range(n):
-            a, b = method.back[0, j, k], method.back[1, j, k]
-            add_multiple(a, x, D[j])
-            add_multiple(-b, y, D[j])
+            c, d = method.back[0, j, k], method.back[1, j, k]
+            add_multiple(c, x, D[j])
+            add_multiple(-d, y, D[j])
             for l in range(m):
-                dl[j, l] += a * r[l] - b * r[m + l]
+                dl[j, l] += c * r[l] - d * r[b + l]
     for j in range(n):
         Z, R, d, l, share = w.Z[j], w.R[j], D[j], w.l[j], dl[j]
         work += np.dot(d, R)
@@ -551,32 +557,57 @@ def _correct(free, method, s, w, state):
 
 @source
 def _join(method, s, w, k, r, q, x, y):
-    """Change x + i y so that the rates of joints become what they have to be, by multipliers r.
+    """Change x + i y, solved with the band for the eigenvalue k, by the rows J beside it.
 
-    ``mu / h J x = -gap`` for the eigenvalue k.
+    By forces r along them: with those of joints ``mu / h J x = -gap``, others are ``C J x``.
     """
-    m, n, p = w.l.shape[1], method.points.size, method.values[0, k]
-    z = method.values[1, k]
+    m, b, n = w.l.shape[1], w.J.shape[0], method.points.size
+    p, z = method.values[0, k], method.values[1, k]
     c, d = s.h * p / (p * p + z * z), -s.h * z / (p * p + z * z)  # h / mu
-    for a in range(m):
+    for a in range(b):
         J = w.J[a]
+        r[a], r[b + a] = np.dot(J, x), np.dot(J, y)
+        for j in range(b):
+            re, im = np.dot(J, w.Y[2 * k, j]), np.dot(J, w.Y[2 * k + 1, j])
+            q[a, j], q[b + a, b + j], q[a, b + j], q[b + a, j] = re, re, -im, im
+    for a in range(m):
         re, im = 0.0, 0.0
         for j in range(n):
             re += method.to[0, k, j] * w.gaps[j, a]
             im += method.to[1, k, j] * w.gaps[j, a]
-        r[a] = np.dot(J, x) + c * re - d * im
-        r[m + a] = np.dot(J, y) + c * im + d * re
-        for b in range(m):
-            re, im = np.dot(J, w.Y[2 * k, b]), np.dot(J, w.Y[2 * k + 1, b])
-            q[a, b], q[m + a, m + b], q[a, m + b], q[m + a, b] = re, re, -im, im
+        r[a] += c * re - d * im
+        r[b + a] += c * im + d * re
+    if b > m:
+        _stiffen(w.S, p / s.h, z / s.h, m, r, q)
     if not dense_solve(q, r):
         return False
-    for b in range(m):
-        re, im, f, g = w.Y[2 * k, b], w.Y[2 * k + 1, b], r[b], r[m + b]
+    for a in range(b):
+        re, im, f, g = w.Y[2 * k, a], w.Y[2 * k + 1, a], r[a], r[b + a]
         for i in lanes(x.size):
             x[i] -= f * re[i] - g * im[i]
             y[i] -= f * im[i] + g * re[i]
     return True
+
+
+@source
+def _stiffen(S, p, z, m, r, q):
+    """The last rows of ``q f = r`` times ``C = S[0] + (p + i z) S[1]``, and f added to them."""
+    k, b = S.shape[1], r.size // 2
+    room = np.empty(2 * k)
+    for j in range(2 * b + 1):
+        column = r if j == 2 * b else q[:, j]
+        for a in range(k):
+            room[a], room[k + a] = column[m + a], column[b + m + a]
+        for a in range(k):
+            re, im = 0.0, 0.0
+            for c in range(k):
+                C, D = S[0, a, c] + p * S[1, a, c], z * S[1, a, c]
+                re += C * room[c] - D * room[k + c]
+                im += C * room[k + c] + D * room[c]
+            column[m + a], column[b + m + a] = re, im
+    for a in range(k):
+        q[m + a, m + a] += 1.0
+        q[b + m + a, b + m + a] += 1.0
 
 
 # its factors
@@ -607,11 +638,7 @@ def _factorize(e, matrices, method, s, w, state, step):
         if matrices.dampers.elements > 0:
             add_element_damping(e.forces, s.times[at], origin, w.y[1], w.D)
     if w.J.shape[0] > 0:
-        joint_directions(e.joints, _row(s.joints.g, at)[0], s.times[at], origin, w.J)
-        for a in range(w.J.shape[0]):
-            J = w.J[a]
-            for i in lanes(J.size):
-                J[i] *= e.free[i]
+        _rows(e, matrices, s, w, at)
     for k in range(method.values.shape[1]):
         a, b = method.values[0, k] / s.h, method.values[1, k] / s.h
         if b != 0.0:
@@ -632,6 +659,28 @@ def _factorize(e, matrices, method, s, w, state, step):
                 y[i] = 0.0
             solve_for(w, k, x, y)
     return True
+
+
+@source
+def _rows(e, matrices, s, w, at):
+    """The rows beside the band at the mean of the points, and what is between those of no joint."""
+    m, forces, t = w.l.shape[1], e.forces, s.times[at]
+    if m > 0:
+        joint_directions(e.joints, _row(s.joints.g, at)[0], t, w.origin, w.J[:m])
+    for a in range(matrices.rows.P.shape[0]):
+        copy(matrices.rows.P[a], w.J[m + a])
+    for a in range(w.J.shape[0]):
+        J = w.J[a]
+        for i in lanes(J.size):
+            J[i] *= e.free[i]
+    modes, D = matrices.dampers.modes.shape[0], np.empty(forces.size)
+    if w.S.shape[1] > modes:
+        element_stiffness(forces, t, w.origin, w.y[1], 0.0, D)
+        put_between(forces, D, 1.0, modes, w.S[0])
+        element_damping(forces, t, w.origin, w.y[1], D)
+        put_between(forces, D, 1.0, modes, w.S[1])
+    for a in range(modes):
+        w.S[1, a, a] = 1.0
 
 
 @source

@@ -23,7 +23,8 @@ from ..body import (add_force_of, body_carry, body_force, body_mean, body_mixed,
                     body_tangent)
 from ..forces.contact_texts import PRESSURES
 from ..forces.texts import (add_contact_tangent, add_elastic_force, add_rubbing_tangent,
-                            augment_contact, element_stiffness, pace_contact, settle_contact)
+                            augment_contact, element_stiffness, pace_contact, put_between,
+                            settle_contact)
 from ..own import own_joints, own_solve
 from ..source import F1, F2, F3, borrowed, by_place, lanes, source
 from ..tables import (add_constraint_rate, add_curvature_force, add_joint_force,
@@ -670,16 +671,12 @@ def _tangent(e, matrices, rule, s, w, state):
 def _add_elements(forces, matrices, s, w):
     """Add the derivatives of force elements to the band, and to what is beside it."""
     if forces.start.size > 0:
-        D, modes, S = np.empty(forces.size), matrices.dampers.modes.shape[0], matrices.rows.S
+        D = np.empty(forces.size)
         element_stiffness(forces, s.acting, w.x.middle, w.y[1],
                           s.damping_factor / s.stiffness_factor, D)
         add_products(matrices.A.flat, forces.band_at, forces.band_weight, D, forces.band_of)
-        k = S.shape[0] - modes
-        between = np.zeros(k * k)
-        add_products(between, forces.row_at, np.ones(forces.row_at.size), D, forces.row_of)
-        for a in range(k):
-            for b in range(k):
-                S[modes + a, modes + b] = s.stiffness_factor * between[a * k + b]
+        put_between(forces, D, s.stiffness_factor, matrices.dampers.modes.shape[0],
+                    matrices.rows.S)
 
 
 @source

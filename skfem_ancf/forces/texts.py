@@ -231,12 +231,30 @@ def add_element_tangent(tables, t, u, A):
 def add_element_damping(tables, t, u, v, A):
     """Add the derivative of :func:`add_resisting_force` by v to a band, for near elements."""
     if tables.start.size > 0:
-        D, elastic = np.empty(tables.size), np.empty(tables.size)
-        element_stiffness(tables, t, u, v, 1.0, D)
-        element_stiffness(tables, t, u, v, 0.0, elastic)
-        for i in lanes(D.size):
-            D[i] -= elastic[i]
+        D = np.empty(tables.size)
+        element_damping(tables, t, u, v, D)
         add_products(A.flat, tables.band_at, tables.band_weight, D, tables.band_of)
+
+
+@source
+def element_damping(tables, t, u, v, D):
+    """The derivative by the velocities of the vectors, shape (size,)."""
+    elastic = np.empty(tables.size)
+    element_stiffness(tables, t, u, v, 1.0, D)
+    element_stiffness(tables, t, u, v, 0.0, elastic)
+    for i in lanes(D.size):
+        D[i] -= elastic[i]
+
+
+@source
+def put_between(tables, D, factor, first, S):
+    """Put derivatives of far elements, times a factor, between their rows: from ``first`` on."""
+    k = S.shape[0] - first
+    between = np.zeros(k * k)
+    add_products(between, tables.row_at, np.ones(tables.row_at.size), D, tables.row_of)
+    for a in range(k):
+        for b in range(k):
+            S[first + a, first + b] = factor * between[a * k + b]
 
 
 # the kinds
