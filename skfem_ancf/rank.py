@@ -78,7 +78,8 @@ def groups(J: Array | sparse.csr_array) -> Iterator[tuple[Array, Array, Array]]:
     """
     if isinstance(J, np.ndarray):
         columns, = J.any(axis=0).nonzero()
-        yield np.arange(len(J)), columns, J[:, columns]
+        if len(J):
+            yield np.arange(len(J)), columns, J[:, columns]
         return
     J = sparse.csr_array(J)
     J.eliminate_zeros()

@@ -33,9 +33,9 @@ class Choice(NamedTuple):
 def choose_scheme(system: System, rtol: float = RTOL) -> Choice:
     """The scheme for a scene.
 
-    Obstacles take the scheme that conserves energy with them; so do coarse tolerances of scenes that
-    lose nothing, others generalised-alpha. Finer ones take collocation: Radau, which damps what
-    steps do not resolve, where there are joints, damping or stiff beams, and Gauss else.
+    Obstacles take the scheme that conserves energy with them; so do coarse tolerances of scenes
+    that lose nothing, others generalised-alpha. Finer ones take collocation: Radau, which damps
+    what steps do not resolve, where there are joints, damping or stiff beams, and Gauss else.
 
     Parameters
     ----------
