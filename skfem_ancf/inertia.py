@@ -137,7 +137,7 @@ def of_cable(beam: Beam) -> Inertia:
     xi, w = gauss(points_along(beam))
     tind = np.array([0]) if across.uniform else None
     X = np.array([xi, 0.5 + 0.0 * xi])
-    N = beam.element.values(mapping, X, tind)
+    N, d_xi = beam.element.along(mapping, X, tind)
     if across.simple and across.uniform:
         return Inertia(N, across.moments(xi[:1], tind, "mass")[0] * (w * beam.mesh.lengths[0]))
     # the length of the axis: directors that are interpolated between nodes are shorter than one
@@ -145,7 +145,7 @@ def of_cable(beam: Beam) -> Inertia:
     mass, *moments = across.moments(xi, tind, "mass") * w * speed
     if across.simple:
         return Inertia(N, mass)
-    return Inertia(N, mass, beam.element.slopes(mapping, X, tind)[0][:, 0], np.array(moments))
+    return Inertia(N, mass, d_xi / speed, np.array(moments))
 
 
 def projected(beam: Beam, field: Callable[[Array], Array]) -> Array:

@@ -541,13 +541,16 @@ class MeshBeam(Frozen, Mesh2D):
         The chains that they make are of one length, too.
         """
         if not hasattr(self, "_is_uniform"):
-            # the round-off of the nodes' positions is no difference in length
-            noise = 8 * np.finfo(float).eps * np.max(np.abs(self.p))
-            self._is_uniform = self.is_straight and self.heights is None and bool(
-                np.ptp(self.lengths) <= 1e-13 * np.max(self.lengths) + noise
-                and np.max(np.ptp(self.p_X, axis=1)) <= 1e-12 + noise / np.min(self.lengths)
-                and np.ptp(self.chain_lengths) <= 1e-12 * np.max(self.chain_lengths))
+            self._is_uniform = self.is_straight and self.heights is None and self._are_equal()
         return self._is_uniform
+
+    def _are_equal(self):
+        """True if straight elements are of one length and direction, as their chains are."""
+        # the round-off of the nodes' positions is no difference in length
+        noise = 8 * EPS * np.max(np.abs(self.p))
+        return bool(np.ptp(self.lengths) <= 1e-13 * np.max(self.lengths) + noise
+                    and np.max(np.ptp(self.p_X, axis=1)) <= 1e-12 + noise / np.min(self.lengths)
+                    and np.ptp(self.chain_lengths) <= 1e-12 * np.max(self.chain_lengths))
 
     @property
     def chain_lengths(self) -> Array:

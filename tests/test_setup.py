@@ -21,12 +21,14 @@ from skfem_ancf.errors import CallbackError
 from skfem_ancf.finder import Finder
 from skfem_ancf.forces import system as forces
 from skfem_ancf.formulations import FORMULATIONS, Assumed
+from skfem_ancf.inertia import points_along
 from skfem_ancf.kernels import cable, section
 from skfem_ancf.kernels.base import pair_tables
 from skfem_ancf.linalg import BandMatrix
 from skfem_ancf.loads import EndMoment, PointForce, Pressure, Weight
 from skfem_ancf.mapping import MappingBeam
 from skfem_ancf.rank import inertia_of, null_basis
+from skfem_ancf.quadrature import gauss
 from skfem_ancf.statics.iteration import ALONE
 from skfem_ancf.system import System
 
@@ -649,6 +651,19 @@ def test_terms_that_are_sampled_at_the_same_places_share_their_tables(monkeypatc
     asked.clear()
     whole, part = Beam(mesh, ElementBeamANCF(2), law.replace(plane="strain"), 0.1).kernel.packs
     assert len(asked) == 1 and whole.table is part.table
+
+
+def test_masses_of_a_tapered_cable_ask_the_map_once(monkeypatch):
+    mesh = MeshBeam.init_curve(lambda s: np.array([np.sin(s), 1.0 - np.cos(s)]),
+                               np.linspace(0, 1, 4), lambda s: 0.12 - 0.04 * s)
+    beam = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(2e7, 0.3, 7800.0), 0.01)
+    asked = counted(monkeypatch, MappingBeam, "_derivatives")
+    inertia = beam.inertia
+    assert len(asked) == 1
+    X = np.array([points_along(beam) * [0.0], points_along(beam) * [0.5]])
+    X[0] = gauss(X.shape[1])[0]
+    slopes = beam.element.slopes(mesh.mapping(), X)[0][:, 0]
+    assert np.allclose(inertia.slopes, slopes, rtol=1e-13, atol=1e-13 * np.abs(slopes).max())
 
 
 #: Arguments of a Beam, some of each.

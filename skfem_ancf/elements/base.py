@@ -341,8 +341,32 @@ class ElementBeam(Frozen, Element):
             (nelements,).
         """
         value, _, _, slope = self.of_mesh(mapping, X, tind)
-        return self._scale(mapping.mesh, slope, tind)[:, :, None] * (
-            value[:, None] if value.ndim == 2 else value)
+        return self._scaled(mapping.mesh, slope, tind, value)[0]
+
+    def along(self, mapping: MappingBeam, X: Array, tind: Array | None = None
+              ) -> tuple[Array, Array]:
+        """All local functions on the body, and their derivatives by xi.
+
+        Parameters
+        ----------
+        mapping, X, tind
+            As for :meth:`gbasis`, shapes (2, npoints) or (2, nelements, npoints), and
+            (nelements,).
+
+        Returns
+        -------
+        value, d_xi
+            Shape (n, nelements, npoints) both.
+        """
+        value, d_xi, _, slope = self.of_mesh(mapping, X, tind)
+        value, d_xi = self._scaled(mapping.mesh, slope, tind, value, d_xi)
+        return value, d_xi
+
+    def _scaled(self, mesh: MeshBeam, slope: Array, tind: Array | None, *values: Array
+                ) -> list[Array]:
+        """Local functions of all elements from those of length 1, which may be the same."""
+        scale = self._scale(mesh, slope, tind)[:, :, None]
+        return [scale * (x[:, None] if x.ndim == 2 else x) for x in values]
 
     def of_mesh(self, mapping: MappingBeam, X: Array, tind: Array | None = None,
                 i: int | slice = slice(None)) -> tuple[Array, Array, Array, Any]:

@@ -391,7 +391,8 @@ class CableKernel(Chain):
         if self.constant is None and _has_alone(mesh.t):
             n = max(n, element.axis_degree)  # no neighbour holds a mode that fewer points miss
         self.points_number = n
-        self.shared = mesh.is_uniform or np.ptp(mesh.lengths) <= 1e-13 * np.max(mesh.lengths)
+        longest = mesh.lengths.max()
+        self.shared = mesh.is_uniform or longest - mesh.lengths.min() <= 1e-13 * longest
         self._across, self.points = across, gauss(n)[0]
         if before is not None and before.points_number == n:
             self.packs = [self._renewed(*before.packs)]
