@@ -71,7 +71,7 @@ class CableSections:
         """
         d, (n, ne) = (self._slopes @ from_first_node(u_e)).transpose(1, 2, 0), self._shape
         r, strain = np.empty(d.shape), np.empty((2, n, ne))
-        square, kappa = np.empty((2, n, ne))
-        cable_strain(self._pack, 0, d, r, square, kappa, strain)
-        tangent = (r[:n] / np.sqrt(square)[:, None]).transpose(1, 2, 0)
+        length, kappa = np.empty((2, n, ne))
+        cable_strain(self._pack, 0, d, r, length, kappa, strain)
+        tangent = (r[:n] / length[:, None]).transpose(1, 2, 0)
         return tangent, strain.swapaxes(1, 2)

@@ -101,17 +101,17 @@ def extension(a0, a1, da0, da1, length, length0):
 
 
 @source
-def cable_strain(pack, first, d, r, square, kappa, strain):
+def cable_strain(pack, first, d, r, length, kappa, strain):
     """Strains of the elements from ``first`` on, without cancellation in the extension.
 
     Parameters
     ----------
     d
         Displacement parts of a and b, shape (rows, 2, elements).
-    r, square, kappa, strain
-        Written: a and b, |a|^2, the curvature, and (eps, kappa - kappa_0).
+    r, length, kappa, strain
+        Written: a and b, |a|, the curvature, and (eps, kappa - kappa_0).
     """
-    n, size = square.shape[0], square.shape[1]
+    n, size = length.shape[0], length.shape[1]
     at, b = pack.frame_place[first:first + size], r[n:]
     for g in lanes(r.shape[0]):
         for i in lanes(2):
@@ -121,10 +121,10 @@ def cable_strain(pack, first, d, r, square, kappa, strain):
         for e in lanes(size):
             a0, a1, da0, da1 = r[p, 0, e], r[p, 1, e], d[p, 0, e], d[p, 1, e]
             s = a0 * a0 + a1 * a1
-            k = curvature(a0, a1, b[p, 0, e], b[p, 1, e], s)
-            strain[0, p, e] = extension(a0, a1, da0, da1, np.sqrt(s), pack.length0[p, at[e]])
+            k, root = curvature(a0, a1, b[p, 0, e], b[p, 1, e], s), np.sqrt(s)
+            strain[0, p, e] = extension(a0, a1, da0, da1, root, pack.length0[p, at[e]])
             strain[1, p, e] = k - pack.kappa0[p, at[e]]
-            square[p, e], kappa[p, e] = s, k
+            length[p, e], kappa[p, e] = root, k
 
 
 @source
@@ -139,21 +139,20 @@ def cable_stress(stiffness, at, strain, other, S):
 
 
 @source
-def cable_rows(weights, at, r, square, kappa, S, T):
+def cable_rows(weights, at, r, length, kappa, S, T):
     """What mean resultants of two states do on the gradients; both may be the same.
 
     eps and kappa are not quadratic in the coordinates; their changes are still linear in the
     step: ``d eps = (a0 + a1) . da / (|a0| + |a1|)`` and, from ``s kappa = a x b``,
     ``mean(s) d kappa = d(a x b) - mean(kappa) ds``.
     """
-    n, k = square.shape[1], len(r) - 1
+    n, k = length.shape[1], len(r) - 1
     b, Tb = r[:, n:], T[n:]
     for p in lanes(n):
         for e in lanes(T.shape[2]):
-            s, z, w = square[0, p, e], square[k, p, e], 2.0 * weights[p, at[e]]
-            M = w * S[1, p, e] / (s + z)
-            N = (w * S[0, p, e] / (np.sqrt(s) + np.sqrt(z))
-                 - (kappa[0, p, e] + kappa[k, p, e]) * M)
+            x, y, w = length[0, p, e], length[k, p, e], 2.0 * weights[p, at[e]]
+            M = w * S[1, p, e] / (x * x + y * y)
+            N = w * S[0, p, e] / (x + y) - (kappa[0, p, e] + kappa[k, p, e]) * M
             a0, a1 = 0.5 * (r[0, p, 0, e] + r[k, p, 0, e]), 0.5 * (r[0, p, 1, e] + r[k, p, 1, e])
             T[p, 0, e] = N * a0 + 0.5 * M * (b[0, p, 1, e] + b[k, p, 1, e])
             T[p, 1, e] = N * a1 - 0.5 * M * (b[0, p, 0, e] + b[k, p, 0, e])
@@ -161,32 +160,33 @@ def cable_rows(weights, at, r, square, kappa, S, T):
 
 
 @source
-def cable_rates(r, d, square, kappa, rates):
+def cable_rates(r, d, length, kappa, rates):
     """Changes of the strains, linearised, by displacement parts d of a and b."""
-    n = square.shape[0]
+    n = length.shape[0]
     b, db = r[n:], d[n:]
     for p in lanes(n):
         for e in lanes(r.shape[2]):
-            a0, a1, s = r[p, 0, e], r[p, 1, e], square[p, e]
+            a0, a1, c = r[p, 0, e], r[p, 1, e], 1.0 / length[p, e]
             along = a0 * d[p, 0, e] + a1 * d[p, 1, e]
             change = (d[p, 0, e] * b[p, 1, e] - d[p, 1, e] * b[p, 0, e] + a0 * db[p, 1, e]
                       - a1 * db[p, 0, e] - 2.0 * kappa[p, e] * along)
-            rates[0, p, e], rates[1, p, e] = along / np.sqrt(s), change / s
+            rates[0, p, e], rates[1, p, e] = c * along, c * c * change
 
 
 @source
-def cable_factors(stiffness, weights, at, r, square, kappa, stress, M, skew):
+def cable_factors(stiffness, weights, at, r, length, kappa, stress, M, skew):
     """Factors of the pairs (a, a), (a, b), (b, b) for N d^2 eps + M d^2 kappa and the stiffness."""
-    n = square.shape[0]
+    n = length.shape[0]
     b, Maa, Mab, Mbb = r[n:], M[:n], M[n:2 * n], M[2 * n:]
     EA, EI, ES = stiffness[0], stiffness[1], stiffness[2]
     for p in lanes(n):
         for e in lanes(M.shape[2]):
             a0, a1, b0, b1 = r[p, 0, e], r[p, 1, e], b[p, 0, e], b[p, 1, e]
-            s, k, w = square[p, e], kappa[p, e], weights[p, at[e]]
-            x, y = w * EA[p, at[e]] / s, w * EI[p, at[e]] / (s * s)
-            z = w * ES[p, at[e]] / (s * np.sqrt(s))
-            N, m = w * stress[0, p, e] / (s * np.sqrt(s)), 2.0 * w * stress[1, p, e] / (s * s)
+            s, k, w = length[p, e] * length[p, e], kappa[p, e], weights[p, at[e]]
+            square = w / s  # over s, over s^(3/2) and over s^2
+            cube, fourth = square / length[p, e], square / s
+            x, y, z = square * EA[p, at[e]], fourth * EI[p, at[e]], cube * ES[p, at[e]]
+            N, m = cube * stress[0, p, e], 2.0 * fourth * stress[1, p, e]
             k0, k1, c = b1 - 2.0 * k * a0, -b0 - 2.0 * k * a1, k * s
             q = 4.0 * k * m  # derivatives of eps by a: a / |a|; of kappa: k / s by a, (-a1, a0) / s
             Maa[p, 0, e] = ((x + q) * a0 * a0 + (y * k0 + 2.0 * z * a0) * k0 + N * a1 * a1
@@ -206,20 +206,21 @@ def cable_factors(stiffness, weights, at, r, square, kappa, stress, M, skew):
 
 
 @source
-def cable_gradients(table, first, pairs, r, square, kappa, out):
+def cable_gradients(table, first, pairs, r, length, kappa, out):
     """Derivatives of the strains into ``out``, (2, points, elements, nb, 2).
 
     Those of eps by a are a / |a|, of kappa k / s by a and (-a1, a0) / s by b.
     """
-    n, size = square.shape[0], square.shape[1]
+    n, size = length.shape[0], length.shape[1]
     X, b = room((3, n, 2, size), r), r[n:]
     for p in lanes(n):
         for e in lanes(size):
-            a0, a1, s, k = r[p, 0, e], r[p, 1, e], square[p, e], kappa[p, e]
-            X[0, p, 0, e], X[0, p, 1, e] = a0 / np.sqrt(s), a1 / np.sqrt(s)
-            X[1, p, 0, e] = (b[p, 1, e] - 2.0 * k * a0) / s
-            X[1, p, 1, e] = (-b[p, 0, e] - 2.0 * k * a1) / s
-            X[2, p, 0, e], X[2, p, 1, e] = -a1 / s, a0 / s
+            a0, a1, k, c = r[p, 0, e], r[p, 1, e], kappa[p, e], 1.0 / length[p, e]
+            q = c * c
+            X[0, p, 0, e], X[0, p, 1, e] = c * a0, c * a1
+            X[1, p, 0, e] = q * (b[p, 1, e] - 2.0 * k * a0)
+            X[1, p, 1, e] = -q * (b[p, 0, e] + 2.0 * k * a1)
+            X[2, p, 0, e], X[2, p, 1, e] = -q * a1, q * a0
     out[:] = 0.0
     for j in range(3):
         g = pairs[j // 2, n:2 * n]
@@ -249,19 +250,19 @@ def cable_block(pack, what, first, last, u, v, f, given, out, to):
     states, changes = 2 if what == MEAN else 1, what == CARRY or what == VISCOUS
     at, stiffness, weights = pack.place[first:last], pack.stiffness, pack.weights
     U, d, T = room((2, nb, 2, size), u), room((2, nr, 2, size), u), room((nr, 2, size), u)
-    r, square, kappa = room((2, nr, 2, size), u), room((2, n, size), u), room((2, n, size), u)
+    r, length, kappa = room((2, nr, 2, size), u), room((2, n, size), u), room((2, n, size), u)
     strain, S = room((2, 2, n, size), u), room((2, n, size), u)
     for k in range(2 if what == MEAN or changes else 1):
         load(pack.start, pack.span, first, v if k else u, U[k])
         product(pack.table, first, U[k], d[k])
         if k < states:
-            cable_strain(pack, first, d[k], r[k], square[k], kappa[k], strain[k])
+            cable_strain(pack, first, d[k], r[k], length[k], kappa[k], strain[k])
     if what == GRADIENTS:
-        _write_gradients(pack, first, at, r[0], square[0], kappa[0], whole)
+        _write_gradients(pack, first, at, r[0], length[0], kappa[0], whole)
         return
     k = states - 1
     if changes:
-        cable_rates(r[0], d[1], square[0], kappa[0], strain[0])
+        cable_rates(r[0], d[1], length[0], kappa[0], strain[0])
     cable_stress(stiffness, at, strain[0], strain[k], S)
     if what == CARRY:
         add_scaled(1.0, given, S, S)
@@ -276,7 +277,7 @@ def cable_block(pack, what, first, last, u, v, f, given, out, to):
             for i in lanes(2):
                 for e in lanes(size):
                     U[0, k, i, e] = 0.5 * (U[0, k, i, e] + U[1, k, i, e])
-    cable_rows(weights, at, r[:states], square[:states], kappa[:states], S, T)
+    cable_rows(weights, at, r[:states], length[:states], kappa[:states], S, T)
     held = pack.constant[:0] if what == GIVEN else pack.constant
     add_force(pack.table, pack.transposed, held, pack.start, pack.span, first, T, U[0], f)
     if what == TANGENT:
@@ -284,12 +285,12 @@ def cable_block(pack, what, first, last, u, v, f, given, out, to):
         if given.shape[0] > 0:
             copy_stress(given, S)
         skew[n:] = 0.0
-        cable_factors(stiffness, weights, at, r[0], square[0], kappa[0], S, M, skew)
+        cable_factors(stiffness, weights, at, r[0], length[0], kappa[0], S, M, skew)
         add_tangent(pack.table, pack.pairs, pack.start, first, M, skew, to)
 
 
 @source
-def _write_gradients(pack, first, at, r, square, kappa, out):
+def _write_gradients(pack, first, at, r, length, kappa, out):
     """What :func:`~skfem_ancf.body.body_gradients` finds, of the elements from ``first`` on."""
     n, nb, size, ne = len(pack.weights), pack.table.shape[2], at.size, pack.start.size
     D, w = room((4, n, size), r), room((n, size), r)
@@ -300,7 +301,7 @@ def _write_gradients(pack, first, at, r, square, kappa, out):
             D[0, p, e], D[1, p, e] = EA[p, at[e]], ES[p, at[e]]
             D[2, p, e], D[3, p, e] = ES[p, at[e]], EI[p, at[e]]
     X = room((2, n, size, nb, 2), r)
-    cable_gradients(pack.table, first, pack.pairs.pairs, r, square, kappa, X)
+    cable_gradients(pack.table, first, pack.pairs.pairs, r, length, kappa, X)
     B = shaped(out, (2, ne, 2, n, 2 * nb))[:, first:first + size]
     weigh(D, w, shaped(X, (2, n, size, 2 * nb)), B[0], B[1])
 
