@@ -299,6 +299,14 @@ def body_gradients(body, u, gradients):
 
 
 @source
+def body_tangent_by(body, u, stresses, gradients, A):
+    """As :func:`body_gradients`, and the lower half of the tangent at these stresses."""
+    clear(A.flat)
+    evaluate_body(body, np.int64(GRADIENTS), u, u, u, stresses, np.int64(1), gradients,
+                  A.flat[A.top:], A.ld)
+
+
+@source
 def _starts(body, k):
     """The first coordinate of each element of pack k, in those of its beam."""
     if body.table[k, KIND] == SECTION:

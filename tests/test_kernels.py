@@ -210,6 +210,11 @@ def test_gradients_carry_stresses_and_give_forces(kind, mesh):
     body.add_force_by(plain, copies, gradients, S, f)
     body.add_force_of(copies, np.tile(u, 3), S, g)
     close(f, g)
+    A, B, again, none = system.new_band().band, system.new_band().band, gradients + 1.0, S[:0]
+    body.body_tangent_by(plain, u, S[:S.size // 3], again, A)
+    body.body_tangent(plain, u, f[:N], S[:S.size // 3], True, none, B)
+    close(again, gradients)
+    close(A.flat, B.flat)
 
 
 @pytest.mark.skipif(compiled_off() is not None, reason="without Numba")
@@ -221,16 +226,16 @@ def test_collocation_with_carried_stresses_is_the_same_compiled(kind, nodes, mon
     monkeypatch.setenv("SKFEM_ANCF_COMPILED", "1")
     found, calls = [], []
 
-    def gradients(*args):
+    def tangent(*args):
         calls.append(args)
-        body.body_gradients(*args)
+        body.body_tangent_by(*args)
 
     for compiled in (True, False):
         mesh = MeshBeam.init_line(nodes, height=0.05)
         s = Scene(Beam(mesh, element(), LAWS[name](1e8, 0.3, 1000.0), 0.02, formulation,
                        compiled=compiled)).pin("left").gravity((0.0, -9.81))
         found.append(s.integrate(0.3, 0.1, scheme="radau", tol=1e-8, progress=False))
-        monkeypatch.setattr(stages, "body_gradients", gradients)  # of the plain text
+        monkeypatch.setattr(stages, "body_tangent_by", tangent)  # of the plain text
     b, a = found
     assert "collocate" in LOADED
     assert a.iterations == b.iterations and a.factorizations == b.factorizations and calls

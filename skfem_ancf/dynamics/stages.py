@@ -12,7 +12,7 @@ import numpy as np
 from ..band import (SPARE, Band, add_multiple, clear, copy, dense_solve, factorize,
                     factorize_complex, fix_stored, multiply, solve, solve_complex, solve_joined)
 from ..body import (add_force_by, add_viscous_stress, body_force, body_gradients, body_mean_stress,
-                    body_mixed, body_stress, body_tangent, carry_by)
+                    body_mixed, body_stress, body_tangent, body_tangent_by, carry_by)
 from ..forces.texts import (add_elastic_force, add_element_damping, add_element_tangent,
                             element_damping, element_stiffness, pace_contact, put_between,
                             settle_contact)
@@ -623,11 +623,11 @@ def _factorize(e, matrices, method, s, w, state, step):
     for k in range(method.points.size):
         add_multiple(method.weights[k], w.U[k], origin)
     if state[MIXED] > 0.0:
-        body_gradients(e.body, origin, w.B)
         body_mean_stress(e.body, e.copies, method.weights, w.carried, S[1])
+        body_tangent_by(e.body, origin, S[1], w.B, e.K)
     else:
         body_stress(e.body, w.y[0], S[1])
-    body_tangent(e.body, origin, f, S[1], yes, S[2], e.K)
+        body_tangent(e.body, origin, f, S[1], yes, S[2], e.K)
     add_load_stiffness(e.loads, _row(s.factors, at), s.times[at], 1.0, origin, e.K)
     add_element_tangent(e.forces, s.times[at], origin, e.K)
     D = w.D.flat

@@ -259,6 +259,9 @@ def cable_block(pack, what, first, last, u, v, f, given, out, to):
             cable_strain(pack, first, d[k], r[k], length[k], kappa[k], strain[k])
     if what == GRADIENTS:
         _write_gradients(pack, first, at, r[0], length[0], kappa[0], whole)
+        if to.flat.size > 0:
+            copy_stress(given, S)
+            _add_tangent(pack, first, at, r[0], length[0], kappa[0], S, to)
         return
     k = states - 1
     if changes:
@@ -281,12 +284,19 @@ def cable_block(pack, what, first, last, u, v, f, given, out, to):
     held = pack.constant[:0] if what == GIVEN else pack.constant
     add_force(pack.table, pack.transposed, held, pack.start, pack.span, first, T, U[0], f)
     if what == TANGENT:
-        M, skew = room((3 * n, 3, size), u), room((n + 1, 1, size), u)
         if given.shape[0] > 0:
             copy_stress(given, S)
-        skew[n:] = 0.0
-        cable_factors(stiffness, weights, at, r[0], length[0], kappa[0], S, M, skew)
-        add_tangent(pack.table, pack.pairs, pack.start, first, M, skew, to)
+        _add_tangent(pack, first, at, r[0], length[0], kappa[0], S, to)
+
+
+@source
+def _add_tangent(pack, first, at, r, length, kappa, S, to):
+    """The tangent of stresses and stiffnesses at the points."""
+    n, size = length.shape[0], length.shape[1]
+    M, skew = room((3 * n, 3, size), r), room((n + 1, 1, size), r)
+    skew[n:] = 0.0
+    cable_factors(pack.stiffness, pack.weights, at, r, length, kappa, S, M, skew)
+    add_tangent(pack.table, pack.pairs, pack.start, first, M, skew, to)
 
 
 @source

@@ -254,8 +254,8 @@ def section_evaluate(pack, what, u, v, f, given, out, to):
         SectionPack.
     what
         ``FORCE``, ``TANGENT``, ``MEAN``, ``STRESS``, ``CARRY``, ``VISCOUS``: the force of
-        stresses that a linear law has of the rate of the strain, or ``GIVEN``: that of given
-        stresses alone, without stabilisation.
+        stresses that a linear law has of the rate of the strain, ``GIVEN``: that of given
+        stresses alone, without stabilisation, or ``GRADIENTS``, with a destination the tangent too.
     u, v
         Displacement, and at the end for the mean, its change for carried stresses, its rate for
         viscous ones, shape (N,).
@@ -322,6 +322,10 @@ def section_block(pack, what, first, last, u, v, f, given, out, to):
             section_gradients(pack, first, r, X)
             B = shaped(whole, (2, pack.start.size, 3, n, 2 * nb))[:, first:last]
             weigh(D, w, shaped(X, (3, n, size, 2 * nb)), B[0], B[1])
+            if to.flat.size > 0:
+                copy_stress(given, S)
+                to_samples(pack.along, pack.ends, w, S, samples)
+                _add_tangent(pack, first, at, samples, D, w, r, to)
             return
         if what == CARRY:
             tangent_stress(D, change, S)
