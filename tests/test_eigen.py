@@ -6,8 +6,8 @@ import scipy.linalg
 from scipy.optimize import brentq, fsolve
 
 import exact
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        MeshBeam, Scene, StVenantKirchhoff, eigen)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
+                        ElementBeamCable, InputError, MeshBeam, Scene, StVenantKirchhoff, eigen)
 from skfem_ancf.elements import ELEMENTS
 
 # units in which E I = rho A = L = 1 at every slenderness
@@ -47,6 +47,18 @@ def test_first_frequency_of_every_element(name, slenderness):
     order = 4 if element.sections == "cubic" or element.order == 0 else 2
     limit = fine + (fine - coarse) / (2**order - 1)
     assert limit == pytest.approx(theory("fixed-free", 1)[0], rel=1e-4)
+
+
+@pytest.mark.parametrize("length", [1e-9, 1e-6, 1e-3, 1e3])
+@pytest.mark.parametrize("element", [ElementBeamANCFCubic(2), ElementBeamANCFHermite(2, 5),
+                                     ElementBeamANCF(3), ElementBeamCable(5)])
+def test_frequencies_do_not_depend_on_the_unit_of_length(element, length):
+    def frequencies(length):
+        mesh = MeshBeam.init_line(length * np.linspace(0, 1, 7), 0.05 * length)
+        steel = StVenantKirchhoff(1.0, 0.3, 1.0 / length**2)
+        return Scene(Beam(mesh, element, steel, length)).clamp("left").modes(3).frequencies
+
+    assert frequencies(length) == pytest.approx(frequencies(1.0), rel=1e-8)
 
 
 @pytest.mark.parametrize("slenderness", [1e1, 1e2, 1e3, 1e4, 1e5, 1e6])

@@ -507,9 +507,11 @@ def append_square_root(K: Array, u_e: Array, B: list[Array], CB: list[Array],
     B, CB, stress
         Lists that R (twice) and R u are appended to.
     """
-    values, V = np.linalg.eigh(K)
+    size = np.sqrt(np.diagonal(K, axis1=1, axis2=2))  # coordinates have units of their own
+    size = np.where(size > 0.0, size, 1.0)[:, :, None]
+    values, V = np.linalg.eigh(K / (size * size.transpose(0, 2, 1)))
     keep = np.max(values / values[:, -1:], axis=0) > 1e-12
-    R = (np.sqrt(values[:, None, keep]) * V[:, :, keep]).transpose(0, 2, 1)
+    R = (np.sqrt(np.maximum(values[:, None, keep], 0.0)) * V[:, :, keep] * size).transpose(0, 2, 1)
     R = np.broadcast_to(R, (len(u_e),) + R.shape[1:])
     B.append(R)
     CB.append(R)
