@@ -237,15 +237,15 @@ class MeshBeam(Frozen, Mesh2D):
                 array.flags.writeable = False
         mesh = object.__new__(cls)
         vars(mesh).update(given, _sealed=True)
-        mesh._boundaries = mesh._build_default_tags()
+        vars(mesh).update(_boundaries=ReadOnlyDict(mesh._build_default_tags()))
         d, far = p[:, 1:] - p[:, :-1], np.abs(p).max()
         mesh._require_length((np.hypot(d[0], d[1]) > 4 * EPS * far) & (lengths > 0.0))
-        low, high = lengths.min(), require_finite("lengths", lengths).max()
         if curve is None:
-            even = heights is None
+            even, low, high = heights is None, lengths.min(), lengths.max()
             vars(mesh).update(_is_straight=True, _on_one_line=even, _is_uniform=even and bool(
                 high - low <= 1e-13 * high + 8 * EPS * far))
         if curve is not None or heights is not None:
+            require_finite("lengths", lengths)
             mesh._mapping().check()
         return mesh
 
