@@ -343,7 +343,8 @@ class Tables:
         columns = self._columns
         varying = [(k, load.amplitude) for k, load in enumerate(columns)
                    if load is not None and load.amplitude is not None]
-        out = np.ones((len(times) if varying else 1, len(columns)))
+        out = np.empty((len(times) if varying else 1, len(columns)))
+        out.fill(1.0)
         for k, amplitude in varying:
             out[:, k] = sampled(amplitude, times, "amplitude").reshape(len(times))
         return out

@@ -68,8 +68,8 @@ def sampled(function: Callable[[Any], Any], times: Array, name: str,
     values = _at_once(function, times) if n > FEW else None
     if values is not None:
         some = [0, n // 2, n - 1]
-        alone = _one_by_one(function, times[some], name, shape)
-        if (values.shape == (n,) + alone.shape[1:] and _are_close(values[some], alone)
+        alone = _one_by_one(function, times.take(some), name, shape)
+        if (values.shape == (n,) + alone.shape[1:] and _are_close(values.take(some, 0), alone)
                 and np.logical_and.reduce(np.isfinite(values), None)):
             return values
     return _one_by_one(function, times, name, shape)
@@ -79,8 +79,10 @@ def _are_close(found: Array, alone: Array) -> bool:
     """True if a few numbers are the same to round-off."""
     numbers = alone.ravel().tolist()
     size = 1e-15 * max(map(abs, numbers), default=0.0)
-    return all(abs(x - y) <= 1e-13 * abs(y) + size
-               for x, y in zip(found.ravel().tolist(), numbers))
+    for x, y in zip(found.ravel().tolist(), numbers):
+        if not abs(x - y) <= 1e-13 * abs(y) + size:
+            return False
+    return True
 
 
 def _one_by_one(function: Callable[[Any], Any], times: Array, name: str,
