@@ -756,20 +756,18 @@ def _add_work(e, matrices, rule, s, w, state, before):
     In the conserving scheme that is the work of its force, else of the mean of the force
     ``before``, which becomes that of the next step, and that at the end.
     """
-    u, u0, d, change = w.x.u, w.y[0], w.x.damping, w.x.pace
+    u, u0, d, pace = w.x.u, w.y[0], w.x.damping, w.x.pace
+    for i in lanes(u.size):
+        pace[i] = (u[i] - u0[i]) / s.dt
     if rule.conserving > 0:
         _middle(rule, w)
-        _pace(e.free, rule, s, w)
-        damping_force(e, matrices.dampers, matrices.M, s.acting, w.x.middle, change, d, w.x.room)
+        damping_force(e, matrices.dampers, matrices.M, s.acting, w.x.middle, pace, d, w.x.room)
+        work = dot(d, pace)
     else:
         damping_force(e, matrices.dampers, matrices.M, s.t, u, w.x.v, d, w.x.room)
-    for i in lanes(u.size):
-        change[i] = u[i] - u0[i]
-    work = dot(d, change)
-    if rule.conserving == 0:
-        work = 0.5 * (work + dot(before, change))
+        work = 0.5 * (dot(d, pace) + dot(before, pace))
         copy(d, before)
-    state[DISSIPATED] += work
+    state[DISSIPATED] += s.dt * work
 
 
 @source
