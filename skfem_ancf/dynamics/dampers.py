@@ -53,15 +53,15 @@ class Dampers(NamedTuple):
 @source
 def damping_force(e, dampers, M, t, u, v, out, room):
     """The force at u that resists the velocity v, of the equations e."""
-    clear(out)
-    if dampers.viscous > 0:
-        add_viscous_force(e.viscous, u, v, out)
-    add_other_damping(e, dampers, M, t, u, v, out, room)
+    damping_beside(e, dampers, M, t, u, v, 0.0, out, room)
 
 
 @source
-def add_other_damping(e, dampers, M, t, u, v, out, room):
-    """Add what of that is not of materials."""
+def damping_beside(e, dampers, M, t, u, v, carried, out, room):
+    """The same without what is of materials, if the stresses of these are carried."""
+    clear(out)
+    if dampers.viscous > 0 and carried == 0.0:
+        add_viscous_force(e.viscous, u, v, out)
     if dampers.elements > 0:
         add_resisting_force(e.forces, t, u, v, out)
     if dampers.mass > 0.0:

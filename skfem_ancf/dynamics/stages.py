@@ -19,7 +19,7 @@ from ..forces.texts import (add_elastic_force, add_element_damping, add_element_
 from ..source import F1, F2, F3, borrowed, by_place, lanes, shaped, source
 from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
                       external_force, joint_directions)
-from .dampers import add_damping, add_other_damping, damping_force
+from .dampers import add_damping, damping_beside, damping_force
 from .rates import JointMotion, JointMotions, acceleration_of_joints, drive_rate
 from .steps import (ASTRAY, BEFORE, COUNT, DEPENDENT, DISSIPATED, DONE, ENERGY, FACTORIZED, FAILED,
                     FAILURE, FRESH, GO_ON, ITERATIONS, LASTING, LAST_SIZE, MIXED, NOT_CONVERGED,
@@ -306,14 +306,15 @@ def _end(e, matrices, method, s, w, state, step):
     n, dampers, first = method.points.size, matrices.dampers, step * (method.points.size + 1)
     t = s.times[first + n]
     u, v, a, f, room = w.y[0], w.y[1], w.y[2], w.x[0], w.x[2]
+    ends = method.points[n - 1] == 1.0
     for k in range(n):
         c, U, V, W = s.h * method.weights[k], w.U[k], w.V[k], w.W[k]
         if dampers.active > 0:
             damping_force(e, dampers, matrices.M, s.times[first + k], U, V, f, room)
             state[DISSIPATED] += c * np.dot(f, V)
-        add_multiple(c, V, u)
-        add_multiple(c, W, v)
-    ends = method.points[n - 1] == 1.0
+        if not ends:
+            add_multiple(c, V, u)
+            add_multiple(c, W, v)
     if ends:
         copy(w.U[n - 1], u)
         copy(w.V[n - 1], v)
@@ -494,11 +495,7 @@ def _residual(e, matrices, method, s, w, state, step, k):
     t = s.times[at]
     add_elastic_force(e.forces, t, 0.0, u, u, f)
     if matrices.dampers.active > 0:
-        if state[MIXED] > 0.0:
-            clear(d)
-            add_other_damping(e, matrices.dampers, matrices.M, t, u, v, d, room)
-        else:
-            damping_force(e, matrices.dampers, matrices.M, t, u, v, d, room)
+        damping_beside(e, matrices.dampers, matrices.M, t, u, v, state[MIXED], d, room)
         for i in lanes(f.size):
             f[i] += d[i]
     external_force(e.loads, _row(s.factors, at), t, 1.0, u, Q)

@@ -30,7 +30,7 @@ from ..source import F1, F2, F3, borrowed, by_place, lanes, source
 from ..tables import (add_constraint_rate, add_curvature_force, add_joint_force,
                       add_load_stiffness, add_products, constraint, joint_directions,
                       mean_external_force)
-from .dampers import (Dampers, Rows, add_damping, add_other_damping, damping_force,
+from .dampers import (Dampers, Rows, add_damping, damping_beside, damping_force,
                       factorize_rows, solve_rows)
 from .rates import JointMotion, JointMotions, acceleration_of_joints, drive_rate
 
@@ -321,10 +321,13 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
                 _tangent(e, matrices, rule, s, w, state)
                 if not _factorize(e, matrices, rule, s, w, state):
                     return n
-            _internal_force(e, matrices.dampers, rule, s, w, state)
+            if damped:
+                _middle(rule, w)
+                _pace(e.free, rule, s, w)
+            _internal_force(e, matrices.dampers, rule, w, state)
             _add_elastic(e.forces, rule, s, w)
             if damped:
-                _resist(e, matrices, rule, s, w, state)
+                _resist(e, matrices, s, w, state)
             anew = joined and (not s.constant or state[SIZE] < 0.0)
             if anew:
                 _directions(e.joints, rule, s, w)
@@ -585,7 +588,7 @@ def _start(e, w, state):
 
 
 @source
-def _internal_force(e, dampers, rule, s, w, state):
+def _internal_force(e, dampers, rule, w, state):
     """The internal force of the iterate, without damping.
 
     With carried stresses S, what is missing in ``S = D eps(u)`` acts as the factors take it, in the
@@ -602,8 +605,6 @@ def _internal_force(e, dampers, rule, s, w, state):
         for i in lanes(missing.size):
             missing[i] = own[i] - carried[i]
         if dampers.viscous > 0:
-            _middle(rule, w)
-            _pace(e.free, rule, s, w)
             body_carry(e.viscous, w.x.middle, w.x.pace, S[0], rates)
             add_force_of(e.body, w.x.middle, slow, f)
             for i in lanes(missing.size):
@@ -734,17 +735,11 @@ def _factorize(e, matrices, rule, s, w, state):
 
 
 @source
-def _resist(e, matrices, rule, s, w, state):
+def _resist(e, matrices, s, w, state):
     """Add the damping force of the iterate to the internal one, which has what is carried."""
     d, f = w.x.damping, w.x.force
-    _middle(rule, w)
-    _pace(e.free, rule, s, w)
-    if state[MIXED] > 0.0:
-        clear(d)
-        add_other_damping(e, matrices.dampers, matrices.M, s.acting, w.x.middle, w.x.pace, d,
-                          w.x.room)
-    else:
-        damping_force(e, matrices.dampers, matrices.M, s.acting, w.x.middle, w.x.pace, d, w.x.room)
+    damping_beside(e, matrices.dampers, matrices.M, s.acting, w.x.middle, w.x.pace, state[MIXED],
+                   d, w.x.room)
     for i in lanes(f.size):
         f[i] += d[i]
 
