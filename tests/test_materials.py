@@ -1,5 +1,8 @@
 """The laws against their energy, Hooke, the three-dimensional body, and each other."""
 
+import inspect
+import textwrap
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -353,6 +356,23 @@ def test_the_text_of_the_users_own_is_compiled(needs_compiled):
     scene = Scene(beam).clamp("left").gravity((0, -0.01))
     scene.solve_static()
     assert "whole iterations" in scene.plan()["compiled loop"].reason
+
+
+def test_a_text_made_by_exec_is_compiled(needs_compiled):
+    """Its module has no name, as none was given."""
+    names = {}
+    exec("from skfem_ancf.source import lanes, source\n\n"
+         + textwrap.dedent(inspect.getsource(StiffeningText.text)).split("\n", 1)[1], names)
+
+    class Executed(StiffeningText):
+        text = staticmethod(names["text"])
+
+    assert names["text"].__module__ is None
+    beam = Beam(MeshBeam.init_line([0, 0.5, 1], 0.1), ElementBeamANCF(2),
+                Executed(50.0, NU, 1.0), 0.1)
+    scene = Scene(beam).clamp("left").gravity((0, -0.01))
+    scene.solve_static()
+    assert scene.plan()["compiled loop"].status == "computed"
 
 
 def test_a_text_that_numba_does_not_take_runs_in_numpy(needs_compiled):

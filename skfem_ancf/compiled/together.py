@@ -225,7 +225,7 @@ class Text:
         return self._compiled(args, entry, True)
 
     def _compiled(self, args, entry, counts):
-        module = self.function.__module__.partition(".")[2]
+        module = str(self.function.__module__).partition(".")[2]  # None: made by exec
         brief = not BRIEF.isdisjoint((module, f"{module}.{self.function.__name__}"))
         part, key = _Part(entry.library, brief), object()
         entry.parts.append(part)
