@@ -126,40 +126,28 @@ class Assumed(Formulation):
                       width: float) -> Array | None:
         if not element.held:
             return None
-        L, EI = mesh.lengths, material.E * width * mesh.height**3 / 12.0
-        if mesh.is_straight:
-            return self._of_straight(mesh, element, EI)
-        per = {"element": L, "beam": mesh.chain_lengths, "": np.ones(1)}
-        q = element.rigid(mesh)
-        q[0] = mesh.p
-        q = np.concatenate([q[:, :, end] for end in mesh.t])  # (2 nb, 2, ne)
-        nb = element.nodal_dofs
-        chord = (q[nb] - q[0]) / L
-        along = np.array([slope for _, slope, _ in 2 * element.functionals])
-        out = None
-        for mode in element.held:
-            c = mode.weights * L[:, None] ** (along - 1)
-            start = np.einsum("ek,kie->ie", c, q)
-            beta = (start[0] + 1j * start[1]) / (chord[0] + 1j * chord[1])
-            beta = np.array([[beta.real, -beta.imag], [beta.imag, beta.real]]).transpose(2, 0, 1)
-            C = np.einsum("ek,ij->eikj", c, np.eye(2))
-            C[:, :, 0] += beta / L[:, None, None]
-            C[:, :, nb] -= beta / L[:, None, None]
-            C = C.reshape(len(L), 2, -1)
-            k = self.alpha * mode.size * EI / per[mode.per] ** 2
-            held = (k * L)[:, None, None] * (C.transpose(0, 2, 1) @ C)
-            out = held if out is None else out + held
-        return out
-
-    def _of_straight(self, mesh: MeshBeam, element: ElementBeam, EI: float) -> Array:
-        """The same of straight elements, of one if all are equal: beta is zero."""
-        L, nb = mesh.lengths[:1 if mesh.is_uniform else None], 2 * element.nodal_dofs
+        straight, n = mesh.is_straight, element.nodal_dofs
+        L = mesh.lengths[:1 if mesh.is_uniform else None]
+        EI = material.E * width * mesh.height**3 / 12.0
         per = {"element": L, "beam": mesh.chain_lengths[:len(L)], "": np.ones(1)}
-        along, held = element.powers(1.0, L[:, None]) / L[:, None], np.zeros((len(L), nb, nb))
+        along = element.powers(1.0, L[:, None]) / L[:, None]
+        if not straight:  # vectors of the plane as complex numbers
+            x, y = element.rigid(mesh).swapaxes(0, 1)
+            z = x + 1j * y
+            z[0] = mesh.p[0] + 1j * mesh.p[1]
+            z = z[:, mesh.t].swapaxes(0, 1).reshape(2 * n, -1).T
+            chord = z[:, n] - z[:, 0]
+        held = np.zeros((len(L), 2 * n, 2 * n), float if straight else complex)
         for mode in element.held:
             c = mode.weights * along
             k = self.alpha * mode.size * EI / per[mode.per] ** 2 * L
-            held += (k[:, None] * c)[:, :, None] * c[:, None]
-        out = np.zeros((len(L), nb, 2, nb, 2))
-        out[:, :, 0, :, 0] = out[:, :, 1, :, 1] = held
-        return out.reshape(len(L), 2 * nb, 2 * nb)
+            if not straight:
+                turned = np.sum(c * z, axis=1) / chord
+                c = c + 0j
+                c[:, 0] += turned
+                c[:, n] -= turned
+            held += (k[:, None] * c.conj())[:, :, None] * c[:, None]
+        out = np.empty((len(L), 2 * n, 2, 2 * n, 2))
+        out[:, :, 0, :, 0] = out[:, :, 1, :, 1] = held.real
+        out[:, :, 1, :, 0], out[:, :, 0, :, 1] = held.imag, -held.imag
+        return out.reshape(len(L), 4 * n, 4 * n)

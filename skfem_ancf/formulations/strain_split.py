@@ -42,7 +42,8 @@ class StrainSplit(EnhancedContinuum):
         eta, w = section
         # a : C : s + 1/2 a : C : a = 1/2 m : C : m - 1/2 (m - a) : C : (m - a), m the mean
         mean = (eta, w[None])
-        rest = (np.append(eta, 0.5), np.append(w, -1.0)[None])
+        places, of = np.unique(np.append(eta, 0.5), return_inverse=True)
+        rest = (places, np.bincount(of, np.append(w, -1.0))[None])
         return [Term(LinearLaw(uncoupled), axis, section),
                 Term(LinearLaw(coupling), axis, AXIS, section_samples=mean),
                 Term(LinearLaw(-coupling), axis, AXIS, section_samples=rest)]

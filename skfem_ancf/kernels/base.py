@@ -406,6 +406,8 @@ def with_constant(pairs: PairTables, constant: Array, elements: int) -> PairTabl
         As there, shape (0, 1 or elements, 2 nb, 2 nb).
     """
     nb = constant.shape[1] // 2
+    if not constant.size and not pairs.held.size and len(pairs.held_place) == elements:
+        return pairs
     held, held_skew, place = _held(_places(nb), constant, nb, elements)
     return pairs._replace(held=held, held_skew=held_skew, held_place=place)
 
@@ -429,15 +431,10 @@ def times_held(pack: Any, factor: float) -> dict[str, Any]:
 
 def _held(places, constant, nb, elements):
     """``held``, ``held_skew`` and ``held_place`` of PairTables."""
-    (a, b), (c, d) = places.lower, places.strictly
-    C = constant.reshape(-1, nb, 2, nb, 2)
-    x, y, cross = C[:, :, 0, :, 0], C[:, :, 1, :, 1], C[:, :, 0, :, 1]
-    held = np.empty((len(C), len(a), 3))
-    held[:, :, 0], held[:, :, 1] = x[:, a, b], y[:, a, b]
-    held[:, :, 2] = 0.5 * (cross[:, a, b] + cross[:, b, a])
-    held_skew = 0.5 * (cross[:, c, d] - cross[:, d, c])
-    return (packed(held.reshape(len(C), 3 * len(a)).T), packed(held_skew.T),
-            packed(np.arange(elements) * (len(C) > 1), np.int64))
+    C, (a, b), (c, d) = constant.reshape(-1, 4 * nb**2).T, places.held, places.held_skew
+    return (0.5 * (C.take(a, axis=0) + C.take(b, axis=0)),
+            0.5 * (C.take(c, axis=0) - C.take(d, axis=0)),
+            packed(np.arange(elements) * (len(constant) > 1), np.int64))
 
 
 def pair_numbers(pairs: Array) -> Array:
@@ -458,10 +455,15 @@ def _partners(content):
 
 
 class _Places(NamedTuple):
-    """The fields of :class:`PairTables` that depend on the number of local functions only."""
+    """The fields of :class:`PairTables` that depend on the number of local functions only.
+
+    ``held`` and ``held_skew`` say which two numbers of a stabilisation make each of those.
+    """
 
     lower: I2
     strictly: I2
+    held: I2
+    held_skew: I2
     entries: I2
     signs: F2
     ends: I1
@@ -475,7 +477,11 @@ def _places(nb):
     n_of, m_of = np.zeros((2, nb, nb), dtype=np.int64)
     n_of[a, b] = n_of[b, a] = np.arange(len(a))
     m_of[c, d] = m_of[d, c] = np.arange(len(c))
-    return _Places(packed([a, b], np.int64), packed([c, d], np.int64), *_entries(nb, n_of, m_of))
+    at = np.arange(4 * nb**2).reshape(nb, 2, nb, 2)
+    x, y = at[a, 0, b, 0], at[a, 1, b, 1]
+    held = [np.array([x, y, at[i, 0, j, 1]]).T.ravel() for i, j in ((a, b), (b, a))]
+    return _Places(packed([a, b], np.int64), packed([c, d], np.int64), np.array(held),
+                   np.array([at[c, 0, d, 1], at[d, 0, c, 1]]), *_entries(nb, n_of, m_of))
 
 
 def _entries(nb, n_of, m_of):
