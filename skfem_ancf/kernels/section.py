@@ -17,6 +17,7 @@ from scipy import sparse
 from ..frozen import Content
 from ..kept import twin_of
 from ..materials import LinearLaw
+from ..quadrature import product_rule
 from ..source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
 from ..types import Array
 from .base import (CARRY, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
@@ -421,7 +422,7 @@ def beam_gradients(mesh: "MeshBeam", element: "ElementBeam", X: Array,
     G = np.ascontiguousarray(slopes.transpose(1, 2, 3, 0))
     # the positions of both nodes together are a translation: exactly, or round-off resists it
     G[..., element.nodal_dofs] = -G[..., 0]
-    return G, np.ascontiguousarray(np.moveaxis(frame, 0, -1))
+    return G, frame.transpose(1, 2, 3, 0)
 
 
 class TermTables:
@@ -453,6 +454,7 @@ class TermTables:
     w: Array
     _rows: Any
     _interpolation: list[Array]
+    _sums: Any
 
     def __init__(self, across: "Across", slab: "Slab", term: "Term", constant: Array,
                  owner: Any, before: "TermTables | None" = None,
@@ -476,13 +478,15 @@ class TermTables:
                 rows[at] = _rows(mesh, across.element, at, tind)
             self._rows = rows[at]
         self._interpolation = before._interpolation if before is not None else _interpolation(term)
-        G, frame, samples, sheared, self._along, scaled = self._rows
-        self._sheared = np.concatenate(sheared)
+        G, frame, self._samples, scaled = self._rows
         weights = self.w if slab.grade is None else across.volume(
             slab, *term.quadrature, tind, whole, "grade")
+        law = law_tables(self.law, owner)
+        self._sums = before._sums if before is not None and before.law is self.law else _sums_of(
+            self._samples, law, self._interpolation, weights.shape[1])
         self.pack: SectionPack = section_pack(
-            G, frame, weights.T, samples, self._interpolation, law_tables(self.law, owner),
-            constant, mesh.t[0], before.pack if before is not None and (
+            G, frame, weights.T, self._samples, self._sums, law, constant, mesh.t[0],
+            before.pack if before is not None and (
                 before._mesh is mesh or not (before.shared or self.shared)) else None, scaled)
 
     def in_proportion(self, slab: "Slab", stiffness: float, volume: float) -> "TermTables":
@@ -518,7 +522,7 @@ class TermTables:
         other, pack, mesh = twin_of(self), self.pack, across.mesh
         *_, (unit, _, _, n) = self._rows
         G, frame, scaled = _scaled(mesh, across.element, unit, n, np.zeros(1, int))
-        other._rows = G, frame, *self._rows[2:5], scaled
+        other._rows = G, frame, self._samples, scaled
         before, other.slab = self._mesh, across.slabs[0]
         larger = mesh.height * mesh.lengths[0] / (before.height * before.lengths[0])
         other._mesh, other.w = mesh, larger * self.w
@@ -559,8 +563,8 @@ class TermTables:
         pack, u
             The tables, and the displacement, shape (N,).
         """
-        n = len(self._sheared) // 2
-        r = self._gradients(pack, u, self._sheared)
+        sheared = self._samples.sheared
+        n, r = len(sheared) // 2, self._gradients(pack, u, sheared)
         rx, ry = r[:n], r[n:]
         return rx[:, 0] * ry[:, 1] > rx[:, 1] * ry[:, 0]
 
@@ -574,7 +578,7 @@ class TermTables:
         u
             Displacement, shape (N,).
         """
-        rx = self._gradients(pack, u, self._along)
+        rx = self._gradients(pack, u, self._samples.along)
         return np.sqrt(np.min(np.sum(rx * rx, axis=1)))
 
 
@@ -588,23 +592,21 @@ def _same_places(a, b):
 
 
 def _rows(mesh, element, at, tind):
-    """Table and frame, g and h of each component's samples, and those of shear and of eps_xx.
+    """Table and frame, and the :class:`_Samples` that are of their rows.
 
     Of one table for all elements also that of an element of length and height 1, what multiplies
     its rows and columns, and how many of its rows are along the axis.
     """
-    points, xx, yy, xy = _samples(at)
-    rows = (xx, xx), (yy, yy), xy
+    samples = _samples(at)
     if mesh.is_straight and mesh.heights is None and element.by_reference:
-        G, frame, scaled = _scaled(mesh, element, element.unit_slopes(*points), points[0].shape[1],
-                                   slice(None) if tind is None else tind)
-        return G, frame, rows, xy, xx, scaled if len(G) == 1 else None
-    n, same = points[0].shape[1], np.array_equal(*points)
-    X = points[0] if same else np.concatenate(points, axis=1)
-    both = beam_gradients(mesh, element, X, tind)
-    G, frame = (np.concatenate([x[0][:, :n], x[1][:, X.shape[1] - points[1].shape[1]:]], axis=1)
-                for x in both)
-    return G, frame.transpose(1, 2, 0), rows, xy, xx, None
+        G, frame, scaled = _scaled(
+            mesh, element, element.unit_slopes(*(samples.X.take(k, axis=1) for k in samples.where)),
+            len(samples.where[0]), slice(None) if tind is None else tind)
+        return G, frame, samples, scaled if len(G) == 1 else None
+    G, frame = beam_gradients(mesh, element, samples.X, tind)
+    return (np.concatenate([x.take(k, axis=1) for x, k in zip(G, samples.where)], axis=1),
+            np.concatenate([x.transpose(1, 2, 0)[k] for x, k in zip(frame, samples.where)]),
+            samples, None)
 
 
 def _scaled(mesh, element, unit, n, tind):
@@ -618,19 +620,44 @@ def _scaled(mesh, element, unit, n, tind):
     return unit * (rows[:, :, None] * columns[:, None]), frame, (unit, rows[0], columns[0], n)
 
 
+class _Samples(NamedTuple):
+    """Where the strains of a term are sampled.
+
+    Attributes
+    ----------
+    X, where
+        Points (2, n), and which of them are those of the rows along the axis, and across it.
+    rows, factors, normal
+        As in :class:`SectionPack`, of two rows ``rows`` (2, samples).
+    along, sheared
+        The rows of eps_xx, and those of eps_xy, first all along, then all across.
+    """
+
+    X: Array
+    where: list[Array]
+    rows: Array
+    factors: Array
+    normal: int
+    along: Array
+    sheared: Array
+
+
 @lru_cache(64)
 def _samples(content):
-    """Points at which slopes along and across are sampled, and the rows of xx, yy, and of xy."""
+    """The _Samples of places along the axis of xx, yy and xy, and of places across."""
     at_xx, at_yy, at_xy, eta = content.arrays
-    xi_x, xi_y = (np.unique(np.concatenate([at, at_xy])) for at in (at_xx, at_yy))
-    points = [np.array([np.repeat(xi, len(eta)), np.tile(eta, len(xi))]) for xi in (xi_x, xi_y)]
+    along, across = (np.union1d(at, at_xy) for at in (at_xx, at_yy))
+    places, n, m = np.union1d(along, across), len(along) * len(eta), len(eta)
 
-    def where(at, xi):
-        return (np.searchsorted(xi, at)[:, None] * len(eta) + np.arange(len(eta))).ravel()
+    def rows(at, xi):
+        return (np.searchsorted(xi, at)[:, None] * m + np.arange(m)).ravel()
 
-    n = points[0].shape[1]
-    return (points, where(at_xx, xi_x), n + where(at_yy, xi_y),
-            (where(at_xy, xi_x), n + where(at_xy, xi_y)))
+    xx, yy, x, y = (rows(at_xx, along), n + rows(at_yy, across), rows(at_xy, along),
+                    n + rows(at_xy, across))
+    g, h = np.concatenate([xx, yy, x]), np.concatenate([xx, yy, y])
+    return _Samples(product_rule((places, places), (eta, eta))[0],
+                    [rows(along, places), rows(across, places)], np.array([g, h]),
+                    np.where(g == h, 0.5, 1.0), len(xx) + len(yy), xx, np.concatenate([x, y]))
 
 
 def _interpolation(term):
@@ -643,7 +670,7 @@ def _interpolation(term):
     return out
 
 
-def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[Array],
+def section_pack(G: Array, frame: Array, weights: Array, samples: _Samples, sums: Any,
                  law: LawTables, constant: Array, left: Array,
                  before: SectionPack | None = None, scaled: Any = None) -> SectionPack:
     """The SectionPack of one term.
@@ -652,10 +679,8 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
     ----------
     G, frame, weights
         Tables (1 or elements, rows, nb), (rows, 2, 1 or elements) and (points, 1 or elements).
-    rows
-        g and h of the samples of each of xx, yy, xy.
-    along
-        Their interpolation along the axis.
+    samples, sums
+        Where it is sampled, and what :func:`_sums_of` returns.
     law
         LawTables.
     constant
@@ -669,21 +694,17 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
         A table (rows, nb) whose rows and columns two vectors multiply to make G, and how many of
         its rows are along the axis; or None.
     """
-    nb, ne, ns = G.shape[2], len(left), weights.shape[0] // len(along[0])
-    (g, h), normal = (np.concatenate(part) for part in zip(*rows)), sum(len(x) for x, _ in rows[:2])
-    rows = np.array([g, h])
-    factors, linear = np.where(g == h, 0.5, 1.0), law.kind == LINEAR
-    content = Content(rows, law.D != 0.0 if linear else np.ones((3, 3), bool), *along)
-    terms, mixing, sizes = _terms(content, weights.shape[0])
-    keep, moduli = np.ones(terms.shape[1], bool), np.zeros((terms.shape[1], 1))
+    nb, ne, linear = G.shape[2], len(left), law.kind == LINEAR
+    content, mixing, joined, ends = sums
+    n = mixing.shape[0] // 2
+    keep, moduli = np.ones(n, bool), np.zeros((n, 1))
     if linear:
         D = (law.D.reshape(9, 1, 1) * weights).reshape(-1, weights.shape[1])
-        moduli = mixing @ D
-        keep = np.any(np.abs(moduli) > 1e-14 * (sizes @ np.abs(D)), axis=1)  # else orthogonal
-    layout = _layout(content, weights.shape[0], Content(keep), linear)
+        moduli, sizes = (mixing @ np.concatenate([D, np.abs(D)])).reshape(2, n, -1)
+        keep = np.any(np.abs(moduli) > 1e-14 * sizes, axis=1)  # else orthogonal
+    layout, shared = _layout(content, len(weights), Content(keep), linear), len(G) == 1
     if linear:
         moduli = moduli[layout.order]
-    shared, (joined, ends) = len(G) == 1, _joined(content, ns)
     if before is not None and before.rows is layout.rows:
         pairs = with_constant(before.pairs, constant, ne)
     elif scaled is not None:
@@ -694,10 +715,21 @@ def section_pack(G: Array, frame: Array, weights: Array, rows: Any, along: list[
     return SectionPack(
         packed(G), packed(G.transpose(0, 2, 1)[:int(shared)]), packed(frame),
         packed(weights), np.zeros(ne, np.int64) if shared else np.arange(ne, dtype=np.int64),
-        layout.rows, factors, int(normal), joined, ends, law,
+        layout.rows, samples.factors, samples.normal, joined, ends, law,
         packed(constant), left.astype(np.int64) * nb, np.arange(2 * nb, dtype=np.int64),
         pairs, layout.terms, layout.rounds, packed(moduli), layout.mixing, layout.parts,
         layout.mixing_rounds)
+
+
+def _sums_of(samples, law, along, points):
+    """What of a term depends on samples, interpolations and which strains its law couples only.
+
+    A key, how moduli come from those at the points and below it its absolute values, and what
+    :func:`_joined` returns.
+    """
+    coupled = law.D != 0.0 if law.kind == LINEAR else np.ones((3, 3), bool)
+    content = Content(samples.rows, coupled, *along)
+    return content, _terms(content, points)[2], *_joined(content, points // len(along[0]))
 
 
 def side_by_side(pack: SectionPack, members: int, N: int) -> SectionPack:
@@ -799,7 +831,7 @@ def _terms(content, points):
     mixing : sparse matrix
         Moduli of the terms from ``w D`` at the points, shape (n, 9 points): (c, d) of D first.
     sizes : sparse matrix
-        Its absolute values.
+        It, and below it its absolute values, of w D and of the absolute values of that.
     """
     rows, coupled, *along = content.arrays
     factors, ns = np.where(rows[0] == rows[1], 0.5, 1.0), points // len(along[0])
@@ -822,7 +854,7 @@ def _terms(content, points):
     terms, of = np.unique(terms, axis=1, return_inverse=True)
     mixing = sparse.csr_matrix((value, (of.ravel(), column_of)),
                                shape=(terms.shape[1], 9 * points))
-    return terms, mixing, abs(mixing)
+    return terms, mixing, sparse.block_diag([mixing, abs(mixing)], format="csr")
 
 
 def _viscous(pack, time, none):
@@ -944,7 +976,7 @@ class Kernel(Chain):
         if not (mine.simple and mine.uniform and across.simple and across.uniform and self.linear
                 and mine.slabs[0].width == across.slabs[0].width
                 and np.array_equal(mine.mesh.t, across.mesh.t)
-                and all(table._rows[5] is not None for table in self.tables)):
+                and all(table._rows[3] is not None for table in self.tables)):
             return Kernel(across, formulation, self, same_law=True)
         other = twin_of(self)
         other._across, other.t = across, across.mesh.t
