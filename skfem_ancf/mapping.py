@@ -156,14 +156,16 @@ def _functions(orders, X):
 
 
 @lru_cache(256)
-def _kept_functions(orders, content):
+def _kept_functions(orders, powers, content):
     """Those as one matrix, by which axis and director of an element are multiplied, one behind the
-    other, for the three."""
-    slopes, *of_director = _functions(orders, *content.arrays)
-    out = np.zeros((2 * sum(orders), 3, slopes.shape[1]), slopes.dtype)
-    out[:len(slopes), 0] = slopes
-    out[len(slopes):, 1], out[len(slopes):, 2] = of_director
-    return read_only(out.reshape(len(out), -1))
+    other, for the three; of the director times as many powers of xi, of a height."""
+    X, = content.arrays
+    slopes, across, turning = (f[:, None] for f in _functions(orders, X))
+    power, rate = np.split(_kept_powers(Content(X[0]))[:powers], 2, axis=1)
+    axis = np.append(slopes, np.zeros((len(slopes), 2, X.shape[1])), axis=1)
+    director = np.stack([0.0 * across * power, across * power,
+                         turning * power + (X[1] - 0.5) * across * rate], axis=2)
+    return read_only(np.append(axis.ravel(), director).reshape(-1, 3 * X.shape[1]))
 
 
 @lru_cache(256)
@@ -226,8 +228,11 @@ class MappingBeam(Mapping):
 
     @cached_property
     def _matrices(self):
-        """Both in one matrix for each element, (2, ne, n)."""
-        return np.concatenate(self._all_coefficients, axis=1).transpose(0, 2, 1)
+        """Both in one matrix for each element, (2, ne, n), directors times heights."""
+        axis, director = self._all_coefficients
+        if self.mesh.heights is not None:
+            director = (director[:, :, None] * self._heights).reshape(2, -1, director.shape[-1])
+        return np.concatenate([axis, director], axis=1).transpose(0, 2, 1)
 
     @property
     def _orders(self):
@@ -405,20 +410,20 @@ class MappingBeam(Mapping):
 
     def _derivatives(self, X, tind):
         """Derivatives of :meth:`F` by xi and eta, and of the axis by xi, (2, ne, np) each."""
-        xi, eta = X
         if few(X):
             of = self._matrices if tind is None else self._matrices[:, tind]
-            found = of @ _kept_functions(self._orders, Content(X))
+            found = of @ _kept_functions(
+                self._orders, 1 if self.mesh.heights is None else 4, Content(X))
             along, across, turning = found.reshape(*of.shape[:2], 3, X.shape[1]).transpose(
                 2, 0, 1, 3)
-        else:
-            axis, director = self._coefficients(tind)
-            slopes, functions, turned = _functions(self._orders, X)
-            along, across = self._sum(axis, slopes), self._sum(director, functions)
-            turning = self._sum(director, turned)
+            return along + turning, across, along
+        axis, director = self._coefficients(tind)
+        slopes, functions, turned = _functions(self._orders, X)
+        along, across = self._sum(axis, slopes), self._sum(director, functions)
+        turning = self._sum(director, turned)
         if self.mesh.heights is not None:
-            g, rate = self._relative(xi, tind)
-            turning, across = g * turning + (eta - 0.5) * rate * across, g * across
+            g, rate = self._relative(X[0], tind)
+            turning, across = g * turning + (X[1] - 0.5) * rate * across, g * across
         return along + turning, across, along
 
     def detDF(self, X: Array, tind: Array | None = None) -> Array:

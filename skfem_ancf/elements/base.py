@@ -390,7 +390,7 @@ class ElementBeam(Frozen, Element):
     def _scale(mesh: MeshBeam, slope: Array, tind: Array | None) -> Array:
         """The lengths of elements to the powers of local functions, shape (n, nelements)."""
         lengths = mesh.lengths if tind is None else mesh.lengths[tind]
-        return np.array([lengths**k for k in range(slope.max(initial=0) + 1)])[slope]
+        return lengths ** slope[:, None]
 
     def slopes(self, mapping: MappingBeam, X: Array, tind: Array | None = None
                ) -> tuple[Array, Array]:
@@ -532,9 +532,9 @@ class ElementBeam(Frozen, Element):
         known = {(1, 0): mesh.p_X, (0, 1): mesh.p_Y}
         if mesh.p_XY is not None:
             known[1, 1] = mesh.p_XY
-        if mesh.p_XY is not None and not mesh.is_straight:
-            more = dict(enumerate(nodal_derivatives(
-                mesh, max(2, self._along[0] - 1, self._along[1]))[2:], 2))
+        most = max(self._along[0] - 1, self._along[1])
+        if most > 1 and mesh.p_XY is not None and not mesh.is_straight:
+            more = dict(enumerate(nodal_derivatives(mesh, most)[2:], 2))
             known |= {(k, 0): d for k, d in more.items()}
             known |= {(k - 1, 1): turned(d) for k, d in more.items() if k > 2}
         out = np.zeros((self.nodal_dofs, *mesh.p.shape))
@@ -611,8 +611,13 @@ def _kept_functions(along: tuple[int, int], functionals: Functionals, section: S
 
 
 def _powers(h: float | Array, power: Array) -> Array:
-    """h to several powers, each found once: shape (n,) + h.shape."""
-    return np.array([h**k for k in range(power.max(initial=0) + 1)])[power]
+    """h to several powers, shape (n,) + h.shape; of an array each found once."""
+    if not isinstance(h, np.ndarray):
+        return h**power
+    found = np.ones((power.max(initial=0) + 1, *h.shape), h.dtype)
+    for k in range(1, len(found)):
+        np.multiply(found[k - 1], h, out=found[k])
+    return found.take(power, axis=0)
 
 
 def _unit_functions(along: tuple[int, int], factors: Array, section: SectionFunctions,
