@@ -80,6 +80,21 @@ def test_derivative(mesh):
         assert_allclose(f(each, subset), whole[..., subset, :], atol=1e-13)
 
 
+@pytest.mark.parametrize("height", [0.02, lambda s: 0.02 + 0.01 * s - 0.005 * s**3])
+@pytest.mark.parametrize("sections", ["linear", "cubic", "septic"])
+def test_few_points_of_all_elements_are_asked_for_as_many(sections, height):
+    mesh = MeshBeam.init_curve(lambda s: np.array([np.sin(s), 1.0 - np.cos(s)]),
+                               np.linspace(0.0, 1.0, 4), height).with_sections(sections)
+    mapping, some = mesh.mapping(), np.array([2, 0])
+    every = np.repeat(POINTS[:, None], mesh.nelements, axis=1)
+    for name in ("DF", "detDF", "frame"):
+        one, other = getattr(mapping, name)(POINTS), getattr(mapping, name)(every)
+        assert_allclose(one, other, rtol=1e-13, atol=1e-15)
+        assert_allclose(getattr(mapping, name)(POINTS, some), other[..., some, :], rtol=1e-13,
+                        atol=1e-15)
+
+
+
 def test_area_is_that_inside_the_boundary(mesh):
     """The integral of detDF against half the integral of x . n over the boundary."""
     mapping, (x, w) = mesh.mapping(), GAUSS

@@ -627,11 +627,15 @@ def test_on_another_mesh_only_what_depends_on_it_is_made(monkeypatch, shape):
 
     first, larger = scene(mesh(1.0)), mesh(1.1)
     first.solve_static()
-    terms, pairs, geometry = (counted(monkeypatch, owner, name) for owner, name in (
-        (Assumed, "terms"), (section, "pair_tables"), (MappingBeam, "_derivatives")))
+    terms, pairs, sums, geometry, heights = (
+        counted(monkeypatch, owner, name) for owner, name in (
+            (Assumed, "terms"), (section, "pair_tables"), (section, "_sums_of"),
+            (MappingBeam, "_derivatives"), (MappingBeam, "_relative")))
     other = first.replace(mesh=larger)
-    assert not terms and not pairs
+    assert not terms and not pairs and not sums
     assert len(geometry) == 3  # of the strains' samples, of their volumes, of the masses
+    # of local functions of samples and masses, and of the middles; maps have theirs multiplied
+    assert len(heights) == (3 if shape == "taper" else 0)
     a, b = other.solve_static(), scene(larger).solve_static()
     assert a.iterations == b.iterations and np.allclose(a.u, b.u, rtol=0, atol=1e-10)
     for one, two in zip(other.beams[0].kernel.packs, scene(larger).beams[0].kernel.packs):

@@ -431,7 +431,8 @@ def times_held(pack: Any, factor: float) -> dict[str, Any]:
 
 def _held(places, constant, nb, elements):
     """``held``, ``held_skew`` and ``held_place`` of PairTables."""
-    C, (a, b), (c, d) = constant.reshape(-1, 4 * nb**2).T, places.held, places.held_skew
+    C = np.ascontiguousarray(constant.reshape(-1, 4 * nb**2).T)
+    (a, b), (c, d) = places.held, places.held_skew
     return (0.5 * (C.take(a, axis=0) + C.take(b, axis=0)),
             0.5 * (C.take(c, axis=0) - C.take(d, axis=0)),
             packed(np.arange(elements) * (len(constant) > 1), np.int64))
