@@ -18,7 +18,7 @@ from skfem_ancf import system
 from skfem_ancf.band import Band
 from skfem_ancf.body import Body
 from skfem_ancf.dynamics import (HHT, SCHEMES, EnergyMomentum, Gauss, GeneralizedAlpha, Newmark,
-                                 get_scheme)
+                                 base, get_scheme)
 from skfem_ancf.dynamics.history import History
 from skfem_ancf.dynamics.integrator import Integrator
 from skfem_ancf.dynamics.rates import JointMotion
@@ -675,7 +675,7 @@ def test_instants_beside_the_ends_of_steps(scheme, monkeypatch):
     scene, made = smooth_scene(), []
     every, at = scene.integrate(0.3, 0.01, scheme=scheme), np.array([0.02, 0.15, 0.3])
     monkeypatch.setattr("skfem_ancf.dynamics.run.Run._first_pace", lambda self: 1000)
-    for name in ("collocation", "integrator"):
+    for name in ("base", "integrator"):
         module = import_module(f"skfem_ancf.dynamics.{name}")
         motion = module.Motion
         monkeypatch.setattr(module, "Motion", lambda *args, motion=motion, **given: (
@@ -689,6 +689,24 @@ def test_instants_beside_the_ends_of_steps(scheme, monkeypatch):
         near = 1e-13 + 0.01 * abs(shift) * np.abs(every.v).max()
         assert_allclose(some.u, every.u[n] + shift * every.v[n], rtol=0, atol=near)
         assert shift or made == [0.0, *t]
+
+
+@pytest.mark.parametrize("scheme", ["radau", "generalized-alpha", "energy-momentum"])
+def test_stored_blocks_are_what_their_steps_were(scheme, monkeypatch):
+    """All instants are stored as arrays of whole blocks, without a Motion for each."""
+    monkeypatch.setattr("skfem_ancf.dynamics.run.Run._first_pace", lambda self: 7)
+    scene, made, motion = smooth_scene(), [], base.Motion
+    monkeypatch.setattr(base, "Motion", lambda *args: made.append(args[0]) or motion(*args))
+    every = scene.integrate(0.3, 0.01, scheme=scheme)
+    assert len(made) <= 5 and len(every) == 31 and every.t[-1] == 0.3
+    asked = scene.integrate(0.3, 0.01, scheme=scheme, t_eval=every.t)
+    for k in (0, 1, 6, 7, 8, 20, 29, 30, -1):
+        one, other = every.state(k)._motion, asked.state(k)._motion
+        for name in History.COLUMNS:
+            assert np.array_equal(getattr(one, name), getattr(other, name)), name
+        assert (one.memory or {}).keys() == (other.memory or {}).keys()
+        for name, value in (one.memory or {}).items():
+            assert np.array_equal(value, other.memory[name])
 
 
 @pytest.mark.parametrize("options", [{"dt": 1e-3}, {"dt": "auto"}])

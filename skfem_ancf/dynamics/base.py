@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from ..system import System
     from ..types import Array
     from .integrator import Integrator
@@ -86,6 +85,91 @@ def kept(y: Motion, contacts: Array | None, **others: Array) -> dict[str, Array]
     """
     contacts = contacts_of(y) if contacts is None else contacts
     return ({"contacts": contacts} if contacts is not None else {}) | others or None
+
+
+class Memories(Sequence):
+    """What is kept after each of some steps, made for those that are asked for.
+
+    Parameters
+    ----------
+    y, n
+        The Motion before them, and their number.
+    contacts
+        What points remember after each, shape (n, k); None if steps leave nothing behind.
+    **others
+        What else is kept, arrays of shape (n, ...).
+    """
+
+    def __init__(self, y: Motion, n: int, contacts: Array | None, **others: Array) -> None:
+        self._n, self._start, self._arrays = n, contacts_of(y), others
+        if contacts is not None:
+            self._start, self._arrays = None, {"contacts": contacts, **others}
+
+    def __len__(self):
+        return self._n
+
+    def __getitem__(self, k):
+        if not 0 <= k < self._n:  # arrays may have more
+            raise IndexError(k)
+        found = {name: x[k].copy() for name, x in self._arrays.items()}
+        return (found if self._start is None else {"contacts": self._start, **found}) or None
+
+
+@dataclass
+class Steps:
+    """Motions after steps of one size that were taken together.
+
+    Attributes
+    ----------
+    start, dt, first
+        Steps end at the times ``start + dt (first + 1)``, ``start + dt (first + 2)`` and so on.
+    rows
+        Displacement, velocity and acceleration after each, and the scheme's own acceleration where
+        it has one, shape (n, 3, N) or (n, 4, N).
+    shares
+        The multipliers, and those where the step took them if that is not at its end, shape (n, 1,
+        m) or (n, 2, m).
+    dissipated
+        The work of damping so far, shape (n,).
+    memories
+        What is kept after each, as :attr:`Motion.memory`.
+    end
+        The time after the last, where round-off makes it another.
+    """
+
+    start: float
+    dt: float
+    first: int
+    rows: Array
+    shares: Array
+    dissipated: Array
+    memories: Sequence[dict[str, Array] | None]
+    end: float | None = None
+
+    def __len__(self):
+        return len(self.memories)
+
+    def __getitem__(self, k: int) -> Motion:
+        """That after the step k, counted from 0, of arrays of its own: it keeps no other."""
+        memory = self.memories[k]
+        t = self.start + self.dt * (self.first + k + 1)
+        if self.end is not None and k + 1 == len(self):
+            t = self.end
+        u, v, *rates = self.rows[k].copy()
+        forces = self.shares[k].copy()
+        return Motion(t, u, v, rates[0], rates[-1], forces[0], forces[-1], self.dt, memory,
+                      float(self.dissipated[k]))
+
+    def columns(self) -> tuple[Array, ...]:
+        """All but memories as arrays, in the order of a Motion: shapes (n,), (n, N) or (n, m)."""
+        n = len(self)
+        t = self.start + self.dt * np.arange(self.first + 1, self.first + n + 1)
+        if self.end is not None:
+            t[-1:] = self.end
+        u, v, *rates = self.rows[:n].swapaxes(0, 1)
+        forces = self.shares[:n].swapaxes(0, 1)
+        return (t, u, v, rates[0], rates[-1], forces[0], forces[-1], np.full(n, self.dt),
+                self.dissipated[:n])
 
 
 class Scheme:
@@ -170,7 +254,7 @@ class Scheme:
 
     def run(self, integrator: Integrator, y: Motion, dt: float, n: int,
             start: float | None = None, first: int = 0,
-            block: tuple[int, int] | None = None) -> tuple[int, Callable[[int], Motion]]:
+            block: tuple[int, int] | None = None) -> Steps:
         """Up to n steps: as :meth:`skfem_ancf.dynamics.integrator.Integrator.run`.
 
         Parameters

@@ -11,15 +11,13 @@ from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 from ..band import factorize, fix, solve
 from ..body import gradients_size
 from ..errors import InputError
-from .base import Motion, Scheme, contacts_of, kept
+from .base import Memories, Motion, Scheme, Steps, contacts_of
 from .differences import derivative, difference_row, grown
 from .integrator import StepFailed
 from .rates import JointMotions
 from .stages import Interval, Method, collocate, room_for_points, solve_for
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from ..system import System
     from ..types import Array
     from .integrator import Integrator
@@ -196,14 +194,14 @@ class Collocation(Scheme):
         return True
 
     def step(self, integrator: Integrator, y: Motion, dt: float) -> Motion:
-        done, motion = self.run(integrator, y, dt, 1)
-        if not done:
+        taken = self.run(integrator, y, dt, 1)
+        if not taken:
             raise StepFailed(integrator.failure)
-        return motion(0)
+        return taken[0]
 
     def run(self, integrator: Integrator, y: Motion, dt: float, n: int,
             start: float | None = None, first: int = 0,
-            block: tuple[int, int] | None = None) -> tuple[int, Callable[[int], Motion]]:
+            block: tuple[int, int] | None = None) -> Steps:
         s, table = integrator.system, self._table
         method, w = table.method, self._room(integrator, table)
         begun, contacts = y.t if start is None else start, s.forces.contacts
@@ -216,25 +214,17 @@ class Collocation(Scheme):
             w.U[:], w.before[:], w.first[:] = (y.memory[k] for k in ("stages", "start", "forces"))
             ahead = method.ahead if dt == y.before else table.ahead(dt / y.before)
             given = given._replace(begun=1, ahead=ahead)
-        rows, stages = np.empty((n, 3, s.N)), np.empty((n, len(method.points), s.N))
+        rows, stages = np.empty((n + 1, 3, s.N)), np.empty((n, len(method.points), s.N))
+        rows[0, 0], rows[0, 1] = y.u, y.v
         forces = np.empty((n, len(method.points) + 1, s.m))
         memories = np.empty((n, 1 + (contacts.tables.memory.size if contacts.lasting else 0)))
         with contacts.lent(contacts_of(y)):
             done = integrator.call(collocate, y, dt, integrator.rule, given, w, integrator.state,
-                                   memories, rows, stages, forces)
+                                   memories, rows[1:], stages, forces)
 
-        def motion(k: int) -> Motion:
-            """After step k, counted from 0."""
-            # copies, so that one instant does not keep the block
-            u, v, a = rows[k].copy()
-            before = rows[k - 1, :2].copy() if k else np.array([y.u, y.v])
-            shares = forces[k].copy()
-            memory = kept(y, memories[k, 1:].copy() if contacts.lasting else None,
-                          stages=stages[k].copy(), start=before, forces=shares[:-1])
-            return Motion(begun + dt * (first + k + 1), u, v, a, a, shares[-1], None, dt,
-                          memory, float(memories[k, 0]))
-
-        return done, motion
+        memory = Memories(y, done, memories[:, 1:] if contacts.lasting else None,
+                          stages=stages, start=rows[:, :2], forces=forces[:, :-1])
+        return Steps(begun, dt, first, rows[1:], forces[:, -1:], memories[:, 0], memory)
 
     def _room(self, integrator, table):
         """Work arrays, in which factors are kept from step to step."""

@@ -112,19 +112,22 @@ class Companion:
         """n steps: displacements after every second one, shape (n / 2, N)."""
         start, h, done, found = self.y.t, 0.5 * self._dt, 0, []
         while done < n:
-            steps = self._some(start, h, done, n)
-            found += [y.u for k, y in enumerate(steps, done + 1) if k % 2 == 0]
-            done, self.y = done + len(steps), steps[-1]
-        return np.array(found)
+            u, self.y = self._some(start, h, done, n)
+            done += len(u)
+            found.append(u)
+        return np.concatenate(found)[1::2]
 
     def _some(self, start, h, done, n):
-        """The ends of the next steps; of one, cut if need be, where there are no blocks."""
+        """Displacements after the next steps, and the Motion after them.
+
+        Where there are no blocks that is one step, cut if need be.
+        """
         if self.scheme.in_blocks(self.system):
-            count, motion = self.scheme.run(self.integrator, self.y, h, n - done, start, done,
-                                            (0, n))
-            if count:
-                return [motion(k) for k in range(count)]
-        return [self.integrator.step(self.y, h)]
+            taken = self.scheme.run(self.integrator, self.y, h, n - done, start, done, (0, n))
+            if taken:
+                return taken.rows[:len(taken), 0], taken[len(taken) - 1]
+        y = self.integrator.step(self.y, h)
+        return y.u[None], y
 
 
 __all__ = ["Companion"]

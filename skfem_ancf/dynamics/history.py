@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import chain
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +25,9 @@ if TYPE_CHECKING:
     from ..resultants import Resultants
     from ..system import System
     from ..types import Array, StrPath, WhichBeam, WhichMember
-    from .base import Scheme
+    from .base import Scheme, Steps
+
+    Columns = tuple[Array, ...]
 
 #: What is stored of a Motion.
 COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before",
@@ -91,29 +94,51 @@ class History:
     multipliers: Array
     dissipated: Array
     _others: tuple[Array, ...]
-    _memories: list[Any]
+    _memories: list[Sequence[Any]]
 
     def __init__(self, system: System, scheme: Scheme, run: Any) -> None:
         self.system, self.scheme, self._run = system, scheme, run
-        self._rows: list[Motion] = []
+        self._rows: list[Motion] = []  # behind those of the blocks
+        self._blocks: list[tuple[Columns, Sequence[Any]]] = []
         self._kept: Any = None
 
     def append(self, y: Motion) -> None:
         """Store an instant."""
         self._rows.append(y)
 
+    def extend(self, taken: Steps) -> None:
+        """Store the instants after some steps."""
+        if self._rows:
+            self._blocks, self._rows = self._stored(), []
+        self._blocks.append((taken.columns(), taken.memories))
+
+    def _stored(self):
+        """All of it in blocks: columns in their order, and memories."""
+        if not self._rows:
+            return self._blocks
+        columns = tuple(map(np.array, zip(*map(_COLUMNS_OF, self._rows))))
+        return [*self._blocks, (columns, [y.memory for y in self._rows])]
+
+    def _end(self):
+        """The time of the last instant that is stored; -inf before the first."""
+        if self._rows:
+            return self._rows[-1].t
+        return self._blocks[-1][0][0][-1] if self._blocks else -np.inf
+
     def end(self, y: Motion) -> None:
         """Store the last instant, if it is not stored."""
-        if not self._rows or self._rows[-1].t < y.t:
+        if self._end() < y.t:
             self._rows.append(y)
 
     def columns(self) -> dict[str, Array]:
         """What was stored, as arrays by their names in :attr:`COLUMNS`."""
-        if not self._rows:
+        stored = self._stored()
+        if not stored:
             N, m = self.system.N, self.system.m
             sizes = {"t": (), "before": (), "dissipated": (), "multipliers": (m,), "force": (m,)}
             return {name: np.zeros((0, *sizes.get(name, (N,)))) for name in self.COLUMNS}
-        return dict(zip(self.COLUMNS, map(np.array, zip(*map(_COLUMNS_OF, self._rows)))))
+        columns = zip(*(columns for columns, _ in stored))
+        return dict(zip(self.COLUMNS, map(np.concatenate, columns)))
 
     def restore(self, columns: dict[str, Array], memories: Sequence[Any]) -> None:
         """Fill an empty History with what :meth:`columns` gave.
@@ -125,22 +150,18 @@ class History:
         memories
             What the scheme kept at each instant, :attr:`memories`.
         """
-        rows = zip(*(columns[name] for name in self.COLUMNS))
-        for (t, *arrays, before, dissipated), memory in zip(rows, memories):
-            u, v, acceleration, algorithmic, multipliers, force = arrays
-            self._rows.append(Motion(float(t), u, v, acceleration, algorithmic, multipliers, force,
-                                     float(before), memory, float(dissipated)))
+        self._blocks.append((tuple(columns[name] for name in self.COLUMNS), memories))
 
     @property
     def memories(self) -> list[Any]:
         """What the scheme itself kept at each instant."""
-        return [y.memory for y in self._rows]
+        return [memory for _, memories in self._stored() for memory in memories]
 
     def close(self) -> History:
         """Nothing more comes: what was stored are arrays from now on."""
         run = self._run
         self.event, self.sensors = run.event, run.recorder.readings()
-        if self._rows and run.y is not None and self._rows[-1].t == run.y.t:
+        if run.y is not None and self._end() == run.y.t:
             self._kept = run.remember()  # of the last instant: the factors too
         self.steps, self.rejected = run.steps, run.rejected
         self.error, self.passes = run.error, 1
@@ -155,11 +176,11 @@ class History:
         made = vars(self)
         if name not in _LATE or made.get("_run", self) is not None:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        columns, memories = self.columns(), self.memories
+        columns, memories = self.columns(), [some for _, some in self._stored()]
         if name not in made:  # another thread may have made them
             made["_others"] = tuple([columns.pop(x) for x in ("algorithmic", "force", "before")])
             made.update(columns, _memories=memories)
-            self._rows = []
+            self._blocks, self._rows = [], []
         return made[name]
 
     def __len__(self):
@@ -182,9 +203,15 @@ class History:
         k = require_index("k", k, len(self))
         algorithmic, force, before = (x[k] for x in self._others)
         motion = Motion(float(self.t[k]), self.u[k], self.v[k], self.acceleration[k], algorithmic,
-                        self.multipliers[k], force, float(before), self._memories[k],
+                        self.multipliers[k], force, float(before), self._memory(k),
                         float(self.dissipated[k]))
         return self.instant(motion, self._kept if k == len(self) - 1 else None)
+
+    def _memory(self, k):
+        for memories in self._memories:
+            if k < len(memories):
+                return memories[k]
+            k -= len(memories)
 
     def instant(self, motion: Motion, kept: Any = None) -> State:
         """A Motion of this system as a State.
@@ -391,7 +418,7 @@ class History:
     def strain_energy(self) -> Array:
         """Strain energy, with the potential of force elements, shape (nt,)."""
         system, out = self.system, []
-        for u, t, memory in zip(self.u, self.t, self._memories):
+        for u, t, memory in zip(self.u, self.t, chain.from_iterable(self._memories)):
             with system.forces.contacts.lent((memory or {}).get("contacts")):
                 out.append(system.strain_energy(u, t))
         return np.array(out)

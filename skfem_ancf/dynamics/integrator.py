@@ -12,7 +12,7 @@ from ..eliminated import Eliminated, EliminatedMass
 from ..errors import AncfError, InputError, SupportError, require_positive, shown
 from ..kept import cached_property, twin_of
 from ..own import handle_of
-from .base import Motion, contacts_of, in_steps, kept, same_scheme
+from .base import Memories, Motion, Steps, contacts_of, in_steps, kept, same_scheme
 from .course import Courses
 from .rates import rates
 from .dampers import Dampers, Rows, solve_rows
@@ -280,7 +280,7 @@ class Integrator:
     # steps
 
     def run(self, y: Motion, dt: float, n: int, start: float | None = None, first: int = 0,
-            block: tuple[int, int] | None = None) -> tuple[int, Callable[[int], Motion]]:
+            block: tuple[int, int] | None = None) -> Steps:
         """Up to ``n`` steps from the Motion ``y``; fewer where one fails.
 
         Parameters
@@ -295,11 +295,11 @@ class Integrator:
 
         Returns
         -------
-        The number of steps done, and a function that gives the Motion after each.
+        Those that were done.
         """
         s, contacts = self.system, self.system.forces.contacts
-        course = self._courses.of(y.t if start is None else start, dt, first, n,
-                                  (first, first + n) if block is None else block, self.limit)
+        begun, block = y.t if start is None else start, block or (first, first + n)
+        course = self._courses.of(begun, dt, first, n, block, self.limit)
         if self._nodes:
             self._nodes[1].lag = 0.5 * dt if self.scheme.conserving else 0.0
         rows, multiplier_rows, works = np.empty((n, 4, s.N)), np.empty((n, 2, s.m)), np.empty(n)
@@ -311,14 +311,8 @@ class Integrator:
             done = self.call(steps, y, dt, self.rule, course, self._state, work, memories, rows,
                              multiplier_rows, works)
 
-        def motion(k):
-            """After step k, counted from 0."""
-            memory = kept(y, memories[k] if contacts.lasting else None)
-            # copies, so that one instant does not keep the block
-            return Motion(float(course.times[k, 0]), *rows[k].copy(), *multiplier_rows[k].copy(),
-                          dt, memory, float(works[k]))
-
-        return done, motion
+        memory = Memories(y, done, memories if contacts.lasting else None)
+        return Steps(begun, dt, first, rows, multiplier_rows, works, memory)
 
     def call(self, text: Callable, y: Motion, dt: float, *args: Any) -> int:
         """Take steps by a text of equations, matrices and others.
@@ -381,10 +375,10 @@ class Integrator:
         y, dt
             Where the motion is, and the size of the step.
         """
-        done, motion = self.run(y, dt, 1)
-        if not done:
+        taken = self.run(y, dt, 1)
+        if not taken:
             raise StepFailed(self.failure)
-        return motion(0)
+        return taken[0]
 
     def step(self, y: Motion, dt: float, depth: int = 0) -> Motion:
         """One step, in two halves where it does not converge; raises StepFailed.

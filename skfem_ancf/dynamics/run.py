@@ -252,9 +252,9 @@ class Run:
             return
         old = self.y
         if self._in_blocks and self.until is None and self.n < self._whole:
-            done, motion = self._block(old)
-            if done:
-                self._store_block(old, done, motion)
+            taken = self._block()
+            if taken:
+                self._store_block(taken)
                 return
         h = self._end - old.t
         if self.n < self._count - 1 or abs(h - self.size) < 1e-9 * self.size:
@@ -263,7 +263,7 @@ class Run:
         new.t = self._time(self.n + 1)
         self._commit(old, new)
 
-    def _block(self, y):
+    def _block(self):
         """A block of steps of one size, at most as many as take :data:`SHOWN`."""
         size = self.integrator.longest
         first = self.n - self.n % size
@@ -273,14 +273,16 @@ class Run:
             number = min(number, self.longest - self.n % self.longest)
         begun = perf_counter()
         try:
-            done, motion = self.scheme.run(self.integrator, y, self.size, number, self._begun,
-                                           self.n, block)
+            taken = self.scheme.run(self.integrator, self.y, self.size, number, self._begun,
+                                    self.n, block)
         except AncfError:  # of a function of the caller's: go on as far as it goes
             self._in_blocks = False
-            return 0, None
+            return None
         took = perf_counter() - begun
         self._pace = max(1, min(size, 4 * number, int(SHOWN * number / took)))
-        return done, motion
+        if self.n + len(taken) == self._count:
+            taken.end = self._end
+        return taken
 
     def _time(self, n):
         """Time after n steps of the segment."""
@@ -379,27 +381,21 @@ class Run:
         if self.event is not None:
             self.history.end(new)
 
-    def _store_block(self, y, done, motion):
-        """The same for a block of steps, of which only those that hold a time to store are made."""
-        first, k, last = self.n, -1, y
-
-        def instant(k):
-            if k < 0:
-                return y
-            new = motion(k)
-            new.t = self._time(first + k + 1)
-            return new
-
+    def _store_block(self, taken):
+        """The same for steps taken together; those are made that hold a time to store."""
+        first, k, last, done = self.n, -1, self.y, len(taken)
         if self.recorder.sensors:
-            self.recorder.record([instant(k) for k in range(done)])
+            self.recorder.record(list(taken))
+        if self.task.t_eval is None:
+            self.history.extend(taken)
+            k, last = done - 1, taken[done - 1]
         while k < done - 1:
             old, k = k, k + 1
-            if self.task.t_eval is not None:
-                wanted = self._wanted()
-                until = (wanted - self._begun) / self.size - 1 - first if wanted < np.inf else done
-                k = min(max(k, ceil(until - NEARLY)), done - 1)
-            begin = partial(instant, k - 1) if k > old + 1 else partial(_same, last)
-            last = instant(k)
+            wanted = self._wanted()
+            until = (wanted - self._begun) / self.size - 1 - first if wanted < np.inf else done
+            k = min(max(k, ceil(until - NEARLY)), done - 1)
+            begin = partial(taken.__getitem__, k - 1) if k > old + 1 else partial(_same, last)
+            last = taken[k]
             self._store(begin, last)
         self.n, self.steps, self.y = first + done, self.steps + done, last
 
