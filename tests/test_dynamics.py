@@ -18,7 +18,7 @@ from skfem_ancf import system
 from skfem_ancf.band import Band
 from skfem_ancf.body import Body
 from skfem_ancf.dynamics import (HHT, SCHEMES, EnergyMomentum, Gauss, GeneralizedAlpha, Newmark,
-                                 base, get_scheme)
+                                 Radau, base, get_scheme)
 from skfem_ancf.dynamics.history import History
 from skfem_ancf.dynamics.integrator import Integrator
 from skfem_ancf.dynamics.rates import JointMotion
@@ -771,6 +771,67 @@ def test_initial_velocity_by_function_and_by_coordinates():
         assert history.angular_momentum[0] == pytest.approx(J * omega, rel=1e-12)
         # and no strain at all: the ring turns as a whole
         assert abs(history.strain_energy[0]) < 1e-20
+
+
+@pytest.mark.parametrize("n", [1, 4])
+@pytest.mark.parametrize("element", [ElementBeamCable(3), ElementBeamANCF(2),
+                                     ElementBeamANCFCubic(2)])
+def test_a_support_stops_what_moves_by_an_impulse_at_its_place(element, n):
+    """A bar that flies sideways and is caught at its end: angular momentum about it is kept."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, n + 1), 0.02), element,
+                StVenantKirchhoff(1e9, 0.0, 1e3), 0.02)
+    scene = Scene(beam).pin("left").initial_velocity(lambda x: np.array([0 * x[0], 2 + 0 * x[0]]))
+    history = scene.integrate(1e-6, 1e-6)
+    assert np.abs(history.velocity((0, 0))[0]).max() < 1e-14
+    assert history.angular_momentum[0] == pytest.approx(0.4 * 2 * 0.5, rel=1e-12)
+    # an impulse loses the energy that it takes at the speed of before, halved
+    assert history.kinetic_energy[0] == pytest.approx(history.momentum[0, 1], rel=1e-12)
+
+
+@pytest.mark.parametrize("scheme, rtol", [("energy-momentum", 1e-3), (GeneralizedAlpha(0.9), 1e-3),
+                                          (Gauss(3), 1e-6), (Radau(), 1e-6)])
+def test_a_base_that_starts_at_once_moves_its_beam_by_an_impulse(scheme, rtol):
+    """A clamp that rises with a speed from a breakpoint on, against Hermite's beam and DOP853."""
+    E, rho, h, begin, end, speed = 1e7, 1e3, 0.1, 0.0105, 0.03, 1e-6
+    beam = Beam(MeshBeam.init_line([0, 0.5, 1], h), ElementBeamCable(3),
+                StVenantKirchhoff(E, 0.0, rho), h, formulation="continuum")
+    scene = Scene(beam).fix("left", "r_X^2")
+    scene.joint("position", at=(0.0, 0.0), r=lambda t: (0.0, speed * max(t - begin, 0.0)))
+    found = scene.integrate(end, 5e-5, scheme, breakpoints=[begin]).displacement((1, 0))[-1, 1]
+    l = 0.5
+    m = rho * h**2 * l / 420 * np.array([
+        [156, 22 * l, 54, -13 * l], [22 * l, 4 * l**2, 13 * l, -3 * l**2],
+        [54, 13 * l, 156, -22 * l], [-13 * l, -3 * l**2, -22 * l, 4 * l**2]])
+    k = E * h**4 / 12 / l**3 * np.array([
+        [12, 6 * l, -12, 6 * l], [6 * l, 4 * l**2, -6 * l, 2 * l**2],
+        [-12, -6 * l, 12, -6 * l], [6 * l, 2 * l**2, -6 * l, 4 * l**2]])
+    M, K = np.zeros((2, 6, 6))
+    for first in (0, 2):
+        part = slice(first, first + 4)
+        M[part, part] += m
+        K[part, part] += k
+    inverse = np.linalg.inv(M[2:, 2:])
+    exact = solve_ivp(
+        lambda t, y: np.concatenate([y[4:], -inverse @ (K[2:, 2:] @ y[:4] + K[2:, 0] * t)]),
+        (0, end - begin), np.concatenate([np.zeros(4), -inverse @ M[2:, 0]]), method="DOP853",
+        rtol=1e-12, atol=1e-14).y[2, -1]
+    assert found / speed == pytest.approx(exact, rel=rtol)
+
+
+def test_supports_that_would_move_the_body_at_once_are_an_error():
+    beam = soft(2, 4)
+    swung = Scene(beam).pin("left").gravity((0, -9.81)).integrate(0.1, 0.01).state(-1)
+    for scene in (Scene(beam).clamp("left"), Scene(beam).pin("right")):
+        with pytest.raises(SupportError, match="at once by"):
+            scene.integrate(0.2, 0.01, start=swung)
+    moved = Scene(beam).clamp("left").fix("right", "r^2", displacement=0.1)
+    with pytest.raises(SupportError, match="at t = 0: begin with a state that they hold"):
+        moved.integrate(0.1, 0.01)
+    assert moved.integrate(0.02, 0.01, start=moved.solve_static()).kinetic_energy[-1] < 1e-16
+    jumping = Scene(beam).clamp("left")
+    jumping.joint("position", at=(1.0, 0.0), r=lambda t: (1.0, 0.1 * (t >= 0.05)))
+    with pytest.raises(SupportError, match="at t = 0.05"):
+        jumping.integrate(0.1, 0.01, breakpoints=[0.05])
 
 
 @pytest.mark.parametrize("element", [ElementBeamCable(3), ElementBeamCable(7), ElementBeamANCF(2),

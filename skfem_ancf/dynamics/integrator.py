@@ -238,6 +238,7 @@ class Integrator:
             y.v[s.fixed], y.acceleration[s.fixed] = self.support_rates(t, dt, ahead)
         else:
             y.u[s.fixed] = y.v[s.fixed] = 0.0
+        self._require_held(y.u - u, t)
         rate, J = y.multipliers, None
         joined = Joined(s, given, y.u, instant) if s.m else None
         if joined is not None:
@@ -247,8 +248,11 @@ class Integrator:
                                    "beams that fit, or from a static solution (start=)")
             J = joined.J
         solve = s.mass_solver(y.u, t, J)
+        jump = y.v - v  # of fixed coordinates: their impulses move the free ones
+        if joined is not None or jump.any():
+            closing = rate if joined is None else -joined.rate(y.v)
+            y.v = y.v + solve(-s.mass.multiply(jump), closing)[0]
         if joined is not None:
-            y.v = y.v + solve(np.zeros(s.N), -joined.rate(y.v))[0]
             rate = -joined.bend(y.v, y.acceleration)
         with contacts.lent(memory):
             if memory is not None and not contacts.lasting:
@@ -267,6 +271,19 @@ class Integrator:
         inertia = s.mass.multiply(y.acceleration)
         return y, (s.strain_energy(y.u, t), 0.5 * float(y.v @ s.mass.multiply(y.v)),
                    float(y.v @ inertia), 0.5 * float(y.acceleration @ inertia))
+
+    def _require_held(self, jump, t):
+        """Raise SupportError where supports would move a body at once, by its mean over the mass."""
+        if not jump.any():
+            return
+        s = self.system
+        along = np.concatenate([member.rigid_motions()[:, 0] for member in s.members])
+        gap = np.sqrt(jump @ s.mass.multiply(jump) / (along @ s.mass.multiply(along)))
+        if gap > 1e-8 * s.size:
+            raise SupportError(
+                f"supports would move the body at once by {gap:.3g} in the mean, at t = {t:.6g}: begin "
+                "with a state that they hold, as a static solution (start=), and move them by "
+                "continuous functions of time")
 
     def expect(self, energy: float) -> None:
         """The iteration's tolerance is relative to the largest energy of the motion."""
