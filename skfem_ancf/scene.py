@@ -1627,6 +1627,8 @@ class Scene:
                          beam: WhichBeam = None) -> Scene:
         """The velocity at the start of :meth:`integrate`.
 
+        What supports and joints do not allow of it they stop by impulses.
+
         Parameters
         ----------
         v

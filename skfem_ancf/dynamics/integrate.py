@@ -123,7 +123,8 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     CheckpointError
         If the checkpoint cannot be written at the start.
     SupportError
-        If joints repeat or contradict each other, or are open at the start.
+        If joints repeat or contradict each other, or are open at the start, or supports would move
+        the body at once.
 
     Warns
     -----
