@@ -273,7 +273,7 @@ class Integrator:
                    float(y.v @ inertia), 0.5 * float(y.acceleration @ inertia))
 
     def _require_held(self, jump, t):
-        """Raise SupportError where supports would move a body at once, by its mean over the mass."""
+        """Raise SupportError where supports would move a body at once, in the mean of its mass."""
         if not jump.any():
             return
         s = self.system
@@ -281,9 +281,9 @@ class Integrator:
         gap = np.sqrt(jump @ s.mass.multiply(jump) / (along @ s.mass.multiply(along)))
         if gap > 1e-8 * s.size:
             raise SupportError(
-                f"supports would move the body at once by {gap:.3g} in the mean, at t = {t:.6g}: begin "
-                "with a state that they hold, as a static solution (start=), and move them by "
-                "continuous functions of time")
+                f"supports would move the body at once by {gap:.3g} in the mean, at t = {t:.6g}: "
+                "begin with a state that they hold, as a static solution (start=), and move them "
+                "by continuous functions of time")
 
     def expect(self, energy: float) -> None:
         """The iteration's tolerance is relative to the largest energy of the motion."""
