@@ -433,18 +433,40 @@ class System:
         t
             Time, for obstacles that move; in statics the load factor.
         """
-        energy = self._energy_of_beams(u) if u.any() else self._energy_at_rest
-        if self.forces.elements:
-            energy += self.forces.potential(self.machine.tables.plain.forces, u, t)
-        return float(energy)
+        energy = self.energy_of_beams(u) if u.any() else self._energy_at_rest
+        return float(energy + self.energy_of_forces(u, t))
 
-    def _energy_of_beams(self, u):
-        return sum(b.kernel.energy(u[s]) for b, s in zip(self.beams, self.slices))
+    def energy_of_beams(self, u: Array) -> Any:
+        """The beams' part of :meth:`strain_energy`, of one displacement or many at once.
+
+        Parameters
+        ----------
+        u
+            Shape (N,) or (k, N).
+
+        Returns
+        -------
+        float or ndarray
+            Shape () or (k,).
+        """
+        return sum(b.kernel.energy(u[..., s]) for b, s in zip(self.beams, self.slices))
+
+    def energy_of_forces(self, u: Array, t: float = 1.0) -> float:
+        """The potential of force elements.
+
+        Parameters
+        ----------
+        u, t
+            As of :meth:`strain_energy`.
+        """
+        if not self.forces.elements:
+            return 0.0
+        return self.forces.potential(self.machine.tables.plain.forces, u, t)
 
     @cached_property
     def _energy_at_rest(self):
         """That of beams that are not displaced."""
-        return 0.0 if self._linear else self._energy_of_beams(np.zeros(self.N))
+        return 0.0 if self._linear else self.energy_of_beams(np.zeros(self.N))
 
     @property
     def _linear(self):

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
-                        NeoHookean, Scene, StVenantKirchhoff)
+                        NeoHookean, Scene, Section, StVenantKirchhoff)
 from skfem_ancf import body
 from skfem_ancf.compiled import LOADED, load
 from skfem_ancf.dynamics import stages
@@ -313,3 +313,30 @@ def test_fixed_rows_and_columns_of_a_band_matrix_are_those_of_the_identity(n, ba
             wanted = A.tocsc().toarray() * np.outer(free, free) + np.diag(1.0 - free)
             fix(A.band, fixed)
             assert_allclose(A.tocsc().toarray(), wanted, atol=0.0)
+
+
+def _energetic(kind):
+    """A beam whose energy takes tables of its elements, of its law, of layers or of widths."""
+    law = StVenantKirchhoff(2e5, 0.3, 1.0)
+    taper = MeshBeam.init_line([0.0, 0.3, 0.7, 1.0], lambda x: 0.1 - 0.05 * x)
+    if kind == "rubber on a curve":
+        return Beam(MESHES["curved"](), ElementBeamANCF(2), NeoHookean(2e5, 0.3, 1.0), 0.1)
+    if kind == "graded":
+        return Beam(taper, ElementBeamANCF(2), StVenantKirchhoff(
+            lambda x, y: 2e5 * (1.0 + x) * np.exp(10.0 * y), 0.3, 1.0), 0.1)
+    if kind == "layers":
+        return Beam(taper, ElementBeamANCF(3), section=Section.layers(
+            (0.02, law), (None, NeoHookean(1e4, 0.3, 1.0)), width=0.1))
+    if kind == "tapered T of a cable":
+        return Beam(taper, ElementBeamCable(5), law, section=Section.profile(
+            "T", width=0.05, web=0.005, flange=0.008))
+    return Beam(taper, ElementBeamANCF(2), law, lambda x, y: 0.1 + 0.1 * x, "strain-split")
+
+
+@pytest.mark.parametrize("kind", ["rubber on a curve", "graded", "layers", "tapered T of a cable",
+                                  "widths"])
+def test_energies_of_many_displacements_at_once(kind, monkeypatch):
+    monkeypatch.setattr(kinds_of, "TOGETHER", 20)  # in groups
+    kernel = _energetic(kind).kernel
+    u = 1e-4 * np.random.default_rng(1).standard_normal((17, kernel.N))
+    assert_allclose(kernel.energy(u), [kernel.energy(x) for x in u], rtol=1e-12)

@@ -417,11 +417,13 @@ class History:
     @cached_property
     def strain_energy(self) -> Array:
         """Strain energy, with the potential of force elements, shape (nt,)."""
-        system, out = self.system, []
-        for u, t, memory in zip(self.u, self.t, chain.from_iterable(self._memories)):
-            with system.forces.contacts.lent((memory or {}).get("contacts")):
-                out.append(system.strain_energy(u, t))
-        return np.array(out)
+        system, contacts = self.system, self.system.forces.contacts
+        out = np.zeros(len(self)) + system.energy_of_beams(self.u)
+        if system.forces.elements:
+            for k, memory in enumerate(chain.from_iterable(self._memories)):
+                with contacts.lent((memory or {}).get("contacts")):
+                    out[k] += system.energy_of_forces(self.u[k], self.t[k])
+        return out
 
     @cached_property
     def kinetic_energy(self) -> Array:

@@ -35,6 +35,8 @@ MATRICES = {"table", "constant"}
 BY_ELEMENT = {"frame", "weights", "stiffness", "moduli", "length0", "kappa0"}
 #: Fields with numbers of elements in a table, and the table.
 PLACES = {"place": "weights", "frame_place": "frame"}
+#: Elements, about, whose energies are found at once.
+TOGETHER = 4096
 
 
 class Destination(NamedTuple):
@@ -826,15 +828,23 @@ class Chain:
         return out
 
     def energy(self, u: Array) -> Any:
-        """Strain energy of a coordinate displacement (N,)."""
-        return np.sum(self.energies(u))
+        """Strain energy of a coordinate displacement (N,), or of many, (k, N): shape () or (k,)."""
+        if u.ndim == 1:
+            return np.sum(self.energies(u))
+        n = max(1, TOGETHER // self.t.shape[1])
+        return np.concatenate([np.sum(self._energies(u[k:k + n]), axis=1)
+                               for k in range(0, len(u), n)])
 
     def energies(self, u: Array) -> Array:
         """Strain energy of each element, shape (ne,)."""
-        u = self.checked(u)
-        out = np.zeros(self.t.shape[1], dtype=u.dtype)
+        return self._energies(self.checked(u)[None])[0]
+
+    def _energies(self, u):
+        """Those of many displacements (k, N), as of k times the elements; shape (k, ne)."""
+        out = np.zeros((len(u), self.t.shape[1]), dtype=u.dtype)
         for pack in self.packs:
-            self.texts.strain_energy(pack, u, out)
+            many = pack if len(u) == 1 else repeated(pack, len(u), self.N)
+            self.texts.strain_energy(many, u.ravel(), out.reshape(-1))
         return out
 
     def forces(self, u: Array) -> Array:

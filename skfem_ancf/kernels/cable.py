@@ -328,10 +328,10 @@ def cable_energy(pack: CablePack, u: Array, out: Array) -> None:
     """
     strain = np.empty((2, len(pack.weights), out.size), u.dtype)
     CABLES.stress(_unit(pack), u, strain)
-    EA, EI, C = pack.stiffness
+    EA, EI, C = pack.stiffness[:, :, pack.place]
     eps, kappa = strain
-    out += 0.5 * np.sum(pack.weights * (EA * eps * eps + EI * kappa * kappa + 2.0 * C * eps * kappa
-                                        ), axis=0)
+    out += 0.5 * np.sum(pack.weights[:, pack.place] * (
+        EA * eps * eps + EI * kappa * kappa + 2.0 * C * eps * kappa), axis=0)
     add_held_energy(pack, u, out)
 
 

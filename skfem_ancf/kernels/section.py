@@ -391,7 +391,7 @@ def section_energy(pack: SectionPack, u: Array, out: Array) -> None:
     W = np.empty((1,) + strain.shape[1:], u.dtype)
     SECTIONS.stress(with_unit_law(pack), u, strain)
     law_evaluate(pack.law, strain, W)
-    out += np.sum(pack.weights * W[0], axis=0)
+    out += np.sum(pack.weights[:, pack.place] * W[0], axis=0)
     add_held_energy(pack, u, out)
 
 
