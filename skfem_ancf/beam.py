@@ -245,8 +245,8 @@ class Beam(Frozen):
             if name not in known + ("fields", "tolerance"):
                 raise NameUnknown("argument of Beam", name, known)
         given = {name: getattr(self, name) for name in known} | {"material": self._given}
-        given["width" if "section" in changes or not isinstance(self.section, Rectangle) else
-              "section"] = None
+        given["section" if "width" in changes and isinstance(self.section, Rectangle) else
+              "width"] = None
         other = type(self)(**{**given, **changes})
         if other.element is self.element:
             self._share(other)

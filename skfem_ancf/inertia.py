@@ -141,7 +141,7 @@ def of_cable(beam: Beam) -> Inertia:
     if across.simple and across.uniform:
         return Inertia(N, across.moments(xi[:1], tind, "mass")[0] * (w * beam.mesh.lengths[0]))
     # the length of the axis: directors that are interpolated between nodes are shorter than one
-    speed = np.sqrt(np.sum(mapping.DF(X, tind)[:, 0] ** 2, axis=0))
+    speed = np.hypot(*mapping.DF(X, tind)[:, 0])
     mass, *moments = across.moments(xi, tind, "mass") * w * speed
     if across.simple:
         return Inertia(N, mass)

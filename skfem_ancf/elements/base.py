@@ -201,12 +201,12 @@ class ElementBeam(Frozen, Element):
             unit = _kept_functions(self._along, self.functionals, self.section, Content(X))[:, i]
         else:
             unit = _unit_functions(self._along, self._factors[:, i], self.section, X)
-        if np.ndim(h) == unit.ndim - 1:  # the same points of several elements
+        if isinstance(h, np.ndarray) and h.ndim == unit.ndim - 1:  # some points of each element
             unit = unit[:, :, None]
         factor = _powers(h, power)
         value, d_xi, d_eta = factor.reshape(factor.shape[:1] + (
             factor.shape[1:] or (1,) * (unit.ndim - 2))) * unit
-        if np.ndim(h):  # h^p P(Y / h) of a height that varies
+        if isinstance(h, np.ndarray):  # h^p P(Y / h) of a height that varies
             d_xi += np.multiply.outer(power, rate / h) * value
         return value, d_xi, d_eta, slope
 
@@ -381,9 +381,10 @@ class ElementBeam(Frozen, Element):
         Returns
         -------
         value, d_xi, d_eta, slope
-            Of a tapered mesh with the axis of the elements: (n, nelements, npoints).
+            Of a tapered mesh with the axis of the elements, (n, nelements, npoints), where there
+            are functions of the section.
         """
-        h, rate = mapping.height(X[0], tind)
+        h, rate = mapping.height(X[0], tind) if self.section.number else (1.0, 0.0)
         return self.local(X, h, i, rate)
 
     @staticmethod

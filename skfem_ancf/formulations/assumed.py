@@ -129,7 +129,6 @@ class Assumed(Formulation):
         straight, n = mesh.is_straight, element.nodal_dofs
         L = mesh.lengths[:1 if mesh.is_uniform else None]
         EI = material.E * width * mesh.height**3 / 12.0
-        per = {"element": L, "beam": mesh.chain_lengths[:len(L)], "": np.ones(1)}
         along = element.powers(1.0, L[:, None]) / L[:, None]
         if not straight:  # vectors of the plane as complex numbers
             x, y = element.rigid(mesh).swapaxes(0, 1)
@@ -140,7 +139,8 @@ class Assumed(Formulation):
         held = np.zeros((len(L), 2 * n, 2 * n), float if straight else complex)
         for mode in element.held:
             c = mode.weights * along
-            k = self.alpha * mode.size * EI / per[mode.per] ** 2 * L
+            of = L if mode.per == "element" else mesh.chain_lengths[:len(L)] if mode.per else 1.0
+            k = self.alpha * mode.size * EI / of**2 * L
             if not straight:
                 turned = np.sum(c * z, axis=1) / chord
                 c = c + 0j

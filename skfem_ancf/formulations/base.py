@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import require_like
-from ..frozen import Frozen
+from ..frozen import Content, Frozen, read_only
+from ..kept import cached_property
 from ..quadrature import gauss, lagrange, product_rule
 
 if TYPE_CHECKING:
@@ -50,10 +51,16 @@ class Term:
     samples: dict[str, tuple[float, ...]] = field(default_factory=dict)
     section_samples: Rule | None = None
 
-    @property
+    @cached_property
     def quadrature(self) -> Rule:
         """Points (2, n) and weights (n,) for scikit-fem's Basis."""
-        return product_rule(self.axis, self.section)
+        X, W = product_rule(self.axis, self.section)
+        return read_only(X), read_only(W)
+
+    @cached_property
+    def places(self) -> Content:
+        """Where it is sampled: places along of xx, yy and xy, and places across."""
+        return Content(*map(self.nodes, COMPONENTS), self.section_nodes)
 
     def nodes(self, component: str) -> Array:
         """Where along the axis a component is sampled, shape (m,)."""

@@ -472,18 +472,19 @@ class TermTables:
         else:
             self.points, W = term.quadrature
             self.w = across.volume(slab, self.points, W, tind, whole)
-            at = Content(*(term.nodes(name) for name in ("xx", "yy", "xy")), term.section_nodes)
             rows = {} if rows is None else rows
-            if at not in rows:
-                rows[at] = _rows(mesh, across.element, at, tind)
-            self._rows = rows[at]
+            if term.places not in rows:
+                rows[term.places] = _rows(mesh, across.element, term.places, tind)
+            self._rows = rows[term.places]
         self._interpolation = before._interpolation if before is not None else _interpolation(term)
         G, frame, self._samples, scaled = self._rows
         weights = self.w if slab.grade is None else across.volume(
             slab, *term.quadrature, tind, whole, "grade")
-        law = law_tables(self.law, owner)
-        self._sums = before._sums if before is not None and before.law is self.law else _sums_of(
-            self._samples, law, self._interpolation, weights.shape[1])
+        if before is not None and before.law is self.law and isinstance(self.law, LinearLaw):
+            law, self._sums = before.pack.law, before._sums
+        else:
+            law = law_tables(self.law, owner)
+            self._sums = _sums_of(self._samples, law, self._interpolation, weights.shape[1])
         self.pack: SectionPack = section_pack(
             G, frame, weights.T, self._samples, self._sums, law, constant, mesh.t[0],
             before.pack if before is not None and (
@@ -697,11 +698,12 @@ def section_pack(G: Array, frame: Array, weights: Array, samples: _Samples, sums
     nb, ne, linear = G.shape[2], len(left), law.kind == LINEAR
     content, mixing, joined, ends = sums
     n = mixing.shape[0] // 2
-    keep, moduli = np.ones(n, bool), np.zeros((n, 1))
     if linear:
         D = (law.D.reshape(9, 1, 1) * weights).reshape(-1, weights.shape[1])
         moduli, sizes = (mixing @ np.concatenate([D, np.abs(D)])).reshape(2, n, -1)
         keep = np.any(np.abs(moduli) > 1e-14 * sizes, axis=1)  # else orthogonal
+    else:
+        keep, moduli = np.ones(n, bool), np.zeros((n, 1))
     layout, shared = _layout(content, len(weights), Content(keep), linear), len(G) == 1
     if linear:
         moduli = moduli[layout.order]
