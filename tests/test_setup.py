@@ -655,6 +655,13 @@ def test_terms_that_are_sampled_at_the_same_places_share_their_tables(monkeypatc
     asked.clear()
     whole, part = Beam(mesh, ElementBeamANCF(2), law.replace(plane="strain"), 0.1).kernel.packs
     assert len(asked) == 1 and whole.table is part.table
+    asked.clear()
+    beam = Beam(mesh, ElementBeamANCF(3), law, 0.1, "ecm")
+    first, axis = beam.kernel.packs  # of the axis alone, which is among the points of the first
+    assert len(asked) == 1 and axis.table.shape[1] == 2 * 5 < first.table.shape[1]
+    slopes = np.array([gauss(5)[0], 5 * [0.5]])
+    slopes = beam.element.slopes(mesh.mapping(), slopes)[0].transpose(2, 1, 3, 0)
+    assert np.allclose(axis.table, slopes.reshape(axis.table.shape), rtol=1e-13, atol=1e-12)
 
 
 def test_masses_of_a_tapered_cable_ask_the_map_once(monkeypatch):

@@ -439,8 +439,9 @@ class TermTables:
     before
         Those of the same element of another material, whose tables serve on the same mesh; on
         another one what does not depend on it. None to make them.
-    rows
-        Tables of other terms there, by where they are sampled; it is added to.
+    rows, asked
+        Tables of other terms there, by where they are sampled, and points with what
+        :func:`beam_gradients` returned for them; both are added to.
 
     Attributes
     ----------
@@ -458,7 +459,8 @@ class TermTables:
 
     def __init__(self, across: "Across", slab: "Slab", term: "Term", constant: Array,
                  owner: Any, before: "TermTables | None" = None,
-                 rows: dict[Content, Any] | None = None) -> None:
+                 rows: dict[Content, Any] | None = None,
+                 asked: "list[tuple[Array, ...]] | None" = None) -> None:
         self.law, self.term, self.slab, mesh = term.law, term, slab, across.mesh
         self._mesh = mesh
         self.shared = across.uniform
@@ -474,7 +476,8 @@ class TermTables:
             self.w = across.volume(slab, self.points, W, tind, whole)
             rows = {} if rows is None else rows
             if term.places not in rows:
-                rows[term.places] = _rows(mesh, across.element, term.places, tind)
+                rows[term.places] = _rows(mesh, across.element, term.places, tind,
+                                          [] if asked is None else asked)
             self._rows = rows[term.places]
         self._interpolation = before._interpolation if before is not None else _interpolation(term)
         G, frame, self._samples, scaled = self._rows
@@ -592,7 +595,7 @@ def _same_places(a, b):
         len(x) == len(y) and all(map(np.array_equal, x, y)) for x, y in zip(*rules))
 
 
-def _rows(mesh, element, at, tind):
+def _rows(mesh, element, at, tind, asked):
     """Table and frame, and the :class:`_Samples` that are of their rows.
 
     Of one table for all elements also that of an element of length and height 1, what multiplies
@@ -604,7 +607,14 @@ def _rows(mesh, element, at, tind):
             mesh, element, element.unit_slopes(*(samples.X.take(k, axis=1) for k in samples.where)),
             len(samples.where[0]), slice(None) if tind is None else tind)
         return G, frame, samples, scaled if len(G) == 1 else None
-    G, frame = beam_gradients(mesh, element, samples.X, tind)
+    for X, G, frame in asked:
+        among = _among(Content(X, samples.X))
+        if among is not None:
+            G, frame = G.take(among, axis=2), frame.take(among, axis=2)
+            break
+    else:
+        G, frame = beam_gradients(mesh, element, samples.X, tind)
+        asked.append((samples.X, G, frame))
     return (np.concatenate([x.take(k, axis=1) for x, k in zip(G, samples.where)], axis=1),
             np.concatenate([x.transpose(1, 2, 0)[k] for x, k in zip(frame, samples.where)]),
             samples, None)
@@ -659,6 +669,14 @@ def _samples(content):
     return _Samples(product_rule((places, places), (eta, eta))[0],
                     [rows(along, places), rows(across, places)], np.array([g, h]),
                     np.where(g == h, 0.5, 1.0), len(xx) + len(yy), xx, np.concatenate([x, y]))
+
+
+@lru_cache(64)
+def _among(content):
+    """Which of points (2, n) others (2, m) are, shape (m,); None if one is none of them."""
+    points, others = content.arrays
+    same = (points[:, :, None] == others[:, None]).all(axis=0)
+    return same.argmax(axis=0) if same.any(axis=0).all() else None
 
 
 def _interpolation(term):
@@ -893,13 +911,14 @@ class Kernel(Chain):
         constants = [none if self.constant is None else self.constant]
         self.tables: list[TermTables] = []
         rows: dict[Content, Any] = {}
+        asked: list[tuple[Array, ...]] = []
         self._across = across
         for slab, terms in ([(across.slabs[0], [t.term for t in known])] if same_law else
                             across.terms(formulation)):
             for term in terms:
                 constant = constants.pop() if constants else none
                 self.tables.append(TermTables(across, slab, term, constant, self,
-                                              known.pop(0) if known else None, rows))
+                                              known.pop(0) if known else None, rows, asked))
         self.packs = [t.pack for t in self.tables]
         slabs = [id(t.slab) for t in self.tables]
         #: The tables of the first term of each slab.
