@@ -248,6 +248,21 @@ def mirror(A):
 
 
 @source
+def widen(A, U):
+    """U = A, of which U stores both halves."""
+    clear(U.flat)
+    if A.top > 0:
+        copy(A.flat, U.flat)
+        return
+    n = A.flat.size // A.ld
+    lower, rows = A.flat.reshape(n, A.ld), U.flat.reshape(n, U.ld)
+    for k in range(A.width + 1):
+        for j in lanes(n):
+            rows[j, U.top + k] = lower[j, k]
+    mirror(U)
+
+
+@source
 def fix(A, fixed):
     """Rows and columns of these numbers become those of the identity."""
     fix_stored(A.flat, A.ld, A.width, A.top, fixed)

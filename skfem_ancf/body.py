@@ -7,7 +7,7 @@ import numpy as np
 
 from .band import clear, copy
 from .kernels.base import (CARRY, FORCE, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, VISCOUS,
-                           Destination, add_changes, add_pushes, add_scaled, repeated)
+                           Destination, add_blocks, add_changes, add_pushes, add_scaled, repeated)
 from .kernels.cable import CablePack, cable_evaluate
 from .kernels.section import SectionPack, section_evaluate
 from .source import I1, I2, primitive, shaped, source
@@ -329,3 +329,11 @@ def add_force_by(body, copies, gradients, stresses, f):
     for k in range(body.table.shape[0]):
         B, given = _gradients(body, k, gradients)[0], _stress(copies, k, stresses)
         add_pushes(B, _starts(copies, k), given, f[copies.table[k, FIRST]:copies.table[k, LAST]])
+
+
+@source
+def add_turned(body, factor, gradients, A):
+    """Add ``factor B_0^T D (B_1 - B_0)`` to a band that stores both halves, by two gradients."""
+    for k in range(body.table.shape[0]):
+        B, C = _gradients(body, k, gradients[0]), _gradients(body, k, gradients[1])
+        add_blocks(factor, B[0], B[1], C[1], _starts(body, k), body.table[k, FIRST], A)

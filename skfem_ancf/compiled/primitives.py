@@ -92,6 +92,19 @@ def add_pushes(B, start, S, f):
 
 
 @jit
+def add_blocks(c, B, old, new, start, first, A):
+    n, span = B.shape[1], B.shape[2]
+    step = A.ld - 1
+    for e in range(start.size):
+        at = (first + start[e]) * A.ld + A.top
+        for s in range(n):
+            for l in range(span):
+                x, to = c * (new[e, s, l] - old[e, s, l]), at + l * step
+                for k in range(span):
+                    A.flat[to + k] += x * B[e, s, k]
+
+
+@jit
 def element_tangents(table, pairs, first, M, M_skew, K, K_skew):
     nb = table.shape[2]
     H, out = room((table.shape[1], 3 * nb), M), room((nb, 3 * nb), M)

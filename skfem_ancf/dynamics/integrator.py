@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..body import gradients_size
 from ..eliminated import Eliminated, EliminatedMass
 from ..errors import AncfError, InputError, SupportError, require_positive, shown
 from ..kept import cached_property, twin_of
+from ..linalg import BandMatrix
 from ..own import handle_of
 from .base import Memories, Motion, Steps, contacts_of, in_steps, kept, same_scheme
 from .course import Courses
@@ -18,7 +20,7 @@ from .rates import rates
 from .dampers import Dampers, Rows, solve_rows
 from .joined import Joined
 from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, READY,
-                    STATE, Matrices, Rule, mass_factor, room_for_steps, steps)
+                    STATE, Matrices, Rule, factors, mass_factor, room_for_steps, steps)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -83,10 +85,12 @@ class Integrator:
             system.forces.contacts.require_penalty(scheme, kick if in_steps(scheme) else np.inf)
         self.system = system
         M, A = system.mass.band, system.new_band()
-        self.matrices = Matrices(M, system.mass_factors.band, A.band, *_damping(system))
         self._nodes: tuple[Eliminated, EliminatedMass] | None = None
         if in_steps(scheme) and system.by_nodes:
             self._nodes = Eliminated(system, A), EliminatedMass(system)
+        turned = scheme.conserving and self._nodes is None
+        U = BandMatrix(system.N if turned else 0, system.bandwidth, False).band
+        self.matrices = Matrices(M, system.mass_factors.band, A.band, U, *_damping(system))
         self._state = np.zeros(STATE)
         self.room: Any = None
         self.asked: Any = None
@@ -101,8 +105,9 @@ class Integrator:
     def _work(self):
         """Work arrays of the steps of :mod:`~skfem_ancf.dynamics.steps`."""
         s = self.system
-        return room_for_steps(s.N, s.m, s.machine.tables.stresses.size,
-                              0 if self._nodes else s.m)
+        turned = self.matrices.U.flat.size > 0
+        return room_for_steps(s.N, s.m, s.machine.tables.stresses.size, gradients_size(
+            s.machine.tables.plain.body) if turned else 0, 0 if self._nodes else s.m)
 
     def _begin(self, scheme, tol):
         """As if nothing had been integrated yet."""
@@ -456,7 +461,7 @@ class Integrator:
         if self._nodes:
             return self._nodes[0].solve(b)
         x = b.copy()
-        solve_rows(self.matrices.A, self.matrices.rows, x)
+        solve_rows(factors(self.matrices, self._state), self.matrices.rows, x)
         return x
 
     def mass_factor(self) -> float:
@@ -503,9 +508,10 @@ class Integrator:
         """The arrays of the factors of steps, by name; none where there are no such factors."""
         if not self.ready or self.scheme.text != "steps":
             return {}
-        A, rows = self.matrices.A, self.matrices.rows
+        A, rows = factors(self.matrices, self._state), self.matrices.rows
         beside = {"S": rows.S, "Z": rows.Z, "H": rows.H} if len(rows.P) else {}
-        return {"A": A.flat, "pivots": A.pivots, "origin": self._work.x.origin, **beside}
+        return {"A": A.flat, "pivots": A.pivots, "origin": self._work.x.origin,
+                "ahead": self._work.x.ahead, **beside}
 
 
 def _damping(system):

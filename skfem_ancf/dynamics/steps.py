@@ -18,9 +18,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..band import (Band, add_multiple, clear, copy, dot, factorize, fix, multiply, solve_joined,
-                    subtract_rows, total)
-from ..body import (add_force_of, body_carry, body_force, body_mean, body_mixed, body_stress,
-                    body_tangent)
+                    subtract_rows, total, widen)
+from ..body import (add_force_of, add_turned, body_carry, body_force, body_gradients, body_mean,
+                    body_mixed, body_stress, body_tangent)
 from ..forces.contact_texts import PRESSURES
 from ..forces.texts import (add_contact_tangent, add_elastic_force, add_rubbing_tangent,
                             augment_contact, element_stiffness, pace_contact, put_between,
@@ -65,6 +65,8 @@ FAILURES = ("", "the iteration matrix is singular", "the residual is not finite"
             f"the pressures of method='augmented' do not settle in {AUGMENTED} iterations (a "
             "larger tolerance= of the obstacle, or method='penalty', helps)")
 SINGULAR, NOT_FINITE, DIVERGES, NOT_CONVERGED, DEPENDENT, UNSETTLED = range(1, 7)
+#: What READY is: no factors, those of the symmetric matrix, those of the other one.
+SYMMETRIC, TURNED = 1.0, 2.0
 #: How impulses of joints are found that are eliminated.
 ROUGHLY, EXACTLY = range(2)
 #: What a correction tells.
@@ -109,6 +111,8 @@ class Matrices(NamedTuple):
     ----------
     M, mass, A
         As said.
+    U
+        That of conserving steps with carried stresses, which is not symmetric; else of no size.
     rows
         What the iteration matrix has beside its band.
     dampers
@@ -118,6 +122,7 @@ class Matrices(NamedTuple):
     M: Band
     mass: Band
     A: Band
+    U: Band
     rows: Rows
     dampers: Dampers
 
@@ -189,8 +194,9 @@ class Vectors(NamedTuple):
         The first four as said; room.
     damping, pace
         The damping force, and the velocity that it resists.
-    origin, straight
-        Where the factors were made, and u at the end with the velocity at the begin.
+    origin, ahead, straight
+        Where the factors were made, of forces and of the strains at the end, and u at the end with
+        the velocity at the begin.
     """
 
     u: F1
@@ -209,6 +215,7 @@ class Vectors(NamedTuple):
     damping: F1
     pace: F1
     origin: F1
+    ahead: F1
     straight: F1
 
 
@@ -251,6 +258,8 @@ class Work(NamedTuple):
     stresses
         Of all beams: zero, those at the begin, others, carried ones, those of the iterate, and the
         last two of rates of strains, shape (7, k).
+    gradients
+        Those of strains where the factors were made, shape (2, l), where U has a size.
     """
 
     y: F2
@@ -259,23 +268,24 @@ class Work(NamedTuple):
     J: F3
     S: F2
     stresses: F2
+    gradients: F2
 
 
-def room_for_steps(N: int, m: int, stresses: int, dense: int) -> Work:
+def room_for_steps(N: int, m: int, stresses: int, gradients: int, dense: int) -> Work:
     """The :class:`Work` of steps.
 
     Parameters
     ----------
     N, m
         Numbers of coordinates and of equations of joints.
-    stresses
-        Number of the stresses of all beams.
+    stresses, gradients
+        Number of the stresses of all beams, and of their gradients that are kept.
     dense
         Number of equations in dense matrices: m, or 0 where they are eliminated.
     """
     x, shares = np.zeros((len(Vectors._fields), N)), np.zeros((len(Shares._fields), m))
     return Work(np.zeros((4, N)), Vectors(*x), Shares(*shares), np.zeros((3, dense, N)),
-                np.zeros((dense, dense)), np.zeros((7, stresses)))
+                np.zeros((dense, dense)), np.zeros((7, stresses)), np.zeros((2, gradients)))
 
 
 @source
@@ -628,7 +638,7 @@ def _judged(e, dampers, rule, s, w, state, wanted, rough):
     if state[MIXED] > 0.0:
         for i in lanes(du.size):
             room[i] = s.stiffness_factor * du[i]
-        body_carry(e.body, w.x.origin, room, w.stresses[4], w.stresses[3])
+        body_carry(e.body, w.x.ahead, room, w.stresses[4], w.stresses[3])
         if dampers.viscous > 0:
             for i in lanes(du.size):
                 room[i] = s.damping_factor * du[i]
@@ -654,6 +664,7 @@ def _tangent(e, matrices, rule, s, w, state):
             body_carry(e.viscous, w.y[0], w.y[1], stresses[1], stresses[1])
     _middle(rule, w)
     copy(w.x.middle, w.x.origin)
+    copy(w.x.middle, w.x.ahead)
     body_tangent(e.body, w.x.middle, w.x.force, stresses[1], yes, stresses[2], matrices.A)
     if dampers.active > 0:
         add_damping(e.viscous, dampers, matrices.M, s.damping_factor / s.stiffness_factor,
@@ -718,20 +729,48 @@ def _factorize(e, matrices, rule, s, w, state):
     """Factors of the iteration matrix; False if it has none."""
     fix(matrices.A, e.fixed)
     state[FACTORIZED] += 1.0
+    state[READY] = SYMMETRIC
     if rule.solver > 0:  # asked without a right-hand side: with what multipliers do at u
         l, dl, none = w.m.l, w.m.dl, w.x.du[:0]
         for k in lanes(l.size):
             dl[k] = s.stiffness_factor * l[k]
         good = own_solve(rule.solver, s.acting, w.x.middle, dl, none, none, none, none)
     else:
-        good = factorize(matrices.A)
+        if state[MIXED] > 0.0 and matrices.U.flat.size > 0:
+            _turn(e, matrices, s, w)
+            state[READY] = TURNED
+        good = factorize(factors(matrices, state))
     if not good:
-        state[FAILURE] = SINGULAR
+        state[READY], state[FAILURE] = 0.0, SINGULAR
         return False
     if rule.solver == 0:
-        factorize_rows(matrices.A, matrices.rows, e.free)
-    state[READY], state[RATE], state[FRESH], state[SIZE] = 1.0, EXPECTED, 1.0, -1.0
+        factorize_rows(factors(matrices, state), matrices.rows, e.free)
+    state[RATE], state[FRESH], state[SIZE] = EXPECTED, 1.0, -1.0
     return True
+
+
+@source
+def factors(matrices, state):
+    """The matrix that has the factors."""
+    return matrices.U if state[READY] == TURNED else matrices.A
+
+
+@source
+def _turn(e, matrices, s, w):
+    """The iteration matrix with the strains' derivatives at the end of the step, into U.
+
+    A force in the middle ``B(u_m)^T S`` has the derivative ``B(u_m)^T D B(u_1)``. For A, which has
+    B(u_m) in place of B(u_1), both must be close: they are not where more strains are sampled than
+    the axis of a straight beam can stretch, as of cables of degree 5 and more, and what bends it
+    must undo the rest. Then the iteration by A contracts slowly, or not at all.
+    """
+    U = matrices.U
+    copy(w.x.u, w.x.ahead)
+    widen(matrices.A, U)
+    body_gradients(e.body, w.x.origin, w.gradients[0])
+    body_gradients(e.body, w.x.ahead, w.gradients[1])
+    add_turned(e.body, s.stiffness_factor, w.gradients, U)
+    fix(U, e.fixed)
 
 
 @source
@@ -824,7 +863,7 @@ def _add_impulses(joints, s, w):
 def _correct(joints, free, matrices, rule, s, w, state, anew):
     """Correct u and the multipliers; FAILED if these are not determined."""
     u, R, du, room = w.x.u, w.x.residual, w.x.du, w.x.room
-    l, dl, phi, A, rows = w.m.l, w.m.dl, w.m.phi, matrices.A, matrices.rows
+    l, dl, phi, A, rows = w.m.l, w.m.dl, w.m.phi, factors(matrices, state), matrices.rows
     state[COUNT] += 1.0
     for i in lanes(u.size):
         R[i] *= free[i]

@@ -107,6 +107,17 @@ def add_pushes(B, start, S, f):
     np.add.at(f, start[:, None] + np.arange(B.shape[2]), (S @ B).reshape(len(start), -1))
 
 
+@primitive("primitives")
+def add_blocks(c, B, old, new, start, first, A):
+    """A[i + k, i + l] += c sum_s B[e, s, k] (new - old)[e, s, l], i = first + start[e].
+
+    Of a band A that stores both halves.
+    """
+    K, k = c * (B.transpose(0, 2, 1) @ (new - old)), np.arange(B.shape[2])
+    column = (first + start)[:, None, None] + k
+    np.add.at(A.flat, column * A.ld + A.top + k[:, None] - k, K)
+
+
 @source
 def load(start, span, first, u, U):
     """The coordinates (nb, 2, elements) of the elements from ``first`` on."""
