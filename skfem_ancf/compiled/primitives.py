@@ -93,15 +93,19 @@ def add_pushes(B, start, S, f):
 
 @jit
 def add_blocks(c, B, old, new, start, first, A):
-    n, span = B.shape[1], B.shape[2]
-    step = A.ld - 1
+    flat, n, span = shaped(B, (B.size,)), B.shape[1], B.shape[2]
+    whole, step = n - n % 4, A.ld - 1
     for e in range(start.size):
-        at = (first + start[e]) * A.ld + A.top
-        for s in range(n):
-            for l in range(span):
-                x, to = c * (new[e, s, l] - old[e, s, l]), at + l * step
-                for k in range(span):
-                    A.flat[to + k] += x * B[e, s, k]
+        at, to, x, y = e * n * span, (first + start[e]) * A.ld + A.top, old[e], new[e]
+        for l in range(span):
+            for s in range(0, whole, 4):
+                a = at + s * span
+                subtract(A.flat, to, flat, (a, a + span, a + 2 * span, a + 3 * span), span,
+                         (c * (x[s, l] - y[s, l]), c * (x[s + 1, l] - y[s + 1, l]),
+                          c * (x[s + 2, l] - y[s + 2, l]), c * (x[s + 3, l] - y[s + 3, l])))
+            for s in range(whole, n):
+                subtract(A.flat, to, flat, (at + s * span,), span, (c * (x[s, l] - y[s, l]),))
+            to += step
 
 
 @jit

@@ -42,6 +42,10 @@ REUSED = 0.1
 #: The same for factors of the step's own where stresses are carried, and for how many steps they
 #: are, from one on that wants new factors again.
 CARRIED, LASTING = 0.3, 32.0
+#: The factors of a step that are the last symmetric ones if they contract slowly.
+THIRD = 3.0
+#: Corrections that are as many times their round-off tell nothing by how they contract.
+ROUGH = 1e3
 #: Contraction expected of new factors, and the least that is expected of any.
 EXPECTED, LEAST = 0.1, 0.01
 #: Iterations of a step in which pressures of obstacles are corrected, at most: those that end take
@@ -313,7 +317,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
     """
     course, state = borrowed(course), borrowed(state)
     m, y, u = w.m.l.size, w.y, w.x.u
-    joined, damped = m > 0, matrices.dampers.active > 0
+    joined, damped, turns = m > 0, matrices.dampers.active > 0, matrices.U.flat.size > 0
     contacts, taken, before = e.forces.contacts, np.empty(1), np.empty(u.size)
     if damped and rule.conserving == 0:
         damping_force(e, matrices.dampers, matrices.M, course.times[0, 0] - course.dt, y[0], y[1],
@@ -349,7 +353,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
             if told == GO_ON:
                 told = _correct(e.joints, e.free, matrices, rule, s, w, state, anew)
             if told == GO_ON:
-                told = _judged(e, matrices.dampers, rule, s, w, state, wanted, rough)
+                told = _judged(e, matrices.dampers, turns, s, w, state, wanted, rough)
             if told == DONE and contacts.lasting >= PRESSURES:
                 augment_contact(e.forces, s.t, u, taken)
                 if taken[0] > 0.0:
@@ -403,7 +407,7 @@ def judge(state, wanted, rough, reused):
         return FAILED
     if before > 0.0:
         rate = size / before
-        if rate > 1.0 and size <= 1e3 * rough:
+        if rate > 1.0 and size <= ROUGH * rough:
             return DONE
         state[RATE] = max(rate, LEAST)  # of one step, used in the next
         if rate > reused and size * min(1.0, rate) > wanted:
@@ -627,7 +631,7 @@ def _internal_force(e, dampers, rule, w, state):
 
 
 @source
-def _judged(e, dampers, rule, s, w, state, wanted, rough):
+def _judged(e, dampers, turns, s, w, state, wanted, rough):
     """What the last correction tells, of iterations with carried stresses and without.
 
     A stiff and slender beam turned by old factors is stretched by what they take for bending: its
@@ -643,7 +647,12 @@ def _judged(e, dampers, rule, s, w, state, wanted, rough):
             for i in lanes(du.size):
                 room[i] = s.damping_factor * du[i]
             body_carry(e.viscous, w.x.origin, room, w.stresses[6], w.stresses[5])
-    return judged(state, wanted, rough, REUSED, CARRIED if state[FRESH] > 0.0 else REUSED)
+    told = judged(state, wanted, rough, REUSED, CARRIED if state[FRESH] > 0.0 else REUSED)
+    slow = told == FAILED or told != DONE and state[READY] == 0.0
+    if (turns and slow and state[FRESH] >= THIRD and state[MIXED] <= LASTING
+            and not state[SIZE] <= ROUGH * rough):
+        state[MIXED], state[READY], told = 2.0 * LASTING, 0.0, ASTRAY if told == FAILED else told
+    return told
 
 
 @source
@@ -736,7 +745,7 @@ def _factorize(e, matrices, rule, s, w, state):
             dl[k] = s.stiffness_factor * l[k]
         good = own_solve(rule.solver, s.acting, w.x.middle, dl, none, none, none, none)
     else:
-        if state[MIXED] > 0.0 and matrices.U.flat.size > 0:
+        if state[MIXED] > LASTING:
             _turn(e, matrices, s, w)
             state[READY] = TURNED
         good = factorize(factors(matrices, state))
@@ -745,7 +754,7 @@ def _factorize(e, matrices, rule, s, w, state):
         return False
     if rule.solver == 0:
         factorize_rows(factors(matrices, state), matrices.rows, e.free)
-    state[RATE], state[FRESH], state[SIZE] = EXPECTED, 1.0, -1.0
+    state[RATE], state[FRESH], state[SIZE] = EXPECTED, state[FRESH] + 1.0, -1.0
     return True
 
 
