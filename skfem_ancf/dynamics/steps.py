@@ -648,10 +648,9 @@ def _judged(e, dampers, turns, s, w, state, wanted, rough):
                 room[i] = s.damping_factor * du[i]
             body_carry(e.viscous, w.x.origin, room, w.stresses[6], w.stresses[5])
     told = judged(state, wanted, rough, REUSED, CARRIED if state[FRESH] > 0.0 else REUSED)
-    slow = told == FAILED or told != DONE and state[READY] == 0.0
-    if (turns and slow and state[FRESH] >= THIRD and state[MIXED] <= LASTING
-            and not state[SIZE] <= ROUGH * rough):
-        state[MIXED], state[READY], told = 2.0 * LASTING, 0.0, ASTRAY if told == FAILED else told
+    slow = state[READY] == 0.0 and ROUGH * rough < state[SIZE] < state[LAST_SIZE]
+    if turns and slow and state[FRESH] >= THIRD and state[MIXED] <= LASTING:
+        state[MIXED] = 2.0 * LASTING
     return told
 
 
