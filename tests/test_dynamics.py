@@ -339,7 +339,8 @@ def oscillator():
     M, mass, A = (Band(np.array([1.0, 0.0]), zero, 2, 0, 0) for _ in range(3))
     forces = Forces([], 1, 0).tables(lambda i, j: i, True, 0)
     equations = Equations(body, spring, joints, none, one, A, None, body, forces, body)
-    return equations, Matrices(M, mass, A, Rows(row, row, row, row), Dampers(0, 0, 0, 0.0, A, row))
+    rows, dampers = Rows(row, row, row, row), Dampers(0, 0, 0, 0.0, A, row)
+    return equations, Matrices(M, mass, A, A, rows, dampers)
 
 
 def amplification(scheme, dt):
@@ -350,7 +351,7 @@ def amplification(scheme, dt):
                     JointMotion(np.zeros((1, 3, 0)), np.zeros((1, 4, 0)), 0))
     rows = []
     for u, v, w in np.eye(3):
-        work, new = room_for_steps(1, 0, 0, 0), np.empty((1, 4, 1))
+        work, new = room_for_steps(1, 0, 0, 0, 0), np.empty((1, 4, 1))
         work.y[:, 0] = u, v, -u, w
         done = steps(equations, matrices, rule, course, np.zeros(STATE), work, np.zeros((1, 0)),
                      new, np.zeros((1, 2, 0)), np.zeros(1))

@@ -63,6 +63,18 @@ def test_two_halves_are_the_whole(scheme, build, compiled):
     assert np.abs(whole.u[-1] - half.u[-1]).max() > 0.01
 
 
+@pytest.mark.parametrize("compiled", [True, False])
+def test_two_halves_with_factors_that_are_not_symmetric(compiled):
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 9), 1e-4)
+    beam = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(2e12, 0.3, 7800.0), 0.01,
+                compiled=compiled)
+    scene = Scene(beam).pin("left").gravity((0, -9.81))
+    whole, half = (scene.integrate(t, 1e-2, "energy-momentum") for t in (0.2, 0.1))
+    rest = scene.integrate(0.2, 1e-2, "energy-momentum", start=half.state(-1))
+    assert np.array_equal(rest.u[-1], whole.u[-1]) and np.array_equal(rest.v[-1], whole.v[-1])
+    assert half.iterations + rest.iterations == whole.iterations
+
+
 @pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha"])
 @pytest.mark.parametrize("build", [swinging, driven])
 def test_from_an_instant_in_the_middle(build, scheme):
