@@ -457,7 +457,7 @@ class System:
         Parameters
         ----------
         u, t
-            As of :meth:`strain_energy`.
+            Displacement, shape (N,), and time, as of :meth:`strain_energy`.
         """
         if not self.forces.elements:
             return 0.0
