@@ -55,7 +55,7 @@ class Solved(NamedTuple):
     held
         Displacements of the fixed coordinates.
     noise
-        Square of the noise of a correction's work, and the size of the scene.
+        Square of the noise of a correction's work.
     spread
         See :class:`~skfem_ancf.statics.iteration.Members`.
     start, slender
@@ -106,7 +106,7 @@ class Numbers:
         self.solved = Solved(
             tables.plain._replace(K=cast(Any, ()), viscous=(), copies=()),
             tables.static_factors(1.0), tables.static_factors(1.0, 0.0), system.values(1.0),
-            np.array([system.work_noise**2, system.size]), np.array([system.noise]),
+            np.array([system.work_noise**2]), np.array([system.noise]),
             np.array([screen.start.real, screen.start.imag]), screen.slender,
             tuple(tuple((part.dofs, part.weights, part.start, int(part.off_axis))
                         for part in located.parts) for located in self.located))
@@ -130,8 +130,8 @@ def _leaves(x: Any, place: tuple = ()) -> Iterator[tuple[tuple, Any]]:
         yield place, x
         return
     for k, part in enumerate(x):
-        if hasattr(x, "_fields") and x._fields[k] in ("handle", "contacts"):
-            continue  # of the one scene; there are no obstacles
+        if hasattr(x, "_fields") and x._fields[k] in ("handle", "contacts", "sizes"):
+            continue  # of the one scene; there are no obstacles; what is next to nothing
         yield from _leaves(part, (*place, k))
 
 

@@ -86,7 +86,7 @@ _MATTER = frozenset({"material", "width"})
 _PLACES = ("mesh", "element", "formulation", "name", "compiled", "damping", "kinematics", "nd", "N")
 #: Attributes of a beam that are made once and depend on its mesh and element only.
 _GEOMETRY = ("vector_element", "q0", "origin", "q0_local", "rows", "finder", "series", "scales",
-             "size")
+             "size", "sizes")
 
 
 def _fields(method):
@@ -579,6 +579,17 @@ class Beam(Frozen):
     def size(self) -> float:
         """Length of its axis."""
         return float(self.mesh.lengths.sum())
+
+    @cached_property
+    def sizes(self) -> Array:
+        """What its coordinates change by where it moves by its length and bends, shape (N,).
+
+        Derivatives along the axis by the length of an element, those across by the height.
+        """
+        length, h = self.size / self.mesh.nelements, self.mesh.height
+        node = [self.size if k == m == 0 else length**-k * (h**(1 - m) if m else length)
+                for _, k, m in self.element.functionals]
+        return np.array(node).repeat(2)[np.arange(self.N) % self.nd]
 
     def held_by_a_section(self, held: Sequence[int]) -> bool:
         """True if a node is held, and the direction of the axis there or its normal.

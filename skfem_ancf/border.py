@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .band import (Band, clear, copy, dense_solve, diagonal, dot, factorize, multiply, solve,
-                   total, weighted)
+                   weighted)
 from .source import F1, F2, I1, lanes, source
 from .tables import add_products
 from .types import Array
@@ -47,6 +47,7 @@ class Border(NamedTuple):
 class Factors(NamedTuple):
     """A matrix with its border, factorised: the matrix before, its factors, and the border.
 
+    ``scale`` has what makes picked coordinates and multipliers numbers without units, (k + m,).
     Of work arrays ``rest`` and ``weight`` have (N,), ``closing`` and ``more`` (m,), ``y`` and
     ``G`` the size of H.
     """
@@ -78,7 +79,7 @@ def factors_of(before: Band, after: Band, J: Array, S: Array) -> Factors:
     """
     (m, N), n = J.shape, len(S) + len(J)
     (rest, weight), (closing, more) = np.empty((2, N)), np.empty((2, m))
-    return Factors(before, after, J, S, np.zeros((n, N)), np.zeros((n, n)), np.ones(m),
+    return Factors(before, after, J, S, np.zeros((n, N)), np.zeros((n, n)), np.ones(n),
                    rest, weight, closing, more, np.empty(n), np.empty((n, n)))
 
 
@@ -105,7 +106,13 @@ def new_factors(border: Border, A: Band, m: int, N: int) -> Factors:
 
 
 @source
-def add_curvature(joints, border, multipliers, free, A, S):
+def mean_stiffness(diagonal, sizes):
+    """The mean of stiffnesses, each times the square of its coordinate's size."""
+    return weighted(sizes, sizes, diagonal) / sizes.size
+
+
+@source
+def add_curvature(joints, border, multipliers, free, sizes, A, S):
     """Add the joints' second derivative and the springs to the band, and to S what is not in it."""
     flat, size, value = S.reshape(S.size), np.empty(free.size), np.empty(joints.hk.size)
     clear(flat)
@@ -118,13 +125,13 @@ def add_curvature(joints, border, multipliers, free, A, S):
                  border.outside_of)
     diagonal(A, size)
     for i in lanes(size.size):
-        size[i] = np.abs(size[i])
-    mean = total(size) / size.size
+        size[i] = np.abs(size[i]) * free[i]  # what is fixed has 1 there, of no unit
+    mean = mean_stiffness(size, sizes)
     for k in range(border.springs):
         at = border.picked[k]
         stiffness = size[at]
         if stiffness == 0.0 or k >= border.springs - border.loose:
-            stiffness += mean
+            stiffness += mean / (sizes[at] * sizes[at])
         A.flat[at * A.ld + A.top] += stiffness
         S[k, k] = -stiffness
 
@@ -155,25 +162,27 @@ def factorize_bordered(f, border, free):
 @source
 def join(f, border, free):
     """Z, H and the scale of the multipliers, by the factors of the band."""
-    J, Z, H, S = f.J, f.Z, f.H, f.S
+    J, Z, H, S, scale, A = f.J, f.Z, f.H, f.S, f.scale, f.before
     k, m, N = S.shape[0], J.shape[0], free.size
     for a in range(k):
-        row = Z[a]
+        row, size = Z[a], abs(A.flat[border.picked[a] * A.ld + A.top])
+        scale[a] = np.sqrt(size) if size > 0.0 else 1.0
         clear(row)
         for c in range(k):
-            row[border.picked[c]] += S[c, a]
+            row[border.picked[c]] += S[c, a] / scale[a]
         solve(f.after, row)
     solve_rows(f.after, J, free, Z[k:])
-    for b in range(m):
-        size, row = dot(J[b], Z[k + b]), Z[k + b]
-        f.scale[b] = 1.0 / np.sqrt(abs(size)) if size != 0.0 else 1.0
+    for b in range(k, k + m):
+        row = Z[b]
+        size = dot(J[b - k], row)
+        scale[b] = 1.0 / np.sqrt(abs(size)) if size != 0.0 else 1.0
         for i in lanes(N):
-            row[i] *= f.scale[b]
+            row[i] *= scale[b]
     for b in range(k + m):
         for a in range(k):
-            H[a, b] = Z[b, border.picked[a]]
+            H[a, b] = scale[a] * Z[b, border.picked[a]]
         for a in range(m):
-            H[k + a, b] = f.scale[a] * dot(J[a], Z[b])
+            H[k + a, b] = scale[k + a] * dot(J[a], Z[b])
     for a in range(k):
         H[a, a] += 1.0
 
@@ -182,14 +191,14 @@ def join(f, border, free):
 def _once(f, border, x, c, dm):
     """Solve in place of x for x and the multipliers; False if H is singular."""
     k, m = f.S.shape[0], c.size
-    y, G = f.y, f.G
+    y, G, scale = f.y, f.G, f.scale
     for a in range(k + m):
         copy(f.H[a], G[a])
     solve(f.after, x)
     for a in range(k):
-        y[a] = x[border.picked[a]]
+        y[a] = scale[a] * x[border.picked[a]]
     for b in range(m):
-        y[k + b] = f.scale[b] * (dot(f.J[b], x) - c[b])
+        y[k + b] = scale[k + b] * (dot(f.J[b], x) - c[b])
     if not dense_solve(G, y):
         return False
     for a in range(k + m):
@@ -197,7 +206,7 @@ def _once(f, border, x, c, dm):
         for i in lanes(x.size):
             x[i] -= row[i] * y[a]
     for b in range(m):
-        dm[b] = f.scale[b] * y[k + b]
+        dm[b] = scale[k + b] * y[k + b]
     return True
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse import coo_matrix
 
-from .border import Border, Factors, factors_of, join, solve_bordered
+from .border import Border, Factors, factors_of, join, mean_stiffness, solve_bordered
 from .linalg import SINGULAR
 
 if TYPE_CHECKING:
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 UNSURE = 1e-7
 
 
-def hold(K: BandMatrix, i: Array, j: Array, values: Array, springs: Array,
+def hold(K: BandMatrix, i: Array, j: Array, values: Array, springs: Array, sizes: Array,
          loose: int = 0) -> tuple[Array, Array]:
     """Add entries and springs to a band matrix, and factorise it.
 
     Parameters
     ----------
-    K, i, j, values, springs, loose
-        As for :class:`BorderedMatrix`: the matrix, entries of shapes (k,), coordinates (s,), and
-        how many of them are loose.
+    K, i, j, values, springs, sizes, loose
+        As for :class:`BorderedMatrix`: the matrix, entries of shapes (k,), coordinates (s,), sizes
+        of all (n,), and how many of them are loose.
 
     Returns
     -------
@@ -44,7 +44,8 @@ def hold(K: BandMatrix, i: Array, j: Array, values: Array, springs: Array,
     diagonal = np.abs(K.diagonal())
     stiffness = diagonal[springs]
     loosely = np.arange(len(springs)) >= len(springs) - loose
-    stiffness[loosely | (stiffness == 0.0)] += np.mean(diagonal)
+    loosely |= stiffness == 0.0
+    stiffness[loosely] += mean_stiffness(diagonal, sizes) / sizes[springs[loosely]]**2
     K.add(springs, springs, stiffness)
     K.factorize()
     i, j, values = i[~inside], j[~inside], values[~inside]
@@ -71,12 +72,13 @@ def gives_way(f: Factors) -> bool:
         A :class:`~skfem_ancf.border.Factors`.
     """
     k, n = len(f.S), len(f.H)
+    S = f.S / (f.scale[:k, None] * f.scale[:k])
     size = np.ones(n)
-    size[:k] = np.sqrt(np.abs(f.S).max(axis=1, initial=0.0))
+    size[:k] = np.sqrt(np.abs(S).max(axis=1, initial=0.0))
     size[size == 0.0] = 1.0
     both = np.zeros((n + k, n + k))  # with -S beside it, for the directions that S adds
-    both[:n, :n], both[n:, n:] = f.H, -f.S / (size[:k, None] * size[:k])
-    both[:k, :n] = f.S @ f.H[:k]
+    both[:n, :n], both[n:, n:] = f.H, -S / (size[:k, None] * size[:k])
+    both[:k, :n] = S @ f.H[:k]
     both[:n, :n] /= size[:, None] * size
     values = np.linalg.eigvalsh(both, "U")
     least = UNSURE * max(-values[0], values[-1])
@@ -100,6 +102,8 @@ class BorderedMatrix:
         Entries to add to K, of both halves where it is symmetric, shapes (k,).
     springs
         Coordinates to hold, shape (s,).
+    sizes
+        Those of all coordinates, 0 of fixed ones, whose diagonal is no stiffness; shape (n,).
     loose
         How many of the last of them have no stiffness of their own.
 
@@ -110,8 +114,8 @@ class BorderedMatrix:
     """
 
     def __init__(self, K: BandMatrix, J: Array, i: Array, j: Array, values: Array,
-                 springs: Array, loose: int = 0) -> None:
-        picked, S = hold(K, i, j, values, springs, loose)
+                 springs: Array, sizes: Array, loose: int = 0) -> None:
+        picked, S = hold(K, i, j, values, springs, sizes, loose)
         none = np.zeros(0, np.int64)
         self._K, self._J = K, J
         self._border = Border(picked, len(springs), loose, none, none, none, none, 0)

@@ -155,6 +155,33 @@ class Constraints:
 
     # equations of joints
 
+    @cached_property
+    def coordinate_sizes(self) -> Array:
+        """What coordinates change by where the scene moves by its size, shape (N,)."""
+        out = np.concatenate([member.sizes for member in self.members])
+        if len(self.members) > 1:
+            for member, s in zip(self.members, self.slices):
+                out[s].reshape(-1, member.nd)[:, :2] = self.size  # positions
+        return out
+
+    def equation_sizes(self, rows: Array, columns: Array, values: Array) -> Array:
+        """What equations are open by where one of their coordinates changes by its size.
+
+        Parameters
+        ----------
+        rows, columns, values
+            Entries of :meth:`full_jacobian`, shapes (k,).
+
+        Returns
+        -------
+        ndarray
+            Shape (m,): the size of the scene where there is no such coordinate.
+        """
+        out = np.zeros(self.m)
+        np.maximum.at(out, rows, np.abs(values) * self.coordinate_sizes[columns])
+        out[out == 0.0] = self.size
+        return out
+
     def constraint(self, u: Array, t: float) -> Array:
         """Phi of the joints with multipliers, shape (m,).
 
@@ -390,13 +417,15 @@ class Constraints:
         if self._independent or not self.joints or self.condensable:
             return
         zero = np.zeros(self.N)
-        found = first_dependent(self._at_rest, self.free, self.constraint(zero, 0.0))
+        found = first_dependent(self._at_rest * self.coordinate_sizes, self.free,
+                                self.constraint(zero, 0.0))
         self._independent = found is None  # nothing of it changes in the life of a system
         if found is None:
             return
         k, gap = found
         joint, equation = [(joint, name) for joint in self.joints for name in joint.equations][k]
-        kind = "repeats" if abs(gap) <= 1e-9 * self.size else "contradicts"
+        size = self.equation_sizes(*self._entries(zero, 0.0))[k]
+        kind = "repeats" if abs(gap) <= 1e-9 * size else "contradicts"
         raise SupportError(f"{joint!r}, equation {equation!r}, {kind} what the supports and the "
                            "joints before it hold already: remove one of them")
 
@@ -463,7 +492,7 @@ class Constraints:
         parts = [motions[self.fixed], joints]
         if self._stiffness is not None:
             pushed = self._stiffness() @ motions
-            size = row_sizes(pushed)
+            size = row_sizes(pushed) * self.coordinate_sizes
             parts.append(pushed[size > 1e-9 * size.max(initial=0.0)])
         small = isinstance(motions, np.ndarray)
         held = np.concatenate(parts) if small else sparse.vstack(parts)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 #: Of a scene without them.
 _NO_INTS = np.zeros(0, np.int64)
 _NO_JOINTS = constant(JointTables(_NO_INTS, _NO_INTS, _NO_INTS, np.zeros(0), _NO_INTS, _NO_INTS,
-                                  0))
+                                  np.zeros(0), 0))
 _NO_MOMENTS = constant(MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)),
                                   np.zeros((0, 2)), np.zeros(0)))
 _NO_BODY = constant(FlatBody(_NO_INTS, np.zeros((0, END_GRADIENTS + 1), np.int64)))
@@ -70,6 +70,8 @@ class Equations(NamedTuple):
     copies
         As ``body``, of several times all coordinates, one behind the other; see
         :meth:`Tables.copied`, the same where nobody has asked.
+    sizes
+        Those of the coordinates, see :attr:`skfem_ancf.constraints.Constraints.coordinate_sizes`.
     """
 
     body: Any
@@ -82,6 +84,7 @@ class Equations(NamedTuple):
     viscous: Any
     forces: ForceTables
     copies: Any
+    sizes: F1
 
 
 class Tables:
@@ -115,7 +118,7 @@ class Tables:
                                system.fixed, system.mask, system.K.band,
                                self._border(joints),
                                viscous_body_of(body, system.beams, system.retardation),
-                               self._forces(), body)
+                               self._forces(), body, system.constraints.coordinate_sizes)
 
     @property
     def system(self) -> "System":
@@ -384,17 +387,18 @@ class Tables:
         s, none = self.system, np.zeros(0)
         if not s.joints:
             return _NO_JOINTS
-        second, first, at = [[none] * 4], [[none] * 2], 0
+        second, first, at = [[none] * 4], [[none] * 3], 0
         for joint in s.joints:
             k, *entries = joint.second_entries(s.N)
             second.append([at + k, *entries])
-            rows, columns, _ = joint.slope_entries(np.zeros(1), s.N)
-            first.append([at + rows, columns])
+            rows, columns, values = joint.slope_entries(np.zeros(1), s.N)
+            first.append([at + rows, columns, values[0]])
             at += len(joint.equations)
         k, i, j, v = (np.concatenate(x) for x in zip(*second))
-        gk, gi = (np.concatenate(x) for x in zip(*first))
-        tables = JointTables(*(x.astype(np.int64) for x in (k, i, j)), v.astype(float),
-                             gk.astype(np.int64), gi.astype(np.int64), 0)
+        gk, gi, g = (np.concatenate(x) for x in zip(*first))
+        k, i, j, gk, gi = (x.astype(np.int64) for x in (k, i, j, gk, gi))
+        tables = JointTables(k, i, j, v.astype(float), gk, gi,
+                             s.constraints.equation_sizes(gk, gi, g), 0)
         tabled = (all(joint.tabled for joint in s.joints) if all(map(ours, s.joints))
                   else self.are_joints(tables))
         return tables if tabled else tables._replace(own=self.handle)
@@ -410,14 +414,16 @@ class Tables:
         s = self.system
         if not s.m:
             return True
-        k, i, j, v, gk, gi, _ = tables
-        for t, u in zip(TRIED, 0.1 * np.random.default_rng(0).standard_normal((2, s.N))):
+        k, i, j, v, gk, gi, sizes, _ = tables
+        all_sizes = s.constraints.coordinate_sizes
+        for t, x in zip(TRIED, np.random.default_rng(0).standard_normal((2, s.N))):
+            u = 0.1 * all_sizes * x
             c, g = self.offsets(np.array([t]))[0], self.slopes(np.array([t]))[0]
             slope = sparse.csr_array((g, (gk, gi)), shape=(s.m, s.N))
             J = slope + sparse.csr_array((v * u[j], (k, i)), shape=slope.shape)
             phi, gap = c + 0.5 * (J + slope) @ u, J - s.sparse_jacobian(u, t)
-            if not (np.allclose(phi, s.constraint(u, t), rtol=0, atol=1e-9 * s.size)
-                    and abs(gap).max() <= 1e-9 * abs(J).max()):
+            if not (np.all(np.abs(phi - s.constraint(u, t)) <= 1e-9 * sizes)
+                    and (abs(gap) @ all_sizes <= 1e-9 * (abs(J) @ all_sizes)).all()):
                 return False
         return True
 

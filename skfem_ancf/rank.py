@@ -127,7 +127,9 @@ def null_basis(J: Array | sparse.csr_array) -> Array | sparse.csr_array:
     n, given = J.shape[1], []
     for rows, columns, A in groups(J):
         k = len(rows)
-        R, order = scipy.linalg.qr(A, mode="r", pivoting=True, check_finite=False)
+        size = row_sizes(A)
+        R, order = scipy.linalg.qr(A / np.where(size > 0.0, size, 1.0)[:, None], mode="r",
+                                   pivoting=True, check_finite=False)
         rest = np.abs(np.diag(R))
         if k > A.shape[1] or rest[k - 1] <= DEPENDENT * rest[0]:
             raise np.linalg.LinAlgError("the joints are not independent in this state")

@@ -140,6 +140,11 @@ class RigidBody(Frozen):
         return float(np.max(np.hypot(*self.outline)))
 
     @property
+    def sizes(self) -> Array:
+        """What the coordinates change by where it moves by its size and turns, shape (4,)."""
+        return np.array([self.size, self.size, 1.0, 1.0])
+
+    @property
     def total_mass(self) -> float:
         """The mass."""
         return self.mass

@@ -827,7 +827,9 @@ class System:
             self.constraints.curvature_entries(u, t, multipliers), self._far_entries()))
         self._outside, self._sparse = (i, j, v), None
         if self.bordered:
-            self._factors = BorderedMatrix(self.K, self._J, i, j, v, self.springs, self.loose)
+            self._factors = BorderedMatrix(self.K, self._J, i, j, v, self.springs,
+                                           self.constraints.coordinate_sizes * self.mask,
+                                           self.loose)
             self._border = self._factors.factors
         else:
             self._sparse = self._sparse_factors(self._whole())
@@ -952,10 +954,11 @@ class System:
         What stiff springs hold in a border lets go of with the round-off of their stiffness: of
         slender beams that is more than bending.
         """
+        size = self.constraints.coordinate_sizes
         if self.bordered and self.N <= DENSE:
-            T = null_basis(self._J)
+            T = null_basis(self._J * size) * size[:, None]
             return T.T @ self._factors.toarray() @ T
-        T = null_basis(sparse.csr_array(self._J))
+        T = sparse.csr_array(null_basis(sparse.csr_array(self._J * size)).multiply(size[:, None]))
         return (T.T @ self._whole() @ T).tocsc()
 
     def _sparse_factors(self, K):

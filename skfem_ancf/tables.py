@@ -25,6 +25,8 @@ class JointTables(NamedTuple):
         H by equation, row, column and value, both halves.
     gk, gi
         Equation and column of each entry of g.
+    sizes
+        What each equation is open by in a displacement of the scene's size.
     own
         Handle of what has joints that are not quadratic, see :mod:`skfem_ancf.own`; 0 for none.
     """
@@ -35,6 +37,7 @@ class JointTables(NamedTuple):
     hv: F1
     gk: I1
     gi: I1
+    sizes: F1
     own: int
 
 

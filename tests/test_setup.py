@@ -762,7 +762,7 @@ def test_factors_tell_whether_what_a_border_holds_gives_way(seed):
     J = rng.standard_normal((m, n)) * x
     J[:, 3:] *= seed % 2  # of one place, which one band tells
     try:
-        found = BorderedMatrix(K, J, i, j, v, springs)
+        found = BorderedMatrix(K, J, i, j, v, springs, 1.0 / x)
     except np.linalg.LinAlgError:
         pytest.skip("singular")
     T, A = null_basis(J), found.toarray()

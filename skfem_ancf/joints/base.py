@@ -40,10 +40,8 @@ class Vector:
     """
 
     def __init__(self, start: ArrayLike, dofs: Array, weights: Array) -> None:
-        weights = weights + np.zeros(dofs.shape)
-        size = np.abs(weights).max(axis=0, initial=0.0)
-        keep = size > 1e-14 * size.max(initial=0.0)
-        self.start, self.dofs, self.weights = np.asarray(start), dofs[:, keep], weights[:, keep]
+        self.start, self.dofs = np.asarray(start), dofs
+        self.weights = weights + np.zeros(dofs.shape)
 
     def __call__(self, u: Array) -> Array:
         return self.start + np.sum(u[self.dofs] * self.weights, axis=1)
@@ -534,6 +532,14 @@ def _fixed(value: Array) -> Vector:
     return Vector(value, np.zeros((2, 0), dtype=int), np.zeros((2, 0)))
 
 
+def _of(scene: Scene, member: Any, start: Array, dofs: Array, weights: Array) -> Vector:
+    """A Vector of coordinates of a beam or body, by their numbers there, without round-off."""
+    weights = np.broadcast_to(weights, dofs.shape)
+    size = np.abs(weights).max(axis=0) * member.sizes[dofs[0]]
+    keep = size > 1e-14 * size.max()
+    return Vector(start, dofs[:, keep] + scene.offset(member), weights[:, keep])
+
+
 def members_at(scene: Scene, at: ArrayLike) -> list[int]:
     """Numbers of the beams that have a material point at a place, and of bodies around it.
 
@@ -627,7 +633,7 @@ def point(scene: Scene, beam: WhichMember, at: Any) -> Vector:
     else:
         e, X = member.locate(at)
         start = member.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
-    return Vector(start, dofs + scene.offset(member), weights)
+    return _of(scene, member, start, dofs, weights)
 
 
 def section(scene: Scene, beam: WhichMember, place: Any) -> tuple[Vector, Vector]:
@@ -648,10 +654,10 @@ def section(scene: Scene, beam: WhichMember, place: Any) -> tuple[Vector, Vector
     if is_ground(beam):
         return point(scene, beam, place), _fixed(np.array([1.0, 0.0]))
     member = scene.beam(beam)
-    first = scene.offset(member)
     if isinstance(member, RigidBody):
         dofs, weights = member.section_direction(member.section_node(place))
-        return point(scene, member, place), Vector(member.q0[dofs] @ weights, dofs + first, weights)
+        return (point(scene, member, place),
+                _of(scene, member, member.q0[dofs] @ weights, dofs, weights))
     try:
         node = member.section_node(place)
     except MeshError:
@@ -659,10 +665,10 @@ def section(scene: Scene, beam: WhichMember, place: Any) -> tuple[Vector, Vector
             raise
         return _inner_section(scene, member, place)
     dofs, weights = member.section_direction(node)
-    direction = Vector(member.q0_local[dofs] @ weights, dofs + first, weights)
+    direction = _of(scene, member, member.q0_local[dofs] @ weights, dofs, weights)
     if is_point(place) and member.has_sections:
         return point(scene, member, place), direction
-    first += node * member.nd
+    first = scene.offset(member) + node * member.nd
     return (Vector(member.mesh.p[:, node], np.array([[first], [first + 1]]), np.ones(1)), direction)
 
 
@@ -674,8 +680,7 @@ def _inner_section(scene: Scene, beam: Any, at: Any) -> tuple[Vector, Vector]:
         at = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
     dofs, _ = beam.probe_reference(e, X)
     weights = beam.kinematics.direction_weights(beam, e, float(X[0]))
-    direction = Vector(beam.q0_local[dofs] @ weights, dofs + scene.offset(beam), weights)
-    return point(scene, beam, at), direction
+    return point(scene, beam, at), _of(scene, beam, beam.q0_local[dofs] @ weights, dofs, weights)
 
 
 def each(value: Any, what: str, n: int) -> tuple[Any, ...]:

@@ -12,7 +12,7 @@ from ..errors import (CallbackError, ConvergenceError, InputError, Interrupted, 
 from ..linalg import NO_FACTORS
 from ..progress import progress_bar
 from .critical import find_critical
-from .iteration import reference_work, settled
+from .iteration import CLOSED, reference_work, settled
 from .newton import rules_of
 
 if TYPE_CHECKING:
@@ -215,7 +215,7 @@ class Tracer:
             residual, phi = load * external - force, system.constraint(u, load)
             if system.joints:
                 residual = residual - m @ system.jacobian(u, load)
-            closed = np.max(np.abs(phi), initial=0.0) <= rules.closed
+            closed = np.all(np.abs(phi) <= CLOSED * system.machine.tables.plain.joints.sizes)
             reference = max(reference_work(force, load * external, u),
                             np.sqrt(abs(external @ step * dl)))
             if closed and settled(work, reference, rules):

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..band import (clear, copy, diagonal, dot, factorize, fix, largest, multiply, smallest, solve,
-                    total, weighted)
+                    weighted)
 from ..body import body_carry, body_force, body_tangent
-from ..border import (Factors, add_curvature, factorize_bordered, new_factors, solve_bordered)
+from ..border import (Factors, add_curvature, factorize_bordered, mean_stiffness, new_factors,
+                      solve_bordered)
 from ..forces.texts import (add_elastic_force, add_element_tangent, contact_along,
                             contact_work)
 from ..compiled.words import constant
@@ -21,12 +22,12 @@ from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, 
 if TYPE_CHECKING:
     from ..equations import Equations
 
-#: Stiffness that a coordinate is taken to have in norms at least, over the mean: that of a rigid
-#: body has none of its own.
+#: Stiffness that a coordinate is taken to have in norms at least, over the mean of all, each times
+#: the square of its size: that of a rigid body has none of its own.
 SMALLEST = 1e-14
 #: How an iteration ends.
 CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
-#: What joints may be open by, over the size of the scene.
+#: What joints may be open by, over the sizes of their equations.
 CLOSED = 1e-12
 #: Work of the third correction, as a root over that of all forces, of an iteration that is astray.
 ASTRAY = 0.9
@@ -68,8 +69,8 @@ class Rules(NamedTuple):
         At most.
     tol, floor, force_floor
         Tolerance of a correction, and round-off of its work and of the residual.
-    closed, inaccurate
-        What joints may be open by, and a border's solution be wrong by, relative.
+    inaccurate
+        What a border's solution may be wrong by, relative.
     solver
         Handle of what solves the linear systems, see :mod:`skfem_ancf.own`; 0 for the band.
     least
@@ -86,7 +87,6 @@ class Rules(NamedTuple):
     tol: float
     floor: float
     force_floor: float
-    closed: float
     inaccurate: float
     solver: int
     least: int
@@ -116,8 +116,8 @@ class Members(NamedTuple):
     scale, which, values
         Number i of member k is ``scale[i] values[k, which[i]]``.
     noise, held
-        Views of ``numbers``: the square of the noise of a correction's work and the size of the
-        scene, (2,), and the displacements of the fixed coordinates.
+        Views of ``numbers``: the square of the noise of a correction's work, (1,), and the
+        displacements of the fixed coordinates.
     factors
         What factors of loads are before the first correction if there is a start.
     spread
@@ -222,8 +222,7 @@ def _member(e, target, rules, x, w, record, members, before, least):
         e, Target(target.factors, before, target.scale, target.at, target.c, target.g, target.gap,
                   target.prescribed),
         Rules(rules.mixed, rules.iterations, rules.tol, floor, floor * members.spread[0],
-              CLOSED * members.noise[1], rules.inaccurate, rules.solver, least, rules.wary,
-              2 - least),
+              rules.inaccurate, rules.solver, least, rules.wary, 2 - least),
         x, w, record)
     if status != CONVERGED:
         return status, number
@@ -287,13 +286,13 @@ def iterate(e, target, rules, x, w, record):
             quiet = rho <= rules.force_floor
         else:
             small = last and rho <= rules.tol * size + rules.force_floor
-        if small and not moving and opening <= rules.closed:
+        if small and not moving and opening <= CLOSED:
             return CONVERGED, k
         if k == rules.iterations:
             break
         if last:
             _tangent(e, target, rules, x, w, k)
-        near = rules.near > 0 and not moving and opening <= rules.closed
+        near = rules.near > 0 and not moving and opening <= CLOSED
         near = near and rho <= rules.tol * size + rules.force_floor
         before, work = work, _correction(e, target, rules, x, w, moving)
         if not (0.0 <= work < 1e300):
@@ -341,21 +340,23 @@ def _tangent(e, target, rules, x, w, k):
     diagonal(e.K, w.scale)
     for i in lanes(x.u.size):
         w.scale[i] = np.abs(w.scale[i])
-    least = SMALLEST * total(w.scale) / w.scale.size
+    least = SMALLEST * mean_stiffness(w.scale, e.sizes)
     for i in lanes(x.u.size):
-        w.scale[i] = 1.0 / (w.scale[i] + least)
+        w.scale[i] = 1.0 / (w.scale[i] + least / (e.sizes[i] * e.sizes[i]))
 
 
 @source
 def _residual(e, target, x, w):
-    """The residual at free coordinates; returns how far joints are open."""
+    """The residual at free coordinates; returns how far joints are open, over their sizes."""
     external_force(e.loads, target.factors, np.nan, target.scale, x.u, w.load)
     clear(w.push)
     opening = 0.0
     if w.phi.size > 0:
         constraint(e.joints, target.c, target.g, target.at, x.u, w.phi)
         add_joint_force(e.joints, target.g, target.at, x.u, x.multipliers, w.push)
-        opening = largest(w.phi)
+        for k in lanes(w.phi.size):
+            w.dm[k] = w.phi[k] / e.joints.sizes[k]
+        opening = largest(w.dm)
     for i in lanes(x.u.size):
         w.R[i] = (w.load[i] - x.force[i] - target.gap[i] - w.push[i]) * e.free[i]
     return opening
@@ -456,7 +457,7 @@ def _solved(e, target, rules, x, w):
         row = f.J[k]
         for i in lanes(row.size):
             row[i] *= e.free[i]
-    add_curvature(e.joints, e.border, x.multipliers, e.free, e.K, f.S)
+    add_curvature(e.joints, e.border, x.multipliers, e.free, e.sizes, e.K, f.S)
     if not factorize_bordered(f, e.border, e.free):
         return False
     error = solve_bordered(f, e.border, w.R, w.phi, w.du, w.dm)

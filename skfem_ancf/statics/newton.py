@@ -14,7 +14,7 @@ from ..linalg import INACCURATE
 from ..own import handle_of
 from ..progress import progress_bar
 from . import stability
-from .iteration import (ALONE, CLOSED, CONVERGED, NOT_CONVERGED, NOT_FINITE, SINGULAR, Rules,
+from .iteration import (ALONE, CONVERGED, NOT_CONVERGED, NOT_FINITE, SINGULAR, Rules,
                         Target, Unknowns, equilibrium, room_for_iterations)
 from .touching import found_touching
 
@@ -459,7 +459,7 @@ def rules_of(system: System, method: str, tol: float, max_iterations: int,
     floor = 8.0 * system.work_noise
     # the residual sums the noise of all coordinates, the work that of the strains
     return Rules(int(method == "mixed"), max_iterations, tol, floor, floor * system.noise,
-                 CLOSED * system.size, INACCURATE, 0, 2, int(wary), 0)
+                 INACCURATE, 0, 2, int(wary), 0)
 
 
 _ENDS = {SINGULAR: "the tangent is singular", NOT_FINITE: "the strain is not finite",

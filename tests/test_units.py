@@ -1,0 +1,129 @@
+"""Beams of any size in metres: the same numbers without units, in as many iterations."""
+
+import numpy as np
+import pytest
+
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
+                        ElementBeamPatelShabana, MeshBeam, RigidBody, Scene, StVenantKirchhoff)
+from skfem_ancf.joints import JOINTS
+
+#: Lengths of a beam in metres, beside one metre.
+LENGTHS = 1e3, 1e-3, 1e-6, 1e-9
+#: Elements of the two beams.
+KINDS = {"sections": lambda: (ElementBeamPatelShabana(), ElementBeamANCFCubic(2)),
+         "mixed": lambda: (ElementBeamANCF(3), ElementBeamCable(5))}
+
+
+def between(a, b, ne, L, element, h, name=None):
+    """A straight beam of density 1000 and unit modulus times 1e6, where L is the unit of length.
+
+    That of mass is L^3, that of time one second.
+    """
+    a, b = L * np.array(a, dtype=float), L * np.array(b, dtype=float)
+    d = b - a
+    mesh = MeshBeam.init_line(np.linspace(0, np.hypot(*d), ne + 1), L * h, origin=a,
+                              angle=np.arctan2(d[1], d[0]))
+    return Beam(mesh, element, StVenantKirchhoff(1e6 * L * L, 0.3, 1000.0), 0.1 * L, name=name)
+
+
+def elbow(name, L, kind):
+    """Two beams, clamped at an angle, with a joint of each kind of the registry, or a dashpot."""
+    arm, forearm = KINDS[kind]()
+    x, y = 0.02 * np.array([-0.3, 1.0])  # off the axis
+
+    def p(a, b):
+        return L * a, L * b
+
+    cases = {
+        "hinge": None, "weld": None,
+        "line": dict(beam="arm", at=p(0.3 + x, 0.09 + y), direction=(1, 2)),
+        "circle": dict(beam="forearm", at=p(1.2, 0.75), center=p(0.4, 0.1)),
+        "position": dict(beam="arm", at=p(0.4 - x, 0.12 - y),
+                         r=lambda t: p(0.4 + 0.005 * np.sin(t) - x, 0.12 + 0.01 * t * t - y)),
+        "angle": dict(beam="forearm", at="right", angle=lambda t: 0.1 * np.sin(3 * t)),
+        "turn": dict(at=("arm", "left"), other=("forearm", "right"),
+                     angle=lambda t: 0.1 * np.sin(3 * t)),
+        "plane": dict(beam="forearm", at="left"),
+        "sleeve": dict(at=("ground", p(1.2, 0.75)), on="forearm", angle=True),
+        "slot": dict(at=("arm", p(0.3 + x, 0.09 + y)), on="ground", direction=(1, 2), angle=True),
+        "dashpot": None}
+    assert set(cases) == {*JOINTS, "dashpot"}
+    turns = name in ("hinge", "plane")
+    scene = Scene(between((0, 0), (1, 0.3), 2, L, arm, 0.1, "arm"),
+                  between((1, 0.3), (1.4, 1.2), 3, L, forearm, 0.15, "forearm"))
+    scene.gravity((0.0, -0.3 * L)).clamp("left", beam="arm", thickness="free")
+    scene.joint("hinge" if turns else "weld", beams=("arm", "forearm"), at=p(1, 0.3))
+    if cases[name]:
+        scene.joint(name, **cases[name])
+    if turns or name == "dashpot":
+        scene.spring(300.0 * L**3, between=(p(1.4, 1.2), p(1.9, 1.2)), damping=20.0 * L**3)
+    return scene
+
+
+def found(name, L, kind, scheme):
+    """Displacement of the tip over L, and the number of iterations."""
+    scene, tip = elbow(name, L, kind), (1.4 * L, 1.2 * L)
+    if scheme is None:
+        state = scene.solve_static()
+        return state.displacement(tip) / L, state.iterations
+    history = scene.integrate(t_end=0.05, dt=0.01, scheme=scheme)
+    return history.displacement(tip)[-1] / L, history.iterations
+
+
+@pytest.mark.parametrize("kind, scheme", [("sections", None), ("mixed", None),
+                                          ("mixed", "energy-momentum"), ("sections", "radau")])
+@pytest.mark.parametrize("name", [*JOINTS, "dashpot"])
+def test_joints_of_beams_of_any_size(name, kind, scheme):
+    wanted, iterations = found(name, 1.0, kind, scheme)
+    for L in LENGTHS[:None if scheme is None else 3]:
+        tip, number = found(name, L, kind, scheme)
+        assert np.allclose(tip, wanted, rtol=0, atol=1e-9 * np.abs(wanted).max()), L
+        assert abs(number - iterations) <= 1, L
+
+
+@pytest.mark.parametrize("L", LENGTHS)
+def test_rigid_bodies_of_any_size(L):
+    """What holds coordinates without stiffness in statics has units of its own."""
+    def run(L):
+        body = RigidBody(0.5 * L**3, 0.01 * L**5, (1.3 * L, 0.8 * L))
+        beam = between((0, 0), (1.3, 0.8), 4, L, ElementBeamCable(5), 0.15)
+        scene = Scene(beam, body).gravity((0.0, -0.1 * L)).clamp("left")
+        scene.hinge((beam, (1.3 * L, 0.8 * L)), (body, (1.3 * L, 0.8 * L)))
+        scene.spring(50.0 * L**3, between=((body, (1.3 * L, 0.9 * L)), (2 * L, 0.5 * L)))
+        return scene.solve_static()
+
+    one, other = run(1.0), run(L)
+    assert other.iterations == one.iterations
+    assert np.isclose(other.strain_energy, one.strain_energy * L**5, rtol=1e-9)
+
+
+@pytest.mark.parametrize("L", LENGTHS)
+def test_verdicts_of_beams_of_any_size(L):
+    """Above and below the buckling load of a column with a clamp at an angle."""
+    def run(L, share):
+        e = np.array([1.0, 0.3]) / np.hypot(1.0, 0.3)
+        scene = Scene(between((0, 0), (1, 0.3), 6, L, ElementBeamPatelShabana(), 0.02))
+        scene.clamp("left", thickness="free")
+        scene.joint("angle", at="right", angle=lambda t: 0.0 * t)
+        scene.point_force(tuple(-share * L**4 * e), at=(L, 0.3 * L))
+        return scene
+
+    load = run(1.0, 1.0).buckling(1).factors[0]
+    assert np.isclose(run(L, 1.0).buckling(1).factors[0], load, rtol=1e-7)
+    for share, negative in ((0.99 * load, 0), (1.01 * load, 1)):
+        system = run(L, share).system
+        straight = run(L, share).solve_linear()
+        system.assemble(straight.u, 1.0)
+        system.factorize(straight.u, 1.0, straight.multipliers)
+        assert tuple(system.inertia()) == (negative, False)
+
+
+@pytest.mark.parametrize("L", [1.0, *LENGTHS])
+def test_joints_that_are_open_at_the_start_are_told(L):
+    from skfem_ancf.errors import SupportError
+
+    beam = between((0, 0), (1, 0.3), 2, L, ElementBeamCable(5), 0.05)
+    scene = Scene(beam).pin("left")
+    scene.joint("angle", at="right", angle=lambda t: 1e-6 + t)
+    with pytest.raises(SupportError, match="open by"):
+        scene.integrate(t_end=0.1, dt=0.01)
