@@ -217,6 +217,8 @@ def spin_up(p):
         for degree in (5, 7):
             for tol in (1e-2, 1e-3, 1e-4):
                 yield ours.run(p, "cable", degree, 1, steps=steps, scheme="radau", tol=tol)
+    for steps in (14, 16, 18, 19):
+        yield ours.run(p, "cable", 3, 2, steps=steps, tol=3e-3)
     for steps in (100, 500, 2000):
         yield ours.run(p, "cubic", 2, 4, steps=steps, tol=1e-6)
     if exudyn_beams.exudyn is None:
