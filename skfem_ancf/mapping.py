@@ -94,12 +94,20 @@ def polynomial(coefficients: Sequence[Any], x: Any) -> Any:
     return value
 
 
-def _product(a, b):
-    """The product of polynomials (n, ne) and (..., m, ne), the lowest coefficients first."""
-    out = np.zeros((*b.shape[:-2], len(a) + b.shape[-2] - 1, b.shape[-1]))
-    for k, c in enumerate(a):
-        out[..., k:k + b.shape[-2], :] += c * b
+def _crossed(a, b):
+    """The cross product of polynomials (2, n, ne) and (2, m, ne), the lowest coefficients first."""
+    n, m = a.shape[1], b.shape[1]
+    out = np.zeros((n + m - 1, a.shape[2]))
+    for k in range(n):
+        out[k:k + m] += cross(a[:, k], b)
     return out
+
+
+@lru_cache(16)
+def _taylor(m):
+    """From the functions' factors to coefficients of powers of xi, of m derivatives a node."""
+    return read_only(np.array([hermite_basis(m, np.zeros(1), d)[:, 0] / factorial(d)
+                               for d in range(2 * m)]))
 
 
 def _sorted(director, crossed):
@@ -525,11 +533,8 @@ class MappingBeam(Mapping):
         axis, director = self._all_coefficients
         axis = axis.copy()
         axis[:, [0, self._orders[0]]] -= axis[:, :1]
-        axis, director = (np.stack([self._sum(c, hermite_basis(m, np.zeros(1), d))[..., 0]
-                                    / factorial(d) for d in range(2 * m)], 1)
-                          for m, c in zip(self._orders, (axis, director)))
-        crossed = _product(axis[1], director[0]) - _product(axis[0], director[1])
-        return [axis, director, crossed]
+        axis, director = (_taylor(m) @ c for m, c in zip(self._orders, (axis, director)))
+        return [axis, director, -_crossed(axis, director)]
 
     def invF(self, x: Array, tind: Array | None = None, max_iterations: int = 30,
              xi: ArrayLike = 0.5) -> Array:

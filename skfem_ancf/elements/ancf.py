@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import legendre
 
 from ..errors import require_integer, require_option, teaching
+from ..frozen import read_only
 from ..quadrature import gauss_lobatto
 from .base import ElementBeam, SectionFunctions
 
@@ -29,6 +31,14 @@ POINT_FAMILIES = {
     "gauss-lobatto": gauss_lobatto,
     "equispaced": lambda n: np.linspace(-1.0, 1.0, n),
 }
+
+
+@lru_cache(64)
+def _section(n: int, points: str) -> tuple[Array, SectionFunctions]:
+    """Places Y / h of the slopes, and the functions of the section."""
+    x = np.zeros(1) if n == 1 else (
+        np.array([-1.0, 1.0]) if n == 2 else POINT_FAMILIES[points](n))
+    return read_only(0.5 * x), SectionFunctions(np.linalg.inv(legendre.legvander(x, n - 1)))
 
 
 @teaching
@@ -74,12 +84,9 @@ class ElementBeamANCF(ElementBeam):
         n = require_integer("the order of an ANCF beam element", order, 1, MAX_ORDER,
                             "polynomials of a higher degree have no digits left")
         require_option("family of section points", points, POINT_FAMILIES)
-        x = np.zeros(1) if n == 1 else (
-            np.array([-1.0, 1.0]) if n == 2 else POINT_FAMILIES[points](n))
-        self.section_points = 0.5 * x
+        self.section_points, functions = _section(n, points)
         names, functionals = self._coordinates()
-        super().__init__(SectionFunctions(np.linalg.inv(legendre.legvander(x, n - 1))), names,
-                         functionals, [f"r_Y{k}" for k in range(n)])
+        super().__init__(functions, names, functionals, [f"r_Y{k}" for k in range(n)])
 
     def _coordinates(self) -> tuple[list[str], list[tuple[float, int, int]]]:
         """Names of the section coordinates of a node, and what they are."""
