@@ -589,7 +589,9 @@ class Beam(Frozen):
         length, h = self.size / self.mesh.nelements, self.mesh.height
         node = [self.size if k == m == 0 else length**-k * (h**(1 - m) if m else length)
                 for _, k, m in self.element.functionals]
-        return np.array(node).repeat(2)[np.arange(self.N) % self.nd]
+        out = np.empty((self.N // self.nd, len(node), 2))
+        out[:] = np.array(node)[:, None]
+        return out.ravel()
 
     def held_by_a_section(self, held: Sequence[int]) -> bool:
         """True if a node is held, and the direction of the axis there or its normal.
@@ -623,7 +625,11 @@ class Beam(Frozen):
         ndarray
             Shape (n, 3), or (N, 3).
         """
-        rows = np.arange(self.N) if rows is None else rows
+        if rows is None:
+            out, q = np.zeros((self.N, 3)), self.q0_local
+            out[::self.nd, 0] = out[1::self.nd, 1] = 1.0
+            out[::2, 2], out[1::2, 2] = -q[1::2], q[::2]
+            return out
         out, of_node, component = np.zeros((len(rows), 3)), rows % self.nd, rows % 2
         out[:, 0], out[:, 1] = of_node == 0, of_node == 1
         out[:, 2] = self.q0_local[rows + 1 - 2 * component] * (2.0 * component - 1.0)

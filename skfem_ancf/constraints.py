@@ -507,10 +507,16 @@ class Constraints:
         columns of a body are two translations and the rotation, in units of its size; dense arrays
         of few coordinates.
         """
+        joints = self._at_rest
+        if self.frame is None and self.N <= DENSE:
+            dense = np.zeros((self.N, 3 * len(self.members)))
+            for k, (member, s) in enumerate(zip(self.members, self.slices)):
+                dense[s, 3 * k:3 * k + 3] = member.rigid_motions() / (1.0, 1.0, member.size)
+            return dense, joints @ dense, [(self._who(k), member.origin, member.size)
+                                           for k, member in enumerate(self.members)]
         values = np.concatenate([member.rigid_motions() for member in self.members])
         sizes = [member.size for member in self.members]
         numbers = [member.N for member in self.members]
-        joints = self._at_rest
         if self.frame is None:
             bodies = [(self._who(k), b.origin, b.size) for k, b in enumerate(self.members)]
             of_body = np.repeat(np.arange(len(bodies)), numbers)
@@ -526,11 +532,6 @@ class Constraints:
             bodies = [(name, origin, size) for name in self.frame.describe(parts)]
             sizes = [size] * len(self.members)
         values[:, 2] /= np.repeat(sizes, numbers)
-        if self.frame is None and self.N <= DENSE:
-            motions = np.zeros((self.N, len(bodies), 3))
-            motions[np.arange(self.N), of_body] = values
-            motions = motions.reshape(self.N, -1)
-            return motions, joints @ motions, bodies
         motions = sparse.csr_array((values.ravel(), (3 * of_body[:, None] + np.arange(3)).ravel(),
                                     3 * np.arange(self.N + 1)), shape=(self.N, 3 * len(bodies)))
         if self.frame is None:

@@ -385,6 +385,8 @@ class Tables:
 
     def _joints(self):
         s, none = self.system, np.zeros(0)
+        #: g at the time 0
+        self._slope = np.zeros((1, 0))
         if not s.joints:
             return _NO_JOINTS
         second, first, at = [[none] * 4], [[none] * 3], 0
@@ -397,6 +399,7 @@ class Tables:
         k, i, j, v = (np.concatenate(x) for x in zip(*second))
         gk, gi, g = (np.concatenate(x) for x in zip(*first))
         k, i, j, gk, gi = (x.astype(np.int64) for x in (k, i, j, gk, gi))
+        self._slope = g[None]
         tables = JointTables(k, i, j, v.astype(float), gk, gi,
                              s.constraints.equation_sizes(gk, gi, g), 0)
         tabled = (all(joint.tabled for joint in s.joints) if all(map(ours, s.joints))
@@ -435,10 +438,10 @@ class Tables:
         return _beside([joint.offset(times, s.N) for joint in s.joints])
 
     def slopes(self, times: Array) -> Array:
-        """g of all joints at the times, shape (n, k)."""
+        """g of all joints at the times, shape (n, k); of one row where none turns."""
         s = self.system
-        if not s.joints:
-            return np.zeros((len(times), 0))
+        if not self.turns:
+            return self._slope
         return _beside([joint.slope_entries(times, s.N)[2] for joint in s.joints])
 
     def driven(self, times: Array) -> Array:

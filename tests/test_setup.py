@@ -22,6 +22,7 @@ from skfem_ancf.finder import Finder
 from skfem_ancf.forces import system as forces
 from skfem_ancf.formulations import FORMULATIONS, Assumed
 from skfem_ancf.inertia import points_along
+from skfem_ancf.joints.base import Joint
 from skfem_ancf.kernels import cable, section
 from skfem_ancf.kernels.base import pair_tables
 from skfem_ancf.linalg import BandMatrix
@@ -779,3 +780,11 @@ def test_later_solutions_held_at_an_angle_ask_factors_alone(monkeypatch):
     assert scene.system.joints and len(scene.system.springs)
     asked = [counted(monkeypatch, Constraints, name) for name in ("_entries", "_curvature")]
     assert np.array_equal(scene.solve_static().u, first.u) and not any(asked)
+
+
+def test_a_first_solve_asks_its_joints_once(monkeypatch):
+    scene = cantilever(ElementBeamCable(5), angle=0.6)
+    asked = counted(monkeypatch, Joint, "slope_entries")
+    for _ in range(2):
+        scene.solve_static()
+        assert len(asked) == len(scene.system.joints) > 0

@@ -410,7 +410,7 @@ class Joint(Sealable):
         """
         if type(self).slope is Joint.slope and not self.turning:
             rows, columns, values = self.entries(np.zeros(N), times[0])
-            return rows, columns, np.broadcast_to(values, (len(times), len(values)))
+            return rows, columns, values[None].repeat(len(times), axis=0)
         columns, values = self.slope(times, N)
         _, m, k = values.shape
         entry = np.arange(m * k)
@@ -448,8 +448,10 @@ class Joint(Sealable):
         equations, rows, columns, values
             Shapes (k,).
         """
-        zero, none = np.zeros(N), np.zeros(0, dtype=int)
-        out: list[Any] = [(none, none, none, np.zeros(0))]
+        none = np.zeros(0, dtype=int)
+        if type(self).curvature is Joint.curvature:
+            return none, none, none, np.zeros(0)
+        zero, out = np.zeros(N), [(none, none, none, np.zeros(0))]
         for row, unit in enumerate(np.eye(len(self.equations))):
             found = self.curvature(zero, 0.0, unit)
             if found is not None:
