@@ -58,7 +58,7 @@ class Term:
         return read_only(X), read_only(W)
 
     @cached_property
-    def places(self) -> Content:
+    def _places(self) -> Content:
         """Where it is sampled: places along of xx, yy and xy, and places across."""
         return Content(*map(self.nodes, COMPONENTS), self.section_nodes)
 

@@ -475,10 +475,10 @@ class TermTables:
             self.points, W = term.quadrature
             self.w = across.volume(slab, self.points, W, tind, whole)
             rows = {} if rows is None else rows
-            if term.places not in rows:
-                rows[term.places] = _rows(mesh, across.element, term.places, tind,
+            if term._places not in rows:
+                rows[term._places] = _rows(mesh, across.element, term._places, tind,
                                           [] if asked is None else asked)
-            self._rows = rows[term.places]
+            self._rows = rows[term._places]
         self._interpolation = before._interpolation if before is not None else _interpolation(term)
         G, frame, self._samples, scaled = self._rows
         weights = self.w if slab.grade is None else across.volume(
