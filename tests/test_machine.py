@@ -246,7 +246,7 @@ def test_what_two_entries_call_is_lowered_once(needs_compiled, monkeypatch):
 
 @pytest.mark.parametrize("order", ["C", "F", "A"])
 def test_single_numbers_of_arrays_are_read_and_written_as_by_numpy(needs_compiled, order):
-    """From either end, of any layout and kind of number; slices are Numba's, as in other code."""
+    """From either end, of any layout and kind of number; as in other code of Numba."""
     from numba import njit
 
     from skfem_ancf.compiled.twin import compile_for
@@ -266,6 +266,36 @@ def test_single_numbers_of_arrays_are_read_and_written_as_by_numpy(needs_compile
             assert x.tolist() == y.tolist()
 
 
+@pytest.mark.parametrize("first, last", [(0, 2), (1, 3), (-2, 9), (3, 1), (-9, -1), (7, 9)])
+def test_parts_of_arrays_are_those_of_numpy(needs_compiled, first, last):
+    """Rows and slices of every end, as places to read and to fill."""
+    from skfem_ancf.compiled.twin import compile_for
+
+    found, expected = np.zeros(12), np.zeros(12)
+    A = np.arange(60.0).reshape(3, 5, 4)
+    parts(A.copy(), first, last, expected)
+    compile_for(parts, (A, first, last, found))(A, first, last, found)
+    assert found.tolist() == expected.tolist() and expected.any()
+
+
+def test_arrays_that_texts_make_live_as_long_as_they_are_used(needs_compiled):
+    """Those made in loops and given back, and views of them; none is left."""
+    from numba.core.runtime import _nrt_python as memory, rtsys
+
+    from skfem_ancf.compiled.twin import compile_for
+
+    x, found, expected = np.arange(1.0, 4.0), np.zeros(3), np.zeros(3)
+    makes(x, expected)
+    run = compile_for(makes, (x, found))
+    memory.memsys_enable_stats()
+    before = rtsys.get_allocation_stats()
+    run(x, found)
+    after = rtsys.get_allocation_stats()
+    memory.memsys_disable_stats()
+    assert found.tolist() == expected.tolist() == [44.0, 36.0, 18.0]
+    assert after.alloc - before.alloc == after.free - before.free > 10
+
+
 @pytest.mark.parametrize("first, last", [(0, 4), (2, 4), (4, 2), (-2, 1), (3, 3)])
 def test_loops_run_as_in_python(needs_compiled, first, last):
     """Loops of one end and of two, by steps, in lanes, and those in others that are left."""
@@ -275,6 +305,45 @@ def test_loops_run_as_in_python(needs_compiled, first, last):
     loops(first, last, expected)
     compile_for(loops, (first, last, found))(first, last, found)
     assert found.tolist() == expected.tolist() and (last <= 0 or expected[0] > 0.0)
+
+
+@source
+def parts(A, first, last, out):
+    row, some, rest = A[-1, 2], A[1, first:last], A[first:]
+    out[0], out[1], out[2] = row[0] + row[-1], some.shape[0], rest.shape[0]
+    out[3] = A[0, 1, 1:last].sum() + A[0, 1, :first].sum() + A[1:, first:, 1:2].sum()
+    out[4:last], A[2, first:last] = 5.0, 1.0
+    A[0] = 2.0
+    last = 1  # what a slice was made of may change
+    out[first:][:1] = 7.0
+    out[10], out[11] = A.sum(), some.sum() + last
+
+
+@source
+def makes(x, out):
+    before = np.zeros(3)
+    for k in range(4):
+        A = np.ones((2, 3))
+        A[1] = 5.0 + k
+        row, junk = row_of(A, 1), np.zeros(3)
+        out[0] += row[0] + before[0] + junk[1]
+        before = row
+    B = np.ones((2, 3))
+    B[1] = 3.0
+    out[1], out[2] = twice(twice(row_of(B, 1)))[1] * x[2], twice(twice(x))[2] + twice(x)[2]
+
+
+@source
+def row_of(A, k):
+    return A[k]
+
+
+@source
+def twice(x):
+    y = np.empty(x.size)
+    for i in range(x.size):
+        y[i] = 2.0 * x[i]
+    return y
 
 
 @source
@@ -335,7 +404,8 @@ def test_texts_of_the_package_count_indices_from_the_begin():
                 for x in ast.walk(text):
                     if isinstance(x, ast.Subscript):
                         parts = x.slice.elts if isinstance(x.slice, ast.Tuple) else [x.slice]
-                        assert not any(isinstance(y, ast.UnaryOp) for y in parts), text.name
+                        ends = [getattr(y, end, None) for y in parts for end in ("lower", "upper")]
+                        assert not any(isinstance(y, ast.UnaryOp) for y in parts + ends), text.name
     assert {"collocate", "equilibrium", "cable_block"} < found
 
 

@@ -39,12 +39,12 @@ class TextFlags(compiler.Flags):
         Known, or KnownOfOthers.
     """
 
-    __slots__ = ("known",)
+    __slots__ = "counts", "known"
 
     def __init__(self, options, counts, kind):
         super().__init__()
         cpu_target.options.parse_as_flags(self, {"nopython": True, **options})
-        self.nrt = counts
+        self.nrt, self.counts = True, counts
         self.no_compile = self.no_cpython_wrapper = self.no_cfunc_wrapper = True
         self.known = kind(self)
 

@@ -52,14 +52,18 @@ class TextLegalization(IRLegalization):
     _name = "text_legalization"
 
     def run_pass(self, state):
-        return state.flags.nrt and super().run_pass(state)
+        return state.flags.counts and super().run_pass(state)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class TextLowering(NativeLowering):
-    """Instructions."""
+    """Instructions, for owners that are counted where they have to be."""
 
     _name = "text_lowering"
+
+    def run_pass(self, state):
+        state.targetctx = state.targetctx.subtarget(enable_nrt=state.flags.counts)
+        return super().run_pass(state)
 
     @property
     def lowering_class(self):

@@ -23,6 +23,7 @@ from ..source import F1, F2, F3, I1
 from ..tables import JointTables, LoadTables
 from . import address as address_of_group
 from . import stamp
+from .convention import TextCallConv
 from .records import kind_of
 from .together import Entry, Shared, Text
 from .twin import entry_of, named, twin
@@ -130,7 +131,8 @@ def _places(group):
         def generate(context, builder, signature, args):
             number, found = args[0], args[0].type(0)
             for k, one in enumerate(made):
-                function = context.declare_function(builder.module, one.descriptor)
+                function = TextCallConv(context).declared(
+                    builder.module, one.symbol, one.signature.return_type, one.signature.args)
                 found = builder.select(builder.icmp_signed("==", number, number.type(k)),
                                        builder.ptrtoint(function, number.type), found)
             return found

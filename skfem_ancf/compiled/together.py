@@ -7,28 +7,28 @@ Numba does, but share the module of the entry, which is optimised once.
 
 from __future__ import annotations
 
-import dis
-from itertools import count, pairwise
+from functools import cached_property
+from itertools import count
 from typing import Any, NamedTuple
 
-from llvmlite.binding import (create_pass_builder, create_pipeline_tuning_options,
-                              parse_assembly)
+from llvmlite.binding import (Linkage, Visibility, create_pass_builder,
+                              create_pipeline_tuning_options, parse_assembly)
+from llvmlite.ir import Ret
 from numba import types
-from numba.core import cgutils, compiler, config
+from numba.core import compiler, config
 from numba.core.codegen import JITCodeLibrary
-from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
 from numba.core.registry import cpu_target
 from numba.core.imputils import lower_builtin, lower_constant
 from numba.extending import models, register_model, typeof_impl
 
 from . import nothing_collected
+from .convention import TextCallConv, is_known
+from .lowering import TextType
 from .passes import TextCompiler
+from .views import has_arrays
 
 
-#: Lines of texts that become part of their callers; of longer ones LLVM wants to know what they do
-#: to what they are given, which it looks for only in what may not be left out.
-SHORT = 800
 #: Modules whose texts are compiled for size: their loops take less time than what they call; and
 #: texts of others.
 BRIEF = {"border", "forces.texts", "kernels.section.section_gradients", "statics.iteration"} | {
@@ -38,20 +38,16 @@ BRIEF = {"border", "forces.texts", "kernels.section.section_gradients", "statics
 
 
 class _Library(JITCodeLibrary):
-    """That of an entry: what has become part of its callers may be left out.
+    """That of an entry, in which nobody else calls its texts: LLVM sees all that they are given."""
 
-    The linker leaves out what is not called yet: callers come first.
-    """
-
-    def __init__(self, codegen, name):
-        super().__init__(codegen, name)
-        self.modules = []
-
-    def add_llvm_module(self, module):
-        self.modules.append(module)
+    def _optimize_functions(self, module):
+        """Not one by one, since all are once they are together."""
 
     def _optimize_final_module(self):
         """As Numba, but loops are not unrolled: in small scenes they run a few times."""
+        for function in self._final_module.functions:
+            if function.visibility is Visibility.hidden:
+                function.linkage = Linkage.internal
         for sums in (False, True):
             options = create_pipeline_tuning_options(config.OPT)
             options.loop_vectorization, options.loop_unrolling = config.LOOP_VECTORIZE, False
@@ -61,34 +57,30 @@ class _Library(JITCodeLibrary):
             passes.add_refprune_pass()
             passes.run(self._final_module, builder)
 
-    def finalize(self):
-        while self.modules:
-            super().add_llvm_module(self.modules.pop())
-        super().finalize()
-
 
 class _Part:
     """What a text puts into the library of an entry, for other entries that call it too."""
 
-    def __init__(self, library, brief):
-        self._library, self._brief = library, brief
-        self.modules, self.linked, self.calls = [], [], {}
+    def __init__(self, library, brief, counts):
+        self._library, self._brief, self.counts = library, brief, counts
+        self.modules, self.linked, self.calls, self.fails = [], [], {}, False
 
     def __getattr__(self, name):
         return getattr(self._library, name)
 
     def add_ir_module(self, module):
         functions = [x for x in module.functions if not x.is_declaration]
+        ends = (block.terminator for function in functions for block in function.blocks)
+        self.fails = any(isinstance(x, Ret) and getattr(x.return_value, "constant", 1) != 0
+                         for x in ends)
         if self._brief:
             for function in functions:
                 function.attributes.add("optsize")
-        text = str(module)
-        read = parse_assembly(text)
+        read = parse_assembly(str(module))
         read.name = module.name
         read.verify()
-        if text.count("\n") < SHORT:
-            for function in functions:
-                read.get_function(function.name).linkage = "linkonce_odr"
+        for function in functions:
+            read.get_function(function.name).visibility = Visibility.hidden
         self.modules.append(read)
         self._library.add_llvm_module(read.clone())
 
@@ -105,6 +97,11 @@ class _Open:
 
     def __init__(self, library, group):
         self.library, self.group, self.texts, self.parts = library, group, set(), []
+
+    @property
+    def counts(self):
+        """True if owners of arrays are counted in what is being lowered, as in an entry itself."""
+        return not self.parts or self.parts[-1].counts
 
     def take(self, text, args):
         """Put in what a text has put elsewhere, and what it calls."""
@@ -153,15 +150,16 @@ class _Typing:
 
 
 class _Made(NamedTuple):
-    """A text for types of arguments: its signature, and what Numba knows it by.
+    """A text for types of arguments: its signature, and what Numba and the linker know it by.
 
-    One that is called in another library has no part and no descriptor.
+    One that is called in another library has no part.
     """
 
     signature: Any
     key: object
     part: _Part | None = None
-    descriptor: Any = None
+    symbol: str = ""
+    counts: bool = False
 
 
 class Shared(NamedTuple):
@@ -172,9 +170,6 @@ class Shared(NamedTuple):
     returns: types.Type
 
 
-#: What texts take of NumPy, and of its arrays, without a need for another array.
-_OF_NUMBERS = {"abs", "arctan2", "ceil", "floor", "hypot", "inf", "int64", "log1p", "maximum",
-               "minimum", "nan", "sign", "sqrt"}
 #: The entries that are being compiled, the innermost last.
 _OPEN: list[_Open] = []
 _TYPING = _Typing(cpu_target.typing_context)
@@ -189,7 +184,7 @@ class Text:
     function
         A Python function.
     flags
-        Two :class:`TextFlags`, with owners of arrays not counted and counted.
+        :class:`TextFlags`, those tried first where owners of arrays are not counted.
     """
 
     def __init__(self, function, flags):
@@ -200,9 +195,21 @@ class Text:
     def of(self, args):
         """Signature and key for types of arguments, in the entry that is being compiled."""
         entry = _OPEN[-1]
+        made = self._of(args, entry)
+        lent = made.counts or "borrowed" in self.function.__code__.co_names
+        if lent or not entry.counts or not has_arrays(made.signature.return_type):
+            return made
+        return self._counted.of(args)
+
+    @cached_property
+    def _counted(self):
+        """The same for those who count the owners of arrays that it gives back."""
+        return Text(self.function, self.flags[-1:])
+
+    def _of(self, args, entry):
         if args in self.shared and self.shared[args].group != entry.group:
             if args not in self._called:
-                self._called[args] = _by_symbol(self.shared[args], args)
+                self._called[args] = self._elsewhere(self.shared[args], args)
             return self._called[args]
         if entry.parts:
             entry.parts[-1].calls[self, args] = None
@@ -213,83 +220,48 @@ class Text:
             entry.texts.add((self, args))
         return self.made[args]
 
+    def _elsewhere(self, shared, args):
+        key = object()
+        _by_symbol(key, args, shared.symbol)
+        return _Made(shared.returns(*args), key)
+
+    def gives_owners(self, args):
+        """True if arrays that it returns are the caller's from then on."""
+        return args in self.made and self.made[args].counts
+
     def _lowered(self, args, entry):
-        """Owners of arrays are counted only where one may be allocated, given back or boxed."""
-        if not _makes_arrays(self.function):
+        """Owners of arrays are counted only where a text gives away what it makes."""
+        for flags in self.flags[:-1]:
             try:
-                made = self._compiled(args, entry, False)
-                if not _has_arrays(made.signature.return_type) or _gives_none(self.function):
-                    return made
+                return self._compiled(args, entry, flags)
             except NumbaError:
                 pass  # said again, if it was not for the owners
-        return self._compiled(args, entry, True)
+        return self._compiled(args, entry, self.flags[-1])
 
-    def _compiled(self, args, entry, counts):
+    def _compiled(self, args, entry, flags):
         module = str(self.function.__module__).partition(".")[2]  # None: made by exec
         brief = not BRIEF.isdisjoint((module, f"{module}.{self.function.__name__}"))
-        part, key = _Part(entry.library, brief), object()
+        part, key = _Part(entry.library, brief, flags.counts), object()
         entry.parts.append(part)
         try:
             made = compiler.compile_extra(_TYPING, cpu_target.target_context,
-                                          self.function, args, None, self.flags[counts], {},
+                                          self.function, args, None, flags, {},
                                           library=part, pipeline_class=TextCompiler)
         finally:
             entry.parts.pop()
-        cpu_target.target_context.insert_user_function(key, made.fndesc)
-        return _Made(made.signature, key, part, made.fndesc)
+        if is_known(made.fndesc.restype):
+            _by_symbol(key, args, made.fndesc.mangled_name, part.fails)
+        else:
+            cpu_target.target_context.insert_user_function(key, made.fndesc)
+        return _Made(made.signature, key, part, made.fndesc.mangled_name, flags.counts)
 
 
-def _by_symbol(shared, args):
-    """A text that is compiled elsewhere."""
+def _by_symbol(key, args, symbol, fails=True):
+    """Let Numba know how to call a text."""
     def call(context, builder, signature, values):
-        takes = signature.return_type, signature.args
-        function = cgutils.get_or_insert_function(
-            builder.module, context.call_conv.get_function_type(*takes), shared.symbol)
-        status, value = context.call_conv.call_function(builder, function, *takes, values)
-        with cgutils.if_unlikely(builder, status.is_error):
-            context.call_conv.return_status_propagate(builder, status)
-        return value
+        return TextCallConv(context).call(builder, symbol, signature, values, fails)
 
-    key = object()
     cpu_target.target_context.insert_func_defn([(call, key, args)])
-    return _Made(shared.returns(*args), key)
-
-
-def _makes_arrays(function):
-    """True if it calls functions of arrays, of NumPy or of Numba, which may make others."""
-    given, code = function.__globals__, dis.get_instructions(function)
-    of_numpy = {y.argval for x, y in pairwise(code)
-                if x.opname == "LOAD_GLOBAL" and x.argval == "np"}
-    return not of_numpy <= _OF_NUMBERS or any(
-        isinstance(given.get(x), Dispatcher) for x in function.__code__.co_names)
-
-
-def _gives_none(function):
-    """True if the arrays that it returns are borrowed."""
-    return "borrowed" in function.__code__.co_names
-
-
-def _has_arrays(kind):
-    if isinstance(kind, types.BaseTuple):
-        return any(_has_arrays(x) for x in kind)
-    return isinstance(kind, types.Array)
-
-
-class TextType(types.Callable):
-    """The type of a :class:`Text`."""
-
-    def __init__(self, text):
-        self.text = text
-        super().__init__(f"text({text.function.__qualname__}, {text.number})")  # one by its name
-
-    def get_call_type(self, context, args, kws):
-        return self.text.of(tuple(types.unliteral(x) for x in args)).signature
-
-    def get_call_signatures(self):
-        return [], True
-
-    def get_impl_key(self, sig):
-        return self.text.of(sig.args).key
 
 
 register_model(TextType)(models.OpaqueModel)

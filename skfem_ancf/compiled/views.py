@@ -13,22 +13,39 @@ _WORD = ir.IntType(64)
 _ALIGNED = 64
 
 
-def _without_owner(context, builder, kind, value):
+def without_owner(context, builder, kind, value):
+    """The same arrays, or tuples of them, that have none."""
     if isinstance(kind, types.Array):
         none = cgutils.get_null_value(context.get_value_type(types.voidptr))
-        return _with(context, builder, kind, value, {"meminfo": none, "parent": none})
+        return with_parts(context, builder, kind, value, {"meminfo": none, "parent": none})
     if isinstance(kind, types.BaseTuple):
         for k, of in enumerate(kind.types):
-            one = _without_owner(context, builder, of, builder.extract_value(value, k))
+            one = without_owner(context, builder, of, builder.extract_value(value, k))
             value = builder.insert_value(value, one, k)
     return value
+
+
+def has_arrays(kind):
+    """True for the type of an array, or of a tuple that has one."""
+    if isinstance(kind, types.BaseTuple):
+        return any(map(has_arrays, kind))
+    return isinstance(kind, types.Array)
+
+
+def owners(context, builder, kind, value):
+    """Those of an array, or of the arrays of a tuple."""
+    if isinstance(kind, types.Array):
+        yield part(context, builder, kind, value, "meminfo")
+    elif isinstance(kind, types.BaseTuple):
+        for k, of in enumerate(kind.types):
+            yield from owners(context, builder, of, builder.extract_value(value, k))
 
 
 @intrinsic
 def borrowed(typing, x):
     """The same arrays, or tuples of them."""
     def generate(context, builder, signature, args):
-        return _without_owner(context, builder, x, args[0])
+        return without_owner(context, builder, x, args[0])
 
     return x(x), generate
 
@@ -40,17 +57,18 @@ def array_at(context, builder, kind, pointer, shape):
     for n in reversed(shape[:-1]):
         strides.insert(0, builder.mul(count, size))
         count = builder.mul(count, n)
-    return _with(context, builder, kind, cgutils.get_null_value(context.get_value_type(kind)), {
+    none = cgutils.get_null_value(context.get_value_type(kind))
+    return with_parts(context, builder, kind, none, {
         "data": pointer, "shape": cgutils.pack_array(builder, shape), "itemsize": size,
         "strides": cgutils.pack_array(builder, strides), "nitems": count})
 
 
 def part(context, builder, kind, array, name):
-    """A part of an array: "data", "shape", "strides"."""
+    """A part of an array: "data", "shape", "strides", "nitems", "meminfo"."""
     return builder.extract_value(array, context.data_model_manager[kind].get_field_position(name))
 
 
-def _with(context, builder, kind, array, parts):
+def with_parts(context, builder, kind, array, parts):
     """An array with other parts."""
     model = context.data_model_manager[kind]
     for name, value in parts.items():
