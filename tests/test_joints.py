@@ -7,7 +7,8 @@ from scipy.integrate import trapezoid
 import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana,
-                        EnergyMomentum, GeneralizedAlpha, MeshBeam, Scene, StVenantKirchhoff)
+                        EnergyMomentum, GeneralizedAlpha, MeshBeam, RigidBody, Scene,
+                        StVenantKirchhoff)
 from skfem_ancf.errors import InputError, NameUnknown, SupportError
 from skfem_ancf.joints import JOINTS, get_joint
 from skfem_ancf.linalg import dense
@@ -674,3 +675,41 @@ def test_joint_of_another_scene():
     with pytest.raises(SupportError, match="not a joint of this scene"):
         state.joint_force(joint)
     assert get_joint(joint) is joint
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamCable(9),
+                                     ElementBeamANCFCubic(3)])
+def test_points_inside_elements_are_held_in_any_unit(element):
+    """A prop, a spring and a torsional spring inside an element, of beams of 10 nm to 1000 km."""
+    def tips(L):
+        beam = Beam(MeshBeam.init_line(np.linspace(0, L, 8), 0.02 * L), element,
+                    StVenantKirchhoff(2e9, 0.0), 0.02 * L)
+        out = []
+        for hold in (lambda s: s.hinge((beam, (0.3 * L, 0)), ("ground", (0.3 * L, 0))),
+                     lambda s: s.spring(2e3 * L, ((0.3 * L, 0), ("ground", (0.3 * L, 0.5 * L)))),
+                     lambda s: s.torsional_spring(2e3 * L**3, at=(0.3 * L, 0))):
+            scene = Scene(beam).clamp("left", thickness="free")
+            hold(scene)
+            scene.point_force((0, -0.02 * L**2), at=(L, 0))
+            out.append(scene.solve_static().displacement((L, 0))[1] / L)
+        return np.array(out)
+
+    one, stiffness = tips(1.0), 2e9 * 0.02**4 / 12
+    assert one[0] == pytest.approx(-0.02 * 0.7**2 * (0.3 / 4 + 0.7 / 3) / stiffness, rel=0.05)
+    for L in (1e-8, 1e-3, 1e6):
+        assert np.allclose(tips(L) / one, 1.0, rtol=0, atol=1e-11)
+
+
+def test_modes_of_a_body_on_a_spring_in_any_unit():
+    """A body on a beam, held by a spring to it: joints of places and of directions."""
+    def frequencies(L):
+        beam = Beam(MeshBeam.init_line(np.linspace(0, L, 7), 0.02 * L), ElementBeamCable(5),
+                    StVenantKirchhoff(2e9, 0.0, 1500.0), 0.02 * L, name="beam")
+        bob = RigidBody(0.3 * L**3, 1e-3 * L**5, (1.1 * L, 0.0), name="bob")
+        scene = Scene(beam, bob).clamp("left", "beam")
+        scene.hinge((beam, "right"), (bob, (L, 0)))
+        scene.spring(100.0 * L, between=((beam, (0.3 * L, 0)), (bob, (1.1 * L, 0.1 * L))))
+        return scene.modes(3).frequencies * L
+
+    for L in (1e-6, 1e6, 1e9):
+        assert np.allclose(frequencies(L) / frequencies(1.0), 1.0, rtol=0, atol=1e-9)
