@@ -94,7 +94,7 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         "each iteration; the last evaluates the force only")
     add("mass", "constant" if dynamic else "skipped",
         "assembled and factorised once" if dynamic else "no inertia in statics")
-    for item in (_bodies(s), _damping(s, dynamic), _elements(s), _obstacles(s)):
+    for item in (_bodies(s), _damping(s, dynamic), _elements(s), _obstacles(s, linear)):
         add(*item)
     dead = [load for load in scene.loads if load.constant and load.amplitude is None]
     rest = len(scene.loads) - len(dead)
@@ -233,11 +233,13 @@ def _elements(s):
         + (", some couple points far apart" if forces.far else ""))
 
 
-def _obstacles(s):
+def _obstacles(s, linear):
     """Term, status and reason of contact."""
     contacts = s.forces.contacts
     if not contacts.obstacles:
         return "obstacles", "skipped", "there are none"
+    if linear:
+        return "obstacles", "skipped", "a linear solution that enters one is refused"
     points = sum(len(group.first) for one in contacts.obstacles for group in one.groups)
     elements = sum(group.elements for one in contacts.obstacles for group in one.groups)
     how = [text for text, there in (

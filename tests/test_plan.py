@@ -268,3 +268,13 @@ def test_which_scheme_a_motion_takes():
     history = held.integrate(0.1, "auto", scheme="auto", rtol=1e-6)
     other = held.integrate(0.1, "auto", scheme="gauss", rtol=1e-6)
     assert np.array_equal(history.u, other.u) and len(history) == len(other)
+
+
+def test_a_linear_solve_computes_no_contact():
+    touched = scene().obstacle(Line((0, -0.5), (0, 1)))
+    plan = touched.plan("linear")["obstacles"]
+    assert plan.status == "skipped" and "refused" in plan.reason
+    assert touched.plan()["obstacles"].status == "computed"
+    touched.gravity((0, -90.0))
+    with pytest.raises(InputError):
+        touched.solve_linear()
