@@ -108,6 +108,8 @@ class Points(NamedTuple):
         Room, shape (3, s), the first row zero.
     x, r, q
         Room, shape (4, N), (2 b,) and (2 b, 2 b), with b rows beside the band.
+    Q
+        Columns of the matrix between these rows for each eigenvalue, shape (k, 2 b, 2 b).
     origin, B
         Where the factors were made, shape (N,), and with carried stresses the gradients there.
     pairs, real
@@ -145,6 +147,7 @@ class Points(NamedTuple):
     x: F2
     r: F1
     q: F2
+    Q: F3
     origin: F1
     B: F1
     pairs: F2
@@ -178,9 +181,9 @@ def room_for_points(method: Method, N: int, m: int, rows: int, stresses: int, gr
     return Points._make([
         np.zeros((3, N)), np.zeros((2, N)), *np.zeros((6, n, N)), *np.zeros((4, n, m)),
         *np.zeros((3, n * stresses)), np.zeros((3, stresses)), np.zeros((4, N)), np.zeros(2 * b),
-        np.zeros((2 * b, 2 * b)), np.zeros(N), np.zeros(gradients), np.zeros((k, 2 * N * ld)), real,
-        np.zeros((b, N)), np.zeros((2 * k, b, N)), np.zeros((2, rows, rows)), np.zeros((2, m, N)),
-        np.zeros((m, m)), np.zeros(m), D, method])
+        np.zeros((2 * b, 2 * b)), np.zeros((k, 2 * b, 2 * b)), np.zeros(N), np.zeros(gradients),
+        np.zeros((k, 2 * N * ld)), real, np.zeros((b, N)), np.zeros((2 * k, b, N)),
+        np.zeros((2, rows, rows)), np.zeros((2, m, N)), np.zeros((m, m)), np.zeros(m), D, method])
 
 
 @source
@@ -558,15 +561,13 @@ def _join(method, s, w, k, r, q, x, y):
 
     By forces r along them: with those of joints ``mu / h J x = -gap``, others are ``C J x``.
     """
+    Q = w.Q[k]
     m, b, n = w.l.shape[1], w.J.shape[0], method.points.size
     p, z = method.values[0, k], method.values[1, k]
     c, d = s.h * p / (p * p + z * z), -s.h * z / (p * p + z * z)  # h / mu
     for a in range(b):
         J = w.J[a]
         r[a], r[b + a] = np.dot(J, x), np.dot(J, y)
-        for j in range(b):
-            re, im = np.dot(J, w.Y[2 * k, j]), np.dot(J, w.Y[2 * k + 1, j])
-            q[a, j], q[b + a, b + j], q[a, b + j], q[b + a, j] = re, re, -im, im
     for a in range(m):
         re, im = 0.0, 0.0
         for j in range(n):
@@ -575,7 +576,10 @@ def _join(method, s, w, k, r, q, x, y):
         r[a] += c * re - d * im
         r[b + a] += c * im + d * re
     if b > m:
-        _stiffen(w.S, p / s.h, z / s.h, m, r, q)
+        _stiffen(w.S, p / s.h, z / s.h, m, r)
+    for a in range(2 * b):
+        for j in range(2 * b):
+            q[a, j] = Q[j, a]
     if not dense_solve(q, r):
         return False
     for a in range(b):
@@ -587,24 +591,19 @@ def _join(method, s, w, k, r, q, x, y):
 
 
 @source
-def _stiffen(S, p, z, m, r, q):
-    """The last rows of ``q f = r`` times ``C = S[0] + (p + i z) S[1]``, and f added to them."""
-    k, b = S.shape[1], r.size // 2
+def _stiffen(S, p, z, m, column):
+    """The last rows of a column of ``q f = r`` times ``C = S[0] + (p + i z) S[1]``."""
+    k, b = S.shape[1], column.size // 2
     room = np.empty(2 * k)
-    for j in range(2 * b + 1):
-        column = r if j == 2 * b else q[:, j]
-        for a in range(k):
-            room[a], room[k + a] = column[m + a], column[b + m + a]
-        for a in range(k):
-            re, im = 0.0, 0.0
-            for c in range(k):
-                C, D = S[0, a, c] + p * S[1, a, c], z * S[1, a, c]
-                re += C * room[c] - D * room[k + c]
-                im += C * room[k + c] + D * room[c]
-            column[m + a], column[b + m + a] = re, im
     for a in range(k):
-        q[m + a, m + a] += 1.0
-        q[b + m + a, b + m + a] += 1.0
+        room[a], room[k + a] = column[m + a], column[b + m + a]
+    for a in range(k):
+        re, im = 0.0, 0.0
+        for c in range(k):
+            C, D = S[0, a, c] + p * S[1, a, c], z * S[1, a, c]
+            re += C * room[c] - D * room[k + c]
+            im += C * room[k + c] + D * room[c]
+        column[m + a], column[b + m + a] = re, im
 
 
 # its factors
@@ -655,7 +654,24 @@ def _factorize(e, matrices, method, s, w, state, step):
             for i in lanes(y.size):
                 y[i] = 0.0
             solve_for(w, k, x, y)
+        _between(w, s.h, k)
     return True
+
+
+@source
+def _between(w, h, k):
+    """The matrix between the rows beside the band, with the factors for the eigenvalue k."""
+    Q, b, m, values = w.Q[k], w.J.shape[0], w.l.shape[1], w.method.values
+    for a in range(b):
+        for j in range(b):
+            re, im = np.dot(w.J[a], w.Y[2 * k, j]), np.dot(w.J[a], w.Y[2 * k + 1, j])
+            Q[j, a], Q[b + j, b + a], Q[b + j, a], Q[j, b + a] = re, re, -im, im
+    if b > m:
+        for j in range(2 * b):
+            _stiffen(w.S, values[0, k] / h, values[1, k] / h, m, Q[j])
+    for a in range(m, b):
+        Q[a, a] += 1.0
+        Q[b + a, b + a] += 1.0
 
 
 @source
