@@ -109,7 +109,7 @@ class Points(NamedTuple):
     x, r, q
         Room, shape (4, N), (2 b,) and (2 b, 2 b), with b rows beside the band.
     Q
-        Columns of the matrix between these rows for each eigenvalue, shape (k, 2 b, 2 b).
+        The matrix between these rows for each eigenvalue, shape (k, 2 b, 2 b).
     origin, B
         Where the factors were made, shape (N,), and with carried stresses the gradients there.
     pairs, real
@@ -561,7 +561,6 @@ def _join(method, s, w, k, r, q, x, y):
 
     By forces r along them: with those of joints ``mu / h J x = -gap``, others are ``C J x``.
     """
-    Q = w.Q[k]
     m, b, n = w.l.shape[1], w.J.shape[0], method.points.size
     p, z = method.values[0, k], method.values[1, k]
     c, d = s.h * p / (p * p + z * z), -s.h * z / (p * p + z * z)  # h / mu
@@ -577,9 +576,7 @@ def _join(method, s, w, k, r, q, x, y):
         r[b + a] += c * im + d * re
     if b > m:
         _stiffen(w.S, p / s.h, z / s.h, m, r)
-    for a in range(2 * b):
-        for j in range(2 * b):
-            q[a, j] = Q[j, a]
+    copy(_flat(w.Q[k]), _flat(q))
     if not dense_solve(q, r):
         return False
     for a in range(b):
@@ -661,17 +658,20 @@ def _factorize(e, matrices, method, s, w, state, step):
 @source
 def _between(w, h, k):
     """The matrix between the rows beside the band, with the factors for the eigenvalue k."""
-    Q, b, m, values = w.Q[k], w.J.shape[0], w.l.shape[1], w.method.values
+    q, Q, b, m, values = w.q, w.Q[k], w.J.shape[0], w.l.shape[1], w.method.values
     for a in range(b):
         for j in range(b):
             re, im = np.dot(w.J[a], w.Y[2 * k, j]), np.dot(w.J[a], w.Y[2 * k + 1, j])
-            Q[j, a], Q[b + j, b + a], Q[b + j, a], Q[j, b + a] = re, re, -im, im
+            q[j, a], q[b + j, b + a], q[b + j, a], q[j, b + a] = re, re, -im, im  # its columns
     if b > m:
         for j in range(2 * b):
-            _stiffen(w.S, values[0, k] / h, values[1, k] / h, m, Q[j])
+            _stiffen(w.S, values[0, k] / h, values[1, k] / h, m, q[j])
     for a in range(m, b):
-        Q[a, a] += 1.0
-        Q[b + a, b + a] += 1.0
+        q[a, a] += 1.0
+        q[b + a, b + a] += 1.0
+    for a in range(2 * b):
+        for j in range(2 * b):
+            Q[a, j] = q[j, a]
 
 
 @source
