@@ -591,7 +591,7 @@ class Beam(Frozen):
                 for _, k, m in self.element.functionals]
         out = np.empty((self.N // self.nd, len(node), 2))
         out[:] = np.array(node)[:, None]
-        return out.ravel()
+        return read_only(out.ravel())
 
     def held_by_a_section(self, held: Sequence[int]) -> bool:
         """True if a node is held, and the direction of the axis there or its normal.

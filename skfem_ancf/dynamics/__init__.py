@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..errors import require_option, taught
-from .base import Motion, Scheme
+from .base import Motion, Scheme, Steps
 from .choice import choose_scheme
 from .energy_momentum import EnergyMomentum, EnergyMomentum4
 from .gauss import Gauss
@@ -32,4 +32,5 @@ def get_scheme(scheme: str | Scheme | type[Scheme]) -> Scheme:
 
 
 __all__ = ["HHT", "SCHEMES", "EnergyMomentum", "EnergyMomentum4", "Gauss", "GeneralizedAlpha",
-           "Motion", "Newmark", "Radau", "Scheme", "choose_scheme", "get_scheme"]
+           "Motion", "Newmark", "Radau", "Scheme", "Steps", "choose_scheme",
+           "get_scheme"]
