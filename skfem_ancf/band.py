@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from scipy.linalg import blas, lapack
 
 from .source import F1, I1, by_place, lanes, primitive, source
@@ -85,21 +86,25 @@ def factorize(A):
 
 
 def _indefinite(columns, width):
-    """L D L^T of columns (n, ld)."""
-    n, where = len(columns), [np.arange(k + 1) for k in range(width + 1)]
+    """L D L^T of columns (n, ld).
+
+    From one column to the next an entry of a row is ld - 1 numbers on: what is left of the next
+    columns is a square, and what of it is above the diagonal belongs to others.
+    """
+    n, ld = columns.shape
+    stride, lower = columns.itemsize, np.tri(min(width, n - 1)).T  # its rows are columns
     for j in range(n):
-        d, m = columns[j, 0], min(width, n - 1 - j)
+        m, d = min(width, n - 1 - j), columns[j, 0]
         if not abs(d) > 0.0:
             return False
-        below = columns[j, 1:m + 1]
-        factor = below / d
-        for k in np.flatnonzero(below):
-            other, at = columns[j + k + 1], where[m - k - 1]
-            before = other[0]
-            other[at] -= factor[k] * below[k:m]
-            if abs(other[0]) < LOST * abs(before):
+        if m:
+            below, diagonal = columns[j, 1:m + 1], columns[j + 1:j + 1 + m, 0]
+            factor, before = below / d, np.abs(diagonal)
+            left = as_strided(columns[j + 1:], (m, m), (stride * (ld - 1), stride))
+            left -= lower[:m, :m] * factor[:, None] * below
+            if (np.abs(diagonal) < LOST * before).any():
                 return False
-        columns[j, 1:m + 1] = factor
+            below[:] = factor
     return bool(np.all(np.isfinite(columns[:, 0])))
 
 
