@@ -240,7 +240,7 @@ class Collocation(Scheme):
         if kept.get("pairs") is w.pairs:
             return w
         factors = {"pairs": w.pairs, "real": w.real.flat} | (
-            {"J": w.J, "Y": w.Y, "S": w.S} if len(w.J) else {})
+            {"J": w.J, "Y": w.Y, "S": w.S, "Q": w.Q} if len(w.J) else {})
         for name, room in factors.items():
             if name in kept and kept[name] is not room:  # of a motion that goes on
                 room[...] = kept[name]
