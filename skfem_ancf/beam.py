@@ -612,28 +612,23 @@ class Beam(Frozen):
                     return True  # the other component would change as it turns
         return False
 
-    def rigid_motions(self, rows: Array | None = None) -> Array:
+    def rigid_motions(self, rows: Any = slice(None)) -> Array:
         """Two translations and the rotation about :attr:`origin`.
 
         Parameters
         ----------
         rows
-            Numbers of coordinates, shape (n,); None for all.
+            Numbers of coordinates, shape (n,), for as many rows; all by default.
 
         Returns
         -------
         ndarray
             Shape (n, 3), or (N, 3).
         """
-        if rows is None:
-            out, q = np.zeros((self.N, 3)), self.q0_local
-            out[::self.nd, 0] = out[1::self.nd, 1] = 1.0
-            out[::2, 2], out[1::2, 2] = -q[1::2], q[::2]
-            return out
-        out, of_node, component = np.zeros((len(rows), 3)), rows % self.nd, rows % 2
-        out[:, 0], out[:, 1] = of_node == 0, of_node == 1
-        out[:, 2] = self.q0_local[rows + 1 - 2 * component] * (2.0 * component - 1.0)
-        return out
+        out, q = np.zeros((self.N, 3)), self.q0_local
+        out[::self.nd, 0] = out[1::self.nd, 1] = 1.0
+        out[::2, 2], out[1::2, 2] = -q[1::2], q[::2]
+        return out[rows]
 
     # fields
 

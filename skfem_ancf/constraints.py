@@ -507,20 +507,17 @@ class Constraints:
         columns of a body are two translations and the rotation, in units of its size; dense arrays
         of few coordinates.
         """
-        joints = self._at_rest
+        joints, sizes = self._at_rest, [member.size for member in self.members]
+        bodies = [(self._who(k), b.origin, b.size) for k, b in enumerate(self.members)]
         if self.frame is None and self.N <= DENSE:
             dense = np.zeros((self.N, 3 * len(self.members)))
             for k, (member, s) in enumerate(zip(self.members, self.slices)):
                 dense[s, 3 * k:3 * k + 3] = member.rigid_motions() / (1.0, 1.0, member.size)
-            return dense, joints @ dense, [(self._who(k), member.origin, member.size)
-                                           for k, member in enumerate(self.members)]
+            return dense, joints @ dense, bodies
         values = np.concatenate([member.rigid_motions() for member in self.members])
-        sizes = [member.size for member in self.members]
         numbers = [member.N for member in self.members]
-        if self.frame is None:
-            bodies = [(self._who(k), b.origin, b.size) for k, b in enumerate(self.members)]
-            of_body = np.repeat(np.arange(len(bodies)), numbers)
-        else:
+        of_body = np.repeat(np.arange(len(bodies)), numbers)
+        if self.frame is not None:
             origin, size, parts = self.members[0].origin, self.size, self.frame.parts()
             shift = np.repeat([member.origin - origin for member in self.members], numbers, axis=0)
             values[:, 2] += shift[:, 0] * values[:, 1] - shift[:, 1] * values[:, 0]

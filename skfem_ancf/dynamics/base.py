@@ -101,9 +101,7 @@ class Memories(Sequence):
     """
 
     def __init__(self, y: Motion, n: int, contacts: Array | None, **others: Array) -> None:
-        self._n, self._start, self._arrays = n, contacts_of(y), others
-        if contacts is not None:
-            self._start, self._arrays = None, {"contacts": contacts, **others}
+        self._y, self._n, self._contacts, self._others = y, n, contacts, others
 
     def __len__(self):
         return self._n
@@ -111,8 +109,8 @@ class Memories(Sequence):
     def __getitem__(self, k):
         if not 0 <= k < self._n:  # arrays may have more
             raise IndexError(k)
-        found = {name: x[k].copy() for name, x in self._arrays.items()}
-        return (found if self._start is None else {"contacts": self._start, **found}) or None
+        contacts = None if self._contacts is None else self._contacts[k].copy()
+        return kept(self._y, contacts, **{name: x[k].copy() for name, x in self._others.items()})
 
 
 @dataclass
@@ -155,9 +153,7 @@ class Steps:
         t = self.start + self.dt * (self.first + k + 1)
         if self.end is not None and k + 1 == len(self):
             t = self.end
-        u, v, *rates = self.rows[k].copy()
-        forces = self.shares[k].copy()
-        return Motion(t, u, v, rates[0], rates[-1], forces[0], forces[-1], self.dt, memory,
+        return Motion(t, *_named(self.rows[k].copy(), self.shares[k].copy()), self.dt, memory,
                       float(self.dissipated[k]))
 
     def columns(self) -> tuple[Array, ...]:
@@ -166,10 +162,14 @@ class Steps:
         t = self.start + self.dt * np.arange(self.first + 1, self.first + n + 1)
         if self.end is not None:
             t[-1:] = self.end
-        u, v, *rates = self.rows[:n].swapaxes(0, 1)
-        forces = self.shares[:n].swapaxes(0, 1)
-        return (t, u, v, rates[0], rates[-1], forces[0], forces[-1], np.full(n, self.dt),
-                self.dissipated[:n])
+        return (t, *_named(self.rows[:n].swapaxes(0, 1), self.shares[:n].swapaxes(0, 1)),
+                np.full(n, self.dt), self.dissipated[:n])
+
+
+def _named(rows: Array, shares: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
+    """What a Motion has from its displacement to its force, of what :class:`Steps` has."""
+    u, v, *rates = rows
+    return u, v, rates[0], rates[-1], shares[0], shares[-1]
 
 
 class Scheme:

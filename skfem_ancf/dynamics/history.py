@@ -119,11 +119,18 @@ class History:
         columns = tuple(map(np.array, zip(*map(_COLUMNS_OF, self._rows))))
         return [*self._blocks, (columns, [y.memory for y in self._rows])]
 
+    def _remembered(self):
+        """The memories of all of it, in the same blocks."""
+        return [*(memories for _, memories in self._blocks), [y.memory for y in self._rows]]
+
     def _end(self):
         """The time of the last instant that is stored; -inf before the first."""
         if self._rows:
             return self._rows[-1].t
-        return self._blocks[-1][0][0][-1] if self._blocks else -np.inf
+        if not self._blocks:
+            return -np.inf
+        (times, *_), _ = self._blocks[-1]
+        return times[-1]
 
     def end(self, y: Motion) -> None:
         """Store the last instant, if it is not stored."""
@@ -155,7 +162,7 @@ class History:
     @property
     def memories(self) -> list[Any]:
         """What the scheme itself kept at each instant."""
-        return [memory for _, memories in self._stored() for memory in memories]
+        return list(chain.from_iterable(self._remembered()))
 
     def close(self) -> History:
         """Nothing more comes: what was stored are arrays from now on."""
@@ -176,7 +183,7 @@ class History:
         made = vars(self)
         if name not in _LATE or made.get("_run", self) is not None:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        columns, memories = self.columns(), [some for _, some in self._stored()]
+        columns, memories = self.columns(), self._remembered()
         if name not in made:  # another thread may have made them
             made["_others"] = tuple([columns.pop(x) for x in ("algorithmic", "force", "before")])
             made.update(columns, _memories=memories)
