@@ -489,8 +489,12 @@ class System:
     @cached_property
     def stiffness_scale(self) -> float:
         """eps times the square root of modulus times volume: the round-off of strains of 1."""
-        total = sum(b.kernel.scale for b in self.beams) or self.energy_of_bodies
-        return EPS * sqrt(total)
+        return EPS * sqrt(self.energy_of_strains)
+
+    @cached_property
+    def energy_of_strains(self) -> float:
+        """Modulus times volume, or :attr:`energy_of_bodies`."""
+        return sum(b.kernel.scale for b in self.beams) or self.energy_of_bodies
 
     @cached_property
     def energy_of_bodies(self) -> float:

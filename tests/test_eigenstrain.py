@@ -5,6 +5,8 @@ import pickle
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.integrate import solve_bvp
+from scipy.optimize import brentq
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, Frame,
                         InputError, MeshBeam, NeoHookean, Scene, Section, StVenantKirchhoff, sweep)
@@ -88,6 +90,45 @@ def test_heat_buckles_a_beam_between_walls():
         beam = Beam(mesh, element, STEEL, width=0.02)
         factor = Scene(beam).clamp("left").clamp("right").temperature(1.0).buckling(1).factors[0]
         assert factor == pytest.approx(np.pi**2 * h**2 / (3 * L**2) / 12e-6, rel=5e-3)
+
+
+def arched(T, alpha, EA):
+    """Rise of a heated beam between clamps, EI = L = 1, that has buckled: a two-point problem."""
+    def rates(s, y, p):
+        stretch = 1 + alpha * T - p[0] * np.cos(y[2]) / EA
+        return np.array([stretch * np.cos(y[2]), stretch * np.sin(y[2]), y[3],
+                         -p[0] * np.sin(y[2]) * stretch])
+
+    s = np.linspace(0, 0.5, 101)
+    a = 2 / np.pi * np.sqrt(alpha * T - 4 * np.pi**2 / EA)  # of small slopes
+    guess = np.array([s, a / 2 * (1 - np.cos(2 * np.pi * s)), a * np.pi * np.sin(2 * np.pi * s),
+                      2 * np.pi**2 * a * np.cos(2 * np.pi * s)])
+    found = solve_bvp(rates, lambda a, b, p: np.array([a[0], a[1], a[2], b[0] - 0.5, b[2]]),
+                      s, guess, p=[4 * np.pi**2], tol=1e-9, max_nodes=10**5)
+    assert found.success
+    return found.y[1, -1]
+
+
+@pytest.mark.parametrize("element, n, tol", [
+    (ElementBeamCable(5), 8, 1e-6), (ElementBeamANCFCubic(2), 16, 1e-3),
+    (ElementBeamANCF(2), 48, 1e-2)], ids=["cable", "cubic", "order 2"])
+def test_the_path_of_a_heated_beam_between_walls(element, n, tol):
+    """No node moves before it buckles: critical temperatures, and the rise beyond."""
+    h, alpha = 1e-3, 1e-5
+    EA = 12 / h**2
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, n + 1), h), element,
+                StVenantKirchhoff(EA / h, 0.3, thermal_expansion=alpha), width=1.0)
+    scene = Scene(beam).clamp("left", thickness="free").clamp("right", thickness="free")
+    first = 4 * np.pi**2 / (EA * alpha)
+    path = scene.temperature(1.0).continuation(ds=1e-6, max_load=3 * first)
+    # tan(x) = x of the antisymmetric mode
+    second = brentq(lambda x: np.sin(x) - x * np.cos(x), np.pi, 1.5 * np.pi) ** 2 / np.pi**2
+    assert_allclose(path.bifurcation_points(), [first, second * first], rtol=tol)
+    assert len(path) > 5 and np.all(np.diff(path.load) > 0)  # no wandering by round-off
+    arch = scene.continuation(branch=path.critical_points[0], ds=1e-4, max_load=3 * first)
+    assert arch.stable[-1]
+    rise = abs(arch.displacement((0.5, 0))[-1, 1])
+    assert rise == pytest.approx(arched(3 * first, alpha, EA), rel=tol)
 
 
 def test_stress_of_a_held_beam_and_of_each_layer():

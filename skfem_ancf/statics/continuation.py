@@ -29,6 +29,8 @@ MAX_STEPS = 10**6
 TURN = 0.03
 #: Shortest step that is tried, relative to ds.
 SHORTEST = 1e-6
+#: Motion of the nodes below which the load counts in the arc length, over what it could stretch.
+STILL = 1e-3
 
 
 class Failed(Exception):
@@ -94,6 +96,8 @@ class Tracer:
             weights[s].reshape(-1, beam.nd)[:, :2] = 1.0
         self.weights = weights / (0.5 * weights.sum() * system.size**2)
         self.unit = system.values(1.0) - system.values(0.0)
+        #: what a unit of load counts in the arc length, where it hardly moves the nodes
+        self.of_load: float = 0.0
 
     def norm(self, v: Array) -> float:
         """The norm of the nodes' mean displacement over the size of the scene."""
@@ -103,6 +107,28 @@ class Tracer:
         """The stress-free state as a point."""
         zero = np.zeros(self.system.N)
         return Point(zero, np.zeros(self.system.m), 0.0, zero, 0.0, 0.0, 0)
+
+    def begin(self, point: Point) -> Point:
+        """Find the tangent at the stress-free state, and what the load counts in the arc length.
+
+        Heat between walls moves no node: there the arc length has the load in it, times the strain
+        that its forces could cause.
+
+        Parameters
+        ----------
+        point
+            It is changed, and returned.
+        """
+        system = self.system
+        forces = float(np.abs(system.external_force(point.u)) @ system.constraints.coordinate_sizes)
+        self.of_load = forces / system.energy_of_strains if forces > 0 else 0.0
+        self.set_tangent(point)
+        motion = self.norm(point.tangent)
+        if motion > STILL * self.of_load * point.rate:
+            self.of_load = 0.0
+            point.rate, point.tangent = point.rate / motion, point.tangent / motion
+            point.multiplier_rate = point.multiplier_rate / motion
+        return point
 
     def _drive(self, external, u, load):
         """What a unit of load adds to the residual and to the constraints."""
@@ -131,38 +157,27 @@ class Tracer:
             raise Failed("the tangent is singular") from None
         return drive
 
-    def set_tangent(self, point: Point, along: Array | None = None) -> Point:
+    def set_tangent(self, point: Point, after: Point | None = None) -> Point:
         """Find the tangent of the path at a point.
 
         Parameters
         ----------
         point
             It is changed, and returned.
-        along
-            A displacement (N,) in whose sense the tangent points; None for that of a growing load.
+        after
+            The point before, from which the tangent points on; None for that of a growing load.
         """
         drive, phi = self.factorize(point)
         dF, mF = self.system.solve(drive, phi)
         dF[self.system.fixed] += self.unit
-        size = self.norm(dF)
+        size = np.hypot(self.norm(dF), self.of_load)
         if not size > 0 or not np.isfinite(size):
             raise Failed("the loads move nothing" if size == 0 else "the tangent is singular")
-        if along is not None and along @ (self.weights * dF) < 0:
+        if after is not None and (self.weights * dF) @ (point.u - after.u) + self.of_load**2 * (
+                point.load - after.load) < 0:
             size = -size
         point.rate, point.tangent, point.multiplier_rate = 1.0 / size, dF / size, mF / size
         return point
-
-    def set_tangent_after(self, start: Point, point: Point) -> Point:
-        """:meth:`set_tangent` in the sense of the way from another point.
-
-        Parameters
-        ----------
-        start
-            The point before.
-        point
-            It is changed, and returned.
-        """
-        return self.set_tangent(point, point.u - start.u)
 
     def advance(self, start: Point, ds: float) -> Point:
         """The next point of the path.
@@ -175,10 +190,10 @@ class Tracer:
             The distance along the tangent.
         """
         first = ds * start.tangent, ds * start.multiplier_rate, ds * start.rate
-        plane = self.weights * start.tangent
+        plane, normal = self.weights * start.tangent, self.of_load**2 * start.rate
 
-        def increment(step, dR, dF):  # the plane at distance ds
-            return (ds - plane @ (step + dR)) / (plane @ dF)
+        def increment(step, dl, dR, dF):  # the plane at distance ds
+            return (ds - plane @ (step + dR) - normal * dl) / (plane @ dF + normal)
 
         return self._correct(start, first, increment, ds)
 
@@ -195,7 +210,7 @@ class Tracer:
             Change of displacement (N,) and multipliers (m,) from there.
         """
         first = guess[0], guess[1], load - start.load
-        return self._correct(start, first, lambda step, dR, dF: 0.0, np.inf)
+        return self._correct(start, first, lambda step, dl, dR, dF: 0.0, np.inf)
 
     def _correct(self, start, first, increment, ds):
         """Iterate from ``start`` and a first increment of u, multipliers and load."""
@@ -229,7 +244,7 @@ class Tracer:
             except NO_FACTORS:
                 raise Failed("the tangent is singular") from None
             dF[system.fixed] += self.unit
-            dl = increment(step, dR, dF)
+            dl = increment(step, load - start.load, dR, dF)
             du, dm = dR + dl * dF, mR + dl * mF
             if not np.all(np.isfinite(du)) or np.sqrt(du @ (weights * du)) > 10 * ds:
                 raise Failed("the iteration leaves the path")
@@ -248,9 +263,10 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
 
     Each step advances by ``ds`` along the tangent of the path, in the norm of the nodes' mean
     displacement over the size of the scene, with the load factor as an unknown, so that the path
-    may turn in load and in displacement. Steps become shorter where the path or its load turns
-    and where iterations multiply. The geometric part of the tangent uses the carried stress, as in
-    :func:`~skfem_ancf.statics.newton.solve_static`.
+    may turn in load and in displacement. Where loads move no node, as heat between walls, the
+    strain that their forces could cause counts in it, too. Steps become shorter where the path or
+    its load turns and where iterations multiply. The geometric part of the tangent uses the carried
+    stress, as in :func:`~skfem_ancf.statics.newton.solve_static`.
 
     Where the load turns, or the number of negative eigenvalues of the tangent stiffness changes,
     the limit or bifurcation point is solved for within its step.
@@ -361,7 +377,7 @@ def _start(tracer, branch, side):
     if branch is None:
         point = tracer.stress_free()
         try:
-            return tracer.set_tangent(point)
+            return tracer.begin(point)
         except Failed as failure:
             raise ConvergenceError(f"the path cannot begin: {failure}", ([point], [])) from None
     point = Point(branch.u, branch.multipliers, branch.load, branch.force, 0.0, branch.error, 0)
@@ -372,7 +388,7 @@ def _start(tracer, branch, side):
 
 def _step(tracer, start, ds):
     """The next point with its tangent, and how far the step is off a straight line."""
-    point = tracer.set_tangent_after(start, tracer.advance(start, ds))
+    point = tracer.set_tangent(tracer.advance(start, ds), start)
     mean = 0.5 * ds * (start.tangent + point.tangent)
     bend = tracer.norm(point.u - start.u - mean) / ds
     scale = max(abs(start.load), abs(point.load))
@@ -390,11 +406,11 @@ def _land(tracer, start, point, load):
         low, high = (x, high) if abs(load_between(start, point, x)) < abs(load) else (low, x)
     near = point
     if x < 1.0 - 1e-9:
-        near = tracer.set_tangent_after(start, tracer.advance(start, x * h))
+        near = tracer.set_tangent(tracer.advance(start, x * h), start)
     ds = (load - near.load) / near.rate
     landed = tracer.at_load(near, load, (ds * near.tangent, ds * near.multiplier_rate))
     landed.load, landed.arc = load, near.arc + ds
-    return tracer.set_tangent_after(start, landed)
+    return tracer.set_tangent(landed, start)
 
 
 def load_between(p: Point, q: Point, x: float) -> float:

@@ -79,7 +79,7 @@ def find_critical(tracer: Tracer, p: Point, q: Point, tol: float) -> list[Critic
 
 def _between(tracer, p, arc, b):
     """The point at an arc length after p; b if it is that one."""
-    return b if arc >= b.arc else tracer.set_tangent_after(p, tracer.advance(p, arc - p.arc))
+    return b if arc >= b.arc else tracer.set_tangent(tracer.advance(p, arc - p.arc), p)
 
 
 def _limit(tracer, p, a, b, tol):
