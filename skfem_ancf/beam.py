@@ -22,7 +22,7 @@ from .frozen import Frozen, read_only
 from .kept import cached_property
 from .kinematics import KINEMATICS
 from .materials import Material, StVenantKirchhoff
-from .mesh import MeshBeam
+from .mesh import MeshBeam, reach
 from .origin import ours
 from .places import as_point, facets_of
 from .quadrature import gauss, tensor
@@ -577,16 +577,16 @@ class Beam(Frozen):
 
     @cached_property
     def size(self) -> float:
-        """Length of its axis."""
-        return float(self.mesh.lengths.sum())
+        """What tolerances of its places are relative to: of one line its length, see `reach`."""
+        return reach([self.mesh])
 
     @cached_property
     def sizes(self) -> Array:
-        """What its coordinates change by where it moves by its length and bends, shape (N,).
+        """What its coordinates change by where it moves by its size and bends, shape (N,).
 
         Derivatives along the axis by the length of an element, those across by the height.
         """
-        length, h = self.size / self.mesh.nelements, self.mesh.height
+        length, h = float(self.mesh.lengths.mean()), self.mesh.height
         node = [self.size if k == m == 0 else length**-k * (h**(1 - m) if m else length)
                 for _, k, m in self.element.functionals]
         out = np.empty((self.N // self.nd, len(node), 2))

@@ -30,7 +30,7 @@ from .refinement import halved
 from .taper import Scaled, heights_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -1041,6 +1041,36 @@ def _read(path, read):
     except Exception as error:  # whatever is in the file
         raise MeshError(f"{str(path)!r} holds no beam, or is damaged: {type(error).__name__}: "
                         f"{error}") from error
+
+
+def reach(meshes: Sequence[MeshBeam]) -> float:
+    """What tolerances of places are relative to: how far bodies reach, or move.
+
+    The diagonal of the box round all nodes, but not less than the longest line, as one that is
+    curled may be drawn straight, and not more than all lines together, as some may lie far apart.
+    What is of forces and strains goes by lengths: there all lines add up.
+
+    Parameters
+    ----------
+    meshes
+        Those of the beams.
+
+    Examples
+    --------
+    >>> from skfem_ancf import Frame, StVenantKirchhoff
+    >>> from skfem_ancf.mesh import reach
+    >>> points, lines = [(0, 0), (3, 0), (3, 4), (0, 4)], [(0, 1), (1, 2), (2, 3), (3, 0)]
+    >>> frame = Frame.from_lines(points, lines, height=0.1, material=StVenantKirchhoff(1e9, 0.3))
+    >>> reach([beam.mesh for beam in frame.beams])
+    5.0
+    """
+    total = float(sum([mesh.lengths.sum() for mesh in meshes]))
+    longest = max([float(mesh.chain_lengths.max()) for mesh in meshes])
+    if longest == total:
+        return total
+    low = np.min([mesh.p.min(axis=1) for mesh in meshes], axis=0)
+    high = np.max([mesh.p.max(axis=1) for mesh in meshes], axis=0)
+    return min(total, max(longest, float(np.hypot(*(high - low)))))
 
 
 def _chain(n):

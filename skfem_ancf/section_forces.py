@@ -339,7 +339,7 @@ class SectionForces:
         beam = self.beam
         strain = UNLOADED * np.max(np.abs(self.q[..., 0, :]), axis=(-2, -1)) / np.min(
             beam.mesh.lengths)
-        return strain * (beam.kernel.scale / beam.size * beam.mesh.height)
+        return strain * (beam.kernel.scale / beam.mesh.lengths.sum() * beam.mesh.height)
 
     def viscous_middles(self) -> tuple[Array, Array]:
         """The part of force and moment that resists the rate of the strain, in the middle of

@@ -28,6 +28,7 @@ from .joints.director import UnitDirector
 from .kept import cached_property
 from .linalg import INACCURATE, NO_FACTORS, BandMatrix, Inertia, dense
 from .machine import Machine
+from .mesh import reach
 from .pickling import functions_of, require_picklable
 from .points import Points
 from .rank import determinant_sign, inertia_of, null_basis
@@ -110,7 +111,7 @@ class System:
         self.offsets, self.N = np.array(offsets), offsets[-1]
         self.slices = [slice(a, b) for a, b in pairwise(offsets)]
         self._index = {id(b): k for k, b in enumerate(self.members)}
-        self.size = float(sum([b.size for b in self.beams])) or _extent(self.bodies)
+        self.size = reach([b.mesh for b in self.beams]) if beams else _extent(self.bodies)
         self.constraints = Constraints(self.members, self.slices, self.size, fixed, values,
                                        [*self._directors(fixed), *joints],
                                        self._held_by_elements if elements else None)
@@ -523,12 +524,12 @@ class System:
         """Round-off of a correction's work, as a square root.
 
         A displacement of the scene's size is known to eps times that size, its gradient in an
-        element to that over the element's length.
+        element to that over the element's length; the stiffness is that of the beam's mean section.
         """
         if not self.beams:
             return self.stiffness_scale
-        total = sum([b.kernel.scale / b.size * float(np.add.reduce(1.0 / b.mesh.lengths))
-                     for b in self.beams])
+        total = sum([b.kernel.scale / float(b.mesh.lengths.sum())
+                     * float(np.add.reduce(1.0 / b.mesh.lengths)) for b in self.beams])
         return EPS * self.size * sqrt(total)
 
     @cached_property
