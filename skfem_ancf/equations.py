@@ -23,7 +23,7 @@ from .kernels.moments import MomentPack
 from .kernels.section import SectionPack, linearised
 from .origin import ours
 from .own import handle_of
-from .sampling import sampled
+from .sampling import Sampled
 from .source import F1, I1, by_place
 from .tables import JointTables, LoadTables
 from .types import Array
@@ -210,7 +210,8 @@ class Tables:
         tables, before = twin_of(self), self.plain
         tables._system, tables._words, tables._own_handle = ref(system), [], None
         tables._words_of_loads, its = [], vars(tables)
-        for name in ("flat", "linearised", "parts", "_stress_size", "prestressed", "_at_rest"):
+        for name in ("flat", "linearised", "parts", "_stress_size", "prestressed", "_at_rest",
+                     "_amplitudes"):
             if name in its:
                 del its[name]
         tables._sort(system.loads)
@@ -343,14 +344,18 @@ class Tables:
 
     def factors(self, times: Array) -> Array:
         """Factors of the loads, shape (n, k); of one row where none has an amplitude."""
-        columns = self._columns
-        varying = [(k, load.amplitude) for k, load in enumerate(columns)
-                   if load is not None and load.amplitude is not None]
-        out = np.empty((len(times) if varying else 1, len(columns)))
-        out.fill(1.0)
+        varying, n = self._amplitudes
+        out = np.ones((len(times) if varying else 1, n))
         for k, amplitude in varying:
-            out[:, k] = sampled(amplitude, times, "amplitude").reshape(len(times))
+            out[:, k] = amplitude(times).reshape(len(times))
         return out
+
+    @cached_property
+    def _amplitudes(self):
+        """Functions of factors that vary, with their numbers, and the number of all factors."""
+        columns = self._columns
+        return [(k, Sampled(load.amplitude, "amplitude")) for k, load in enumerate(columns)
+                if load is not None and load.amplitude is not None], len(columns)
 
     @cached_property
     def prestressed(self) -> bool:

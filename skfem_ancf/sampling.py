@@ -50,29 +50,44 @@ def sample(function: Callable[[Any], Any], times: ArrayLike, name: str = "functi
     [[0.0, 1.0], [1.0, 2.0]]
     """
     require_function(name, function, "of time")
-    return sampled(function, require_finite("times", times, (None,)), name, shape)
+    return Sampled(function, name, shape)(require_finite("times", times, (None,)))
 
 
-def sampled(function: Callable[[Any], Any], times: Array, name: str,
-            shape: tuple[int, ...] | None = None) -> Array:
-    """As :func:`sample`, of a function and of times that are known to be good.
+class Sampled:
+    """As :func:`sample`, of a function that is asked again and again, at times known to be good.
+
+    Between the same first and last time it is seen once whether it takes arrays.
 
     Parameters
     ----------
     function, name, shape
         As there.
-    times
-        Shape (n,).
     """
-    n = len(times)
-    values = _at_once(function, times) if n > FEW else None
-    if values is not None:
-        some = [0, n // 2, n - 1]
-        alone = _one_by_one(function, times.take(some), name, shape)
-        if (values.shape == (n,) + alone.shape[1:] and _are_close(values.take(some, 0), alone)
-                and np.logical_and.reduce(np.isfinite(values), None)):
-            return values
-    return _one_by_one(function, times, name, shape)
+
+    def __init__(self, function: Callable[[Any], Any], name: str,
+                 shape: tuple[int, ...] | None = None) -> None:
+        self._function, self._name, self._shape = function, name, shape
+        self._seen: Any = None
+
+    def __call__(self, times: Array) -> Array:
+        n, function = len(times), self._function
+        values = _at_once(function, times) if n > FEW else None
+        if values is not None and np.logical_and.reduce(np.isfinite(values), None):
+            seen = n, times[0], times[-1], values.shape
+            if seen == self._seen:
+                return values
+            some = [0, n // 2, n - 1]
+            alone = self._one_by_one(times.take(some))
+            if values.shape == (n,) + alone.shape[1:] and _are_close(values.take(some, 0), alone):
+                self._seen = seen
+                return values
+        return self._one_by_one(times)
+
+    def _one_by_one(self, times: Array) -> Array:
+        what, function, shape = self._name + "(t={:g})", self._function, self._shape
+        if shape == ():
+            return np.array([ask_number(what, function, t) for t in times])
+        return np.array([ask_array(what, shape, function, t) for t in times])
 
 
 def _are_close(found: Array, alone: Array) -> bool:
@@ -83,14 +98,6 @@ def _are_close(found: Array, alone: Array) -> bool:
         if not abs(x - y) <= 1e-13 * abs(y) + size:
             return False
     return True
-
-
-def _one_by_one(function: Callable[[Any], Any], times: Array, name: str,
-                shape: tuple[int, ...] | None) -> Array:
-    what = name + "(t={:g})"
-    if shape == ():
-        return np.array([ask_number(what, function, t) for t in times])
-    return np.array([ask_array(what, shape, function, t) for t in times])
 
 
 def _at_once(function: Callable[[Any], Any], times: Array) -> Array | None:

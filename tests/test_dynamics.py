@@ -1152,6 +1152,23 @@ def test_a_function_that_takes_arrays_is_asked_a_few_times():
     assert asked == [(1000,), (), (), ()]
 
 
+@pytest.mark.parametrize("scheme", ["generalized-alpha", "energy-momentum"])
+def test_directions_of_joints_that_follow_the_time_alone_are_solved_with_once_a_step(
+        scheme, monkeypatch):
+    """And with each new matrix, and with the mass; not in each iteration."""
+    from skfem_ancf import band
+
+    solved, solve_many = [], band.solve_many
+    monkeypatch.setattr(band, "solve_many", lambda *args: solved.append(1) or solve_many(*args))
+    beam = Beam(MeshBeam.init_line([0, 0.5, 1], 0.01), ElementBeamCable(3),
+                StVenantKirchhoff(2e8, 0.3, 7800), 0.01, compiled=False)
+    scene = Scene(beam).pin("left")
+    scene.joint("angle", at="left", angle=lambda t: 20.0 * t**2)
+    history = scene.integrate(0.2, 0.01, scheme=scheme)
+    assert history.iterations > 2 * history.steps
+    assert len(solved) <= 2 * history.steps + history.factorizations
+
+
 def test_a_body_that_is_turned_inside_out_is_said():
     mesh = MeshBeam.init_line(np.linspace(0, 1, 5), 0.2)
     beam = Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(1e3, 0.3, 100.0), 0.1)

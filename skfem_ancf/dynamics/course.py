@@ -30,7 +30,7 @@ class Courses:
     def __init__(self, system: System, conserving: bool) -> None:
         self._system, self._conserving = system, conserving
         self._asked: Any = None, None
-        self._begin: Any = None, None
+        self._beside: Any = None, None
 
     def of(self, start: float, dt: float, first: int, n: int, block: tuple[int, int],
            limit: float) -> Course:
@@ -71,7 +71,7 @@ class Courses:
                                                     self._conserving))
         joints = self._ask_joints(times)
         if joints is not None:
-            self._begin = (start + dt * first, dt, limit), joints[:PARTS + 1]
+            self._beside = (start + dt * first, dt, True, limit), joints[:PARTS + 1]
             joints = steps_of(joints)
         return Course(float(dt), instants, self._system.machine.tables.factors(instants[:, 1]),
                       self._supports(times, dt), self._joints(joints, dt))
@@ -85,18 +85,28 @@ class Courses:
         out[:, :, s.fixed] = found
         return out
 
-    def joints(self, t: float, dt: float, ahead: bool, limit: float) -> JointMotion:
-        """What of joints depends on time, at one time.
+    def asked(self, t: float, dt: float, ahead: bool, limit: float) -> Any:
+        """Functions of joints within one step, shape (PARTS + 1, k); None where all are steady.
 
         Parameters
         ----------
         t, dt, ahead, limit
             As of :func:`~skfem_ancf.dynamics.rates.times_beside`.
         """
-        if ahead and self._begin[0] == (t, dt, limit):
-            asked = self._begin[1]
-        else:
-            asked = self._ask_joints(times_beside(t, dt, ahead, limit))
+        beside = t, dt, ahead, limit
+        if self._beside[0] != beside:
+            self._beside = beside, self._ask_joints(times_beside(*beside))
+        return self._beside[1]
+
+    def joints(self, t: float, dt: float, ahead: bool, limit: float) -> JointMotion:
+        """What of joints depends on time, at one time.
+
+        Parameters
+        ----------
+        t, dt, ahead, limit
+            As of :meth:`asked`.
+        """
+        asked = self.asked(t, dt, ahead, limit)
         found = self._joints(asked if asked is None else asked[None, ::-1], -dt if ahead else dt)
         return JointMotion(found.c[0], found.g[0], found.drives)
 

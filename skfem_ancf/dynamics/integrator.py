@@ -219,13 +219,13 @@ class Integrator:
         """
         s = self.system
         instant = t, dt, ahead, self.limit
-        given = self._courses.joints(*instant) if s.m else None
+        asked = self._courses.asked(*instant) if s.m else None
         # it is that of the motion before from the same place with the same motion of joints
         steady = not (s.varies or s.forces.elements or s.machine.tables.asks)
-        key = (u.tobytes(), v.tobytes(), *(() if given is None else (
-            given.c.tobytes(), given.g.tobytes()))) if steady else None
+        key = (u.tobytes(), v.tobytes(), *(() if asked is None else (
+            dt, ahead, asked.tobytes()))) if steady else None
         if key is None or self._begun[0] != key:
-            self._begun = key, *self._start(u, v, instant, given, memory)
+            self._begun = key, *self._start(u, v, instant, memory)
         _, y, (strain, kinetic, power, change) = self._begun
         y = twin_of(y)
         y.t = t
@@ -233,7 +233,7 @@ class Integrator:
         self.expect(max(strain, kinetic, kinetic + dt * power + dt**2 * change))
         return y
 
-    def _start(self, u, v, instant, given, memory):
+    def _start(self, u, v, instant, memory):
         """The same, with the strain energy, the kinetic one and half its two derivatives."""
         s, contacts, (t, dt, ahead, _) = self.system, self.system.forces.contacts, instant
         y = Motion(t, u.copy(), v.copy(), np.zeros(s.N), np.zeros(s.N),
@@ -245,7 +245,7 @@ class Integrator:
             y.u[s.fixed] = y.v[s.fixed] = 0.0
         self._require_held(y.u - u, t)
         rate, J = y.multipliers, None
-        joined = Joined(s, given, y.u, instant) if s.m else None
+        joined = Joined(s, self._courses.joints(*instant), y.u, instant) if s.m else None
         if joined is not None:
             gap = np.abs(joined.gap())
             if np.any(gap > 1e-8 * s.machine.tables.plain.joints.sizes):

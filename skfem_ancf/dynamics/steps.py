@@ -168,7 +168,7 @@ class Step(NamedTuple):
     mass_factor, damping_factor, stiffness_factor
         The iteration matrix is ``mass_factor M + damping_factor D + stiffness_factor K``.
     constant
-        True if the joints' directions are always the same.
+        True if the joints' directions do not depend on the displacement.
     """
 
     dt: float
@@ -475,7 +475,7 @@ def _row(x, n):
 def _step(joints, rule, course, n):
     """The :class:`Step` number n."""
     c, g = course.joints.c, course.joints.g
-    constant = joints.hk.size == 0 and g.shape[0] == 1 and joints.own == 0
+    constant = joints.hk.size == 0 and joints.own == 0
     joints_now = JointMotion(_row(c, n), _row(g, n), course.joints.drives)
     return borrowed(Step(course.dt, course.times[n, 0], course.times[n, 1],
                          _row(course.factors, n), _row(course.supports, n), joints_now,
@@ -941,7 +941,7 @@ def _accelerations(free, rule, s, w, state):
 def _close_acceleration(joints, free, mass, rule, s, w, state):
     """Change accelerations and multipliers so that they meet the joints' second rate too."""
     a1, w1, l, dl, shared = w.x.acceleration, w.x.du, w.m.l, w.m.dl, w.m.phi
-    l0, last, anew = w.m.l0, w.m.last, w.m.l.size > 0
+    l0, last, anew = w.m.l0, w.m.last, rule.conserving > 0  # J are those of the velocity, else
     acceleration_of_joints(joints, s.joints, s.t, s.dt, w.x.u, w.x.v, dl)
     share = (1.0 - rule.alpha_f) / (1.0 - rule.alpha_m)
     if rule.mass_solver > 0:

@@ -10,7 +10,7 @@ import scipy
 from ..errors import (ask_array, ask_number, require_finite_scalar, require_function, require_label,
                       teaching)
 from ..rigid import on_body
-from ..sampling import sampled
+from ..sampling import Sampled
 from .base import Joint, both_of, cross_terms, gradients, point, rotation, section
 
 if TYPE_CHECKING:
@@ -50,14 +50,14 @@ class PrescribedPosition(Joint):
         self.at, self.beam, self.name = at, beam, require_label("name", name)
 
     def bind(self, scene: Scene) -> None:
-        self.r = point(scene, self.beam, self.at)
+        self.r, self._motion = point(scene, self.beam, self.at), Sampled(self.motion, "r", (2,))
         self.found = gradients(*([(self.r, e)] for e in np.eye(2)))
 
     def value(self, u: Array, t: float) -> Array:
         return self.r(u) - ask_array("r(t={:g})", (2,), self.motion, t)
 
     def offset(self, times: Array, N: int) -> Array:
-        return self.r.start - sampled(self.motion, times, "r", (2,))
+        return self.r.start - self._motion(times)
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
         return self.found
@@ -91,7 +91,7 @@ class PrescribedAngle(Joint):
 
     def bind(self, scene: Scene) -> None:
         _, self.d = section(scene, self.beam, self.at)
-        self.start = np.arctan2(*self.d.start[::-1])
+        self.start, self._angles = np.arctan2(*self.d.start[::-1]), Sampled(self.angle, "angle", ())
         n = self.d.dofs.shape[1]
         of = self._of_normal = np.zeros((2, 1 + 2 * n))  # offset and slope, see driven
         of[:, 0], (of[0, 1:1 + n], of[1, 1 + n:]) = self.d.start, self.d.weights
@@ -108,7 +108,7 @@ class PrescribedAngle(Joint):
         return gradients([(self.d, (-np.sin(a), np.cos(a)))])
 
     def driven(self, times: Array, N: int) -> Array:
-        a = self.start + sampled(self.angle, times, "angle", ())
+        a = self.start + self._angles(times)
         normals = np.empty((len(a), 2))
         normals[:, 0], normals[:, 1] = -np.sin(a), np.cos(a)
         return normals @ self._of_normal

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..sampling import sampled
+from ..sampling import Sampled
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -33,6 +33,7 @@ class Settlements:
     def __init__(self, numbers: Array, functions: Sequence[Callable[[float], float]] = (),
                  at: Sequence[tuple[int, int]] = ()) -> None:
         self.numbers, self.functions, self.at = numbers, tuple(functions), tuple(at)
+        self._sampled = [Sampled(f, HELD[k], ()) for f, (_, k) in zip(self.functions, self.at)]
 
     def given(self, nodes: Array, k: int, by: float | Callable[[float], float]) -> Settlements:
         """The same with nodes displaced by a number or a function of time.
@@ -72,7 +73,7 @@ class Settlements:
             Times, or load factors, shape (n,).
         """
         out = np.multiply.outer(times, self.numbers[nodes, k])
-        for function, (node, way) in zip(self.functions, self.at):
+        for sampled, (node, way) in zip(self._sampled, self.at):
             if way == k:
-                out[:, np.searchsorted(nodes, node)] = sampled(function, times, HELD[k], ())
+                out[:, np.searchsorted(nodes, node)] = sampled(times)
         return out
