@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,8 +11,8 @@ import scipy.linalg
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
 
 from .band import fix
-from .errors import (ConvergenceError, InputError, SupportError, require_finite_scalar,
-                     require_index, require_integer, teaching)
+from .errors import (ConvergenceError, InputError, ModelWarning, SupportError,
+                     require_finite_scalar, require_index, require_integer, teaching)
 from .linalg import NO_FACTORS
 from .results import State
 from .tangent import Inverse, StrainTangent, is_symmetric
@@ -27,6 +28,7 @@ SLOW = 1e-6  # a velocity at which what is quadratic in it can be left out
 UNREFINED = 1e-7  # error of an inverse that Lanczos takes as it is
 LANCZOS = 1e-10  # its tolerance
 SAME = 1e-6  # relative distance of eigenvalues that are the same
+TURNING = 1e-2  # square of the angular velocity over that of a frequency
 REAL = 1e-7  # imaginary over absolute value of an eigenvalue that counts as real
 
 
@@ -188,7 +190,33 @@ def _modes(system, state, k):
     shapes[:, tangent.free] = X.T
     frequencies = np.sqrt(values) if np.any(values.imag) else (
         np.sign(values.real) * np.sqrt(np.abs(values.real)))
+    _warn_of_turning(state, np.abs(values), ROUND_OFF**2 * _bending_eigenvalue(system))
     return Modes(frequencies, shapes, state, values.astype(complex))
+
+
+def _warn_of_turning(state, values, rigid):
+    """Give a ModelWarning if the state turns not much slower than it vibrates."""
+    speed = _angular_velocity(state) if np.any(state.v) else 0.0
+    values = values[values > max(rigid, TURNING * speed**2)]  # of vibrations
+    if values.size and speed**2 > TURNING * values.min():
+        warnings.warn(f"the state turns by {speed:.3g} rad/s, and modes know its stiffness alone: "
+                      "centrifugal and Coriolis forces are missing, which change the square of a "
+                      "frequency by about the square of that; take the state at rest in a frame "
+                      "that turns, with a load of your own (docs/modes.md, What turns)",
+                      ModelWarning, stacklevel=8)
+
+
+def _angular_velocity(state):
+    """The largest one of a beam or body, in the mean of its mass."""
+    system, speeds = state.system, []
+    for member, s in zip(system.members, system.slices):
+        B, v = np.zeros((system.N, 3)), np.zeros(system.N)
+        x, y = state.q[s].reshape(-1, 2).T
+        B[s], v[s] = member.rigid_motions(), state.v[s]
+        B[s, 2] = np.column_stack([-y, x]).ravel()
+        MB = np.column_stack([system.mass.multiply(b) for b in B.T])
+        speeds.append(abs(np.linalg.solve(B.T @ MB, MB.T @ v)[2]))
+    return max(speeds)
 
 
 def _free_mass(system, tangent):

@@ -8,7 +8,7 @@ import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, MeshBeam, Scene,
                         StVenantKirchhoff, eigen)
 from skfem_ancf.elements import ELEMENTS
-from skfem_ancf.errors import ConvergenceError, InputError, SupportError
+from skfem_ancf.errors import ConvergenceError, InputError, ModelWarning, SupportError
 from skfem_ancf.formulations import FORMULATIONS
 from skfem_ancf.results import State
 
@@ -401,3 +401,20 @@ def test_refused():
     scene.joint("hinge", beams=(a, b), at=(1, 0))
     with pytest.raises(SupportError):
         scene.modes(3)
+
+
+@pytest.mark.parametrize("place", [0.0, 1e4])
+def test_of_a_state_that_turns_modes_say_that_they_know_its_stiffness_alone(place):
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 5), 0.02, origin=(place, 0))
+    beam = Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(E, 0.0, RHO), B)
+
+    def instant(scene, speed, flight=0.0):
+        scene.initial_velocity(lambda x: np.array([flight - speed * x[1], speed * (x[0] - place)]))
+        return scene, scene.integrate(0.01, 1e-3).state(-1)
+
+    scene, state = instant(Scene(beam).pin("left"), 20.0)
+    with pytest.warns(ModelWarning, match="turns by 20 rad/s.*centrifugal") as found:
+        scene.modes(2, state)
+    assert found[0].filename == __file__
+    for scene, state in (instant(Scene(beam), 1.0, 1e3), instant(Scene(beam).clamp("left"), 1.0)):
+        scene.modes(5, state)  # warnings are errors
