@@ -593,23 +593,32 @@ class Beam(Frozen):
         out[:] = np.array(node)[:, None]
         return read_only(out.ravel())
 
-    def held_by_a_section(self, held: Sequence[int]) -> bool:
+    def held_by_a_section(self, held: Sequence[int], sums: Sequence[Any] = ()) -> bool:
         """True if a node is held, and the direction of the axis there or its normal.
 
         Parameters
         ----------
         held
             Numbers of coordinates.
+        sums
+            Sums of coordinates that are held, too: for each their numbers and factors, in pairs.
         """
         every = set(held)
-        for dof in held:
-            node, k = divmod(dof, self.nd)
-            first = dof - k
-            if k > 1 and first in every and first + 1 in every:
-                of = self.element.functionals[k // 2][1:]
-                if of in _DIRECTIONS and (
-                        abs(getattr(self.mesh, _DIRECTIONS[of])[1 - k % 2, node]) > 1e-3):
-                    return True  # the other component would change as it turns
+        for one in [*([(dof, 1.0)] for dof in held), *sums]:
+            node = one[0][0] // self.nd if one else 0
+            first, turn, size = node * self.nd, 0.0, 0.0
+            if first not in every or first + 1 not in every:
+                continue
+            for dof, factor in one:
+                k = dof - first
+                of = self.element.functionals[k // 2][1:] if 1 < k < self.nd else None
+                if of not in _DIRECTIONS:
+                    break
+                way = getattr(self.mesh, _DIRECTIONS[of])[1 - k % 2, node]
+                turn, size = turn + factor * (way if k % 2 else -way), size + abs(factor)
+            else:
+                if abs(turn) > 1e-3 * size:
+                    return True  # it would change as the section turns
         return False
 
     def rigid_motions(self, rows: Any = slice(None)) -> Array:

@@ -16,13 +16,15 @@ from .rank import DENSE, first_dependent, null_space, row_sizes, unit_rows
 from .rigid import RigidBody
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from .beam import Beam
     from .types import Array
 
 #: Columns of a border above which sparse LU is faster.
 WIDE_BORDER = 96
+#: No rows, columns and values.
+_NO_ENTRIES = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
 
 
 class Constraints:
@@ -209,12 +211,17 @@ class Constraints:
         u, t
             Displacement of the coordinates, shape (N,), and time.
         """
-        if not self.bordered:
-            return self.sparse_jacobian(u, t)
+        return (self._dense if self.bordered else self._sparse)(*self._entries(u, t))
+
+    def _dense(self, rows, columns, values):
+        """A matrix (m, N) by its entries."""
         J = np.zeros((self.m, self.N))
-        rows, columns, values = self._entries(u, t)
         np.add.at(J, (rows, columns), values)
         return J
+
+    def _sparse(self, rows, columns, values):
+        """The same as a scipy.sparse array."""
+        return sparse.csr_array((values, (rows, columns)), shape=(self.m, self.N))
 
     def sparse_jacobian(self, u: Array, t: float) -> sparse.csr_array:
         """As :meth:`full_jacobian`, as a scipy.sparse array in CSR format.
@@ -224,26 +231,39 @@ class Constraints:
         u, t
             Displacement of the coordinates, shape (N,), and time.
         """
-        rows, columns, values = self._entries(u, t)
-        return sparse.csr_array((values, (rows, columns)), shape=(self.m, self.N))
+        return self._sparse(*self._entries(u, t))
+
+    @cached_property
+    def slopes(self) -> tuple[Array, Array, Array]:
+        """Rows, columns and values of :meth:`full_jacobian` in the stress-free state at the time 0.
+
+        As :meth:`~skfem_ancf.joints.Joint.slope_entries` of the joints has them.
+        """
+        found = [joint.slope_entries(np.zeros(1), self.N) for joint in self.joints]
+        return self.in_order((rows, columns, values[0]) for rows, columns, values in found)
 
     @cached_property
     def _at_rest(self):
-        """:meth:`full_jacobian` in the stress-free state, sparse where the coordinates are many."""
-        return (self.full_jacobian if self.N <= DENSE else self.sparse_jacobian)(
-            np.zeros(self.N), 0.0)
+        """The matrix of :attr:`slopes`, sparse where the coordinates are many."""
+        return (self._dense if self.bordered and self.N <= DENSE else self._sparse)(*self.slopes)
 
     def _entries(self, u, t):
         """Rows, columns and values of :meth:`full_jacobian`."""
-        return self._in_order(joint.entries(u, t) for joint in self.joints)
+        return self.in_order(joint.entries(u, t) for joint in self.joints)
 
-    def _in_order(self, entries):
-        """Those of the joints, one after the other, with rows of all equations."""
-        first, parts = 0, [(*[np.zeros(0, dtype=int)] * 2, np.zeros(0))]
-        for joint, (rows, columns, values) in zip(self.joints, entries):
-            parts.append((first + rows, columns, values))
+    def in_order(self, entries: Iterable[tuple]) -> tuple[Array, ...]:
+        """Tables of the joints one behind the other, their rows those of all equations.
+
+        Parameters
+        ----------
+        entries
+            For each joint rows and other columns, arrays of one shape (k,).
+        """
+        first, parts = 0, []
+        for joint, (rows, *others) in zip(self.joints, entries):
+            parts.append((first + rows, *others))
             first += len(joint.equations)
-        return tuple(np.concatenate(column) for column in zip(*parts))
+        return _joined(parts or [_NO_ENTRIES])
 
     def jacobian(self, u: Array, t: float) -> Array | sparse.csr_array:
         """As :meth:`full_jacobian`, zero at fixed coordinates.
@@ -301,11 +321,9 @@ class Constraints:
         return i, j, v * (self.free[i] & self.free[j])
 
     def _curvature(self, u, t, multipliers):
-        none = np.zeros(0, dtype=int)
         parts = [joint.curvature(u, t, part)
                  for joint, part in zip(self.joints, self.multipliers_of(multipliers))]
-        parts = [(none, none, np.zeros(0))] + [part for part in parts if part is not None]
-        return tuple(np.concatenate(column) for column in zip(*parts))
+        return _joined([part for part in parts if part is not None] or [_NO_ENTRIES])
 
     def mean_jacobian(self, u0: Array, u1: Array, t: float) -> Array:
         """Discrete gradients of :meth:`constraint` in a step, shape (m, N).
@@ -316,7 +334,7 @@ class Constraints:
             Displacements at its ends, shape (N,), and the time in its middle.
         """
         J = np.zeros((self.m, self.N))
-        rows, columns, values = self._in_order(joint.mean_entries(u0, u1, t)
+        rows, columns, values = self.in_order(joint.mean_entries(u0, u1, t)
                                                for joint in self.joints)
         np.add.at(J, (rows, columns), values)
         return J
@@ -416,18 +434,28 @@ class Constraints:
         """Raise SupportError if joints repeat or contradict each other or the supports."""
         if self._independent or not self.joints or self.condensable:
             return
+        self._independent = self._apart
+        if self._independent:
+            return
         zero = np.zeros(self.N)
         found = first_dependent(self._at_rest * self.coordinate_sizes, self.free,
-                                self.constraint(zero, 0.0))
+                                lambda: self.constraint(zero, 0.0))
         self._independent = found is None  # nothing of it changes in the life of a system
         if found is None:
             return
         k, gap = found
         joint, equation = [(joint, name) for joint in self.joints for name in joint.equations][k]
-        size = self.equation_sizes(*self._entries(zero, 0.0))[k]
+        size = self.equation_sizes(*self.slopes)[k]
         kind = "repeats" if abs(gap) <= 1e-9 * size else "contradicts"
         raise SupportError(f"{joint!r}, equation {equation!r}, {kind} what the supports and the "
                            "joints before it hold already: remove one of them")
+
+    @property
+    def _apart(self):
+        """True if no coordinate of an equation of joints is held or in another one."""
+        rows, columns, values = self.slopes
+        return (len(set(columns.tolist())) == len(columns) and len(set(rows.tolist())) == self.m
+                and bool(self.free.take(columns).all()) and bool(values.all()))
 
     @cached_property
     def _standing(self) -> list[bool]:
@@ -486,9 +514,9 @@ class Constraints:
 
     def free_rigid_motions(self) -> list[str]:
         """Descriptions of the rigid motions that nothing holds, one string each."""
-        if self.frame is None and all(self._standing):
+        if self.frame is None and (all(self._standing) or self._held_by_a_section()):
             return []
-        motions, joints, bodies = self._motions()
+        motions, joints, parts_of_frame = self._motions()
         parts = [motions[self.fixed], joints]
         if self._stiffness is not None:
             pushed = self._stiffness() @ motions
@@ -496,45 +524,62 @@ class Constraints:
             parts.append(pushed[size > 1e-9 * size.max(initial=0.0)])
         small = isinstance(motions, np.ndarray)
         held = np.concatenate(parts) if small else sparse.vstack(parts)
-        if small and len(bodies) == 1 and _has_full_rank(held):
+        if small and len(self.members) == 1 and _has_full_rank(held):
             return []
-        return [_describe(v, bodies) for v in null_space(unit_rows(held))]
+        free = null_space(unit_rows(held))
+        bodies = self._bodies(parts_of_frame) if len(free) else []
+        return [_describe(v, bodies) for v in free]
+
+    def _held_by_a_section(self):
+        """True if supports and joints hold the only beam by one of its sections."""
+        if len(self.members) > 1 or not self.m:
+            return False
+        sums: list[list[Any]] = [[] for _ in range(self.m)]
+        for k, *entry in zip(*(x.tolist() for x in self.slopes)):
+            sums[k].append(entry)
+        return self.members[0].held_by_a_section(self.fixed.tolist(), sums)
+
+    def _bodies(self, parts):
+        """Who, origin and size of each of those that :meth:`_motions` are of."""
+        if self.frame is None:
+            return [(self._who(k), b.origin, b.size) for k, b in enumerate(self.members)]
+        return [(name, self.members[0].origin, self.size) for name in self.frame.describe(parts)]
 
     def _motions(self):
-        """Rigid motions of the bodies, those that joints hold, and (who, origin, size) of each.
+        """Rigid motions of the bodies, those that joints hold, and of a frame which are its parts.
 
         Bodies are beams and rigid bodies, of a frame the parts whose lines are joined rigidly. The
         columns of a body are two translations and the rotation, in units of its size; dense arrays
         of few coordinates.
         """
         joints, sizes = self._at_rest, [member.size for member in self.members]
-        bodies = [(self._who(k), b.origin, b.size) for k, b in enumerate(self.members)]
         if self.frame is None and self.N <= DENSE:
             dense = np.zeros((self.N, 3 * len(self.members)))
             for k, (member, s) in enumerate(zip(self.members, self.slices)):
-                dense[s, 3 * k:3 * k + 3] = member.rigid_motions() / (1.0, 1.0, member.size)
-            return dense, joints @ dense, bodies
+                dense[s, 3 * k:3 * k + 3] = member.rigid_motions()
+                dense[s, 3 * k + 2] /= member.size
+            return dense, joints @ dense, None
         values = np.concatenate([member.rigid_motions() for member in self.members])
         numbers = [member.N for member in self.members]
-        of_body = np.repeat(np.arange(len(bodies)), numbers)
+        of_body, number, parts = np.repeat(np.arange(len(numbers)), numbers), len(numbers), None
         if self.frame is not None:
             origin, size, parts = self.members[0].origin, self.size, self.frame.parts()
+            number = int(parts.max()) + 1
             shift = np.repeat([member.origin - origin for member in self.members], numbers, axis=0)
             values[:, 2] += shift[:, 0] * values[:, 1] - shift[:, 1] * values[:, 0]
             of_body, first = np.zeros(self.N, dtype=int), 0
             for beam, s in zip(self.members, self.slices):
                 ends = chain_ends(beam)
-                number = np.repeat(parts[first:first + len(ends)], ends[:, 1] - ends[:, 0] + 1)
-                of_body[s], first = np.repeat(number, beam.nd), first + len(ends)
-            bodies = [(name, origin, size) for name in self.frame.describe(parts)]
+                of = np.repeat(parts[first:first + len(ends)], ends[:, 1] - ends[:, 0] + 1)
+                of_body[s], first = np.repeat(of, beam.nd), first + len(ends)
             sizes = [size] * len(self.members)
         values[:, 2] /= np.repeat(sizes, numbers)
         motions = sparse.csr_array((values.ravel(), (3 * of_body[:, None] + np.arange(3)).ravel(),
-                                    3 * np.arange(self.N + 1)), shape=(self.N, 3 * len(bodies)))
+                                    3 * np.arange(self.N + 1)), shape=(self.N, 3 * number))
         if self.frame is None:
-            return motions, joints @ motions, bodies
-        held = self.frame.held_motions(parts, origin, size, len(bodies))
-        return motions, sparse.vstack([held, joints[len(self.frame.equations):] @ motions]), bodies
+            return motions, joints @ motions, None
+        held = self.frame.held_motions(parts, origin, size, number)
+        return motions, sparse.vstack([held, joints[len(self.frame.equations):] @ motions]), parts
 
     def require_supports(self) -> None:
         """Raise SupportError if a rigid motion is free, or joints are not independent."""
@@ -564,6 +609,11 @@ class Constraints:
                     "for a point, or springs")
         return ("scene.clamp('left'), scene.pin('right') or, as a roller, "
                 "scene.fix('right', 'r^2')")
+
+
+def _joined(parts):
+    """Rows, columns and values of several tables, one behind the other."""
+    return parts[0] if len(parts) == 1 else tuple(map(np.concatenate, zip(*parts)))
 
 
 def _describe(v, bodies):

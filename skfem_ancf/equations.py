@@ -389,23 +389,16 @@ class Tables:
     # joints
 
     def _joints(self):
-        s, none = self.system, np.zeros(0)
+        s = self.system
         #: g at the time 0
         self._slope = np.zeros((1, 0))
         if not s.joints:
             return _NO_JOINTS
-        second, first, at = [[none] * 4], [[none] * 3], 0
-        for joint in s.joints:
-            k, *entries = joint.second_entries(s.N)
-            second.append([at + k, *entries])
-            rows, columns, values = joint.slope_entries(np.zeros(1), s.N)
-            first.append([at + rows, columns, values[0]])
-            at += len(joint.equations)
-        k, i, j, v = (np.concatenate(x) for x in zip(*second))
-        gk, gi, g = (np.concatenate(x) for x in zip(*first))
-        k, i, j, gk, gi = (x.astype(np.int64) for x in (k, i, j, gk, gi))
-        self._slope = g[None]
-        tables = JointTables(k, i, j, v.astype(float), gk, gi,
+        k, i, j, v = s.constraints.in_order([joint.second_entries(s.N) for joint in s.joints])
+        gk, gi, g = s.constraints.slopes
+        k, i, j, gk, gi = (packed(x, np.int64) for x in (k, i, j, gk, gi))
+        self._slope = packed(g)[None]
+        tables = JointTables(k, i, j, packed(v), gk, gi,
                              s.constraints.equation_sizes(gk, gi, g), 0)
         tabled = (all(joint.tabled for joint in s.joints) if all(map(ours, s.joints))
                   else self.are_joints(tables))

@@ -13,7 +13,7 @@ from scipy.sparse.linalg import splu
 from .linalg import SMALL, Inertia, beside_zero, dense
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from .types import Array
 
@@ -31,7 +31,7 @@ MOST, ITERATIONS = 8, 6
 
 
 def first_dependent(J: Array | sparse.csr_array, free: Array,
-                    phi: Array) -> tuple[int, float] | None:
+                    phi: Callable[[], Array]) -> tuple[int, float] | None:
     """The first equation that those before it hold already, or None.
 
     The rows of J fall apart into groups without a common coordinate. In each group QR
@@ -44,7 +44,7 @@ def first_dependent(J: Array | sparse.csr_array, free: Array,
     free
         Truth values of the coordinates that supports leave free, shape (N,).
     phi
-        What each equation is open by, shape (m,).
+        Returns what each equation is open by, shape (m,).
 
     Returns
     -------
@@ -59,11 +59,12 @@ def first_dependent(J: Array | sparse.csr_array, free: Array,
         R = scipy.linalg.lapack.dgeqrf(A.T)[0] if A.size else A.T  # and below it, what is not asked
         rest, k = np.zeros(len(rows)), min(R.shape)
         rest[:k] = np.abs(R.diagonal())
-        dependent = np.flatnonzero(rest <= DEPENDENT * size[rows])
-        if len(dependent) and (first is None or rows[dependent[0]] < first[0]):
-            k = dependent[0]
-            known = scipy.linalg.solve_triangular(R[:k, :k], phi[rows[:k]], trans="T")
-            first = int(rows[k]), float(phi[rows[k]] - R[:k, k] @ known)
+        small = rest <= DEPENDENT * size[rows]
+        k = int(small.argmax())
+        if small[k] and (first is None or rows[k] < first[0]):
+            gap = phi()[rows]
+            known = scipy.linalg.solve_triangular(R[:k, :k], gap[:k], trans="T")
+            first = int(rows[k]), float(gap[k] - R[:k, k] @ known)
     return first
 
 

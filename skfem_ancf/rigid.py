@@ -172,13 +172,13 @@ class RigidBody(Frozen):
         n = np.array([-self.q0[3], self.q0[2]])
         return np.append(v[:, 0], n * (n @ (v[:, 1] - v[:, 0])) / self.size)
 
-    def held_by_a_section(self, held: Sequence[int]) -> bool:
+    def held_by_a_section(self, held: Sequence[int], sums: Sequence[Any] = ()) -> bool:
         """False: of a body its motions are asked.
 
         Parameters
         ----------
-        held
-            Numbers of coordinates.
+        held, sums
+            Numbers of coordinates, and sums of them.
         """
         return False
 
