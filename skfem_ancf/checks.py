@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 from itertools import accumulate
+from math import sin
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -116,10 +117,11 @@ class Screen:
     @cached_property
     def _turns(self):
         """What tells of turns: places of tangents, these at rest, and the limits of elements."""
-        limits = [turning_limit(b) for b in self._beams]
-        limit = np.repeat(limits, [b.mesh.nelements for b in self._beams])
-        widest = 2.0 * np.sin(0.5 * limit)
-        return 1 + self._places, self.start[self._ends], widest, limit / widest * self.slender
+        limits, sizes = zip(*[(turning_limit(b), b.mesh.lengths.shape) for b in self._beams])
+        widest = [2.0 * sin(0.5 * limit) for limit in limits]
+        thick = [limit / wide for limit, wide in zip(limits, widest)]
+        widest, thick = (_joined(list(map(np.full, sizes, x))) for x in (widest, thick))
+        return 1 + self._places, self.start[self._ends], widest, thick * self.slender
 
     @cached_property
     def _folds(self):
