@@ -440,7 +440,7 @@ class TermTables:
         Those of the same element of another material, whose tables serve on the same mesh; on
         another one what does not depend on it. None to make them.
     rows, asked
-        Tables of other terms there, by where they are sampled, and points with what
+        Tables and weights of other terms there, by their places, and points with what
         :func:`beam_gradients` returned for them; both are added to.
 
     Attributes
@@ -459,7 +459,7 @@ class TermTables:
 
     def __init__(self, across: "Across", slab: "Slab", term: "Term", constant: Array,
                  owner: Any, before: "TermTables | None" = None,
-                 rows: dict[Content, Any] | None = None,
+                 rows: dict[Any, Any] | None = None,
                  asked: "list[tuple[Array, ...]] | None" = None) -> None:
         self.law, self.term, self.slab, mesh = term.law, term, slab, across.mesh
         self._mesh = mesh
@@ -473,8 +473,11 @@ class TermTables:
             self.points, self.w, self._rows = before.points, before.w, before._rows
         else:
             self.points, W = term.quadrature
-            self.w = across.volume(slab, self.points, W, tind, whole)
             rows = {} if rows is None else rows
+            at = id(slab), Content(self.points, W)
+            if at not in rows:
+                rows[at] = across.volume(slab, self.points, W, tind, whole)
+            self.w = rows[at]
             if term._places not in rows:
                 rows[term._places] = _rows(mesh, across.element, term._places, tind,
                                           [] if asked is None else asked)
@@ -513,7 +516,7 @@ class TermTables:
                                    weights=weights, **times_held(pack, both))
         return other
 
-    def on_mesh(self, across: "Across", constant: Array) -> "TermTables":
+    def on_mesh(self, across: "Across", constant: Array, rows: dict[int, Any]) -> "TermTables":
         """As :meth:`Kernel.on_mesh`.
 
         Parameters
@@ -522,11 +525,15 @@ class TermTables:
             As there.
         constant
             The stabilisation there, shape (0 or 1, 2 nb, 2 nb).
+        rows
+            Tables of other terms there, by the identity of those here; added to.
         """
         other, pack, mesh = twin_of(self), self.pack, across.mesh
-        *_, (unit, _, _, n) = self._rows
-        G, frame, scaled = _scaled(mesh, across.element, unit, n, np.zeros(1, int))
-        other._rows = G, frame, self._samples, scaled
+        unit, n = self._rows[3][::3]
+        if id(self._rows) not in rows:
+            G, frame, scaled = _scaled(mesh, across.element, unit, n, np.zeros(1, int))
+            rows[id(self._rows)] = G, frame, self._samples, scaled
+        other._rows = G, frame, _, scaled = rows[id(self._rows)]
         before, other.slab = self._mesh, across.slabs[0]
         larger = mesh.height * mesh.lengths[0] / (before.height * before.lengths[0])
         other._mesh, other.w = mesh, larger * self.w
@@ -711,17 +718,19 @@ def section_pack(G: Array, frame: Array, weights: Array, samples: _Samples, sums
         its rows are along the axis; or None.
     """
     nb, ne, linear = G.shape[2], len(left), law.kind == LINEAR
-    content, mixing, joined, ends = sums
-    n = mixing.shape[0] // 2
+    content, (mixing, several, sizes), joined, ends = sums
+    keep, moduli = np.ones(mixing.shape[0], bool), np.zeros((mixing.shape[0], 1))
     if linear:
         D = (law.D.reshape(9, 1, 1) * weights).reshape(-1, weights.shape[1])
-        moduli, sizes = (mixing @ np.concatenate([D, np.abs(D)])).reshape(2, n, -1)
-        keep = np.any(np.abs(moduli) > 1e-14 * sizes, axis=1)  # else orthogonal
-    else:
-        keep, moduli = np.ones(n, bool), np.zeros((n, 1))
+        moduli = mixing @ D
+        if not weights.all():
+            keep = moduli.any(axis=1)
+        if len(several):  # else orthogonal
+            least = 1e-14 * (sizes @ np.abs(D))
+            keep[several] = (np.abs(moduli.take(several, axis=0)) > least).any(axis=1)
     layout, shared = _layout(content, len(weights), Content(keep), linear), len(G) == 1
     if linear:
-        moduli = moduli[layout.order]
+        moduli = moduli.take(layout.order, axis=0)
     if before is not None and before.rows is layout.rows:
         pairs = with_constant(before.pairs, constant, ne)
     elif scaled is not None:
@@ -741,12 +750,11 @@ def section_pack(G: Array, frame: Array, weights: Array, samples: _Samples, sums
 def _sums_of(samples, law, along, points):
     """What of a term depends on samples, interpolations and which strains its law couples only.
 
-    A key, how moduli come from those at the points and below it its absolute values, and what
-    :func:`_joined` returns.
+    A key, how moduli come from those at the points, and what :func:`_joined` returns.
     """
     coupled = law.D != 0.0 if law.kind == LINEAR else np.ones((3, 3), bool)
     content = Content(samples.rows, coupled, *along)
-    return content, _terms(content, points)[2], *_joined(content, points // len(along[0]))
+    return content, _terms(content, points)[1:], *_joined(content, points // len(along[0]))
 
 
 def side_by_side(pack: SectionPack, members: int, N: int) -> SectionPack:
@@ -815,7 +823,7 @@ class _Layout(NamedTuple):
 def _layout(content, points, kept, linear):
     """The _Layout of the terms of :func:`_terms` that are kept; of a linear law without mixing."""
     rows, (keep,) = content.arrays[0], kept.arrays
-    terms, mixing, _ = _terms(content, points)
+    terms, mixing, *_ = _terms(content, points)
     terms = terms[:, keep]
     pairs, of = np.unique(np.concatenate([terms[:2], rows], axis=1), axis=1, return_inverse=True)
     of, number = of.ravel(), pair_numbers(pairs)
@@ -847,8 +855,10 @@ def _terms(content, points):
         g, h, k, l, with g <= h, each once, shape (4, n).
     mixing : sparse matrix
         Moduli of the terms from ``w D`` at the points, shape (n, 9 points): (c, d) of D first.
+    several : ndarray
+        Numbers of the terms that do not come from one of these, so that they may cancel, (k,).
     sizes : sparse matrix
-        It, and below it its absolute values, of w D and of the absolute values of that.
+        The absolute values of their rows, shape (k, 9 points).
     """
     rows, coupled, *along = content.arrays
     factors, ns = np.where(rows[0] == rows[1], 0.5, 1.0), points // len(along[0])
@@ -871,7 +881,10 @@ def _terms(content, points):
     terms, of = np.unique(terms, axis=1, return_inverse=True)
     mixing = sparse.csr_matrix((value, (of.ravel(), column_of)),
                                shape=(terms.shape[1], 9 * points))
-    return terms, mixing, sparse.block_diag([mixing, abs(mixing)], format="csr")
+    exact = mixing.copy()
+    exact.eliminate_zeros()
+    several = np.flatnonzero(np.diff(exact.indptr) != 1)
+    return terms, mixing, several, abs(mixing)[several]
 
 
 def _viscous(pack, time, none):
@@ -907,7 +920,7 @@ class Kernel(Chain):
         none = np.zeros((0, 2 * self.nd, 2 * self.nd))
         constants = [none if self.constant is None else self.constant]
         self.tables: list[TermTables] = []
-        rows: dict[Content, Any] = {}
+        rows: dict[Any, Any] = {}
         asked: list[tuple[Array, ...]] = []
         self._across = across
         for slab, terms in ([(across.slabs[0], [t.term for t in known])] if same_law else
@@ -1001,7 +1014,8 @@ class Kernel(Chain):
         other.constant = across.stabilisation(formulation)
         none = np.zeros((0, 2 * self.nd, 2 * self.nd))
         first = none if other.constant is None else other.constant
-        other.tables = [table.on_mesh(across, none if k else first)
+        rows: dict[int, Any] = {}
+        other.tables = [table.on_mesh(across, none if k else first, rows)
                         for k, table in enumerate(self.tables)]
         other.firsts = [other.tables[self.tables.index(t)] for t in self.firsts]
         other.packs = [t.pack for t in other.tables]
