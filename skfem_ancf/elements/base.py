@@ -196,19 +196,24 @@ class ElementBeam(Frozen, Element):
                 self._index_error()
             value, d_xi, d_eta, (slope,) = self.local(X, h, slice(i, i + 1), rate)
             return value[0], d_xi[0], d_eta[0], int(slope)
-        power, slope = self._factors[3:, i]
-        if few(X):
-            unit = _kept_functions(self._along, self.functionals, self.section, Content(X))[:, i]
-        else:
-            unit = _unit_functions(self._along, self._factors[:, i], self.section, X)
-        if isinstance(h, np.ndarray) and h.ndim == unit.ndim - 1:  # some points of each element
-            unit = unit[:, :, None]
-        factor = _powers(h, power)
-        value, d_xi, d_eta = factor.reshape(factor.shape[:1] + (
-            factor.shape[1:] or (1,) * (unit.ndim - 2))) * unit
+        (value, d_xi, d_eta), power, slope = self._of_height(X, h, i)
         if isinstance(h, np.ndarray):  # h^p P(Y / h) of a height that varies
             d_xi += np.multiply.outer(power, rate / h) * value
         return value, d_xi, d_eta, slope
+
+    def _of_height(self, X, h, i=slice(None), parts=slice(None)):
+        """What :meth:`local` returns first, or some of it, at a constant height; both powers."""
+        power, slope = self._factors[3:, i]
+        if few(X):
+            unit = _kept_functions(self._along, self.functionals, self.section, Content(X))
+            unit = unit[parts, i]
+        else:
+            unit = _unit_functions(self._along, self._factors[:, i], self.section, X)[parts]
+        if isinstance(h, np.ndarray) and h.ndim == unit.ndim - 1:  # some points of each element
+            unit = unit[:, :, None]
+        factor = _powers(h, power)
+        return factor.reshape(factor.shape[:1] + (
+            factor.shape[1:] or (1,) * (unit.ndim - 2))) * unit, power, slope
 
     def series(self) -> tuple[Array, Array, Array]:
         """The local functions of height 1 and length 1 in products of Chebyshev polynomials.
@@ -249,7 +254,7 @@ class ElementBeam(Frozen, Element):
 
     @property
     def by_reference(self) -> bool:
-        """True if all straight elements follow from one of length and height 1, by powers."""
+        """True if elements follow from one of length and height 1, straight ones by powers."""
         return all(getattr(type(self), name) is getattr(ElementBeam, name)
                    for name in ("local", "of_mesh", "functions", "slopes"))
 
@@ -340,7 +345,11 @@ class ElementBeam(Frozen, Element):
             As for :meth:`gbasis`, shapes (2, npoints) or (2, nelements, npoints), and
             (nelements,).
         """
-        value, _, _, slope = self.of_mesh(mapping, X, tind)
+        if not self.by_reference:
+            value, _, _, slope = self.of_mesh(mapping, X, tind)
+        else:
+            h = mapping.height(X[0], tind)[0] if self.section.number else 1.0
+            (value,), _, slope = self._of_height(X, h, parts=slice(1))
         return self._scaled(mapping.mesh, slope, tind, value)[0]
 
     def along(self, mapping: MappingBeam, X: Array, tind: Array | None = None
