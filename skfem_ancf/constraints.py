@@ -234,7 +234,7 @@ class Constraints:
         return self._sparse(*self._entries(u, t))
 
     @cached_property
-    def slopes(self) -> tuple[Array, Array, Array]:
+    def slopes(self) -> tuple[Array, ...]:
         """Rows, columns and values of :meth:`full_jacobian` in the stress-free state at the time 0.
 
         As :meth:`~skfem_ancf.joints.Joint.slope_entries` of the joints has them.

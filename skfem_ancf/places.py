@@ -57,9 +57,10 @@ def as_point(point: Any, mesh: MeshBeam | None = None) -> Array:
     mesh
         Of the body, to say in the message where a boundary is that was named instead; or None.
     """
-    if type(point) is tuple and len(point) == 2 and type(point[0]) is type(point[1]) is float and (
-            abs(point[0]) + abs(point[1]) < np.inf):
-        return np.array(point)
+    if type(point) is tuple and len(point) == 2 and (
+            isinstance(point[0], float) and isinstance(point[1], float)
+            and abs(point[0]) + abs(point[1]) < np.inf):
+        return np.array(point, float)
     if isinstance(point, (list, tuple)):
         flat = len(point) == 2 and not any(
             isinstance(x, (list, tuple)) or np.ndim(x) for x in point)

@@ -30,6 +30,7 @@ from skfem_ancf.loads import EndMoment, PointForce, Pressure, Weight
 from skfem_ancf.mapping import MappingBeam
 from skfem_ancf.rank import inertia_of, null_basis
 from skfem_ancf.quadrature import gauss
+from skfem_ancf.sections import Across
 from skfem_ancf.statics.iteration import ALONE
 from skfem_ancf.system import System
 
@@ -280,6 +281,97 @@ def test_supports_by_a_section_are_those_that_hold_motions():
         assert np.array_equal(beam.rigid_motions(np.array(held)), beam.rigid_motions()[held])
         assert rank == 3 or not beam.held_by_a_section(held)
     assert beam.held_by_a_section([0, 1, 2]) and beam.held_by_a_section([8, 9, 12])
+
+
+def test_what_joints_hold_beside_supports_is_seen_without_matrices(monkeypatch):
+    dense = counted(monkeypatch, Constraints, "_dense")
+    for element in (ElementBeamCable(5), ElementBeamANCF(2)):
+        system = cantilever(element, angle=0.6).system
+        assert system.joints
+        system.require_supports()
+        assert not dense
+        system.constraints.require_supports()
+    rng = np.random.default_rng(0)
+    for beam in (cantilever(ElementBeamANCF(2), 3, angle=0.3).beams[0],
+                 cantilever(ElementBeamCable(5), 3, angle=0.3).beams[0]):
+        held, motions = [8, 9] if beam.nd == 8 else [6, 7], beam.rigid_motions()
+        for _ in range(60):
+            columns = rng.choice(beam.N, 3, replace=False)
+            one = list(zip(columns.tolist(), rng.standard_normal(3).tolist()))
+            row = sum(factor * motions[k] for k, factor in one)
+            if beam.held_by_a_section(held, [one]):
+                assert np.linalg.matrix_rank([*motions[held], row], tol=1e-6) == 3
+    x, y = motions[beam.nd + 2:beam.nd + 4, 2]
+    assert beam.held_by_a_section([6, 7], [[(8, 1.0), (9, 0.5)]])
+    assert not beam.held_by_a_section([6, 7], [[(8, y), (9, -x)]])  # it stretches
+    assert not beam.held_by_a_section([6, 7], [[(8, 1.0), (2, 0.5)], []])
+
+
+@pytest.mark.parametrize("more", ["same", "opposite", "apart"])
+def test_equations_that_share_coordinates_are_still_tried(more):
+    scene = cantilever(ElementBeamCable(5), angle=0.6)
+    if more == "apart":
+        scene.joint("angle", at="right", angle=lambda t: 0.0)
+        return scene.system.require_supports()
+    scene.clamp((0.0, 0.0) if more == "same" else "left", thickness="free")
+    with pytest.raises(SupportError, match="repeats"):
+        scene.solve_static()
+
+
+@pytest.mark.parametrize("formulation", sorted(FORMULATIONS))
+def test_terms_of_one_modulus_each_are_those_that_do_not_vanish(formulation):
+    """What comes from several places may cancel, as weights of a rule that are orthogonal do."""
+    x = np.linspace(0, 1, 3)
+    for mesh in (MeshBeam.init_line(x, 0.1), MeshBeam.init_line(x, lambda s: 0.1 - 0.03 * s)):
+        beam = Beam(mesh, ElementBeamANCF(3), StVenantKirchhoff(2e7, 0.3), 0.1, formulation)
+        for table in beam.kernel.tables:
+            _, (mixing, several, sizes), *_ = table._sums
+            law, w = table.pack.law.D.reshape(9, 1, 1), table.pack.weights
+            D = (law * w).reshape(-1, w.shape[1])
+            keep = np.any(np.abs(mixing @ D) > 1e-14 * (abs(mixing) @ np.abs(D)), axis=1)
+            assert table.pack.terms.shape[1] == np.sum(keep)
+            assert abs(abs(mixing)[several] - sizes).max() == 0.0 if len(several) else True
+            assert keep[np.setdiff1d(np.arange(len(keep)), several)].all()
+
+
+def test_volumes_at_the_same_places_are_asked_once(monkeypatch):
+    asked = counted(monkeypatch, Across, "volume")
+    mesh = MeshBeam.init_line([0, 0.5, 1], lambda x: 0.1 - 0.02 * x)
+    packs = Beam(mesh, ElementBeamANCF(3), StVenantKirchhoff(2e7, 0.3), 0.1, "strain-split"
+                 ).kernel.packs
+    assert len(packs) == 3 and len(asked) == 2  # of the body, and of its axis
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(3), ElementBeamANCFHermite(2, 5),
+                                     ElementBeamCable(5)])
+def test_values_alone_are_those_that_come_with_derivatives(element):
+    X = np.random.default_rng(0).random((2, 5))
+    for height in (0.1, lambda x: 0.1 - 0.02 * x):
+        mesh = MeshBeam.init_line([0.0, 0.4, 1.0], height)
+        for at, tind in ((X, None), (X, np.array([1])), (np.stack([X, X + 0.01], 1), None)):
+            values = element.values(mesh.mapping(), at, tind)
+            assert np.array_equal(values, element.functions(mesh.mapping(), at, tind)[0])
+
+
+@pytest.mark.parametrize("shape", ["line", "taper", "arc"])
+def test_what_is_turned_inside_out_is_seen_by_determinants(shape):
+    x, rng = np.linspace(0, 1, 4), np.random.default_rng(0)
+    mesh = (MeshBeam.init_line(x, 0.1) if shape == "line" else
+            MeshBeam.init_line(x, lambda s: 0.1 - 0.04 * s) if shape == "taper" else
+            MeshBeam.init_curve(lambda s: np.array([np.sin(s), 1.0 - np.cos(s)]), x, 0.1))
+    beam = Beam(mesh, ElementBeamANCF(3), StVenantKirchhoff(2e9, 0.3), 0.01)
+    kernel, table = beam.kernel, beam.kernel.firsts[0]
+    at, found = table._samples, set()
+    points = at.X[:, at.where[0]][:, at.sheared[:len(at.sheared) // 2]]
+    for size in np.geomspace(1e-3, 1.0, 12):
+        u = size * rng.standard_normal(beam.N) * beam.sizes
+        H, frame = beam.gradients(u, points)
+        F = np.einsum("iJep,iKep->JKep", frame, H + frame)
+        det = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
+        found.add(kernel.inverted(u))
+        assert kernel.inverted(u) == bool(np.any(det <= 0.0))
+        assert np.array_equal(table.upright(table.pack, u), det > 0.0)
+    assert found == {True, False}
 
 
 def test_a_tapered_beam_has_slopes_of_its_height():

@@ -201,7 +201,8 @@ class ElementBeam(Frozen, Element):
             d_xi += np.multiply.outer(power, rate / h) * value
         return value, d_xi, d_eta, slope
 
-    def _of_height(self, X, h, i=slice(None), parts=slice(None)):
+    def _of_height(self, X: Array, h: Any, i: slice = slice(None), parts: slice = slice(None)
+                   ) -> tuple[Array, Array, Array]:
         """What :meth:`local` returns first, or some of it, at a constant height; both powers."""
         power, slope = self._factors[3:, i]
         if few(X):

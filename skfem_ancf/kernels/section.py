@@ -516,7 +516,7 @@ class TermTables:
                                    weights=weights, **times_held(pack, both))
         return other
 
-    def on_mesh(self, across: "Across", constant: Array, rows: dict[int, Any]) -> "TermTables":
+    def on_mesh(self, across: "Across", constant: Array, known: dict[int, Any]) -> "TermTables":
         """As :meth:`Kernel.on_mesh`.
 
         Parameters
@@ -525,15 +525,15 @@ class TermTables:
             As there.
         constant
             The stabilisation there, shape (0 or 1, 2 nb, 2 nb).
-        rows
+        known
             Tables of other terms there, by the identity of those here; added to.
         """
         other, pack, mesh = twin_of(self), self.pack, across.mesh
         unit, n = self._rows[3][::3]
-        if id(self._rows) not in rows:
+        if id(self._rows) not in known:
             G, frame, scaled = _scaled(mesh, across.element, unit, n, np.zeros(1, int))
-            rows[id(self._rows)] = G, frame, self._samples, scaled
-        other._rows = G, frame, _, scaled = rows[id(self._rows)]
+            known[id(self._rows)] = G, frame, self._samples, scaled
+        other._rows = G, frame, _, scaled = known[id(self._rows)]
         before, other.slab = self._mesh, across.slabs[0]
         larger = mesh.height * mesh.lengths[0] / (before.height * before.lengths[0])
         other._mesh, other.w = mesh, larger * self.w
@@ -1014,8 +1014,8 @@ class Kernel(Chain):
         other.constant = across.stabilisation(formulation)
         none = np.zeros((0, 2 * self.nd, 2 * self.nd))
         first = none if other.constant is None else other.constant
-        rows: dict[int, Any] = {}
-        other.tables = [table.on_mesh(across, none if k else first, rows)
+        known: dict[int, Any] = {}
+        other.tables = [table.on_mesh(across, none if k else first, known)
                         for k, table in enumerate(self.tables)]
         other.firsts = [other.tables[self.tables.index(t)] for t in self.firsts]
         other.packs = [t.pack for t in other.tables]
