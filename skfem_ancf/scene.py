@@ -1775,7 +1775,9 @@ class Scene:
                progress: bool | None = None) -> History:
         """Go on with a motion from its checkpoint, to the end that it was given.
 
-        On the same machine its numbers are those of a run that was not interrupted, bit for bit.
+        On the same machine its numbers are those of a run that was not interrupted, bit for bit if
+        both are compiled or both are not; instants of ``t_eval`` within a step are to the tolerance
+        of the iteration.
 
         Parameters
         ----------

@@ -164,3 +164,21 @@ def test_automatic_steps_go_on_in_their_size(compiled):
     assert rest.t[1] - rest.t[0] > 0.1 * (half.t[-2] - half.t[-3])
     fine = scene.integrate(0.2, 5e-4, t_eval=[0.2])
     assert np.abs(rest.u[-1] - fine.u[-1]).max() < 1e-2
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
+def test_what_a_sensor_ends_goes_on_in_its_steps(error):
+    """The step whose end it did not read is not stored."""
+    def watched(end):
+        def read(state):
+            if state.t > end:
+                raise error("of the caller's")
+            return state.t
+        return swinging().sensor("watch", read)
+
+    with pytest.raises((InputError, KeyboardInterrupt)) as caught:
+        watched(0.1).integrate(0.2, "auto", rtol=1e-4, check=False)
+    begun = caught.value.state
+    assert np.array_equal(begun.sensors["watch"], begun.t)
+    rest = watched(1.0).integrate(0.2, "auto", rtol=1e-4, check=False, start=begun.state(-1))
+    assert rest.t[1] - rest.t[0] > 0.1 * (begun.t[-2] - begun.t[-3])

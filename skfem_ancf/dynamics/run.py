@@ -337,8 +337,8 @@ class Run:
                 self._look_beyond(new)
         else:
             self.n += 1
+        self.recorder.record([new])  # first: functions of the caller's may end it here
         self._store(partial(_same, old), new)
-        self.recorder.record([new])
         self.y, self.steps = new, self.steps + 1
 
     def _look(self, old, new):
