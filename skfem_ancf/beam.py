@@ -586,12 +586,14 @@ class Beam(Frozen):
 
         Derivatives along the axis by the length of an element, those across by the height.
         """
-        length, h = float(self.mesh.lengths.mean()), self.mesh.height
+        lengths, h = self.mesh.lengths, self.mesh.height
+        length = float(np.add.reduce(lengths)) / lengths.size
         node = [self.size if k == m == 0 else length**-k * (h**(1 - m) if m else length)
                 for _, k, m in self.element.functionals]
-        out = np.empty((self.N // self.nd, len(node), 2))
-        out[:] = np.array(node)[:, None]
-        return read_only(out.ravel())
+        out = np.empty((self.N // self.nd, self.nd))
+        out[:] = np.array(node).repeat(2)
+        out.flags.writeable = False
+        return out.ravel()
 
     def held_by_a_section(self, held: Sequence[int], sums: Sequence[Any] = ()) -> bool:
         """True if a node is held, and the direction of the axis there or its normal.

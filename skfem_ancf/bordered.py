@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import lapack
 from scipy.sparse import coo_matrix
 
 from .border import Border, Factors, factors_of, join, mean_stiffness, solve_bordered
@@ -80,9 +81,12 @@ def gives_way(f: Factors) -> bool:
     both[:n, :n], both[n:, n:] = f.H, -S / (size[:k, None] * size[:k])
     both[:k, :n] = S @ f.H[:k]
     both[:n, :n] /= size[:, None] * size
-    values = np.linalg.eigvalsh(both, "U")
+    values, _, info = lapack.dsyevd(both, compute_v=0)  # increasing, of the upper half
+    if info != 0:
+        raise np.linalg.LinAlgError("the eigenvalues of the border are not found")
     least = UNSURE * max(-values[0], values[-1])
-    return np.sum(values > least) - np.sum(values < -least) != len(f.J)
+    negative, others = values.searchsorted(-least), values.searchsorted(least, "right")
+    return bool(len(values) - others - negative != len(f.J))
 
 
 class BorderedMatrix:

@@ -1064,7 +1064,9 @@ def reach(meshes: Sequence[MeshBeam]) -> float:
     >>> reach([beam.mesh for beam in frame.beams])
     5.0
     """
-    total = float(sum([mesh.lengths.sum() for mesh in meshes]))
+    total = float(sum([np.add.reduce(mesh.lengths) for mesh in meshes]))
+    if len(meshes) == 1 and meshes[0].t.shape[1] == meshes[0].doflocs.shape[1] - 1:  # one line
+        return total
     longest = max([float(mesh.chain_lengths.max()) for mesh in meshes])
     if longest == total:
         return total

@@ -111,7 +111,8 @@ class System:
         self.offsets, self.N = np.array(offsets), offsets[-1]
         self.slices = [slice(a, b) for a, b in pairwise(offsets)]
         self._index = {id(b): k for k, b in enumerate(self.members)}
-        self.size = reach([b.mesh for b in self.beams]) if beams else _extent(self.bodies)
+        self.size = (_extent(self.bodies) if not beams else beams[0].size if len(beams) == 1
+                     else reach([b.mesh for b in self.beams]))
         self.constraints = Constraints(self.members, self.slices, self.size, fixed, values,
                                        [*self._directors(fixed), *joints],
                                        self._held_by_elements if elements else None)
