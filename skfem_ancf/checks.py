@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 from itertools import accumulate
-from math import sin
+from math import sin, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 #: Stretch below which St. Venant-Kirchhoff resists less the more it is compressed: the force of a
 #: fibre, E (l^3 - l) / 2, has its smallest value there.
-COMPRESSED = 1.0 / np.sqrt(3.0)
+COMPRESSED = 1.0 / sqrt(3.0)
 #: Angle, in radians, by which the axis may turn over one element, for a cubic axis and others.
 #: A cubic cable bent by an end moment is off by 1.7, 4.5, 9, 14 % of its length at 0.76, 0.93, 1.07
 #: and 1.18 rad, and beyond 1.2 rad nothing is left of the solution; one of degree 5 by 1.5e-5 at
@@ -127,10 +127,10 @@ class Screen:
     def _folds(self):
         """What tells of folds: places of end, begin and a tangent, each with both; at rest."""
         (begin, end), rest = self._places, _joined([_complex(b.mesh.p.T) for b in self._beams])
-        left, right = self._ends
-        return (np.array([[end, end], [begin, begin], [1 + begin, 1 + end]]).reshape(3, -1),
-                np.array([[rest[right]] * 2, [rest[left]] * 2,
-                          [self.start[left], self.start[right]]]).reshape(3, -1))
+        (left, right), (first, last) = self._ends, rest[self._ends]
+        return (np.concatenate([end, end, begin, begin, 1 + begin, 1 + end]).reshape(3, -1),
+                np.concatenate([last, last, first, first, self.start[left], self.start[right]]
+                               ).reshape(3, -1))
 
     @cached_property
     def _turns_of_few(self):
@@ -160,11 +160,13 @@ class Screen:
         if self._none:
             return True
         if u.ndim == 1 and self._turns_of_few:
-            z = _paired(u).tolist()
-            p, q, turns, bends = zip(*[_changes(z[i], z[j], *numbers)
-                                       for i, j, *numbers in self._turns_of_few])
-            least = max(bends) + 1.1 * COMPRESSED
-            return all(x < 1.0 for x in turns) and all(x > least for x in p + q)
+            z, least, bends = _paired(u).tolist(), np.inf, 0.0
+            for i, j, *numbers in self._turns_of_few:
+                p, q, turn, bend = _changes(z[i], z[j], *numbers)
+                if not turn < 1.0:
+                    return False
+                least, bends = min(least, p, q), max(bends, bend)
+            return least > bends + 1.1 * COMPRESSED
         places, rest, widest, thick = self._turns
         z, rest = _paired(u)[..., places], rest if start is None else start[..., self._ends]
         thick = thick if slender is None else thick / self.slender * slender

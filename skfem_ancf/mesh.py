@@ -553,9 +553,14 @@ class MeshBeam(Frozen, Mesh2D):
                     and np.ptp(self.chain_lengths) <= 1e-12 * np.max(self.chain_lengths))
 
     @property
+    def is_chain(self) -> bool:
+        """True if each element begins where the one before it ends."""
+        return bool(self.t.shape[1] == self.doflocs.shape[1] - 1)
+
+    @property
     def chain_lengths(self) -> Array:
         """Length of the chain that each element is in, shape (nelements,)."""
-        if self.t.shape[1] == self.doflocs.shape[1] - 1:  # one chain
+        if self.is_chain:
             return np.full(self.t.shape[1], self.lengths.sum())
         chain = np.cumsum(np.append(False, self.t[0, 1:] != self.t[1, :-1]))
         return np.bincount(chain, self.lengths)[chain]
@@ -1065,11 +1070,9 @@ def reach(meshes: Sequence[MeshBeam]) -> float:
     5.0
     """
     total = float(sum([np.add.reduce(mesh.lengths) for mesh in meshes]))
-    if len(meshes) == 1 and meshes[0].t.shape[1] == meshes[0].doflocs.shape[1] - 1:  # one line
+    if len(meshes) == 1 and meshes[0].is_chain:
         return total
     longest = max([float(mesh.chain_lengths.max()) for mesh in meshes])
-    if longest == total:
-        return total
     low = np.min([mesh.p.min(axis=1) for mesh in meshes], axis=0)
     high = np.max([mesh.p.max(axis=1) for mesh in meshes], axis=0)
     return min(total, max(longest, float(np.hypot(*(high - low)))))

@@ -21,14 +21,19 @@ class Courses:
 
     Parameters
     ----------
-    system
-        A :class:`~skfem_ancf.system.System`.
     conserving
         The equation of motion holds in the middle of a step, not at its end.
+
+    Attributes
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
     """
 
-    def __init__(self, system: System, conserving: bool) -> None:
-        self._system, self._conserving = system, conserving
+    system: System
+
+    def __init__(self, conserving: bool) -> None:
+        self._conserving = conserving
         self._asked: Any = None, None
         self._beside: Any = None, None
 
@@ -73,11 +78,11 @@ class Courses:
         if joints is not None:
             self._beside = (start + dt * first, dt, True, limit), joints[:PARTS + 1]
             joints = steps_of(joints)
-        return Course(float(dt), instants, self._system.machine.tables.factors(instants[:, 1]),
+        return Course(float(dt), instants, self.system.machine.tables.factors(instants[:, 1]),
                       self._supports(times, dt), self._joints(joints, dt))
 
     def _supports(self, times, dt):
-        s = self._system
+        s = self.system
         if not s.moves:
             return np.zeros((1, 3, s.N))
         found = of_step(dt)[END:] @ steps_of(s.values_at(times))
@@ -113,14 +118,14 @@ class Courses:
     def _ask_joints(self, times):
         """c and g at the times, as of ``Tables.driven``; None where they are no tables, or steady.
         """
-        tables = self._system.machine.tables
+        tables = self.system.machine.tables
         if not tables.motion_varies or tables.plain.joints.own:
             return None
         return tables.driven(times)
 
     def _joints(self, asked, dt):
         """Of what :meth:`_ask_joints` gave in each step, in the order of time."""
-        tables = self._system.machine.tables
+        tables = self.system.machine.tables
         c, g = tables.still
         if asked is not None:
             found, m = _weights(dt, self._conserving) @ asked, c.shape[2]

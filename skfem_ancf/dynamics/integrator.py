@@ -83,7 +83,6 @@ class Integrator:
             alpha_m, alpha_f, beta, _ = scheme.parameters
             kick = (1.0 - alpha_m) / ((1.0 - alpha_f) * beta)
             system.forces.contacts.require_penalty(scheme, kick if in_steps(scheme) else np.inf)
-        self.system = system
         M, A = system.mass.band, system.new_band()
         self._nodes: tuple[Eliminated, EliminatedMass] | None = None
         if in_steps(scheme) and system.by_nodes:
@@ -97,7 +96,7 @@ class Integrator:
         self._begun: Any = (None,)
         self.machine = system.machine
         self._ruled: Any = None
-        self._begin(scheme, tol)
+        self._begin(system, scheme, tol)
         numbers = 4 * system.N + system.forces.contacts.tables.memory.size
         self.longest = max(1, min(STORED // numbers, BLOCK))
 
@@ -109,9 +108,9 @@ class Integrator:
         return room_for_steps(s.N, s.m, s.machine.tables.stresses.size, gradients_size(
             s.machine.tables.plain.body) if turned else 0, 0 if self._nodes else s.m)
 
-    def _begin(self, scheme, tol):
+    def _begin(self, system, scheme, tol):
         """As if nothing had been integrated yet."""
-        self.scheme, self.limit, system = scheme, np.inf, self.system
+        self.system, self.scheme, self.limit = system, scheme, np.inf
         self.tol = scheme.tol if tol is None else require_positive("tol", tol)
         if self.tol >= 1.0:
             raise InputError(f"tol is the error of a step's iteration, relative: less than 1, and "
@@ -126,7 +125,8 @@ class Integrator:
         self._dt, self.substeps, self._lost = np.nan, 0, ""
         self.kept: dict[str, Array] = {}
         if system.depends_on_time or self.asked is None:
-            self._courses, self.asked = Courses(system, scheme.conserving), (None,)
+            self._courses, self.asked = Courses(scheme.conserving), (None,)
+        self._courses.system = system
 
     @classmethod
     def lent(cls, system: System, scheme: Scheme, tol: float | None = None) -> Integrator:
@@ -143,14 +143,17 @@ class Integrator:
         except IndexError:
             return cls(system, scheme, tol)
         if same_scheme(integrator.scheme, scheme):
-            integrator._begin(scheme, tol)
+            integrator._begin(system, scheme, tol)
             return integrator
         return cls(system, scheme, tol)
 
     def give_back(self) -> None:
         """Its motion has ended: its work arrays are for another one, where they are small."""
-        if self._nodes is None and self.system.N <= LENT and len(self.system.integrators) < 2:
-            self.system.integrators.append(self)
+        free = self.system.integrators
+        if self._nodes is None and self.system.N <= LENT and len(free) < 2:
+            # without a circle both go when nobody asks for them any more
+            del self.system, self._courses.system
+            free.append(self)
 
     @property
     def iterations(self) -> int:

@@ -536,10 +536,12 @@ def _fixed(value: Array) -> Vector:
 
 def _of(scene: Scene, member: Any, start: Array, dofs: Array, weights: Array) -> Vector:
     """A Vector of coordinates of a beam or body, by their numbers there, without round-off."""
-    weights = np.broadcast_to(weights, dofs.shape)
-    size = np.abs(weights).max(axis=0) * member.sizes[dofs[0]]
-    keep = size > 1e-14 * size.max()
-    return Vector(start, dofs[:, keep] + scene.offset(member), weights[:, keep])
+    found = Vector(start, dofs + scene.offset(member), weights)
+    size = np.maximum.reduce(np.abs(found.weights)) * member.sizes.take(dofs[0])
+    keep = size > 1e-14 * np.maximum.reduce(size)
+    if not np.logical_and.reduce(keep):
+        found.dofs, found.weights = found.dofs[:, keep], found.weights[:, keep]
+    return found
 
 
 def members_at(scene: Scene, at: ArrayLike) -> list[int]:
