@@ -345,7 +345,8 @@ class Tables:
     def factors(self, times: Array) -> Array:
         """Factors of the loads, shape (n, k); of one row where none has an amplitude."""
         varying, n = self._amplitudes
-        out = np.ones((len(times) if varying else 1, n))
+        out = np.empty((len(times) if varying else 1, n))
+        out.fill(1.0)
         for k, amplitude in varying:
             out[:, k] = amplitude(times).reshape(len(times))
         return out
