@@ -370,7 +370,7 @@ def test_what_is_turned_inside_out_is_seen_by_determinants(shape):
         det = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
         found.add(kernel.inverted(u))
         assert kernel.inverted(u) == bool(np.any(det <= 0.0))
-        assert np.array_equal(table.upright(table.pack, u), det > 0.0)
+        assert np.array_equal(table.upright(table.pack, u), det.T > 0.0)
     assert found == {True, False}
 
 

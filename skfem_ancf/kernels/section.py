@@ -546,12 +546,13 @@ class TermTables:
         return other
 
     def _gradients(self, pack, u, rows):
-        """Some rows of the deformation gradient as complex numbers, shape (elements, rows)."""
-        nodes = pack.start[:, None] // 2 + np.arange(pack.table.shape[2])
-        U = u.view(complex)[nodes].view(float).reshape(*nodes.shape, 2)
-        r = pack.table.take(rows, axis=1) @ U
-        r += pack.frame.take(rows, axis=0).transpose(2, 0, 1)
-        return r.view(complex)[..., 0]
+        """Some rows of the deformation gradient, shape (rows, 2, elements)."""
+        U = np.empty((pack.table.shape[2], 2, pack.start.size))
+        r = np.empty((len(rows),) + U.shape[1:])
+        load(pack.start, pack.span, 0, u, U)
+        product(pack.table.take(rows, axis=1), 0, U, r)
+        r += pack.frame.take(rows, axis=0)
+        return r
 
     def inverted(self, pack: SectionPack, u: Array) -> bool:
         """True if the body is turned inside out at a sample: det F is not positive.
@@ -566,7 +567,7 @@ class TermTables:
         return not self.upright(pack, u).all()
 
     def upright(self, pack: SectionPack, u: Array) -> Any:
-        """Where det F is positive, of each element and each sample of the shear.
+        """Where det F is positive, of each sample of the shear and each element.
 
         Parameters
         ----------
@@ -575,7 +576,8 @@ class TermTables:
         """
         sheared = self._samples.sheared
         n, r = len(sheared) // 2, self._gradients(pack, u, sheared)
-        return (r[:, :n].conj() * r[:, n:]).imag > 0.0
+        rx, ry = r[:n], r[n:]
+        return rx[:, 0] * ry[:, 1] > rx[:, 1] * ry[:, 0]
 
     def shortest(self, pack: SectionPack, u: Array) -> Any:
         """Smallest stretch of the fibres along the axis, where eps_xx is sampled.
@@ -587,7 +589,8 @@ class TermTables:
         u
             Displacement, shape (N,).
         """
-        return np.min(np.abs(self._gradients(pack, u, self._samples.along)))
+        rx = self._gradients(pack, u, self._samples.along)
+        return np.sqrt(np.min(np.sum(rx * rx, axis=1)))
 
 
 def _same_places(a, b):
@@ -1034,7 +1037,7 @@ class Kernel(Chain):
         found = np.zeros(len(u), dtype=bool)
         for table, pack in zip(self.tables, packs):
             if table in self.firsts:
-                up = np.all(table.upright(pack, u.ravel()), axis=1)
+                up = np.all(table.upright(pack, u.ravel()), axis=0)
                 found |= ~np.all(up.reshape(len(u), -1), axis=1)
         return found
 
