@@ -252,7 +252,7 @@ class BandMatrix:
         if self._factor is None or not self.symmetric:
             return False
         if self._factor[0] == "ldl":
-            return bool(self._flat[::self._ld].min() > 0.0)
+            return bool(np.minimum.reduce(self._flat[::self._ld]) > 0.0)
         return self._factor[0] == "pb"
 
     def inertia(self) -> Inertia:

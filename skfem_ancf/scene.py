@@ -1562,7 +1562,6 @@ class Scene:
         return State(system, u, require_finite_scalar("load", load), converged=False,
                      message="given coordinates", multipliers=multipliers)
 
-    @_alone
     def _solve(self, u, **options):
         system = self.system
         system.require_supports()

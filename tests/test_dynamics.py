@@ -1169,6 +1169,28 @@ def test_directions_of_joints_that_follow_the_time_alone_are_solved_with_once_a_
     assert len(solved) <= 2 * history.steps + history.factorizations
 
 
+@pytest.mark.parametrize("scheme", ["generalized-alpha", "energy-momentum", "radau"])
+def test_directions_of_hinges_are_solved_with_once_for_many_steps(scheme, monkeypatch):
+    """With each new matrix, and with the mass once in a block of steps."""
+    from skfem_ancf import band
+
+    solved, solve_many = [], band.solve_many
+    monkeypatch.setattr(band, "solve_many", lambda *args: solved.append(1) or solve_many(*args))
+    a, b = (Beam(MeshBeam.init_line([0, 1], 0.01, origin=(x, 0)), ElementBeamCable(3),
+                 StVenantKirchhoff(2e8, 0.3, 7800), 0.01, compiled=False) for x in (0, 1))
+    scene = Scene(a, b).pin("left", a).gravity(GRAVITY)
+    hinge = scene.hinge((1, 0))
+    history = scene.integrate(0.1, 1e-3, scheme=scheme)
+    assert len(solved) <= history.factorizations + 0.3 * history.steps
+    in_one, in_parts = (scene.integrate(0.02, 1e-3, scheme=scheme), [])
+    start = None
+    for k in range(1, 5):  # blocks begin anew
+        part = scene.integrate(0.005 * k, 1e-3, scheme=scheme, start=start)
+        start = part.state(-1)
+        in_parts.append(part.joint_force(hinge)[1:])
+    assert_allclose(np.concatenate(in_parts), in_one.joint_force(hinge)[1:], rtol=1e-7)
+
+
 def test_a_body_that_is_turned_inside_out_is_said():
     mesh = MeshBeam.init_line(np.linspace(0, 1, 5), 0.2)
     beam = Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(1e3, 0.3, 100.0), 0.1)

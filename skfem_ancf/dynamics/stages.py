@@ -326,13 +326,13 @@ def _end(e, matrices, method, s, w, state, step):
     for i in lanes(u.size):
         u[i] = u[i] * e.free[i] + held[0, i]
         v[i] = v[i] * e.free[i] + held[1, i]
-    if joined and not _close(e, matrices, s, w, motion, t):
+    if joined and not _close(e, matrices, s, w, motion, t, step):
         return False
     if not ends:
         _balance(e, matrices, s, w, first + n)
     if joined:
         acceleration_of_joints(e.joints, motion, t, s.h, u, v, w.shares)
-        if not _meet(matrices.mass, e.free, w, a):
+        if not _meet(matrices.mass, e.free, w, a, not joined):  # J as for the velocity
             return False
         if ends:
             add_multiple(1.0, w.l[n - 1], w.shares)
@@ -365,28 +365,33 @@ def _balance(e, matrices, s, w, at):
 
 
 @source
-def _close(e, matrices, s, w, motion, t):
+def _close(e, matrices, s, w, motion, t, step):
     """Move u to where joints are closed, the nearest in the norm of the mass, and v with it."""
     u, v, g, x = w.y[0], w.y[1], motion.g[0], w.x[3]
-    for _ in range(CLOSINGS):
+    bends = e.joints.hk.size > 0 or e.joints.own > 0  # J depends on u, or on the time
+    turns = step == 0 or s.joints.g.shape[0] > 1
+    for k in range(CLOSINGS):
         joint_directions(e.joints, g, t, u, w.end[0])
         constraint(e.joints, motion.c[0], g, t, u, w.shares)
         for i in lanes(x.size):
             x[i] = 0.0
-        if not _meet(matrices.mass, e.free, w, x):
+        if not _meet(matrices.mass, e.free, w, x, bends or (turns and k == 0)):
             return False
         for i in lanes(x.size):
             u[i] += x[i]
     joint_directions(e.joints, g, t, u, w.end[0])
     drive_rate(e.joints, motion, t, s.h, u, w.shares)
-    return _meet(matrices.mass, e.free, w, v)
+    return _meet(matrices.mass, e.free, w, v, bends)
 
 
 @source
-def _meet(mass, free, w, x):
-    """Change x so that J x becomes minus ``w.shares``, which become the multipliers for it."""
-    J, yes = w.end[0], w.shares.size > 0
-    return solve_joined(mass, J, J, free, yes, w.end[1], w.shared, w.shares, x)
+def _meet(mass, free, w, x, anew):
+    """Change x so that J x becomes minus ``w.shares``, which become the multipliers for it.
+
+    Of ``J M^-1`` made anew, or of that of the last time.
+    """
+    J = w.end[0]
+    return solve_joined(mass, J, J, free, anew, w.end[1], w.shared, w.shares, x)
 
 
 # the iteration

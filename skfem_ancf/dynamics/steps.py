@@ -167,8 +167,9 @@ class Step(NamedTuple):
         As of the Course, without the first axis.
     mass_factor, damping_factor, stiffness_factor
         The iteration matrix is ``mass_factor M + damping_factor D + stiffness_factor K``.
-    constant
-        True if the joints' directions do not depend on the displacement.
+    constant, kept
+        True if the joints' directions do not depend on the displacement; and nor on time, and the
+        step before has solved with them.
     """
 
     dt: float
@@ -181,6 +182,7 @@ class Step(NamedTuple):
     damping_factor: float
     stiffness_factor: float
     constant: bool
+    kept: bool
 
 
 class Vectors(NamedTuple):
@@ -256,7 +258,8 @@ class Work(NamedTuple):
         As above.
     J
         The joints' directions where they act, those at the end of the step, and the solutions with
-        the former, shape (3, m, N); of no joint where they are eliminated.
+        the former, by the factors and by those of the mass, shape (4, m, N); of no joint where they
+        are eliminated.
     S
         ``J1 A^-1 J^T``, shape (m, m), or of none.
     stresses
@@ -288,7 +291,7 @@ def room_for_steps(N: int, m: int, stresses: int, gradients: int, dense: int) ->
         Number of equations in dense matrices: m, or 0 where they are eliminated.
     """
     x, shares = np.zeros((len(Vectors._fields), N)), np.zeros((len(Shares._fields), m))
-    return Work(np.zeros((4, N)), Vectors(*x), Shares(*shares), np.zeros((3, dense, N)),
+    return Work(np.zeros((4, N)), Vectors(*x), Shares(*shares), np.zeros((4, dense, N)),
                 np.zeros((dense, dense)), np.zeros((7, stresses)), np.zeros((2, gradients)))
 
 
@@ -318,14 +321,14 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
     course, state = borrowed(course), borrowed(state)
     m, y, u = w.m.l.size, w.y, w.x.u
     joined, damped, turns = m > 0, matrices.dampers.active > 0, matrices.U.flat.size > 0
-    contacts, taken, before = e.forces.contacts, np.empty(1), np.empty(u.size)
+    contacts, taken, before, stale = e.forces.contacts, np.empty(1), np.empty(u.size), joined
     if damped and rule.conserving == 0:
         damping_force(e, matrices.dampers, matrices.M, course.times[0, 0] - course.dt, y[0], y[1],
                       before, w.x.room)
     for n in range(rows.shape[0]):
         s = _step(e.joints, rule, course, n)
         rough, wanted = _begin(e.free, matrices.M, rule, s, w, state)
-        told, left, most = GO_ON, ITERATIONS, AUGMENTED
+        told, left, most, stale = GO_ON, ITERATIONS, AUGMENTED, stale or not s.kept
         _start(e, w, state)
         if contacts.lasting > 0:
             pace_contact(e.forces, s.dt)
@@ -335,6 +338,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
                 _tangent(e, matrices, rule, s, w, state)
                 if not _factorize(e, matrices, rule, s, w, state):
                     return n
+                stale = True
             if damped:
                 _middle(rule, w)
                 _pace(e.free, rule, s, w)
@@ -342,7 +346,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
             _add_elastic(e.forces, rule, s, w)
             if damped:
                 _resist(e, matrices, s, w, state)
-            anew = joined and (not s.constant or state[SIZE] < 0.0)
+            anew, stale = joined and (stale or not s.constant), False
             if anew:
                 _directions(e.joints, rule, s, w)
             _residual(e.loads, e.joints, e.free, matrices.M, rule, s, w)
@@ -363,7 +367,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
             elif told != GO_ON:
                 break
         if told == DONE:
-            if joined:
+            if joined and not s.constant:
                 _directions(e.joints, rule, s, w)
             told = _velocity(e.joints, e.free, matrices.mass, rule, s, w, state, EXACTLY)
             _accelerations(e.free, rule, s, w, state)
@@ -476,11 +480,12 @@ def _step(joints, rule, course, n):
     """The :class:`Step` number n."""
     c, g = course.joints.c, course.joints.g
     constant = joints.hk.size == 0 and joints.own == 0
+    kept = constant and g.shape[0] == 1 and n > 0
     joints_now = JointMotion(_row(c, n), _row(g, n), course.joints.drives)
     return borrowed(Step(course.dt, course.times[n, 0], course.times[n, 1],
                          _row(course.factors, n), _row(course.supports, n), joints_now,
                          mass_factor(rule, course.dt), damping_factor(rule, course.dt),
-                         0.5 if rule.conserving > 0 else 1.0, constant))
+                         0.5 if rule.conserving > 0 else 1.0, constant, kept))
 
 
 @source
@@ -549,12 +554,12 @@ def _velocity(joints, free, mass, rule, s, w, state, exact):
     iteration leaves, where that is not the last, unless ``exact``.
     """
     _free_velocity(free, rule, s, w)
-    anew = w.m.impulse.size > 0
-    if anew:
+    if w.m.impulse.size > 0:
         drive_rate(joints, s.joints, s.t, s.dt, w.x.u, w.m.impulse)
         if rule.mass_solver > 0:
             return _eliminated(joints, rule, s, w, w.x.middle, w.m.impulse, w.x.v, state, exact)
-        if not solve_joined(mass, w.J[0], w.J[1], free, anew, w.J[2], w.S, w.m.impulse, w.x.v):
+        if not solve_joined(mass, w.J[0], w.J[1], free, not s.kept, w.J[3], w.S, w.m.impulse,
+                            w.x.v):
             state[FAILURE] = DEPENDENT
             return FAILED
     return GO_ON
@@ -950,12 +955,12 @@ def _close_acceleration(joints, free, mass, rule, s, w, state):
         for i in lanes(w1.size):
             w1[i] += share * w.x.pace[i]
     else:
-        if not solve_joined(mass, w.J[1], w.J[1], free, anew, w.J[2], w.S, dl, a1):
+        if not solve_joined(mass, w.J[1], w.J[1], free, anew, w.J[3], w.S, dl, a1):
             state[FAILURE] = DEPENDENT
             return FAILED
         for k in lanes(l.size):
             shared[k] = share * dl[k]
-        subtract_rows(w.J[2], shared, w1)
+        subtract_rows(w.J[3], shared, w1)
     for k in lanes(l.size):
         l0[k] = l[k] + dl[k]
         last[k] = l0[k]
