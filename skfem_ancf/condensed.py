@@ -108,7 +108,13 @@ class Condensed:
         self._inside = np.flatnonzero((i < self.size) & (j < self.size))
         #: where the entries of the members go in the matrix of the nodes
         self._entries = tuple(x[self._inside].astype(np.int32) for x in (i, j))
-        self._own = nodes.hinged.reshape(-1, 2)
+        self._moves = _Moves(nodes)
+        n, at = self.size, self._unknowns.ravel()
+        rows = np.flatnonzero(at < n)
+        one = np.ones(len(rows))
+        #: displacements of the ends by those of the nodes
+        self._follow = sparse.csr_array((one, (rows, at[rows])), (len(at), n))
+        self._gather = self._follow.T.tocsr()
         self._parts: list[_Part] = []
 
     @property
@@ -141,32 +147,26 @@ class Condensed:
         numpy.linalg.LinAlgError, RuntimeError
             If the matrix is singular.
         """
-        self._turns = self.nodes.turns(u)
-        self._pairs = self._followers()
-        moments = self._moments(multipliers)
-        self._parts = [_Part(group, K, bases, self._turns, moments)
+        turns, hinged = self.nodes.turns(u), self.nodes.hinged.reshape(-1, 2)
+        scales = self._moves.scales(turns)
+        moments = self._moments(multipliers, scales)
+        self._parts = [_Part(group, K, bases, turns, moments, hinged[group.members])
                        for group, bases in zip(self.groups, self._bases)]
-        S = np.empty((len(self._own), 6, 6))
+        S = np.empty((len(hinged), 6, 6))
         for part in self._parts:
             S[part.group.members] = part.ends
-        sides = [(np.flatnonzero(own), k) for own, k in zip(self._own.T, (2, 5))]
-        self._released = [_Release(S, members, k) for members, k in sides if len(members)]
+        #: displacements of the ends by the equations of the nodes, multipliers by forces
+        self._moved = self._moves(turns, scales)
+        self._pushed = self._moved.T
         self._ends, self._nodes = S, self._factors(S)
 
-    def _moments(self, multipliers):
+    def _moments(self, multipliers, scales):
         """How rotation and stretch of each end are coupled by the multipliers of the rotations."""
-        out = np.zeros(len(self._turns))
-        follower, leader, scale = self._pairs
-        value = self.nodes.split(multipliers)[1] * scale
-        np.add.at(out, leader, -value)
+        out, follower = np.zeros(len(self.nodes.nodes)), self.nodes.turned
+        value = self.nodes.split(multipliers)[1] * scales
+        np.add.at(out, self.nodes.leader[follower], -value)
         out[follower] += value
         return out
-
-    def _followers(self):
-        """Ends that follow a rotation, those that lead them, and the scale of their equation."""
-        s = self.nodes.turned
-        m = self.nodes.leader[s]
-        return s, m, (np.conj(self._turns[s]) * self._turns[m]).real
 
     def _factors(self, ends):
         """Pivots of the matrix of the nodes, over its diagonal, and its sparse factors."""
@@ -183,7 +183,7 @@ class Condensed:
         """Signs of the eigenvalues of the tangent on the tangent space of the joints."""
         found = [part.inertia() for part in self._parts]
         negative, singular = sum(x.negative for x in found), any(x.singular for x in found)
-        for ratio in [self._nodes[0], *(np.sign(x.pivot) for x in self._released)]:
+        for ratio in [self._nodes[0], *(np.sign(part.pivots) for part in self._parts)]:
             negative += int(np.sum(ratio < 0.0))
             singular = singular or bool(np.any(np.abs(ratio) < LOST))
         return Inertia(negative, singular)
@@ -204,55 +204,18 @@ class Condensed:
         x, multipliers
             Of these shapes.
         """
-        at, lu, k = self._unknowns, self._nodes[1], b[:1].size
-        v, x = self._offsets(phi.reshape(-1, k)).reshape(-1, 6, k), np.zeros((len(b), k))
+        lu, k = self._nodes[1], b[:1].size
+        v, x = (self._moved @ phi.reshape(-1, k)).reshape(-1, 6, k), np.zeros((len(b), k))
         f = np.empty(v.shape)
         for part in self._parts:
             f[part.group.members] = part.reduce(b.reshape(x.shape))
-        for turned in self._released:
-            turned.reduce(f)
         if lu is not None:
-            left = f - self._ends @ v
-            nodes = _summed(at.ravel(), left.reshape(-1, k), self.size + 1)
-            nodes[:-1] = lu.solve(nodes[:-1])
-            nodes[-1] = 0.0
-            v += nodes[at].reshape(v.shape)
-        forces = (f - self._ends @ v).reshape(-1, 3, k)
-        forces[self.nodes.hinged, 2] = 0.0
-        for turned in reversed(self._released):
-            turned.expand(f, v)
+            left = self._gather @ (f - self._ends @ v).reshape(-1, k)
+            v += (self._follow @ lu.solve(left)).reshape(v.shape)
         for part in self._parts:
             part.expand(v[part.group.members], x)
-        return x.reshape(b.shape), self._multipliers(forces).reshape(phi.shape)
-
-    def _offsets(self, phi):
-        """By how much ends move apart from the unknowns of their nodes, (ends, 3, columns)."""
-        nodes, out = self.nodes, np.zeros((len(self._turns), 3, phi.shape[1]))
-        forces, moments, x, y, angle = nodes.split(phi)
-        out[nodes.held_x, 0], out[nodes.held_y, 1] = x, y
-        out[nodes.held_angle, 2] = angle / np.abs(self._turns[nodes.held_angle, None])
-        follower, leader, scale = self._pairs
-        out[nodes.followers, :2] = out[nodes.leader[nodes.followers], :2] - forces
-        out[follower, 2] = out[leader, 2] - moments / scale[:, None]
-        return out
-
-    def _multipliers(self, forces):
-        """Those that leave the forces (ends, 3, columns) at the ends."""
-        nodes = self.nodes
-        total = _summed(nodes.nodes, forces.reshape(len(forces), -1), len(nodes.held))
-        total = total.reshape(-1, *forces.shape[1:])
-        follower, _, scale = self._pairs
-        held = nodes.held_x, nodes.held_y, nodes.held_angle
-        x, y, angle = (total[nodes.nodes[ends], k] for k, ends in enumerate(held))
-        return np.concatenate([
-            *(0.0 - forces[nodes.followers, k] for k in range(2)),
-            -forces[follower, 2] / scale[:, None], x, y,
-            angle / np.abs(self._turns[nodes.held_angle, None])])
-
-
-def _summed(at, values, n):
-    """The sums of the rows (rows, columns) that go to each of n places."""
-    return np.stack([np.bincount(at, column, n) for column in values.T], axis=1)
+        multipliers = self._pushed @ (f - self._ends @ v).reshape(-1, k)
+        return x.reshape(b.shape), multipliers.reshape(phi.shape)
 
 
 def _order(nodes):
@@ -264,39 +227,47 @@ def _order(nodes):
     return np.argsort(splu(A, "MMD_AT_PLUS_A", options={"SymmetricMode": True}).perm_c)
 
 
-class _Release:
-    """Rotations of hinged ends, coordinate k of the six of a member: they are the member's own.
+class _Moves:
+    """How far the equations of the nodes, where they are open, move ends from their nodes.
 
     Parameters
     ----------
-    S
-        Matrices (members, 6, 6); changed.
-    members
-        Numbers of those that are hinged there, shape (k,).
-    k
-        2 at the start, 5 at the end.
+    nodes
+        The :class:`~skfem_ancf.joints.nodes.Nodes`.
     """
 
-    def __init__(self, S: Array, members: Array, k: int) -> None:
-        self.members, self.k = members, k
-        some = S[members]
-        self.row, self.pivot = some[:, k].copy(), some[:, k, k].copy()
-        if not np.all(self.pivot):
-            raise np.linalg.LinAlgError("a hinged end has no stiffness")
-        some -= self.row[:, :, None] * (self.row / self.pivot[:, None])[:, None]
-        some[:, k] = some[:, :, k] = 0.0
-        S[members] = some
+    def __init__(self, nodes: Nodes) -> None:
+        self._turned, self._leading = nodes.turned, nodes.leader[nodes.turned]
+        follow = (nodes.followers, nodes.followers, nodes.turned)
+        rows = [3 * ends + k for k, ends in enumerate(follow)]
+        self._following, first = sum(map(len, follow)), 0
+        columns = [np.arange(self._following)]
+        first = self._following
+        for k, held in enumerate((nodes.held_x, nodes.held_y, nodes.held_angle)):
+            number = np.full(len(nodes.held), -1)
+            number[nodes.nodes[held]] = first + np.arange(len(held))
+            ends = np.flatnonzero((number[nodes.nodes] >= 0) & ~((k == 2) & nodes.hinged))
+            rows, columns, first = ([*rows, 3 * ends + k],
+                                    [*columns, number[nodes.nodes[ends]]], first + len(held))
+        #: of the last, whose rotation is held, the ends that lead
+        self._held = nodes.leader[ends]
+        self._at = np.concatenate(rows), np.concatenate(columns)
+        self._shape = 3 * len(nodes.nodes), first
 
-    def reduce(self, f: Array) -> None:
-        """Eliminate them from forces (members, 6, columns); what is known of them is there then."""
-        own = f[self.members, self.k] / self.pivot[:, None]
-        f[self.members] -= self.row[:, :, None] * own[:, None]
-        f[self.members, self.k] = own
+    def scales(self, turns: Array) -> Array:
+        """Of the equations of ends that follow a rotation, by the turns (ends,) of all."""
+        return (np.conj(turns[self._turned]) * turns[self._leading]).real
 
-    def expand(self, f: Array, v: Array) -> None:
-        """Find them, zero in v (members, 6, columns), from what :meth:`reduce` left in f."""
-        along = np.sum(self.row[:, :, None] * v[self.members], axis=1)
-        v[self.members, self.k] = f[self.members, self.k] - along / self.pivot[:, None]
+    def __call__(self, turns: Array, scales: Array) -> sparse.csr_array:
+        """The displacements (3 ends,) for what equations (m,) should change by.
+
+        The transpose takes forces (3 ends,), negative, to multipliers (m,).
+        """
+        values = np.ones(len(self._at[0]))
+        values[:self._following] = -1.0
+        values[self._following - len(scales):self._following] /= scales
+        values[len(values) - len(self._held):] /= np.abs(turns[self._held])
+        return sparse.csr_array((values, self._at), self._shape)
 
 
 class _Basis:
@@ -360,17 +331,21 @@ class _Part:
         The :class:`_Basis` of both sides.
     turns, moments
         Of all ends, as the bases take them, shape (ends,).
+    hinged
+        Whether the members' starts and ends are, shape (M, 2): their rotations are their own.
 
     Attributes
     ----------
     ends
         What is left, shape (M, 6, 6).
+    pivots
+        Of the rotations of hinged ends, shape (k,).
     """
 
     def __init__(self, group: Group, K: BandMatrix, bases: Sequence[_Basis], turns: Array,
-                 moments: Array) -> None:
-        self.group, self._T = group, [basis(turns) for basis in bases]
-        self._places = group.places
+                 moments: Array, hinged: Array) -> None:
+        self.group, self._places = group, group.places
+        bases_now = [basis(turns) for basis in bases]
         D, C = _blocks(K, group)
         nd, n = group.nd, group.elements
         first, to_first, last = D[:, 0], C[:, 0], D[:, 1]
@@ -384,7 +359,7 @@ class _Part:
             last = D[:, k + 1] - C[:, k] @ X[:, :, nd:]
             to_first = -C[:, k] @ X[:, :, :nd]
         ends = np.empty((len(D), 2, nd, 2, nd))
-        left, right = self._T
+        left, right = bases_now
         ends[:, 0, :, 0] = _between(left, first, left)
         ends[:, 1, :, 1] = _between(right, last, right)
         ends[:, 1, :, 0] = _between(right, to_first, left)
@@ -392,17 +367,37 @@ class _Part:
         for side, basis in enumerate(bases):
             basis.add_curvature(moments, ends[:, side, :, side])
         p = 2 * (nd - SHARED)
-        A = ends[:, :, SHARED:, :, SHARED:].reshape(-1, p, p)
+        self._outer = A = ends[:, :, SHARED:, :, SHARED:].reshape(-1, p, p)
         W = ends[:, :, SHARED:, :, :SHARED].reshape(-1, p, 2 * SHARED)
         inverse = _inverse(A)
-        X = _solved(A, inverse, W)
-        self._outer = A, inverse, X
-        self.ends = ends[:, :, :SHARED, :, :SHARED].reshape(-1, 6, 6) - W.transpose(0, 2, 1) @ X
+        shared, own = (_beside([T[:, :, some] for T in bases_now]).transpose(0, 2, 1)
+                       for some in (slice(SHARED), slice(SHARED, None)))
+        X = _solved(A, inverse, np.concatenate([W, own], axis=2))
+        W = W.transpose(0, 2, 1)
+        self.ends = ends[:, :, :SHARED, :, :SHARED].reshape(-1, 6, 6) - W @ X[:, :, :6]
+        #: forces at the ends, and displacements where these are held, by those on both end nodes
+        self._forces = shared - W @ X[:, :, 6:]
+        self._flexibility = own.transpose(0, 2, 1) @ X[:, :, 6:]
+        self.pivots = np.concatenate([self._release(np.flatnonzero(hinged[:, k]), 3 * k + 2)
+                                      for k in range(2)])
+
+    def _release(self, some, k):
+        """Eliminate rotation k of some members too, which is their own; returns the pivots."""
+        row, force = self.ends[some, k], self._forces[some, k]
+        pivot = row[:, k].copy()
+        if not np.all(pivot):
+            raise np.linalg.LinAlgError("a hinged end has no stiffness")
+        row, along = row[:, :, None], (force / pivot[:, None])[:, None]
+        self.ends[some] -= row * (row / pivot[:, None, None]).transpose(0, 2, 1)
+        self._forces[some] -= row * along
+        self._flexibility[some] += force[:, :, None] * along
+        self.ends[some, k] = self.ends[some, :, k] = self._forces[some, k] = 0.0
+        return pivot
 
     def inertia(self) -> Inertia:
         """Signs of the eigenvalues of what was eliminated."""
         negative, singular = 0, False
-        for A, *_ in [*self._inner, self._outer]:
+        for A in [*(A for A, *_ in self._inner), self._outer]:
             size = 1.0 / np.sqrt(np.abs(A.diagonal(axis1=1, axis2=2)))
             A = size[:, :, None] * A * size[:, None]
             try:
@@ -420,31 +415,34 @@ class _Part:
         """Forces (M, 6, k) at the ends from those on the coordinates, columns (N, k)."""
         nd, columns = self.group.nd, b.shape[1]
         f = b[self._places].reshape(len(self._places), -1, nd, columns)
-        self._known = []
+        known = []
         first, last = f[:, 0], f[:, 1]
         for k, (A, inverse, X) in enumerate(self._inner):
-            self._known.append(_solved(A, inverse, last))
+            known.append(_solved(A, inverse, last))
             both = X.transpose(0, 2, 1) @ last
             first, last = first - both[:, :nd], f[:, k + 2] - both[:, nd:]
-        g = np.stack([T.transpose(0, 2, 1) @ x for T, x in zip(self._T, (first, last))], 1)
-        A, inverse, X = self._outer
-        own = g[:, :, SHARED:].reshape(len(g), -1, columns)
-        self._known.append(_solved(A, inverse, own))
-        return g[:, :, :SHARED].reshape(-1, 6, columns) - X.transpose(0, 2, 1) @ own
+        outer = np.concatenate([first, last], axis=1)
+        self._known = [*known, outer]
+        return self._forces @ outer
 
     def expand(self, v: Array, x: Array) -> None:
         """All displacements x (N, k) from those at the ends, (M, 6, k), after :meth:`reduce`."""
         group, nd, columns = self.group, self.group.nd, v.shape[2]
-        ends = np.empty((len(v), 2, nd, columns))
-        ends[:, :, :SHARED] = v.reshape(-1, 2, SHARED, columns)
-        ends[:, :, SHARED:] = (self._known[-1] - self._outer[2] @ v
-                               ).reshape(-1, 2, nd - SHARED, columns)
         out = np.empty((len(v), group.elements + 1, nd, columns))
-        out[:, 0], out[:, -1] = (T @ ends[:, k] for k, T in enumerate(self._T))
+        ends = self._forces.transpose(0, 2, 1) @ v + self._flexibility @ self._known[-1]
+        out[:, 0], out[:, -1] = ends[:, :nd], ends[:, nd:]
         for k in range(group.elements - 1, 0, -1):
             around = np.concatenate([out[:, 0], out[:, k + 1]], axis=1)
             out[:, k] = self._known[k - 1] - self._inner[k - 1][2] @ around
         x[self._places] = out.reshape(len(v), -1, columns)
+
+
+def _beside(matrices):
+    """Two matrices (M, nd, k) as blocks of one, (M, 2 nd, 2 k)."""
+    M, nd, k = matrices[0].shape
+    out = np.zeros((M, 2, nd, 2, k))
+    out[:, 0, :, 0], out[:, 1, :, 1] = matrices
+    return out.reshape(M, 2 * nd, 2 * k)
 
 
 def _inverse(A):
