@@ -468,8 +468,10 @@ def _blocks(K, group):
 
     The latter, (M, elements, nd, nd), have the rows of the right node.
     """
-    a, b, ld = np.arange(group.nd)[:, None], np.arange(group.nd), K.band.ld
+    nd, n, ld = group.nd, group.elements, K.band.ld
+    a, b = np.arange(nd)[:, None], np.arange(nd)
     low, high = np.minimum(a, b), np.maximum(a, b)
-    first = (group.first[:, None] + group.nd * np.arange(group.elements + 1))[..., None, None] * ld
-    flat = K.band.flat
-    return flat[first + low * ld + high - low], flat[first[:, :-1] + b * ld + group.nd + a - b]
+    # columns of the band, node by node
+    nodes = K.band.flat.reshape(-1, ld)[group.places].reshape(-1, n + 1, nd * ld)
+    D, C = nodes.take(low * ld + high - low, axis=2), nodes[:, :n].take(b * ld + nd + a - b, axis=2)
+    return D, C

@@ -26,7 +26,7 @@ logger = logging.getLogger(__name__)
 #: of new ones.
 KEPT, NEW = (0.05, 1e-12), (0.5, 1e-6)
 #: Length of a refinement at most, and its accuracy.
-REFINEMENTS, EXACT = 50, 1e-15
+REFINEMENTS, EXACT = 50, 1e-14
 #: Corrections where more iterations follow.
 ROUGHLY = 2
 
@@ -171,11 +171,10 @@ class EliminatedMass:
         x, l
             Shapes (N,) and (m,).
         """
-        J1 = self._system.sparse_jacobian(u, t)
-        J = J1 if forces is None else forces
-        if self._last is None or self._last[0] != t:  # not another iterate of this instant
-            self._last = t, np.zeros(len(b)), np.zeros(len(rate))
-        start = self._last[1:]
+        J1 = self._condensed.nodes.derivative(u, t)
+        J = (J1 if forces is None else forces).T
+        # another iterate of this instant begins with what the last one has found
+        start = self._last[1:] if self._last is not None and self._last[0] == t else None
         rules, found = (scale, most), None
         if self.at is not None:
             found = self._refined(J, J1, start, b, rate, rules, *KEPT)
@@ -188,10 +187,16 @@ class EliminatedMass:
         return found
 
     def _refined(self, J, J1, start, b, rate, rules, contraction, rough):
-        """The solution by the factors that there are; None where it does not contract so fast."""
-        (x, l), before, (scale, most) = start, np.inf, rules
-        for _ in range(most):
-            dx, dl = self._condensed.solve(b - self._M.multiply(x) - J.T @ l, rate - J1 @ x)
+        """The solution by the factors that there are; None where it does not contract so fast.
+
+        J is the transpose of what it is elsewhere.
+        """
+        (x, l), before, (scale, most) = start or (0.0, 0.0), np.inf, rules
+        for k in range(most):
+            missing = b, rate
+            if k or start:
+                missing = b - self._M.multiply(x) - J @ l, rate - J1 @ x
+            dx, dl = self._condensed.solve(*missing)
             x, l = x + dx, l + dl
             step, size = np.linalg.norm(dx), max(scale, np.linalg.norm(x))
             left = step * min(1.0, step / before) if before < np.inf else step
@@ -224,7 +229,7 @@ class EliminatedMass:
         try:
             J = None
             if self.lag or not np.array_equal(du, u):
-                J = self._system.sparse_jacobian(du.copy(), t - self.lag)
+                J = self._condensed.nodes.derivative(du, t - self.lag)
             du[:], dm[:] = self.solve(u, t, 0.0 * R, phi, J, float(np.linalg.norm(R)),
                                       REFINEMENTS if len(multipliers) else ROUGHLY)
         except NO_FACTORS as error:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from ..kept import cached_property
 from .base import Joint
 from .settlements import HELD, Settlements
 
@@ -163,50 +164,68 @@ class Nodes(Joint):
         x, y, turn = self._shifts(times)
         return np.hstack([-x, -y, -np.sin(turn)])
 
-    def _linear(self) -> Any:
-        """Rows, columns and values of the equations of positions."""
+    @cached_property
+    def _pattern(self) -> tuple[Array, Array, Array]:
+        """Rows and columns of all entries, and the values of the equations of positions."""
         s, n, k = self.followers, len(self.followers), len(self.turned)
         m, row = self.leader[s], np.arange(len(self.followers))
         x, y = self.positions.T
-        first = 2 * n + k
-        a = first + np.arange(len(self.held_x))
-        b = first + len(a) + np.arange(len(self.held_y))
-        rows = np.concatenate([row, row, n + row, n + row, a, b])
-        columns = np.concatenate([x[m], x[s], y[m], y[s], x[self.held_x], y[self.held_y]])
-        values = np.ones(len(rows))
+        a = 2 * n + k + np.arange(len(self.held_x))
+        b = a.size + 2 * n + k + np.arange(len(self.held_y))
+        angles = [(2 * n, self.leader[self.turned]), (2 * n, self.turned),
+                  (len(self.equations) - len(self.held_angle), self.held_angle)]
+        rows, columns = [row, row, n + row, n + row, a, b], [
+            x[m], x[s], y[m], y[s], x[self.held_x], y[self.held_y]]
+        for first, ends in angles:
+            at = self.directions[:, ends].transpose(1, 0, 2)
+            rows.append(np.broadcast_to(first + np.arange(len(ends))[:, None, None], at.shape))
+            columns.append(at)
+        values = np.ones(4 * n + len(a) + len(b))
         values[n:2 * n] = values[3 * n:4 * n] = -1.0
-        return rows, columns, values
+        return *(np.concatenate([x.ravel() for x in parts]) for parts in (rows, columns)), values
 
-    def _angles(self, factors: Array, ends: Array, first: int) -> Any:
-        """Rows, columns and values of ``Im(factor dg)`` of some ends, one row each."""
+    def _angles(self, factors: Array, ends: Array) -> Array:
+        """Values of ``Im(factor dg)`` of some ends."""
         z = (factors * self.frame[ends])[:, None] * self.weights[ends]
-        values = np.stack([z.imag, z.real], axis=1)
-        columns = self.directions[:, ends].transpose(1, 0, 2)
-        rows = np.broadcast_to(first + np.arange(len(ends))[:, None, None], values.shape)
-        return rows.ravel(), columns.ravel(), values.ravel()
+        return np.stack([z.imag, z.real], axis=1).ravel()
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        rows, columns, values = self._entries(u, t)
+        (rows, columns, _), values = self._pattern, self._values(u, t)
         keep = values != 0.0
         return rows[keep], columns[keep], values[keep]
 
-    def _entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        """As :meth:`entries`, with those that are zero; turns of held ends are the last."""
-        g, s, n = self.turns(u), self.turned, len(self.followers)
-        m, last = self.leader[s], len(self.equations) - len(self.held_angle)
-        parts = [self._linear(), self._angles(np.conj(g[s]), m, 2 * n),
-                 self._angles(-np.conj(g[m]), s, 2 * n),
-                 self._angles(np.exp(-1j * self._shifts(np.array([t]))[2][0]), self.held_angle,
-                              last)]
-        rows, columns, values = (np.concatenate(x) for x in zip(*parts))
-        return rows, columns, values
+    def _values(self, u: Array, t: float) -> Array:
+        """Of :meth:`entries`, with those that are zero; turns of held ends are the last."""
+        g, s = self.turns(u), self.turned
+        m = self.leader[s]
+        return np.concatenate([
+            self._pattern[2], self._angles(np.conj(g[s]), m), self._angles(-np.conj(g[m]), s),
+            self._angles(np.exp(-1j * self._shifts(np.array([t]))[2][0]), self.held_angle)])
+
+    @cached_property
+    def _places(self) -> Any:
+        """Where the values go in :meth:`derivative`, whose data are their numbers."""
+        rows, columns, _ = self._pattern
+        return sparse.csr_array((np.arange(len(rows)), (rows, columns)))
+
+    def derivative(self, u: Array, t: float) -> sparse.csr_array:
+        """The derivative of :meth:`value`, shape (m, N), of one pattern.
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the scene's coordinates, shape (N,), and time.
+        """
+        at = self._places
+        return sparse.csr_array((self._values(u, t)[at.data], at.indices, at.indptr),
+                                shape=(len(self.equations), len(u)))
 
     def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
-        rows, columns, values = self._entries(np.zeros(N), 0.0)
+        (rows, columns, _), values = self._pattern, self._values(np.zeros(N), 0.0)
         out = np.tile(values, (len(times) if self.turning else 1, 1))
         if self.turning:
             for row, turn in zip(out, self._shifts(times)[2]):
-                last = self._angles(np.exp(-1j * turn), self.held_angle, 0)[2]
+                last = self._angles(np.exp(-1j * turn), self.held_angle)
                 row[len(row) - len(last):] = last
         return rows, columns, np.broadcast_to(out, (len(times), len(values)))
 
