@@ -62,6 +62,12 @@ class Group(NamedTuple):
         """Numbers of the coordinates of each chain, shape (M, (elements + 1) nd)."""
         return self.first[:, None] + np.arange((self.elements + 1) * self.nd)
 
+    @property
+    def end_places(self) -> Array:
+        """The same of their first and last nodes, shape (M, 2 nd)."""
+        return self.first[:, None] + np.append(*np.arange(self.nd) + [
+            [0], [self.elements * self.nd]])
+
 
 def groups_of(beams: Sequence[Beam], slices: Sequence[slice]) -> list[Group]:
     """The chains of all beams in groups.
@@ -427,14 +433,13 @@ class _Part:
 
     def expand(self, v: Array, x: Array) -> None:
         """All displacements x (N, k) from those at the ends, (M, 6, k), after :meth:`reduce`."""
-        group, nd, columns = self.group, self.group.nd, v.shape[2]
-        out = np.empty((len(v), group.elements + 1, nd, columns))
+        nd, places = self.group.nd, self._places
         ends = self._forces.transpose(0, 2, 1) @ v + self._flexibility @ self._known[-1]
-        out[:, 0], out[:, -1] = ends[:, :nd], ends[:, nd:]
-        for k in range(group.elements - 1, 0, -1):
-            around = np.concatenate([out[:, 0], out[:, k + 1]], axis=1)
-            out[:, k] = self._known[k - 1] - self._inner[k - 1][2] @ around
-        x[self._places] = out.reshape(len(v), -1, columns)
+        x[self.group.end_places] = ends
+        around = ends.copy()
+        for k in range(self.group.elements - 1, 0, -1):
+            around[:, nd:] = self._known[k - 1] - self._inner[k - 1][2] @ around
+            x[places[:, k * nd:(k + 1) * nd]] = around[:, nd:]
 
 
 def _beside(matrices):
