@@ -32,10 +32,12 @@ logger = logging.getLogger(__name__)
 LOST = 1e-13
 #: Unknowns that an end shares with its node.
 SHARED = 3
+#: Members whose matrices are made at once, so that what they are made of takes little memory.
+CHUNK = 1024
 
 
 class Group(NamedTuple):
-    """Chains of one beam with equally many elements.
+    """Chains of one beam with equally many elements, at most :data:`CHUNK`.
 
     Attributes
     ----------
@@ -81,8 +83,9 @@ def groups_of(beams: Sequence[Beam], slices: Sequence[slice]) -> list[Group]:
     for beam, s in zip(beams, slices):
         first, last = chain_ends(beam).T
         for n in np.unique(last - first):
-            some = np.flatnonzero(last - first == n)
-            out.append(Group(number + some, s.start + beam.nd * first[some], beam.nd, int(n)))
+            all_of_them = np.flatnonzero(last - first == n)
+            out += [Group(number + some, s.start + beam.nd * first[some], beam.nd, int(n))
+                    for some in np.split(all_of_them, range(CHUNK, len(all_of_them), CHUNK))]
         number += len(first)
     return out
 
@@ -156,11 +159,9 @@ class Condensed:
         turns, hinged = self.nodes.turns(u), self.nodes.hinged.reshape(-1, 2)
         scales = self._moves.scales(turns)
         moments = self._moments(multipliers, scales)
-        self._parts = [_Part(group, K, bases, turns, moments, hinged[group.members])
-                       for group, bases in zip(self.groups, self._bases)]
-        S = np.empty((len(hinged), 6, 6))
-        for part in self._parts:
-            S[part.group.members] = part.ends
+        S, self._parts = np.empty((len(hinged), 6, 6)), []
+        for group, bases in zip(self.groups, self._bases):
+            self._parts.append(_Part(group, K, bases, turns, moments, hinged[group.members], S))
         #: displacements of the ends by the equations of the nodes, multipliers by forces
         self._moved = self._moves(turns, scales)
         self._pushed = self._moved.T
@@ -339,19 +340,19 @@ class _Part:
         Of all ends, as the bases take them, shape (ends,).
     hinged
         Whether the members' starts and ends are, shape (M, 2): their rotations are their own.
+    S
+        What is left of all members, shape (members, 6, 6); that of these is set.
 
     Attributes
     ----------
-    ends
-        What is left, shape (M, 6, 6).
     pivots
         Of the rotations of hinged ends, shape (k,).
     """
 
     def __init__(self, group: Group, K: BandMatrix, bases: Sequence[_Basis], turns: Array,
-                 moments: Array, hinged: Array) -> None:
+                 moments: Array, hinged: Array, S: Array) -> None:
         self.group, self._places = group, group.places
-        bases_now = [basis(turns) for basis in bases]
+        sides = left, right = [basis(turns) for basis in bases]
         D, C = _blocks(K, group)
         nd, n = group.nd, group.elements
         first, to_first, last = D[:, 0], C[:, 0], D[:, 1]
@@ -365,7 +366,6 @@ class _Part:
             last = D[:, k + 1] - C[:, k] @ X[:, :, nd:]
             to_first = -C[:, k] @ X[:, :, :nd]
         ends = np.empty((len(D), 2, nd, 2, nd))
-        left, right = bases_now
         ends[:, 0, :, 0] = _between(left, first, left)
         ends[:, 1, :, 1] = _between(right, last, right)
         ends[:, 1, :, 0] = _between(right, to_first, left)
@@ -376,28 +376,29 @@ class _Part:
         self._outer = A = ends[:, :, SHARED:, :, SHARED:].reshape(-1, p, p)
         W = ends[:, :, SHARED:, :, :SHARED].reshape(-1, p, 2 * SHARED)
         inverse = _inverse(A)
-        shared, own = (_beside([T[:, :, some] for T in bases_now]).transpose(0, 2, 1)
+        shared, own = (_beside([T[:, :, some] for T in sides]).transpose(0, 2, 1)
                        for some in (slice(SHARED), slice(SHARED, None)))
         X = _solved(A, inverse, np.concatenate([W, own], axis=2))
         W = W.transpose(0, 2, 1)
-        self.ends = ends[:, :, :SHARED, :, :SHARED].reshape(-1, 6, 6) - W @ X[:, :, :6]
+        rest = ends[:, :, :SHARED, :, :SHARED].reshape(-1, 6, 6) - W @ X[:, :, :6]
         #: forces at the ends, and displacements where these are held, by those on both end nodes
         self._forces = shared - W @ X[:, :, 6:]
         self._flexibility = own.transpose(0, 2, 1) @ X[:, :, 6:]
-        self.pivots = np.concatenate([self._release(np.flatnonzero(hinged[:, k]), 3 * k + 2)
-                                      for k in range(2)])
+        self.pivots = np.concatenate([self._release(np.flatnonzero(turning), 3 * k + 2, rest)
+                                      for k, turning in enumerate(hinged.T)])
+        S[group.members] = rest
 
-    def _release(self, some, k):
+    def _release(self, some, k, S):
         """Eliminate rotation k of some members too, which is their own; returns the pivots."""
-        row, force = self.ends[some, k], self._forces[some, k]
+        row, force = S[some, k], self._forces[some, k]
         pivot = row[:, k].copy()
         if not np.all(pivot):
             raise np.linalg.LinAlgError("a hinged end has no stiffness")
         row, along = row[:, :, None], (force / pivot[:, None])[:, None]
-        self.ends[some] -= row * (row / pivot[:, None, None]).transpose(0, 2, 1)
+        S[some] -= row * (row / pivot[:, None, None]).transpose(0, 2, 1)
         self._forces[some] -= row * along
         self._flexibility[some] += force[:, :, None] * along
-        self.ends[some, k] = self.ends[some, :, k] = self._forces[some, k] = 0.0
+        S[some, k] = S[some, :, k] = self._forces[some, k] = 0.0
         return pivot
 
     def inertia(self) -> Inertia:
