@@ -159,7 +159,7 @@ class Condensed:
         turns, hinged = self.nodes.turns(u), self.nodes.hinged.reshape(-1, 2)
         scales = self._moves.scales(turns)
         moments = self._moments(multipliers, scales)
-        S, self._parts = np.empty((len(hinged), 6, 6)), []
+        S, self._parts, self._nodes = np.empty((len(hinged), 6, 6)), [], None  # no two at once
         for group, bases in zip(self.groups, self._bases):
             self._parts.append(_Part(group, K, bases, turns, moments, hinged[group.members], S))
         #: displacements of the ends by the equations of the nodes, multipliers by forces
@@ -176,7 +176,7 @@ class Condensed:
         return out
 
     def _factors(self, ends):
-        """Pivots of the matrix of the nodes, over its diagonal, and its sparse factors."""
+        """The diagonal of the matrix of the nodes, and its sparse factors."""
         n = self.size
         if not n:
             return np.zeros(0), None
@@ -184,13 +184,16 @@ class Condensed:
         lu = splu(A, "NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         if not np.array_equal(lu.perm_r, lu.perm_c):
             raise np.linalg.LinAlgError("a pivot of the nodes is zero")
-        return lu.U.diagonal()[lu.perm_c] / np.abs(A.diagonal()), lu
+        return A.diagonal(), lu
 
     def inertia(self) -> Inertia:
         """Signs of the eigenvalues of the tangent on the tangent space of the joints."""
         found = [part.inertia() for part in self._parts]
         negative, singular = sum(x.negative for x in found), any(x.singular for x in found)
-        for ratio in [self._nodes[0], *(np.sign(part.pivots) for part in self._parts)]:
+        diagonal, lu = self._nodes
+        # asked for here only, as these factors are copies
+        pivots = diagonal if lu is None else lu.U.diagonal()[lu.perm_c] / np.abs(diagonal)
+        for ratio in [pivots, *(np.sign(part.pivots) for part in self._parts)]:
             negative += int(np.sum(ratio < 0.0))
             singular = singular or bool(np.any(np.abs(ratio) < LOST))
         return Inertia(negative, singular)
@@ -299,16 +302,16 @@ class _Basis:
         self._size = np.sum(self._c**2, axis=1)
         # directions in which the weighted sum does not change
         self._others = np.linalg.qr(self._c[:, :, None], mode="complete")[0][:, :, 1:]
-        self._template = np.zeros((len(ends), nd, nd))
-        self._template[:, 0, 0] = self._template[:, 1, 1] = 1.0
+        self._template = np.zeros((nd, nd))
+        self._template[0, 0] = self._template[1, 1] = 1.0
         used = np.concatenate([[0, 1], places, places + 1])
-        self._template[:, np.setdiff1d(np.arange(nd), used), 2 + 2 * n:] = np.eye(nd - 2 - 2 * n)
+        self._template[np.setdiff1d(np.arange(nd), used), 2 + 2 * n:] = np.eye(nd - 2 - 2 * n)
 
     def __call__(self, turns: Array) -> Array:
         """Displacements of the coordinates for these unknowns, shape (M, nd, nd)."""
         d = turns[self._ends] * self._start
         self._length, n, x = np.abs(d), len(self._at), self._at
-        along, out = d / self._length, self._template.copy()
+        along, out = d / self._length, np.repeat(self._template[None], len(d), axis=0)
         turn = (1j * d / self._size)[:, None] * self._c
         out[:, x, 2], out[:, x + 1, 2] = turn.real, turn.imag
         for k in range(n):
