@@ -604,6 +604,26 @@ def test_a_beam_slides_down_a_slope_as_coulomb_says(scheme):
     assert np.ptp(energy) < (1e-9 if scheme == "energy-momentum" else 1e-2) * history.dissipated[-1]
 
 
+@pytest.mark.parametrize("shape", ["line that shakes", "polygon", "own"])
+def test_friction_far_from_the_origin_is_that_at_the_origin(shape):
+    """Up to what coordinates lose there: 5e-13 m, three kilometres from it."""
+    def slides(at):
+        x, y = at
+        mesh = MeshBeam.init_line(np.linspace(0, 1, 5), 0.02, origin=(x, y + 0.0102), angle=0.0)
+        b = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(1e7, 0.3, 1000.0), 0.02)
+        obstacle = {"line that shakes": Line((x, y)), "own": SignedDistance(lambda _, q: q - y),
+                    "polygon": Polygon([(x - 3, y - 1), (x + 5, y - 1), (x + 5, y), (x - 3, y)])}
+        move = {"position": lambda t: (0.05 * np.sin(20 * t), 0.0)} if "shakes" in shape else {}
+        scene = Scene(b).gravity((6.0, -9.81)).obstacle(obstacle[shape], friction=0.4,
+                                                        stiffness=1e7, **move)
+        scene.point_force((0.0, -2.0), (x + 1.0, y + 0.0102), amplitude=lambda t: np.sin(40 * t))
+        return scene.integrate(0.04, 1e-3)
+
+    near, far = slides((0.0, 0.0)), slides((3000.0, 2000.0))
+    assert np.abs(near.u[-1]).max() > 0.02
+    assert np.abs(near.u[-1] - far.u[-1]).max() < 1e-8
+
+
 @pytest.mark.parametrize("scheme", [Gauss(2), Radau()], ids=repr)
 def test_collocation_takes_friction(scheme):
     """A block slides as Coulomb says, one on a flatter slope rests."""

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-FORMAT = 4
+FORMAT = 5
 #: Times of a motion at which functions of time are compared.
 TIMES = 33
 #: Points of the surface, about, at which distances of obstacles are.

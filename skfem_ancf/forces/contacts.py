@@ -82,6 +82,9 @@ NOTHING: AbstractContextManager[None] = nullcontext()
 class Contacts:
     """The obstacles of a scene.
 
+    Places are seen from the middle of the bodies, in tables and memory: far from the origin of the
+    scene's coordinates friction would feel their round-off.
+
     Parameters
     ----------
     elements
@@ -91,6 +94,8 @@ class Contacts:
     ----------
     obstacles, groups
         These, and pairs of the number of an obstacle and a :class:`Group`.
+    origin
+        From where places are seen, shape (2,).
     tables
         A :class:`~skfem_ancf.forces.contact_texts.ContactTables`.
     moving, own
@@ -99,7 +104,10 @@ class Contacts:
 
     def __init__(self, elements: Sequence[Any]) -> None:
         self.obstacles = [element for element in elements if element.groups]
-        self.groups = [(k, group) for k, one in enumerate(self.obstacles) for group in one.groups]
+        groups = [(k, group) for k, one in enumerate(self.obstacles) for group in one.groups]
+        self.origin = _middle([group.starts[:2] for _, group in groups])
+        start = np.append(self.origin, np.zeros(2))[:, None]
+        self.groups = [(k, group._replace(starts=group.starts - start)) for k, group in groups]
         self.moving = any(one.moves for one in self.obstacles)
         self.own = any(one.shape.kind == OWN for one in self.obstacles)
         poses = np.zeros(POSES * len(self.obstacles))
@@ -114,13 +122,14 @@ class Contacts:
         headers, memory, looks = np.zeros((n, HEADER), dtype=np.int64), REACHES + 2 * n, 0
         for number, (k, group) in enumerate(self.groups):
             shape, none = self.obstacles[k].shape, np.zeros((0, len(group.first)))
+            numbers = self.numbers(k)
             slopes = none if group.slopes is None else group.slopes
             headers[number] = (
                 shape.kind, k, group.elements, group.points, len(group.weights),
                 group.slopes is not None, ints.add(group.first),
                 floats.add(np.concatenate([group.weights, slopes])), floats.add(group.areas),
                 floats.add(group.offsets), floats.add(group.starts), floats.add(middle_of(group)),
-                floats.add(group.numbers), floats.add(shape.numbers), len(shape.numbers), memory,
+                floats.add(group.numbers), floats.add(numbers), len(numbers), memory,
                 number, looks, *_look(group))
             memory += 4 * len(group.first)
             looks += 3 * headers[number, LOOK]
@@ -129,6 +138,32 @@ class Contacts:
                              np.zeros(2 + n, np.int64),
                              int(self.moving or self.own), handle_of(self),
                              int(ANCHORS * self.anchored + PRESSURES * self.augmented))
+
+    def numbers(self, k: int) -> Array:
+        """Those of the shape of obstacle k, its corners seen from the origin.
+
+        Parameters
+        ----------
+        k
+            Its number.
+        """
+        numbers = self.obstacles[k].shape.numbers.copy()
+        numbers[3:].reshape(-1, 5)[:, :2] -= self.origin
+        return numbers
+
+    def pose(self, k: int, t: float, rates: bool = True) -> Array:
+        """Where obstacle k is, its pivot seen from the origin; shape (10,).
+
+        Parameters
+        ----------
+        k
+            Its number.
+        t, rates
+            As of :meth:`~skfem_ancf.obstacles.obstacle.Obstacle.pose`.
+        """
+        pose = self.obstacles[k].pose(t, rates)
+        pose[4:6] -= self.origin
+        return pose
 
     # what texts ask
 
@@ -142,11 +177,11 @@ class Contacts:
         poses
             Written, shape (30 obstacles,).
         """
-        for k, one in enumerate(self.obstacles):
+        for k in range(len(self.obstacles)):
             rows = poses[k * POSES:(k + 1) * POSES].reshape(-1, POSE)
-            rows[:] = one.pose(t)
+            rows[:] = self.pose(k, t)
             if span > 0.0:
-                rows[1:] = one.pose(t - 0.5 * span), one.pose(t + 0.5 * span)
+                rows[1:] = self.pose(k, t - 0.5 * span), self.pose(k, t + 0.5 * span)
 
     def ask(self, obstacle: int, t: float, x: Array, out: Array) -> None:
         """Distance, gradient and second derivatives of a shape of one's own.
@@ -158,11 +193,11 @@ class Contacts:
         t
             The time.
         x
-            Points, shape (2, n).
+            Points seen from the origin, shape (2, n).
         out
             Written, shape (6, n).
         """
-        out[:] = self.obstacles[obstacle].shape.derivatives(x, t)
+        out[:] = self.obstacles[obstacle].shape.derivatives(x + self.origin[:, None], t)
 
     # memory
 
@@ -342,7 +377,7 @@ class Contacts:
         """
         for k, ((which, _), x, _) in enumerate(self.look(u, t, False)):
             part = (1.0 + self.firmness[k]) / (1.0 + firmness[k])
-            at, points = self.reach(k), taken_back(self.obstacles[which].pose(t, False), x)
+            at, points = self.reach(k), taken_back(self.pose(which, t, False), x)
             at[1:3] = points + part * (at[1:3] - points)
             at[3] *= part
         self.firmness[:] = firmness
@@ -413,8 +448,9 @@ class Contacts:
         Returns
         -------
         list
-            For each group its number of obstacle and :class:`Group`, the points (2, n), and what
-            :func:`~skfem_ancf.forces.contact_texts.distances` says of them, (6, n).
+            For each group its number of obstacle and :class:`Group`, the points (2, n) seen from
+            the origin, and what :func:`~skfem_ancf.forces.contact_texts.distances` says of them,
+            (6, n).
         """
         self._place(t)
         out = []
@@ -481,7 +517,8 @@ class Contacts:
                 levers(self.tables.floats, header, at, rows, lever)
                 slide(lever, rows)
                 resist(self.tables, header, 0.0, at, rows, x, found, more, K)
-            out.append((which, x, -F[:2] - more[:2], F[3] / group.areas, found[0]))
+            out.append((which, x + self.origin[:, None], -F[:2] - more[:2], F[3] / group.areas,
+                        found[0]))
         return out
 
     @cached_property
@@ -571,6 +608,14 @@ class Contacts:
         at, = np.nonzero(A.flat)
         j, i = np.divmod(at, ld)
         return i + j - bandwidth, j, A.flat[at]
+
+
+def _middle(places):
+    """The middle of the box round points, of arrays (2, n); zero where there are none."""
+    if not places:
+        return np.zeros(2)
+    x = np.concatenate(places, axis=1)
+    return 0.5 * (x.min(axis=1) + x.max(axis=1))
 
 
 def _look(group):

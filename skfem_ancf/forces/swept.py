@@ -97,6 +97,7 @@ class _Path:
     def __init__(self, contacts, k, poses):
         self._which, self._group = contacts.groups[k]
         self.obstacle, self._poses = contacts.obstacles[self._which], poses
+        self._contacts, self._numbers = contacts, contacts.numbers(self._which)
         self._header = contacts.header(k)
         self._tables, group = contacts.tables, self._group
         first = group.first[::group.points]
@@ -223,18 +224,18 @@ class _Path:
             return x
         key = self._which, float(t)
         if key not in self._poses:
-            self._poses[key] = self.obstacle.pose(float(t), False)
+            self._poses[key] = self._contacts.pose(self._which, float(t), False)
         return taken_back(self._poses[key], x)
 
     def _asked(self, x, t, whole=False):
         """The distance of points, seen from the obstacle, and its gradient if whole; (6, n)."""
         shape, out = self.obstacle.shape, np.empty((6, x.shape[1]))
         if shape.kind != OWN:
-            outline(shape.numbers, whole, np.ascontiguousarray(x), out)
+            outline(self._numbers, whole, np.ascontiguousarray(x), out)
         elif whole:
-            out[:] = shape.derivatives(x, t)
+            out[:] = shape.derivatives(x + self._contacts.origin[:, None], t)
         else:
-            out[0] = shape.distance(x, t)
+            out[0] = shape.distance(x + self._contacts.origin[:, None], t)
         return -out if shape.hollow else out
 
 

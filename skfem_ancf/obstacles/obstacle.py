@@ -192,10 +192,11 @@ class Obstacle(ForceElement):
         contacts = Contacts([self])
         for (_, group), x, found in contacts.look(np.zeros(scene.N), 0.0):
             deepest = int(np.argmin(found[0]))
+            place = x[:, deepest] + contacts.origin
             if not found[0, deepest] >= -CUT * height:
                 raise InputError(
                     f"{self!r} cuts the body at the start: the point "
-                    f"{shown(x[:, deepest].tolist())} of its surface is {-found[0, deepest]:.4g} "
+                    f"{shown(place.tolist())} of its surface is {-found[0, deepest]:.4g} "
                     "deep in it. Move the obstacle, or the body to where it is")
         self._require_outside(beams)
         return [Link(np.zeros(2))]
