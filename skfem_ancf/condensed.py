@@ -9,7 +9,7 @@ multiplier is unknown: they are the forces left at the ends.
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -118,18 +118,19 @@ class Condensed:
         #: where the entries of the members go in the matrix of the nodes
         self._entries = tuple(x[self._inside].astype(np.int32) for x in (i, j))
         self._moves = _Moves(nodes)
-        n, at = self.size, self._unknowns.ravel()
-        rows = np.flatnonzero(at < n)
-        one = np.ones(len(rows))
+        number = self._unknowns.ravel()
+        rows = np.flatnonzero(number < self.size)
         #: displacements of the ends by those of the nodes
-        self._follow = sparse.csr_array((one, (rows, at[rows])), (len(at), n))
+        self._follow = sparse.csr_array((np.ones(len(rows)), (rows, number[rows])),
+                                        (len(number), self.size))
         self._gather = self._follow.T.tocsr()
         self._parts: list[_Part] = []
+        self._nodes: Any = None
 
     @property
     def ready(self) -> bool:
         """True if there are factors."""
-        return bool(self._parts)
+        return self._nodes is not None
 
     def _unknown(self):
         """Whether x, y and the rotation of a node are unknown, (number, 3)."""

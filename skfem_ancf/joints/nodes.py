@@ -182,7 +182,8 @@ class Nodes(Joint):
             columns.append(at)
         values = np.ones(4 * n + len(a) + len(b))
         values[n:2 * n] = values[3 * n:4 * n] = -1.0
-        return *(np.concatenate([x.ravel() for x in parts]) for parts in (rows, columns)), values
+        i, j = (np.concatenate([x.ravel() for x in parts]) for parts in (rows, columns))
+        return i, j, values
 
     def _angles(self, factors: Array, ends: Array) -> Array:
         """Values of ``Im(factor dg)`` of some ends."""
