@@ -250,6 +250,35 @@ def require_positive(name: str, value: object, unit: str = "") -> float:
     return value
 
 
+#: By how much a derivative may be off, over the larger of it and the difference.
+SLOPE = 0.01
+
+
+def require_slope(what: str, of: str, change: Any, slope: Any, noise: float,
+                  else_: str = "") -> None:
+    """Raise :class:`InputError` unless a derivative is that of a function, nearly.
+
+    Parameters
+    ----------
+    what, of
+        What messages call the derivative, and the function.
+    change
+        By how much the function changes over a small step.
+    slope
+        The derivative times that step, an array of the same shape.
+    noise
+        Round-off of the change.
+    else_
+        What the message says in the end.
+    """
+    change, slope = np.ravel(change), np.ravel(slope)
+    off = np.abs(change - slope)
+    if np.max(off, initial=0.0) > SLOPE * np.max(np.abs([change, slope])) + noise:
+        k = np.argmax(off)
+        raise InputError(f"{what} is not the derivative of {of}: over a small step it says "
+                         f"{slope[k]:.6g} where that changes by {change[k]:.6g}{else_}")
+
+
 def require_not_negative(name: str, value: Any, energy: bool = True) -> float:
     """A finite number that is zero or positive; raises InputError.
 

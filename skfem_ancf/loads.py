@@ -18,10 +18,11 @@ from skfem.element import DiscreteField
 
 from .beam import Beam
 from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number, require_finite,
-                     require_function, shown, warnings_as_errors)
+                     require_function, require_slope, shown, warnings_as_errors)
 from .frozen import Sealable, read_only
 from .kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from .kept import twin_of
+from .origin import ours
 from .pickling import picklable_form
 from .places import facets_of
 from .rigid import RigidBody
@@ -244,6 +245,8 @@ def bind_load(load: Load, beam: Beam | RigidBody) -> Load:
         require_finite("its force", bound.force(zero), (beam.N,))
         bound._seal()
         if bound.constant:
+            if not ours(bound):
+                _require_constant(bound)
             return bound
         i, j, v = bound.stiffness(zero)
     except AncfError as error:
@@ -257,7 +260,56 @@ def bind_load(load: Load, beam: Beam | RigidBody) -> Load:
     if np.any(far > 1):
         raise InputError(f"the stiffness of {load!r} couples nodes that are {np.max(far)} apart: "
                          "only neighbours of the chain may be coupled, as they are in its elements")
+    if not ours(bound):
+        _require_derivatives(bound)
     return bound
+
+
+def beside(sizes: Array) -> tuple[Array, Array]:
+    """A displacement at which nothing is zero by chance, and a step that is small to it.
+
+    Parameters
+    ----------
+    sizes
+        What coordinates change by where things move by their size, shape (N,).
+
+    Returns
+    -------
+    u, step
+        Shapes (N,).
+    """
+    k = np.arange(len(sizes))
+    return 1e-4 * sizes * np.cos(k), 1e-6 * sizes * np.sin(1.0 + k)
+
+
+def _require_constant(load):
+    u, _ = beside(load.beam.sizes)
+    force, other = load.force(0.0 * u), load.force(u)
+    if np.any(np.abs(other - force) > 1e-12 * np.max(np.abs(force), initial=0.0)):
+        raise InputError("force(u) depends on the displacement: say so in its class, constant = "
+                         "False, and define stiffness(u)")
+
+
+def _require_derivatives(load):
+    """Raise InputError unless stiffness and potential of a load of the user's fit its force."""
+    u, d = beside(load.beam.sizes)
+    try:
+        force, *forces = (load.force(u + s * d) for s in (0.0, -1.0, 1.0))
+        potentials = [load.potential(u + s * d) for s in (0.0, -1.0, 1.0)]
+        i, j, v = load.stiffness(u)
+    except Exception:  # it may be one of the stress-free state alone
+        return
+    K, noise = sparse.coo_array((v, (i, j)), shape=(len(u), len(u))), 1e-13 * np.abs(force).max()
+    require_slope(f"stiffness(u) of {load!r}", "force(u)", forces[1] - forces[0], 2.0 * (K @ d),
+                  noise)
+    if load.symmetric:
+        require_slope(f"stiffness(u) of {load!r}, transposed,", "force(u)", forces[1] - forces[0],
+                      2.0 * (K.T @ d), noise,
+                      "; a load without a potential says so in its class: symmetric = False")
+    if potentials[0] is not None:
+        require_slope(f"minus force(u) of {load!r}", "potential(u)",
+                      np.array([potentials[2] - potentials[1]]), np.array([-2.0 * (force @ d)]),
+                      1e-13 * abs(potentials[0]))
 
 
 def require_entries(what: str, i: ArrayLike, j: ArrayLike, v: ArrayLike, n: int) -> None:

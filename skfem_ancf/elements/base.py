@@ -9,7 +9,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from skfem.element import DiscreteField, Element
 
-from ..errors import InputError, MeshError, shown
+from ..errors import InputError, MeshError, require_finite, shown
 from ..frozen import Content, Frozen, read_only
 from ..kept import cached_property
 from ..nodal import nodal_derivatives, turned
@@ -115,6 +115,13 @@ class ElementBeam(Frozen, Element):
         self.doflocs = np.array([[xi, 0.5 + f[0]] for xi in (0.0, 1.0) for f in self.functionals])
         self._along = (sum(across == 0 for _, _, across in self.functionals),
                        1 + max([a for _, a, across in self.functionals if across > 0], default=0))
+        across, expected = len(self.functionals) - self._along[0], section.number * self._along[1]
+        if len(names) != len(functionals) or across != expected:
+            raise InputError(
+                f"{type(self).__name__} has {len(names)} names and {len(functionals)} functionals, "
+                f"{across} of them across the section: each name is one, and of each of the "
+                f"{section.number} section functions there is one for each derivative along X, "
+                f"here {expected}")
         self.axis_degree = 2 * self._along[0] - 1
         self.sections = SECTIONS[self._along[1] - 1]
         # stock quadrature takes 2 maxdeg in each direction: exact for the energy, which is of
@@ -658,7 +665,7 @@ class SectionFunctions(Frozen):
     """
 
     def __init__(self, derivatives: ArrayLike) -> None:
-        self._dP = np.asarray(derivatives)
+        self._dP = require_finite("derivatives", derivatives, (None, None))
         self._P = _integrals(Content(self._dP))
 
     def __eq__(self, other: object) -> bool:

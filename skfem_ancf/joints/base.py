@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import AncfError, InputError, MeshError, require_finite, shown
+from ..errors import (AncfError, InputError, MeshError, require_finite, require_slope, shown)
 from ..frozen import Sealable
-from ..loads import require_entries
+from ..loads import beside, require_entries
 from ..origin import ours
 from ..places import as_point, is_place, is_point
 from ..rigid import RigidBody
@@ -493,6 +493,7 @@ def bind_joint(joint: Joint, scene: Scene) -> Joint:
         bound._seal()
         if not ours(joint):
             _try(bound, scene.N)
+            _require_derivatives(bound, np.concatenate([b.sizes for b in scene.members]))
     except AncfError:
         raise
     except Exception as error:
@@ -500,7 +501,8 @@ def bind_joint(joint: Joint, scene: Scene) -> Joint:
             raise
         raise InputError(  # it is the user's: it may raise anything
             f"{joint!r} fails in the stress-free state: {type(error).__name__}: {error}; a joint "
-            "defines bind(scene), value(u, t), jacobian(u, t)") from error
+            "defines bind(scene), value(u, t), jacobian(u, t), and curvature(u, t, multipliers) "
+            "unless that is constant") from error
     return bound
 
 
@@ -511,6 +513,28 @@ def _try(joint: Joint, n: int) -> None:
     found = joint.curvature(zero, 0.0, np.ones(m))
     if found is not None:
         require_entries(f"curvature of {joint!r}", *found, n)
+
+
+def _require_derivatives(joint: Joint, sizes: Array) -> None:
+    """Raise InputError unless jacobian and curvature of a joint of the user's fit its value."""
+    u, d = beside(sizes)
+    multipliers = np.cos(np.arange(len(joint.equations)))
+    try:
+        value, *values = (np.asarray(joint.value(u + s * d, 0.0)) for s in (0.0, -1.0, 1.0))
+        J, *others = (joint.jacobian(u + s * d, 0.0) for s in (0.0, -1.0, 1.0))
+        found = joint.curvature(u, 0.0, multipliers)
+    except Exception:  # it may be open too far there
+        return
+    require_slope(f"jacobian(u, t) of {joint!r}", "value(u, t)", values[1] - values[0],
+                  2.0 * (J @ d), 1e-13 * max(1.0, np.abs(value).max()) * np.abs(sizes).max())
+    turned = 0.0 * u
+    if found is not None:
+        i, j, v = found
+        np.add.at(turned, i, v * d[j])
+    change = multipliers @ (others[1] - others[0])
+    require_slope(f"curvature(u, t, multipliers) of {joint!r}, zero unless it is defined,",
+                  "multipliers @ jacobian(u, t)", change * sizes, 2.0 * turned * sizes,
+                  1e-12 * np.max(np.abs(multipliers @ J) * sizes, initial=0.0))
 
 
 def same_joint(a: Joint, b: Joint) -> bool:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import (InputError, require_finite_scalar, require_like, require_option,
-                      require_positive, shown, taught)
+                      require_positive, require_slope, shown, taught)
 from ..frozen import Frozen, rebuilt
 from ..kept import cached_property, kept, twin_of
+from ..origin import ours
 from ..pickling import require_picklable
 from ..quadrature import gauss
 
@@ -189,6 +190,8 @@ class Material(Frozen):
             raise InputError(f"{type(self).__name__} overrides energy and not stress, with which "
                              "beams are solved: define stress(strain), its derivative, too")
         law = self if self._fits("energy") and self._fits("moduli") else OverriddenLaw(self)
+        if not ours(self):
+            _require_derivatives(law, self)
         return law if k_s == 1.0 else ShearCorrected(law, k_s)
 
     def _require_number(self):
@@ -325,6 +328,26 @@ class ShearCorrected:
     def moduli(self, strain: Array) -> Array:
         D = self.base.moduli(self._scaled(strain))
         return D * np.outer(self.scale, self.scale).reshape((3, 3) + (1,) * (D.ndim - 2))
+
+
+def _require_derivatives(law, material):
+    """Raise InputError unless the stress of a law of the user's is that of its energy."""
+    E, d = np.array([[1.3e-3], [-0.7e-3], [0.9e-3]]), np.array([[1e-6], [0.7e-6], [-1.6e-6]])
+    try:
+        stress, *stresses = (np.asarray(law.stress(E + s * d)) for s in (0.0, -1.0, 1.0))
+        energies = [np.asarray(law.energy(E + s * d)) for s in (0.0, -1.0, 1.0)]
+        D = np.asarray(law.moduli(E))
+    except NotImplementedError:
+        raise InputError(f"{type(material).__name__} must define energy(strain) and "
+                         "stress(strain)") from None
+    noise = 1e-13 * np.abs(stress).max()
+    for moduli, name in ((D, "moduli(strain)"), (D.swapaxes(0, 1), "moduli(strain), transposed,")):
+        require_slope(f"{name} of {type(material).__name__}", "stress(strain)",
+                      stresses[1] - stresses[0], 2.0 * np.einsum("ij...,j...->i...", moduli, d),
+                      noise)
+    require_slope(f"stress(strain) of {type(material).__name__}", "energy(strain)",
+                  energies[2] - energies[1], 2.0 * np.sum(stress * d, axis=0),
+                  1e-13 * np.abs(energies[0]).max())
 
 
 class OverriddenLaw:
