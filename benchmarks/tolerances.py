@@ -6,8 +6,8 @@
 ``--others`` takes the motions of ``other_motions.py``, by which nothing was chosen; ``--once``
 leaves out the check that takes a motion again. The error is by how far a node or a rigid body is
 off, the farthest of the scene at 200 instants of the motion, over the scene's size; in brackets
-that at the end, then the steps, and a star for each time that it was taken again. Motions are measured
-against many steps of collocation on the same mesh, kept in out/. Three minutes.
+that at the end, then the steps, and a star for each time that it was taken again. Motions are
+measured against many steps of collocation on the same mesh, kept in out/. Three minutes.
 """
 
 import argparse
