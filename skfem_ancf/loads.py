@@ -7,7 +7,7 @@ again for the same scene on other meshes.
 from __future__ import annotations
 
 import re
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -261,38 +261,42 @@ def bind_load(load: Load, beam: Beam | RigidBody) -> Load:
         raise InputError(f"the stiffness of {load!r} couples nodes that are {np.max(far)} apart: "
                          "only neighbours of the chain may be coupled, as they are in its elements")
     if not ours(bound):
-        _require_derivatives(bound)
+        beside(partial(_require_derivatives, bound), bound.beam.sizes)
     return bound
 
 
-def beside(sizes: Array) -> tuple[Array, Array]:
-    """A displacement at which nothing is zero by chance, and a step that is small to it.
+def beside(check: Callable[[Array, Array], None], sizes: Array) -> None:
+    """Call a check of derivatives at displacements at which nothing is zero by chance.
+
+    At one of two it may fail: there may be a kink.
 
     Parameters
     ----------
+    check
+        A function of a displacement and of a step that is small to it; raises InputError.
     sizes
         What coordinates change by where things move by their size, shape (N,).
-
-    Returns
-    -------
-    u, step
-        Shapes (N,).
     """
-    k = np.arange(len(sizes))
-    return 1e-4 * sizes * np.cos(k), 1e-6 * sizes * np.sin(1.0 + k)
+    angles = np.arange(len(sizes))
+    try:
+        check(1e-4 * sizes * np.cos(angles), 1e-6 * sizes * np.sin(angles + 1.0))
+    except InputError:
+        check(1e-4 * sizes * np.cos(angles + 2.0), 1e-6 * sizes * np.sin(angles + 3.0))
 
 
 def _require_constant(load):
-    u, _ = beside(load.beam.sizes)
-    force, other = load.force(0.0 * u), load.force(u)
-    if np.any(np.abs(other - force) > 1e-12 * np.max(np.abs(force), initial=0.0)):
-        raise InputError("force(u) depends on the displacement: say so in its class, constant = "
-                         "False, and define stiffness(u)")
+    force = load.force(np.zeros(load.beam.N))
+
+    def check(u, _):
+        if np.any(np.abs(load.force(u) - force) > 1e-12 * np.max(np.abs(force), initial=0.0)):
+            raise InputError("force(u) depends on the displacement: say so in its class, constant "
+                             "= False, and define stiffness(u)")
+
+    beside(check, load.beam.sizes)
 
 
-def _require_derivatives(load):
+def _require_derivatives(load, u, d):
     """Raise InputError unless stiffness and potential of a load of the user's fit its force."""
-    u, d = beside(load.beam.sizes)
     try:
         force, *forces = (load.force(u + s * d) for s in (0.0, -1.0, 1.0))
         potentials = [load.potential(u + s * d) for s in (0.0, -1.0, 1.0)]

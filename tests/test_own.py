@@ -35,6 +35,21 @@ class Springs(Load):
         return 5.0 * float(np.sum(u[self.dofs] ** 2 / 2 + u[self.dofs] ** 4 / 4))
 
 
+class Ground(Springs):
+    """k w at each node that is below the ground, nothing above: a kink where it touches."""
+
+    def force(self, u):
+        out, w = np.zeros(self.beam.N), u[self.dofs]
+        out[self.dofs] = -5.0 * np.minimum(w, 0.0)
+        return out
+
+    def stiffness(self, u):
+        return self.dofs, self.dofs, -5.0 * (u[self.dofs] < 0.0)
+
+    def potential(self, u):
+        return 2.5 * float(np.sum(np.minimum(u[self.dofs], 0.0) ** 2))
+
+
 class Frozen(Springs):
     constant = True
 
@@ -146,6 +161,10 @@ def test_those_that_fit_are_taken():
     known = scene().solve_static().u
     assert np.allclose(scene(Law).solve_static().u, known, rtol=0, atol=1e-9)
     assert scene().add(Springs()).solve_static().converged
+    line = MeshBeam.init_line(np.linspace(0, 1, 5), 0.05)
+    for n in (1, 2, 3, 4):  # a kink may lie where it is looked
+        beam = Beam(line, ElementBeamANCF(n), StVenantKirchhoff(2e8, 0.3), width=0.05)
+        assert Scene(beam).clamp("left").add(Ground()).solve_static().converged
     state = scene().add(Tether()).solve_static()
     assert np.hypot(*(state.position((1, 0)) - (0.7, 0.4))) == pytest.approx(0.5, rel=1e-12)
 

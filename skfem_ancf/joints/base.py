@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from os import urandom
 from typing import TYPE_CHECKING, Any
 
@@ -493,7 +494,8 @@ def bind_joint(joint: Joint, scene: Scene) -> Joint:
         bound._seal()
         if not ours(joint):
             _try(bound, scene.N)
-            _require_derivatives(bound, np.concatenate([b.sizes for b in scene.members]))
+            sizes = np.concatenate([b.sizes for b in scene.members])
+            beside(partial(_require_derivatives, bound, sizes), sizes)
     except AncfError:
         raise
     except Exception as error:
@@ -515,9 +517,8 @@ def _try(joint: Joint, n: int) -> None:
         require_entries(f"curvature of {joint!r}", *found, n)
 
 
-def _require_derivatives(joint: Joint, sizes: Array) -> None:
+def _require_derivatives(joint: Joint, sizes: Array, u: Array, d: Array) -> None:
     """Raise InputError unless jacobian and curvature of a joint of the user's fit its value."""
-    u, d = beside(sizes)
     multipliers = np.cos(np.arange(len(joint.equations)))
     try:
         value, *values = (np.asarray(joint.value(u + s * d, 0.0)) for s in (0.0, -1.0, 1.0))
