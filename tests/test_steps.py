@@ -10,7 +10,7 @@ from skfem_ancf import (HHT, Beam, ElementBeamANCF, ElementBeamANCFCubic, Elemen
 from skfem_ancf.band import (SPARE, Band, factorize, factorize_complex, solve, solve_complex,
                              solve_joined, subtract_rows)
 from skfem_ancf.dynamics.integrator import Integrator
-from skfem_ancf.dynamics.steps import READY, TURNED
+from skfem_ancf.dynamics.steps import MIXED, READY, SYMMETRIC, TURNED
 from skfem_ancf.loads import Load
 
 ELEMENTS = (ElementBeamANCF(1), ElementBeamANCF(2), ElementBeamANCFCubic(2),
@@ -108,8 +108,8 @@ def test_few_iterations_where_the_axis_is_stiff(slenderness, element, scheme):
     scene = stiff_pendulum(slenderness, element, False)
     history = scene.integrate(0.2, 1e-2, scheme)
     assert history.substeps == 0
-    assert history.iterations <= 8 * history.steps
-    assert history.factorizations <= 1.25 * history.steps
+    assert history.iterations <= 5 * history.steps
+    assert history.factorizations <= history.steps + 2
     if not scheme.conserving:
         return
     assert np.ptp(history.total_energy) < 2e-13 * history.kinetic_energy.max()
@@ -132,14 +132,39 @@ def test_carried_stresses_are_the_same_compiled(element, scheme, law, rods, need
     assert_allclose(fast.u, slow.u, rtol=0, atol=1e-8)
 
 
+@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(3)])
+def test_few_iterations_of_a_stiff_rod_that_turns_fast(element):
+    """By 10 degrees in a step, where the stresses at its end go up and down from step to step."""
+    scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 1e-3), element,
+                       StVenantKirchhoff(2e10, 0.3, 7800.0), 0.01))
+    scene.initial_velocity(lambda x: np.array(
+        [1.0 - 10.0 * x[1] * (1.0 + 2.0 * x[0]), 10.0 * x[0] * (1.0 + x[0])]))
+    history = scene.integrate(0.5, 1e-2, EnergyMomentum())
+    assert history.substeps == 0
+    assert history.iterations <= 7 * history.steps
+    assert history.factorizations <= history.steps + 2
+
+
+@pytest.mark.parametrize("dt, kind", [(1e-2, TURNED), (2e-3, SYMMETRIC)])
+def test_factors_that_are_not_symmetric_are_those_of_long_steps(dt, kind):
+    """They take longer: where symmetric ones contract as well, these are taken."""
+    system = stiff_pendulum(1e4, ElementBeamCable(3), False, n=8).system
+    integrator, rest = Integrator(system, EnergyMomentum()), np.zeros(system.N)
+    y = integrator.start(rest, rest, 0.0, dt)
+    for _ in range(10):
+        y = integrator.take(y, dt)
+    assert integrator.state[MIXED] > 0.0
+    assert integrator.state[READY] == kind
+
+
 @pytest.mark.parametrize("degree, n", [(5, 8), (7, 4), (9, 4)])
 def test_few_iterations_where_more_strains_are_sampled_than_the_axis_has(degree, n):
     """Symmetric factors contract slowly there, or not at all: 19 to 24 iterations a step."""
     history = stiff_pendulum(1e4, ElementBeamCable(degree), False, n=n).integrate(
         0.7, 1e-2, EnergyMomentum())
     assert history.substeps == 0
-    assert history.iterations <= 10 * history.steps
-    assert history.factorizations <= 1.6 * history.steps
+    assert history.iterations <= 8 * history.steps
+    assert history.factorizations <= 1.3 * history.steps
     assert np.ptp(history.total_energy) < 1e-12 * history.kinetic_energy.max()
 
 
@@ -227,7 +252,7 @@ def test_the_counts_tell_other_rules():
 @pytest.mark.parametrize("flag", [False, True])
 def test_a_step_that_fails_is_cut_the_same(flag):
     """A step much longer than the fast turn of a free beam: it is halved."""
-    beam = Beam(MeshBeam.init_line([0, 0.5, 1], 0.05), ElementBeamANCF(2),
+    beam = Beam(MeshBeam.init_line([0, 0.5, 1], 0.01), ElementBeamANCF(2),
                 StVenantKirchhoff(1e7, 0.3, 1000.0), 0.1, compiled=flag)
     scene = Scene(beam).initial_velocity(lambda x: np.array([-90.0 * x[1], 90.0 * (x[0] - 0.5)]))
     history = scene.integrate(0.2, 0.1)

@@ -562,7 +562,7 @@ def test_interpolation_is_of_fourth_order():
 @pytest.mark.filterwarnings("ignore:the body is turned inside out")  # two steps are too few
 @pytest.mark.parametrize("compiled", [True, False])
 def test_parts_of_steps_that_are_cut_are_counted(compiled):
-    scene = Scene(soft(1, 1, E=1e6, h=0.1, compiled=compiled)).initial_velocity(
+    scene = Scene(soft(1, 1, E=1e6, h=0.05, compiled=compiled)).initial_velocity(
         lambda x: 30.0 * np.array([-x[1], x[0] - 0.5]) + 5.0 * np.array([x[0] ** 2, 0 * x[0]]))
     history = scene.integrate(0.4, 0.2)
     assert history.substeps >= 2 and history.steps == 2 and len(history) == 3

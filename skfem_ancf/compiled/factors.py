@@ -124,12 +124,13 @@ def _exchanging(A):
         if not abs(flat[at + p]) > 0.0 or not abs(flat[at + p]) < np.inf:
             return False
         last = max(last, min(j + width + p, n - 1))
-        for c in range(j, last + 1):
-            row = c * ld + top + j - c
-            if p != 0:
+        if p != 0:
+            for c in range(j, last + 1):
+                row = c * ld + top + j - c
                 flat[row], flat[row + p] = flat[row + p], flat[row]
+        inverse = 1.0 / flat[at]
         for i in range(1, m + 1):
-            flat[at + i] /= flat[at]
+            flat[at + i] *= inverse
         for c in range(j + 1, last + 1):
             row = c * ld + top + j - c
             x = flat[row]

@@ -514,7 +514,8 @@ class Integrator:
         A, rows = factors(self.matrices, self._state), self.matrices.rows
         beside = {"S": rows.S, "Z": rows.Z, "H": rows.H} if len(rows.P) else {}
         return {"A": A.flat, "pivots": A.pivots, "origin": self._work.x.origin,
-                "ahead": self._work.x.ahead, **beside}
+                "ahead": self._work.x.ahead, "carried": self._work.stresses[3],
+                "rates": self._work.stresses[5], **beside}
 
 
 def _damping(system):

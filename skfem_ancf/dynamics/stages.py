@@ -22,12 +22,12 @@ from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, 
 from .dampers import add_damping, damping_beside, damping_force
 from .rates import JointMotion, JointMotions, acceleration_of_joints, drive_rate
 from .steps import (ASTRAY, BEFORE, COUNT, DEPENDENT, DISSIPATED, DONE, ENERGY, FACTORIZED, FAILED,
-                    FAILURE, FRESH, GO_ON, ITERATIONS, LASTING, LAST_SIZE, MIXED, NOT_CONVERGED,
-                    RATE, READY, SINGULAR, SIZE, judged, round_off)
+                    FAILURE, FRESH, GO_ON, ITERATIONS, LAST_SIZE, MIXED, NOT_CONVERGED, RATE,
+                    READY, SINGULAR, SIZE, judged, round_off)
 
 #: Contraction up to which factors are kept, and where stresses are carried: new ones at points
-#: as far apart turn as far from them.
-REUSED, CARRIED = 0.3, 0.5
+#: as far apart turn as far from them. For how many steps they are.
+REUSED, CARRIED, LASTING = 0.3, 0.5, 32.0
 #: Corrections that close joints at the end of a step.
 CLOSINGS = 2
 

@@ -20,7 +20,7 @@ import numpy as np
 from ..band import (Band, add_multiple, clear, copy, dot, factorize, fix, multiply, solve_joined,
                     subtract_rows, total, widen)
 from ..body import (add_force_of, add_turned, body_carry, body_force, body_gradients, body_mean,
-                    body_mixed, body_stress, body_tangent)
+                    body_mixed, body_stress, body_tangent, body_tangent_by)
 from ..forces.contact_texts import PRESSURES
 from ..forces.texts import (add_contact_tangent, add_elastic_force, add_rubbing_tangent,
                             augment_contact, element_stiffness, pace_contact, put_between,
@@ -41,9 +41,9 @@ ITERATIONS = 30
 REUSED = 0.1
 #: The same for factors of the step's own where stresses are carried, and for how many steps they
 #: are, from one on that wants new factors again.
-CARRIED, LASTING = 0.3, 32.0
-#: The factors of a step that are the last symmetric ones if they contract slowly.
-THIRD = 3.0
+CARRIED, LASTING = 0.3, 256.0
+#: Contraction of symmetric factors beyond which the others pay where stresses are carried.
+SLOW = 0.03
 #: Corrections that are as many times their round-off tell nothing by how they contract.
 ROUGH = 1e3
 #: Contraction expected of new factors, and the least that is expected of any.
@@ -320,7 +320,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
     """
     course, state = borrowed(course), borrowed(state)
     m, y, u = w.m.l.size, w.y, w.x.u
-    joined, damped, turns = m > 0, matrices.dampers.active > 0, matrices.U.flat.size > 0
+    joined, damped = m > 0, matrices.dampers.active > 0
     contacts, taken, before, stale = e.forces.contacts, np.empty(1), np.empty(u.size), joined
     if damped and rule.conserving == 0:
         damping_force(e, matrices.dampers, matrices.M, course.times[0, 0] - course.dt, y[0], y[1],
@@ -357,7 +357,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
             if told == GO_ON:
                 told = _correct(e.joints, e.free, matrices, rule, s, w, state, anew)
             if told == GO_ON:
-                told = _judged(e, matrices.dampers, turns, s, w, state, wanted, rough)
+                told = _judged(e, matrices.dampers, s, w, state, wanted, rough)
             if told == DONE and contacts.lasting >= PRESSURES:
                 augment_contact(e.forces, s.t, u, taken)
                 if taken[0] > 0.0:
@@ -601,7 +601,7 @@ def _start(e, w, state):
     """Where the iteration begins; with carried stresses on a straight way."""
     copy(w.x.straight if state[MIXED] > 0.0 else w.x.guess, w.x.u)
     copy(w.m.l0, w.m.l)
-    if state[MIXED] > 0.0:
+    if state[MIXED] > 0.0 and state[READY] == 0.0:  # else those of the step before
         body_stress(e.body, w.y[0], w.stresses[3])
         clear(w.stresses[5])
 
@@ -636,7 +636,7 @@ def _internal_force(e, dampers, rule, w, state):
 
 
 @source
-def _judged(e, dampers, turns, s, w, state, wanted, rough):
+def _judged(e, dampers, s, w, state, wanted, rough):
     """What the last correction tells, of iterations with carried stresses and without.
 
     A stiff and slender beam turned by old factors is stretched by what they take for bending: its
@@ -652,11 +652,10 @@ def _judged(e, dampers, turns, s, w, state, wanted, rough):
             for i in lanes(du.size):
                 room[i] = s.damping_factor * du[i]
             body_carry(e.viscous, w.x.origin, room, w.stresses[6], w.stresses[5])
-    told = judged(state, wanted, rough, REUSED, CARRIED if state[FRESH] > 0.0 else REUSED)
-    slow = state[READY] == 0.0 and ROUGH * rough < state[SIZE] < state[LAST_SIZE]
-    if turns and slow and state[FRESH] >= THIRD and state[MIXED] <= LASTING:
-        state[MIXED] = 2.0 * LASTING
-    return told
+        slow = ROUGH * rough < state[SIZE] and 0.0 < SLOW * state[LAST_SIZE] < state[SIZE]
+        if slow and state[FRESH] > 0.0 and state[READY] == SYMMETRIC:
+            state[MIXED] = 2.0 * LASTING
+    return judged(state, wanted, rough, REUSED, CARRIED if state[FRESH] > 0.0 else REUSED)
 
 
 @source
@@ -678,7 +677,10 @@ def _tangent(e, matrices, rule, s, w, state):
     _middle(rule, w)
     copy(w.x.middle, w.x.origin)
     copy(w.x.middle, w.x.ahead)
-    body_tangent(e.body, w.x.middle, w.x.force, stresses[1], yes, stresses[2], matrices.A)
+    if turning(matrices, state):
+        body_tangent_by(e.body, w.x.middle, stresses[1], w.gradients[0], matrices.A)
+    else:
+        body_tangent(e.body, w.x.middle, w.x.force, stresses[1], yes, stresses[2], matrices.A)
     if dampers.active > 0:
         add_damping(e.viscous, dampers, matrices.M, s.damping_factor / s.stiffness_factor,
                     w.x.middle, stresses, w.x.room, matrices.A)
@@ -749,7 +751,7 @@ def _factorize(e, matrices, rule, s, w, state):
             dl[k] = s.stiffness_factor * l[k]
         good = own_solve(rule.solver, s.acting, w.x.middle, dl, none, none, none, none)
     else:
-        if state[MIXED] > LASTING:
+        if turning(matrices, state):
             _turn(e, matrices, s, w)
             state[READY] = TURNED
         good = factorize(factors(matrices, state))
@@ -769,6 +771,12 @@ def factors(matrices, state):
 
 
 @source
+def turning(matrices, state):
+    """True if the next factors are those of the matrix that is not symmetric."""
+    return state[MIXED] > LASTING and matrices.U.flat.size > 0
+
+
+@source
 def _turn(e, matrices, s, w):
     """The iteration matrix with the strains' derivatives at the end of the step, into U.
 
@@ -780,7 +788,6 @@ def _turn(e, matrices, s, w):
     U = matrices.U
     copy(w.x.u, w.x.ahead)
     widen(matrices.A, U)
-    body_gradients(e.body, w.x.origin, w.gradients[0])
     body_gradients(e.body, w.x.ahead, w.gradients[1])
     add_turned(e.body, s.stiffness_factor, w.gradients, U)
     fix(U, e.fixed)
