@@ -108,7 +108,7 @@ def test_few_iterations_where_the_axis_is_stiff(slenderness, element, scheme):
     scene = stiff_pendulum(slenderness, element, False)
     history = scene.integrate(0.2, 1e-2, scheme)
     assert history.substeps == 0
-    assert history.iterations <= 5 * history.steps
+    assert history.iterations <= 5.5 * history.steps
     assert history.factorizations <= history.steps + 2
     if not scheme.conserving:
         return
@@ -141,7 +141,7 @@ def test_few_iterations_of_a_stiff_rod_that_turns_fast(element):
         [1.0 - 10.0 * x[1] * (1.0 + 2.0 * x[0]), 10.0 * x[0] * (1.0 + x[0])]))
     history = scene.integrate(0.5, 1e-2, EnergyMomentum())
     assert history.substeps == 0
-    assert history.iterations <= 7 * history.steps
+    assert history.iterations <= 8 * history.steps
     assert history.factorizations <= history.steps + 2
 
 

@@ -42,7 +42,8 @@ REUSED = 0.1
 #: The same for factors of the step's own where stresses are carried, and for how many steps they
 #: are, from one on that wants new factors again.
 CARRIED, LASTING = 0.3, 256.0
-#: Contraction of symmetric factors beyond which the others pay where stresses are carried.
+#: Contraction of symmetric factors beyond which the others pay where stresses are carried, and the
+#: least that is expected of these.
 SLOW = 0.03
 #: Corrections that are as many times their round-off tell nothing by how they contract.
 ROUGH = 1e3
@@ -413,7 +414,8 @@ def judge(state, wanted, rough, reused):
         rate = size / before
         if rate > 1.0 and size <= ROUGH * rough:
             return DONE
-        state[RATE] = max(rate, LEAST)  # of one step, used in the next
+        # of one step, used in the next; sizes by what is not symmetric are no norm
+        state[RATE] = max(rate, SLOW if state[READY] == TURNED else LEAST)
         if rate > reused and size * min(1.0, rate) > wanted:
             if state[FRESH] > 0.0 and rate > DIVERGING:
                 state[FAILURE] = DIVERGES
