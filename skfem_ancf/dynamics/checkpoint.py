@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-FORMAT = 5
+FORMAT = 6
 #: Times of a motion at which functions of time are compared.
 TIMES = 33
 #: Points of the surface, about, at which distances of obstacles are.
