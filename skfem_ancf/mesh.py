@@ -1065,7 +1065,8 @@ def reach(meshes: Sequence[MeshBeam]) -> float:
     >>> from skfem_ancf import Frame, StVenantKirchhoff
     >>> from skfem_ancf.mesh import reach
     >>> points, lines = [(0, 0), (3, 0), (3, 4), (0, 4)], [(0, 1), (1, 2), (2, 3), (3, 0)]
-    >>> frame = Frame.from_lines(points, lines, height=0.1, material=StVenantKirchhoff(1e9, 0.3))
+    >>> steel = StVenantKirchhoff(E=2e11, nu=0.3)
+    >>> frame = Frame.from_lines(points, lines, height=0.1, width=0.1, material=steel)
     >>> reach([beam.mesh for beam in frame.beams])
     5.0
     """

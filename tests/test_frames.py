@@ -69,7 +69,7 @@ def test_a_joint_gives_its_entries_or_its_dense_rows():
             self.rows = self.r.row((0.0, 1.0), scene.N)[None]
 
         def value(self, u, t):
-            return self.rows @ u
+            return self.jacobian(u, t) @ u
 
         def jacobian(self, u, t):
             return self.rows
@@ -93,8 +93,14 @@ def test_a_joint_gives_its_entries_or_its_dense_rows():
 
 def test_dense_rows_of_a_subclass_replace_the_entries_above():
     class Tilted(OnCircle):
+        def value(self, u, t):
+            return 2.0 * super().value(u, t)
+
         def jacobian(self, u, t):
             return 2.0 * super().jacobian(u, t)
+
+        def curvature(self, u, t, multipliers):
+            return super().curvature(u, t, 2.0 * multipliers)
 
     scene = Scene(bar((0, 0), (1, 0)))
     joints = [scene.joint(kind((1, 0), (0, 1))) for kind in (OnCircle, Tilted)]
