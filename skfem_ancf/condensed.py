@@ -251,9 +251,8 @@ class _Moves:
         self._turned, self._leading = nodes.turned, nodes.leader[nodes.turned]
         follow = (nodes.followers, nodes.followers, nodes.turned)
         rows = [3 * ends + k for k, ends in enumerate(follow)]
-        self._following, first = sum(map(len, follow)), 0
-        columns = [np.arange(self._following)]
-        first = self._following
+        self._following = first = sum(map(len, follow))
+        columns = [np.arange(first)]
         for k, held in enumerate((nodes.held_x, nodes.held_y, nodes.held_angle)):
             number = np.full(len(nodes.held), -1)
             number[nodes.nodes[held]] = first + np.arange(len(held))

@@ -167,7 +167,8 @@ def inertia_of(A: Array | sparse.csr_array) -> Inertia:
     if isinstance(A, np.ndarray):
         root = np.sqrt(size)
         values = np.linalg.eigvalsh(A / (root[:, None] * root))
-        return beside_zero(lambda shift: int(np.sum(values < -shift)))
+        largest = max(1.0, values[-1])  # of its size is their round-off
+        return beside_zero(lambda shift: int(np.sum(values < -shift * largest)))
     scale = sparse.diags(1.0 / np.sqrt(size))
     A = scale @ A @ scale
     try:
