@@ -592,8 +592,7 @@ class Beam(Frozen):
                 for _, k, m in self.element.functionals]
         out = np.empty((self.N // self.nd, self.nd))
         out[:] = np.array(node).repeat(2)
-        out.flags.writeable = False
-        return out.ravel()
+        return read_only(out.ravel())
 
     def held_by_a_section(self, held: Sequence[int], sums: Sequence[Any] = ()) -> bool:
         """True if a node is held, and the direction of the axis there or its normal.

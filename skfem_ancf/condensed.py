@@ -109,20 +109,19 @@ class Condensed:
         number = np.empty(unknown.shape, dtype=np.int64)
         number[order] = np.cumsum(unknown[order]).reshape(-1, 3) - 1
         self.size = int(np.sum(unknown))
-        #: unknown of each end's x, y and rotation; one behind the last where there is none
-        self._unknowns = np.where(unknown, number, self.size)[nodes.nodes]
-        self._unknowns[nodes.hinged, 2] = self.size
-        at = self._unknowns.reshape(-1, 6)
+        # unknown of each end's x, y and rotation; one behind the last where there is none
+        unknowns = np.where(unknown, number, self.size)[nodes.nodes]
+        unknowns[nodes.hinged, 2] = self.size
+        at = unknowns.reshape(-1, 6)
         i, j = (np.broadcast_to(x, (len(at), 6, 6)).ravel() for x in (at[:, :, None], at[:, None]))
         self._inside = np.flatnonzero((i < self.size) & (j < self.size))
         #: where the entries of the members go in the matrix of the nodes
         self._entries = tuple(x[self._inside].astype(np.int32) for x in (i, j))
         self._moves = _Moves(nodes)
-        number = self._unknowns.ravel()
-        rows = np.flatnonzero(number < self.size)
+        rows = np.flatnonzero(at < self.size)
         #: displacements of the ends by those of the nodes
-        self._follow = sparse.csr_array((np.ones(len(rows)), (rows, number[rows])),
-                                        (len(number), self.size))
+        self._follow = sparse.csr_array((np.ones(len(rows)), (rows, at.ravel()[rows])),
+                                        (at.size, self.size))
         self._gather = self._follow.T.tocsr()
         self._parts: list[_Part] = []
         self._nodes: Any = None

@@ -333,11 +333,7 @@ class Constraints:
         u0, u1, t
             Displacements at its ends, shape (N,), and the time in its middle.
         """
-        J = np.zeros((self.m, self.N))
-        rows, columns, values = self.in_order(joint.mean_entries(u0, u1, t)
-                                               for joint in self.joints)
-        np.add.at(J, (rows, columns), values)
-        return J
+        return self._dense(*self.in_order(joint.mean_entries(u0, u1, t) for joint in self.joints))
 
     def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
                      multipliers: Array) -> Array:
