@@ -6,15 +6,18 @@ because a beam that only joints hold has a singular matrix of its own, and those
 outside of the band. With ``Z = K^-1 [P^T S, J^T]``, by Sherman, Morrison and Woodbury::
 
     H y = [P K^-1 b; J K^-1 b - c],  H = [1, 0; 0, 0] + [P; J] Z,  x = K^-1 b - Z y
+
+Where joints hold such a beam by directions that fit into the band, as a clamp at an angle does, K is
+made stiff along these in place of springs: x and J x are the same, l is less by stiffness times c.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from .band import (Band, clear, copy, dense_solve, diagonal, dot, factorize, multiply, solve,
-                   weighted)
-from .source import F1, F2, I1, lanes, source
+from .band import (Band, clear, copy, dense_solve, diagonal, dot, factorize, largest, multiply,
+                   solve, weighted)
+from .source import F1, F2, I1, I2, lanes, source
 from .tables import add_products
 from .types import Array
 
@@ -32,6 +35,9 @@ class Border(NamedTuple):
         of :class:`~skfem_ancf.tables.JointTables` they are.
     wide
         1 if sparse factors are used in its place.
+    along
+        Equations of joints whose directions are made stiff, the first of their coordinates and
+        the one behind the last, shape (n, 3).
     """
 
     picked: I1
@@ -42,12 +48,14 @@ class Border(NamedTuple):
     outside_at: I1
     outside_of: I1
     wide: int
+    along: I2
 
 
 class Factors(NamedTuple):
     """A matrix with its border, factorised: the matrix before, its factors, and the border.
 
-    ``scale`` has what makes picked coordinates and multipliers numbers without units, (k + m,).
+    ``scale`` has what makes picked coordinates and multipliers numbers without units, (k + m,),
+    ``stiffness`` that of the matrix along directions of joints, (m,).
     Of work arrays ``rest`` and ``weight`` have (N,), ``closing`` and ``more`` (m,), ``y`` and
     ``G`` the size of H.
     """
@@ -65,6 +73,7 @@ class Factors(NamedTuple):
     more: F1
     y: F1
     G: F2
+    stiffness: F1
 
 
 def factors_of(before: Band, after: Band, J: Array, S: Array) -> Factors:
@@ -80,7 +89,7 @@ def factors_of(before: Band, after: Band, J: Array, S: Array) -> Factors:
     (m, N), n = J.shape, len(S) + len(J)
     (rest, weight), (closing, more) = np.empty((2, N)), np.empty((2, m))
     return Factors(before, after, J, S, np.zeros((n, N)), np.zeros((n, n)), np.ones(n),
-                   rest, weight, closing, more, np.empty(n), np.empty((n, n)))
+                   rest, weight, closing, more, np.empty(n), np.empty((n, n)), np.zeros(m))
 
 
 #: No numbers: vectors, a matrix, and integers.
@@ -99,7 +108,7 @@ def new_factors(border: Border, A: Band, m: int, N: int) -> Factors:
     """
     x, X, none = _NONE
     if border.wide > 0 or m == 0:
-        return Factors(A._replace(flat=x, pivots=none), A, X, X, X, X, x, x, x, x, x, x, X)
+        return Factors(A._replace(flat=x, pivots=none), A, X, X, X, X, x, x, x, x, x, x, X, x)
     before = A._replace(flat=np.empty(A.flat.size), pivots=none)
     k = border.picked.size
     return factors_of(before, A, np.zeros((m, N)), np.zeros((k, k)))
@@ -112,8 +121,9 @@ def mean_stiffness(diagonal, sizes):
 
 
 @source
-def add_curvature(joints, border, multipliers, free, sizes, A, S):
+def add_curvature(joints, border, multipliers, free, sizes, A, f):
     """Add the joints' second derivative and the springs to the band, and to S what is not in it."""
+    S = f.S
     flat, size, value = S.reshape(S.size), np.empty(free.size), np.empty(joints.hk.size)
     clear(flat)
     for a in lanes(value.size):
@@ -134,6 +144,23 @@ def add_curvature(joints, border, multipliers, free, sizes, A, S):
             stiffness += mean / (sizes[at] * sizes[at])
         A.flat[at * A.ld + A.top] += stiffness
         S[k, k] = -stiffness
+    for k in range(border.along.shape[0]):
+        of, first, last = border.along[k, 0], border.along[k, 1], border.along[k, 2]
+        f.stiffness[of] = _stiffen(A, size, f.J[of], first, last)
+
+
+@source
+def _stiffen(A, size, direction, first, last):
+    """Make A stiff along a direction as its coordinates, from one to before another, are; how."""
+    most = largest(direction[first:last])
+    stiffness = 0.0
+    for i in range(first, last):
+        if direction[i] != 0.0:
+            stiffness = max(stiffness, size[i] / (most * most))
+    for j in range(first, last):
+        for i in range(first if A.top > 0 else j, last):
+            A.flat[j * A.ld + A.top + i - j] += stiffness * direction[i] * direction[j]
+    return stiffness
 
 
 @source
@@ -238,5 +265,5 @@ def solve_bordered(f, border, b, c, x, dm):
     for i in lanes(N):
         x[i] += r[i]
     for a in range(m):
-        dm[a] += dl[a]
+        dm[a] += dl[a] + f.stiffness[a] * c[a]
     return np.sqrt(error / size) if size > 0.0 else 0.0

@@ -122,7 +122,8 @@ class BorderedMatrix:
         picked, S = hold(K, i, j, values, springs, sizes, loose)
         none = np.zeros(0, np.int64)
         self._K, self._J = K, J
-        self._border = Border(picked, len(springs), loose, none, none, none, none, 0)
+        self._border = Border(picked, len(springs), loose, none, none, none, none, 0,
+                              np.zeros((0, 3), np.int64))
         self.factors = factors_of(K.band, K.factors, np.array(J), S)
         join(self.factors, self._border, np.ones(J.shape[1]))
         if not np.all(np.isfinite(self.factors.H)) or np.linalg.slogdet(self.factors.H)[0] == 0.0:

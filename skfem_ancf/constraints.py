@@ -473,8 +473,41 @@ class Constraints:
         The positions of two nodes far apart, for each such beam; all coordinates of rigid bodies,
         which have no stiffness of their own, come last.
         """
+        return self._springs(self._standing)
+
+    @cached_property
+    def stiff(self) -> tuple[Array, Array]:
+        """Directions of joints that hold such beams, and :attr:`springs` of the others.
+
+        Directions are those of equations whose coordinates lie in the band, and whose derivative
+        is constant: the number of the equation, the first of the coordinates and the one behind
+        the last, shape (n, 3).
+        """
+        constant = [joint.constant for joint in self.joints for _ in joint.equations]
+        of, columns, values = self.slopes
+        standing, found = self._standing.copy(), []
+        for k in [k for k, stands in enumerate(standing) if not stands]:
+            beam, s = self.members[k], self.slices[k]
+            if isinstance(beam, RigidBody):
+                continue
+            rows, motions = [], beam.rigid_motions() / (1.0, 1.0, self.size)
+            held = [motions[~self.free[s]]]
+            for b in np.unique(of[(columns >= s.start) & (columns < s.stop)]).tolist():
+                at, v = columns[of == b], values[of == b]
+                first, last = int(at.min()), int(at.max()) + 1
+                if (constant[b] and first >= s.start and last <= s.stop
+                        and last - first < 2 * beam.nd):
+                    rows.append((b, first, last))
+                    held.append((v @ motions[at - s.start])[None])
+            standing[k] = bool(rows) and _has_full_rank(np.concatenate(held))
+            if standing[k]:
+                found += rows
+        return np.array(found, np.int64).reshape(-1, 3), self._springs(standing)
+
+    def _springs(self, standing):
+        """As :attr:`springs`, of beams that do not stand."""
         found: list[int] = []
-        for beam, s, stands in zip(self.members, self.slices, self._standing):
+        for beam, s, stands in zip(self.members, self.slices, standing):
             if isinstance(beam, RigidBody):
                 found += range(s.start, s.stop)
                 continue
@@ -484,7 +517,7 @@ class Constraints:
             x, y = p - p[:, :1]
             far = int((x * x + y * y).argmax())
             found += [s.start + node * beam.nd + k for node in (0, far) for k in range(2)]
-        out = np.array(found, dtype=int)
+        out = np.array(found, np.int64)
         return out[self.free[out]]
 
     @cached_property

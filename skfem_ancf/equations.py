@@ -41,7 +41,8 @@ _NO_MOMENTS = constant(MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)
                                   np.zeros((0, 2)), np.zeros(0)))
 _NO_BODY = constant(FlatBody(_NO_INTS, np.zeros((0, END_GRADIENTS + 1), np.int64)))
 _NO_PUSHES = np.zeros((0, 0))
-_NO_BORDER = constant(Border(_NO_INTS, 0, 0, _NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, 0))
+_NO_ROWS = np.zeros((0, 3), np.int64)
+_NO_BORDER = constant(Border(_NO_INTS, 0, 0, _NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, 0, _NO_ROWS))
 constant(NO_FORCES)
 
 #: Times at which joints are tried, whether tables give them.
@@ -485,10 +486,11 @@ class Tables:
         if not s.coupled:
             return _NO_BORDER
         if not s.joints or not s.bordered or joints.own or s.forces.far:
-            return Border(none, 0, 0, none, none, none, none, int(s.coupled))
-        i, j, ns, springs = joints.hi, joints.hj, len(s.springs), s.springs.astype(np.int64)
+            return Border(none, 0, 0, none, none, none, none, int(s.coupled), _NO_ROWS)
+        along, springs = s.constraints.stiff
+        i, j, ns = joints.hi, joints.hj, len(springs)
         if not len(i):
-            return Border(springs, ns, s.loose, none, none, none, none, 0)
+            return Border(springs, ns, s.loose, none, none, none, none, 0, along)
         outside = np.abs(i - j) > s.bandwidth
         far = np.unique(np.append(i[outside], j[outside]))
         picked = np.append(springs, far)
@@ -496,7 +498,7 @@ class Tables:
         stored, = np.nonzero(~outside & ((i >= j) | (not s.symmetric)))
         row, column = (ns + np.searchsorted(far, x[out]) for x in (i, j))
         return Border(picked, ns, s.loose, s.K._position(i[stored], j[stored]), stored,
-                      row * len(picked) + column, out, 0)
+                      row * len(picked) + column, out, 0, along)
 
 
 @cache

@@ -457,7 +457,7 @@ def _solved(e, target, rules, x, w):
         row = f.J[k]
         for i in lanes(row.size):
             row[i] *= e.free[i]
-    add_curvature(e.joints, e.border, x.multipliers, e.free, e.sizes, e.K, f.S)
+    add_curvature(e.joints, e.border, x.multipliers, e.free, e.sizes, e.K, f)
     if not factorize_bordered(f, e.border, e.free):
         return False
     error = solve_bordered(f, e.border, w.R, w.phi, w.du, w.dm)
