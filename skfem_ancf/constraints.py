@@ -462,8 +462,7 @@ class Constraints:
             if beam.held_by_a_section(held.tolist()):
                 found.append(True)
                 continue
-            found.append(len(held) > 2 and _has_full_rank(
-                beam.rigid_motions(held) / (1.0, 1.0, self.size)))
+            found.append(self._holds(beam, held, ()))
         return found
 
     @cached_property
@@ -483,26 +482,43 @@ class Constraints:
         is constant: the number of the equation, the first of the coordinates and the one behind
         the last, shape (n, 3).
         """
-        constant = [joint.constant for joint in self.joints for _ in joint.equations]
-        of, columns, values = self.slopes
+        standing, rows = self._held_alone
+        return np.array(rows, np.int64).reshape(-1, 3), self._springs(standing)
+
+    @cached_property
+    def _held_alone(self):
+        """Whether each is held by its own supports and joints, and what of joints is needed."""
         standing, found = self._standing.copy(), []
-        for k in [k for k, stands in enumerate(standing) if not stands]:
-            beam, s = self.members[k], self.slices[k]
-            if isinstance(beam, RigidBody):
+        if all(standing) or not self.m:
+            return standing, found
+        constant = [joint.constant for joint in self.joints for _ in joint.equations]
+        sums: list[list[Any]] = [[] for _ in constant]
+        for b, *entry in zip(*(x.tolist() for x in self.slopes)):
+            sums[b].append(entry)
+        for k, (beam, s) in enumerate(zip(self.members, self.slices)):
+            if standing[k] or isinstance(beam, RigidBody):
                 continue
-            rows, motions = [], beam.rigid_motions() / (1.0, 1.0, self.size)
-            held = [motions[~self.free[s]]]
-            for b in np.unique(of[(columns >= s.start) & (columns < s.stop)]).tolist():
-                at, v = columns[of == b], values[of == b]
-                first, last = int(at.min()), int(at.max()) + 1
-                if (constant[b] and first >= s.start and last <= s.stop
-                        and last - first < 2 * beam.nd):
+            rows, own = [], []
+            for b, of in enumerate(sums):
+                at = [dof for dof, _ in of if constant[b]] or [-1]
+                first, last = min(at), max(at) + 1
+                if s.start <= first and last <= min(s.stop, first + 2 * beam.nd):
                     rows.append((b, first, last))
-                    held.append((v @ motions[at - s.start])[None])
-            standing[k] = bool(rows) and _has_full_rank(np.concatenate(held))
+                    own.append([(dof - s.start, factor) for dof, factor in of])
+            held, = (~self.free[s]).nonzero()
+            standing[k] = bool(rows) and (beam.held_by_a_section(held.tolist(), own)
+                                          or self._holds(beam, held, own))
             if standing[k]:
                 found += rows
-        return np.array(found, np.int64).reshape(-1, 3), self._springs(standing)
+        return standing, found
+
+    def _holds(self, beam, held, sums):
+        """True if a beam is held by some coordinates and sums of others."""
+        if len(held) + len(sums) < 3:
+            return False
+        motions = beam.rigid_motions() / (1.0, 1.0, self.size)
+        sums = [np.array([v for _, v in of]) @ motions[[dof for dof, _ in of]] for of in sums]
+        return _has_full_rank(np.vstack([motions[held], *sums]))
 
     def _springs(self, standing):
         """As :attr:`springs`, of beams that do not stand."""
@@ -529,7 +545,9 @@ class Constraints:
     @property
     def bordered(self) -> bool:
         """True if the multipliers are few enough for a border about the band matrix."""
-        return self.frame is None and self.m + len(self.springs) <= WIDE_BORDER
+        most = self.m + 4 * len(self.members)  # springs are seldom worth asking for
+        return self.frame is None and (most <= WIDE_BORDER
+                                       or self.m + len(self.springs) <= WIDE_BORDER)
 
     @cached_property
     def frame(self) -> Nodes | None:
@@ -543,7 +561,7 @@ class Constraints:
 
     def free_rigid_motions(self) -> list[str]:
         """Descriptions of the rigid motions that nothing holds, one string each."""
-        if self.frame is None and (all(self._standing) or self._held_by_a_section()):
+        if self.frame is None and all(self._held_alone[0]):
             return []
         motions, joints, parts_of_frame = self._motions()
         parts = [motions[self.fixed], joints]
@@ -558,15 +576,6 @@ class Constraints:
         free = null_space(unit_rows(held))
         bodies = self._bodies(parts_of_frame) if len(free) else []
         return [_describe(v, bodies) for v in free]
-
-    def _held_by_a_section(self):
-        """True if supports and joints hold the only beam by one of its sections."""
-        if len(self.members) > 1 or not self.m:
-            return False
-        sums: list[list[Any]] = [[] for _ in range(self.m)]
-        for k, *entry in zip(*(x.tolist() for x in self.slopes)):
-            sums[k].append(entry)
-        return self.members[0].held_by_a_section(self.fixed.tolist(), sums)
 
     def _bodies(self, parts):
         """Who, origin and size of each of those that :meth:`_motions` are of."""
