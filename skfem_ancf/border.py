@@ -7,8 +7,8 @@ outside of the band. With ``Z = K^-1 [P^T S, J^T]``, by Sherman, Morrison and Wo
 
     H y = [P K^-1 b; J K^-1 b - c],  H = [1, 0; 0, 0] + [P; J] Z,  x = K^-1 b - Z y
 
-Where joints hold such a beam by directions that fit into the band, as a clamp at an angle does, K is
-made stiff along these in place of springs: x and J x are the same, l is less by stiffness times c.
+Where joints hold such a beam by directions that fit into the band, as a clamp at an angle does, K
+is made stiff along these in place of springs: x is the same, l is less by that stiffness times c.
 """
 
 from typing import NamedTuple

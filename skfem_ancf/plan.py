@@ -157,7 +157,7 @@ def _linear_solver(s, dynamic):
     else:
         solver = f"banded Cholesky, half bandwidth {bandwidth}"
     if s.m and (dynamic or s.bordered):
-        springs = 0 if dynamic else len(s.springs)
+        springs = 0 if dynamic else len(s.constraints.stiff[1])
         solver += ", bordered by the multipliers" + (
             f" and by {springs} springs on beams that joints alone hold" if springs else "")
     return solver

@@ -8,20 +8,23 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+import skfem_ancf.system
 from skfem_ancf import (AncfError, Beam, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamANCFHermite, ElementBeamCable, ElementBeamPatelShabana,
                         InputError, KelvinVoigt, MeshBeam, MeshError, NeoHookean, Scene,
                         StVenantKirchhoff, SupportError)
+from skfem_ancf.border import Border, add_curvature, factorize_bordered, new_factors, solve_bordered
 from skfem_ancf.bordered import BorderedMatrix, gives_way
 from skfem_ancf.compiled.words import Words
 from skfem_ancf.constraints import Constraints
 from skfem_ancf.elements import base
-from skfem_ancf.equations import Tables
+from skfem_ancf.equations import _NO_JOINTS, Tables
 from skfem_ancf.errors import CallbackError
 from skfem_ancf.finder import Finder
 from skfem_ancf.forces import system as forces
 from skfem_ancf.formulations import FORMULATIONS, Assumed
 from skfem_ancf.inertia import points_along
+from skfem_ancf.joints import OnLine
 from skfem_ancf.joints.base import Joint
 from skfem_ancf.kernels import cable, section
 from skfem_ancf.kernels.base import pair_tables
@@ -901,6 +904,50 @@ def test_later_solutions_held_at_an_angle_ask_factors_alone(monkeypatch):
     assert scene.system.joints and len(scene.system.springs)
     asked = [counted(monkeypatch, Constraints, name) for name in ("_entries", "_curvature")]
     assert np.array_equal(scene.solve_static().u, first.u) and not any(asked)
+
+
+@pytest.mark.parametrize("height", [0.01, 1e-4])
+@pytest.mark.parametrize("hold", [
+    lambda scene: scene.clamp("left"),
+    lambda scene: scene.pin("left").add(OnLine((0.4, 0.3), (1.0, 0.2), through=(0.4, 0.301)))])
+def test_what_joints_hold_at_an_angle_needs_neither_springs_nor_sparse_factors(monkeypatch, height,
+                                                                               hold):
+    mesh = MeshBeam.init_line(0.25 * np.arange(5), height, angle=np.arctan(0.75))
+    scene = hold(Scene(Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(2e9, 0.3), width=0.01)))
+    scene.point_force((0.0, -1e4 * height**3), at=tuple(mesh.p[:, -1]))
+    system, asked = scene.system, [counted(monkeypatch, place, name) for place, name in (
+        (System, "solve_own"), (skfem_ancf.system, "gives_way"))]
+    found = scene.solve_static()
+    assert not any(asked) and found.iterations < 8
+    assert system.machine.tables.plain.border.springs == 0 < len(system.springs)
+    rest = system.external_force(found.u) - system.internal_force(found.u)
+    rest -= found.multipliers @ system.full_jacobian(found.u, 1.0)
+    assert np.allclose(rest * system.mask, 0.0, rtol=0, atol=1e-3 * 1e4 * height**3)
+    assert np.max(np.abs(system.constraint(found.u, 1.0))) < 1e-12
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_stiff_directions_of_joints_change_no_solution(symmetric):
+    rng = np.random.default_rng(3)
+    n, width, x = 9, 3, 10.0 ** rng.uniform(-3, 3, 9)
+    i, j = (k.ravel() for k in np.meshgrid(range(n), range(n)))
+    A = rng.uniform(-1.0, 1.0, (n, n)) + 6.0 * np.eye(n)
+    A = (0.5 * (A + A.T) if symmetric else A) * (abs(i - j).reshape(n, n) <= width) * np.outer(x, x)
+    K, J = BandMatrix(n, width, symmetric), np.zeros((2, n))
+    keep = (abs(i - j) <= width) & ((i >= j) | (not symmetric))
+    K.add(i[keep], j[keep], A[i, j][keep])
+    J[0, 4:6], J[1, [0, 2]] = rng.standard_normal(2) * x[4:6], rng.standard_normal(2) * x[[0, 2]]
+    none = np.zeros(0, np.int64)
+    border = Border(none, 0, 0, none, none, none, none, 0, np.array([[0, 4, 6], [1, 0, 3]]))
+    f, free = new_factors(border, K.band, 2, n), np.ones(n)
+    f.J[:] = J
+    add_curvature(_NO_JOINTS, border, np.zeros(2), free, 1.0 / x, K.band, f)
+    assert factorize_bordered(f, border, free)
+    b, c, u, l = rng.standard_normal(n) * x, rng.standard_normal(2), np.zeros(n), np.zeros(2)
+    assert 0.0 <= solve_bordered(f, border, b, c, u, l) < 1e-9
+    wanted = np.linalg.solve(np.block([[A, J.T], [J, np.zeros((2, 2))]]), np.append(b, c))
+    assert np.allclose(x * u, x * wanted[:n], rtol=1e-9) and np.allclose(l, wanted[n:], rtol=1e-9)
+    assert np.all(f.stiffness > 0.0)
 
 
 def test_a_first_solve_asks_its_joints_once(monkeypatch):
