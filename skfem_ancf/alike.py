@@ -52,6 +52,8 @@ class Solved(NamedTuple):
         :class:`~skfem_ancf.equations.Equations`, without room for the tangent.
     factors, before
         Of loads, at full load and before the first correction from zero.
+    offsets, slopes
+        Of joints, see :meth:`~skfem_ancf.equations.Tables.at`.
     held
         Displacements of the fixed coordinates.
     noise
@@ -68,6 +70,8 @@ class Solved(NamedTuple):
     equations: Equations
     factors: Array
     before: Array
+    offsets: Array
+    slopes: Array
     held: Array
     noise: Array
     spread: Array
@@ -105,7 +109,8 @@ class Numbers:
         self.scene, self.located = scene, [reading.located(scene) for reading in readings]
         self.solved = Solved(
             tables.plain._replace(K=cast(Any, ()), viscous=(), copies=()),
-            tables.static_factors(1.0), tables.static_factors(1.0, 0.0), system.values(1.0),
+            tables.static_factors(1.0), tables.static_factors(1.0, 0.0), *tables.at(1.0),
+            system.values(1.0),
             np.array([system.work_noise**2]), np.array([system.noise]),
             np.array([screen.start.real, screen.start.imag]), screen.slender,
             tuple(tuple((part.dofs, part.weights, part.start, int(part.off_axis))

@@ -74,12 +74,12 @@ class Lane:
         equations = solved.equations._replace(K=band, viscous=body, copies=body)
         tables = system.machine.tables.with_equations(equations)
         self._machine = system.machine.with_tables(tables)
-        self._solved, N, none = solved, system.N, np.zeros(0)
-        self._target = Target(solved.factors, solved.before, 1.0, 1.0, none, none, np.zeros(N),
-                              np.zeros(len(solved.held)))
+        self._solved, N, m = solved, system.N, system.m
+        self._target = Target(solved.factors, solved.before, 1.0, 1.0, solved.offsets,
+                              solved.slopes, np.zeros(N), np.zeros(len(solved.held)))
         self._rules = rules_of(system, *OPTIONS)
-        self._room = room_for_iterations(equations, 0)
-        self._x = Unknowns(np.empty(N), none, np.empty(N), tables.stresses, tables.stresses)
+        self._room = room_for_iterations(equations, m)
+        self._x = Unknowns(np.empty(N), np.empty(m), np.empty(N), tables.stresses, tables.stresses)
         self._record = np.empty((OPTIONS[-1] + 1, 2))
 
     def solve(self, values: Array, u: Array, given: bool) -> Array:

@@ -166,10 +166,12 @@ class Tables:
     @property
     def alone(self) -> str:
         """Why the scene cannot be solved together with others of its topology; empty if it can."""
-        s = self.system
+        s, border = self.system, self.plain.border
         laws = [pack.law.kind for pack in self.plain.body.packs if isinstance(pack, SectionPack)]
         return next((text for text, there in (
-            ("joints have multipliers", s.m), ("there are rigid bodies", s.bodies),
+            ("joints move, are of your own, or hold beams to each other",
+             s.m and (border.wide or border.picked.size or self.motion_varies)),
+            ("there are rigid bodies", s.bodies),
             ("a load has no potential, or is one of your own", not s.symmetric or self.own_loads),
             ("there are obstacles", s.forces.contacts.obstacles),
             ("force elements are of your own, or couple points far apart",

@@ -215,6 +215,7 @@ def equilibrium(e, target, rules, x, w, record, members):
 @source
 def _member(e, target, rules, x, w, record, members, before, least):
     """As :func:`iterate`, of the member whose numbers are set; singular if it is not stable."""
+    clear(x.multipliers)
     for i in lanes(e.fixed.size):
         target.prescribed[i] = members.held[i] - x.u[e.fixed[i]]
     floor = 8.0 * np.sqrt(members.noise[0])
@@ -228,7 +229,7 @@ def _member(e, target, rules, x, w, record, members, before, least):
         return status, number
     if number == 0:  # the tangent is there, its factors are not
         fix(e.K, e.fixed)
-        if not factorize(e.K):
+        if not _solved(e, target, rules, x, w):
             return SINGULAR, number
     diagonal(e.K, w.scale)
     if not smallest(w.scale) > 0.0:
