@@ -12,6 +12,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
 from skfem_ancf.alike import Unlike
 from skfem_ancf.batch import Batch, Lane
 from skfem_ancf.errors import NameUnknown, PickleError, StabilityWarning, SweepWarning
+from skfem_ancf.joints import OnLine
 from skfem_ancf.members import Sweep
 from skfem_ancf.obstacles import Circle
 from skfem_ancf.polynomials import MOST, Polynomial
@@ -26,6 +27,18 @@ def cantilever(E=2e8, b=0.01, h=0.02, L=1.0, F=1e-3, kind="cable", law=StVenantK
     mesh = MeshBeam.init_line(np.linspace(0, L, n + 1), height=h)
     beam = Beam(mesh, ELEMENTS[kind], law(E, 0.3, 1000.0), width=b)
     return Scene(beam).clamp("left").gravity((0, -1.0)).point_force((0, -F), at=(L, 0))
+
+
+def guided(E=2e8, L=1.0, turn=0.5, F=1e-3, hold="clamp", n=4):
+    """A cable at an angle, held by equations of joints."""
+    mesh = MeshBeam.init_line(np.linspace(0, L, n + 1), height=0.02, angle=turn)
+    beam, tip = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(E, 0.3, 1000.0), 0.01), mesh.p[
+        :, -1]
+    scene = Scene(beam).gravity((0, -1.0)).point_force((0, -F), at=tuple(tip))
+    if hold == "clamp":
+        return scene.clamp("left")
+    way = np.cos(turn + 0.7), np.sin(turn + 0.7)
+    return scene.pin("left").add(OnLine(tuple(tip), way, through=tip + (0.01, 0.0)))
 
 
 def arc(R, M, kind="cubic"):
@@ -83,6 +96,31 @@ def compare(build, table, n, rtol=1e-8, least=None):
     for k in (0, n // 2, n - 1):
         assert_allclose(result["tip"][k], alone(build, table, k), rtol=rtol, atol=1e-12)
     return result
+
+
+@pytest.mark.parametrize("hold", ["clamp", "line"])
+@pytest.mark.parametrize("ranges", [{"E": (2e8, 3e8), "F": (-1e-3, 1e-3)},
+                                    {"turn": (0.3, 0.6), "L": (1.0, 1.2)}])
+def test_what_is_held_at_an_angle(hold, ranges):
+    def build(**floats):
+        return guided(**floats, hold=hold)
+
+    compare(build, drawn(400, **ranges), 400)
+
+
+def test_joints_of_their_own_place_that_rest_keep_members_together():
+    scene = guided(F=0.0)
+    assert scene.system.m and not scene.system.machine.tables.alone
+
+    def unloaded(E):
+        scene = guided(E=E)
+        return scene.replace(loads=[])
+
+    result = sweep(unloaded, drawn(20, E=(2e8, 3e8)), TIP, workers=1)
+    assert "20 of 20 members were solved together" in result.report
+    assert_array_equal(result["tip"], 0.0)
+    scene.joint("angle", at="right", angle=lambda t: 0.1 * t)
+    assert "joints move" in scene.system.machine.tables.alone
 
 
 @pytest.mark.parametrize("kind, law", [("section", StVenantKirchhoff), ("cable", StVenantKirchhoff),
