@@ -13,7 +13,7 @@ from skfem.element import ElementVector
 from . import forms
 from .damping import KelvinVoigt
 from .elements import ElementBeam, choose_element
-from .errors import (InputError, MeshError, NameUnknown, require_finite, require_flag,
+from .errors import (InputError, NameUnknown, require_finite, require_flag,
                      require_integer, require_label, require_like, require_names, shown, taught,
                      teaching)
 from .finder import Finder
@@ -24,7 +24,7 @@ from .kinematics import KINEMATICS
 from .materials import Material, StVenantKirchhoff
 from .mesh import MeshBeam, reach
 from .origin import ours
-from .places import as_point, facets_of
+from .places import as_point, facets_of, node_of
 from .quadrature import gauss, tensor
 from .rigid import RigidBody
 from .sections import Across, Rectangle, Section
@@ -565,11 +565,7 @@ class Beam(Frozen):
 
     def section_node(self, boundary: Place) -> int:
         """The node of a place that is one section, see :meth:`dofs`."""
-        facets = np.asarray(facets_of(self.mesh, boundary))
-        if len(facets) != 1 or facets[0] >= self.mesh.p.shape[1]:
-            raise MeshError(f"boundary {boundary!r} is not one section of the beam; sections are "
-                            "'left' and 'right', or the point of a node of the axis")
-        return int(facets[0])
+        return node_of(self.mesh, boundary)
 
     def section_direction(self, node: int) -> tuple[Array, Array]:
         """Coordinates (2, n) and weights (n,) of the direction 12 / h^3 int Y r dY of a section."""

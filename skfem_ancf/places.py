@@ -53,9 +53,10 @@ def as_point(point: Any, mesh: MeshBeam | None = None) -> Array:
     Parameters
     ----------
     point
-        Its place (x, y) in the stress-free body: a tuple, a list or an array (2,).
+        Its place (x, y) in the stress-free body: a tuple, a list or an array (2,); or the name of
+        a boundary that is one section, as "right", for the axis there.
     mesh
-        Of the body, to say in the message where a boundary is that was named instead; or None.
+        Of the body, without which no boundary can be named; or None.
     """
     if type(point) is tuple and len(point) == 2 and (
             isinstance(point[0], float) and isinstance(point[1], float)
@@ -69,13 +70,10 @@ def as_point(point: Any, mesh: MeshBeam | None = None) -> Array:
     if flat and not any(
             isinstance(x, (str, bytes, bool, np.bool_)) for x in point):
         return require_finite("a material point", point, (2,))
-    hint = ""
     if isinstance(point, str) and mesh is not None and point in (mesh.boundaries or {}):
-        facets = np.asarray(mesh.boundaries[point])
-        if len(facets) == 1 and facets[0] < mesh.p.shape[1]:
-            hint = f"; the axis at {point!r} is {_pair(mesh.p[:, facets[0]])}"
-    raise MeshError(f"a material point has two coordinates (x, y), its place in the stress-free "
-                    f"body, got {shown(point)}{hint}")
+        return mesh.p[:, node_of(mesh, point)]
+    raise MeshError("a material point has two coordinates (x, y), its place in the stress-free "
+                    f"body, or is the name of an end, as 'right', got {shown(point)}")
 
 
 def on_other_mesh(place: object) -> bool:
@@ -146,6 +144,28 @@ def facets_of(mesh: MeshBeam, place: Place) -> Array:
             isinstance(p, numbers.Integral) for p in place):
         hint = f"; for facets of those numbers write np.array({shown(list(place))})"
     raise InputError(f"a place is {KINDS}, got {shown(place)}{hint}")
+
+
+def node_of(mesh: MeshBeam, place: Place) -> int:
+    """The node of a place that is one section.
+
+    Parameters
+    ----------
+    mesh
+        A :class:`~skfem_ancf.MeshBeam`.
+    place
+        As of :func:`facets_of`.
+
+    Raises
+    ------
+    MeshError
+        If it is none, or more than one.
+    """
+    facets = np.asarray(facets_of(mesh, place))
+    if len(facets) != 1 or facets[0] >= mesh.p.shape[1]:
+        raise MeshError(f"boundary {place!r} is not one section of the beam; sections are "
+                        "'left' and 'right', or the point of a node of the axis")
+    return int(facets[0])
 
 
 def section_at(mesh: MeshBeam, point: ArrayLike) -> int:

@@ -169,6 +169,9 @@ class Points:
         MeshError
             If a point is in none of the beams.
         """
+        if isinstance(points, str):
+            beam = select_beam(self.beams, beam)
+            points = tuple(as_point(points, beam.mesh).tolist())
         if self.bodies:
             found = self._of_body(points, beam)
             if found is not None:

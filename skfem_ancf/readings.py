@@ -39,11 +39,7 @@ class Reading(NamedTuple):
 
     def located(self, scene: Scene) -> Located | Point:
         """The points in a scene."""
-        at = self.at
-        if isinstance(at, str):
-            beam = scene.beams[scene._number_of_beam(self.beam)]
-            at = tuple(beam.mesh.p[:, beam.section_node(at)].tolist())
-        return scene.system.points.find(at, self.beam)
+        return scene.system.points.find(self.at, self.beam)
 
     def of(self, scene: Scene, state: State) -> Any:
         """The value.

@@ -699,8 +699,8 @@ class Scene:
         force
             The force, shape (2,).
         at
-            The point: its place (x, y) in the stress-free body; of a rigid body also None, for its
-            centre of mass.
+            The point: its place (x, y) in the stress-free body, or "right" for the axis at that
+            end; of a rigid body also None, for its centre of mass.
         beam
             The beam, its name or its number, where several have the point; or a RigidBody.
         amplitude
@@ -1248,7 +1248,7 @@ class Scene:
         if not self._elements:
             return []
         masses = [x for x in self.elements if isinstance(x, PointMass) and x.mass]
-        return [bind_load(PointForce(mass.mass * load.g, tuple(mass.at), None, load.amplitude),
+        return [bind_load(PointForce(mass.mass * load.g, mass.at, None, load.amplitude),
                           self.members[k])
                 for k, load, _ in self._loads if isinstance(load, Weight)
                 for mass in masses if self._number(mass.beam) == k]

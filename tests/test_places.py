@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skfem import LinearForm
 
 from skfem_ancf import (AncfError, Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam,
-                        MeshError, NameUnknown, Scene, StVenantKirchhoff)
+                        MeshError, NameUnknown, RigidBody, Scene, StVenantKirchhoff)
 from skfem_ancf.joints import Joint
 from skfem_ancf.loads import Load
 from skfem_ancf.places import facets_of
@@ -97,13 +97,43 @@ def test_a_point_is_the_same_on_a_finer_mesh():
 
 def test_material_points():
     scene = Scene(beam())
-    for point in ("right", (1, 2, 3), 1.0, None, ("1", "0"), (1, 2j), (True, False)):
+    for point in ((1, 2, 3), 1.0, None, ("1", "0"), (1, 2j), (True, False)):
         with pytest.raises(InputError, match="material point"):
             scene.point_force((0, -1), at=point)
         with pytest.raises(InputError, match="material point"):
             scene.state().displacement(point)
-    with pytest.raises(MeshError, match=r"the axis at 'right' is \(2, 0\)"):
-        scene.point_force((0, -1), at="right")
+    for point, message in ("rigth", "name of an end.*got 'rigth'"), ("top", "not one section"):
+        with pytest.raises(MeshError, match=message):
+            scene.point_force((0, -1), at=point)
+        with pytest.raises(MeshError, match=message):
+            scene.state().displacement(point)
+
+
+def test_ends_are_material_points():
+    """What takes a point takes the name of an end: of the only beam that has it."""
+    a, b = beam(line(), name="a"), beam(line(origin=(2.5, 0)), name="b")
+    body = RigidBody(mass=1.0, inertia=0.1, position=(0, 5), name="body")
+    found = []
+    for end in ("right", (2, 0)):
+        scene = Scene(a, body).clamp("left", "a").clamp(body).gravity((0, -1))
+        scene.point_force((0, -1), at=end).follower_force((1, 0), at=end).point_mass(2.0, at=end)
+        scene.spring(3.0, between=(end, (2, 1)))
+        scene.sensor("tip", "displacement", at=end)
+        state = scene.solve_static()
+        motion = scene.integrate(0.02, 1e-2)
+        found.append(np.concatenate([state.u, state.position(end), motion.velocity(end)[-1],
+                                     motion.sensors["tip"][-1], [state.resultants(end).angle]]))
+    assert_allclose(*found, rtol=1e-12, atol=1e-12)
+    scene = Scene(a, b).clamp("left", "a").clamp("left", "b")
+    assert scene.point_force((0, -1), at="right", beam="b").solve_static().displacement(
+        "right", "b")[1] < 0
+    for call in (lambda: scene.point_force((0, -1), at="right"),
+                 lambda: scene.spring(1.0, between=("right", (9, 9))),
+                 lambda: scene.state().displacement("right")):
+        with pytest.raises(InputError, match="say which"):
+            call()
+    with pytest.raises(InputError, match="got 'rigth'"):
+        Scene(a).clamp("left").spring(1.0, between=("rigth", (9, 9)))
 
 
 def test_welds_meet():
@@ -234,7 +264,7 @@ BAD = {
     "joint": [("glue",), ("line",), ("line", (9, 9), (1, 0)), ("plane", "top"),
               ("circle", (1, 0), (1, 0)), (Loose("raises"),)],
     "gravity": [(9.81,), ((0, np.inf),), ((0, -1), "b"), ((0, -1), None, 3.0)],
-    "point_force": [((0, -1), (9, 9)), ((0, -1), "right"), ((0, 1, 2), (1, 0)),
+    "point_force": [((0, -1), (9, 9)), ((0, -1), "rigth"), ((0, 1, 2), (1, 0)),
                     ((0, 1), (1, 0), None, "t")],
     "traction": [("top", (0, np.nan)), ("nowhere", (0, 1)), ("top", lambda x: x[9]),
                  ("top", lambda x: [x[0]]), ("top", lambda x: "up")],

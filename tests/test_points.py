@@ -201,7 +201,7 @@ def test_points_are_found_once_and_not_all_are_kept(monkeypatch):
     (np.array([[0.1], [np.inf]]), InputError, "infinite"),
     ([(True, 0.0)], MeshError, "two coordinates"),
     ([], MeshError, "two coordinates"),
-    ("left", MeshError, "the axis at 'left' is"),
+    ("lef", MeshError, "name of an end"),
 ])
 def test_what_is_no_point(what, error, message):
     state = bent(LINE, ElementBeamANCF(2))

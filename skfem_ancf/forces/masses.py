@@ -26,7 +26,7 @@ class PointMass(ForceElement):
     mass
         Zero or positive.
     at
-        The point: its place (x, y) in the stress-free body, shape (2,).
+        The point: its place (x, y) in the stress-free body, or the name of an end.
     inertia
         Moment of inertia, zero or positive, of what turns with the section of a node, which the
         point then has to be on.
@@ -38,15 +38,16 @@ class PointMass(ForceElement):
                  beam: WhichBeam = None) -> None:
         self.mass = require_not_negative("mass", mass)
         self.inertia = require_not_negative("inertia", inertia)
-        self.at, self.beam = require_finite("at", at, (2,)), beam
+        self.at = at if isinstance(at, str) else tuple(require_finite("at", at, (2,)).tolist())
+        self.beam = beam
         if not self.mass and not self.inertia:
             raise InputError("a point mass needs a mass or an inertia that is positive, got two "
                              "zeros")
 
     def bind(self, scene: Scene) -> list[Link]:
-        self._masses = [(self.mass, link(point(scene, self.beam, tuple(self.at))))]
+        self._masses = [(self.mass, link(point(scene, self.beam, self.at)))]
         if self.inertia:
-            self._masses.append((self.inertia, link(section(scene, self.beam, tuple(self.at))[1])))
+            self._masses.append((self.inertia, link(section(scene, self.beam, self.at)[1])))
         return [place for _, place in self._masses]
 
     def parts(self) -> list[Part]:

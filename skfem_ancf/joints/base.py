@@ -577,12 +577,12 @@ def members_at(scene: Scene, at: ArrayLike) -> list[int]:
     scene
         What :meth:`Joint.bind` was given.
     at
-        The place (x, y) in the stress-free state, shape (2,).
+        The place (x, y) in the stress-free state, shape (2,), or the name of an end.
     """
     found = []
     for k, member in enumerate(scene.members):
         if isinstance(member, RigidBody):
-            if member.contains(np.reshape(at, (2, 1)))[0]:
+            if not isinstance(at, str) and member.contains(np.reshape(at, (2, 1)))[0]:
                 found.append(k)
             continue
         try:
@@ -602,7 +602,7 @@ def named_place(scene: Scene, place: Any, where_none_is: str | None = None) -> t
         What :meth:`Joint.bind` was given.
     place
         (x, y): the material point there; (beam, (x, y)), or another place of a beam; a RigidBody,
-        for its centre of mass; ("ground", (x, y)).
+        for its centre of mass; ("ground", (x, y)); "right", for the end that one beam alone has.
     where_none_is
         Whose a point is where no beam and no body is: "ground", or None to raise InputError.
 
@@ -625,8 +625,10 @@ def named_place(scene: Scene, place: Any, where_none_is: str | None = None) -> t
         elif isinstance(at, np.ndarray):
             at = tuple(at.tolist())
         return which, at
-    at = require_finite("a point of a spring or a joint", place, (2,))
-    found = members_at(scene, at)
+    found = members_at(scene, place) if isinstance(place, str) else []
+    if not found:
+        place = require_finite("a point of a spring or a joint", place, (2,))
+        found = members_at(scene, place)
     if len(found) > 1:
         names = [scene.members[k].name or k for k in found]
         raise InputError(f"the point {shown(place)} is one of the beams {names}: say which, as "
@@ -635,7 +637,8 @@ def named_place(scene: Scene, place: Any, where_none_is: str | None = None) -> t
         raise InputError(f"no beam and no rigid body is at the point {shown(place)}: for one of "
                          f"the ground write ('ground', {shown(place)}), for one outside of the "
                          "outline of a rigid body (body, (x, y))")
-    return (found[0] if found else where_none_is), tuple(map(float, at))
+    return (found[0] if found else where_none_is), (
+        place if isinstance(place, str) else tuple(map(float, place)))
 
 
 def point(scene: Scene, beam: WhichMember, at: Any) -> Vector:
