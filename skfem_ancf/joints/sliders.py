@@ -119,13 +119,6 @@ class Sleeve(Joint):
         return self.axis.length(self._parameter(np.asarray(u)))
 
     def lost(self, u: Array) -> str:
-        """Why the joint does not hold any more, in words; "" if it does.
-
-        Parameters
-        ----------
-        u
-            Displacement of the scene's coordinates, shape (N,).
-        """
         s = self._parameter(u)
         if not self._outside(s):
             return ""

@@ -860,7 +860,7 @@ class Chain:
 
     def forces(self, u: Array) -> Array:
         """Element forces (ne, nb, 2) of a coordinate displacement (N,)."""
-        return self.element_forces(self.gather(self.checked(u)))
+        return self.forces_of(self.apart(), self.gather(self.checked(u)))
 
     def tangents(self, u: Array, geometric: bool = True) -> Array:
         """Element tangents (ne, 2 nb, 2 nb) of a coordinate displacement (N,).
@@ -877,18 +877,6 @@ class Chain:
         return np.concatenate([self.element_tangents(
             self.gather(u, part), part, carried and [C[:, :, part] for C in carried])
             for part in self.chunks()])
-
-    def element_forces(self, u_e: Array, elements: slice = slice(None)) -> Array:
-        """Forces (ne, nb, 2) of the displacements (ne, nb, 2) of a slice of elements.
-
-        Parameters
-        ----------
-        u_e
-            Displacements of the coordinates of these elements, shape (ne, nb, 2).
-        elements
-            A slice of the elements.
-        """
-        return self.forces_of(self.apart(elements), u_e)
 
     def forces_of(self, packs: list[Any], u_e: Array) -> Array:
         """Forces (ne, nb, 2) of packs as :func:`apart` makes them.

@@ -408,7 +408,7 @@ class CableKernel(Chain):
         if before is not None and before.points_number == n:
             self.packs = [self._renewed(*before.packs)]
         else:
-            self.packs = [self._pack(mesh, element, across, n)]
+            self.packs = [self._pack(mesh, element, n)]
 
     @property
     def volume(self) -> float:
@@ -435,7 +435,7 @@ class CableKernel(Chain):
         h = self._across.mesh.mapping().height(self.points)[0]
         return eps, 0.5 * np.transpose(h) * np.abs(kappa)
 
-    def _pack(self, mesh, element, across, n):
+    def _pack(self, mesh, element, n):
         """The tables of the reference element times powers of the lengths, of one or of each."""
         ne, nb = mesh.nelements, self.nd
         L = (mesh.lengths[:1] if self.shared else mesh.lengths)[:, None]
@@ -522,27 +522,9 @@ class CableKernel(Chain):
         return out
 
     def strain_increment(self, pack: CablePack, u: Array, du: Array, out: Array) -> None:
-        """The strain's derivative in the direction du, (2, points, elements).
-
-        Parameters
-        ----------
-        pack
-            The tables.
-        u, du, out
-            Displacement and direction, shape (N,), and the result.
-        """
         CABLES.carry(_unit(pack), u, du, np.zeros_like(out), out)
 
     def weighted_moduli(self, pack: CablePack, u: Array) -> Array:
-        """Weighted stiffnesses at the points, shape (2, 2, points, elements).
-
-        Parameters
-        ----------
-        pack
-            The tables.
-        u
-            Displacement, shape (N,).
-        """
         n, ne = pack.weights.shape[0], pack.start.size
         EA, EI, C = pack.stiffness
         return np.array([[EA, C], [C, EI]]) * np.broadcast_to(pack.weights, (n, ne))
@@ -558,6 +540,5 @@ class CableKernel(Chain):
         return self.viscous_packs(0.0)
 
     def without_material(self, pack: CablePack) -> CablePack:
-        """The pack of a cable without stiffness, for given normal forces and moments."""
         return pack._replace(stiffness=np.zeros_like(pack.stiffness),
                              pairs=pack.pairs._replace(held=pack.pairs.held[:, :0]))

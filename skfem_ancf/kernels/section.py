@@ -939,7 +939,6 @@ class Kernel(Chain):
 
     @property
     def linear(self) -> bool:
-        """True if all moduli are constant."""
         return all(pack.law.kind == LINEAR for pack in self.packs)
 
     @property
@@ -1025,15 +1024,6 @@ class Kernel(Chain):
         return other
 
     def inverted_members(self, packs: "Sequence[SectionPack]", u: Array) -> Array:
-        """For each of several beams alike whether it is :meth:`inverted`, shape (members,).
-
-        Parameters
-        ----------
-        packs
-            :func:`side_by_side` of each of the :attr:`packs`.
-        u
-            Displacement of the coordinates, shape (members, N).
-        """
         found = np.zeros(len(u), dtype=bool)
         for table, pack in zip(self.tables, packs):
             if table in self.firsts:
@@ -1054,27 +1044,9 @@ class Kernel(Chain):
         return min(first.shortest(pack, u_e) for first, pack, u_e in self._of_firsts(u))
 
     def strain_increment(self, pack: SectionPack, u: Array, du: Array, out: Array) -> None:
-        """The strain's derivative in the direction du, (3, points, elements).
-
-        Parameters
-        ----------
-        pack
-            The tables.
-        u, du, out
-            Displacement and direction, shape (N,), and the result.
-        """
         SECTIONS.carry(with_unit_law(pack), u, du, np.zeros_like(out), out)
 
     def weighted_moduli(self, pack: SectionPack, u: Array) -> Array:
-        """w D at the points of integration, shape (3, 3, points, elements).
-
-        Parameters
-        ----------
-        pack
-            The tables.
-        u
-            Displacement, shape (N,).
-        """
         n, ne = pack.weights.shape[0], pack.start.size
         if pack.law.kind == LINEAR:
             return np.broadcast_to(pack.law.D[:, :, None, None] * pack.weights, (3, 3, n, ne))
@@ -1097,7 +1069,6 @@ class Kernel(Chain):
             pairs=pack.pairs._replace(held=packed(pack.pairs.held[:, :0]))) for pack in self.packs]
 
     def without_material(self, pack: SectionPack) -> SectionPack:
-        """The pack of a law without stiffness, for given stresses."""
         return pack._replace(terms=packed(pack.terms[:, :0], np.int64),
                              rounds=np.zeros(1, np.int64), moduli=np.zeros((0, pack.start.size)),
                              law=pack.law._replace(kind=LINEAR),

@@ -543,16 +543,6 @@ class Across(Frozen):
         out[1, np.abs(out[1]) <= 1e-13 * np.sqrt(out[0] * out[2])] = 0.0  # as symmetric as it is
         return out
 
-    def simple_moments(self, what: str = "stiffness") -> tuple[float, float, float]:
-        """The numbers of :meth:`moments` where :attr:`simple` says that they are the same all over.
-
-        Parameters
-        ----------
-        what
-            As there.
-        """
-        return self._plain_moments(self.mesh.height, what)
-
     def _plain_moments(self, h, what):
         """Those of plain sections of heights h."""
         slab = self.slabs[0]
