@@ -14,6 +14,7 @@ from ..progress import progress_bar
 from .critical import find_critical
 from .iteration import CLOSED, reference_work, settled
 from .newton import rules_of
+from .stability import position_weights
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -91,9 +92,7 @@ class Tracer:
 
     def __init__(self, system: System, tol: float, max_iterations: int) -> None:
         self.system, self.rules = system, rules_of(system, "mixed", tol, max_iterations)
-        weights = np.zeros(system.N)
-        for beam, s in zip(system.members, system.slices):
-            weights[s].reshape(-1, beam.nd)[:, :2] = 1.0
+        weights = position_weights(system)
         self.weights = weights / (0.5 * weights.sum() * system.size**2)
         self.unit = system.values(1.0) - system.values(0.0)
         #: what a unit of load counts in the arc length, where it hardly moves the nodes
