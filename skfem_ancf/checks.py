@@ -230,25 +230,16 @@ def _joined(arrays):
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays, axis=-1)
 
 
-def warn_of(state: State, stacklevel: int) -> None:
-    """Give a :class:`~skfem_ancf.errors.ModelWarning` for each finding.
-
-    Parameters
-    ----------
-    state
-        A static State.
-    stacklevel
-        Of the caller's line, as for ``warnings.warn``.
-    """
+def warn_of(state: State) -> None:
+    """Give a :class:`~skfem_ancf.errors.ModelWarning` for each finding of ``solve_static``."""
     for text in state.system.forces.contacts.sunk(state.u, state.load):
-        warnings.warn(text, ModelWarning, stacklevel=stacklevel)
+        warnings.warn(text, ModelWarning, stacklevel=4)
     if state.system.screen.passes(state.u):
         return
     for beam in state.beams:
         u = state.u_of(beam)
         for text in _findings(beam, shortest(beam, u), turning(beam, u)):
-            warnings.warn(f"{text} (state.checks has the numbers)", ModelWarning,
-                          stacklevel=stacklevel)
+            warnings.warn(f"{text} (state.checks has the numbers)", ModelWarning, stacklevel=4)
 
 
 def _findings(beam, stretch, turn):

@@ -89,7 +89,7 @@ def displacement(system: System, state: State, name: str = "start") -> Array:
     return np.array(require_finite(f"{name}.u", state.u, (system.N,)))
 
 
-def configuration(system: System, state: State, name: str = "state") -> State:
+def configuration(system: System, state: State) -> State:
     """A State with its multipliers, as one of the equations of a scene.
 
     Parameters
@@ -98,20 +98,18 @@ def configuration(system: System, state: State, name: str = "state") -> State:
         The :class:`~skfem_ancf.system.System`.
     state
         A State, as for :func:`displacement`.
-    name
-        What messages call it.
 
     Raises
     ------
     InputError
         As :func:`displacement`, and if the state has multipliers of other joints.
     """
-    u = displacement(system, state, name)
+    u = displacement(system, state, "state")
     if state.system is system:
         return state
     kinds = [[(type(j), j.equations) for j in s.joints] for s in (state.system, system)]
     if kinds[0] != kinds[1]:
-        raise InputError(f"{name} has multipliers of other joints: {list(state.system.joints)} "
+        raise InputError(f"state has multipliers of other joints: {list(state.system.joints)} "
                          f"there, {list(system.joints)} in the scene; scene.state(u, multipliers) "
                          "takes them as they are")
     return state.replace(system=system, u=u)

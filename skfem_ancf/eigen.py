@@ -404,7 +404,7 @@ def buckling(system: System, k: int) -> Buckling:
     tangent = StrainTangent(system, zero, 0.0, None, none)
     n, m = tangent.size
     k = _count(k, n - m)
-    du, stress, multipliers = tangent.response(1.0)
+    du, stress, multipliers = tangent.response()
     Ks = tangent.geometric(stress, multipliers, 1.0)
     if not Ks.nnz or not abs(Ks).max() > 0.0:
         raise InputError("no positive load factor: the loads do not stress the beam")

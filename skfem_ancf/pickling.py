@@ -14,16 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
 
-def functions_of(things: Iterable[Any], what: str = "of") -> Iterator[tuple[str, Any]]:
-    """Pairs of a description and a function, for the functions that objects hold.
-
-    Parameters
-    ----------
-    things
-        Objects.
-    what
-        What stands between a function and its object in the description.
-    """
+def functions_of(things: Iterable[Any]) -> Iterator[tuple[str, Any]]:
+    """Pairs of a description and a function, for the functions that objects hold."""
     for thing in things:
         spread = getattr(thing, "_spread", None)  # of a load, which may hold a function too
         more = {} if spread is None else vars(spread)
@@ -34,7 +26,7 @@ def functions_of(things: Iterable[Any], what: str = "of") -> Iterator[tuple[str,
             value = getattr(value, "function", value)  # an Amplitude, for one
             for one in value if isinstance(value, tuple) else (value,):
                 if callable(one) and not isinstance(one, type):
-                    yield f"the function {name!r} {what} {shown(thing)}", one
+                    yield f"the function {name!r} of {shown(thing)}", one
 
 
 def require_picklable(items: Iterable[tuple[str, Any]]) -> None:

@@ -1523,7 +1523,7 @@ class Scene:
         if state.doubt:
             warnings.warn(f"{state.doubt}; the state is {state.verdict}", StabilityWarning,
                           stacklevel=3)
-        warn_of(state, stacklevel=4)
+        warn_of(state)
 
     def state(self, u: ArrayLike | None = None, multipliers: ArrayLike | None = None,
               load: float = 1.0) -> State:

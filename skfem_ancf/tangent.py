@@ -118,13 +118,8 @@ class StrainTangent:
              + self.system.curvature(u, time, multipliers))
         return S[self.free][:, self.free]
 
-    def response(self, load: float) -> tuple[Array, Array, Array]:
-        """The stress and the multipliers that a load causes by linear theory.
-
-        Parameters
-        ----------
-        load
-            Factor on the loads and on the displacements of supports.
+    def response(self) -> tuple[Array, Array, Array]:
+        """The stress and the multipliers that the full load causes by linear theory.
 
         Returns
         -------
@@ -133,10 +128,10 @@ class StrainTangent:
         """
         system, u = self.system, self._at[0]
         du = np.zeros(system.N)
-        du[system.fixed] = system.values(load)
-        rest = (load * system.external_force(u)[self.free] - self._element_force()
+        du[system.fixed] = system.values(1.0)
+        rest = (system.external_force(u)[self.free] - self._element_force()
                 - self.B.T @ (self._rows[1] @ du))
-        gap = -system.constraint(u + du, load)
+        gap = -system.constraint(u + du, 1.0)
         x, multipliers = Inverse(self).solve_both(rest[:, None], gap[:, None])
         du[self.free] = x[:, 0]
         return du, self._rows[1] @ du, multipliers[:, 0]

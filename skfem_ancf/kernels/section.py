@@ -770,13 +770,12 @@ def side_by_side(pack: SectionPack, members: int, N: int) -> SectionPack:
     members, N
         How many, and the number of coordinates of each.
     """
-    def all_of(x, axis, alike):
-        return x if x.shape[axis] in (alike, members * ne) else np.concatenate(members * [x], axis)
+    def all_of(x, axis):
+        return x if x.shape[axis] in (1, members * ne) else np.concatenate(members * [x], axis)
 
     ne = pack.start.size
     start = (N * np.arange(members)[:, None] + pack.start).ravel()
-    return pack._replace(start=start, table=all_of(pack.table, 0, 1),
-                         frame=all_of(pack.frame, 2, 1))
+    return pack._replace(start=start, table=all_of(pack.table, 0), frame=all_of(pack.frame, 2))
 
 
 def linearised(pack: SectionPack) -> SectionPack:

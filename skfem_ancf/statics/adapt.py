@@ -323,13 +323,13 @@ def refine(scene: Scene, marked: Sequence[ArrayLike]) -> tuple[Scene, Callable[[
 
     def prolong(u):
         parts = np.split(u, np.cumsum([b.N for b in scene.beams]))  # the last of rigid bodies
-        return np.concatenate([*(_prolong(a, b, m, v) for a, b, m, v in zip(
-            scene.beams, beams, marked, parts)), parts[-1]])
+        return np.concatenate([*(_prolong(b, m, v) for b, m, v in zip(
+            scene.beams, marked, parts)), parts[-1]])
 
     return scene.with_beams(beams), prolong
 
 
-def _prolong(old, new, marked, u):
+def _prolong(old, marked, u):
     """The same displacement on the mesh with the marked elements halved: the spaces are nested."""
     nodes = u.reshape(-1, old.element.nodal_dofs, 2)
     marked = np.unique(marked)
@@ -389,7 +389,7 @@ def _mark(coarse, state, fine, better, split):
             errors.append(np.zeros(a.mesh.nelements))
             continue
         u, v, every = state.u_of(a), better.u_of(b), np.arange(a.mesh.nelements)
-        d = v - _prolong(a, b, every, u)
+        d = v - _prolong(a, every, u)
         force, new = _collect(a, every, after[fine.system.of(b)])
         gap = force - before[coarse.system.of(a)].reshape(force.shape)
         work = np.abs(np.sum(gap * d.reshape(len(new), *gap.shape[1:])[~new], axis=(1, 2)))
