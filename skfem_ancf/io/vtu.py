@@ -91,7 +91,7 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
     ['S_xx', 'S_xy', 'S_yy', 'displacement']
     """
     require_like("state", state, "State", "beams", "u_of")
-    m, n = _subdivision(subdivide)
+    m, n = subdivision(subdivide)
     lagrange = require_flag("lagrange", lagrange)
     undeformed = require_flag("undeformed", undeformed)
     recover = require_flag("recover", recover)
@@ -352,7 +352,8 @@ class replacing:
             raise FileError(f"cannot write {str(self.path)!r}: {error}") from error
 
 
-def _subdivision(subdivide):
+def subdivision(subdivide: Any) -> tuple[int, ...]:
+    """Intervals along and across an element, checked."""
     try:
         m, n = subdivide
     except (TypeError, ValueError):

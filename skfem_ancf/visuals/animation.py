@@ -10,8 +10,9 @@ from ..errors import (FileError, InputError, MissingExtra, require_flag,
                       require_integer, require_like, require_option, require_path,
                       require_positive, require_text, taught)
 from ..io.vtu import replacing
-from .matplotlib import _colormap, unit_of
-from .pyvista import Scenery, _dressed, _look, lines_of, new_plotter, pixels
+from .matplotlib import colormap, figure_class, triangulation
+from .pyvista import dressed, lines_of, new_plotter, pixels
+from .scenery import GHOST, INK, MUTED, RIGID, WALL, Scenery
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -81,7 +82,7 @@ def animate(history: History, filename: StrPath, field: Any = "eps_yy", *,
     path, undeformed = _file(filename), require_flag("undeformed", undeformed)
     chosen = _chosen(history, frames)
     backend = _backend(backend)
-    cmap = _colormap(cmap)
+    cmap = colormap(cmap)
     fps = _fps(history, chosen, fps)
     size, unit = pixels("size", size), require_text("unit", unit)
     scenery = Scenery(list(history.states(chosen)), field, thickness, limits, subdivide,
@@ -152,12 +153,11 @@ def _by_pyvista(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: Any,
         if fine > 1:
             plotter.disable_anti_aliasing()
             plotter.render_window.SetDPI(fine * plotter.render_window.GetDPI())
-        mesh = _dressed(scenery, plotter, cmap, undeformed, unit)
+        mesh = dressed(scenery, plotter, cmap, undeformed, unit)
         # at a point: text in a corner is fitted to the window in each frame
         clock = plotter.add_text("", position=(0.985, 0.955), viewport=True, font_size=9,
                                  color="#444444")
         clock.GetTextProperty().SetJustificationToRight()
-        _look(plotter, scenery)
         for k, time in enumerate(t):
             mesh.points = scenery.points(k)
             if scenery.wall is not None:
@@ -188,39 +188,36 @@ def _picture_of(plotter, fine):
 
 def _by_matplotlib(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: Any,
                    unit: str | None) -> Iterator[Array]:
-    from .matplotlib import _GHOST, _INK, _MUTED, _RIGID, _WALL, _figure_class
-
-    Figure = _figure_class()
+    Figure = figure_class()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import LineCollection, PolyCollection
-    from matplotlib.tri import Triangulation
+    from matplotlib.colors import ListedColormap
 
     figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, layout="constrained")
     canvas, ax, field = FigureCanvasAgg(figure), figure.add_subplot(), scenery.field
     cells = scenery.cells
-    triangles = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
     every = np.concatenate([scenery.points(k, ghost) for k in range(len(t))
                             for ghost in (False, True)])
     low, high = every.min(axis=0), every.max(axis=0)
     margin = 0.04 * np.max(high - low)
     if undeformed:
         x = scenery.points(0, True)
-        ax.tripcolor(Triangulation(x[:, 0], x[:, 1], triangles), np.zeros(len(x)),
-                     cmap=_one_colour(_GHOST), shading="gouraud")
+        ax.tripcolor(triangulation(x[:, :2].T, cells), np.zeros(len(x)),
+                     cmap=ListedColormap([GHOST]), shading="gouraud")
     x = scenery.points(0)
-    image = ax.tripcolor(Triangulation(x[:, 0], x[:, 1], triangles), scenery.values(0),
+    image = ax.tripcolor(triangulation(x[:, :2].T, cells), scenery.values(0),
                          shading="gouraud", vmin=scenery.low, vmax=scenery.high,
-                         cmap=cmap or ("RdYlBu_r" if field.signed else "viridis"))
-    rigid = ax.add_collection(PolyCollection(scenery.outlines(0), facecolor=_RIGID, edgecolor=_INK))
-    walls = ax.add_collection(LineCollection(scenery.walls[0], colors=_WALL, linewidths=1.2))
+                         cmap=scenery.colours(cmap))
+    rigid = ax.add_collection(PolyCollection(scenery.outlines(0), facecolor=RIGID, edgecolor=INK))
+    walls = ax.add_collection(LineCollection(scenery.walls[0], colors=WALL, linewidths=1.2))
     ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
     ax.set_aspect("equal")
-    unit = unit_of(field, unit)
+    unit = scenery.unit(unit)
     bar = figure.colorbar(image, ax=ax, location="bottom", shrink=0.6, aspect=45)
     bar.set_label((field.title or field.name) + (f" ({unit})" if unit else ""), fontsize=8)
     bar.formatter.set_powerlimits((-3, 4))
-    ax.set_title(scenery.note, loc="left", fontsize=8, color=_MUTED)
-    clock = ax.set_title("", loc="right", fontsize=8, color=_INK)
+    ax.set_title(scenery.note, loc="left", fontsize=8, color=MUTED)
+    clock = ax.set_title("", loc="right", fontsize=8, color=INK)
     canvas.draw()
     figure.set_layout_engine("none")
     for artist in (walls, rigid, image, clock):
@@ -240,12 +237,6 @@ def _by_matplotlib(scenery: Any, t: Array, size: Any, undeformed: bool, cmap: An
         yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-def _one_colour(colour):
-    from matplotlib.colors import ListedColormap
-
-    return ListedColormap([colour])
-
-
 def _gif(path, images, fps, colours):
     try:
         from PIL import Image
@@ -263,7 +254,7 @@ def _colours(scenery, cmap):
     """256 colours as bytes: those of the colour map, and greys."""
     from matplotlib import colormaps
 
-    cmap = cmap or ("RdYlBu_r" if scenery.field.signed else "viridis")
+    cmap = scenery.colours(cmap)
     shades = (colormaps[cmap] if isinstance(cmap, str) else cmap)(np.linspace(0, 1, 216))
     greys = np.repeat(np.linspace(0, 1, 40)[:, None], 3, axis=1)
     return np.round(255 * np.concatenate([shades[:, :3], greys])).astype(np.uint8).tobytes()

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..beam import select_beam
 from ..errors import InputError, require_flag, require_like, taught
-from ..io.vtu import replacing
-from .matplotlib import _INK, _MUTED, _figure_class, _page
+from .matplotlib import figure_class, page, plain, save
+from .scenery import INK, MUTED
 
 if TYPE_CHECKING:
     from ..results import State
@@ -60,11 +60,11 @@ def plot_resultants(state: State, beam: WhichBeam = None, axes: Any = None, *,
     >>> [ax.get_ylabel() for ax in state.plot_resultants()]
     ['normal force $N$', 'shear force $Q$', 'bending moment $M$']
     """
-    Figure = _figure_class()
+    Figure = figure_class()
     require_like("state", state, "State", "beams", "resultants")
     recover = require_flag("recover", recover)
     beams = list(state.beams) if beam is None else [select_beam(state.beams, beam)]
-    filename, dpi = _page(None, title, filename, dpi)
+    filename, dpi = page(None, title, filename, dpi)
     if axes is None:
         axes = Figure(figsize=(6.0, 5.4), layout="constrained").subplots(3, 1, sharex=True)
     axes = [axes] if not isinstance(axes, (list, tuple, np.ndarray)) else list(
@@ -82,23 +82,17 @@ def plot_resultants(state: State, beam: WhichBeam = None, axes: Any = None, *,
             line, = ax.plot(found.s, values, lw=1.4, label=label if several else None)
             ax.fill_between(found.s, values, color=line.get_color(), alpha=0.18, lw=0)
     for ax, (_, label) in zip(axes, _ROWS):
-        ax.axhline(0.0, color=_MUTED, lw=0.6)
-        ax.set_ylabel(label, fontsize=9, color=_INK)
+        ax.axhline(0.0, color=MUTED, lw=0.6)
+        ax.set_ylabel(label, fontsize=9, color=INK)
         ax.ticklabel_format(axis="y", scilimits=(-3, 4), useMathText=True)
         _clear_of_noise(ax)
-        ax.tick_params(color=_MUTED, labelcolor=_INK, labelsize=8)
-        for side in ("top", "right"):
-            ax.spines[side].set_visible(False)
-        for side in ("left", "bottom"):
-            ax.spines[side].set_color(_MUTED)
-    axes[2].set_xlabel("arc length $s$", fontsize=9, color=_INK)
+        plain(ax)
+    axes[2].set_xlabel("arc length $s$", fontsize=9, color=INK)
     if several:
         axes[0].legend(fontsize=8, frameon=False)
     if title:
-        axes[0].set_title(title, loc="left", fontsize=10, color=_INK)
-    if filename is not None:
-        with replacing(filename) as temporary:
-            axes[0].figure.savefig(temporary, dpi=dpi)
+        axes[0].set_title(title, loc="left", fontsize=10, color=INK)
+    save(axes[0], filename, dpi=dpi)
     return axes
 
 

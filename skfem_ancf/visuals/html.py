@@ -76,14 +76,14 @@ def path_html(path: Path) -> str:
 
 def history_html(history: History) -> str:
     """The words of a History, and its energies over time."""
-    from .matplotlib import _dress, _figure_class
+    from .matplotlib import dress, figure_class
 
     def draw():
-        ax = _figure_class()(figsize=(5.5, 3.0), layout="constrained").subplots()
+        ax = figure_class()(figsize=(5.5, 3.0), layout="constrained").subplots()
         for name in ("strain", "kinetic", "potential", "total"):
             ax.plot(history.t, getattr(history, f"{name}_energy"), lw=1.4, label=name)
         ax.legend(fontsize=8, frameon=False)
-        _dress(ax, "energy", 1.0)
+        dress(ax, "energy")
         ax.set(xlabel="time", ylabel="")
         return ax
 

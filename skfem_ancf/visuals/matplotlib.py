@@ -6,30 +6,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import (InputError, MissingExtra, require_finite_scalar, require_flag,
-                      require_integer, require_like, require_option, require_path, require_positive,
-                      require_text, shown, taught)
-from ..fields import DRAWN, Field, find_field, values_on_grid
-from ..io.vtu import _subdivision, layout, replacing
+from ..errors import (InputError, MissingExtra, require_flag, require_integer, require_like,
+                      require_option, require_path, require_positive, require_text, taught)
+from ..io.vtu import replacing
 from ..obstacles.pictures import AROUND, around, outlines
+from .scenery import GHOST, INK, MUTED, RIGID, WALL, Scenery, cells_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from ..path import Path
-    from ..types import StrPath, WhichBeam
+    from ..types import Array, StrPath, WhichBeam
 
 
-#: ``thickness="auto"`` draws a section at least this part of the picture high.
-READABLE = 1 / 25
 
 #: Largest resolution of a file, in dots per inch.
 MAX_DPI = 2400
 
 _EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max",
            (True, True): "both"}
-_INK, _MUTED, _GHOST, _RIGID = "#222222", "#666666", "#d9d9d9", "#bbbbbb"
-_WALL = "#7a5230"
 
 
 @taught
@@ -103,66 +98,50 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
     >>> ax.get_title(loc="left")
     'second Piola–Kirchhoff stress $S_{xx}$, beam frame'
     """
-    Figure = _figure_class()
+    Figure = figure_class()
     from matplotlib.collections import LineCollection, PolyCollection
 
-    drawn, states = find_field(field, DRAWN), _states(state)
-    undeformed = require_flag("undeformed", undeformed)
-    recover = require_flag("recover", recover)
-    colorbar, cmap = require_flag("colorbar", colorbar), _colormap(cmap)
-    filename, dpi = _page(ax, title, filename, dpi)
+    states, undeformed = _states(state), require_flag("undeformed", undeformed)
+    colorbar, cmap = require_flag("colorbar", colorbar), colormap(cmap)
+    filename, dpi = page(ax, title, filename, dpi)
     unit = require_text("unit", unit)
-    m, n = _subdivision(subdivide)
-    bodies = [_Body(s, beam, drawn, m, n, recover) for s in states for beam in s.beams]
-    factor = _thickness(thickness, bodies)
-    ghosts = [line for b in bodies[:len(states[0].beams)] if undeformed
+    scenery = Scenery(states, field, thickness, limits, subdivide, recover)
+    drawn, bodies, factor, values = scenery.field, scenery.every, scenery.factor, scenery.found
+    ghosts = [line for b in scenery.frames[0] if undeformed
               for line in b.outline(b.reference, factor)]
     edges = [line for b in bodies for line in b.outline(b.deformed, factor)]
-    rigid = [b.outline_at(s.u_of(b)).T for s in states for b in getattr(s, "bodies", ())]
-    values = np.concatenate([np.zeros(0), *(b.values.ravel() for b in bodies)])
-    low, high = _limits(limits, values, drawn)
+    rigid = [line for k in range(len(states)) for line in scenery.outlines(k)]
 
     if ax is None:
         ax = Figure(figsize=_figsize(np.concatenate(ghosts + edges + rigid), colorbar),
                     layout="constrained").add_subplot()
     if ghosts:
-        ax.add_collection(PolyCollection(ghosts, facecolor=_GHOST, edgecolor=_GHOST, linewidth=0.5,
+        ax.add_collection(PolyCollection(ghosts, facecolor=GHOST, edgecolor=GHOST, linewidth=0.5,
                                          zorder=1), autolim=True)
     if rigid:
-        ax.add_collection(PolyCollection(rigid, facecolor=_RIGID, edgecolor=_INK, linewidth=0.5,
+        ax.add_collection(PolyCollection(rigid, facecolor=RIGID, edgecolor=INK, linewidth=0.5,
                                          zorder=1.5), autolim=True)
     if bodies:
-        image = ax.tripcolor(_triangulation(bodies, factor), values, shading="gouraud",
-                             cmap=cmap or ("RdYlBu_r" if drawn.signed else "viridis"),
-                             vmin=low, vmax=high, zorder=2)
+        points = [b.points(b.deformed, factor).reshape(2, -1) for b in bodies]
+        image = ax.tripcolor(triangulation(np.concatenate(points, axis=1), cells_of(bodies)),
+                             values, shading="gouraud", cmap=scenery.colours(cmap),
+                             vmin=scenery.low, vmax=scenery.high, zorder=2)
     ax.add_collection(LineCollection([np.vstack([line, line[:1]]) for line in edges],
-                                     colors=_INK, linewidths=0.5, zorder=3))
+                                     colors=INK, linewidths=0.5, zorder=3))
     box = around(np.concatenate(ghosts + edges + rigid).T)
     walls = [wall for s in states for wall in outlines(s, box)]
     if walls:
-        ax.add_collection(LineCollection(np.concatenate(walls), colors=_WALL, linewidths=1.2,
+        ax.add_collection(LineCollection(np.concatenate(walls), colors=WALL, linewidths=1.2,
                                          zorder=2.5), autolim=False)
     ax.set_aspect("equal")
     ax.margins(AROUND if walls else 0.04)
     ax.autoscale_view()
-    _dress(ax, (drawn.title or drawn.name) if title is None else title, factor)
+    dress(ax, (drawn.title or drawn.name) if title is None else title, scenery.note)
     if colorbar and bodies:
-        _add_colorbar(ax, image, bool(np.any(values < low)), bool(np.any(values > high)),
-                      unit_of(drawn, unit))
-    if filename is not None:
-        with replacing(filename) as temporary:
-            ax.figure.savefig(temporary, dpi=dpi, bbox_inches="tight")
+        _add_colorbar(ax, image, bool(np.any(values < scenery.low)),
+                      bool(np.any(values > scenery.high)), scenery.unit(unit))
+    save(ax, filename, dpi=dpi, bbox_inches="tight")
     return ax
-
-
-def _triangulation(bodies, factor):
-    """Two triangles for each quad."""
-    from matplotlib.tri import Triangulation
-
-    points = np.concatenate([b.points(b.deformed, factor).reshape(2, -1) for b in bodies], axis=1)
-    first = np.concatenate([[0], np.cumsum([b.values.size for b in bodies])])
-    cells = np.concatenate([f + b.cells for f, b in zip(first, bodies)])
-    return Triangulation(*points, np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]]))
 
 
 def _states(state):
@@ -173,117 +152,6 @@ def _states(state):
     for one in states:
         require_like("state", one, "State", "beams", "u_of")
     return states
-
-
-def _colormap(cmap):
-    """A colour map by its name, or itself; None for none."""
-    from matplotlib import colormaps
-    from matplotlib.colors import Colormap
-
-    if cmap is None or isinstance(cmap, Colormap):
-        return cmap
-    return require_option("colour map", cmap, tuple(colormaps))
-
-
-def _page(ax, title, filename, dpi):
-    """The file, or None, and its resolution; what is wrong is said before anything is drawn."""
-    from matplotlib.backend_bases import FigureCanvasBase
-
-    if ax is not None:
-        require_like("ax", ax, "matplotlib Axes", "tripcolor", "figure")
-    require_text("title", title)
-    dpi = require_positive("dpi", dpi)
-    if not 1.0 <= dpi <= MAX_DPI:
-        raise InputError(f"dpi must lie between 1 and {MAX_DPI}, got {dpi!r}")
-    if filename is not None:
-        known = sorted(FigureCanvasBase.get_supported_filetypes())
-        filename = require_path("filename", filename, [f".{kind}" for kind in known])
-    return filename, dpi
-
-
-class _Body:
-    """One beam on a grid: the deformed and the stress-free place of each point, and the field."""
-
-    def __init__(self, state, beam, field, m, n, recover):
-        X, quads = layout(beam, m, n)
-        values, rows = values_on_grid(state, beam, X, recover), X.shape[-1] // (m + 1)
-        self.rows, self.height = rows, beam.mesh.height
-        self.shape = (2, beam.mesh.nelements, m + 1, rows)
-        #: Quads as rows of points, shape (nc, 4).
-        self.cells = (np.arange(0, values.n, X.shape[-1])[:, None, None] + quads).reshape(-1, 4)
-        # the axis is at eta = 1/2, which is on the grid only if n is even
-        ends = np.array([np.linspace(0, 1, m + 1), np.full(m + 1, 0.5)])
-        flat = self.shape[:2] + (-1,)
-        x, axis = values.x.reshape(flat), beam.mesh.mapping().F(ends)
-        u, axis_u = values.u.reshape(flat), beam.displacements(state.u_of(beam), ends)
-        self.reference, self.deformed = (x, axis), (x + u, axis + axis_u)
-        self.values = field.of(values)
-        if field.components > 1:
-            self.values = np.sqrt(np.sum(self.values**2, axis=0))
-
-    def points(self, body, factor):
-        """Positions (2, nelements, m + 1, rows) with the section drawn ``factor`` thicker."""
-        x, axis = body
-        axis = axis[..., None]
-        return axis + factor * (x.reshape(self.shape) - axis)
-
-    def outline(self, body, factor):
-        """Closed lines around each unbroken run of elements, shape (points, 2)."""
-        x = self.points(body, factor)
-        cuts = np.nonzero(np.hypot(*(x[:, 1:, 0] - x[:, :-1, -1])).max(axis=-1)
-                          > 1e-6 * self.height)[0] + 1
-        out = []
-        for part in np.split(np.arange(x.shape[1]), cuts):
-            run = x[:, part].reshape(2, -1, self.rows)
-            out.append(np.hstack([run[:, :, 0], run[:, -1, 1:], run[:, -2::-1, -1],
-                                  run[:, 0, -2:0:-1]]).T)
-        return out
-
-
-def _thickness(thickness, bodies):
-    if not (isinstance(thickness, str) and thickness == "auto"):
-        return require_positive("thickness", thickness)
-    if not bodies:
-        return 1.0
-    shapes = [(b, p) for b in bodies for p in (b.reference, b.deformed)]
-    x = np.concatenate([axis.reshape(2, -1) for _, (_, axis) in shapes], axis=1)
-    factor = round(READABLE * np.max(np.ptp(x, axis=1)) / max(b.height for b in bodies))
-    for body, (x, axis) in shapes:  # both faces keep a third of the advance of the axis
-        step = np.diff(axis, axis=-1)
-        for face in (0, -1):
-            offset = np.diff(x.reshape(body.shape)[..., face] - axis, axis=-1)
-            turn = -np.sum(offset * step, axis=0) / np.sum(step**2, axis=0)
-            factor = min(factor, (2 / 3) // max(np.max(turn), 1e-300))
-    return float(max(1, factor))
-
-
-def _limits(limits, values, field):
-    if limits is not None:
-        try:
-            low, high = limits
-        except (TypeError, ValueError):
-            raise InputError(f"limits must be two numbers, got {shown(limits)}") from None
-        low, high = require_finite_scalar("limits", low), require_finite_scalar("limits", high)
-        if not low < high:
-            raise InputError(f"limits must increase, got {shown(limits)}")
-        return low, high
-    start = field.neutral
-    size = np.max(np.abs(values[np.isfinite(values)] - start), initial=0.0) or 1.0
-    return (start - size if field.signed else start), start + size
-
-
-def unit_of(field: Field, unit: str | None = None) -> str:
-    """What a colour bar says of the unit: nothing for numbers.
-
-    Parameters
-    ----------
-    field
-        A :class:`~skfem_ancf.fields.Field`.
-    unit
-        To say in place of its own.
-    """
-    unit = field.unit if unit is None else unit
-    return "" if unit == "1" else unit
 
 
 def _add_colorbar(ax, image, below, above, unit):
@@ -297,8 +165,8 @@ def _add_colorbar(ax, image, below, above, unit):
         bar = ax.figure.colorbar(image, cax=ax.inset_axes([1.03, 0.0, 0.03, 1.0]),
                                  extend=_EXTEND[below, above])
     bar.outline.set_visible(False)
-    bar.set_label(unit, fontsize=8, color=_MUTED)
-    bar.ax.tick_params(labelsize=8, color=_MUTED, labelcolor=_INK)
+    bar.set_label(unit, fontsize=8, color=MUTED)
+    bar.ax.tick_params(labelsize=8, color=MUTED, labelcolor=INK)
     bar.formatter.set_powerlimits((-3, 4))
     bar.formatter.set_useMathText(True)
     (bar.ax.xaxis if flat else bar.ax.yaxis).get_offset_text().set_size(8)
@@ -311,14 +179,6 @@ def _figsize(points, colorbar):
     area = 5.2 * 5.2 if aspect > 0.5 else 36.0
     w = min(8.0, np.sqrt(area / aspect))
     return w + (1.2 if colorbar else 0.3), max(1.6, w * aspect) + 0.9
-
-
-def _figure_class():
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise MissingExtra("matplotlib", "plot") from None
-    return Figure
 
 
 @taught
@@ -365,9 +225,9 @@ def plot_path(path: Path, point: ArrayLike, component: int = 1, beam: WhichBeam 
     >>> path.plot((1, 0)).get_ylabel()
     'load factor'
     """
-    Figure = _figure_class()
+    Figure = figure_class()
     component = require_integer("component", component, 0, 1)
-    filename, dpi = _page(ax, title, filename, dpi)
+    filename, dpi = page(ax, title, filename, dpi)
     if ax is None:
         ax = Figure(figsize=(5.5, 4.0), layout="constrained").subplots()
     u, load = path.displacement(point, beam)[:, component], path.load
@@ -377,25 +237,104 @@ def plot_path(path: Path, point: ArrayLike, component: int = 1, beam: WhichBeam 
         ax.plot(u[k:k + 2], load[k:k + 2], color=color, lw=1.6, ls=(0, (3, 2)) if dashed else "-")
     turns = np.nonzero(np.diff(np.sign(np.diff(load))))[0] + 1
     ax.plot(u[turns], load[turns], "o", ms=4, color=color)
-    _dress(ax, title, 1.0)
-    ax.set_xlabel(f"displacement $u_{'xy'[component]}$", fontsize=9, color=_INK)
-    ax.set_ylabel("load factor", fontsize=9, color=_INK)
-    if filename is not None:
-        with replacing(filename) as temporary:
-            ax.figure.savefig(temporary, dpi=dpi)
+    dress(ax, title)
+    ax.set_xlabel(f"displacement $u_{'xy'[component]}$", fontsize=9, color=INK)
+    ax.set_ylabel("load factor", fontsize=9, color=INK)
+    save(ax, filename, dpi=dpi)
     return ax
 
 
-def _dress(ax, title, factor):
-    if title:
-        ax.set_title(title, loc="left", fontsize=10, color=_INK, pad=6 if factor == 1.0 else 18)
+def figure_class() -> Any:
+    """matplotlib's Figure, which needs no window."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise MissingExtra("matplotlib", "plot") from None
+    return Figure
+
+
+def colormap(cmap: Any) -> Any:
+    """A colour map by its name, or itself; None for none."""
+    from matplotlib import colormaps
+    from matplotlib.colors import Colormap
+
+    if cmap is None or isinstance(cmap, Colormap):
+        return cmap
+    return require_option("colour map", cmap, tuple(colormaps))
+
+
+def page(ax: Any, title: str | None, filename: Any, dpi: float) -> tuple[Any, float]:
+    """The file, or None, and its resolution; what is wrong is said before anything is drawn.
+
+    Parameters
+    ----------
+    ax, title, filename, dpi
+        Those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`.
+    """
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    if ax is not None:
+        require_like("ax", ax, "matplotlib Axes", "tripcolor", "figure")
+    require_text("title", title)
+    dpi = require_positive("dpi", dpi)
+    if not 1.0 <= dpi <= MAX_DPI:
+        raise InputError(f"dpi must lie between 1 and {MAX_DPI}, got {dpi!r}")
+    if filename is not None:
+        known = sorted(FigureCanvasBase.get_supported_filetypes())
+        filename = require_path("filename", filename, [f".{kind}" for kind in known])
+    return filename, dpi
+
+
+def save(ax: Any, filename: Any, **options: Any) -> None:
+    """Write the figure of some Axes.
+
+    Parameters
+    ----------
+    ax, filename
+        The Axes, and the file, or None for none.
+    **options
+        Those of matplotlib's ``savefig``.
+    """
+    if filename is not None:
+        with replacing(filename) as temporary:
+            ax.figure.savefig(temporary, **options)
+
+
+def plain(ax: Any) -> None:
+    """Axes without a box, with small numbers."""
     for side in ("top", "right"):
         ax.spines[side].set_visible(False)
     for side in ("left", "bottom"):
-        ax.spines[side].set_color(_MUTED)
-    ax.tick_params(color=_MUTED, labelcolor=_INK, labelsize=8)
-    ax.set_xlabel("x", fontsize=9, color=_INK)
-    ax.set_ylabel("y", fontsize=9, color=_INK)
-    if factor != 1.0:
-        ax.annotate(f"section drawn {factor:g} times as thick", (0, 1), (0, 5), va="bottom",
-                    xycoords="axes fraction", textcoords="offset points", fontsize=8, color=_MUTED)
+        ax.spines[side].set_color(MUTED)
+    ax.tick_params(color=MUTED, labelcolor=INK, labelsize=8)
+
+
+def dress(ax: Any, title: str | None, note: str = "") -> None:
+    """Title, axes and labels of a picture.
+
+    Parameters
+    ----------
+    ax, title, note
+        The Axes, and what is above them, or None, and a small text there.
+    """
+    if title:
+        ax.set_title(title, loc="left", fontsize=10, color=INK, pad=18 if note else 6)
+    plain(ax)
+    ax.set_xlabel("x", fontsize=9, color=INK)
+    ax.set_ylabel("y", fontsize=9, color=INK)
+    if note:
+        ax.annotate(note, (0, 1), (0, 5), va="bottom",
+                    xycoords="axes fraction", textcoords="offset points", fontsize=8, color=MUTED)
+
+
+def triangulation(points: Array, cells: Array) -> Any:
+    """Two triangles for each quad.
+
+    Parameters
+    ----------
+    points, cells
+        Shape (2, n), and rows of 4 of them, (nc, 4).
+    """
+    from matplotlib.tri import Triangulation
+
+    return Triangulation(*points, np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]]))

@@ -11,16 +11,16 @@ import numpy as np
 from ..errors import (InputError, MissingExtra, require_flag, require_index, require_integer,
                       require_like, require_options, require_path, require_text, shown, taught,
                       teaching)
-from ..fields import DRAWN, FIELDS, Field, find_field, find_fields, values_on_grid
-from ..io.vtu import _subdivision, lagrange_cell, layout, replacing
-from ..obstacles.pictures import around, obstacles_of, outlines
-from .matplotlib import _Body, _colormap, _limits, _thickness, unit_of
+from ..fields import FIELDS, find_fields, values_on_grid
+from ..io.vtu import lagrange_cell, layout, replacing, subdivision
+from ..obstacles.pictures import around, outlines
+from .matplotlib import colormap
+from .scenery import RIGID, WALL, Scenery, outline_points
 
 if TYPE_CHECKING:
     from ..dynamics.history import History
     from ..results import State
-    from ..rigid import RigidBody
-    from ..types import Array, StrPath
+    from ..types import StrPath
 
 #: VTK's numbers of the cells.
 POLYGON, QUAD, LAGRANGE = 7, 9, 70
@@ -134,20 +134,6 @@ class _RigidGrid:
         made.Modified()
 
 
-def outline_points(body: RigidBody, u: Array) -> Array:
-    """The corners of a rigid body's outline, shape (n, 3).
-
-    Parameters
-    ----------
-    body
-        A :class:`~skfem_ancf.RigidBody`.
-    u
-        Displacement of its coordinates, shape (4,).
-    """
-    x = body.outline_at(u)
-    return np.array([*x, np.zeros(x.shape[1])]).T
-
-
 @teaching
 class Series:
     """A motion for pyvista: one mesh whose points and fields are those of any instant.
@@ -195,7 +181,7 @@ def _make(state, fields=None, subdivide=(8, 4), lagrange=False, undeformed=False
     pv = _pyvista()
     require_like("state", state, "State", "beams", "u_of")
     wanted, lenient = _wanted(fields)
-    subdivide = _subdivision(subdivide)
+    subdivide = subdivision(subdivide)
     lagrange = require_flag("lagrange", lagrange)
     undeformed = require_flag("undeformed", undeformed)
     options = wanted, lenient, undeformed, require_flag("recover", recover)
@@ -259,112 +245,37 @@ def has_display() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-class Scenery:
-    """Bodies of one or more instants with one factor of thickness and one range of colours.
+def dressed(scenery: Scenery, plotter: Any, cmap: Any, undeformed: bool, unit: str | None) -> Any:
+    """Put frame 0 into a plotter, seen from the front; returns its mesh.
 
     Parameters
     ----------
-    states
-        States of the same beams.
-    field, thickness, limits, subdivide, recover
+    scenery
+        What is drawn.
+    plotter, cmap, undeformed, unit
         Those of :func:`view`.
     """
-
-    def __init__(self, states: list[State], field: Any, thickness: Any, limits: Any,
-                 subdivide: tuple[int, int], recover: bool) -> None:
-        self.field: Field = find_field(field, DRAWN)
-        m, n = _subdivision(subdivide)
-        recover = require_flag("recover", recover)
-        self.frames = [[_Body(state, beam, self.field, m, n, recover) for beam in state.beams]
-                       for state in states]
-        self.rigid = [[(body, state.u_of(body)) for body in getattr(state, "bodies", ())]
-                      for state in states]
-        every = [body for frame in self.frames for body in frame]
-        self.factor = _thickness(thickness, every)
-        self.walls, self.wall = self._walls(states), None
-        values = np.concatenate([np.zeros(0), *(b.values.ravel() for b in every)])
-        self.low, self.high = _limits(limits, values, self.field)
-
-    def _walls(self, states):
-        """The outlines of obstacles in each frame, shapes (n, 2, 2)."""
-        none = np.zeros((0, 2, 2))
-        if not obstacles_of(states[0]):
-            return [none] * len(states)
-        every = [self.points(k, ghost)[:, :2] for k in range(len(states)) for ghost in (0, 1)]
-        box = around(np.concatenate(every).T)
-        return [np.concatenate([none, *outlines(state, box)]) for state in states]
-
-    def points(self, k: int, undeformed: bool = False) -> Any:
-        """Points of a frame, shape (n, 3).
-
-        Parameters
-        ----------
-        k
-            The frame.
-        undeformed
-            Those of the stress-free body.
-        """
-        x = np.concatenate([np.zeros((2, 0)), *(
-            b.points(b.reference if undeformed else b.deformed, self.factor).reshape(2, -1)
-            for b in self.frames[k])], axis=1)
-        return np.concatenate([np.array([*x, np.zeros(x.shape[1])]).T, *(
-            outline_points(body, 0.0 * u if undeformed else u) for body, u in self.rigid[k])])
-
-    def values(self, k: int) -> Any:
-        """Values of frame ``k``, shape (n,); NaN on rigid bodies."""
-        return np.concatenate([b.values.ravel() for b in self.frames[k]] + [
-            np.full(body.outline.shape[1], np.nan) for body, _ in self.rigid[k]])
-
-    def outlines(self, k: int) -> list[Any]:
-        """Corners of the rigid bodies of frame ``k``, shapes (n, 2)."""
-        return [body.outline_at(u).T for body, u in self.rigid[k]]
-
-    @property
-    def cells(self) -> Any:
-        """Quads as rows of points, shape (nc, 4)."""
-        first = np.cumsum([0] + [b.values.size for b in self.frames[0]])
-        return np.concatenate([np.zeros((0, 4), dtype=int), *(
-            f + b.cells for f, b in zip(first, self.frames[0]))])
-
-    @property
-    def faces(self) -> Any:
-        """Quads, and outlines of rigid bodies: the number of corners and the points of each."""
-        cells, at = self.cells, sum(b.values.size for b in self.frames[0])
-        parts = [np.hstack([np.full((len(cells), 1), 4), cells]).ravel()]
-        for body, _ in self.rigid[0]:
-            corners = body.outline.shape[1]
-            parts.append(np.append(corners, at + np.arange(corners)))
-            at += corners
-        return np.concatenate(parts)
-
-    @property
-    def note(self) -> str:
-        """What the picture says of the thickness."""
-        return "" if self.factor == 1.0 else f"section drawn {self.factor:g} times as thick"
-
-
-def _dressed(scenery, plotter, cmap, undeformed, unit):
-    """Put frame 0 into a plotter; returns its mesh."""
     pv, field, faces = _pyvista(), scenery.field, scenery.faces
     if undeformed:
         ghost = pv.PolyData(scenery.points(0, True) - [0.0, 0.0, 1e-6], faces)
         plotter.add_mesh(ghost, color="#e2e2e2", lighting=False)
     mesh = pv.PolyData(scenery.points(0), faces)
     mesh.point_data[field.name] = scenery.values(0)
-    unit = unit_of(field, unit)
+    unit = scenery.unit(unit)
     plotter.add_mesh(
         mesh, scalars=field.name, clim=(scenery.low, scenery.high), lighting=False,
-        cmap=cmap or ("RdYlBu_r" if field.signed else "viridis"), nan_color="#bbbbbb",
+        cmap=scenery.colours(cmap), nan_color=RIGID,
         scalar_bar_args=dict(title=f"{field.name} ({unit})\n" if unit else f"{field.name}\n",
                              color="black",
                              vertical=False, title_font_size=18, label_font_size=14, n_labels=5,
                              position_x=0.2, width=0.6, height=0.09, fmt="%.3g"))
     if len(scenery.walls[0]):
         scenery.wall = lines_of(scenery.walls[0])
-        plotter.add_mesh(scenery.wall, color="#7a5230", line_width=2, lighting=False)
+        plotter.add_mesh(scenery.wall, color=WALL, line_width=2, lighting=False)
     if scenery.note:
         plotter.add_text(scenery.note, position="upper_left", font_size=9, color="#444444")
     plotter.set_background("white")
+    _look(plotter, scenery)
     return mesh
 
 
@@ -435,12 +346,11 @@ def view(state: State, field: Any = "eps_yy", plotter: Any = None, *, thickness:
     path = None if filename is None else require_path("filename", filename, PICTURES)
     if plotter is not None:
         require_like("plotter", plotter, "pyvista Plotter", "add_mesh", "screenshot")
-    cmap, unit = _colormap(cmap), require_text("unit", unit)
+    cmap, unit = colormap(cmap), require_text("unit", unit)
     scenery = Scenery([state], field, thickness, limits, subdivide, recover)
     if plotter is None:
         plotter = new_plotter(pv, off_screen if path is None else True, window_size)
-    _dressed(scenery, plotter, cmap, require_flag("undeformed", undeformed), unit)
-    _look(plotter, scenery)
+    dressed(scenery, plotter, cmap, require_flag("undeformed", undeformed), unit)
     if path is not None:
         with replacing(path) as temporary:
             plotter.screenshot(str(temporary))
