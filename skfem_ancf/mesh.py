@@ -8,7 +8,6 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
-import scipy
 from numpy import ndarray
 from skfem.element import Element
 from skfem.generic_utils import OrientedBoundary
@@ -19,6 +18,7 @@ from .errors import (CallbackError, FileError, InputError, MeshError, NameUnknow
                      require_finite, require_finite_scalar, require_function, require_integer,
                      require_option, require_options, require_path, require_positive, shown,
                      teaching)
+from .finder import Finder
 from .frozen import Frozen, ReadOnlyDict
 from .kept import twin_of
 from .mapping import MappingBeam
@@ -568,41 +568,17 @@ class MeshBeam(Frozen, Mesh2D):
     def element_finder(self, mapping: Any = None) -> Callable[..., Array]:
         """A function from points x, y to the elements that hold them.
 
-        The function raises :class:`MeshError` for points outside the body.
+        The function raises :class:`MeshError` for points outside the body. ``mapping`` is
+        scikit-fem's argument: the mesh has its own.
         """
-        mapping = self._mapping() if mapping is None else mapping
-        samples = np.array([(np.arange(4) + 0.5) / 4, np.full(4, 0.5)])
-        tree = scipy.spatial.cKDTree(mapping.F(samples).reshape(2, -1).T)
-        k = min(6, 4 * self.nelements)
-        # points of an exact curve may lie a little outside its cubic elements
-        allowed = 1e-6 if self.is_straight else 1e-3
-
-        def best(x, candidates):
-            """The best of the candidates (n, k) for each point, and how far outside it is."""
-            n, k = candidates.shape
-            X = mapping.invF(np.repeat(x, k, axis=1)[:, :, None], tind=candidates.ravel())
-            outside = np.max(np.abs(X[:, :, 0] - 0.5) - 0.5, axis=0).reshape(n, k)
-            outside[np.isnan(outside)] = np.inf
-            size = np.max(np.abs(x), initial=0.0) + np.max(np.abs(self.p))
-            outside[outside < 1e-9 + 8 * np.finfo(float).eps * size / self.height] = 0.0
-            rows, which = np.arange(n), np.argmin(outside, axis=1)
-            return candidates[rows, which].astype(np.int32), outside[rows, which]
+        find = Finder(self)
 
         def finder(*x):
             x = require_finite("the points", x, (2, None))
-            near = tree.query(x.T, k=k)[1].reshape(x.shape[1], k) // 4
-            found, outside = best(x, np.sort(near, axis=1))
-            for i in np.nonzero(outside > allowed)[0]:  # rare: neighbouring coils are nearer
-                found[i:i + 1], outside[i:i + 1] = best(
-                    x[:, i:i + 1], np.arange(self.nelements)[None])
-                if outside[i] <= allowed:
-                    continue
-                bad = x[:, i]
-                raise MeshError(
-                    f"the point ({bad[0]:.9g}, {bad[1]:.9g}) is outside the body: points are named "
-                    f"by their place in the stress-free beam of height {self.height:.6g}, whose "
-                    f"axis runs from {self.p[:, 0].tolist()} to {self.p[:, -1].tolist()}")
-            return found
+            found, _, outside = find(x)
+            if np.any(outside > find.allowed):
+                raise find.refuse(x, outside)
+            return found.astype(np.int32)
 
         return finder
 
