@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .errors import CallbackError, MeshError, ask_array, warnings_as_errors
+from .quadrature import gauss
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -254,8 +255,8 @@ def _stencil(s, s0, s1):
 
 def _gauss_points(a, step):
     """Parameters (n, 12) of pieces that begin at a, and weights."""
-    x, w = _legendre()
-    return a[:, None] + step[:, None] * (0.5 + 0.5 * x), 0.5 * w
+    x, w = gauss(12)
+    return a[:, None] + step[:, None] * x, w
 
 
 def _require_no_kink(s, p, beside):
@@ -286,12 +287,6 @@ def _lagrange_derivatives():
         others = np.delete(STENCIL, i)
         out.append(np.polyder(np.poly(others) / np.prod(here - others)))
     return np.array(out)
-
-
-@cache
-def _legendre():
-    """Gauss points and weights of arc lengths, on [-1, 1]."""
-    return np.polynomial.legendre.leggauss(12)
 
 
 def check_curvature(bent: Array, s: Array, height: float | Array) -> None:
