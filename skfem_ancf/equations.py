@@ -408,6 +408,12 @@ class Tables:
                   else self.are_joints(tables))
         return tables if tabled else tables._replace(own=self.handle)
 
+    @property
+    def linear_joints(self) -> bool:
+        """True if the equations of joints are linear in the coordinates, the same at all times."""
+        joints = self.plain.joints
+        return not (len(joints.hk) or joints.own or self.motion_varies)
+
     def are_joints(self, tables: JointTables) -> bool:
         """True if the tables give Phi and its derivative: joints of others may not be quadratic.
 

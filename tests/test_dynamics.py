@@ -30,6 +30,7 @@ from skfem_ancf.equations import Equations
 from skfem_ancf.errors import (ConvergenceError, InputError, ModelWarning, NameUnknown,
                                SupportError)
 from skfem_ancf.formulations import FORMULATIONS
+from skfem_ancf.joints.base import rotation
 from skfem_ancf.kernels.moments import MomentPack
 from skfem_ancf.linalg import BandMatrix
 from skfem_ancf.sampling import sample
@@ -257,6 +258,36 @@ def test_high_order_with_joints_and_moving_supports():
     driven = driven_hub().integrate(1.0, 1 / 80, scheme="radau")
     for value, known in zip((driven.u, driven.v, driven.multipliers), driven_motion()):
         assert_allclose(value[-1], known, rtol=0, atol=5e-6 * np.abs(known).max())
+
+
+@pytest.mark.parametrize("points, n", [(1, 160), (2, 40), (3, 20)])
+def test_gauss_keeps_its_order_with_joints_that_are_linear(points, n):
+    """A clamp at an angle is what it is along an axis, and a hinge the motion that Radau has."""
+    runs = []
+    for angle in (0.0, 0.4):
+        mesh = MeshBeam.init_line([0.0, 0.5, 1.0], 0.1, angle=angle)
+        scene = Scene(Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(1e5, 0.3, 1000.0), 0.1))
+        scene.clamp("left").gravity(rotation(angle) @ [0.0, -9.81])
+        history = scene.integrate(0.5, 0.5 / n, scheme=Gauss(points))
+        runs.append([x.reshape(-1, 2) @ rotation(angle) for x in (history.u[-1], history.v[-1])])
+    assert scene.system.m
+    for one, other in zip(*runs):
+        assert_allclose(one, other, rtol=0, atol=1e-10 * np.abs(one).max())
+
+    def hinged():
+        right = soft(mesh=MeshBeam.init_line([1.0, 2.0], 0.5))
+        scene = Scene(soft(), right).pin("left", beam=0)
+        scene.hinge((1, 0))
+        return scene.gravity((0, -3.0))
+
+    fine = hinged().integrate(1.0, 1 / 160, scheme="radau")
+    coarse, better = (hinged().integrate(1.0, 1 / k, scheme=Gauss(points)) for k in (n, 2 * n))
+    for name in ("u", "v", "multipliers"):
+        errors = [np.abs(getattr(run, name)[-1] - getattr(fine, name)[-1]).max()
+                  for run in (coarse, better)]
+        assert np.log2(errors[0] / errors[1]) == pytest.approx(2 * points, abs=0.1 * points)
+    assert np.abs(hinged().system.constraint(better.u[-1], 1.0)).max() < 1e-14
+    assert np.ptp(better.total_energy) < 1e-3 * np.ptp(better.kinetic_energy)
 
 
 @pytest.mark.parametrize("scheme", [cls() for cls in SCHEMES.values()], ids=repr)

@@ -129,9 +129,10 @@ class Collocation(Scheme):
         return f"<{type(self).__name__}, {len(self.points)} points>"
 
     def require(self, system: System) -> None:
-        if system.m and not self.joined:
-            raise InputError(f"{self!r} loses its order with joints and rigid bodies: take "
-                             "'radau', or 'energy-momentum', which conserves energy with them")
+        if system.m and not (self.joined or system.machine.tables.linear_joints):
+            raise InputError(f"{self!r} loses its order with joints that turn or move, and with "
+                             "rigid bodies: take 'radau', or 'energy-momentum', which conserves "
+                             "energy with them")
 
     def local_error(self, old: Motion, new: Motion, dt: float) -> Array:
         """Estimate of the error that a step adds to the displacement, shape (N,).

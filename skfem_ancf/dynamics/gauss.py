@@ -27,6 +27,9 @@ class Gauss(Collocation):
     they are by the forces there, which for a pendulum of steel in 40 steps are those of vibrations
     that no step resolves, 240 times those of the swing.
 
+    Joints whose equations are linear in the coordinates and do not move, as clamps and lines at an
+    angle and hinges of beams, cost no order; others, and rigid bodies, are refused.
+
     Parameters
     ----------
     points
