@@ -2,6 +2,8 @@
 
 Symmetric: the lower half, entry (i, j) at ``j * ld + i - j``, and :data:`SPARE` zeros behind each
 column; its factors L D L^T take its place.
+In two halves, ``top`` below 0: in each column that of the lower half, and behind it that of the
+transpose's; its factors L D R^T take its place.
 Else entry (i, j) at ``j * ld + top + i - j``, LAPACK's storage for ``gbtrf``, whose factors take
 its place.
 """
@@ -14,7 +16,7 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 from scipy.linalg import blas, lapack
 
-from .source import F1, I1, by_place, lanes, primitive, source
+from .source import F1, I1, by_place, lanes, primitive, shaped, source
 
 if TYPE_CHECKING:
     from .types import Array
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
 SPARE = 6
 #: A pivot that small beside what it came from is round-off.
 LOST = 1e-13
+#: ``top`` of a matrix in two halves.
+HALVES = -1
 
 
 @by_place
@@ -40,7 +44,13 @@ class Band(NamedTuple):
 def as_lapack(A: Band) -> Array:
     """A view of LAPACK's band storage, shape (rows, n)."""
     ab = A.flat.reshape(-1, A.ld).T
-    return ab if A.top else ab[:A.width + 1]
+    return ab if A.top > 0 else ab[:A.width + 1]
+
+
+def _transposed(A):
+    """The same of the transpose, of a matrix without exchanges."""
+    first = A.ld // 2 if A.top < 0 else 0
+    return A.flat.reshape(-1, A.ld).T[first:first + A.width + 1]
 
 
 @primitive("factors")
@@ -48,7 +58,7 @@ def multiply(A, x, y):
     """y = A x."""
     n, k = len(x), A.width
     ab = as_lapack(A)
-    if not A.top:
+    if A.top == 0:
         y[:] = blas.dsbmv(k, 1.0, ab, x, lower=1)
     elif n > 2 * k:
         y[:] = blas.dgbmv(n, n, k, k, 1.0, ab[k:], x)
@@ -70,41 +80,47 @@ def factorize(A):
     """Factorise in place; False if a pivot is lost.
 
     A symmetric matrix is not pivoted: one that is not positive definite has factors L D L^T too,
-    unless one of its leading parts is singular.
+    unless one of its leading parts is singular. Nor is one in two halves.
     """
     ab = as_lapack(A)
-    if A.top:
+    if A.top < 0:
+        return _eliminate(A)
+    if A.top > 0:
         lu, A.pivots[:], info = lapack.dgbtrf(ab, A.width, A.width)
         ab[:] = lu
         return bool(info == 0 and np.all(np.isfinite(lu[A.top])))
     c, info = lapack.dpbtrf(ab, lower=1)
     if info != 0:
-        return _indefinite(A.flat.reshape(-1, A.ld), A.width)
+        return _eliminate(A)
     before, ab[0] = ab[0].copy(), c[0] ** 2
     ab[1:] = c[1:] / c[0]
     return bool(np.all(ab[0] >= LOST * before))
 
 
-def _indefinite(columns, width):
-    """L D L^T of columns (n, ld).
+def _eliminate(A):
+    """L D L^T, or L D R^T of two halves.
 
     From one column to the next an entry of a row is ld - 1 numbers on: what is left of the next
     columns is a square, and what of it is above the diagonal belongs to others.
     """
-    n, ld = columns.shape
-    stride, lower = columns.itemsize, np.tri(min(width, n - 1)).T  # its rows are columns
+    columns, rows = (x.T for x in (as_lapack(A), _transposed(A)))
+    n, stride = len(columns), columns.itemsize
+    lower = np.tri(min(A.width, n - 1)).T  # its rows are columns
+    both = ((columns, rows), (rows, columns))[:1 if A.top == 0 else 2]
     for j in range(n):
-        m, d = min(width, n - 1 - j), columns[j, 0]
+        m, d = min(A.width, n - 1 - j), columns[j, 0]
         if not abs(d) > 0.0:
             return False
         if m:
-            below, diagonal = columns[j, 1:m + 1], columns[j + 1:j + 1 + m, 0]
-            factor, before = below / d, np.abs(diagonal)
-            left = as_strided(columns[j + 1:], (m, m), (stride * (ld - 1), stride))
-            left -= lower[:m, :m] * factor[:, None] * below
+            diagonal = columns[j + 1:j + 1 + m, 0]
+            before = np.abs(diagonal)
+            for x, y in both:
+                left = as_strided(x[j + 1:], (m, m), (stride * (A.ld - 1), stride))
+                left -= lower[:m, :m] * (y[j, 1:m + 1] / d)[:, None] * x[j, 1:m + 1]
             if (np.abs(diagonal) < LOST * before).any():
                 return False
-            below[:] = factor
+            for x, _ in both:
+                x[j, 1:m + 1] /= d
     return bool(np.all(np.isfinite(columns[:, 0])))
 
 
@@ -112,11 +128,11 @@ def _indefinite(columns, width):
 def solve(A, x):
     """Solve in place with the factors; x is (n,)."""
     ab = as_lapack(A)
-    if A.top:
+    if A.top > 0:
         x[:] = lapack.dgbtrs(ab, A.width, A.width, x, A.pivots)[0]
         return
     y = lapack.dtbtrs(ab, x, uplo="L", diag="U")[0].ravel() / ab[0]
-    x[:] = lapack.dtbtrs(ab, y, uplo="L", trans="T", diag="U")[0].ravel()
+    x[:] = lapack.dtbtrs(_transposed(A), y, uplo="L", trans="T", diag="U")[0].ravel()
 
 
 @primitive("factors")
@@ -180,11 +196,11 @@ def solve_many(A: Band, B: Array, X: Array) -> None:
         Right-hand sides and solutions, shape (m, N).
     """
     ab = as_lapack(A)
-    if A.top:
+    if A.top > 0:
         X[:] = lapack.dgbtrs(ab, A.width, A.width, B.T, A.pivots)[0].T
         return
     y = lapack.dtbtrs(ab, B.T, uplo="L", diag="U")[0] / ab[0][:, None]
-    X[:] = lapack.dtbtrs(ab, y, uplo="L", trans="T", diag="U")[0].T
+    X[:] = lapack.dtbtrs(_transposed(A), y, uplo="L", trans="T", diag="U")[0].T
 
 
 @primitive("factors")
@@ -253,18 +269,21 @@ def mirror(A):
 
 
 @source
-def widen(A, U):
-    """U = A, of which U stores both halves."""
-    clear(U.flat)
-    if A.top > 0:
-        copy(A.flat, U.flat)
+def add_halves(A, factor, U):
+    """U = A + factor U, of which U stores two halves."""
+    n, m, top = A.flat.size // A.ld, A.width + 1, A.top
+    rows, both = shaped(A.flat, (n, A.ld)), shaped(U.flat, (n, 2, U.ld // 2))
+    if top > 0:
+        for k in range(min(m, n)):
+            later = rows[k:]
+            for j in lanes(n - k):
+                both[j, 0, k] = rows[j, top + k] + factor * both[j, 0, k]
+                both[j, 1, k] = later[j, top - k] + factor * both[j, 1, k]
         return
-    n = A.flat.size // A.ld
-    lower, rows = A.flat.reshape(n, A.ld), U.flat.reshape(n, U.ld)
-    for k in range(A.width + 1):
+    for i in range(2):
         for j in lanes(n):
-            rows[j, U.top + k] = lower[j, k]
-    mirror(U)
+            for k in lanes(m):
+                both[j, i, k] = rows[j, k] + factor * both[j, i, k]
 
 
 @source
@@ -278,13 +297,17 @@ def fix_stored(flat, ld, width, top, fixed):
     """The same of what a band stores."""
     n, step = flat.size // ld, max(1, ld - 1)
     for i in fixed:
-        at = i * ld + top
+        at = i * ld + max(top, 0)
         for k in lanes(i * ld, (i + 1) * ld):
             flat[k] = 0.0
         for k in lanes(at - step * min(width, i), at, step):
             flat[k] = 0.0
         if top > 0:
             for k in lanes(at + step, at + step * min(width, n - 1 - i) + 1, step):
+                flat[k] = 0.0
+        if top < 0:
+            back = at + ld // 2
+            for k in lanes(back - step * min(width, i), back, step):
                 flat[k] = 0.0
         flat[at] = 1.0
 

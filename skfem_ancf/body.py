@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .band import clear, copy
-from .kernels.base import (CARRY, FORCE, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, VISCOUS,
-                           Destination, add_blocks, add_changes, add_pushes, add_scaled, repeated)
+from .kernels.base import (CARRY, FORCE, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, TURNED,
+                           VISCOUS, Destination, add_changes, add_pushes, add_scaled, repeated)
 from .kernels.cable import CablePack, cable_evaluate
 from .kernels.section import SectionPack, section_evaluate
 from .source import I1, I2, primitive, shaped, source
@@ -332,8 +332,7 @@ def add_force_by(body, copies, gradients, stresses, f):
 
 
 @source
-def add_turned(body, factor, gradients, A):
-    """Add ``factor B_0^T D (B_1 - B_0)`` to a band that stores both halves, by two gradients."""
-    for k in range(body.table.shape[0]):
-        B, C = _gradients(body, k, gradients[0]), _gradients(body, k, gradients[1])
-        add_blocks(factor, B[0], B[1], C[1], _starts(body, k), body.table[k, FIRST], A)
+def add_turned(body, u, v, U):
+    """Add ``B(u)^T D (B(v) - B(u))`` to a matrix in two halves."""
+    none = u[:0]
+    evaluate_body(body, np.int64(TURNED), u, v, u, none, np.int64(0), none, U.flat, U.ld)

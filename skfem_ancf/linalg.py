@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import blas, eigh, lapack
 from scipy.sparse import coo_matrix, issparse
 
-from .band import SPARE, Band, solve
+from .band import HALVES, SPARE, Band, solve
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -49,6 +49,18 @@ class Inertia(NamedTuple):
 
     negative: int
     singular: bool
+
+
+def halves(n: int, bandwidth: int) -> Band:
+    """A :class:`~skfem_ancf.band.Band` in two halves.
+
+    Parameters
+    ----------
+    n, bandwidth
+        Numbers of rows, and of subdiagonals.
+    """
+    ld = 2 * (bandwidth + 1 + SPARE)
+    return Band(np.zeros(n * ld), np.zeros(0, np.int64), ld, bandwidth, HALVES)
 
 
 def beside_zero(negative: Callable[[float], int]) -> Inertia:

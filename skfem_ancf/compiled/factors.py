@@ -4,7 +4,7 @@ import numpy as np
 
 from ..band import LOST, SPARE
 from .twin import jit
-from .vectors import products, scale, subtract, subtract_columns
+from .vectors import eliminate, products, scale, subtract, subtract_columns
 
 
 @jit
@@ -45,16 +45,16 @@ def add_multiple(c, x, y):
 
 @jit
 def factorize(A):
-    """L D L^T, or L U with exchanges of rows, in place; False if a pivot is lost.
+    """L D L^T, L D R^T, or L U with exchanges of rows, in place; False if a pivot is lost.
 
     Four columns at a time. The places between columns, which are zero, let vectors end behind them.
     """
     if A.top > 0:
         return _exchanging(A)
     flat, ld, n = A.flat, A.ld, A.flat.size // A.ld
-    last = n - n % 4
+    last, back = n - n % 4, _half(A)
     for j in range(0, last, 4):
-        if not _four_columns(flat, ld, A.width, j, min(A.width + 3, n - 1 - j)):
+        if not _four_columns(flat, back, ld, A.width, j, min(A.width + 3, n - 1 - j)):
             return False
     for j in range(last, n):
         at = j * ld
@@ -62,42 +62,61 @@ def factorize(A):
         for k in range(1, n - j):
             other = at + k * ld
             before = flat[other]
-            subtract_columns(flat, other, n - j - k, (at + k,), (flat[at + k] * inverse,))
+            _less(flat, back, other, n - j - k, (at + k,), (inverse,))
             if abs(flat[other]) < LOST * abs(before):
                 return False
         if inverse == 0.0:
             return False
-        scale(flat, at + 1, n - 1 - j, inverse)
+        _scale(flat, back, at + 1, n - 1 - j, inverse)
     return True
 
 
 @jit
-def _four_columns(flat, ld, width, j, last):
+def _half(A):
+    return A.ld // 2 if A.top < 0 else 0
+
+
+@jit
+def _less(flat, back, to, n, of, inverses):
+    """Subtract what earlier columns with these pivots have taken, from a half or from both."""
+    eliminate(flat, 0, back, to, n, of, inverses)
+    if back > 0:
+        eliminate(flat, back, -back, to, n, of, inverses)
+
+
+@jit
+def _scale(flat, back, to, n, c):
+    """Multiply a part of a column, of a half or of both."""
+    scale(flat, to, n, c)
+    if back > 0:
+        scale(flat, to + back, n, c)
+
+
+@jit
+def _four_columns(flat, back, ld, width, j, last):
     """Eliminate columns j to j + 3, which reach to row j + last; False if a pivot is lost."""
     a = j * ld
     b, c, d = a + ld, a + 2 * ld, a + 3 * ld
     ia, before = _inverse(flat[a], flat[a]), flat[b]
-    subtract_columns(flat, b, width, (a + 1,), (flat[a + 1] * ia,))
+    _less(flat, back, b, width, (a + 1,), (ia,))
     ib, before = _inverse(flat[b], before), flat[c]
-    subtract_columns(flat, c, width, (a + 2, b + 1), (flat[a + 2] * ia, flat[b + 1] * ib))
+    _less(flat, back, c, width, (a + 2, b + 1), (ia, ib))
     ic, before = _inverse(flat[c], before), flat[d]
-    subtract_columns(flat, d, width, (a + 3, b + 2, c + 1),
-                     (flat[a + 3] * ia, flat[b + 2] * ib, flat[c + 1] * ic))
+    _less(flat, back, d, width, (a + 3, b + 2, c + 1), (ia, ib, ic))
     id_ = _inverse(flat[d], before)
     if ia == 0.0 or ib == 0.0 or ic == 0.0 or id_ == 0.0:
         return False
     for k in range(4, last + 1):
         to = a + k * ld
         before = flat[to]
-        subtract_columns(
-            flat, to, last + 1 - k, (a + k, b + k - 1, c + k - 2, d + k - 3),
-            (flat[a + k] * ia, flat[b + k - 1] * ib, flat[c + k - 2] * ic, flat[d + k - 3] * id_))
+        _less(flat, back, to, last + 1 - k, (a + k, b + k - 1, c + k - 2, d + k - 3),
+              (ia, ib, ic, id_))
         if abs(flat[to]) < LOST * abs(before):
             return False
-    scale(flat, a + 1, width, ia)
-    scale(flat, b + 1, width, ib)
-    scale(flat, c + 1, width, ic)
-    scale(flat, d + 1, width, id_)
+    _scale(flat, back, a + 1, width, ia)
+    _scale(flat, back, b + 1, width, ib)
+    _scale(flat, back, c + 1, width, ic)
+    _scale(flat, back, d + 1, width, id_)
     return True
 
 
@@ -158,18 +177,19 @@ def solve(A, x):
     for j in range(last, n):
         for k in range(1, n - j):
             x[j + k] -= flat[j * ld + k] * x[j]
+    h = _half(A)
     for j in range(n - 1, last - 1, -1):
         x[j] /= flat[j * ld]
         for k in range(1, n - j):
-            x[j] -= flat[j * ld + k] * x[j + k]
+            x[j] -= flat[j * ld + h + k] * x[j + k]
     for j in range(last - 4, -1, -4):
         a, m = j * ld, min(A.width, n - 4 - j)
         b, c, d = a + ld, a + 2 * ld, a + 3 * ld
-        p, q, r, s = products(x, j + 4, m, flat, (a + 4, b + 3, c + 2, d + 1))
+        p, q, r, s = products(x, j + 4, m, flat, (a + h + 4, b + h + 3, c + h + 2, d + h + 1))
         s = x[j + 3] / flat[d] - s
-        r = x[j + 2] / flat[c] - r - flat[c + 1] * s
-        q = x[j + 1] / flat[b] - q - flat[b + 1] * r - flat[b + 2] * s
-        p = x[j] / flat[a] - p - flat[a + 1] * q - flat[a + 2] * r - flat[a + 3] * s
+        r = x[j + 2] / flat[c] - r - flat[c + h + 1] * s
+        q = x[j + 1] / flat[b] - q - flat[b + h + 1] * r - flat[b + h + 2] * s
+        p = x[j] / flat[a] - p - flat[a + h + 1] * q - flat[a + h + 2] * r - flat[a + h + 3] * s
         x[j], x[j + 1], x[j + 2], x[j + 3] = p, q, r, s
 
 

@@ -92,20 +92,36 @@ def add_pushes(B, start, S, f):
 
 
 @jit
-def add_blocks(c, B, old, new, start, first, A):
-    flat, n, span = shaped(B, (B.size,)), B.shape[1], B.shape[2]
-    whole, step = n - n % 4, A.ld - 1
-    for e in range(start.size):
-        at, to, x, y = e * n * span, (first + start[e]) * A.ld + A.top, old[e], new[e]
-        for l in range(span):
-            for s in range(0, whole, 4):
-                a = at + s * span
-                subtract(A.flat, to, flat, (a, a + span, a + 2 * span, a + 3 * span), span,
-                         (c * (x[s, l] - y[s, l]), c * (x[s + 1, l] - y[s + 1, l]),
-                          c * (x[s + 2, l] - y[s + 2, l]), c * (x[s + 3, l] - y[s + 3, l])))
-            for s in range(whole, n):
-                subtract(A.flat, to, flat, (at + s * span,), span, (c * (x[s, l] - y[s, l]),))
-            to += step
+def add_both_halves(table, pairs, start, first, M, to):
+    n, nb = table.shape[1], table.shape[2]
+    H, K, half = room((n, 4 * nb), M), room((nb, 4 * nb), M), to.ld // 2
+    flat, rows, whole = shaped(H, (H.size,)), shaped(K, (K.size,)), n - n % 4
+    for e in range(M.shape[2]):
+        G = table[first + e if table.shape[0] > 1 else 0]
+        H[:], K[:] = 0.0, 0.0
+        of = shaped(G, (G.size,))
+        for p in range(M.shape[0]):
+            g, h = pairs.pairs[0, p], pairs.pairs[1, p]
+            c = -0.5 if g == h else -1.0
+            for i in range(4):
+                subtract(flat, (4 * g + i) * nb, of, (h * nb,), nb, (c * M[p, i, e],))
+                subtract(flat, (4 * h + i) * nb, of, (g * nb,), nb, (c * M[p, 4 + i, e],))
+        for a in range(nb):
+            for g in range(0, whole, 4):
+                at = 4 * g * nb
+                subtract(rows, 4 * a * nb, flat, (at, at + 4 * nb, at + 8 * nb, at + 12 * nb),
+                         4 * nb, (-G[g, a], -G[g + 1, a], -G[g + 2, a], -G[g + 3, a]))
+            for g in range(whole, n):
+                subtract(rows, 4 * a * nb, flat, (4 * g * nb,), 4 * nb, (-G[g, a],))
+        at = (to.start + start[first + e]) * to.ld
+        for b in range(nb):
+            for j in range(2):
+                for a in range(b, nb):
+                    for i in range(j if a == b else 0, 2):
+                        k = at + 2 * (a - b) + i - j
+                        to.flat[k] += K[a, (2 * i + j) * nb + b]
+                        to.flat[k + half] += K[b, (2 * j + i) * nb + a]
+                at += to.ld
 
 
 @jit

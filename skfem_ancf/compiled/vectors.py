@@ -76,6 +76,25 @@ def subtract_columns(typing, y, to, n, of, c):
 
 
 @intrinsic
+def eliminate(typing, y, at, back, to, n, of, c):
+    """y[at + to + i] -= the sum of c[k] y[at + back + of[k]] y[at + of[k] + i], for each k.
+
+    For n numbers and up to :data:`MORE` behind.
+    """
+    def generate(context, builder, signature, args):
+        _, at, back, to, n, of, c = args
+        ends = [_end(context, builder, y, args[0], builder.add(at, one))
+                for one in (to, *unpack_tuple(builder, of))]
+        factors = [_wide(builder, builder.fmul(x, builder.load(builder.gep(end, [back]))))
+                   for x, end in zip(unpack_tuple(builder, c), ends[1:])]
+        with _vectors(builder, n) as i:
+            _write(builder, i, ends, factors, _subtracted)
+        return context.get_dummy_value()
+
+    return types.void(y, types.int64, types.int64, types.int64, types.int64, of, c), generate
+
+
+@intrinsic
 def scale(typing, y, to, n, c):
     """y[to + i] *= c, for n numbers and up to :data:`MORE` behind."""
     def generate(context, builder, signature, args):

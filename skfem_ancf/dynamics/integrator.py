@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..body import gradients_size
 from ..eliminated import Eliminated, EliminatedMass
 from ..errors import AncfError, InputError, SupportError, require_positive, shown
 from ..kept import cached_property, twin_of
-from ..linalg import BandMatrix
+from ..linalg import halves
 from ..own import handle_of
 from .base import Memories, Motion, Steps, contacts_of, in_steps, kept, same_scheme
 from .course import Courses
@@ -88,7 +87,7 @@ class Integrator:
         if in_steps(scheme) and system.by_nodes:
             self._nodes = Eliminated(system, A), EliminatedMass(system)
         turned = scheme.conserving and self._nodes is None
-        U = BandMatrix(system.N if turned else 0, system.bandwidth, False).band
+        U = halves(system.N if turned else 0, system.bandwidth)
         self.matrices = Matrices(M, system.mass_factors.band, A.band, U, *_damping(system))
         self._state = np.zeros(STATE)
         self.room: Any = None
@@ -104,9 +103,7 @@ class Integrator:
     def _work(self):
         """Work arrays of the steps of :mod:`~skfem_ancf.dynamics.steps`."""
         s = self.system
-        turned = self.matrices.U.flat.size > 0
-        return room_for_steps(s.N, s.m, s.machine.tables.stresses.size, gradients_size(
-            s.machine.tables.plain.body) if turned else 0, 0 if self._nodes else s.m)
+        return room_for_steps(s.N, s.m, s.machine.tables.stresses.size, 0 if self._nodes else s.m)
 
     def _begin(self, system, scheme, tol):
         """As if nothing had been integrated yet."""

@@ -17,10 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..band import (Band, add_multiple, clear, copy, dot, factorize, fix, multiply, solve_joined,
-                    subtract_rows, total, widen)
-from ..body import (add_force_of, add_turned, body_carry, body_force, body_gradients, body_mean,
-                    body_mixed, body_stress, body_tangent, body_tangent_by)
+from ..band import (Band, add_halves, add_multiple, clear, copy, dot, factorize, fix, multiply,
+                    solve_joined, subtract_rows, total)
+from ..body import (add_force_of, add_turned, body_carry, body_force, body_mean, body_mixed,
+                    body_stress, body_tangent)
 from ..forces.contact_texts import PRESSURES
 from ..forces.texts import (add_contact_tangent, add_elastic_force, add_rubbing_tangent,
                             augment_contact, element_stiffness, pace_contact, put_between,
@@ -266,8 +266,6 @@ class Work(NamedTuple):
     stresses
         Of all beams: zero, those at the begin, others, carried ones, those of the iterate, and the
         last two of rates of strains, shape (7, k).
-    gradients
-        Those of strains where the factors were made, shape (2, l), where U has a size.
     """
 
     y: F2
@@ -276,24 +274,23 @@ class Work(NamedTuple):
     J: F3
     S: F2
     stresses: F2
-    gradients: F2
 
 
-def room_for_steps(N: int, m: int, stresses: int, gradients: int, dense: int) -> Work:
+def room_for_steps(N: int, m: int, stresses: int, dense: int) -> Work:
     """The :class:`Work` of steps.
 
     Parameters
     ----------
     N, m
         Numbers of coordinates and of equations of joints.
-    stresses, gradients
-        Number of the stresses of all beams, and of their gradients that are kept.
+    stresses
+        Number of the stresses of all beams.
     dense
         Number of equations in dense matrices: m, or 0 where they are eliminated.
     """
     x, shares = np.zeros((len(Vectors._fields), N)), np.zeros((len(Shares._fields), m))
     return Work(np.zeros((4, N)), Vectors(*x), Shares(*shares), np.zeros((4, dense, N)),
-                np.zeros((dense, dense)), np.zeros((7, stresses)), np.zeros((2, gradients)))
+                np.zeros((dense, dense)), np.zeros((7, stresses)))
 
 
 @source
@@ -679,10 +676,7 @@ def _tangent(e, matrices, rule, s, w, state):
     _middle(rule, w)
     copy(w.x.middle, w.x.origin)
     copy(w.x.middle, w.x.ahead)
-    if turning(matrices, state):
-        body_tangent_by(e.body, w.x.middle, stresses[1], w.gradients[0], matrices.A)
-    else:
-        body_tangent(e.body, w.x.middle, w.x.force, stresses[1], yes, stresses[2], matrices.A)
+    body_tangent(e.body, w.x.middle, w.x.force, stresses[1], yes, stresses[2], matrices.A)
     if dampers.active > 0:
         add_damping(e.viscous, dampers, matrices.M, s.damping_factor / s.stiffness_factor,
                     w.x.middle, stresses, w.x.room, matrices.A)
@@ -789,9 +783,9 @@ def _turn(e, matrices, s, w):
     """
     U = matrices.U
     copy(w.x.u, w.x.ahead)
-    widen(matrices.A, U)
-    body_gradients(e.body, w.x.ahead, w.gradients[1])
-    add_turned(e.body, s.stiffness_factor, w.gradients, U)
+    clear(U.flat)
+    add_turned(e.body, w.x.middle, w.x.ahead, U)
+    add_halves(matrices.A, s.stiffness_factor, U)
     fix(U, e.fixed)
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 #: Elements of which Python evaluates matrices together; bounds the memory.
 CHUNK = 1024
 #: What a kernel finds; given as ``np.int64``, or Numba compiles for each.
-FORCE, TANGENT, MEAN, STRESS, CARRY, VISCOUS, GIVEN, GRADIENTS = range(8)
+FORCE, TANGENT, MEAN, STRESS, CARRY, VISCOUS, GIVEN, GRADIENTS, TURNED = range(9)
 #: Fields of a pack whose first axis are the elements, where they have matrices of their own.
 MATRICES = {"table", "constant"}
 #: Those whose last axis are the elements, where they have tables of their own.
@@ -40,7 +40,10 @@ TOGETHER = 4096
 
 
 class Destination(NamedTuple):
-    """Entry (i, j), i >= j, of a tangent is added at ``flat[(start + j) * ld + i - j]``."""
+    """Entry (i, j), i >= j, of a tangent is added at ``flat[(start + j) * ld + i - j]``.
+
+    Of one in two halves (j, i) is half of ld behind.
+    """
 
     flat: F1
     ld: int
@@ -105,17 +108,6 @@ def add_pushes(B, start, S, f):
     """f[start[e] + k] += sum_s B[e, s, k] S[s, e], B repeated for copies of the elements."""
     S = S.reshape(-1, len(start)).T.reshape(-1, len(B), 1, B.shape[1])
     np.add.at(f, start[:, None] + np.arange(B.shape[2]), (S @ B).reshape(len(start), -1))
-
-
-@primitive("primitives")
-def add_blocks(c, B, old, new, start, first, A):
-    """A[i + k, i + l] += c sum_s B[e, s, k] (new - old)[e, s, l], i = first + start[e].
-
-    Of a band A that stores both halves.
-    """
-    K, k = c * (B.transpose(0, 2, 1) @ (new - old)), np.arange(B.shape[2])
-    column = (first + start)[:, None, None] + k
-    np.add.at(A.flat, column * A.ld + A.top + k[:, None] - k, K)
 
 
 @source
@@ -273,6 +265,32 @@ def add_tangent(table, pairs, start, first, M, M_skew, to):
                 for e in lanes(size):
                     to.flat[column(below) + where[e]] += (column(x) * rows[k, e]
                                                           + column(y) * skew[m, e])
+
+
+@primitive("primitives")
+def add_both_halves(table, pairs, start, first, M, to):
+    """Add the sum of G_g^T M_gh G_h to a matrix in two halves.
+
+    Parameters
+    ----------
+    table, pairs, start, first, to
+        As for :func:`add_tangent`.
+    M
+        Of each pair (g, h) M_gh and M_hg, xx, xy, yx and yy; of g = h it is the mean of both, shape
+        (p, 8, elements).
+    """
+    nb, size, (g, h) = table.shape[2], M.shape[2], pairs.pairs[:2]
+    G = table if len(table) == 1 else table[first:first + size]
+    both = np.zeros((4, G.shape[1], G.shape[1], size))
+    X = (np.where(g == h, 0.5, 1.0)[:, None, None] * M).transpose(1, 0, 2)
+    both[:, g, h] += X[:4]
+    both[:, h, g] += X[4:]
+    K = G.transpose(0, 2, 1)[:, None] @ (both.transpose(3, 0, 1, 2) @ G[:, None])
+    K = K.reshape(size, 2, 2, nb, nb).transpose(0, 3, 1, 4, 2).reshape(size, 2 * nb, 2 * nb)
+    k, l = np.tril_indices(2 * nb)
+    at = (to.start + start[first:first + size])[:, None] * to.ld + l * to.ld + k - l
+    np.add.at(to.flat, at, K[:, k, l])
+    np.add.at(to.flat, at + to.ld // 2, K[:, l, k])
 
 
 @source

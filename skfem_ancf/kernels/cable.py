@@ -19,10 +19,10 @@ from ..kept import twin_of
 from ..quadrature import gauss
 from ..source import F2, F3, I1, lanes, primitive, room, shaped, source
 from ..types import Array
-from .base import (CARRY, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
-                   Texts, add_by_rows, add_force, add_held_energy, add_scaled, add_tangent, block,
-                   copy_stress, load, packed, pair_tables, product, scaled_pair_tables, times_held,
-                   weigh, with_constant)
+from .base import (CARRY, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, TURNED, VISCOUS, Chain,
+                   PairTables, Texts, add_both_halves, add_by_rows, add_force, add_held_energy,
+                   add_scaled, add_tangent, block, copy_stress, load, packed, pair_tables, product,
+                   scaled_pair_tables, times_held, weigh, with_constant)
 
 if TYPE_CHECKING:
     from ..formulations.base import Formulation
@@ -206,13 +206,12 @@ def cable_factors(stiffness, weights, at, r, length, kappa, stress, M, skew):
 
 
 @source
-def cable_gradients(table, first, pairs, r, length, kappa, out):
-    """Derivatives of the strains into ``out``, (2, points, elements, nb, 2).
+def row_gradients(r, length, kappa, X):
+    """Derivatives of the strains by a and b: of eps by a, of kappa by a and by b, (3, n, 2, e).
 
-    Those of eps by a are a / |a|, of kappa k / s by a and (-a1, a0) / s by b.
+    That of eps by a is a / |a|, those of kappa are k / s and (-a1, a0) / s.
     """
-    n, size = length.shape[0], length.shape[1]
-    X, b = room((3, n, 2, size), r), r[n:]
+    n, size, b = length.shape[0], length.shape[1], r[length.shape[0]:]
     for p in lanes(n):
         for e in lanes(size):
             a0, a1, k, c = r[p, 0, e], r[p, 1, e], kappa[p, e], 1.0 / length[p, e]
@@ -221,6 +220,39 @@ def cable_gradients(table, first, pairs, r, length, kappa, out):
             X[1, p, 0, e] = q * (b[p, 1, e] - 2.0 * k * a0)
             X[1, p, 1, e] = -q * (b[p, 0, e] + 2.0 * k * a1)
             X[2, p, 0, e], X[2, p, 1, e] = -q * a1, q * a0
+
+
+@source
+def turned_factors(stiffness, weights, at, X, Y, M):
+    """What :func:`~skfem_ancf.kernels.base.add_both_halves` takes, of gradients X and Y.
+
+    ``X^T D (Y - X)`` of the pairs (a, a), (a, b) and (b, b).
+    """
+    n, size = X.shape[1], X.shape[3]
+    EA, EI, ES = stiffness[0], stiffness[1], stiffness[2]
+    aa, ab, bb = M[:n], M[n:2 * n], M[2 * n:]
+    for i in range(2):
+        for j in range(2):
+            k, l = 2 * i + j, 4 + 2 * i + j
+            for p in lanes(n):
+                for e in lanes(size):
+                    w = weights[p, at[e]]
+                    A, I, S = w * EA[p, at[e]], w * EI[p, at[e]], w * ES[p, at[e]]
+                    x, y, z = X[0, p, i, e], X[1, p, i, e], X[2, p, i, e]
+                    dx, dy = Y[0, p, j, e] - X[0, p, j, e], Y[1, p, j, e] - X[1, p, j, e]
+                    dz = Y[2, p, j, e] - X[2, p, j, e]
+                    whole, last = (A * x + S * y) * dx + (S * x + I * y) * dy, I * z * dz
+                    aa[p, k, e], aa[p, l, e] = whole, whole
+                    ab[p, k, e], ab[p, l, e] = (S * x + I * y) * dz, z * (S * dx + I * dy)
+                    bb[p, k, e], bb[p, l, e] = last, last
+
+
+@source
+def cable_gradients(table, first, pairs, r, length, kappa, out):
+    """Derivatives of the strains into ``out``, (2, points, elements, nb, 2)."""
+    n, size = length.shape[0], length.shape[1]
+    X = room((3, n, 2, size), r)
+    row_gradients(r, length, kappa, X)
     out[:] = 0.0
     for j in range(3):
         g = pairs[j // 2, n:2 * n]
@@ -247,16 +279,23 @@ def cable_block(pack, what, first, last, u, v, f, given, out, to):
     """As :func:`cable_evaluate`, for the elements from ``first`` to ``last``."""
     whole, given, out = out, given[:, :, first:last], out[:, :, first:last]
     n, nr, nb, size = len(pack.weights), pack.table.shape[1], pack.table.shape[2], out.shape[2]
-    states, changes = 2 if what == MEAN else 1, what == CARRY or what == VISCOUS
+    changes, states = what == CARRY or what == VISCOUS, 2 if what == MEAN or what == TURNED else 1
     at, stiffness, weights = pack.place[first:last], pack.stiffness, pack.weights
     U, d, T = room((2, nb, 2, size), u), room((2, nr, 2, size), u), room((nr, 2, size), u)
     r, length, kappa = room((2, nr, 2, size), u), room((2, n, size), u), room((2, n, size), u)
     strain, S = room((2, 2, n, size), u), room((2, n, size), u)
-    for k in range(2 if what == MEAN or changes else 1):
+    for k in range(max(states, 1 + changes)):
         load(pack.start, pack.span, first, v if k else u, U[k])
         product(pack.table, first, U[k], d[k])
         if k < states:
             cable_strain(pack, first, d[k], r[k], length[k], kappa[k], strain[k])
+    if what == TURNED:
+        X, M = room((2, 3, n, 2, size), u), room((3 * n, 8, size), u)
+        for k in range(2):
+            row_gradients(r[k], length[k], kappa[k], X[k])
+        turned_factors(stiffness, weights, at, X[0], X[1], M)
+        add_both_halves(pack.table, pack.pairs, pack.start, first, M, to)
+        return
     if what == GRADIENTS:
         _write_gradients(pack, first, at, r[0], length[0], kappa[0], whole)
         if to.flat.size > 0:

@@ -20,10 +20,11 @@ from ..materials import LinearLaw
 from ..quadrature import product_rule
 from ..source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
 from ..types import Array
-from .base import (CARRY, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, VISCOUS, Chain, PairTables,
-                   Texts, add_by_rows, add_force, add_held_energy, add_scaled, add_tangent, apart,
-                   block, copy_stress, in_rounds, load, packed, pair_numbers, pair_tables, product,
-                   scaled_pair_tables, times_held, weigh, with_constant)
+from .base import (CARRY, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, TURNED, VISCOUS, Chain,
+                   PairTables, Texts, add_both_halves, add_by_rows, add_force, add_held_energy,
+                   add_scaled, add_tangent, apart, block, copy_stress, in_rounds, load, packed,
+                   pair_numbers, pair_tables, product, scaled_pair_tables, times_held, weigh,
+                   with_constant)
 from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
 
 if TYPE_CHECKING:
@@ -230,6 +231,21 @@ def pair_factors(rows, samples, terms, rounds, moduli, r, M, M_skew):
 
 
 @source
+def turned_factors(terms, rounds, moduli, r, d, M):
+    """What :func:`~skfem_ancf.kernels.base.add_both_halves` takes, for changes d of the rows r."""
+    M[:] = 0.0
+    for k in range(rounds.size - 1):
+        for t in lanes(rounds[k], rounds[k + 1]):
+            p, g, h = terms[0, t], terms[2, t], terms[3, t]
+            for e in lanes(r.shape[2]):
+                c = moduli[t, e]
+                for i in range(2):
+                    for j in range(2):
+                        M[p, 2 * i + j, e] += c * r[g, i, e] * d[h, j, e]
+                        M[p, 4 + 2 * i + j, e] += c * r[h, i, e] * d[g, j, e]
+
+
+@source
 def section_gradients(pack, first, r, points):
     """Derivatives of the strains at the points, shape (3, points, elements 2 nb)."""
     rows, size, nb = pack.rows, r.shape[2], pack.table.shape[2]
@@ -256,7 +272,8 @@ def section_evaluate(pack, what, u, v, f, given, out, to):
     what
         ``FORCE``, ``TANGENT``, ``MEAN``, ``STRESS``, ``CARRY``, ``VISCOUS``: the force of
         stresses that a linear law has of the rate of the strain, ``GIVEN``: that of given
-        stresses alone, without stabilisation, or ``GRADIENTS``, with a destination the tangent too.
+        stresses alone, without stabilisation, ``GRADIENTS``, with a destination the tangent too, or
+        ``TURNED``: see :func:`~skfem_ancf.body.add_turned`.
     u, v
         Displacement, and at the end for the mean, its change for carried stresses, its rate for
         viscous ones, shape (N,).
@@ -288,7 +305,8 @@ def section_block(pack, what, first, last, u, v, f, given, out, to):
     table, rows, law = pack.table, pack.rows, pack.law
     whole, given, out = out, given[:, :, first:last], out[:, :, first:last]
     n, nr, nb, size = len(pack.weights), table.shape[1], table.shape[2], out.shape[2]
-    changes, grows = what == MEAN or what == CARRY or what == VISCOUS, pack.grows
+    to_end, grows = what == MEAN or what == TURNED, pack.grows
+    changes = to_end or what == CARRY or what == VISCOUS
     shift = 0.5 if what == MEAN else 0.0
     at = pack.place[first:first + size]
     U, vectors = room((2, nb, 2, size), u), room((4, nr, 2, size), u)
@@ -299,7 +317,7 @@ def section_block(pack, what, first, last, u, v, f, given, out, to):
     set_tables(pack.frame, pack.weights, at, x, w)
     for part in range(1 + changes):  # the strain is quadratic: its change is a derivative
         load(pack.start, pack.span, first, v if part else u, U[part])
-        if part and what == MEAN:
+        if part and to_end:
             add_scaled(-1.0, U[0], U[1], U[1])
         product(table, first, U[part], d)
         add_scaled(shift if part else 1.0, d, r if part else x, r)
@@ -309,15 +327,18 @@ def section_block(pack, what, first, last, u, v, f, given, out, to):
         add_scaled(0.5, change, strain, strain)
         add_scaled(0.5, U[1], U[0], U[0])
     both = room((1 + grows, 9, n, size if what == CARRY or what == GRADIENTS
-                 or what == TANGENT and law.kind else 0), w)
+                 or (what == TANGENT or what == TURNED) and law.kind else 0), w)
     D = both[0]
-    none = what == CARRY or what == GRADIENTS or what == GIVEN and grows == 0
+    none = what == CARRY or what == GRADIENTS or what == TURNED or what == GIVEN and grows == 0
     for part in range(1 + grows):
         if part > 0:
             add_scaled(1.0, given, strain, strain)
         for k in range(1 if none else 0, 2 if D.size > 0 else 1):
             law_evaluate(law, change if what == VISCOUS else strain,
                          both[part] if k else strains[2 + part])
+        if what == TURNED:
+            _add_turned(pack, first, at, D, w, r, d, to)
+            return
         if what == GRADIENTS:
             X = room((3, n, 2 * nb * size), r)
             section_gradients(pack, first, r, X)
@@ -364,6 +385,16 @@ def _add_tangent(pack, first, at, samples, D, w, r, to):
     term_moduli(pack, at, D, w, moduli)
     pair_factors(pack.rows, samples, pack.terms, pack.rounds, moduli, r, M, M_skew)
     add_tangent(pack.table, pairs, pack.start, first, M, M_skew, to)
+
+
+@source
+def _add_turned(pack, first, at, D, w, r, d, to):
+    """What changes d of the rows change of the derivative of stresses of the strains."""
+    moduli = room((pack.terms.shape[1], r.shape[2]), r)
+    M = room((pack.pairs.pairs.shape[1], 8, r.shape[2]), r)
+    term_moduli(pack, at, D, w, moduli)
+    turned_factors(pack.terms, pack.rounds, moduli, r, d, M)
+    add_both_halves(pack.table, pack.pairs, pack.start, first, M, to)
 
 
 def with_unit_law(pack: SectionPack) -> SectionPack:
