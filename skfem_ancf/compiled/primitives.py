@@ -92,39 +92,6 @@ def add_pushes(B, start, S, f):
 
 
 @jit
-def add_both_halves(table, pairs, start, first, M, to):
-    n, nb = table.shape[1], table.shape[2]
-    H, K, half = room((n, 4 * nb), M), room((nb, 4 * nb), M), to.ld // 2
-    flat, rows, whole = shaped(H, (H.size,)), shaped(K, (K.size,)), n - n % 4
-    for e in range(M.shape[2]):
-        G = table[first + e if table.shape[0] > 1 else 0]
-        H[:], K[:] = 0.0, 0.0
-        of = shaped(G, (G.size,))
-        for p in range(M.shape[0]):
-            g, h = pairs.pairs[0, p], pairs.pairs[1, p]
-            c = -0.5 if g == h else -1.0
-            for i in range(4):
-                subtract(flat, (4 * g + i) * nb, of, (h * nb,), nb, (c * M[p, i, e],))
-                subtract(flat, (4 * h + i) * nb, of, (g * nb,), nb, (c * M[p, 4 + i, e],))
-        for a in range(nb):
-            for g in range(0, whole, 4):
-                at = 4 * g * nb
-                subtract(rows, 4 * a * nb, flat, (at, at + 4 * nb, at + 8 * nb, at + 12 * nb),
-                         4 * nb, (-G[g, a], -G[g + 1, a], -G[g + 2, a], -G[g + 3, a]))
-            for g in range(whole, n):
-                subtract(rows, 4 * a * nb, flat, (4 * g * nb,), 4 * nb, (-G[g, a],))
-        at = (to.start + start[first + e]) * to.ld
-        for b in range(nb):
-            for j in range(2):
-                for a in range(b, nb):
-                    for i in range(j if a == b else 0, 2):
-                        k = at + 2 * (a - b) + i - j
-                        to.flat[k] += K[a, (2 * i + j) * nb + b]
-                        to.flat[k + half] += K[b, (2 * j + i) * nb + a]
-                at += to.ld
-
-
-@jit
 def element_tangents(table, pairs, first, M, M_skew, K, K_skew):
     nb = table.shape[2]
     H, out = room((table.shape[1], 3 * nb), M), room((nb, 3 * nb), M)
@@ -152,6 +119,32 @@ def element_tangents(table, pairs, first, M, M_skew, K, K_skew):
         for n in range(K_skew.shape[0]):
             a, b = pairs.strictly[0, n], pairs.strictly[1, n]
             K_skew[n, 0, e] = 0.5 * (out[a, 2 * nb + b] - out[b, 2 * nb + a])
+
+
+@jit
+def element_products(table, pairs, first, M, M_skew, K, K_skew):
+    n, nb = table.shape[1], table.shape[2]
+    H, out = room((n, 4 * nb), M), room((nb, 4 * nb), M)
+    for e in range(M.shape[2]):
+        G = table[first + e]
+        H[:] = 0.0
+        for p in range(M.shape[0]):
+            g, h, q = pairs.pairs[0, p], pairs.pairs[1, p], pairs.pairs[2, p]
+            for i in range(4):
+                x, y, at = M[p, i, e], M_skew[q, i, e] if g != h else 0.0, i * nb
+                for a in range(nb):
+                    H[g, at + a] += (x + y) * G[h, a]
+                if g != h:
+                    for a in range(nb):
+                        H[h, at + a] += (x - y) * G[g, a]
+        np.dot(G.T, H, out)
+        for i in range(4):
+            for k in range(K.shape[0]):
+                a, b = pairs.lower[0, k], pairs.lower[1, k]
+                K[k, i, e] = 0.5 * (out[a, i * nb + b] + out[b, i * nb + a])
+            for k in range(K_skew.shape[0]):
+                a, b = pairs.strictly[0, k], pairs.strictly[1, k]
+                K_skew[k, i, e] = 0.5 * (out[a, i * nb + b] - out[b, i * nb + a])
 
 
 @jit

@@ -69,7 +69,8 @@ GROUPS = {
         Call(base.add_force, (F3, F3, F3, I1, I1, int, F3, F3, F1)),
         Call(base.product, (F3, int, F3, F3)),
         Call(base.turned_product, (F3, F3, int, F3, F3)),
-        Call(base.add_tangent, (F3, PairTables, I1, int, F3, F3, ByValue(Destination)))),
+        Call(base.add_tangent, (F3, PairTables, I1, int, F3, F3, ByValue(Destination))),
+        Call(base.add_both_halves, (F3, PairTables, I1, int, F3, F3, ByValue(Destination)))),
 }
 
 

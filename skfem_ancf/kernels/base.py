@@ -268,29 +268,45 @@ def add_tangent(table, pairs, start, first, M, M_skew, to):
 
 
 @primitive("primitives")
-def add_both_halves(table, pairs, start, first, M, to):
-    """Add the sum of G_g^T M_gh G_h to a matrix in two halves.
+def element_products(table, pairs, first, M, M_skew, K, K_skew):
+    """As :func:`element_tangents`, of xx, xy, yx and yy that have nothing to do with each other."""
+    rows, size, (g, h, k) = table.shape[1], M.shape[2], pairs.pairs
+    G, both = table[first:first + size][:, None], np.zeros((4, rows, rows, size))
+    x, y = (values.transpose(1, 0, 2) for values in (M, M_skew[k]))
+    y = np.where((g != h)[:, None], y, 0.0)
+    both[:, h, g], both[:, g, h] = x - y, x + y
+    out = (G.transpose(0, 1, 3, 2) @ (both.transpose(3, 0, 1, 2) @ G)).transpose(2, 1, 3, 0)
+    (a, b), (c, d) = pairs.lower, pairs.strictly
+    K[:] = 0.5 * (out[a, :, b] + out[b, :, a])
+    K_skew[:] = 0.5 * (out[c, :, d] - out[d, :, c])
 
-    Parameters
-    ----------
-    table, pairs, start, first, to
-        As for :func:`add_tangent`.
-    M
-        Of each pair (g, h) M_gh and M_hg, xx, xy, yx and yy; of g = h it is the mean of both, shape
-        (p, 8, elements).
-    """
-    nb, size, (g, h) = table.shape[2], M.shape[2], pairs.pairs[:2]
-    G = table if len(table) == 1 else table[first:first + size]
-    both = np.zeros((4, G.shape[1], G.shape[1], size))
-    X = (np.where(g == h, 0.5, 1.0)[:, None, None] * M).transpose(1, 0, 2)
-    both[:, g, h] += X[:4]
-    both[:, h, g] += X[4:]
-    K = G.transpose(0, 2, 1)[:, None] @ (both.transpose(3, 0, 1, 2) @ G[:, None])
-    K = K.reshape(size, 2, 2, nb, nb).transpose(0, 3, 1, 4, 2).reshape(size, 2 * nb, 2 * nb)
-    k, l = np.tril_indices(2 * nb)
-    at = (to.start + start[first:first + size])[:, None] * to.ld + l * to.ld + k - l
-    np.add.at(to.flat, at, K[:, k, l])
-    np.add.at(to.flat, at + to.ld // 2, K[:, l, k])
+
+@source
+def add_both_halves(table, pairs, start, first, M, M_skew, to):
+    """As :func:`add_tangent`, of factors xx, xy, yx and yy, to a matrix in two halves."""
+    size, half = M.shape[2], to.ld // 2
+    K = room((pairs.lower.shape[1], 4, size), M)
+    K_skew = room((pairs.strictly.shape[1], 4, size), M)
+    if pairs.symmetric.shape[0] == 1:
+        product(pairs.symmetric, first, M, K)
+        product(pairs.skew, first, M_skew, K_skew)
+    else:
+        element_products(table, pairs, first, M, M_skew, K, K_skew)
+    rows, skew = shaped(K, (4 * len(K), size)), shaped(K_skew, (4 * len(K_skew), size))
+    at, where = start[first:first + size], room(size, start)
+    for e in lanes(size):
+        where[e] = (to.start + at[e]) * to.ld
+    for part in range(4):  # elements have no left node in common
+        for n in lanes(pairs.ends[part], pairs.ends[part + 1]):
+            j, k, m = pairs.entries[1, n], pairs.entries[2, n] // 3 * 4, pairs.entries[3, n] * 4
+            below, i, l = pairs.entries[0, n] + j * to.ld, (pairs.entries[0, n] + j) % 2, j % 2
+            x, y = pairs.signs[0, n], pairs.signs[1, n] * (1 - 2 * i * (1 - l))
+            ij, ji = 2 * i + l, 2 * l + i
+            for e in lanes(size):
+                to.flat[column(below) + where[e]] += (column(x) * rows[k + ij, e]
+                                                      + column(y) * skew[m + ij, e])
+                to.flat[column(below + half) + where[e]] += (column(x) * rows[k + ji, e]
+                                                             - column(y) * skew[m + ji, e])
 
 
 @source

@@ -223,28 +223,25 @@ def row_gradients(r, length, kappa, X):
 
 
 @source
-def turned_factors(stiffness, weights, at, X, Y, M):
-    """What :func:`~skfem_ancf.kernels.base.add_both_halves` takes, of gradients X and Y.
-
-    ``X^T D (Y - X)`` of the pairs (a, a), (a, b) and (b, b).
-    """
-    n, size = X.shape[1], X.shape[3]
+def turned_factors(stiffness, weights, at, X, Y, M, skew):
+    """As :func:`cable_factors`, of ``X^T D (Y - X)`` for two gradients; xx, xy, yx and yy."""
+    n = X.shape[1]
     EA, EI, ES = stiffness[0], stiffness[1], stiffness[2]
     aa, ab, bb = M[:n], M[n:2 * n], M[2 * n:]
     for i in range(2):
         for j in range(2):
-            k, l = 2 * i + j, 4 + 2 * i + j
+            k = 2 * i + j
             for p in lanes(n):
-                for e in lanes(size):
+                for e in lanes(M.shape[2]):
                     w = weights[p, at[e]]
                     A, I, S = w * EA[p, at[e]], w * EI[p, at[e]], w * ES[p, at[e]]
                     x, y, z = X[0, p, i, e], X[1, p, i, e], X[2, p, i, e]
                     dx, dy = Y[0, p, j, e] - X[0, p, j, e], Y[1, p, j, e] - X[1, p, j, e]
                     dz = Y[2, p, j, e] - X[2, p, j, e]
-                    whole, last = (A * x + S * y) * dx + (S * x + I * y) * dy, I * z * dz
-                    aa[p, k, e], aa[p, l, e] = whole, whole
-                    ab[p, k, e], ab[p, l, e] = (S * x + I * y) * dz, z * (S * dx + I * dy)
-                    bb[p, k, e], bb[p, l, e] = last, last
+                    u, v = (S * x + I * y) * dz, z * (S * dx + I * dy)
+                    aa[p, k, e] = (A * x + S * y) * dx + (S * x + I * y) * dy
+                    ab[p, k, e], skew[p, k, e] = 0.5 * (u + v), 0.5 * (u - v)
+                    bb[p, k, e] = I * z * dz
 
 
 @source
@@ -290,11 +287,7 @@ def cable_block(pack, what, first, last, u, v, f, given, out, to):
         if k < states:
             cable_strain(pack, first, d[k], r[k], length[k], kappa[k], strain[k])
     if what == TURNED:
-        X, M = room((2, 3, n, 2, size), u), room((3 * n, 8, size), u)
-        for k in range(2):
-            row_gradients(r[k], length[k], kappa[k], X[k])
-        turned_factors(stiffness, weights, at, X[0], X[1], M)
-        add_both_halves(pack.table, pack.pairs, pack.start, first, M, to)
+        _add_turned(pack, first, at, r, length, kappa, to)
         return
     if what == GRADIENTS:
         _write_gradients(pack, first, at, r[0], length[0], kappa[0], whole)
@@ -336,6 +329,18 @@ def _add_tangent(pack, first, at, r, length, kappa, S, to):
     skew[n:] = 0.0
     cable_factors(pack.stiffness, pack.weights, at, r, length, kappa, S, M, skew)
     add_tangent(pack.table, pack.pairs, pack.start, first, M, skew, to)
+
+
+@source
+def _add_turned(pack, first, at, r, length, kappa, to):
+    """What the second state changes of the derivative of stresses of the strains of the first."""
+    n, size = length.shape[1], length.shape[2]
+    X, M, skew = room((2, 3, n, 2, size), r), room((3 * n, 4, size), r), room((n + 1, 4, size), r)
+    skew[n:] = 0.0
+    for k in range(2):
+        row_gradients(r[k], length[k], kappa[k], X[k])
+    turned_factors(pack.stiffness, pack.weights, at, X[0], X[1], M, skew)
+    add_both_halves(pack.table, pack.pairs, pack.start, first, M, skew, to)
 
 
 @source

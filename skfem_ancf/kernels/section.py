@@ -231,18 +231,18 @@ def pair_factors(rows, samples, terms, rounds, moduli, r, M, M_skew):
 
 
 @source
-def turned_factors(terms, rounds, moduli, r, d, M):
-    """What :func:`~skfem_ancf.kernels.base.add_both_halves` takes, for changes d of the rows r."""
-    M[:] = 0.0
+def turned_factors(terms, rounds, moduli, r, d, M, M_skew):
+    """As :func:`pair_factors`, of the moduli: what changes d of the rows change; xx, xy, yx, yy."""
     for k in range(rounds.size - 1):
         for t in lanes(rounds[k], rounds[k + 1]):
-            p, g, h = terms[0, t], terms[2, t], terms[3, t]
-            for e in lanes(r.shape[2]):
-                c = moduli[t, e]
-                for i in range(2):
-                    for j in range(2):
-                        M[p, 2 * i + j, e] += c * r[g, i, e] * d[h, j, e]
-                        M[p, 4 + 2 * i + j, e] += c * r[h, i, e] * d[g, j, e]
+            p, q, g, h = terms[0, t], terms[1, t], terms[2, t], terms[3, t]
+            for i in range(2):
+                for j in range(2):
+                    for e in lanes(r.shape[2]):
+                        c = 0.5 * moduli[t, e]
+                        x, y = c * r[g, i, e] * d[h, j, e], c * r[h, i, e] * d[g, j, e]
+                        M[p, 2 * i + j, e] += x + y
+                        M_skew[q, 2 * i + j, e] += x - y
 
 
 @source
@@ -390,11 +390,13 @@ def _add_tangent(pack, first, at, samples, D, w, r, to):
 @source
 def _add_turned(pack, first, at, D, w, r, d, to):
     """What changes d of the rows change of the derivative of stresses of the strains."""
-    moduli = room((pack.terms.shape[1], r.shape[2]), r)
-    M = room((pack.pairs.pairs.shape[1], 8, r.shape[2]), r)
+    pairs, size = pack.pairs, r.shape[2]
+    M, M_skew = room((pairs.pairs.shape[1], 4, size), r), room((pairs.skew.shape[2], 4, size), r)
+    moduli = room((pack.terms.shape[1], size), r)
+    M[:], M_skew[:] = 0.0, 0.0
     term_moduli(pack, at, D, w, moduli)
-    turned_factors(pack.terms, pack.rounds, moduli, r, d, M)
-    add_both_halves(pack.table, pack.pairs, pack.start, first, M, to)
+    turned_factors(pack.terms, pack.rounds, moduli, r, d, M, M_skew)
+    add_both_halves(pack.table, pairs, pack.start, first, M, M_skew, to)
 
 
 def with_unit_law(pack: SectionPack) -> SectionPack:
