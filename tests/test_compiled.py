@@ -14,7 +14,7 @@ from skfem_ancf.joints.base import point
 from skfem_ancf import band
 from skfem_ancf.batch import Batch
 from skfem_ancf.band import factorize as factorize_band, solve as solve_band
-from skfem_ancf.linalg import BandMatrix
+from skfem_ancf.linalg import BandMatrix, halves
 from skfem_ancf.materials import LinearLaw
 from skfem_ancf.readings import Readings
 from skfem_ancf.source import source
@@ -383,6 +383,31 @@ def test_factors_and_solutions(bands, n, width, definite):
         solve(K.band, x)
         assert_allclose(L @ (K.ab[0] * (L.T @ x)), b, rtol=0, atol=1e-14 * n * size * (
             np.max(np.abs(x)) + 1.0))
+
+
+@pytest.mark.parametrize("n, width", [(1, 0), (3, 0), (2, 1), (3, 2), (5, 3), (6, 5), (7, 2),
+                                      (12, 3), (13, 4), (23, 19), (40, 11)])
+def test_factors_and_solutions_of_two_halves(bands, n, width):
+    """L D R^T without pivots, of a matrix that is not symmetric."""
+    rng = np.random.default_rng(n)
+    dense = np.triu(np.tril(rng.standard_normal((n, n)), width), -width)
+    dense += (4 * width + 8) * np.eye(n)
+    b = rng.standard_normal(n)
+    for factorize, solve in bands:
+        A, x = halves(n, width), b.copy()
+        columns = A.flat.reshape(n, 2, -1)
+        for k in range(width + 1):
+            columns[:n - k, 0, k], columns[:n - k, 1, k] = np.diag(dense, -k), np.diag(dense, k)
+        assert factorize(A)
+        L, R = np.eye(n), np.eye(n)
+        for k in range(1, width + 1):
+            at = np.arange(k, n), np.arange(n - k)
+            L[at], R[at] = columns[:n - k, 0, k], columns[:n - k, 1, k]
+        assert_allclose(L @ np.diag(columns[:, 0, 0]) @ R.T, dense, rtol=0, atol=1e-12)
+        solve(A, x)
+        assert_allclose(dense @ x, b, rtol=0, atol=1e-13)
+        A.flat[:] = 0.0
+        assert not factorize(A)
 
 
 @pytest.mark.parametrize("n", [2, 5, 7])

@@ -16,8 +16,8 @@ from skfem_ancf.kernels import base as kinds_of
 from skfem_ancf.kernels.base import GIVEN, nowhere, repeated
 from skfem_ancf.kernels.cable import _unit
 from skfem_ancf.kernels.section import with_unit_law
-from skfem_ancf.band import fix
-from skfem_ancf.linalg import BandMatrix
+from skfem_ancf.band import add_halves, fix
+from skfem_ancf.linalg import BandMatrix, halves
 from skfem_ancf.materials import Material
 from skfem_ancf.sections import Across, Rectangle
 from skfem_ancf.switch import compiled_off
@@ -217,6 +217,37 @@ def test_gradients_carry_stresses_and_give_forces(kind, mesh):
     close(A.flat, B.flat)
 
 
+def from_halves(U):
+    """A matrix in two halves as a dense one."""
+    n = U.flat.size // U.ld
+    k = np.arange(U.width + 1)
+    i, j = np.arange(n)[:, None] + k, np.broadcast_to(np.arange(n)[:, None], (n, len(k)))
+    dense, columns, inside = np.zeros((n, n)), U.flat.reshape(n, 2, -1)[:, :, k], i < n
+    dense[j[inside], i[inside]] = columns[:, 1][inside]
+    dense[i[inside], j[inside]] = columns[:, 0][inside]
+    return dense
+
+
+@kinds
+@every
+def test_what_a_second_state_changes_of_the_derivative_of_forces(kind, mesh):
+    """``B(u)^T D (B(v) - B(u))``, as gradients give it, with the moduli at u."""
+    _, element, formulation, name = KINDS[kind]
+    system = Scene(Beam(MESHES[mesh](), element(), LAWS[name](2e5, 0.3), 0.02, formulation)).system
+    plain, N, (u, v) = system.machine.tables.plain.body, system.N, states(system)
+    U, expected = halves(N, system.bandwidth), np.zeros((N, N))
+    body.add_turned(plain, u, v, U)
+    first, last = np.zeros((2, body.gradients_size(plain)))
+    body.body_gradients(plain, u, first)
+    body.body_gradients(plain, v, last)
+    for k in range(len(plain.table)):
+        (B, DB), (C, _) = body._gradients(plain, k, first), body._gradients(plain, k, last)
+        for e, start in enumerate(body._starts(plain, k)):
+            own = slice(start, start + B.shape[2])
+            expected[own, own] += DB[e].T @ (C[e] - B[e])
+    close(from_halves(U), expected)
+
+
 @pytest.mark.skipif(compiled_off() is not None, reason="without Numba")
 @pytest.mark.parametrize("nodes", [[0, 0.2, 0.6, 1], np.linspace(0, 1, 35)])  # in several blocks
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if KINDS[kind][3] != "own"])
@@ -311,8 +342,13 @@ def test_fixed_rows_and_columns_of_a_band_matrix_are_those_of_the_identity(n, ba
             A.add(i[inside], j[inside], 2.0 + np.sin(i + 7.0 * j)[inside])
             free[fixed] = 0.0
             wanted = A.tocsc().toarray() * np.outer(free, free) + np.diag(1.0 - free)
+            U = halves(n, bandwidth)
+            U.flat[:] = 1.0
+            add_halves(A.band, 0.0, U)
             fix(A.band, fixed)
+            fix(U, fixed)
             assert_allclose(A.tocsc().toarray(), wanted, atol=0.0)
+            assert_allclose(from_halves(U), wanted, atol=0.0)
 
 
 def _energetic(kind):
