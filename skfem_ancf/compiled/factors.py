@@ -51,8 +51,16 @@ def factorize(A):
     """
     if A.top > 0:
         return _exchanging(A)
+    if A.top < 0:
+        return _all_columns(A, A.ld // 2)
+    return _all_columns(A, None)
+
+
+@jit
+def _all_columns(A, back):
+    """Factors of a lower half, or of both, the other one ``back`` behind."""
     flat, ld, n = A.flat, A.ld, A.flat.size // A.ld
-    last, back = n - n % 4, _half(A)
+    last = n - n % 4
     for j in range(0, last, 4):
         if not _four_columns(flat, back, ld, A.width, j, min(A.width + 3, n - 1 - j)):
             return False
@@ -62,34 +70,13 @@ def factorize(A):
         for k in range(1, n - j):
             other = at + k * ld
             before = flat[other]
-            _less(flat, back, other, n - j - k, (at + k,), (inverse,))
+            eliminate(flat, back, other, n - j - k, (at + k,), (inverse,))
             if abs(flat[other]) < LOST * abs(before):
                 return False
         if inverse == 0.0:
             return False
-        _scale(flat, back, at + 1, n - 1 - j, inverse)
+        scale(flat, back, at + 1, n - 1 - j, inverse)
     return True
-
-
-@jit
-def _half(A):
-    return A.ld // 2 if A.top < 0 else 0
-
-
-@jit
-def _less(flat, back, to, n, of, inverses):
-    """Subtract what earlier columns with these pivots have taken, from a half or from both."""
-    eliminate(flat, 0, back, to, n, of, inverses)
-    if back > 0:
-        eliminate(flat, back, -back, to, n, of, inverses)
-
-
-@jit
-def _scale(flat, back, to, n, c):
-    """Multiply a part of a column, of a half or of both."""
-    scale(flat, to, n, c)
-    if back > 0:
-        scale(flat, to + back, n, c)
 
 
 @jit
@@ -98,25 +85,25 @@ def _four_columns(flat, back, ld, width, j, last):
     a = j * ld
     b, c, d = a + ld, a + 2 * ld, a + 3 * ld
     ia, before = _inverse(flat[a], flat[a]), flat[b]
-    _less(flat, back, b, width, (a + 1,), (ia,))
+    eliminate(flat, back, b, width, (a + 1,), (ia,))
     ib, before = _inverse(flat[b], before), flat[c]
-    _less(flat, back, c, width, (a + 2, b + 1), (ia, ib))
+    eliminate(flat, back, c, width, (a + 2, b + 1), (ia, ib))
     ic, before = _inverse(flat[c], before), flat[d]
-    _less(flat, back, d, width, (a + 3, b + 2, c + 1), (ia, ib, ic))
+    eliminate(flat, back, d, width, (a + 3, b + 2, c + 1), (ia, ib, ic))
     id_ = _inverse(flat[d], before)
     if ia == 0.0 or ib == 0.0 or ic == 0.0 or id_ == 0.0:
         return False
     for k in range(4, last + 1):
         to = a + k * ld
         before = flat[to]
-        _less(flat, back, to, last + 1 - k, (a + k, b + k - 1, c + k - 2, d + k - 3),
+        eliminate(flat, back, to, last + 1 - k, (a + k, b + k - 1, c + k - 2, d + k - 3),
               (ia, ib, ic, id_))
         if abs(flat[to]) < LOST * abs(before):
             return False
-    _scale(flat, back, a + 1, width, ia)
-    _scale(flat, back, b + 1, width, ib)
-    _scale(flat, back, c + 1, width, ic)
-    _scale(flat, back, d + 1, width, id_)
+    scale(flat, back, a + 1, width, ia)
+    scale(flat, back, b + 1, width, ib)
+    scale(flat, back, c + 1, width, ic)
+    scale(flat, back, d + 1, width, id_)
     return True
 
 
@@ -177,7 +164,7 @@ def solve(A, x):
     for j in range(last, n):
         for k in range(1, n - j):
             x[j + k] -= flat[j * ld + k] * x[j]
-    h = _half(A)
+    h = ld // 2 if A.top < 0 else 0
     for j in range(n - 1, last - 1, -1):
         x[j] /= flat[j * ld]
         for k in range(1, n - j):

@@ -76,34 +76,39 @@ def subtract_columns(typing, y, to, n, of, c):
 
 
 @intrinsic
-def eliminate(typing, y, at, back, to, n, of, c):
-    """y[at + to + i] -= the sum of c[k] y[at + back + of[k]] y[at + of[k] + i], for each k.
+def eliminate(typing, y, back, to, n, of, c):
+    """y[to + i] -= the sum of c[k] y[back + of[k]] y[of[k] + i], for n numbers and up to MORE.
 
-    For n numbers and up to :data:`MORE` behind.
+    And y[back + to + i] likewise, by c[k] y[of[k]]; if ``back`` is None, the former by these.
     """
     def generate(context, builder, signature, args):
-        _, at, back, to, n, of, c = args
-        ends = [_end(context, builder, y, args[0], builder.add(at, one))
-                for one in (to, *unpack_tuple(builder, of))]
-        factors = [_wide(builder, builder.fmul(x, builder.load(builder.gep(end, [back]))))
-                   for x, end in zip(unpack_tuple(builder, c), ends[1:])]
-        with _vectors(builder, n) as i:
-            _write(builder, i, ends, factors, _subtracted)
+        _, distance, to, n, of, c = args
+        ends = [_end(context, builder, y, args[0], at) for at in (to, *unpack_tuple(builder, of))]
+        halves = [ends]
+        if back != types.none:
+            halves.append([builder.gep(end, [distance]) for end in ends])
+        for half, other in zip(halves, halves[::-1]):
+            factors = [_wide(builder, builder.fmul(x, builder.load(end)))
+                       for x, end in zip(unpack_tuple(builder, c), other[1:])]
+            with _vectors(builder, n) as i:
+                _write(builder, i, half, factors, _subtracted)
         return context.get_dummy_value()
 
-    return types.void(y, types.int64, types.int64, types.int64, types.int64, of, c), generate
+    return types.void(y, back, types.int64, types.int64, of, c), generate
 
 
 @intrinsic
-def scale(typing, y, to, n, c):
-    """y[to + i] *= c, for n numbers and up to :data:`MORE` behind."""
+def scale(typing, y, back, to, n, c):
+    """y[to + i] *= c, for n numbers and up to MORE behind; and y[back + to + i] if not None."""
     def generate(context, builder, signature, args):
-        end, c = _end(context, builder, y, args[0], args[1]), _wide(builder, args[3])
-        with _vectors(builder, args[2]) as i:
-            _write(builder, i, [end], [c], lambda builder, values, c: builder.fmul(*values, *c))
+        _, distance, to, n, c = args
+        end, c = _end(context, builder, y, args[0], to), _wide(builder, c)
+        for one in [end] if back == types.none else [end, builder.gep(end, [distance])]:
+            with _vectors(builder, n) as i:
+                _write(builder, i, [one], [c], lambda builder, values, c: builder.fmul(*values, *c))
         return context.get_dummy_value()
 
-    return types.void(y, types.int64, types.int64, types.float64), generate
+    return types.void(y, back, types.int64, types.int64, types.float64), generate
 
 
 def _end(context, builder, kind, array, at):
