@@ -382,7 +382,7 @@ def amplification(scheme, dt):
                     JointMotion(np.zeros((1, 3, 0)), np.zeros((1, 4, 0)), 0))
     rows = []
     for u, v, w in np.eye(3):
-        work, new = room_for_steps(1, 0, 0, 0, 0), np.empty((1, 4, 1))
+        work, new = room_for_steps(1, 0, 0, 0), np.empty((1, 4, 1))
         work.y[:, 0] = u, v, -u, w
         done = steps(equations, matrices, rule, course, np.zeros(STATE), work, np.zeros((1, 0)),
                      new, np.zeros((1, 2, 0)), np.zeros(1))
