@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-FORMAT = 6
+FORMAT = 7
 #: Times of a motion at which functions of time are compared.
 TIMES = 33
 #: Points of the surface, about, at which distances of obstacles are.
