@@ -31,7 +31,7 @@ from .machine import Machine
 from .mesh import reach
 from .pickling import functions_of, require_picklable
 from .points import Points
-from .rank import determinant_sign, inertia_of, null_basis
+from .rank import determinant_sign, inertia_of, null_basis, row_sizes
 from .results import State
 
 if TYPE_CHECKING:
@@ -968,9 +968,12 @@ class System:
         return (T.T @ self._whole() @ T).tocsc()
 
     def _sparse_factors(self, K):
-        self._weight = float(np.mean(np.abs(K.diagonal()[self.free])))
-        J = sparse.csr_matrix(self._J * self._weight)
-        return splu(sparse.bmat([[K, J.T], [J, None]], format="csc"))
+        """Of K with the joints, all rows and columns over their sizes: pivots need one unit."""
+        J, size = sparse.csr_array(self._J), self.constraints.coordinate_sizes
+        root = np.sqrt(np.mean((np.abs(K.diagonal()) * size**2)[self.free]))
+        self._sizes = np.append(size / root, root / row_sizes(J.multiply(size)))
+        S = sparse.dia_array((self._sizes[None], 0), shape=2 * self._sizes.shape)
+        return splu((S @ sparse.block_array([[K, J.T], [J, None]]) @ S).tocsc())
 
     def solve(self, residual: Array, phi: Any = None) -> tuple[Array, Array]:
         """Solve with the factors.
@@ -999,8 +1002,8 @@ class System:
                 return x, multipliers
             logger.debug("border inaccurate by %.3g: sparse LU", error)
             self._sparse = self._sparse_factors(self._factors.tocsc())
-        x = self._sparse.solve(np.append(b, self._weight * phi))
-        return x[:self.N], self._weight * x[self.N:]
+        x = self._sizes * self._sparse.solve(self._sizes * np.append(b, phi))
+        return x[:self.N], x[self.N:]
 
 
 #: Names of attributes that are made when they are asked for.

@@ -162,6 +162,28 @@ def test_a_border_that_is_not_accurate_gives_way_to_sparse_lu(monkeypatch):
     assert np.allclose(state.u, expected, rtol=0, atol=1e-12)
 
 
+def test_sparse_factors_know_no_unit(monkeypatch):
+    """A tee of a tenth of a micrometre, in metres: coordinates of lengths, slopes, curvatures."""
+    def tee(unit):
+        steel = StVenantKirchhoff(E=2e11 / unit, nu=0.3)
+        a, b = (Beam(MeshBeam.init_line(unit * np.linspace(0, 1, 5), 0.02 * unit, origin=origin,
+                                        angle=angle), ElementBeamCable(7), steel,
+                     width=0.02 * unit, name=name)
+                for name, origin, angle in (("a", (0, 0), 0.0), ("b", (0.7 * unit, 0), 1.0)))
+        scene = Scene(a, b).clamp("left", a)
+        scene.weld((a, (0.7 * unit, 0)), (b, "left"))
+        return scene.pressure("top", 1e5 / unit, b).solve_static()
+
+    expected = tee(1.0)
+    for module in ("system", "statics.newton"):
+        monkeypatch.setattr(f"skfem_ancf.{module}.INACCURATE", 0.0)
+    for unit in (1.0, 1e-4, 1e-7):
+        state = tee(unit)
+        assert state.iterations == expected.iterations
+        assert np.allclose(state.displacement((unit, 0), "a") / unit,
+                           expected.displacement((1, 0), "a"), rtol=0, atol=1e-10)
+
+
 def test_a_frame_of_hinges_and_welds_is_solved_through_its_border():
     """Beams that joints alone hold, an arch of three hinges: symmetric, and in equilibrium."""
     beams = [between(a, b, 3, element=ElementBeamCable(5), name=n, E=1e8) for a, b, n in (
