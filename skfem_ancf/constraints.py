@@ -413,6 +413,32 @@ class Constraints:
                 return reaction[self.fixed[first:first + len(factors)]] / factors
         raise SupportError(f"{shown(joint)} is not a joint of this scene")
 
+    def force_on(self, held: Array, multipliers: Array) -> tuple[Array, Array]:
+        """What joints do that hold these coordinates alone by equations that do not change.
+
+        They are as supports, which coordinates along the axes would be fixed for.
+
+        Parameters
+        ----------
+        held
+            Truth values of the coordinates, shape (N,).
+        multipliers
+            Of the equations, shape (m,).
+
+        Returns
+        -------
+        force, touched
+            The force on the coordinates, shape (N,), and which of them these joints hold.
+        """
+        force, touched, zero = np.zeros(self.N), np.zeros(self.N, dtype=bool), np.zeros(self.N)
+        for joint, part in zip(self.joints, self.multipliers_of(multipliers)):
+            if joint.constant:
+                rows, columns, values = joint.entries(zero, 0.0)
+                if held[columns].all():
+                    np.subtract.at(force, columns, values * part[rows])
+                    touched[columns] = True
+        return force, touched
+
     # what is held
 
     def require_motion(self) -> None:

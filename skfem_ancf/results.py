@@ -53,7 +53,8 @@ class Reaction(NamedTuple):
     force
         Resultant, shape (2,).
     moment
-        Moment about the deformed position of the support's axis point, counterclockwise.
+        Moment about the deformed position of the support's axis point, counterclockwise; of a
+        rigid body about its centre of mass.
     coordinates
         The force on each fixed coordinate by name, summed over the nodes.
     """
@@ -610,6 +611,9 @@ class State(Frozen):
     def reactions(self, boundary: Place | None, beam: WhichMember = None) -> Reaction:
         """What the supports at a boundary do to the beam: force, moment, and by coordinate.
 
+        Supports are clamps, pins and what is fixed, at any angle, and joints that hold a section,
+        or a rigid body, to the ground by linear equations, as a line or a given position.
+
         Parameters
         ----------
         boundary
@@ -633,15 +637,18 @@ class State(Frozen):
             return Reaction(*frame.reaction(boundary, self.u, multipliers))
         member: Any = select_member(self.beams, self.system.bodies, beam)
         s = self.system.of(member)
-        total = np.where(self.system.free, 0.0, self._support_force())
-        nodes = member.nodes(boundary)
+        nodes, there = member.nodes(boundary), np.zeros(self.system.N, dtype=bool)
+        there[s].reshape(-1, member.nd)[nodes] = True
+        force, touched = self.system.constraints.force_on(there, self.multipliers)
+        total = np.where(self.system.free, 0.0, self._support_force()) + force
         forces = total[s].reshape(-1, member.nd // 2, 2)[nodes]
         q = (member.q0_local + self.u[s]).reshape(-1, member.nd // 2, 2)[nodes]
         arm = q.copy()
         arm[:, 0] -= q[0, 0]
         moment = np.sum(arm[..., 0] * forces[..., 1] - arm[..., 1] * forces[..., 0])
         by_name = dict(zip(member.dofnames, forces.sum(axis=0).ravel()))
-        held = set(np.nonzero(~self.system.free[s].reshape(-1, member.nd)[nodes].all(axis=0))[0])
+        holds = (~self.system.free | touched)[s].reshape(-1, member.nd)[nodes]
+        held = set(np.nonzero(holds.any(axis=0))[0])
         names = {n: float(v) for k, (n, v) in enumerate(by_name.items()) if k in held}
         if frame is not None and not names:
             raise InputError(f"no support of beam {shown(beam)} at {shown(boundary)}: what holds "

@@ -259,6 +259,21 @@ def test_clamped_pinned_and_fixed_bodies():
     assert_allclose(state.angle(body), 0.3 + 0.2)
 
 
+def test_a_pin_beside_the_centre_of_mass_has_a_reaction():
+    """A pendulum at rest at an angle for a moment: a pin and a line hold it."""
+    scene, body, _ = pendulum(mass=2.0, arm=0.6)
+    scene.torsional_spring(5.0, body)
+    scene.moment(body, 3.0)
+    state = scene.solve_static()
+    reaction = state.reactions(None, body)
+    assert_allclose(reaction.force, [0.0, 2.0 * G], atol=1e-9)
+    lever = -state.position(body)  # from the centre of mass to the pin
+    about = lever[0] * reaction.force[1] - lever[1] * reaction.force[0]
+    assert abs(reaction.moment - about) < 1e-9
+    assert abs(reaction.moment + 3.0 - 5.0 * state.angle(body)) < 1e-7
+    assert abs(reaction.moment) > 0.5
+
+
 def test_many_bodies_are_solved_by_sparse_factors():
     """A chain of thirty links hangs down: more multipliers than a border takes."""
     links = [RigidBody(1.0, 0.01, position=(0, -k - 0.5), name=f"link {k}") for k in range(30)]

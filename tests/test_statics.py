@@ -8,8 +8,8 @@ from scipy.optimize import brentq, root
 
 import exact
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamPatelShabana, InputError, MeshBeam, MeshError, NameUnknown,
-                        NeoHookean, Scene, StVenantKirchhoff, SupportError)
+                        ElementBeamCable, ElementBeamPatelShabana, InputError, MeshBeam, MeshError,
+                        NameUnknown, NeoHookean, Scene, StVenantKirchhoff, SupportError)
 from skfem_ancf.formulations import FORMULATIONS
 from skfem_ancf.materials import LinearLaw, Material
 from skfem_ancf.statics import newton as solving
@@ -283,6 +283,44 @@ def test_reactions_balance_the_loads(order, formulation):
     free = (state.internal_force - state.system.external_force(state.u))[state.system.free]
     assert np.abs(free).max() < 1e-7 * size
     assert np.abs(state.displacement(TIP)).max() > 0.05
+
+
+@pytest.mark.parametrize("thickness", ["fixed", "free"])
+@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCF(1), ElementBeamANCF(2),
+                                     ElementBeamANCFCubic(2)], ids=str)
+def test_reactions_do_not_depend_on_the_angle(element, thickness):
+    """The moment of a clamp, and what a line carries: along the axes, where both only fix
+    coordinates, and at an angle, where they have multipliers.
+    """
+    found = []
+    for angle in (0.0, 0.7):
+        mesh = MeshBeam.init_line(np.linspace(0, 1, 5), 0.05, angle=angle)
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        scene = Scene(Beam(mesh, element, StVenantKirchhoff(1e6, 0.3), width=0.05))
+        scene.clamp("left", thickness=thickness)
+        scene.joint("line", at=turn[:, 0], direction=turn @ (1, 0))
+        state = solved(scene.line_load(turn @ (1.0, -2.0)))
+        left, right = state.reactions("left"), state.reactions("right")
+        assert_allclose(left.force + right.force, turn @ (-1.0, 2.0), atol=1e-8)
+        lever = state.position(turn[:, 0])
+        centre = np.mean([w * x for x, w in zip(*_line_of(state, turn))], axis=0)
+        about = left.moment + right.moment + _cross(lever, right.force)
+        assert abs(about + _cross(centre, turn @ (1.0, -2.0))) < 2e-6
+        found.append([*(turn.T @ left.force), left.moment, *(turn.T @ right.force), right.moment])
+        assert any(name.startswith("r_") for name in left.coordinates)
+    assert_allclose(found[1], found[0], atol=1e-8)
+    assert abs(found[0][2]) > 0.1
+
+
+def _line_of(state, turn):
+    """Places of the deformed axis, and weights whose mean is 1."""
+    x, w = np.polynomial.legendre.leggauss(8)
+    s = np.concatenate([(k + 0.5 * (x + 1)) / 4 for k in range(4)])
+    return state.position(turn @ [s, 0 * s]).T, np.tile(4 * w, 4)
+
+
+def _cross(a, b):
+    return a[0] * b[1] - a[1] * b[0]
 
 
 @pytest.mark.parametrize("names", [ROOTS[3], ["r", "r_Y0", "r_Y1", "r_Y2"]])
