@@ -1,6 +1,7 @@
 # make demo    the cantilever of the paper: numbers, out/*.vtu, out/*.png; nothing else is installed
 # make test    the tests, on two processes; ARGS="..." goes to pytest
-# make test-settings   most of them as on an old processor, and without Numba
+# make test-settings   most of them as on an old processor, and without Numba and with least versions
+# make test-least   the tests, with the least versions that pyproject.toml promises
 # make paper   the paper's tables; bench: timings; stress: large and hard cases
 # make fuzz    2000 random scenes; mutants: changes of the text that the tests should see
 # make coverage  the tests, with the lines and branches that they run
@@ -20,7 +21,7 @@ PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test test-settings lint paper bench stress fuzz mutants coverage docs pictures dist clean
+.PHONY: demo test test-settings test-least lint paper bench stress fuzz mutants coverage docs pictures dist clean
 
 demo: $(VENV)/demo.stamp
 	$(PY) demos/cantilever.py
@@ -37,18 +38,30 @@ test: $(VENV)/test.stamp
 	$(PY) -m pytest -n 2 $(ARGS)
 
 # what round-off could decide, in other kernels of OpenBLAS and without fused multiply-add;
-# the code that Numba compiles for it is kept apart, and checks every index. Then, without Numba,
-# all that solves.
+# the code that Numba compiles for it is kept apart, and checks every index. Then, without Numba
+# and with the least versions of all others, all that solves.
+LEAST := $(VENV)/least
 GENERIC := compiled doors locking stability statics
 ONCE := bad_arguments basis bench demos docstrings elements forms fuzz io mapping mesh package \
   paper places points pyvista readme rooms stress visuals
 
-test-settings: $(VENV)/test.stamp
+test-settings: $(VENV)/test.stamp $(LEAST)/stamp
 	export OPENBLAS_CORETYPE=Nehalem NUMBA_CPU_NAME=generic NUMBA_BOUNDSCHECK=1 \
 	  NUMBA_CACHE_DIR=$(CURDIR)/out/numba-generic; \
 	  $(PY) -m skfem_ancf.compiled && $(PY) -m pytest -n 2 $(ARGS) $(GENERIC:%=tests/test_%.py)
 	OPENBLAS_CORETYPE=Haswell SKFEM_ANCF_COMPILED=0 \
-	  $(PY) -m pytest -n 2 $(ARGS) tests $(ONCE:%=--ignore=tests/test_%.py)
+	  $(LEAST)/bin/python -m pytest -n 2 $(ARGS) tests $(ONCE:%=--ignore=tests/test_%.py)
+
+test-least: $(LEAST)/stamp
+	$(LEAST)/bin/python -m skfem_ancf.compiled
+	$(LEAST)/bin/python -m pytest -n 2 $(ARGS)
+
+$(LEAST)/stamp: pyproject.toml tests/least.py | $(PY)
+	$(PY) -m venv $(LEAST)
+	$(PY) tests/least.py > $(LEAST)/least.txt
+	$(LEAST)/bin/python -m pip install --quiet --disable-pip-version-check \
+	  --constraint $(LEAST)/least.txt --editable '.[test]'
+	@touch $@
 
 # in an environment of its own: nothing else depends on the versions
 LINT := $(VENV)/lint

@@ -391,8 +391,8 @@ class State(Frozen):
         >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.1), ElementBeamANCF(2),
         ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
         >>> state = Scene(beam).clamp("left").point_force((0, -0.1), at=(1, 0)).solve_static()
-        >>> state.field("von_mises", (0.5, 0.05)).round(-1), state.field("tresca", (0.5, 0)).round()
-        (np.float64(300.0), np.float64(30.0))
+        >>> float(state.field("von_mises", (0.5, 0.05)).round(-1))
+        300.0
         """
         at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
         field = find_field(field)
