@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 #: Sections in an element, both ends included, where none are named.
 ALONG_ELEMENT = 9
+#: Part of an element over which the slope of the moment of a cable is taken.
+NEAR = 1e-3
 
 
 @dataclass(frozen=True, repr=False)
@@ -214,14 +216,12 @@ def _axis(piece):
 
 def _own(state, beam, e, xi):
     """From the stress of the elements, integrated across the section."""
+    if not beam.has_sections:
+        return _own_of_cable(state, beam, e, xi)
     u, mapping = state.u_of(beam), beam.mesh.mapping()
-    eta, breadth = (np.concatenate(parts, axis=1) for parts in zip(*(
-        beam.across.points(slab, e, xi, max(beam.element.order, 1) + 2)
-        for slab in beam.across.slabs)))
-    X = np.array([xi[:, None] + 0.0 * eta, eta])
-    area = breadth * mapping.height(X[0], e)[0]
-    S, eigen = beam.stress(u, X, e), state.eigenstrains(beam)
-    for factor, load in eigen:
+    X, area = _across(beam, e, xi)
+    S = beam.stress(u, X, e)
+    for factor, load in state.eigenstrains(beam):
         S = S - load.stress_at(u, X, e, factor)
     H, frame = beam.gradients(u, X, e)
     F = H + frame
@@ -233,21 +233,44 @@ def _own(state, beam, e, xi):
 
     arm = position(X) - position(axis)
     R, M = np.sum(P * area, axis=-1), np.sum(cross(arm, P) * area, axis=-1)
-    angle, stretch, shear, curvature = (_axis_of_element if beam.has_sections else _cable_axis)(
-        beam, u, e, xi)
+    angle, stretch, shear, curvature = _axis_of_element(beam, u, e, xi)
     t, normal = _directions(angle)
-    N, Q = np.sum(R * t, axis=0), np.sum(R * normal, axis=0)
-    if not beam.has_sections:
-        EA, ES, EI = beam.across.moments(xi[:, None], e)[..., 0]
-        N, M = EA * (stretch - 1.0) - ES * curvature, EI * curvature - ES * (stretch - 1.0)
-        for factor, load in eigen:
-            S0 = load.stress_at(u, X, e, factor)[0] * area
-            Y = beam.mesh.mapping().offset(X, e)
-            N, M = N - np.sum(S0, axis=-1), M + np.sum(S0 * Y, axis=-1)
-        Q = np.full(len(e), np.nan)
-        R = N * t + Q * normal
-    return dict(N=N, Q=Q, M=M, curvature=curvature, stretch=stretch, shear=shear, angle=angle,
-                force=R)
+    return dict(N=np.sum(R * t, axis=0), Q=np.sum(R * normal, axis=0), M=M, curvature=curvature,
+                stretch=stretch, shear=shear, angle=angle, force=R)
+
+
+def _across(beam, e, xi):
+    """Points across sections, shape (2, n, m), and the areas that they stand for."""
+    eta, breadth = (np.concatenate(parts, axis=1) for parts in zip(*(
+        beam.across.points(slab, e, xi, max(beam.element.order, 1) + 2)
+        for slab in beam.across.slabs)))
+    X = np.array([xi[:, None] + 0.0 * eta, eta])
+    return X, breadth * beam.mesh.mapping().height(X[0], e)[0]
+
+
+def _own_of_cable(state, beam, e, xi):
+    """Of a cable from EA and EI; the shear force is the slope of the moment in the element."""
+    found = _forces_of_cable(state, beam, e, xi)
+    near = np.clip([xi - NEAR, xi + NEAR], 0.0, 1.0)
+    a, b = (_forces_of_cable(state, beam, e, x) for x in near)
+    middle = 0.5 * np.sum(near, axis=0)
+    speed = np.hypot(*beam.mesh.mapping().DF(np.array([middle, 0.5 + 0.0 * xi])[:, :, None], e)[
+        :, 0, :, 0])
+    Q = (a["M"] - b["M"]) / (speed * found["stretch"] * (near[1] - near[0]))
+    t, normal = _directions(found["angle"])
+    return dict(found, Q=Q, force=found["N"] * t + Q * normal)
+
+
+def _forces_of_cable(state, beam, e, xi):
+    """Normal force and moment of a cable, and the strains of its axis."""
+    u, (X, area) = state.u_of(beam), _across(beam, e, xi)
+    angle, stretch, shear, curvature = _cable_axis(beam, u, e, xi)
+    EA, ES, EI = beam.across.moments(xi[:, None], e)[..., 0]
+    N, M = EA * (stretch - 1.0) - ES * curvature, EI * curvature - ES * (stretch - 1.0)
+    for factor, load in state.eigenstrains(beam):
+        S0 = load.stress_at(u, X, e, factor)[0] * area
+        N, M = N - np.sum(S0, axis=-1), M + np.sum(S0 * beam.mesh.mapping().offset(X, e), axis=-1)
+    return dict(N=N, M=M, curvature=curvature, stretch=stretch, shear=shear, angle=angle)
 
 
 def _cable_axis(beam, u, e, xi):

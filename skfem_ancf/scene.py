@@ -1105,7 +1105,7 @@ class Scene:
         Scene
             Itself.
         """
-        beams = range(len(self._beams)) if beam is None else [self._number(beam)]
+        beams = range(len(self._beams)) if beam is None else [self._number_of_beam(beam)]
         return self._put(elements=[Drag(density, normal, tangential, k) for k in beams])
 
     def point_mass(self, mass: float, at: ArrayLike, inertia: float = 0.0,

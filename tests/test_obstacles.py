@@ -10,7 +10,7 @@ from scipy.integrate import solve_bvp
 
 from skfem_ancf import (Beam, CallbackError, ConvergenceError, ElementBeamANCF,
                         ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        MeshBeam, ModelWarning, Scene, StVenantKirchhoff)
+                        MeshBeam, ModelWarning, RigidBody, Scene, StVenantKirchhoff)
 from skfem_ancf.dynamics import Gauss, GeneralizedAlpha, Radau
 from skfem_ancf.forces import contact_texts as texts
 from skfem_ancf.forces.contacts import BY_POINTS
@@ -33,6 +33,16 @@ def beam(element=None, n=8, height=0.01, nu=0.3, E=2e8, length=1.0):
 
 def asked(what, t=0.0, span=0.0):
     return texts.Question(what, t, span, 0.0, 0, 0)
+
+
+def test_what_an_obstacle_cannot_be_told():
+    body = RigidBody(mass=1.0, inertia=1.0, position=(0, 2), name="ball")
+    with pytest.raises(InputError, match="asked of beams, got <RigidBody ball"):
+        Scene(beam(), body).obstacle(Line((0, -1)), beam=body)
+    with pytest.raises(InputError, match="asked of beams, got <RigidBody ball"):
+        Scene(beam(), body).drag(1.0, 1.0, beam=body)
+    with pytest.raises(InputError, match="option of an obstacle 'body'; known: 'friction'"):
+        Scene(beam(), body).obstacle(Line((0, -1)), body=body)
 
 
 SHAPES = {"line": Line((0, -0.006), (0.05, 1)), "circle": Circle((0.5, -0.2), 0.19),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..beam import select_beam
 from ..errors import (InputError, MeshError, ModelWarning, ask_array, require_function,
                       require_integer, require_not_negative, require_option, require_positive,
                       shown, teaching)
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
     from ..types import Array, WhichBeam
 
 METHODS = ("penalty", "augmented")
+#: What an obstacle may be told; the last two may be left to it.
+KNOWN = ("friction", "stiffness", "beam", "method", "position", "angle", "damping", "points",
+         "width", "tolerance")
 #: The least length over which a strip that is pressed in one point sinks in, relative to its
 #: extent: shorter ones no mesh resolves, and Newton's method loses its way among single points.
 SPREAD = 1.0 / 200.0
@@ -177,10 +181,10 @@ class Obstacle(ForceElement):
         return carried(pose, points), pieces
 
     def bind(self, scene: Scene) -> list[Link]:
-        beams = scene.beams if self.beam is None else [scene.beam(self.beam)]
-        if not beams:
+        if not scene.beams:
             raise InputError("an obstacle is touched by surfaces of beams, the scene has rigid "
                              "bodies alone: hold them by one-sided springs, or add a beam")
+        beams = scene.beams if self.beam is None else [select_beam(scene.beams, self.beam)]
         height = min(beam.mesh.height for beam in beams)
         self.tolerance = self.options["tolerance"] or TOLERANCE * height
         groups = []
@@ -348,11 +352,10 @@ def _options(options):
         warnings.warn("slip_speed= has no effect any more, leave it out: in a motion points stick "
                       "as they do in statics", DeprecationWarning, stacklevel=4)
         options = {name: x for name, x in options.items() if name != "slip_speed"}
-    known = ("width", "tolerance")
     for name in options:
-        require_option("option of an obstacle", name, known)
+        require_option("option of an obstacle", name, KNOWN)
     return {name: None if options.get(name) is None else require_positive(name, options[name])
-            for name in known}
+            for name in KNOWN[-2:]}
 
 
 __all__ = ["Obstacle"]
