@@ -6,7 +6,7 @@ ORDER = [
     "first_beam", "rollup", "plain_scikit_fem", "cantilever", "choose_element",
     "poisson_locking", "thick_beam",
     "tapered_blade", "catenary", "spring", "leaf_spring", "bimetal", "soft_finger", "frame",
-    "cylinder", "capstan", "ring",
+    "cylinder", "pipe_laying", "capstan", "ring",
     "column", "shallow_arch",
     "pendulum", "spaghetti", "driven_arm", "four_bar", "tuning_fork", "damping",
     "own_law", "own_element", "fit_modulus", "uncertainty",

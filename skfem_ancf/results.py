@@ -51,7 +51,7 @@ class Reaction(NamedTuple):
     Attributes
     ----------
     force
-        Resultant, shape (2,).
+        Resultant, shape (2,); of a History (nt, 2), and what follows (nt,).
     moment
         Moment about the deformed position of the support's axis point, counterclockwise; of a
         rigid body about its centre of mass.
@@ -60,7 +60,7 @@ class Reaction(NamedTuple):
     """
 
     force: np.ndarray
-    moment: float
+    moment: Any
     coordinates: dict
 
 

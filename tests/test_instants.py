@@ -124,3 +124,18 @@ def test_fields_are_recovered_when_they_are_asked_for(monkeypatch, tmp_path):
     assert max(made) > 9
     first = history.states([3, 5])
     assert [s.t for s in first] == [history.t[3], history.t[5]]
+
+
+@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCFCubic(2)], ids=repr)
+def test_reactions_change_the_momentum(element):
+    scene = Scene(line(element)).clamp("left").gravity((0, -9.81))
+    history = scene.integrate(0.05, 1e-3, scheme="generalized-alpha")
+    found, last = history.reactions("left"), history.state(-1).reactions("left")
+    assert found.force.shape == (51, 2) and found.moment.shape == (51,)
+    assert_allclose(found.force[-1], last.force)
+    assert_allclose(found.moment[-1], last.moment)
+    assert found.coordinates["r^2"][-1] == last.coordinates["r^2"]
+    force = found.force + [0.0, -9.81 * 7800 * 0.05**2]
+    impulse = np.cumsum(0.5 * (force[1:] + force[:-1]) * 1e-3, axis=0)
+    size = np.abs(history.momentum).max()
+    assert_allclose(impulse, history.momentum[1:], atol=1e-3 * size)

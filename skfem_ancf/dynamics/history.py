@@ -13,7 +13,7 @@ from ..errors import (InputError, require_finite, require_index, require_path, s
                       teaching)
 from ..points import require_body
 from ..resultants import over_time
-from ..results import State
+from ..results import Reaction, State
 from .base import Motion, contacts_of
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ..joints.base import Joint
     from ..resultants import Resultants
     from ..system import System
-    from ..types import Array, StrPath, WhichBeam, WhichMember
+    from ..types import Array, Place, StrPath, WhichBeam, WhichMember
     from .base import Scheme, Steps
 
     Columns = tuple[Array, ...]
@@ -418,6 +418,35 @@ class History:
     def joint_force(self, joint: Joint) -> Array:
         """What a joint does to its first beam at all instants, shape (nt, m)."""
         return np.array([state.joint_force(joint) for state in self])
+
+    def reactions(self, boundary: Place | None, beam: WhichMember = None) -> Reaction:
+        """What the supports at a boundary do to the beam at all instants.
+
+        Parameters
+        ----------
+        boundary, beam
+            Those of :meth:`State.reactions <skfem_ancf.results.State.reactions>`.
+
+        Returns
+        -------
+        Reaction
+            Of arrays: the force has the shape (nt, 2), the moment and each coordinate (nt,).
+
+        Examples
+        --------
+        What the pin of a pendulum carries:
+
+        >>> import numpy as np
+        >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+        >>> beam = Beam(MeshBeam.init_line([0, 1], height=0.01), ElementBeamCable(5),
+        ...             StVenantKirchhoff(E=2e11, nu=0.3, density=1e4), width=0.01)
+        >>> history = Scene(beam).pin("left").gravity((0, -8)).integrate(t_end=0.01, dt=1e-3)
+        >>> history.reactions("left").force.shape
+        (11, 2)
+        """
+        force, moment, names = zip(*(state.reactions(boundary, beam) for state in self))
+        return Reaction(np.array(force), np.array(moment),
+                        {name: np.array([at[name] for at in names]) for name in names[0]})
 
     # of the whole
 
