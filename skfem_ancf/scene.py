@@ -440,6 +440,10 @@ class Scene:
         """
         if isinstance(names, (list, set, frozenset, np.ndarray)):
             names = tuple(names)
+        if callable(displacement):
+            raise InputError("displacement must be a number, got a function: what moves by a "
+                             'function of time is scene.joint("position", at=..., r=...), or '
+                             '"angle"')
         return self._put([Support(self._number(beam), boundary, names,
                                   require_finite_scalar("displacement", displacement))])
 

@@ -584,7 +584,7 @@ class History:
         from ..io.vtkhdf import VtkHdfWriter
         from ..progress import progress_bar
 
-        path = require_path("filename", filename)
+        path = require_path("filename", filename, (".pvd", ".vtkhdf"))
         kind = VtkHdfWriter if path.suffix.lower() == ".vtkhdf" else PvdWriter
         with kind(path, **options) as writer, progress_bar(
                 progress, total=len(self), desc="files") as bar:
