@@ -13,7 +13,8 @@ from skfem_ancf.dynamics import GeneralizedAlpha
 from skfem_ancf.errors import ConvergenceError, MeshError, NameUnknown
 from skfem_ancf.io import body_fields
 from skfem_ancf.quadrature import gauss, tensor
-from skfem_ancf.recovery import smoothed, strain_of_stress
+from skfem_ancf.pieces import smoothed
+from skfem_ancf.recovery import strain_of_stress
 from skfem_ancf.statics.adapt import strain_error
 
 REFERENCE = np.load(Path(__file__).parent / "data" / "reference_2d.npz")
