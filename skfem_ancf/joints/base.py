@@ -785,24 +785,46 @@ def equations_of(names: Sequence[str], n: int) -> tuple[str, ...]:
     return tuple(f"{name}, from number {k}" for k in range(1, n) for name in names)
 
 
-def cross_terms(a: Vector, b: Vector, Q: Array) -> tuple[Array, Array, Array]:
-    """Second derivative of ``a x (Q b)`` by the coordinates.
+def angle_to(d: ArrayLike, e: ArrayLike) -> float:
+    """The angle from a plane vector e to another one d, in (-2 pi, 2 pi).
 
     Parameters
     ----------
-    a, b
+    d, e
+        Shapes (2,).
+    """
+    return float(np.arctan2(*np.flip(d)) - np.arctan2(*np.flip(e)))
+
+
+class Aligned:
+    """``(Q e) x d``, zero where a plane vector d has the direction of another one e, turned by Q.
+
+    Parameters
+    ----------
+    d, e
         Vectors.
     Q
         Matrix, shape (2, 2).
-
-    Returns
-    -------
-    rows, columns, values
-        Shapes (k,), of a symmetric matrix.
     """
-    J = np.array([[0.0, 1.0], [-1.0, 0.0]]) @ Q  # a x c = a^T [[0, 1], [-1, 0]] c
-    values = np.einsum("ij,ik,jl->ikjl", J, a.weights, b.weights)
-    rows = np.broadcast_to(a.dofs[:, :, None, None], values.shape).ravel()
-    cols = np.broadcast_to(b.dofs[None, None], values.shape).ravel()
-    values = values.ravel()
-    return np.append(rows, cols), np.append(cols, rows), np.append(values, values)
+
+    def __init__(self, d: Vector, e: Vector, Q: Array) -> None:
+        self.d, self.e, self.Q = d, e, Q
+
+    def value(self, u: Array) -> float:
+        """The number at displacements u (N,) of the scene's coordinates."""
+        e, d = self.Q @ self.e(u), self.d(u)
+        return e[0] * d[1] - e[1] * d[0]
+
+    def terms(self, u: Array) -> list[Any]:
+        """Its derivative, as :func:`gradients` takes it."""
+        e, d = self.Q @ self.e(u), self.d(u)
+        return [(self.d, (-e[1], e[0])), (self.e, (d[1], -d[0]) @ self.Q)]
+
+    def second(self, factor: float) -> tuple[Array, Array, Array]:
+        """Its second derivative times a number: rows, columns and values (k,), both halves."""
+        J = np.array([[0.0, 1.0], [-1.0, 0.0]]) @ self.Q  # d x c = d^T [[0, 1], [-1, 0]] c
+        values = np.einsum("ij,ik,jl->ikjl", J, self.d.weights, self.e.weights)
+        rows = np.broadcast_to(self.d.dofs[:, :, None, None], values.shape).ravel()
+        columns = np.broadcast_to(self.e.dofs[None, None], values.shape).ravel()
+        values = -factor * values.ravel()
+        return np.append(rows, columns), np.append(columns, rows), np.append(values, values)

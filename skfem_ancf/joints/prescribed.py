@@ -11,7 +11,7 @@ from ..errors import (ask_array, ask_number, require_finite_scalar, require_func
                       teaching)
 from ..rigid import on_body
 from ..sampling import Sampled
-from .base import Joint, both_of, cross_terms, gradients, point, rotation, section
+from .base import Aligned, Joint, angle_to, both_of, gradients, point, rotation, section
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -168,20 +168,17 @@ class PrescribedTurn(Joint):
 
     def bind(self, scene: Scene) -> None:
         (_, self.d), (_, self.e) = (section(scene, *place) for place in (self.at, self.other))
-        self.start = float(np.arctan2(*self.d.start[::-1]) - np.arctan2(*self.e.start[::-1]))
+        self.start = angle_to(self.d.start, self.e.start)
 
-    def _turn(self, t: float) -> Array:
-        return rotation(self.start + ask_number("angle(t={:g})", self.angle, t))
+    def _turned(self, t: float) -> Aligned:
+        return Aligned(self.d, self.e, rotation(
+            self.start + ask_number("angle(t={:g})", self.angle, t)))
 
     def value(self, u: Array, t: float) -> Array:
-        d, e = self.d(u), self._turn(t) @ self.e(u)
-        return np.array([e[0] * d[1] - e[1] * d[0]])
+        return np.array([self._turned(t).value(u)])
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        Q, d = self._turn(t), self.d(u)
-        e = Q @ self.e(u)
-        return gradients([(self.d, (-e[1], e[0])), (self.e, (d[1], -d[0]) @ Q)])
+        return gradients(self._turned(t).terms(u))
 
     def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
-        i, j, v = cross_terms(self.d, self.e, self._turn(t))
-        return i, j, -multipliers[0] * v
+        return self._turned(t).second(multipliers[0])

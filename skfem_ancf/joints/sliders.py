@@ -11,13 +11,11 @@ from ..errors import InputError, require_finite, require_flag, require_label, sh
 from ..beam import select_beam
 from ..mapping import cross
 from .axis import Axis
-from .base import (GROUND, Joint, Vector, cross_terms, gradients, named_place, point, rotation,
-                   section)
+from .base import (GROUND, Aligned, Joint, Vector, angle_to, gradients, named_place, point,
+                   rotation, section)
 from .spans import Family, Product, Span
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import ArrayLike
 
     from ..scene import Scene
@@ -99,8 +97,7 @@ class Sleeve(Joint):
             raise InputError(f"{self!r}: the point ({self.p.start[0]:.6g}, {self.p.start[1]:.6g}) "
                              f"is {gap:.6g} off the axis of {beam!r}: name one that is on it")
         tangent = self.axis.at(zero, s)[1]
-        turn = np.arctan2(*self.d.start[::-1]) - np.arctan2(*tangent[::-1])
-        self.Q = rotation(turn)
+        self.Q = rotation(angle_to(self.d.start, tangent))
 
     def __repr__(self) -> str:
         return f"<Sleeve {f'{self.name} ' if self.name else ''}at {shown(self.at)}>"
@@ -335,24 +332,16 @@ class Slot(Joint):
         if abs(gap) > 1e-6 * size:
             raise InputError(f"{self!r}: the point ({self.p.start[0]:.6g}, {self.p.start[1]:.6g}) "
                              f"is {abs(gap):.6g} off the line: give another through=")
-        angle = np.arctan2(*self.direction[::-1]) - np.arctan2(*self.e.start[::-1])
-        self.pairs: Sequence[tuple[Vector, Array]] = [(self.w, rotation(angle))]
-        if d is not None:
-            angle = np.arctan2(*d.start[::-1]) - np.arctan2(*self.e.start[::-1])
-            self.pairs = [*self.pairs, (d, rotation(angle))]
+        kept = [(self.w, self.direction)] if d is None else [(self.w, self.direction), (d, d.start)]
+        self.pairs = [Aligned(vector, self.e, rotation(angle_to(start, self.e.start)))
+                      for vector, start in kept]
 
     def value(self, u: Array, t: float) -> Array:
-        e = self.e(u)
-        return np.array([cross(Q @ e, a(u)) for a, Q in self.pairs])
+        return np.array([turned.value(u) for turned in self.pairs])
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        e, equations = self.e(u), []
-        for vector, Q in self.pairs:
-            f, a = Q @ e, vector(u)
-            equations.append([(vector, (-f[1], f[0])), (self.e, (a[1], -a[0]) @ Q)])
-        return gradients(*equations)
+        return gradients(*(turned.terms(u) for turned in self.pairs))
 
     def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
-        i, j, v = zip(*(cross_terms(vector, self.e, Q) for vector, Q in self.pairs))
-        return (np.concatenate(i), np.concatenate(j),
-                np.concatenate([-m * x for m, x in zip(multipliers, v)]))
+        i, j, v = zip(*(turned.second(m) for turned, m in zip(self.pairs, multipliers)))
+        return np.concatenate(i), np.concatenate(j), np.concatenate(v)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, require_flag, require_label, teaching
-from .base import (Joint, cross_terms, each, equations_of, gradients, is_ground, rotation, section,
-                   several)
+from .base import (Aligned, Joint, angle_to, each, equations_of, gradients, is_ground, rotation,
+                   section, several)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -54,13 +54,12 @@ class Weld(Joint):
                                       len(self.beams))
 
     def bind(self, scene: Scene) -> None:
-        (self.a, self.da), *others = (
+        (self.a, d), *others = (
             section(scene, beam, at) for beam, at in zip(self.beams, self.at))
         self.pairs = []
-        for b, db in others:
+        for b, e in others:
             self._require_together(scene, b)
-            angle = np.arctan2(*self.da.start[::-1]) - np.arctan2(*db.start[::-1])
-            self.pairs.append((b, db, rotation(angle)))
+            self.pairs.append((b, Aligned(d, e, rotation(angle_to(d.start, e.start)))))
 
     def _require_together(self, scene: Scene, b: Vector) -> None:
         gap = b.start - self.a.start
@@ -74,22 +73,15 @@ class Weld(Joint):
                 "apart=True to draw them together")
 
     def value(self, u: Array, t: float) -> Array:
-        a, d, out = self.a(u), self.da(u), []
-        for b, db, Q in self.pairs:
-            e = Q @ db(u)
-            out += [*(a - b(u)), e[0] * d[1] - e[1] * d[0]]
+        a, out = self.a(u), []
+        for b, turned in self.pairs:
+            out += [*(a - b(u)), turned.value(u)]
         return np.array(out)
 
     def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
-        d = self.da(u)
-        equations: list[list[Any]] = []
-        for b, db, Q in self.pairs:
-            e = Q @ db(u)
-            equations += [[(self.a, n), (b, -n)] for n in np.eye(2)]
-            equations.append([(self.da, (-e[1], e[0])), (db, (d[1], -d[0]) @ Q)])
-        return gradients(*equations)
+        return gradients(*(terms for b, turned in self.pairs for terms in (
+            *([(self.a, n), (b, -n)] for n in np.eye(2)), turned.terms(u))))
 
     def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
-        i, j, v = zip(*(cross_terms(self.da, db, Q) for _, db, Q in self.pairs))
-        return (np.concatenate(i), np.concatenate(j),
-                np.concatenate([-m * x for m, x in zip(multipliers[2::3], v)]))
+        i, j, v = zip(*(turned.second(m) for (_, turned), m in zip(self.pairs, multipliers[2::3])))
+        return np.concatenate(i), np.concatenate(j), np.concatenate(v)
