@@ -111,11 +111,11 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
             X, local = layout(beam, m, n)
         values = values_on_grid(state, beam, X, recover)
         x = values.x if undeformed else values.x + values.u
-        points.append(_rows(x))
+        points.append(in_space(x))
         for field in wanted:
             value = _known(field, values, fields is None)
             data.setdefault(field.name, []).append(
-                value if field.components == 1 else _rows(value) if field.components == 2 else
+                value if field.components == 1 else in_space(value) if field.components == 2 else
                 value.T)
         ne, npoints = beam.mesh.nelements, X.shape[-1]
         start = first + npoints * np.arange(ne)
@@ -128,9 +128,9 @@ def body_fields(state: Any, subdivide: tuple[int, int] = (8, 4), lagrange: bool 
         start = body.outline_at(np.zeros(4))
         u = body.outline_at(state.u_of(body)) - start
         n = u.shape[1]
-        points.append(_rows(start if undeformed else start + u))
+        points.append(in_space(start if undeformed else start + u))
         for name, parts in data.items():
-            parts.append(_rows(u) if name == "displacement" else
+            parts.append(in_space(u) if name == "displacement" else
                          np.full((n, *parts[0].shape[1:]), np.nan))
         cells.append(("polygon", first + np.arange(n)[None]))
         numbers["beam"].append(np.array([len(state.beams) + k]))
@@ -252,11 +252,7 @@ def save_frame(state: Any, filename: StrPath, packed: dict, precision: str = "do
     dtype = PRECISIONS[require_option("precision", precision, PRECISIONS)]
     raw = require_option("encoding", encoding, ENCODINGS) == "raw"
     body = body_fields(state, **options)
-    with replacing(path) as temporary:
-        if path.suffix.lower() == ".vtu":
-            write_vtu(temporary, body, dtype, raw, packed)
-        else:
-            _write_vtk(temporary, body)
+    _write(path, body, dtype, raw, packed)
     logger.info("wrote %s: %d points", path, len(body.points))
     save_obstacles(state, path, body, dtype, raw)
     return path
@@ -285,25 +281,25 @@ def save_obstacles(state: Any, path: Path, body: BodyFields, dtype: Any = np.flo
     walls = outlines(state, around(body.points[:, :2].T))
     if not walls:
         return None
-    ends = np.concatenate(walls).reshape(-1, 2)
-    points = np.column_stack([ends, np.zeros(len(ends))])
+    points = in_space(np.concatenate(walls).reshape(-1, 2).T)
     numbers = np.repeat(np.arange(len(walls)), [len(wall) for wall in walls])
-    lines = BodyFields(points, [("line", np.arange(len(ends)).reshape(-1, 2))], {},
+    lines = BodyFields(points, [("line", np.arange(len(points)).reshape(-1, 2))], {},
                        {"obstacle": [numbers]})
     suffix = path.suffix if path.suffix.lower() in SUFFIXES else ".vtu"
     beside = path.with_name(f"{path.stem}_obstacles{suffix}")
-    with replacing(beside) as temporary:
-        if suffix.lower() == ".vtu":
-            write_vtu(temporary, lines, dtype, raw)
-        else:
-            _write_vtk(temporary, lines)
+    _write(beside, lines, dtype, raw)
     return beside
 
 
-def _write_vtk(path, body):
-    import meshio
+def _write(path, body, dtype, raw, packed=None):
+    with replacing(path) as temporary:
+        if path.suffix.lower() == ".vtu":
+            write_vtu(temporary, body, dtype, raw, packed)
+            return
+        import meshio
 
-    meshio.write(path, meshio.Mesh(body.points, body.cells, body.point_data, body.cell_data))
+        meshio.write(temporary, meshio.Mesh(body.points, body.cells, body.point_data,
+                                            body.cell_data))
 
 
 def require_next(state: Any, t: Any, before: float | None) -> float:
@@ -365,8 +361,8 @@ def subdivision(subdivide: Any) -> tuple[int, ...]:
                          f"and across an element, got {shown(subdivide)}") from None
 
 
-def _rows(x):
-    """Vectors (2, nelements, npoints) as rows with a third component of zero."""
+def in_space(x: Array) -> Array:
+    """Vectors (2, ...) of the plane as rows with a third component of zero, shape (n, 3)."""
     out = np.zeros((x[0].size, 3))
     out[:, :2] = x.reshape(2, -1).T
     return out

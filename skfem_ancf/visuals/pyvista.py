@@ -12,7 +12,7 @@ from ..errors import (InputError, MissingExtra, require_flag, require_index, req
                       require_like, require_options, require_path, require_text, shown, taught,
                       teaching)
 from ..fields import FIELDS, find_fields, values_on_grid
-from ..io.vtu import lagrange_cell, layout, replacing, subdivision
+from ..io.vtu import in_space, lagrange_cell, layout, replacing, subdivision
 from ..obstacles.pictures import around, outlines
 from .matplotlib import colormap
 from .scenery import RIGID, WALL, Scenery, outline_points
@@ -72,7 +72,7 @@ def _arrays(values, wanted, lenient):
         name = f"{field.name} ({field.frame} frame)" if field.components > 1 and field.frame else (
             field.name)
         if field.components == 2:
-            value = np.array([*value, np.zeros(values.n)]).T
+            value = in_space(value)
         elif field.components == 3:
             xx, yy, xy = value
             zero = np.zeros(values.n)
@@ -96,7 +96,7 @@ class _Grid:
 
     def points(self, values, undeformed):
         x = values.x if undeformed else values.x + values.u
-        return np.array([*x, np.zeros(values.n)]).T
+        return in_space(x)
 
     def make(self, state, wanted, lenient, undeformed, recover):
         values = values_on_grid(state, self.beam, self.X, recover)
@@ -287,9 +287,9 @@ def lines_of(walls: Any) -> Any:
     walls
         Their ends, shape (n, 2, 2).
     """
-    ends = walls.reshape(-1, 2)
+    ends = in_space(walls.reshape(-1, 2).T)
     pieces = np.arange(len(ends)).reshape(-1, 2)
-    return _pyvista().PolyData(np.column_stack([ends, np.zeros(len(ends))]), lines=np.column_stack(
+    return _pyvista().PolyData(ends, lines=np.column_stack(
         [np.full(len(pieces), 2), pieces]).ravel())
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InputError, require_finite_scalar, require_flag, require_positive, shown
 from ..fields import DRAWN, Field, find_field, values_on_grid
-from ..io.vtu import layout, subdivision
+from ..io.vtu import in_space, layout, subdivision
 from ..kept import cached_property
 from ..obstacles.pictures import around, obstacles_of, outlines
 
@@ -147,7 +147,7 @@ class Scenery:
         x = np.concatenate([np.zeros((2, 0)), *(
             b.points(b.reference if undeformed else b.deformed, self.factor).reshape(2, -1)
             for b in self.frames[k])], axis=1)
-        return np.concatenate([np.array([*x, np.zeros(x.shape[1])]).T, *(
+        return np.concatenate([in_space(x), *(
             outline_points(body, 0.0 * u if undeformed else u) for body, u in self.rigid[k])])
 
     def values(self, k: int) -> Any:
@@ -207,5 +207,4 @@ def outline_points(body: RigidBody, u: Array) -> Array:
     u
         Displacement of its coordinates, shape (4,).
     """
-    x = body.outline_at(u)
-    return np.array([*x, np.zeros(x.shape[1])]).T
+    return in_space(body.outline_at(u))
