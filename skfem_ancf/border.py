@@ -164,7 +164,7 @@ def _stiffen(A, size, direction, first, last):
 
 
 @source
-def solve_rows(A, J, free, Y):
+def inverse_rows(A, J, free, Y):
     """Y[k] = A^-1 J[k] at free coordinates, with the factors of A."""
     for k in range(J.shape[0]):
         row, out = J[k], Y[k]
@@ -198,7 +198,7 @@ def join(f, border, free):
         for c in range(k):
             row[border.picked[c]] += S[c, a] / scale[a]
         solve(f.after, row)
-    solve_rows(f.after, J, free, Z[k:])
+    inverse_rows(f.after, J, free, Z[k:])
     for b in range(k, k + m):
         row = Z[b]
         size = dot(J[b - k], row)

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..band import Band, clear, dense_solve, dot, multiply, solve, subtract_rows
 from ..body import add_viscous_force, body_tangent
+from ..border import inverse_rows
 from ..forces.texts import add_resisting_force
 from ..source import F2, lanes, source
 
@@ -97,11 +98,7 @@ def factorize_rows(A, rows, free):
     P, S, Z, H = rows.P, rows.S, rows.Z, rows.H
     k = P.shape[0]
     G = np.empty((k, k))
-    for a in range(k):
-        row, out = P[a], Z[a]
-        for i in lanes(free.size):
-            out[i] = row[i] * free[i]
-        solve(A, out)
+    inverse_rows(A, P, free, Z)
     for a in range(k):
         for b in range(k):
             G[a, b] = dot(P[a], Z[b])
