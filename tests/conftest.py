@@ -49,11 +49,6 @@ def mesh(request):
     return MESHES[request.param]()
 
 
-@pytest.fixture(params=STRAIGHT)
-def straight_mesh(request):
-    return MESHES[request.param]()
-
-
 @pytest.fixture
 def needs_compiled():
     """Skips a test where Numba is missing or left out."""

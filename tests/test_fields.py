@@ -81,7 +81,7 @@ def test_plane_stress_of_a_bar():
         assert state.field(name, (0.5, 0.02)) == pytest.approx(sigma, rel=1e-6)
 
 
-def test_every_field_at_points_in_files_and_over_time(tmp_path):
+def test_every_field_at_points_in_files_and_over_time():
     state = bent(mesh=quarter_arc(4, 0.1))
     body = body_fields(state, (2, 2), undeformed=True, fields=list(FIELDS))
     x = body.points[:, :2].T
@@ -102,7 +102,7 @@ def test_every_field_at_points_in_files_and_over_time(tmp_path):
     assert history.field("stretch", POINT)[0] == pytest.approx(1.0, abs=1e-3)
 
 
-def test_fields_of_the_users_own(tmp_path):
+def test_fields_of_the_users_own():
     def utilisation(v):
         assert isinstance(v, Values) and set(v) == set(FIELDS) and len(v) == len(FIELDS)
         return v["von_mises"] / 2.0

@@ -109,7 +109,7 @@ def test_small_displacement_locks_by_poisson_on_order_1_only(statics):
         assert ratio == pytest.approx(0.91 if name == "N=1" else 1.0, abs=8e-3)
 
 
-def test_thick_cantilever(parts, statics):
+def test_thick_cantilever(statics):
     result = statics["5.3"]
     sheet = result.sheets["fig11"]
     assert sheet.of("N=2", "value")[0][-1] == pytest.approx(-0.213679, abs=1e-6)
@@ -169,7 +169,7 @@ def test_released_cantilever_locks_on_order_1_only(motions):
         assert short == pytest.approx(0.083 if name == "N=1" else 0.0, abs=0.012)
 
 
-def test_shapes(parts, motions):
+def test_shapes(motions):
     """Every instant of every model, from the support to the tip of the time file."""
     shape, motion = motions["5.6"].sheets["fig22"], motions["5.6"].sheets["fig23"]
     assert shape.columns == ("t", "model", "X", "x", "y")
@@ -182,7 +182,7 @@ def test_shapes(parts, motions):
         assert (x[end][-1], y[end][-1]) == pytest.approx((tip[0][-1], tip[1][-1]), abs=1e-14)
 
 
-def test_figures_and_report(parts, statics, motions, tmp_path):
+def test_figures_and_report(parts, statics, motions):
     results = statics | motions
     assert list(results) == list(parts.examples.EXAMPLES)
     for number, result in results.items():
@@ -200,7 +200,7 @@ def test_figures_and_report(parts, statics, motions, tmp_path):
     assert not re.search(r"\b(nan|None)\b", text)
 
 
-def test_table_without_paper_row(parts, statics, tmp_path):
+def test_table_without_paper_row(statics, tmp_path):
     """What is not known is empty in the file."""
     statics["5.2"].sheets["table3"].write(tmp_path / "table3.csv")
     with open(tmp_path / "table3.csv", newline="") as file:
