@@ -270,7 +270,7 @@ class Cable(Sections):
 
     @staticmethod
     def _section(beam, u, X, tind):
-        at = CableSections(beam.kernel, X[0], tind, beam.mesh, beam.element)
+        at = CableSections(beam, X[0], tind)
         tangent, strain = at(beam.kernel.gather(u, slice(None) if tind is None else tind))
         return tangent, at.tangent0, *strain
 

@@ -274,7 +274,7 @@ def _forces_of_cable(state, beam, e, xi):
 
 
 def _cable_axis(beam, u, e, xi):
-    at = CableSections(beam.kernel, xi[:, None], e, beam.mesh, beam.element)
+    at = CableSections(beam, xi[:, None], e)
     tangent, (eps, kappa) = at(beam.kernel.gather(u, e))
     t = tangent[..., 0]
     return np.arctan2(t[1], t[0]), 1.0 + eps[:, 0], 0.0 * xi, kappa[:, 0]

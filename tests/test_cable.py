@@ -291,7 +291,7 @@ def test_sections_stay_normal_and_keep_their_height(degree, name):
     h = beam.mesh.height
     across = (x[..., 2::3] - x[..., 0::3]) / h
     np.testing.assert_allclose(np.hypot(*across), 1.0, atol=1e-12)
-    tangent, _ = CableSections(beam.kernel, X[0, 1::3], None, beam.mesh, beam.element)(
+    tangent, _ = CableSections(beam, X[0, 1::3], None)(
         beam.kernel.gather(u))
     assert np.max(np.abs(np.sum(across * tangent, axis=0))) < 1e-12
 

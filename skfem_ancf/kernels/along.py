@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .cable import CableKernel, cable_strain, cross
+from .cable import cable_strain, cross
 
 if TYPE_CHECKING:
-    from ..elements.cable import ElementBeamCable
-    from ..mesh import MeshBeam
+    from ..beam import Beam
     from ..types import Array
 
 
@@ -33,13 +32,13 @@ class CableSections:
 
     Parameters
     ----------
-    kernel, xi, tind, mesh, element
-        A kernel of cables, points xi of shape (np,) or (ne, np), elements tind (ne,) or None for
-        all, and mesh and element of the kernel.
+    beam, xi, tind
+        A beam of a cable, points xi of shape (np,) or (ne, np), elements tind (ne,) or None for
+        all.
     """
 
-    def __init__(self, kernel: CableKernel, xi: Array, tind: Array | None, mesh: MeshBeam,
-                 element: ElementBeamCable) -> None:
+    def __init__(self, beam: Beam, xi: Array, tind: Array | None) -> None:
+        kernel, mesh, element = beam.kernel, beam.mesh, beam.element
         t = kernel.t if tind is None else kernel.t[:, tind]
         L = (mesh.lengths if tind is None else mesh.lengths[tind])
         if len(np.shape(xi)) == 1:
