@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .errors import (CallbackError, InputError, NameUnknown, ask, require_finite_scalar,
                      require_flag, require_integer, require_text, shown, teaching)
-from .kept import kept
+from .kept import cached_property, kept
 from .materials import LinearLaw
 from .parts import Part
 

@@ -7,7 +7,7 @@ again for the same scene on other meshes.
 from __future__ import annotations
 
 import re
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -21,7 +21,7 @@ from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number
                      require_function, require_slope, shown, warnings_as_errors)
 from .frozen import Sealable, read_only
 from .kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
-from .kept import twin_of
+from .kept import cached_property, twin_of
 from .origin import ours
 from .pickling import picklable_form
 from .places import facets_of

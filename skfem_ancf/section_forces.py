@@ -8,14 +8,14 @@ of the element between a node and a section gives the force and the moment there
 from __future__ import annotations
 
 from copy import copy
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .errors import AncfError
 from .formulations.ecm import AXIS as WHOLE
-from .kept import kept
+from .kept import cached_property, kept
 from .kernels.base import apart
 from .mapping import cross
 from .quadrature import gauss, lagrange

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from operator import mul
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
 from .formulations import COMPONENTS
-from .kept import kept
+from .kept import cached_property, kept
 from .kernels.along import from_first_node
 from .series import chebyshev, derivatives, polynomials
 

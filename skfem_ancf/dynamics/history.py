@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from itertools import chain
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from ..errors import (InputError, require_finite, require_index, require_path, shown,
                       teaching)
+from ..kept import cached_property
 from ..points import require_body
 from ..resultants import over_time
 from ..results import Reaction, State
