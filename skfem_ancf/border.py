@@ -146,11 +146,11 @@ def add_curvature(joints, border, multipliers, free, sizes, A, f):
         S[k, k] = -stiffness
     for k in range(border.along.shape[0]):
         of, first, last = border.along[k, 0], border.along[k, 1], border.along[k, 2]
-        f.stiffness[of] = _stiffen(A, size, f.J[of], first, last)
+        f.stiffness[of] = stiffen(A, size, f.J[of], first, last)
 
 
 @source
-def _stiffen(A, size, direction, first, last):
+def stiffen(A, size, direction, first, last):
     """Make A stiff along a direction as its coordinates, from one to before another, are; how."""
     most = largest(direction[first:last])
     stiffness = 0.0
@@ -239,7 +239,11 @@ def _once(f, border, x, c, dm):
 
 @source
 def solve_bordered(f, border, b, c, x, dm):
-    """x and dm with one refinement; returns its size relative to x, or -1 if H is singular."""
+    """x and dm with one refinement; returns its size relative to x, or -1 if H is singular.
+
+    0 where all joints are directions that the band is stiff along: its round-off remains that of a
+    band.
+    """
     N, m, picked = x.size, c.size, border.picked
     r, rc, dl, weight = f.rest, f.closing, f.more, f.weight
     copy(b, x)
@@ -266,4 +270,6 @@ def solve_bordered(f, border, b, c, x, dm):
         x[i] += r[i]
     for a in range(m):
         dm[a] += dl[a] + f.stiffness[a] * c[a]
+    if picked.size == 0 and border.along.shape[0] == m:
+        return 0.0
     return np.sqrt(error / size) if size > 0.0 else 0.0

@@ -11,7 +11,8 @@ import numpy as np
 from scipy.linalg import lapack
 from scipy.sparse import coo_matrix
 
-from .border import Border, Factors, factors_of, join, mean_stiffness, solve_bordered
+from .border import (Border, Factors, factors_of, join, mean_stiffness, solve_bordered,
+                     stiffen)
 from .linalg import SINGULAR
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from .linalg import BandMatrix
     from .types import Array
 
+#: No directions that are made stiff.
+NONE_ALONG = np.zeros((0, 3), np.int64)
 #: Eigenvalue of a border, of springs of unit stiffness, that may be round-off.
 UNSURE = 1e-7
 
@@ -110,6 +113,8 @@ class BorderedMatrix:
         Those of all coordinates, 0 of fixed ones, whose diagonal is no stiffness; shape (n,).
     loose
         How many of the last of them have no stiffness of their own.
+    along
+        Rows of J along which K is made stiff, see :class:`~skfem_ancf.border.Border`.
 
     Raises
     ------
@@ -118,13 +123,16 @@ class BorderedMatrix:
     """
 
     def __init__(self, K: BandMatrix, J: Array, i: Array, j: Array, values: Array,
-                 springs: Array, sizes: Array, loose: int = 0) -> None:
+                 springs: Array, sizes: Array, loose: int = 0, along: Array = NONE_ALONG) -> None:
+        size, stiffness = np.abs(K.diagonal()), np.zeros(len(J))
+        for row, first, last in along.tolist():
+            stiffness[row] = stiffen(K.band, size, J[row], first, last)
         picked, S = hold(K, i, j, values, springs, sizes, loose)
         none = np.zeros(0, np.int64)
         self._K, self._J = K, J
-        self._border = Border(picked, len(springs), loose, none, none, none, none, 0,
-                              np.zeros((0, 3), np.int64))
+        self._border = Border(picked, len(springs), loose, none, none, none, none, 0, along)
         self.factors = factors_of(K.band, K.factors, np.array(J), S)
+        self.factors.stiffness[:] = stiffness
         join(self.factors, self._border, np.ones(J.shape[1]))
         if not np.all(np.isfinite(self.factors.H)) or np.linalg.slogdet(self.factors.H)[0] == 0.0:
             raise np.linalg.LinAlgError("the matrix is singular")
@@ -151,13 +159,13 @@ class BorderedMatrix:
         return bool(K.shifted(-SINGULAR).factorize().positive_definite)
 
     def toarray(self) -> Array:
-        """A as an array, shape (n, n)."""
+        """A as an array, stiff along directions, shape (n, n)."""
         A, at = self._K.toarray(), self._border.picked
         np.add.at(A, (at[:, None], at), self.factors.S)
         return A
 
     def tocsc(self) -> csc_matrix:
-        """A as a scipy.sparse array in CSC format."""
+        """A as a scipy.sparse array in CSC format, stiff along directions."""
         picked, S = self._border.picked, self.factors.S
         rows = np.broadcast_to(picked[:, None], S.shape)
         outside = coo_matrix((S.ravel(), (rows.ravel(), rows.T.ravel())), (self._K.n, self._K.n))

@@ -833,9 +833,10 @@ class System:
             self.constraints.curvature_entries(u, t, multipliers), self._far_entries()))
         self._outside, self._sparse = (i, j, v), None
         if self.bordered:
-            self._factors = BorderedMatrix(self.K, self._J, i, j, v, self.springs,
+            along, springs = self.constraints.stiff
+            self._factors = BorderedMatrix(self.K, self._J, i, j, v, springs,
                                            self.constraints.coordinate_sizes * self.mask,
-                                           self.loose)
+                                           self.loose, along)
             self._border = self._factors.factors
         else:
             self._sparse = self._sparse_factors(self._whole())
@@ -1003,6 +1004,8 @@ class System:
             logger.debug("border inaccurate by %.3g: sparse LU", error)
             self._sparse = self._sparse_factors(self._factors.tocsc())
         x = self._sizes * self._sparse.solve(self._sizes * np.append(b, phi))
+        if self.bordered:
+            x[self.N:] += self._factors.factors.stiffness * phi
         return x[:self.N], x[self.N:]
 
 
