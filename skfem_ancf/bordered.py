@@ -114,7 +114,7 @@ class BorderedMatrix:
     loose
         How many of the last of them have no stiffness of their own.
     along
-        Rows of J along which K is made stiff, see :class:`~skfem_ancf.border.Border`.
+        Rows of J along which K is made stiff, shape (k, 3), see :class:`~skfem_ancf.border.Border`.
 
     Raises
     ------
