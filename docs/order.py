@@ -8,7 +8,7 @@ ORDER = [
     "tapered_blade", "catenary", "spring", "leaf_spring", "bimetal", "soft_finger", "frame",
     "cylinder", "pipe_laying", "capstan", "ring",
     "column", "shallow_arch",
-    "pendulum", "spaghetti", "driven_arm", "four_bar", "tuning_fork", "damping",
+    "pendulum", "spaghetti", "driven_arm", "four_bar", "moving_load", "tuning_fork", "damping",
     "own_law", "own_element", "fit_modulus", "uncertainty",
 ]
 
