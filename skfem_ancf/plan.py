@@ -58,81 +58,95 @@ def make_plan(scene: Scene, kind: str = "static") -> Plan:
         If the kind is not known.
     """
     require_option("kind of solution", kind, KINDS)
-    s, beams = scene.system, scene.beams
-    dynamic, linear = kind == "dynamic", kind == "linear"
-    items = []
+    return Plan([Item(*item) for part in (_energy, _matrices, _forces, _solution)
+                 for item in part(scene, kind)])
 
-    def add(term, status, reason):
-        items.append(Item(term, status, reason))
 
+def _energy(scene, _):
+    """What belongs to the strain energy of the beams."""
+    beams = scene.beams
     points = sum(b.mesh.nelements * b.kernel.points_number for b in beams)
     if beams:
-        add("strain energy", "computed", f"{points} integration points, "
-            + ", ".join(sorted({b.formulation.name for b in beams})))
+        yield "strain energy", "computed", f"{points} integration points, " + ", ".join(
+            sorted({b.formulation.name for b in beams}))
     else:
-        add("strain energy", "skipped", "rigid bodies alone")
+        yield "strain energy", "skipped", "rigid bodies alone"
     shared = [b for b in beams if b.kernel.shared]
-    add("tables", "constant", "one for all elements of a straight beam with equal elements"
+    yield "tables", "constant", (
+        "one for all elements of a straight beam with equal elements"
         if len(shared) == len(beams) else "one for each element: curved or unequal elements")
     poisson = [b for b in beams if b.material.nu != 0 and b.has_sections]
     if poisson:
-        add("Poisson coupling", "computed", "nu = " + ", ".join(
-            sorted({f"{b.material.nu:g}" for b in poisson})))
+        yield "Poisson coupling", "computed", "nu = " + ", ".join(
+            sorted({f"{b.material.nu:g}" for b in poisson}))
     else:
-        add("Poisson coupling", "skipped", "nu = 0, or a section without thickness strain")
-    for item in _sections(scene):
-        add(*item)
+        yield "Poisson coupling", "skipped", "nu = 0, or a section without thickness strain"
+    yield from _sections(scene)
     held = [b for b in beams if b.kernel.constant is not None]
-    add("stabilisation", "constant" if held else "skipped",
+    yield "stabilisation", "constant" if held else "skipped", (
         "quadratic: one matrix" if held else "the quadrature leaves no mode out")
-    add("geometric term", "skipped" if linear else "computed",
+
+
+def _matrices(_, kind):
+    """Tangent and mass."""
+    dynamic, linear = kind == "dynamic", kind == "linear"
+    yield "geometric term", "skipped" if linear else "computed", (
         "no stress in a linear solve" if linear else "the stress is not zero")
-    add("tangent", "constant" if linear else "computed",
+    yield "tangent", "constant" if linear else "computed", (
         "one assembly, one factorisation" if linear else
         "its factors are kept while the iteration contracts; where a step's own do not, "
         "stresses are carried" if dynamic else
         "each iteration; the last evaluates the force only")
-    add("mass", "constant" if dynamic else "skipped",
+    yield "mass", "constant" if dynamic else "skipped", (
         "assembled and factorised once" if dynamic else "no inertia in statics")
-    for item in (_bodies(s), _damping(s, dynamic), _elements(s), _obstacles(s, linear)):
-        add(*item)
+
+
+def _forces(scene, kind):
+    """What acts on the beams, and what holds them."""
+    s = scene.system
+    yield from (_bodies(s), _damping(s, kind == "dynamic"), _elements(s),
+                _obstacles(s, kind == "linear"))
     dead = [load for load in scene.loads if load.constant and load.amplitude is None]
-    rest = len(scene.loads) - len(dead)
-    add("dead loads", "constant" if dead else "skipped",
+    rest = [load for load in scene.loads if load not in dead]
+    yield "dead loads", "constant" if dead else "skipped", (
         f"{len(dead)} assembled when given" if dead else "there are none")
-    add("varying loads", "computed" if rest else "skipped",
-        f"{_kinds(load for load in scene.loads if load not in dead)}: they depend on displacement "
-        "or time" if rest else "no follower load, no amplitude")
-    add("multipliers", "computed" if s.m else "skipped",
+    yield "varying loads", "computed" if rest else "skipped", (
+        f"{_kinds(rest)}: they depend on displacement or time" if rest else
+        "no follower load, no amplitude")
+    yield "multipliers", "computed" if s.m else "skipped", (
         f"{s.m} equations of {_kinds(s.joints)}" if s.m else
         "no joints" if not scene.joints else "the joints only fix coordinates")
-    add("linear solver", "computed", _linear_solver(s, dynamic))
+
+
+def _solution(scene, kind):
+    """How the equations are solved, and what is looked at."""
+    s, beams, dynamic, linear = scene.system, scene.beams, kind == "dynamic", kind == "linear"
+    yield "linear solver", "computed", _linear_solver(s, dynamic)
     rules = sorted({(b.element.order, t.section_points, t.slab.measure.spent)
                     for b in beams if b.has_sections for t in b.kernel.firsts})
     layer = " a layer" if any(len(b.across.slabs) > 1 for b in beams) else ""
-    add("section quadrature", "constant" if rules else "skipped",
+    yield "section quadrature", "constant" if rules else "skipped", (
         "; ".join(f"order {n}: {p} points{layer}, exact for degree {2 * p - 1 - spent} of {4 * n}"
                   for n, p, spent in rules) or "a cable has EA and EI")
     if linear:
-        add("compiled loop", "skipped", "one solve")
+        yield "compiled loop", "skipped", "one solve"
     else:
         way, reason = s.machine.choose("steps" if dynamic else "equilibrium")
-        add("compiled loop", "skipped" if way == "plain" else "computed",
+        yield "compiled loop", "skipped" if way == "plain" else "computed", (
             f"whole {'time steps, in blocks' if dynamic else 'iterations'}: {reason}")
     if kind == "static":
         alone = s.machine.tables.alone
-        add("sweep", "skipped" if alone else "computed",
+        yield "sweep", "skipped" if alone else "computed", (
             f"members are solved one by one: {alone}" if alone else
             "members that differ by floats are solved together, if points are read")
     if dynamic:
         scheme, reason = choose_scheme(s)
-        add("scheme", "computed", f'scheme="auto" takes {scheme!r}: {reason}')
+        yield "scheme", "computed", f'scheme="auto" takes {scheme!r}: {reason}'
     sensors = scene.sensors if dynamic else {}
-    add("sensors", "computed" if sensors else "skipped",
+    yield "sensors", "computed" if sensors else "skipped", (
         f"{len(sensors)} read at every step" if sensors else
         "they record motions" if scene.sensors else "there are none")
-    add("fields", "skipped", "strain and stress are computed where a State is asked for them")
-    return Plan(items)
+    yield "fields", "skipped", "strain and stress are computed where a State is asked for them"
 
 
 def _linear_solver(s, dynamic):
