@@ -846,8 +846,8 @@ class Chain:
         for pack, S in zip(self.packs, stresses):
             self.texts.stress(pack, u, S)
         for part in self.chunks():
-            tangents = self.element_tangents(
-                self.gather(u, part), part, [C[:, :, part] for C in used] if given else None)
+            tangents = self.tangents_of(self.apart(part), self.gather(u, part),
+                                        [C[:, :, part] for C in used] if given else None)
             K.add_elements(tangents, start, self.nd, self.t[0, part])
         return Assembly(self, u, stresses)
 
@@ -908,8 +908,8 @@ class Chain:
         """
         u = self.checked(u)
         carried = None if geometric else self.stresses()
-        return np.concatenate([self.element_tangents(
-            self.gather(u, part), part, carried and [C[:, :, part] for C in carried])
+        return np.concatenate([self.tangents_of(
+            self.apart(part), self.gather(u, part), carried and [C[:, :, part] for C in carried])
             for part in self.chunks()])
 
     def forces_of(self, packs: list[Any], u_e: Array) -> Array:
@@ -927,21 +927,6 @@ class Chain:
             self.texts.force(pack, u_e.ravel(), out)
         return out.reshape(u_e.shape)
 
-    def element_tangents(self, u_e: Array, elements: slice = slice(None),
-                         carried: list[Array] | None = None) -> Array:
-        """Tangents (ne, 2 nb, 2 nb) of the displacements (ne, nb, 2) of a slice of elements.
-
-        Parameters
-        ----------
-        u_e
-            Displacements of the coordinates of these elements, shape (ne, nb, 2).
-        elements
-            A slice of the elements.
-        carried
-            Stresses of each pack for the geometric part; those of the displacement if None.
-        """
-        return self.tangents_of(self.apart(elements), u_e, carried)
-
     def tangents_of(self, packs: list[Any], u_e: Array,
                     carried: list[Array] | None = None) -> Array:
         """Tangents (ne, 2 nb, 2 nb) of packs as :func:`apart` makes them.
@@ -953,7 +938,7 @@ class Chain:
         u_e
             Displacements of the coordinates of these elements, shape (ne, nb, 2).
         carried
-            As for :meth:`element_tangents`.
+            Stresses of each pack for the geometric part; those of the displacement if None.
         """
         ne, n = len(u_e), 2 * self.nd
         u, force, flat = u_e.ravel(), np.zeros(u_e.size), np.zeros((ne, n, n + 1))
