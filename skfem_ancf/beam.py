@@ -355,7 +355,7 @@ class Beam(Frozen):
 
     @cached_property
     def kernel(self) -> Any:
-        """The fused evaluation of the strain energy; see :mod:`skfem_ancf.kernel`."""
+        """The fused evaluation of the strain energy; see :mod:`skfem_ancf.kernels`."""
         return self.kinematics.kernel(self.across, self.formulation)
 
     @cached_property

@@ -184,7 +184,7 @@ class Text:
     function
         A Python function.
     flags
-        :class:`TextFlags`, those tried first where owners of arrays are not counted.
+        :class:`~.flags.TextFlags`, those tried first where owners of arrays are not counted.
     """
 
     def __init__(self, function, flags):

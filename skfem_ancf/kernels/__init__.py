@@ -3,9 +3,9 @@
 The weak forms of :mod:`skfem_ancf.forms` say what is computed; this package computes the same from
 tables of the derivatives of the local functions in the beam's own frame. Every formula stands
 here once, as a text that :mod:`skfem_ancf.source` marks: it runs as plain NumPy, and compiled.
-A kind of beam is a module with a pack of tables and the texts ``KIND_force(pack, u, f)``,
-``KIND_tangent``, ``KIND_carry``, ``KIND_stress``, ``KIND_mean`` and ``KIND_energy``. In their
-arrays the elements are the last axis.
+A kind of beam is a module with a pack of tables, a text that evaluates forces, stresses and
+tangents, and its :class:`~skfem_ancf.kernels.base.Texts`. In their arrays the elements are the
+last axis.
 
 Everything is a function of the displacement ``u = q - q0`` of the coordinates: the gradient is
 ``r_X = e_1 + G u``, and ``eps_xx = (e_1 + G u / 2) . G u`` has no cancellation where displacements
