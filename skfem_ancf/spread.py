@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .types import Array
 
 #: Places nearer than this part of an element to a node are at the node.
-SNAP = 1e-6
+SNAP = 1e-5
 
 #: A function of ``r`` that differs from 0 or 1 by less is that at a node, where it is flat.
 FLAT = 1e-11

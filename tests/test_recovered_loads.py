@@ -195,3 +195,27 @@ def test_section_force_of_a_damped_beam_is_that_of_the_part_behind_it(element):
         total -= weight * RHO * B * H / 8 * np.sum(w * (a + alpha * v), axis=(1, 2))
     total += [0.0, -G * RHO * B * H / 2]
     assert_allclose(state.resultants((0.5, 0)).force, total, atol=1e-4 * np.abs(total).max())
+
+
+@pytest.mark.parametrize("curved", [False, True])
+@pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCFCubic(3),
+                                     ElementBeamCable(5)], ids=str)
+def test_a_force_close_to_a_node(element, curved):
+    """What changes is in proportion to how far it is from the node."""
+    def stress(xi, e):
+        s = np.linspace(0, 1, 7)
+        mesh = (MeshBeam.init_curve(lambda s: np.array([s, 0.06 * np.sin(3 * s)]), s, 0.1) if curved
+                else MeshBeam.init_line(s, 0.02))
+        at = mesh.mapping().F(np.array([[xi], [0.5]]), np.array([e]))[:, 0, 0]
+        beam = Beam(mesh, element, StVenantKirchhoff(2e8, 0.3), width=0.05)
+        scene = Scene(beam).clamp("left", thickness="free").point_force((0, -1), at=at)
+        state = scene.point_force((0, -1), at=mesh.p[:, -1]).solve_static()
+        assert state.recovered == {0: ""}
+        points = mesh.mapping().F(np.array([[0.5], [0.9]]), np.arange(6))[..., 0]
+        return state.stress(points)[0]
+
+    at_node = stress(0.0, 3)
+    for far in (1e-6, 4e-6, 3e-5, 5e-4, 2e-3):
+        for xi, e in ((far, 3), (1.0 - far, 2)):
+            change = np.abs(stress(xi, e) - at_node).max() / np.abs(at_node).max()
+            assert change < 0.2 * far + 1e-7
