@@ -894,7 +894,11 @@ class Chain:
 
     def forces(self, u: Array) -> Array:
         """Element forces (ne, nb, 2) of a coordinate displacement (N,)."""
-        return self.forces_of(self.apart(), self.gather(self.checked(u)))
+        u_e = self.gather(self.checked(u))
+        out = np.zeros(u_e.size, dtype=u_e.dtype)
+        for pack in self.apart():
+            self.texts.force(pack, u_e.ravel(), out)
+        return out.reshape(u_e.shape)
 
     def tangents(self, u: Array, geometric: bool = True) -> Array:
         """Element tangents (ne, 2 nb, 2 nb) of a coordinate displacement (N,).
@@ -911,21 +915,6 @@ class Chain:
         return np.concatenate([self.tangents_of(
             self.apart(part), self.gather(u, part), carried and [C[:, :, part] for C in carried])
             for part in self.chunks()])
-
-    def forces_of(self, packs: list[Any], u_e: Array) -> Array:
-        """Forces (ne, nb, 2) of packs as :func:`apart` makes them.
-
-        Parameters
-        ----------
-        packs
-            The packs, all of the same elements.
-        u_e
-            Displacements of the coordinates of these elements, shape (ne, nb, 2).
-        """
-        out = np.zeros(u_e.size, dtype=u_e.dtype)
-        for pack in packs:
-            self.texts.force(pack, u_e.ravel(), out)
-        return out.reshape(u_e.shape)
 
     def tangents_of(self, packs: list[Any], u_e: Array,
                     carried: list[Array] | None = None) -> Array:
