@@ -408,7 +408,7 @@ def buckling(system: System, k: int) -> Buckling:
     Ks = tangent.geometric(stress, multipliers, 1.0)
     if not Ks.nnz or not abs(Ks).max() > 0.0:
         raise InputError("no positive load factor: the loads do not stress the beam")
-    symmetric = is_symmetric(Ks)
+    symmetric = is_symmetric(Ks, system.constraints.coordinate_sizes[tangent.free])
     theta, X = (_geometric if symmetric else _follower)(tangent, Ks, k)
     # mean strain before buckling over that of the strain energy of a strain of one
     strain = np.sqrt(max(float(du @ tangent.internal(stress)), 0.0)) * np.finfo(float).eps

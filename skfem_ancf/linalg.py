@@ -361,14 +361,23 @@ class BandMatrix:
             lower[k, :self.n - k] = 0.5 * (ab[top + k, :self.n - k] + ab[top - k, k:])
         return out
 
-    def skew_size(self) -> tuple[float, float]:
-        """The largest entries, without sign, of A - A^T and of A."""
-        ab, top = self.ab, self._diagonal
-        size = float(np.max(np.abs(ab[max(top - self.bandwidth, 0):])))
-        if self.symmetric:
-            return 0.0, size
-        return max((float(np.max(np.abs(ab[top + k, :self.n - k] - ab[top - k, k:])))
-                    for k in range(1, min(self.bandwidth + 1, self.n))), default=0.0), size
+    def skew_size(self, sizes: Array) -> tuple[float, float]:
+        """The largest entries, without sign, of A - A^T and of A, of coordinates over their sizes.
+
+        Parameters
+        ----------
+        sizes
+            Of the coordinates, which have units of their own, shape (n,).
+        """
+        ab, top, n = self.ab, self._diagonal, self.n
+        size, skew = float(np.max(np.abs(ab[top]) * sizes**2)), 0.0
+        for k in range(1, min(self.bandwidth + 1, n)):
+            both = sizes[k:] * sizes[:n - k]
+            below = ab[top + k, :n - k] * both
+            above = below if self.symmetric else ab[top - k, k:] * both
+            size = max(size, float(np.max(np.abs(below))), float(np.max(np.abs(above))))
+            skew = max(skew, float(np.max(np.abs(below - above))))
+        return skew, size
 
     def toarray(self) -> Array:
         """The matrix as an array, shape (n, n)."""

@@ -184,7 +184,7 @@ class StrainTangent:
     @property
     def symmetric(self) -> bool:
         """True if the tangent is symmetric between the free coordinates, to round-off."""
-        return is_symmetric(self.S)
+        return is_symmetric(self.S, self.system.constraints.coordinate_sizes[self.free])
 
     def multiply(self, x: Array, S: csr_matrix | None = None) -> Array:
         """The tangent times a vector or columns.
@@ -270,8 +270,18 @@ def _beam_geometric(beam, u, stress):
     return sparse.csr_matrix((values, (i, j)), shape=(beam.N, beam.N))
 
 
-def is_symmetric(S: csr_matrix) -> bool:
-    """True if a sparse matrix is symmetric to round-off."""
+def is_symmetric(S: csr_matrix, sizes: Array) -> bool:
+    """True if a sparse matrix is symmetric to round-off.
+
+    Parameters
+    ----------
+    S
+        The matrix, shape (n, n).
+    sizes
+        Of its coordinates, which have units of their own, shape (n,).
+    """
+    D = sparse.diags(sizes)
+    S = D @ S @ D
     gap = abs(S - S.T)
     return not gap.nnz or bool(gap.max() <= 1e-12 * abs(S).max())
 

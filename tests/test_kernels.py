@@ -327,8 +327,10 @@ def test_skew_size_of_a_band_matrix_is_that_of_the_dense_one(n, bandwidth):
         i, j = np.nonzero(abs(np.arange(n)[:, None] - np.arange(n)) <= bandwidth)
         A.add(i, j, np.sin(1.0 + np.minimum(i, j) + 7.0 * np.maximum(i, j) + (0.0 if symmetric
                                                                              else (i > j))))
-        dense = A.tocsc().toarray()
-        assert_allclose(A.skew_size(), (np.max(abs(dense - dense.T)), np.max(abs(dense))))
+        sizes = 1.0 + np.arange(n)
+        dense = sizes[:, None] * A.tocsc().toarray() * sizes
+        expected = np.max(abs(dense - dense.T)), np.max(abs(dense))
+        assert_allclose(A.skew_size(sizes), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize(("n", "bandwidth"), [(1, 0), (3, 4), (9, 2)])

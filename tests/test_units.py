@@ -164,3 +164,16 @@ def test_how_far_bodies_reach():
     assert np.isclose(reach([bar, near]), np.sqrt(2.0), rtol=1e-12)
     assert np.isclose(reach([bar.translated((7.0, 8.0)), near.translated((7.0, 8.0))]),
                       np.sqrt(2.0), rtol=1e-12)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_becks_column_flutters_in_any_unit(unit):
+    """Loads without a potential are seen where coordinates have units of 1e-12 to 1e12."""
+    mesh = MeshBeam.init_line(unit * np.linspace(0, 1, 7), 1e-2 * unit)
+    column = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(12e6 / unit, 0, 1e2 / unit**3),
+                  width=unit)
+    scene = Scene(column).clamp("left").follower_force((-20.5 * unit, 0), at=(unit, 0))
+    state = scene.solve_static()
+    modes = scene.modes(2, state)
+    assert modes.flutter and state.stability == "undecided"
+    assert np.allclose(modes.frequencies.real, 10.98061, rtol=1e-6)  # beyond P = 20.051

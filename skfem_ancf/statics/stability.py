@@ -114,7 +114,7 @@ def verdict_of_factors(system: System) -> Verdict:
 
 def _is_symmetric(system):
     """True if the tangent of loads that follow is symmetric all the same."""
-    skew, size = system.K.skew_size()
+    skew, size = system.K.skew_size(system.constraints.coordinate_sizes * system.mask)
     return skew <= ROUND_OFF * size
 
 
