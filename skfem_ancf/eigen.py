@@ -500,4 +500,7 @@ def _real(X):
 
 
 def _count(k, n):
+    if n == 0:
+        raise InputError("there are no modes, as supports and joints hold all coordinates: leave "
+                         "some of them free")
     return require_integer("the number of modes", k, 1, n)

@@ -766,6 +766,17 @@ def test_statics_of_bodies_alone():
     assert_allclose(turn / np.sin(turn), 1.5, rtol=2e-3)
 
 
+def test_a_body_that_is_held_by_all_of_its_coordinates():
+    """Nothing is free: its weight is what its support carries, and there are no modes."""
+    body = RigidBody(mass=2.0, inertia=0.5)
+    scene = Scene(body).clamp(body).gravity((0, -G))
+    state = scene.solve_static()
+    assert state.iterations <= 1 and state.stability == "stable"
+    assert_allclose(state.reactions(None, body).force, (0.0, 2.0 * G))
+    with pytest.raises(InputError, match="no modes, as supports and joints hold all"):
+        scene.modes(1)
+
+
 def test_a_scene_of_bodies_is_kept_and_written(tmp_path):
     scene, body, _ = alone()
     history = scene.integrate(0.2, 0.01, checkpoint=tmp_path / "half.npz", every=7)
