@@ -492,21 +492,14 @@ class Constraints:
         return found
 
     @cached_property
-    def springs(self) -> Array:
-        """Coordinates that hold the beams which their own supports leave free to move.
-
-        The positions of two nodes far apart, for each such beam; all coordinates of rigid bodies,
-        which have no stiffness of their own, come last.
-        """
-        return self._springs(self._standing)
-
-    @cached_property
     def stiff(self) -> tuple[Array, Array]:
-        """Directions of joints that hold such beams, and :attr:`springs` of the others.
+        """What holds the beams which their own supports leave free: directions, and coordinates.
 
-        Directions are those of equations whose coordinates lie in the band, and whose derivative
-        is constant: the number of the equation, the first of the coordinates and the one behind
-        the last, shape (n, 3).
+        Directions of joints that hold a beam are those of equations whose coordinates lie in the
+        band, and whose derivative is constant: the number of the equation, the first of the
+        coordinates and the one behind the last, shape (n, 3). Of each beam which these leave free
+        to move, the positions of two nodes far apart; all coordinates of rigid bodies, which have
+        no stiffness of their own, come last.
         """
         standing, rows = self._held_alone
         return np.array(rows, np.int64).reshape(-1, 3), self._springs(standing)
@@ -547,7 +540,7 @@ class Constraints:
         return _has_full_rank(np.vstack([motions[held], *sums]))
 
     def _springs(self, standing):
-        """As :attr:`springs`, of beams that do not stand."""
+        """The coordinates of :attr:`stiff`, of beams that do not stand."""
         found: list[int] = []
         for beam, s, stands in zip(self.members, self.slices, standing):
             if isinstance(beam, RigidBody):
@@ -564,7 +557,7 @@ class Constraints:
 
     @cached_property
     def loose(self) -> int:
-        """How many of the last of :attr:`springs` are coordinates of rigid bodies."""
+        """How many of the last coordinates of :attr:`stiff` are of rigid bodies."""
         return sum(int(np.sum(self.free[s])) for member, s in zip(self.members, self.slices)
                    if isinstance(member, RigidBody))
 
@@ -573,7 +566,7 @@ class Constraints:
         """True if the multipliers are few enough for a border about the band matrix."""
         most = self.m + 4 * len(self.members)  # springs are seldom worth asking for
         return self.frame is None and (most <= WIDE_BORDER
-                                       or self.m + len(self.springs) <= WIDE_BORDER)
+                                       or self.m + len(self.stiff[1]) <= WIDE_BORDER)
 
     @cached_property
     def frame(self) -> Nodes | None:

@@ -201,7 +201,6 @@ class System:
     mean_turning: Any = _OfConstraints()
     multipliers_of: Any = _OfConstraints()
     joint_force: Any = _OfConstraints()
-    springs: Any = _OfConstraints()
     loose: Any = _OfConstraints()
     bordered: Any = _OfConstraints()
     free_rigid_motions: Any = _OfConstraints()
