@@ -20,9 +20,10 @@ if TYPE_CHECKING:
     from .recovery import Recovery
     from .types import Array
 
-#: Rounds of steps 2 and 3 at most, and the change of the stretch, relative to its largest, at which
-#: they end.
+#: Rounds of steps 2 and 3, and the change of the stretch, relative to its largest, at which they
+#: end; of those that contract slowly.
 ROUNDS, SETTLED = 6, 1e-7
+MOST, SLOWLY = 30, 1e-4
 
 #: Part of an element beside a load or a joint that has no sections of its own, up to this.
 CLOSE = 0.02
@@ -93,6 +94,8 @@ class Piece:
         Direction of the fibres along the axis, (..., n, m), in radians.
     rate
         At which the sections turn, (..., n).
+    change
+        Of the stretch in the last round, (...).
     """
 
     def __init__(self, recovery: Recovery, start: float, end: float) -> None:
@@ -413,7 +416,7 @@ class Piece:
     def _rounds(self):
         """Steps 2 and 3 in turn, for each state until its stretch has settled."""
         settled = np.zeros(self.forces.states, dtype=bool)
-        for _ in range(ROUNDS):
+        for k in range(MOST):
             before = self.stretch, self.alpha, self.S.copy(), self.phi, self.rate
             self._balance(BALANCE)
             self._turn()
@@ -423,8 +426,9 @@ class Piece:
                     np.where(settled.reshape(settled.shape + (1,) * places), old, new)
                     for places, old, new in zip((2, 2, 2, 1, 1), before, (
                         self.stretch, self.alpha, self.S, self.phi, self.rate)))
-            settled = settled | (largest(self.stretch - before[0])
-                                 <= SETTLED * largest(self.stretch - 1.0))
+            self.change = largest(self.stretch - before[0])
+            settled = settled | (self.change <= largest(self.stretch - 1.0) * (
+                SETTLED if k < ROUNDS - 1 else SLOWLY))
             if np.all(settled):
                 break
 

@@ -36,7 +36,7 @@ from .formulations.ecm import EnhancedContinuum
 from .kept import cached_property, kept
 from .materials import LinearLaw
 from .panels import Moved, Panels
-from .pieces import Piece, refuse
+from .pieces import Piece, largest, refuse
 from .point import AGAIN
 from .quadrature import gauss
 from .refinement import by_element
@@ -57,6 +57,10 @@ if TYPE_CHECKING:
 
 #: Elements of which arc lengths are kept for single points.
 ELEMENTS = 4096
+
+#: Fields that the last round changes by more than this part of the largest strain have not settled;
+#: strains below the other are round-off.
+UNSETTLED, TINY = 0.01, 1e-12
 
 
 def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[int] = (0, 1, 2),
@@ -174,6 +178,12 @@ class Recovery:
         self.pieces = [Piece(self, a, b) for a, b in zip(forces.cuts[:-1], forces.cuts[1:])]
         for piece in self.pieces:
             refuse(~np.all(np.isfinite(piece.strain), axis=(0, -2, -1)))
+        strain = np.max([largest(piece.stretch - 1.0) for piece in self.pieces], axis=0)
+        change = np.max([piece.change for piece in self.pieces], axis=0) / np.maximum(strain, TINY)
+        if np.any(change > UNSETTLED):
+            raise NotRecovered("the fields do not settle: the last of their rounds changes the "
+                               f"strain by {np.max(change):.0%} of its largest value",
+                               change > UNSETTLED)
         self._tables = [p.table(np.concatenate([p.strain, p.stress, p.angle[None]]))
                         for p in self.pieces]
         self._cuts = forces.cuts.tolist()
