@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 ROUNDS, SETTLED = 6, 1e-7
 MOST, SLOWLY = 30, 1e-4
 
-#: Part of an element beside a load or a joint that has no sections of its own, up to this.
+#: Part of an element beside a load or a joint that has no sections of its own, up to this. Alone
+#: between two of them it has those of the whole element.
 CLOSE = 0.02
 
 #: Iterations of the balance of a section in a round, and at most after the last one.
@@ -108,9 +109,11 @@ class Piece:
             e, a, b = e[far], a[far], b[far]
         if np.any((a > 0) & (b < 1)):
             raise NotRecovered("two point loads act inside of one element: put a node at them")
+        side = np.where(a > 0, 1.0, np.where(b < 1, 0.0, 0.5))
+        if not np.any(far):  # the field on whole elements, under the section force of this part
+            a, b = 0.0 * a, 0.0 * b + 1.0
         whole = (a == 0) & (b == 1)
         self.elements = e[whole] if np.any(whole) else e
-        side = np.where(a > 0, 1.0, np.where(b < 1, 0.0, 0.5))
         self.e = np.append(np.repeat(e, 2), e[-1])
         self.xi = xi = np.append(np.stack([a, 0.5 * (a + b)], 1).ravel(), b[-1])
         self.s = recovery.arc(self.e, xi)

@@ -219,3 +219,22 @@ def test_a_force_close_to_a_node(element, curved):
         for xi, e in ((far, 3), (1.0 - far, 2)):
             change = np.abs(stress(xi, e) - at_node).max() / np.abs(at_node).max()
             assert change < 0.2 * far + 1e-7
+
+
+@pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCFCubic(3),
+                                     ElementBeamCable(5)], ids=str)
+@pytest.mark.parametrize("far", [2e-5, 1e-4, 1e-3, 1e-2])
+def test_between_a_force_and_an_end_close_to_it(element, far):
+    """No noise in the sliver: no stress where nothing acts, else the pressure on its face."""
+    mesh = MeshBeam.init_curve(lambda s: np.array([s, 0.06 * np.sin(3 * s)]),
+                               np.linspace(0, 1, 7), 0.1)
+    near, middle, end = (mesh.mapping().F(np.array([3 * [xi], [0.0, 0.5, 1.0]]), np.array([e]))[
+        :, 0] for xi, e in ((1.0 - far, 5), (0.5, 2), (1.0 - 0.5 * far, 5)))
+    beam = Beam(mesh, element, StVenantKirchhoff(2e8, 0.3), width=0.05)
+    scene = Scene(beam).clamp("left", thickness="free").point_force((0, -1e-2), at=near[:, 1])
+    state = scene.solve_static(tol=1e-12)
+    assert state.recovered == {0: ""}
+    assert np.abs(state.stress(end)).max() < 1e-8 * np.abs(state.stress(middle)).max()
+    pressed = scene.pressure("top", 1.0).solve_static(tol=1e-12)
+    assert pressed.recovered == {0: ""}
+    assert_allclose(pressed.stress(end)[1], [0.0, -0.5, -1.0], atol=0.05)
