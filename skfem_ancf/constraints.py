@@ -647,7 +647,8 @@ class Constraints:
         if free:
             raise SupportError(
                 "the supports leave rigid motions free: " + "; ".join(free)
-                + f". Add a support, for example {self._advice()}, or solve in time with "
+                + (", along which the springs have no stiffness before the load"
+                   if self._stiffness is not None else "") + f". Add a support, for example {self._advice()}, or solve in time with "
                 "scene.integrate")
         self._supported = True
 

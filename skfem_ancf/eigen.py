@@ -33,7 +33,7 @@ REAL = 1e-7  # imaginary over absolute value of an eigenvalue that counts as rea
 
 
 @teaching
-@dataclass
+@dataclass(repr=False)
 class Modes:
     """Natural frequencies and shapes, the lowest first.
 
@@ -60,6 +60,9 @@ class Modes:
     shapes: np.ndarray
     state: State
     eigenvalues: np.ndarray
+
+    def __repr__(self):
+        return f"<Modes of {len(self.frequencies)} frequencies, {_listed(self.frequencies)} rad/s>"
 
     @property
     def flutter(self) -> bool:
@@ -118,7 +121,7 @@ class Modes:
                      load=self.state.load, message=f"mode {i}")
 
 
-@dataclass
+@dataclass(repr=False)
 class Buckling:
     """Load factors at which the stress-free state loses stability, the lowest first.
 
@@ -136,6 +139,15 @@ class Buckling:
     factors: np.ndarray
     shapes: np.ndarray
     follower: bool = False
+
+    def __repr__(self):
+        loads = ", under loads that follow the body" if self.follower else ""
+        return f"<Buckling at the load factors {_listed(self.factors)}{loads}>"
+
+
+def _listed(numbers):
+    """The first of some numbers, for people."""
+    return ", ".join(f"{x:.6g}" for x in numbers[:6]) + ", ..." * (len(numbers) > 6)
 
 
 def modes(system: System, state: State, k: int) -> Modes:

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from .types import Array
 
@@ -741,6 +741,29 @@ def teaching(cls: Class) -> Class:
         elif isinstance(value, (classmethod, staticmethod)):
             setattr(cls, name, type(value)(taught(value.__func__)))
     return cls
+
+
+def require_options(call: str, options: Mapping[str, Any], known: Sequence[str],
+                    hint: str) -> None:
+    """Raise CallError for an option that is none of those known.
+
+    Parameters
+    ----------
+    call
+        What was called.
+    options
+        Those given.
+    known
+        The names of those that there are.
+    hint
+        What else there is to say.
+    """
+    unknown = [name for name in options if name not in known]
+    if unknown:
+        near = nearest(unknown[0], known)
+        raise CallError(f"{call}() has no option {unknown[0]!r}"
+                        f"{'.' if near is None else f'; did you mean {near!r}?'} There are "
+                        f"{', '.join(known)}; {hint}")
 
 
 def _explain(function, kwargs, error):

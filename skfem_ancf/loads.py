@@ -250,7 +250,9 @@ def bind_load(load: Load, beam: Beam | RigidBody) -> Load:
             return bound
         i, j, v = bound.stiffness(zero)
     except AncfError as error:
-        raise InputError(f"{load!r} is no load of this beam: {error}") from None
+        raise InputError(f"{load!r} is no load of this beam: {error}. Meshes change, under adapt= "
+                         "and by refinement: what has the size of one is made in bind(beam) or "
+                         "force(u), of places along self.beam") from None
     except Exception as error:  # it is the user's: it may raise anything
         raise InputError(f"{load!r} fails in the stress-free state: {type(error).__name__}: "
                          f"{error}; a load defines force(u) of shape (beam.N,), and stiffness(u) "
@@ -452,7 +454,8 @@ class FormLoad(Load):
                  amplitude: TimeFunction = None) -> None:
         super().__init__(beam, amplitude)
         if not isinstance(form, LinearForm):
-            raise InputError(f"a load is a scikit-fem LinearForm, got {shown(form)}")
+            raise InputError(f"a load is a scikit-fem LinearForm, got {shown(form)}; what is no "
+                             "form is a subclass of skfem_ancf.loads.Load, for scene.add")
         self.form, self.boundary = form, boundary
 
     def bind(self, beam: Beam) -> Load:

@@ -30,7 +30,7 @@ from .forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring,
                      bind_force)
 from .errors import (ConvergenceError, InputError, Interrupted, StabilityWarning, ask_field,
                      require_finite, require_finite_scalar, require_label, require_option,
-                     require_positive, shown, taught, teaching)
+                     require_options, require_positive, shown, taught, teaching)
 from .joints import Joint, bind_joint, get_joint
 from .joints.base import both_of, is_ground, members_at, named_place
 from .joints.prescribed import Turned
@@ -61,6 +61,8 @@ if TYPE_CHECKING:
     from .obstacles import Shape
     from .plan import Plan
     from .types import Array, Place, StrPath, TimeFunction, WhichBeam, WhichMember
+
+OPTIONS = ("method", "tol", "max_iterations", "first_step", "min_step", "progress", "stable")
 
 
 def _alone(method):
@@ -1566,11 +1568,14 @@ class Scene:
         return State(system, u, require_finite_scalar("load", load), converged=False,
                      message="given coordinates", multipliers=multipliers)
 
-    def _solve(self, u, **options):
+    def _solve(self, u, memory=None, **options):
+        require_options("solve_static", options, OPTIONS,
+                        "first_step=0.1 begins with a tenth of the load; with adapt= those of "
+                        "statics.adapt.solve_adaptive too")
         system = self.system
         system.require_supports()
         try:
-            result = newton.solve_static(system, u, **options)
+            result = newton.solve_static(system, u, memory=memory, **options)
         except (ConvergenceError, Interrupted) as error:
             raise type(error)(str(error), self._state(error.state)) from None
         return self._state(result)
@@ -1635,9 +1640,10 @@ class Scene:
         Parameters
         ----------
         v
-            Velocities of the coordinates, shape (beam.N,), or a function of the points x, shape
-            (2, ...), of the stress-free body that returns velocities (2, ...). Of a rigid body the
-            function is asked at its centre of mass and beside it.
+            The velocity of all points, shape (2,), or a function of the points x, shape (2, ...), of
+            the stress-free body that returns velocities (2, ...); or velocities of the coordinates,
+            shape (beam.N,). Of a rigid body the function is asked at its centre of mass and beside
+            it.
         beam
             The beam, its name or its number, in a scene of several; or a RigidBody.
 
@@ -1650,6 +1656,9 @@ class Scene:
 
     def _bind_velocity(self, k, v):
         beam = self.members[k]
+        if (isinstance(v, (list, tuple)) and len(v) == 2) or getattr(v, "shape", None) == (2,):
+            uniform = require_finite("v", v, (2,))
+            return self._bind_velocity(k, lambda x: np.multiply.outer(uniform, np.ones(x[0].shape)))
         if callable(v) and isinstance(beam, RigidBody):
             v = beam.velocity_of(lambda x: ask_field("v(x)", v, x))
         elif callable(v):

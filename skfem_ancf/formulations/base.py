@@ -119,7 +119,8 @@ class Formulation(Frozen):
         -------
         list of Term
         """
-        raise NotImplementedError
+        raise NotImplementedError(f"{type(self).__name__} has no terms: a formulation defines "
+                                  "terms(element, material), a list of Term")
 
     def points_along(self, element: ElementBeam, material: Material) -> int:
         """Number of points along an element of the first of the terms.

@@ -32,7 +32,8 @@ class PrescribedPosition(Joint):
     Parameters
     ----------
     at
-        The material point: its place (x, y) in the stress-free body.
+        The material point: its place (x, y) in the stress-free body, or the name of an end; of a
+        RigidBody, which may stand here too, its centre of mass if no point is given.
     r
         The motion: a function of time that returns the position (2,).
     beam
@@ -44,10 +45,11 @@ class PrescribedPosition(Joint):
     equations = ("force along x", "force along y")
     moving = True
 
-    def __init__(self, at: ArrayLike, r: Callable[[float], ArrayLike], beam: WhichMember = None,
-                 name: str | None = None) -> None:
+    def __init__(self, at: Any = None, r: Callable[[float], ArrayLike] | None = None,
+                 beam: WhichMember = None, name: str | None = None) -> None:
         self.motion = require_function("r", r, "of time that returns a position (2,)")
-        self.at, self.beam, self.name = at, beam, require_label("name", name)
+        self.at, self.beam = on_body(at, beam)
+        self.name = require_label("name", name)
 
     def bind(self, scene: Scene) -> None:
         self.r, self._motion = point(scene, self.beam, self.at), Sampled(self.motion, "r", (2,))
@@ -70,7 +72,8 @@ class PrescribedAngle(Joint):
     Parameters
     ----------
     at
-        The section, as "left" or "right" or a point through which it goes; a RigidBody.
+        The section, as "left" or "right" or a point through which it goes; a RigidBody. Not asked
+        for where ``beam`` is a RigidBody.
     angle
         The angle in radians as a function of time, from the stress-free state, counterclockwise.
     beam
@@ -83,8 +86,8 @@ class PrescribedAngle(Joint):
     constant = False
     moving = True
 
-    def __init__(self, at: Any, angle: Callable[[float], float], beam: WhichMember = None,
-                 name: str | None = None) -> None:
+    def __init__(self, at: Any = None, angle: Callable[[float], float] | None = None,
+                 beam: WhichMember = None, name: str | None = None) -> None:
         self.angle = require_function("angle", angle, "of time that returns radians")
         self.at, self.beam = on_body(at, beam)
         self.name = require_label("name", name)

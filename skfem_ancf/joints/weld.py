@@ -65,10 +65,13 @@ class Weld(Joint):
         gap = b.start - self.a.start
         beams = [scene.beam(beam) for beam in self.beams if not is_ground(beam)]
         if not self.apart and np.hypot(*gap) > 1e-6 * min(beam.size for beam in beams):
+            centre = next((f": of {beam!r} alone it is the centre of mass that is meant, name "
+                           "the point, as (body, (x, y)); or" for beam, at in
+                           zip(self.beams, self.at) if at is None), ":")
             raise InputError(
                 f"the sections to weld are {np.hypot(*gap):.6g} apart, one at "
                 f"({self.a.start[0]:.6g}, {self.a.start[1]:.6g}), the other at "
-                f"({b.start[0]:.6g}, {b.start[1]:.6g}): name sections that meet, move a "
+                f"({b.start[0]:.6g}, {b.start[1]:.6g}){centre} name sections that meet, move a "
                 f"mesh by mesh.translated(({0 - gap[0]:.6g}, {0 - gap[1]:.6g})), or weld with "
                 "apart=True to draw them together")
 

@@ -431,11 +431,11 @@ class Across(Frozen):
         """
         if self.plain:
             slab = self.slabs[0]
-            return [(slab, list(formulation.terms(self.element, slab.material)))]
+            return [(slab, _terms(formulation, self.element, slab.material))]
         out = []
         for slab in self.slabs:
-            terms = list(formulation.terms(self.element.measured(slab.measure, self.shear),
-                                           slab.material))
+            terms = _terms(formulation, self.element.measured(slab.measure, self.shear),
+                           slab.material)
             eta, w = slab.measure.gauss(2)
             for term in terms:
                 if self.element.order and term.section_samples is not None and slab.measure.moves:
@@ -580,3 +580,12 @@ def _for(element, slab):
     """A slab with the measure for an element."""
     measure = measure_of(slab.measure).of_order(element.order)
     return slab if measure is slab.measure else replace(slab, measure=measure)
+
+
+def _terms(formulation, element, material):
+    """Those of a formulation, of which there has to be one."""
+    terms = list(formulation.terms(element, material))
+    if not terms:
+        raise InputError(f"{formulation!r} has no terms, so that nothing is stiff: terms(element, "
+                         "material) returns a list of one Term at least")
+    return terms
