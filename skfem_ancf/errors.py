@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from .types import Array
 
@@ -521,7 +521,8 @@ def require_names(kind: str, names: Any, known: Iterable[str]) -> tuple[str, ...
     return tuple(require_option(kind, name, known) for name in names)
 
 
-def require_options(what: str, options: dict[str, Any], known: Iterable[str]) -> dict[str, Any]:
+def require_options(what: str, options: dict[str, Any], known: Iterable[str],
+                    hint: str = "") -> dict[str, Any]:
     """Return the options of a call, or raise :class:`CallError` if one is not known.
 
     Parameters
@@ -532,13 +533,15 @@ def require_options(what: str, options: dict[str, Any], known: Iterable[str]) ->
         Its keywords.
     known
         The keywords that it takes.
+    hint
+        What else there is to say.
     """
     for name in options:
         if name not in known:
             near = nearest(name, known)
             raise CallError(f"{what} has no option {name!r}; known: "
                             + ", ".join(map(repr, known))
-                            + (f"; did you mean {near!r}?" if near is not None else ""))
+                            + (f"; did you mean {near!r}?" if near is not None else "") + hint)
     return options
 
 
@@ -741,29 +744,6 @@ def teaching(cls: Class) -> Class:
         elif isinstance(value, (classmethod, staticmethod)):
             setattr(cls, name, type(value)(taught(value.__func__)))
     return cls
-
-
-def require_options(call: str, options: Mapping[str, Any], known: Sequence[str],
-                    hint: str) -> None:
-    """Raise CallError for an option that is none of those known.
-
-    Parameters
-    ----------
-    call
-        What was called.
-    options
-        Those given.
-    known
-        The names of those that there are.
-    hint
-        What else there is to say.
-    """
-    unknown = [name for name in options if name not in known]
-    if unknown:
-        near = nearest(unknown[0], known)
-        raise CallError(f"{call}() has no option {unknown[0]!r}"
-                        f"{'.' if near is None else f'; did you mean {near!r}?'} There are "
-                        f"{', '.join(known)}; {hint}")
 
 
 def _explain(function, kwargs, error):

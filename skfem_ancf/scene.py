@@ -1570,7 +1570,7 @@ class Scene:
 
     def _solve(self, u, memory=None, **options):
         require_options("solve_static", options, OPTIONS,
-                        "first_step=0.1 begins with a tenth of the load; with adapt= those of "
+                        "; first_step=0.1 begins with a tenth of the load; with adapt= those of "
                         "statics.adapt.solve_adaptive too")
         system = self.system
         system.require_supports()
@@ -1640,10 +1640,10 @@ class Scene:
         Parameters
         ----------
         v
-            The velocity of all points, shape (2,), or a function of the points x, shape (2, ...), of
-            the stress-free body that returns velocities (2, ...); or velocities of the coordinates,
-            shape (beam.N,). Of a rigid body the function is asked at its centre of mass and beside
-            it.
+            The velocity of all points, shape (2,), or a function of the points x, shape (2, ...),
+            of the stress-free body that returns velocities (2, ...); or velocities of the
+            coordinates, shape (beam.N,). Of a rigid body the function is asked at its centre of
+            mass and beside it.
         beam
             The beam, its name or its number, in a scene of several; or a RigidBody.
 

@@ -544,7 +544,7 @@ BAD = {
     "a word": lambda s, b: s.hinge((b, "left"), (0, "left")),
     "ambiguous": lambda s, b: s.hinge((1, 0), (0, 0)),
     "moment": lambda s, b: s.moment("left", 1.0, b),
-    "velocities": lambda s, b: s.initial_velocity([1.0, 2.0], b),
+    "velocities": lambda s, b: s.initial_velocity([1.0, 2.0, 3.0], b),
     "angle of a beam": lambda s, b: s.state().angle(0),
     "angle of nothing": lambda s, b: s.state().angle(None),
     "strain of a body": lambda s, b: s.state().strain((1, 0), b),
