@@ -648,7 +648,8 @@ class Constraints:
             raise SupportError(
                 "the supports leave rigid motions free: " + "; ".join(free)
                 + (", along which the springs have no stiffness before the load"
-                   if self._stiffness is not None else "") + f". Add a support, for example {self._advice()}, or solve in time with "
+                   if self._stiffness is not None else "")
+                + f". Add a support, for example {self._advice()}, or solve in time with "
                 "scene.integrate")
         self._supported = True
 
