@@ -6,6 +6,7 @@ import warnings
 from dataclasses import dataclass
 from itertools import accumulate
 from math import sin, sqrt
+from operator import lt, mul
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,8 +31,8 @@ COMPRESSED = 1.0 / sqrt(3.0)
 #: 1.6 rad, of degree 7 by 2.4e-8 at 2, of degree 9 by 5e-11 at 2.5.
 TURNING = {3: 1.0, 5: 1.6, 7: 2.0}
 TURNING_SMOOTH = 2.5
-#: Elements up to which they are looked at one by one.
-FEW = 8
+#: Places up to which they are looked at one by one.
+FEW = 32
 TINY = 1e-300
 
 
@@ -116,12 +117,17 @@ class Screen:
 
     @cached_property
     def _turns(self):
-        """What tells of turns: places of tangents, these at rest, and the limits of elements."""
-        limits, sizes = zip(*[(turning_limit(b), b.mesh.lengths.shape) for b in self._beams])
-        widest = [2.0 * sin(0.5 * limit) for limit in limits]
-        thick = [limit / wide for limit, wide in zip(limits, widest)]
-        widest, thick = (_joined(list(map(np.full, sizes, x))) for x in (widest, thick))
-        return 1 + self._places, self.start[self._ends], widest, thick * self.slender
+        """What tells of turns: places of tangents, these at rest, and of elements the tangents.
+
+        And how far the directions of these may be apart, and what makes a strain of that.
+        """
+        first = accumulate([b.N // 2 for b in self._beams], initial=1)
+        places = _joined([np.arange(n, n + b.N // 2, b.nd // 2)
+                          for n, b in zip(first, self._beams)])
+        limits = [turning_limit(b) for b in self._beams]
+        numbers = [b.mesh.nelements for b in self._beams]
+        limit, widest = np.array([limits, [2.0 * sin(0.5 * x) for x in limits]]).repeat(numbers, 1)
+        return places, self.start, *self._ends, widest, limit / widest * self.slender
 
     @cached_property
     def _folds(self):
@@ -134,18 +140,17 @@ class Screen:
 
     @cached_property
     def _turns_of_few(self):
-        """The same for each element, none of many."""
-        return self._one_by_one(self._turns)
+        """The same as lists, none of many elements."""
+        return self._of_few(self._turns)
 
     @cached_property
     def _folds_of_few(self):
         """The same for each element and tangent, none of many."""
-        return self._one_by_one(self._folds)
+        lists = self._of_few(self._folds)
+        return lists and [*zip(*lists[0], *lists[1])]
 
-    def _one_by_one(self, what):
-        if len(self.slender) > FEW:
-            return None
-        return [*zip(*[column for x in what for column in x.reshape(-1, x.shape[-1]).tolist()])]
+    def _of_few(self, arrays):
+        return None if arrays[0].size > FEW else [x.tolist() for x in arrays]
 
     def passes(self, u: Array, start: Array | None = None, slender: Array | None = None) -> Any:
         """False if a fibre may be compressed, or an element may turn, beyond the range.
@@ -159,21 +164,25 @@ class Screen:
         """
         if self._none:
             return True
+        # how long tangents are over what they were, and how far they have turned: the largest
+        # curvature of an element is seldom more than twice its mean
         if u.ndim == 1 and self._turns_of_few:
-            z, least, bends = _paired(u).tolist(), np.inf, 0.0
-            for i, j, *numbers in self._turns_of_few:
-                p, q, turn, bend = _changes(z[i], z[j], *numbers)
-                if not turn < 1.0:
-                    return False
-                least, bends = min(least, p, q), max(bends, bend)
-            return least > bends + 1.1 * COMPRESSED
-        places, rest, widest, thick = self._turns
-        z, rest = _paired(u)[..., places], rest if start is None else start[..., self._ends]
+            places, rest, begin, end, widest, thick = self._turns_of_few
+            z = _paired(u).tolist()
+            change = [z[k] / tangent + 1.0 for k, tangent in zip(places, rest)]
+            stretch = [abs(x) for x in change]
+            turn = [x / (long + TINY) for x, long in zip(change, stretch)]
+            apart = [abs(turn[j] - turn[i]) for i, j in zip(begin, end)]
+            return (all(map(lt, apart, widest))
+                    and min(stretch) > max(map(mul, apart, thick)) + 1.1 * COMPRESSED)
+        places, rest, begin, end, widest, thick = self._turns
         thick = thick if slender is None else thick / self.slender * slender
-        p, q, turns, bends = _changes(z[..., 0, :], z[..., 1, :], rest[..., 0, :], rest[..., 1, :],
-                                      widest, thick)
-        return (turns < 1.0).all(axis=-1) & (
-            np.minimum(p, q).min(axis=-1) > bends.max(axis=-1) + 1.1 * COMPRESSED)
+        change = _paired(u)[..., places] / (rest if start is None else start) + 1.0
+        stretch = np.abs(change)
+        turn = change / (stretch + TINY)
+        apart = np.abs(turn[..., end] - turn[..., begin])
+        return (apart < widest).all(axis=-1) & (
+            stretch.min(axis=-1) > (apart * thick).max(axis=-1) + 1.1 * COMPRESSED)
 
     def folded(self, u: Array) -> bool:
         """True if the axis of an element turns back: its ends lie against a tangent of the axis.
@@ -193,22 +202,6 @@ class Screen:
                         for i, j, k, *rest in self._folds_of_few]) < 0.0
         places, rest = self._folds
         return bool(_along(*_paired(u)[places], *rest).min() < 0.0)
-
-
-# of numbers for few elements, as arrays take longer, and of arrays
-
-
-def _changes(begin, end, first, last, widest, thick):
-    """What changes of tangents at both ends of an element say.
-
-    How long the tangents are over what they were, ``2 sin(turn / 2)`` of the angle between them
-    over the widest, and the largest strain of bending: the largest curvature of an element is
-    seldom more than twice its mean.
-    """
-    begin, end = begin / first + 1.0, end / last + 1.0
-    p, q = abs(begin), abs(end)
-    apart = abs(p * end - q * begin) / (p * q + TINY)
-    return p, q, apart / widest, apart * thick
 
 
 def _along(end, begin, tangent, last, first, slope):

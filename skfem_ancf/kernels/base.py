@@ -363,7 +363,7 @@ def packed(values: Any, dtype: Any = np.float64) -> Array:
     """
     if type(values) is np.ndarray and values.dtype == dtype and values.flags.carray:
         return values
-    return np.require(values, dtype, ["C", "W"])
+    return np.array(values, dtype, order="C")
 
 
 def in_rounds(keys: Array) -> tuple[Array, Array]:
