@@ -134,7 +134,7 @@ class Machine:
             In place of its own.
         """
         machine = twin_of(self)
-        machine.tables, machine._kept = tables, Kept()
+        machine.tables, machine._kept = tables, self._kept.of(self._rooms.values())
         vars(machine).pop("linearised", None)
         return machine
 

@@ -12,7 +12,7 @@ import skfem_ancf.system
 from skfem_ancf import (AncfError, Beam, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamANCFHermite, ElementBeamCable, ElementBeamPatelShabana,
                         InputError, KelvinVoigt, MeshBeam, MeshError, NeoHookean, Scene,
-                        StVenantKirchhoff, SupportError)
+                        StVenantKirchhoff, SupportError, checks)
 from skfem_ancf.border import Border, add_curvature, factorize_bordered, new_factors, solve_bordered
 from skfem_ancf.bordered import BorderedMatrix, gives_way
 from skfem_ancf.compiled.words import Words
@@ -976,3 +976,46 @@ def test_a_first_solve_asks_its_joints_once(monkeypatch):
     for _ in range(2):
         scene.solve_static()
         assert len(asked) == len(scene.system.joints) > 0
+
+
+@pytest.mark.parametrize("change", ["load", "material"])
+def test_a_changed_scene_reads_anew_what_has_changed(needs_compiled, monkeypatch, change):
+    scene = cantilever(ElementBeamCable(5))
+    scene.solve_static()
+    begin, read = Words.__init__, []
+
+    def counting(self, x):
+        read.append(type(x).__name__)
+        begin(self, x)
+
+    monkeypatch.setattr(Words, "__init__", counting)
+    scene.solve_static()
+    assert not read
+    changed = scene.replace(**{"loads": [Weight((0.0, -9.0))]} if change == "load" else {
+        "material": scene.beams[0].material.replace(E=3e9)})
+    changed.solve_static()
+    assert sorted(read) == ["CablePack"] * (change == "material") + ["Equations"]
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_turns_of_few_elements_are_found_as_those_of_many(monkeypatch, number):
+    rng, found = np.random.default_rng(number), []
+    s = np.linspace(0.0, 1.0, 8)
+    meshes = [MeshBeam.init_curve(lambda s: np.array([np.sin(s), 1.0 - np.cos(s)]), s, 0.1),
+              MeshBeam.init_line(0.5 * s, 0.02, angle=0.3)]
+    beams = [Beam(mesh, element, StVenantKirchhoff(2e9, 0.3), width=0.01) for mesh, element in
+             list(zip(meshes, [ElementBeamCable(3), ElementBeamANCF(2)]))[:number]]
+    few, many = checks.Screen(beams), checks.Screen(beams)
+    assert few._turns_of_few
+    monkeypatch.setattr(checks, "FEW", 0)
+    for size in 10.0 ** rng.uniform(-2.5, 0.5, 200):
+        u = size * rng.standard_normal(sum(beam.N for beam in beams))
+        found.append(few.passes(u))
+        assert found[-1] == many.passes(u) == many.passes(u[None])[0]
+        assert few.folded(u) == many.folded(u)
+        fine = all(np.all(np.abs(checks.tangents(beam, part)) > 0.3) and checks.turning(
+            beam, part) <= checks.turning_limit(beam) for beam, part in
+            zip(beams, np.split(u, [beams[0].N])))
+        assert fine or not found[-1]
+    assert 0 < sum(found) < len(found)
+    assert not many._turns_of_few

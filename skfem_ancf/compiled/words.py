@@ -49,7 +49,7 @@ class Words:
         _collect(x, arrays, codes, self.words)
         self.address = self.words.buffer_info()[0]
         read, kinds = _reader()
-        places, asked = array("q", map(id, arrays)), array("q", codes)
+        places, asked = array("q", list(map(id, arrays))), array("q", codes)
         wrong = read(places.buffer_info()[0], asked.buffer_info()[0], len(asked), self.address,
                      *kinds)
         if wrong >= 0:
@@ -101,7 +101,7 @@ def _collect(x, arrays, codes, words):
         elif kind is float:
             words.append(_WORD.unpack(_NUMBER.pack(value))[0])
         elif id(value) in _CONSTANT:
-            known = _known(value)
+            known = _known(value).words
             words += known
             code = [-len(known)]
         else:
@@ -111,7 +111,7 @@ def _collect(x, arrays, codes, words):
 
 
 #: Tuples that modules keep, by identity, and their words once they have been asked for.
-_CONSTANT: dict[int, tuple[tuple, array | None]] = {}
+_CONSTANT: dict[int, tuple[tuple, Words | None]] = {}
 
 _Tuple = TypeVar("_Tuple", bound=tuple)
 
@@ -129,10 +129,10 @@ def constant(x: _Tuple) -> _Tuple:
 
 
 def _known(x):
-    """The words of a constant tuple."""
+    """The Words of a constant tuple."""
     found = _CONSTANT[id(x)][1]
     if found is None:
-        found = Words(x).words
+        found = Words(x)
         _CONSTANT[id(x)] = x, found
     return found
 
@@ -143,10 +143,18 @@ class Kept:
     def __init__(self):
         self._found = {}
 
+    def of(self, tuples):
+        """Another one with those of some tuples, where they are known."""
+        other, found = Kept(), [self._found.get(id(x)) for x in tuples]
+        other._found = {id(words.of): words for words in found if words is not None}
+        return other
+
     def __call__(self, x):
         """Words of a tuple that a scene keeps, and anything else as it is."""
         if not hasattr(x, "by_place"):
             return x
+        if id(x) in _CONSTANT:
+            return _known(x)
         found = self._found.pop(id(x), None)
         if found is None or found.of is not x:
             found = Words(x)
