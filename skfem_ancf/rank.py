@@ -163,6 +163,8 @@ def inertia_of(A: Array | sparse.csr_array) -> Inertia:
         If there are no factors with pivots on the diagonal.
     """
     size = np.abs(A.diagonal())
+    if not len(size):  # joints and supports leave nothing free
+        return Inertia(0, False)
     size[size == 0.0] = np.max(size)
     if isinstance(A, np.ndarray):
         root = np.sqrt(size)

@@ -499,12 +499,16 @@ class System:
 
     @cached_property
     def energy_of_bodies(self) -> float:
-        """What springs and loads do to rigid bodies over the scene's size; zero with beams."""
+        """What springs and loads do to rigid bodies over the scene's size; zero with beams.
+
+        One where there are neither: a mechanism that is driven, in which no force has a unit.
+        """
         if self.beams:
             return 0.0
         springs = abs(self._held_by_elements())
         force = np.max(np.abs(self.external_force(np.zeros(self.N))))
-        return float((springs.max() if springs.nnz else 0.0) * self.size**2 + force * self.size)
+        held = springs.max() if springs.nnz else 0.0
+        return float(held * self.size**2 + force * self.size) or 1.0
 
     @cached_property
     def inertia_of_places(self) -> float:
@@ -970,7 +974,7 @@ class System:
     def _sparse_factors(self, K):
         """Of K with the joints, all rows and columns over their sizes: pivots need one unit."""
         J, size = sparse.csr_array(self._J), self.constraints.coordinate_sizes
-        root = np.sqrt(np.mean((np.abs(K.diagonal()) * size**2)[self.free]))
+        root = np.sqrt(np.mean((np.abs(K.diagonal()) * size**2)[self.free])) or 1.0
         self._sizes = np.append(size / root, root / row_sizes(J.multiply(size)))
         S = sparse.dia_array((self._sizes[None], 0), shape=2 * self._sizes.shape)
         return splu((S @ sparse.block_array([[K, J.T], [J, None]]) @ S).tocsc())

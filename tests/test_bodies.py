@@ -800,3 +800,33 @@ def test_what_bodies_alone_have_not(wrong, words):
     scene, body, _ = alone()
     with pytest.raises(AncfError, match=words):
         wrong(scene, body)
+
+
+@pytest.mark.parametrize("weight", [0.0, 9.81])
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+def test_linkages_that_are_driven_are_found_by_statics(weight, unit):
+    crank = RigidBody(mass=1, inertia=unit**2, position=(0.5 * unit, 0), name="crank")
+    rod = RigidBody(mass=1, inertia=unit**2, position=(1.5 * unit, 0), name="rod")
+    scene = Scene(crank, rod).pin((0, 0), crank)
+    if weight:
+        scene.gravity((0, -weight))
+    scene.hinge((crank, (unit, 0)), (rod, (unit, 0)))
+    scene.slider((rod, (2 * unit, 0)), on="ground", direction=(1, 0))
+    motor = scene.motor(crank, angle=lambda t: t * np.pi / 3)
+    state = scene.solve_static()
+    assert_allclose(state.position((2 * unit, 0), rod), [unit, 0], atol=1e-9 * unit)
+    # virtual work: both centres rise by unit / 2 sin(angle)
+    assert_allclose(state.joint_force(motor), weight * unit / 2, atol=1e-9 * unit)
+    assert state.stability == "stable"
+    if weight:
+        assert scene.solve_static(start=state).converged
+
+
+def test_bodies_that_joints_drive_altogether():
+    body = RigidBody(mass=1, inertia=1, position=(0.5, 0))
+    scene = Scene(body)
+    scene.joint("angle", beam=body, angle=lambda t: t)
+    scene.joint("position", at=(0, 0), beam=body, r=lambda t: (0, t))
+    state = scene.solve_static()
+    assert_allclose(state.angle(body), 1, atol=1e-9)
+    assert_allclose(state.position(body), (0.5 * np.cos(1), 1 + 0.5 * np.sin(1)), atol=1e-9)

@@ -342,8 +342,6 @@ def _tangent(e, target, rules, x, w, k):
     for i in lanes(x.u.size):
         w.scale[i] = np.abs(w.scale[i])
     least = SMALLEST * mean_stiffness(w.scale, e.sizes)
-    if least == 0.0:  # bodies alone, which are held
-        least = 1.0
     for i in lanes(x.u.size):
         w.scale[i] = 1.0 / (w.scale[i] + least / (e.sizes[i] * e.sizes[i]))
 
