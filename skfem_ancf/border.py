@@ -116,7 +116,7 @@ def new_factors(border: Border, A: Band, m: int, N: int) -> Factors:
 
 @source
 def mean_stiffness(diagonal, sizes):
-    """The mean of stiffnesses, each times the square of its coordinate's size; 1 of bodies alone."""
+    """The mean of stiffnesses, each times the square of its coordinate's size; 1 of none."""
     mean = weighted(sizes, sizes, diagonal) / sizes.size
     return mean if mean > 0.0 else 1.0
 
