@@ -156,7 +156,10 @@ class BorderedMatrix:
             v = row[at] * (np.sqrt(np.max(size[at])) / np.max(np.abs(row)))
             i, j = np.repeat(at, len(at)), np.tile(at, len(at))
             K.add(i, j, np.outer(v, v).ravel())
-        return bool(K.shifted(-SINGULAR).factorize().positive_definite)
+        try:
+            return bool(K.shifted(-SINGULAR).factorize().positive_definite)
+        except np.linalg.LinAlgError:  # a body's direction, which has no stiffness to go by
+            return False
 
     def toarray(self) -> Array:
         """A as an array, stiff along directions, shape (n, n)."""

@@ -830,3 +830,14 @@ def test_bodies_that_joints_drive_altogether():
     state = scene.solve_static()
     assert_allclose(state.angle(body), 1, atol=1e-9)
     assert_allclose(state.position(body), (0.5 * np.cos(1), 1 + 0.5 * np.sin(1)), atol=1e-9)
+
+
+@pytest.mark.parametrize("stiffness, stability", [(100.0, "stable"), (-100.0, "unstable")])
+def test_a_body_on_a_guide_is_as_stable_as_its_spring(stiffness, stability):
+    body = RigidBody(mass=2, inertia=1e-3, position=(0, 0))
+    scene = Scene(body).point_force((0, -1), at=(0, 0), beam=body)
+    scene.slider(body, on="ground", direction=(0, 1), angle=True)
+    scene.spring(lambda longer: stiffness * longer, between=((body, (0, 0)), ("ground", (0, -0.2))))
+    state = scene.solve_static(stable=False)
+    assert_allclose(state.displacement(body), [0, -1 / stiffness], atol=1e-9)
+    assert state.stability == stability
