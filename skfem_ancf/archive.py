@@ -50,14 +50,14 @@ def write(path: Path, arrays: Mapping[str, Array]) -> None:
     part = path.with_name(path.name + ".part")
     try:
         with open(part, "wb") as file:
+            content = BytesIO()  # by way of memory: on a full disk neither can be closed
             if path.suffix == ".h5":
-                with find_h5py().File(file, "w") as h5:
+                with find_h5py().File(content, "w") as h5:
                     for name, array in arrays.items():
                         h5.create_dataset(name, data=array)
-            else:  # by way of memory: an archive on a full disk cannot be closed
-                content = BytesIO()
+            else:
                 np.savez(content, **arrays)  # type: ignore[arg-type]
-                file.write(content.getbuffer())
+            file.write(content.getbuffer())
             file.flush()
             os.fsync(file.fileno())
         os.replace(part, path)

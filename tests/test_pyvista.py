@@ -1,6 +1,9 @@
 """Grids, views and films: read back, and looked at pixel by pixel."""
 
 import itertools
+import os
+import shutil
+import subprocess
 import sys
 
 import numpy as np
@@ -255,6 +258,39 @@ def test_vtkhdf_refuses_and_leaves_nothing_behind(history, state, tmp_path):
             series.add(state, 1.0)
         raise RuntimeError
     assert not list(tmp_path.iterdir())
+
+
+FULL = """
+import numpy as np
+from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+from skfem_ancf.errors import FileError
+
+beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.02), ElementBeamANCF(2),
+            StVenantKirchhoff(2e8, 0.3, 7800), width=0.02)
+history = Scene(beam).pin("left").gravity((0, -9.81)).integrate(0.1, 0.002)
+try:
+    history.save("a.vtkhdf")
+except FileError as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize("size", [100, 4300, 4700])  # kilobytes
+def test_vtkhdf_on_a_full_disk(tmp_path, size):
+    """HDF5 took the process with it."""
+    pytest.importorskip("h5py")
+    if not shutil.which("mount") or subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", str(tmp_path)]).returncode:
+        pytest.skip("needs a small disk, which takes the right to mount one")
+    try:
+        (tmp_path / "a.vtkhdf").write_text("before")
+        run = subprocess.run([sys.executable, "-c", FULL], cwd=tmp_path, capture_output=True,
+                             text=True, env={**os.environ, "SKFEM_ANCF_COMPILED": "0"})
+        assert run.returncode == 0, run.stderr
+        assert run.stdout == "cannot write 'a.vtkhdf': No space left on device\n"
+        assert [p.read_text() for p in tmp_path.iterdir()] == ["before"]
+    finally:
+        subprocess.run(["umount", str(tmp_path)], check=True)
 
 
 @pytest.mark.parametrize("lagrange", [False, True])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,9 +17,15 @@ from .xml import topology
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
+    from pathlib import Path
 
     from ..results import State
     from ..types import StrPath
+
+
+#: Bytes beside the file that are set free where the disk is full: HDF5 cannot close a file whose
+#: writing fails, and takes the process with it.
+SPARE = 2**22
 
 
 @teaching
@@ -39,6 +45,8 @@ class VtkHdfWriter:
     ------
     InputError
         If the file name does not end with .vtkhdf.
+    FileError
+        If the file cannot be written; what was there stays.
     MissingExtra
         If h5py is not installed.
 
@@ -56,11 +64,16 @@ class VtkHdfWriter:
         find_fields(self.options.get("fields"))
         files = find_h5py()
         self._temporary = self.path.with_name(f".{self.path.stem}.{os.getpid()}.vtkhdf")
+        self._spare = self._temporary.with_suffix(".spare")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = files.File(self._temporary, "w")
-        except OSError as error:
-            raise FileError(f"cannot write {str(self.path)!r}: {error}") from error
+            self._spare.write_bytes(os.urandom(SPARE))  # which no file system makes shorter
+            self._file = files.File(self._temporary, "w", rdcc_nbytes=0)  # chunks are whole frames
+        except BaseException as error:
+            self._remove()
+            if isinstance(error, OSError):
+                raise self._cannot(error) from error
+            raise
         self._root = self._file.create_group("VTKHDF")
         self._root.attrs["Version"] = (2, 0)
         self._root.attrs.create("Type", b"UnstructuredGrid", dtype="S16")
@@ -72,14 +85,27 @@ class VtkHdfWriter:
     def __exit__(self, kind: Any, *_: Any) -> None:
         if self._file is None:
             return
-        if self.times:
-            self._steps()
-        self._file.close()
-        self._file = None
-        if kind is None and self.times:
-            os.replace(self._temporary, self.path)
-        else:
-            Path(self._temporary).unlink(missing_ok=True)
+        try:
+            self._spare.unlink(missing_ok=True)
+            if self.times:
+                self._steps()
+            self._file.close()
+            if kind is None and self.times:
+                os.replace(self._temporary, self.path)
+        except OSError as error:
+            raise self._cannot(error) from error
+        finally:
+            self._file = None
+            self._remove()
+
+    def _remove(self):
+        for path in (self._spare, self._temporary):
+            with suppress(OSError):
+                path.unlink()
+
+    def _cannot(self, error):
+        why = os.strerror(error.errno) if error.errno else error  # HDF5 says it in ten lines
+        return FileError(f"cannot write {str(self.path)!r}: {why}")
 
     def extend(self, states: Iterable[Any], done: Callable[[], Any] = lambda: None) -> None:
         """Append the frames of a motion.
@@ -118,9 +144,12 @@ class VtkHdfWriter:
         elif len(body.points) != self._n:
             raise InputError(f"all frames have the same points: the first has {self._n}, this one "
                              f"{len(body.points)}")
-        self._append("Points", body.points)
-        for name, values in body.point_data.items():
-            self._append(f"PointData/{name}", values)
+        try:
+            self._append("Points", body.points)
+            for name, values in body.point_data.items():
+                self._append(f"PointData/{name}", values)
+        except OSError as error:
+            raise self._cannot(error) from error
         self.times.append(t)
         return self.path
 
