@@ -522,7 +522,7 @@ class Beam(Frozen):
         dofs, weights
             Shapes (2, n) and (n,).
         """
-        if not self.has_sections and abs(X[1] - 0.5) > 1e-6:
+        if not self.has_sections and abs(X[1] - 0.5) > self.finder.allowed:
             raise InputError(
                 f"the point {tuple(map(float, np.ravel(point)))} is off the axis of a cable, whose "
                 "position there is no linear function of its coordinates: name a point of the "

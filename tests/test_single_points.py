@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from conftest import quarter_arc, s_curve
 from test_points import STEEL, inside
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
-                        NeoHookean, Scene, Section, StVenantKirchhoff, finder, raw)
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
+                        MeshBeam, NeoHookean, Scene, Section, StVenantKirchhoff, finder, raw)
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.raw import Patch
 
@@ -271,3 +271,25 @@ def test_few_polynomials_are_kept(monkeypatch):
         many = state.strain([x, x], recover=False)[:, 0]
         assert_allclose(state.strain(x, recover=False), many, atol=1e-13 * np.abs(many).max())
         assert 1 <= len(state._raw[0]._patches) <= 2
+
+
+@pytest.mark.parametrize("degree", [3, 5, 7])
+def test_points_of_the_exact_curve_are_points_of_a_cable(degree):
+    """A force, a spring, a hinge between nodes at the place that the curve's function says; the
+    elements of the mesh are cubics beside it."""
+    def arc(s):
+        return np.array([np.sin(s), 1 - np.cos(s)])
+
+    mesh = MeshBeam.init_curve(arc, np.linspace(0, 1, 9), height=0.02)
+    beam = Beam(mesh, ElementBeamCable(degree), StVenantKirchhoff(2e9, 0.3, 1000), width=0.02)
+    at = tuple(arc(0.546875))
+    force = np.array([0.03, -0.04])
+    scene = Scene(beam).clamp("left").point_force(force, at)
+    state = scene.solve_static(tol=1e-12)
+    reaction = state.reactions("left")
+    arm = state.position(at)
+    assert np.allclose(reaction.force, -force, rtol=0, atol=1e-10)
+    assert reaction.moment == pytest.approx(arm[1] * force[0] - arm[0] * force[1], rel=2e-5)
+    Scene(beam).clamp("left").spring(1.0, between=((beam, at), ("ground", (0.5, 1.0)))).system
+    with pytest.raises(InputError, match="off the axis"):
+        Scene(beam).clamp("left").point_force(force, tuple(arc(0.546875) + [-1e-4, 1e-4]))
