@@ -152,6 +152,15 @@ def gradients_size(body: "Body") -> int:
 
 
 @source
+def quadratic(body):
+    """True if all strains are quadratic in the coordinates: those of sections are."""
+    for k in range(body.table.shape[0]):
+        if body.table[k, KIND] == CABLE:
+            return False
+    return True
+
+
+@source
 def _stress(body, k, stresses):
     """The stresses of pack k, shape (components, points, elements), a view; or of none."""
     row = body.table[k]

@@ -270,7 +270,7 @@ def _converges(e, matrices, method, rule, s, w, state, step):
         if not _correct(e.free, method, s, w, state):
             state[FAILURE] = DEPENDENT
             return False
-        told = judged(state, wanted, rough, REUSED, CARRIED)
+        told = judged(state, wanted, rough, REUSED, CARRIED, False)
         if told == GO_ON and state[FRESH] > 0.0 and _is_lost(state):
             state[MIXED], told = LASTING, ASTRAY  # its factors serve
             body_gradients(e.body, w.origin, w.B)

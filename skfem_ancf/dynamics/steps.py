@@ -20,7 +20,7 @@ import numpy as np
 from ..band import (Band, add_halves, add_multiple, clear, copy, dot, factorize, fix, multiply,
                     solve_joined, subtract_rows, total)
 from ..body import (add_force_of, add_turned, body_carry, body_force, body_mean, body_mixed,
-                    body_stress, body_tangent)
+                    body_stress, body_tangent, quadratic)
 from ..forces.contact_texts import PRESSURES
 from ..forces.texts import (add_contact_tangent, add_elastic_force, add_rubbing_tangent,
                             augment_contact, element_stiffness, pace_contact, put_between,
@@ -45,6 +45,8 @@ CARRIED, LASTING = 0.3, 256.0
 #: Contraction of symmetric factors beyond which the others pay where stresses are carried, and the
 #: least that is expected of these.
 SLOW = 0.03
+#: Part of the way of a step that a correction is, beyond which its end is a poor place of factors.
+FAR = 0.03
 #: Corrections that are as many times their round-off tell nothing by how they contract.
 ROUGH = 1e3
 #: Contraction expected of new factors, and the least that is expected of any.
@@ -58,7 +60,8 @@ DIVERGING = 2.0
 #: What a run of steps keeps, in one array: whether there are factors, how many iterations and
 #: factorisations there were, the last contraction, the size of the step before, the largest energy
 #: seen, and why a step has failed; of the step, whether its factors are its own, and the sizes of
-#: the last two corrections, negative where there is none; the work of damping so far; for how many
+#: the last two corrections, negative where there is none (of the first of a step, minus how often
+#: the one before has factorised); the work of damping so far; for how many
 #: steps stresses are carried.
 (READY, COUNT, FACTORIZED, RATE, BEFORE, ENERGY, FAILURE, FRESH, SIZE, LAST_SIZE,
  DISSIPATED, MIXED) = range(12)
@@ -355,7 +358,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
             if told == GO_ON:
                 told = _correct(e.joints, e.free, matrices, rule, s, w, state, anew)
             if told == GO_ON:
-                told = _judged(e, matrices.dampers, s, w, state, wanted, rough)
+                told = _judged(e, matrices, s, w, state, wanted, rough)
             if told == DONE and contacts.lasting >= PRESSURES:
                 augment_contact(e.forces, s.t, u, taken)
                 if taken[0] > 0.0:
@@ -423,7 +426,7 @@ def judge(state, wanted, rough, reused):
 
 
 @source
-def judged(state, wanted, rough, reused, carried):
+def judged(state, wanted, rough, reused, carried, later):
     """What a correction tells, of iterations with carried stresses too.
 
     Parameters
@@ -432,11 +435,13 @@ def judged(state, wanted, rough, reused, carried):
         As for :func:`judge`; MIXED may be written.
     carried
         Contraction up to which factors are kept where stresses are carried.
+    later
+        True if those of the step before serve for two corrections then, else for one.
     """
     fresh = state[FRESH] > 0.0
     if state[MIXED] > 0.0:
         told = judge(state, wanted, rough, carried)
-        if told == GO_ON and not fresh and state[LAST_SIZE] < 0.0:
+        if told == GO_ON and not fresh and (state[LAST_SIZE] > 0.0 or not later):
             state[READY] = 0.0  # old ones have turned the beam
         return told
     told = judge(state, wanted, rough, reused)
@@ -510,7 +515,7 @@ def _begin(free, M, rule, s, w, state):
     if rule.conserving > 0:  # what the velocity changes by
         for i in lanes(u.size):
             held[i] = (s.supports[1, i] - v0[i]) * (1.0 - free[i]) / h
-    state[FRESH], state[SIZE] = 0.0, -1.0
+    state[FRESH], state[SIZE] = 0.0, -max(1.0, state[FRESH])  # of the last step
     _free_velocity(free, rule, s, w)
     energy = max(state[ENERGY], _energy(M, w.x.v, w.x.room))
     noise = 2.0 * abs(_energy(M, u, w.x.room))
@@ -635,7 +640,7 @@ def _internal_force(e, dampers, rule, w, state):
 
 
 @source
-def _judged(e, dampers, s, w, state, wanted, rough):
+def _judged(e, matrices, s, w, state, wanted, rough):
     """What the last correction tells, of iterations with carried stresses and without.
 
     A stiff and slender beam turned by old factors is stretched by what they take for bending: its
@@ -647,14 +652,24 @@ def _judged(e, dampers, s, w, state, wanted, rough):
         for i in lanes(du.size):
             room[i] = s.stiffness_factor * du[i]
         body_carry(e.body, w.x.ahead, room, w.stresses[4], w.stresses[3])
-        if dampers.viscous > 0:
+        if matrices.dampers.viscous > 0:
             for i in lanes(du.size):
                 room[i] = s.damping_factor * du[i]
             body_carry(e.viscous, w.x.origin, room, w.stresses[6], w.stresses[5])
         slow = ROUGH * rough < state[SIZE] and 0.0 < SLOW * state[LAST_SIZE] < state[SIZE]
         if slow and state[FRESH] > 0.0 and state[READY] == SYMMETRIC:
             state[MIXED] = 2.0 * LASTING
-    return judged(state, wanted, rough, REUSED, CARRIED if state[FRESH] > 0.0 else REUSED)
+    # where nothing but their place is off, and the last step was an easy one, it has to be good
+    easy = state[LAST_SIZE] >= -1.0 and state[RATE] <= SLOW
+    later = state[READY] == TURNED and easy and quadratic(e.body) and _far(matrices.M, s, w)
+    return judged(state, wanted, rough, REUSED, CARRIED if state[FRESH] > 0.0 else REUSED, later)
+
+
+@source
+def _far(M, s, w):
+    """True if a correction is not small against the way of a step, at the speed of its begin."""
+    way = (FAR * s.dt)**2 * _energy(M, w.y[1], w.x.room)
+    return _energy(M, w.x.du, w.x.room) > way
 
 
 @source
