@@ -28,6 +28,7 @@ SLOW = 1e-6  # a velocity at which what is quadratic in it can be left out
 UNREFINED = 1e-7  # error of an inverse that Lanczos takes as it is
 LANCZOS = 1e-10  # its tolerance
 SAME = 1e-6  # relative distance of eigenvalues that are the same
+UNSTRESSED = 1e-9  # force of springs at rest, over their stiffness times the size, of round-off
 TURNING = 1e-2  # square of the angular velocity over that of a frequency
 REAL = 1e-7  # imaginary over absolute value of an eigenvalue that counts as real
 
@@ -409,10 +410,12 @@ def buckling(system: System, k: int) -> Buckling:
     Raises
     ------
     InputError
-        If k is out of range, the loads do not buckle the beam, or it touches an obstacle before.
+        If k is out of range, the loads do not buckle the beam, it touches an obstacle before, or
+        springs are tight before any load.
     """
     system.require_supports()
     zero, none = np.zeros(system.N), np.zeros(system.m)
+    _require_unstressed(system, zero)
     tangent = StrainTangent(system, zero, 0.0, None, none)
     n, m = tangent.size
     k = _count(k, n - m)
@@ -437,6 +440,19 @@ def buckling(system: System, k: int) -> Buckling:
     shapes = np.zeros((len(order), system.N))
     shapes[:, tangent.free] = X[:, good].T[order]
     return Buckling(factors[order], shapes, not symmetric)
+
+
+def _require_unstressed(system, zero):
+    """Raise InputError where force elements push before there is any load."""
+    if not len(system.forces.elements):
+        return
+    push = np.abs(system.internal_force(zero, 0.0, 0.0) * system.mask).max()
+    held = abs(system._held_by_elements())
+    if push > UNSTRESSED * (held.max() if held.nnz else 0.0) * system.size:
+        raise InputError(
+            "springs push before there is any load: buckling() knows the stress-free state and "
+            "scales all that stresses it. state.stability of scene.solve_static(stable=False), and "
+            "scene.modes(k, state), tell under which loads the tightened scene holds")
 
 
 _FLUTTER = (

@@ -264,3 +264,25 @@ def test_loads_that_do_not_stress():
     scene = Scene(unit_beam(ElementBeamCable(3), 3, 100.0)).clamp("left")
     with pytest.raises(InputError, match="do not stress"):
         scene.buckling()
+
+
+def test_buckling_does_not_scale_the_tightness_of_springs():
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.01), ElementBeamCable(5),
+                StVenantKirchhoff(E=12e8, nu=0, density=1), width=1.0)
+    EI, tight = 12e8 * 0.01**3 / 12, 150.0
+
+    def mast(load, tight):
+        scene = Scene(beam).pin("left").point_force((-load, 0), at="right")
+        for y in (-0.75, 0.75):
+            scene.spring(1e6, between=((0, (1.0, 0.0)), ("ground", (0.0, y))),
+                         length=1.25 - tight / 1e6)
+        return scene
+
+    slack = mast(1.0, 0.0).buckling(1).factors[0]
+    share = 2 * 1e6 * 0.8**2 / 12e6                        # of the load that the guys take
+    assert abs(slack / (np.pi**2 * EI * (1 + share)) - 1) < 1e-3
+    with pytest.raises(InputError, match="springs push before there is any load"):
+        mast(1.0, tight).buckling(1)
+    left = slack - 2 * tight / 1.25
+    for part, stability in (0.97, "stable"), (1.03, "unstable"):
+        assert mast(part * left, tight).solve_static(stable=False).stability == stability
