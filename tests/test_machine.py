@@ -114,6 +114,18 @@ def test_everything_is_compiled_beforehand(needs_compiled, monkeypatch):
     assert compiled.KNOWN | {"evaluate", "equilibrium", "steps"} == set(machine.COMPILING)
 
 
+def test_code_of_two_versions_of_numba_is_kept_side_by_side(needs_compiled, monkeypatch):
+    from skfem_ancf.compiled.twin import named
+
+    names = set()
+    for number in ("0.61.0", "0.62.1"):
+        compiled.key.cache_clear()
+        monkeypatch.setattr(compiled, "version", lambda name, number=number: number)
+        names.add(named(run).__qualname__)
+    compiled.key.cache_clear()
+    assert len(names) == 2
+
+
 def test_kernels_that_a_scene_has_not_are_not_compiled():
     assert scene().system.machine.tables.parts == ["common", "kernels", "SectionPack"]
     cable = scene(ElementBeamCable(3))

@@ -36,7 +36,7 @@ PROBLEMS: list[str] = []
 
 
 @cache
-def stamp() -> str:
+def _stamp() -> str:
     """Of all texts of the package: a function has parts from other files than its own."""
     total = hashlib.sha256()
     for path in sorted(Path(__file__).parent.parent.rglob("*.py")):
@@ -59,19 +59,22 @@ def _folder() -> Path:
 
 
 @cache
-def _key() -> str:
-    """What compiled code depends on besides the texts."""
+def key() -> str:
+    """What compiled code depends on, in 16 letters: names by which it is kept end with them.
+
+    Numba's own index of what it keeps is that of one version, which another writes anew.
+    """
     try:
         numba = version("numba")
     except PackageNotFoundError:
         numba = "none"
-    parts = (stamp(), numba, sys.implementation.cache_tag,
+    parts = (_stamp(), numba, sys.implementation.cache_tag,
              os.environ.get("NUMBA_CPU_NAME", ""), os.environ.get("NUMBA_CPU_FEATURES", ""))
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
 
 def _note_of(name: str) -> Path:
-    return _folder() / f"skfem_ancf-{name}-{_key()}.compiled"
+    return _folder() / f"skfem_ancf-{name}-{key()}.compiled"
 
 
 def on_disk(*names: str) -> bool:

@@ -22,7 +22,7 @@ from ..kernels.base import Destination, PairTables
 from ..source import F1, F2, F3, I1
 from ..tables import JointTables, LoadTables
 from . import address as address_of_group
-from . import stamp
+from . import key
 from .convention import TextCallConv
 from .records import kind_of
 from .together import Entry, Shared, Text
@@ -82,7 +82,7 @@ def _type(hint):
 
 
 def _shared(group, call):
-    symbol = f"{__package__}.{call.text.__name__}.{stamp()}"
+    symbol = f"{__package__}.{call.text.__name__}.{key()}"
     return tuple(map(_type, call.args)), Shared(group, symbol, _type(call.returns))
 
 

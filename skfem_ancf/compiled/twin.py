@@ -10,7 +10,7 @@ from numba import cfunc, njit, typeof
 
 from ..origin import ours
 from ..source import column, lanes
-from . import stamp
+from . import key
 from .flags import Known, KnownOfOthers, TextFlags
 from .loops import counted
 from .records import record_type
@@ -67,7 +67,7 @@ def named(function, names=None):
     text = FunctionType(code, names or function.__globals__, function.__name__,
                         function.__defaults__)
     text.__module__, text.__doc__ = function.__module__, function.__doc__
-    text.__qualname__ = f"{function.__qualname__}_{stamp()}"
+    text.__qualname__ = f"{function.__qualname__}_{key()}"
     return text
 
 
