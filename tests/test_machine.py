@@ -50,13 +50,11 @@ def test_a_first_solution_imports_no_compiler(tmp_path):
 
 
 @pytest.fixture
-def auto(monkeypatch):
+def auto(needs_compiled, monkeypatch):
     """The default rules, nothing loaded, nothing on disk, no time spent."""
-    from skfem_ancf.switch import VARIABLE, compiled_off
+    from skfem_ancf.switch import VARIABLE
 
     monkeypatch.delenv(VARIABLE, raising=False)
-    if compiled_off() is not None:
-        pytest.skip(compiled_off())
     loads = []
 
     def load(text, args):
