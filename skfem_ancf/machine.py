@@ -241,7 +241,7 @@ def _too_early(name):
 def _given_up(text, error):
     """The plain text, in place of one that cannot be compiled; nor is any other from now on."""
     compiled.PROBLEMS.append(
-        f"Numba cannot be imported: {error}" if isinstance(error, ImportError) else
+        f"Numba cannot be used: {error}" if isinstance(error, ImportError) else
         f"{text.__name__} cannot be compiled: {error!r}")
     logger.warning("%s; it runs in NumPy", compiled.PROBLEMS[-1])
     return CLOCK.timed(text)

@@ -245,8 +245,7 @@ def read_again(words, given):
     return found
 
 
-def test_words_say_where_arrays_begin():
-    pytest.importorskip("numba")
+def test_words_say_where_arrays_begin(needs_compiled):
     sealed = np.arange(6.0)[2:]
     sealed.flags.writeable = False
     given = ALONE._replace(noise=sealed, u=np.ones((2, 3)))
@@ -263,9 +262,10 @@ def test_words_say_where_arrays_begin():
             Words(ALONE._replace(u=wrong))
 
 
-def test_arrays_are_tried_before_their_heads_are_read(monkeypatch):
+def test_arrays_are_tried_before_their_heads_are_read(needs_compiled, monkeypatch):
     """Words at other places, as a NumPy might have that is yet to come, are seen."""
-    heads = pytest.importorskip("skfem_ancf.compiled.heads", exc_type=ImportError)
+    from skfem_ancf.compiled import heads
+
     tried = np.arange(6)[2:], np.zeros((2, 3))[1:], np.zeros((2, 1, 3)), np.zeros(0)
     assert all(map(heads.laid_out, tried))
     for name, k in ("_PLACE", 2), ("_AXES", 2), ("_SHAPE", 3), ("_TYPE", 4), ("_FLAGS", 40):

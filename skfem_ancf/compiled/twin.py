@@ -6,7 +6,7 @@ from functools import cache
 from importlib import import_module
 from types import FunctionType
 
-from numba import cfunc, njit, typeof
+from numba import __version__, cfunc, njit, typeof, version_info
 
 from ..origin import ours
 from ..source import column, lanes
@@ -16,6 +16,14 @@ from .loops import counted
 from .records import record_type
 from .together import Entry, Text
 from .words import Words
+
+#: From this version on Numba itself runs the passes of LLVM that texts are compiled by: the one
+#: before has them, and seldom they end Python.
+LEAST = 0, 62
+
+if version_info.short < LEAST:
+    raise ImportError(f"version {__version__} is older than {'.'.join(map(str, LEAST))}, which "
+                      "texts are compiled by: pip install --upgrade numba")
 
 logger = logging.getLogger(__name__)
 
