@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from vtkmodules.vtkCommonCore import vtkLogger
 
 from conftest import quarter_arc
 from test_io import bent
-from skfem_ancf import (Beam, ElementBeamANCF, InputError, MeshBeam, MissingExtra,
+from skfem_ancf import (Beam, ElementBeamANCF, InputError, Line, MeshBeam, MissingExtra,
                         NameUnknown, Scene, StVenantKirchhoff)
 from skfem_ancf.fields import FIELDS
 from skfem_ancf.io import body_fields
@@ -258,6 +259,66 @@ def test_vtkhdf_refuses_and_leaves_nothing_behind(history, state, tmp_path):
             series.add(state, 1.0)
         raise RuntimeError
     assert not list(tmp_path.iterdir())
+
+
+def test_a_frame_that_was_interrupted_moves_none_of_the_next(history, tmp_path, monkeypatch):
+    """Points were appended, fields were not: of all later frames they were of two instants."""
+    h5py = pytest.importorskip("h5py")
+    append, names = VtkHdfWriter._append, []
+
+    def interrupted(writer, name, values):
+        names.append(name)
+        if len(names) == 6:
+            raise KeyboardInterrupt
+        append(writer, name, values)
+
+    monkeypatch.setattr(VtkHdfWriter, "_append", interrupted)
+    options = dict(subdivide=(1, 1), fields=["displacement", "u_x", "u_y"])
+    with VtkHdfWriter(tmp_path / "a.vtkhdf", **options) as series:
+        for k in range(4):
+            with suppress(KeyboardInterrupt):
+                series.add(history.state(k), history.t[k])
+    assert names[4:7] == ["Points", "PointData/displacement", "Points"]
+    with h5py.File(tmp_path / "a.vtkhdf") as file:
+        root = file["VTKHDF"]
+        assert_array_equal(root["Steps/Values"], history.t[[0, 2, 3]])
+        for frame, k in enumerate([0, 2, 3]):
+            body = body_fields(history.state(k), **options)
+            at = slice(root["Steps/PointOffsets"][frame], None)
+            for name, values in {"Points": body.points, **{
+                    f"PointData/{name}": v for name, v in body.point_data.items()}}.items():
+                assert_array_equal(root[name][at][:len(values)], values)
+
+
+def test_frames_of_other_beams_are_not_put_on_the_cells_of_the_first(tmp_path):
+    pytest.importorskip("h5py")
+    beams = [Beam(MeshBeam.init_line(np.linspace(x, x + 1, n), 0.02), ElementBeamANCF(2),
+                  StVenantKirchhoff(2e8, 0.3), width=0.02) for x, n in ((0, 3), (1, 5))]
+    with VtkHdfWriter(tmp_path / "a.vtkhdf") as series:
+        series.add(Scene(*beams).state(), 0.0)
+        with pytest.raises(InputError, match="the same cells"):
+            series.add(Scene(*beams[::-1]).state(), 1.0)
+    assert series.times == [0.0]
+
+
+def test_an_interrupted_series_keeps_the_obstacles_of_the_one_before(tmp_path):
+    """They lie beside the body, in a file of their own, and are as old as it."""
+    pytest.importorskip("h5py")
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 3), 0.02), ElementBeamANCF(2),
+                StVenantKirchhoff(2e8, 0.3), width=0.02)
+    states = [Scene(beam).obstacle(Line((0, y))).state() for y in (-0.1, -0.2)]
+
+    def files():
+        return {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+
+    with VtkHdfWriter(tmp_path / "a.vtkhdf") as series:
+        series.add(states[0], 0.0)
+    before = files()
+    assert sorted(before) == ["a.vtkhdf", "a_obstacles.vtu"]
+    with pytest.raises(KeyboardInterrupt), VtkHdfWriter(tmp_path / "a.vtkhdf") as series:
+        series.add(states[1], 0.0)
+        raise KeyboardInterrupt
+    assert files() == before
 
 
 FULL = """

@@ -92,6 +92,7 @@ class VtkHdfWriter:
             self._file.close()
             if kind is None and self.times:
                 os.replace(self._temporary, self.path)
+                save_obstacles(self._first, self.path, self._body)
         except OSError as error:
             raise self._cannot(error) from error
         finally:
@@ -140,10 +141,13 @@ class VtkHdfWriter:
         body = body_fields(state, **self.options)
         if not self.times:
             self._begin(body)
-            save_obstacles(state, self.path, body)
+            self._first, self._body = state, body
         elif len(body.points) != self._n:
             raise InputError(f"all frames have the same points: the first has {self._n}, this one "
                              f"{len(body.points)}")
+        elif not all(map(np.array_equal, _cells(body), _cells(self._body))):
+            raise InputError("all frames have the same cells, of the same beams and elements: write "
+                             "states of another scene into a file of their own, or as .pvd")
         try:
             self._append("Points", body.points)
             for name, values in body.point_data.items():
@@ -174,8 +178,7 @@ class VtkHdfWriter:
                                 compression="gzip", compression_opts=4, shuffle=True)
 
     def _append(self, name, values):
-        data = self._root[name]
-        n = len(data)
+        data, n = self._root[name], len(self.times) * self._n  # behind the last whole frame
         data.resize(n + len(values), axis=0)
         data[n:] = values
 
@@ -191,3 +194,8 @@ class VtkHdfWriter:
         for group, offsets in (("PointData", first), ("CellData", zero)):
             for name in self._root[group]:
                 steps[f"{group}Offsets/{name}"] = offsets
+
+
+def _cells(body):
+    """What is stored once of a body: its cells and their numbers."""
+    return *topology(body), *map(np.concatenate, body.cell_data.values())
