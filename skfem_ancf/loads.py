@@ -7,6 +7,7 @@ again for the same scene on other meshes.
 from __future__ import annotations
 
 import re
+import warnings
 from functools import partial
 from typing import TYPE_CHECKING, Any, cast
 
@@ -17,8 +18,8 @@ from skfem.assembly.form.form import FormExtraParams
 from skfem.element import DiscreteField
 
 from .beam import Beam
-from .errors import (AncfError, CallbackError, InputError, ask_field, ask_number, require_finite,
-                     require_function, require_slope, shown, warnings_as_errors)
+from .errors import (AncfError, CallbackError, InputError, ModelWarning, ask_field, ask_number,
+                     require_finite, require_function, require_slope, shown, warnings_as_errors)
 from .frozen import Sealable, read_only
 from .kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
 from .kept import cached_property, twin_of
@@ -35,6 +36,11 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from .types import Array, Place, TimeFunction, WhichBeam
+
+
+#: A traction on a cable is warned of where the moment by its lever across is more than this part of that
+#: by the length, and than the other part of force times height, which is round-off.
+LEVER, ROUND_OFF = 0.01, 1e-12
 
 
 class Amplitude:
@@ -400,7 +406,7 @@ class PointForce(Load):
 
 
 class Traction(Load):
-    """A dead traction on a surface.
+    """A dead traction on a surface. The surface of a cable is its axis, without the lever across.
 
     Parameters
     ----------
@@ -421,14 +427,35 @@ class Traction(Load):
     def bind(self, beam: Beam) -> Load:
         t, vector, mapping = self.t, np.zeros(beam.N), beam.mesh.mapping()
         found = surfaces_of(beam, self.boundary, 7 if callable(t) else beam.facet_points)
+        forces: list[Array] = []
         for one in found:
             density = ask_field("t(x)", t, mapping.F(one.X, one.elements)) if callable(t) else (
                 t[:, None, None])
             functions = beam.element.values(mapping, one.X, one.elements)
-            add_nodal(beam, one.elements, np.einsum("iep,cep->eic", functions,
-                                                    density * one.areas), vector)
+            forces.append(density * one.areas)
+            add_nodal(beam, one.elements, np.einsum("iep,cep->eic", functions, forces[-1]), vector)
+        if not beam.has_sections:
+            _warn_of_lever(beam, found, forces)
         return DeadLoad(beam, vector, self.amplitude, on_facets(
             beam.mesh, np.concatenate([one.facets for one in found]), traction=t))
+
+
+def _warn_of_lever(beam, surfaces, forces):
+    """Give a ModelWarning if forces on a cable, (2, nf, np) each, would turn it by their lever."""
+    mapping, length = beam.mesh.mapping(), np.sum(beam.mesh.lengths)
+    lost, kept, size = {}, 0.0, 0.0
+    for one, force in zip(surfaces, forces):
+        along, across = np.einsum("ikep,iep->kep", mapping.frame(one.X, one.elements), force)
+        moment = np.sum(along * mapping.offset(one.X, one.elements), axis=1)
+        lost[one.side] = lost.get(one.side, 0.0) + moment  # of the slabs of an end together
+        kept += length * np.sum(np.abs(across))
+        size += beam.mesh.height * np.sum(np.hypot(along, across))
+    left_out = sum(np.sum(np.abs(moment)) for moment in lost.values())
+    if left_out > LEVER * kept + ROUND_OFF * size:
+        warnings.warn(
+            f"a traction on {beam!r} acts on its axis: it leaves out a moment of {left_out:.3g} by "
+            "the distance of the face. Use an element with sections, as ElementBeamANCF(2), or give "
+            "an end its moment by scene.moment", ModelWarning, stacklevel=2)
 
 
 class FormLoad(Load):

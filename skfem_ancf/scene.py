@@ -770,6 +770,9 @@ class Scene:
                  beam: WhichBeam = None, amplitude: TimeFunction = None) -> Scene:
         """A dead traction on a surface, per area of the stress-free body.
 
+        On a cable it acts on the axis, without the moment by the distance of the face: a
+        ModelWarning says how large that is where it is more than a hundredth.
+
         Parameters
         ----------
         boundary

@@ -5,7 +5,7 @@ import pytest
 from skfem.assembly import asm
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
-                        Section, StVenantKirchhoff)
+                        ModelWarning, Scene, Section, StVenantKirchhoff)
 from skfem_ancf import forms
 from skfem_ancf.loads import Pressure, Traction
 from skfem_ancf.surfaces import surfaces_of
@@ -20,6 +20,7 @@ BODIES = {
 PLACES = ["left", "right", "bottom", "top", np.array([1, 2]), ("right", "bottom")]
 
 
+@pytest.mark.filterwarnings("ignore:a traction on .* acts on its axis")
 @pytest.mark.parametrize("element", [ElementBeamANCF(1), ElementBeamANCF(3),
                                      ElementBeamANCFCubic(2), ElementBeamCable(5)])
 @pytest.mark.parametrize("body", BODIES)
@@ -77,3 +78,29 @@ def test_a_closed_surface_under_pressure_has_no_resultant():
     q = beam.q0 + 1e-2 * np.random.default_rng(1).standard_normal(beam.N)
     nodal = load.force(q - beam.q0).reshape(-1, beam.nd // 2, 2)
     assert np.allclose(nodal[:, 0].sum(axis=0), 0.0, atol=1e-12 * np.max(np.abs(nodal)))
+
+
+def bend(x):
+    return np.array([50.0 * x[1], 0.0 * x[1]])
+
+
+@pytest.mark.parametrize("place, t, moment", [("top", (3.0, 0.0), 3.0 * 0.02 * 0.05),
+                                              ("right", bend, 50.0 * 0.02 * 0.1**3 / 12)])
+def test_a_moment_that_a_cable_does_not_take_from_a_traction_is_said(place, t, moment):
+    """Its axis was not bent at all; sections bend by that moment."""
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 5), 0.1)
+    with pytest.warns(ModelWarning, match=f"leaves out a moment of {moment:.3g} "):
+        scene = Scene(Beam(mesh, ElementBeamCable(5), LAW, 0.02)).clamp("left").traction(place, t)
+        state = scene.solve_static()
+    assert state.reactions("left").moment == pytest.approx(0.0, abs=1e-9 * moment)
+    scene = Scene(Beam(mesh, ElementBeamANCF(2), LAW, 0.02)).clamp("left").traction(place, t)
+    assert abs(scene.solve_static().reactions("left").moment) == pytest.approx(moment, rel=1e-5)
+
+
+@pytest.mark.parametrize("section", [dict(width=0.02), dict(section=Section.profile(
+    "I", width=0.06, web=0.01, flange=0.015))], ids=["plain", "I"])
+@pytest.mark.parametrize("place, t", [("top", (0.0, -1.0)), ("right", (5.0, 1.0)),
+                                      (("left", "right"), (5.0, 0.0))])
+def test_tractions_that_a_cable_takes_whole(place, t, section):
+    mesh = MeshBeam.init_line(np.linspace(0, 1, 5), 0.1)
+    Traction(place, t).bind(Beam(mesh, ElementBeamCable(5), LAW, **section))
