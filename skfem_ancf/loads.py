@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from .types import Array, Place, TimeFunction, WhichBeam
 
 
-#: A traction on a cable is warned of where the moment by its lever across is more than this part of that
-#: by the length, and than the other part of force times height, which is round-off.
+#: A traction on a cable is warned of where the moment by its lever across is more than this part
+#: of that by the length, and than the other part of force times height, which is round-off.
 LEVER, ROUND_OFF = 0.01, 1e-12
 
 
@@ -454,8 +454,8 @@ def _warn_of_lever(beam, surfaces, forces):
     if left_out > LEVER * kept + ROUND_OFF * size:
         warnings.warn(
             f"a traction on {beam!r} acts on its axis: it leaves out a moment of {left_out:.3g} by "
-            "the distance of the face. Use an element with sections, as ElementBeamANCF(2), or give "
-            "an end its moment by scene.moment", ModelWarning, stacklevel=2)
+            "the distance of the face. Use an element with sections, as ElementBeamANCF(2), or "
+            "give an end its moment by scene.moment", ModelWarning, stacklevel=2)
 
 
 class FormLoad(Load):

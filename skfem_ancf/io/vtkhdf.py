@@ -146,8 +146,8 @@ class VtkHdfWriter:
             raise InputError(f"all frames have the same points: the first has {self._n}, this one "
                              f"{len(body.points)}")
         elif not all(map(np.array_equal, _cells(body), _cells(self._body))):
-            raise InputError("all frames have the same cells, of the same beams and elements: write "
-                             "states of another scene into a file of their own, or as .pvd")
+            raise InputError("all frames have the same cells, of the same beams and elements: "
+                             "write states of another scene into another file, or as .pvd")
         try:
             self._append("Points", body.points)
             for name, values in body.point_data.items():
