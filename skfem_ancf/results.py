@@ -168,9 +168,9 @@ class State(Frozen):
         for name in ("_recoveries", "_near", "_raw", "actions", "together"):
             vars(other).pop(name, None)
         if {"u", "multipliers", "system", "load", "t"} & set(changes):
-            vars(other).update(_verdict=None, _checks=None)
+            vars(other).update(_verdict=None, _checks=None, _force=None)
         if {"u", "multipliers", "system"} & set(changes):
-            vars(other).update(_force=None, _motion=None, _origin=None, _memory=None)
+            vars(other).update(_motion=None, _origin=None, _memory=None)
         other._seal()
         return other
 

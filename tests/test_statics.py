@@ -687,3 +687,15 @@ def test_a_start_that_leads_nowhere_is_tried_once(monkeypatch):
     state = scene.point_force((0, -1.6e6), at=(2, 0)).solve_static()
     assert tried == [1.0] and len(state.steps) > 1
     assert_allclose(state.displacement((2, 0))[1], -1.308, rtol=0, atol=2e-3)
+
+
+def test_the_internal_force_at_another_load_factor():
+    """It has the force of a controller, which depends on the factor: the old one was kept."""
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 5), 0.05), ElementBeamANCF(2),
+                StVenantKirchhoff(1e7, 0.3), 0.02)
+    scene = Scene(beam).clamp("left")
+    state = scene.control(lambda t: np.array([0.0, -2.0 * t]), at=(1, 0)).solve_static()
+    moved = state.replace(load=0.5)
+    assert_allclose(moved.internal_force, scene.state(state.u).replace(load=0.5).internal_force)
+    assert_allclose(moved.reactions("left").force, [0.0, 2.0], atol=1e-6)
+    assert np.max(np.abs(moved.internal_force - state.internal_force)) == pytest.approx(1.0)
