@@ -142,10 +142,14 @@ def of_cable(beam: Beam) -> Inertia:
         return Inertia(N, across.moments(xi[:1], tind, "mass")[0] * (w * beam.mesh.lengths[0]))
     # the length of the axis: directors that are interpolated between nodes are shorter than one
     speed = np.hypot(*mapping.DF(X, tind)[:, 0])
-    mass, *moments = across.moments(xi, tind, "mass") * w * speed
+    mass, first, second = across.moments(xi, tind, "mass") * w * speed
     if across.simple:
         return Inertia(N, mass)
-    return Inertia(N, mass, d_xi / speed, np.array(moments))
+    # the volume of a curve is that of its axis times 1 - Y / R
+    bottom, middle, top = (mapping.detDF(np.array([xi, eta + 0.0 * xi]), tind)
+                           for eta in (0.0, 0.5, 1.0))
+    bend = (bottom - top) / (middle * mapping.height(xi, tind)[0])
+    return Inertia(N, mass - bend * first, d_xi / speed, np.array([first - bend * second, second]))
 
 
 def projected(beam: Beam, field: Callable[[Array], Array]) -> Array:

@@ -482,3 +482,29 @@ def test_a_cable_has_rotary_inertia_if_its_section_is_given(height):
     assert_allclose(frequencies[0], k**2 * height * np.sqrt(2e8 / 7800 / 12), rtol=1e-5)
     assert_allclose(frequencies[1] / frequencies[0], (1 + (k * height) ** 2 / 12) ** -0.5,
                     rtol=1e-8)
+
+
+@pytest.mark.parametrize("section, material, density", [
+    (Section.layers((0.04, StVenantKirchhoff(1e7, 0.3, 800.0)),
+                    (0.06, StVenantKirchhoff(1e7, 0.3, 200.0)), width=0.02), None,
+     lambda Y: 0.02 * np.where(Y < -0.01, 800.0, 200.0)),
+    (None, StVenantKirchhoff(1e7, 0.3, lambda x, y: 500.0 - 6000.0 * y),
+     lambda Y: 0.02 * (500.0 - 6000.0 * Y))], ids=["layers", "varies"])
+@pytest.mark.parametrize("element", [ElementBeamCable(5), ElementBeamANCFCubic(2)], ids=repr)
+def test_the_mass_of_a_curve_is_that_of_its_body(element, section, material, density):
+    """Outside of the axis there is more of it: of cables it was the mass of the straight section."""
+    R, H = 0.5, 0.1
+    mesh = MeshBeam.init_curve(lambda s: (R * np.sin(s / R), R * (1 - np.cos(s / R))),
+                               np.linspace(0, 1, 17), height=H)
+    beam = Beam(mesh, element, material, **(dict(section=section) if section else {"width": 0.02}))
+    Y, w = ((np.arange(50000) + 0.5) / 5e4 - 0.5) * H, H / 5e4
+    mass = np.sum(density(Y) * (1 - Y / R)) * w
+    assert beam.total_mass == pytest.approx(mass, rel=2e-6)
+    assert mass - np.sum(density(Y)) * w > 0.01 * mass
+    state = Scene(beam).clamp("left").gravity((0, -1e-3)).solve_static()
+    assert state.reactions("left").force[1] == pytest.approx(1e-3 * mass, rel=2e-6)
+    s = np.linspace(0, 1, 2001)[:-1] + 0.5 / 2000  # centroids of slices, at small displacement
+    moment = 1e-3 * np.sum(density(Y)[:, None] * (1 - Y / R)[:, None] * (
+        (R - Y[:, None]) * np.sin(s / R))) * w / 2000
+    assert state.reactions("left").moment == pytest.approx(moment, rel=2e-4)
+    assert state.resultants((0, 0)).M == pytest.approx(-moment, rel=2e-4)
