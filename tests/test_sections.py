@@ -492,7 +492,7 @@ def test_a_cable_has_rotary_inertia_if_its_section_is_given(height):
      lambda Y: 0.02 * (500.0 - 6000.0 * Y))], ids=["layers", "varies"])
 @pytest.mark.parametrize("element", [ElementBeamCable(7), ElementBeamANCFCubic(2)], ids=repr)
 def test_the_mass_of_a_curve_is_that_of_its_body(element, section, material, density):
-    """Outside of the axis there is more of it: of cables it was the mass of the straight section."""
+    """There is more of it outside: of cables it was the mass of the straight section."""
     R, H = 0.5, 0.1
     mesh = MeshBeam.init_curve(lambda s: (R * np.sin(s / R), R * (1 - np.cos(s / R))),
                                np.linspace(0, 1, 17), height=H)
