@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .linalg import BandMatrix
+from .mapping import cross
 from .quadrature import gauss, product_rule
 
 if TYPE_CHECKING:
@@ -140,14 +141,15 @@ def of_cable(beam: Beam) -> Inertia:
     N, d_xi = beam.element.along(mapping, X, tind)
     if across.simple and across.uniform:
         return Inertia(N, across.moments(xi[:1], tind, "mass")[0] * (w * beam.mesh.lengths[0]))
+    eta = np.array([0.5] if across.simple else [0.5, 0.0, 1.0])
+    J = mapping.DF(np.array([np.tile(xi, len(eta)), np.repeat(eta, len(xi))]), tind)
     # the length of the axis: directors that are interpolated between nodes are shorter than one
-    speed = np.hypot(*mapping.DF(X, tind)[:, 0])
+    speed = np.hypot(*J[:, 0, ..., :len(xi)])
     mass, first, second = across.moments(xi, tind, "mass") * w * speed
     if across.simple:
         return Inertia(N, mass)
     # the volume of a curve is that of its axis times 1 - Y / R
-    bottom, middle, top = (mapping.detDF(np.array([xi, eta + 0.0 * xi]), tind)
-                           for eta in (0.0, 0.5, 1.0))
+    middle, bottom, top = np.split(cross(J[:, 0], J[:, 1]), 3, axis=-1)
     bend = (bottom - top) / (middle * mapping.height(xi, tind)[0])
     return Inertia(N, mass - bend * first, d_xi / speed, np.array([first - bend * second, second]))
 
