@@ -29,6 +29,8 @@ UNREFINED = 1e-7  # error of an inverse that Lanczos takes as it is
 LANCZOS = 1e-10  # its tolerance
 SAME = 1e-6  # relative distance of eigenvalues that are the same
 UNSTRESSED = 1e-9  # force of springs at rest, over their stiffness times the size, of round-off
+ASIDE = 1e-5  # motion that shows on which sides springs push, over the size
+STIFFER = 0.1  # relative change of their stiffness that is not left out
 TURNING = 1e-2  # square of the angular velocity over that of a frequency
 REAL = 1e-7  # imaginary over absolute value of an eigenvalue that counts as real
 
@@ -410,8 +412,13 @@ def buckling(system: System, k: int) -> Buckling:
     Raises
     ------
     InputError
-        If k is out of range, the loads do not buckle the beam, it touches an obstacle before, or
-        springs are tight before any load.
+        If k is out of range, the loads do not buckle the beam, it touches an obstacle before,
+        springs are tight before any load, or push or pull on one side only of where it buckles.
+
+    Warns
+    -----
+    ModelWarning
+        Where springs become stiffer or softer before it buckles.
     """
     system.require_supports()
     zero, none = np.zeros(system.N), np.zeros(system.m)
@@ -435,6 +442,7 @@ def buckling(system: System, k: int) -> Buckling:
     order = np.argsort(factors)[:k]
     system.forces.contacts.require_free(factors[order[0]] * du, "buckling()",
                                         "continuation(): it touches before it buckles")
+    _require_same_springs(system, factors[order[0]] * du)
     if not symmetric:
         _require_no_flutter(system, tangent, Ks, factors[order[0]])
     shapes = np.zeros((len(order), system.N))
@@ -453,6 +461,28 @@ def _require_unstressed(system, zero):
             "springs push before there is any load: buckling() knows the stress-free state and "
             "scales all that stresses it. state.stability of scene.solve_static(stable=False), and "
             "scene.modes(k, state), tell under which loads the tightened scene holds")
+
+
+def _require_same_springs(system, u):
+    """Raise InputError where springs give way to one side only of the buckling state u.
+
+    A small motion there and back tells. Warns where they are not as stiff as without load.
+    """
+    if not len(system.forces.elements):
+        return
+    kick = ASIDE * np.random.default_rng(0).uniform(-1.0, 1.0, system.N) * system.mask
+    kick *= system.constraints.coordinate_sizes
+    rest, here, up, down = (system.forces.firmnesses(system.machine.tables.plain.forces, x)
+                            for x in (np.zeros(system.N), u, u + kick, u - kick))
+    if np.any(np.abs(up - down) > STIFFER * np.maximum(up, down)):
+        raise InputError(
+            "where it buckles, springs or foundations are stiffer to one side than to the other, "
+            "as ropes and one-sided foundations: buckling() knows one stiffness for both. Take "
+            "scene.continuation() with a small force to either side, or leave out what comes loose")
+    if np.any(np.abs(here - rest) > STIFFER * np.maximum(here, rest)):
+        warnings.warn("springs become stiffer or softer before it buckles, and buckling() knows "
+                      "their stiffness without load alone: state.stability of scene.solve_static() "
+                      "tells under which loads it holds", ModelWarning, stacklevel=4)
 
 
 _FLUTTER = (

@@ -7,7 +7,8 @@ from scipy.optimize import brentq, fsolve
 
 import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
-                        ElementBeamCable, InputError, MeshBeam, Scene, StVenantKirchhoff, eigen)
+                        ElementBeamCable, InputError, MeshBeam, ModelWarning, Scene,
+                        StVenantKirchhoff, eigen)
 from skfem_ancf.elements import ELEMENTS
 
 # units in which E I = rho A = L = 1 at every slenderness
@@ -286,3 +287,30 @@ def test_buckling_does_not_scale_the_tightness_of_springs():
     left = slack - 2 * tight / 1.25
     for part, stability in (0.97, "stable"), (1.03, "unstable"):
         assert mast(part * left, tight).solve_static(stable=False).stability == stability
+
+
+def test_buckling_knows_springs_that_act_on_one_side():
+    beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.01), ElementBeamCable(5),
+                StVenantKirchhoff(E=12e6, nu=0, density=1), width=1.0)  # E I = 1
+
+    def column():
+        return Scene(beam).pin("left").fix("right", "r^2").point_force((-1, 0), at="right")
+
+    both = column().foundation(500.0, "bottom").buckling(2).factors
+    n = np.array([2, 1])
+    assert both == pytest.approx((n * np.pi) ** 2 + 500 / (n * np.pi) ** 2, rel=1e-3)
+    with pytest.raises(InputError, match="stiffer to one side"):  # it lifts off at less than pi^2
+        column().foundation(500.0, "bottom", one_sided=True).buckling(1)
+
+    def flagpole(law):
+        scene = Scene(beam).clamp("left").point_force((-1, 0), at="right")
+        return scene.spring(law, between=((1, 0), (1, 1)))
+
+    with pytest.raises(InputError, match="stiffer to one side"):
+        flagpole(lambda e: 100.0 * max(e, 0.0)).buckling(1)
+    slack = flagpole(lambda e: 100.0 * max(e - 0.01, 0.0)).buckling(1)
+    assert slack.factors == pytest.approx([np.pi**2 / 4], rel=1e-3)
+    # a rope along the column that becomes tight before it buckles
+    tied = column().spring(lambda e: 1e9 * max(e - 1e-5, 0.0), between=((1, 0), (2, 0)))
+    with pytest.warns(ModelWarning, match="stiffer or softer before it buckles"):
+        tied.buckling(1)

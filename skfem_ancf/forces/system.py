@@ -312,6 +312,19 @@ class Forces:
         element_stiffness(tables, t, u, v, factor, D)
         return D
 
+    def firmnesses(self, tables: ForceTables, u: Array) -> Array:
+        """The largest stiffness of each element in any direction, shape (k,).
+
+        Parameters
+        ----------
+        tables
+            Those of :meth:`tables`.
+        u
+            Displacement of the coordinates, shape (N,).
+        """
+        D = self.stiffness(tables, 0.0, u, np.zeros(len(u)), 0.0)
+        return np.array([np.linalg.norm(D[at], 2) for _, _, at in self._blocks])
+
     def entries(self, tables: ForceTables, t: float, u: Array, v: Array,
                 factor: float) -> tuple[Array, Array, Array]:
         """The same by the coordinates: rows, columns and values.
