@@ -5,6 +5,7 @@ let live.
 """
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,12 +13,19 @@ from numpy.testing import assert_allclose
 from skfem import Basis, Functional, asm
 
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamCable, ElementBeamPatelShabana, MeshBeam, MeshError, Scene,
-                        StVenantKirchhoff, SupportError, forms)
+                        ElementBeamCable, ElementBeamPatelShabana, Frame, InputError, MeshBeam,
+                        MeshError, RigidBody, Scene, Section, StVenantKirchhoff, SupportError,
+                        forms)
+from skfem_ancf.border import mean_stiffness
+from skfem_ancf.dynamics import steps
 from skfem_ancf.dynamics.integrate import Integrator
 from skfem_ancf.io import PvdWriter
+from skfem_ancf.joints import Joint, PrescribedAngle, Weld
 from skfem_ancf.quadrature import gauss, tensor
+from skfem_ancf.spread import BODY, Sampled
 from skfem_ancf.statics import newton
+from skfem_ancf.statics.continuation import Tracer
+from skfem_ancf.taper import PLACES, halved
 
 STEEL = StVenantKirchhoff(1e6, 0.3, 1.0)
 
@@ -451,3 +459,189 @@ def test_an_interrupted_series_keeps_its_list(tmp_path, monkeypatch):
         monkeypatch.undo()
         assert series.path.read_bytes() == before
         assert not [f for f in tmp_path.iterdir() if f.suffix not in (".pvd", ".vtu")]
+
+
+# lines that no other test runs, or does not notice
+
+
+def test_what_a_unit_of_load_drives():
+    """Of supports and joints that move with it: by differences of residual and constraints."""
+    left = Beam(line(2), ElementBeamANCF(2), STEEL, 0.1, name="left")
+    right = Beam(line(2, origin=(1.0, 0.0)), ElementBeamANCF(2), STEEL, 0.1, name="right")
+    scene = Scene(left, right).clamp("left", "left")
+    scene.joint(Weld(beams=("left", "right"), at=((1.0, 0.0), (1.0, 0.0))))
+    scene.joint(PrescribedAngle("right", lambda t: 0.3 * t, "right"))
+    scene.fix("left", "r^2", displacement=0.02, beam="right").gravity((0.0, -10.0))
+    system, load = scene.system, 0.7
+    u = 1e-3 * np.random.default_rng(1).standard_normal(system.N)
+    moved = np.zeros(system.N)
+    moved[system.fixed] = system.values(1.0) - system.values(0.0)
+    assert moved.any() and system.drives
+    external = system.external_force(u)
+    system.assemble(u, load)
+    drive, gap = Tracer(system, 1e-9, 20)._drive(external, u, load)
+
+    def residual(s):
+        return (load + s) * external - system.internal_force(u + s * moved, load + s)
+
+    def phi(s):
+        return system.constraint(u + s * moved, load + s)
+
+    h = 1e-5
+    expected = (residual(h) - residual(-h)) / (2 * h)
+    assert_allclose(drive, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+    assert np.abs(gap).max() > 0.01
+    assert_allclose(gap, (phi(-h) - phi(h)) / (2 * h), rtol=0, atol=1e-8)
+
+
+def bent():
+    lines = [(0, 1), (1, 2), (2, 3)]
+    return Frame.from_lines([(0, 0), (0, 1), (1, 1), (1, 0)], lines, material=STEEL, height=0.1,
+                            width=0.1).clamp([0, 3])
+
+
+def test_second_differences_of_the_nodes_of_a_frame():
+    """Equations of nodes are quadratic: second differences are exact."""
+    system = bent().system
+    u, v = 0.1 * np.random.default_rng(2).standard_normal((2, system.N))
+    phi = [system.constraint(u + s * v, 0.0) for s in (-1.0, 0.0, 1.0)]
+    expected = phi[0] - 2.0 * phi[1] + phi[2]
+    assert np.abs(expected).max() > 1e-3
+    assert_allclose(system.quadratic(u, 0.0, v), expected, rtol=0, atol=1e-13)
+
+
+def test_a_moment_at_a_node_turns_as_its_node():
+    frame = bent().moment(1, 2.0)
+    state = frame.solve_static()
+    (load,) = frame.system.loads
+    s = frame.system.slices[0]
+    turned = frame.rotations(state)[1]
+    assert 0.005 < turned < 1.0
+    assert load.angle(state.u[s]) == pytest.approx(turned, rel=1e-9)
+    assert load.potential(state.u[s]) == pytest.approx(-2.0 * turned, rel=1e-9)
+
+
+def test_tangent_of_a_moment_that_varies():
+    """At a time the stiffness of a moment is that of what it is then, times the load."""
+    def tangent(M, amplitude, *args, **options):
+        scene = Scene(Beam(line(2), ElementBeamANCF(2), STEEL, 0.1)).clamp("left")
+        system = scene.moment("right", M, amplitude=amplitude).system
+        u = 0.1 * np.random.default_rng(3).standard_normal(system.N)
+        system.assemble(u, *args, **options)
+        return system.K.toarray()
+
+    expected = tangent(30.0, None, 0.5)
+    assert np.abs(tangent(0.0, None) - expected).max() > 1e-5 * np.abs(expected).max()
+    assert_allclose(tangent(10.0, lambda t: 3.0 * t, 0.5, t=1.0), expected, rtol=1e-12,
+                    atol=1e-12 * np.abs(expected).max())
+
+
+def test_slope_of_a_joint_that_does_not_say_it():
+    class Plain(PrescribedAngle):
+        slope = Joint.slope
+
+    found = []
+    for kind in (PrescribedAngle, Plain):
+        scene = Scene(Beam(line(2), ElementBeamANCF(2), STEEL, 0.1)).pin("left")
+        joint = scene.joint(kind("right", lambda t: 0.3 * t))
+        N = scene.system.N
+        _, columns, values = joint.slope_entries(np.array([0.0, 1.0, 2.0]), N)
+        dense = np.zeros((3, N))
+        for out, row in zip(dense, values):
+            np.add.at(out, columns, row)
+        found.append(dense)
+    assert np.ptp(found[0], axis=0).max() > 0.1
+    assert_allclose(found[1], found[0], rtol=0, atol=1e-14)
+
+
+def test_a_density_at_points_that_differ_from_section_to_section():
+    def density(e, xi, eta):
+        return np.array([(1 + e) * (xi + eta**2), xi * eta - e])
+
+    e, p, q = np.array([0, 2]), np.array([0.1, 0.5, 0.9]), np.array([0.0, 0.4, 1.0])
+    sampled = Sampled(BODY, e, p, density(e[:, None, None], p[:, None], q), q)
+    at, xi = np.array([0, 2, 2, 1]), np.array([0.3, 0.0, 0.7, 0.5])
+    for eta in (np.array([[0.2, 0.9], [0.1, 0.3], [0.5, 0.6], [0.2, 0.2]]),
+                np.tile([0.2, 0.9], (4, 1))):
+        expected = density(at[:, None], xi[:, None], eta)
+        expected[:, 3] = 0.0
+        assert_allclose(sampled.at(at, xi, eta, 3), expected, rtol=0, atol=1e-13)
+
+
+def test_heights_of_halved_elements():
+    def cubic(x):
+        return 1.0 + x - 2.0 * x**2 + 0.5 * x**3
+
+    heights = np.array([cubic(PLACES), cubic(1.0 + PLACES)]).T
+    found = halved(heights, np.array([False, True]))
+    expected = [cubic(PLACES), cubic(1.0 + PLACES / 2), cubic(1.5 + PLACES / 2)]
+    assert_allclose(found.T, expected, rtol=1e-14)
+
+
+def test_refined_meshes_without_their_curve_have_the_same_points(tmp_path):
+    """Children of elements with cubic sections: their map is that of the parent."""
+    mesh = MeshBeam.init_curve(lambda s: np.array([2 * s + 0.2 * s**2, 0.4 * np.sin(2.5 * s)]),
+                               [-1.0, -0.2, 0.8], 0.2).with_sections("cubic")
+    mesh.save(tmp_path / "mesh.npz")
+    mesh = MeshBeam.load(tmp_path / "mesh.npz")
+    assert mesh.curve is None
+    fine = mesh.refined([0])
+    X = np.array([[0.1, 0.6, 1.0], [0.1, 0.9, 0.3]])
+    for child, begin in ((0, 0.0), (1, 0.5)):
+        there = np.array([begin + X[0] / 2, X[1]])
+        assert_allclose(fine.mapping().F(X, np.array([child])),
+                        mesh.mapping().F(there, np.array([0])), rtol=0, atol=1e-13)
+
+
+def test_small_beams_that_do_not_meet_are_not_welded():
+    """A gap counts against the beams' size, not against a unit of length."""
+    size, gap = 1e-2, 1e-7
+    left = Beam(line(1, 1e-3, size), ElementBeamANCF(2), STEEL, 0.1, name="left")
+    for far in (False, True):
+        right = Beam(line(1, 1e-3, size, origin=(size + gap * (1.0 if far else 0.01), 0.0)),
+                     ElementBeamANCF(2), STEEL, 0.1, name="right")
+        scene = Scene(left, right)
+        weld = Weld(beams=("left", "right"), at=("right", "left"))
+        if far:
+            with pytest.raises(InputError, match="apart"):
+                scene.joint(weld)
+        else:
+            scene.joint(weld)
+
+
+def test_mean_stiffness_below_one():
+    """It has the unit of the scene: 1 stands for none only."""
+    sizes = np.array([1.0, 2.0])
+    assert mean_stiffness(np.array([1e-3, 2e-3]), sizes) == pytest.approx(4.5e-3)
+    assert mean_stiffness(np.zeros(2), sizes) == 1.0
+
+
+def test_energy_of_bodies_on_springs():
+    """Stiffness times the square of the size, and force times the size."""
+    def asked(k, weight):
+        body = RigidBody(1.0, 0.5, position=(0.0, -2.0))
+        scene = Scene(body).gravity((0.0, -weight))
+        system = (scene.spring(k, [(0.0, 0.0), (body, (0.0, -2.0))]) if k else scene).system
+        return system.energy_of_bodies, system.size
+
+    for k, weight in ((7.0, 3.0), (7.0, 0.0), (0.0, 3.0)):
+        energy, size = asked(k, weight)
+        assert energy == pytest.approx(k * size**2 + weight * size, rel=1e-12)
+    assert asked(0.0, 0.0)[0] == 1.0
+
+
+@pytest.mark.parametrize("part, far", [(0.9, False), (1.1, True)])
+def test_corrections_far_against_the_way_of_a_step(part, far):
+    system = Scene(Beam(line(2), ElementBeamANCF(2), STEEL, 0.1)).system
+    v, dt = np.random.default_rng(4).standard_normal(system.N), 0.2
+    x = SimpleNamespace(du=part * steps.FAR * dt * v, room=np.zeros(system.N))
+    w = SimpleNamespace(x=x, y=np.array([0.0 * v, v]))
+    assert steps._far(system.mass.band, SimpleNamespace(dt=dt), w) == far
+
+
+def test_mass_of_a_tapered_round_rod():
+    """A frustum: its width is a part of the height everywhere."""
+    mesh = line(3, lambda x: 0.2 - 0.1 * x, 1.5)
+    beam = Beam(mesh, ElementBeamANCF(2), STEEL, section=Section.profile("circle"))
+    a, b = 0.1, 0.025
+    assert beam.total_mass == pytest.approx(np.pi * 1.5 / 3 * (a * a + a * b + b * b), rel=1e-12)
