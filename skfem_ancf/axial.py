@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from .beam import Beam
-    from .types import Array, TimeFunction, WhichBeam
+    from .types import Array, TimeFunction
+    from .layout import WhichBeam
 
 
 class FollowerForce(Load):

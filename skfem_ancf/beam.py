@@ -26,7 +26,6 @@ from .mesh import MeshBeam, reach
 from .origin import ours
 from .places import as_point, facets_of, node_of
 from .quadrature import gauss, tensor
-from .rigid import RigidBody
 from .sections import Across, Rectangle, Section
 from .series import Series
 from .strains import ElementStrain
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
 
     from .formulations.base import Formulation, Term
     from .inertia import Inertia
-    from .types import Array, Law, Place, Rule, WhichMember
+    from .types import Array, Law, Place, Rule
 
 
 @taught
@@ -875,71 +874,3 @@ def _material(section, material, mesh):
                          f"{shown(material)}" if section.has_materials else
                          f"material must be a Material, got {shown(material)}")
     return material or section.slabs(mesh, None)[0].material
-
-
-def select_beam(beams: Sequence[Beam], beam: WhichMember) -> Beam:
-    """The beam meant by a Beam, a name, a number, or None where there is only one.
-
-    Parameters
-    ----------
-    beams
-        The beams of a scene.
-    beam
-        A Beam, its name or its number, or None.
-
-    Raises
-    ------
-    NameUnknown
-        If there is no such beam, or None is given and there are several.
-    """
-    if beam is None and len(beams) == 1:
-        return beams[0]
-    found: Sequence[Beam] = ()
-    if isinstance(beam, Beam):
-        found = [b for b in beams if b is beam]
-    elif isinstance(beam, str):
-        found = [b for b in beams if b.name == beam]
-    elif isinstance(beam, int) and not isinstance(beam, bool) and beam >= 0:
-        found = list(beams[beam:beam + 1])
-    if found:
-        return found[0]
-    known = [b.name if b.name is not None else k for k, b in enumerate(beams)]
-    if not beams:
-        raise InputError("this is asked of beams, the scene has rigid bodies alone: name one of "
-                         f"them, by itself, its name or its number; got {shown(beam)}")
-    if beam is None:
-        raise InputError(f"the scene has {len(beams)} beams: say which with beam=, one of {known}")
-    if isinstance(beam, RigidBody):
-        raise InputError(f"this is asked of beams, got {shown(beam)}; beams are {known}")
-    raise NameUnknown("beam", beam, known)
-
-
-def select_member(beams: Sequence[Beam], bodies: Sequence[RigidBody],
-                  which: WhichMember) -> Beam | RigidBody:
-    """As :func:`select_beam`, of beams and of rigid bodies, which are numbered behind them.
-
-    Parameters
-    ----------
-    beams, bodies
-        Those of a scene.
-    which
-        A Beam or a RigidBody, its name or its number; None for the only beam, without beams for
-        the only body.
-
-    Raises
-    ------
-    NameUnknown
-        If there is none, or None is given and there are several beams.
-    """
-    if which is None and not beams and len(bodies) == 1:
-        return bodies[0]
-    if which is None or not bodies:
-        return select_beam(beams, which)
-    members = *beams, *bodies
-    if isinstance(which, RigidBody):
-        found = [b for b in bodies if b is which]
-        if found:
-            return found[0]
-        raise NameUnknown("rigid body", which, [b.name or len(beams) + k
-                                                for k, b in enumerate(bodies)])
-    return select_beam(members, which)  # type: ignore[arg-type]

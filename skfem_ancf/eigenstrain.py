@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
     from .beam import Beam
     from .sections import Slab
-    from .types import Array, TimeFunction, WhichBeam
+    from .types import Array, TimeFunction
+    from .layout import WhichBeam
 
 #: Products of a function of place and one of time that a function of both may be.
 MOST = 8

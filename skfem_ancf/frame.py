@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from .results import State
-    from .types import Array, TimeFunction, WhichBeam
+    from .types import Array, TimeFunction
+    from .layout import WhichBeam
 
 #: What is given for all lines, or for those of a group.
 BEAM = "height", "material", "width", "section", "element", "formulation", "damping", "compiled"

@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from .types import Array, Place, TimeFunction, WhichBeam
+    from .types import Array, Place, TimeFunction
+    from .layout import WhichBeam
 
 
 #: A traction on a cable is warned of where the moment by its lever across is more than this part

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from .statics.continuation import Point
     from .statics.critical import Critical
     from .system import System
-    from .types import Array, WhichBeam
+    from .types import Array
+    from .layout import WhichBeam
 
 
 @dataclass(repr=False)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .beam import select_beam, select_member
+from .layout import select_beam, select_member
 from .errors import InputError, MeshError, require_finite, shown
 from .kept import cached_property
 from .parts import BodyPart, Part
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from .beam import Beam
     from .mesh import MeshBeam
     from .system import System
-    from .types import Array, WhichMember
+    from .types import Array
+    from .layout import WhichMember
 
 #: Types of numbers of which nothing has to be asked.
 PLAIN = (float, int, np.float64)

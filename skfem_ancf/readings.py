@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .points import Located
     from .results import State
     from .scene import Scene
-    from .types import WhichMember
+    from .layout import WhichMember
 
 #: What is read of material points by its name.
 WHAT = ("displacement", "position")

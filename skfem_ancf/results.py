@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .beam import select_beam, select_member
+from .layout import select_beam, select_member
 from .errors import InputError, NameUnknown, require_flag, shown, teaching
 from .eigenstrain import EigenStrain
 from .fields import Values, find_field
@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     from .rigid import RigidBody
     from .statics.stability import Verdict
     from .system import System
-    from .types import Array, Place, StrPath, WhichBeam, WhichMember
+    from .types import Array, Place, StrPath
+    from .layout import WhichBeam, WhichMember
 
 logger = logging.getLogger(__name__)
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from . import eigen
 from .axial import FollowerForce, LineLoad
-from .beam import Beam, select_member
+from .beam import Beam
+from .layout import select_member
 from .checks import warn_of
 from .damping import Damping
 from .doors import configuration, displacement
@@ -60,7 +61,8 @@ if TYPE_CHECKING:
     from .eigen import Buckling, Modes
     from .obstacles import Shape
     from .plan import Plan
-    from .types import Array, Place, StrPath, TimeFunction, WhichBeam, WhichMember
+    from .types import Array, Place, StrPath, TimeFunction
+    from .layout import WhichBeam, WhichMember
 
 OPTIONS = ("method", "tol", "max_iterations", "first_step", "min_step", "progress", "stable")
 

@@ -4,26 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 from numpy.typing import ArrayLike, NDArray
-
-if TYPE_CHECKING:
-    from .beam import Beam
-    from .rigid import RigidBody
 
 #: An array of numbers; its shape is said where it is used.
 Array: TypeAlias = NDArray[Any]
 
 #: What :func:`skfem_ancf.places.facets_of` takes.
 Place: TypeAlias = "str | ArrayLike | Callable[[Array], Array]"
-
-#: What :func:`skfem_ancf.beam.select_beam` takes: a Beam, its name or its number; None for the
-#: only one.
-WhichBeam: TypeAlias = "Beam | str | int | None"
-
-#: The same, of beams and rigid bodies.
-WhichMember: TypeAlias = "Beam | RigidBody | str | int | None"
 
 #: What a force is multiplied by: a function of time, or None.
 TimeFunction: TypeAlias = "Callable[[float], float] | None"

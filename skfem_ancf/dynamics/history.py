@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from ..joints.base import Joint
     from ..resultants import Resultants
     from ..system import System
-    from ..types import Array, Place, StrPath, WhichBeam, WhichMember
+    from ..types import Array, Place, StrPath
+    from ..layout import WhichBeam, WhichMember
     from .base import Scheme, Steps
 
     Columns = tuple[Array, ...]

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
     from ..results import State
     from ..system import System
-    from ..types import Array, WhichBeam
+    from ..types import Array
+    from ..layout import WhichBeam
     from .base import Motion
 
 #: What is read of the coordinates of many steps at once.

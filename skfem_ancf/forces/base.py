@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from ..beam import Beam
-    from ..scene import Scene
+    from ..layout import Layout
     from ..spread import Facets
     from ..types import Array
 
@@ -135,12 +135,12 @@ class ForceElement(Sealable):
     links: Any = ()
     groups: Any = ()
 
-    def bind(self, scene: Scene) -> Sequence[Vector | Link]:
+    def bind(self, layout: Layout) -> Sequence[Vector | Link]:
         """The points and sections on which it acts, found in the scene's coordinates.
 
         Parameters
         ----------
-        scene
+        layout
             Has ``beam(which)``, the Beam meant by a Beam, a name, a number or None,
             ``offset(which)``, the number of its first coordinate, and ``N``.
 
@@ -266,14 +266,14 @@ def _derivative(function, x):
     return out
 
 
-def bind_force(element: ForceElement, scene: Scene) -> ForceElement:
+def bind_force(element: ForceElement, layout: Layout) -> ForceElement:
     """A copy of a force element, bound to a scene and tried there.
 
     Parameters
     ----------
     element
         A :class:`ForceElement`.
-    scene
+    layout
         The :class:`~skfem_ancf.Scene`.
 
     Raises
@@ -284,7 +284,7 @@ def bind_force(element: ForceElement, scene: Scene) -> ForceElement:
     bound = element._unsealed()
     own = element.parts.__func__ is ForceElement.parts  # type: ignore[attr-defined]
     try:
-        bound.links = _links(element, bound.bind(scene))
+        bound.links = _links(element, bound.bind(layout))
         if bound.parts() is None:
             _try(bound)
     except AncfError:

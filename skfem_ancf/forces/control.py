@@ -20,8 +20,9 @@ from .texts import turned, turning
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from ..scene import Scene
-    from ..types import Array, WhichBeam
+    from ..layout import Layout
+    from ..types import Array
+    from ..layout import WhichBeam
 
 KINDS = ("force", "moment")
 #: Part of the time between two samples that is round-off.
@@ -98,40 +99,40 @@ class Control(ForceElement):
                              "in both")
         self.dt = None if dt is None else require_positive("dt", dt)
 
-    def bind(self, scene: Scene) -> list[Link]:
+    def bind(self, layout: Layout) -> list[Link]:
         find = self._point if self.kind == "force" else self._section
-        ends = [find(scene, self.at)]
+        ends = [find(layout, self.at)]
         if self.kind == "moment":
-            ends.append(Link(ends[0].start) if self.other is None else find(scene, self.other))
+            ends.append(Link(ends[0].start) if self.other is None else find(layout, self.other))
         elif self.other is not None:
-            ends.append(find(scene, self.other))
+            ends.append(find(layout, self.other))
         if not ends[0].weights.size:
             raise InputError(f"a control acts on a material point, there is none at "
                              f"{shown(self.at)}")
-        places = [self._point(scene, place) for _, place in self.points]
-        directions = [self._section(scene, place) for _, place in self.sections]
+        places = [self._point(layout, place) for _, place in self.points]
+        directions = [self._section(layout, place) for _, place in self.sections]
         self._ends = len(ends)
         self._held: list[tuple[float, Any]] = []
         self._starts = [d.start for d in directions]
         return [*ends, *places, *directions]
 
-    def _point(self, scene, place):
+    def _point(self, layout, place):
         if self.beam is not None and is_point(place):
             place = (self.beam, place)
-        return link(end_of(scene, place))
+        return link(end_of(layout, place))
 
-    def _section(self, scene, place):
+    def _section(self, layout, place):
         if isinstance(place, RigidBody):
             which, at = place, None
         elif isinstance(place, (tuple, list)) and len(place) == 2 and not is_point(place):
             which, at = place
         elif is_point(place) and self.beam is None:
-            which, at = named_place(scene, place)
+            which, at = named_place(layout, place)
         else:
             which, at = self.beam, place
         if is_ground(which):
             raise InputError("the ground does not turn: leave other= out for a moment from there")
-        return link(section(scene, which, at)[1])
+        return link(section(layout, which, at)[1])
 
     # what it does
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..beam import select_beam
+from ..layout import select_beam
 from ..errors import require_flag, require_not_negative, teaching
 from ..kernels.section import beam_gradients
 from ..quadrature import gauss
@@ -16,8 +16,9 @@ from .base import ForceElement, Link, Part, link
 from .texts import DRAG, FOUNDATION
 
 if TYPE_CHECKING:
-    from ..scene import Scene
-    from ..types import Place, WhichBeam
+    from ..layout import Layout
+    from ..types import Place
+    from ..layout import WhichBeam
 
 
 @teaching
@@ -48,8 +49,8 @@ class Foundation(ForceElement):
         self.side, self.one_sided = side, require_flag("one_sided", one_sided)
         self.beam = beam
 
-    def bind(self, scene: Scene) -> list[Link]:
-        beam, first = select_beam(scene.beams, self.beam), scene.offset(self.beam)
+    def bind(self, layout: Layout) -> list[Link]:
+        beam, first = select_beam(layout.beams, self.beam), layout.offset(self.beam)
         self._at, found = [], surfaces_of(beam, self.side, beam.facet_points)
         self.along = (beam, *groups_of(beam.mesh, found))
         for one in found:
@@ -103,8 +104,8 @@ class Drag(ForceElement):
         self.tangential = require_not_negative("tangential", tangential)
         self.beam = beam
 
-    def bind(self, scene: Scene) -> list[Link]:
-        beam, first = select_beam(scene.beams, self.beam), scene.offset(self.beam)
+    def bind(self, layout: Layout) -> list[Link]:
+        beam, first = select_beam(layout.beams, self.beam), layout.offset(self.beam)
         mesh, mapping = beam.mesh, beam.mesh.mapping()
         xi, w = gauss(beam.element.axis_degree + 1)
         X = np.array([xi, 0.5 + 0.0 * xi])

@@ -13,8 +13,9 @@ from .base import ForceElement, Link, Part, link
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from ..scene import Scene
-    from ..types import Array, WhichBeam
+    from ..layout import Layout
+    from ..types import Array
+    from ..layout import WhichBeam
 
 
 @teaching
@@ -44,10 +45,10 @@ class PointMass(ForceElement):
             raise InputError("a point mass needs a mass or an inertia that is positive, got two "
                              "zeros")
 
-    def bind(self, scene: Scene) -> list[Link]:
-        self._masses = [(self.mass, link(point(scene, self.beam, self.at)))]
+    def bind(self, layout: Layout) -> list[Link]:
+        self._masses = [(self.mass, link(point(layout, self.beam, self.at)))]
         if self.inertia:
-            self._masses.append((self.inertia, link(section(scene, self.beam, self.at)[1])))
+            self._masses.append((self.inertia, link(section(layout, self.beam, self.at)[1])))
         return [place for _, place in self._masses]
 
     def parts(self) -> list[Part]:

@@ -14,26 +14,27 @@ from .laws import Law, force_of, number_or_law, potential_of, said, slope_of, wo
 from .texts import SPRING, TINY, TORSION, turned, turning
 
 if TYPE_CHECKING:
-    from ..scene import Scene
-    from ..types import Array, Place, WhichBeam
+    from ..layout import Layout
+    from ..types import Array, Place
+    from ..layout import WhichBeam
 
 #: Rate beside which the step of a difference of a dashpot's law is small.
 STILL = 1e-3
 
 
-def end_of(scene: Scene, place: Any) -> Vector:
+def end_of(layout: Layout, place: Any) -> Vector:
     """A material point, or one of the ground.
 
     Parameters
     ----------
-    scene
+    layout
         What :meth:`ForceElement.bind` was given.
     place
         (x, y): the material point there, or the point of the ground where no beam and no rigid
         body is; a RigidBody, for its centre of mass; (beam, (x, y)); or ("ground", (x, y)).
     """
-    which, at = named_place(scene, place, GROUND)
-    return point(scene, which, at)
+    which, at = named_place(layout, place, GROUND)
+    return point(layout, which, at)
 
 
 @teaching
@@ -68,8 +69,8 @@ class Spring(ForceElement):
         self.between = tuple((place, None) if isinstance(place, RigidBody) else place
                              for place in between)
 
-    def bind(self, scene: Scene) -> list[Link]:
-        a, b = (end_of(scene, place) for place in self.between)
+    def bind(self, layout: Layout) -> list[Link]:
+        a, b = (end_of(layout, place) for place in self.between)
         if not a.weights.size and not b.weights.size:
             raise InputError(f"neither end of the spring between {shown(self.between)} is a point "
                              "of a beam or a rigid body: both would be of the ground")
@@ -157,10 +158,10 @@ class TorsionalSpring(ForceElement):
                              "section is known up to whole turns only. Of a spring wound by "
                              "more, add the moment of the turns, 2 pi k each, by scene.moment")
 
-    def bind(self, scene: Scene) -> list[Link]:
-        self._d = link(section(scene, self.beam, self.at)[1])
+    def bind(self, layout: Layout) -> list[Link]:
+        self._d = link(section(layout, self.beam, self.at)[1])
         self._e = link(Link(self._d.start)) if self.other is None else link(
-            section(scene, *self.other)[1])
+            section(layout, *self.other)[1])
         d, e = self._d.start, self._e.start
         self._start = float(np.arctan2(e[0] * d[1] - e[1] * d[0], d @ e)) + self.angle
         return [self._d, self._e]

@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from ..scene import Scene
-    from ..types import Array, WhichMember
+    from ..layout import Layout
+    from ..types import Array
+    from ..layout import WhichMember
 
 
 class Vector:
@@ -166,12 +167,12 @@ class Joint(Sealable):
 
             cls.jacobian = jacobian  # type: ignore[method-assign]
 
-    def bind(self, scene: Scene) -> None:
+    def bind(self, layout: Layout) -> None:
         """Find the points and sections in the scene's coordinates.
 
         Parameters
         ----------
-        scene
+        layout
             Has ``beam(which)``, the Beam meant by a Beam, a name, a number or None,
             ``offset(which)``, the number of its first coordinate, and ``N``.
         """
@@ -470,14 +471,14 @@ class Joint(Sealable):
         return f"<{' '.join(part for part in parts if part)}>"
 
 
-def bind_joint(joint: Joint, scene: Scene) -> Joint:
+def bind_joint(joint: Joint, layout: Layout) -> Joint:
     """A copy of a joint, bound to a scene and tried there: what it returns fits the scene.
 
     Parameters
     ----------
     joint
         A :class:`Joint`, as it was given.
-    scene
+    layout
         The :class:`~skfem_ancf.Scene`.
 
     Raises
@@ -490,11 +491,11 @@ def bind_joint(joint: Joint, scene: Scene) -> Joint:
         vars(joint)["_key"] = urandom(16).hex()
     bound = joint._unsealed()
     try:
-        bound.bind(scene)
+        bound.bind(layout)
         bound._seal()
         if not ours(joint):
-            _try(bound, scene.N)
-            sizes = np.concatenate([b.sizes for b in scene.members])
+            _try(bound, layout.N)
+            sizes = np.concatenate([b.sizes for b in layout.members])
             beside(partial(_require_derivatives, bound, sizes), sizes)
     except AncfError:
         raise
@@ -559,9 +560,9 @@ def _fixed(value: Array) -> Vector:
     return Vector(value, np.zeros((2, 0), dtype=int), np.zeros((2, 0)))
 
 
-def _of(scene: Scene, member: Any, start: Array, dofs: Array, weights: Array) -> Vector:
+def _of(layout: Layout, member: Any, start: Array, dofs: Array, weights: Array) -> Vector:
     """A Vector of coordinates of a beam or body, by their numbers there, without round-off."""
-    found = Vector(start, dofs + scene.offset(member), weights)
+    found = Vector(start, dofs + layout.offset(member), weights)
     size = np.maximum.reduce(np.abs(found.weights)) * member.sizes.take(dofs[0])
     keep = size > 1e-14 * np.maximum.reduce(size)
     if not np.logical_and.reduce(keep):
@@ -569,18 +570,18 @@ def _of(scene: Scene, member: Any, start: Array, dofs: Array, weights: Array) ->
     return found
 
 
-def members_at(scene: Scene, at: ArrayLike) -> list[int]:
+def members_at(layout: Layout, at: ArrayLike) -> list[int]:
     """Numbers of the beams that have a material point at a place, and of bodies around it.
 
     Parameters
     ----------
-    scene
+    layout
         What :meth:`Joint.bind` was given.
     at
         The place (x, y) in the stress-free state, shape (2,), or the name of an end.
     """
     found = []
-    for k, member in enumerate(scene.members):
+    for k, member in enumerate(layout.members):
         if isinstance(member, RigidBody):
             if not isinstance(at, str) and member.contains(np.reshape(at, (2, 1)))[0]:
                 found.append(k)
@@ -593,12 +594,12 @@ def members_at(scene: Scene, at: ArrayLike) -> list[int]:
     return found
 
 
-def named_place(scene: Scene, place: Any, where_none_is: str | None = None) -> tuple[Any, Any]:
+def named_place(layout: Layout, place: Any, where_none_is: str | None = None) -> tuple[Any, Any]:
     """Which beam or body a place is of, and the place there.
 
     Parameters
     ----------
-    scene
+    layout
         What :meth:`Joint.bind` was given.
     place
         (x, y): the material point there; (beam, (x, y)), or another place of a beam; a RigidBody,
@@ -625,12 +626,12 @@ def named_place(scene: Scene, place: Any, where_none_is: str | None = None) -> t
         elif isinstance(at, np.ndarray):
             at = tuple(at.tolist())
         return which, at
-    found = members_at(scene, place) if isinstance(place, str) else []
+    found = members_at(layout, place) if isinstance(place, str) else []
     if not found:
         place = require_finite("a point of a spring or a joint", place, (2,))
-        found = members_at(scene, place)
+        found = members_at(layout, place)
     if len(found) > 1:
-        names = [scene.members[k].name or k for k in found]
+        names = [layout.members[k].name or k for k in found]
         raise InputError(f"the point {shown(place)} is one of the beams {names}: say which, as "
                          f"({names[0]!r}, {shown(place)})")
     if not found and where_none_is is None:
@@ -641,12 +642,12 @@ def named_place(scene: Scene, place: Any, where_none_is: str | None = None) -> t
         place if isinstance(place, str) else tuple(map(float, place)))
 
 
-def point(scene: Scene, beam: WhichMember, at: Any) -> Vector:
+def point(layout: Layout, beam: WhichMember, at: Any) -> Vector:
     """The position of a material point, as a :class:`Vector`.
 
     Parameters
     ----------
-    scene
+    layout
         What :meth:`Joint.bind` was given.
     beam
         The beam or rigid body, its name or its number; "ground" for a point of the ground.
@@ -656,24 +657,24 @@ def point(scene: Scene, beam: WhichMember, at: Any) -> Vector:
     """
     if is_ground(beam):
         return _fixed(np.array(as_point(at)))
-    member = scene.beam(beam)
+    member = layout.beam(beam)
     if isinstance(at, str) and not isinstance(member, RigidBody):
-        return section(scene, member, at)[0]
+        return section(layout, member, at)[0]
     dofs, weights = member.probe(at)
     if isinstance(member, RigidBody):
         start = member.place(at)
     else:
         e, X = member.locate(at)
         start = member.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
-    return _of(scene, member, start, dofs, weights)
+    return _of(layout, member, start, dofs, weights)
 
 
-def section(scene: Scene, beam: WhichMember, place: Any) -> tuple[Vector, Vector]:
+def section(layout: Layout, beam: WhichMember, place: Any) -> tuple[Vector, Vector]:
     """Position and direction of a section, as two :class:`Vector`.
 
     Parameters
     ----------
-    scene
+    layout
         What :meth:`Joint.bind` was given.
     beam
         The beam or rigid body, its name or its number; "ground" for the ground.
@@ -684,27 +685,27 @@ def section(scene: Scene, beam: WhichMember, place: Any) -> tuple[Vector, Vector
         centre of mass.
     """
     if is_ground(beam):
-        return point(scene, beam, place), _fixed(np.array([1.0, 0.0]))
-    member = scene.beam(beam)
+        return point(layout, beam, place), _fixed(np.array([1.0, 0.0]))
+    member = layout.beam(beam)
     if isinstance(member, RigidBody):
         dofs, weights = member.section_direction(member.section_node(place))
-        return (point(scene, member, place),
-                _of(scene, member, member.q0[dofs] @ weights, dofs, weights))
+        return (point(layout, member, place),
+                _of(layout, member, member.q0[dofs] @ weights, dofs, weights))
     try:
         node = member.section_node(place)
     except MeshError:
         if not is_point(place):
             raise
-        return _inner_section(scene, member, place)
+        return _inner_section(layout, member, place)
     dofs, weights = member.section_direction(node)
-    direction = _of(scene, member, member.q0_local[dofs] @ weights, dofs, weights)
+    direction = _of(layout, member, member.q0_local[dofs] @ weights, dofs, weights)
     if is_point(place) and member.has_sections:
-        return point(scene, member, place), direction
-    first = scene.offset(member) + node * member.nd
+        return point(layout, member, place), direction
+    first = layout.offset(member) + node * member.nd
     return (Vector(member.mesh.p[:, node], np.array([[first], [first + 1]]), np.ones(1)), direction)
 
 
-def _inner_section(scene: Scene, beam: Any, at: Any) -> tuple[Vector, Vector]:
+def _inner_section(layout: Layout, beam: Any, at: Any) -> tuple[Vector, Vector]:
     """As :func:`section`, for a section inside an element."""
     e, X = beam.locate(at)
     if not beam.has_sections:
@@ -712,7 +713,7 @@ def _inner_section(scene: Scene, beam: Any, at: Any) -> tuple[Vector, Vector]:
         at = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
     dofs, _ = beam.probe_reference(e, X)
     weights = beam.kinematics.direction_weights(beam, e, float(X[0]))
-    return point(scene, beam, at), _of(scene, beam, beam.q0_local[dofs] @ weights, dofs, weights)
+    return point(layout, beam, at), _of(layout, beam, beam.q0_local[dofs] @ weights, dofs, weights)
 
 
 def each(value: Any, what: str, n: int) -> tuple[Any, ...]:

@@ -12,8 +12,9 @@ from .base import Joint, gradients, point
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from ..scene import Scene
-    from ..types import Array, WhichBeam
+    from ..layout import Layout
+    from ..types import Array
+    from ..layout import WhichBeam
 
 
 @teaching
@@ -45,8 +46,8 @@ class OnLine(Joint):
         self.through = None if through is None else require_finite("through", through, (2,))
         self.beam, self.at, self.name = beam, at, require_label("name", name)
 
-    def bind(self, scene: Scene) -> None:
-        self.r = point(scene, self.beam, self.at)
+    def bind(self, layout: Layout) -> None:
+        self.r = point(layout, self.beam, self.at)
         self.p = self.r.start if self.through is None else self.through
         self.found = gradients([(self.r, self.normal)])
 
@@ -84,8 +85,8 @@ class OnCircle(Joint):
         self.radius = None if radius is None else require_positive("radius", radius)
         self.beam, self.at, self.name = beam, at, require_label("name", name)
 
-    def bind(self, scene: Scene) -> None:
-        self.r = point(scene, self.beam, self.at)
+    def bind(self, layout: Layout) -> None:
+        self.r = point(layout, self.beam, self.at)
         self.R = self.radius or require_positive(
             "the distance of the point from the centre", np.hypot(*(self.r.start - self.center)))
         if self.R < 1e-9 * np.hypot(*(self.r.start - self.center)):

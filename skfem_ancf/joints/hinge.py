@@ -12,7 +12,7 @@ from .base import Joint, each, equations_of, gradients, point, several
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..scene import Scene
+    from ..layout import Layout
     from ..types import Array
 
 
@@ -42,8 +42,8 @@ class Hinge(Joint):
         self.name = require_label("name", name)
         self.equations = equations_of(("force along x", "force along y"), len(self.beams))
 
-    def bind(self, scene: Scene) -> None:
-        self.points = [point(scene, beam, at) for beam, at in zip(self.beams, self.at)]
+    def bind(self, layout: Layout) -> None:
+        self.points = [point(layout, beam, at) for beam, at in zip(self.beams, self.at)]
         first = self.points[0]
         self.found = gradients(*([(first, e), (other, -e)]
                                  for other in self.points[1:] for e in np.eye(2)))

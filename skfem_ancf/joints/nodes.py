@@ -16,7 +16,7 @@ from .settlements import HELD, Settlements
 if TYPE_CHECKING:
     from ..beam import Beam
     from ..net import Net
-    from ..scene import Scene
+    from ..layout import Layout
     from ..types import Array
 
 FORCE_X, FORCE_Y, MOMENT = "force along x", "force along y", "moment"
@@ -111,10 +111,10 @@ class Nodes(Joint):
         """
         return self.leaders[np.searchsorted(self.nodes[self.leaders], nodes)]
 
-    def bind(self, scene: Scene) -> None:
+    def bind(self, layout: Layout) -> None:
         positions, directions, weights, start = [], [], [], []
-        for k, beam in enumerate(scene.beams):
-            at, first = chain_ends(beam).ravel(), scene.offset(k)
+        for k, beam in enumerate(layout.beams):
+            at, first = chain_ends(beam).ravel(), layout.offset(k)
             dofs, c = _directions(beam, at)
             q0 = beam.q0_local[dofs]
             start.append(np.sum(c * (q0[0] + 1j * q0[1]), axis=1))

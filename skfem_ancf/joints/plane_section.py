@@ -10,8 +10,9 @@ from ..errors import require_label, teaching
 from .base import Joint
 
 if TYPE_CHECKING:
-    from ..scene import Scene
-    from ..types import Array, Place, WhichBeam
+    from ..layout import Layout
+    from ..types import Array, Place
+    from ..layout import WhichBeam
 
 
 @teaching
@@ -33,13 +34,13 @@ class PlaneSection(Joint):
     def __init__(self, at: Place, beam: WhichBeam = None, name: str | None = None) -> None:
         self.at, self.beam, self.name = at, beam, require_label("name", name)
 
-    def bind(self, scene: Scene) -> None:
-        beam = scene.beam(self.beam)
+    def bind(self, layout: Layout) -> None:
+        beam = layout.beam(self.beam)
         node = beam.section_node(self.at)
         t = beam.mesh.p_X[:, node]
         direction, held = beam.kinematics.plane(beam, t)
         self.direction = np.array([0.0 if abs(x) < 1e-14 else x for x in direction.tolist()])
-        first = scene.offset(beam) + node * beam.nd
+        first = layout.offset(beam) + node * beam.nd
         self.equations = tuple(f"moment on {beam.element.dofnames[k]}" for k in held)
         parts = [c for c in (0, 1) if self.direction[c]]
         dofs = np.array([[first + 2 * k + c for c in parts] for k in held])

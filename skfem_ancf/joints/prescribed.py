@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from ..scene import Scene
-    from ..types import Array, WhichMember
+    from ..layout import Layout
+    from ..types import Array
+    from ..layout import WhichMember
 
 #: Pieces of an integral over time, at most.
 PIECES = 500
@@ -51,8 +52,8 @@ class PrescribedPosition(Joint):
         self.at, self.beam = on_body(at, beam)
         self.name = require_label("name", name)
 
-    def bind(self, scene: Scene) -> None:
-        self.r, self._motion = point(scene, self.beam, self.at), Sampled(self.motion, "r", (2,))
+    def bind(self, layout: Layout) -> None:
+        self.r, self._motion = point(layout, self.beam, self.at), Sampled(self.motion, "r", (2,))
         self.found = gradients(*([(self.r, e)] for e in np.eye(2)))
 
     def value(self, u: Array, t: float) -> Array:
@@ -92,8 +93,8 @@ class PrescribedAngle(Joint):
         self.at, self.beam = on_body(at, beam)
         self.name = require_label("name", name)
 
-    def bind(self, scene: Scene) -> None:
-        _, self.d = section(scene, self.beam, self.at)
+    def bind(self, layout: Layout) -> None:
+        _, self.d = section(layout, self.beam, self.at)
         self.start, self._angles = np.arctan2(*self.d.start[::-1]), Sampled(self.angle, "angle", ())
         n = self.d.dofs.shape[1]
         of = self._of_normal = np.zeros((2, 1 + 2 * n))  # offset and slope, see driven
@@ -169,8 +170,8 @@ class PrescribedTurn(Joint):
         self.at, self.other = both_of("at", at), both_of("other", other)
         self.name = require_label("name", name)
 
-    def bind(self, scene: Scene) -> None:
-        (_, self.d), (_, self.e) = (section(scene, *place) for place in (self.at, self.other))
+    def bind(self, layout: Layout) -> None:
+        (_, self.d), (_, self.e) = (section(layout, *place) for place in (self.at, self.other))
         self.start = angle_to(self.d.start, self.e.start)
 
     def _turned(self, t: float) -> Aligned:

@@ -8,7 +8,7 @@ import numpy as np
 from skfem.helpers import dot
 
 from ..errors import InputError, require_finite, require_flag, require_label, shown, teaching
-from ..beam import select_beam
+from ..layout import select_beam
 from ..mapping import cross
 from .axis import Axis
 from .base import (GROUND, Aligned, Joint, Vector, angle_to, gradients, named_place, point,
@@ -18,8 +18,9 @@ from .spans import Family, Product, Span
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from ..scene import Scene
-    from ..types import Array, WhichBeam, WhichMember
+    from ..layout import Layout
+    from ..types import Array
+    from ..layout import WhichBeam, WhichMember
 
 #: How far beyond an end of a beam a sleeve may be, in elements.
 BEYOND = 1e-6
@@ -79,18 +80,18 @@ class Sleeve(Joint):
         self.name = require_label("name", name)
         self.equations = ("force normal to the axis",) + ("moment",) * self.angle
 
-    def bind(self, scene: Scene) -> None:
-        which, at = named_place(scene, self.at)
-        beam = select_beam(scene.beams, self.on)
-        if which != GROUND and scene.beam(which) is beam:
+    def bind(self, layout: Layout) -> None:
+        which, at = named_place(layout, self.at)
+        beam = select_beam(layout.beams, self.on)
+        if which != GROUND and layout.beam(which) is beam:
             raise InputError(f"{self!r}: a point of {beam!r} cannot slide along the beam itself")
-        self.axis = Axis(beam, scene.offset(beam))
-        zero = np.zeros(scene.N)
+        self.axis = Axis(beam, layout.offset(beam))
+        zero = np.zeros(layout.N)
         self._known = []
         if self.angle:
-            self.p, self.d = section(scene, which, at)
+            self.p, self.d = section(layout, which, at)
         else:
-            self.p = self.d = point(scene, which, at)
+            self.p = self.d = point(layout, which, at)
         s = self.axis.nearest(zero, self.p.start)
         gap = np.hypot(*(self.p.start - self.axis.at(zero, s)[0]))
         if gap > 1e-6 * beam.size or self._outside(s):
@@ -313,22 +314,22 @@ class Slot(Joint):
     def __repr__(self) -> str:
         return f"<Slot {f'{self.name} ' if self.name else ''}at {shown(self.at)}>"
 
-    def bind(self, scene: Scene) -> None:
-        which, at = named_place(scene, self.at)
-        self.p, d = section(scene, which, at) if self.angle else (
-            point(scene, which, at), None)
+    def bind(self, layout: Layout) -> None:
+        which, at = named_place(layout, self.at)
+        self.p, d = section(layout, which, at) if self.angle else (
+            point(layout, which, at), None)
         through = self.p.start if self.through is None else self.through
-        b, self.e = section(scene, self.on, tuple(map(float, through)))
+        b, self.e = section(layout, self.on, tuple(map(float, through)))
         self.constant = not self.e.dofs.size
         self.w = Vector(self.p.start - b.start, np.hstack([self.p.dofs, b.dofs]),
                         np.hstack([self.p.weights, -b.weights]))
         if not self.w.dofs.size:
             raise InputError(f"{self!r}: the point and the line are both of the ground")
         if which == self.on or (which != GROUND and self.on != GROUND
-                                and scene.beam(which) is scene.beam(self.on)):
+                                and layout.beam(which) is layout.beam(self.on)):
             raise InputError(f"{self!r}: a point cannot slide along a line of its own beam or body")
         gap = cross(self.direction, self.w.start)
-        size = max(scene.beam(k).size for k in (which, self.on) if k != GROUND)
+        size = max(layout.beam(k).size for k in (which, self.on) if k != GROUND)
         if abs(gap) > 1e-6 * size:
             raise InputError(f"{self!r}: the point ({self.p.start[0]:.6g}, {self.p.start[1]:.6g}) "
                              f"is {abs(gap):.6g} off the line: give another through=")

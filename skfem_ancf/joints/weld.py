@@ -13,7 +13,7 @@ from .base import (Aligned, Joint, angle_to, each, equations_of, gradients, is_g
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..scene import Scene
+    from ..layout import Layout
     from ..types import Array
     from .base import Vector
 
@@ -53,17 +53,17 @@ class Weld(Joint):
         self.equations = equations_of(("force along x", "force along y", "moment"),
                                       len(self.beams))
 
-    def bind(self, scene: Scene) -> None:
+    def bind(self, layout: Layout) -> None:
         (self.a, d), *others = (
-            section(scene, beam, at) for beam, at in zip(self.beams, self.at))
+            section(layout, beam, at) for beam, at in zip(self.beams, self.at))
         self.pairs = []
         for b, e in others:
-            self._require_together(scene, b)
+            self._require_together(layout, b)
             self.pairs.append((b, Aligned(d, e, rotation(angle_to(d.start, e.start)))))
 
-    def _require_together(self, scene: Scene, b: Vector) -> None:
+    def _require_together(self, layout: Layout, b: Vector) -> None:
         gap = b.start - self.a.start
-        beams = [scene.beam(beam) for beam in self.beams if not is_ground(beam)]
+        beams = [layout.beam(beam) for beam in self.beams if not is_ground(beam)]
         if not self.apart and np.hypot(*gap) > 1e-6 * min(beam.size for beam in beams):
             centre = next((f": of {beam!r} alone it is the centre of mass that is meant, name "
                            "the point, as (body, (x, y)); or" for beam, at in

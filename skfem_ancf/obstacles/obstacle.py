@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..beam import select_beam
+from ..layout import select_beam
 from ..errors import (InputError, MeshError, ModelWarning, ask_array, require_function,
                       require_integer, require_not_negative, require_option, require_positive,
                       shown, teaching)
@@ -19,8 +19,9 @@ from ..quadrature import gauss_lobatto
 from .shapes import Shape
 
 if TYPE_CHECKING:
-    from ..scene import Scene
-    from ..types import Array, WhichBeam
+    from ..layout import Layout
+    from ..types import Array
+    from ..layout import WhichBeam
 
 METHODS = ("penalty", "augmented")
 #: What an obstacle may be told; the last two may be left to it.
@@ -180,21 +181,21 @@ class Obstacle(ForceElement):
             np.array([corners.min(axis=1), corners.max(axis=1)]).T, t)
         return carried(pose, points), pieces
 
-    def bind(self, scene: Scene) -> list[Link]:
-        if not scene.beams:
+    def bind(self, layout: Layout) -> list[Link]:
+        if not layout.beams:
             raise InputError("an obstacle is touched by surfaces of beams, the scene has rigid "
                              "bodies alone: hold them by one-sided springs, or add a beam")
-        beams = scene.beams if self.beam is None else [select_beam(scene.beams, self.beam)]
+        beams = layout.beams if self.beam is None else [select_beam(layout.beams, self.beam)]
         height = min(beam.mesh.height for beam in beams)
         self.tolerance = self.options["tolerance"] or TOLERANCE * height
         groups = []
         for beam in beams:
-            groups += self._groups_of(beam, scene.offset(beam))
+            groups += self._groups_of(beam, layout.offset(beam))
         places = np.concatenate([group.starts[:2] for group in groups], axis=1)
         self.shape = self.shape.fitted(places, height)
         self.groups = tuple(groups)
         contacts = Contacts([self])
-        for (_, group), x, found in contacts.look(np.zeros(scene.N), 0.0):
+        for (_, group), x, found in contacts.look(np.zeros(layout.N), 0.0):
             deepest = int(np.argmin(found[0]))
             place = x[:, deepest] + contacts.origin
             if not found[0, deepest] >= -CUT * height:

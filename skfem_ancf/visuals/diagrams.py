@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..beam import select_beam
+from ..layout import select_beam
 from ..errors import InputError, require_flag, require_like, taught
 from .matplotlib import figure_class, page, plain, save
 from .scenery import INK, MUTED
 
 if TYPE_CHECKING:
     from ..results import State
-    from ..types import StrPath, WhichBeam
+    from ..types import StrPath
+    from ..layout import WhichBeam
 
 _ROWS = (("N", "normal force $N$"), ("Q", "shear force $Q$"), ("M", "bending moment $M$"))
 

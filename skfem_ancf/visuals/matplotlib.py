@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from ..path import Path
-    from ..types import Array, StrPath, WhichBeam
+    from ..types import Array, StrPath
+    from ..layout import WhichBeam
 
 
 
