@@ -32,7 +32,7 @@ with ``F = grad r``, and S the second Piola-Kirchhoff stress of the material's l
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from skfem.assembly import BilinearForm, CellBasis, Form, Functional, LinearForm
@@ -47,8 +47,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from .beam import Beam
+    from .elements.base import ElementBeam
     from .materials.base import Material
+    from .mesh import MeshBeam
     from .types import Array
 
 
@@ -413,6 +414,28 @@ def pressure(width: float | Array = 1.0) -> BilinearForm:
 # a beam's own forms
 
 
+class HasKernel(Protocol):
+    """What :func:`of` reads of a :class:`~skfem_ancf.Beam`.
+
+    Attributes
+    ----------
+    mesh, element
+        Those of the basis on which the forms are assembled.
+    N, q0
+        Number of degrees of freedom, and their values in the reference configuration, (N,).
+    kernel
+        Energies, forces and tangents of all elements.
+    """
+
+    mesh: MeshBeam
+    element: ElementBeam
+    q0: Array
+    kernel: Any
+
+    @property
+    def N(self) -> int: ...
+
+
 class BeamForms(NamedTuple):
     """The forms of one beam; :func:`of` makes them."""
 
@@ -422,7 +445,7 @@ class BeamForms(NamedTuple):
 
 
 @taught
-def of(beam: Beam) -> BeamForms:
+def of(beam: HasKernel) -> BeamForms:
     """The weak forms of a beam's own formulation, whatever it is.
 
     They are ``U(r)``, ``delta U`` and ``delta^2 U`` of the strain energy that

@@ -35,3 +35,26 @@ class Law(Protocol):
 
     def moduli(self, strain: Array) -> Array:
         """Derivative of the stress, shape (3, 3, ...)."""
+
+
+class HasShear(Protocol):
+    """What a shear factor depends on: whether sections of an element carry the shear parabola."""
+
+    @property
+    def carries_shear_parabola(self) -> bool: ...
+
+
+class Isotropic(Protocol):
+    """What the choice of an element reads of a material: its elastic constants."""
+
+    @property
+    def E(self) -> float: ...
+
+    @property
+    def G(self) -> float: ...
+
+    @property
+    def nu(self) -> float: ...
+
+    @property
+    def is_hooke(self) -> bool: ...

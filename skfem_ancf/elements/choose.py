@@ -12,8 +12,8 @@ from .cubic import ElementBeamANCFCubic
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..materials.base import Material
     from ..mesh import MeshBeam
+    from ..types import Isotropic
     from .base import ElementBeam
 
 #: The order that a field of the section needs at least; 0 is the cable.
@@ -22,7 +22,7 @@ ORDER_OF_FIELD = {"displacement": 0, "eps_xx": 0, "S_xx": 0, "eps_yy": 2, "eps_x
 
 
 @taught
-def choose_element(mesh: MeshBeam, material: Material, fields: str | Sequence[str] = (),
+def choose_element(mesh: MeshBeam, material: Isotropic, fields: str | Sequence[str] = (),
                    tolerance: float = 1e-3) -> ElementBeam:
     """The element of lowest order that carries the fields and is accurate enough.
 

@@ -9,13 +9,12 @@ import numpy as np
 from ..errors import InputError, require_finite_scalar, require_like, taught
 from ..materials import LinearLaw
 from ..quadrature import gauss
-from .base import Formulation, Term
+from .base import Formulation, Integrated, Term
 from .ecm import AXIS, split_moduli
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from ..beam import Beam
     from ..elements.base import ElementBeam
     from ..materials.base import Material
     from ..mesh import MeshBeam
@@ -112,7 +111,7 @@ class Assumed(Formulation):
         return [Term(laws[0], whole.axis, whole.section, whole.samples),
                 Term(laws[1], gauss(volume), whole.section, samples)]
 
-    def stress_of(self, beam: Beam, strain: Callable[..., Array]) -> Array:
+    def stress_of(self, beam: Integrated, strain: Callable[..., Array]) -> Array:
         first, *others = beam.terms
         total = first.law.stress(strain(first))
         for term in others:  # of the middle of the element, or of the section's mean

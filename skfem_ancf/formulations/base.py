@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from ..beam import Beam
     from ..elements.base import ElementBeam
     from ..materials.base import Material
     from ..mesh import MeshBeam
@@ -100,6 +99,28 @@ class Term:
         return np.kron(np.eye(len(self.axis[0])) if along is None else along, across)
 
 
+class Integrated(Protocol):
+    """What a formulation reads of a beam for its stress.
+
+    Attributes
+    ----------
+    terms
+        The integrals that make up its strain energy.
+    law
+        The material law at its integration points.
+    """
+
+    @property
+    def terms(self) -> Sequence[Term]: ...
+
+    @property
+    def law(self) -> Law: ...
+
+    def strains(self, strain: Array, u: Array, X: Array,
+                tind: Array | None) -> Callable[..., Array]:
+        """The strain of each term at points, as :meth:`Formulation.stress_of` calls it."""
+
+
 class Formulation(Frozen):
     """Base class of the formulations; a subclass gives its name and its terms."""
 
@@ -153,7 +174,8 @@ class Formulation(Frozen):
         """
         return None
 
-    def stress(self, beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
+    def stress(self, beam: Integrated, strain: Array, u: Array, X: Array,
+               tind: Array | None) -> Array:
         """Second Piola-Kirchhoff stress of a beam's strain, for output.
 
         Parameters
@@ -177,7 +199,7 @@ class Formulation(Frozen):
         """
         return self.stress_of(beam, beam.strains(strain, u, X, tind))
 
-    def stress_of(self, beam: Beam, strain: Callable[..., Array]) -> Array:
+    def stress_of(self, beam: Integrated, strain: Callable[..., Array]) -> Array:
         """As :meth:`stress`, which calls it: for one point and for many.
 
         Parameters

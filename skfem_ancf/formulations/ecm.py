@@ -8,12 +8,11 @@ import numpy as np
 
 from ..errors import InputError, require_like
 from ..materials import LinearLaw
-from .base import Formulation, Term
+from .base import Formulation, Integrated, Term
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from ..beam import Beam
     from ..elements.base import ElementBeam
     from ..materials.base import Material
     from ..types import Array
@@ -74,7 +73,7 @@ class EnhancedContinuum(Formulation):
             terms.append(Term(LinearLaw(coupling), axis, AXIS))
         return terms
 
-    def stress_of(self, beam: Beam, strain: Callable[..., Array]) -> Array:
+    def stress_of(self, beam: Integrated, strain: Callable[..., Array]) -> Array:
         first, *coupling = beam.terms
         out = first.law.stress(strain(first))
         if coupling:

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from ..elements.base import ElementBeam
-    from ..types import Array, Law
+    from ..types import Array, HasShear, Law
 
 PLANES = ("stress", "strain")
 
@@ -151,7 +150,7 @@ class Material(Frozen):
         return self.nu / (1.0 if self.plane == "stress" else 1.0 - self.nu)
 
     @taught
-    def shear_factor(self, element: ElementBeam) -> float:
+    def shear_factor(self, element: HasShear) -> float:
         """The factor k_s on the shear modulus for sections of an element."""
         require_like("element", element, "beam element", "carries_shear_parabola")
         if isinstance(self.shear_correction, float):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial, reduce
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebinterpolate, chebval
@@ -21,10 +21,9 @@ from .shear import shear_factor
 from .within import NAMES, Within
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from ..elements.base import ElementBeam
-    from ..formulations.base import Formulation, Term
     from ..materials import Material
     from ..mesh import MeshBeam
     from ..types import Array, Rule
@@ -39,6 +38,19 @@ HEIGHTS = 7
 
 #: Attributes of a plain section that do not depend on its material and width.
 _OF_PLACES = "mesh", "element", "plain", "simple", "constant", "uniform", "moving"
+
+
+class Integrals(Protocol):
+    """What a section asks of a formulation, a :class:`~skfem_ancf.formulations.Formulation`."""
+
+    name: str
+
+    def terms(self, element: ElementBeam, material: Material) -> Sequence[Any]:
+        """The integrals that make up the strain energy of one material."""
+
+    def stabilisation(self, mesh: MeshBeam, element: ElementBeam, material: Material,
+                      width: float) -> Array | None:
+        """A constant element stiffness that is added to that of the terms, or None."""
 
 
 class Across(Frozen):
@@ -416,7 +428,7 @@ class Across(Frozen):
         at = Within(self, slab, np.repeat(xi[None, :, None], 2, 0), e)
         return slab.measure.sampled(at, n)
 
-    def terms(self, formulation: Formulation) -> list[tuple[Slab, list[Term]]]:
+    def terms(self, formulation: Integrals) -> list[tuple[Slab, list[Any]]]:
         """The terms of the strain energy of each slab.
 
         Parameters
@@ -479,7 +491,7 @@ class Across(Frozen):
         soft = w * self.mesh.lengths[:, None] / chebval(z, GA)
         return float(np.sum(soft) / np.sum(soft / chebval(z, factor)))
 
-    def stabilisation(self, formulation: Formulation) -> Array | None:
+    def stabilisation(self, formulation: Integrals) -> Array | None:
         """The constant element stiffness of a formulation, for the section's own E I.
 
         It is asked for a width of 1 and the largest height, and is proportional to the width.

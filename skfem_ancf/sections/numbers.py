@@ -12,8 +12,8 @@ from .base import Section, Slab
 from .measure import Uniform
 
 if TYPE_CHECKING:
-    from ..elements.base import ElementBeam
     from ..mesh import MeshBeam
+    from ..types import HasShear
 
 
 class Numbers(Section):
@@ -71,5 +71,5 @@ class Numbers(Section):
 class _Given(StVenantKirchhoff):
     """Hooke's law whose shear factor gives a section of any order one stiffness against shear."""
 
-    def shear_factor(self, element: ElementBeam) -> float:
+    def shear_factor(self, element: HasShear) -> float:
         return super().shear_factor(element) * (1.2 if element.carries_shear_parabola else 1.0)
