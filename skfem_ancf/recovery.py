@@ -50,9 +50,9 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from .beam import Beam
+    from .configuration import Configuration
     from .parts import Part
     from .point import Point
-    from .results import State
     from .types import Array, Law
 
 #: Elements of which arc lengths are kept for single points.
@@ -446,7 +446,7 @@ class Recovery:
                          [lam_x * np.sin(angle), lam_y * np.sin(across)]])
 
 
-def actions(state: State) -> list[list[float]]:
+def actions(state: Configuration) -> list[list[float]]:
     """Where supports and joints act on each beam of a state: element + xi, a list a beam."""
     system = state.system
     t = state.load if state.t is None else state.t
@@ -470,7 +470,7 @@ def actions(state: State) -> list[list[float]]:
     return out
 
 
-def distributed(states: Sequence[State], beam: Beam) -> tuple[list[Sampled], list[float]]:
+def distributed(states: Sequence[Configuration], beam: Beam) -> tuple[list[Sampled], list[float]]:
     """What force elements that act all along a beam do there, and the stations of other parts.
 
     Parameters
@@ -509,7 +509,7 @@ def distributed(states: Sequence[State], beam: Beam) -> tuple[list[Sampled], lis
     return sampled, stations
 
 
-def recover(states: Sequence[State], number: int) -> list[Recovery | NotRecovered]:
+def recover(states: Sequence[Configuration], number: int) -> list[Recovery | NotRecovered]:
     """The recovered fields of one beam in some states of a scene, found together.
 
     Parameters

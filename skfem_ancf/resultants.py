@@ -16,7 +16,7 @@ from .spread import SNAP
 
 if TYPE_CHECKING:
     from .parts import Part
-    from .results import State
+    from .configuration import Configuration
     from .types import Array
 
 #: Sections in an element, both ends included, where none are named.
@@ -104,7 +104,7 @@ def over_time(instants: list[Resultants]) -> Resultants:
                          "recovered": all(r.recovered for r in instants)})
 
 
-def resultants(state: State, number: int, part: Part | None = None,
+def resultants(state: Configuration, number: int, part: Part | None = None,
                recover: bool = True) -> Resultants:
     """The Resultants of a beam.
 

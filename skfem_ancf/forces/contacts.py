@@ -22,7 +22,6 @@ from .swept import Passage, middle_of
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from ..results import State
     from ..types import Array
 
 
@@ -275,7 +274,7 @@ class Contacts:
         memory = self.tables.memory
         return memory.copy() if np.any(memory) else None
 
-    def of_state(self, state: State | None) -> Array | None:
+    def of_state(self, state: Any) -> Array | None:
         """What points of a state remember, shape (n,); None if its obstacles are others.
 
         Parameters

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from pathlib import Path
 
-    from ..results import State
+    from ..configuration import Configuration
     from ..types import StrPath
 
 
@@ -122,7 +122,7 @@ class VtkHdfWriter:
             self.add(state, state.t)
             done()
 
-    def add(self, state: State, t: float) -> Path:
+    def add(self, state: Configuration, t: float) -> Path:
         """Append a frame.
 
         Parameters

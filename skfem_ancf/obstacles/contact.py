@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError, require_index
 
 if TYPE_CHECKING:
-    from ..results import State
+    from ..configuration import Configuration
     from ..types import Array
 
 
@@ -56,7 +56,7 @@ class Contact:
                 f"{self.nearest:.3g}>")
 
 
-def contact_of(state: State, obstacle: Any = None) -> Contact:
+def contact_of(state: Configuration, obstacle: Any = None) -> Contact:
     """The Contact of a state.
 
     Parameters

@@ -12,7 +12,7 @@ from .matplotlib import figure_class, page, plain, save
 from .scenery import INK, MUTED
 
 if TYPE_CHECKING:
-    from ..results import State
+    from ..configuration import Configuration
     from ..types import StrPath
     from ..layout import WhichBeam
 
@@ -20,7 +20,7 @@ _ROWS = (("N", "normal force $N$"), ("Q", "shear force $Q$"), ("M", "bending mom
 
 
 @taught
-def plot_resultants(state: State, beam: WhichBeam = None, axes: Any = None, *,
+def plot_resultants(state: Configuration, beam: WhichBeam = None, axes: Any = None, *,
                     title: str | None = None, recover: bool = True,
                     filename: StrPath | None = None, dpi: float = 150) -> Any:
     """Draw normal force, shear force and bending moment along the beams.

@@ -5,17 +5,11 @@ from __future__ import annotations
 import base64
 import html
 import io
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..errors import AncfError
-
-if TYPE_CHECKING:
-    from ..dynamics.history import History
-    from ..path import Path
-    from ..results import State
-    from ..scene import Scene
 
 #: Resolution of the pictures, in dots per inch.
 DPI = 80
@@ -38,13 +32,13 @@ def _words(text):
     return f"<pre>{html.escape(text)}</pre>"
 
 
-def state_html(state: State) -> str:
+def state_html(state: Any) -> str:
     """The words of a State, and its strain across the section."""
     field = "eps_yy" if any(np.any(state.u_of(b)) for b in state.beams) else "displacement"
     return _words(str(state)) + _picture(lambda: state.plot(field))
 
 
-def scene_html(scene: Scene) -> str:
+def scene_html(scene: Any) -> str:
     """A table of what is in a Scene, and its stress-free body."""
     rows: list[tuple[str, object]] = [("beam", b) for b in scene.beams]
     rows += [("rigid body", b) for b in scene.bodies]
@@ -62,7 +56,7 @@ def _short(thing: Any) -> str:
     return text if len(text) <= 160 else text[:157] + "..."
 
 
-def path_html(path: Path) -> str:
+def path_html(path: Any) -> str:
     """The words of a Path, and its load against the displacement of the node that moves most."""
     def draw():
         state = path.state(len(path) - 1)
@@ -74,7 +68,7 @@ def path_html(path: Path) -> str:
     return _words(repr(path)[1:-1]) + _picture(draw)
 
 
-def history_html(history: History) -> str:
+def history_html(history: Any) -> str:
     """The words of a History, and its energies over time."""
     from .matplotlib import dress, figure_class
 

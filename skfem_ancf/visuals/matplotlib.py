@@ -15,7 +15,6 @@ from .scenery import GHOST, INK, MUTED, RIGID, WALL, Scenery, cells_of
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from ..path import Path
     from ..types import Array, StrPath
     from ..layout import WhichBeam
 
@@ -183,7 +182,7 @@ def _figsize(points, colorbar):
 
 
 @taught
-def plot_path(path: Path, point: ArrayLike, component: int = 1, beam: WhichBeam = None,
+def plot_path(path: Any, point: ArrayLike, component: int = 1, beam: WhichBeam = None,
               ax: Any = None, *, title: str | None = None, filename: StrPath | None = None,
               dpi: float = 200) -> Any:
     """Draw the load factor of an equilibrium path against a displacement.

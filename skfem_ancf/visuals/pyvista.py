@@ -18,8 +18,7 @@ from .matplotlib import colormap
 from .scenery import RIGID, WALL, Scenery, outline_points
 
 if TYPE_CHECKING:
-    from ..dynamics.history import History
-    from ..results import State
+    from ..configuration import Configuration, Motion
     from ..types import StrPath
 
 #: VTK's numbers of the cells.
@@ -155,7 +154,7 @@ class Series:
         The instant that the mesh shows.
     """
 
-    def __init__(self, history: History, **options: Any) -> None:
+    def __init__(self, history: Motion, **options: Any) -> None:
         options = require_options("to_pyvista", options, (
             "fields", "subdivide", "lagrange", "undeformed", "recover"))
         self._history, self.t, self.k = history, history.t, 0
@@ -209,7 +208,7 @@ def _make(state, fields=None, subdivide=(8, 4), lagrange=False, undeformed=False
 
 
 @taught
-def to_pyvista(state: State, fields: Any = None, subdivide: tuple[int, int] = (8, 4),
+def to_pyvista(state: Configuration, fields: Any = None, subdivide: tuple[int, int] = (8, 4),
                lagrange: bool = False, undeformed: bool = False, recover: bool = True) -> Any:
     """The body of a state as a grid of pyvista.
 
@@ -305,8 +304,9 @@ def _look(plotter, scenery):
 
 
 @taught
-def view(state: State, field: Any = "eps_yy", plotter: Any = None, *, thickness: Any = "auto",
-         undeformed: bool = True, cmap: Any = None, limits: Any = None, unit: str | None = None,
+def view(state: Configuration, field: Any = "eps_yy", plotter: Any = None, *,
+         thickness: Any = "auto", undeformed: bool = True, cmap: Any = None, limits: Any = None,
+         unit: str | None = None,
          subdivide: tuple[int, int] = (16, 8), recover: bool = True,
          off_screen: bool | None = None, window_size: tuple[int, int] = (1000, 700),
          filename: StrPath | None = None) -> Any:

@@ -13,7 +13,7 @@ from ..kept import cached_property
 from ..obstacles.pictures import around, obstacles_of, outlines
 
 if TYPE_CHECKING:
-    from ..results import State
+    from ..configuration import Configuration
     from ..rigid import RigidBody
     from ..types import Array
 
@@ -106,7 +106,7 @@ class Scenery:
         Those of :func:`~skfem_ancf.visuals.matplotlib.plot_state`.
     """
 
-    def __init__(self, states: list[State], field: Any, thickness: Any, limits: Any,
+    def __init__(self, states: list[Configuration], field: Any, thickness: Any, limits: Any,
                  subdivide: tuple[int, int], recover: bool) -> None:
         self.field: Field = find_field(field, DRAWN)
         m, n = subdivision(subdivide)
