@@ -49,7 +49,7 @@ NONE = "N=1", "tapered profile"  # its mean strain is no rule's
 #: What is asked, and what it costs at most: one new point, and one of many, in microseconds.
 QUANTITIES = {"displacement": {}, "position": {}, "velocity": {}, "strain": {}, "stress": {},
               "raw strain": {"recover": False}, "raw stress": {"recover": False}}
-GOALS = 20.0, 1.0
+GOALS = 1000.0, 2.0
 MANY, BATCH, BATCHES, QUICK = 10000, 100, 5, 3
 
 

@@ -24,6 +24,7 @@ from .kinematics import KINEMATICS
 from .materials import Material, StVenantKirchhoff
 from .mesh import MeshBeam, reach
 from .origin import ours
+from .parts import Part
 from .places import as_point, facets_of, node_of
 from .quadrature import gauss, tensor
 from .sections import Across, Rectangle, Section
@@ -466,11 +467,7 @@ class Beam(Frozen):
         MeshError
             If the point is outside the body.
         """
-        x = as_point(point, self.mesh)
-        place = self.finder.one(*x.tolist())
-        if isinstance(place, tuple):
-            return place[0], np.array(place[1:])
-        x = x[:, None]
+        x = as_point(point, self.mesh)[:, None]
         e, X, outside = self.finder(x)
         if outside[0] > self.finder.allowed:
             raise self.finder.refuse(x, outside)
@@ -484,11 +481,6 @@ class Beam(Frozen):
     @cached_property
     def tables(self) -> dict:
         """Tables at sections that do not change with the state, see :mod:`skfem_ancf.kept`."""
-        return {}
-
-    @cached_property
-    def touched(self) -> dict:
-        """Tables of the elements in which single points were asked for last."""
         return {}
 
     @cached_property
@@ -543,12 +535,8 @@ class Beam(Frozen):
         dofs, weights
             Shapes (2, n) and (n,).
         """
-        xi, eta = map(float, X)
-        weights = self.series.at(xi, eta) * self.scales[e]
-        if self.mesh.heights is not None:
-            weights *= self.series.swollen(self.mesh.mapping().relative_height(e, xi)[0])
-        first = self.mesh.t[0, e] * self.nd
-        return first + np.arange(2 * self.nd).reshape(-1, 2).T, weights
+        one = Part(self, 0, slice(0, self.N), None, np.array([e]), np.reshape(X, (2, 1)))
+        return one.dofs[..., 0].T, one.weights[:, 0]
 
     def first_of_node(self, e: int, xi: float, eta: float) -> int:
         """The first coordinate of the node that a point of an element is; -1 if it is none.

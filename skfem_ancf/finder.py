@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
 
 from .errors import MeshError
-from .kept import cached_property, kept
+from .kept import cached_property
 
 if TYPE_CHECKING:
     from .mapping import MappingBeam
@@ -20,9 +19,8 @@ if TYPE_CHECKING:
 #: the elements next to its nearest sample.
 SAMPLES, CANDIDATES = 4, 6
 
-#: Squares of the plane of which a finder remembers what is near, at most: as single points and as
-#: many meet them.
-CELLS, MOST = 2**14, 2**20
+#: Squares of the plane of which a finder remembers what is near, at most.
+MOST = 2**20
 
 
 class Finder:
@@ -39,9 +37,7 @@ class Finder:
         self.size = float(np.abs(mesh.p).max())
         # points of an exact curve may lie a little outside its cubic elements
         self.allowed = 1e-6 if mesh.is_straight else 1e-3
-        #: Where single points begin, for squares of the plane, see :meth:`_start`.
-        self._cells: dict = {}
-        #: And for many, once there were more of them than squares.
+        #: Where points begin, for squares of the plane, once there were more of them than squares.
         self._of_squares: Array | None = None
         self._line = self._straight_line()
 
@@ -92,96 +88,6 @@ class Finder:
             self.size + np.max(np.abs(x), initial=0.0)) / self.mesh.height
         with np.errstate(all="ignore"):
             return self._find(x, noise)
-
-    def one(self, x: float, y: float) -> tuple[int, float, float] | bool | None:
-        """As a call, for one point and many times faster: its element and reference point.
-
-        Parameters
-        ----------
-        x, y
-            The point.
-
-        Returns
-        -------
-        tuple
-            (e, xi, eta); or False where it is certain that the point is outside, or None where
-            the general search has to say.
-        """
-        found = (self._one_near if self._line is None else self._one_on_line)(x, y, self._noise)
-        if not found:
-            return found
-        e, xi, eta = found
-        if 0.0 <= xi <= 1.0 and 0.0 <= eta <= 1.0:
-            return found
-        outside = max(abs(xi - 0.5), abs(eta - 0.5)) - 0.5
-        if not outside <= self._noise:
-            return False if outside > 1.0 and self._line is not None else None
-        return e, min(max(xi, 0.0), 1.0), min(max(eta, 0.0), 1.0)
-
-    @cached_property
-    def _noise(self):
-        """As that of a call, for points of the body."""
-        return 1e-9 + 8.0 * float(np.finfo(float).eps) * (
-            2.0 * self.size / self.mesh.height + 1.0)
-
-    @cached_property
-    def _numbers(self):
-        """Of the line: its start and direction, both ends of the elements, and their lengths."""
-        start, d, ends = self._line
-        return (*start.tolist(), *d.tolist(), *ends.tolist(), self.mesh.lengths.tolist(),
-                self.mesh.height)
-
-    def _one_on_line(self, x, y, noise):
-        x0, y0, dx, dy, left, right, lengths, height = self._numbers
-        x, y = x - x0, y - y0
-        along = dx * x + dy * y
-        e = min(bisect_left(right, along), len(right) - 1)
-        if e > 0 and (along - right[e - 1] <= noise * lengths[e - 1] or along < left[e]):
-            e -= 1  # of the section between two elements, or in a gap
-            if along - right[e] > noise * lengths[e]:
-                return None
-        xi = (along - left[e]) / lengths[e]
-        if self.mesh.heights is not None:
-            height *= self.mapping.relative_height(e, min(max(xi, 0.0), 1.0))[0]
-        return e, xi, (dx * y - dy * x) / height + 0.5
-
-    def _one_near(self, x, y, noise):
-        cell = x // self._cell, y // self._cell
-        start = self._cells.get(cell)
-        if start is None:
-            start = kept(self._cells, cell, lambda: self._start(cell), CELLS)
-        if not start:
-            return start
-        e, xi, a, b = start
-        xi += a * x + b * y
-        for _ in range(3):
-            found = self.mapping.find_in(e, x, y, xi)
-            if found is None:
-                return None
-            # as in _near
-            other = (self._neighbours[0][e] if found[0] <= noise else self._neighbours[1][e]
-                     if found[0] > 1.0 + noise else -1)
-            if other < 0:
-                return e, *found
-            e, xi = other, 0.5
-        return None
-
-    def _start(self, cell):
-        """Of a square of the plane the element next to its middle, and xi linear in x and y there.
-
-        Four numbers; False if it is outside of all elements, None if it has no middle.
-        """
-        x, y = self._cell * (cell[0] + 0.5), self._cell * (cell[1] + 0.5)
-        d = np.hypot(self._samples[0] - x, self._samples[1] - y)
-        k = int(d.argmin())
-        if not d[k] <= self._far + self._cell:
-            return False if d[k] > self._far else None
-        e, xi = k // SAMPLES, (k % SAMPLES + 0.5) / SAMPLES
-        found = self.mapping.find_in(e, x, y, xi)
-        if found is None or not -0.5 < found[0] < 1.5:
-            return e, xi, 0.0, 0.0
-        a, b = self.mapping.section_at(e, x, y, found[0])
-        return e, found[0] - a * x - b * y, a, b
 
     def _find(self, x, noise):
         e, X, outside = (self._near if self._line is None else self._on_line)(x, noise)
@@ -244,10 +150,6 @@ class Finder:
         margin = self._far + self._cell
         low, high = self._samples.min(axis=1) - margin, self._samples.max(axis=1) + margin
         return low, np.ceil((high - low) / self._cell)
-
-    @cached_property
-    def _neighbours(self):
-        return self._before.tolist(), self._after.tolist()
 
     @cached_property
     def _samples(self):

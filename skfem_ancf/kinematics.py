@@ -15,7 +15,6 @@ from .kernels import CableKernel, Kernel
 from .kernels.along import CableSections
 from .errors import InputError
 from .formulations.ecm import AXIS
-from .near import NearCable, NearSections, fibre
 from .quadrature import gauss
 
 if TYPE_CHECKING:
@@ -33,14 +32,11 @@ class Sections:
     ----------
     kernel
         Class of the strain energy.
-    near
-        Class of what single points ask of an element in one state.
     has_sections : bool
         Points off the axis are linear in the coordinates.
     """
 
     kernel: Any = Kernel
-    near: Any = NearSections
     has_sections = True
 
     @staticmethod
@@ -234,7 +230,6 @@ class Cable(Sections):
     """Sections stay normal to the axis, and get thinner so that S_yy = 0."""
 
     kernel: Any = CableKernel
-    near: Any = NearCable
     has_sections = False
 
     @staticmethod
@@ -300,7 +295,9 @@ class Cable(Sections):
     @staticmethod
     def _strain_of(beam, Y, which, eps, kappa):
         ratios = np.array([slab.material.lateral_ratio for slab in beam.across.slabs])
-        return np.array(fibre(Y, eps, kappa, ratios[which]))
+        along = eps - Y * kappa
+        xx = along + 0.5 * along * along
+        return np.array([xx, -ratios[which] * xx, 0.0 * xx])
 
     @classmethod
     def strain_at(cls, beam: Beam, u: Array, e: Array, X: Array) -> Array:

@@ -319,8 +319,7 @@ class MappingBeam(Mapping):
         tuple
             Two numbers, or arrays (..., n).
         """
-        c = self._known_heights[e] if isinstance(e, int) else self._heights.take(e, axis=-1)
-        return _with_slope(c, xi)
+        return _with_slope(self._heights.take(e, axis=-1), xi)
 
     def heights_of(self, e: Any) -> Callable[[Any], tuple[Any, Any]] | None:
         """From places along elements what :meth:`relative_height` says of them, or None.
@@ -339,10 +338,6 @@ class MappingBeam(Mapping):
             return 0
         return int(np.max(np.nonzero(np.any(self._heights, axis=1))))
 
-    @cached_property
-    def _known_heights(self):
-        return self._heights.T.tolist()
-
     def offset(self, X: Array, tind: Array | None = None) -> Any:
         """Distance Y of reference points from the axis.
 
@@ -357,17 +352,6 @@ class MappingBeam(Mapping):
             Shape (nelements, npoints), or as ``X[1]`` where the height is constant.
         """
         return self.height(X[0], tind)[0] * (X[1] - 0.5)
-
-    def lever(self, e: int, xi: float, eta: float) -> float:
-        """The distance of one point from the axis.
-
-        Parameters
-        ----------
-        e, xi, eta
-            Its element and reference point.
-        """
-        lever = self.mesh.height * (eta - 0.5)
-        return lever if self.mesh.heights is None else lever * self.relative_height(e, xi)[0]
 
     @staticmethod
     def _sum(coefficients, functions):
@@ -576,65 +560,20 @@ class MappingBeam(Mapping):
         X[:, far] = np.nan
         return X
 
-    def find_in(self, e: int, x: float, y: float, xi: float) -> tuple[float, float] | None:
-        """The reference point of one point, as :meth:`invF` says; None if it is far outside.
-
-        Parameters
-        ----------
-        e
-            The element.
-        x, y
-            The point.
-        xi
-            To start from.
-        """
-        (x0, y0), axis, director, turning, rest = self._numbers(e)
-        gap = x - x0, y - y0
-        beside = beside_section(turning, rest, gap)
-        for _ in range(8):  # as in invF
-            value, slope = _with_slope(beside, xi)
-            if not abs(value) < abs(slope):
-                return None
-            change = value / slope
-            xi -= change
-            if abs(change) <= CLOSE * (1.0 + abs(xi)):
-                height = 1.0 if self.mesh.heights is None else self.relative_height(e, xi)[0]
-                return xi, height_in_section(axis, director, gap, xi, height)
-        return None
-
-    def section_at(self, e: int, x: float, y: float, xi: float) -> tuple[float, float]:
-        """The derivatives by x and y of the place along an element whose section holds a point.
-
-        Parameters
-        ----------
-        e
-            The element.
-        x, y
-            The point.
-        xi
-            Its place along the element.
-        """
-        (x0, y0), _, director, turning, rest = self._numbers(e)
-        slope = _with_slope(beside_section(turning, rest, (x - x0, y - y0)), xi)[1]
-        return -_with_slope(director[1], xi)[0] / slope, _with_slope(director[0], xi)[0] / slope
-
     def derivatives(self, e: Any, xi: Any, eta: Any) -> tuple[Any, Any, Any]:
         """The derivatives of the map by xi and eta, and the tangent of the axis.
 
         Parameters
         ----------
         e, xi, eta
-            Element and reference point: numbers, or elements (n,) and arrays (..., n).
+            Elements (n,) and reference points, arrays (..., n).
 
         Returns
         -------
         tuple
-            Three vectors, each a pair of numbers or arrays.
+            Three vectors, each a pair of arrays (..., n).
         """
-        if isinstance(e, int):
-            _, axis, director, _, _ = self._numbers(e)
-        else:
-            axis, director = (c.take(e, axis=-1) for c in self._powers[:2])
+        axis, director = (c.take(e, axis=-1) for c in self._powers[:2])
         dx, dy = _with_slope(axis[0], xi)[1], _with_slope(axis[1], xi)[1]
         (nx, dnx), (ny, dny) = _with_slope(director[0], xi), _with_slope(director[1], xi)
         if self.mesh.heights is not None:
@@ -655,19 +594,6 @@ class MappingBeam(Mapping):
         (x, y), (dx, dy) = ([polynomial([perm(k, d) * c for k, c in enumerate(row)][d:], X[0])
                              for row in axis] for d in (1, 2))
         return (x * dy - y * dx) / (x * x + y * y) ** 1.5
-
-    def _numbers(self, e):
-        """Of one element: where its axis begins, axis and director, :func:`_sorted` of these."""
-        found = self._known.get(e)
-        if found is None:
-            start, axis, director, crossed = (c[..., e].tolist() for c in (
-                self._all_coefficients[0][:, 0], *self._powers))
-            found = self._known[e] = start, axis, director, *_sorted(director, crossed)
-        return found
-
-    @cached_property
-    def _known(self):
-        return {}
 
     def _facet_elements(self, find):
         """One element of each facet, and the local number of the facet in it."""

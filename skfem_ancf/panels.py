@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .frozen import Frozen
-from .kept import cached_property
 from .quadrature import gauss, lagrange
 from .series import chebyshev, polynomials
 
@@ -179,12 +178,6 @@ class Panels(Frozen):
         return [a + b / h for a, b in (np.expand_dims(line, tuple(range(2, 2 + h.ndim)))
                                        for line in self._lines)]
 
-    @cached_property
-    def _numbers(self):
-        """Of each panel both ends of :attr:`_lines`, where it begins, and its size."""
-        return [(*low, *high, p.low, p.high - p.low) for low, high, p in zip(
-            *(np.transpose(line).tolist() for line in self._lines), self.panels)]
-
     def moved(self, h: Array) -> Moved:
         """The points at sections of some heights.
 
@@ -201,7 +194,7 @@ class Panels(Frozen):
         (low, high), (low2, high2) = ((end[of].T for end in self._low_high(k * h))
                                       for k in (1.0, 2.0))
         low_rate, high_rate = (2.0 * (b - a) / h[:, None] for a, b in ((low, low2), (high, high2)))
-        stretch, at = (high - low) / size, [self.place(0.5, x) for x in h.tolist()]
+        stretch, at = (high - low) / size, self.place(0.5, h)
         inside = np.array([self._till(x) for x in at])
         return Moved(low + (high - low) * z, stretch, low_rate + (high_rate - low_rate) * z,
                      (high_rate - low_rate) / (high - low),
@@ -215,13 +208,7 @@ class Panels(Frozen):
         eta, h
             Places, and heights of the sections there: numbers, or arrays (n,).
         """
-        if isinstance(h, float):
-            for a, b, c, d, start, size in self._numbers:
-                low, high = a + b / h, c + d / h
-                if eta < high:
-                    break
-            return start + size * (eta - low) / (high - low)
-        low, high = self._low_high(h)
+        low, high = self._low_high(np.asarray(h))
         which = np.sum(np.asarray(eta) >= high[:-1], axis=0)
         low, high = (np.take_along_axis(x, which[None], 0)[0] for x in (low, high))
         starts, ends = (np.array([getattr(p, end) for p in self.panels])[which]

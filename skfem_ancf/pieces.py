@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from copy import copy
 from typing import TYPE_CHECKING, Any
 
@@ -494,7 +493,6 @@ class Table:
 
     def __init__(self, s: Array, coefficients: Array) -> None:
         self.starts = s[:-1]
-        self._list = self.starts.tolist()
         self._c = coefficients
 
     def of(self, k: int) -> Table:
@@ -502,28 +500,6 @@ class Table:
         one = copy(self)
         one._c = self._c[:, :, :, k]
         return one
-
-    @cached_property
-    def _cubics(self):
-        """The coefficients as single points take them, (n - 1, 7, 4, m)."""
-        return np.ascontiguousarray(np.moveaxis(self._c, 0, 2))
-
-    def one(self, s: float, weights: Array, rows: slice) -> list[float]:
-        """Values at one place.
-
-        Parameters
-        ----------
-        s
-            Its arc length.
-        weights
-            Of the points across, shape (m,).
-        rows
-            Which of the 7.
-        """
-        k = max(bisect_right(self._list, s) - 1, 0)
-        d = s - self._list[k]
-        return [((a * d + b) * d + c) * d + e
-                for a, b, c, e in self._cubics[k, rows].dot(weights).tolist()]
 
     def many(self, s: Array, weights: Array, rows: slice, columns: Any) -> Array:
         """Values at many places, shape (rows, n).

@@ -6,7 +6,6 @@ two numbers; many are an array of shape (2, n), as scikit-fem has them, or a lis
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from .errors import InputError, MeshError, require_finite, shown
 from .kept import cached_property
 from .parts import BodyPart, Part
 from .places import as_point
-from .point import Point
 from .rigid import RigidBody
 
 if TYPE_CHECKING:
@@ -27,14 +25,6 @@ if TYPE_CHECKING:
     from .system import System
     from .types import Array
     from .layout import WhichMember
-
-#: Types of numbers of which nothing has to be asked.
-PLAIN = (float, int, np.float64)
-#: Coordinates beyond which a point is looked at before it is looked for.
-HUGE = 1e300
-
-#: Points that a scene remembers, at most, and calls.
-REMEMBERED_POINTS, REMEMBERED = 2**16, 1024
 
 
 def is_many(points: Any) -> bool:
@@ -132,7 +122,7 @@ class Located:
 
 
 class Points:
-    """Finds the points of a scene, and remembers the last ones.
+    """Finds the points of a scene.
 
     Parameters
     ----------
@@ -145,31 +135,30 @@ class Points:
     def __init__(self, beams: Sequence[Beam], slices: Sequence[slice],
                  bodies: Sequence[RigidBody] = ()) -> None:
         self.beams, self.slices, self.bodies = list(beams), slices, list(bodies)
-        self._known: OrderedDict[Any, Located | Point] = OrderedDict()
-        self._held = 0
 
-    def find(self, points: Any, beam: WhichMember = None) -> Located | Point:
+    def find(self, points: Any, beam: WhichMember = None) -> Located:
         """Where points are.
 
         Parameters
         ----------
         points
             One point, shape (2,), or many, shape (2, n) or a list, see :func:`as_points`; a
-            RigidBody for its centre of mass.
+            RigidBody for its centre of mass; what was found before, which is returned.
         beam
             The beam or rigid body that they are in, its name or number; found for each if it is not
             given.
 
         Returns
         -------
-        Located or Point
-            The latter of a single point of a beam; it can do what a Located can.
+        Located
 
         Raises
         ------
         MeshError
             If a point is in none of the beams.
         """
+        if isinstance(points, Located):
+            return points
         if isinstance(points, str):
             beam = select_beam(self.beams, beam)
             points = tuple(as_point(points, beam.mesh).tolist())
@@ -177,29 +166,11 @@ class Points:
             found = self._of_body(points, beam)
             if found is not None:
                 return found
-        if (type(points) is tuple and len(points) == 2 and type(points[0]) in PLAIN
-                and type(points[1]) in PLAIN):
-            key: Any = points if beam is None else (points, _name(beam), type(beam))
-        else:
-            if isinstance(points, (int, float)):
-                as_points(points)  # x and y as two arguments: y is no beam
-            one = beam is not None or self._alone
-            points = as_points(points, select_beam(self.beams, beam).mesh if one else None)
-            key = points.tobytes(), points.ndim, _name(beam), type(beam)
-        found = self._known.get(key)
-        if found is None:
-            found = self._find(points, beam)
-            self._remember(key, found)
-        return found
-
-    def _remember(self, key, found):
-        if found.n > REMEMBERED_POINTS:
-            return
-        known = self._known
-        self._held += found.n
-        known[key] = found
-        while known and (len(known) > REMEMBERED or self._held > REMEMBERED_POINTS):
-            self._held -= known.popitem(last=False)[1].n
+        if isinstance(points, (int, float)):
+            as_points(points)  # x and y as two arguments: y is no beam
+        one = beam is not None or self._alone
+        return self._find(as_points(points, select_beam(self.beams, beam).mesh if one else None),
+                          beam)
 
     @property
     def _alone(self):
@@ -222,23 +193,15 @@ class Points:
     def _coordinates(self, body):
         return self.slices[len(self.beams) + [b is body for b in self.bodies].index(True)]
 
-    def _find(self, points, beam):
-        if type(points) is tuple or points.ndim == 1:
-            found = self._find_one(*points, beam)
-            if found is not None:
-                return found
+    def _find(self, x, beam):
+        one, x = x.ndim == 1, np.reshape(x, (2, -1))
         if beam is not None or self._alone:
             beam = select_beam(self.beams, beam)
-            x = as_points(points, beam.mesh)
-            e, X, outside = beam.finder(np.reshape(x, (2, -1)))
+            e, X, outside = beam.finder(x)
             if np.any(outside > beam.finder.allowed):
-                raise beam.finder.refuse(np.reshape(x, (2, -1)), outside)
+                raise beam.finder.refuse(x, outside)
             k = self.beams.index(beam)
-            if x.ndim == 1:
-                return Point(beam, k, self.slices[k], (int(e[0]), *X[:, 0].tolist()))
-            return Located(False, len(e), [Part(beam, k, self.slices[k], None, e, X)])
-        x = as_points(points)
-        one, x = x.ndim == 1, np.reshape(x, (2, -1))
+            return Located(one, len(e), [Part(beam, k, self.slices[k], None, e, X)])
         left, parts = np.arange(x.shape[1]), list[Any]()
         for k, candidate in enumerate(self.beams):
             x0, x1, y0, y1 = candidate.finder.box
@@ -266,39 +229,8 @@ class Points:
                             f"beams{more}; {where}")
         if len(parts) == 1:
             parts[0].index = None
-        if one and isinstance(part := parts[0], Part):
-            return Point(part.beam, part.number, part.coordinates,
-                         (int(part.e[0]), *part.X[:, 0].tolist()))
         return Located(one, x.shape[1], parts)
 
-    def _find_one(self, x, y, beam):
-        """A single point, or None where the general search has to say."""
-        if not abs(x) + abs(y) < HUGE:
-            return None
-        x, y = float(x), float(y)
-        if beam is None and len(self.beams) == 1:
-            near = self.beams
-        elif beam is None:
-            near = [b for b, (x0, x1, y0, y1) in self._boxes if x0 <= x <= x1 and y0 <= y <= y1]
-        else:
-            near = [select_beam(self.beams, beam)]
-        for b in near:
-            place = b.finder.one(x, y)
-            if place:
-                k = self.beams.index(b)
-                return Point(b, k, self.slices[k], place, (x, y))
-            if place is None:
-                return None
-        return None
-
-    @cached_property
-    def _boxes(self):
-        return [(b, b.finder.box) for b in self.beams]
-
-
-def _name(beam):
-    """What a beam is remembered by."""
-    return beam if beam is None or isinstance(beam, (str, int)) else id(beam)
 
 
 def require_body(system: System, which: WhichMember) -> RigidBody:

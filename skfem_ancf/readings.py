@@ -9,7 +9,6 @@ from .errors import InputError, require_label, require_option, shown
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from .point import Point
     from .points import Located
     from .results import State
     from .scene import Scene
@@ -37,7 +36,7 @@ class Reading(NamedTuple):
     at: Any = None
     beam: WhichMember = None
 
-    def located(self, scene: Scene) -> Located | Point:
+    def located(self, scene: Scene) -> Located:
         """The points in a scene."""
         return scene.system.points.find(self.at, self.beam)
 

@@ -23,13 +23,12 @@ beam between two places where its section force jumps:
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
 from copy import copy
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.polynomial.chebyshev import cheb2poly, chebint, chebvander
+from numpy.polynomial.chebyshev import chebint, chebvander
 from scipy import sparse
 
 from .formulations.ecm import EnhancedContinuum
@@ -37,10 +36,8 @@ from .kept import cached_property, kept
 from .materials import LinearLaw
 from .panels import Moved, Panels
 from .pieces import Piece, largest, refuse
-from .point import AGAIN
 from .quadrature import gauss
 from .refinement import by_element
-from .mapping import polynomial
 from .section_forces import NotRecovered, SectionForces, viscous_forces
 from .spread import SNAP, Sampled, station_of_node, stations_of_vector
 
@@ -52,11 +49,7 @@ if TYPE_CHECKING:
     from .beam import Beam
     from .configuration import Configuration
     from .parts import Part
-    from .point import Point
     from .types import Array, Law
-
-#: Elements of which arc lengths are kept for single points.
-ELEMENTS = 4096
 
 #: Fields that the last round changes by more than this part of the largest strain have not settled;
 #: strains below the other are round-off.
@@ -169,7 +162,7 @@ class Recovery:
         self.eta = self.panels.eta
         self.laws = [(columns, slab.material.law(slab.shear))
                      for slab, columns in zip(slabs, self.panels.slabs)]
-        self.lengths, self._inside, self._arcs = kept(beam.tables, "arc", self._arc_tables)
+        self.lengths, self._inside = kept(beam.tables, "arc", self._arc_tables)
         self.geometry = kept(beam.tables, "geometry", lambda: _geometry(beam))
         self.has_stress = (len(slabs) == 1 and slabs[0].face is None
                            and beam.element.carries_shear_parabola
@@ -271,7 +264,7 @@ class Recovery:
         speed = np.hypot(*axis)
         series = np.linalg.solve(chebvander(2.0 * x - 1.0, 7), speed.T)
         inside = chebint(series, lbnd=-1.0, scl=0.5).T  # (ne, 9): the length from xi = 0
-        return np.append(0.0, np.cumsum(speed @ w)), inside, {}
+        return np.append(0.0, np.cumsum(speed @ w)), inside
 
     def arc(self, e: ArrayLike, xi: ArrayLike) -> Array:
         """Arc length along the stress-free axis of places of elements.
@@ -345,52 +338,6 @@ class Recovery:
         if places is None:
             places = part.tables["recovery"] = self._places(part.e, *part.X)
         return self._values(places, rows)
-
-    def at_point(self, point: Point, rows: slice) -> list[float]:
-        """As :meth:`at`, of a single point, as a list of numbers.
-
-        Parameters
-        ----------
-        point
-            The :class:`~skfem_ancf.point.Point`.
-        rows
-            A slice of the seven rows.
-        """
-        known = point.recovery
-        if not known:
-            new = self._place(*point.place)
-            known, point.recovery = new, AGAIN if known is None else new
-        station, end, s, weights = known
-        find = bisect_left if end else bisect_right
-        piece = min(max(find(self._cuts, station) - 1, 0), len(self._tables) - 1)
-        return self._tables[piece].one(s, weights, rows)
-
-    def _place(self, e, xi, eta):
-        """As :meth:`_places`, of one point."""
-        end = xi > 1.0 - SNAP
-        station = e + (1.0 if end else 0.0 if xi < SNAP else xi)
-        if self.panels.moving:
-            eta = self.panels.place(eta, self._height(e, xi))
-        return station, end, self._arc_of_one(e, xi), self.panels.values(eta)
-
-    def _arc_of_one(self, e, xi):
-        if self.beam.mesh.is_straight:
-            start, end = self.lengths[e:e + 2].tolist()
-            return start + xi * (end - start)
-        found = self._arcs.get(e)
-        if found is None:
-            found = kept(self._arcs, e, lambda: self._arc_in(e), ELEMENTS)
-        start, inside = found
-        return start + polynomial(inside, 2.0 * xi - 1.0)
-
-    def _arc_in(self, e):
-        """Of one element the arc length where it begins, and in it, a polynomial of 2 xi - 1.
-
-        Without terms of round-off.
-        """
-        inside = self._inside[e]
-        last = np.max(np.nonzero(np.abs(inside) > 1e-17 * inside[0]))
-        return float(self.lengths[e]), cheb2poly(inside[:last + 1]).tolist()
 
     def _places(self, e, xi, eta):
         """What evaluation at points (n,) needs and does not change with the state.

@@ -14,9 +14,7 @@ from .eigenstrain import EigenStrain
 from .fields import Values, find_field
 from .frozen import Frozen
 from .kept import cached_property
-from .point import Point
 from .points import require_body
-from .raw import RawField
 from .recovery import actions, recover
 from .resultants import Resultants, resultants
 from .section_forces import NotRecovered
@@ -26,7 +24,6 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
     from pathlib import Path
 
-    from numpy.typing import ArrayLike
 
     from .beam import Beam
     from .checks import Checks
@@ -166,7 +163,7 @@ class State(Frozen):
                 raise NameUnknown("attribute of State", name, known)
         other = object.__new__(type(self))
         vars(other).update(vars(self), **changes)
-        for name in ("_recoveries", "_near", "_raw", "actions", "together"):
+        for name in ("_recoveries", "actions", "together"):
             vars(other).pop(name, None)
         if {"u", "multipliers", "system", "load", "t"} & set(changes):
             vars(other).update(_verdict=None, _checks=None, _force=None)
@@ -328,7 +325,7 @@ class State(Frozen):
         """
         return self.system.points.find(point, beam).velocity(self.u, self.v)
 
-    def strain(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True) -> Array:
+    def strain(self, point: Any, beam: WhichBeam = None, recover: bool = True) -> Array:
         """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, (3,) or (3, n).
 
         Parameters
@@ -340,16 +337,11 @@ class State(Frozen):
             (:attr:`recovered`); False for the strain of the element at the point.
         """
         at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
-        if isinstance(at, Point):
-            r = self._recovery_of(at.number) if recover else None
-            xx, yy, xy = (self._raw[0](at, "strain", self._strain_alone, self._raw_strain)
-                          if r is None else r.at_point(at, STRAIN))
-            return np.array([xx, yy, 0.5 * xy])
         values = at.gather([self._strain(part, recover) for part in at.parts])
         values[2] *= 0.5
         return values
 
-    def stress(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True) -> Array:
+    def stress(self, point: Any, beam: WhichBeam = None, recover: bool = True) -> Array:
         """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, (3,) or (3, n).
 
         Parameters are those of :meth:`strain`.
@@ -360,13 +352,9 @@ class State(Frozen):
             As for :meth:`strain`: one point, shape (2,), or many.
         """
         at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
-        if isinstance(at, Point):
-            r = self._recovery_of(at.number) if recover else None
-            return np.array(self._raw[1](at, "stress", self._stress_alone, self._raw_stress)
-                            if r is None else r.at_point(at, STRESS))
         return at.gather([self._stress(part, recover) for part in at.parts])
 
-    def field(self, field: Any, point: ArrayLike, beam: WhichBeam = None,
+    def field(self, field: Any, point: Any, beam: WhichBeam = None,
               recover: bool = True) -> Array:
         """Any field at material points.
 
@@ -428,24 +416,11 @@ class State(Frozen):
 
     def _strain(self, part, recover):
         r = self._recovery_of(part.number) if recover else None
-        return self._raw_strain(part) if r is None else r.at(part, STRAIN)
+        return part.strain(self.u) if r is None else r.at(part, STRAIN)
 
     def _stress(self, part, recover):
         r = self._recovery_of(part.number) if recover else None
-        return self._raw_stress(part) if r is None else r.at(part, STRESS)
-
-    def _raw_strain(self, part):
-        return part.strain(self.u)
-
-    def _raw_stress(self, part):
-        return part.stress(self.u) - self.eigen(part, True)
-
-    def _strain_alone(self, point):
-        return point.strain(self.u, self._near)
-
-    def _stress_alone(self, point):
-        S = point.stress(self.u, self._near)
-        return S - self.eigen(point.parts[0], True)[:, 0] if self.eigenstrains(point.beam) else S
+        return part.stress(self.u) - self.eigen(part, True) if r is None else r.at(part, STRESS)
 
     # recovered fields
 
@@ -501,16 +476,6 @@ class State(Frozen):
         return {}
 
     @cached_property
-    def _near(self):
-        """What single points have asked of elements, by beam and element."""
-        return {}
-
-    @cached_property
-    def _raw(self):
-        """Strain and stress of the elements at single points."""
-        return RawField(), RawField()
-
-    @cached_property
     def together(self) -> Sequence[State]:
         """States of the same scene whose fields are recovered with those of this one."""
         return (self,)
@@ -523,7 +488,7 @@ class State(Frozen):
             return first.actions  # of supports: always the same
         return actions(self)
 
-    def resultants(self, at: ArrayLike | None = None, beam: WhichBeam = None,
+    def resultants(self, at: Any = None, beam: WhichBeam = None,
                    recover: bool = True) -> Resultants:
         """Normal force, shear force and bending moment along a beam, with the strains of its axis.
 

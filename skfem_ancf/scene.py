@@ -22,7 +22,7 @@ from .dynamics import choose_scheme, get_scheme
 from .dynamics.choice import RTOL
 from .dynamics.checkpoint import resume
 from .dynamics.integrate import follow, integrate
-from .dynamics.sensors import Sensor
+from .dynamics.sensors import Sensor, locate
 from .eigenstrain import EigenStrain, Temperature, products, require_alone, takes_time
 from .inertia import projected
 from .kept import cached_property
@@ -1774,7 +1774,7 @@ class Scene:
             raise InputError("the name of a sensor must be a text, got None")
         sensor = Sensor(what, at, beam, recover)
         with self._lock:
-            sensor.check(self.system)
+            locate(sensor, self.system)
             self._sensors = {**self._sensors, name: sensor}
         return self
 
@@ -1785,7 +1785,7 @@ class Scene:
 
     def _checked_sensors(self):
         for sensor in self._sensors.values():
-            sensor.check(self.system)
+            locate(sensor, self.system)
         return list(self._sensors.items())
 
     def resume(self, path: StrPath, scheme: str | Scheme | type[Scheme] | None = None,

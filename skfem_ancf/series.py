@@ -111,43 +111,6 @@ def coefficients(function: Callable[[Array], Array], p: int, m: int) -> Array:
     return np.ascontiguousarray((_matrices(p)[0] @ values @ _matrices(m)[0].T).swapaxes(-1, -2))
 
 
-def along(function: Callable[[Array], Array], n: int) -> Array:
-    """Polynomials of xi as sums of Chebyshev polynomials.
-
-    Parameters
-    ----------
-    function
-        From places xi (n,) to the values of k polynomials, (k, n).
-    n
-        How many Chebyshev polynomials they need.
-
-    Returns
-    -------
-    ndarray
-        Coefficients, shape (k, n).
-
-    Examples
-    --------
-    >>> along(lambda xi: np.array([xi, 1.0 + 0.0 * xi]), 2).round(12).tolist()
-    [[0.5, 0.5], [1.0, 0.0]]
-    """
-    return function(places(n)) @ _matrices(n)[0].T
-
-
-def products(table: Array, xi: float, eta: float) -> Array:
-    """Sums of products of Chebyshev polynomials at one point, shape (...).
-
-    Parameters
-    ----------
-    table
-        Their coefficients, shape (..., across, along).
-    xi, eta
-        The reference point.
-    """
-    m, p = table.shape[-2:]
-    return table.dot(np.array(polynomials(xi, p))).dot(np.array(polynomials(eta, m)))
-
-
 def derivatives(c: Array) -> Array:
     """The derivatives by xi and by eta of polynomials.
 
@@ -165,11 +128,6 @@ def derivatives(c: Array) -> Array:
     along = _matrices(p)[1] @ c.reshape(p, -1)
     return np.array([along, (_matrices(m)[1] @ c.reshape(p, m, -1)).reshape(p, -1)]).reshape(
         2, *c.shape)
-
-
-def along_slopes(table: Array) -> Array:
-    """The table of the derivatives by xi of what a table has, shape (..., across, along) both."""
-    return table @ _matrices(table.shape[-1])[1].T
 
 
 class Series:
@@ -214,16 +172,6 @@ class Series:
     def tables(self) -> Array:
         return np.stack([self.value, self.along])
 
-    def at(self, xi: float, eta: float) -> Array:
-        """The functions at one point, shape (nb,).
-
-        Parameters
-        ----------
-        xi, eta
-            The reference point.
-        """
-        return products(self._value, xi, eta)
-
     def in_elements(self, q: Array, heights: Callable[[Array], Any] | None) -> Array:
         """Sums of the functions of elements of length 1: polynomials, as :func:`chebyshev` says.
 
@@ -255,26 +203,6 @@ class Series:
         n, p = self.shape[0], self._shape[0]
         return (chebyshev(places(n), p).T @ self.value).transpose(1, 2, 0)
 
-    def in_element(self, scales: Array, heights: Callable[[Array], Any] | None) -> Array:
-        """A table of the functions of one element, of which :func:`products` are the values.
-
-        Parameters
-        ----------
-        scales
-            Of the functions, see :meth:`scales`, (nb,).
-        heights
-            As for :meth:`in_elements`.
-
-        Returns
-        -------
-        ndarray
-            Shape (nb, across, along).
-        """
-        if heights is None:
-            return scales[:, None, None] * self._value
-        return np.ascontiguousarray(
-            self.in_elements(np.diag(scales)[:, :, None], heights)[..., 0].T)
-
     def values(self, table: Array, X: Array) -> Array:
         """The values at many points, shape (nb, n).
 
@@ -299,14 +227,11 @@ class Series:
         Parameters
         ----------
         g
-            The height over that of the functions: a number, or an array (...) of places.
+            The height over that of the functions, shape (...).
 
         Returns
         -------
         ndarray
             Shape (nb, ...).
         """
-        return g ** self._power_of_height(g)
-
-    def _power_of_height(self, g):
-        return self.swell if type(g) is float else self.swell.reshape((-1,) + (1,) * np.ndim(g))
+        return g ** self.swell.reshape((-1,) + (1,) * np.ndim(g))

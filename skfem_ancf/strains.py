@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from operator import mul
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
 from .formulations import COMPONENTS
-from .kept import cached_property, kept
+from .kept import cached_property
 from .kernels.along import from_first_node
 from .series import chebyshev, derivatives, polynomials
 
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
 #: Points that are evaluated at once.
 CHUNK = 3072
-
-#: Elements of which tables for single points are kept.
-ELEMENTS = 1024
 
 #: Which derivatives of the position each strain component needs: along the axis 0, across it 1.
 NEEDS = ((0,), (1,), (0, 1))
@@ -68,54 +65,6 @@ def shear(a: Any, b: Any, x: Any, y: Any) -> Any:
 
 #: The components in their order.
 STRAINS = along_axis, across_axis, shear
-
-
-class PointStrain(NamedTuple):
-    """The strain at one point as a function of the polynomials of its element in a state.
-
-    Attributes
-    ----------
-    terms
-        As ``ElementStrain.terms``.
-    along, across
-        The Chebyshev polynomials of both reference coordinates, arrays.
-    weights
-        Of the samples in the strain, a list.
-    frames
-        The tangent of the stress-free axis at each place, pairs of numbers.
-    inverse, turning
-        Of curved elements one over the determinants at places, and what :func:`_turning` says of
-        the point itself, or None.
-    """
-
-    terms: list[tuple[int, int, int, int]]
-    along: Array
-    across: Array
-    weights: list[float]
-    frames: list[Any]
-    inverse: list[float] | None
-    turning: Any
-
-    def __call__(self, polynomials: Array) -> list[float]:
-        """(eps_xx, eps_yy, 2 eps_xy) of what :meth:`ElementStrain.polynomials` returns."""
-        terms, along, across, weights, frames, inverse, _ = self
-        slopes = polynomials.dot(along).reshape(-1, len(across)).dot(across).reshape(-1, 2).tolist()
-        return interpolated(terms, weights, sampled(
-            terms, slopes if inverse is None else self.slopes(slopes), frames))
-
-    def slopes(self, values: list[Any]) -> list[Any]:
-        """Derivatives along the axis and across it.
-
-        Parameters
-        ----------
-        values
-            Those of the polynomials, pairs of numbers.
-        """
-        if self.inverse is None:
-            return values
-        here = values[len(self.inverse):]
-        slopes = [(f * x, f * y) for f, (x, y) in zip(self.inverse, values)]
-        return slopes + turned(self.turning, *here) if here else slopes
 
 
 def turned(turning: Sequence[Any], by_xi: Any, by_eta: Any) -> list[Any]:
@@ -165,46 +114,6 @@ def interpolated(terms: Sequence[Any], weights: Sequence[Any], samples: Sequence
     return out
 
 
-class SectionStrain(NamedTuple):
-    """The mean of the strain over sections of one element in one state.
-
-    Attributes
-    ----------
-    strain
-        The :class:`ElementStrain`.
-    e
-        The element.
-    samples
-        Means of the samples that are the same at all its sections, a number for each term.
-    here
-        Derivatives by xi and by eta at the points of the rule, (points, 2, 2, along).
-    rule
-        Pairs of these points and their weights.
-    """
-
-    strain: ElementStrain
-    e: int
-    samples: list[float]
-    here: Array
-    rule: list[tuple[float, float]]
-
-    def __call__(self, xi: float) -> list[float]:
-        """(eps_xx, eps_yy, 2 eps_xy) of the section at xi."""
-        of, means = self.strain, self.samples.copy()
-        along = np.array(polynomials(xi, self.here.shape[-1]))
-        if of.here:
-            mapping, frame = of.beam.mesh.mapping(), of.tangent(self.e)
-            for (eta, weight), pair in zip(self.rule, self.here.dot(along).tolist()):
-                if frame is None:
-                    turning = _turning(*mapping.derivatives(self.e, xi, eta))
-                    pair, tangent = turned(turning, *pair), turning[5:]
-                else:
-                    tangent = frame
-                for k, row in of.at_points:
-                    means[k] += weight * STRAINS[row](*pair, *tangent)
-        return interpolated(of.terms, of.weights(along), means)
-
-
 class ElementStrain:
     """The strain of a term of a formulation: interpolated samples.
 
@@ -230,7 +139,6 @@ class ElementStrain:
     """
 
     def __init__(self, beam: Beam, term: Term, rows: Sequence[int] = (0, 1, 2)) -> None:
-        self._elements: dict = {}
         self.beam, series = beam, beam.series
         names = [COMPONENTS[row] for row in rows]
         self.places = sorted({float(xi) for name in names for xi in term.samples.get(name, ())})
@@ -442,110 +350,6 @@ class ElementStrain:
         """Those of straight elements, (2, n)."""
         mesh = self.beam.mesh
         return mesh.p_X[:, mesh.t[0]].take(e, axis=-1)
-
-    # at one point
-
-    def at(self, e: int, xi: float, eta: float) -> PointStrain:
-        """What gives the strain at one point in many states.
-
-        Parameters
-        ----------
-        e, xi, eta
-            Element and reference point.
-        """
-        _, (n, m), frames, determinants = self._elements.get(e) or self._of(e)
-        across, along = polynomials(eta, m), np.array(polynomials(xi, n))
-        weights = self.weights(along)
-        inverse = turning = None
-        if determinants is not None:
-            z = across[1]
-            inverse = [1.0 / (c + z * d) for c, d in determinants]
-            if self.here:
-                turning = _turning(*self.beam.mesh.mapping().derivatives(e, xi, eta))
-                frames = [*frames, turning[5:]]
-        # in half the time of PointStrain(...)
-        return tuple.__new__(PointStrain, (self.terms, along, np.array(across), weights, frames,
-                                           inverse, turning))
-
-    def tangent(self, e: int) -> tuple[float, float] | None:
-        """That of a straight element of one height, or None."""
-        return self._of(e)[2][0] if self._linear else None
-
-    def weights(self, along: Array) -> list[float]:
-        """Those of the samples, for the Chebyshev polynomials of a place along elements."""
-        return self._weights.dot(along[:self._degree]).tolist()
-
-    def sections(self, e: int, polynomials: Array, rule: Rule) -> SectionStrain:
-        """What gives the mean of the strain over any section of an element.
-
-        Parameters
-        ----------
-        e
-            The element.
-        polynomials
-            What :meth:`polynomials` returns, shape (pairs 2 across, along).
-        rule
-            Points and weights across the section.
-        """
-        here, samples = [], np.zeros(len(self.terms))
-        table = polynomials.reshape(len(self._pairs), 2, -1, polynomials.shape[-1])
-        for eta, weight in zip(*rule):
-            at = self.at(e, 0.5, eta)
-            values = table.swapaxes(2, 3).dot(at.across)
-            slopes = at.slopes(values.dot(at.along).tolist())
-            here.append(values[-2:])
-            samples += [weight * STRAINS[row](slopes[a], slopes[b], *at.frames[place])
-                        if place < len(self.places) else 0.0 for row, place, a, b in self.terms]
-        return SectionStrain(self, e, samples.tolist(), np.array(here), [
-            (float(eta), float(weight)) for eta, weight in zip(*rule)])
-
-    def polynomials(self, e: int, u_e: Array) -> Array:
-        """The derivatives in an element that single points need, as polynomials.
-
-        At the places along the axis and across it, of curved elements times the determinant; at
-        the points themselves too, of curved elements by xi and by eta.
-
-        Parameters
-        ----------
-        e
-            The element.
-        u_e
-            Displacements of its coordinates, shape (2, nb).
-
-        Returns
-        -------
-        ndarray
-            Coefficients, shape (pairs 2 across, along).
-        """
-        table = np.tensordot(from_first_node(u_e.T), self._of(e)[0], (0, 1)).swapaxes(0, 1)
-        return table.reshape(-1, table.shape[-1])
-
-    def _of(self, e):
-        return kept(self._elements, e, lambda: self._tables_of(e), ELEMENTS)
-
-    def _tables_of(self, e):
-        """Of one element what single points need of it.
-
-        As :meth:`polynomials` those of all local functions, (pairs, nb, across, along); how many
-        polynomials there are along and across; the tangents at the places; of curved elements the
-        determinants, linear in 2 eta - 1.
-        """
-        mesh, scale, at = self.beam.mesh, self.beam.scales[e], np.array([e])
-        straight, (p, m) = self._linear, self._shape
-        shape = max(p if self.here else 1, self._degree), m if straight else m + 1
-        table = np.zeros((len(self._pairs), len(scale), shape[1], shape[0]))
-        fixed, free = self._derivatives(np.diag(scale)[:, :, None], e)
-        for row, polynomial in zip(table, self._turned(fixed, at)):
-            row[..., 0] = polynomial[..., 0].T
-        if self.here:
-            size = np.array([mesh.lengths[e], mesh.height]) if straight else np.ones(2)
-            table[-2:, :, :m, :p] = free[..., 0].transpose(0, 3, 2, 1) / size[:, None, None, None]
-        frames = [tuple(f[:, 0].tolist()) for f in self._frames(at)]
-        if straight and self.here:
-            frames.append(tuple(self._tangents(at)[:, 0].tolist()))
-        return table, shape, frames, None if straight else [
-            tuple(self._map[0, place, :, e].tolist()) for place in self._at]
-
 
 def _times(linear, table):
     """Products of linear functions (pairs, 2, n) of z and polynomials (pairs, m, k, n).

@@ -1,7 +1,5 @@
 """One material point alone is where it is among many, and has the same fields: to 1e-13."""
 
-from unittest import mock
-
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -11,9 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from conftest import quarter_arc, s_curve
 from test_points import STEEL, inside
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        MeshBeam, NeoHookean, Scene, Section, StVenantKirchhoff, finder, raw)
+                        MeshBeam, NeoHookean, Scene, Section, StVenantKirchhoff, finder)
 from skfem_ancf.elements import ELEMENTS
-from skfem_ancf.raw import Patch
 
 
 METHODS = ("displacement", "position", "velocity", "strain", "stress")
@@ -28,17 +25,13 @@ PART = st.floats(0.0, 1.0)
 
 def agree(state, x, tol=1e-13, names=METHODS, beam=None):
     """All that is known at points, one by one and together."""
-    asked = [(name, {}) for name in names] + [
-        (name, {"recover": False}) for name in names if name in ("strain", "stress")]
-    for worth in (raw.WORTH, 0):  # by themselves, and by polynomials as soon as possible
-        with mock.patch.object(raw, "WORTH", worth):
-            for name, options in asked:
-                ask = getattr(state.replace(message=f"{worth}"), name)
-                many = ask(x, beam, **options)
-                one = np.array([ask(tuple(p), beam, **options) for p in x.T.tolist()]).T
-                assert_allclose(one, many, rtol=0, atol=tol * np.abs(many).max(),
-                                err_msg=f"{name} {options} {worth}")
-        asked = asked[len(names):]
+    for name in names:
+        for options in ({}, {"recover": False}) if name in ("strain", "stress") else ({},):
+            ask = getattr(state, name)
+            many = ask(x, beam, **options)
+            one = np.array([ask(tuple(p), beam, **options) for p in x.T.tolist()]).T
+            assert_allclose(one, many, rtol=0, atol=tol * np.abs(many).max(),
+                            err_msg=f"{name} {options}")
 
 
 def loaded(beam):
@@ -138,16 +131,14 @@ def test_a_changed_state_is_another():
 @example(xi=0.0, eta=0.0, bend=1.0, height=0.3, n=3, offset=0.0)
 @example(xi=1.0, eta=1.0, bend=0.0, height=0.3, n=1, offset=0.0)
 def test_a_point_of_a_parabola_is_found(xi, eta, bend, height, n, offset):
-    """By itself and among many, in the same element, at the place that it was made from."""
+    """At the place that it was made from."""
     nodes = np.linspace(-0.5, 0.5, n + 1)
     mesh = MeshBeam.init_curve(lambda s: np.array([s + offset, bend * s * s]), nodes, height)
     find, e = finder.Finder(mesh), (n - 1) // 2
     x = mesh.mapping().F(np.array([[xi], [eta]]), np.array([e]))[:, 0]
-    (many,), X, (outside,) = find(x)
-    one = find.one(*x[:, 0].tolist())
-    assert outside == 0 and one and one[0] == many
-    assert_allclose(one[1:], X[:, 0], atol=(2e-14 + 2e-15 * offset) / height)
-    at = mesh.mapping().F(np.array([[one[1]], [one[2]]]), np.array([one[0]]))[:, 0]
+    found, X, (outside,) = find(x)
+    assert outside == 0
+    at = mesh.mapping().F(X, found)[:, 0]
     assert_allclose(at, x, atol=1e-14 + 1e-15 * offset)
 
 
@@ -165,27 +156,6 @@ def test_fields_of_a_point_of_an_arc(xi, eta, e, element):
 
 
 STATES: dict = {}
-
-
-def test_a_finder_forgets_squares_of_the_plane(monkeypatch):
-    monkeypatch.setattr(finder, "CELLS", 3)
-    mesh = quarter_arc(12, height=0.1)
-    find = finder.Finder(mesh)
-    e, X, x = inside(mesh, 100)
-    within = (X[0] > 0.01) & (X[0] < 0.99)
-    for k in np.nonzero(within)[0]:
-        assert find.one(*x[:, k].tolist())[0] == e[k]
-    assert len(find._cells) <= 3
-
-
-@pytest.mark.parametrize("mesh", [quarter_arc(8, height=0.1), s_curve(0.1)], ids=["arc", "s"])
-def test_single_points_outside(mesh):
-    """Never found, at once or by the general search, near the body and far away."""
-    find, rng = finder.Finder(mesh), np.random.default_rng(4)
-    x = rng.uniform(-3.0, 3.0, (2, 400))
-    outside = find(x)[2] > 1e-6
-    assert 100 < np.sum(outside) < 400
-    assert not any(find.one(*p) for p in x[:, outside].T.tolist())
 
 
 @pytest.mark.parametrize("mesh", [quarter_arc(8, height=0.1), s_curve(0.1)], ids=["arc", "s"])
@@ -214,27 +184,6 @@ def test_what_is_in_the_body_is_in_its_box(mesh):
     assert x0 < x.min() and x.max() < x1 and y0 < y.min() and y.max() < y1
 
 
-@pytest.mark.parametrize("kind", ["taper of arc", "taper", "kink", "step", "unloaded"])
-def test_fields_of_the_elements_at_points_asked_for_again(kind, monkeypatch):
-    """Polynomials of them where there are some: 1e-13 of many points."""
-    mesh, element = MeshBeam.init_line(np.linspace(0.0, 1.2, 5), 0.1), ElementBeamANCF(3)
-    material, at = STEEL, (0.6, 0.0) if kind == "unloaded" else None
-    if kind.startswith("taper"):
-        mesh = TAPERS[kind == "taper"]()
-    elif kind != "unloaded":
-        material = StVenantKirchhoff(nu=0.3, E=(lambda x, y: 1e6 * (1.0 + np.abs(x - 0.5)))
-                                     if kind == "kink" else lambda x, y: 1e6 * (1.0 + (y > 0.01)))
-    scene = Scene(Beam(mesh, element, material, 0.1)).clamp("left")
-    state = scene.point_force((0.1, -0.4), at=mesh.p[:, -1] if at is None else at).solve_static()
-    x = inside(mesh, 60)[2]
-    agree(state, x, names=("strain", "stress"))
-    monkeypatch.setattr(raw, "WORTH", 0)
-    for p in x.T.tolist():
-        state.stress(tuple(p), recover=False)
-    made = [isinstance(patch, Patch) for patch in state._raw[1]._patches.values()]
-    assert sum(made) == {"taper of arc": 2, "taper": 2, "kink": 3, "step": 0, "unloaded": 4}[kind]
-
-
 @pytest.mark.parametrize("straight", [True, False])
 @pytest.mark.parametrize("element", [ElementBeamANCF(3), ElementBeamANCFCubic(2)], ids=repr)
 def test_strain_of_a_tapered_beam_is_that_of_its_displacement_gradient(element, straight):
@@ -247,30 +196,6 @@ def test_strain_of_a_tapered_beam_is_that_of_its_displacement_gradient(element, 
     assert_allclose(beam.strain_of(beam.terms[0])(u, e, X),
                     [0.5 * (C[0, 0] - 1.0), 0.5 * (C[1, 1] - 1.0), C[0, 1]],
                     atol=1e-12 * np.abs(C).max())
-
-
-@pytest.mark.parametrize("law, points", [(STEEL, 64), (NeoHookean(1e6, 0.3), 4)], ids=repr)
-def test_polynomials_are_made_once_they_are_worth_it(law, points):
-    """After some points, and after fewer that take longer by themselves."""
-    mesh = MESHES["straight"]()
-    state = loaded(Beam(mesh, ElementBeamANCF(2), law, 0.1))
-    X = np.array([np.linspace(0.1, 0.9, points), np.full(points, 0.3)])
-    x = mesh.mapping().F(X, np.array([1]))[:, 0]
-    for p in x.T[:-1].tolist():
-        state.stress(tuple(p), recover=False)
-    assert not state._raw[1]._patches
-    state.stress(tuple(x[:, -1].tolist()), recover=False)
-    assert [isinstance(patch, Patch) for patch in state._raw[1]._patches.values()] == 3 * [True]
-
-
-def test_few_polynomials_are_kept(monkeypatch):
-    for name, number in (("WORTH", 0), ("BLOCK", 1), ("ELEMENTS", 2)):
-        monkeypatch.setattr(raw, name, number)
-    state = loaded(Beam(MESHES["arc"](), ElementBeamANCF(2), STEEL, 0.1))
-    for x in state.beams[0].mesh.mapping().F(np.array([[0.3], [0.2]]))[..., 0].T.tolist():
-        many = state.strain([x, x], recover=False)[:, 0]
-        assert_allclose(state.strain(x, recover=False), many, atol=1e-13 * np.abs(many).max())
-        assert 1 <= len(state._raw[0]._patches) <= 2
 
 
 @pytest.mark.parametrize("degree", [3, 5, 7])

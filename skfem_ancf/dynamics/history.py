@@ -359,8 +359,8 @@ class History:
         recover
             As for :meth:`State.strain <skfem_ancf.results.State.strain>`.
         """
-        self.system.points.find(point, beam)
-        return np.array([state.strain(point, beam, recover) for state in self])
+        at = self.system.points.find(point, beam)
+        return np.array([state.strain(at, recover=recover) for state in self])
 
     def stress(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True) -> Array:
         """Second Piola-Kirchhoff stress at all instants, (nt, 3) or (nt, 3, n).
@@ -376,8 +376,8 @@ class History:
         recover
             As for :meth:`State.strain <skfem_ancf.results.State.strain>`.
         """
-        self.system.points.find(point, beam)
-        return np.array([state.stress(point, beam, recover) for state in self])
+        at = self.system.points.find(point, beam)
+        return np.array([state.stress(at, recover=recover) for state in self])
 
     def field(self, field: Any, point: ArrayLike, beam: WhichBeam = None,
               recover: bool = True) -> Array:
@@ -395,8 +395,8 @@ class History:
         ndarray
             Shape (nt, ...).
         """
-        self.system.points.find(point, beam)
-        return np.array([state.field(field, point, beam, recover) for state in self])
+        at = self.system.points.find(point, beam)
+        return np.array([state.field(field, at, recover=recover) for state in self])
 
     def resultants(self, at: ArrayLike, beam: WhichBeam = None, recover: bool = True) -> Resultants:
         """Section forces and strains of the axis at all instants.
@@ -413,8 +413,8 @@ class History:
         Resultants
             Its arrays begin with the axis of the instants, (nt,) or (nt, n).
         """
-        self.system.points.find(at, beam)
-        return over_time([state.resultants(at, beam, recover) for state in self])
+        found = self.system.points.find(at, beam)
+        return over_time([state.resultants(found, recover=recover) for state in self])
 
     def joint_force(self, joint: Joint) -> Array:
         """What a joint does to its first beam at all instants, shape (nt, m)."""

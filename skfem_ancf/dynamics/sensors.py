@@ -16,6 +16,7 @@ from ..joints.base import Joint
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
+    from ..points import Located
     from ..results import State
     from ..system import System
     from ..types import Array
@@ -68,40 +69,21 @@ class Sensor(Frozen):
         elif at is None:
             raise InputError(f"a sensor of {what!r} is at points of the body: give at=")
 
-    def check(self, system: System) -> None:
-        """Raise MeshError or InputError if it cannot be read in a scene.
-
-        Parameters
-        ----------
-        system
-            The :class:`~skfem_ancf.system.System` of the scene.
-        """
-        if callable(self.what) or self.what == "joint_force":
-            return
-        found = system.points.find(self.at, self.beam)
-        if self.what in SECTION and len(found.parts) != 1:
-            raise InputError("the points of a sensor of sections must be in one beam: make one for "
-                             "each")
-        if self.what == "acceleration" and any(part.off_axis for part in found.parts):
-            raise InputError("the acceleration of a cable is known on its axis: off it sections "
-                             "turn with the tangent; put the sensor on the axis")
-
     @property
     def moving(self) -> bool:
         """True if it is read of the coordinates of many steps at once."""
         return self.what in MOVING
 
-    def read_steps(self, system: System, steps: Sequence[Motion]) -> Array:
+    def read_steps(self, at: Located, steps: Sequence[Motion]) -> Array:
         """Of one that is :attr:`moving`, the values at some steps, shape (n, ...).
 
         Parameters
         ----------
-        system
-            The :class:`~skfem_ancf.system.System`.
+        at
+            What :func:`locate` returns.
         steps
             Motions.
         """
-        at = system.points.find(self.at, self.beam)
         u = np.array([y.u for y in steps])
         if self.what == "velocity":
             return at.velocity(u, np.array([y.v for y in steps]))
@@ -110,22 +92,57 @@ class Sensor(Frozen):
         found = at.displacement(u)
         return found + at.start if self.what == "position" else found
 
-    def read(self, state: State) -> Any:
-        """Of another one, the value at a State: a number or an array."""
+    def read(self, at: Located | None, state: State) -> Any:
+        """Of another one, the value at a State: a number or an array.
+
+        Parameters
+        ----------
+        at
+            What :func:`locate` returns.
+        state
+            The State.
+        """
         what: Any = self.what
         if callable(what):
             return ask_array("the function of a sensor", None, what, state)
         if what == "joint_force":
             return state.joint_force(self.at)
         if what in ("strain", "stress"):
-            return getattr(state, what)(self.at, self.beam, self.recover)
+            return getattr(state, what)(at, recover=self.recover)
         if what in SECTION:
-            return getattr(state.resultants(self.at, self.beam, self.recover), what)
-        return state.field(find_field(what), self.at, self.beam, self.recover)
+            return getattr(state.resultants(at, recover=self.recover), what)
+        return state.field(find_field(what), at, recover=self.recover)
 
     def __repr__(self) -> str:
         where = "" if self.at is None else f" at {shown(self.at)}"
         return f"<Sensor of {shown(self.what)}{where}>"
+
+
+def locate(sensor: Sensor, system: System) -> Located | None:
+    """The points of a sensor in a scene; None if it has none.
+
+    Parameters
+    ----------
+    sensor
+        The Sensor.
+    system
+        The :class:`~skfem_ancf.system.System` of the scene.
+
+    Raises
+    ------
+    MeshError, InputError
+        If it cannot be read there.
+    """
+    if callable(sensor.what) or sensor.what == "joint_force":
+        return None
+    found = system.points.find(sensor.at, sensor.beam)
+    if sensor.what in SECTION and len(found.parts) != 1:
+        raise InputError("the points of a sensor of sections must be in one beam: make one for "
+                         "each")
+    if sensor.what == "acceleration" and any(part.off_axis for part in found.parts):
+        raise InputError("the acceleration of a cable is known on its axis: off it sections "
+                         "turn with the tangent; put the sensor on the axis")
+    return found
 
 
 class Readings(Mapping):
@@ -172,7 +189,8 @@ class Recorder:
 
     def __init__(self, sensors: Sequence[tuple[str, Sensor]], system: System,
                  states_of: Callable[[Sequence[Motion]], Iterable[State]]) -> None:
-        self.sensors, self._system, self._states_of = list(sensors), system, states_of
+        self.sensors, self._states_of = list(sensors), states_of
+        self._located: list[Any] = [locate(sensor, system) for _, sensor in self.sensors]
         self._t: list[Array] = []
         self._read: list[list[Array]] = [[] for _ in self.sensors]
 
@@ -185,11 +203,11 @@ class Recorder:
         if others:
             for state in self._states_of(steps):
                 for k, values in others.items():
-                    values.append(self.sensors[k][1].read(state))
+                    values.append(self.sensors[k][1].read(self._located[k], state))
         self._t.append(np.array([y.t for y in steps]))
-        for k, ((_, sensor), read) in enumerate(zip(self.sensors, self._read)):
-            read.append(np.array(others[k]) if k in others else
-                        sensor.read_steps(self._system, steps))
+        for k, ((_, sensor), at) in enumerate(zip(self.sensors, self._located)):
+            self._read[k].append(np.array(others[k]) if k in others else
+                                 sensor.read_steps(at, steps))
 
     def readings(self) -> Readings:
         """What was read so far."""
