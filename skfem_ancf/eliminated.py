@@ -17,7 +17,6 @@ from .linalg import NO_FACTORS
 
 if TYPE_CHECKING:
     from .linalg import BandMatrix
-    from .system import System
     from .types import Array
 
 logger = logging.getLogger(__name__)
@@ -31,7 +30,7 @@ REFINEMENTS, EXACT = 50, 1e-14
 ROUGHLY = 2
 
 
-def condensed(system: System) -> Condensed:
+def condensed(system: Any) -> Condensed:
     """What condenses the matrices of a frame to its nodes.
 
     Parameters
@@ -61,7 +60,7 @@ class Eliminated:
         The matrix, which texts fill.
     """
 
-    def __init__(self, system: System, A: BandMatrix) -> None:
+    def __init__(self, system: Any, A: BandMatrix) -> None:
         self.A, self._condensed = A, condensed(system)
         #: what it was factorised at: displacement and multipliers
         self.at = np.zeros(system.N), np.zeros(system.m)
@@ -122,7 +121,7 @@ class EliminatedMass:
         A :class:`~skfem_ancf.system.System` of a frame that can be condensed.
     """
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: Any) -> None:
         self._system = system
         self._M = system.mass if system.mass.symmetric else system.mass.symmetric_part()
         self._condensed = condensed(system)

@@ -30,8 +30,6 @@ from .types import Array
 
 if TYPE_CHECKING:
     from .loads import Load
-    from .system import System
-
 
 #: Of a scene without them.
 _NO_INTS = np.zeros(0, np.int64)
@@ -104,7 +102,7 @@ class Tables:
         A joint moves with time; its derivative in the stress-free state does.
     """
 
-    def __init__(self, system: "System") -> None:
+    def __init__(self, system: Any) -> None:
         # the system has the tables: without a circle both go when nobody asks for them any more
         self._system = ref(system)
         self._own_handle: int | None = None
@@ -122,7 +120,7 @@ class Tables:
                                self._forces(), body, system.constraints.coordinate_sizes)
 
     @property
-    def system(self) -> "System":
+    def system(self) -> Any:
         """Whose they are."""
         system = self._system()
         assert system is not None
@@ -200,7 +198,7 @@ class Tables:
         return self.with_equations(self.plain._replace(
             copies=copies_of(self.plain.body, n, self.system.N)))
 
-    def renewed(self, system: "System", same_loads: bool = False) -> "Tables":
+    def renewed(self, system: Any, same_loads: bool = False) -> "Tables":
         """Those of a system that differs by its loads, or by its beams' materials and widths.
 
         Parameters

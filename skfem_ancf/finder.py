@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
@@ -11,8 +11,7 @@ from .errors import MeshError
 from .kept import cached_property
 
 if TYPE_CHECKING:
-    from .mapping import MappingBeam
-    from .mesh import MeshBeam
+    from .chain import Chain
     from .types import Array
 
 #: Samples of each element in the tree of the finder, and candidates for a point that is in none of
@@ -32,7 +31,7 @@ class Finder:
         A :class:`~skfem_ancf.MeshBeam`.
     """
 
-    def __init__(self, mesh: MeshBeam) -> None:
+    def __init__(self, mesh: Chain) -> None:
         self.mesh = mesh
         self.size = float(np.abs(mesh.p).max())
         # points of an exact curve may lie a little outside its cubic elements
@@ -42,7 +41,7 @@ class Finder:
         self._line = self._straight_line()
 
     @property
-    def mapping(self) -> MappingBeam:
+    def mapping(self) -> Any:
         """That of the mesh, which keeps it."""
         return self.mesh.mapping()
 

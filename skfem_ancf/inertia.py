@@ -13,7 +13,7 @@ from .quadrature import gauss, product_rule
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from .beam import Beam
+    from .interior import Interior
     from .types import Array
 
 #: Points along an element more, where the height is a cubic or something varies.
@@ -96,7 +96,7 @@ class Inertia(NamedTuple):
         return out
 
 
-def points_along(beam: Beam) -> int:
+def points_along(beam: Interior) -> int:
     """Gauss points along an element for products of two coordinates.
 
     Parameters
@@ -108,7 +108,7 @@ def points_along(beam: Beam) -> int:
     return beam.element.axis_degree + 1 + more
 
 
-def of_sections(beam: Beam) -> Inertia:
+def of_sections(beam: Interior) -> Inertia:
     """The Inertia of a beam with sections.
 
     Parameters
@@ -126,7 +126,7 @@ def of_sections(beam: Beam) -> Inertia:
     return Inertia(*(np.concatenate(part, axis=-1) for part in zip(*parts)))
 
 
-def of_cable(beam: Beam) -> Inertia:
+def of_cable(beam: Interior) -> Inertia:
     """The Inertia of a cable; without that of turning if its section is a plain rectangle.
 
     Parameters
@@ -154,7 +154,7 @@ def of_cable(beam: Beam) -> Inertia:
     return Inertia(N, mass - bend * first, d_xi / speed, np.array([first - bend * second, second]))
 
 
-def projected(beam: Beam, field: Callable[[Array], Array]) -> Array:
+def projected(beam: Interior, field: Callable[[Array], Array]) -> Array:
     """Rates of the coordinates whose velocity is nearest to a field, in the mean over the body.
 
     Parameters

@@ -18,7 +18,7 @@ from .formulations.ecm import AXIS
 from .quadrature import gauss
 
 if TYPE_CHECKING:
-    from .beam import Beam
+    from .interior import Interior
     from .elements.base import ElementBeam
     from .inertia import Inertia
     from .materials.base import Material
@@ -49,7 +49,7 @@ class Sections:
         return gauss(element.order + 1)
 
     @staticmethod
-    def inertia(beam: Beam) -> Inertia:
+    def inertia(beam: Interior) -> Inertia:
         """Its masses at points.
 
         Parameters
@@ -60,7 +60,7 @@ class Sections:
         return of_sections(beam)
 
     @staticmethod
-    def direction(beam: Beam, node: int) -> tuple[Array, Array]:
+    def direction(beam: Interior, node: int) -> tuple[Array, Array]:
         """Coordinates (2, n) and weights (n,) of 12 / h^3 int Y r dY of a section.
 
         Parameters
@@ -79,7 +79,7 @@ class Sections:
         return node * beam.nd + 2 * first + np.arange(2 * len(f)).reshape(-1, 2).T, c
 
     @staticmethod
-    def direction_weights(beam: Beam, e: int, xi: float) -> Array:
+    def direction_weights(beam: Interior, e: int, xi: float) -> Array:
         """Weights (nb,) of an element's local functions in the direction of a section inside it.
 
         Of the same integral as :meth:`direction`; of a cable those of the tangent of its axis.
@@ -98,7 +98,7 @@ class Sections:
         return 12.0 / h * (rows[0] @ (w * (eta - 0.5))) * beam.mesh.lengths[e] ** rows[3]
 
     @staticmethod
-    def plane(beam: Beam, tangent: Array) -> tuple[Array, list[int]]:
+    def plane(beam: Interior, tangent: Array) -> tuple[Array, list[int]]:
         """What keeps a section in its plane: its normal, and the coordinates that stay in it.
 
         Parameters
@@ -112,7 +112,7 @@ class Sections:
                          if along == 0 and across > 0]
 
     @staticmethod
-    def gradients(beam: Beam, u: Array, X: Array, tind: Array | None) -> tuple[Array, Array]:
+    def gradients(beam: Interior, u: Array, X: Array, tind: Array | None) -> tuple[Array, Array]:
         """Displacement gradient in the beam's frame, and the frame.
 
         Parameters
@@ -127,7 +127,7 @@ class Sections:
         return beam.element.gradients(beam.mesh.mapping(), X, tind, u_e)
 
     @staticmethod
-    def displacements(beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:
+    def displacements(beam: Interior, u: Array, X: Array, tind: Array | None) -> Array:
         """Displacement at reference points, shape (2, nelements, npoints).
 
         Parameters
@@ -144,7 +144,7 @@ class Sections:
         return np.einsum("eki,kep->iep", u_e, functions, optimize=True)
 
     @staticmethod
-    def strain(beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:
+    def strain(beam: Interior, u: Array, X: Array, tind: Array | None) -> Array:
         """Green-Lagrange strain of the formulation, shape (3, nelements, npoints).
 
         Parameters
@@ -158,7 +158,7 @@ class Sections:
         return beam.sampled_strain(beam.terms[0], u, X, tind)
 
     @staticmethod
-    def strain_at(beam: Beam, u: Array, e: Array, X: Array) -> Array:
+    def strain_at(beam: Interior, u: Array, e: Array, X: Array) -> Array:
         """As :meth:`strain`, at points each in an element of its own, shape (3, n).
 
         Parameters
@@ -173,7 +173,7 @@ class Sections:
         return beam.strain_of(beam.terms[0])(u, e, X)
 
     @staticmethod
-    def stress(beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
+    def stress(beam: Interior, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
         """Second Piola-Kirchhoff stress, shape (3, nelements, npoints).
 
         Parameters
@@ -191,7 +191,7 @@ class Sections:
             for layer in beam.layers], tind)
 
     @staticmethod
-    def shortest(beam: Beam, u: Array) -> float:
+    def shortest(beam: Interior, u: Array) -> float:
         """Smallest stretch of the fibres along the axis at the integration points.
 
         Parameters
@@ -204,7 +204,7 @@ class Sections:
         return beam.kernel.shortest(u)
 
     @staticmethod
-    def deformation(beam: Beam, u: Array) -> tuple[Array, Array]:
+    def deformation(beam: Interior, u: Array) -> tuple[Array, Array]:
         """det F and both principal stretches at the integration points.
 
         Parameters
@@ -246,21 +246,21 @@ class Cable(Sections):
         return AXIS
 
     @staticmethod
-    def inertia(beam: Beam) -> Inertia:
+    def inertia(beam: Interior) -> Inertia:
         return of_cable(beam)
 
     @staticmethod
-    def direction(beam: Beam, node: int) -> tuple[Array, Array]:
+    def direction(beam: Interior, node: int) -> tuple[Array, Array]:
         # the tangent, which turns with the section
         return node * beam.nd + 2 + np.arange(2).reshape(2, 1), np.ones(1)
 
     @staticmethod
-    def direction_weights(beam: Beam, e: int, xi: float) -> Array:
+    def direction_weights(beam: Interior, e: int, xi: float) -> Array:
         rows = beam.element.local(np.array([[xi], [0.5]]), beam.mesh.height)
         return rows[1][:, 0] * beam.mesh.lengths[e] ** (rows[3] - 1.0)
 
     @staticmethod
-    def plane(beam: Beam, tangent: Array) -> tuple[Array, list[int]]:
+    def plane(beam: Interior, tangent: Array) -> tuple[Array, list[int]]:
         return np.array([-tangent[1], tangent[0]]), [1]
 
     @staticmethod
@@ -270,7 +270,8 @@ class Cable(Sections):
         return tangent, at.tangent0, *strain
 
     @classmethod
-    def gradients(cls, beam: Beam, u: Array, X: Array, tind: Array | None) -> tuple[Array, Array]:
+    def gradients(cls, beam: Interior, u: Array, X: Array,
+                  tind: Array | None) -> tuple[Array, Array]:
         frame = beam.mesh.mapping().frame(X, tind)
         tangent, _, eps, kappa = cls._section(beam, u, X, tind)
         strain = cls.strain(beam, u, X, tind)
@@ -281,14 +282,14 @@ class Cable(Sections):
         return F - frame, frame
 
     @classmethod
-    def displacements(cls, beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:
+    def displacements(cls, beam: Interior, u: Array, X: Array, tind: Array | None) -> Array:
         tangent, tangent0, _, _ = cls._section(beam, u, X, tind)
         turn = tangent - tangent0
         return (Sections.displacements(beam, u, X, tind)
                 + beam.mesh.mapping().offset(X, tind) * np.array([-turn[1], turn[0]]))
 
     @classmethod
-    def strain(cls, beam: Beam, u: Array, X: Array, tind: Array | None) -> Array:
+    def strain(cls, beam: Interior, u: Array, X: Array, tind: Array | None) -> Array:
         return cls._strain_of(beam, beam.mesh.mapping().offset(X, tind), beam.across.which(X, tind),
                               *cls._section(beam, u, X, tind)[2:])
 
@@ -300,11 +301,11 @@ class Cable(Sections):
         return np.array([xx, -ratios[which] * xx, 0.0 * xx])
 
     @classmethod
-    def strain_at(cls, beam: Beam, u: Array, e: Array, X: Array) -> Array:
+    def strain_at(cls, beam: Interior, u: Array, e: Array, X: Array) -> Array:
         return cls.strain(beam, u, X[:, :, None], e)[..., 0]
 
     @staticmethod
-    def stress(beam: Beam, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
+    def stress(beam: Interior, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
         def along(material):
             S = material.axial_modulus * strain[0]
             return np.array([S, 0.0 * S, 0.0 * S])
@@ -313,12 +314,12 @@ class Cable(Sections):
                                                 for slab in beam.across.slabs], tind)
 
     @staticmethod
-    def shortest(beam: Beam, u: Array) -> float:
+    def shortest(beam: Interior, u: Array) -> float:
         eps, outer = beam.kernel.outer_strain(u)
         return np.min(1.0 + eps - outer)
 
     @staticmethod
-    def deformation(beam: Beam, u: Array) -> tuple[Array, Array]:
+    def deformation(beam: Interior, u: Array) -> tuple[Array, Array]:
         eps, outer = beam.kernel.outer_strain(u)
         along = 1.0 + eps + outer * np.array([[[-1.0]], [[1.0]]])
         ratio = beam.across.slabs[0].material.lateral_ratio

@@ -23,8 +23,6 @@ from .switch import compiled_off, wanted
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from .system import System
-
 logger = logging.getLogger(__name__)
 
 #: Seconds that compiling takes, about: what texts have in common, what kernels have, the kernels,
@@ -100,7 +98,7 @@ class Machine:
         The equations.
     """
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: Any) -> None:
         self.tables = Tables(system)
         self._plain: str | None = None
         self._followed = False

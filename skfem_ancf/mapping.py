@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from .mesh import MeshBeam
+    from .chain import Chain
     from .types import Array
 
 #: Corrections of Newton's method that are small enough, and powers of xi in relative heights that
@@ -214,7 +214,7 @@ class MappingBeam(Mapping):
         A :class:`~skfem_ancf.MeshBeam`.
     """
 
-    def __init__(self, mesh: MeshBeam) -> None:
+    def __init__(self, mesh: Chain) -> None:
         self.mesh = mesh
         self.dim = 2
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from .mesh import MeshBeam
+    from .chain import Chain
     from .types import Array
 
 
@@ -23,7 +23,7 @@ def turned(d: Array) -> Array:
     return np.array([-d[1], d[0]])
 
 
-def nodal_derivatives(mesh: MeshBeam, most: int) -> list[Array]:
+def nodal_derivatives(mesh: Chain, most: int) -> list[Array]:
     """Position of the stress-free axis at the nodes, and its derivatives by the arc length.
 
     Position, tangent and curvature are those of the mesh. A node takes the others of the

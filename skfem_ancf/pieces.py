@@ -16,7 +16,6 @@ from .sections.jumps import beside
 from .spread import AXIS
 
 if TYPE_CHECKING:
-    from .recovery import Recovery
     from .types import Array
 
 #: Rounds of steps 2 and 3, and the change of the stretch, relative to its largest, at which they
@@ -98,7 +97,7 @@ class Piece:
         Of the stretch in the last round, (...).
     """
 
-    def __init__(self, recovery: Recovery, start: float, end: float) -> None:
+    def __init__(self, recovery: Any, start: float, end: float) -> None:
         self.recovery, self.forces = recovery, recovery.forces
         mesh = recovery.beam.mesh
         e = np.arange(int(np.floor(start)), int(np.ceil(end)))

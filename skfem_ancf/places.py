@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from .mesh import MeshBeam
+    from .chain import Chain
     from .types import Array, Place
 
 #: How far off a section a point may be that names it, relative to an element next to it.
@@ -47,7 +47,7 @@ def is_place(place: object) -> bool:
     return isinstance(place, (str, np.ndarray)) or callable(place) or is_point(place)
 
 
-def as_point(point: Any, mesh: MeshBeam | None = None) -> Array:
+def as_point(point: Any, mesh: Chain | None = None) -> Array:
     """A material point as an array (2,); raises MeshError for anything else.
 
     Parameters
@@ -85,7 +85,7 @@ def on_other_mesh(place: object) -> bool:
     return True
 
 
-def facets_of(mesh: MeshBeam, place: Place) -> Array:
+def facets_of(mesh: Chain, place: Place) -> Array:
     """The facets that a place means.
 
     This is the one rule for every method that takes a place:
@@ -146,7 +146,7 @@ def facets_of(mesh: MeshBeam, place: Place) -> Array:
     raise InputError(f"a place is {KINDS}, got {shown(place)}{hint}")
 
 
-def node_of(mesh: MeshBeam, place: Place) -> int:
+def node_of(mesh: Chain, place: Place) -> int:
     """The node of a place that is one section.
 
     Parameters
@@ -168,7 +168,7 @@ def node_of(mesh: MeshBeam, place: Place) -> int:
     return int(facets[0])
 
 
-def section_at(mesh: MeshBeam, point: ArrayLike) -> int:
+def section_at(mesh: Chain, point: ArrayLike) -> int:
     """The node on whose section a point of the stress-free body lies.
 
     Parameters
@@ -211,11 +211,11 @@ def _pair(x: Array) -> str:
     return f"({x[0]:.9g}, {x[1]:.9g})"
 
 
-def _names(mesh: MeshBeam) -> str:
+def _names(mesh: Chain) -> str:
     return ", ".join(repr(name) for name, facets in (mesh.boundaries or {}).items() if len(facets))
 
 
-def _named(mesh: MeshBeam, name: str) -> Array:
+def _named(mesh: Chain, name: str) -> Array:
     if name not in (mesh.boundaries or {}):
         raise NameUnknown("boundary", name, mesh.boundaries or {})
     facets = mesh.boundaries[name]
@@ -225,7 +225,7 @@ def _named(mesh: MeshBeam, name: str) -> Array:
     return facets
 
 
-def _numbered(mesh: MeshBeam, facets: Array) -> Array:
+def _numbered(mesh: Chain, facets: Array) -> Array:
     if facets.dtype.kind not in "iu" or facets.ndim != 1 or not len(facets):
         raise InputError(f"facets are a one-dimensional array of integers that is not empty, got "
                          f"{shown(facets)}; a place may also be {KINDS.rsplit(', or', 1)[0]}")
@@ -239,7 +239,7 @@ def _numbered(mesh: MeshBeam, facets: Array) -> Array:
     return facets
 
 
-def _satisfying(mesh: MeshBeam, test: Callable[[Array], Any]) -> Array:
+def _satisfying(mesh: Chain, test: Callable[[Array], Any]) -> Array:
     x = mesh.mapping().G(np.array([[0.5]]))[:, :, 0]
     try:
         chosen = np.asarray(test(x))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,9 +11,6 @@ from .dynamics.choice import choose_scheme
 from .eigenstrain import EigenStrain
 from .errors import NameUnknown, require_option
 from .origin import ours
-
-if TYPE_CHECKING:
-    from .scene import Scene
 
 KINDS = ("static", "linear", "dynamic")
 
@@ -42,7 +39,7 @@ class Plan(tuple):
         return "\n".join(f"{i.term:<{width}}  {i.status:<8}  {i.reason}" for i in self)
 
 
-def make_plan(scene: Scene, kind: str = "static") -> Plan:
+def make_plan(scene: Any, kind: str = "static") -> Plan:
     """The plan of a scene.
 
     Parameters

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from .beam import Beam
     from .mesh import MeshBeam
-    from .system import System
     from .types import Array
     from .layout import WhichMember
 
@@ -233,7 +232,7 @@ class Points:
 
 
 
-def require_body(system: System, which: WhichMember) -> RigidBody:
+def require_body(system: Any, which: WhichMember) -> RigidBody:
     """The rigid body meant by itself, its name or its number; raises InputError of a beam.
 
     Parameters

@@ -12,11 +12,10 @@ from .taper import halved as halved_heights
 from .taper import heights_of
 
 if TYPE_CHECKING:
-    from .mesh import MeshBeam
     from .types import Array
 
 
-def halved(mesh: MeshBeam, ix: Array) -> MeshBeam:
+def halved(mesh: Any, ix: Array) -> Any:
     """The mesh with some elements halved; names are kept.
 
     Parameters
@@ -65,7 +64,7 @@ def halved(mesh: MeshBeam, ix: Array) -> MeshBeam:
     return m
 
 
-def by_element(mesh: MeshBeam, at: Array) -> MeshBeam:
+def by_element(mesh: Any, at: Array) -> Any:
     """The mesh of elements apart, whose sections turn as their axis beside some nodes.
 
     Where sections are cubic along the elements, or of a higher degree, one rate of turning at a

@@ -16,7 +16,6 @@ from .kept import cached_property
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from .elements.base import ElementBeam
     from .types import Array
 
 
@@ -154,7 +153,7 @@ class Series:
         How many polynomials of xi and of eta the functions of an element are, its height included.
     """
 
-    def __init__(self, element: ElementBeam, h: float, degree: int = 0) -> None:
+    def __init__(self, element: Any, h: float, degree: int = 0) -> None:
         unit, self.swell, self.power = element.series()
         self._value = h ** self.swell[:, None, None] * unit if self.swell.any() else unit
         self._shape = unit.shape[:0:-1]

@@ -16,7 +16,7 @@ from .series import chebyshev, derivatives, polynomials
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from .beam import Beam
+    from .interior import Interior
     from .formulations.base import Term
     from .types import Array, Rule
 
@@ -138,7 +138,7 @@ class ElementStrain:
         those along the axis and across it there.
     """
 
-    def __init__(self, beam: Beam, term: Term, rows: Sequence[int] = (0, 1, 2)) -> None:
+    def __init__(self, beam: Interior, term: Term, rows: Sequence[int] = (0, 1, 2)) -> None:
         self.beam, series = beam, beam.series
         names = [COMPONENTS[row] for row in rows]
         self.places = sorted({float(xi) for name in names for xi in term.samples.get(name, ())})

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from ..mapping import MappingBeam
+    from ..chain import Chain
     from ..mesh import MeshBeam
     from ..types import Array, Rule
 
@@ -379,7 +380,7 @@ class ElementBeam(Frozen, Element):
         value, d_xi = self._scaled(mapping.mesh, slope, tind, value, d_xi)
         return value, d_xi
 
-    def _scaled(self, mesh: MeshBeam, slope: Array, tind: Array | None, *values: Array
+    def _scaled(self, mesh: Chain, slope: Array, tind: Array | None, *values: Array
                 ) -> list[Array]:
         """Local functions of all elements from those of length 1, which may be the same."""
         scale = self._scale(mesh, slope, tind)[:, :, None]
@@ -405,7 +406,7 @@ class ElementBeam(Frozen, Element):
         return self.local(X, h, i, rate)
 
     @staticmethod
-    def _scale(mesh: MeshBeam, slope: Array, tind: Array | None) -> Array:
+    def _scale(mesh: Chain, slope: Array, tind: Array | None) -> Array:
         """The lengths of elements to the powers of local functions, shape (n, nelements)."""
         lengths = mesh.lengths if tind is None else mesh.lengths[tind]
         return lengths ** slope[:, None]

@@ -8,7 +8,7 @@ have passed through that are deeper on it than at both of its ends, and on anoth
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from .poses import taken_back
 
 if TYPE_CHECKING:
     from ..types import Array
-    from .contacts import Contacts, Group
 
 #: Parts of a way at which points are looked at, at most.
 MOST_PARTS = 400
@@ -43,7 +42,7 @@ class Passage:
         The obstacles of a scene.
     """
 
-    def __init__(self, contacts: Contacts) -> None:
+    def __init__(self, contacts: Any) -> None:
         self._poses: dict[tuple[int, float], Array] = {}
         self._paths = [_Path(contacts, k, self._poses) for k, (_, group) in enumerate(
             contacts.groups) if group.depth < np.inf]
@@ -252,7 +251,7 @@ def _between(u, v, t, s):
     return straight + s * (1.0 - s) * ((1.0 - s) * (h * v[0] - change) - s * (h * v[1] - change))
 
 
-def middle_of(group: Group) -> Array:
+def middle_of(group: Any) -> Array:
     """Place of the middle of each element; then weights, and how much they differ from these.
 
     Parameters

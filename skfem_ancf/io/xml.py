@@ -5,13 +5,10 @@ from __future__ import annotations
 import zlib
 from base64 import b64encode
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from .vtu import BodyFields
 
 #: Level of zlib: the next ones save little and cost much.
 LEVEL = 4
@@ -48,7 +45,7 @@ class _Arrays:
                 f'{components}format="appended" offset="{offset}"/>')
 
 
-def topology(body: BodyFields) -> tuple[Any, Any, Any]:
+def topology(body: Any) -> tuple[Any, Any, Any]:
     """Connectivity, offsets and types of the cells of a body, for VTK."""
     connectivity = np.concatenate([cells.ravel() for _, cells in body.cells])
     sizes = np.concatenate([np.full(len(c), c.shape[1]) for _, c in body.cells])
@@ -56,7 +53,7 @@ def topology(body: BodyFields) -> tuple[Any, Any, Any]:
     return connectivity.astype(np.int32), np.cumsum(sizes).astype(np.int32), types
 
 
-def write_vtu(path: Path, body: BodyFields, dtype: Any = np.float64,
+def write_vtu(path: Path, body: Any, dtype: Any = np.float64,
               raw: bool = False, packed: dict | None = None) -> None:
     """Write a body as a .vtu file.
 

@@ -9,7 +9,7 @@ import numpy as np
 from .cable import cable_strain, cross
 
 if TYPE_CHECKING:
-    from ..beam import Beam
+    from ..interior import Interior
     from ..types import Array
 
 
@@ -37,7 +37,7 @@ class CableSections:
         all.
     """
 
-    def __init__(self, beam: Beam, xi: Array, tind: Array | None) -> None:
+    def __init__(self, beam: Interior, xi: Array, tind: Array | None) -> None:
         kernel, mesh, element = beam.kernel, beam.mesh, beam.element
         t = kernel.t if tind is None else kernel.t[:, tind]
         L = (mesh.lengths if tind is None else mesh.lengths[tind])

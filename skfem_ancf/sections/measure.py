@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from scipy.linalg import eigh_tridiagonal
@@ -15,13 +15,33 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from ..types import Array, Rule
-    from .within import Within
 
 #: Points more, where the weight is no polynomial of Y.
 MORE = 4
 
 #: Points across a slab for means of functions.
 MEAN = 8
+
+
+class InSlab(Protocol):
+    """Points of a slab on a mesh, a :class:`~skfem_ancf.sections.within.Within`."""
+
+    X: Array
+    body: Any
+    slab: Any
+    tind: Array | None
+
+    @property
+    def heights(self) -> Array: ...
+
+    def moved(self, X: Array) -> Any:
+        """Other points of the slab."""
+
+    def asked(self, name: str) -> Array:
+        """What a function of the slab returns there."""
+
+    def factor(self, name: str, whole: bool = False) -> Any:
+        """A number of the slab, or what its function is there."""
 
 
 class Piece(NamedTuple):
@@ -111,7 +131,7 @@ class Measure(Frozen):
         """
         return np.multiply.outer(self.highest, np.ones(h.shape))
 
-    def values(self, at: Within, name: str, whole: bool = False) -> Array:
+    def values(self, at: InSlab, name: str, whole: bool = False) -> Array:
         """A function of the slab at points, or the means of their sections.
 
         Parameters
@@ -136,7 +156,7 @@ class Measure(Frozen):
         values = at.moved(points.reshape(X.shape[:-1] + (-1,))).asked(name)
         return values.reshape(values.shape[0], -1, len(eta)) @ w
 
-    def breadth(self, at: Within, whole: bool = False, times: str = "") -> Any:
+    def breadth(self, at: InSlab, whole: bool = False, times: str = "") -> Any:
         """What the weights of rules are multiplied by: area over height.
 
         Parameters
@@ -160,7 +180,7 @@ class Measure(Frozen):
             size = size * at.heights / mesh.height
         return size * at.factor(times, whole) if times else size
 
-    def width(self, at: Within) -> Any:
+    def width(self, at: InSlab) -> Any:
         """The width at points of the slab.
 
         Parameters
@@ -175,7 +195,7 @@ class Measure(Frozen):
         """
         return self.breadth(at) / at.slab.part
 
-    def outline(self, at: Within) -> Any:
+    def outline(self, at: InSlab) -> Any:
         """The largest width of sections, or where that is a function the one at points.
 
         Parameters
@@ -192,7 +212,7 @@ class Measure(Frozen):
         scale = slab.outer * slab.part / slab.width if slab.outer else 1.0
         return scale * self.breadth(at) / slab.part
 
-    def sampled(self, at: Within, n: int) -> tuple[Array, Array]:
+    def sampled(self, at: InSlab, n: int) -> tuple[Array, Array]:
         """Points of sections, for fields that are the slab's own.
 
         Parameters

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from ..types import Array, Rule
-    from .measure import Piece
-    from .within import Within
+    from .measure import InSlab, Piece
 
 #: Least degree of the series of a width, and its points more where that is a square root.
 LEAST, ROUND = 8, 40
@@ -90,10 +89,10 @@ class Moving(Measure):
         return at.moved(np.array([np.broadcast_to(at.X[0], low.shape),
                                   np.clip(at.X[1], low, high)]))
 
-    def values(self, at: Within, name: str, whole: bool = False) -> Array:
+    def values(self, at: InSlab, name: str, whole: bool = False) -> Array:
         return self._inside(at).asked(name)
 
-    def width(self, at: Within) -> Array:
+    def width(self, at: InSlab) -> Array:
         eta, h = (x[..., None] for x in np.broadcast_arrays(at.X[1], at.heights))
         found = self.pieces_of(h)
         out = 0.0 * eta
@@ -102,12 +101,12 @@ class Moving(Measure):
             out = np.where(inside, piece.width(eta) if callable(piece.width) else piece.width, out)
         return at.factor("width") * out[..., 0]
 
-    def outline(self, at: Within) -> Any:
+    def outline(self, at: InSlab) -> Any:
         if at.slab.by_height:  # a tube
             return at.heights
         return at.slab.outer or at.factor("width")
 
-    def breadth(self, at: Within, whole: bool = False, times: str = "") -> Array:
+    def breadth(self, at: InSlab, whole: bool = False, times: str = "") -> Array:
         xi = np.asarray(at.X[0])
         back: Any = slice(None)
         if xi.ndim == 1:
@@ -126,7 +125,7 @@ class Moving(Measure):
         c = c * self.moments(at.body.heights(xi, at.tind), product if functions else None)
         return c[0][:, back] if whole else self.series(c[:, :, back], at.X[1])
 
-    def sampled(self, at: Within, n: int) -> tuple[Array, Array]:
+    def sampled(self, at: InSlab, n: int) -> tuple[Array, Array]:
         eta, w = self.points(at.heights[:, 0], n)
         there = at.moved(np.array([at.X[0] + 0.0 * eta, eta]))
         return eta, w * (there.asked("width") if callable(at.slab.width) else at.slab.width)

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ..errors import InputError
 from .base import asked
 
 if TYPE_CHECKING:
     from ..types import Array
-    from .across import Across
     from .base import Slab
 
 #: What messages call the functions of a slab.
 NAMES = {"width": "width", "grade": "E", "density": "density"}
+
+
+class OnMesh(Protocol):
+    """What points of a slab ask of the section on the mesh, an Across."""
+
+    mesh: Any
+
+    def heights(self, xi: Array, tind: Array | None = None) -> Array:
+        """Heights of sections, shape (nelements, npoints)."""
+
+    def coordinates(self, X: Array, tind: Array | None = None) -> Any:
+        """Material coordinates of reference points, as functions of the user take them."""
 
 
 class Within:
@@ -33,7 +44,7 @@ class Within:
 
     __slots__ = "X", "body", "slab", "tind"
 
-    def __init__(self, body: Across, slab: Slab, X: Array,
+    def __init__(self, body: OnMesh, slab: Slab, X: Array,
                  tind: Array | None = None) -> None:
         self.body, self.slab, self.X, self.tind = body, slab, X, tind
 
