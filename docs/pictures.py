@@ -48,8 +48,8 @@ def pushed_frame(n=5):
     """The first state of frames.md."""
     number = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
     lines = np.hstack([[number[:-1].ravel(), number[1:].ravel()],
-                       [number[1:, :-1].ravel(), number[1:, 1:].ravel()]])
-    frame = Frame.from_lines(np.array(np.divmod(number.ravel(), n + 1)[::-1], dtype=float), lines,
+                       [number[1:, :-1].ravel(), number[1:, 1:].ravel()]]).T
+    frame = Frame.from_lines(np.column_stack(np.divmod(number.ravel(), n + 1)[::-1]), lines,
                              material=StVenantKirchhoff(E=2.1e11, nu=0.3), height=0.02, width=0.02)
     return frame.clamp(number[0]).point_force((2000, 0), at=number[1:, 0]).solve_static()
 

@@ -447,9 +447,18 @@ def require_text(name: str, value: Any) -> Any:
     value
         What was given.
     """
-    if value is not None and not isinstance(value, str):
+    if value is not None and not (isinstance(value, str) and _is_unicode(value)):
         raise InputError(f"{name} must be a text, got {shown(value)}")
     return value
+
+
+def _is_unicode(text):
+    """True if a text has no lone surrogates, which no file can hold."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def require_flag(name: str, value: object) -> bool:
@@ -477,7 +486,7 @@ def require_label(name: str, value: object) -> str | None:
     value
         What was given.
     """
-    if value is not None and not (isinstance(value, str) and value):
+    if value is not None and not (isinstance(value, str) and value and _is_unicode(value)):
         raise InputError(f"{name} must be a text, or None for none, got {shown(value)}")
     return value
 
@@ -562,7 +571,8 @@ def require_path(name: str, value: Any, suffixes: Sequence[str] = ()) -> Path:
         raise InputError(f"{name} must be the path of a file, got {shown(value)}")
     try:
         path = Path(value)
-    except TypeError:
+        os.fsencode(path)
+    except (TypeError, UnicodeEncodeError):  # the latter of lone surrogates
         raise InputError(f"{name} must be the path of a file, got {shown(value)}") from None
     if suffixes and path.suffix.lower() not in suffixes:
         raise InputError("the file name must end with "

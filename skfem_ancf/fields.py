@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .errors import (CallbackError, InputError, NameUnknown, ask, require_finite_scalar,
-                     require_flag, require_integer, require_text, shown, teaching)
+                     require_flag, require_integer, require_label, require_text, shown, teaching)
 from .kept import cached_property, kept
 from .materials import LinearLaw
 from .parts import Part
@@ -81,7 +81,7 @@ class Field:
     neutral: float = 0.0
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name:
+        if require_label("the name of a field", self.name) is None:
             raise InputError(f"the name of a field must be a text, got {shown(self.name)}")
         if not callable(self.function):
             raise InputError("the function of a field takes Values and returns an array, got "

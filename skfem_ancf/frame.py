@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .beam import Beam
+from .doors import displacement
 from .elements import ElementBeamCable
 from .errors import (InputError, require_finite, require_finite_scalar, require_function,
                      require_integer, require_names, require_option, require_options,
@@ -141,9 +142,9 @@ class Frame(Scene):
         Parameters
         ----------
         points
-            A list of pairs (x, y), or an array (2, n).
+            Pairs (x, y): a list, or an array of shape (n, 2).
         lines
-            Pairs of numbers of points, or an array (2, m).
+            Pairs of numbers of points: a list, or an array of shape (m, 2).
         groups
             Numbers of lines by name: each group is a beam of that name. A line is in one group at
             most; those in none are the beam "lines".
@@ -151,7 +152,8 @@ class Frame(Scene):
             Numbers of points by name, for supports and loads.
         hinges
             Where lines may turn: "all" for a truss; or a list of numbers and names of nodes, where
-            all lines are hinged, and of pairs (line, node), each by its number or its name.
+            all lines are hinged, and of pairs (line, node), each by its number or its name; or an
+            array of such pairs, shape (k, 2).
         curves
             By the number of a line a function of parameters s (k,), from 0 to 1, that returns the
             points (2, k) of its axis.
@@ -312,7 +314,8 @@ class Frame(Scene):
         ----------
         place
             The name of nodes, the number of a node, a point as a tuple (x, y), a function of the
-            points x (2, n) that returns n truth values, an array of numbers, or a list of these.
+            points x (2, n) that returns n truth values, an array of numbers, an array of points
+            (k, 2), or a list of these.
         """
         return self.net.nodes_at(place)
 
@@ -527,10 +530,10 @@ class Frame(Scene):
         state
             A State of this frame.
         """
-        joint = self._bound
+        joint, u = self._bound, displacement(self.system, state, "state")
         out = np.full(self.points.shape[1], np.nan)
         rigid = joint.leaders[~joint.hinged[joint.leaders]]
-        out[joint.nodes[rigid]] = np.angle(joint.turns(state.u)[rigid])
+        out[joint.nodes[rigid]] = np.angle(joint.turns(u)[rigid])
         return out
 
     def with_beams(self, beams: Sequence[Beam]) -> Frame:
@@ -604,11 +607,12 @@ def _hinged(net, hinges):
         return ~out
     if isinstance(hinges, (str, int, np.integer)):
         hinges = [hinges]
-    if not isinstance(hinges, (list, tuple, set, frozenset)) and np.ndim(hinges) == 0:
+    if not isinstance(hinges, (list, tuple, set, frozenset)) and not (
+            isinstance(hinges, np.ndarray) and hinges.ndim):
         raise InputError('hinges are "all", or a list of nodes and of pairs (line, node), got '
                          f"{shown(hinges)}")
     for one in hinges:
-        if isinstance(one, tuple) and len(one) == 2:
+        if isinstance(one, (tuple, list, np.ndarray)) and len(one) == 2:
             line, node = (int(net.lines_of(one[0])[0]), int(net.nodes_at(one[1])[0]))
             at = net.lines[:, line] == node
             if not np.any(at):

@@ -24,7 +24,7 @@ from .kept import twin_of
 from .mapping import MappingBeam
 from .origin import ours
 from .pickling import require_picklable
-from .places import is_point
+from .places import is_point, points_of_rows
 from .reference import SECTIONS, ElementBeamP1
 from .refinement import halved
 from .taper import Scaled, heights_of
@@ -614,7 +614,7 @@ class MeshBeam(Frozen, Mesh2D):
         ----------
         at
             Sections: "left", "right", or points (x, y) of the axis; one, or a tuple or list of
-            several.
+            several, or an array of points, shape (n, 2).
         size
             Length of the elements at the sections; a quarter of the height by default. See
             docs/fields.md for the accuracy to expect.
@@ -643,8 +643,15 @@ class MeshBeam(Frozen, Mesh2D):
         """
         size = 0.25 * self.height if size is None else require_positive("size", size)
         growth = require_positive("growth", growth)
-        single = isinstance(at, str) or is_point(at)
-        places = np.array([self._section_point(place) for place in ([at] if single else at)])
+        if 3.0 * self.height / size > MAX_ELEMENTS:
+            raise InputError(f"size = {size:g} would make more than {MAX_ELEMENTS} elements of a "
+                             f"beam of height {self.height:g}: give a larger one")
+        at = points_of_rows(at)
+        if isinstance(at, str) or is_point(at) or not isinstance(at, (tuple, list, set, frozenset)):
+            at = [at]
+        if not at:
+            raise InputError("at names no section: give 'left', 'right', or a point of the axis")
+        places = np.array([self._section_point(place) for place in at])
         mesh = self
         while True:
             X = np.array([np.linspace(0, 1, 5), np.full(5, 0.5)])

@@ -13,7 +13,7 @@ from .errors import (FileError, InputError, MeshError, NameUnknown, ask, ask_fie
                      require_finite, require_integer, require_label, require_path, shown)
 from .lines import Axes, MeshLines, heights_of_chains
 from .mesh import MeshBeam
-from .places import is_point
+from .places import is_point, points_of_rows
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,9 +33,9 @@ class Net:
     Parameters
     ----------
     points
-        Shape (2, n), or a list of pairs.
+        Pairs (x, y): a list, or an array of shape (n, 2).
     lines
-        Numbers of the points that each line joins, shape (2, m), or a list of pairs.
+        Pairs of numbers of the points that each line joins: a list, or an array of shape (m, 2).
     groups
         Numbers of lines by name; a line is in one group at most.
     nodes
@@ -117,7 +117,8 @@ class Net:
         ----------
         place
             The name of nodes, the number of a node, a point as a tuple (x, y), a function of the
-            points x (2, n) that returns n truth values, an array of numbers, or a list of these.
+            points x (2, n) that returns n truth values, an array of numbers, an array of points
+            (k, 2), or a list of these.
 
         Raises
         ------
@@ -128,7 +129,7 @@ class Net:
         InputError
             If it is no place.
         """
-        n = self.points.shape[1]
+        n, place = self.points.shape[1], points_of_rows(place)
         if isinstance(place, str):
             if place not in self.nodes:
                 raise NameUnknown("name of nodes", place, self.nodes)
@@ -244,21 +245,17 @@ def mapping_of(name: str, given: Any) -> Mapping[Any, Any]:
 
 
 def _pairs(what, values):
-    """Pairs as an array (2, n)."""
-    if isinstance(values, np.ndarray):
-        out = require_finite(what, values)
-        if out.ndim != 2 or out.shape[0] != 2 or not out.shape[1]:
-            hint = "; give its transpose" if out.ndim == 2 and out.shape[1] == 2 else ""
-            raise InputError(f"{what} as an array have shape (2, n), got {out.shape}{hint}")
-        return out
-    try:
-        rows = [tuple(pair) for pair in values]
-    except TypeError:
-        raise InputError(f"{what} are pairs or an array (2, n), got {shown(values)}") from None
-    odd = [pair for pair in rows if len(pair) != 2]
-    if odd or not rows:
-        raise InputError(f"{what} are pairs, one at least, got {shown(odd[0] if odd else values)}")
-    return require_finite(what, np.array(rows)).T
+    """Pairs, each a row, as an array (2, n)."""
+    found = require_finite(what, list(values) if _is_iterable(values) else values)
+    if found.ndim != 2 or found.shape[1] != 2 or not len(found):
+        hint = "; give its transpose" if found.ndim == 2 and len(found) == 2 else ""
+        raise InputError(f"{what} are pairs, one at least: a list of pairs or an array of shape "
+                         f"(n, 2), got {shown(values)} of shape {found.shape}{hint}")
+    return found.T
+
+
+def _is_iterable(values):
+    return hasattr(values, "__iter__") and not isinstance(values, (np.ndarray, str, Mapping))
 
 
 def _numbers(what, values):
@@ -334,7 +331,7 @@ def net_from_meshio(mesh: Any) -> Net:
             for i, cell in enumerate(block.data):
                 curves[int(first[k]) + i] = _Parabola(points[cell, :2].T)
     groups, nodes = _names(mesh, blocks, first, used)
-    return Net(points[used, :2].T, lines.reshape(-1, 2).T, groups, nodes, curves)
+    return Net(points[used, :2], lines.reshape(-1, 2), groups, nodes, curves)
 
 
 def _names(mesh, blocks, first, used):

@@ -42,6 +42,13 @@ def is_point(place: object) -> bool:
                     for x in place))
 
 
+def points_of_rows(places: Any) -> Any:
+    """A list of points (x, y) for an array with one in each row, shape (n, 2); else what it is."""
+    if isinstance(places, np.ndarray) and places.ndim == 2 and places.shape[1] == 2:
+        return [tuple(point) for point in places.tolist()]
+    return places
+
+
 def is_place(place: object) -> bool:
     """True for one place, False for a tuple of one place for each of several beams."""
     return isinstance(place, (str, np.ndarray)) or callable(place) or is_point(place)
@@ -96,7 +103,7 @@ def facets_of(mesh: Chain, place: Place) -> Array:
     * a function takes points x, shape (2, n), and returns n truth values: the facets with their
       middle there,
     * an array of integers holds numbers of facets,
-    * another tuple, list or set holds places: all of them.
+    * another tuple, list or set holds places: all of them; an array (n, 2) holds n points.
 
     Parameters
     ----------
@@ -126,6 +133,7 @@ def facets_of(mesh: Chain, place: Place) -> Array:
     >>> facets_of(mesh, "right").tolist(), facets_of(mesh, (1, 0)).tolist()
     ([2], [1])
     """
+    place = points_of_rows(place)
     if isinstance(place, str):
         return _named(mesh, place)
     if is_point(place):

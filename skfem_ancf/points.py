@@ -40,7 +40,8 @@ def as_points(points: Any, mesh: MeshBeam | None = None) -> Array:
     Parameters
     ----------
     points
-        Two numbers for one point; an array (2, n), or a list of pairs, for many.
+        Two numbers for one point; for many a list of pairs, or an array (2, n), whose columns are
+        points: those of an array of shape (2, 2) too, as of scikit-fem's ``mesh.p``.
     mesh
         The mesh of the beam, for hints in messages.
 
@@ -60,7 +61,7 @@ def as_points(points: Any, mesh: MeshBeam | None = None) -> Array:
     if isinstance(points, np.ndarray):
         if len(points) == 2:
             return require_finite("points", points)
-        hint = "; give its transpose" if points.shape[1] == 2 else ""
+        hint = "; give its transpose, or a list" if points.shape[1] == 2 else ""
         raise MeshError("an array of points has shape (2, n), the x in its first row and the y in "
                         f"its second, got {points.shape}{hint}")
     if any(np.shape(p) != (2,) for p in points if not _ragged(p)) or any(map(_ragged, points)):

@@ -14,6 +14,7 @@ from .eigenstrain import EigenStrain
 from .fields import Values, find_field
 from .frozen import Frozen
 from .kept import cached_property
+from .parts import Part
 from .points import require_body
 from .recovery import actions, recover
 from .resultants import Resultants, resultants
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from .checks import Checks
     from .joints.base import Joint
     from .obstacles.contact import Contact
-    from .parts import Part
     from .recovery import Recovery
     from .rigid import RigidBody
     from .statics.stability import Verdict
@@ -280,8 +280,8 @@ class State(Frozen):
         Parameters
         ----------
         point
-            A material point, named by its place (x, y) in the stress-free body, or many: an array
-            (2, n), or a list of points; a RigidBody for its centre of mass.
+            A material point, named by its place (x, y) in the stress-free body, or many: a list of
+            points, or an array (2, n) whose columns are points; a RigidBody for its centre of mass.
         beam
             The beam or rigid body, its name or its number; found for each point if it is not given.
 
@@ -404,13 +404,17 @@ class State(Frozen):
         ndarray
             Shape (3, n), or 0.
         """
-        u = self.u_of(part.beam)
+        if not isinstance(part, Part):
+            raise InputError("part must be points of a beam, a skfem_ancf.parts.Part, got "
+                             f"{shown(part)}")
+        u, stress = self.u_of(part.beam), require_flag("stress", stress)
         return sum((load.stress_at(u, part.at, part.e, factor) if stress else
                     factor * load.strain_at(part.at, part.e))[..., 0]
                    for factor, load in self.eigenstrains(part.beam))
 
-    def eigenstrains(self, beam: Beam) -> list[tuple[float, EigenStrain]]:
+    def eigenstrains(self, beam: WhichBeam = None) -> list[tuple[float, EigenStrain]]:
         """Factors and loads of stress-free strains on a beam."""
+        beam = select_beam(self.beams, beam)
         return [(self.load * load.factor(self.t), load) for load in self.system.loads
                 if isinstance(load, EigenStrain) and load.beam is beam]
 
@@ -431,7 +435,7 @@ class State(Frozen):
         """
         return self._recovery_of(self.beams.index(select_beam(self.beams, beam)))
 
-    def balance(self, beam: Beam) -> Recovery | None:
+    def balance(self, beam: WhichBeam = None) -> Recovery | None:
         """The :class:`~skfem_ancf.recovery.Recovery` with the section forces of a beam, or None.
 
         A section given by numbers has these, but no fields.
@@ -439,9 +443,9 @@ class State(Frozen):
         Parameters
         ----------
         beam
-            One of the beams.
+            The beam, its name or its number, in a scene of several.
         """
-        return self._recovery_of(self.beams.index(beam), fields=False)
+        return self._recovery_of(self.beams.index(select_beam(self.beams, beam)), fields=False)
 
     def _recovery_of(self, k, fields=True):
         if k not in self._recoveries:

@@ -48,9 +48,10 @@ class RigidBody(Frozen):
     name
         What messages call the body.
     outline
-        Corners of a polygon in its own frame, from the centre of mass, shape (2, n) or a list of
-        points: for pictures and files, and to find which body a point is in. By default the square
-        whose plate of constant thickness has this mass and inertia.
+        Corners of a polygon in its own frame, from the centre of mass: a list of points, or an
+        array of shape (n, 2), or (2, n) as the attribute has it. For pictures and files, and to
+        find which body a point is in. By default the square whose plate of constant thickness has
+        this mass and inertia.
 
     Raises
     ------
@@ -268,7 +269,9 @@ class RigidBody(Frozen):
         x
             Places at the start, shape (2, ...).
         """
-        x = np.asarray(x, dtype=float)
+        x = require_finite("x", x)
+        if x.ndim < 1 or len(x) != 2:
+            raise InputError(f"x must have shape (2, ...), got {x.shape}")
         return np.tensordot(self._frame.T, x - self.position.reshape((2,) + (1,) * (x.ndim - 1)), 1)
 
     def probe(self, at: Any) -> tuple[Array, Array]:
@@ -295,7 +298,7 @@ class RigidBody(Frozen):
         x
             Places at the start, shape (2, n).
         """
-        p = self.local(x).T
+        p = self.local(require_finite("x", x, (2, None))).T
         corners = self.outline.T
         inside, near = np.zeros(len(p), dtype=bool), np.zeros(len(p), dtype=bool)
         for a, b in zip(corners, np.roll(corners, -1, axis=0)):
@@ -359,11 +362,11 @@ def _square(mass, inertia):
 
 
 def _polygon(outline):
-    if isinstance(outline, (list, tuple)) and len(outline) != 2:
-        points = require_finite("outline", outline, (None, 2)).T
-    else:
-        points = require_finite("outline", outline, (2, None))
-    if points.shape[1] < 3 or not np.max(np.hypot(*points)) > 0.0:
+    points = require_finite("outline", outline)
+    if points.ndim == 2 and points.shape[1] == 2:  # of three corners (2, n) has more columns
+        points = points.T
+    if points.ndim != 2 or len(points) != 2 or points.shape[1] < 3 or not np.any(points):
         raise InputError("an outline is a polygon of three corners at least, from the centre of "
-                         f"mass, of shape (2, n) or a list of points, got {shown(outline)}")
+                         "mass: a list of points, or an array of shape (n, 2), got "
+                         f"{shown(outline)}")
     return points

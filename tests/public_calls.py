@@ -41,6 +41,7 @@ BAD = {
     "True": True, "None": None, "'1.0'": "1.0", "'text'": "text", "''": "", "b'1'": b"1",
     "1j": 1j, "object()": object(), "[]": [], "[99]": [99], "{}": {}, "set": {1.0},
     "[1.0, 2.0, 3.0]": [1.0, 2.0, 3.0], "['0', '1']": ["0", "1"], "ragged": [[1.0, 2.0], [3.0]],
+    "ragged pair": [[0.0, 0.0], [1.0, [2.0, 3.0]]], "lone surrogate": "a\ud800b.vtu",
     "[10**400, 0]": [10**400, 0], "[nan, 0]": [float("nan"), 0.0], "[1j, 0]": [1j, 0.0],
     "[None, None]": [None, None], "[True, False]": [True, False],
     "zeros(2, 2, 2)": np.zeros((2, 2, 2)), "object array": np.array([object(), object()]),
@@ -105,7 +106,8 @@ WORDS = {
     "fields": "field", "dr": "derivative", "factors": "factor|body", "filename": "file|read|write",
     "shear_correction": "shear correction", "t_start": "t_eval", "radius": "joints",
     "t_end": "times", "adapt": "max_elements", "function": "function|the field 'f'",
-    "side": "place|facet|boundary|point", "between": "point of a spring", "other": "beam|place",
+    "side": "place|facet|boundary|point", "between": "point of a spring|beam",
+    "other": "beam|place",
     "first": "point|beam", "second": "point|beam", "body": "rigid bod|beam", "beams": "[Bb]eam",
     "on": "beam|direction|point", "torque": "torque|amplitude",
 }
@@ -534,6 +536,31 @@ call("joint slot", lambda **k: joined("slot", clamped, **k),
      name="label?")
 call("state.angle", lambda **k: Scene(beam(), RigidBody(1.0, 1.0)).state().angle(**k),
      dict(body=1), body="other")
+
+
+def with_body():
+    """A beam and a rigid body beside it."""
+    return Scene(beam(), RigidBody(1.0, 1.0, (5.0, 5.0))).clamp("left")
+
+
+for _name in ("point_force", "follower_force"):
+    call(f"scene.{_name}, body", lambda _name=_name, **k: moved(
+        getattr(with_body(), _name)((0.0, -0.1), **k)), dict(at=(1.0, 0.0), beam=None),
+         at="vector", beam="beam?")
+call("scene.point_mass, body", lambda **k: moved(with_body().point_mass(1.0, **k)),
+     dict(at=(1.0, 0.0), beam=0), at="vector", beam="beam?")
+for _name in ("moment", "pressure"):
+    call(f"scene.{_name}, body", lambda _name=_name, **k: moved(getattr(with_body(), _name)(**k)),
+         dict(boundary="right", beam=0, **{"M" if _name == "moment" else "p": 0.1}),
+         boundary="facets", beam="beam?")
+for _name in ("displacement", "position", "velocity", "strain", "stress", "resultants"):
+    _at = "at" if _name == "resultants" else "point"
+    call(f"state.{_name}, body", lambda _name=_name, **k: getattr(with_body().state(), _name)(
+        **k), {_at: (1.0, 0.0), "beam": 0}, **{_at: f"vector{'?' * (_at == 'at')}"}, beam="beam?")
+call("state.field, body", lambda **k: with_body().state().field("S_xx", **k),
+     dict(point=(1.0, 0.0), beam=None), point="vector", beam="beam?")
+call("scene.sensor, body", lambda **k: with_body().sensor("s", "displacement", **k),
+     dict(at=(1.0, 0.0), beam=None), at="vector", beam="beam?")
 call("scene.gravity", lambda **k: moved(clamped().gravity(**k)),
      dict(g=(0.0, -1.0), beam=0, amplitude=amplitude), g="vector", beam="beam?",
      amplitude="function?")
@@ -646,6 +673,12 @@ for _name in ("strain", "stress"):
          lambda _name=_name, **k: getattr(state(), _name)((1.0, 0.0), **k),
          dict(recover=False), recover="flag")
 call("state.recovery", lambda **k: state().recovery(**k), dict(beam=0), beam="beam?")
+for _name in ("balance", "eigenstrains"):
+    call(f"state.{_name}", lambda _name=_name, **k: getattr(state(), _name)(**k), dict(beam=0),
+         beam="beam?")
+call("state.eigen", lambda **k: state().eigen(**k), dict(
+    part=state().system.points.find([(1.0, 0.0)]).parts[0], stress=False), part="other",
+     stress="flag")
 call("scene.state", lambda **k: loaded_once().state(**k),
      dict(u=np.zeros(beam().N), multipliers=None, load=1.0),
      {"multipliers": {"[]": "there are none"}}, u="other?", multipliers="other?", load="number")

@@ -510,6 +510,23 @@ def test_bad_bodies(options, what):
         RigidBody(**{"mass": 1.0, "inertia": 1.0, **options})
 
 
+@pytest.mark.parametrize("corners", [[(0, 0), (2, 0), (0, 1)], [(0, 0), (2, 0), (2, 1), (0, 1)]])
+def test_rows_of_an_outline_are_its_corners(corners):
+    for outline in (corners, np.array(corners), np.transpose(corners)):
+        body = RigidBody(1.0, 1.0, outline=outline)
+        assert_allclose(body.outline.T, corners, rtol=0, atol=0)
+        assert body.contains(np.array([[0.5, 0.5], [0.25, 1.5]])).tolist() == [True, False]
+
+
+def test_a_force_on_no_point_is_refused_beside_a_body():
+    """It was a ValueError of NumPy."""
+    scene = mechanism()
+    for at in (1, [1], (1, 2, 3), {}, np.zeros((2, 2)), object()):
+        for add in (scene.point_force, scene.follower_force):
+            with pytest.raises(MeshError, match="a material point has two coordinates"):
+                add((0, -1), at=at)
+
+
 def test_a_body_does_not_change():
     body = RigidBody(1.0, 2.0)
     with pytest.raises(ImmutableError):

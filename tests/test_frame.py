@@ -36,8 +36,8 @@ def square(n, size=1.0, **options):
     number = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
     y, x = np.divmod(number.ravel(), n + 1)
     lines = np.hstack([[number[:-1].ravel(), number[1:].ravel()],
-                       [number[1:, :-1].ravel(), number[1:, 1:].ravel()]])
-    return Frame.from_lines(size * np.array([x, y]), lines, **{
+                       [number[1:, :-1].ravel(), number[1:, 1:].ravel()]]).T
+    return Frame.from_lines(size * np.column_stack([x, y]), lines, **{
         "nodes": {"ground": number[0], "side": number[1:, 0]}, "height": H, "width": H,
         "material": STEEL, **options}).clamp("ground")
 
@@ -205,7 +205,7 @@ def test_any_frame_is_that_with_multipliers_as_unknowns(seed, monkeypatch):
     found = []
     for condensed in (System.condensed, None):
         monkeypatch.setattr(System, "condensed", condensed)
-        frame = Frame.from_lines(points, lines, height=H, width=H, material=STEEL, **options)
+        frame = Frame.from_lines(points.T, lines, height=H, width=H, material=STEEL, **options)
         frame.clamp([0, 1]).pin(2).point_force((300.0, -500.0), at=[6, 8]).moment(7, 40.0)
         state = frame.line_load((0, -200.0), beam="a").solve_static(tol=1e-11)
         found.append((state, state.reactions([0, 1, 2])))
@@ -908,13 +908,42 @@ def test_memory_is_linear():
     (*PORTAL, {"elements": 0}, InputError, "elements must be an integer from 1"),
     (*PORTAL, {"height": None}, InputError, "height must be a number"),
     (*PORTAL, {"curves": {0: lambda s: np.array([s, s])}}, MeshError, "curve of line 0 runs from"),
-    ("text", PORTAL[1], {}, InputError, "points are pairs"),
-    (np.zeros((4, 2)), PORTAL[1], {}, InputError, "transpose"),
+    ("text", PORTAL[1], {}, InputError, "points must be an array"),
+    (np.zeros((2, 4)), PORTAL[1], {}, InputError, "transpose"),
+    (PORTAL[0], np.transpose(PORTAL[1]), {}, InputError, "transpose"),
+    ([(0, 0), (1, [2, 3])], [(0, 1)], {}, InputError, "points must be an array of numbers"),
+    ([(0, 0), (1, 0, 2)], [(0, 1)], {}, InputError, "points must be an array of numbers"),
+    (PORTAL[0], [(0, 1), (1, [2, 3])], {}, InputError, "lines must be an array of numbers"),
     (PORTAL[0], [(0, 0.5)], {}, InputError, "lines are numbers of points"),
 ])
 def test_lines_that_make_no_frame(points, lines, options, error, message):
     with pytest.raises(error, match=message):
         Frame.from_lines(points, lines, **{"material": STEEL, "height": H, "width": H, **options})
+
+
+@pytest.mark.parametrize("points, lines", [
+    ([(0, 0), (2, 1)], [(0, 1)]), ([(0, 0), (2, 0), (0, 1), (2, 1)], [(0, 1), (2, 3)]), PORTAL])
+def test_rows_of_arrays_are_points_and_lines_as_in_lists(points, lines):
+    options = {"material": STEEL, "height": H, "width": H}
+    a = Frame.from_lines(points, lines, **options)
+    for b in (Frame.from_lines(np.array(points), np.array(lines), **options),
+              Frame.from_lines(np.array(points, dtype=float), lines, **options),
+              Frame.from_lines(points, np.array(lines), **options)):
+        assert b.points.T.tolist() == a.points.T.tolist() == [list(map(float, p)) for p in points]
+        assert b.net.lines.T.tolist() == a.net.lines.T.tolist() == [list(pair) for pair in lines]
+        assert_allclose(b.beams[0].mesh.p, a.beams[0].mesh.p, rtol=0, atol=1e-12)
+
+
+def test_rows_of_arrays_are_hinges_nodes_and_places():
+    options = {"material": STEEL, "height": H, "width": H}
+    pairs = [(0, 1), (1, 2)]
+    tips = []
+    for hinges in (pairs, [list(pair) for pair in pairs], np.array(pairs)):
+        frame = Frame.from_lines(*PORTAL, hinges=hinges, **options).clamp([0, 3])
+        tips.append(frame.point_force((100.0, 0.0), at=1).solve_static().displacement((0, 1)))
+    assert_allclose(tips, [tips[0]] * 3, rtol=1e-9)
+    assert frame.nodes(np.array(PORTAL[0])[[0, 3]]).tolist() == [0, 3]
+    assert frame.nodes(np.array(PORTAL[0], dtype=float)[[2, 1]]).tolist() == [1, 2]
 
 
 def test_what_is_not_held_is_said():

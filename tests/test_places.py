@@ -29,9 +29,25 @@ def beam(mesh=None, element=None, **options):
     (np.array([1, 0]), [1, 0]), (np.array([3]), [3]), (np.array([12], dtype=np.uint8), [12]),
     (lambda x: x[0] > 1.9, [4]), (lambda x: x[1] > 0.04, [9, 10, 11, 12]),
     (("left", "right"), [0, 4]), ([(0, 0), (1, 0)], [0, 2]), ({"left"}, [0]),
+    (np.array([[0.0, 0.0], [1.0, 0.0]]), [0, 2]), (np.array([[0, 0], [1, 0], [2, 0]]), [0, 2, 4]),
 ])
 def test_the_rule(place, facets):
     assert_array_equal(facets_of(line(), place), facets)
+
+
+def test_rows_of_an_array_are_points():
+    a, b = beam(name="a"), beam(line(origin=(2, 0)), name="b")
+    for at in ([(2, 0), (2, 0)], np.array([[2, 0], [2, 0]])):
+        joint = Scene(a, b).joint("hinge", beams=("a", "b"), at=at)
+        assert joint.equations == ("force along x", "force along y")
+    ends = [(2, 0), (2, 1)]
+    state = [Scene(a).clamp("left").spring(1e3, between).gravity((0, -1.0)).solve_static()
+             for between in (ends, np.array(ends))]
+    assert_allclose(state[1].displacement((2, 0)), state[0].displacement((2, 0)), rtol=1e-12)
+    graded = [line().graded(at) for at in ([(0, 0), (1, 0)], np.array([[0, 0], [1, 0]]))]
+    assert_allclose(graded[1].p, graded[0].p, rtol=0, atol=1e-14)
+    with pytest.raises(InputError, match="more than 16777216 elements"):
+        line().graded(size=1e-300)
 
 
 @pytest.mark.parametrize("place, error, message", [

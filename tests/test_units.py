@@ -132,8 +132,8 @@ def test_joints_that_are_open_at_the_start_are_told(L):
 def side_by_side(k, L=1.0, origin=(0.0, 0.0), order=slice(None)):
     """A frame of k equal cantilevers, 0.001 L apart, under the same forces at their tips."""
     x, y = np.meshgrid(L * np.array([0.0, 1.0]), 1e-3 * L * np.arange(k))
-    lines = np.arange(2 * k).reshape(k, 2)[order].T
-    return Frame.from_lines(np.array([x.ravel(), y.ravel()]) + np.reshape(origin, (2, 1)), lines,
+    lines = np.arange(2 * k).reshape(k, 2)[order]
+    return Frame.from_lines(np.column_stack([x.ravel(), y.ravel()]) + origin, lines,
                             height=0.1 * L, width=0.1 * L, elements=2,
                             material=StVenantKirchhoff(1e6 * L * L, 0.3, 1000.0)).clamp(
         np.arange(0, 2 * k, 2)).point_force((0.0, -20.0 * L**4), at=np.arange(1, 2 * k, 2))

@@ -36,12 +36,12 @@ class Square:
 
 
 def net(cells):
-    """Points (2, n), lines (2, m), and the numbers of the nodes by storey and axis."""
+    """Points (n, 2), lines (m, 2), and the numbers of the nodes by storey and axis."""
     number = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
     y, x = np.divmod(number.ravel(), cells + 1)
     lines = np.hstack([[number[:-1].ravel(), number[1:].ravel()],
                        [number[1:, :-1].ravel(), number[1:, 1:].ravel()]])
-    return np.array([x, y], dtype=float), lines, number
+    return np.array([x, y], dtype=float).T, lines.T, number
 
 
 def force(cells):
@@ -81,10 +81,10 @@ def exudyn_system(cells, elements, nodes, part=1.0):
     def add_node(p):
         return mbs.AddNode(items.NodeRigidBody2D(referenceCoordinates=[*p, 0.0]))
 
-    corners = [add_node(p) for p in points.T]
+    corners = [add_node(p) for p in points]
     parts = elements * (nodes - 1)
-    for i, j in lines.T:
-        a, d = points[:, i], points[:, j] - points[:, i]
+    for i, j in lines:
+        a, d = points[i], points[j] - points[i]
         chain = [corners[i], *(add_node(a + k / parts * d) for k in range(1, parts)), corners[j]]
         for k in range(0, parts, nodes - 1):
             mbs.AddObject(items.ObjectBeamGeometricallyExact2D(

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InputError, require_finite_scalar, require_not_negative, shown, teaching
 from ..joints.base import GROUND, Vector, both_of, named_place, point, section
+from ..places import points_of_rows
 from ..rigid import RigidBody, on_body
 from .base import ForceElement, Link, Part, difference, link
 from .laws import Law, force_of, number_or_law, potential_of, said, slope_of, work_of
@@ -63,6 +64,7 @@ class Spring(ForceElement):
         self.k = number_or_law("k", k, "elongation")
         self.damping = number_or_law("damping", damping, "rate")
         self.length = None if length is None else require_not_negative("length", length, False)
+        between = points_of_rows(between)
         if not isinstance(between, (tuple, list)) or len(between) != 2:
             raise InputError("between must be two places, as ((1, 0), (1, 0.5)), got "
                              f"{shown(between)}")

@@ -6,7 +6,7 @@ import logging
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
-from ..errors import require_options, require_path, teaching
+from ..errors import require_options, require_path, require_text, teaching
 from ..fields import find_fields
 from ..obstacles.pictures import obstacles_of
 from .vtu import replacing, require_next, save_frame
@@ -62,6 +62,7 @@ class PvdWriter:
 
     def __init__(self, filename: StrPath, **options: Any) -> None:
         self.path = require_path("filename", filename, (".pvd",))
+        require_text("filename", self.path.name)  # names of frames are written in Unicode
         self.options = require_options("PvdWriter", options,
                                        ("subdivide", "lagrange", "undeformed", "recover",
                                         "fields", "precision", "encoding"))

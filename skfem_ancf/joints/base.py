@@ -12,7 +12,7 @@ from ..errors import (AncfError, InputError, MeshError, require_finite, require_
 from ..frozen import Sealable
 from ..loads import beside, require_entries
 from ..origin import ours
-from ..places import as_point, is_place, is_point
+from ..places import as_point, is_place, is_point, points_of_rows
 from ..rigid import RigidBody
 
 if TYPE_CHECKING:
@@ -581,6 +581,8 @@ def members_at(layout: Layout, at: ArrayLike) -> list[int]:
         The place (x, y) in the stress-free state, shape (2,), or the name of an end.
     """
     found = []
+    if not isinstance(at, str):
+        at = as_point(at)
     for k, member in enumerate(layout.members):
         if isinstance(member, RigidBody):
             if not isinstance(at, str) and member.contains(np.reshape(at, (2, 1)))[0]:
@@ -722,7 +724,7 @@ def each(value: Any, what: str, n: int) -> tuple[Any, ...]:
     Parameters
     ----------
     value
-        One place, or a tuple or list of n.
+        One place, or n of them: a tuple, a list, or the rows of an array of points, shape (n, 2).
     what
         What it is, for messages.
     n
@@ -730,6 +732,7 @@ def each(value: Any, what: str, n: int) -> tuple[Any, ...]:
     """
     if value is None:
         raise InputError(f"a joint needs {what}")
+    value = points_of_rows(value)
     if is_place(value):
         return (value,) * n
     if isinstance(value, (tuple, list)) and len(value) == n:
