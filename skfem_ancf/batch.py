@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from contextvars import copy_context
 from functools import partial
 from queue import SimpleQueue
 from threading import Lock
@@ -106,11 +107,11 @@ class Lane:
         args = self._target, self._rules, self._x, self._room, self._record, members
         with np.errstate(all="ignore"):  # what overflows is seen in the residual
             with _LOCK:
-                run, equations = self._machine.of(equilibrium)
+                run = self._machine.of(equilibrium)
                 if equilibrium.__name__ not in compiled.LOADED:
-                    run(equations, *args)
+                    run(*args)
                     return found
-            run(equations, *args)
+            run(*args)
         return found
 
 
@@ -511,7 +512,7 @@ def _spread(batch, threads):
 
     chunks = np.array_split(np.arange(n), -(-n // CHUNK))
     with ThreadPoolExecutor(threads) as pool:
-        flying = {pool.submit(solve, chunk) for chunk in chunks}
+        flying = {pool.submit(copy_context().run, solve, chunk) for chunk in chunks}
         try:
             while flying:
                 done, flying = wait(flying, return_when=FIRST_COMPLETED)

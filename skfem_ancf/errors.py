@@ -190,6 +190,10 @@ class CheckpointWarning(UserWarning):
     """
 
 
+class CompilationWarning(UserWarning):
+    """Compiled code cannot be kept on disk: each process compiles anew."""
+
+
 class SweepWarning(UserWarning):
     """Members of a sweep failed; the others are there."""
 

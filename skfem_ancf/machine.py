@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import logging
-import time
-from contextlib import AbstractContextManager, contextmanager, nullcontext
-from functools import wraps
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,11 +15,11 @@ from .kept import cached_property, twin_of
 from .kernels.law import with_text
 from .kernels.section import SectionPack
 from .materials.followed import NotFollowed
-from .progress import progress_bar
-from .switch import compiled_off, wanted
+from .progress import announced_bar
+from .switch import compiled_off, expected, wanted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator
 
 logger = logging.getLogger(__name__)
 
@@ -33,18 +31,10 @@ COMPILING = {"common": 3.0, "kernels": 0.8, "SectionPack": 2.3, "CablePack": 1.2
 WHERE_USED = {"collocate": 5.6}
 LOADING = 0.7
 SECONDS = {**COMPILING, **WHERE_USED}
-
-
-def compiling(name: str, parts: Sequence[str]) -> float:
-    """Seconds that compiling a text takes, about, with the kernels that are not there yet.
-
-    Parameters
-    ----------
-    name, parts
-        Keys of :data:`COMPILING`: the text, and the kernels of a scene.
-    """
-    return SECONDS[name] + sum(COMPILING[part] for part in parts
-                                 if part not in compiled.KNOWN and not compiled.on_disk(part))
+#: Seconds that NumPy takes for an iteration, about, and what each element adds to them.
+ITERATION, ELEMENT = 1e-3, 1.2e-5
+#: How many tasks of one size code that is kept on disk is assumed to serve.
+SERVES = 5
 
 
 class Choice(NamedTuple):
@@ -54,38 +44,17 @@ class Choice(NamedTuple):
     reason: str
 
 
-class _Clock:
-    """Seconds that plain texts have taken in this process."""
-
-    def __init__(self):
-        self.spent = 0.0
-
-    def timed(self, text):
-        """The text, its time added up."""
-        @wraps(text)
-
-        def run(*args):
-            begun = time.perf_counter()
-            try:
-                with np.errstate(all="ignore"):  # what overflows is seen in the residual
-                    return text(*args)
-            finally:
-                self.spent += time.perf_counter() - begun
-
-        return run
-
-
 _IS_LOADED = Choice("loaded", "compiled code is loaded")
-#: Of the process: what it has spent on one scene says that others will follow.
-CLOCK = _Clock()
 
 
 class Machine:
     """Runs the texts of a system.
 
-    A scene begins in NumPy. What is compiled already in this process is used at once; what lies on
-    disk, once NumPy has taken as long as loading it would take; what has to be compiled, once it
-    has taken as long as that: so no run takes more than twice the time of the better choice.
+    The size of the task decides, which is known before it starts: the iterations that are expected,
+    see :func:`~skfem_ancf.switch.expecting`, and the number of elements. What is compiled already
+    in this process is used at once. What lies on disk is loaded for a task for which NumPy would
+    take longer than loading takes. What has to be compiled first is compiled, and kept on disk,
+    for a task that pays for it in :data:`SERVES` runs.
 
     Parameters
     ----------
@@ -166,25 +135,46 @@ class Machine:
                            "skfem_ancf.materials.TextMaterial")
 
     def _chosen(self, name):
-        loaded = name in compiled.LOADED and not compiled.PROBLEMS
-        if loaded and self._plain is None and wanted() != "0":
+        missing = self._missing(name)
+        if not missing and not compiled.PROBLEMS and self._plain is None and wanted() != "0":
             return _IS_LOADED
         if self._off is not None:
             return Choice("plain", self._off)
-        parts = self.tables.parts
-        seconds = compiling(name, parts)
         if wanted() == "1":
             return Choice("compiled", "SKFEM_ANCF_COMPILED=1")
-        if compiled.on_disk(name, *parts):
-            if CLOCK.spent >= LOADING:
-                return Choice("compiled", "compiled code lies on disk")
-            return Choice("plain", f"NumPy has taken {CLOCK.spent:.2g} s so far, loading the "
-                          f"compiled code from disk takes about {LOADING:g} s")
-        if CLOCK.spent >= seconds:
-            return Choice("compiled", f"NumPy has taken {CLOCK.spent:.3g} s, compiling takes "
-                          f"about {seconds:g} s")
-        return Choice("plain", f"NumPy has taken {CLOCK.spent:.2g} s so far, compiling would take "
-                      f"about {seconds:g} s; python -m skfem_ancf.compiled does it beforehand")
+        if missing == ["evaluate"]:
+            return Choice("compiled", "what it calls is loaded")
+        work = self.seconds(expected())
+        if work < LOADING:
+            return Choice("plain", f"NumPy takes about {work:.2g} s for {_iterations()}, loading "
+                          f"compiled code {LOADING:g} s and more")
+        missing = [part for part in missing if not compiled.on_disk(part)]
+        if not missing:
+            return Choice("compiled", f"compiled code lies on disk, NumPy would take about "
+                          f"{work:.2g} s for {_iterations()}")
+        seconds, times = compiling(missing), SERVES if compiled.can_keep() else 1
+        if times * work >= seconds:
+            return Choice("compiled", f"compiling takes about {seconds:.2g} s once, NumPy would "
+                          f"take about {work:.2g} s for {_iterations()}")
+        return Choice("plain", f"NumPy takes about {work:.2g} s for {_iterations()}, compiling "
+                      f"would take about {seconds:.2g} s; python -m skfem_ancf.compiled does it "
+                      "beforehand")
+
+    def _missing(self, name):
+        """What of a text and of what it calls this process has not loaded."""
+        missing = [part for part in self.tables.parts if part not in compiled.KNOWN]
+        return missing if name in compiled.LOADED else [*missing, name]
+
+    def seconds(self, iterations: float) -> float:
+        """How long NumPy takes for so many iterations, about.
+
+        Parameters
+        ----------
+        iterations
+            Their number.
+        """
+        beams = self.tables.system.beams
+        return iterations * (ITERATION + ELEMENT * sum(beam.mesh.nelements for beam in beams))
 
     def room(self, make: Callable, *sizes: int) -> Any:
         """Work arrays of a text, made once.
@@ -200,74 +190,111 @@ class Machine:
             self._rooms[make.__name__] = make(self.tables.plain, *sizes)
         return self._rooms[make.__name__]
 
-    def of(self, text: Callable) -> tuple[Callable, Any]:
-        """The function of a text, plain or compiled, and the equations that it takes."""
-        name = text.__name__
-        if _too_early(name) or self.choose(name).way == "plain":
-            return CLOCK.timed(text), self.tables.plain
-        try:
-            equations = vars(self.tables).get("flat") or self._flattened()
-        except compiled.TextProblem as error:
-            self._plain = str(error)
-            logger.info(self._plain)
-            return CLOCK.timed(text), self.tables.plain
-        except Exception as error:  # of a Numba that is not as those that are known
-            return _given_up(text, error), self.tables.plain
+    def of(self, text: Callable) -> Callable:
+        """The function of a text for its equations, plain or compiled: it takes all but these.
+
+        Parameters
+        ----------
+        text
+            Its first argument takes the equations.
+        """
+        if self.choose(text.__name__).way == "plain":
+            return self._in_numpy(text)
 
         def run(*args):
             try:
-                function = _load(text, args)
-            except Exception as error:
-                return _given_up(text, error)(self.tables.plain, *args[1:])
-            return function(*map(self._kept, args))
+                function, equations = self._load(text, args)
+            except compiled.TextProblem as error:
+                self._plain = str(error)
+                logger.info(self._plain)
+                return self._in_numpy(text)(*args)
+            except Exception as error:  # of a Numba that is not as those that are known
+                compiled.PROBLEMS.append(
+                    f"Numba cannot be used: {error}" if isinstance(error, ImportError) else
+                    f"{text.__name__} cannot be compiled: {error!r}")
+                logger.warning("%s; it runs in NumPy", compiled.PROBLEMS[-1])
+                return self._in_numpy(text)(*args)
+            return function(equations, *map(self._kept, args))
 
-        return run, equations
+        return run
 
-    def _flattened(self):
-        """The equations that compiled texts take, made for the first time."""
-        new = [part for part in self.tables.parts if part not in compiled.KNOWN]
-        with _announced(new) if new else _SILENT:
-            return self.tables.flat
+    def _in_numpy(self, text):
+        def run(*args):
+            with np.errstate(all="ignore"):  # what overflows is seen in the residual
+                return text(self.tables.plain, *args)
 
+        return run
 
-def _too_early(name):
-    """True if NumPy has taken less time than anything else: what lies on disk is not looked for."""
-    return (name not in compiled.LOADED and CLOCK.spent < min(LOADING, SECONDS[name])
-            and wanted() != "1")
-
-
-def _given_up(text, error):
-    """The plain text, in place of one that cannot be compiled; nor is any other from now on."""
-    compiled.PROBLEMS.append(
-        f"Numba cannot be used: {error}" if isinstance(error, ImportError) else
-        f"{text.__name__} cannot be compiled: {error!r}")
-    logger.warning("%s; it runs in NumPy", compiled.PROBLEMS[-1])
-    return CLOCK.timed(text)
-
-
-def _load(text, args):
-    """The compiled function; says so where that takes long."""
-    name = text.__name__
-    if name not in compiled.LOADED:
-        with _announced([name]):
-            compiled.load(text, args)
-    return compiled.LOADED[name]
-
-
-#: Nothing is said.
-_SILENT: AbstractContextManager[None] = nullcontext()
+    def _load(self, text, args):
+        """The compiled function and the equations that it takes; says so where that takes long."""
+        name = text.__name__
+        flat = vars(self.tables).get("flat")
+        if flat is None or name not in compiled.LOADED:
+            with announced(self._missing(name)) as update:
+                for part in self.tables.parts:
+                    compiled.address(part)
+                    update(part)
+                flat = self.tables.flat
+                if name not in compiled.LOADED:
+                    compiled.load(text, (flat, *args))
+                    update(name)
+        return compiled.LOADED[name], self._kept(flat)
 
 
-def _announced(names: Sequence[str]) -> AbstractContextManager[None]:
-    """Say what is compiled, if it is not there."""
-    names = [name for name in names if not compiled.on_disk(name)]
-    return _saying(names) if names else _SILENT
+def compiling(names: Iterable[str]) -> float:
+    """Seconds that compiling takes, about.
+
+    Parameters
+    ----------
+    names
+        Keys of :data:`SECONDS`: texts and what they call.
+    """
+    return sum(SECONDS[name] for name in names)
+
+
+def _iterations():
+    n = expected()
+    return "one evaluation" if n <= 1 else f"{n:.3g} iterations"
+
+
+#: True while it is said that something is compiled.
+_announced = False
 
 
 @contextmanager
-def _saying(names: Sequence[str]) -> Iterator[None]:
-    said = f"compiling once, about {sum(SECONDS[name] for name in names):g} s, kept on disk"
-    logger.info("%s: %s", ", ".join(names), said)
-    with progress_bar(None, 1.0, said) as bar:
-        yield
-        bar.update(1.0)
+def announced(names: Iterable[str]) -> Iterator[Callable[[str], None]]:
+    """Say on stderr what is compiled, about how long it takes, and how far it is.
+
+    Parameters
+    ----------
+    names
+        Keys of :data:`SECONDS`. Of those on disk nothing is said.
+
+    Yields
+    ------
+    function
+        Of the name of what is done.
+    """
+    global _announced
+    names = {name for name in names if not compiled.on_disk(name)}
+    if not names or _announced:
+        yield _nothing
+        return
+    said = (f"compiling once, about {compiling(names):.2g} s, kept in {compiled.folder()}"
+            if compiled.can_keep() else f"compiling, about {compiling(names):.2g} s")
+    logger.info("%s: %s", ", ".join(sorted(names)), said)
+    _announced = True
+    try:
+        with announced_bar(compiling(names), f"skfem_ancf: {said}") as bar:
+            def update(name):
+                if name in names:
+                    names.discard(name)
+                    bar.update(SECONDS[name])
+
+            yield update
+    finally:
+        _announced = False
+
+
+def _nothing(name):
+    """Nothing is said."""

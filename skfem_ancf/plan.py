@@ -8,11 +8,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .dynamics.choice import choose_scheme
+from .dynamics.run import ITERATIONS as OF_STEP
 from .eigenstrain import EigenStrain
 from .errors import NameUnknown, require_option
 from .origin import ours
+from .statics.newton import ITERATIONS as OF_STATICS
+from .switch import expecting
 
 KINDS = ("static", "linear", "dynamic")
+#: Steps of a motion of which it is said whether they are compiled: how many there will be is not
+#: known.
+STEPS = 1000
 
 
 class Item(NamedTuple):
@@ -128,9 +134,10 @@ def _solution(scene, kind):
     if linear:
         yield "compiled loop", "skipped", "one solve"
     else:
-        way, reason = s.machine.choose("steps" if dynamic else "equilibrium")
+        with expecting(STEPS * OF_STEP if dynamic else OF_STATICS):
+            way, reason = s.machine.choose("steps" if dynamic else "equilibrium")
         yield "compiled loop", "skipped" if way == "plain" else "computed", (
-            f"whole {'time steps, in blocks' if dynamic else 'iterations'}: {reason}")
+            f"whole {f'time steps, in blocks, of {STEPS}' if dynamic else 'iterations'}: {reason}")
     if kind == "static":
         alone = s.machine.tables.alone
         yield "sweep", "skipped" if alone else "computed", (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from .errors import InputError, MissingExtra, shown
@@ -53,3 +54,42 @@ def _bar(show: bool | None, total: float, desc: str) -> Iterator[Any]:
     with tqdm(total=total, desc=desc, delay=0.0 if show else 1.0,
               bar_format="{l_bar}{bar}| {n:.3g}/{total:.3g} [{elapsed}]") as bar:
         yield bar
+
+
+@contextmanager
+def announced_bar(total: float, desc: str) -> Iterator[Any]:
+    """A bar with ``update(amount)`` for work that is always announced, on stderr.
+
+    On a terminal it is a bar, if tqdm is installed; else one line for each update.
+
+    Parameters
+    ----------
+    total
+        The amount at the end.
+    desc
+        What is done; the first line.
+    """
+    if sys.stderr is None:  # a program without a console
+        yield _NoBar()
+        return
+    print(desc, file=sys.stderr, flush=True)
+    if sys.stderr.isatty() and find_spec("tqdm") is not None:
+        from tqdm import tqdm
+
+        with tqdm(total=total, bar_format="{percentage:3.0f}%|{bar}| [{elapsed}]") as bar:
+            yield bar
+    else:
+        yield _Lines(total)
+
+
+class _Lines:
+    """A bar as lines, for output that goes to a file."""
+
+    def __init__(self, total: float) -> None:
+        self.total, self.done = total, 0.0
+
+    def update(self, amount: float) -> None:
+        """A line more."""
+        self.done += amount
+        part = self.done / self.total
+        print(f"{'#' * round(40 * part):-<40} {part:.0%}", file=sys.stderr, flush=True)

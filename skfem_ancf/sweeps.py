@@ -18,6 +18,7 @@ from .batch import solve_together, threads_of
 from .members import Sweep, column_of, require_plain
 from .progress import progress_bar
 from .readings import Readings, measured
+from .switch import expecting
 from .workers import Task, here, in_processes, on_cluster, sendable
 
 if TYPE_CHECKING:
@@ -139,7 +140,8 @@ def sweep(build: Callable[..., Any],
     task, places = Task(build, measure), record.places
     source = _source(task, members, places, workers, client, record)
     try:
-        with progress_bar(progress, len(members), "members") as bar, closing(source):
+        with (progress_bar(progress, len(members), "members") as bar, closing(source),
+              expecting(len(places))):
             bar.update(len(members) - len(places))
             for chunk, found in source:
                 record.add(chunk, found)

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from importlib.util import find_spec
+from typing import TYPE_CHECKING
 
 from .errors import InputError
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 #: Environment variable: "0" leaves Numba out, as if it were not installed; "1" compiles at once;
-#: "auto", the default, where it pays.
+#: "auto", the default, for tasks that are large enough.
 VARIABLE = "SKFEM_ANCF_COMPILED"
 
 
@@ -25,8 +31,41 @@ def wanted() -> str:
     value = os.environ.get(VARIABLE, "auto")
     if value not in ("0", "1", "auto"):
         raise InputError(f"the environment variable {VARIABLE} must be 0 (without Numba), 1 "
-                         f"(compile at once) or auto (where it pays), got {value!r}")
+                         f"(compile at once) or auto (for large tasks), got {value!r}")
     return value
+
+
+_EXPECTED: ContextVar[float] = ContextVar("expected", default=1.0)
+
+
+@contextmanager
+def expecting(number: float) -> Iterator[None]:
+    """A task that repeats what is in it: the size by which it is decided whether to compile.
+
+    Tasks within tasks multiply: members of a sweep, steps of a motion, iterations of a step.
+
+    Parameters
+    ----------
+    number
+        How often, about, at least once.
+
+    Examples
+    --------
+    >>> from skfem_ancf.switch import expected, expecting
+    >>> with expecting(100), expecting(3):
+    ...     expected()
+    300.0
+    """
+    token = _EXPECTED.set(expected() * max(1.0, float(number)))
+    try:
+        yield
+    finally:
+        _EXPECTED.reset(token)
+
+
+def expected() -> float:
+    """How many iterations are expected of the task that is being done, about."""
+    return _EXPECTED.get()
 
 
 def compiled_off() -> str | None:

@@ -397,8 +397,8 @@ class System:
             factors = load * tables.factors(np.array([t]))[0]
         none = tables.stresses if stresses is None or carried is None else None
         force = np.zeros(self.N)
-        run, equations = self.machine.of(evaluate)
-        run(equations, what, u, v, factors, time, float(load), use_carried,
+        run = self.machine.of(evaluate)
+        run(what, u, v, factors, time, float(load), use_carried,
             none if stresses is None else stresses, none if carried is None else carried, force)
         return force
 

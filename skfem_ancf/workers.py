@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import time
 from collections import deque
 from contextlib import contextmanager
 from functools import partial
@@ -16,6 +15,7 @@ import numpy as np
 
 from .errors import AncfError, CallbackError, InputError, PickleError, require_like, shown
 from .pickling import require_picklable
+from .switch import expecting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     Found = dict[str, Array] | str
     Chunks = Generator[tuple[list[int], list[Found]], None, None]
 
-#: Seconds that a worker computes before it reports: sending takes a millisecond.
-CHUNK = 0.2
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -40,10 +38,15 @@ class Task:
         From the parameters to a scene.
     measure
         From the scene to a number, an array or a dict of them.
+
+    Attributes
+    ----------
+    share
+        Members that a process computes, about.
     """
 
     def __init__(self, build: Callable[..., Any], measure: Callable[[Any], Any]) -> None:
-        self.build, self.measure = build, measure
+        self.build, self.measure, self.share = build, measure, 1.0
 
     def __call__(self, member: dict[str, Any]) -> Found:
         """What is measured of a member, by name, or the text of the error."""
@@ -52,11 +55,10 @@ class Task:
         except Exception as error:  # of the caller's functions, which may raise anything
             return f"{type(error).__name__}: {error}"
 
-    def chunk(self, members: list[dict[str, Any]]) -> tuple[float, list[Found]]:
-        """Seconds, and what is found of each of several members."""
-        begun = time.perf_counter()
-        found = [self(member) for member in members]
-        return time.perf_counter() - begun, found
+    def elsewhere(self, member: dict[str, Any]) -> Found:
+        """The same in another process."""
+        with expecting(self.share):
+            return self(member)
 
 
 def _named(value, member):
@@ -224,40 +226,32 @@ def _single_threads():
 
 
 def _spread(submit, lanes, task, members, places):
-    """Chunks in flight, two for each lane; what came back, as it comes.
+    """Members in flight, two for each lane; what came back, as it comes.
 
     Members that were in flight when a worker died are computed again, one at a time, so that the
     one which kills is known.
     """
     places, again, flying, back = deque(places), deque(), {}, SimpleQueue()
-    mean = None
+    task.share = len(places) / lanes
     try:
         while places or again or flying:
             alone = bool(again)
             source, most = (again, 1) if alone else (places, 2 * lanes)
             while source and len(flying) < most:
-                size = 1 if alone else _size(mean, len(source), lanes)
-                chunk = [source.popleft() for _ in range(min(size, len(source)))]
-                future = submit(task.chunk, [members[k] for k in chunk])
-                flying[future] = chunk, alone
+                k = source.popleft()
+                future = submit(task.elsewhere, members[k])
+                flying[future] = k, alone
                 future.add_done_callback(back.put)
             future = back.get()
-            chunk, was_alone = flying.pop(future)
+            k, was_alone = flying.pop(future)
             try:
-                seconds, found = future.result()
+                found = future.result()
             except Exception as error:
                 if not was_alone:
-                    again.extend(chunk)
+                    again.append(k)
                     continue
-                found = [f"{type(error).__name__}: {error}"]
-            else:
-                mean = max(seconds, 1e-6) / len(chunk)
-            yield chunk, found
+                found = f"{type(error).__name__}: {error}"
+            yield [k], [found]
     finally:
         for future in flying:
             future.cancel()
-
-
-def _size(mean, left, lanes):
-    """Members of a chunk, of as many as are left, of a mean of seconds or None."""
-    return 1 if mean is None else int(np.clip(CHUNK / mean, 1, 1 + left // (2 * lanes)))

@@ -1,4 +1,4 @@
-"""Where texts run: NumPy at first, compiled where that pays, and the same either way."""
+"""Where texts run: in NumPy or compiled, by the size of the task; and the same either way."""
 
 import ast
 import subprocess
@@ -10,7 +10,9 @@ import pytest
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFHermite, ElementBeamCable,
                         EnergyMomentum, MeshBeam, Scene, StVenantKirchhoff, compiled, machine)
+from skfem_ancf.errors import CompilationWarning
 from skfem_ancf.source import lanes, primitive, source
+from skfem_ancf.switch import expecting
 
 ROOT = Path(__file__).parent.parent
 
@@ -26,14 +28,15 @@ print(state.displacement((1, 0)).tolist(), "numba" in sys.modules)
 TIP = (-0.74, -0.90)
 
 
-def run(code, tmp_path, **env):
+def run(code, tmp_path, errors=False, **env):
     """Standard output of a new process, with an empty folder for compiled code."""
     import os
 
     variables = {k: v for k, v in os.environ.items() if not k.startswith(("SKFEM", "NUMBA"))}
     variables.update(NUMBA_CACHE_DIR=str(tmp_path / "numba"), PYTHONPATH=str(ROOT), **env)
-    return subprocess.run([sys.executable, "-c", code], env=variables, check=True,
-                          capture_output=True, text=True).stdout
+    done = subprocess.run([sys.executable, "-c", code], env=variables, check=True,
+                          capture_output=True, text=True)
+    return done.stderr if errors else done.stdout
 
 
 def scene(element=None, flag=True):
@@ -51,11 +54,11 @@ def test_a_first_solution_imports_no_compiler(tmp_path):
 
 @pytest.fixture
 def auto(needs_compiled, monkeypatch):
-    """The default rules, nothing loaded, nothing on disk, no time spent."""
+    """The default rules, nothing loaded, nothing on disk."""
     from skfem_ancf.switch import VARIABLE
 
     monkeypatch.delenv(VARIABLE, raising=False)
-    loads = []
+    loads, known, before, address = [], set(), compiled.KNOWN, compiled.address
 
     def load(text, args):
         loads.append(text.__name__)
@@ -63,41 +66,116 @@ def auto(needs_compiled, monkeypatch):
             plain, *(getattr(x, "of", x) for x in rest))
         return compiled.LOADED[text.__name__]
 
+    def found(part):
+        known.add(part)
+        return address(part)
+
     s = scene()
     plain = s.system.machine.tables.plain
     monkeypatch.setattr(compiled, "LOADED", {})
+    monkeypatch.setattr(compiled, "KNOWN", known)
     monkeypatch.setattr(compiled, "load", load)
-    monkeypatch.setattr(compiled, "on_disk", lambda *names: False)
-    monkeypatch.setattr(machine, "CLOCK", machine._Clock())
-    return s, loads
+    monkeypatch.setattr(compiled, "address", found)
+    monkeypatch.setattr(compiled, "on_disk", lambda *names: not names)
+    yield s, loads
+    before.update(known)
 
 
-def test_compiled_once_numpy_has_taken_as_long(auto, caplog):
+#: Of a motion of 1000 steps.
+STEPS = dict(t_end=1.0, dt=1e-3)
+
+
+def test_small_tasks_run_in_numpy_however_many(auto):
     s, loads = auto
-    caplog.set_level("INFO")
-    s.solve_static()
-    seconds = machine.compiling("equilibrium", s.system.machine.tables.parts)
-    assert not loads and 0.0 < machine.CLOCK.spent < seconds
-    assert "would take about" in s.plan()["compiled loop"].reason
-    machine.CLOCK.spent = seconds
-    assert s.plan()["compiled loop"].status == "computed"
-    for _ in range(2):
+    for _ in range(40):
         s.solve_static()
-    assert loads.count("equilibrium") == 1
-    said = [r.message for r in caplog.records if "compiling once, about" in r.message]
-    assert [text.split(":")[0] for text in said if "Pack" not in text] == loads
+    s.integrate(0.05, 1e-3)
+    assert not loads
+    assert "would take about" not in s.plan()["compiled loop"].reason
+    assert "NumPy takes about" in s.plan()["compiled loop"].reason
 
 
-def test_taken_from_disk_once_numpy_has_taken_as_long_as_loading(auto, monkeypatch, caplog):
+def test_a_long_motion_is_compiled_at_its_start_which_is_said(auto, capsys):
     s, loads = auto
-    caplog.set_level("INFO")
+    assert s.plan("dynamic")["compiled loop"].status == "computed"
+    assert s.plan()["compiled loop"].status == "skipped"
+    s.integrate(**STEPS, t_eval=[1.0])
+    assert loads == ["steps"]
+    said = capsys.readouterr().err.splitlines()
+    assert said[0].startswith("skfem_ancf: compiling once, about 12 s, kept in ")
+    assert said[-1].endswith("100%") and len(said) == 5  # one for each part, and the steps
+    assert s.plan("dynamic")["compiled loop"].reason.endswith("compiled code is loaded")
+    s.system.internal_force(np.full(s.N, 1e-3))  # as energies of the motion ask for them
+    assert loads == ["steps", "evaluate"]
+
+
+def test_what_lies_on_disk_is_loaded_for_tasks_longer_than_loading(auto, monkeypatch, capsys):
+    s, loads = auto
     monkeypatch.setattr(compiled, "on_disk", lambda *names: True)
     s.solve_static()
+    s.integrate(0.1, 1e-3)
     assert not loads
-    machine.CLOCK.spent = machine.LOADING
-    s.solve_static()
-    assert "equilibrium" in loads
-    assert not [r for r in caplog.records if "compiling once" in r.message]
+    s.integrate(0.4, 1e-3)
+    assert loads == ["steps"] and not capsys.readouterr().err
+
+
+def test_members_and_steps_count(auto, monkeypatch):
+    """A sweep, a path and a motion of automatic steps are as large as what they repeat."""
+    from skfem_ancf import sweep
+    from skfem_ancf.switch import expected
+
+    s, loads = auto
+    seen = []
+    sweep(lambda x: s, {"x": np.arange(7)}, lambda s: seen.append(expected()) or 0.0)
+    assert seen == [7.0] * 7 and expected() == 1.0
+    monkeypatch.setattr(compiled, "on_disk", lambda *names: True)
+    with expecting(1000):
+        s.solve_static()
+    assert loads == ["equilibrium"]
+    small = scene()
+    assert not small.system.machine._missing("equilibrium")  # and so it is used at once
+    assert small.plan()["compiled loop"].reason.endswith("compiled code is loaded")
+
+
+def test_no_clock_decides(auto, monkeypatch):
+    """The same blocks of steps, and the same way, on a machine that is a thousand times slower."""
+    import itertools
+    import time
+
+    def blocks():
+        taken, steps = [], s.system.machine.of
+
+        def of(text):
+            function = steps(text)
+            return lambda *args: taken.append(text.__name__) or function(*args)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(s.system.machine, "of", of)
+            s.integrate(0.2, 1e-3)
+        return taken
+
+    s, loads = auto
+    usual = blocks()
+    clock = itertools.count()
+    for name in "perf_counter", "monotonic", "process_time", "time":
+        monkeypatch.setattr(time, name, lambda: 1000.0 * next(clock))
+    assert blocks() == usual and not loads
+
+
+def test_a_folder_that_cannot_be_written_is_said_once(auto, monkeypatch, tmp_path):
+    s, loads = auto
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "folder"))
+    for function in compiled.folder, compiled.can_keep, compiled._warn_of:
+        function.cache_clear()
+    try:
+        with pytest.warns(CompilationWarning, match="each process compiles anew.*NUMBA_CACHE_DIR"):
+            s.integrate(**STEPS, t_eval=[1.0])
+        assert not loads  # it would not pay
+        assert machine.Machine(s.system).choose("steps").way == "plain"
+    finally:
+        for function in compiled.folder, compiled.can_keep, compiled._warn_of:
+            function.cache_clear()
 
 
 def test_everything_is_compiled_beforehand(needs_compiled, monkeypatch):
@@ -142,15 +220,7 @@ def test_kernels_that_a_scene_has_not_are_not_compiled():
     cable.spring(1.0, between=((1.0, 0.0), ("ground", (1.0, 1.0))))
     assert cable.system.machine.tables.parts == ["common", "kernels", "CablePack", "elements"]
     assert set(compiled.ADDRESSES) <= set(machine.COMPILING)
-    less = machine.compiling("steps", ["CablePack"]) - machine.compiling("steps", [])
-    assert any(less == pytest.approx(x) for x in (0.0, machine.COMPILING["CablePack"]))
-
-
-def test_a_motion_changes_over_on_its_way(auto):
-    s, loads = auto
-    machine.CLOCK.spent = machine.compiling("steps", s.system.machine.tables.parts) - 1e-3
-    history = s.integrate(0.2, 1e-3)
-    assert loads.count("steps") == 1 and len(history) == 201
+    assert machine.compiling(["steps", "CablePack"]) > machine.compiling(["steps"]) > 0.0
 
 
 def test_a_broken_numba_costs_nothing_but_speed(auto, monkeypatch):
@@ -161,8 +231,8 @@ def test_a_broken_numba_costs_nothing_but_speed(auto, monkeypatch):
         raise ImportError("made for another NumPy")
 
     monkeypatch.setattr(compiled, "address", address)
-    machine.CLOCK.spent = 1e3
-    assert s.solve_static().converged
+    with expecting(1000):
+        assert s.solve_static().converged
     assert "another NumPy" in s.plan()["compiled loop"].reason
 
 
@@ -176,9 +246,9 @@ def test_what_cannot_be_compiled_runs_in_numpy(what, auto, monkeypatch, caplog):
         raise AttributeError("Numba has changed")
 
     monkeypatch.setattr(compiled, what, fail)
-    machine.CLOCK.spent = 1e3
-    for _ in range(2):
-        assert s.solve_static().converged
+    with expecting(1000):
+        for _ in range(2):
+            assert s.solve_static().converged
     said = [r.message for r in caplog.records if "runs in NumPy" in r.message]
     assert len(said) == 1 and "Numba has changed" in said[0]
     assert "Numba has changed" in s.plan()["compiled loop"].reason
@@ -238,6 +308,42 @@ print(y.tolist())
     assert run(code, tmp_path).strip() == "[2.0, 2.0, 2.0]"
 
 
+def test_code_that_is_not_that_of_its_index_is_compiled_anew(tmp_path, needs_compiled):
+    """Two functions of the same arguments, whose files are swapped."""
+    code = f"""
+import numpy as np, sys
+sys.path.insert(0, {str(tmp_path)!r})
+from small import cube, double
+from skfem_ancf.compiled.twin import compile_for
+for text in cube, double:
+    y = np.zeros(3)
+    compile_for(text, (np.ones(3), y))(np.full(3, 4.0), y)
+    print(y.tolist())
+"""
+    (tmp_path / "small.py").write_text(
+        "from skfem_ancf.source import lanes, source\n\n\n"
+        "@source\ndef cube(x, y):\n    for i in lanes(x.size):\n        y[i] = x[i]**3\n\n\n"
+        "@source\ndef double(x, y):\n    for i in lanes(x.size):\n        y[i] = 2.0 * x[i]\n")
+    expected = ["[64.0, 64.0, 64.0]", "[8.0, 8.0, 8.0]"]
+    assert run(code, tmp_path).splitlines() == expected
+    one, other = (next((tmp_path / "numba").rglob(f"*{name}*.nbc")) for name in ("cube", "double"))
+    a, b = one.read_bytes(), other.read_bytes()
+    one.write_bytes(b), other.write_bytes(a)
+    assert run(code, tmp_path).splitlines() == expected
+    assert one.read_bytes() != b
+    kept = one.stat().st_mtime_ns
+    assert run(code, tmp_path).splitlines() == expected and one.stat().st_mtime_ns == kept
+
+
+def test_a_folder_in_which_nothing_can_be_kept_is_said_in_a_warning(tmp_path, needs_compiled):
+    """In a process of its own: where it is, and what to set."""
+    (tmp_path / "numba").write_text("")
+    code = "from skfem_ancf import compiled; compiled.note('steps'); compiled.note('equilibrium')"
+    said = run(code, tmp_path, errors=True)
+    assert said.count("each process compiles anew") == 1
+    assert str(tmp_path / "numba") in said and "NUMBA_CACHE_DIR" in said
+
+
 def test_texts_and_twins(needs_compiled):
     """What a text calls is compiled with it: texts, inner ones too, and twins of primitives."""
     from skfem_ancf.compiled.twin import compile_for
@@ -256,8 +362,7 @@ def test_what_two_entries_call_is_lowered_once(needs_compiled, monkeypatch):
     compile_extra = together.compiler.compile_extra
     monkeypatch.setattr(together.compiler, "compile_extra", lambda *args, **options: (
         lowered.append(args[2].__name__), compile_extra(*args, **options))[1])
-    njit = twin.njit
-    monkeypatch.setattr(twin, "njit", lambda cache=False, **options: njit(**options))
+    monkeypatch.setattr(twin, "_kept_on_disk", lambda function, compiled: compiled())
     x, y, z = np.arange(4.0), np.zeros(4), np.zeros(4)
     twin.compile_for(sum_of_cubes, (x, y))(x, y)
     twin.compile_for(cubes_of_cubes, (x, z))(x, z)

@@ -12,12 +12,15 @@ import hashlib
 import logging
 import os
 import sys
+import warnings
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from ..errors import CompilationWarning
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -47,15 +50,50 @@ def _stamp() -> str:
 
 
 @cache
-def _folder() -> Path:
+def folder() -> Path:
     """Where notes are kept of what has been compiled: as Numba keeps its own."""
     given = os.environ.get("NUMBA_CACHE_DIR")
     if given:
         return Path(given)
     own = Path(__file__).parent / "__pycache__"
-    if os.access(own if own.exists() else own.parent, os.W_OK):
+    if _writable(own):
         return own
     return Path.home() / ".cache" / "skfem_ancf"
+
+
+def _writable(path):
+    """True if a folder can be written to, or made."""
+    while not path.exists() and path != path.parent:
+        path = path.parent
+    return path.is_dir() and os.access(path, os.W_OK)
+
+
+@cache
+def can_keep() -> bool:
+    """True if compiled code can be kept on disk, as far as is known before; else warns, once."""
+    if not _writable(folder()):
+        cannot_keep("it cannot be written")
+        return False
+    return True
+
+
+@cache
+def _warn_of(path):
+    warnings.warn(f"compiled code is not kept in {str(path)!r}: each process compiles anew. Make "
+                  "the folder writable, or set the environment variable NUMBA_CACHE_DIR to another "
+                  "one", CompilationWarning, stacklevel=2)
+
+
+def cannot_keep(reason: object) -> None:
+    """Warn, once a process, that what is compiled is not kept on disk.
+
+    Parameters
+    ----------
+    reason
+        Why.
+    """
+    logger.info("compiled code is not kept: %s", reason)
+    _warn_of(folder())
 
 
 @cache
@@ -74,7 +112,7 @@ def key() -> str:
 
 
 def _note_of(name: str) -> Path:
-    return _folder() / f"skfem_ancf-{name}-{key()}.compiled"
+    return folder() / f"skfem_ancf-{name}-{key()}.compiled"
 
 
 def on_disk(*names: str) -> bool:
@@ -92,7 +130,7 @@ def on_disk(*names: str) -> bool:
 
 
 def note(name: str) -> None:
-    """Note that a text has been compiled; where that cannot be written it is compiled again.
+    """Note that a text has been compiled; warns where that cannot be written.
 
     Parameters
     ----------
@@ -100,10 +138,10 @@ def note(name: str) -> None:
         Name of the text.
     """
     try:
-        _folder().mkdir(parents=True, exist_ok=True)
+        folder().mkdir(parents=True, exist_ok=True)
         _note_of(name).touch()
     except OSError as error:
-        logger.info("no note of compiled code: %s", error)
+        cannot_keep(error)
 
 
 @cache

@@ -1,11 +1,11 @@
 """Compile every text and keep it on disk: ``python -m skfem_ancf.compiled``."""
 
 import os
+import sys
 from functools import partial
 
-from ..progress import progress_bar
 from ..switch import VARIABLE
-from . import ADDRESSES, PROBLEMS, address, nothing_collected
+from . import ADDRESSES, PROBLEMS, address, folder, nothing_collected, on_disk
 
 
 def main() -> None:
@@ -14,7 +14,7 @@ def main() -> None:
     import numpy as np
 
     from .. import Beam, ElementBeamCable, EnergyMomentum, MeshBeam, Scene, StVenantKirchhoff
-    from ..machine import COMPILING
+    from ..machine import COMPILING, announced
     from ..switch import compiled_off
 
     reason = compiled_off()
@@ -27,13 +27,14 @@ def main() -> None:
              "evaluate": lambda: system.internal_force(np.zeros(system.N)),
              "equilibrium": scene.solve_static,
              "steps": lambda: scene.integrate(0.02, 0.01, EnergyMomentum())}
-    whole = sum(COMPILING[name] for name in works)
-    with nothing_collected(), progress_bar(True, whole, "compiling") as bar:
+    if on_disk(*COMPILING):
+        print(f"all is compiled already, in {folder()}", file=sys.stderr)
+    with nothing_collected(), announced(COMPILING) as update:
         for name, work in works.items():
             work()
             if PROBLEMS:
                 raise SystemExit(PROBLEMS[0])
-            bar.update(COMPILING[name])
+            update(name)
 
 
 if __name__ == "__main__":

@@ -1,16 +1,19 @@
 """Compiles the texts that :mod:`skfem_ancf.source` marks."""
 
+import hashlib
 import logging
 import pickle
 from functools import cache
+from glob import escape
 from importlib import import_module
+from pathlib import Path
 from types import FunctionType
 
 from numba import __version__, cfunc, njit, typeof, version_info
 
 from ..origin import ours
 from ..source import column, lanes
-from . import key
+from . import cannot_keep, key
 from .flags import Known, KnownOfOthers, TextFlags
 from .loops import counted
 from .records import record_type
@@ -96,24 +99,68 @@ def entry_of(function, types, compiler=Entry):
         The latter has objects of Python that the former needs: it has to live as long.
     """
     _prepare(function)
-    try:
-        dispatcher = njit(cache=True, pipeline_class=compiler, **ENTRY)(function)
+
+    def compiled(**kept):
+        dispatcher = njit(pipeline_class=compiler, **kept, **ENTRY)(function)
         return dispatcher.compile(types), dispatcher
-    except (RuntimeError, *_SPOILT) as error:  # no folder to write to, or what is in it
-        logger.info("compiled code is not kept: %s", error)
-    dispatcher = njit(pipeline_class=compiler, **ENTRY)(function)
-    return dispatcher.compile(types), dispatcher
+
+    return _kept_on_disk(function, compiled)
 
 
 def address_of(function, signature, kept=True):
     """The address of a function compiled as one of C, ``kept`` on disk."""
     _prepare(function)
-    if kept:
-        try:
-            return cfunc(signature, cache=True, pipeline_class=Entry, **OPTIONS)(function).address
-        except (RuntimeError, *_SPOILT) as error:
-            logger.info("compiled code is not kept: %s", error)
-    return cfunc(signature, pipeline_class=Entry, **OPTIONS)(function).address
+
+    def compiled(**kept):
+        return cfunc(signature, pipeline_class=Entry, **kept, **OPTIONS)(function).address
+
+    return _kept_on_disk(function, compiled) if kept else compiled()
+
+
+def _kept_on_disk(function, compiled):
+    """What ``compiled(cache=True)`` returns, or without where there is no folder to write to.
+
+    Numba keeps an index and code in files of their own. It does not see that they do not belong
+    together, and Python ends where they do not: their hash is kept beside them.
+    """
+    try:
+        folder, name = _files_of(function)
+        note = folder / f"{name}.sha256"
+        before = _hash_of(folder, name)
+        if before is not None and (not note.exists() or note.read_text() != before):
+            logger.warning("compiled code in %s is not what was written there: it is compiled anew",
+                           folder)
+            for path in _all_of(folder, name):
+                path.unlink()
+            before = None
+        found = compiled(cache=True)
+        now = _hash_of(folder, name)
+        if now is not None and now != before:
+            note.write_text(now)
+        return found
+    except (RuntimeError, *_SPOILT) as error:  # no folder to write to, or what is in it
+        cannot_keep(error)
+    return compiled()
+
+
+def _files_of(function):
+    """The folder in which Numba keeps a function, and how the names of its files begin."""
+    dispatcher = njit(cache=True)(function)
+    return Path(dispatcher.stats.cache_path), dispatcher._cache._impl.filename_base
+
+
+def _all_of(folder, name):
+    return sorted(path for path in folder.glob(f"{escape(name)}.*")
+                  if path.suffix in (".nbi", ".nbc"))
+
+
+def _hash_of(folder, name):
+    """Of the names and contents of all files of a function; None where there is none."""
+    paths, total = _all_of(folder, name), hashlib.sha256()
+    for path in paths:
+        content = path.read_bytes()
+        total.update(f"{path.name} {len(content)} ".encode() + content)
+    return total.hexdigest() if paths else None
 
 
 def _prepare(function):

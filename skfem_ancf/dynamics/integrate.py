@@ -11,6 +11,7 @@ from ..errors import (AccuracyWarning, AncfError, ConvergenceError, InputError, 
                       ModelWarning, require_finite, require_finite_scalar, require_flag,
                       require_function, require_positive, shown, taught)
 from ..progress import progress_bar
+from ..switch import expecting
 from .checkpoint import Checkpoint, same_problem
 from .base import contacts_of, in_steps, same_scheme
 from .budget import ENOUGH
@@ -318,7 +319,8 @@ def _go(run, file, progress):
     history, task, body = run.history, run.task, _Body(run)
     run.system.forces.contacts.sweep.begin()
     try:
-        with progress_bar(progress, total=task.span, desc="time") as bar:
+        with expecting(run.iterations), progress_bar(progress, total=task.span,
+                                                     desc="time") as bar:
             bar.update(run.y.t - task.t_start)
             while not run.done:
                 before = run.y.t

@@ -357,11 +357,11 @@ class Integrator:
             self._dt, self._state[READY] = dt, 0.0
         state = self._state
         state[BEFORE], state[FAILURE], state[DISSIPATED] = y.before, 0.0, y.dissipated
-        function, equations = self.machine.of(text)
+        function = self.machine.of(text)
         asks = self.machine.tables.asks
         try:
             with np.errstate(all="ignore") if asks else _NOTHING:
-                done = function(equations, self.matrices, *args)
+                done = function(self.matrices, *args)
         except BaseException:  # also Ctrl-C: the motion may go on from y
             self._state[:], self._state[READY] = before, 0.0
             raise

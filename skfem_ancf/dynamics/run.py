@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil, ulp
-from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,10 +31,11 @@ if TYPE_CHECKING:
 NEARLY = 1e-6
 #: Part of a step up to which an instant is interpolated: a step that short is all round-off.
 CLOSE = 1e-6
-#: Seconds after which a block of steps is to be seen: by a progress bar, and on Ctrl-C.
-SHOWN = 0.2
-#: Coordinates times steps of the first block, compiled: some hundredths of a second.
-FIRST = 10_000
+#: Coordinates times steps of a block: after some hundredths of a second, compiled, and about a
+#: second in NumPy it is to be seen, by a progress bar, and on Ctrl-C.
+SHOWN = 50_000
+#: Iterations of a step, about, and steps of automatic size in a motion, as many as may be expected.
+ITERATIONS, AUTOMATIC = 3, 1000
 #: Part of the motion below which a step that fails is not taken again in one half as long.
 SHORTEST = 1e-7
 #: Part of a step to which an event is found.
@@ -125,7 +125,7 @@ class Run:
         self._value: float | None = None
         self.companion: Companion | None = None
         self.budget = Budget(task.t_start, task.span)
-        self._in_blocks, self._pace = scheme.in_blocks(system), self._first_pace()
+        self._in_blocks = scheme.in_blocks(system)
         self._limit()
 
     # the start
@@ -178,10 +178,12 @@ class Run:
             self.history.append(self.y)
             self._next = 1
 
-    def _first_pace(self):
-        """Steps of the first block."""
-        loaded = self.system.machine.choose(self.scheme.text).way == "loaded"
-        return max(1, FIRST // self.system.N) if loaded else 1
+    @property
+    def iterations(self) -> float:
+        """Those that are expected from here to the end, about."""
+        y, task = self.y, self.task
+        left = task.t_end - (task.t_start if y is None else y.t)
+        return ITERATIONS * (AUTOMATIC * left / task.span if task.dt is None else left / task.dt)
 
     def _first_step(self):
         """Size of the first step of a segment."""
@@ -264,22 +266,19 @@ class Run:
         self._commit(old, new)
 
     def _block(self):
-        """A block of steps of one size, at most as many as take :data:`SHOWN`."""
+        """A block of steps of one size, :data:`SHOWN` over the number of coordinates or fewer."""
         size = self.integrator.longest
         first = self.n - self.n % size
         block = first, min(first + size, self._whole)
-        number = min(block[1] - self.n, self._pace)
+        number = min(block[1] - self.n, max(1, SHOWN // self.system.N))
         if self.longest is not None:
             number = min(number, self.longest - self.n % self.longest)
-        begun = perf_counter()
         try:
             taken = self.scheme.run(self.integrator, self.y, self.size, number, self._begun,
                                     self.n, block)
         except AncfError:  # of a function of the caller's: go on as far as it goes
             self._in_blocks = False
             return None
-        took = perf_counter() - begun
-        self._pace = max(1, min(size, 4 * number, int(SHOWN * number / took)))
         if self.n + len(taken) == self._count:
             taken.end = self._end
         return taken

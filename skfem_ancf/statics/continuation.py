@@ -11,6 +11,7 @@ from ..errors import (CallbackError, ConvergenceError, InputError, Interrupted, 
                       require_function, require_integer, require_positive, shown, taught)
 from ..linalg import NO_FACTORS
 from ..progress import progress_bar
+from ..switch import expecting
 from .critical import find_critical
 from .iteration import CLOSED, reference_work, settled
 from .newton import rules_of
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from .critical import Critical
 
 logger = logging.getLogger(__name__)
+#: Evaluations of the equations in a step, about.
+EVALUATIONS = 10
 #: Steps of the longest path.
 MAX_STEPS = 10**6
 #: How far a step may be off a straight line, relative to its length and to the load.
@@ -328,7 +331,8 @@ def continuation(system: System, steps: int = 100, ds: float = 0.02, ds_max: flo
     tracer = Tracer(system, require_positive("tol", tol),
                     require_integer("max_iterations", max_iterations, 1, 10000))
     points, critical, step = [_start(tracer, branch, side)], [], ds
-    with progress_bar(progress, total=steps, desc="path") as bar:
+    with (expecting(EVALUATIONS * steps),
+          progress_bar(progress, total=steps, desc="path") as bar):
         while len(points) <= steps:
             start, straight = points[-1], branch is None or len(points) > 1
             try:

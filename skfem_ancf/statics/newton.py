@@ -13,6 +13,7 @@ from ..errors import (ConvergenceError, InputError, Interrupted, require_finite,
 from ..linalg import INACCURATE
 from ..own import handle_of
 from ..progress import progress_bar
+from ..switch import expecting
 from . import stability
 from .iteration import (ALONE, CONVERGED, NOT_CONVERGED, NOT_FINITE, SINGULAR, Rules,
                         Target, Unknowns, equilibrium, room_for_iterations)
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-#: Iterations in a load step, at most.
+#: Iterations in a load step that are expected, about, and at most.
+ITERATIONS = 10
 MAX_ITERATIONS = 10000
 #: Corrections of the pressure of obstacles in a load step, at most.
 AUGMENTED = 50
@@ -175,7 +177,8 @@ def solve_static(system: System, u: Array | None = None, method: str = "mixed", 
     if not 0.0 < require_positive("first_step", first_step) <= 1.0:
         raise InputError(f"first_step must lie in (0, 1], got {first_step!r}")
     max_iterations = require_integer("max_iterations", max_iterations, 1, MAX_ITERATIONS)
-    with system.forces.contacts.lent():
+    steps = 1.0 + max(0.0, np.log2(1.0 / first_step))  # each is twice as long as the one before
+    with system.forces.contacts.lent(), expecting(ITERATIONS * steps):
         return _load_steps(system, u, memory, stable, (first_step, min_step),
                            (method, tol, max_iterations), progress)
 
@@ -419,8 +422,7 @@ def _iterate(system, result, load, options, record, descent=None, machine=None, 
         x = Unknowns(result.u.copy(), result.multipliers.copy(), np.empty(system.N),
                      tables.stresses, tables.stresses)
         residuals = np.zeros((max_iterations + 1, 2))
-        run, equations = machine.of(equilibrium)
-        status, n = run(equations, target, rules, x, room, residuals, ALONE)
+        status, n = machine.of(equilibrium)(target, rules, x, room, residuals, ALONE)
         if status != SINGULAR or solver is not None:
             break
         solver = system  # factors with exchanges of rows, or sparse ones
