@@ -706,7 +706,7 @@ def test_instants_beside_the_ends_of_steps(scheme, monkeypatch):
     """Of a block only those steps are made to Motions that hold an instant."""
     scene, made = smooth_scene(), []
     every, at = scene.integrate(0.3, 0.01, scheme=scheme), np.array([0.02, 0.15, 0.3])
-    monkeypatch.setattr("skfem_ancf.dynamics.run.Run._first_pace", lambda self: 1000)
+    monkeypatch.setattr("skfem_ancf.dynamics.run.SHOWN", 10**9)
     for name in ("base", "integrator"):
         module = import_module(f"skfem_ancf.dynamics.{name}")
         motion = module.Motion
@@ -726,8 +726,8 @@ def test_instants_beside_the_ends_of_steps(scheme, monkeypatch):
 @pytest.mark.parametrize("scheme", ["radau", "generalized-alpha", "energy-momentum"])
 def test_stored_blocks_are_what_their_steps_were(scheme, monkeypatch):
     """All instants are stored as arrays of whole blocks, without a Motion for each."""
-    monkeypatch.setattr("skfem_ancf.dynamics.run.Run._first_pace", lambda self: 7)
     scene, made, motion = smooth_scene(), [], base.Motion
+    monkeypatch.setattr("skfem_ancf.dynamics.run.SHOWN", 7 * scene.N)
     monkeypatch.setattr(base, "Motion", lambda *args: made.append(args[0]) or motion(*args))
     every = scene.integrate(0.3, 0.01, scheme=scheme)
     assert len(made) <= 5 and len(every) == 31 and every.t[-1] == 0.3
