@@ -36,7 +36,7 @@ _NO_INTS = np.zeros(0, np.int64)
 _NO_JOINTS = constant(JointTables(_NO_INTS, _NO_INTS, _NO_INTS, np.zeros(0), _NO_INTS, _NO_INTS,
                                   np.zeros(0), 0))
 _NO_MOMENTS = constant(MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)),
-                                  np.zeros((0, 2)), np.zeros(0)))
+                                  np.zeros((0, 2)), np.zeros(0), _NO_INTS))
 _NO_BODY = constant(FlatBody(_NO_INTS, np.zeros((0, END_GRADIENTS + 1), np.int64)))
 _NO_PUSHES = np.zeros((0, 0))
 _NO_ROWS = np.zeros((0, 3), np.int64)
@@ -330,7 +330,15 @@ class Tables:
             dofs[k] = first + load.dofs[:, :1]  # what is left over has no weight
             dofs[k, :, :size], c[k, :size] = first + load.dofs, load.c
             start[k] = load.direction(np.zeros(load.beam.N))
-        return MomentPack(dofs, c, start, np.array([load.M for load in turning], dtype=float))
+        couples: dict[Any, list[int]] = {}  # from what both moments of a couple have to their numbers
+        for k, load in enumerate(turning):
+            couples.setdefault(k if load.couple is None else load.couple, []).append(k)
+        opposite = np.full(n, -1, dtype=np.int64)
+        for pair in couples.values():
+            if len(pair) == 2:
+                opposite[pair] = pair[::-1]
+        return MomentPack(dofs, c, start, np.array([load.M for load in turning], dtype=float),
+                          opposite)
 
     @property
     def own_loads(self) -> list["Load"]:

@@ -688,6 +688,9 @@ class EndMoment(Load):
         The moment, counterclockwise.
     amplitude
         As for :class:`Load`.
+    couple
+        Any object that two moments have in common of which one is the opposite of the other: they
+        keep the angular momentum. None for a moment from the ground.
     """
 
     constant = False
@@ -695,16 +698,18 @@ class EndMoment(Load):
     for_bodies = True
 
     def __init__(self, beam: Beam | RigidBody, boundary: Place | int | None, M: float,
-                 amplitude: TimeFunction = None) -> None:
+                 amplitude: TimeFunction = None, couple: Any = None) -> None:
         super().__init__(_the_beam(beam, self.for_bodies), amplitude)
-        self.M, self.boundary = M, boundary
+        self.M, self.boundary, self.couple = M, boundary, couple
         if isinstance(boundary, (int, np.integer)):
             self.boundary = np.array([boundary])
         self.node = beam.section_node(cast("Place", self.boundary))
         self.dofs, self.c = beam.section_direction(self.node)
 
     def bind(self, beam: Beam) -> Load:
-        return self if beam is self.beam else EndMoment(beam, self.boundary, self.M, self.amplitude)
+        if beam is self.beam:
+            return self
+        return EndMoment(beam, self.boundary, self.M, self.amplitude, self.couple)
 
     def direction(self, u: Array) -> Array:
         """The section's direction d, shape (2,)."""
@@ -728,7 +733,8 @@ class EndMoment(Load):
     @cached_property
     def _pack(self):
         start = self.direction(np.zeros(self.beam.N))
-        return MomentPack(self.dofs[None], self.c[None], start[None], np.array([float(self.M)]))
+        return MomentPack(self.dofs[None], self.c[None], start[None], np.array([float(self.M)]),
+                          np.array([-1]))
 
     def force(self, u: Array) -> Array:
         out = np.zeros(self.beam.N, dtype=u.dtype)

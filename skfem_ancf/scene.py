@@ -651,12 +651,13 @@ class Scene:
         """Moments of a motor; the first of them."""
         M, amplitude = (1.0, torque) if callable(torque) else (
             require_finite_scalar("torque", torque), None)
-        loads, places = [], [(at, 1.0)]
+        loads, places, couple = [], [(at, 1.0)], None
         if other is not None:
+            couple = object()
             places.append((both_of("other", other), -1.0))
         for (which, place), sign in places:
             k = self._number(which)
-            loads.append((k, EndMoment(self.members[k], place, sign * M, amplitude)))
+            loads.append((k, EndMoment(self.members[k], place, sign * M, amplitude, couple)))
         n = len(self._loads)
         return self._put(loads=loads)._loads[n][2]
 

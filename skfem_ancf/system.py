@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import logging
-from itertools import accumulate, pairwise
+from itertools import accumulate, count, pairwise
 from math import sqrt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from scipy import sparse
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from .dynamics.integrator import Integrator
     from .forces.base import ForceElement
     from .joints.base import Joint
-    from .loads import Load
+    from .loads import EndMoment, Load
     from .rigid import RigidBody
     from .types import Array
 
@@ -474,7 +474,8 @@ class System:
         """True if the laws of all beams are linear."""
         return all(beam.kernel.linear for beam in self.beams)
 
-    def load_potential(self, u: Array, t: float | None = None) -> float:
+    def load_potential(self, u: Array, t: float | None = None,
+                       turned: Array | None = None) -> float:
         """Potential of the loads; loads without one count as zero.
 
         Parameters
@@ -483,9 +484,19 @@ class System:
             Displacement, shape (N,).
         t
             Time; None for full size.
+        turned
+            The angles by which the sections of moments have turned, in the order of these, shape
+            (k,), k at least their number; by default those of u, of which whole turns are counted
+            along a beam only.
         """
-        return float(sum(factor * (acting.potential(u[self.of(load)]) or 0.0)
-                         for load in self.loads for factor, acting in [load.acting(t)]))
+        total, number = 0.0, count()
+        for load in self.loads:
+            factor, acting = load.acting(t)
+            if turned is not None and load.turning:
+                total -= factor * cast("EndMoment", load).M * turned[next(number)]
+            else:
+                total += factor * (acting.potential(u[self.of(load)]) or 0.0)
+        return float(total)
 
     @cached_property
     def stiffness_scale(self) -> float:

@@ -11,11 +11,11 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, KelvinVoigt, Line,
-                        MeshBeam, MeshError, NameUnknown, RigidBody, Scene, StVenantKirchhoff,
+from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, InputError, KelvinVoigt,
+                        Line, MeshBeam, MeshError, NameUnknown, RigidBody, Scene, StVenantKirchhoff,
                         SupportError)
 from skfem_ancf.dynamics import SCHEMES
-from skfem_ancf.errors import AncfError, CheckpointError, ImmutableError
+from skfem_ancf.errors import AncfError, CallbackError, CheckpointError, ImmutableError
 
 G = 9.81
 EI = 1e4 * 0.1**4 / 12
@@ -40,6 +40,63 @@ def spun(scene, body, rate):
 
 
 # motion
+
+def driven_round(what):
+    """Free bodies and beams that a moment turns by some turns in 2 s."""
+    body, beam = RigidBody(1.0, 1.0, name="a"), beam_of(3, E=2e7, density=1000.0)
+    if what == "body":
+        return Scene(body).moment(None, 40.0, beam=body)
+    if what == "motor":
+        scene = Scene(body)
+        scene.motor(body, torque=40.0)
+        return scene
+    if what == "couple":
+        other = RigidBody(1.0, 3.0, position=(2, 1))
+        scene = Scene(body, other)
+        scene.motor(body, torque=40.0, other=other)
+        return spun(scene, body, 2.0)
+    if what == "end":
+        return Scene(beam).moment("right", 30.0)
+    if what == "inside":
+        return Scene(beam).pin("left").moment((1 / 3, 0), 30.0)
+    frame = Frame.from_lines([(0, 0), (1, 0)], [[0, 1]], height=0.1, width=0.1,
+                             material=StVenantKirchhoff(2e7, 0.3, 1000.0))
+    return frame.pin(0).moment(1, 30.0)
+
+
+@pytest.mark.parametrize("what", ["body", "motor", "couple", "end", "inside", "frame"])
+def test_the_energy_under_moments_counts_turns(what, tmp_path):
+    scene, path = driven_round(what), tmp_path / "run.npz"
+    whole = scene.integrate(2.0, 0.01)
+    most = whole.kinetic_energy.max()
+    assert np.ptp(whole.potential_energy) > 4 * np.pi * (40.0 if what in (
+        "body", "motor", "couple") else 30.0)
+    assert np.ptp(whole.total_energy) < 1e-9 * most
+    # of few instants between which there are whole turns
+    few = scene.integrate(2.0, 0.01, t_eval=[0.0, 1.03, 1.9994, 2.0])
+    assert_allclose(few.potential_energy[[0, -1]], whole.potential_energy[[0, -1]],
+                    rtol=0, atol=1e-9 * most)
+    assert np.ptp(few.total_energy) < 1e-9 * most
+    # of a motion that goes on, by the same scheme and by another one, and from a file
+    half = scene.integrate(1.0, 0.01, t_eval=[1.0])
+    for scheme, end, exact in (("energy-momentum", 2.0, 1e-9), ("radau", 1.02, 1e-3)):
+        rest = scene.integrate(end, 0.01, scheme=scheme, start=half.state(0), t_eval=[1.0, end])
+        assert_allclose(rest.total_energy, whole.total_energy[0], rtol=0, atol=exact * most)
+    ends = [1.4]
+    scene.sensor("within", lambda state: 1.0 / (state.t < ends[-1]))
+    with pytest.raises(CallbackError):
+        scene.integrate(2.0, 0.01, checkpoint=path, every=50)
+    ends.append(7.0)
+    assert np.ptp(scene.resume(path).total_energy) < 1e-9 * most
+
+
+def test_the_angle_of_a_body_counts_turns_between_instants():
+    body = RigidBody(1.0, 0.5)
+    scene = Scene(body)
+    scene.motor(body, torque=2.0)
+    history = scene.integrate(6.0, 0.01, t_eval=[0.0, 3.0, 6.0])
+    assert_allclose(history.angle(body), [0.0, 18.0, 72.0], rtol=1e-2)
+
 
 @pytest.mark.parametrize("scheme", [name for name, cls in SCHEMES.items() if cls.joined])
 def test_a_pendulum_swings_as_it_should(scheme):

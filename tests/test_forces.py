@@ -150,6 +150,62 @@ def test_two_beams_on_a_spring_keep_their_momenta():
     assert np.ptp(history.angular_momentum) < 1e-13
 
 
+def spinning_pair(kinds, rates=(20.0, 14.0)):
+    """Two free members apart from each other, each turning about the origin at its rate."""
+    members = [RigidBody(2.0, 0.1 + 0.2 * k, (1.5 * k, 0.5)) if kind == "body" else
+               beam_of(kind, 3, x0=1.5 * k, y0=0.5 * k, h=0.1) for k, kind in enumerate(kinds)]
+    scene = Scene(*members)
+    for k, w in enumerate(rates):
+        scene.initial_velocity(lambda x, w=w: w * np.array([-x[1], x[0]]), beam=k)
+    places = [member if kind == "body" else (member, end)
+              for kind, member, end in zip(kinds, members, ("right", "left"))]
+    return scene, places
+
+
+def cubic(angle):
+    return 50.0 * angle + 20.0 * angle**3
+
+
+def torsion(k, damping=0.0):
+    def add(scene, a, b):
+        beam, at = a if isinstance(a, tuple) else (None, a)
+        scene.torsional_spring(k, at, damping, beam=beam, other=b)
+    return add
+
+
+BETWEEN = {
+    "spring": torsion(50.0), "law": torsion(cubic),
+    "law and potential": torsion((cubic, lambda angle: 25.0 * angle**2 + 5.0 * angle**4)),
+    "damper": torsion(50.0, 0.3),
+    "law of the damper": torsion(50.0, lambda rate: 0.3 * rate + 0.01 * rate**3),
+    "torque": lambda scene, a, b: scene.motor(a, torque=3.0, other=b),
+    "torque of time": lambda scene, a, b: scene.motor(a, torque=np.cos, other=b),
+    "control": lambda scene, a, b: scene.control(lambda t: 3.0, a, kind="moment", other=b)}
+
+
+@pytest.mark.parametrize("what, kinds", [
+    *[(what, ("body", "body")) for what in BETWEEN],
+    *[(what, kinds) for what in ("law", "damper", "torque") for kinds in (
+        ("sections", "body"), ("cable", "sections"), ("body", "cable"), ("cable", "cable"))]])
+def test_moments_between_two_members_keep_the_angular_momentum(what, kinds):
+    scene, (a, b) = spinning_pair(kinds)
+    BETWEEN[what](scene, a, b)
+    history = scene.integrate(0.2, 0.02)
+    L = history.angular_momentum
+    assert np.ptp(L) < 1e-12 * np.abs(L).max()  # 2e-5 to 1e-3 by means of each section's own
+    if what not in ("torque of time", "control"):
+        energy = history.total_energy + history.dissipated
+        assert np.ptp(energy) < 1e-11 * history.kinetic_energy.max()
+
+
+def test_a_spring_with_a_law_between_two_bodies_keeps_the_angular_momentum():
+    scene, (a, b) = spinning_pair(("body", "body"))
+    scene.spring(lambda s: 50.0 * s + 30.0 * s**3, ((a, (0.2, 0.5)), (b, (1.5, 0.2))))
+    history = scene.integrate(0.2, 0.02)
+    assert np.ptp(history.angular_momentum) < 1e-12 * np.abs(history.angular_momentum).max()
+    assert np.ptp(history.total_energy) < 1e-11 * history.kinetic_energy.max()
+
+
 @pytest.mark.parametrize("damping", [0.0, 3.0])
 def test_bodies_on_a_spring_by_collocation(damping):
     """Order 5 of Radau, against the equations of two points."""

@@ -42,6 +42,9 @@ class Motion:
         or a dict of numbers and arrays.
     dissipated
         The work of damping so far.
+    turns
+        Angles as of :class:`~skfem_ancf.forces.turns.Turns`, shape (k,); None where nothing
+        follows them.
     """
 
     t: float
@@ -54,6 +57,7 @@ class Motion:
     before: float = 0.0
     memory: dict | None = None
     dissipated: float = 0.0
+    turns: np.ndarray | None = None
 
     def __post_init__(self):
         if self.force is None:
@@ -133,6 +137,8 @@ class Steps:
         What is kept after each, as :attr:`Motion.memory`.
     end
         The time after the last, where round-off makes it another.
+    turns
+        Angles after each, as of a Motion, shape (n, k), or None.
     """
 
     start: float
@@ -143,6 +149,7 @@ class Steps:
     dissipated: Array
     memories: Sequence[dict[str, Array] | None]
     end: float | None = None
+    turns: Array | None = None
 
     def __len__(self):
         return len(self.memories)
@@ -154,16 +161,18 @@ class Steps:
         if self.end is not None and k + 1 == len(self):
             t = self.end
         return Motion(t, *_named(self.rows[k].copy(), self.shares[k].copy()), self.dt, memory,
-                      float(self.dissipated[k]))
+                      float(self.dissipated[k]),
+                      None if self.turns is None else self.turns[k].copy())
 
     def columns(self) -> tuple[Array, ...]:
-        """All but memories as arrays, in the order of a Motion: shapes (n,), (n, N) or (n, m)."""
+        """All but memories as arrays, in the order of a Motion: (n,), (n, N), (n, m) or (n, k)."""
         n = len(self)
+        turns = np.zeros((n, 0)) if self.turns is None else self.turns[:n]
         t = self.start + self.dt * np.arange(self.first + 1, self.first + n + 1)
         if self.end is not None:
             t[-1:] = self.end
         return (t, *_named(self.rows[:n].swapaxes(0, 1), self.shares[:n].swapaxes(0, 1)),
-                np.full(n, self.dt), self.dissipated[:n])
+                np.full(n, self.dt), self.dissipated[:n], turns)
 
 
 def _named(rows: Array, shares: Array) -> tuple[Array, Array, Array, Array, Array, Array]:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-FORMAT = 7
+FORMAT = 8
 #: Times of a motion at which functions of time are compared.
 TIMES = 33
 #: Points of the surface, about, at which distances of obstacles are.
@@ -425,6 +425,6 @@ def _restore(run, arrays):
             memories[int(k)][key] = value
     now, *stored = [memory or None for memory in memories]
     run.history.restore(columns, stored)
-    t, *rest, before, dissipated = (arrays[f"now.{name}"] for name in run.history.COLUMNS)
-    run.recall(Motion(float(t), *rest, float(before), now, float(dissipated)),
+    t, *rest, before, dissipated, turns = (arrays[f"now.{name}"] for name in run.history.COLUMNS)
+    run.recall(Motion(float(t), *rest, float(before), now, float(dissipated), turns),
                {k[4:]: v for k, v in arrays.items() if k.startswith("run.")})

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import (InputError, require_finite, require_index, require_path, shown,
                       teaching)
+from ..forces.turns import Turns
 from ..kept import cached_property
 from ..points import require_body
 from ..resultants import over_time
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 #: What is stored of a Motion.
 COLUMNS = ("t", "u", "v", "acceleration", "algorithmic", "multipliers", "force", "before",
-           "dissipated")
+           "dissipated", "turns")
 _COLUMNS_OF = attrgetter(*COLUMNS)
 #: Attributes of a motion that has ended that are made when one of them is asked for.
 _LATE = {"t", "u", "v", "acceleration", "multipliers", "dissipated", "_others", "_memories"}
@@ -102,6 +103,7 @@ class History:
         self._rows: list[Motion] = []  # behind those of the blocks
         self._blocks: list[tuple[Columns, Sequence[Any]]] = []
         self._kept: Any = None
+        self._turns = Turns(system)
 
     def append(self, y: Motion) -> None:
         """Store an instant."""
@@ -143,7 +145,8 @@ class History:
         stored = self._stored()
         if not stored:
             N, m = self.system.N, self.system.m
-            sizes = {"t": (), "before": (), "dissipated": (), "multipliers": (m,), "force": (m,)}
+            sizes = {"t": (), "before": (), "dissipated": (), "multipliers": (m,), "force": (m,),
+                     "turns": (self._turns.number,)}
             return {name: np.zeros((0, *sizes.get(name, (N,)))) for name in self.COLUMNS}
         columns = zip(*(columns for columns, _ in stored))
         return dict(zip(self.COLUMNS, map(np.concatenate, columns)))
@@ -186,7 +189,8 @@ class History:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         columns, memories = self.columns(), self._remembered()
         if name not in made:  # another thread may have made them
-            made["_others"] = tuple([columns.pop(x) for x in ("algorithmic", "force", "before")])
+            made["_others"] = tuple([columns.pop(x) for x in ("algorithmic", "force", "before",
+                                                                  "turns")])
             made.update(columns, _memories=memories)
             self._blocks, self._rows = [], []
         return made[name]
@@ -209,10 +213,10 @@ class History:
         <skfem_ancf.Scene.integrate>` from it (``start=``) continues the motion.
         """
         k = require_index("k", k, len(self))
-        algorithmic, force, before = (x[k] for x in self._others)
+        algorithmic, force, before, turns = (x[k] for x in self._others)
         motion = Motion(float(self.t[k]), self.u[k], self.v[k], self.acceleration[k], algorithmic,
                         self.multipliers[k], force, float(before), self._memory(k),
-                        float(self.dissipated[k]))
+                        float(self.dissipated[k]), turns)
         return self.instant(motion, self._kept if k == len(self) - 1 else None)
 
     def _memory(self, k):
@@ -331,7 +335,8 @@ class History:
             The RigidBody, its name or its number.
         """
         found = require_body(self.system, body)
-        return np.unwrap(found.angle_at(self.u[:, self.system.of(found)]))
+        k = self._turns.moments + self.system.bodies.index(found)
+        return found.angle + self._others[-1][:, k]
 
     def angular_velocity(self, body: WhichMember) -> Array:
         """The angular velocity of a rigid body at all instants, counterclockwise, shape (nt,).
@@ -469,8 +474,12 @@ class History:
 
     @cached_property
     def potential_energy(self) -> Array:
-        """Potential of the loads, zero in the stress-free state, shape (nt,)."""
-        return np.array([self.system.load_potential(u, t) for u, t in zip(self.u, self.t)])
+        """Potential of the loads, zero in the stress-free state, shape (nt,).
+
+        That of moments counts whole turns, which are followed from step to step.
+        """
+        return np.array([self.system.load_potential(u, t, turned) for u, t, turned in zip(
+            self.u, self.t, self._others[-1])])
 
     @property
     def total_energy(self) -> Array:

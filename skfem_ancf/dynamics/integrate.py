@@ -165,7 +165,8 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         else:
             run.begin(np.zeros(system.N) if u is None else u,
                       np.zeros(system.N) if velocity is None else velocity,
-                      system.forces.contacts.of_state(start))
+                      system.forces.contacts.of_state(start),
+                      None if motion is None else motion.turns)
         return run
 
     if checked:

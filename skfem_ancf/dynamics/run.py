@@ -117,6 +117,7 @@ class Run:
         self.segment = self.n = self._next = self.steps = self.rejected = 0
         self.size = 1e-4 * task.span if task.dt is None else task.dt
         self.history = History(system, scheme, self)
+        self._turns = self.history._turns
         self.recorder = Recorder(sensors, system, self.history.instants)
         self.y: Any = None
         self.longest: int | None = None
@@ -130,7 +131,8 @@ class Run:
 
     # the start
 
-    def begin(self, u: Array, v: Array, memory: Array | None = None) -> None:
+    def begin(self, u: Array, v: Array, memory: Array | None = None,
+              turns: Array | None = None) -> None:
         """Begin with a displacement and a velocity.
 
         Parameters
@@ -139,9 +141,15 @@ class Run:
             Of the coordinates, shape (N,).
         memory
             What points remember of obstacles there, shape (k,), or None.
+        turns
+            Angles there, those of another motion of this scene, shape (k,), or None.
         """
         self.system.sample(u, v, self.task.t_start, True)
         self.y = self._start(u, v, memory)
+        known = self._turns
+        if turns is None or len(turns) != known.number:
+            turns = known.begin(self.y.u)
+        self._follow(turns, self.y)
         self._store_start()
 
     def _start(self, u, v, memory):
@@ -149,6 +157,11 @@ class Run:
         if self._in_blocks and self.until is None and self._whole > 0:
             self.integrator.ask(self._begun, self.size, self._whole)
         return self.integrator.start(u, v, self._begun, self._first_step(), memory=memory)
+
+    def _follow(self, last, y):
+        """Tell a Motion by how much everything has turned, from the angles (k,) before; it."""
+        y.turns = self._turns.follow(last, y.u[None])[0]
+        return y
 
     def go_on(self, y: Motion, memory: dict[str, Any] | None = None) -> None:
         """Begin where another run of the same scene was.
@@ -243,7 +256,7 @@ class Run:
         self.system.sample(y.u, y.v, self._begun, False)
         turned = self._start(y.u, y.v, contacts_of(y))
         turned.dissipated = y.dissipated
-        return turned
+        return self._follow(y.turns, turned)
 
     # steps
 
@@ -281,6 +294,7 @@ class Run:
             return None
         if self.n + len(taken) == self._count:
             taken.end = self._end
+        taken.turns = self._turns.follow(self.y.turns, taken.rows[:len(taken), 0])
         return taken
 
     def _time(self, n):
@@ -328,6 +342,7 @@ class Run:
 
     def _commit(self, old, new):
         """A step is done."""
+        self._follow(old.turns, new)
         if self.until is not None:
             new = self._look(old, new)
         if self.event is None and new.t >= self._end and not self._last:
@@ -407,7 +422,7 @@ class Run:
         if s > 1.0 - 1e-12:
             return new
         if s < CLOSE:
-            return interpolate(old, new, t)
+            return self._follow(old.turns, interpolate(old, new, t))
         if self._side is None:
             self._side = Integrator.lent(self.system, self.scheme, self.task.tol)
         side = self._side
@@ -420,7 +435,7 @@ class Run:
         if s < self.scheme.near(self.system):
             smooth = interpolate(old, new, t)
             found.acceleration, found.multipliers = smooth.acceleration, smooth.multipliers
-        return found
+        return self._follow(old.turns, found)
 
     # what it takes to go on
 

@@ -190,6 +190,33 @@ class ForceElement(Sealable):
         after = None if before is None else self.potential(y)
         return None if before is None or after is None else after - before
 
+    def mean_force(self, x: Array, y: Array, t: float) -> Array:
+        """A mean of the force without velocities whose work is what the potential loses.
+
+        By default that in the middle, corrected along the change of the places (Gonzalez 1996):
+        the work is exact, but the correction may have a moment. What keeps angular momentum
+        exactly is a mean of its own, as of :class:`Spring` and :class:`TorsionalSpring`.
+
+        Parameters
+        ----------
+        x, y
+            Places of the points at the start and the end of a step, shape (n, 2) each.
+        t
+            Time in the middle of it.
+
+        Returns
+        -------
+        ndarray
+            Shape (n, 2).
+        """
+        zero, d = 0.0 * x, y - x
+        force = np.asarray(self.force(0.5 * (x + y), zero, t), dtype=float)
+        square = np.sum(d * d)
+        gain = self.gain(x, y) if square > 0.0 else None
+        if gain is None:
+            return force
+        return force - (gain + np.sum(force * d)) / square * d
+
     def stiffness(self, x: Array, v: Array, t: float) -> Array:
         """Derivative of the force by the places; by a complex step or differences by default.
 

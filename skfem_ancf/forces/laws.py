@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Points by which the work between two states of a step is integrated.
 POINTS = 8
+#: Part of a potential that is its round-off.
+ROUND_OFF = 1e-13
 #: Relative step of the differences that give the slope of a law.
 STEP = 1e-6
 
@@ -70,8 +72,20 @@ class Law:
         """
         if self.energy is not None:
             return self.potential(b) - self.potential(a)
+        return (b - a) * self.mean(a, b)
+
+    def mean(self, a: float, b: float) -> float:
+        """The mean force from a to b, whose product with b - a is :meth:`work`."""
+        if a == b:
+            return self(a)
         x, w = gauss(POINTS)
-        return (b - a) * float(np.dot(w, [self(a + (b - a) * z) for z in x]))
+        found = float(np.dot(w, [self(a + (b - a) * z) for z in x]))
+        if self.energy is not None:
+            before, after = self.potential(a), self.potential(b)
+            missing = after - before - (b - a) * found
+            if abs(missing) > ROUND_OFF * (abs(before) + abs(after)):
+                found += missing / (b - a)
+        return found
 
     def slope(self, s: float, scale: float = 1.0) -> float:
         """Its derivative at s, by differences.
@@ -149,6 +163,17 @@ def work_of(k: float | Law, a: float, b: float) -> float:
         A number or a Law, and the states.
     """
     return k.work(a, b) if isinstance(k, Law) else 0.5 * k * (b - a) * (b + a)
+
+
+def mean_of(k: float | Law, a: float, b: float) -> float:
+    """Its mean between two states of one step, whose product with b - a is its integral.
+
+    Parameters
+    ----------
+    k, a, b
+        A number or a Law, and the states.
+    """
+    return k.mean(a, b) if isinstance(k, Law) else 0.5 * k * (a + b)
 
 
 def slope_of(k: float | Law, s: float, scale: float) -> float:

@@ -11,7 +11,8 @@ from ..joints.base import GROUND, Vector, both_of, named_place, point, section
 from ..places import points_of_rows
 from ..rigid import RigidBody, on_body
 from .base import ForceElement, Link, Part, difference, link
-from .laws import Law, force_of, number_or_law, potential_of, said, slope_of, work_of
+from ..kernels.moments import mean_turning
+from .laws import Law, force_of, mean_of, number_or_law, potential_of, said, slope_of, work_of
 from .texts import SPRING, TINY, TORSION, turned, turning
 
 if TYPE_CHECKING:
@@ -107,6 +108,10 @@ class Spring(ForceElement):
     def gain(self, x: Array, y: Array) -> float:
         return work_of(self.k, *(self._along(z)[0] - self._length for z in (x, y)))
 
+    def mean_force(self, x: Array, y: Array, t: float) -> Array:
+        a, b = self._along(x)[0], self._along(y)[0]
+        return -mean_of(self.k, a - self._length, b - self._length) / (a + b) * (x + y)
+
     def stiffness(self, x: Array, v: Array, t: float) -> Array:
         length, n = self._along(x)
         s, along = length - self._length, np.outer(n, n)
@@ -198,6 +203,11 @@ class TorsionalSpring(ForceElement):
 
     def gain(self, x: Array, y: Array) -> float:
         return work_of(self.k, self._angle(x), self._angle(y))
+
+    def mean_force(self, x: Array, y: Array, t: float) -> Array:
+        g = np.empty((4, 1))
+        mean_turning(x.reshape(4, 1), y.reshape(4, 1), g)
+        return -mean_of(self.k, self._angle(x), self._angle(y)) * g.reshape(2, 2)
 
     def resistance(self, x: Array, v: Array, t: float) -> Array:
         g = self._turning(np.asarray(x))

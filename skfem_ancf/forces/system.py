@@ -360,7 +360,7 @@ class Forces:
         for element, (rows, places) in zip(self.own, self._slices):
             x, y = a[rows].reshape(-1, 2), b[rows].reshape(-1, 2)
             if what == 0:
-                out[rows] -= _mean_force(element, x, y, t).ravel()
+                out[rows] -= np.ravel(element.mean_force(x, y, t))
             elif what == 1:
                 if np.any(y):
                     out[rows] -= np.ravel(np.asarray(element.force(x, y, t))
@@ -373,17 +373,6 @@ class Forces:
 
 
 _NONE.update(vars(Forces((), 0, 0)))
-
-
-def _mean_force(element, x, y, t):
-    """At the middle, corrected so that its work is what the potential loses: Gonzalez (1996)."""
-    zero, d = 0.0 * x, y - x
-    force = np.asarray(element.force(0.5 * (x + y), zero, t), dtype=float)
-    square = np.sum(d * d)
-    gain = element.gain(x, y) if square > 0.0 else None
-    if gain is None:
-        return force
-    return force - (gain + np.sum(force * d)) / square * d
 
 
 def _no_tables():

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..band import clear, dot
+from ..kernels.moments import mean_turning
 from ..own import own_elements, own_poses
 from ..source import F1, I1, lanes, primitive, shaped, source
 from ..tables import add_products
@@ -333,33 +334,6 @@ def turning(y, g):
         d, s = y[0, e] ** 2 + y[1, e] ** 2, y[2, e] ** 2 + y[3, e] ** 2
         g[0, e], g[1, e] = -y[1, e] / d, y[0, e] / d
         g[2, e], g[3, e] = y[3, e] / s, -y[2, e] / s
-
-
-@source
-def mean_turning(a, b, g):
-    """A mean of it, whose product with the change of both is the change of the angle exactly.
-
-    The discrete gradient of Gonzalez (1996).
-    """
-    middle = np.empty(a.shape)
-    for i in lanes(4):
-        for e in lanes(a.shape[1]):
-            middle[i, e] = 0.5 * (a[i, e] + b[i, e])
-    turning(middle, g)
-    for e in lanes(a.shape[1]):
-        angle = (np.arctan2(a[0, e] * b[1, e] - a[1, e] * b[0, e],
-                            a[0, e] * b[0, e] + a[1, e] * b[1, e])
-                 - np.arctan2(a[2, e] * b[3, e] - a[3, e] * b[2, e],
-                              a[2, e] * b[2, e] + a[3, e] * b[3, e]))
-        x0, x1, x2, x3 = (b[0, e] - a[0, e], b[1, e] - a[1, e], b[2, e] - a[2, e],
-                          b[3, e] - a[3, e])
-        square = x0 * x0 + x1 * x1 + x2 * x2 + x3 * x3
-        missing = angle - (g[0, e] * x0 + g[1, e] * x1 + g[2, e] * x2 + g[3, e] * x3)
-        c = missing * (square > TINY) / np.maximum(square, TINY)
-        g[0, e] += c * x0
-        g[1, e] += c * x1
-        g[2, e] += c * x2
-        g[3, e] += c * x3
 
 
 @source

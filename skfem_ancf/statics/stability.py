@@ -10,6 +10,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..band import fix
+from ..forces.turns import Turns
 from ..linalg import NO_FACTORS
 
 if TYPE_CHECKING:
@@ -439,13 +440,16 @@ def _side(system, descent, v, u, last, load):
     back = descent.product(v, last - u)
     if abs(back) > 1e-6 * descent.product(v, v):
         return 1.0 if back > 0 else -1.0
-    here, up, down = (potential(system, x, load) for x in (u, u + v, u - v))
+    turns = Turns(system)
+    near = turns.begin(u)
+    here, up, down = (potential(system, x, load, turns.follow(near, x[None])[0])
+                      for x in (u, u + v, u - v))
     if abs(up - down) > 1e-6 * abs(up + down - 2.0 * here):
         return 1.0 if up < down else -1.0
     return 1.0 if v[np.argmax(np.abs(v) > 0.5 * np.max(np.abs(v)))] > 0 else -1.0
 
 
-def potential(system: System, u: Array, load: float) -> float:
+def potential(system: System, u: Array, load: float, turned: Array | None = None) -> float:
     """The total potential: strain energy less the work of the loads.
 
     Parameters
@@ -456,8 +460,10 @@ def potential(system: System, u: Array, load: float) -> float:
         Displacement of the coordinates, shape (N,).
     load
         Load factor.
+    turned
+        As of :meth:`~skfem_ancf.system.System.load_potential`, shape (k,).
     """
-    return system.strain_energy(u, load) + load * system.load_potential(u)
+    return system.strain_energy(u, load) + load * system.load_potential(u, turned=turned)
 
 
 def position_weights(system: System) -> Array:
