@@ -330,13 +330,11 @@ class Tables:
             dofs[k] = first + load.dofs[:, :1]  # what is left over has no weight
             dofs[k, :, :size], c[k, :size] = first + load.dofs, load.c
             start[k] = load.direction(np.zeros(load.beam.N))
-        couples: dict[Any, list[int]] = {}  # from what both moments of a couple have to their numbers
-        for k, load in enumerate(turning):
-            couples.setdefault(k if load.couple is None else load.couple, []).append(k)
         opposite = np.full(n, -1, dtype=np.int64)
-        for pair in couples.values():
-            if len(pair) == 2:
-                opposite[pair] = pair[::-1]
+        for k, load in enumerate(turning):
+            for i in range(k if load.couple is not None else 0):
+                if turning[i].couple is load.couple:
+                    opposite[[i, k]] = k, i
         return MomentPack(dofs, c, start, np.array([load.M for load in turning], dtype=float),
                           opposite)
 

@@ -58,9 +58,10 @@ def add_moments(moments, factors, u, f):
 def mean_turning(a, b, g):
     """A mean derivative of the angle from e to d, whose work from a to b is its change exactly.
 
-    Columns of a, b and g are of d and e. The angle is a function of ``c = e . d`` and ``s = e x d``. Its discrete gradient by both
-    (Gonzalez 1996), times their derivatives in the middle of the step, has no moment on d and e
-    together, as both are bilinear and do not change where d and e turn alike.
+    Columns of a, b and g are of d and e. The angle is a function of ``c = e . d`` and ``s = e x
+    d``. Its discrete gradient by both (Gonzalez 1996), times their derivatives in the middle of the
+    step, has no moment on d and e together, as both are bilinear and do not change where d and e
+    turn alike.
     """
     for e in lanes(a.shape[1]):
         c0, s0 = a[2, e] * a[0, e] + a[3, e] * a[1, e], a[2, e] * a[1, e] - a[3, e] * a[0, e]
