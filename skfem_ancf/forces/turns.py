@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from ..loads import EndMoment
     from ..system import System
     from ..types import Array
 
@@ -32,7 +33,7 @@ class Turns:
 
     def __init__(self, system: System) -> None:
         self._system = system
-        self._loads = [load for load in system.loads if load.turning]
+        self._loads = [cast("EndMoment", load) for load in system.loads if load.turning]
         self.moments, self.number = len(self._loads), len(self._loads) + len(system.bodies)
         pack = system.machine.tables.plain.loads.moments
         first = np.array([system.of(body).start for body in system.bodies], dtype=int)
