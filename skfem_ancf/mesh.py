@@ -13,6 +13,7 @@ from skfem.element import Element
 from skfem.generic_utils import OrientedBoundary
 from skfem.mesh import Mesh2D, MeshQuad
 
+from . import archive
 from .curve import Curve, check_curvature, derivative_of
 from .errors import (CallbackError, FileError, InputError, MeshError, NameUnknown, ask,
                      require_finite, require_finite_scalar, require_function, require_integer,
@@ -40,6 +41,9 @@ EPS = float(np.finfo(float).eps)
 
 #: Elements of the largest mesh that :meth:`MeshBeam.refined` makes.
 MAX_ELEMENTS = 2**24
+
+#: Formats of several files, of which one names the others: these are written where they stay.
+IN_PARTS = (".xdmf", ".xmf", ".node", ".ele")
 
 #: Points of a picture or a file along and across an element.
 MAX_SUBDIVISION = 1000
@@ -900,7 +904,9 @@ class MeshBeam(Frozen, Mesh2D):
 
     def save_npz(self, filename: StrPath) -> None:
         """Save all but the functions ``curve`` and ``taper``; read it with :meth:`load_npz`."""
-        filename = require_path("filename", filename)
+        path = require_path("filename", filename)
+        if path.suffix != ".npz":
+            path = path.with_name(f"{path.name}.npz")
         tags = {f"b_{k}": v for k, v in (self.boundaries or {}).items()}
         tags |= {f"o_{k}": v.ori for k, v in (self.boundaries or {}).items()
                  if getattr(v, "ori", None) is not None}
@@ -908,11 +914,12 @@ class MeshBeam(Frozen, Mesh2D):
         s = {name: getattr(self, name) for name in ("s", "p_XY", "heights")
              if getattr(self, name) is not None}
         try:
-            np.savez(filename, doflocs=self.doflocs, t=self.t, height=self.height, p_X=self.p_X,
-                     p_Y=self.p_Y, lengths=self.lengths, sections=self.sections, kind=self.kind,
-                     **s, **tags)
+            archive.write(path, {
+                "doflocs": self.doflocs, "t": self.t, "height": self.height, "p_X": self.p_X,
+                "p_Y": self.p_Y, "lengths": self.lengths, "sections": self.sections,
+                "kind": self.kind, **s, **tags})
         except OSError as error:
-            raise FileError(f"cannot write {str(filename)!r}: {error}") from error
+            raise FileError(f"cannot write {str(path)!r}: {error}") from error
 
     @classmethod
     def load_npz(cls, filename: StrPath) -> MeshBeam:
@@ -984,13 +991,17 @@ class MeshBeam(Frozen, Mesh2D):
             self.save_npz(path)
             return
         try:
-            if path.suffix == ".json":
-                path.write_text(json.dumps(self.to_dict()), encoding="utf-8")
-            elif not path.suffix:
+            if not path.suffix:
                 raise FileError(f"the file name {str(path)!r} does not say the format: end it with "
                                 ".npz, .json, .vtu or what else meshio writes")
-            else:
+            if path.suffix in IN_PARTS:
                 self.to_meshquad().save(filename, point_data, cell_data, **kwargs)
+                return
+            with archive.replacing(path) as new:
+                if path.suffix == ".json":
+                    new.write_text(json.dumps(self.to_dict()), encoding="utf-8")
+                else:
+                    self.to_meshquad().save(new, point_data, cell_data, **kwargs)
         except FileError:
             raise
         except (OSError, meshio.ReadError, meshio.WriteError, SystemExit) as error:

@@ -11,6 +11,7 @@ from types import FunctionType
 
 from numba import __version__, cfunc, njit, typeof, version_info
 
+from ..archive import replacing
 from ..origin import ours
 from ..source import column, lanes
 from . import cannot_keep, key
@@ -136,7 +137,8 @@ def _kept_on_disk(function, compiled):
         found = compiled(cache=True)
         now = _hash_of(folder, name)
         if now is not None and now != before:
-            note.write_text(now)
+            with replacing(note) as new:
+                new.write_text(now)
         return found
     except (RuntimeError, *_SPOILT) as error:  # no folder to write to, or what is in it
         cannot_keep(error)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..archive import find_h5py
+from ..archive import find_h5py, new_file, put_in_place
 from ..errors import (FileError, InputError, require_option, require_options,
                       require_path, teaching)
 from ..fields import find_fields
@@ -63,10 +63,12 @@ class VtkHdfWriter:
         self._dtype = PRECISIONS[require_option("precision", precision, PRECISIONS)]
         find_fields(self.options.get("fields"))
         files = find_h5py()
-        self._temporary = self.path.with_name(f".{self.path.stem}.{os.getpid()}.vtkhdf")
-        self._spare = self._temporary.with_suffix(".spare")
+        self._made: list[Path] = []
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
+            for beside in self.path, self.path.with_suffix(".spare"):
+                self._made.append(new_file(beside))
+            self._temporary, self._spare = self._made
             self._spare.write_bytes(os.urandom(SPARE))  # which no file system makes shorter
             self._file = files.File(self._temporary, "w", rdcc_nbytes=0)  # chunks are whole frames
         except BaseException as error:
@@ -91,7 +93,7 @@ class VtkHdfWriter:
                 self._steps()
             self._file.close()
             if kind is None and self.times:
-                os.replace(self._temporary, self.path)
+                put_in_place(self._temporary, self.path)
                 save_obstacles(self._first, self.path, self._body)
         except OSError as error:
             raise self._cannot(error) from error
@@ -100,7 +102,7 @@ class VtkHdfWriter:
             self._remove()
 
     def _remove(self):
-        for path in (self._spare, self._temporary):
+        for path in self._made:
             with suppress(OSError):
                 path.unlink()
 

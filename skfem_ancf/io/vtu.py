@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import logging
-import os
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from .. import archive
 from ..errors import (FileError, InputError, require_finite_scalar, require_flag,
                       require_integer, require_like, require_option, require_path, shown, taught)
 from ..fields import find_fields, values_on_grid
@@ -17,6 +18,8 @@ from ..quadrature import tensor
 from .xml import write_vtu
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from ..beam import Beam
     from ..types import Array, StrPath
 
@@ -321,31 +324,27 @@ def require_next(state: Any, t: Any, before: float | None) -> float:
     return t
 
 
-class replacing:
-    """A context with a temporary path beside ``path``, which replaces ``path`` on success."""
+@contextmanager
+def replacing(path: StrPath) -> Iterator[Path]:
+    """As :func:`skfem_ancf.archive.replacing`: makes the folder, and raises FileError.
 
-    def __init__(self, path: StrPath) -> None:
-        self.path = Path(path)
-        self.temporary = self.path.with_name(f".{self.path.stem}.{os.getpid()}{self.path.suffix}")
-
-    def __enter__(self):
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise FileError(f"cannot make the folder {str(self.path.parent)!r}: {error}"
-                            ) from error
-        return self.temporary
-
-    def __exit__(self, kind, error, _):
-        try:
-            if error is None:
-                os.replace(self.temporary, self.path)
-            else:
-                self.temporary.unlink(missing_ok=True)
-        except OSError as failure:
-            error = error or failure
-        if isinstance(error, OSError) and not isinstance(error, FileError):
-            raise FileError(f"cannot write {str(self.path)!r}: {error}") from error
+    Parameters
+    ----------
+    path
+        Where the file goes.
+    """
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot make the folder {str(path.parent)!r}: {error}") from error
+    try:
+        with archive.replacing(path) as new:
+            yield new
+    except FileError:
+        raise
+    except OSError as error:
+        raise FileError(f"cannot write {str(path)!r}: {error}") from error
 
 
 def subdivision(subdivide: Any) -> tuple[int, ...]:
