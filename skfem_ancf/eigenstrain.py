@@ -17,6 +17,7 @@ from scipy import sparse
 from .errors import InputError, ask_array, require_finite_scalar, require_function, shown
 from .formulations import COMPONENTS
 from .growth import energy_lost, sampled
+from .kernels.along import stretched
 from .kernels.base import GIVEN, MEAN, apart, no_stresses, nowhere
 from .kernels.law import LINEAR
 from .loads import Load
@@ -41,7 +42,8 @@ class EigenStrain(Load):
     """A stress-free strain: the elastic strain is what is left of E.
 
     It is given in the beam's frame, along the axis and across it. Of a cable only ``xx`` acts: its
-    mean stretches the axis, and its slope across bends it.
+    mean stretches the axis, and its slope across bends it. There it is the stretch minus 1 that a
+    fibre has without stress; of sections it is that of Green and Lagrange.
 
     Parameters
     ----------
@@ -222,14 +224,27 @@ class EigenStrain(Load):
             On the strain.
         """
         beam, E0 = self.beam, self.strain_at(X, e)
+        if not beam.has_sections:
+            stretch, _ = stretched(beam.strain(u, X, e)[0])
+            return self.nominal_at(X, e, factor) / stretch
         E = beam.strain(u, X, e) if self.grows else 0.0 * E0
-        if beam.has_sections:
-            laws = [layer.material.law(layer.material.shear_factor(layer.element)).stress
-                    for layer in beam.layers]
-        else:
-            laws = [_Along(slab.material.axial_modulus) for slab in beam.across.slabs]
+        laws = [layer.material.law(layer.material.shear_factor(layer.element)).stress
+                for layer in beam.layers]
         return beam.across.of_slabs(
             X, E0, [lambda law=law: law(E) - law(E - factor * E0) for law in laws], e)
+
+    def nominal_at(self, X: Array, e: Array, factor: float = 1.0) -> Array:
+        """What the nominal stress of a cable, force per stress-free area, is less by, (3, n, m).
+
+        Parameters
+        ----------
+        X, e, factor
+            As for :meth:`stress_at`, shapes (2, n, m) and (n,).
+        """
+        E0 = factor * self.strain_at(X, e) * np.array([1.0, 0.0, 0.0])[:, None, None]
+        return self.beam.across.of_slabs(X, E0, [
+            lambda slab=slab: slab.material.axial_modulus * E0
+            for slab in self.beam.across.slabs], e)
 
 
 class Temperature(EigenStrain):
@@ -260,16 +275,6 @@ class Temperature(EigenStrain):
         size = law.thermal_expansion * (1.0 + law.nu if law.plane == "strain" else 1.0)
         T = size * _asked("the temperature", self.change, x, y)
         return np.array([T, T, 0.0 * T])
-
-
-class _Along:
-    """Stress along a fibre of a cable."""
-
-    def __init__(self, modulus):
-        self.modulus = modulus
-
-    def __call__(self, strain):
-        return np.array([self.modulus * strain[0], 0.0 * strain[0], 0.0 * strain[0]])
 
 
 def _number_or_function(name, value, optional=True):

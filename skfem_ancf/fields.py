@@ -17,6 +17,7 @@ import numpy as np
 from .errors import (CallbackError, InputError, NameUnknown, ask, require_finite_scalar,
                      require_flag, require_integer, require_label, require_text, shown, teaching)
 from .kept import cached_property, kept
+from .kernels.along import stretched
 from .materials import LinearLaw
 from .parts import Part
 
@@ -269,11 +270,20 @@ class Values(Mapping):
         """Strain energy per stress-free volume, (n,)."""
         def of(material):
             law = material.law()
-            if isinstance(law, LinearLaw) or not self.beam.has_sections:
+            if not self.beam.has_sections:
+                return self._energy_of_fibres()
+            if isinstance(law, LinearLaw):
                 return 0.5 * np.sum(self.elastic * self.S, axis=0)
             return law.energy(self.elastic)
 
         return self.of_materials(of)
+
+    def _energy_of_fibres(self):
+        """Of a cable: half of its nominal stress times the stretch that is elastic."""
+        stretch, longer = stretched(self.strain[0])
+        if self._eigen is not None:
+            longer = longer - (self._eigen(self._part) + 0.0 * self.strain)[0]
+        return 0.5 * (stretch * self.S[0] * longer + self.elastic[2] * self.S[2])
 
     @cached_property
     def principal(self) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from .inertia import of_cable, of_sections
 from .kernels import CableKernel, Kernel
-from .kernels.along import CableSections
+from .kernels.along import CableSections, stretched
 from .errors import InputError
 from .formulations.ecm import AXIS
 from .quadrature import gauss
@@ -227,7 +227,12 @@ class Sections:
 
 
 class Cable(Sections):
-    """Sections stay normal to the axis, and get thinner so that S_yy = 0."""
+    """Sections stay normal to the axis, and get thinner so that S_yy = 0.
+
+    The nominal stress along a fibre is ``P = E (eps - Y kappa)``; E / (1 - nu^2) in plane strain.
+    Over a section its integral is N = EA eps - ES kappa, that of -Y P is M = EI kappa - ES eps. The
+    second Piola-Kirchhoff stress is P over the stretch of the fibre.
+    """
 
     kernel: Any = CableKernel
     has_sections = False
@@ -267,23 +272,22 @@ class Cable(Sections):
     def _section(beam, u, X, tind):
         at = CableSections(beam, X[0], tind)
         tangent, strain = at(beam.kernel.gather(u, slice(None) if tind is None else tind))
-        return tangent, at.tangent0, *strain
+        return tangent, at.tangent0, *strain, at.kappa0
 
     @classmethod
     def gradients(cls, beam: Interior, u: Array, X: Array,
                   tind: Array | None) -> tuple[Array, Array]:
         frame = beam.mesh.mapping().frame(X, tind)
-        tangent, _, eps, kappa = cls._section(beam, u, X, tind)
-        strain = cls.strain(beam, u, X, tind)
-        normal = np.array([-tangent[1], tangent[0]])
-        Y = beam.mesh.mapping().offset(X, tind)
-        F = np.stack([(1.0 + eps - Y * kappa) * tangent,
+        tangent, _, eps, kappa, kappa0 = cls._section(beam, u, X, tind)
+        Y, normal = beam.mesh.mapping().offset(X, tind), np.array([-tangent[1], tangent[0]])
+        strain = cls._strain_of(beam, Y, beam.across.which(X, tind), eps, kappa, kappa0)
+        F = np.stack([(1.0 + (eps - Y * kappa) / (1.0 - Y * kappa0)) * tangent,
                       np.sqrt(1.0 + 2.0 * strain[1]) * normal], axis=1)
         return F - frame, frame
 
     @classmethod
     def displacements(cls, beam: Interior, u: Array, X: Array, tind: Array | None) -> Array:
-        tangent, tangent0, _, _ = cls._section(beam, u, X, tind)
+        tangent, tangent0, *_ = cls._section(beam, u, X, tind)
         turn = tangent - tangent0
         return (Sections.displacements(beam, u, X, tind)
                 + beam.mesh.mapping().offset(X, tind) * np.array([-turn[1], turn[0]]))
@@ -294,10 +298,10 @@ class Cable(Sections):
                               *cls._section(beam, u, X, tind)[2:])
 
     @staticmethod
-    def _strain_of(beam, Y, which, eps, kappa):
+    def _strain_of(beam, Y, which, eps, kappa, kappa0):
         ratios = np.array([slab.material.lateral_ratio for slab in beam.across.slabs])
-        along = eps - Y * kappa
-        xx = along + 0.5 * along * along
+        longer = (eps - Y * kappa) / (1.0 - Y * kappa0)  # of a fibre, by its length
+        xx = longer + 0.5 * longer * longer
         return np.array([xx, -ratios[which] * xx, 0.0 * xx])
 
     @classmethod
@@ -306,8 +310,13 @@ class Cable(Sections):
 
     @staticmethod
     def stress(beam: Interior, strain: Array, u: Array, X: Array, tind: Array | None) -> Array:
+        stretch, longer = stretched(strain[0])
+        if not beam.mesh.is_straight:
+            kappa0 = CableSections(beam, X[0], tind).kappa0
+            longer = longer * (1.0 - beam.mesh.mapping().offset(X, tind) * kappa0)
+
         def along(material):
-            S = material.axial_modulus * strain[0]
+            S = material.axial_modulus * longer / stretch
             return np.array([S, 0.0 * S, 0.0 * S])
 
         return beam.across.of_slabs(X, strain, [partial(along, slab.material)
@@ -315,13 +324,11 @@ class Cable(Sections):
 
     @staticmethod
     def shortest(beam: Interior, u: Array) -> float:
-        eps, outer = beam.kernel.outer_strain(u)
-        return np.min(1.0 + eps - outer)
+        return np.min(beam.kernel.outer_stretches(u))
 
     @staticmethod
     def deformation(beam: Interior, u: Array) -> tuple[Array, Array]:
-        eps, outer = beam.kernel.outer_strain(u)
-        along = 1.0 + eps + outer * np.array([[[-1.0]], [[1.0]]])
+        along = beam.kernel.outer_stretches(u)
         ratio = beam.across.slabs[0].material.lateral_ratio
         across = np.sqrt(np.maximum(1.0 - ratio * (along * along - 1.0), 0.0))  # S_yy = 0
         return along * across, along

@@ -99,6 +99,8 @@ class Piece:
 
     def __init__(self, recovery: Any, start: float, end: float) -> None:
         self.recovery, self.forces = recovery, recovery.forces
+        #: Sections of cables keep their height where the axis is stretched.
+        self.rigid = not recovery.beam.has_sections
         mesh = recovery.beam.mesh
         e = np.arange(int(np.floor(start)), int(np.ceil(end)))
         a, b = np.maximum(start - e, 0.0), np.minimum(end - e, 1.0)
@@ -143,6 +145,7 @@ class Piece:
         self.g = sections.volume / (speed[:, None] * h)
         self.E0 = sum(np.moveaxis(np.multiply.outer(factor, eigen.strain_at(X, self.e)),
                                   np.ndim(factor), 0) for factor, eigen in self.forces.eigen)
+        self._E0_along = 0.0 if isinstance(self.E0, int) else self.E0[0]
         area = self.integral(1.0)[:, None]
         self.below = self.from_bottom(self.width) / area
         axis_load = axis.sampled(AXIS) / (area * speed[:, None])
@@ -284,15 +287,35 @@ class Piece:
         r = self.recovery
         if self.stress_given:
             return self.E0 + r.strain_of(self.S / self.grade, self.eps - self.E0)
+        if self.rigid:
+            eps, self.S[0] = self._fibres(self._fed)
+            return eps
         self.eps[0] = 0.5 * (self.stretch**2 - 1.0)
         eps = r.strain_of(self._fed, self.eps - self.E0, (1, 2))
         self.S[0] = self.grade * r.by_law(lambda law, strain: law.stress(strain)[0], eps)
         return eps + self.E0
 
+    def _fibres(self, S):
+        """The strain of a cable's fibres, and their S_xx, with S_yy and S_xy as they are in S.
+
+        Hooke's law is that of stretches: P = E (stretch - 1) along a fibre, S_xx = P / stretch.
+        """
+        r, longer = self.recovery, self.stretch - 1.0
+        eps = r.strain_of(S, np.array([longer, 0.0 * longer, 0.0 * longer]) - self.E0, (1, 2))
+        P = self.grade * r.by_law(lambda law, strain: law.stress(strain)[0], eps)
+        eps = eps + self.E0
+        size = 1.0 + 0.5 * longer  # of Green-Lagrange strain over stretch minus 1
+        thin = r.by_law(lambda law, xx: law.D[1, 0] / law.D[1, 1] * xx,
+                        size * (longer - self._E0_along))
+        self.thinner = np.sqrt(1.0 - 2.0 * self.at_axis(thin))
+        return np.array([size * longer, size * eps[1], eps[2]]), P / self.stretch
+
     def _section(self):
         """r_Y along t and n, and P_1 along t and n; (..., n, m) each."""
         self.eps = eps = self._strain()
         lam_y = np.sqrt(1.0 + 2.0 * eps[1])
+        if self.rigid:  # a stretch of the axis makes the sections of a cable no thinner
+            lam_y = lam_y / self.thinner[..., None]
         lean = self.alpha - np.arcsin(np.clip(eps[2] / (self.stretch * lam_y), -1.0, 1.0))
         self.rY = np.array([-lam_y * np.sin(lean), lam_y * np.cos(lean)])
         self.rX = self.stretch * np.array([np.cos(self.alpha), np.sin(self.alpha)])
@@ -310,7 +333,7 @@ class Piece:
             self._section()
             E = self.grade * self.recovery.modulus(self.eps - self.E0)
             x, y = self.from_axis(self.rY)
-            z, force = y / h, (self.S[0] + E * self.stretch**2) / self.g
+            z, force = y / h, (E if self.rigid else self.S[0] + E * self.stretch**2) / self.g
             # force and moment, and what a stretch and a bending of 1 / g and z / g add to them
             found, moment, one, two, three = self.integral(np.array([
                 self.P[0], x * self.P[1] - y * self.P[0], force, z * force, z * z * force]))
@@ -412,7 +435,8 @@ class Piece:
             self._balance()
             self._shear()
         self.stress, self.angle = self.S, self.phi[..., None] + self.alpha
-        self.strain = self.E0 + self.recovery.strain_of(self.S / self.grade, self.eps - self.E0)
+        self.strain = self._fibres(self.S / self.grade)[0] if self.rigid else (
+            self.E0 + self.recovery.strain_of(self.S / self.grade, self.eps - self.E0))
 
     def _rounds(self):
         """Steps 2 and 3 in turn, for each state until its stretch has settled."""

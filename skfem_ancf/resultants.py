@@ -47,7 +47,8 @@ class Resultants:
     M
         Bending moment about the deformed axis, counterclockwise: it presses the upper fibres.
     curvature
-        Change of the rate at which the sections turn along the stress-free axis, per length.
+        Change of the rate at which the sections turn along the stress-free axis, per length. A
+        cable has N = EA (stretch - 1) and M = EI curvature, if its axis is at the centroid.
     stretch
         Length of the axis over that in the stress-free state.
     shear
@@ -133,6 +134,8 @@ def resultants(state: Configuration, number: int, part: Part | None = None,
     x = beam.mesh.mapping().F(np.array([xi, 0.5 + 0.0 * xi])[:, :, None], e)[..., 0]
     values = (_own(state, beam, e, xi) if recovery is None else
               _recovered(recovery, e, xi, after))
+    if recovery is not None and not beam.has_sections:
+        values.update(_strains_of_cable(state, beam, e, xi, values["N"], values["M"]))
     return Resultants(lengths, x, **values, recovered=recovery is not None)
 
 
@@ -263,14 +266,29 @@ def _own_of_cable(state, beam, e, xi):
 
 def _forces_of_cable(state, beam, e, xi):
     """Normal force and moment of a cable, and the strains of its axis."""
-    u, (X, area) = state.u_of(beam), _across(beam, e, xi)
-    angle, stretch, shear, curvature = _cable_axis(beam, u, e, xi)
+    angle, stretch, shear, curvature = _cable_axis(beam, state.u_of(beam), e, xi)
     EA, ES, EI = beam.across.moments(xi[:, None], e)[..., 0]
-    N, M = EA * (stretch - 1.0) - ES * curvature, EI * curvature - ES * (stretch - 1.0)
-    for factor, load in state.eigenstrains(beam):
-        S0 = load.stress_at(u, X, e, factor)[0] * area
-        N, M = N - np.sum(S0, axis=-1), M + np.sum(S0 * beam.mesh.mapping().offset(X, e), axis=-1)
+    N0, M0 = _stress_free_of_cable(state, beam, e, xi)
+    N = EA * (stretch - 1.0) - ES * curvature - N0
+    M = EI * curvature - ES * (stretch - 1.0) - M0
     return dict(N=N, M=M, curvature=curvature, stretch=stretch, shear=shear, angle=angle)
+
+
+def _strains_of_cable(state, beam, e, xi, N, M):
+    """Stretch and change of curvature of a cable under a normal force and a moment."""
+    EA, ES, EI = beam.across.moments(xi[:, None], e)[..., 0]
+    N0, M0 = _stress_free_of_cable(state, beam, e, xi)
+    N, M, det = N + N0, M + M0, EA * EI - ES * ES
+    return dict(stretch=1.0 + (EI * N + ES * M) / det, curvature=(EA * M + ES * N) / det)
+
+
+def _stress_free_of_cable(state, beam, e, xi):
+    """Normal force and moment that the stress-free strains of a cable would take."""
+    (X, area), out = _across(beam, e, xi), np.zeros((2, len(e)))
+    for factor, load in state.eigenstrains(beam):
+        S0 = load.nominal_at(X, e, factor)[0] * area
+        out += np.sum(S0, axis=-1), -np.sum(S0 * beam.mesh.mapping().offset(X, e), axis=-1)
+    return out
 
 
 def _cable_axis(beam, u, e, xi):

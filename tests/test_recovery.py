@@ -98,7 +98,9 @@ def test_goals_away_from_the_weld(name, element):
 
 
 @pytest.mark.parametrize("element, bound", [
-    (ElementBeamANCF(1), (2.5, 2.5, 5, 2.5, 0.15)), (ElementBeamCable(5), (0.5, 0.5, 5, 0.5, 0.1)),
+    (ElementBeamANCF(1), (2.5, 2.5, 5, 2.5, 0.15)),
+    # a cable has another law: P = E (stretch - 1), at strains of 1.5 %
+    (ElementBeamCable(5), (3, 3, 5, 5, 0.1)),
     (ElementBeamPatelShabana(), (2, 2, 5, 2, 0.1))], ids=repr)
 def test_other_elements(element, bound):
     assert np.all(errors("gravity", gravity_cantilever(element)) < bound)

@@ -23,8 +23,13 @@ if TYPE_CHECKING:
 class ElementBeamCable(ElementBeam):
     """An axis without a section of its own: ``r`` and its derivatives along X only.
 
-    Sections stay normal to the axis; the beam has the stiffnesses EA and EI, and its thickness
-    follows from S_yy = 0. For slender scenes that ask for no more of the section.
+    Sections stay plane and normal to the axis; the beam has the stiffnesses EA and EI, and its
+    thickness follows from S_yy = 0. For slender scenes that ask for no more of the section.
+
+    N = EA (stretch - 1) and M = EI (change of curvature), at any size: along a fibre the nominal
+    stress is E (stretch - 1), E / (1 - nu^2) in plane strain. Strain and stress that are read are
+    those of Green and Lagrange and the second of Piola and Kirchhoff: eps_xx = (stretch^2 - 1) / 2
+    and S_xx = E (stretch - 1) / stretch.
 
     Parameters
     ----------

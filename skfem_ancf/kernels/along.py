@@ -27,6 +27,18 @@ def from_first_node(q_e: Array) -> Array:
     return q_e
 
 
+def stretched(xx: Array) -> tuple[Array, Array]:
+    """The stretch of a fibre, and the stretch minus 1 without cancellation.
+
+    Parameters
+    ----------
+    xx
+        Its Green-Lagrange strain, shape (...).
+    """
+    stretch = np.sqrt(1.0 + 2.0 * xx)
+    return stretch, 2.0 * xx / (1.0 + stretch)
+
+
 class CableSections:
     """Sections of a cable: what of their strain does not depend on the state.
 
@@ -54,8 +66,10 @@ class CableSections:
         a0, b0 = G1 @ q_e, (0.0 if mesh.is_straight else 1.0) * (G2 @ q_e)
         frame, (n, ne) = np.concatenate([a0, b0], axis=1).transpose(1, 2, 0), a0.shape[1::-1]
         square0 = np.sum(a0 * a0, axis=-1)
+        #: Curvature in the stress-free state, (ne, np).
+        self.kappa0 = cross(a0, b0) / square0
         self._pack = kernel.packs[0]._replace(
-            frame=frame, length0=np.sqrt(square0).T, kappa0=(cross(a0, b0) / square0).T,
+            frame=frame, length0=np.sqrt(square0).T, kappa0=self.kappa0.T,
             frame_place=np.arange(ne))
         self._slopes, self._shape = np.concatenate([G1, G2], axis=1), (n, ne)
         self.tangent0 = np.moveaxis(a0 / np.sqrt(square0)[..., None], -1, 0)

@@ -467,17 +467,18 @@ class CableKernel(Chain):
         per = pack.weights * pack.stiffness[0]
         return float(per.sum()) * (pack.start.size / per.shape[1])
 
-    def outer_strain(self, u: Array) -> tuple[Array, Array]:
-        """Extension of the axis, and what bending adds to it at a face; both (points, elements).
+    def outer_stretches(self, u: Array) -> Array:
+        """Stretch of the fibres at the bottom and at the top, (2, points, elements).
 
         Parameters
         ----------
         u
             Displacement of the coordinates, shape (N,).
         """
-        eps, kappa = self.strain(self.gather(u))
-        h = self._across.mesh.mapping().height(self.points)[0]
-        return eps, 0.5 * np.transpose(h) * np.abs(kappa)
+        pack, (eps, kappa) = self.packs[0], self.strain(self.gather(u))
+        Y = 0.5 * np.transpose(self._across.mesh.mapping().height(self.points)[0])
+        kappa0 = pack.kappa0[:, pack.frame_place]
+        return np.array([1.0 + (eps - y * kappa) / (1.0 - y * kappa0) for y in (-Y, Y)])
 
     def _pack(self, mesh, element, n):
         """The tables of the reference element times powers of the lengths, of one or of each."""
