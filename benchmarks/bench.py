@@ -23,7 +23,7 @@ from work_precision.report import OURS, goals, report
 
 OPERATIONS = ("tangent", "iteration", "scaling", "frames", "large", "sweep")
 SIZES = {False: dict(tangent=(16, 256, 4096), scaling=(16, 64, 256, 1024, 4096, 16384, 100000),
-                     frames=(14, 30, 100), large=(14, 30, 65, 100, 204), sweep=(10000,)),
+                     frames=(14, 30, 100), large=(14, 30, 65, 100, 204), sweep=(500,)),
          True: dict(tangent=(16,), scaling=(16, 64), frames=(2,), large=(2, 3), sweep=(5,))}
 PASSES = 2
 #: Error of the runs that are made cold, too.

@@ -120,8 +120,8 @@ def sweep(results):
     head = ["members", "what", "error", "microseconds a member", "times faster than Exudyn"]
     return table(head, [
         (r["note"].split()[0], f"{r['elements']} x {r['variant']}", f"{r['error']:.0e}",
-         short(1e6 * r["seconds"], 3), short(found, 3) + ", **missed**" * (verdict == "missed"))
-        for r, found, its, verdict in sweeps(results["sweep"]) if its])
+         short(1e6 * r["seconds"], 3), short(found, 3))
+        for r, found, its in sweeps(results["sweep"]) if its])
 
 
 def tangent(results):

@@ -21,9 +21,8 @@ from .formulations import get_formulation
 from .frozen import Frozen, read_only
 from .kept import cached_property
 from .kinematics import KINEMATICS
-from .materials import Material, StVenantKirchhoff
+from .materials import Material
 from .mesh import MeshBeam, reach
-from .origin import ours
 from .parts import Part
 from .places import as_point, facets_of, node_of
 from .quadrature import gauss, tensor
@@ -80,13 +79,6 @@ def _coordinates(mesh, element, p):
 
 #: Attributes of meshes that functionals of vectors at nodes are of, by their derivatives.
 _DIRECTIONS = {(1, 0): "p_X", (0, 1): "p_Y"}
-#: Arguments of a beam that change neither its coordinates nor its strains.
-_MATTER = frozenset({"material", "width"})
-#: Attributes of a beam that do not depend on material and width.
-_PLACES = ("mesh", "element", "formulation", "name", "compiled", "damping", "kinematics", "nd", "N")
-#: Attributes of a beam that are made once and depend on its mesh and element only.
-_GEOMETRY = ("vector_element", "q0", "origin", "q0_local", "rows", "finder", "series", "scales",
-             "size", "sizes")
 
 
 def _fields(method):
@@ -223,11 +215,6 @@ class Beam(Frozen):
         NameUnknown
             If an argument is not known.
 
-        Notes
-        -----
-        What does not depend on the changes is not made again: of another material the tables of
-        all strains stay, of another width what depends on mesh and element.
-
         Examples
         --------
         >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, StVenantKirchhoff
@@ -237,8 +224,6 @@ class Beam(Frozen):
         >>> beam.width, stiffer.width, stiffer.material.E
         (0.1, 0.2, 2.0)
         """
-        if type(self) is Beam and _MATTER.issuperset(changes) and type(self.section) is Rectangle:
-            return self._of(changes.get("material", self._given), changes.get("width", self.width))
         known = ("mesh", "element", "material", "width", "formulation", "name", "compiled",
                  "damping", "section")
         for name in changes:
@@ -247,62 +232,7 @@ class Beam(Frozen):
         given = {name: getattr(self, name) for name in known} | {"material": self._given}
         given["section" if "width" in changes and isinstance(self.section, Rectangle) else
               "width"] = None
-        other = type(self)(**{**given, **changes})
-        if other.element is self.element:
-            self._share(other)
-        return other
-
-    def _of(self, material, width):
-        """The same beam of another material and width."""
-        other, section = object.__new__(Beam), self.section
-        if width is not self.width:
-            section = _section(None, width)
-        mine, its = vars(self), vars(other)
-        for name in _PLACES:
-            its[name] = mine[name]
-        other._fill(section, _material(section, material, self.mesh), material,
-                    self.across.of_material(section, material))
-        self._share(other)
-        vars(other)["_sealed"] = True
-        return other
-
-    def _share(self, other):
-        """Hand on what depends on mesh and element, and to another material of one section more."""
-        mine, its = vars(self), vars(other)
-        if other.mesh is not self.mesh:
-            if ("kernel" in mine and other.formulation is self.formulation
-                    and other.material is self.material):
-                found = self.kernel.on_mesh(other.across, other.formulation)
-                if found is not None:
-                    its["kernel"] = found
-            return
-        for name in _GEOMETRY:
-            if name in mine:
-                its[name] = mine[name]
-        if (other.formulation is not self.formulation
-                or not (self.across.plain and other.across.plain)):
-            return
-        factors = self._in_proportion(other) if "kernel" in mine else None
-        if factors is not None:
-            its["kernel"] = self.kernel.in_proportion(other.across, *factors)
-        same, density = other.width == self.width, self.across.slabs[0].density
-        if ("inertia" in mine and other.across.slabs[0].density == density
-                and (same or not (callable(other.width) or callable(self.width)))):
-            its["inertia"] = self.inertia.times(1.0 if same else other.width / self.width)
-        if not same:
-            return
-        if "kernel" in mine and "kernel" not in its:
-            its["kernel"] = self.kinematics.kernel(other.across, other.formulation, self.kernel)
-
-    def _in_proportion(self, other):
-        """By how much stiffer and wider the other beam is; None if it differs in other ways."""
-        a, b, width = self.material, other.material, self.width
-        if (type(a) is not StVenantKirchhoff or type(b) is not StVenantKirchhoff
-                or (a.nu, a.plane, a.shear_correction) != (b.nu, b.plane, b.shear_correction)
-                or a.graded or b.graded or callable(width) or callable(other.width)
-                or not ours(self.formulation)):
-            return None
-        return b.E / a.E, other.width / width
+        return type(self)(**{**given, **changes})
 
     def with_mesh(self, mesh: MeshBeam) -> Beam:
         """The same beam on another mesh."""

@@ -84,24 +84,6 @@ def body_of(beams: Sequence["Beam"], slices: Sequence[slice],
     return Body(tuple(packs), table)
 
 
-def renewed_body(before: "Body", beams: Sequence["Beam"], slices: Sequence[slice]) -> "Body":
-    """The Body of beams of other materials, with the table of the one before if it is the same.
-
-    Parameters
-    ----------
-    before
-        The Body of beams with the same coordinates.
-    beams, slices
-        As for :func:`body_of`.
-    """
-    packs = [pack for beam in beams for pack in beam.kernel.packs]
-    if len(packs) == len(before.packs) and all(
-            one.weights.shape[0] == other.weights.shape[0]
-            for one, other in zip(packs, before.packs)):
-        return Body(tuple(packs), before.table)
-    return body_of(beams, slices)
-
-
 def viscous_body_of(body: "Body", beams: Sequence["Beam"], times: Sequence[float]) -> "Body":
     """The Body of what resists the rates of strains; ``body`` itself where nothing does.
 

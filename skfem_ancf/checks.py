@@ -6,8 +6,7 @@ import warnings
 from dataclasses import dataclass
 from itertools import accumulate
 from math import sin, sqrt
-from operator import lt, mul
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,8 +30,6 @@ COMPRESSED = 1.0 / sqrt(3.0)
 #: 1.6 rad, of degree 7 by 2.4e-8 at 2, of degree 9 by 5e-11 at 2.5.
 TURNING = {3: 1.0, 5: 1.6, 7: 2.0}
 TURNING_SMOOTH = 2.5
-#: Places up to which they are looked at one by one.
-FEW = 32
 TINY = 1e-300
 
 
@@ -138,51 +135,25 @@ class Screen:
                 np.concatenate([last, last, first, first, self.start[left], self.start[right]]
                                ).reshape(3, -1))
 
-    @cached_property
-    def _turns_of_few(self):
-        """The same as lists, none of many elements."""
-        return self._of_few(self._turns)
-
-    @cached_property
-    def _folds_of_few(self):
-        """The same for each element and tangent, none of many."""
-        lists = self._of_few(self._folds)
-        return lists and [*zip(*lists[0], *lists[1])]
-
-    def _of_few(self, arrays):
-        return None if arrays[0].size > FEW else [x.tolist() for x in arrays]
-
-    def passes(self, u: Array, start: Array | None = None, slender: Array | None = None) -> Any:
+    def passes(self, u: Array) -> bool:
         """False if a fibre may be compressed, or an element may turn, beyond the range.
 
         Parameters
         ----------
         u
-            Displacement of the coordinates, shape (..., N).
-        start, slender
-            Of others than the beams, (..., nodes) and (..., elements).
+            Displacement of the coordinates, shape (N,).
         """
         if self._none:
             return True
         # how long tangents are over what they were, and how far they have turned: the largest
         # curvature of an element is seldom more than twice its mean
-        if u.ndim == 1 and self._turns_of_few:
-            places, rest, begin, end, widest, thick = self._turns_of_few
-            z = _paired(u).tolist()
-            change = [z[k] / tangent + 1.0 for k, tangent in zip(places, rest)]
-            stretch = [abs(x) for x in change]
-            turn = [x / (long + TINY) for x, long in zip(change, stretch)]
-            apart = [abs(turn[j] - turn[i]) for i, j in zip(begin, end)]
-            return (all(map(lt, apart, widest))
-                    and min(stretch) > max(map(mul, apart, thick)) + 1.1 * COMPRESSED)
         places, rest, begin, end, widest, thick = self._turns
-        thick = thick if slender is None else thick / self.slender * slender
-        change = _paired(u)[..., places] / (rest if start is None else start) + 1.0
+        change = _paired(u)[places] / rest + 1.0
         stretch = np.abs(change)
         turn = change / (stretch + TINY)
-        apart = np.abs(turn[..., end] - turn[..., begin])
-        return (apart < widest).all(axis=-1) & (
-            stretch.min(axis=-1) > (apart * thick).max(axis=-1) + 1.1 * COMPRESSED)
+        apart = np.abs(turn[end] - turn[begin])
+        return bool((apart < widest).all()
+                    and stretch.min() > (apart * thick).max() + 1.1 * COMPRESSED)
 
     def folded(self, u: Array) -> bool:
         """True if the axis of an element turns back: its ends lie against a tangent of the axis.
@@ -196,10 +167,6 @@ class Screen:
         """
         if self._none:
             return False
-        if self._folds_of_few:
-            z = _paired(u).tolist()
-            return min([_along(z[i], z[j], z[k], *rest)
-                        for i, j, k, *rest in self._folds_of_few]) < 0.0
         places, rest = self._folds
         return bool(_along(*_paired(u)[places], *rest).min() < 0.0)
 

@@ -10,7 +10,7 @@ from scipy import sparse
 
 from . import compiled
 from .band import Band
-from .body import (BEGIN, END_GRADIENTS, FlatBody, body_of, copies_of, renewed_body, stress_size,
+from .body import (BEGIN, END_GRADIENTS, FlatBody, body_of, copies_of, stress_size,
                    viscous_body_of)
 from .border import Border
 from .compiled.words import Words, constant
@@ -18,7 +18,7 @@ from .forces.system import NO_FORCES
 from .forces.texts import ForceTables
 from .kept import cached_property, twin_of
 from .kernels.base import packed
-from .kernels.law import LINEAR, OWN, text_of, with_text
+from .kernels.law import LINEAR, text_of, with_text
 from .kernels.moments import MomentPack
 from .kernels.section import SectionPack, linearised
 from .origin import ours
@@ -161,21 +161,6 @@ class Tables:
         return [*_parts(frozenset(map(type, self.plain.body.packs)), forces.number > 0,
                         forces.contacts.number > 0)]
 
-    @property
-    def alone(self) -> str:
-        """Why the scene cannot be solved together with others of its topology; empty if it can."""
-        s, border = self.system, self.plain.border
-        laws = [pack.law.kind for pack in self.plain.body.packs if isinstance(pack, SectionPack)]
-        return next((text for text, there in (
-            ("joints move, are of your own, or hold beams to each other",
-             s.m and (border.wide or border.picked.size or self.motion_varies)),
-            ("there are rigid bodies", s.bodies),
-            ("a load has no potential, or is one of your own", not s.symmetric or self.own_loads),
-            ("there are obstacles", s.forces.contacts.obstacles),
-            ("force elements are of your own, or couple points far apart",
-             s.forces.own or s.forces.far),
-            ("a law is one of your own in Python", OWN in laws)) if there), "")
-
     @cached_property
     def linearised(self) -> "Tables | None":
         """The same with laws of constant moduli, those without strain; None if all are such."""
@@ -197,36 +182,6 @@ class Tables:
         """
         return self.with_equations(self.plain._replace(
             copies=copies_of(self.plain.body, n, self.system.N)))
-
-    def renewed(self, system: Any, same_loads: bool = False) -> "Tables":
-        """Those of a system that differs by its loads, or by its beams' materials and widths.
-
-        Parameters
-        ----------
-        system
-            A :class:`~skfem_ancf.system.System` of the same coordinates and joints.
-        same_loads
-            Its loads are constant and have the same vectors.
-        """
-        tables, before = twin_of(self), self.plain
-        tables._system, tables._words, tables._own_handle = ref(system), [], None
-        tables._words_of_loads, its = [], vars(tables)
-        for name in ("flat", "linearised", "parts", "_stress_size", "prestressed", "_at_rest",
-                     "_amplitudes"):
-            if name in its:
-                del its[name]
-        tables._sort(system.loads)
-        loads = before.loads if same_loads else tables._load_tables()
-        if system.beams != self.system.beams:
-            body = renewed_body(before.body, system.beams, system.slices)
-            viscous = viscous_body_of(body, system.beams, system.retardation)
-            tables.plain = before._replace(body=body, copies=body, loads=loads, viscous=viscous)
-            return tables
-        tables.plain = before._replace(loads=loads)
-        if "flat" in vars(self):
-            tables._words = self._words
-            tables.flat = self.flat._replace(loads=tables._flat_loads())
-        return tables
 
     def with_equations(self, plain: Equations) -> "Tables":
         """The same with other numbers.

@@ -46,19 +46,6 @@ class Inertia(NamedTuple):
     slopes: Array | None = None
     moments: Any = None
 
-    def times(self, factor: float) -> Inertia:
-        """That of so many times the mass.
-
-        Parameters
-        ----------
-        factor
-            The number.
-        """
-        if factor == 1.0:
-            return self
-        return self._replace(mass=factor * self.mass, moments=None if self.moments is None else (
-            factor * self.moments))
-
     def matrices(self, elements: Any) -> Array:
         """Mass matrices, shape (n, 2 nb, 2 nb).
 

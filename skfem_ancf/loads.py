@@ -22,7 +22,7 @@ from .errors import (AncfError, CallbackError, InputError, ModelWarning, ask_fie
                      require_finite, require_function, require_slope, shown, warnings_as_errors)
 from .frozen import Sealable, read_only
 from .kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
-from .kept import cached_property, twin_of
+from .kept import cached_property
 from .origin import ours
 from .pickling import picklable_form
 from .places import facets_of
@@ -585,18 +585,6 @@ class DeadLoad(Load):
             raise InputError("a DeadLoad is a vector of the coordinates of one mesh and cannot be "
                              "put on another: use scene.load(form) or a Load with bind(beam)")
         return self
-
-    def moved(self, beam: Beam) -> DeadLoad:
-        """The same vector on a beam of the same mesh and element.
-
-        Parameters
-        ----------
-        beam
-            A :class:`~skfem_ancf.Beam`.
-        """
-        other = twin_of(self)
-        vars(other)["beam"] = beam
-        return other
 
     def force(self, u: Array) -> Array:
         return self.vector

@@ -105,11 +105,6 @@ class Machine:
         vars(machine).pop("linearised", None)
         return machine
 
-    @property
-    def shareable(self) -> bool:
-        """True if nothing of the choice between the ways depends on the laws."""
-        return self._plain is None
-
     def choose(self, name: str) -> Choice:
         """The way of a text for the next call.
 

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from .types import Array, StrPath
 
-    Block = tuple[Array, dict[str, Array]]
-
 _FORMAT = 1
 #: Arrays of a file beside those of parameters and values.
 _OWN = ("format", "done", "failed", "errors")
@@ -52,10 +50,6 @@ class Sweep:
         From name to array of shape (n, ...), one row for each member.
     found
         For each member a dict of arrays, the text of an error, or None where it is not done.
-    report
-        How members were solved, in words.
-    blocks
-        What is found of many together: their places (k,), and from name to array (k, ...).
 
     Attributes
     ----------
@@ -69,9 +63,6 @@ class Sweep:
     failures : list of Failure
         Those that failed; a member whose values have other names or shapes than those of the first
         that is done has failed too.
-    report : str
-        How many members were solved together, how, and why others were solved alone; empty where
-        ``measure`` solves.
 
     Examples
     --------
@@ -84,16 +75,10 @@ class Sweep:
     """
 
     def __init__(self, parameters: dict[str, Array],
-                 found: Sequence[dict[str, Array] | str | None], report: str = "",
-                 blocks: Sequence[Block] = ()) -> None:
-        self.parameters, self.report = parameters, report
+                 found: Sequence[dict[str, Array] | str | None]) -> None:
+        self.parameters = parameters
         self.status = np.full(len(found), "open", dtype="<U6")
-        if blocks and _of_blocks_alone(found, blocks):
-            places, self.values = _joined(blocks, len(found))
-            self.status[places] = "done"
-            self._errors: dict[int, str] = {}
-            return
-        found = _alike(_with_blocks(found, blocks))
+        found = _alike(found)
         self._errors = {k: one for k, one in enumerate(found) if isinstance(one, str)}
         done = [k for k, one in enumerate(found) if isinstance(one, dict)]
         self.status[list(self._errors)], self.status[done] = "failed", "done"
@@ -272,31 +257,6 @@ def _fits(values, shapes):
 
 def _listed(values):
     return ", ".join(f"{name!r} of shape {value.shape}" for name, value in values.items())
-
-
-def _of_blocks_alone(found, blocks):
-    """True if nothing else is found, and all have the same names and shapes."""
-    shapes = [{name: x.shape[1:] for name, x in columns.items()} for _, columns in blocks]
-    return all(one is None for one in found) and all(one == shapes[0] for one in shapes)
-
-
-def _joined(blocks, n):
-    """The places of blocks, and from name to array of all members, nan where nothing is found."""
-    places, arrays = np.concatenate([at for at, _ in blocks]), {}
-    for name in blocks[0][1]:
-        rows = np.concatenate([columns[name] for _, columns in blocks])
-        arrays[name] = np.full((n, *rows.shape[1:]), np.nan, dtype=rows.dtype)
-        arrays[name][places] = rows
-    return places, arrays
-
-
-def _with_blocks(found, blocks):
-    """A list with what is found in blocks, member by member."""
-    found = list(found)
-    for places, columns in blocks:
-        for k, row in zip(places.tolist(), zip(*columns.values())):
-            found[k] = dict(zip(columns, row))
-    return found
 
 
 def _arrays(found, done):

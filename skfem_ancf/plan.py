@@ -138,11 +138,6 @@ def _solution(scene, kind):
             way, reason = s.machine.choose("steps" if dynamic else "equilibrium")
         yield "compiled loop", "skipped" if way == "plain" else "computed", (
             f"whole {f'time steps, in blocks, of {STEPS}' if dynamic else 'iterations'}: {reason}")
-    if kind == "static":
-        alone = s.machine.tables.alone
-        yield "sweep", "skipped" if alone else "computed", (
-            f"members are solved one by one: {alone}" if alone else
-            "members that differ by floats are solved together, if points are read")
     if dynamic:
         scheme, reason = choose_scheme(s)
         yield "scheme", "computed", f'scheme="auto" takes {scheme!r}: {reason}'

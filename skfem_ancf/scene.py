@@ -35,9 +35,8 @@ from .errors import (ConvergenceError, InputError, Interrupted, StabilityWarning
 from .joints import Joint, bind_joint, get_joint
 from .joints.base import both_of, is_ground, members_at, named_place
 from .joints.prescribed import Turned
-from .loads import (DeadLoad, EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight,
+from .loads import (EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight,
                     bind_load)
-from .origin import ours
 from .path import CriticalPoint, Path
 from .pickling import functions_of, require_picklable
 from .places import on_other_mesh
@@ -1341,11 +1340,6 @@ class Scene:
             Another one. A state of this scene is a good start for its
             ``solve_static(start=state)``, if the mesh has not changed.
 
-        Notes
-        -----
-        Scenes that differ by loads, materials or widths share tables and work arrays: only one of
-        them is solved at a time, the others wait.
-
         Raises
         ------
         NameUnknown
@@ -1381,7 +1375,7 @@ class Scene:
                 k = self._number_of_beam(beam)
                 beams = list(self._beams)
                 beams[k] = beams[k].replace(**changes)
-                scene = self._stiffer(k, beams, changes) or self.with_beams(beams)
+                scene = self.with_beams(beams)
             return scene if loads is None else scene._loaded(loads)
 
     def _loaded(self, loads):
@@ -1392,31 +1386,8 @@ class Scene:
         given = tuple((self._number(load.beam), load) for load in loads)
         bound = tuple((k, load, bind_load(load, self.members[k])) for k, load in given)
         require_alone([(k, load) for k, _, load in bound])
-        return self._sharing(bound, self._beams)
-
-    def _stiffer(self, k, beams, changes):
-        """The scene of another material or width of beam k, None where more depends on it."""
-        system, old, new = self._system, self._beams[k], beams[k]
-        if (system is None or set(changes) - {"material", "width"} or self._elements
-                or type(self).with_beams is not Scene.with_beams
-                or new.element is not old.element or "kernel" not in vars(new)
-                or not all(ours(joint) for _, joint in self._joints)):
-            return None
-        same = new.width == old.width and new.material.density == old.material.density
-        moved = [n != k or (same and isinstance(bound, DeadLoad)) for n, _, bound in self._loads]
-        loads = tuple([(n, load, bound if n != k else bound.moved(new) if of else
-                        bind_load(load, new)) for (n, load, bound), of in zip(self._loads, moved)])
-        return self._sharing(loads, beams, all(moved))
-
-    def _sharing(self, loads, beams, same_loads=False):
-        """A scene that shares what does not depend on loads, materials and widths."""
-        other, system = self.__copy__(), self._system
-        other._beams, other._loads = tuple(beams), loads
-        if system is not None and not system.forces.contacts.obstacles:
-            bound = [load for _, _, load in loads]
-            other._system = system.renewed([*bound, *other._weights()], beams, same_loads)
-            if other._system is not None:
-                other._lock = self._lock
+        other = self.__copy__()
+        other._loads = bound
         return other
 
     @_alone

@@ -14,12 +14,11 @@ import numpy as np
 from .errors import (CallbackError, CallError, CheckpointWarning, FileError, InputError,
                      Interrupted, NameUnknown, SweepWarning, require_function, require_integer,
                      require_path, shown, taught)
-from .batch import solve_together, threads_of
 from .members import Sweep, column_of, require_plain
 from .progress import progress_bar
-from .readings import Readings, measured
+from .probes import Probes, measured
 from .switch import expecting
-from .workers import Task, here, in_processes, on_cluster, sendable
+from .workers import Task, here, in_processes, in_threads, on_cluster
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -43,19 +42,10 @@ def sweep(build: Callable[..., Any],
     reads. Results do not depend on where members are computed, nor on their order. A member that
     fails is nan, and is listed with its parameters in ``failures``; the others go on.
 
-    Where ``measure`` says what to read of material points at equilibrium, as ``("displacement",
-    (1, 0))``, members that differ by floats only are solved together: a few scenes are built, of
-    the others the numbers follow, and compiled code solves one after the other in as many threads
-    as there are processors. See ``result.report``. That takes smooth functions of the parameters: a
-    choice that ``build`` makes by comparing a float, or a narrow peak, may go unseen where it
-    concerns a few members only (of one parameter less than a sixteenth of 128 or more, of two an
-    eighth); hand a choice as a text, a truth value or an integer.
-
     Parameters
     ----------
     build
-        From the parameters, by keyword, to a :class:`Scene`, or whatever ``measure`` takes. For
-        members that are solved together it is asked at a few values between theirs.
+        From the parameters, by keyword, to a :class:`Scene`, or whatever ``measure`` takes.
     parameters
         From name to an array of shape (n, ...), one row for each member; a table of pandas; or a
         list of n dicts.
@@ -64,14 +54,14 @@ def sweep(build: Callable[..., Any],
         and shapes for all members. Or what to read of the scene's ``solve_static()``: a pair
         (what, at) or a triple (what, at, beam) of "displacement" or "position", a point (x, y),
         points (2, n) or the name of an end, and a beam; or a dict by name of such and of functions
-        of the State.
+        of the State. With these, members are solved in this process in as many threads as there
+        are processors: compiled code runs side by side. Members are built one after the other.
     workers
-        How many processes, of threads for members that are solved together; None: in this one, and
-        as many threads as there are processors. Processes import ``build`` and ``measure``, which
+        How many processes; None: in this one. Processes import ``build`` and ``measure``, which
         are to be defined by ``def`` at the top of a module; a script calls under
         ``if __name__ == "__main__":``. Libraries of linear algebra have one thread in each.
     client
-        A ``dask.distributed.Client``, in place of ``workers``; it solves members one by one.
+        A ``dask.distributed.Client``, in place of ``workers``.
     path
         A file (.npz) that is written as results come. If it is there, the sweep goes on: what is
         done is taken from it, what failed is tried again. Parameters are compared with those of
@@ -121,11 +111,11 @@ def sweep(build: Callable[..., Any],
     >>> bool(np.allclose(result["value"], -0.01 / (3 * EI), rtol=1e-4))
     True
 
-    A thousand, solved together:
+    The same, by saying what is read:
 
-    >>> many = sweep(build, {"E": np.linspace(1e9, 8e9, 1000)}, ("displacement", (1, 0)))
-    >>> many.report[:23]
-    '1000 of 1000 members we'
+    >>> again = sweep(build, {"E": [1e9, 2e9, 4e9, 8e9]}, ("displacement", (1, 0)))
+    >>> bool(np.allclose(again["value"][:, 1], result["value"], rtol=1e-9))
+    True
     """
     require_function("build", build, "of the parameters that returns a scene")
     measure = measured(measure)
@@ -138,7 +128,7 @@ def sweep(build: Callable[..., Any],
     columns = {name: column_of(members.rows(name)) for name in members[0]}
     record = _Record(columns, None if path is None else require_path("path", path, (".npz",)))
     task, places = Task(build, measure), record.places
-    source = _source(task, members, places, workers, client, record)
+    source = _source(task, members, places, workers, client)
     try:
         with (progress_bar(progress, len(members), "members") as bar, closing(source),
               expecting(len(places))):
@@ -154,26 +144,15 @@ def sweep(build: Callable[..., Any],
     return _judged(record.kept())
 
 
-def _source(task, members, places, workers, client, record):
-    """Chunks of members and what was found: together, those that can be; then the others."""
+def _source(task, members, places, workers, client):
+    """Chunks of members and what was found of them, as they come."""
     if client is not None:
-        yield from on_cluster(task, members, places, client)
-        return
-    if isinstance(task.measure, Readings):
-        left = np.zeros(len(members), dtype=bool)
-        left[places] = True
-        for chunk, found in solve_together(task.build, task.measure, members, record.columns,
-                                           places, threads_of(workers), record.said):
-            left[chunk] = False
-            yield chunk, found
-        some, places = len(places) > np.sum(left), np.flatnonzero(left).tolist()
-        if some and places and workers is not None and not sendable(task):
-            record.said.append("the others were solved in this process: functions that cannot be "
-                               "pickled are known in no other one")
-            workers = None
-    if places:
-        yield from (here(task, members, places) if workers is None else
-                    in_processes(task, members, places, workers))
+        return on_cluster(task, members, places, client)
+    if workers is not None:
+        return in_processes(task, members, places, workers)
+    if isinstance(task.measure, Probes):
+        return in_threads(task, members, places)
+    return here(task, members, places)
 
 
 class _Record:
@@ -181,9 +160,7 @@ class _Record:
 
     def __init__(self, columns: dict[str, Array], path: Path | None) -> None:
         self.columns, self.path = columns, path
-        self.said: list[str] = []
         self.found: list[dict[str, Array] | str | None] = [None] * len(next(iter(columns.values())))
-        self.blocks: list[tuple[Array, dict[str, Array]]] = []
         self.next = time.monotonic() + _SECONDS
         if path is not None:
             require_plain(columns)
@@ -194,12 +171,9 @@ class _Record:
             self.result().save(path)  # it can be written
 
     def add(self, places, found):
-        """Take what was found of members, one by one or in arrays; write, if it is time to."""
-        if isinstance(found, dict):
-            self.blocks.append((places, found))
-        else:
-            for k, one in zip(places, found):
-                self.found[k] = one
+        """Take what was found of members; write, if it is time to."""
+        for k, one in zip(places, found):
+            self.found[k] = one
         if self.path is not None and time.monotonic() >= self.next:
             begun = time.monotonic()
             self.kept()
@@ -208,7 +182,7 @@ class _Record:
 
     def result(self):
         """The Sweep so far."""
-        return Sweep(self.columns, self.found, "; ".join(self.said), self.blocks)
+        return Sweep(self.columns, self.found)
 
     def kept(self):
         """The Sweep so far, in its file too; a warning where that cannot be written any more."""
@@ -223,8 +197,7 @@ class _Record:
 
     def stopped(self):
         """Where it was interrupted."""
-        done = sum(isinstance(one, dict) for one in self.found) + sum(
-            len(places) for places, _ in self.blocks)
+        done = sum(isinstance(one, dict) for one in self.found)
         return (f"interrupted with {done} of {len(self.found)} members done; " + (
             "they are in the state of this exception; with path= the next call would go on"
             if self.path is None else f"call again with {str(self.path)!r} to go on"))

@@ -53,10 +53,6 @@ EPS = float(np.finfo(float).eps)
 MANY = 48
 #: Coordinates up to which the tangent on the tangent space of joints is a dense matrix.
 DENSE = 100
-#: What a system has found that stays for other materials and widths; and for other loads, too.
-_OF_PLACES = {"K", "noise", "screen"}
-_OF_BEAMS = _OF_PLACES | {"points", "mass", "mass_factors", "stiffness_scale", "work_noise",
-                          "inertia_of_places", "condensed"}
 
 
 class _OfConstraints(cached_property):
@@ -123,60 +119,15 @@ class System:
                             for b in self.beams]
         self.viscous = any(time > 0.0 for time in self.retardation)
 
-    def _take_loads(self, same_loads=False):
+    def _take_loads(self):
         steady = [load.constant and load.amplitude is None for load in self.loads]
         self._varying: list[Any] = [load for load, of in zip(self.loads, steady) if not of]
-        if same_loads:
-            return
         self.symmetric = all(load.symmetric for load in self.loads) and self.forces.symmetric
         self.constant_force = np.zeros(self.N)
         for load, of in zip(self.loads, steady):
             if of:
                 s = self.of(load)
                 self.constant_force[s] += load.force(np.zeros(s.stop - s.start))
-
-    def renewed(self, loads: Sequence[Load], beams: Sequence[Beam],
-                same_loads: bool = False) -> System | None:
-        """That of other loads, or of other materials and widths: work arrays are shared.
-
-        Parameters
-        ----------
-        loads
-            The loads of all beams.
-        beams
-            Beams whose meshes and elements are those of this system; or its own.
-        same_loads
-            The loads have the vectors of those of this system.
-
-        Returns
-        -------
-        System or None
-            None if it has to be made anew.
-        """
-        system = object.__new__(type(self))
-        vars(system).update(vars(self))
-        _, _, *others = self._given
-        system._given = (tuple(beams), tuple(loads), *others)
-        beams, system.loads = list(beams), list(loads)
-        before, same_beams = self.machine.tables, beams == self.beams
-        if not same_beams:
-            system.beams, system.members = beams, [*beams, *self.bodies]
-            system._index = {id(b): k for k, b in enumerate(system.members)}
-        system._take_loads(same_loads)
-        if not same_beams and not (self.machine.shareable and all(
-                beam.kernel.linear for beam in beams)):
-            return None
-        if system.symmetric != self.symmetric or before.asks:
-            return None
-        made = vars(system)
-        for name in _NOT_OF_BEAMS if same_beams else _NOT_OF_PLACES:
-            if name in made:
-                del made[name]
-        tables = before.renewed(system, same_loads)
-        if tables.asks:
-            return None
-        system.machine = self.machine.with_tables(tables)
-        return system
 
     fixed: Any = _OfConstraints()
     free: Any = _OfConstraints()
@@ -1021,13 +972,6 @@ class System:
         if self.bordered:
             x[self.N:] += self._factors.factors.stiffness * phi
         return x[:self.N], x[self.N:]
-
-
-#: Names of attributes that are made when they are asked for.
-_MADE_ONCE = {name for name, value in vars(System).items()
-              if isinstance(value, cached_property) and not isinstance(value, _OfConstraints)}
-#: Those that do not stay for other loads, and for other materials and widths.
-_NOT_OF_BEAMS, _NOT_OF_PLACES = tuple(_MADE_ONCE - _OF_BEAMS), tuple(_MADE_ONCE - _OF_PLACES)
 
 
 def _extent(bodies):

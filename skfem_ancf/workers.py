@@ -6,7 +6,9 @@ import os
 import signal
 import sys
 from collections import deque
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from contextvars import copy_context
 from functools import partial
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
@@ -19,6 +21,7 @@ from .switch import expecting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterable
+    from concurrent.futures import Future
 
     from .types import Array
 
@@ -50,9 +53,20 @@ class Task:
 
     def __call__(self, member: dict[str, Any]) -> Found:
         """What is measured of a member, by name, or the text of the error."""
+        return self.begun(member)()
+
+    def begun(self, member: dict[str, Any]) -> Callable[[], Found]:
+        """A function that measures the scene of a member, which is built now."""
         try:
-            return _named(self.measure(self.build(**member)), member)
+            return partial(self._measured, self.build(**member), member)
         except Exception as error:  # of the caller's functions, which may raise anything
+            text = f"{type(error).__name__}: {error}"
+            return lambda: text
+
+    def _measured(self, scene, member):
+        try:
+            return _named(self.measure(scene), member)
+        except Exception as error:
             return f"{type(error).__name__}: {error}"
 
     def elsewhere(self, member: dict[str, Any]) -> Found:
@@ -90,6 +104,37 @@ def here(task: Task, members: list[dict[str, Any]], places: Iterable[int]) -> Ch
     """
     for k in places:
         yield [k], [task(members[k])]
+
+
+def in_threads(task: Task, members: list[dict[str, Any]], places: Iterable[int]) -> Chunks:
+    """As :func:`here`, measured in as many threads as there are processors, built one by one.
+
+    Parameters
+    ----------
+    task, members, places
+        As there.
+    """
+    threads = processors()
+    flying: deque[tuple[int, Future[Found]]] = deque()
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            for k in places:
+                flying.append((k, pool.submit(copy_context().run, task.begun(members[k]))))
+                if len(flying) > 2 * threads:
+                    first, future = flying.popleft()
+                    yield [first], [future.result()]
+            for k, future in flying:
+                yield [k], [future.result()]
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on every system
+        return os.cpu_count() or 1
 
 
 def in_processes(task: Task, members: list[dict[str, Any]], places: Iterable[int], workers: int
@@ -134,21 +179,6 @@ def on_cluster(task: Task, members: list[dict[str, Any]], places: Iterable[int],
     if lanes < 1:
         raise InputError("client has no workers: start some, or client.wait_for_workers(n)")
     yield from _spread(partial(client.submit, pure=False), lanes, task, members, places)
-
-
-def sendable(task: Task) -> bool:
-    """True if the functions can be sent to another process.
-
-    Parameters
-    ----------
-    task
-        What is done with each.
-    """
-    try:
-        _require_sendable(task)
-    except PickleError:
-        return False
-    return True
 
 
 def _require_sendable(task):

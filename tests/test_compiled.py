@@ -12,11 +12,9 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
 from skfem_ancf.joints import JOINTS, Joint
 from skfem_ancf.joints.base import point
 from skfem_ancf import band
-from skfem_ancf.batch import Batch
 from skfem_ancf.band import factorize as factorize_band, solve as solve_band
 from skfem_ancf.linalg import BandMatrix, halves
 from skfem_ancf.materials import LinearLaw
-from skfem_ancf.readings import Readings
 from skfem_ancf.source import source
 from skfem_ancf.switch import compiled_off
 
@@ -462,26 +460,3 @@ def test_fine_and_slender_beams_find_their_equilibrium(slenderness, n):
     state = Scene(beam).clamp("left", thickness="free").gravity((0, -9.81)).solve_static()
     assert state.iterations <= 10
     assert_allclose(state.displacement((1, 0)), (-0.74099, -0.90313), rtol=0, atol=3e-4)
-
-
-@pytest.mark.parametrize("element", [ElementBeamANCF(2), ElementBeamCable(5)], ids=repr)
-@pytest.mark.parametrize("many", [160, 300])
-def test_members_of_a_sweep_take_as_many_iterations(monkeypatch, element, many):
-    """From zero, and from polynomials of solutions; loads, moduli and lengths are of each."""
-    def build(x):
-        E, force, L = map(float, x)
-        beam = Beam(MeshBeam.init_line(np.linspace(0, L, 3), 0.05), element,
-                    StVenantKirchhoff(E, 0.3, 1000.0), width=0.02)
-        return Scene(beam).clamp("left").point_force((0.1, -force), at=(L, 0)).gravity((0, -1.0))
-
-    x = np.random.default_rng(1).uniform([1e7, 0.1, 0.95], [2e7, 0.6, 1.05], (many, 3))
-    found = []
-    for way in ("0", "1"):
-        monkeypatch.setenv("SKFEM_ANCF_COMPILED", way)
-        made = Batch(build, Readings(("position", "right")).items, x)
-        u, counts, good, _ = made.solve(made.lane, np.arange(20))
-        assert good.all() and (made.start is None) == (many < 256)
-        found.append((u, counts, made.read(u, np.arange(20))["value"]))
-    assert_allclose(found[0][1], found[1][1])
-    assert_allclose(found[0][0], found[1][0], rtol=0, atol=1e-9)
-    assert_allclose(found[0][2], found[1][2], rtol=0, atol=1e-9)

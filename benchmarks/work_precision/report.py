@@ -12,9 +12,7 @@ from .problems import PROBLEMS
 OURS, EXUDYN, Q2, TEXTBOOK = "skfem-ancf", "Exudyn", "scikit-fem Q2", "scikit-fem forms"
 TANGENT = "Tangent assembly 100 times faster than the textbook BilinearForm, 16 to 4096 elements"
 ITERATION = "A static iteration at 16 elements, N = 3, under 0.25 ms"
-SWEEP = "A sweep of cantilevers 20 times faster than a loop of Exudyn's, at no larger error"
-#: How variants of sweeps end that have no goal: members are solved one by one.
-ALONE = ("one by one", "processes")
+SWEEP = "A sweep of cantilevers, beside a loop of Exudyn's at no larger error"
 DECADES = 10.0 ** -np.arange(1.0, 8.0)
 
 
@@ -159,8 +157,6 @@ def goals(results):
     for n, pairs, _, fused, verdict in tangents(results.get("tangent", ())):
         out.append((TANGENT, f"{n} elements", "100 times", f"{pairs / fused:.3g}", verdict,
                     f"{1e3 * fused:.3g} ms", f"{1e3 * pairs:.3g} ms"))
-    out += [(SWEEP, r["variant"], "20 times", f"{ratio:.3g}", verdict, named(r), named(its))
-            for r, ratio, its, verdict in sweeps(results.get("sweep", ())) if its and verdict]
     for r in results.get("iteration", ()):
         if r["variant"].endswith("its iterations"):
             out.append((ITERATION, r["variant"], "0.25 ms", f"{1e3 * r['seconds']:.3g} ms",
@@ -169,33 +165,25 @@ def goals(results):
 
 
 def sweeps(rows):
-    """Rows of this package in a sweep, how many times faster than a peer, its row, the verdict.
-
-    There is none on those that are solved one by one.
-    """
+    """Rows of this package in a sweep, how many times faster than a peer, and its row."""
     for mine in rows:
         if mine["code"] == OURS:
             its = fastest(rows, EXUDYN, mine["error"])
-            ratio = its["seconds"] / mine["seconds"] if its else None
-            verdict = "met" if ratio is None or ratio >= 20.0 else "missed"
-            yield mine, ratio, its, "" if mine["variant"].endswith(ALONE) else verdict
+            yield mine, its["seconds"] / mine["seconds"] if its else None, its
 
 
-def goal_sweep(results):
+def sweep(results):
     """Lines for many scenes."""
     if "sweep" not in results:
         return [f"**{SWEEP}**: not measured in this run.", ""]
     lines = [(r["variant"], r["note"].split()[0], r["elements"], f"{r['error']:.1e}",
               f"{1e3 * r['seconds']:.3g}", f"{r['setup_seconds']:.2g}",
-              f"{ratio:.3g}" if its else "", named(its), verdict if its else "")
-             for r, ratio, its, verdict in sweeps(results["sweep"])]
-    verdict = "missed" if any(line[-1] == "missed" for line in lines) else "met"
-    return [f"**{SWEEP}**: {verdict if any(line[-1] for line in lines) else 'no peer took part'}. "
-            "(By a clock on the wall, for each member; building, and the start of processes, are "
-            "in it; the start is what a sweep before took, of two members or of all together.)",
-            "",
+              f"{ratio:.3g}" if its else "", named(its))
+             for r, ratio, its in sweeps(results["sweep"])]
+    return [f"**{SWEEP}**. (By a clock on the wall, for each member; building, and the start of "
+            "processes, are in it; the start is what a sweep of two members took before.)", "",
             *table(["what", "members", "elements", "error", "ms a member", "start (s)",
-                    "times faster", EXUDYN, ""], lines)]
+                    "times faster", EXUDYN], lines)]
 
 
 def goal_tangent(results):
@@ -320,7 +308,7 @@ def report(results, about, loading, quick):
                   "missing.**", ""]
     lines += ["## Goals", "",
               *(line for goal in GOALS for line in goal_against(results, goal)),
-              *goal_tangent(results), *goal_iteration(results), *goal_sweep(results)]
+              *goal_tangent(results), *goal_iteration(results), *sweep(results)]
     others = [name for name in ("5.2-1e3", "5.2-1e4", "5.1", "roll-up")
               if name in results and any(r["code"] == EXUDYN for r in results[name])]
     if others:

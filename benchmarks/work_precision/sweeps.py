@@ -1,17 +1,14 @@
 """Many cantilevers of example 5.2, each with a modulus of its own, from parameters to the tip.
 
 Seconds are those of a clock on the wall, for each member: building is in them, and the start of
-processes. A sweep before, of two members or of all that are solved together, has loaded what is
-compiled; what that took is in ``setup_seconds``. All together are done three times, since they take
-less than a second: the median counts. The error is that of the member with the modulus of the
-example.
+processes. A sweep of two members before has loaded what is compiled; what that took is in
+``setup_seconds``. The error is that of the member with the modulus of the example.
 """
 
 import time
 from dataclasses import replace
 from functools import partial
 from itertools import product
-from operator import itemgetter
 
 import numpy as np
 
@@ -26,11 +23,8 @@ from .runs import every_core
 
 PROBLEM = PROBLEMS["5.2"]
 OURS = (("ancf", 3, 16), ("cable", 5, 4))
-#: How this package solves: all members together in the threads of this process; one by one here,
-#: or in two processes.
-PLACES = ("together", "one by one", "2 processes")
-#: Members of a loop of one by one, at most: each takes as long as the next.
-FEW = 500
+#: How this package solves: in the threads of this process; one by one here; in two processes.
+PLACES = ("threads", "one by one", "2 processes")
 EXUDYN = (("ANCFCable2D", 8), ("ANCFCable2D", 32), ("GE2D quadratic", 4), ("GE2D quadratic", 16))
 
 
@@ -56,7 +50,7 @@ def runs_of():
         model, build = ours.element_of(kind, order)[1], partial(scene, kind=kind, order=order, n=n)
 
         def run(moduli, build=build, place=place):
-            return sweep(build, {"E": moduli}, ("displacement", PROBLEM.tip) if place == "together"
+            return sweep(build, {"E": moduli}, ("displacement", PROBLEM.tip) if place == "threads"
                          else tip, workers=2 if place == "2 processes" else None,
                          progress=False)["value"]
 
@@ -69,20 +63,16 @@ def runs_of():
 
 
 def measure(sizes, about, watch):
-    """Rows for so many members, of this package together, alone and in processes, and of a peer."""
+    """Rows for so many members, of this package in threads, alone, in processes, and of a peer."""
     rows = []
     for members in watch(sizes, "sweep"):
         for code, variant, n, model, run in runs_of():
-            together = variant.endswith("together")
-            count = members if together else min(members, FEW)
-            moduli = PROBLEM.E * (1.0 + 0.2 * (np.arange(count) - count // 2) / count)
-            setup, _ = timed(run, moduli if together else moduli[:2])
-            runs = sorted((timed(run, moduli) for _ in range(3 if together else 1)),
-                          key=itemgetter(0))
-            seconds, tips = runs[len(runs) // 2]
-            error = np.linalg.norm(tips[count // 2] - reference("5.2", model)) / PROBLEM.L
-            rows.append(row("sweep", code, variant, n, "", seconds / count, about, error,
-                            f"{count} members", setup_seconds=setup))
+            moduli = PROBLEM.E * (1.0 + 0.2 * (np.arange(members) - members // 2) / members)
+            setup, _ = timed(run, moduli[:2])
+            seconds, tips = timed(run, moduli)
+            error = np.linalg.norm(tips[members // 2] - reference("5.2", model)) / PROBLEM.L
+            rows.append(row("sweep", code, variant, n, "", seconds / members, about, error,
+                            f"{members} members", setup_seconds=setup))
     return rows
 
 

@@ -442,40 +442,6 @@ def _unit_pairs(content):
             np.append(off, 0))  # the last column is zero
 
 
-def with_constant(pairs: PairTables, constant: Array, elements: int) -> PairTables:
-    """The tables with another stabilisation.
-
-    Parameters
-    ----------
-    pairs
-        What :func:`pair_tables` has returned.
-    constant, elements
-        As there, shape (0, 1 or elements, 2 nb, 2 nb).
-    """
-    nb = constant.shape[1] // 2
-    if not constant.size and not pairs.held.size and len(pairs.held_place) == elements:
-        return pairs
-    held, held_skew, place = _held(_places(nb), constant, nb, elements)
-    return pairs._replace(held=held, held_skew=held_skew, held_place=place)
-
-
-def times_held(pack: Any, factor: float) -> dict[str, Any]:
-    """The fields of a pack, of a :class:`Chain`, that a stabilisation so many times larger changes.
-
-    Parameters
-    ----------
-    pack
-        The tables.
-    factor
-        The number.
-    """
-    if not len(pack.constant):
-        return {}
-    held, skew = factor * pack.pairs.held, factor * pack.pairs.held_skew
-    return {"constant": factor * pack.constant,
-            "pairs": pack.pairs._replace(held=held, held_skew=skew)}
-
-
 def _held(places, constant, nb, elements):
     """``held``, ``held_skew`` and ``held_place`` of PairTables."""
     C = np.ascontiguousarray(constant.reshape(-1, 4 * nb**2).T)
@@ -729,18 +695,6 @@ class Chain:
         self.nd = 2 * element.nodal_dofs
         self.t = mesh.t
         self.N = self.nd * mesh.p.shape[1]
-
-    def on_mesh(self, across: Any, formulation: Any) -> "Chain | None":
-        """The kernel of the same beam on another mesh; None if it is made anew.
-
-        Parameters
-        ----------
-        across
-            The section on it, a :class:`~skfem_ancf.sections.Across`.
-        formulation
-            That of the beam.
-        """
-        return None
 
     def gather(self, u: Array, elements: Any = slice(None)) -> Array:
         """Element values (ne, nb, 2) of a coordinate vector (N,).
@@ -1046,16 +1000,6 @@ class Chain:
     def inverted(self, u: Array) -> bool:
         """True if the body is turned inside out somewhere: no deformation of a real one."""
         return False
-
-    def inverted_members(self, packs: Any, u: Array) -> Array:
-        """For each of several beams alike whether it is :meth:`inverted`, shape (members,).
-
-        Parameters
-        ----------
-        packs, u
-            Tables of all members, and their displacements, shape (members, N).
-        """
-        return np.zeros(len(u), dtype=bool)
 
 
 def apart(pack: Any, elements: slice) -> Any:

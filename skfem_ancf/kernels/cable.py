@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..frozen import read_only
-from ..kept import twin_of
 from ..quadrature import gauss
 from ..source import F2, F3, I1, lanes, primitive, room, shaped, source
 from ..types import Array
 from .base import (CARRY, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, TURNED, VISCOUS, Chain,
                    PairTables, Texts, add_both_halves, add_by_rows, add_force, add_held_energy,
                    add_scaled, add_tangent, block, copy_stress, load, packed, pair_tables, product,
-                   scaled_pair_tables, times_held, weigh, with_constant)
+                   scaled_pair_tables, weigh)
 
 if TYPE_CHECKING:
     from ..formulations.base import Formulation
@@ -431,14 +430,11 @@ class CableKernel(Chain):
         ``ElementBeamCable``.
     formulation
         That of the beam; its first term has the Gauss points along the axis.
-    before
-        The kernel of the same beam of another material, whose tables serve; None to make them.
     """
 
     texts = CABLES
 
-    def __init__(self, across: "Across", formulation: "Formulation",
-                 before: "CableKernel | None" = None) -> None:
+    def __init__(self, across: "Across", formulation: "Formulation") -> None:
         mesh, element = across.mesh, across.element
         super().__init__(mesh, element)
         self.constant = across.stabilisation(formulation)
@@ -449,10 +445,7 @@ class CableKernel(Chain):
         longest = mesh.lengths.max()
         self.shared = mesh.is_uniform or longest - mesh.lengths.min() <= 1e-13 * longest
         self._across, self.points = across, gauss(n)[0]
-        if before is not None and before.points_number == n:
-            self.packs = [self._renewed(*before.packs)]
-        else:
-            self.packs = [self._pack(mesh, element, n)]
+        self.packs = [self._pack(mesh, element, n)]
 
     @property
     def volume(self) -> float:
@@ -500,23 +493,6 @@ class CableKernel(Chain):
             scaled_pair_tables(unit, rows[0], columns[0], pairs, constant, ne) if self.shared else
             pair_tables(table, pairs, constant, ne))
 
-    def in_proportion(self, across: "Across", stiffness: float, volume: float) -> "CableKernel":
-        """The kernel of the same beam, stiffer, and wider.
-
-        Parameters
-        ----------
-        across
-            Its section.
-        stiffness, volume
-            Factors on the moduli, and on the volume.
-        """
-        other, pack, both = twin_of(self), self.packs[0], stiffness * volume
-        other._across = across
-        if self.constant is not None:
-            other.constant = both * self.constant
-        other.packs = [pack._replace(stiffness=both * pack.stiffness, **times_held(pack, both))]
-        return other
-
     def _stiffness(self):
         """EA, EI and - ES at the points, (3, points, 1 or elements)."""
         few = np.zeros(1, int) if self.shared and self._across.constant else None
@@ -524,12 +500,6 @@ class CableKernel(Chain):
         out = np.empty((3, *EA.T.shape))
         out[0], out[1], out[2] = EA.T, EI.T, -ES.T
         return out
-
-    def _renewed(self, pack):
-        """A pack of another material with the stiffnesses of this one."""
-        constant = pack.constant[:0] if self.constant is None else self.constant
-        return pack._replace(stiffness=self._stiffness(), constant=packed(constant),
-                             pairs=with_constant(pack.pairs, constant, pack.start.size))
 
     def _stress_free(self, mesh, element, n, table):
         """a and b in the stress-free state, (rows, 2, 1 or elements), its lengths and curvatures.

@@ -9,13 +9,12 @@ interpolation and the weights in them, the tangent is a sum over pairs of rows.
 from dataclasses import replace
 from functools import lru_cache
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
 
 from ..frozen import Content
-from ..kept import twin_of
 from ..materials import LinearLaw
 from ..quadrature import product_rule
 from ..source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
@@ -23,12 +22,10 @@ from ..types import Array
 from .base import (CARRY, GIVEN, GRADIENTS, MEAN, STRESS, TANGENT, TURNED, VISCOUS, Chain,
                    PairTables, Texts, add_both_halves, add_by_rows, add_force, add_held_energy,
                    add_scaled, add_tangent, apart, block, copy_stress, in_rounds, load, packed,
-                   pair_numbers, pair_tables, product, scaled_pair_tables, times_held, weigh,
-                   with_constant)
+                   pair_numbers, pair_tables, product, scaled_pair_tables, weigh)
 from .law import LINEAR, LawTables, conserve, law_evaluate, law_tables
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
 
     from ..elements.base import ElementBeam
     from ..formulations.base import Formulation, Term
@@ -469,9 +466,6 @@ class TermTables:
         Stabilisation of each element, shape (0, 1 or elements, 2 nb, 2 nb).
     owner
         What is kept alive as long as a law of one's own is asked.
-    before
-        Those of the same element of another material, whose tables serve on the same mesh; on
-        another one what does not depend on it. None to make them.
     rows, asked
         Tables and weights of other terms there, by their places, and points with what
         :func:`beam_gradients` returned for them; both are added to.
@@ -486,97 +480,31 @@ class TermTables:
 
     points: Array
     w: Array
-    _rows: Any
-    _interpolation: list[Array]
-    _sums: Any
 
     def __init__(self, across: "Across", slab: "Slab", term: "Term", constant: Array,
-                 owner: Any, before: "TermTables | None" = None,
-                 rows: dict[Any, Any] | None = None,
+                 owner: Any, rows: dict[Any, Any] | None = None,
                  asked: "list[tuple[Array, ...]] | None" = None) -> None:
         self.law, self.term, self.slab, mesh = term.law, term, slab, across.mesh
-        self._mesh = mesh
         self.shared = across.uniform
         tind = np.array([0]) if self.shared else None
         self.section_points = len(term.section[0])
         whole = self.section_points == 1
-        if before is not None and not _same_places(term, before.term):
-            before = None
-        if before is not None and before._mesh is mesh:
-            self.points, self.w, self._rows = before.points, before.w, before._rows
-        else:
-            self.points, W = term.quadrature
-            rows = {} if rows is None else rows
-            at = id(slab), Content(self.points, W)
-            if at not in rows:
-                rows[at] = across.volume(slab, self.points, W, tind, whole)
-            self.w = rows[at]
-            if term._places not in rows:
-                rows[term._places] = _rows(mesh, across.element, term._places, tind,
-                                          [] if asked is None else asked)
-            self._rows = rows[term._places]
-        self._interpolation = before._interpolation if before is not None else _interpolation(term)
-        G, frame, self._samples, scaled = self._rows
+        self.points, W = term.quadrature
+        rows = {} if rows is None else rows
+        at = id(slab), Content(self.points, W)
+        if at not in rows:
+            rows[at] = across.volume(slab, self.points, W, tind, whole)
+        self.w = rows[at]
+        if term._places not in rows:
+            rows[term._places] = _rows(mesh, across.element, term._places, tind,
+                                      [] if asked is None else asked)
+        G, frame, self._samples, scaled = rows[term._places]
         weights = self.w if slab.grade is None else across.volume(
             slab, *term.quadrature, tind, whole, "grade")
-        if before is not None and before.law is self.law and isinstance(self.law, LinearLaw):
-            law, self._sums = before.pack.law, before._sums
-        else:
-            law = law_tables(self.law, owner)
-            self._sums = _sums_of(self._samples, law, self._interpolation, weights.shape[1])
+        law = law_tables(self.law, owner)
+        sums = _sums_of(self._samples, law, _interpolation(term), weights.shape[1])
         self.pack: SectionPack = section_pack(
-            G, frame, weights.T, self._samples, self._sums, law, constant, mesh.t[0],
-            before.pack if before is not None and (
-                before._mesh is mesh or not (before.shared or self.shared)) else None, scaled)
-
-    def in_proportion(self, slab: "Slab", stiffness: float, volume: float) -> "TermTables":
-        """As :meth:`Kernel.in_proportion`.
-
-        Parameters
-        ----------
-        slab
-            The slab of the other section.
-        stiffness, volume
-            As there.
-        """
-        other, term, pack, both = twin_of(self), twin_of(self.term), self.pack, stiffness * volume
-        law = cast("LinearLaw", self.law).times(stiffness)
-        vars(term)["law"], weights = law, pack.weights
-        other.law, other.slab, other.term = law, slab, term
-        if volume != 1.0:
-            other.w, weights = volume * self.w, volume * weights
-        other.pack = pack._replace(law=pack.law._replace(D=law.D), moduli=both * pack.moduli,
-                                   weights=weights, **times_held(pack, both))
-        return other
-
-    def on_mesh(self, across: "Across", constant: Array, known: dict[int, Any]) -> "TermTables":
-        """As :meth:`Kernel.on_mesh`.
-
-        Parameters
-        ----------
-        across
-            As there.
-        constant
-            The stabilisation there, shape (0 or 1, 2 nb, 2 nb).
-        known
-            Tables of other terms there, by the identity of those here; added to.
-        """
-        other, pack, mesh = twin_of(self), self.pack, across.mesh
-        unit, n = self._rows[3][::3]
-        if id(self._rows) not in known:
-            G, frame, scaled = _scaled(mesh, across.element, unit, n, np.zeros(1, int))
-            known[id(self._rows)] = G, frame, self._samples, scaled
-        other._rows = G, frame, _, scaled = known[id(self._rows)]
-        before, other.slab = self._mesh, across.slabs[0]
-        larger = mesh.height * mesh.lengths[0] / (before.height * before.lengths[0])
-        other._mesh, other.w = mesh, larger * self.w
-        _, rows, columns, _ = scaled
-        other.pack = pack._replace(
-            table=G, transposed=packed(G.transpose(0, 2, 1)), frame=frame,
-            weights=larger * pack.weights, moduli=larger * pack.moduli, constant=packed(constant),
-            pairs=scaled_pair_tables(unit, rows, columns, pack.pairs.pairs[:2], constant,
-                                     mesh.nelements))
-        return other
+            G, frame, weights.T, self._samples, sums, law, constant, mesh.t[0], scaled)
 
     def _gradients(self, pack, u, rows):
         """Some rows of the deformation gradient, shape (rows, 2, elements)."""
@@ -626,20 +554,11 @@ class TermTables:
         return np.sqrt(np.min(np.sum(rx * rx, axis=1)))
 
 
-def _same_places(a, b):
-    """True if two terms are sampled and integrated at the same places."""
-    if a is b:
-        return True
-    rules = [(x.axis, x.section, x.section_samples or ()) for x in (a, b)]
-    return a.samples == b.samples and all(
-        len(x) == len(y) and all(map(np.array_equal, x, y)) for x, y in zip(*rules))
-
-
 def _rows(mesh, element, at, tind, asked):
     """Table and frame, and the :class:`_Samples` that are of their rows.
 
-    Of one table for all elements also that of an element of length and height 1, what multiplies
-    its rows and columns, and how many of its rows are along the axis.
+    Of one table for all elements also that of an element of length and height 1, and what
+    multiplies its rows and columns.
     """
     samples = _samples(at)
     if mesh.is_straight and mesh.heights is None and element.by_reference:
@@ -668,7 +587,7 @@ def _scaled(mesh, element, unit, n, tind):
     rows[:, :n], rows[:, n:] = 1.0 / L, 1.0 / h
     x, y = (mesh.p[:, t[1]] - mesh.p[:, t[0]]) / L.T
     frame[:n, 0], frame[:n, 1], frame[n:, 0], frame[n:, 1] = x, y, -y, x
-    return unit * (rows[:, :, None] * columns[:, None]), frame, (unit, rows[0], columns[0], n)
+    return unit * (rows[:, :, None] * columns[:, None]), frame, (unit, rows[0], columns[0])
 
 
 class _Samples(NamedTuple):
@@ -731,7 +650,7 @@ def _interpolation(term):
 
 def section_pack(G: Array, frame: Array, weights: Array, samples: _Samples, sums: Any,
                  law: LawTables, constant: Array, left: Array,
-                 before: SectionPack | None = None, scaled: Any = None) -> SectionPack:
+                 scaled: Any = None) -> SectionPack:
     """The SectionPack of one term.
 
     Parameters
@@ -746,12 +665,8 @@ def section_pack(G: Array, frame: Array, weights: Array, samples: _Samples, sums
         Stabilisation (0, 1 or elements, 2 nb, 2 nb).
     left
         The left node of each element.
-    before
-        One of the same G, or of as many rows of G for each element, whose tables of pairs serve if
-        the law couples the same strains.
     scaled
-        A table (rows, nb) whose rows and columns two vectors multiply to make G, and how many of
-        its rows are along the axis; or None.
+        A table (rows, nb) whose rows and columns two vectors multiply to make G; or None.
     """
     nb, ne, linear = G.shape[2], len(left), law.kind == LINEAR
     content, (mixing, several, sizes), joined, ends = sums
@@ -767,10 +682,8 @@ def section_pack(G: Array, frame: Array, weights: Array, samples: _Samples, sums
     layout, shared = _layout(content, len(weights), Content(keep), linear), len(G) == 1
     if linear:
         moduli = moduli.take(layout.order, axis=0)
-    if before is not None and before.rows is layout.rows:
-        pairs = with_constant(before.pairs, constant, ne)
-    elif scaled is not None:
-        unit, of_rows, of_columns, _ = scaled
+    if scaled is not None:
+        unit, of_rows, of_columns = scaled
         pairs = scaled_pair_tables(unit, of_rows, of_columns, layout.pairs, constant, ne)
     else:
         pairs = pair_tables(G, layout.pairs, constant, ne)
@@ -791,24 +704,6 @@ def _sums_of(samples, law, along, points):
     coupled = law.D != 0.0 if law.kind == LINEAR else np.ones((3, 3), bool)
     content = Content(samples.rows, coupled, *along)
     return content, _terms(content, points)[1:], *_joined(content, points // len(along[0]))
-
-
-def side_by_side(pack: SectionPack, members: int, N: int) -> SectionPack:
-    """The pack of as many beams alike, for what needs table and frame only.
-
-    Parameters
-    ----------
-    pack
-        Of one, or with table and frame of them all.
-    members, N
-        How many, and the number of coordinates of each.
-    """
-    def all_of(x, axis):
-        return x if x.shape[axis] in (1, members * ne) else np.concatenate(members * [x], axis)
-
-    ne = pack.start.size
-    start = (N * np.arange(members)[:, None] + pack.start).ravel()
-    return pack._replace(start=start, table=all_of(pack.table, 0), frame=all_of(pack.frame, 2))
 
 
 def linearised(pack: SectionPack) -> SectionPack:
@@ -938,32 +833,23 @@ class Kernel(Chain):
         A body with its section, a :class:`~skfem_ancf.sections.Across`.
     formulation
         A :class:`~skfem_ancf.formulations.Formulation`.
-    before
-        The kernel of the same beam of another material, or on another mesh, whose tables serve;
-        None to make them.
-    same_law
-        The law is the same, of a plain section.
     """
 
     texts = SECTIONS
 
-    def __init__(self, across: "Across", formulation: "Formulation",
-                 before: "Kernel | None" = None, same_law: bool = False) -> None:
+    def __init__(self, across: "Across", formulation: "Formulation") -> None:
         super().__init__(across.mesh, across.element)
         self.constant = across.stabilisation(formulation)
-        known = [] if before is None else before.tables[:]
         none = np.zeros((0, 2 * self.nd, 2 * self.nd))
         constants = [none if self.constant is None else self.constant]
         self.tables: list[TermTables] = []
         rows: dict[Any, Any] = {}
         asked: list[tuple[Array, ...]] = []
         self._across = across
-        for slab, terms in ([(across.slabs[0], [t.term for t in known])] if same_law else
-                            across.terms(formulation)):
+        for slab, terms in across.terms(formulation):
             for term in terms:
                 constant = constants.pop() if constants else none
-                self.tables.append(TermTables(across, slab, term, constant, self,
-                                              known.pop(0) if known else None, rows, asked))
+                self.tables.append(TermTables(across, slab, term, constant, self, rows, asked))
         self.packs = [t.pack for t in self.tables]
         slabs = [id(t.slab) for t in self.tables]
         #: The tables of the first term of each slab.
@@ -1001,67 +887,6 @@ class Kernel(Chain):
 
     def inverted(self, u: Array) -> bool:
         return any(first.inverted(pack, u_e) for first, pack, u_e in self._of_firsts(u))
-
-    def in_proportion(self, across: "Across", stiffness: float, volume: float) -> "Kernel":
-        """The kernel of the same beam with linear laws, stiffer, and wider.
-
-        Parameters
-        ----------
-        across
-            Its section, of one slab.
-        stiffness, volume
-            Factors on the moduli, and on the volume.
-        """
-        other, (slab,) = twin_of(self), across.slabs
-        other._across = across
-        other.tables = tables = [t.in_proportion(slab, stiffness, volume) for t in self.tables]
-        other.firsts, other.packs = tables[:1], [t.pack for t in tables]
-        if self.constant is not None:
-            other.constant = other.packs[0].constant
-        return other
-
-    def on_mesh(self, across: "Across", formulation: "Formulation") -> "Kernel | None":
-        """The kernel of the same beam on another mesh.
-
-        Parameters
-        ----------
-        across
-            Its section.
-        formulation
-            That of the beam.
-
-        Returns
-        -------
-        Kernel or None
-            None if the section is not plain.
-        """
-        mine = self._across
-        if not (mine.plain and across.plain):
-            return None
-        if not (mine.simple and mine.uniform and across.simple and across.uniform and self.linear
-                and mine.slabs[0].width == across.slabs[0].width
-                and np.array_equal(mine.mesh.t, across.mesh.t)
-                and all(table._rows[3] is not None for table in self.tables)):
-            return Kernel(across, formulation, self, same_law=True)
-        other = twin_of(self)
-        other._across, other.t = across, across.mesh.t
-        other.constant = across.stabilisation(formulation)
-        none = np.zeros((0, 2 * self.nd, 2 * self.nd))
-        first = none if other.constant is None else other.constant
-        known: dict[int, Any] = {}
-        other.tables = [table.on_mesh(across, none if k else first, known)
-                        for k, table in enumerate(self.tables)]
-        other.firsts = [other.tables[self.tables.index(t)] for t in self.firsts]
-        other.packs = [t.pack for t in other.tables]
-        return other
-
-    def inverted_members(self, packs: "Sequence[SectionPack]", u: Array) -> Array:
-        found = np.zeros(len(u), dtype=bool)
-        for table, pack in zip(self.tables, packs):
-            if table in self.firsts:
-                up = np.all(table.upright(pack, u.ravel()), axis=0)
-                found |= ~np.all(up.reshape(len(u), -1), axis=1)
-        return found
 
     def _of_firsts(self, u):
         """Each of the first tables with a pack of some elements and their coordinates."""

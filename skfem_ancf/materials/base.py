@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import (InputError, require_finite_scalar, require_like, require_option,
                       require_positive, require_slope, shown, taught)
 from ..frozen import Frozen, rebuilt
-from ..kept import cached_property, kept, twin_of
+from ..kept import cached_property, kept
 from ..origin import ours
 from ..pickling import require_picklable
 from ..quadrature import gauss
@@ -403,12 +403,6 @@ class LinearLaw:
     def rows(self) -> tuple[int, ...]:
         """The components of the strain on which the stress depends."""
         return tuple(k for k, column in enumerate(self.D.T) if np.any(column))
-
-    def times(self, factor: float) -> LinearLaw:
-        """The law of a material that is so many times stiffer."""
-        other = twin_of(self)
-        other.D, other._compliances = factor * self.D, {}
-        return other
 
     def compliance(self, rows: tuple[int, ...]) -> Array:
         """The changes of some components of the strain with the stress of these alone.

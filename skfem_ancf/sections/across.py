@@ -12,7 +12,7 @@ from numpy.polynomial.legendre import legvander
 
 from ..errors import InputError
 from ..frozen import Frozen
-from ..kept import cached_property, twin_of
+from ..kept import cached_property
 from ..quadrature import gauss
 from .base import Rectangle
 from .jumps import BEND, KINK, jumps
@@ -97,23 +97,6 @@ class Across(Frozen):
                           moving=any(s.measure.moves for s in slabs))
         if varying:
             self._check()
-
-    def of_material(self, section: Section, material: Material | None) -> Across:
-        """The same body of another material and width.
-
-        Parameters
-        ----------
-        section, material
-            As for the constructor.
-        """
-        if (not self.plain or type(section) is not Rectangle or material is None
-                or material.graded or callable(section.width)):
-            return Across(self.mesh, self.element, section, material)
-        other, slab, mine = object.__new__(type(self)), twin_of(self.slabs[0]), vars(self)
-        vars(slab).update(material=material, width=section.width, density=material.density)
-        vars(other).update([(name, mine[name]) for name in _OF_PLACES], slabs=(slab,),
-                           _sealed=True)
-        return other
 
     def _check(self):
         """Ask functions all over the body, so that they fail when the beam is made."""

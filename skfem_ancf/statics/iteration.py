@@ -6,16 +6,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..band import (clear, copy, diagonal, dot, factorize, fix, largest, multiply, smallest, solve,
+from ..band import (clear, copy, diagonal, dot, factorize, fix, largest, multiply, solve,
                     weighted)
 from ..body import body_carry, body_force, body_tangent
 from ..border import (Factors, add_curvature, factorize_bordered, mean_stiffness, new_factors,
                       solve_bordered)
 from ..forces.texts import (add_elastic_force, add_element_tangent, contact_along,
                             contact_work)
-from ..compiled.words import constant
 from ..own import own_solve
-from ..source import F1, F2, I1, I2, borrowed, by_place, lanes, source
+from ..source import F1, borrowed, by_place, lanes, source
 from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
                       external_force, joint_directions)
 
@@ -27,6 +26,8 @@ if TYPE_CHECKING:
 SMALLEST = 1e-14
 #: How an iteration ends.
 CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
+#: Corrections at least, where the residual at the start is not round-off.
+LEAST = 2
 #: What joints may be open by, over the sizes of their equations.
 CLOSED = 1e-12
 #: Work of the third correction, as a root over that of all forces, of an iteration that is astray.
@@ -73,13 +74,8 @@ class Rules(NamedTuple):
         What a border's solution may be wrong by, relative.
     solver
         Handle of what solves the linear systems, see :mod:`skfem_ancf.own`; 0 for the band.
-    least
-        Corrections at least, where the residual at the start is not round-off.
     wary
         1 if it ends where the first corrections do not get smaller.
-    near
-        1 if it starts at an equilibrium, nearly: a correction is the last one if it is small and
-        the residual before it, too.
     """
 
     mixed: int
@@ -89,9 +85,7 @@ class Rules(NamedTuple):
     force_floor: float
     inaccurate: float
     solver: int
-    least: int
     wary: int
-    near: int
 
 
 class Unknowns(NamedTuple):
@@ -102,43 +96,6 @@ class Unknowns(NamedTuple):
     force: F1
     stresses: F1
     carried: F1
-
-
-@by_place
-class Members(NamedTuple):
-    """Scenes of one topology, solved one after the other; none where a scene is solved alone.
-
-    Attributes
-    ----------
-    numbers
-        What differs among them, of the one that is solved: arrays of the equations and of the
-        target are views of it.
-    scale, which, values
-        Number i of member k is ``scale[i] values[k, which[i]]``.
-    noise, held
-        Views of ``numbers``: the square of the noise of a correction's work, (1,), and the
-        displacements of the fixed coordinates.
-    factors
-        What factors of loads are before the first correction if there is a start.
-    spread
-        How much larger the noise of the residual is than that of the work, (1,).
-    u
-        Where they start, and their solutions, shape (members, N).
-    found
-        For each the status, the number of linear systems solved, and 1 if a start was given and
-        2 if it was solved from zero; what is 0 has no start. Shape (members, 3).
-    """
-
-    numbers: F1
-    scale: F1
-    which: I1
-    values: F2
-    noise: F1
-    held: F1
-    factors: F1
-    spread: F1
-    u: F2
-    found: I2
 
 
 @by_place
@@ -175,76 +132,7 @@ def room_for_iterations(e: Equations, m: int) -> Work:
 
 
 @source
-def equilibrium(e, target, rules, x, w, record, members):
-    """As :func:`iterate`; or that for each of several members.
-
-    Parameters
-    ----------
-    e, target, rules, x, w, record
-        As there.
-    members
-        :class:`Members`.
-
-    Returns
-    -------
-    status, number
-        Of the last one.
-    """
-    many = members.found.shape[0]
-    if many == 0:
-        return iterate(e, target, rules, x, w, record)
-    status, number = np.int64(CONVERGED), np.int64(0)
-    for k in range(many):
-        values, found = members.values[k], members.found[k]
-        for i in lanes(members.numbers.size):
-            members.numbers[i] = members.scale[i] * values[members.which[i]]
-        copy(members.u[k], x.u)
-        if found[2] > 0:
-            for i in lanes(e.fixed.size):
-                x.u[e.fixed[i]] = members.held[i]
-            status, number = _member(e, target, rules, x, w, record, members, members.factors, 1)
-        if found[2] == 0 or status != CONVERGED:
-            found[2] *= 2
-            clear(x.u)
-            status, number = _member(e, target, rules, x, w, record, members, target.before, 2)
-        found[0], found[1] = status, number
-        copy(x.u, members.u[k])
-    return status, number
-
-
-@source
-def _member(e, target, rules, x, w, record, members, before, least):
-    """As :func:`iterate`, of the member whose numbers are set; singular if it is not stable."""
-    clear(x.multipliers)
-    for i in lanes(e.fixed.size):
-        target.prescribed[i] = members.held[i] - x.u[e.fixed[i]]
-    floor = 8.0 * np.sqrt(members.noise[0])
-    status, number = iterate(
-        e, Target(target.factors, before, target.scale, target.at, target.c, target.g, target.gap,
-                  target.prescribed),
-        Rules(rules.mixed, rules.iterations, rules.tol, floor, floor * members.spread[0],
-              rules.inaccurate, rules.solver, least, rules.wary, 2 - least),
-        x, w, record)
-    if status != CONVERGED:
-        return status, number
-    if number == 0:  # the tangent is there, its factors are not
-        fix(e.K, e.fixed)
-        if not _solved(e, target, rules, x, w):
-            return SINGULAR, number
-    diagonal(e.K, w.scale)
-    if not smallest(w.scale) > 0.0:
-        return SINGULAR, number
-    return status, number
-
-
-#: Of a scene that is solved alone.
-ALONE = constant(Members(
-    np.zeros(0), np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros(0), np.zeros(0),
-    np.zeros(0), np.zeros(0), np.zeros((0, 0)), np.zeros((0, 3), np.int64)))
-
-
-@source
-def iterate(e, target, rules, x, w, record):
+def equilibrium(e, target, rules, x, w, record):
     """Iterate to equilibrium from x, in place.
 
     Parameters
@@ -269,7 +157,7 @@ def iterate(e, target, rules, x, w, record):
     for k in range(rules.iterations + 1):
         # after the last correction only the residual is wanted, not the tangent
         part = min(1.0, work / before) if k > 1 else 1.0
-        last = (k >= rules.least or (k > 0 and quiet)) and settled(work * part, reference, rules)
+        last = (k >= LEAST or (k > 0 and quiet)) and settled(work * part, reference, rules)
         if last:
             body_force(e.body, x.u, x.force)
             add_elastic_force(e.forces, target.at, 0.0, x.u, x.u, x.force)
@@ -293,8 +181,6 @@ def iterate(e, target, rules, x, w, record):
             break
         if last:
             _tangent(e, target, rules, x, w, k)
-        near = rules.near > 0 and not moving and opening <= CLOSED
-        near = near and rho <= rules.tol * size + rules.force_floor
         before, work = work, _correction(e, target, rules, x, w, moving)
         if not (0.0 <= work < 1e300):
             return SINGULAR, k
@@ -308,8 +194,6 @@ def iterate(e, target, rules, x, w, record):
             x.multipliers[i] += w.dm[i]
         reference = reference_work(x.force, w.load, x.u)
         record[k, 1] = work / reference if reference > 0.0 else 0.0
-        if near and settled(work, reference, rules):
-            return CONVERGED, k + 1
         if rules.wary > 0 and k == 2 and record[k, 1] > ASTRAY:
             return NOT_CONVERGED, k + 1
     return NOT_CONVERGED, rules.iterations

@@ -15,7 +15,7 @@ from ..own import handle_of
 from ..progress import progress_bar
 from ..switch import expecting
 from . import stability
-from .iteration import (ALONE, CONVERGED, NOT_CONVERGED, NOT_FINITE, SINGULAR, Rules,
+from .iteration import (CONVERGED, NOT_CONVERGED, NOT_FINITE, SINGULAR, Rules,
                         Target, Unknowns, equilibrium, room_for_iterations)
 from .touching import found_touching
 
@@ -422,7 +422,7 @@ def _iterate(system, result, load, options, record, descent=None, machine=None, 
         x = Unknowns(result.u.copy(), result.multipliers.copy(), np.empty(system.N),
                      tables.stresses, tables.stresses)
         residuals = np.zeros((max_iterations + 1, 2))
-        status, n = machine.of(equilibrium)(target, rules, x, room, residuals, ALONE)
+        status, n = machine.of(equilibrium)(target, rules, x, room, residuals)
         if status != SINGULAR or solver is not None:
             break
         solver = system  # factors with exchanges of rows, or sparse ones
@@ -461,7 +461,7 @@ def rules_of(system: System, method: str, tol: float, max_iterations: int,
     floor = 8.0 * system.work_noise
     # the residual sums the noise of all coordinates, the work that of the strains
     return Rules(int(method == "mixed"), max_iterations, tol, floor, floor * system.noise,
-                 INACCURATE, 0, 2, int(wary), 0)
+                 INACCURATE, 0, int(wary))
 
 
 _ENDS = {SINGULAR: "the tangent is singular", NOT_FINITE: "the strain is not finite",
