@@ -21,4 +21,4 @@ def ours(thing: Any) -> bool:
     (True, False, True)
     """
     named = thing if isinstance(getattr(thing, "__qualname__", None), str) else type(thing)
-    return str(named.__module__).partition(".")[0] == __package__
+    return str(named.__module__).partition(".")[0] == __package__.partition(".")[0]

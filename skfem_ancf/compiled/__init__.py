@@ -42,7 +42,8 @@ PROBLEMS: list[str] = []
 def _stamp() -> str:
     """Of all texts of the package: a function has parts from other files than its own."""
     total = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.parent.rglob("*.py")):
+    package = Path(str(sys.modules[__name__.partition(".")[0]].__file__)).parent
+    for path in sorted(package.rglob("*.py")):
         text = path.read_bytes()
         if b"@source" in text or path.parent.name == "compiled":
             total.update(text)
