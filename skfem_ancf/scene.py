@@ -349,7 +349,8 @@ class Scene:
         if isinstance(thing, ForceElement):
             return self._put(elements=[thing])
         raise InputError(f"a scene takes a Load or a Joint or a ForceElement, got {shown(thing)}: "
-                         "derive yours from skfem_ancf.loads.Load, skfem_ancf.joints.Joint or "
+                         "derive yours from skfem_ancf.loads.Load, "
+                         "skfem_ancf.joints.Joint or "
                          "skfem_ancf.forces.ForceElement")
 
     # supports

@@ -331,7 +331,8 @@ def _links(element, links):
     if not isinstance(links, (list, tuple)) or not links or not all(
             isinstance(x, (Vector, Link)) for x in links):
         raise InputError(f"bind(scene) of {element!r} must return a list of points and sections, "
-                         "as [point(scene, None, (1, 0))] with skfem_ancf.forces.point, got "
+                         "as [point(scene, None, (1, 0))] with "
+                         "skfem_ancf.forces.point, got "
                          f"{shown(links)}")
     return [link(x) for x in links]
 
