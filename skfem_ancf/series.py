@@ -73,7 +73,7 @@ def places(n: int) -> Array:
 
 
 @lru_cache(64)
-def _matrices(n):
+def _matrices(n: int) -> tuple[Array, Array]:
     """From values at :func:`places` to coefficients, and from these to those of the slope."""
     slope = np.zeros((n, n))
     slope[:-1] = 2.0 * chebder(np.eye(n))
@@ -197,7 +197,7 @@ class Series:
         return found.reshape(*self.shape, *q.shape[1:])
 
     @cached_property
-    def _at_places(self):
+    def _at_places(self) -> Array:
         """The functions at as many places along an element as it has polynomials, (n, m, nb)."""
         n, p = self.shape[0], self._shape[0]
         return (chebyshev(places(n), p).T @ self.value).transpose(1, 2, 0)
