@@ -106,11 +106,14 @@ class LineLoad(Load):
         axis that returns (2, ...).
     beam, amplitude
         As for :class:`~skfem_ancf.loads.Load`.
+    chains
+        Numbers of the chains of elements that it acts on, shape (k,); None for all of them.
     """
 
     def __init__(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
-                 amplitude: TimeFunction = None) -> None:
+                 amplitude: TimeFunction = None, chains: Array | None = None) -> None:
         super().__init__(beam, amplitude)
+        self.chains = chains
         self.per_length = force if callable(force) else require_finite("force", force, (2,))
 
     def bind(self, beam: Beam) -> Load:
@@ -122,6 +125,8 @@ class LineLoad(Load):
         given = self.per_length
         values = (ask_field("force(x)", given, x) if callable(given) else
                   np.broadcast_to(given[:, None, None], x.shape))
+        if self.chains is not None:
+            values = values * np.isin(mesh.chains, self.chains)[:, None]
         functions = beam.element.functions(mapping, X)[0]
         vector = beam.kernel.scatter(np.einsum("kep,iep->eki", functions, lengths * values))
         spread = Spread(sampled=(Sampled(AXIS, np.arange(mesh.nelements), xi,

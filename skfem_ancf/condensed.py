@@ -134,6 +134,7 @@ class Condensed:
     def _unknown(self):
         """Whether x, y and the rotation of a node are unknown, (number, 3)."""
         out = ~self.nodes.held
+        out[np.setdiff1d(np.arange(len(out)), self.nodes.nodes)] = False  # no line ends there
         rigid = np.zeros(len(out), dtype=bool)
         rigid[self.nodes.nodes[~self.nodes.hinged]] = True
         out[:, 2] &= rigid

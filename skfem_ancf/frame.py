@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .axial import LineLoad
 from .beam import Beam
 from .doors import displacement
 from .elements import ElementBeamCable
@@ -136,7 +137,7 @@ class Frame(Scene):
                    nodes: Mapping[str, Any] | None = None, hinges: Any = (),
                    curves: Mapping[int, Callable[[Array], Any]] | None = None, elements: Any = 1,
                    sections: Mapping[str, Mapping[str, Any]] | None = None,
-                   **beam: Any) -> Frame:
+                   tol: float | None = None, **beam: Any) -> Frame:
         """A frame of lines between points.
 
         Parameters
@@ -161,6 +162,12 @@ class Frame(Scene):
             How many elements a line is divided into, or for each line, shape (m,).
         sections
             Arguments of ``beam`` by group, where they differ: ``{"columns": {"height": 0.3}}``.
+        tol
+            Points not farther apart than this are one node, at the place of the first of them, and
+            a line between two of them is left out; numbers of points and lines stay. By default
+            1e-5 of the size of the frame, or 1e-3 of its longest line if that is less, and a
+            ModelWarning names such points. It also names points that are nearly as close, and stay
+            apart. With 0 all points are nodes of their own.
         **beam
             ``height``, and the arguments of :class:`~skfem_ancf.Beam`: ``material`` and ``width``
             or ``section``, and where they differ from these ``element`` (``ElementBeamCable(5)``),
@@ -178,7 +185,7 @@ class Frame(Scene):
         ------
         MeshError
             If a line joins an unknown point, has no length, or is there twice; if a point is in
-            no line, or two are at one place.
+            no line, or two are at one place with ``tol=0``.
         InputError
             If an argument is of the wrong kind.
 
@@ -208,24 +215,30 @@ class Frame(Scene):
         3.141593
         """
         require_options("Frame.from_lines", beam, ("points", "lines", "groups", "nodes", "hinges",
-                                                   "curves", "elements", "sections", *BEAM))
-        return cls._made(Net(points, lines, groups, nodes, curves), hinges, elements, sections,
+                                                   "curves", "elements", "sections", "tol", *BEAM))
+        return cls._made(Net(points, lines, groups, nodes, curves, tol), hinges, elements, sections,
                          beam)
 
     @classmethod
     def from_meshio(cls, mesh: Any, hinges: Any = (), elements: Any = 1,
-                    sections: Mapping[str, Mapping[str, Any]] | None = None,
-                    **beam: Any) -> Frame:
+                    sections: Mapping[str, Mapping[str, Any]] | None = None, groups: Any = None,
+                    tol: float | None = None, **beam: Any) -> Frame:
         """A frame of the line cells of a mesh: of Gmsh's ``.msh``, ``.vtu``, and others.
 
         Parameters
         ----------
         mesh
-            A ``meshio.Mesh``, or the name of a file. Each cell "line" or "line3", which is curved,
-            is a line. Cell sets and physical groups of lines are groups; those of vertices, and
-            point sets, are names of nodes.
-        hinges, elements, sections, **beam
+            A ``meshio.Mesh``, or the name of a file. Each cell "line", or "line3", "line4", ...,
+            which are curved, is a line. Cell sets and physical groups are names: those of vertices,
+            and point sets, of nodes, those of lines of their ends, and in :meth:`line_load` of the
+            lines. Other kinds of cells are refused.
+        hinges, elements, sections, tol, **beam
             As for :meth:`from_lines`.
+        groups
+            Names of the sets of lines that are beams, no line in two of them; other sets may
+            overlap. By default those that are named in ``sections``, and those that share no line
+            with another set. Names that meshio writes into files without sets, as numbers called
+            "column-girder", are read if one of them is named here or in ``sections``.
 
         Returns
         -------
@@ -236,7 +249,7 @@ class Frame(Scene):
         FileError
             If the file cannot be read.
         MeshError
-            If it holds no lines, or as for :meth:`from_lines`.
+            If it holds no lines, or cells of other kinds, or as for :meth:`from_lines`.
 
         Examples
         --------
@@ -250,20 +263,22 @@ class Frame(Scene):
         ['column', 'girder']
         """
         require_options("Frame.from_meshio", beam,
-                        ("mesh", "hinges", "elements", "sections", *BEAM))
-        return cls._made(net_from_meshio(mesh), hinges, elements, sections, beam)
+                        ("mesh", "hinges", "elements", "sections", "groups", "tol", *BEAM))
+        named = list(mapping_of("sections", sections))
+        return cls._made(net_from_meshio(mesh, groups, named, tol), hinges, elements, sections,
+                         beam)
 
     @classmethod
     def _made(cls, net, hinges, elements, sections, options):
         m = net.lines.shape[1]
         elements = _elements(elements, m)
         sections = mapping_of("sections", sections)
-        require_names("group of lines in sections", list(sections), [*net.groups, REST])
+        require_names("group of lines in sections", list(sections), [*net.beams, REST])
         for name, given in sections.items():
             require_options(f"the section of {name!r}", mapping_of(f"sections[{name!r}]", given),
                             BEAM)
-        groups = dict(net.groups)
-        rest = np.setdiff1d(np.arange(m), np.concatenate([*groups.values(), [-1]]))
+        groups = {name: net.groups[name] for name in net.beams}
+        rest = np.setdiff1d(net.kept, np.concatenate([*groups.values(), [-1]]))
         if len(rest):
             if REST in groups:
                 raise InputError(f"lines {rest[:5].tolist()} are in no group and would be the beam "
@@ -276,7 +291,8 @@ class Frame(Scene):
                 raise InputError("the lines need a height of their section: give height=, or one "
                                  f"for each group in sections, as {{{name!r}: {{'height': 0.1}}}}")
             numbers = lines if "height" in sections.get(name, {}) else np.arange(m)
-            height = _heights(given.pop("height"), numbers)
+            height, lines = _heights(given.pop("height"), numbers), np.intersect1d(lines, net.kept)
+            groups[name] = lines
             if isinstance(height, list):
                 height = [height[k] for k in np.searchsorted(numbers, lines)]
             mesh = net.mesh(lines, elements, height)
@@ -294,7 +310,7 @@ class Frame(Scene):
             self._system = None
 
     def __repr__(self):
-        n, m = self.points.shape[1], len(self._lines)
+        n, m = len(np.unique(self.net.same)), len(self._lines)
         return f"<Frame of {m} line(s) between {n} nodes, {len(self.loads)} load(s)>"
 
     @property
@@ -313,9 +329,9 @@ class Frame(Scene):
         Parameters
         ----------
         place
-            The name of nodes, the number of a node, a point as a tuple (x, y), a function of the
-            points x (2, n) that returns n truth values, an array of numbers, an array of points
-            (k, 2), or a list of these.
+            The name of nodes, or of lines for their ends, the number of a node, a point as a tuple
+            (x, y), a function of the points x (2, n) that returns n truth values, an array of
+            numbers, an array of points (k, 2), or a list of these.
         """
         return self.net.nodes_at(place)
 
@@ -513,6 +529,37 @@ class Frame(Scene):
         self._put(loads=loads)
         return self
 
+    def line_load(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
+                  amplitude: TimeFunction = None) -> Frame:
+        """A dead force per length of the axis of lines.
+
+        Parameters
+        ----------
+        force
+            Force per length of the stress-free axis: constant, shape (2,), or a function of the
+            points x (2, ...) of the axis that returns (2, ...).
+        beam
+            The beam, its name or its number; or the name of a set of lines of the mesh.
+        amplitude
+            A function of time by which the force is multiplied in a motion.
+
+        Returns
+        -------
+        Frame
+            Itself.
+        """
+        known = [b.name for b in self.beams]
+        if not isinstance(beam, str) or beam in known or beam not in self.net.groups:
+            super().line_load(force, beam, amplitude)
+            return self
+        loads, chains = [], np.isin(self._lines, self.net.groups[beam])
+        for k, b in enumerate(self.beams):
+            some, chains = np.split(chains, [len(chain_ends(b))])
+            if np.any(some):
+                loads.append((k, LineLoad(force, None, amplitude, np.flatnonzero(some))))
+        self._put(loads=loads)
+        return self
+
     def _ends_at(self, place):
         """Of nodes the beams (k,) whose ends lead there, and numbers of these ends (k,)."""
         ends = self._bound.leading(self.nodes(place))
@@ -534,7 +581,7 @@ class Frame(Scene):
         out = np.full(self.points.shape[1], np.nan)
         rigid = joint.leaders[~joint.hinged[joint.leaders]]
         out[joint.nodes[rigid]] = np.angle(joint.turns(u)[rigid])
-        return out
+        return out[self.net.same]
 
     def with_beams(self, beams: Sequence[Beam]) -> Frame:
         """The same frame with other beams, whose lines end where they did.
@@ -602,7 +649,8 @@ def _heights(height, lines):
 
 def _hinged(net, hinges):
     """Whether the start and the end of each line are hinged, (2, m)."""
-    out = np.zeros(net.lines.shape, dtype=bool)
+    lines = net.given  # before ends became one node: what is hinged at one of them stays so
+    out = np.zeros(lines.shape, dtype=bool)
     if isinstance(hinges, str) and hinges == "all":
         return ~out
     if isinstance(hinges, (str, int, np.integer)):
@@ -613,12 +661,15 @@ def _hinged(net, hinges):
                          f"{shown(hinges)}")
     for one in hinges:
         if isinstance(one, (tuple, list, np.ndarray)) and len(one) == 2:
-            line, node = (int(net.lines_of(one[0])[0]), int(net.nodes_at(one[1])[0]))
-            at = net.lines[:, line] == node
+            line, node = (int(net.lines_of(one[0])[0]), int(net.points_at(one[1])[0]))
+            at = lines[:, line] == node
             if not np.any(at):
                 raise InputError(f"line {line} does not end at node {node}: it joins "
-                                 f"{net.lines[:, line].tolist()}")
+                                 f"{lines[:, line].tolist()}")
+            if line not in net.kept:
+                raise InputError(f"line {line} cannot be hinged: its ends are one node, as they "
+                                 f"are not farther apart than tol = {net.tol:.3g}")
             out[at, line] = True
         else:
-            out |= np.isin(net.lines, net.nodes_at(one))
+            out |= np.isin(lines, net.points_at(one))
     return out

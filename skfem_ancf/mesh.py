@@ -566,8 +566,12 @@ class MeshBeam(Frozen, Mesh2D):
         """Length of the chain that each element is in, shape (nelements,)."""
         if self.is_chain:
             return np.full(self.t.shape[1], self.lengths.sum())
-        chain = np.cumsum(np.append(False, self.t[0, 1:] != self.t[1, :-1]))
-        return np.bincount(chain, self.lengths)[chain]
+        return np.bincount(self.chains, self.lengths)[self.chains]
+
+    @property
+    def chains(self) -> Array:
+        """Number of the chain that each element is in, shape (nelements,)."""
+        return np.cumsum(np.append(False, self.t[0, 1:] != self.t[1, :-1]))
 
     def element_finder(self, mapping: Any = None) -> Callable[..., Array]:
         """A function from points x, y to the elements that hold them.

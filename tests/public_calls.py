@@ -458,14 +458,19 @@ def frame(points=((0, 0), (0, 1), (1, 1)), lines=((0, 1), (1, 2)), **options):
 
 call("Frame.from_lines", lambda **k: frame(**k),
      dict(points=((0, 0), (0, 1), (1, 1)), lines=((0, 1), (1, 2)), groups={"a": [0]},
-          nodes={"b": [1]}, hinges=[(0, 1)], curves={}, elements=2, sections={}, height=0.02),
+          nodes={"b": [1]}, hinges=[(0, 1)], curves={}, elements=2, sections={}, tol=1e-6,
+          height=0.02),
      {name: {"{}": "none"} for name in ("groups", "nodes", "curves", "sections")}
      | {"hinges": {"[]": "none", "0": "a node"}}, points="other", lines="other",
      groups="other?", nodes="other?", hinges="other", curves="other?", elements="other",
-     sections="other?", height="positive")
-call("Frame.from_meshio", lambda mesh: Frame.from_meshio(
-    mesh, height=0.02, width=0.02, material=StVenantKirchhoff(2e11, 0.3)),
-     dict(mesh=meshio.Mesh([[0, 0], [0, 1]], [("line", [[0, 1]])])), mesh="other")
+     sections="other?", tol="not negative?", height="positive")
+call("Frame.from_meshio", lambda **k: Frame.from_meshio(
+    **k, height=0.02, width=0.02, material=StVenantKirchhoff(2e11, 0.3)),
+     dict(mesh=meshio.Mesh([[0, 0], [0, 1]], [("line", [[0, 1]])]), groups=None, tol=None),
+     {"groups": {"[]": "none"}}, mesh="other", groups="other?", tol="not negative?")
+call("frame.line_load", lambda **k: moved(frame().clamp(0).line_load(**k)),
+     dict(force=(0, -1), beam=None, amplitude=amplitude), force="vector", beam="beam?",
+     amplitude="function?")
 call("frame.nodes", lambda **k: frame().nodes(**k), dict(place=(0, 1)), place="nodes")
 call("frame.hold", lambda place, what: frame().hold(place, what), dict(place=0, what="x"),
      place="nodes", what="other")

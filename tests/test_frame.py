@@ -849,9 +849,11 @@ def test_a_frame_of_a_vtu_file(tmp_path):
     mesh = meshio.Mesh(np.pad(np.array(PORTAL[0], float), ((0, 0), (0, 1))),
                        [("line", PORTAL[1])], cell_sets={"columns": [[0, 2]], "girder": [[1]]})
     mesh.write(tmp_path / "portal.vtu")
-    frame = Frame.from_meshio(tmp_path / "portal.vtu", material=STEEL, height=H, width=H)
-    assert [(beam.name, beam.mesh.nelements) for beam in frame.beams] == [("columns", 2),
-                                                                          ("girder", 1)]
+    for options in ({"groups": ["columns", "girder"]}, {"sections": {"columns": {"height": H}}}):
+        frame = Frame.from_meshio(tmp_path / "portal.vtu", material=STEEL, height=H, width=H,
+                                  **options)
+        assert [(beam.name, beam.mesh.nelements) for beam in frame.beams] == [("columns", 2),
+                                                                              ("girder", 1)]
 
 
 def test_a_frame_is_pickled_and_copied():
@@ -900,7 +902,8 @@ def test_memory_is_linear():
     (PORTAL[0], [*PORTAL[1], (1, 1)], {}, MeshError, "line 3 has no length"),
     (PORTAL[0], [*PORTAL[1], (2, 1)], {}, MeshError, "lines 1 and 3 are the same"),
     ([*PORTAL[0], (5, 5)], PORTAL[1], {}, MeshError, "point 4 at .5, 5. is in no line"),
-    ([*PORTAL[0], (0, 1), (2, 2)], [*PORTAL[1], (4, 5)], {}, MeshError, "1 and 4 are both at"),
+    ([*PORTAL[0], (0, 1), (2, 2)], [*PORTAL[1], (4, 5)], {"tol": 0}, MeshError,
+     "1 and 4 are both at"),
     (*PORTAL, {"groups": {"a": [0, 1], "b": [1]}}, InputError, "line 1 is in the groups 'a' and"),
     (*PORTAL, {"groups": {"a": [3]}}, MeshError, "'a' holds the number 3"),
     (*PORTAL, {"sections": {"column": {}}, "groups": {"columns": [0]}}, NameUnknown, "columns"),
