@@ -445,7 +445,7 @@ def run(script, compare=False, seconds=120):
 
 def _own_warnings():
     """Warnings of the package are no errors here."""
-    from skfem_ancf import errors
+    from skfem_ancf.core import errors
     for kind in vars(errors).values():
         if isinstance(kind, type) and issubclass(kind, Warning):
             warnings.simplefilter("ignore", kind)

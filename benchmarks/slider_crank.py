@@ -35,8 +35,7 @@ def angle(t):
 
 def scene(elements):
     """The same of skfem_ancf, with quintic cables: the scene, and its crank, rod and slider."""
-    from skfem_ancf import (Beam, ElementBeamCable, MeshBeam, RigidBody, Scene,
-                            StVenantKirchhoff)
+    from skfem_ancf import Beam, ElementBeamCable, MeshBeam, RigidBody, Scene, StVenantKirchhoff
 
     x = np.linspace(CRANK, CRANK + ROD, elements + 1)
     rod = Beam(MeshBeam.init_line(x, SIDE), ElementBeamCable(), StVenantKirchhoff(E, 0.0, DENSITY),

@@ -19,12 +19,12 @@ from scipy.linalg import eigh
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "validation"))
 import exact
 
-from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF,
-                        ElementBeamANCFCubic, ElementBeamCable, MeshBeam, ModelWarning,
-                        NeoHookean, Scene, StVenantKirchhoff)
+from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
+                        ElementBeamCable, MeshBeam, ModelWarning, NeoHookean, Scene,
+                        StVenantKirchhoff)
 from skfem_ancf.formulations import Formulation, Term
-from skfem_ancf.progress import progress_bar
-from skfem_ancf.quadrature import gauss
+from skfem_ancf.core.progress import progress_bar
+from skfem_ancf.core.quadrature import gauss
 
 NU, WIDTH, G = 0.3, 0.01, 9.81
 

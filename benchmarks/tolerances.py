@@ -30,7 +30,7 @@ import slider_crank
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, KelvinVoigt, MeshBeam, RigidBody,
                         Scene, StVenantKirchhoff)
 from skfem_ancf.dynamics import SCHEMES, Gauss
-from skfem_ancf.errors import AncfError, InputError
+from skfem_ancf.core.errors import AncfError, InputError
 from work_precision import ours
 from work_precision.problems import PROBLEMS
 

@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.integrate import trapezoid
 
-from skfem_ancf import (Beam, ElementBeamANCFCubic, MeshBeam, Scene, Section, StVenantKirchhoff)
+from skfem_ancf import Beam, ElementBeamANCFCubic, MeshBeam, Scene, Section, StVenantKirchhoff
 
 # %%
 # Invar below, brass above, 0.5 mm each; 150 mm long, 10 mm wide, heated by 200 K.

@@ -9,8 +9,7 @@ statics says. Where the energy goes is in the material, whose stress resists the
 import matplotlib.pyplot as plt
 import numpy as np
 
-from skfem_ancf import (Beam, ElementBeamCable, KelvinVoigt, MeshBeam, Scene,
-                        StVenantKirchhoff)
+from skfem_ancf import Beam, ElementBeamCable, KelvinVoigt, MeshBeam, Scene, StVenantKirchhoff
 
 # %%
 # The time of the damper sets the decay: a vibration of the angular frequency omega loses the part

@@ -10,7 +10,7 @@ import numpy as np
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, MeshBeam, Scene,
                         StVenantKirchhoff)
-from skfem_ancf.obstacles import Circle, Line
+from skfem_ancf.actions.obstacles import Circle, Line
 
 DOCS = Path(__file__).resolve().parent
 DEMOS = DOCS.parent / "demos"

@@ -1,22 +1,22 @@
 """Planar ANCF beams of any order as scikit-fem elements."""
 
-from . import forms
-from .beam import Beam, reference_coordinates
-from .damping import KelvinVoigt
+from .forms import weak as forms
+from .beam.beam import Beam, reference_coordinates
+from .materials.damping import KelvinVoigt
 from .dynamics import HHT, EnergyMomentum, Gauss, GeneralizedAlpha, Newmark, Radau
 from .elements import (ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
                        ElementBeamCable, ElementBeamPatelShabana)
-from .errors import (AncfError, CallbackError, CallError, ConvergenceError, FileError, InputError,
-                     MeshError, MissingExtra, ModelWarning, NameUnknown, StabilityWarning,
-                     SupportError)
-from .frame import Frame
+from .core.errors import (AncfError, CallbackError, CallError, ConvergenceError, FileError,
+                          InputError, MeshError, MissingExtra, ModelWarning, NameUnknown,
+                          StabilityWarning, SupportError)
+from .scene.frame import Frame
 from .materials import NeoHookean, StVenantKirchhoff
-from .mesh import MeshBeam
-from .obstacles import Circle, Line, Polygon, SignedDistance
-from .rigid import RigidBody
-from .scene import Scene
+from .mesh.mesh_beam import MeshBeam
+from .actions.obstacles import Circle, Line, Polygon, SignedDistance
+from .beam.rigid import RigidBody
+from .scene.scene import Scene
 from .sections import Section
-from .sweeps import sweep
+from .sweeps.sweep import sweep
 
 __version__ = "0.1.0"
 

@@ -10,7 +10,7 @@ import pytest
 
 from skfem_ancf import MeshBeam
 from skfem_ancf.elements import ELEMENTS
-from skfem_ancf.switch import compiled_off
+from skfem_ancf.core.switch import compiled_off
 
 
 def quarter_arc(n=3, height=0.3, radius=1.0):

@@ -21,12 +21,12 @@ from skfem_ancf import (HHT, Beam, ElementBeamANCF, ElementBeamANCFCubic, Elemen
 from skfem_ancf.dynamics import get_scheme
 from skfem_ancf.elements import choose_element
 from skfem_ancf.formulations import Assumed, Continuum, get_formulation
-from skfem_ancf.fields import Field
+from skfem_ancf.recovery.fields import Field
 from skfem_ancf.io import PvdWriter, body_fields, save_vtu
 from skfem_ancf.io.vtkhdf import VtkHdfWriter
-from skfem_ancf.loads import Weight
-from skfem_ancf.quadrature import gauss, lagrange, tensor
-from skfem_ancf.sampling import sample
+from skfem_ancf.actions.loads import Weight
+from skfem_ancf.core.quadrature import gauss, lagrange, tensor
+from skfem_ancf.core.sampling import sample
 
 
 def fails(*args, **kwargs):

@@ -9,8 +9,8 @@ from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCF
                         ElementBeamANCFHermite, ElementBeamCable, InputError, MeshBeam, Scene,
                         StVenantKirchhoff)
 from skfem_ancf.elements import ELEMENTS
-from skfem_ancf.results import State
-from skfem_ancf.statics.adapt import refine
+from skfem_ancf.results.state import State
+from skfem_ancf.scene.adapt import refine
 
 
 def cantilever(element, n, x=None):

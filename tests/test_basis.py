@@ -14,7 +14,7 @@ from skfem.models.poisson import laplace, mass, unit_load
 
 from conftest import MESHES, quarter_arc
 from skfem_ancf import ElementBeamANCF, ElementBeamPatelShabana, InputError, MeshBeam, MeshError
-from skfem_ancf.reference import ElementBeamP1
+from skfem_ancf.mesh.reference_cell import ElementBeamP1
 
 
 @Functional

@@ -15,7 +15,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, Frame, InputErr
                         Line, MeshBeam, MeshError, NameUnknown, RigidBody, Scene, StVenantKirchhoff,
                         SupportError)
 from skfem_ancf.dynamics import SCHEMES
-from skfem_ancf.errors import AncfError, CallbackError, CheckpointError, ImmutableError
+from skfem_ancf.core.errors import AncfError, CallbackError, CheckpointError, ImmutableError
 
 G = 9.81
 EI = 1e4 * 0.1**4 / 12

@@ -6,7 +6,7 @@ import pytest
 import exact
 from skfem_ancf import (Beam, ElementBeamANCFCubic, ElementBeamCable, InputError, MeshBeam, Scene,
                         Section, StVenantKirchhoff)
-from skfem_ancf.kernels.along import CableSections
+from skfem_ancf.beam.kernels.along import CableSections
 
 DEGREES = (3, 5, 7, 9, 13)
 E, NU, RHO, B = 2e8, 0.3, 7800.0, 0.01

@@ -13,10 +13,11 @@ import pytest
 
 from skfem_ancf import (Beam, ElementBeamANCF, MeshBeam, NeoHookean, Scene, Section,
                         StVenantKirchhoff)
-from skfem_ancf.dynamics import SCHEMES, GeneralizedAlpha, Newmark, checkpoint
-from skfem_ancf.errors import (CallbackError, CheckpointError, CheckpointWarning, InputError,
-                               Interrupted, MissingExtra)
-from skfem_ancf.obstacles import SignedDistance
+from skfem_ancf.dynamics import SCHEMES, GeneralizedAlpha, Newmark
+from skfem_ancf.dynamics import checkpoint
+from skfem_ancf.core.errors import (CallbackError, CheckpointError, CheckpointWarning, InputError,
+                                    Interrupted, MissingExtra)
+from skfem_ancf.actions.obstacles import SignedDistance
 
 from test_restart import driven, swinging
 

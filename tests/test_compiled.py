@@ -9,14 +9,14 @@ from numpy.testing import assert_allclose
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana, EnergyMomentum, GeneralizedAlpha, MeshBeam,
                         NeoHookean, Scene, StVenantKirchhoff)
-from skfem_ancf.joints import JOINTS, Joint
-from skfem_ancf.joints.base import point
-from skfem_ancf import band
-from skfem_ancf.band import factorize as factorize_band, solve as solve_band
-from skfem_ancf.linalg import BandMatrix, halves
+from skfem_ancf.actions.joints import JOINTS, Joint
+from skfem_ancf.actions.joints.base import point
+from skfem_ancf.core import band
+from skfem_ancf.core.band import factorize as factorize_band, solve as solve_band
+from skfem_ancf.core.linalg import BandMatrix, halves
 from skfem_ancf.materials import LinearLaw
-from skfem_ancf.source import source
-from skfem_ancf.switch import compiled_off
+from skfem_ancf.core.source import source
+from skfem_ancf.core.switch import compiled_off
 
 if compiled_off() is not None:
     pytest.skip(compiled_off(), allow_module_level=True)
@@ -351,7 +351,7 @@ def test_restart_under_another_load_is_compiled():
 @pytest.fixture(scope="module")
 def bands():
     """What factorises and solves, plain and compiled."""
-    from skfem_ancf.compiled.twin import compile_for
+    from skfem_ancf.equations.compiled.twin import compile_for
     A = BandMatrix(2, 1).band
     return ((band.factorize, band.solve),
             (compile_for(factors_of, (A,)), compile_for(solution_of, (A, np.zeros(2)))))

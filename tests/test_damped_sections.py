@@ -9,7 +9,7 @@ from test_damping import decay
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, KelvinVoigt,
                         MeshBeam, NeoHookean, Scene, Section, StVenantKirchhoff)
-from skfem_ancf.quadrature import gauss
+from skfem_ancf.core.quadrature import gauss
 
 H = 0.02
 STEEL = StVenantKirchhoff(2e8, 0.3, 7800.0)

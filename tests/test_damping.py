@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from skfem_ancf import (HHT, Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
-                        EnergyMomentum, GeneralizedAlpha, InputError,
-                        KelvinVoigt, MeshBeam, NeoHookean, Newmark, Scene, StVenantKirchhoff)
+                        EnergyMomentum, GeneralizedAlpha, InputError, KelvinVoigt, MeshBeam,
+                        NeoHookean, Newmark, Scene, StVenantKirchhoff)
 from skfem_ancf.dynamics import SCHEMES
-from skfem_ancf.errors import CheckpointError
+from skfem_ancf.core.errors import CheckpointError
 from skfem_ancf.materials import Material
 
 

@@ -10,11 +10,11 @@ from scipy.linalg import svdvals
 from scipy.optimize import brentq
 
 import exact
-from skfem_ancf import (Beam, ElementBeamANCFHermite, ElementBeamCable, InputError, MeshBeam,
-                        Scene, StVenantKirchhoff)
+from skfem_ancf import (Beam, ElementBeamANCFHermite, ElementBeamCable, InputError, MeshBeam, Scene,
+                        StVenantKirchhoff)
 from skfem_ancf.elements.base import DEGREES
-from skfem_ancf.nodal import nodal_derivatives
-from skfem_ancf.reference import SECTIONS, hermite_basis
+from skfem_ancf.mesh.nodal import nodal_derivatives
+from skfem_ancf.mesh.reference_cell import SECTIONS, hermite_basis
 
 E, NU, RHO, B = 2e8, 0.3, 7800.0, 0.01
 

@@ -16,16 +16,16 @@ from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCF
                         ElementBeamCable, ElementBeamPatelShabana, Frame, InputError, MeshBeam,
                         MeshError, RigidBody, Scene, Section, StVenantKirchhoff, SupportError,
                         forms)
-from skfem_ancf.border import mean_stiffness
+from skfem_ancf.equations.border import mean_stiffness
 from skfem_ancf.dynamics import steps
 from skfem_ancf.dynamics.integrate import Integrator
 from skfem_ancf.io import PvdWriter
-from skfem_ancf.joints import Joint, PrescribedAngle, Weld
-from skfem_ancf.quadrature import gauss, tensor
-from skfem_ancf.spread import BODY, Sampled
-from skfem_ancf.statics import newton
-from skfem_ancf.statics.continuation import Tracer
-from skfem_ancf.taper import PLACES, halved
+from skfem_ancf.actions.joints import Joint, PrescribedAngle, Weld
+from skfem_ancf.core.quadrature import gauss, tensor
+from skfem_ancf.beam.distribution import BODY, Sampled
+from skfem_ancf.solvers import newton
+from skfem_ancf.solvers.continuation import Tracer
+from skfem_ancf.mesh.taper import PLACES, halved
 
 STEEL = StVenantKirchhoff(1e6, 0.3, 1.0)
 

@@ -33,8 +33,9 @@ def modules():
 def functions(module):
     """Public functions and methods of a module: name, function, class it belongs to or None.
 
-    Not the texts of :mod:`skfem_ancf.source`: their arguments are named tuples and work arrays,
-    which the attributes of the tuples and the head of the module describe, and Numba types them.
+    Not the texts of :mod:`skfem_ancf.core.source`: their arguments are named tuples and work
+    arrays, which the attributes of the tuples and the head of the module describe, and Numba types
+    them.
     """
     for name, thing in vars(importlib.import_module(module)).items():
         if name.startswith("_") or getattr(thing, "__module__", None) != module:

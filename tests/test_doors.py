@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
                         MeshBeam, NameUnknown, NeoHookean, Scene, StVenantKirchhoff)
-from skfem_ancf.errors import ImmutableError
-from skfem_ancf.joints import Joint
-from skfem_ancf.loads import Load
+from skfem_ancf.core.errors import ImmutableError
+from skfem_ancf.actions.joints import Joint
+from skfem_ancf.actions.loads import Load
 from skfem_ancf.materials import Material
 
 MATERIAL = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)

@@ -14,27 +14,28 @@ from scipy.integrate import solve_ivp
 import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, KelvinVoigt,
                         MeshBeam, NeoHookean, RigidBody, Scene, StVenantKirchhoff)
-from skfem_ancf import system
-from skfem_ancf.band import Band
-from skfem_ancf.body import Body
+from skfem_ancf.equations import system
+from skfem_ancf.core.band import Band
+from skfem_ancf.beam.strain_energy import Body
 from skfem_ancf.dynamics import (HHT, SCHEMES, EnergyMomentum, Gauss, GeneralizedAlpha, Newmark,
-                                 Radau, base, get_scheme)
+                                 Radau, get_scheme)
+from skfem_ancf.dynamics import base
 from skfem_ancf.dynamics.history import History
 from skfem_ancf.dynamics.integrator import Integrator
 from skfem_ancf.dynamics.rates import JointMotion
 from skfem_ancf.dynamics.dampers import Dampers, Rows
-from skfem_ancf.forces.system import Forces
+from skfem_ancf.actions.forces.system import Forces
 from skfem_ancf.dynamics.steps import STATE, Course, Matrices, Rule, room_for_steps, steps
 from skfem_ancf.elements import ELEMENTS
-from skfem_ancf.equations import Equations
-from skfem_ancf.errors import (ConvergenceError, InputError, ModelWarning, NameUnknown,
-                               SupportError)
+from skfem_ancf.equations.tables import Equations
+from skfem_ancf.core.errors import (ConvergenceError, InputError, ModelWarning, NameUnknown,
+                                    SupportError)
 from skfem_ancf.formulations import FORMULATIONS
-from skfem_ancf.joints.base import rotation
-from skfem_ancf.kernels.moments import MomentPack
-from skfem_ancf.linalg import BandMatrix
-from skfem_ancf.sampling import sample
-from skfem_ancf.tables import JointTables, LoadTables
+from skfem_ancf.actions.joints.base import rotation
+from skfem_ancf.beam.kernels.moments import MomentPack
+from skfem_ancf.core.linalg import BandMatrix
+from skfem_ancf.core.sampling import sample
+from skfem_ancf.actions.tables import JointTables, LoadTables
 
 from conftest import quarter_arc
 
@@ -1187,7 +1188,7 @@ def test_a_function_that_takes_arrays_is_asked_a_few_times():
 def test_directions_of_joints_that_follow_the_time_alone_are_solved_with_once_a_step(
         scheme, monkeypatch):
     """And with each new matrix, and with the mass; not in each iteration."""
-    from skfem_ancf import band
+    from skfem_ancf.core import band
 
     solved, solve_many = [], band.solve_many
     monkeypatch.setattr(band, "solve_many", lambda *args: solved.append(1) or solve_many(*args))
@@ -1203,7 +1204,7 @@ def test_directions_of_joints_that_follow_the_time_alone_are_solved_with_once_a_
 @pytest.mark.parametrize("scheme", ["generalized-alpha", "energy-momentum", "radau"])
 def test_directions_of_hinges_are_solved_with_once_for_many_steps(scheme, monkeypatch):
     """With each new matrix, and with the mass once in a block of steps."""
-    from skfem_ancf import band
+    from skfem_ancf.core import band
 
     solved, solve_many = [], band.solve_many
     monkeypatch.setattr(band, "solve_many", lambda *args: solved.append(1) or solve_many(*args))

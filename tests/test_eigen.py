@@ -8,7 +8,8 @@ from scipy.optimize import brentq, fsolve
 import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamANCFHermite,
                         ElementBeamCable, InputError, MeshBeam, ModelWarning, Scene,
-                        StVenantKirchhoff, eigen)
+                        StVenantKirchhoff)
+from skfem_ancf.solvers import eigen
 from skfem_ancf.elements import ELEMENTS
 
 # units in which E I = rho A = L = 1 at every slenderness

@@ -10,10 +10,10 @@ from scipy.optimize import brentq
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, Frame,
                         InputError, MeshBeam, NeoHookean, Scene, Section, StVenantKirchhoff, sweep)
-from skfem_ancf.eigenstrain import Temperature
-from skfem_ancf.errors import CallbackError
-from skfem_ancf.quadrature import gauss
-from skfem_ancf.switch import compiled_off
+from skfem_ancf.actions.eigenstrain import Temperature
+from skfem_ancf.core.errors import CallbackError
+from skfem_ancf.core.quadrature import gauss
+from skfem_ancf.core.switch import compiled_off
 
 STEEL = StVenantKirchhoff(E=2e11, nu=0.0, density=8000, thermal_expansion=12e-6)
 BRASS = StVenantKirchhoff(E=1e11, nu=0.0, density=8500, thermal_expansion=19e-6)

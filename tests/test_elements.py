@@ -14,7 +14,7 @@ from conftest import MESHES
 from skfem_ancf import (ElementBeamANCF, ElementBeamPatelShabana, InputError, MeshBeam, MeshError,
                         NameUnknown)
 from skfem_ancf.elements.ancf import POINT_FAMILIES
-from skfem_ancf.reference import SECTIONS, ElementBeamP1, RefBeam, hermite, linear
+from skfem_ancf.mesh.reference_cell import SECTIONS, ElementBeamP1, RefBeam, hermite, linear
 
 ORDERS = range(1, 11)
 SIZES = [(1.0, 1.0), (0.01, 3.0), (250.0, 1e-3)]

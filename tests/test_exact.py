@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 from scipy.optimize import brentq
 
 import exact
-from skfem_ancf.errors import InputError
+from skfem_ancf.core.errors import InputError
 
 SOFT = dict(E=2e8, nu=0.3, rho=7800.0, L=1.0, b=0.01, h=0.01)
 

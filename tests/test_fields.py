@@ -8,8 +8,8 @@ from conftest import quarter_arc
 from test_io import affine, bent, turn
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, NameUnknown,
                         NeoHookean, Scene, StVenantKirchhoff)
-from skfem_ancf.errors import CallbackError
-from skfem_ancf.fields import DRAWN, FIELDS, Field, Values, find_fields
+from skfem_ancf.core.errors import CallbackError
+from skfem_ancf.recovery.fields import DRAWN, FIELDS, Field, Values, find_fields
 from skfem_ancf.io import body_fields
 from skfem_ancf.materials import Material
 

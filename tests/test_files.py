@@ -6,7 +6,7 @@ import stat
 import numpy as np
 import pytest
 
-from skfem_ancf import (Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff, sweep)
+from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff, sweep
 from skfem_ancf.io import PvdWriter
 
 posix = pytest.mark.skipif(os.name != "posix", reason="modes and links of files are those of POSIX")

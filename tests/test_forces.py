@@ -10,12 +10,11 @@ from scipy.optimize import brentq
 
 from skfem_ancf import (HHT, Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         EnergyMomentum, GeneralizedAlpha, InputError, MeshBeam, MeshError,
-                        ModelWarning, Newmark, RigidBody, Scene, StVenantKirchhoff,
-                        SupportError)
-from skfem_ancf.errors import CheckpointError
-from skfem_ancf.forces import ForceElement, point, section
-from skfem_ancf.forces.texts import add_elastic_force, add_resisting_force
-from skfem_ancf.quadrature import gauss
+                        ModelWarning, Newmark, RigidBody, Scene, StVenantKirchhoff, SupportError)
+from skfem_ancf.core.errors import CheckpointError
+from skfem_ancf.actions.forces import ForceElement, point, section
+from skfem_ancf.actions.forces.texts import add_elastic_force, add_resisting_force
+from skfem_ancf.core.quadrature import gauss
 
 E, H = 2e8, 0.01
 EI, RHO_A = E * H**4 / 12, 7800 * H**2

@@ -14,7 +14,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamPatelShabana, MeshBeam
                         StVenantKirchhoff, forms, reference_coordinates)
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.formulations import FORMULATIONS
-from skfem_ancf.loads import DeadLoad, EndMoment, Pressure
+from skfem_ancf.actions.loads import DeadLoad, EndMoment, Pressure
 
 STEP = 1e-30
 BODIES = {

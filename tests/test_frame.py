@@ -11,13 +11,15 @@ from scipy.optimize import brentq
 from test_sections import axis_tip, plane
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, Frame,
-                        KelvinVoigt, MeshBeam, Scene, Section, StVenantKirchhoff, system, tangent)
-from skfem_ancf.condensed import Condensed
-from skfem_ancf.dynamics import EnergyMomentum, integrate
+                        KelvinVoigt, MeshBeam, Scene, Section, StVenantKirchhoff)
+from skfem_ancf.equations import system, strain_tangent as tangent
+from skfem_ancf.equations.condensation import Condensed
+from skfem_ancf.dynamics import EnergyMomentum
+from skfem_ancf.dynamics import integrate
 from skfem_ancf.dynamics.integrator import Integrator
-from skfem_ancf.errors import (CallbackError, FileError, InputError, MeshError, NameUnknown,
-                               PickleError, SupportError)
-from skfem_ancf.system import System
+from skfem_ancf.core.errors import (CallbackError, FileError, InputError, MeshError, NameUnknown,
+                                    PickleError, SupportError)
+from skfem_ancf.equations.system import System
 
 E, H = 2e11, 0.02
 STEEL = StVenantKirchhoff(E, 0.3, density=7800.0)

@@ -8,11 +8,11 @@ import scipy.linalg
 from numpy.testing import assert_allclose
 from scipy import sparse
 
-from skfem_ancf import (Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff, constraints,
-                        rank)
-from skfem_ancf.errors import SupportError
-from skfem_ancf.joints import Joint, OnCircle
-from skfem_ancf.joints.base import point
+from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
+from skfem_ancf.equations import constraints, signature as rank
+from skfem_ancf.core.errors import SupportError
+from skfem_ancf.actions.joints import Joint, OnCircle
+from skfem_ancf.actions.joints.base import point
 import itertools
 
 E, RHO, H = 2e11, 7800.0, 0.02

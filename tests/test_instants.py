@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
                         MeshBeam, NeoHookean, Scene, StVenantKirchhoff)
-from skfem_ancf.section_forces import SectionForces
+from skfem_ancf.recovery.section_forces import SectionForces
 
 pytestmark = pytest.mark.filterwarnings("ignore::skfem_ancf.ModelWarning")  # few elements
 STEEL = StVenantKirchhoff(2e8, 0.3, 7800.0)

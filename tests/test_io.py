@@ -9,12 +9,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from conftest import quarter_arc, s_curve
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
-                        ElementBeamPatelShabana, InputError, MeshBeam,
-                        NeoHookean, Scene, StVenantKirchhoff)
-from skfem_ancf.io import PvdWriter, body_fields, save_vtu, vtu
+                        ElementBeamPatelShabana, InputError, MeshBeam, NeoHookean, Scene,
+                        StVenantKirchhoff)
+from skfem_ancf.io import PvdWriter, body_fields, save_vtu
+from skfem_ancf.io import vtu
 from skfem_ancf.io.vtu import grid, lagrange_cell, quads
 from skfem_ancf.materials import Material
-from skfem_ancf.results import State
+from skfem_ancf.results.state import State
 
 FIELDS = {f"{a}_{k}" for a in ("eps", "S", "sigma") for k in ("xx", "yy", "xy")} | {"displacement"}
 

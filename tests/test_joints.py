@@ -6,13 +6,12 @@ from scipy.integrate import trapezoid
 
 import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
-                        ElementBeamPatelShabana,
-                        EnergyMomentum, GeneralizedAlpha, MeshBeam, RigidBody, Scene,
-                        StVenantKirchhoff)
-from skfem_ancf.errors import InputError, NameUnknown, SupportError
-from skfem_ancf.joints import JOINTS, get_joint
-from skfem_ancf.linalg import dense
-from skfem_ancf.system import System
+                        ElementBeamPatelShabana, EnergyMomentum, GeneralizedAlpha, MeshBeam,
+                        RigidBody, Scene, StVenantKirchhoff)
+from skfem_ancf.core.errors import InputError, NameUnknown, SupportError
+from skfem_ancf.actions.joints import JOINTS, get_joint
+from skfem_ancf.core.linalg import dense
+from skfem_ancf.equations.system import System
 
 E, NU, RHO = 1e6, 0.3, 1000.0
 GRAVITY = (0.0, -9.81)
@@ -128,7 +127,7 @@ def held(name, pressure=False):
 def test_joints_are_solved_like_the_dense_system(name, border, pressure, monkeypatch):
     """The border, and sparse LU where it is too wide, against the whole matrix."""
     if not border:
-        monkeypatch.setattr("skfem_ancf.constraints.WIDE_BORDER", 0)
+        monkeypatch.setattr("skfem_ancf.equations.constraints.WIDE_BORDER", 0)
     s = held(name, pressure).system
     rng = np.random.default_rng(4)
     # the prescribed joints leave the forearm of the elbow one motion: a stress holds it
@@ -151,8 +150,8 @@ def test_joints_are_solved_like_the_dense_system(name, border, pressure, monkeyp
 @pytest.mark.filterwarnings("ignore::skfem_ancf.ModelWarning")  # an elbow of few elements
 def test_a_border_that_is_not_accurate_gives_way_to_sparse_lu(monkeypatch):
     expected = held("weld").solve_static().u
-    monkeypatch.setattr("skfem_ancf.statics.newton.INACCURATE", 0.0)  # in the iteration
-    monkeypatch.setattr("skfem_ancf.system.INACCURATE", 0.0)
+    monkeypatch.setattr("skfem_ancf.solvers.newton.INACCURATE", 0.0)  # in the iteration
+    monkeypatch.setattr("skfem_ancf.equations.system.INACCURATE", 0.0)
     calls = []
     sparse = System._sparse_factors
     monkeypatch.setattr(System, "_sparse_factors",

@@ -6,21 +6,22 @@ from numpy.testing import assert_allclose
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
                         NeoHookean, Scene, Section, StVenantKirchhoff)
-from skfem_ancf import body
-from skfem_ancf.compiled import LOADED, load
+from skfem_ancf.beam import strain_energy as body
+from skfem_ancf.equations.compiled import LOADED, load
 from skfem_ancf.dynamics import stages
-from skfem_ancf.evaluation import CARRY, FORCE, MEAN, STRESS, TANGENT, evaluate
+from skfem_ancf.equations.evaluation import CARRY, FORCE, MEAN, STRESS, TANGENT, evaluate
 from skfem_ancf.formulations import get_formulation
-from skfem_ancf.kernels import CableKernel, Kernel, law
-from skfem_ancf.kernels import base as kinds_of
-from skfem_ancf.kernels.base import GIVEN, nowhere, repeated
-from skfem_ancf.kernels.cable import _unit
-from skfem_ancf.kernels.section import with_unit_law
-from skfem_ancf.band import add_halves, fix
-from skfem_ancf.linalg import BandMatrix, halves
+from skfem_ancf.beam.kernels import CableKernel, Kernel
+from skfem_ancf.beam.kernels import law
+from skfem_ancf.beam.kernels import base as kinds_of
+from skfem_ancf.beam.kernels.base import GIVEN, nowhere, repeated
+from skfem_ancf.beam.kernels.cable import _unit
+from skfem_ancf.beam.kernels.section import with_unit_law
+from skfem_ancf.core.band import add_halves, fix
+from skfem_ancf.core.linalg import BandMatrix, halves
 from skfem_ancf.materials import Material
 from skfem_ancf.sections import Across, Rectangle
-from skfem_ancf.switch import compiled_off
+from skfem_ancf.core.switch import compiled_off
 
 STEP = 1e-30
 

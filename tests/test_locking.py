@@ -11,7 +11,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.formulations import Assumed, Formulation, Term
 from skfem_ancf.materials import Material
-from skfem_ancf.quadrature import gauss
+from skfem_ancf.core.quadrature import gauss
 
 ORDERS = (1, 2, 3, 6)
 PLANES = ("stress", "strain")

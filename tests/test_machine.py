@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFHermite, ElementBeamCable,
-                        EnergyMomentum, MeshBeam, Scene, StVenantKirchhoff, compiled, machine)
-from skfem_ancf.errors import CompilationWarning
-from skfem_ancf.source import lanes, primitive, source
-from skfem_ancf.switch import expecting
+                        EnergyMomentum, MeshBeam, Scene, StVenantKirchhoff)
+from skfem_ancf.equations import compiled, backend as machine
+from skfem_ancf.core.errors import CompilationWarning
+from skfem_ancf.core.source import lanes, primitive, source
+from skfem_ancf.core.switch import expecting
 
 ROOT = Path(__file__).parent.parent
 
@@ -55,7 +56,7 @@ def test_a_first_solution_imports_no_compiler(tmp_path):
 @pytest.fixture
 def auto(needs_compiled, monkeypatch):
     """The default rules, nothing loaded, nothing on disk."""
-    from skfem_ancf.switch import VARIABLE
+    from skfem_ancf.core.switch import VARIABLE
 
     monkeypatch.delenv(VARIABLE, raising=False)
     loads, known, before, address = [], set(), compiled.KNOWN, compiled.address
@@ -122,7 +123,7 @@ def test_what_lies_on_disk_is_loaded_for_tasks_longer_than_loading(auto, monkeyp
 def test_members_and_steps_count(auto, monkeypatch):
     """A sweep, a path and a motion of automatic steps are as large as what they repeat."""
     from skfem_ancf import sweep
-    from skfem_ancf.switch import expected
+    from skfem_ancf.core.switch import expected
 
     s, loads = auto
     seen = []
@@ -179,8 +180,8 @@ def test_a_folder_that_cannot_be_written_is_said_once(auto, monkeypatch, tmp_pat
 
 
 def test_everything_is_compiled_beforehand(needs_compiled, monkeypatch):
-    from skfem_ancf.compiled.__main__ import main
-    from skfem_ancf.switch import VARIABLE
+    from skfem_ancf.equations.compiled.__main__ import main
+    from skfem_ancf.core.switch import VARIABLE
 
     monkeypatch.setenv(VARIABLE, "1")
     main()
@@ -202,7 +203,7 @@ def test_a_numba_that_is_too_old_is_left_out(tmp_path):
 
 
 def test_code_of_two_versions_of_numba_is_kept_side_by_side(needs_compiled, monkeypatch):
-    from skfem_ancf.compiled.twin import named
+    from skfem_ancf.equations.compiled.twin import named
 
     names = set()
     for number in ("0.62.0", "0.68.1"):
@@ -255,7 +256,7 @@ def test_what_cannot_be_compiled_runs_in_numpy(what, auto, monkeypatch, caplog):
 
 
 def test_one_signature_for_every_scene(needs_compiled, monkeypatch):
-    from skfem_ancf.compiled.twin import type_of
+    from skfem_ancf.equations.compiled.twin import type_of
 
     def recorded(name, function):
         def run(*args):
@@ -287,13 +288,13 @@ def test_a_cache_that_cannot_be_used_costs_time_only(damage, tmp_path, needs_com
 import numpy as np, sys
 sys.path.insert(0, {folder!r})
 from small import double
-from skfem_ancf.compiled.twin import compile_for
+from skfem_ancf.equations.compiled.twin import compile_for
 y = np.zeros(3)
 compile_for(double, (np.ones(3), y))(np.ones(3), y)
 print(y.tolist())
 """
     (tmp_path / "small.py").write_text(
-        "from skfem_ancf.source import lanes, source\n\n\n@source\ndef double(x, y):\n"
+        "from skfem_ancf.core.source import lanes, source\n\n\n@source\ndef double(x, y):\n"
         "    for i in lanes(x.size):\n        y[i] = 2.0 * x[i]\n")
     code = code.format(folder=str(tmp_path))
     folder = tmp_path / "numba"
@@ -314,14 +315,14 @@ def test_code_that_is_not_that_of_its_index_is_compiled_anew(tmp_path, needs_com
 import numpy as np, sys
 sys.path.insert(0, {str(tmp_path)!r})
 from small import cube, double
-from skfem_ancf.compiled.twin import compile_for
+from skfem_ancf.equations.compiled.twin import compile_for
 for text in cube, double:
     y = np.zeros(3)
     compile_for(text, (np.ones(3), y))(np.full(3, 4.0), y)
     print(y.tolist())
 """
     (tmp_path / "small.py").write_text(
-        "from skfem_ancf.source import lanes, source\n\n\n"
+        "from skfem_ancf.core.source import lanes, source\n\n\n"
         "@source\ndef cube(x, y):\n    for i in lanes(x.size):\n        y[i] = x[i]**3\n\n\n"
         "@source\ndef double(x, y):\n    for i in lanes(x.size):\n        y[i] = 2.0 * x[i]\n")
     expected = ["[64.0, 64.0, 64.0]", "[8.0, 8.0, 8.0]"]
@@ -346,7 +347,7 @@ def test_a_folder_in_which_nothing_can_be_kept_is_said_in_a_warning(tmp_path, ne
 
 def test_texts_and_twins(needs_compiled):
     """What a text calls is compiled with it: texts, inner ones too, and twins of primitives."""
-    from skfem_ancf.compiled.twin import compile_for
+    from skfem_ancf.equations.compiled.twin import compile_for
 
     x, y, z = np.arange(4.0), np.zeros(4), np.zeros(4)
     total_of_squares(x, y)
@@ -356,7 +357,7 @@ def test_texts_and_twins(needs_compiled):
 
 
 def test_what_two_entries_call_is_lowered_once(needs_compiled, monkeypatch):
-    from skfem_ancf.compiled import together, twin
+    from skfem_ancf.equations.compiled import together, twin
 
     lowered = []
     compile_extra = together.compiler.compile_extra
@@ -375,7 +376,7 @@ def test_single_numbers_of_arrays_are_read_and_written_as_by_numpy(needs_compile
     """From either end, of any layout and kind of number; as in other code of Numba."""
     from numba import njit
 
-    from skfem_ancf.compiled.twin import compile_for
+    from skfem_ancf.equations.compiled.twin import compile_for
 
     def given():
         a = np.arange(48.0).reshape(4, 6, 2)[:, :3] if order == "A" else np.array(
@@ -395,7 +396,7 @@ def test_single_numbers_of_arrays_are_read_and_written_as_by_numpy(needs_compile
 @pytest.mark.parametrize("first, last", [(0, 2), (1, 3), (-2, 9), (3, 1), (-9, -1), (7, 9)])
 def test_parts_of_arrays_are_those_of_numpy(needs_compiled, first, last):
     """Rows and slices of every end, as places to read and to fill."""
-    from skfem_ancf.compiled.twin import compile_for
+    from skfem_ancf.equations.compiled.twin import compile_for
 
     found, expected = np.zeros(12), np.zeros(12)
     A = np.arange(60.0).reshape(3, 5, 4)
@@ -408,7 +409,7 @@ def test_arrays_that_texts_make_live_as_long_as_they_are_used(needs_compiled):
     """Those made in loops and given back, and views of them; none is left."""
     from numba.core.runtime import _nrt_python as memory, rtsys
 
-    from skfem_ancf.compiled.twin import compile_for
+    from skfem_ancf.equations.compiled.twin import compile_for
 
     x, found, expected = np.arange(1.0, 4.0), np.zeros(3), np.zeros(3)
     makes(x, expected)
@@ -425,7 +426,7 @@ def test_arrays_that_texts_make_live_as_long_as_they_are_used(needs_compiled):
 @pytest.mark.parametrize("first, last", [(0, 4), (2, 4), (4, 2), (-2, 1), (3, 3)])
 def test_loops_run_as_in_python(needs_compiled, first, last):
     """Loops of one end and of two, by steps, in lanes, and those in others that are left."""
-    from skfem_ancf.compiled.twin import compile_for
+    from skfem_ancf.equations.compiled.twin import compile_for
 
     found, expected = np.zeros(5), np.zeros(5)
     loops(first, last, expected)
@@ -491,7 +492,7 @@ def loops(first, last, out):
 
 def test_shared_texts_are_found_by_their_types(needs_compiled):
     """Each text of a group is called with the types that the group says."""
-    from skfem_ancf.compiled import shared, twin
+    from skfem_ancf.equations.compiled import shared, twin
 
     compiled.address("common"), compiled.address("kernels")
     for group, calls in shared.GROUPS.items():

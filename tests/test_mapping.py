@@ -7,8 +7,8 @@ from skfem import FacetBasis
 
 from conftest import MESHES, STRAIGHT, quarter_arc
 from skfem_ancf import MeshBeam, MeshError
-from skfem_ancf.mapping import MappingBeam
-from skfem_ancf.reference import ElementBeamP1
+from skfem_ancf.mesh.mapping import MappingBeam
+from skfem_ancf.mesh.reference_cell import ElementBeamP1
 
 STEP = 1e-30
 POINTS = np.random.default_rng(2).random((2, 30))

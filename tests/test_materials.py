@@ -12,12 +12,12 @@ from numpy.testing import assert_allclose
 from skfem_ancf import (Beam, ElementBeamANCF, EnergyMomentum, InputError, MeshBeam, NameUnknown,
                         NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.elements import ELEMENTS
-from skfem_ancf.forms import green_lagrange
+from skfem_ancf.forms.weak import green_lagrange
 from skfem_ancf.materials import MATERIALS, Material, TextMaterial
 from skfem_ancf.materials.followed import NotFollowed, follow
 from skfem_ancf.materials.base import ShearCorrected
 from skfem_ancf.materials.base import hooke as hooke_matrix
-from skfem_ancf.source import lanes, source
+from skfem_ancf.core.source import lanes, source
 
 STEP = 1e-30
 E, NU = 2.1e11, 0.3
@@ -361,7 +361,7 @@ def test_the_text_of_the_users_own_is_compiled(needs_compiled):
 def test_a_text_made_by_exec_is_compiled(needs_compiled):
     """Its module has no name, as none was given."""
     names = {}
-    exec("from skfem_ancf.source import lanes, source\n\n"
+    exec("from skfem_ancf.core.source import lanes, source\n\n"
          + textwrap.dedent(inspect.getsource(StiffeningText.text)).split("\n", 1)[1], names)
 
     class Executed(StiffeningText):

@@ -12,7 +12,7 @@ from skfem.generic_utils import OrientedBoundary
 
 from conftest import MESHES, quarter_arc, s_curve
 from skfem_ancf import AncfError, InputError, MeshBeam, MeshError, NameUnknown
-from skfem_ancf.reference import ElementBeamP1
+from skfem_ancf.mesh.reference_cell import ElementBeamP1
 
 CENTRE = np.array([[0.5], [0.5]])
 CURVED = ["arc", "s-curve", "s-curve, cubic sections"]

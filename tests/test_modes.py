@@ -6,11 +6,12 @@ from scipy.optimize import brentq
 
 import exact
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, MeshBeam, Scene,
-                        StVenantKirchhoff, eigen)
+                        StVenantKirchhoff)
+from skfem_ancf.solvers import eigen
 from skfem_ancf.elements import ELEMENTS
-from skfem_ancf.errors import ConvergenceError, InputError, ModelWarning, SupportError
+from skfem_ancf.core.errors import ConvergenceError, InputError, ModelWarning, SupportError
 from skfem_ancf.formulations import FORMULATIONS
-from skfem_ancf.results import State
+from skfem_ancf.results.state import State
 
 from conftest import quarter_arc
 
@@ -59,7 +60,7 @@ def test_beam_as_thin_as_a_hair(ends, caplog):
     """A slenderness of 1e8: the stresses are unknowns beside the coordinates."""
     h = 1e-8
     scene, _ = held(straight(64, h, ElementBeamANCF(3)), ends)
-    with caplog.at_level("INFO", logger="skfem_ancf.tangent"):
+    with caplog.at_level("INFO", logger="skfem_ancf.equations.strain_tangent"):
         found = scene.modes(3).frequencies
     assert "stresses become unknowns" in caplog.text
     # elements as long as 1 / 64: the same relative error as at a slenderness of 200

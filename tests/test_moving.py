@@ -13,8 +13,8 @@ from test_sections import BRASS, FOAM, PLAIN, STEEL, H, cantilever, plane, plane
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
                         KelvinVoigt, MeshBeam, NeoHookean, RigidBody, Scene, Section)
 from skfem_ancf.formulations import Formulation, Term
-from skfem_ancf.obstacles import Line
-from skfem_ancf.quadrature import gauss
+from skfem_ancf.actions.obstacles import Line
+from skfem_ancf.core.quadrature import gauss
 from skfem_ancf.sections.moving import Moving
 
 P = 1e-2

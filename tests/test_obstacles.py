@@ -9,13 +9,13 @@ import pytest
 from scipy.integrate import solve_bvp
 
 from skfem_ancf import (Beam, CallbackError, ConvergenceError, ElementBeamANCF,
-                        ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        MeshBeam, ModelWarning, RigidBody, Scene, StVenantKirchhoff)
+                        ElementBeamANCFCubic, ElementBeamCable, InputError, MeshBeam, ModelWarning,
+                        RigidBody, Scene, StVenantKirchhoff)
 from skfem_ancf.dynamics import Gauss, GeneralizedAlpha, Radau
-from skfem_ancf.forces import contact_texts as texts
-from skfem_ancf.forces.contacts import BY_POINTS
-from skfem_ancf.forces.texts import add_contact
-from skfem_ancf.obstacles import Circle, Line, Polygon, SignedDistance
+from skfem_ancf.actions.forces import contact_texts as texts
+from skfem_ancf.actions.forces.contacts import BY_POINTS
+from skfem_ancf.actions.forces.texts import add_contact
+from skfem_ancf.actions.obstacles import Circle, Line, Polygon, SignedDistance
 
 ELEMENTS = ElementBeamANCF(2), ElementBeamCable(3)
 
@@ -724,7 +724,7 @@ def test_without_obstacles_nothing_is_paid(monkeypatch):
     def never(*args):
         raise AssertionError("asked for contact")
 
-    monkeypatch.setattr("skfem_ancf.forces.texts.run_contacts", never)
+    monkeypatch.setattr("skfem_ancf.actions.forces.texts.run_contacts", never)
     scene = Scene(beam()).clamp("left").gravity((0, -9.81))
     assert scene.system.forces.contacts.tables.number == 0
     scene.solve_static()
@@ -1112,7 +1112,7 @@ def test_a_pin_that_a_step_would_jump_over_stops_a_rod(scheme, monkeypatch):
     found = {}
     for sweeps in (True, False):
         if not sweeps:
-            monkeypatch.setattr("skfem_ancf.forces.contacts.Contacts.sweeps", False)
+            monkeypatch.setattr("skfem_ancf.actions.forces.contacts.Contacts.sweeps", False)
         history = turning_rod(PIN).integrate(0.06, 5e-3, scheme=scheme)
         found[sweeps] = history.angular_momentum[-1], history.substeps
     assert abs(found[False][0] - 1 / 3) < 1e-3 and found[False][1] == 0

@@ -6,9 +6,9 @@ import pytest
 from skfem_ancf import Beam, ElementBeamANCF, InputError, MeshBeam, Scene, StVenantKirchhoff
 from skfem_ancf.elements import ElementBeam
 from skfem_ancf.elements.base import SectionFunctions
-from skfem_ancf.joints import Joint
-from skfem_ancf.joints.base import point
-from skfem_ancf.loads import Load
+from skfem_ancf.actions.joints import Joint
+from skfem_ancf.actions.joints.base import point
+from skfem_ancf.actions.loads import Load
 from skfem_ancf.materials import Material
 from skfem_ancf.materials.base import hooke
 

@@ -13,7 +13,7 @@ from skfem.generic_utils import OrientedBoundary
 
 from skfem_ancf import (AncfError, Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana, MeshBeam, NeoHookean, Scene, StVenantKirchhoff)
-from skfem_ancf.errors import PickleError
+from skfem_ancf.core.errors import PickleError
 from skfem_ancf.formulations import FORMULATIONS
 
 MATERIAL = StVenantKirchhoff(E=2e8, nu=0.3, density=1000)

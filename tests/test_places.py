@@ -7,9 +7,9 @@ from skfem import LinearForm
 
 from skfem_ancf import (AncfError, Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam,
                         MeshError, NameUnknown, RigidBody, Scene, StVenantKirchhoff)
-from skfem_ancf.joints import Joint
-from skfem_ancf.loads import Load
-from skfem_ancf.places import facets_of
+from skfem_ancf.actions.joints import Joint
+from skfem_ancf.actions.loads import Load
+from skfem_ancf.mesh.places import facets_of
 
 MATERIAL = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)
 

@@ -10,15 +10,16 @@ from numpy.testing import assert_allclose
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, KelvinVoigt, Line,
                         MeshBeam, NameUnknown, Scene, StVenantKirchhoff, SupportError)
-from skfem_ancf.beam import Beam as BeamClass
-from skfem_ancf import compiled
-from skfem_ancf import body
-from skfem_ancf.dynamics import choose_scheme, steps
-from skfem_ancf.kernels.base import FORCE, TANGENT
-from skfem_ancf.statics import iteration
-from skfem_ancf.linalg import BandMatrix
-from skfem_ancf.strains import ElementStrain
-from skfem_ancf.system import System
+from skfem_ancf.beam.beam import Beam as BeamClass
+from skfem_ancf.equations import compiled
+from skfem_ancf.beam import strain_energy as body
+from skfem_ancf.dynamics import choose_scheme
+from skfem_ancf.dynamics import steps
+from skfem_ancf.beam.kernels.base import FORCE, TANGENT
+from skfem_ancf.solvers import iteration
+from skfem_ancf.core.linalg import BandMatrix
+from skfem_ancf.beam.strains import ElementStrain
+from skfem_ancf.equations.system import System
 
 
 def scene(element=None, nu=0.3, formulation="assumed", **options):

@@ -9,8 +9,8 @@ from test_io import affine
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana, InputError, MeshBeam, MeshError, NameUnknown,
                         Scene, StVenantKirchhoff)
-from skfem_ancf import finder
-from skfem_ancf.points import as_points
+from skfem_ancf.mesh import location as finder
+from skfem_ancf.recovery.points import as_points
 
 STEEL = StVenantKirchhoff(E=1e6, nu=0.3, density=10.0)
 LINE = MeshBeam.init_line([0, 0.3, 1.0], height=0.1)
@@ -223,7 +223,7 @@ def test_strain_of_the_elements_at_few_and_at_many_points(mesh, formulation, pla
     state = Scene(beam).clamp("left").point_force((2, -3), at=mesh.p[:, -1]).solve_static()
     e, X, x = inside(mesh)
     few = [np.array([ask(p, recover=False) for p in x.T]).T for ask in (state.strain, state.stress)]
-    monkeypatch.setattr("skfem_ancf.strains.CHUNK", 7)
+    monkeypatch.setattr("skfem_ancf.beam.strains.CHUNK", 7)
     many = [state.strain(x, recover=False), state.stress(x, recover=False)]
     assert_allclose(few, many, rtol=1e-10, atol=1e-13 * np.abs(few[1]).max())
     if formulation == "continuum":  # r(X + d) - r(X) by differences, in the frame of the beam

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff
-from skfem_ancf.obstacles import Circle
+from skfem_ancf.actions.obstacles import Circle
 
 RADIUS, HEIGHT, WIDTH, TAIL, DENSITY = 0.1, 1e-3, 0.01, 0.1, 1000.0
 AXIS = RADIUS + HEIGHT / 2

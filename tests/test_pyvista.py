@@ -19,7 +19,7 @@ from conftest import quarter_arc
 from test_io import bent
 from skfem_ancf import (Beam, ElementBeamANCF, InputError, Line, MeshBeam, MissingExtra,
                         NameUnknown, Scene, StVenantKirchhoff)
-from skfem_ancf.fields import FIELDS
+from skfem_ancf.recovery.fields import FIELDS
 from skfem_ancf.io import body_fields
 from skfem_ancf.io.vtkhdf import VtkHdfWriter
 
@@ -324,7 +324,7 @@ def test_an_interrupted_series_keeps_the_obstacles_of_the_one_before(tmp_path):
 FULL = """
 import numpy as np
 from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
-from skfem_ancf.errors import FileError
+from skfem_ancf.core.errors import FileError
 
 beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.02), ElementBeamANCF(2),
             StVenantKirchhoff(2e8, 0.3, 7800), width=0.02)

@@ -8,8 +8,8 @@ from skfem.helpers import ddot
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, KelvinVoigt,
                         MeshBeam, Scene, StVenantKirchhoff)
-from skfem_ancf.forces import ForceElement, point
-from skfem_ancf.quadrature import gauss
+from skfem_ancf.actions.forces import ForceElement, point
+from skfem_ancf.core.quadrature import gauss
 
 E, NU, RHO, H, B, G = 2e8, 0.3, 7800.0, 0.01, 0.02, 9.81
 ELEMENTS = [ElementBeamANCF(2), ElementBeamANCF(3), ElementBeamANCFCubic(2), ElementBeamCable(5)]

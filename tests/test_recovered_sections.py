@@ -9,8 +9,8 @@ from test_sections import (BIMETAL, BRASS, PROFILES, SANDWICH, STEEL, H, cantile
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
                         NeoHookean, Scene, Section)
-from skfem_ancf.damping import KelvinVoigt
-from skfem_ancf.panels import Panels
+from skfem_ancf.materials.damping import KelvinVoigt
+from skfem_ancf.recovery.intervals import Panels
 from skfem_ancf.sections.base import slab_of
 from skfem_ancf.sections.measure import Uniform
 

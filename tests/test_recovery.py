@@ -10,12 +10,12 @@ from skfem import LinearForm
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana, MeshBeam, NeoHookean, Scene, StVenantKirchhoff)
 from skfem_ancf.dynamics import GeneralizedAlpha
-from skfem_ancf.errors import ConvergenceError, MeshError, NameUnknown
+from skfem_ancf.core.errors import ConvergenceError, MeshError, NameUnknown
 from skfem_ancf.io import body_fields
-from skfem_ancf.quadrature import gauss, tensor
-from skfem_ancf.pieces import smoothed
-from skfem_ancf.recovery import strain_of_stress
-from skfem_ancf.statics.adapt import strain_error
+from skfem_ancf.core.quadrature import gauss, tensor
+from skfem_ancf.recovery.segments import smoothed
+from skfem_ancf.recovery.recovered import strain_of_stress
+from skfem_ancf.scene.adapt import strain_error
 
 REFERENCE = np.load(Path(__file__).parent / "data" / "reference_2d.npz")
 NU = 0.3

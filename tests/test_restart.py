@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, MeshBeam, NeoHookean, Scene,
                         StVenantKirchhoff)
 from skfem_ancf.dynamics import SCHEMES, GeneralizedAlpha, Newmark
-from skfem_ancf.errors import InputError
+from skfem_ancf.core.errors import InputError
 
 VARIANTS = [*(cls() for cls in SCHEMES.values() if cls.joined), GeneralizedAlpha(0.3),
             Newmark(0.36, 0.6)]

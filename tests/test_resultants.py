@@ -7,9 +7,9 @@ from numpy.testing import assert_allclose
 from conftest import quarter_arc
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
                         MeshBeam, NeoHookean, Scene, StVenantKirchhoff)
-from skfem_ancf.obstacles import Line
+from skfem_ancf.actions.obstacles import Line
 from skfem_ancf.dynamics import GeneralizedAlpha
-from skfem_ancf.quadrature import gauss
+from skfem_ancf.core.quadrature import gauss
 import itertools
 
 ELEMENTS = [ElementBeamANCF(1), ElementBeamANCF(3), ElementBeamANCFCubic(2), ElementBeamCable(5)]

@@ -13,10 +13,10 @@ from skfem.helpers import sym_grad
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
                         MeshBeam, NameUnknown, NeoHookean, Scene, Section, StVenantKirchhoff)
-from skfem_ancf.errors import CallError
+from skfem_ancf.core.errors import CallError
 from skfem_ancf.materials.base import hooke
-from skfem_ancf.obstacles import Line
-from skfem_ancf.quadrature import gauss
+from skfem_ancf.actions.obstacles import Line
+from skfem_ancf.core.quadrature import gauss
 from skfem_ancf.sections.measure import Piece, Weighted
 
 H = 0.1

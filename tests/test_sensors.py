@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam, MeshError,
                         NameUnknown, Scene, StVenantKirchhoff)
-from skfem_ancf.errors import CheckpointError
+from skfem_ancf.core.errors import CheckpointError
 
 
 def swinging(element=None, **options):

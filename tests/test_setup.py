@@ -7,31 +7,32 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-import skfem_ancf.system
+import skfem_ancf.equations.system
 from skfem_ancf import (AncfError, Beam, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamANCFHermite, ElementBeamCable, ElementBeamPatelShabana,
                         InputError, KelvinVoigt, MeshBeam, MeshError, NeoHookean, Scene,
                         StVenantKirchhoff, SupportError)
-from skfem_ancf.border import Border, add_curvature, factorize_bordered, new_factors, solve_bordered
-from skfem_ancf.bordered import BorderedMatrix, gives_way
-from skfem_ancf.constraints import Constraints
+from skfem_ancf.equations.border import (Border, add_curvature, factorize_bordered, new_factors,
+                                         solve_bordered)
+from skfem_ancf.equations.bordered import BorderedMatrix, gives_way
+from skfem_ancf.equations.constraints import Constraints
 from skfem_ancf.elements import base
-from skfem_ancf.equations import _NO_JOINTS, Tables
-from skfem_ancf.errors import CallbackError
-from skfem_ancf.finder import Finder
-from skfem_ancf.forces import system as forces
-from skfem_ancf.inertia import points_along
-from skfem_ancf.joints import OnLine
-from skfem_ancf.joints.base import Joint
-from skfem_ancf.kernels import section
-from skfem_ancf.kernels.base import pair_tables
-from skfem_ancf.linalg import BandMatrix
-from skfem_ancf.loads import EndMoment, PointForce, Pressure, Weight
-from skfem_ancf.mapping import MappingBeam
-from skfem_ancf.rank import inertia_of, null_basis
-from skfem_ancf.quadrature import gauss
+from skfem_ancf.equations.tables import _NO_JOINTS, Tables
+from skfem_ancf.core.errors import CallbackError
+from skfem_ancf.mesh.location import Finder
+from skfem_ancf.actions.forces import system as forces
+from skfem_ancf.beam.inertia import points_along
+from skfem_ancf.actions.joints import OnLine
+from skfem_ancf.actions.joints.base import Joint
+from skfem_ancf.beam.kernels import section
+from skfem_ancf.beam.kernels.base import pair_tables
+from skfem_ancf.core.linalg import BandMatrix
+from skfem_ancf.actions.loads import EndMoment, PointForce, Pressure, Weight
+from skfem_ancf.mesh.mapping import MappingBeam
+from skfem_ancf.equations.signature import inertia_of, null_basis
+from skfem_ancf.core.quadrature import gauss
 from skfem_ancf.sections import Across
-from skfem_ancf.system import System
+from skfem_ancf.equations.system import System
 
 
 def cantilever(element, n=4, length=1.0, height=0.01, E=2e9, angle=0.0):
@@ -230,7 +231,7 @@ def test_meshes_made_by_their_class_are_not_asked_again(monkeypatch):
 
 def test_arrays_are_tried_before_their_heads_are_read(needs_compiled, monkeypatch):
     """Words at other places, as a NumPy might have that is yet to come, are seen."""
-    from skfem_ancf.compiled import heads
+    from skfem_ancf.equations.compiled import heads
 
     tried = np.arange(6)[2:], np.zeros((2, 3))[1:], np.zeros((2, 1, 3)), np.zeros(0)
     assert all(map(heads.laid_out, tried))
@@ -724,7 +725,7 @@ def test_what_joints_hold_at_an_angle_needs_neither_springs_nor_sparse_factors(m
     scene = hold(Scene(Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(2e9, 0.3), width=0.01)))
     scene.point_force((0.0, -1e4 * height**3), at=tuple(mesh.p[:, -1]))
     system, asked = scene.system, [counted(monkeypatch, place, name) for place, name in (
-        (System, "solve_own"), (skfem_ancf.system, "gives_way"))]
+        (System, "solve_own"), (skfem_ancf.equations.system, "gives_way"))]
     found = scene.solve_static()
     assert not any(asked) and found.iterations < 8
     assert system.machine.tables.plain.border.springs == 0 < len(system.constraints.stiff[0])
@@ -769,7 +770,7 @@ def test_directions_that_are_stiff_give_forces_by_sparse_factors_too(monkeypatch
     u, l, b, c = np.zeros(system.N), np.zeros(1), rng.standard_normal(system.N), np.array([0.01])
     found = []
     for accuracy in (1e-5, -1.0):
-        monkeypatch.setattr(skfem_ancf.system, "INACCURATE", accuracy)
+        monkeypatch.setattr(skfem_ancf.equations.system, "INACCURATE", accuracy)
         system.assemble(u)
         system.factorize(u, 0.0, l)
         found.append(system.solve(b, c))

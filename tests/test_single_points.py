@@ -9,7 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from conftest import quarter_arc, s_curve
 from test_points import STEEL, inside
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        MeshBeam, NeoHookean, Scene, Section, StVenantKirchhoff, finder)
+                        MeshBeam, NeoHookean, Scene, Section, StVenantKirchhoff)
+from skfem_ancf.mesh import location as finder
 from skfem_ancf.elements import ELEMENTS
 
 

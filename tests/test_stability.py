@@ -12,11 +12,11 @@ from skfem import asm
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
                         ElementBeamCable, MeshBeam, ModelWarning, NeoHookean, Scene,
                         StabilityWarning, StVenantKirchhoff, forms)
-from skfem_ancf import constraints
-from skfem_ancf.linalg import dense
-from skfem_ancf.linalg import BandMatrix, Inertia
-from skfem_ancf.results import State
-from skfem_ancf.statics.stability import Verdict
+from skfem_ancf.equations import constraints
+from skfem_ancf.core.linalg import dense
+from skfem_ancf.core.linalg import BandMatrix, Inertia
+from skfem_ancf.results.state import State
+from skfem_ancf.solvers.stability import Verdict
 
 ELEMENTS = (ElementBeamANCF(2), ElementBeamCable(3), ElementBeamCable(5), ElementBeamANCFCubic(2))
 SUPPORTS = ("clamped", "pinned", "weld", "hinge", "slider")

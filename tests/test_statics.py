@@ -12,7 +12,7 @@ from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCF
                         NameUnknown, NeoHookean, Scene, StVenantKirchhoff, SupportError)
 from skfem_ancf.formulations import FORMULATIONS
 from skfem_ancf.materials import LinearLaw, Material
-from skfem_ancf.statics import newton as solving
+from skfem_ancf.solvers import newton as solving
 
 TIP = (1.0, 0.0)
 GRAVITY = (0.0, -9.81)
@@ -615,10 +615,10 @@ def test_a_load_as_small_as_the_round_off_of_the_axis_is_not_ignored(compiled):
 
 def test_an_interrupt_keeps_what_has_converged(monkeypatch):
     """Ctrl-C in the third step: the state of the second, an equilibrium of its own load."""
-    from skfem_ancf.errors import Interrupted
+    from skfem_ancf.core.errors import Interrupted
     from importlib import import_module
 
-    newton, continuation = (import_module(f"skfem_ancf.statics.{name}")
+    newton, continuation = (import_module(f"skfem_ancf.solvers.{name}")
                             for name in ("newton", "continuation"))
     scene = Scene(Beam(MeshBeam.init_line(np.linspace(0, 1, 9), 0.01), ElementBeamANCF(2),
                        StVenantKirchhoff(2e8, 0.3, 7800), 0.01)).clamp("left").gravity((0, -1))

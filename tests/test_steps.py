@@ -6,12 +6,13 @@ from numpy.testing import assert_allclose
 
 from skfem_ancf import (HHT, Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana, EnergyMomentum, GeneralizedAlpha, MeshBeam,
-                        Newmark, NeoHookean, Scene, StVenantKirchhoff, compiled)
-from skfem_ancf.band import (SPARE, Band, factorize, factorize_complex, solve, solve_complex,
-                             solve_joined, subtract_rows)
+                        Newmark, NeoHookean, Scene, StVenantKirchhoff)
+from skfem_ancf.equations import compiled
+from skfem_ancf.core.band import (SPARE, Band, factorize, factorize_complex, solve, solve_complex,
+                                  solve_joined, subtract_rows)
 from skfem_ancf.dynamics.integrator import Integrator
 from skfem_ancf.dynamics.steps import MIXED, READY, SYMMETRIC, TURNED
-from skfem_ancf.loads import Load
+from skfem_ancf.actions.loads import Load
 
 ELEMENTS = (ElementBeamANCF(1), ElementBeamANCF(2), ElementBeamANCFCubic(2),
             ElementBeamPatelShabana(), ElementBeamCable(3), ElementBeamCable(5))

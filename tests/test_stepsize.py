@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 
 from scipy.integrate import solve_ivp
 
-from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, MeshBeam,
-                        RigidBody, Scene, StVenantKirchhoff)
+from skfem_ancf import (Beam, Circle, ElementBeamANCF, ElementBeamCable, MeshBeam, RigidBody, Scene,
+                        StVenantKirchhoff)
 from skfem_ancf.dynamics import (SCHEMES, EnergyMomentum4, Gauss, GeneralizedAlpha, Motion, Newmark,
                                  Radau)
 from skfem_ancf.dynamics.base import in_steps
@@ -17,7 +17,7 @@ from skfem_ancf.dynamics.budget import Budget
 from skfem_ancf.dynamics.energy_momentum import PARTS
 from skfem_ancf.dynamics.integrator import Integrator, StepFailed
 from skfem_ancf.dynamics.run import Run, interpolate
-from skfem_ancf.errors import AccuracyWarning, InputError
+from skfem_ancf.core.errors import AccuracyWarning, InputError
 
 from test_dynamics import GRAVITY, by_scipy, soft
 from test_restart import driven

@@ -7,8 +7,8 @@ from skfem.assembly import asm
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, MeshBeam,
                         ModelWarning, Scene, Section, StVenantKirchhoff)
 from skfem_ancf import forms
-from skfem_ancf.loads import Pressure, Traction
-from skfem_ancf.surfaces import surfaces_of
+from skfem_ancf.actions.loads import Pressure, Traction
+from skfem_ancf.beam.surfaces import surfaces_of
 
 LAW = StVenantKirchhoff(2e9, 0.3, 7800.0)
 X = np.array([0.0, 0.7, 1.1, 2.0])

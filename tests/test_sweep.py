@@ -13,8 +13,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 import skfem_ancf
 from skfem_ancf import (Beam, CallbackError, CallError, ElementBeamCable, FileError, InputError,
                         MeshBeam, MissingExtra, NameUnknown, Scene, StVenantKirchhoff, sweep)
-from skfem_ancf.errors import CheckpointWarning, Interrupted, PickleError, SweepWarning
-from skfem_ancf.members import Sweep
+from skfem_ancf.core.errors import CheckpointWarning, Interrupted, PickleError, SweepWarning
+from skfem_ancf.sweeps.members import Sweep
 
 MESH = MeshBeam.init_line([0.0, 0.5, 1.0], 0.01)
 FORCE = 1e-4

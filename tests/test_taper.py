@@ -10,9 +10,9 @@ from scipy.integrate import solve_bvp
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable,
                         ElementBeamPatelShabana, InputError, MeshBeam, MeshError, Scene,
                         StVenantKirchhoff)
-from skfem_ancf.errors import CallbackError, PickleError
-from skfem_ancf.quadrature import gauss
-from skfem_ancf.statics.adapt import refine
+from skfem_ancf.core.errors import CallbackError, PickleError
+from skfem_ancf.core.quadrature import gauss
+from skfem_ancf.scene.adapt import refine
 
 ELEMENTS = {"order 1": ElementBeamANCF(1), "order 2": ElementBeamANCF(2),
             "order 4": ElementBeamANCF(4), "Patel-Shabana": ElementBeamPatelShabana(),

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from skfem_ancf import (Beam, CallError, ElementBeamANCF, ElementBeamCable, InputError, MeshBeam,
                         RigidBody, Scene, StVenantKirchhoff, SupportError)
 from skfem_ancf.formulations import Formulation
-from skfem_ancf.loads import Load
+from skfem_ancf.actions.loads import Load
 
 STEEL = StVenantKirchhoff(E=2e8, nu=0.3, density=7800)
 MESH = MeshBeam.init_line(np.linspace(0, 1, 5), height=0.05)

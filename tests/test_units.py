@@ -5,7 +5,7 @@ import pytest
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, Frame,
                         ElementBeamPatelShabana, MeshBeam, RigidBody, Scene, StVenantKirchhoff)
-from skfem_ancf.joints import JOINTS
+from skfem_ancf.actions.joints import JOINTS
 
 #: Lengths of a beam in metres, beside one metre.
 LENGTHS = 1e3, 1e-3, 1e-6, 1e-9
@@ -120,7 +120,7 @@ def test_verdicts_of_beams_of_any_size(L):
 
 @pytest.mark.parametrize("L", [1.0, *LENGTHS])
 def test_joints_that_are_open_at_the_start_are_told(L):
-    from skfem_ancf.errors import SupportError
+    from skfem_ancf.core.errors import SupportError
 
     beam = between((0, 0), (1, 0.3), 2, L, ElementBeamCable(5), 0.05)
     scene = Scene(beam).pin("left")
@@ -154,7 +154,7 @@ def test_many_lines_do_not_make_a_scene_larger(L, origin, order):
 
 def test_how_far_bodies_reach():
     """The box round lines; a curled one may be drawn straight, what lies apart adds up."""
-    from skfem_ancf.mesh import reach
+    from skfem_ancf.mesh.mesh_beam import reach
 
     arc = MeshBeam.init_curve(lambda s: [np.cos(s), np.sin(s)], np.linspace(0, np.pi, 9), 0.05)
     bar = MeshBeam.init_line(np.linspace(0, 1, 3), 0.05)

@@ -12,7 +12,7 @@ from conftest import quarter_arc
 from test_io import affine, bent, turn
 from skfem_ancf import (Beam, ElementBeamANCF, InputError, MeshBeam, MissingExtra, NameUnknown,
                         Scene, StVenantKirchhoff)
-from skfem_ancf.fields import DRAWN, FIELDS
+from skfem_ancf.recovery.fields import DRAWN, FIELDS
 from skfem_ancf.visuals.matplotlib import plot_state
 
 STEEL = StVenantKirchhoff(E=1e6, nu=0.3)

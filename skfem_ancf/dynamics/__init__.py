@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..errors import require_option, taught
+from ..core.errors import require_option, taught
 from .base import Motion, Scheme, Steps
 from .choice import choose_scheme
 from .energy_momentum import EnergyMomentum, EnergyMomentum4

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from ..system import System
-    from ..types import Array
+    from ..equations.system import System
+    from ..core.types import Array
     from .integrator import Integrator
 
 #: Part of a step up to which an acceleration is interpolated, where it is a difference.
@@ -43,7 +43,7 @@ class Motion:
     dissipated
         The work of damping so far.
     turns
-        Angles as of :class:`~skfem_ancf.forces.turns.Turns`, shape (k,); None where nothing
+        Angles as of :class:`~skfem_ancf.actions.forces.turns.Turns`, shape (k,); None where nothing
         follows them.
     """
 
@@ -257,7 +257,7 @@ class Scheme:
         Parameters
         ----------
         system
-            A :class:`~skfem_ancf.system.System`.
+            A :class:`~skfem_ancf.equations.system.System`.
         """
         return type(self).step is Scheme.step
 
@@ -281,7 +281,7 @@ class Scheme:
         Parameters
         ----------
         system
-            A :class:`~skfem_ancf.system.System`.
+            A :class:`~skfem_ancf.equations.system.System`.
         """
 
     def local_error(self, old: Motion, new: Motion, dt: float) -> Array:
@@ -309,7 +309,7 @@ class Scheme:
         Parameters
         ----------
         system
-            A :class:`~skfem_ancf.system.System`.
+            A :class:`~skfem_ancf.equations.system.System`.
         """
         return NEAR
 

@@ -11,20 +11,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..archive import DAMAGED, find_h5py
-from ..archive import write as _write
-from ..errors import (CheckpointError, CheckpointWarning, InputError, require_integer,
-                      require_path, shown)
-from ..forces.system import Forces
+from ..core.archive import DAMAGED, find_h5py
+from ..core.archive import write as _write
+from ..core.errors import (CheckpointError, CheckpointWarning, InputError, require_integer,
+                           require_path, shown)
+from ..actions.forces.system import Forces
 from .base import Motion
 from .run import Run, Task
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..results import State
-    from ..system import System
-    from ..types import Array, StrPath
+    from ..results.state import State
+    from ..equations.system import System
+    from ..core.types import Array, StrPath
     from .base import Scheme
     from .sensors import Sensor
 
@@ -131,7 +131,7 @@ def functions(system: System, t_start: float, t_end: float) -> dict[str, Array]:
     Parameters
     ----------
     system
-        The :class:`~skfem_ancf.system.System`.
+        The :class:`~skfem_ancf.equations.system.System`.
     t_start, t_end
         Times of start and end of the motion.
     """
@@ -162,7 +162,7 @@ def same_problem(system: System, start: State, t: float) -> bool:
     Parameters
     ----------
     system
-        The :class:`~skfem_ancf.system.System`.
+        The :class:`~skfem_ancf.equations.system.System`.
     start
         An instant of a motion.
     t
@@ -384,7 +384,7 @@ def resume(system: System, path: StrPath, scheme: str | Scheme | type[Scheme] | 
     Parameters
     ----------
     system
-        The :class:`~skfem_ancf.system.System`.
+        The :class:`~skfem_ancf.equations.system.System`.
     path
         Name of the file.
     scheme

@@ -13,7 +13,7 @@ from .generalized_alpha import GeneralizedAlpha
 from .radau import Radau
 
 if TYPE_CHECKING:
-    from ..system import System
+    from ..equations.system import System
 
 #: Tolerance up to which steps of high order are the cheaper ones.
 FINE = 1e-4
@@ -40,7 +40,7 @@ def choose_scheme(system: System, rtol: float = RTOL) -> Choice:
     Parameters
     ----------
     system
-        A :class:`~skfem_ancf.system.System`.
+        A :class:`~skfem_ancf.equations.system.System`.
     rtol
         The tolerance asked for, relative to the size of the scene.
 
@@ -82,7 +82,7 @@ def stiffness_ratio(system: System) -> float:
     Parameters
     ----------
     system
-        A :class:`~skfem_ancf.system.System`.
+        A :class:`~skfem_ancf.equations.system.System`.
     """
     return max((0.7 * b.mesh.nelements * float(np.sum(b.mesh.lengths)) / b.mesh.height
                 for b in system.beams), default=1.0)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 
-from ..band import factorize, fix, solve
-from ..body import gradients_size
-from ..errors import InputError
+from ..core.band import factorize, fix, solve
+from ..beam.strain_energy import gradients_size
+from ..core.errors import InputError
 from .base import Memories, Motion, Scheme, Steps, contacts_of
 from .differences import derivative, difference_row, grown
 from .integrator import StepFailed
@@ -18,8 +18,8 @@ from .rates import JointMotions
 from .stages import Interval, Method, collocate, room_for_points, solve_for
 
 if TYPE_CHECKING:
-    from ..system import System
-    from ..types import Array
+    from ..equations.system import System
+    from ..core.types import Array
     from .integrator import Integrator
 
 #: Part of a step up to which accelerations are interpolated where something is driven.
@@ -166,7 +166,7 @@ class Collocation(Scheme):
         Parameters
         ----------
         system
-            A :class:`~skfem_ancf.system.System`.
+            A :class:`~skfem_ancf.equations.system.System`.
         """
         return NEAR if system.moves or system.machine.tables.motion_varies else 0.0
 

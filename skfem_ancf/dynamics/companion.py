@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..statics.stability import position_weights
+from ..solvers.stability import position_weights
 from .base import Motion, contacts_of
 from .integrator import Integrator, StepFailed
 
 if TYPE_CHECKING:
-    from ..system import System
-    from ..types import Array
+    from ..equations.system import System
+    from ..core.types import Array
     from .base import Scheme
 
 

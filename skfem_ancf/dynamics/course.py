@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..frozen import read_only
+from ..core.frozen import read_only
 from .rates import (END, MIDDLE, PARTS, RATE, JointMotion, JointMotions, of_step, steps_of,
                     times_beside)
 from .steps import Course
 
 if TYPE_CHECKING:
-    from ..system import System
+    from ..equations.system import System
 
 
 class Courses:
@@ -27,7 +27,7 @@ class Courses:
     Attributes
     ----------
     system
-        A :class:`~skfem_ancf.system.System`.
+        A :class:`~skfem_ancf.equations.system.System`.
     """
 
     system: System

@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..band import Band, clear, dense_solve, dot, multiply, solve, subtract_rows
-from ..body import add_viscous_force, body_tangent
-from ..border import inverse_rows
-from ..forces.texts import add_resisting_force
-from ..source import F2, lanes, source
+from ..core.band import Band, clear, dense_solve, dot, multiply, solve, subtract_rows
+from ..beam.strain_energy import add_viscous_force, body_tangent
+from ..equations.border import inverse_rows
+from ..actions.forces.texts import add_resisting_force
+from ..core.source import F2, lanes, source
 
 
 class Rows(NamedTuple):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from ..types import Array
+    from ..core.types import Array
     from .base import Motion
 
 #: Growth from one derivative to the next, times the size of the step, at most.

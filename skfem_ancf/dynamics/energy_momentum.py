@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..errors import InputError
+from ..core.errors import InputError
 from .base import Motion, Scheme, contacts_of
 from .differences import derivative, grown
 
 if TYPE_CHECKING:
-    from ..system import System
-    from ..types import Array
+    from ..equations.system import System
+    from ..core.types import Array
     from .integrator import Integrator
 
 #: Parts of a step of fourth order, all of whose ends lie within it.
@@ -34,7 +34,7 @@ class EnergyMomentum(Scheme):
     Hamiltonian to which both are joined by multipliers lambda and gamma conserves the energy
     while it meets both at the end of every step. gamma is of the size of dt^2. Of a sleeve, which
     is not quadratic, J is a discrete gradient, and what has gamma as a factor has the work that is
-    missing (:meth:`~skfem_ancf.joints.Joint.mean_entries`, ``mean_turning``).
+    missing (:meth:`~skfem_ancf.actions.joints.Joint.mean_entries`, ``mean_turning``).
 
     References
     ----------

@@ -5,12 +5,12 @@ from __future__ import annotations
 from math import factorial
 from typing import TYPE_CHECKING
 
-from ..errors import require_integer
-from ..quadrature import gauss
+from ..core.errors import require_integer
+from ..core.quadrature import gauss
 from .collocation import Collocation
 
 if TYPE_CHECKING:
-    from ..types import Array
+    from ..core.types import Array
 
 #: Factors of the estimated error by number of points, as measured: the more points, the more of
 #: the error is of vibrations that turn so far in a step that the estimate falls short of them.

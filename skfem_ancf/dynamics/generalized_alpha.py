@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..errors import InputError, require_finite_scalar, taught
+from ..core.errors import InputError, require_finite_scalar, taught
 from .base import Scheme
 
 if TYPE_CHECKING:
-    from ..types import Array
+    from ..core.types import Array
     from .base import Motion
 
 

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import (InputError, require_finite, require_index, require_path, shown,
-                      teaching)
-from ..forces.turns import Turns
-from ..kept import cached_property
-from ..points import require_body
-from ..resultants import over_time
-from ..results import Reaction, State
+from ..core.errors import InputError, require_finite, require_index, require_path, shown, teaching
+from ..actions.forces.turns import Turns
+from ..core.kept import cached_property
+from ..recovery.points import require_body
+from ..recovery.resultants import over_time
+from ..results.state import Reaction, State
 from .base import Motion, contacts_of
 
 if TYPE_CHECKING:
@@ -22,11 +21,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from ..joints.base import Joint
-    from ..resultants import Resultants
-    from ..system import System
-    from ..types import Array, Place, StrPath
-    from ..layout import WhichBeam, WhichMember
+    from ..actions.joints.base import Joint
+    from ..recovery.resultants import Resultants
+    from ..equations.system import System
+    from ..core.types import Array, Place, StrPath
+    from ..beam.layout import WhichBeam, WhichMember
     from .base import Scheme, Steps
 
     Columns = tuple[Array, ...]
@@ -592,7 +591,7 @@ class History:
         """
         from ..io.pvd import PvdWriter
         from ..io.vtkhdf import VtkHdfWriter
-        from ..progress import progress_bar
+        from ..core.progress import progress_bar
 
         path = require_path("filename", filename, (".pvd", ".vtkhdf"))
         kind = VtkHdfWriter if path.suffix.lower() == ".vtkhdf" else PvdWriter

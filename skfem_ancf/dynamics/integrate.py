@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import (AccuracyWarning, AncfError, ConvergenceError, InputError, Interrupted,
-                      ModelWarning, require_finite, require_finite_scalar, require_flag,
-                      require_function, require_positive, shown, taught)
-from ..progress import progress_bar
-from ..switch import expecting
+from ..core.errors import (AccuracyWarning, AncfError, ConvergenceError, InputError, Interrupted,
+                           ModelWarning, require_finite, require_finite_scalar, require_flag,
+                           require_function, require_positive, shown, taught)
+from ..core.progress import progress_bar
+from ..core.switch import expecting
 from .checkpoint import Checkpoint, same_problem
 from .base import contacts_of, in_steps, same_scheme
 from .budget import ENOUGH
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from ..results import State
-    from ..system import System
-    from ..types import Array, StrPath
+    from ..results.state import State
+    from ..equations.system import System
+    from ..core.types import Array, StrPath
     from .base import Scheme
     from .history import History
     from .sensors import Sensor
@@ -58,7 +58,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
     Parameters
     ----------
     system
-        A :class:`~skfem_ancf.system.System`.
+        A :class:`~skfem_ancf.equations.system.System`.
     t_end
         Time at the end.
     dt

@@ -8,24 +8,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..eliminated import Eliminated, EliminatedMass
-from ..errors import AncfError, InputError, SupportError, require_positive, shown
-from ..kept import cached_property, twin_of
-from ..linalg import halves
-from ..own import handle_of
+from ..equations.step_condensation import Eliminated, EliminatedMass
+from ..core.errors import AncfError, InputError, SupportError, require_positive, shown
+from ..core.kept import cached_property, twin_of
+from ..core.linalg import halves
+from ..core.callbacks import handle_of
 from .base import Memories, Motion, Steps, contacts_of, in_steps, kept, same_scheme
 from .course import Courses
 from .rates import rates
 from .dampers import Dampers, Rows, solve_rows
 from .joined import Joined
-from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, READY,
-                    STATE, Matrices, Rule, factors, mass_factor, room_for_steps, steps)
+from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, READY, STATE,
+                    Matrices, Rule, factors, mass_factor, room_for_steps, steps)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ..system import System
-    from ..types import Array
+    from ..equations.system import System
+    from ..core.types import Array
     from .base import Scheme
 
 logger = logging.getLogger(__name__)
@@ -53,7 +53,7 @@ class Integrator:
     Parameters
     ----------
     system
-        A :class:`~skfem_ancf.system.System`.
+        A :class:`~skfem_ancf.equations.system.System`.
     scheme
         A :class:`~skfem_ancf.dynamics.Scheme`.
     tol

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..kept import cached_property
-from ..tables import constraint, joint_directions
+from ..core.kept import cached_property
+from ..actions.tables import constraint, joint_directions
 from .rates import JointMotion, acceleration_of_joints, drive_rate, rates
 
 if TYPE_CHECKING:
-    from ..system import System
-    from ..types import Array
+    from ..equations.system import System
+    from ..core.types import Array
 
 
 class Joined:
@@ -21,7 +21,7 @@ class Joined:
     Parameters
     ----------
     system
-        A :class:`~skfem_ancf.system.System`.
+        A :class:`~skfem_ancf.equations.system.System`.
     motion
         What of its joints depends on time, at that time.
     u

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..frozen import read_only
+from ..core.frozen import read_only
 from .collocation import Collocation
 
 if TYPE_CHECKING:
-    from ..types import Array
+    from ..core.types import Array
 
 
 POINTS = read_only(np.array([0.4 - 0.1 * np.sqrt(6.0), 0.4 + 0.1 * np.sqrt(6.0), 1.0]))

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..frozen import read_only
-from ..own import own_joints
-from ..source import F2, F3, lanes, source
-from ..tables import add_products, add_triples
+from ..core.frozen import read_only
+from ..core.callbacks import own_joints
+from ..core.source import F2, F3, lanes, source
+from ..actions.tables import add_products, add_triples
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ..types import Array
+    from ..core.types import Array
 
 #: Intervals into which a step is divided.
 PARTS = 4
@@ -115,7 +115,8 @@ class JointMotion(NamedTuple):
     Attributes
     ----------
     c
-        c of :mod:`skfem_ancf.tables` at the end of a step and its first two rates, shape (3, m).
+        c of :mod:`skfem_ancf.actions.tables` at the end of a step and its first two rates, shape
+        (3, m).
     g
         g there, g when the joints act, and the first two rates of g, shape (4, k).
     drives

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
-from ..errors import AncfError, ask_number
+from ..core.errors import AncfError, ask_number
 from .base import Motion, Scheme, contacts_of
 from .budget import Budget
 from .companion import Companion
@@ -22,9 +22,9 @@ from .stepsize import StepSize
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from ..results import State
-    from ..system import System
-    from ..types import Array
+    from ..results.state import State
+    from ..equations.system import System
+    from ..core.types import Array
     from .sensors import Sensor
 
 #: Part of a step by which one may end before an instant that is looked for there.

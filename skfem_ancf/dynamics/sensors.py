@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import (CheckpointError, InputError, NameUnknown, ask_array, require_flag, shown,
-                      teaching)
-from ..fields import FIELDS, find_field
-from ..frozen import Frozen
-from ..joints.base import Joint
+from ..core.errors import (CheckpointError, InputError, NameUnknown, ask_array, require_flag, shown,
+                           teaching)
+from ..recovery.fields import FIELDS, find_field
+from ..core.frozen import Frozen
+from ..actions.joints.base import Joint
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from ..points import Located
-    from ..results import State
-    from ..system import System
-    from ..types import Array
-    from ..layout import WhichBeam
+    from ..recovery.points import Located
+    from ..results.state import State
+    from ..equations.system import System
+    from ..core.types import Array
+    from ..beam.layout import WhichBeam
     from .base import Motion
 
 #: What is read of the coordinates of many steps at once.
@@ -37,9 +37,9 @@ class Sensor(Frozen):
     ----------
     what
         "position", "displacement", "velocity" or "acceleration" of points; "strain", "stress" or
-        another name of :data:`skfem_ancf.fields.FIELDS` there; "N", "Q", "M", "force", "curvature",
-        "shear" or "angle" of sections; "joint_force"; or a function of the State
-        that returns a number or an array.
+        another name of :data:`skfem_ancf.recovery.fields.FIELDS` there; "N", "Q", "M", "force",
+        "curvature", "shear" or "angle" of sections; "joint_force"; or a function of the State that
+        returns a number or an array.
     at
         Points, as for :meth:`State.displacement <skfem_ancf.results.State.displacement>`; a joint
         for its force; None for a function.
@@ -126,7 +126,7 @@ def locate(sensor: Sensor, system: System) -> Located | None:
     sensor
         The Sensor.
     system
-        The :class:`~skfem_ancf.system.System` of the scene.
+        The :class:`~skfem_ancf.equations.system.System` of the scene.
 
     Raises
     ------

@@ -9,21 +9,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..band import (SPARE, Band, add_multiple, clear, copy, dense_solve, factorize,
-                    factorize_complex, fix_stored, multiply, solve, solve_complex, solve_joined)
-from ..body import (add_force_by, add_viscous_stress, body_force, body_gradients, body_mean_stress,
-                    body_mixed, body_stress, body_tangent, body_tangent_by, carry_by)
-from ..forces.texts import (add_elastic_force, add_element_damping, add_element_tangent,
-                            element_damping, element_stiffness, pace_contact, put_between,
-                            settle_contact)
-from ..source import F1, F2, F3, borrowed, by_place, lanes, shaped, source
-from ..tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
-                      external_force, joint_directions)
+from ..core.band import (SPARE, Band, add_multiple, clear, copy, dense_solve, factorize,
+                         factorize_complex, fix_stored, multiply, solve, solve_complex,
+                         solve_joined)
+from ..beam.strain_energy import (add_force_by, add_viscous_stress, body_force, body_gradients,
+                                  body_mean_stress, body_mixed, body_stress, body_tangent,
+                                  body_tangent_by, carry_by)
+from ..actions.forces.texts import (add_elastic_force, add_element_damping, add_element_tangent,
+                                    element_damping, element_stiffness, pace_contact, put_between,
+                                    settle_contact)
+from ..core.source import F1, F2, F3, borrowed, by_place, lanes, shaped, source
+from ..actions.tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
+                              external_force, joint_directions)
 from .dampers import add_damping, damping_beside, damping_force
 from .rates import JointMotion, JointMotions, acceleration_of_joints, drive_rate
 from .steps import (ASTRAY, BEFORE, COUNT, DEPENDENT, DISSIPATED, DONE, ENERGY, FACTORIZED, FAILED,
-                    FAILURE, FRESH, GO_ON, ITERATIONS, LAST_SIZE, MIXED, NOT_CONVERGED, RATE,
-                    READY, SINGULAR, SIZE, judged, round_off)
+                    FAILURE, FRESH, GO_ON, ITERATIONS, LAST_SIZE, MIXED, NOT_CONVERGED, RATE, READY,
+                    SINGULAR, SIZE, judged, round_off)
 
 #: Contraction up to which factors are kept, and where stresses are carried: new ones at points
 #: as far apart turn as far from them. For how many steps they are.

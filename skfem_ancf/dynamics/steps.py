@@ -17,21 +17,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..band import (Band, add_halves, add_multiple, clear, copy, dot, factorize, fix, multiply,
-                    solve_joined, subtract_rows, total)
-from ..body import (add_force_of, add_turned, body_carry, body_force, body_mean, body_mixed,
-                    body_stress, body_tangent, quadratic)
-from ..forces.contact_texts import PRESSURES
-from ..forces.texts import (add_contact_tangent, add_elastic_force, add_rubbing_tangent,
-                            augment_contact, element_stiffness, pace_contact, put_between,
-                            settle_contact)
-from ..own import own_joints, own_solve
-from ..source import F1, F2, F3, borrowed, by_place, lanes, source
-from ..tables import (add_constraint_rate, add_curvature_force, add_joint_force,
-                      add_load_stiffness, add_products, constraint, joint_directions,
-                      mean_external_force)
-from .dampers import (Dampers, Rows, add_damping, damping_beside, damping_force,
-                      factorize_rows, solve_rows)
+from ..core.band import (Band, add_halves, add_multiple, clear, copy, dot, factorize, fix, multiply,
+                         solve_joined, subtract_rows, total)
+from ..beam.strain_energy import (add_force_of, add_turned, body_carry, body_force, body_mean,
+                                  body_mixed, body_stress, body_tangent, quadratic)
+from ..actions.forces.contact_texts import PRESSURES
+from ..actions.forces.texts import (add_contact_tangent, add_elastic_force, add_rubbing_tangent,
+                                    augment_contact, element_stiffness, pace_contact, put_between,
+                                    settle_contact)
+from ..core.callbacks import own_joints, own_solve
+from ..core.source import F1, F2, F3, borrowed, by_place, lanes, source
+from ..actions.tables import (add_constraint_rate, add_curvature_force, add_joint_force,
+                              add_load_stiffness, add_products, constraint, joint_directions,
+                              mean_external_force)
+from .dampers import (Dampers, Rows, add_damping, damping_beside, damping_force, factorize_rows,
+                      solve_rows)
 from .rates import JointMotion, JointMotions, acceleration_of_joints, drive_rate
 
 EPS = 2.2e-16
@@ -96,7 +96,7 @@ class Rule(NamedTuple):
         Round-off of the strains in that norm, and what the square of that of places is a factor of.
     solver, mass_solver
         Handles of what solves with the iteration matrix and with the mass where joints are
-        eliminated, see :mod:`skfem_ancf.eliminated`; 0 where they are a border.
+        eliminated, see :mod:`skfem_ancf.equations.step_condensation`; 0 where they are a border.
     """
 
     conserving: int

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..sampling import sample
+from ..core.errors import InputError
+from ..core.sampling import sample
 
 if TYPE_CHECKING:
-    from ..system import System
+    from ..equations.system import System
     from .base import Motion, Scheme
     from .integrator import Integrator
 

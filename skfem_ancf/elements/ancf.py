@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.polynomial import legendre
 
-from ..errors import require_integer, require_option, teaching
-from ..frozen import read_only
-from ..quadrature import gauss_lobatto
+from ..core.errors import require_integer, require_option, teaching
+from ..core.frozen import read_only
+from ..core.quadrature import gauss_lobatto
 from .base import ElementBeam, SectionFunctions
 
 if TYPE_CHECKING:
-    from ..types import Array
+    from ..core.types import Array
 
 
 def _chebyshev(n: int) -> Array:

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.polynomial import legendre
 from skfem.element import DiscreteField, Element
 
-from ..errors import InputError, MeshError, require_finite, shown
-from ..frozen import Content, Frozen, read_only
-from ..kept import cached_property
-from ..nodal import nodal_derivatives, turned
-from ..quadrature import gauss, tensor
-from ..reference import SECTIONS, RefBeam, few, hermite_basis
-from ..series import coefficients
+from ..core.errors import InputError, MeshError, require_finite, shown
+from ..core.frozen import Content, Frozen, read_only
+from ..core.kept import cached_property
+from ..mesh.nodal import nodal_derivatives, turned
+from ..core.quadrature import gauss, tensor
+from ..mesh.reference_cell import SECTIONS, RefBeam, few, hermite_basis
+from .series import coefficients
 from .sampling import Held, Sampling, default_sampling, missed
 
 if TYPE_CHECKING:
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from ..mapping import MappingBeam
-    from ..chain import Chain
-    from ..mesh import MeshBeam
-    from ..types import Array, Rule
+    from ..mesh.mapping import MappingBeam
+    from ..mesh.chain import Chain
+    from ..mesh.mesh_beam import MeshBeam
+    from ..core.types import Array, Rule
 
     Functionals = tuple[tuple[float, int, int], ...]
 
@@ -96,7 +96,7 @@ class ElementBeam(Frozen, Element):
         True if the section functions hold Y^3, so that no shear correction is wanted.
     kinematics : str
         How the points of a section follow the coordinates: a name of
-        :data:`skfem_ancf.kinematics.KINEMATICS`.
+        :data:`skfem_ancf.beam.kinematics.KINEMATICS`.
     """
 
     refdom = RefBeam
@@ -230,7 +230,7 @@ class ElementBeam(Frozen, Element):
         Returns
         -------
         coefficients
-            As :func:`skfem_ancf.series.coefficients` returns them, which are kept.
+            As :func:`skfem_ancf.elements.series.coefficients` returns them, which are kept.
         height, length
             The powers of both that the functions take, shape (2 nodal_dofs,) each.
         """
@@ -425,7 +425,7 @@ class ElementBeam(Frozen, Element):
         -------
         slopes, frame
             Shapes (n, 2, nelements, npoints) and (2, 2, nelements, npoints), see
-            :meth:`MappingBeam.frame <skfem_ancf.mapping.MappingBeam.frame>`.
+            :meth:`MappingBeam.frame <skfem_ancf.mesh.mapping.MappingBeam.frame>`.
         """
         _, d_xi, d_eta, slope = self.of_mesh(mapping, X, tind)
         if d_xi.ndim == 2:  # the same points of all elements

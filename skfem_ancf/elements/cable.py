@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import teaching
-from ..frozen import read_only
-from ..kept import cached_property
-from ..quadrature import gauss
-from ..reference import SECTIONS, hermite_basis
+from ..core.errors import teaching
+from ..core.frozen import read_only
+from ..core.kept import cached_property
+from ..core.quadrature import gauss
+from ..mesh.reference_cell import SECTIONS, hermite_basis
 from .base import DEGREES, ElementBeam, SectionFunctions, require_degree
 from .sampling import Held, Sampling, missed
 
 if TYPE_CHECKING:
-    from ..types import Array
+    from ..core.types import Array
 
 
 @teaching

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..errors import InputError, require_like, require_names, require_positive, taught
+from ..core.errors import InputError, require_like, require_names, require_positive, taught
 from .ancf import ElementBeamANCF
 from .cable import ElementBeamCable
 from .cubic import ElementBeamANCFCubic
@@ -12,8 +12,8 @@ from .cubic import ElementBeamANCFCubic
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..mesh import MeshBeam
-    from ..types import Isotropic
+    from ..mesh.mesh_beam import MeshBeam
+    from ..core.types import Isotropic
     from .base import ElementBeam
 
 #: The order that a field of the section needs at least; 0 is the cable.

@@ -1,6 +1,6 @@
 """ANCF beam elements whose sections vary cubically along the axis: fourth order."""
 
-from ..errors import teaching
+from ..core.errors import teaching
 from .hermite import ElementBeamANCFHermite
 
 

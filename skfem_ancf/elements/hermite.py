@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..errors import teaching
-from ..origin import ours
+from ..core.errors import teaching
+from ..core.origin import ours
 from .ancf import ElementBeamANCF
 from .base import DEGREES, require_degree
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import teaching
+from ..core.errors import teaching
 from .base import ElementBeam, SectionFunctions
 
 

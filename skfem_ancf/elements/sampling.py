@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.polynomial import legendre
 
-from ..frozen import read_only
-from ..quadrature import gauss, gauss_lobatto
-from ..reference import hermite_basis
+from ..core.frozen import read_only
+from ..core.quadrature import gauss, gauss_lobatto
+from ..mesh.reference_cell import hermite_basis
 
 if TYPE_CHECKING:
-    from ..types import Array
+    from ..core.types import Array
 
 
 class Sampling(NamedTuple):

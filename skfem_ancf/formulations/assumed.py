@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError, require_finite_scalar, require_like, taught
+from ..core.errors import InputError, require_finite_scalar, require_like, taught
 from ..materials import LinearLaw
-from ..quadrature import gauss
+from ..core.quadrature import gauss
 from .base import Formulation, Integrated, Term
 from .ecm import AXIS, split_moduli
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     from ..elements.base import ElementBeam
     from ..materials.base import Material
-    from ..mesh import MeshBeam
-    from ..types import Array
+    from ..mesh.mesh_beam import MeshBeam
+    from ..core.types import Array
 
 
 class Assumed(Formulation):

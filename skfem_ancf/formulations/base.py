@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from ..errors import require_like
-from ..frozen import Content, Frozen, read_only
-from ..kept import cached_property
-from ..quadrature import gauss, lagrange, product_rule
+from ..core.errors import require_like
+from ..core.frozen import Content, Frozen, read_only
+from ..core.kept import cached_property
+from ..core.quadrature import gauss, lagrange, product_rule
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from ..elements.base import ElementBeam
     from ..materials.base import Material
-    from ..mesh import MeshBeam
-    from ..types import Array, Law, Rule
+    from ..mesh.mesh_beam import MeshBeam
+    from ..core.types import Array, Law, Rule
 
 COMPONENTS = ("xx", "yy", "xy")
 

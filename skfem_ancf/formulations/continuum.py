@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..errors import require_like, taught
+from ..core.errors import require_like, taught
 from .base import Formulation, Term
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError, require_like
+from ..core.errors import InputError, require_like
 from ..materials import LinearLaw
 from .base import Formulation, Integrated, Term
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from ..elements.base import ElementBeam
     from ..materials.base import Material
-    from ..types import Array
+    from ..core.types import Array
 
 #: The rule across the section that is the axis alone, with the weight of the whole section.
 AXIS = (np.array([0.5]), np.array([1.0]))

@@ -6,16 +6,16 @@ import logging
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
-from ..errors import require_options, require_path, require_text, teaching
-from ..fields import find_fields
-from ..obstacles.pictures import obstacles_of
+from ..core.errors import require_options, require_path, require_text, teaching
+from ..recovery.fields import find_fields
+from ..actions.obstacles.pictures import obstacles_of
 from .vtu import replacing, require_next, save_frame
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from pathlib import Path
 
-    from ..types import StrPath
+    from ..core.types import StrPath
 
 logger = logging.getLogger(__name__)
 

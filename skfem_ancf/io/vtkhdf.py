@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..archive import find_h5py, new_file, put_in_place
-from ..errors import (FileError, InputError, require_option, require_options,
-                      require_path, teaching)
-from ..fields import find_fields
+from ..core.archive import find_h5py, new_file, put_in_place
+from ..core.errors import (FileError, InputError, require_option, require_options, require_path,
+                           teaching)
+from ..recovery.fields import find_fields
 from .vtu import PRECISIONS, body_fields, require_next, save_obstacles
 from .xml import topology
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from pathlib import Path
 
-    from ..configuration import Configuration
-    from ..types import StrPath
+    from ..beam.configuration import Configuration
+    from ..core.types import StrPath
 
 
 #: Bytes beside the file that are set free where the disk is full: HDF5 cannot close a file whose

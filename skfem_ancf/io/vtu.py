@@ -9,19 +9,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .. import archive
-from ..errors import (FileError, InputError, require_finite_scalar, require_flag,
-                      require_integer, require_like, require_option, require_path, shown, taught)
-from ..fields import find_fields, values_on_grid
-from ..obstacles.pictures import around, outlines
-from ..quadrature import tensor
+from ..core import archive
+from ..core.errors import (FileError, InputError, require_finite_scalar, require_flag,
+                           require_integer, require_like, require_option, require_path, shown,
+                           taught)
+from ..recovery.fields import find_fields, values_on_grid
+from ..actions.obstacles.pictures import around, outlines
+from ..core.quadrature import tensor
 from .xml import write_vtu
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from ..beam import Beam
-    from ..types import Array, StrPath
+    from ..beam.beam import Beam
+    from ..core.types import Array, StrPath
 
 logger = logging.getLogger(__name__)
 
@@ -204,8 +205,8 @@ def save_vtu(state: Any, filename: StrPath, subdivide: tuple[int, int] = (8, 4),
         those of the elements at the points.
 
     fields
-        Names of :data:`skfem_ancf.fields.FIELDS`, functions or Fields, see
-        :mod:`skfem_ancf.fields`; those of the table by default.
+        Names of :data:`skfem_ancf.recovery.fields.FIELDS`, functions or Fields, see
+        :mod:`skfem_ancf.recovery.fields`; those of the table by default.
     precision
         "double", or "single" for files of half the size.
     encoding
@@ -326,7 +327,7 @@ def require_next(state: Any, t: Any, before: float | None) -> float:
 
 @contextmanager
 def replacing(path: StrPath) -> Iterator[Path]:
-    """As :func:`skfem_ancf.archive.replacing`: makes the folder, and raises FileError.
+    """As :func:`skfem_ancf.core.archive.replacing`: makes the folder, and raises FileError.
 
     Parameters
     ----------

@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import (InputError, require_finite_scalar, require_like, require_option,
-                      require_positive, require_slope, shown, taught)
-from ..frozen import Frozen, rebuilt
-from ..kept import cached_property, kept
-from ..origin import ours
-from ..pickling import require_picklable
-from ..quadrature import gauss
+from ..core.errors import (InputError, require_finite_scalar, require_like, require_option,
+                           require_positive, require_slope, shown, taught)
+from ..core.frozen import Frozen, rebuilt
+from ..core.kept import cached_property, kept
+from ..core.origin import ours
+from ..core.pickling import require_picklable
+from ..core.quadrature import gauss
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import ArrayLike
 
-    from ..types import Array, HasShear, Law
+    from ..core.types import Array, HasShear, Law
 
 PLANES = ("stress", "strain")
 

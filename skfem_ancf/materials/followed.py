@@ -1,7 +1,7 @@
 """The text of a law in Python: its operations on a strain, followed once and differentiated.
 
 A law is called with arrays of symbols in place of numbers, as NumPy allows for arrays of objects.
-What it does to them is written down as a text, see :mod:`skfem_ancf.source`.
+What it does to them is written down as a text, see :mod:`skfem_ancf.core.source`.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..source import lanes, source
+from ..core.source import lanes, source
 
 if TYPE_CHECKING:
-    from ..types import Array, Law
+    from ..core.types import Array, Law
 
 
 class NotFollowed(Exception):

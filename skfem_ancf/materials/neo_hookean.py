@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError, taught
-from ..source import lanes, primitive, source
+from ..core.errors import InputError, taught
+from ..core.source import lanes, primitive, source
 from .text import TextMaterial
 
 if TYPE_CHECKING:
-    from ..types import Array, Law
+    from ..core.types import Array, Law
 
 
 @primitive("primitives")

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from ..errors import require_positive, taught
+from ..core.errors import require_positive, taught
 from .base import LinearLaw, Material, hooke
 
 if TYPE_CHECKING:
-    from ..types import Array, Law
+    from ..core.types import Array, Law
 
 
 class StVenantKirchhoff(Material):

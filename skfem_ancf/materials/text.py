@@ -9,14 +9,15 @@ import numpy as np
 from .base import Material
 
 if TYPE_CHECKING:
-    from ..types import Array
+    from ..core.types import Array
 
 
 class TextMaterial(Material):
-    """A law given by a text, see :mod:`skfem_ancf.source`: compiled code calls it as NumPy does.
+    """A law given by a text, see :mod:`skfem_ancf.core.source`: compiled code calls it as NumPy
+    does.
 
     A subclass has a static method ``text(constants, strain, out)``, marked by
-    :func:`~skfem_ancf.source.source`, and :attr:`constants`. The text takes strains
+    :func:`~skfem_ancf.core.source.source`, and :attr:`constants`. The text takes strains
     (eps_xx, eps_yy, 2 eps_xy) of shape (3, n, m) and writes to ``out`` what its first length
     asks for: 1 for the energy per volume, 3 for the second Piola-Kirchhoff stress, 9 for the
     moduli, row by row. Parameters are those of :class:`~skfem_ancf.materials.base.Material`.
@@ -27,7 +28,7 @@ class TextMaterial(Material):
     --------
     >>> import numpy as np
     >>> from skfem_ancf.materials import TextMaterial
-    >>> from skfem_ancf.source import lanes, source
+    >>> from skfem_ancf.core.source import lanes, source
     >>> class Springs(TextMaterial):
     ...     constants = property(lambda self: np.array([self.E]))
     ...

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebinterpolate, chebval
 from numpy.polynomial.legendre import legvander
 
-from ..errors import InputError
-from ..frozen import Frozen
-from ..kept import cached_property
-from ..quadrature import gauss
+from ..core.errors import InputError
+from ..core.frozen import Frozen
+from ..core.kept import cached_property
+from ..core.quadrature import gauss
 from .base import Rectangle
 from .jumps import BEND, KINK, jumps
 from .measure import measure_of
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
     from ..elements.base import ElementBeam
     from ..materials import Material
-    from ..mesh import MeshBeam
-    from ..types import Array, Rule
+    from ..mesh.mesh_beam import MeshBeam
+    from ..core.types import Array, Rule
     from .base import Section, Slab
 
 #: Points across a slab for areas and moments.

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, ask_array, require_positive, shown
-from ..frozen import Frozen
+from ..core.errors import InputError, ask_array, require_positive, shown
+from ..core.frozen import Frozen
 from ..materials import Material
-from ..pickling import require_picklable
+from ..core.pickling import require_picklable
 from .measure import MORE, WHOLE, Uniform
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ..mesh import MeshBeam
-    from ..types import Array
+    from ..mesh.mesh_beam import MeshBeam
+    from ..core.types import Array
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ..types import Array
+    from ..core.types import Array
 
 #: How far from its ends an element is asked for what may jump there, relative to its length.
 SIDE = 1e-7

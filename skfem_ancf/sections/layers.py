@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, require_positive, shown
+from ..core.errors import InputError, require_positive, shown
 from ..materials import Material
 from .base import Section, Slab, slab_of
 from .measure import Piece, Uniform
@@ -15,7 +15,7 @@ from .moving import Moving
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ..mesh import MeshBeam
+    from ..mesh.mesh_beam import MeshBeam
 
 #: Relative difference of the height of layers and that of a mesh.
 FILLS = 1e-9

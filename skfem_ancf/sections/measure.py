@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 from scipy.linalg import eigh_tridiagonal
 
-from ..frozen import Frozen
-from ..quadrature import gauss
+from ..core.frozen import Frozen
+from ..core.quadrature import gauss
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from ..types import Array, Rule
+    from ..core.types import Array, Rule
 
 #: Points more, where the weight is no polynomial of Y.
 MORE = 4

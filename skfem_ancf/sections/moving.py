@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.polynomial.legendre import legval, legvander
 
-from ..quadrature import gauss
+from ..core.quadrature import gauss
 from .measure import MORE, Measure, Weighted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from ..types import Array, Rule
+    from ..core.types import Array, Rule
     from .measure import InSlab, Piece
 
 #: Least degree of the series of a width, and its points more where that is a square root.

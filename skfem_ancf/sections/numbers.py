@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, require_positive
+from ..core.errors import InputError, require_positive
 from ..materials import StVenantKirchhoff
 from .base import Section, Slab
 from .measure import Uniform
 
 if TYPE_CHECKING:
-    from ..mesh import MeshBeam
-    from ..types import HasShear
+    from ..mesh.mesh_beam import MeshBeam
+    from ..core.types import HasShear
 
 
 class Numbers(Section):

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import CallError, InputError, require_flag, require_option, require_positive
+from ..core.errors import CallError, InputError, require_flag, require_option, require_positive
 from .base import Section, Slab, slab_of
 from .measure import Piece, Weighted
 from .moving import Moving
 
 if TYPE_CHECKING:
-    from ..mesh import MeshBeam
+    from ..mesh.mesh_beam import MeshBeam
 
 #: Sizes that a profile has besides the height, which is that of the mesh.
 SIZES = {"rectangle": ("width",), "I": ("width", "web", "flange"), "T": ("width", "web", "flange"),

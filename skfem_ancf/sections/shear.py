@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from ..quadrature import gauss, lagrange
+from ..core.quadrature import gauss, lagrange
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

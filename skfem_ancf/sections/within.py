@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol
 
-from ..errors import InputError
+from ..core.errors import InputError
 from .base import asked
 
 if TYPE_CHECKING:
-    from ..types import Array
+    from ..core.types import Array
     from .base import Slab
 
 #: What messages call the functions of a slab.

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import (FileError, InputError, MissingExtra, require_flag,
-                      require_integer, require_like, require_option, require_path,
-                      require_positive, require_text, taught)
+from ..core.errors import (FileError, InputError, MissingExtra, require_flag, require_integer,
+                           require_like, require_option, require_path, require_positive,
+                           require_text, taught)
 from ..io.vtu import replacing
 from .matplotlib import colormap, figure_class, triangulation
 from .pyvista import dressed, lines_of, new_plotter, pixels
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from ..configuration import Motion
-    from ..types import Array, StrPath
+    from ..beam.configuration import Motion
+    from ..core.types import Array, StrPath
 
 SUFFIXES = (".gif", ".mp4")
 BACKENDS = ("pyvista", "matplotlib")

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..layout import select_beam
-from ..errors import InputError, require_flag, require_like, taught
+from ..beam.layout import select_beam
+from ..core.errors import InputError, require_flag, require_like, taught
 from .matplotlib import figure_class, page, plain, save
 from .scenery import INK, MUTED
 
 if TYPE_CHECKING:
-    from ..configuration import Configuration
-    from ..types import StrPath
-    from ..layout import WhichBeam
+    from ..beam.configuration import Configuration
+    from ..core.types import StrPath
+    from ..beam.layout import WhichBeam
 
 _ROWS = (("N", "normal force $N$"), ("Q", "shear force $Q$"), ("M", "bending moment $M$"))
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import AncfError
+from ..core.errors import AncfError
 
 #: Resolution of the pictures, in dots per inch.
 DPI = 80

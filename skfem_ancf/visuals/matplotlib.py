@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import (InputError, MissingExtra, require_flag, require_integer, require_like,
-                      require_option, require_path, require_positive, require_text, taught)
+from ..core.errors import (InputError, MissingExtra, require_flag, require_integer, require_like,
+                           require_option, require_path, require_positive, require_text, taught)
 from ..io.vtu import replacing
-from ..obstacles.pictures import AROUND, around, outlines
+from ..actions.obstacles.pictures import AROUND, around, outlines
 from .scenery import GHOST, INK, MUTED, RIGID, WALL, Scenery, cells_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from ..types import Array, StrPath
-    from ..layout import WhichBeam
+    from ..core.types import Array, StrPath
+    from ..beam.layout import WhichBeam
 
 
 
@@ -43,9 +43,9 @@ def plot_state(state: Any, field: str = "eps_yy", ax: Any = None, *,
         of them, drawn over each other with one range of colours and the stress-free body of the
         first.
     field
-        A name of :data:`skfem_ancf.fields.FIELDS` with one component, as "S_xx", "von_mises" or
-        "eps_1"; "displacement" for its magnitude; or a function or Field of your own, see
-        :mod:`skfem_ancf.fields`.
+        A name of :data:`skfem_ancf.recovery.fields.FIELDS` with one component, as "S_xx",
+        "von_mises" or "eps_1"; "displacement" for its magnitude; or a function or Field of your
+        own, see :mod:`skfem_ancf.recovery.fields`.
     ax
         matplotlib Axes to draw in; a new figure by default, which needs no display.
     thickness
@@ -194,7 +194,7 @@ def plot_path(path: Any, point: ArrayLike, component: int = 1, beam: WhichBeam =
     point
         The material point: its place (x, y) in the stress-free body.
     path
-        A :class:`~skfem_ancf.path.Path`.
+        A :class:`~skfem_ancf.results.path.Path`.
     component, beam
         Its displacement's component (0 or 1), and the beam it belongs to.
     ax

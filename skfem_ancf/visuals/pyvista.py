@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import (InputError, MissingExtra, require_flag, require_index, require_integer,
-                      require_like, require_options, require_path, require_text, shown, taught,
-                      teaching)
-from ..fields import FIELDS, find_fields, values_on_grid
+from ..core.errors import (InputError, MissingExtra, require_flag, require_index, require_integer,
+                           require_like, require_options, require_path, require_text, shown, taught,
+                           teaching)
+from ..recovery.fields import FIELDS, find_fields, values_on_grid
 from ..io.vtu import in_space, lagrange_cell, layout, replacing, subdivision
-from ..obstacles.pictures import around, outlines
+from ..actions.obstacles.pictures import around, outlines
 from .matplotlib import colormap
 from .scenery import RIGID, WALL, Scenery, outline_points
 
 if TYPE_CHECKING:
-    from ..configuration import Configuration, Motion
-    from ..types import StrPath
+    from ..beam.configuration import Configuration, Motion
+    from ..core.types import StrPath
 
 #: VTK's numbers of the cells.
 POLYGON, QUAD, LAGRANGE = 7, 9, 70
@@ -217,7 +217,7 @@ def to_pyvista(state: Configuration, fields: Any = None, subdivide: tuple[int, i
     state
         A :class:`~skfem_ancf.results.State`.
     fields
-        Names of :data:`skfem_ancf.fields.FIELDS`, functions or Fields; all of the table by
+        Names of :data:`skfem_ancf.recovery.fields.FIELDS`, functions or Fields; all of the table by
         default. Tensors have VTK's six components xx, yy, zz, xy, yz, xz; the name of a vector
         or tensor says its frame, as "stress (beam frame)".
     subdivide, lagrange, undeformed, recover

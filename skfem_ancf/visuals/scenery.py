@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, require_finite_scalar, require_flag, require_positive, shown
-from ..fields import DRAWN, Field, find_field, values_on_grid
+from ..core.errors import InputError, require_finite_scalar, require_flag, require_positive, shown
+from ..recovery.fields import DRAWN, Field, find_field, values_on_grid
 from ..io.vtu import in_space, layout, subdivision
-from ..kept import cached_property
-from ..obstacles.pictures import around, obstacles_of, outlines
+from ..core.kept import cached_property
+from ..actions.obstacles.pictures import around, obstacles_of, outlines
 
 if TYPE_CHECKING:
-    from ..configuration import Configuration
-    from ..rigid import RigidBody
-    from ..types import Array
+    from ..beam.configuration import Configuration
+    from ..beam.rigid import RigidBody
+    from ..core.types import Array
 
 #: ``thickness="auto"`` draws a section at least this part of the picture high.
 READABLE = 1 / 25

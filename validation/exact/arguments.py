@@ -1,6 +1,6 @@
 """What the arguments of reference solutions are checked by."""
 
-from skfem_ancf.errors import InputError
+from skfem_ancf.core.errors import InputError
 
 
 def choose(kind, name, table):

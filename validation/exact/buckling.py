@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import jv
 
-from skfem_ancf.errors import require_positive
+from skfem_ancf.core.errors import require_positive
 
 from .arguments import choose
 

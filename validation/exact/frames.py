@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 from scipy.optimize import brentq
 
-from skfem_ancf.errors import InputError, require_positive
+from skfem_ancf.core.errors import InputError, require_positive
 
 from .arguments import count_of
 from .rods import line, march

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
-from skfem_ancf.errors import InputError, require_positive
+from skfem_ancf.core.errors import InputError, require_positive
 
 
 def rigid_pendulum(t, L, theta0=np.pi / 2, g=9.81):

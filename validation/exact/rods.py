@@ -20,7 +20,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipeinc, ellipkinc
 
-from skfem_ancf.errors import InputError, require_positive
+from skfem_ancf.core.errors import InputError, require_positive
 
 from .arguments import choose
 from .sections import inertia, shear_factor

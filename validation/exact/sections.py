@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from skfem_ancf.errors import require_positive
+from skfem_ancf.core.errors import require_positive
 
 
 def inertia(b, h):

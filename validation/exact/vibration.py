@@ -5,7 +5,7 @@
 import numpy as np
 from scipy.optimize import brentq
 
-from skfem_ancf.errors import require_positive
+from skfem_ancf.core.errors import require_positive
 
 from .arguments import choose, count_of
 

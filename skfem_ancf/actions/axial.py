@@ -1,0 +1,134 @@
+"""Loads on the axis of a beam: those that turn with it, and those along its length."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from ..core.errors import ask_field, require_finite
+from ..beam.kernels.section import beam_gradients
+from .loads import DeadLoad, Load
+from ..core.quadrature import gauss
+from ..beam.rigid import RigidBody
+from ..beam.distribution import AXIS, Sampled, Spread
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
+
+    from ..beam.beam import Beam
+    from ..core.types import Array, TimeFunction
+    from ..beam.layout import WhichBeam
+
+
+class FollowerForce(Load):
+    """A force on a material point that turns with the tangent of the axis there, or with a body.
+
+    It has no potential: what is loaded by it may flutter.
+
+    Parameters
+    ----------
+    force
+        The force in the stress-free state, shape (2,).
+    at
+        The point: its place (x, y) in the stress-free body, shape (2,).
+    beam, amplitude
+        As for :class:`~skfem_ancf.actions.loads.Load`.
+    """
+
+    constant = False
+    symmetric = False
+    for_bodies = True
+    # of a bound one: the point, coordinates and weights of its place and of the tangent
+    _stations: tuple[float, ...]
+    _dofs: Any
+    _weights: Any
+    _along: Any
+    _slopes: Any
+    _start: Any
+    _turn: Any
+
+    def __init__(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, amplitude)
+        self.total, self.at = require_finite("force", force, (2,)), at
+
+    def bind(self, beam: Beam | RigidBody) -> Load:
+        bound = cast("FollowerForce", super().bind(cast("Beam", beam)))
+        bound._dofs, weights = beam.probe(self.at)
+        bound._weights = np.broadcast_to(weights, bound._dofs.shape)
+        if isinstance(beam, RigidBody):
+            bound._stations, bound._start = (), beam.q0[2:]
+            bound._along, bound._slopes = beam.section_direction(0)
+        else:
+            e, X = beam.locate(self.at)
+            bound._stations, bound._along = (e + float(X[0]),), bound._dofs
+            slopes, frame = beam_gradients(beam.mesh, beam.element, np.array([X[:1], [0.5]]),
+                                           np.array([e]))
+            bound._slopes, bound._start = slopes[0, 0, 0], frame[0, 0, 0]
+        # the force is a matrix times the unit tangent
+        (x, y), n = self.total, bound._start / np.hypot(*bound._start)
+        a, b = x * n[0] + y * n[1], x * n[1] - y * n[0]
+        bound._turn = np.array([[a, b], [-b, a]])
+        return bound
+
+    def _tangent(self, u):
+        return self._start + u[self._along] @ self._slopes
+
+    def force(self, u: Array) -> Array:
+        d = self._tangent(u)
+        out = np.zeros(self.beam.N)
+        np.add.at(out, self._dofs, (self._turn @ d / np.hypot(*d))[:, None] * self._weights)
+        return out
+
+    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
+        d = self._tangent(u)
+        size = np.hypot(*d)
+        D = self._turn @ (np.eye(2) - np.outer(d, d) / size**2) / size
+        values = np.einsum("ij,ik,l->ikjl", D, self._weights, self._slopes)
+        rows = np.broadcast_to(self._dofs[:, :, None, None], values.shape)
+        columns = np.broadcast_to(self._along[None, None], values.shape)
+        return rows.ravel(), columns.ravel(), values.ravel()
+
+    def spread(self, u: Array) -> Spread:
+        return Spread(stations=self._stations)
+
+
+class LineLoad(Load):
+    """A dead force per length of the stress-free axis.
+
+    Parameters
+    ----------
+    force
+        Force per length, shape (2,), or a function of the points x (2, ...) of the stress-free
+        axis that returns (2, ...).
+    beam, amplitude
+        As for :class:`~skfem_ancf.actions.loads.Load`.
+    chains
+        Numbers of the chains of elements that it acts on, shape (k,); None for all of them.
+    """
+
+    def __init__(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
+                 amplitude: TimeFunction = None, chains: Array | None = None) -> None:
+        super().__init__(beam, amplitude)
+        self.chains = chains
+        self.per_length = force if callable(force) else require_finite("force", force, (2,))
+
+    def bind(self, beam: Beam) -> Load:
+        mesh, mapping = beam.mesh, beam.mesh.mapping()
+        xi, w = gauss(beam.element.axis_degree + 5)
+        X = np.array([xi, 0.5 + 0.0 * xi])
+        lengths = np.sqrt(np.sum(mapping.DF(X)[:, 0] ** 2, axis=0)) * w
+        x = np.asarray(mapping.F(X))
+        given = self.per_length
+        values = (ask_field("force(x)", given, x) if callable(given) else
+                  np.broadcast_to(given[:, None, None], x.shape))
+        if self.chains is not None:
+            values = values * np.isin(mesh.chains, self.chains)[:, None]
+        functions = beam.element.functions(mapping, X)[0]
+        vector = beam.kernel.scatter(np.einsum("kep,iep->eki", functions, lengths * values))
+        spread = Spread(sampled=(Sampled(AXIS, np.arange(mesh.nelements), xi,
+                                         values * (lengths / w)),))
+        return DeadLoad(beam, vector, self.amplitude, spread)

@@ -1,0 +1,243 @@
+"""Forces and moments as functions of time and of what is measured: controllers, motors."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from copy import copy
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ...core.errors import (InputError, ask_array, ask_number, require_function, require_option,
+                            require_positive, shown, teaching)
+from ..joints.base import is_ground, named_place, section
+from ...mesh.places import is_point
+from ...beam.rigid import RigidBody
+from .base import ForceElement, Link, differences, link
+from .springs import end_of
+from .texts import turned, turning
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from ...beam.layout import Layout
+    from ...core.types import Array
+    from ...beam.layout import WhichBeam
+
+KINDS = ("force", "moment")
+#: Part of the time between two samples that is round-off.
+ROUND_OFF = 1e-9
+
+
+class MeasuredPoint(NamedTuple):
+    """What is measured at a point.
+
+    Attributes
+    ----------
+    position, velocity
+        Shape (2,) each.
+    """
+
+    position: Array
+    velocity: Array
+
+
+class MeasuredSection(NamedTuple):
+    """What is measured of a section.
+
+    Attributes
+    ----------
+    angle, rate
+        From the stress-free state, in radians and in (-pi, pi], counterclockwise; and its rate.
+    """
+
+    angle: float
+    rate: float
+
+
+@teaching
+class Control(ForceElement):
+    """A force on a point, or a moment on a section, as a function of time and measurements.
+
+    Parameters
+    ----------
+    law
+        A function ``law(t, name=..., ...)`` of the time (in statics the load factor) and of what is
+        measured, by the names of ``points`` and ``sections``. It returns the force (2,), or the
+        moment, counterclockwise.
+    at
+        Where it acts: a point as for a spring, or the section for a moment: a place or
+        (beam, place).
+    kind
+        "force" or "moment".
+    other
+        Where the opposite acts; None for the ground.
+    points, sections
+        Names and places of what is measured: :class:`MeasuredPoint` and :class:`MeasuredSection`.
+    dt
+        Time between two samples: the law is asked at ``t_start + k dt`` and its value is held;
+        None to ask it with the state at every time, in each iteration.
+    beam
+        The beam, its name or its number, in a scene of several, of places that name none.
+    """
+
+    symmetric = False
+
+    def __init__(self, law: Callable[..., Any], at: Any, kind: str = "force", other: Any = None,
+                 points: Mapping[str, Any] | None = None,
+                 sections: Mapping[str, Any] | None = None, dt: float | None = None,
+                 beam: WhichBeam = None) -> None:
+        self.law = require_function("law", law, "of time and measurements")
+        if isinstance(law, type):
+            raise InputError(f"law must be a function of time and measurements, got {shown(law)}")
+        self.at, self.other, self.beam = at, other, beam
+        self.kind = require_option("kind", kind, KINDS)
+        self.points, self.sections = _named("points", points), _named("sections", sections)
+        both = {name for name, _ in self.points} & {name for name, _ in self.sections}
+        if both:
+            raise InputError(f"points and sections must have different names, got {sorted(both)} "
+                             "in both")
+        self.dt = None if dt is None else require_positive("dt", dt)
+
+    def bind(self, layout: Layout) -> list[Link]:
+        find = self._point if self.kind == "force" else self._section
+        ends = [find(layout, self.at)]
+        if self.kind == "moment":
+            ends.append(Link(ends[0].start) if self.other is None else find(layout, self.other))
+        elif self.other is not None:
+            ends.append(find(layout, self.other))
+        if not ends[0].weights.size:
+            raise InputError(f"a control acts on a material point, there is none at "
+                             f"{shown(self.at)}")
+        places = [self._point(layout, place) for _, place in self.points]
+        directions = [self._section(layout, place) for _, place in self.sections]
+        self._ends = len(ends)
+        self._held: list[tuple[float, Any]] = []
+        self._starts = [d.start for d in directions]
+        return [*ends, *places, *directions]
+
+    def _point(self, layout, place):
+        if self.beam is not None and is_point(place):
+            place = (self.beam, place)
+        return link(end_of(layout, place))
+
+    def _section(self, layout, place):
+        if isinstance(place, RigidBody):
+            which, at = place, None
+        elif isinstance(place, (tuple, list)) and len(place) == 2 and not is_point(place):
+            which, at = place
+        elif is_point(place) and self.beam is None:
+            which, at = named_place(layout, place)
+        else:
+            which, at = self.beam, place
+        if is_ground(which):
+            raise InputError("the ground does not turn: leave other= out for a moment from there")
+        return link(section(layout, which, at)[1])
+
+    # what it does
+
+    def measured(self, x: Array, v: Array) -> dict[str, Any]:
+        """What the law is told, by name.
+
+        Parameters
+        ----------
+        x, v
+            Places and velocities of the points, shape (n, 2) each.
+        """
+        out: dict[str, Any] = {}
+        k = self._ends
+        for name, _ in self.points:
+            out[name] = MeasuredPoint(np.array(x[k]), np.array(v[k]))
+            k += 1
+        for (name, _), start in zip(self.sections, self._starts):
+            y, angle, g = np.append(x[k], start)[:, None], np.empty(1), np.empty((4, 1))
+            turned(np.array([[0.0], [0.0], [1.0], [0.0]]), y, angle)
+            turning(y, g)
+            out[name] = MeasuredSection(float(angle[0]), float(g[:2, 0] @ v[k]))
+            k += 1
+        return out
+
+    def ask(self, x: Array, v: Array, t: float) -> Any:
+        """The value of the law: a number, or a force (2,).
+
+        Parameters
+        ----------
+        x, v, t
+            As for :meth:`force`, shapes (n, 2), (n, 2) and ().
+        """
+        values = self.measured(x, v)
+        if self.kind == "moment":
+            return ask_number("law(t = {:g})", lambda t: self.law(t, **values), float(t))
+        return ask_array("law(t = {:g})", (2,), lambda t: self.law(t, **values), float(t))
+
+    def sample(self, x: Array, v: Array, t: float, first: bool) -> None:
+        """Ask the law and hold its value, if it is time to.
+
+        Parameters
+        ----------
+        x, v, t
+            As for :meth:`force`, shapes (n, 2), (n, 2) and ().
+        first
+            A motion begins: what was held before is forgotten.
+        """
+        if self.dt is None:
+            return
+        if first:
+            self._held.clear()
+        if not self._held or t >= self._held[-1][0] + (1.0 - ROUND_OFF) * self.dt:
+            self._held.append((float(t), self.ask(x, v, t)))
+
+    def unheld(self) -> Control:
+        other = copy(self)
+        vars(other)["_held"] = []
+        return other
+
+    @property
+    def held(self) -> Array:
+        """Times of the samples and the values held, shape (n, 2) or (n, 3)."""
+        return np.array([np.append(t, value) for t, value in self._held])
+
+    def hold(self, held: Array) -> None:
+        """Take over what another run has held, as :attr:`held` gave it; (n, 2) or (n, 3)."""
+        moment = self.kind == "moment"
+        self._held[:] = [(float(row[0]), float(row[1]) if moment else row[1:])
+                         for row in np.asarray(held)]
+
+    def _value(self, x, v, t):
+        if self.dt is None or not self._held:
+            return self.ask(x, v, t)
+        k = bisect_right(self._held, t, key=lambda sample: sample[0])
+        return self._held[max(k - 1, 0)][1]
+
+    def force(self, x: Array, v: Array, t: float) -> Array:
+        out, value = np.zeros(np.shape(x)), self._value(x, v, t)
+        if self.kind == "moment":
+            g = np.empty((4, 1))
+            turning(np.reshape(x[:2], (4, 1)), g)
+            out[:2] = value * g.reshape(2, 2)
+        else:
+            out[0] = value
+            if self._ends == 2:
+                out[1] = -np.asarray(value)
+        return out
+
+    def stiffness(self, x: Array, v: Array, t: float) -> Array:
+        return differences(lambda y: self.force(y, v, t), x)
+
+    def resistance(self, x: Array, v: Array, t: float) -> Array:
+        return differences(lambda w: self.force(x, w, t), v)
+
+    def __repr__(self) -> str:
+        how = "" if self.dt is None else f", sampled every {self.dt:g}"
+        return f"<Control of a {self.kind} at {shown(self.at)}{how}>"
+
+
+def _named(what, places):
+    """Pairs of names and places of a dictionary."""
+    if places is None:
+        return ()
+    if not isinstance(places, dict) or not all(
+            isinstance(name, str) and name.isidentifier() and name != "t" for name in places):
+        raise InputError(f"{what} must be a dictionary from names, which become arguments of the "
+                         f"law, to places, got {shown(places)}")
+    return tuple(places.items())

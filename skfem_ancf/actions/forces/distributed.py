@@ -1,0 +1,133 @@
+"""Foundations and drag: force elements at the points of a rule."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...beam.layout import select_beam
+from ...core.errors import require_flag, require_not_negative, teaching
+from ...beam.kernels.section import beam_gradients
+from ...core.quadrature import gauss
+from ...beam.distribution import AXIS, Facets
+from ...beam.surfaces import groups_of, surfaces_of
+from .base import ForceElement, Link, Part, link
+from .texts import DRAG, FOUNDATION
+
+if TYPE_CHECKING:
+    from ...beam.layout import Layout
+    from ...core.types import Place
+    from ...beam.layout import WhichBeam
+
+
+@teaching
+class Foundation(ForceElement):
+    """Winkler's foundation: springs along the normal of a side, as it was in the stress-free state.
+
+    Parameters
+    ----------
+    k
+        Stiffness per area of the side: force per area and displacement, zero or positive.
+    side
+        A place of the boundary, see :func:`skfem_ancf.mesh.places.facets_of`; of a cable, whose
+        surface is no coordinate, the axis is held in place of it.
+    one_sided
+        It pushes and does not pull.
+    damping
+        Force per area and velocity, zero or positive; while it pushes, if it is one-sided.
+    beam
+        The beam, its name or its number, in a scene of several.
+    """
+
+    distributed = True
+
+    def __init__(self, k: float, side: Place = "bottom", one_sided: bool = False,
+                 damping: float = 0.0, beam: WhichBeam = None) -> None:
+        self.k = require_not_negative("k", k)
+        self.damping = require_not_negative("damping", damping)
+        self.side, self.one_sided = side, require_flag("one_sided", one_sided)
+        self.beam = beam
+
+    def bind(self, layout: Layout) -> list[Link]:
+        beam, first = select_beam(layout.beams, self.beam), layout.offset(self.beam)
+        self._at, found = [], surfaces_of(beam, self.side, beam.facet_points)
+        self.along = (beam, *groups_of(beam.mesh, found))
+        for one in found:
+            X = one.X if beam.has_sections else np.array([one.X[0], np.full(len(one.X[0]), 0.5)])
+            for e, areas, normals in zip(one.elements.tolist(), one.areas,
+                                         one.normals.transpose(1, 2, 0)):
+                for x, area, normal in zip(X.T, areas, normals):
+                    dofs, weights = beam.probe_reference(e, x)
+                    self._at.append((link(Link(np.zeros(2), dofs + first, weights)), float(area),
+                                     normal))
+        return [place for place, _, _ in self._at]
+
+    def parts(self) -> list[Part]:
+        none, one = Link(np.zeros(2)), float(self.one_sided)
+        return [Part(FOUNDATION, place, none, (self.k * area, self.damping * area, n[0], n[1], one))
+                for place, area, n in self._at]
+
+    def __repr__(self) -> str:
+        return f"<Foundation {self.k:g} at {self.side!r}>"
+
+
+@teaching
+class Drag(ForceElement):
+    """A force per length of the axis against its velocity v, quadratic in it.
+
+    ``density width / 2 (normal |v_n| v_n + tangential |v_t| v_t)`` per length of the stress-free
+    axis, with the velocities across and along the axis. What is around is at rest.
+
+    Parameters
+    ----------
+    density
+        Mass per volume of what is around, zero or positive.
+    normal, tangential
+        Coefficients, zero or positive.
+    beam
+        The beam, its name or its number, in a scene of several.
+
+    References
+    ----------
+    Taylor: "Analysis of the swimming of long and narrow animals", Proceedings of the Royal Society
+    A 214 (1952); Morison, O'Brien, Johnson, Schaaf: "The force exerted by surface waves on piles",
+    Petroleum Transactions 189 (1950).
+    """
+
+    distributed = True
+
+    def __init__(self, density: float, normal: float, tangential: float = 0.0,
+                 beam: WhichBeam = None) -> None:
+        self.density = require_not_negative("density", density)
+        self.normal = require_not_negative("normal", normal)
+        self.tangential = require_not_negative("tangential", tangential)
+        self.beam = beam
+
+    def bind(self, layout: Layout) -> list[Link]:
+        beam, first = select_beam(layout.beams, self.beam), layout.offset(self.beam)
+        mesh, mapping = beam.mesh, beam.mesh.mapping()
+        xi, w = gauss(beam.element.axis_degree + 1)
+        X = np.array([xi, 0.5 + 0.0 * xi])
+        length = np.sqrt(np.sum(mapping.DF(X)[:, 0] ** 2, axis=0))  # of the axis, by xi
+        slopes, frame = beam_gradients(mesh, beam.element, X)
+        every = np.arange(mesh.nelements)
+        self.along = beam, [Facets(AXIS, every, every, xi)], ()
+        length = length * beam.across.outline(X)
+        self._at = []
+        for e in range(mesh.nelements):
+            for k, x in enumerate(X.T):
+                dofs, weights = beam.probe_reference(e, x)
+                place = link(Link(np.zeros(2), dofs + first, weights))
+                slope = link(Link(frame[0, e, k], dofs + first, slopes[0, e, k]))
+                self._at.append((place, slope, float(w[k] * length[e, k])))
+        return [place for place, _, _ in self._at]
+
+    def parts(self) -> list[Part]:
+        q = 0.5 * self.density
+        return [Part(DRAG, place, slope, (q * self.normal * ds, q * self.tangential * ds, 0.0, 0.0,
+                                          0.0)) for place, slope, ds in self._at]
+
+    def __repr__(self) -> str:
+        return f"<Drag {self.normal:g}, {self.tangential:g}>"
+

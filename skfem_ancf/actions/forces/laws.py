@@ -1,0 +1,187 @@
+"""Laws of springs and dashpots as functions of the caller's: of an elongation, an angle, a rate."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy
+
+from ...core.errors import InputError, ask_number, require_function, require_not_negative, shown
+from ...core.quadrature import gauss
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+#: Points by which the work between two states of a step is integrated.
+POINTS = 8
+#: Part of a potential that is its round-off.
+ROUND_OFF = 1e-13
+#: Relative step of the differences that give the slope of a law.
+STEP = 1e-6
+
+
+class Law:
+    """A force, or moment, as a function of one number, with its potential.
+
+    Parameters
+    ----------
+    name
+        What messages call it, as "k".
+    given
+        A function of the elongation that returns the force; or that and its potential, which is
+        else the integral of the force from zero.
+    of
+        What it is a function of, in words.
+
+    Examples
+    --------
+    >>> law = Law("k", lambda s: 3.0 * s**2)
+    >>> law(2.0), round(law.potential(2.0), 12), round(law.slope(2.0), 6)
+    (12.0, 8.0, 12.0)
+    """
+
+    def __init__(self, name: str, given: Any, of: str = "elongation") -> None:
+        pair = given if isinstance(given, (tuple, list)) else (given,)
+        if not 1 <= len(pair) <= 2 or any(isinstance(part, type) for part in pair):
+            raise InputError(f"{name} must be a number, a function of the {of}, or a function and "
+                             f"its potential, got {shown(given)}")
+        what = f"of the {of} that returns a number"
+        self.name, self.of = name, of
+        self.function: Callable[[float], float] = require_function(name, pair[0], what)
+        self.energy: Any = None if len(pair) == 1 else require_function(
+            f"the potential of {name}", pair[1], what)
+
+    def __call__(self, s: float) -> float:
+        """The force at s."""
+        return ask_number(f"{self.name}({self.of} = {{:g}})", self.function, float(s))
+
+    def potential(self, s: float) -> float:
+        """The potential at s; its integral from zero where none was given."""
+        if self.energy is not None:
+            return ask_number(f"the potential of {self.name} at {{:g}}", self.energy, float(s))
+        return float(scipy.integrate.quad(self, 0.0, s, epsabs=0.0, epsrel=1e-12, limit=200)[0])
+
+    def work(self, a: float, b: float) -> float:
+        """What the potential gains from a to b, two states of one step.
+
+        Parameters
+        ----------
+        a, b
+            Elongations, angles.
+        """
+        if self.energy is not None:
+            return self.potential(b) - self.potential(a)
+        return (b - a) * self.mean(a, b)
+
+    def mean(self, a: float, b: float) -> float:
+        """The mean force from a to b, whose product with b - a is :meth:`work`."""
+        if a == b:
+            return self(a)
+        x, w = gauss(POINTS)
+        found = float(np.dot(w, [self(a + (b - a) * z) for z in x]))
+        if self.energy is not None:
+            before, after = self.potential(a), self.potential(b)
+            missing = after - before - (b - a) * found
+            if abs(missing) > ROUND_OFF * (abs(before) + abs(after)):
+                found += missing / (b - a)
+        return found
+
+    def slope(self, s: float, scale: float = 1.0) -> float:
+        """Its derivative at s, by differences.
+
+        Parameters
+        ----------
+        s
+            Where.
+        scale
+            A length, or angle, beside which the step is small.
+        """
+        d = STEP * max(abs(s), scale)
+        return (self(s + d) - self(s - d)) / (2.0 * d)
+
+    def __repr__(self) -> str:
+        return f"<{self.name} {shown(self.function)}>"
+
+
+def number_or_law(name: str, given: Any, of: str) -> float | Law:
+    """A number that is not negative as it is, a function as a :class:`Law`.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    given
+        What was given.
+    of
+        What a function of it is a function of.
+    """
+    if isinstance(given, Law):
+        return given
+    if callable(given) or isinstance(given, (tuple, list)):
+        law = Law(name, given, of)
+        if of.endswith("rate") and law(0.0) != 0.0:
+            raise InputError(f"{name} is a force of the {of}, and must be 0 where that is 0, got "
+                             f"{law(0.0):g}")
+        return law
+    return require_not_negative(name, given)
+
+
+def said(k: float | Law) -> str:
+    """A number or a Law in few letters."""
+    return repr(k) if isinstance(k, Law) else f"{k:g}"
+
+
+def force_of(k: float | Law, s: float) -> float:
+    """What a number times s is, or the law at s.
+
+    Parameters
+    ----------
+    k, s
+        A number or a Law, and where.
+    """
+    return k(s) if isinstance(k, Law) else k * s
+
+
+def potential_of(k: float | Law, s: float) -> float:
+    """Its integral from zero.
+
+    Parameters
+    ----------
+    k, s
+        A number or a Law, and where.
+    """
+    return k.potential(s) if isinstance(k, Law) else 0.5 * k * s * s
+
+
+def work_of(k: float | Law, a: float, b: float) -> float:
+    """Its integral between two states of one step.
+
+    Parameters
+    ----------
+    k, a, b
+        A number or a Law, and the states.
+    """
+    return k.work(a, b) if isinstance(k, Law) else 0.5 * k * (b - a) * (b + a)
+
+
+def mean_of(k: float | Law, a: float, b: float) -> float:
+    """Its mean between two states of one step, whose product with b - a is its integral.
+
+    Parameters
+    ----------
+    k, a, b
+        A number or a Law, and the states.
+    """
+    return k.mean(a, b) if isinstance(k, Law) else 0.5 * k * (a + b)
+
+
+def slope_of(k: float | Law, s: float, scale: float) -> float:
+    """Its derivative.
+
+    Parameters
+    ----------
+    k, s, scale
+        A number or a Law, where, and as for :meth:`Law.slope`.
+    """
+    return k.slope(s, scale) if isinstance(k, Law) else k

@@ -1,0 +1,68 @@
+"""Point masses: they add to the mass matrix, and weigh where there is gravity."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...core.errors import InputError, require_finite, require_not_negative, shown, teaching
+from ..joints.base import point, section
+from .base import ForceElement, Link, Part, link
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from ...beam.layout import Layout
+    from ...core.types import Array
+    from ...beam.layout import WhichBeam
+
+
+@teaching
+class PointMass(ForceElement):
+    """A mass on a material point, perhaps with a moment of inertia about it.
+
+    Parameters
+    ----------
+    mass
+        Zero or positive.
+    at
+        The point: its place (x, y) in the stress-free body, or the name of an end.
+    inertia
+        Moment of inertia, zero or positive, of what turns with the section of a node, which the
+        point then has to be on.
+    beam
+        The beam, its name or its number, in a scene of several.
+    """
+
+    def __init__(self, mass: float, at: ArrayLike, inertia: float = 0.0,
+                 beam: WhichBeam = None) -> None:
+        self.mass = require_not_negative("mass", mass)
+        self.inertia = require_not_negative("inertia", inertia)
+        self.at = at if isinstance(at, str) else tuple(require_finite("at", at, (2,)).tolist())
+        self.beam = beam
+        if not self.mass and not self.inertia:
+            raise InputError("a point mass needs a mass or an inertia that is positive, got two "
+                             "zeros")
+
+    def bind(self, layout: Layout) -> list[Link]:
+        self._masses = [(self.mass, link(point(layout, self.beam, self.at)))]
+        if self.inertia:
+            self._masses.append((self.inertia, link(section(layout, self.beam, self.at)[1])))
+        return [place for _, place in self._masses]
+
+    def parts(self) -> list[Part]:
+        return []
+
+    def mass_entries(self) -> tuple[Array, Array, Array]:
+        """What it adds to the mass matrix: rows, columns and values, shapes (k,)."""
+        rows, columns, values = [], [], []
+        for size, place in self._masses:
+            for dofs, weights in zip(place.dofs, place.weights):
+                rows.append(np.repeat(dofs, len(dofs)))
+                columns.append(np.tile(dofs, len(dofs)))
+                values.append(size * np.outer(weights, weights).ravel())
+        return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
+
+    def __repr__(self) -> str:
+        return f"<PointMass {self.mass:g} at {shown(self.at)}>"

@@ -1,0 +1,36 @@
+"""Where obstacles are, and points seen from there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ...core.types import Array
+
+
+def carried(pose: Array, x: Array) -> Array:
+    """Where points of an obstacle are that were at x, shape (2, n), when it was given.
+
+    Parameters
+    ----------
+    pose
+        That of :meth:`~skfem_ancf.actions.obstacles.obstacle.Obstacle.pose`, shape (10,).
+    x
+        Points, shape (2, n).
+    """
+    turn = np.array([[pose[2], -pose[3]], [pose[3], pose[2]]])
+    return turn @ (x - pose[4:6, None]) + pose[4:6, None] + pose[:2, None]
+
+
+def taken_back(pose: Array, x: Array) -> Array:
+    """The inverse of :func:`carried`.
+
+    Parameters
+    ----------
+    pose, x
+        As there, shapes (10,) and (2, n).
+    """
+    turn = np.array([[pose[2], pose[3]], [-pose[3], pose[2]]])
+    return turn @ (x - pose[4:6, None] - pose[:2, None]) + pose[4:6, None]

@@ -1,0 +1,218 @@
+"""Springs and dashpots between points, and between directions of sections."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...core.errors import InputError, require_finite_scalar, require_not_negative, shown, teaching
+from ..joints.base import GROUND, Vector, both_of, named_place, point, section
+from ...mesh.places import points_of_rows
+from ...beam.rigid import RigidBody, on_body
+from .base import ForceElement, Link, Part, difference, link
+from ...beam.kernels.moments import mean_turning
+from .laws import Law, force_of, mean_of, number_or_law, potential_of, said, slope_of, work_of
+from .texts import SPRING, TINY, TORSION, turned, turning
+
+if TYPE_CHECKING:
+    from ...beam.layout import Layout
+    from ...core.types import Array, Place
+    from ...beam.layout import WhichBeam
+
+#: Rate beside which the step of a difference of a dashpot's law is small.
+STILL = 1e-3
+
+
+def end_of(layout: Layout, place: Any) -> Vector:
+    """A material point, or one of the ground.
+
+    Parameters
+    ----------
+    layout
+        What :meth:`ForceElement.bind` was given.
+    place
+        (x, y): the material point there, or the point of the ground where no beam and no rigid
+        body is; a RigidBody, for its centre of mass; (beam, (x, y)); or ("ground", (x, y)).
+    """
+    which, at = named_place(layout, place, GROUND)
+    return point(layout, which, at)
+
+
+@teaching
+class Spring(ForceElement):
+    """A spring between two points, with a dashpot along the same line.
+
+    Its force is ``k (l - length) + damping dl / dt`` of the distance l, or
+    ``k(l - length) + damping(dl / dt)`` where these are functions.
+
+    Parameters
+    ----------
+    k
+        Stiffness (force per length), zero or positive; or a function of the elongation that returns
+        the force, positive in tension; or such a function and its potential.
+    between
+        Two places, each (x, y): the material point there, or the point of the ground where no beam
+        is; or (beam, (x, y)) with a Beam, a RigidBody, a name or a number; or ("ground", (x, y)).
+    damping
+        Force per velocity, zero or positive; or a function of the rate that returns the force.
+    length
+        Length without force; that of the stress-free state by default.
+    """
+
+    def __init__(self, k: Any, between: Any, damping: Any = 0.0,
+                 length: float | None = None) -> None:
+        self.k = number_or_law("k", k, "elongation")
+        self.damping = number_or_law("damping", damping, "rate")
+        self.length = None if length is None else require_not_negative("length", length, False)
+        between = points_of_rows(between)
+        if not isinstance(between, (tuple, list)) or len(between) != 2:
+            raise InputError("between must be two places, as ((1, 0), (1, 0.5)), got "
+                             f"{shown(between)}")
+        self.between = tuple((place, None) if isinstance(place, RigidBody) else place
+                             for place in between)
+
+    def bind(self, layout: Layout) -> list[Link]:
+        a, b = (end_of(layout, place) for place in self.between)
+        if not a.weights.size and not b.weights.size:
+            raise InputError(f"neither end of the spring between {shown(self.between)} is a point "
+                             "of a beam or a rigid body: both would be of the ground")
+        self._link = difference(a, b)
+        distance = float(np.hypot(*self._link.start))
+        if distance == 0.0 and self.length != 0.0:
+            raise InputError(f"the spring between {shown(self.between)} has length zero, and so no "
+                             "direction: name two different points, or give length=0 for a spring "
+                             "that pulls them together")
+        self._length = distance if self.length is None else self.length
+        return [self._link]
+
+    def parts(self) -> list[Part] | None:
+        if isinstance(self.k, Law) or isinstance(self.damping, Law):
+            return None
+        return [Part(SPRING, self._link, Link(np.zeros(2)),
+                     (self.k, self._length, self.damping, 0.0, 0.0))]
+
+    def _along(self, x):
+        """Its length, at least a little, and its direction."""
+        length = max(float(np.hypot(*x[0])), TINY)
+        return length, x[0] / length
+
+    def force(self, x: Array, v: Array, t: float) -> Array:
+        length, n = self._along(x)
+        return -(force_of(self.k, length - self._length) + force_of(self.damping, v[0] @ n)) * n[
+            None]
+
+    def potential(self, x: Array) -> float:
+        return potential_of(self.k, self._along(x)[0] - self._length)
+
+    def gain(self, x: Array, y: Array) -> float:
+        return work_of(self.k, *(self._along(z)[0] - self._length for z in (x, y)))
+
+    def mean_force(self, x: Array, y: Array, t: float) -> Array:
+        a, b = self._along(x)[0], self._along(y)[0]
+        return -mean_of(self.k, a - self._length, b - self._length) / (a + b) * (x + y)
+
+    def stiffness(self, x: Array, v: Array, t: float) -> Array:
+        length, n = self._along(x)
+        s, along = length - self._length, np.outer(n, n)
+        K = slope_of(self.k, s, self._length) * along + force_of(self.k, s) / length * (
+            np.eye(2) - along)
+        return -K.reshape(1, 2, 1, 2)
+
+    def resistance(self, x: Array, v: Array, t: float) -> Array:
+        _, n = self._along(x)
+        c = slope_of(self.damping, float(v[0] @ n), STILL)
+        return -c * np.outer(n, n).reshape(1, 2, 1, 2)
+
+    def __repr__(self) -> str:
+        return f"<Spring {said(self.k)} between {shown(self.between)}>"
+
+
+@teaching
+class TorsionalSpring(ForceElement):
+    """A moment against the angle by which a section turns, with a dashpot.
+
+    The moment is ``k (phi - angle) + damping dphi / dt``, phi the angle from the stress-free state,
+    to the ground or to another section, taken in (-pi, pi] about ``angle``; or
+    ``k(phi - angle) + damping(dphi / dt)`` where these are functions.
+
+    Parameters
+    ----------
+    k
+        Moment per angle, zero or positive; or a function of the angle that returns the moment; or
+        such a function and its potential.
+    at
+        A place that is one section of a beam, or a point through which it goes; or a RigidBody.
+    damping
+        Moment per angular velocity, zero or positive; or a function of it.
+    beam
+        The beam, its name or its number, in a scene of several.
+    other
+        The other section as (beam, place), or a RigidBody; None for the ground.
+    angle
+        The angle without moment, in [-pi, pi].
+    """
+
+    def __init__(self, k: Any, at: Place, damping: Any = 0.0, beam: WhichBeam = None,
+                 other: Any = None, angle: float = 0.0) -> None:
+        self.k = number_or_law("k", k, "angle")
+        self.damping = number_or_law("damping", damping, "angular rate")
+        self.at, self.beam = on_body(at, beam)
+        self.other = None if other is None else both_of("other", other)
+        self.angle = require_finite_scalar("angle", angle)
+        if abs(self.angle) > np.pi:
+            raise InputError(f"angle must lie in [-pi, pi], got {self.angle!r}: the angle of a "
+                             "section is known up to whole turns only. Of a spring wound by "
+                             "more, add the moment of the turns, 2 pi k each, by scene.moment")
+
+    def bind(self, layout: Layout) -> list[Link]:
+        self._d = link(section(layout, self.beam, self.at)[1])
+        self._e = link(Link(self._d.start)) if self.other is None else link(
+            section(layout, *self.other)[1])
+        d, e = self._d.start, self._e.start
+        self._start = float(np.arctan2(e[0] * d[1] - e[1] * d[0], d @ e)) + self.angle
+        return [self._d, self._e]
+
+    def parts(self) -> list[Part] | None:
+        if isinstance(self.k, Law) or isinstance(self.damping, Law):
+            return None
+        return [Part(TORSION, self._d, self._e, (self.k, self.damping, np.cos(self._start),
+                                                 np.sin(self._start), 0.0))]
+
+    def _angle(self, x):
+        """The angle at directions d and e, (2, 2)."""
+        p = np.array([0.0, 0.0, np.cos(self._start), np.sin(self._start)])[:, None]
+        out = np.empty(1)
+        turned(p, x.reshape(4, 1), out)
+        return float(out[0])
+
+    @staticmethod
+    def _turning(x):
+        """The derivative of the angle by both directions, (2, 2)."""
+        out = np.empty((4, 1))
+        turning(x.reshape(4, 1), out)
+        return out.reshape(2, 2)
+
+    def force(self, x: Array, v: Array, t: float) -> Array:
+        g = self._turning(np.asarray(x))
+        return -(force_of(self.k, self._angle(x)) + force_of(
+            self.damping, float(np.sum(g * v)))) * g
+
+    def potential(self, x: Array) -> float:
+        return potential_of(self.k, self._angle(x))
+
+    def gain(self, x: Array, y: Array) -> float:
+        return work_of(self.k, self._angle(x), self._angle(y))
+
+    def mean_force(self, x: Array, y: Array, t: float) -> Array:
+        g = np.empty((4, 1))
+        mean_turning(x.reshape(4, 1), y.reshape(4, 1), g)
+        return -mean_of(self.k, self._angle(x), self._angle(y)) * g.reshape(2, 2)
+
+    def resistance(self, x: Array, v: Array, t: float) -> Array:
+        g = self._turning(np.asarray(x))
+        c = slope_of(self.damping, float(np.sum(g * v)), STILL)
+        return -c * np.multiply.outer(g, g)
+
+    def __repr__(self) -> str:
+        return f"<TorsionalSpring {said(self.k)} at {shown(self.at)}>"

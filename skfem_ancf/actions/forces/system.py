@@ -1,0 +1,396 @@
+"""The force elements of a scene in its equations: their tables, and elements of one's own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...core.kept import cached_property
+from .base import Part
+from .contacts import NO_CONTACTS, Contacts
+from .control import Control
+from .masses import PointMass
+from .texts import (ELASTIC, NUMBERS, RESISTING, TORSION, ForceTables, element_stiffness, potential,
+                    run_kinds, turned, vectors_of)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ...core.types import Array
+    from .base import ForceElement, Link
+
+#: Kinds that the texts know.
+KINDS = 4
+#: What the Forces of scenes without any have, which is made once.
+_NONE: dict[str, Any] = {}
+
+
+class Forces:
+    """The force elements of a scene.
+
+    Parameters
+    ----------
+    elements
+        Force elements, bound.
+    N, bandwidth
+        Coordinates of the scene, and subdiagonals of its band.
+
+    Attributes
+    ----------
+    elements, own
+        All, and those that are no tables.
+    far
+        True if one couples coordinates that are not in the band.
+    symmetric
+        True if all have symmetric derivatives.
+    masses
+        Those that add to the mass.
+    contacts
+        The obstacles, a :class:`~skfem_ancf.actions.forces.contacts.Contacts`.
+    resists
+        True if velocities may cause a force.
+    """
+
+    def __init__(self, elements: Sequence[ForceElement], N: int, bandwidth: int) -> None:
+        if not elements and _NONE:
+            vars(self).update(_NONE, _N=N, _bandwidth=bandwidth)
+            return
+        self.elements, self._N, self._bandwidth = list(elements), N, bandwidth
+        parts: list[Part] = []
+        self.own = []
+        for element in self.elements:
+            found = element.parts()
+            if found is None:
+                self.own.append(element)
+            else:
+                parts += found
+        order = sorted(range(len(parts)), key=lambda k: parts[k].kind)
+        self.parts = [parts[k] for k in order]
+        self._place = np.argsort(order) if order else np.zeros(0, np.int64)
+        n = len(self.parts)
+        vectors = [[part.d, part.e] for part in self.parts]
+        own = [element.links for element in self.own]
+        # links, numbers of their components, and where the derivatives by them are
+        blocks: list[tuple[list[Link], Array, Array]] = []
+        for k, pair in enumerate(vectors):
+            rows = k + n * np.arange(4)
+            blocks.append((pair, rows, k + n * np.arange(16).reshape(4, 4)))
+        row, at = 4 * n, 16 * n
+        self._slices = []
+        for links in own:
+            m = 2 * len(links)
+            self._slices.append((slice(row, row + m), slice(at, at + m * m)))
+            blocks.append((links, row + np.arange(m), at + np.arange(m * m).reshape(m, m)))
+            row, at = row + m, at + m * m
+        self._blocks, self.rows, self.size = blocks, row, at
+        self._couplings = [self._coupling(k) for k in range(len(blocks))]
+        self._far = [bool(np.any(np.abs(i - j) > bandwidth)) for i, j, _, _ in self._couplings]
+        self.far, self.symmetric = any(self._far), all(e.symmetric for e in self.elements)
+        self.masses = [element for element in self.elements if isinstance(element, PointMass)]
+        self.contacts = Contacts(self.elements)
+        self.resists = bool(self.own) or any(_resists(part) for part in self.parts) or any(
+            one.damping > 0.0 for one in self.contacts.obstacles)
+
+    def _coupling(self, k):
+        """Rows, columns, weights and places of the derivatives that element k adds."""
+        links, _, places = self._blocks[k]
+        dofs = [link.dofs[c] for link in links for c in range(2)]
+        weights = [row for link in links for row in link.weights]
+        known = k >= len(self.parts)
+        used = range(len(dofs)) if known or self.parts[k].kind == TORSION else range(2)
+        out: list[list[Any]] = [[], [], [], []]
+        for i in used:
+            for j in used:
+                a, b = dofs[i], dofs[j]
+                out[0].append(np.repeat(a, len(b)))
+                out[1].append(np.tile(b, len(a)))
+                out[2].append(np.outer(weights[i], weights[j]).ravel())
+                out[3].append(np.full(len(a) * len(b), places[i, j]))
+        return tuple(np.concatenate(column) for column in out)
+
+    def _entries(self, far):
+        """Rows, columns, weights and places of near elements, or of far ones."""
+        none = np.zeros(0, dtype=np.int64)
+        found = [(none, none, np.zeros(0), none)] + [
+            c for c, other in zip(self._couplings, self._far) if other == far]
+        return tuple(np.concatenate(column) for column in zip(*found))
+
+    def tables(self, position: Any, symmetric: bool, handle: int) -> ForceTables:
+        """What texts take.
+
+        Parameters
+        ----------
+        position
+            Where an entry (i, j) is in the band.
+        symmetric
+            The band has its lower half only.
+        handle
+            What finds elements of one's own.
+        """
+        if not self.elements:
+            return NO_FORCES
+        at, of, weight, start = [], [], [], np.zeros(self.rows)
+        for links, rows, _ in self._blocks:
+            for k, one in enumerate(links):
+                for c in range(2):
+                    row = rows[2 * k + c]
+                    start[row] = one.start[c]
+                    at.append(np.full(len(one.weights[c]), row))
+                    of.append(one.dofs[c])
+                    weight.append(one.weights[c])
+        i, j, w, place = self._entries(False)
+        keep = (i >= j) | (not symmetric)
+        kinds = np.array([part.kind for part in self.parts], dtype=np.int64)
+        numbers = np.array([part.numbers for part in self.parts]).reshape(-1, NUMBERS)
+        rows, columns, places = self._between_rows()
+        between = len(self.far_rows())
+        return ForceTables(
+            start, _ints(at), _ints(of), np.concatenate([np.zeros(0), *weight]), len(self.parts),
+            np.searchsorted(kinds, np.arange(KINDS + 1)).astype(np.int64),
+            np.ascontiguousarray(numbers.T).ravel(), self.size,
+            position(i[keep], j[keep]).astype(np.int64), place[keep].astype(np.int64), w[keep],
+            (rows * between + columns).astype(np.int64), places.astype(np.int64),
+            handle if self.own else 0, self.contacts.tables)
+
+    def acting_rows(self) -> Array:
+        """The derivatives of the places where elements act on few points, shape (k, N)."""
+        return self._derivatives([one for element in self.elements if not element.distributed
+                                  for one in element.links])
+
+    # elements that couple what is far apart
+
+    def _far_blocks(self):
+        for block, far in zip(self._blocks, self._far):
+            if far:
+                yield block
+
+    def far_rows(self) -> Array:
+        """The derivatives of far elements' vectors by the coordinates, shape (k, N)."""
+        return self._derivatives([one for links, _, _ in self._far_blocks() for one in links])
+
+    def _derivatives(self, links):
+        out = np.zeros((2 * len(links), self._N))
+        for k, row in enumerate(out):
+            one = links[k // 2]
+            np.add.at(row, one.dofs[k % 2], one.weights[k % 2])
+        return out
+
+    def _between_rows(self):
+        """Row, column and place of the derivatives between those rows."""
+        found, first = [np.zeros((3, 0), dtype=np.int64)], 0
+        for _, rows, places in self._far_blocks():
+            m = len(rows)
+            a, b = np.divmod(np.arange(m * m), m)
+            found.append(np.array([first + a, first + b, places.ravel()]))
+            first += m
+        return np.concatenate(found, axis=1)
+
+    def far_entries(self) -> tuple[Array, Array, Array, Array]:
+        """Rows, columns, weights and places of what is not in the band; shapes (k,)."""
+        return self._entries(True)
+
+    # values
+
+    def vectors(self, tables: ForceTables, u: Array) -> Array:
+        """The vectors' numbers at u.
+
+        Parameters
+        ----------
+        tables
+            Those of :meth:`tables`.
+        u
+            Displacement of the coordinates, shape (N,).
+        """
+        y = np.empty(self.rows)
+        vectors_of(tables, u, 1.0, y)
+        return y
+
+    def potential(self, tables: ForceTables, u: Array, t: float = 0.0) -> float:
+        """The potential of all elements; those without one count as zero.
+
+        Parameters
+        ----------
+        tables
+            Those of :meth:`tables`.
+        u
+            Displacement of the coordinates, shape (N,).
+        t
+            Time, for obstacles that move.
+        """
+        y = self.vectors(tables, u)
+        return potential(tables, y) + self.contacts.potential(u, t) + sum(
+            element.potential(y[rows].reshape(-1, 2)) or 0.0
+            for element, (rows, _) in zip(self.own, self._slices))
+
+    @cached_property
+    def sampled(self) -> list[Control]:
+        """Controls whose law is asked now and then, and its value held."""
+        return [e for e in self.own if isinstance(e, Control) and e.dt is not None]
+
+    def sample(self, tables: ForceTables, u: Array, v: Array, t: float, first: bool) -> None:
+        """Ask sampled controls whose time it is.
+
+        Parameters
+        ----------
+        tables
+            Those of :meth:`tables`.
+        u, v, t
+            Displacement of the coordinates and its rate, shape (N,), and time.
+        first
+            A motion begins.
+        """
+        y, w = self.vectors(tables, u), np.empty(self.rows)
+        vectors_of(tables, v, 0.0, w)
+        for element, (rows, _) in zip(self.own, self._slices):
+            if isinstance(element, Control):
+                element.sample(y[rows].reshape(-1, 2), w[rows].reshape(-1, 2), t, first)
+
+    def rows_of(self, element: ForceElement) -> Array:
+        """Where the parts of an element are among all, in its own order; shape (n,)."""
+        first = 0
+        for other in self.elements:
+            n = len(other.parts() or ())
+            if other is element:
+                return self._place[first:first + n]
+            first += n
+        return self._place[:0]
+
+    def part_forces(self, tables: ForceTables, u: Array, v: Array) -> Array:
+        """What resists on the first vector of each part, shape (2, parts).
+
+        Parameters
+        ----------
+        tables
+            Those of :meth:`tables`.
+        u, v
+            Displacement of the coordinates and its rate, shape (N,).
+        """
+        y, w, out = self.vectors(tables, u), np.empty(self.rows), np.zeros(self.rows)
+        vectors_of(tables, v, 0.0, w)
+        run_kinds(tables, np.int64(ELASTIC), y, y, 0.0, out)
+        resisting = np.zeros(self.rows)
+        run_kinds(tables, np.int64(RESISTING), y, w, 0.0, resisting)
+        n = len(self.parts)
+        return (out + resisting)[:2 * n].reshape(2, n)
+
+    def turns(self, u: Array) -> Array:
+        """The angles of springs of sections, in (-pi, pi] about those without moment.
+
+        Parameters
+        ----------
+        u
+            Displacements of the coordinates, shape (n, N).
+
+        Returns
+        -------
+        ndarray
+            Shape (k, n).
+        """
+        springs = [part for part in self.parts if part.kind == TORSION and part.numbers[0] > 0.0]
+        out = np.empty((len(springs), len(u)))
+        for row, part in zip(out, springs):
+            y = [(one.start + np.sum(u[:, one.dofs] * one.weights, axis=2)).T
+                 for one in (part.d, part.e)]
+            turned(np.repeat(np.reshape(part.numbers, (-1, 1)), len(u), axis=1),
+                   np.concatenate(y), row)
+        return out
+
+    def stiffness(self, tables: ForceTables, t: float, u: Array, v: Array,
+                  factor: float) -> Array:
+        """The derivatives by the vectors, shape (size,).
+
+        Parameters
+        ----------
+        tables
+            Those of :meth:`tables`.
+        t, u, v, factor
+            Time, displacement and velocity, shape (N,), and the factor on derivatives by
+            velocities.
+        """
+        D = np.zeros(self.size)
+        element_stiffness(tables, t, u, v, factor, D)
+        return D
+
+    def firmnesses(self, tables: ForceTables, u: Array) -> Array:
+        """The largest stiffness of each element in any direction, shape (k,).
+
+        Parameters
+        ----------
+        tables
+            Those of :meth:`tables`.
+        u
+            Displacement of the coordinates, shape (N,).
+        """
+        D = self.stiffness(tables, 0.0, u, np.zeros(len(u)), 0.0)
+        return np.array([np.linalg.norm(D[at], 2) for _, _, at in self._blocks])
+
+    def entries(self, tables: ForceTables, t: float, u: Array, v: Array,
+                factor: float) -> tuple[Array, Array, Array]:
+        """The same by the coordinates: rows, columns and values.
+
+        Parameters
+        ----------
+        tables, t, u, v, factor
+            As for :meth:`stiffness`; u and v of shape (N,).
+        """
+        D = self.stiffness(tables, t, u, v, factor)
+        near, far = self._entries(False), self._entries(True)
+        i, j, w, place = (np.append(a, b) for a, b in zip(near, far))
+        touched = self.contacts.entries(t, u, self._bandwidth)
+        return (np.append(i, touched[0]), np.append(j, touched[1]),
+                np.append(w * D[place], touched[2]))
+
+    def add_own(self, what: int, t: float, factor: float, a: Array, b: Array,
+                out: Array) -> None:
+        """Elements of one's own: what :func:`skfem_ancf.core.callbacks.own_elements` is asked.
+
+        Parameters
+        ----------
+        what
+            0: the mean force without velocity between places a and b. 1: what the velocities b
+            add to the force at a. 2: the derivatives by places, and by velocities with a factor.
+        t, factor
+            Time, and that factor.
+        a, b
+            Of all vectors, shape (rows,).
+        out
+            Added to, shape (rows,) or (size,): what resists, as an internal force.
+        """
+        for element, (rows, places) in zip(self.own, self._slices):
+            x, y = a[rows].reshape(-1, 2), b[rows].reshape(-1, 2)
+            if what == 0:
+                out[rows] -= np.ravel(element.mean_force(x, y, t))
+            elif what == 1:
+                if np.any(y):
+                    out[rows] -= np.ravel(np.asarray(element.force(x, y, t))
+                                          - element.force(x, 0.0 * y, t))
+            else:
+                found = np.array(element.stiffness(x, y, t))
+                if factor != 0.0:
+                    found = found + factor * np.asarray(element.resistance(x, y, t))
+                out[places] -= found.ravel()
+
+
+_NONE.update(vars(Forces((), 0, 0)))
+
+
+def _no_tables():
+    """The tables of no elements."""
+    x, i = np.zeros(0), np.zeros(0, np.int64)
+    return ForceTables(x, i, i, x, 0, np.zeros(KINDS + 1, np.int64), x, 0, i, i, x, i, i, 0,
+                       NO_CONTACTS)
+
+
+#: Of scenes without force elements.
+NO_FORCES = _no_tables()
+
+
+def _resists(part):
+    """True if a part has a damping."""
+    k, c, damping = part.numbers[:3]
+    return {0: damping, 1: c, 2: c, 3: k or c}[part.kind] > 0.0
+
+
+def _ints(parts):
+    return np.concatenate([np.zeros(0, dtype=np.int64), *parts]).astype(np.int64)

@@ -1,0 +1,53 @@
+"""Joints: constraints with Lagrange multipliers. A new joint is one file and one line here."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...core.errors import require_option
+from .base import Joint, bind_joint
+from .guides import OnCircle, OnLine
+from .hinge import Hinge
+from .plane_section import PlaneSection
+from .prescribed import PrescribedAngle, PrescribedPosition, PrescribedTurn
+from .sliders import Sleeve, Slot
+from .weld import Weld
+
+#: The joints by name.
+JOINTS = {
+    "hinge": Hinge,
+    "weld": Weld,
+    "line": OnLine,
+    "circle": OnCircle,
+    "position": PrescribedPosition,
+    "angle": PrescribedAngle,
+    "turn": PrescribedTurn,
+    "plane": PlaneSection,
+    "sleeve": Sleeve,
+    "slot": Slot,
+}
+
+
+def get_joint(joint: str | Joint, **options: Any) -> Joint:
+    """A :class:`Joint` from its name and options, or itself.
+
+    Parameters
+    ----------
+    joint
+        A name from :data:`JOINTS`, or a Joint.
+    **options
+        Arguments of the joint's class, where it is given by its name.
+
+    Raises
+    ------
+    NameUnknown
+        If the name is not known; the message lists the known ones.
+    """
+    if isinstance(joint, Joint):
+        return joint
+    return JOINTS[require_option("joint", joint, JOINTS)](**options)
+
+
+__all__ = ["JOINTS", "Hinge", "Joint", "OnCircle", "OnLine", "PlaneSection", "PrescribedAngle",
+           "PrescribedPosition", "PrescribedTurn", "Sleeve", "Slot", "Weld", "bind_joint",
+           "get_joint"]

@@ -1,0 +1,167 @@
+"""The axis of a beam as a curve of its coordinates, and the point of it that is nearest to another.
+
+A point of the axis has the parameter s: the number of its element, and where in it, from 0 to 1.
+"""
+
+from __future__ import annotations
+
+from math import factorial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...mesh.reference_cell import hermite_basis
+
+if TYPE_CHECKING:
+    from ...beam.beam import Beam
+    from ...core.types import Array
+
+#: Points at least of an element among which the nearest is looked for first.
+SAMPLES = 5
+#: Iterations for the nearest point.
+ITERATIONS = 40
+
+
+class Axis:
+    """The axis of a beam: a polynomial of s in each element.
+
+    Parameters
+    ----------
+    beam
+        The :class:`~skfem_ancf.Beam`.
+    first
+        Number of its first coordinate in the scene.
+    """
+
+    def __init__(self, beam: Beam, first: int) -> None:
+        self.beam, self.first, degree = beam, first, beam.element.axis_degree
+        # the coordinates of the axis, by their derivatives of both nodes as Hermite functions are
+        along = np.array([-1 if across else a for _, a, across in beam.element.functionals])
+        m, nb = (degree + 1) // 2, len(along)
+        one = np.array([int(np.flatnonzero(along == k)[0]) for k in range(m)])
+        self._used = np.concatenate([one, nb + one])
+        self._slope = np.tile(np.arange(m), 2)
+        # coefficients of the functions, and of their derivatives by s: (4, nb, degree + 1), in
+        # powers of the distance from the middle of the element, where they stay small
+        self._powers = np.zeros((4, len(self._used), degree + 1))
+        for k in range(degree + 1):
+            self._powers[0, :, k] = hermite_basis(m, 0.5, k) / factorial(k)
+        for k in range(1, 4):
+            self._powers[k, :, :-1] = self._powers[k - 1, :, 1:] * np.arange(1, degree + 1)
+        self._start = np.asarray(beam.q0)
+        x = np.linspace(0.0, 1.0, max(SAMPLES, degree))
+        self._samples = self._powers[0] @ (x - 0.5) ** np.arange(degree + 1)[:, None]
+        elements = np.arange(beam.mesh.nelements)
+        self._all = self._local(elements)
+        self._scales = beam.mesh.lengths[:, None] ** self._slope
+
+    def _local(self, e: Any) -> Array:
+        """Coordinates of elements, (..., 2, nb)."""
+        first = np.asarray(self.beam.mesh.t[0, e] * self.beam.nd)
+        return first[..., None, None] + 2 * self._used + np.arange(2)[:, None]
+
+    def element(self, s: float) -> int:
+        """The element of a parameter: the nearest one beyond the ends."""
+        return int(np.clip(np.floor(s), 0, self.beam.mesh.nelements - 1))
+
+    def weights(self, s: float) -> tuple[Array, Array]:
+        """Coordinates of the scene, and their weights in the axis and its derivatives by s.
+
+        Parameters
+        ----------
+        s
+            The parameter; beyond an end the curve of the last element goes on.
+
+        Returns
+        -------
+        dofs, weights
+            Shapes (2, nb) and (4, nb): of the position and its first three derivatives.
+        """
+        e = self.element(s)
+        xi = (s - e - 0.5) ** np.arange(self._powers.shape[2])
+        return self.first + self._local(e), (self._powers @ xi) * self._scales[e]
+
+    def between(self, s0: float, s1: float) -> tuple[Array, Array, Array]:
+        """Weights at two parameters, and quotients of their differences.
+
+        Parameters
+        ----------
+        s0, s1
+            The parameters.
+
+        Returns
+        -------
+        dofs, weights, quotients
+            Shapes (2, 2 nb), (2, 2, 2 nb) and (2, 2 nb): at each parameter those of the position
+            and its derivative by the length of the stress-free axis, and their differences over
+            the length between; the derivatives where that is none.
+        """
+        (one, a), (two, b) = self.weights(s0), self.weights(s1)
+        e, f = self.element(s0), self.element(s1)
+        nb = one.shape[1]
+        weights = np.zeros((2, 2, 2 * nb))
+        weights[0, :, :nb] = a[:2] / self.beam.mesh.lengths[e] ** np.arange(2)[:, None]
+        weights[1, :, nb:] = b[:2] / self.beam.mesh.lengths[f] ** np.arange(2)[:, None]
+        dofs = np.hstack([one, two])
+        if e != f:
+            return dofs, weights, (weights[1] - weights[0]) / (self.length(s1) - self.length(s0))
+        x, y, n = s0 - e - 0.5, s1 - e - 0.5, self._powers.shape[2]
+        powers = [sum(x**j * y**(k - 1 - j) for j in range(k)) for k in range(n)]
+        quotients = np.zeros((2, 2 * nb))
+        quotients[:, :nb] = ((self._powers[:2] @ powers) * self._scales[e]
+                             / self.beam.mesh.lengths[e] ** np.arange(1, 3)[:, None])
+        return dofs, weights, quotients
+
+    def at(self, u: Array, s: float) -> Array:
+        """The position and its first three derivatives by s, shape (4, 2).
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        s
+            The parameter.
+        """
+        dofs, weights = self.weights(s)
+        return weights @ self.places(u, dofs).T
+
+    def nearest(self, u: Array, p: Array) -> float:
+        """The parameter of the point of the axis that is nearest to a point.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        p
+            The point, shape (2,).
+        """
+        q = self._start[self._all] + u[self.first + self._all]
+        x = np.einsum("eck,ek,ks->ecs", q, self._scales, self._samples)
+        gap = np.sum((x - p[:, None]) ** 2, axis=1)
+        e, k = np.unravel_index(int(np.argmin(gap)), gap.shape)
+        s, n = float(e + k / (gap.shape[1] - 1)), self.beam.mesh.nelements
+        for _ in range(ITERATIONS):
+            c, d, dd, _ = self.at(u, s)
+            gap, size = c - p, float(d @ d)
+            slope = size + float(gap @ dd)
+            step = -float(gap @ d) / (slope if slope > 0.1 * size else size)
+            inside = float(np.clip(s + np.clip(step, -0.5, 0.5), -0.5, n + 0.5))
+            done, s = abs(inside - s) <= 1e-15 * n, inside
+            if done:
+                break
+        return s
+
+    def places(self, u: Array, dofs: Array) -> Array:
+        """Coordinates of the axis, of the body with a displacement.
+
+        Parameters
+        ----------
+        u, dofs
+            Displacement of the scene's coordinates, shape (N,), and numbers of some of them.
+        """
+        return self._start[dofs - self.first] + u[dofs]
+
+    def length(self, s: float) -> float:
+        """Length of the stress-free axis from its start to a parameter."""
+        e = self.element(s)
+        return float(np.sum(self.beam.mesh.lengths[:e]) + (s - e) * self.beam.mesh.lengths[e])

@@ -1,0 +1,834 @@
+"""What every joint shares: constraint equations on points and sections of beams."""
+
+from __future__ import annotations
+
+from functools import partial
+from os import urandom
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...core.errors import AncfError, InputError, MeshError, require_finite, require_slope, shown
+from ...core.frozen import Sealable
+from ..loads import beside, require_entries
+from ...core.origin import ours
+from ...mesh.places import as_point, is_place, is_point, points_of_rows
+from ...beam.rigid import RigidBody
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+    from ...beam.layout import Layout
+    from ...core.types import Array
+    from ...beam.layout import WhichMember
+
+
+class Vector:
+    """A plane vector that depends affinely on the coordinates.
+
+    ``start + sum(u[dofs] * weights, axis=1)``: the position of a material point, the direction of a
+    section and that of a rigid body are such vectors, and so is a point of the ground.
+
+    Parameters
+    ----------
+    start
+        Its value in the stress-free state, shape (2,).
+    dofs
+        Numbers of the coordinates of both components, shape (2, n).
+    weights
+        Their weights, shape (2, n), or (n,) if they are those of both components.
+    """
+
+    def __init__(self, start: ArrayLike, dofs: Array, weights: Array) -> None:
+        self.start, self.dofs = np.asarray(start), dofs
+        self.weights = weights + np.zeros(dofs.shape)
+
+    def __call__(self, u: Array) -> Array:
+        return self.start + np.sum(u[self.dofs] * self.weights, axis=1)
+
+    def row(self, direction: ArrayLike, n: int) -> Array:
+        """The derivative of ``direction . vector`` by the coordinates, as a dense row (n,).
+
+        Parameters
+        ----------
+        direction
+            Shape (2,).
+        n
+            Number of all coordinates.
+
+        Returns
+        -------
+        ndarray
+            Shape (n,).
+        """
+        out = np.zeros(n)
+        np.add.at(out, self.dofs, np.asarray(direction)[:, None] * self.weights)
+        return out
+
+    def entries(self, direction: ArrayLike) -> tuple[Array, Array]:
+        """The derivative of ``direction . vector`` by the coordinates.
+
+        Parameters
+        ----------
+        direction
+            Shape (2,).
+
+        Returns
+        -------
+        columns, values
+            Shapes (k,).
+        """
+        return self.dofs.ravel(), (np.asarray(direction)[:, None] * self.weights).ravel()
+
+
+def gradients(*equations: list) -> tuple[Array, Array, Array]:
+    """The entries of a Jacobian that are not zero.
+
+    Parameters
+    ----------
+    *equations
+        For each a list of pairs, Vector and direction (2,), whose scalar products it sums.
+
+    Returns
+    -------
+    rows, columns, values
+        Shapes (k,).
+    """
+    none = np.zeros(0, dtype=int)
+    rows, columns, values = [none], [none], [np.zeros(0)]
+    for k, terms in enumerate(equations):
+        for vector, direction in terms:
+            found = vector.entries(direction)
+            rows.append(np.full(len(found[0]), k))
+            columns.append(found[0])
+            values.append(found[1])
+    i, j, v = map(np.concatenate, (rows, columns, values))
+    keep = v != 0.0
+    return i[keep], j[keep], v[keep]
+
+
+def rotation(angle: float) -> Array:
+    """The matrix that turns by ``angle``."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]])
+
+
+class Joint(Sealable):
+    """Constraint equations Phi(u, t) = 0 with Lagrange multipliers.
+
+    A joint is bound to a scene by :meth:`bind`, which finds its points; from then on ``u`` is
+    the displacement of all coordinates of the scene. The multipliers are the forces (or moment)
+    that the joint exerts, in the order of :attr:`equations`.
+
+    A joint of your own is a subclass that sets :attr:`equations` and defines :meth:`bind`,
+    :meth:`value`, :meth:`jacobian` or :meth:`entries`, and :meth:`curvature` if it is not constant;
+    :meth:`skfem_ancf.Scene.add` takes it. The scene keeps a copy and binds others: one to its own
+    beams, and one to those of each finer mesh of ``solve_static(adapt=...)``.
+
+    Attributes
+    ----------
+    equations : tuple of str
+        What each equation holds.
+    constant : bool
+        The derivative of Phi depends neither on u nor on t. Where it does,
+        :class:`~skfem_ancf.dynamics.EnergyMomentum` is exact if Phi is at most quadratic in u, or
+        if :meth:`mean_entries` and :meth:`mean_turning` are exact.
+    moving : bool
+        Phi depends on t.
+    tabled : bool
+        Of the package's own joints: Phi is at most quadratic in u, with second derivatives that do
+        not depend on t. Those of others are tried.
+    """
+
+    equations: tuple[str, ...] = ()
+    constant = True
+    moving = False
+    tabled = True
+    name: str | None = None
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Of :meth:`jacobian` and :meth:`entries` the one that a class defines gives the other."""
+        super().__init_subclass__(**options)
+        if "jacobian" in vars(cls) and "entries" not in vars(cls):
+            def entries(self: Joint, u: Array, t: float) -> tuple[Array, Array, Array]:
+                J = cls.jacobian(self, u, t)
+                rows, columns = np.nonzero(J)
+                return rows, columns, J[rows, columns]
+
+            cls.entries = entries  # type: ignore[method-assign]
+        elif "entries" in vars(cls) and "jacobian" not in vars(cls):
+            def jacobian(self: Joint, u: Array, t: float) -> Array:
+                rows, columns, values = cls.entries(self, u, t)
+                J = np.zeros((len(self.equations), len(u)))
+                np.add.at(J, (rows, columns), values)
+                return J
+
+            cls.jacobian = jacobian  # type: ignore[method-assign]
+
+    def bind(self, layout: Layout) -> None:
+        """Find the points and sections in the scene's coordinates.
+
+        Parameters
+        ----------
+        layout
+            Has ``beam(which)``, the Beam meant by a Beam, a name, a number or None,
+            ``offset(which)``, the number of its first coordinate, and ``N``.
+        """
+        raise NotImplementedError
+
+    def value(self, u: Array, t: float) -> Array:
+        """The equations Phi, which are zero where the joint is closed.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        t
+            Time; in statics the load factor.
+
+        Returns
+        -------
+        ndarray
+            Shape (m,).
+        """
+        raise NotImplementedError
+
+    def jacobian(self, u: Array, t: float) -> Array:
+        """Derivative of Phi by u; by default that of :meth:`entries`.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        t
+            Time; in statics the load factor.
+
+        Returns
+        -------
+        ndarray
+            Shape (m, N).
+        """
+        raise NotImplementedError("a joint defines jacobian(u, t) or entries(u, t)")
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        """The entries of :meth:`jacobian` that are not zero; those at one place add up.
+
+        A joint that defines them costs what it holds, however many beams a scene has; else they
+        are looked for in the dense rows.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        t
+            Time; in statics the load factor.
+
+        Returns
+        -------
+        rows, columns, values
+            Shapes (k,).
+        """
+        raise NotImplementedError("a joint defines jacobian(u, t) or entries(u, t)")
+
+    def curvature(self, u: Array, t: float,
+                  multipliers: Array) -> tuple[Array, Array, Array] | None:
+        """The sum over k of multipliers[k] d^2 Phi_k / du^2.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        t
+            Time; in statics the load factor.
+        multipliers
+            Those of its equations, shape (m,).
+
+        Returns
+        -------
+        rows, columns, values
+            Shapes (k,); or None if the derivative of Phi is constant.
+        """
+        return None
+
+    def quadratic(self, u: Array, t: float, v: Array) -> Array:
+        """The second derivative of Phi in a direction, a number for each equation.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        t
+            Time; in statics the load factor.
+        v
+            The direction, shape (N,).
+        """
+        out = np.zeros(len(self.equations))
+        for k, unit in enumerate(np.eye(len(out))):
+            second = self.curvature(u, t, unit)
+            if second is not None:
+                out[k] = second[2] @ (v[second[0]] * v[second[1]])
+        return out
+
+    def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:
+        """As :meth:`entries`, of a discrete gradient: ``D (u1 - u0) = Phi(u1) - Phi(u0)``.
+
+        That in the middle, which is one where Phi is quadratic.
+
+        Parameters
+        ----------
+        u0, u1
+            Displacements at the ends of a step, shape (N,).
+        t
+            Time in the middle of it.
+
+        Returns
+        -------
+        rows, columns, values
+            Shapes (k,).
+        """
+        return self.entries(0.5 * (u0 + u1), t)
+
+    def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
+                     multipliers: Array) -> Array:
+        """X with ``X . (u1 - u0) = multipliers . D (v1 - v0) / 2``, D of :meth:`mean_entries`.
+
+        By default ``-(multipliers . Phi'') (v0 + v1) / 4`` in the middle, which is one where Phi
+        is quadratic.
+
+        Parameters
+        ----------
+        u0, u1
+            Displacements at the ends of a step, shape (N,).
+        v0, v1
+            Velocities there that the joint allows, shape (N,).
+        t
+            Time in the middle of it.
+        multipliers
+            Shape (m,).
+
+        Returns
+        -------
+        ndarray
+            Shape (N,).
+        """
+        second, v = self.curvature(0.5 * (u0 + u1), t, multipliers), v0 + v1
+        if second is None:
+            return 0.0 * v
+        rows, columns, values = second
+        return -0.25 * np.bincount(rows, values * v[columns], len(v))
+
+    def lost(self, u: Array) -> str:
+        """Why the joint cannot hold in a converged state, in words; "" if it can.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        """
+        return ""
+
+    def offset(self, times: Array, N: int) -> Array:
+        """Phi of the stress-free state at several times.
+
+        A joint that moves may override it to ask for its motion only.
+
+        Parameters
+        ----------
+        times
+            Times, shape (n,).
+        N
+            Number of the scene's coordinates.
+
+        Returns
+        -------
+        ndarray
+            Shape (n, m).
+        """
+        zero = np.zeros(N)
+        return np.array([self.value(zero, t) for t in times])
+
+    @property
+    def turning(self) -> bool:
+        """True if the derivative of Phi in the stress-free state depends on time."""
+        return self.moving and not self.constant
+
+    def moved(self, times: Array, N: int) -> Array:
+        """Those columns of :meth:`offset` that depend on time.
+
+        Parameters
+        ----------
+        times
+            Times, shape (n,).
+        N
+            Number of the scene's coordinates.
+
+        Returns
+        -------
+        ndarray
+            Shape (n, k).
+        """
+        return self.offset(times, N)
+
+    def slope(self, times: Array, N: int) -> tuple[Array, Array]:
+        """The derivative of Phi in the stress-free state at several times.
+
+        Parameters
+        ----------
+        times
+            Times, shape (n,).
+        N
+            Number of the scene's coordinates.
+
+        Returns
+        -------
+        columns, values
+            Shapes (k,) and (n, m, k): of the coordinates on which it depends.
+        """
+        zero = np.zeros(N)
+        if self.turning:
+            return np.arange(N), np.array([self.jacobian(zero, t) for t in times])
+        rows, found, values = self.entries(zero, times[0])
+        columns, where = np.unique(found, return_inverse=True)
+        J = np.zeros((len(self.equations), len(columns)))
+        np.add.at(J, (rows, where), values)
+        return columns, np.broadcast_to(J, (len(times),) + J.shape)
+
+    def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
+        """As :meth:`slope`, by its entries; a joint of many equations overrides it.
+
+        Parameters
+        ----------
+        times
+            Times, shape (n,).
+        N
+            Number of the scene's coordinates.
+
+        Returns
+        -------
+        rows, columns, values
+            Shapes (k,), (k,) and (n, k).
+        """
+        if type(self).slope is Joint.slope and not self.turning:
+            rows, columns, values = self.entries(np.zeros(N), times[0])
+            return rows, columns, values[None].repeat(len(times), axis=0)
+        columns, values = self.slope(times, N)
+        _, m, k = values.shape
+        entry = np.arange(m * k)
+        return entry // k, columns[entry % k], values.reshape(len(times), m * k)
+
+    def driven(self, times: Array, N: int) -> Array:
+        """:meth:`offset`, and beside it the values of :meth:`slope_entries`.
+
+        A joint that moves may override it to ask for its motion once.
+
+        Parameters
+        ----------
+        times
+            Times, shape (n,).
+        N
+            Number of the scene's coordinates.
+
+        Returns
+        -------
+        ndarray
+            Shape (n, m + k).
+        """
+        return np.hstack([self.offset(times, N), self.slope_entries(times, N)[2]])
+
+    def second_entries(self, N: int) -> tuple[Array, Array, Array, Array]:
+        """The second derivatives of Phi in the stress-free state, equation by equation.
+
+        Parameters
+        ----------
+        N
+            Number of the scene's coordinates.
+
+        Returns
+        -------
+        equations, rows, columns, values
+            Shapes (k,).
+        """
+        none = np.zeros(0, dtype=int)
+        if type(self).curvature is Joint.curvature:
+            return none, none, none, np.zeros(0)
+        zero, out = np.zeros(N), [(none, none, none, np.zeros(0))]
+        for row, unit in enumerate(np.eye(len(self.equations))):
+            found = self.curvature(zero, 0.0, unit)
+            if found is not None:
+                i, j, v = (np.asarray(x) for x in found)
+                keep = v != 0
+                out.append((np.full(keep.sum(), row), i[keep], j[keep], v[keep]))
+        k, i, j, v = (np.concatenate(x) for x in zip(*out))
+        return k, i, j, v
+
+    def __repr__(self) -> str:
+        at = getattr(self, "at", None)
+        if isinstance(at, tuple) and len(at) > 1 and all(x is at[0] for x in at):  # given once
+            at = at[0]
+        parts = [type(self).__name__, self.name, None if at is None else f"at {shown(at)}"]
+        return f"<{' '.join(part for part in parts if part)}>"
+
+
+def bind_joint(joint: Joint, layout: Layout) -> Joint:
+    """A copy of a joint, bound to a scene and tried there: what it returns fits the scene.
+
+    Parameters
+    ----------
+    joint
+        A :class:`Joint`, as it was given.
+    layout
+        The :class:`~skfem_ancf.Scene`.
+
+    Raises
+    ------
+    InputError
+        If the joint does not keep to the interface of :class:`Joint`.
+    """
+    # by which it is known again: in a bound copy, on another mesh, in another process
+    if "_key" not in vars(joint):
+        vars(joint)["_key"] = urandom(16).hex()
+    bound = joint._unsealed()
+    try:
+        bound.bind(layout)
+        bound._seal()
+        if not ours(joint):
+            _try(bound, layout.N)
+            sizes = np.concatenate([b.sizes for b in layout.members])
+            beside(partial(_require_derivatives, bound, sizes), sizes)
+    except AncfError:
+        raise
+    except Exception as error:
+        if ours(joint):
+            raise
+        raise InputError(  # it is the user's: it may raise anything
+            f"{joint!r} fails in the stress-free state: {type(error).__name__}: {error}; a joint "
+            "defines bind(scene), value(u, t), jacobian(u, t), and curvature(u, t, multipliers) "
+            "unless that is constant") from error
+    return bound
+
+
+def _try(joint: Joint, n: int) -> None:
+    m, zero = len(joint.equations), np.zeros(n)
+    require_finite(f"value(u, t) of {joint!r}", joint.value(zero, 0.0), (m,))
+    require_finite(f"jacobian(u, t) of {joint!r}", joint.jacobian(zero, 0.0), (m, n))
+    found = joint.curvature(zero, 0.0, np.ones(m))
+    if found is not None:
+        require_entries(f"curvature of {joint!r}", *found, n)
+
+
+def _require_derivatives(joint: Joint, sizes: Array, u: Array, d: Array) -> None:
+    """Raise InputError unless jacobian and curvature of a joint of the user's fit its value."""
+    multipliers = np.cos(np.arange(len(joint.equations)))
+    try:
+        value, *values = (np.asarray(joint.value(u + s * d, 0.0)) for s in (0.0, -1.0, 1.0))
+        J, *others = (joint.jacobian(u + s * d, 0.0) for s in (0.0, -1.0, 1.0))
+        found = joint.curvature(u, 0.0, multipliers)
+    except Exception:  # it may be open too far there
+        return
+    require_slope(f"jacobian(u, t) of {joint!r}", "value(u, t)", values[1] - values[0],
+                  2.0 * (J @ d), 1e-13 * max(1.0, np.abs(value).max()) * np.abs(sizes).max())
+    turned = 0.0 * u
+    if found is not None:
+        i, j, v = found
+        np.add.at(turned, i, v * d[j])
+    change = multipliers @ (others[1] - others[0])
+    require_slope(f"curvature(u, t, multipliers) of {joint!r}, zero unless it is defined,",
+                  "multipliers @ jacobian(u, t)", change * sizes, 2.0 * turned * sizes,
+                  1e-12 * np.max(np.abs(multipliers @ J) * sizes, initial=0.0))
+
+
+def same_joint(a: Joint, b: Joint) -> bool:
+    """True if both are the same joint, bound or not, to whatever mesh.
+
+    Parameters
+    ----------
+    a, b
+        Joints.
+    """
+    return a is b or (getattr(a, "_key", None) is not None
+                      and getattr(a, "_key", None) == getattr(b, "_key", None))
+
+
+#: What a joint or a spring calls the ground in the place of a beam.
+GROUND = "ground"
+
+
+def _fixed(value: Array) -> Vector:
+    """A Vector that does not move."""
+    return Vector(value, np.zeros((2, 0), dtype=int), np.zeros((2, 0)))
+
+
+def _of(layout: Layout, member: Any, start: Array, dofs: Array, weights: Array) -> Vector:
+    """A Vector of coordinates of a beam or body, by their numbers there, without round-off."""
+    found = Vector(start, dofs + layout.offset(member), weights)
+    size = np.maximum.reduce(np.abs(found.weights)) * member.sizes.take(dofs[0])
+    keep = size > 1e-14 * np.maximum.reduce(size)
+    if not np.logical_and.reduce(keep):
+        found.dofs, found.weights = found.dofs[:, keep], found.weights[:, keep]
+    return found
+
+
+def members_at(layout: Layout, at: ArrayLike) -> list[int]:
+    """Numbers of the beams that have a material point at a place, and of bodies around it.
+
+    Parameters
+    ----------
+    layout
+        What :meth:`Joint.bind` was given.
+    at
+        The place (x, y) in the stress-free state, shape (2,), or the name of an end.
+    """
+    found = []
+    if not isinstance(at, str):
+        at = as_point(at)
+    for k, member in enumerate(layout.members):
+        if isinstance(member, RigidBody):
+            if not isinstance(at, str) and member.contains(np.reshape(at, (2, 1)))[0]:
+                found.append(k)
+            continue
+        try:
+            member.locate(at)
+        except MeshError:
+            continue
+        found.append(k)
+    return found
+
+
+def named_place(layout: Layout, place: Any, where_none_is: str | None = None) -> tuple[Any, Any]:
+    """Which beam or body a place is of, and the place there.
+
+    Parameters
+    ----------
+    layout
+        What :meth:`Joint.bind` was given.
+    place
+        (x, y): the material point there; (beam, (x, y)), or another place of a beam; a RigidBody,
+        for its centre of mass; ("ground", (x, y)); "right", for the end that one beam alone has.
+    where_none_is
+        Whose a point is where no beam and no body is: "ground", or None to raise InputError.
+
+    Returns
+    -------
+    which, at
+        As :func:`point` takes them.
+
+    Raises
+    ------
+    InputError
+        If there is no beam and no body, or more than one.
+    """
+    if isinstance(place, RigidBody):
+        return place, None
+    if isinstance(place, (tuple, list)) and len(place) == 2 and not is_point(place):
+        which, at = place
+        if is_ground(which):
+            at = tuple(map(float, require_finite("a point of the ground", at, (2,))))
+        elif isinstance(at, np.ndarray):
+            at = tuple(at.tolist())
+        return which, at
+    found = members_at(layout, place) if isinstance(place, str) else []
+    if not found:
+        place = require_finite("a point of a spring or a joint", place, (2,))
+        found = members_at(layout, place)
+    if len(found) > 1:
+        names = [layout.members[k].name or k for k in found]
+        raise InputError(f"the point {shown(place)} is one of the beams {names}: say which, as "
+                         f"({names[0]!r}, {shown(place)})")
+    if not found and where_none_is is None:
+        raise InputError(f"no beam and no rigid body is at the point {shown(place)}: for one of "
+                         f"the ground write ('ground', {shown(place)}), for one outside of the "
+                         "outline of a rigid body (body, (x, y))")
+    return (found[0] if found else where_none_is), (
+        place if isinstance(place, str) else tuple(map(float, place)))
+
+
+def point(layout: Layout, beam: WhichMember, at: Any) -> Vector:
+    """The position of a material point, as a :class:`Vector`.
+
+    Parameters
+    ----------
+    layout
+        What :meth:`Joint.bind` was given.
+    beam
+        The beam or rigid body, its name or its number; "ground" for a point of the ground.
+    at
+        The point: its place (x, y) in the stress-free state, shape (2,); None for the centre of
+        mass of a rigid body; a place of a beam that is one section, as "left", for its axis there.
+    """
+    if is_ground(beam):
+        return _fixed(np.array(as_point(at)))
+    member = layout.beam(beam)
+    if isinstance(at, str) and not isinstance(member, RigidBody):
+        return section(layout, member, at)[0]
+    dofs, weights = member.probe(at)
+    if isinstance(member, RigidBody):
+        start = member.place(at)
+    else:
+        e, X = member.locate(at)
+        start = member.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
+    return _of(layout, member, start, dofs, weights)
+
+
+def section(layout: Layout, beam: WhichMember, place: Any) -> tuple[Vector, Vector]:
+    """Position and direction of a section, as two :class:`Vector`.
+
+    Parameters
+    ----------
+    layout
+        What :meth:`Joint.bind` was given.
+    beam
+        The beam or rigid body, its name or its number; "ground" for the ground.
+    place
+        A place that is one section, whose position is that of its axis; or a material point (x, y),
+        at which the section through it may lie inside an element. Of a cable the position is that
+        of the axis, and the direction that of its tangent. Of a rigid body a point, or None for its
+        centre of mass.
+    """
+    if is_ground(beam):
+        return point(layout, beam, place), _fixed(np.array([1.0, 0.0]))
+    member = layout.beam(beam)
+    if isinstance(member, RigidBody):
+        dofs, weights = member.section_direction(member.section_node(place))
+        return (point(layout, member, place),
+                _of(layout, member, member.q0[dofs] @ weights, dofs, weights))
+    try:
+        node = member.section_node(place)
+    except MeshError:
+        if not is_point(place):
+            raise
+        return _inner_section(layout, member, place)
+    dofs, weights = member.section_direction(node)
+    direction = _of(layout, member, member.q0_local[dofs] @ weights, dofs, weights)
+    if is_point(place) and member.has_sections:
+        return point(layout, member, place), direction
+    first = layout.offset(member) + node * member.nd
+    return (Vector(member.mesh.p[:, node], np.array([[first], [first + 1]]), np.ones(1)), direction)
+
+
+def _inner_section(layout: Layout, beam: Any, at: Any) -> tuple[Vector, Vector]:
+    """As :func:`section`, for a section inside an element."""
+    e, X = beam.locate(at)
+    if not beam.has_sections:
+        X = np.array([X[0], 0.5])
+        at = beam.mesh.mapping().F(X[:, None], np.array([e]))[:, 0, 0]
+    dofs, _ = beam.probe_reference(e, X)
+    weights = beam.kinematics.direction_weights(beam, e, float(X[0]))
+    return point(layout, beam, at), _of(layout, beam, beam.q0_local[dofs] @ weights, dofs, weights)
+
+
+def each(value: Any, what: str, n: int) -> tuple[Any, ...]:
+    """A place for each of several beams: given once for all of them, or once for each.
+
+    Parameters
+    ----------
+    value
+        One place, or n of them: a tuple, a list, or the rows of an array of points, shape (n, 2).
+    what
+        What it is, for messages.
+    n
+        How many beams there are.
+    """
+    if value is None:
+        raise InputError(f"a joint needs {what}")
+    value = points_of_rows(value)
+    if is_place(value):
+        return (value,) * n
+    if isinstance(value, (tuple, list)) and len(value) == n:
+        return tuple(value)
+    raise InputError(f"a joint of {n} beams needs {what}, one for all of them or one for each, as "
+                     f"at=('right', 'left'), got {shown(value)}")
+
+
+def both_of(name: str, place: Any) -> tuple[Any, Any]:
+    """A beam or body and a place of it; a RigidBody alone is all of it.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    place
+        As (beam, place), or a RigidBody.
+    """
+    if isinstance(place, RigidBody):
+        return place, None
+    if not isinstance(place, (tuple, list)) or len(place) != 2 or is_point(place):
+        raise InputError(f"{name} is a beam with a place of it, as (1, 'left'), or a RigidBody, "
+                         f"got {shown(place)}")
+    return place[0], place[1]
+
+
+def is_ground(beam: Any) -> bool:
+    """True for the name of the ground."""
+    return isinstance(beam, str) and beam == GROUND
+
+
+def several(beams: Any) -> tuple[Any, ...]:
+    """The beams and bodies of a joint, two at least."""
+    if not isinstance(beams, (tuple, list)) or len(beams) < 2:
+        raise InputError("beams must be two beams or rigid bodies or more, by Beam, RigidBody, "
+                         f"name or number, or 'ground', got {shown(beams)}")
+    if all(map(is_ground, beams)):
+        raise InputError(f"a joint holds a beam or a rigid body, got {shown(beams)}")
+    return tuple(beams)
+
+
+def equations_of(names: Sequence[str], n: int) -> tuple[str, ...]:
+    """Names of the equations between the first of n beams and each of the others.
+
+    Parameters
+    ----------
+    names
+        Those between two beams.
+    n
+        How many beams there are.
+    """
+    if n == 2:
+        return tuple(names)
+    return tuple(f"{name}, from number {k}" for k in range(1, n) for name in names)
+
+
+def angle_to(d: ArrayLike, e: ArrayLike) -> float:
+    """The angle from a plane vector e to another one d, in (-2 pi, 2 pi).
+
+    Parameters
+    ----------
+    d, e
+        Shapes (2,).
+    """
+    return float(np.arctan2(*np.flip(d)) - np.arctan2(*np.flip(e)))
+
+
+class Aligned:
+    """``(Q e) x d``, zero where a plane vector d has the direction of another one e, turned by Q.
+
+    Parameters
+    ----------
+    d, e
+        Vectors.
+    Q
+        Matrix, shape (2, 2).
+    """
+
+    def __init__(self, d: Vector, e: Vector, Q: Array) -> None:
+        self.d, self.e, self.Q = d, e, Q
+
+    def value(self, u: Array) -> float:
+        """The number at displacements u (N,) of the scene's coordinates."""
+        e, d = self.Q @ self.e(u), self.d(u)
+        return e[0] * d[1] - e[1] * d[0]
+
+    def terms(self, u: Array) -> list[Any]:
+        """Its derivative, as :func:`gradients` takes it."""
+        e, d = self.Q @ self.e(u), self.d(u)
+        return [(self.d, (-e[1], e[0])), (self.e, (d[1], -d[0]) @ self.Q)]
+
+    def second(self, factor: float) -> tuple[Array, Array, Array]:
+        """Its second derivative times a number: rows, columns and values (k,), both halves."""
+        J = np.array([[0.0, 1.0], [-1.0, 0.0]]) @ self.Q  # d x c = d^T [[0, 1], [-1, 0]] c
+        values = np.einsum("ij,ik,jl->ikjl", J, self.d.weights, self.e.weights)
+        rows = np.broadcast_to(self.d.dofs[:, :, None, None], values.shape).ravel()
+        columns = np.broadcast_to(self.e.dofs[None, None], values.shape).ravel()
+        values = -factor * values.ravel()
+        return np.append(rows, columns), np.append(columns, rows), np.append(values, values)

@@ -1,0 +1,42 @@
+"""The director of a rigid body keeps its length."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .base import Joint
+
+if TYPE_CHECKING:
+    from ...beam.rigid import RigidBody
+    from ...core.types import Array
+
+
+class UnitDirector(Joint):
+    """(d . d - 1) / 2 = 0 for the director d of a rigid body. A system has one for each body.
+
+    Parameters
+    ----------
+    body
+        The body.
+    first
+        Number of its first coordinate.
+    """
+
+    equations = ("length of the director",)
+    constant = False
+
+    def __init__(self, body: RigidBody, first: int) -> None:
+        self.name = body.name
+        self.dofs, self.start = first + 2 + np.arange(2), body.q0[2:]
+
+    def value(self, u: Array, t: float) -> Array:
+        du = u[self.dofs]  # of the start d . d is 1 but for round-off
+        return np.array([self.start @ du + 0.5 * (du @ du)])
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return np.zeros(2, dtype=int), self.dofs, self.start + u[self.dofs]
+
+    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
+        return self.dofs, self.dofs, np.full(2, multipliers[0])

@@ -1,0 +1,107 @@
+"""A point of a beam slides on a line or on a circle."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...core.errors import InputError, require_finite, require_label, require_positive, teaching
+from .base import Joint, gradients, point
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from ...beam.layout import Layout
+    from ...core.types import Array
+    from ...beam.layout import WhichBeam
+
+
+@teaching
+class OnLine(Joint):
+    """n . (r - p) = 0: a material point slides on a straight line.
+
+    Parameters
+    ----------
+    at
+        The material point: its place (x, y) in the stress-free body.
+    direction
+        Direction of the line, shape (2,).
+    beam
+        The beam, by Beam, name or number; None where there is only one.
+    through
+        A point of the line, shape (2,); the material point's stress-free place by default.
+    name
+        What messages call the joint.
+    """
+
+    equations = ("force normal to the line",)
+
+    def __init__(self, at: ArrayLike, direction: ArrayLike, beam: WhichBeam = None,
+                 through: ArrayLike | None = None, name: str | None = None) -> None:
+        d = require_finite("direction", direction, (2,))
+        if not np.any(d):
+            raise InputError("the direction of the line must not be zero")
+        self.normal = np.array([-d[1], d[0]]) / np.hypot(*d)
+        self.through = None if through is None else require_finite("through", through, (2,))
+        self.beam, self.at, self.name = beam, at, require_label("name", name)
+
+    def bind(self, layout: Layout) -> None:
+        self.r = point(layout, self.beam, self.at)
+        self.p = self.r.start if self.through is None else self.through
+        self.found = gradients([(self.r, self.normal)])
+
+    def value(self, u: Array, t: float) -> Array:
+        return np.array([self.normal @ (self.r(u) - self.p)])
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return self.found
+
+
+@teaching
+class OnCircle(Joint):
+    """``(|r - c|^2 - R^2) / (2 R) = 0``: a material point slides on a circle.
+
+    Parameters
+    ----------
+    at
+        The material point: its place (x, y) in the stress-free body.
+    center
+        Centre of the circle, shape (2,).
+    beam
+        The beam, by Beam, name or number; None where there is only one.
+    radius
+        Its radius; the distance of the stress-free point by default.
+    name
+        What messages call the joint.
+    """
+
+    equations = ("force away from the centre",)
+    constant = False
+
+    def __init__(self, at: ArrayLike, center: ArrayLike, beam: WhichBeam = None,
+                 radius: float | None = None, name: str | None = None) -> None:
+        self.center = require_finite("center", center, (2,))
+        self.radius = None if radius is None else require_positive("radius", radius)
+        self.beam, self.at, self.name = beam, at, require_label("name", name)
+
+    def bind(self, layout: Layout) -> None:
+        self.r = point(layout, self.beam, self.at)
+        self.R = self.radius or require_positive(
+            "the distance of the point from the centre", np.hypot(*(self.r.start - self.center)))
+        if self.R < 1e-9 * np.hypot(*(self.r.start - self.center)):
+            raise InputError(f"radius = {self.R!r} is nothing beside the distance of the point "
+                             "from the centre")
+
+    def value(self, u: Array, t: float) -> Array:
+        d = self.r(u) - self.center
+        return np.array([(d @ d - self.R**2) / (2 * self.R)])
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return gradients([(self.r, (self.r(u) - self.center) / self.R)])
+
+    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
+        w = self.r.weights
+        values = np.einsum("ik,il->ikl", w, w) * (multipliers[0] / self.R)
+        rows = np.broadcast_to(self.r.dofs[:, :, None], values.shape)
+        return rows.ravel(), rows.transpose(0, 2, 1).ravel(), values.ravel()

@@ -1,0 +1,56 @@
+"""Two beams or more share a point and turn freely about it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...core.errors import require_label, teaching
+from .base import Joint, each, equations_of, gradients, point, several
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ...beam.layout import Layout
+    from ...core.types import Array
+
+
+@teaching
+class Hinge(Joint):
+    """r_a = r_b for a material point of each of two beams, and of a third, and so on.
+
+    Parameters
+    ----------
+    beams
+        Two or more, each a Beam or a RigidBody, its name or its number, or "ground".
+    at
+        The point, its place (x, y) in the stress-free bodies; or one point for each beam, if they
+        are apart. None is the centre of mass of a rigid body.
+    name
+        What messages call the joint.
+
+    References
+    ----------
+    Eq. (26) of "A series of locking-free beam element models in absolute nodal coordinate
+    formulation", Archive of Applied Mechanics (2024).
+    """
+
+    def __init__(self, beams: Sequence[Any], at: Any, name: str | None = None) -> None:
+        self.beams = several(beams)
+        self.at = each(at, "the point at=", len(self.beams))
+        self.name = require_label("name", name)
+        self.equations = equations_of(("force along x", "force along y"), len(self.beams))
+
+    def bind(self, layout: Layout) -> None:
+        self.points = [point(layout, beam, at) for beam, at in zip(self.beams, self.at)]
+        first = self.points[0]
+        self.found = gradients(*([(first, e), (other, -e)]
+                                 for other in self.points[1:] for e in np.eye(2)))
+
+    def value(self, u: Array, t: float) -> Array:
+        first = self.points[0](u)
+        return np.concatenate([first - other(u) for other in self.points[1:]])
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return self.found

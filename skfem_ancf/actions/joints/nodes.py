@@ -1,0 +1,369 @@
+"""The nodes of a frame: the ends of its lines that meet, all at once."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from ...core.kept import cached_property
+from .base import Joint
+from .settlements import HELD, Settlements
+
+if TYPE_CHECKING:
+    from ...beam.beam import Beam
+    from ...mesh.frame_graph import Net
+    from ...beam.layout import Layout
+    from ...core.types import Array
+
+FORCE_X, FORCE_Y, MOMENT = "force along x", "force along y", "moment"
+
+
+class Nodes(Joint):
+    """Ends that meet at a node share its position, and those that are rigid its rotation.
+
+    The ends are those of all chains of all beams: first the start and the end of the first chain of
+    the first beam. At each node the first rigid end, or else the first, leads the others: the
+    equations are ``r_leader - r = 0`` and ``g x g_leader = 0`` with the direction g of a section,
+    seen from that of the stress-free state, as in :class:`~skfem_ancf.actions.joints.Weld`; then
+    those of what is held, ``r - r_0 = d`` and ``(cos a, sin a) x g = 0`` of the leader, with what
+    it is displaced by. Unknowns of the nodes take the place of the multipliers where the linear
+    systems are solved, see :mod:`skfem_ancf.equations.condensation`.
+
+    Parameters
+    ----------
+    nodes
+        The node of each end, shape (ends,).
+    hinged
+        Whether the end may turn against its node, shape (ends,).
+    held
+        Whether the positions along x and y and the rotation of each node are held, (number, 3).
+    net
+        The :class:`~skfem_ancf.mesh.frame_graph.Net` that has the nodes.
+    lines
+        Number of the line of each chain, shape (ends / 2,).
+    settled
+        What held nodes are displaced by,
+        :class:`~skfem_ancf.actions.joints.settlements.Settlements`.
+
+    Attributes
+    ----------
+    leader
+        The end that leads at the node of each end, shape (ends,).
+    followers, turned
+        Ends that follow the position of another; those that follow its rotation, too.
+    held_x, held_y, held_angle
+        Leading ends that are held.
+    positions, directions, weights
+        Coordinates of each end's position, (ends, 2), those of the direction of its section, (2,
+        ends, n), and their weights, (ends, n): zero where a beam has less of them.
+    """
+
+    constant = False
+
+    def __init__(self, nodes: Array, hinged: Array, held: Array, net: Net, lines: Array,
+                 settled: Settlements | None = None) -> None:
+        self.nodes, self.hinged, self.held = nodes, hinged, held
+        self.settled = Settlements(np.zeros(held.shape)) if settled is None else settled
+        #: functions of time of these
+        self.functions = self.settled.functions
+        self.net, self.lines = net, lines
+        # rigid ends before hinged ones: the first of each node leads
+        order = np.lexsort((np.arange(len(nodes)), hinged, nodes))
+        _, first = np.unique(nodes[order], return_index=True)
+        self.leaders = order[first]
+        self.leader = self.leading(nodes)
+        follows = self.leader != np.arange(len(nodes))
+        self.followers = np.flatnonzero(follows)
+        self.turned = np.flatnonzero(follows & ~hinged)
+        self.held_x, self.held_y, self.held_angle = (
+            self.leaders[held[nodes[self.leaders], k]] for k in range(3))
+        self.held_angle = self.held_angle[~hinged[self.held_angle]]
+        n, k = len(self.followers), len(self.turned)
+        self.equations = ((FORCE_X,) * n + (FORCE_Y,) * n + (MOMENT,) * k
+                          + (FORCE_X,) * len(self.held_x) + (FORCE_Y,) * len(self.held_y)
+                          + (MOMENT,) * len(self.held_angle))
+
+    @property
+    def moving(self) -> bool:  # type: ignore[override]
+        """True if a node is given a displacement."""
+        return any(self.settled.moves(k) for k in range(len(HELD)))
+
+    @property
+    def turning(self) -> bool:
+        return self.settled.moves(HELD.index("angle"))
+
+    def _shifts(self, times: Array) -> list[Array]:
+        """What held ends are displaced by: along x and y, and angles, shapes (n, k) each."""
+        ends = self.held_x, self.held_y, self.held_angle
+        return [self.settled.by(self.nodes[at], k, times) for k, at in enumerate(ends)]
+
+    def leading(self, nodes: Array) -> Array:
+        """The ends that lead at some nodes, shape (k,).
+
+        Parameters
+        ----------
+        nodes
+            Numbers of the nodes, shape (k,).
+        """
+        return self.leaders[np.searchsorted(self.nodes[self.leaders], nodes)]
+
+    def bind(self, layout: Layout) -> None:
+        positions, directions, weights, start = [], [], [], []
+        for k, beam in enumerate(layout.beams):
+            at, first = chain_ends(beam).ravel(), layout.offset(k)
+            dofs, c = _directions(beam, at)
+            q0 = beam.q0_local[dofs]
+            start.append(np.sum(c * (q0[0] + 1j * q0[1]), axis=1))
+            positions.append(first + at[:, None] * beam.nd + np.arange(2))
+            directions.append(first + dofs)
+            weights.append(c)
+        n = max(c.shape[1] for c in weights)
+        self.directions = np.concatenate([np.concatenate(
+            [d, np.repeat(d[..., :1], n - d.shape[2], axis=2)], axis=2) for d in directions], 1)
+        self.weights = np.concatenate([np.pad(c, ((0, 0), (0, n - c.shape[1]))) for c in weights])
+        self.positions, self.start = np.concatenate(positions), np.concatenate(start)
+        #: what takes directions to the frame of the stress-free state, as complex numbers
+        self.frame = 1.0 / self.start
+
+    def turns(self, u: Array) -> Array:
+        """The direction of each end's section, seen from that of the stress-free state.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+
+        Returns
+        -------
+        ndarray
+            Complex, shape (ends,): stretch times ``exp(i angle)``.
+        """
+        d = u[self.directions]
+        return 1.0 + self.frame * np.sum(self.weights * (d[0] + 1j * d[1]), axis=1)
+
+    def value(self, u: Array, t: float) -> Array:
+        g, r = self.turns(u), u[self.positions]
+        gap = r[self.leader[self.followers]] - r[self.followers]
+        angle = np.conj(g[self.turned]) * g[self.leader[self.turned]]
+        x, y, turn = (shift[0] for shift in self._shifts(np.array([t])))
+        return np.concatenate([gap[:, 0], gap[:, 1], angle.imag, r[self.held_x, 0] - x,
+                               r[self.held_y, 1] - y,
+                               (np.exp(-1j * turn) * g[self.held_angle]).imag])
+
+    def offset(self, times: Array, N: int) -> Array:
+        moved = self.moved(times, N)
+        out = np.zeros((len(times), len(self.equations)))
+        out[:, out.shape[1] - moved.shape[1]:] = moved
+        return out
+
+    def moved(self, times: Array, N: int) -> Array:
+        x, y, turn = self._shifts(times)
+        return np.hstack([-x, -y, -np.sin(turn)])
+
+    @cached_property
+    def _pattern(self) -> tuple[Array, Array, Array]:
+        """Rows and columns of all entries, and the values of the equations of positions."""
+        s, n, k = self.followers, len(self.followers), len(self.turned)
+        m, row = self.leader[s], np.arange(len(self.followers))
+        x, y = self.positions.T
+        a = 2 * n + k + np.arange(len(self.held_x))
+        b = a.size + 2 * n + k + np.arange(len(self.held_y))
+        angles = [(2 * n, self.leader[self.turned]), (2 * n, self.turned),
+                  (len(self.equations) - len(self.held_angle), self.held_angle)]
+        rows, columns = [row, row, n + row, n + row, a, b], [
+            x[m], x[s], y[m], y[s], x[self.held_x], y[self.held_y]]
+        for first, ends in angles:
+            at = self.directions[:, ends].transpose(1, 0, 2)
+            rows.append(np.broadcast_to(first + np.arange(len(ends))[:, None, None], at.shape))
+            columns.append(at)
+        values = np.ones(4 * n + len(a) + len(b))
+        values[n:2 * n] = values[3 * n:4 * n] = -1.0
+        i, j = (np.concatenate([x.ravel() for x in parts]) for parts in (rows, columns))
+        return i, j, values
+
+    def _angles(self, factors: Array, ends: Array) -> Array:
+        """Values of ``Im(factor dg)`` of some ends."""
+        z = (factors * self.frame[ends])[:, None] * self.weights[ends]
+        return np.stack([z.imag, z.real], axis=1).ravel()
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        (rows, columns, _), values = self._pattern, self._values(u, t)
+        keep = values != 0.0
+        return rows[keep], columns[keep], values[keep]
+
+    def _values(self, u: Array, t: float) -> Array:
+        """Of :meth:`entries`, with those that are zero; turns of held ends are the last."""
+        g, s = self.turns(u), self.turned
+        m = self.leader[s]
+        return np.concatenate([
+            self._pattern[2], self._angles(np.conj(g[s]), m), self._angles(-np.conj(g[m]), s),
+            self._angles(np.exp(-1j * self._shifts(np.array([t]))[2][0]), self.held_angle)])
+
+    @cached_property
+    def _places(self) -> Any:
+        """Where the values go in :meth:`derivative`, whose data are their numbers."""
+        rows, columns, _ = self._pattern
+        return sparse.csr_array((np.arange(len(rows)), (rows, columns)))
+
+    def derivative(self, u: Array, t: float) -> sparse.csr_array:
+        """The derivative of :meth:`value`, shape (m, N), of one pattern.
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the scene's coordinates, shape (N,), and time.
+        """
+        at = self._places
+        return sparse.csr_array((self._values(u, t)[at.data], at.indices, at.indptr),
+                                shape=(len(self.equations), len(u)))
+
+    def slope_entries(self, times: Array, N: int) -> tuple[Array, Array, Array]:
+        (rows, columns, _), values = self._pattern, self._values(np.zeros(N), 0.0)
+        out = np.tile(values, (len(times) if self.turning else 1, 1))
+        if self.turning:
+            for row, turn in zip(out, self._shifts(times)[2]):
+                last = self._angles(np.exp(-1j * turn), self.held_angle)
+                row[len(row) - len(last):] = last
+        return rows, columns, np.broadcast_to(out, (len(times), len(values)))
+
+    def second_entries(self, N: int) -> tuple[Array, Array, Array, Array]:
+        s, first = self.turned, 2 * len(self.followers)
+        m, unit = self.leader[s], np.array([1.0, 1j])
+        a = (self.frame[s, None] * self.weights[s])[:, None] * unit[:, None]  # (k, 2, n)
+        b = (self.frame[m, None] * self.weights[m])[:, None] * unit[:, None]
+        values = (np.conj(a)[:, :, :, None, None] * b[:, None, None]).imag
+        i = np.broadcast_to(self.directions[:, s].transpose(1, 0, 2)[..., None, None], values.shape)
+        j = np.broadcast_to(self.directions[:, m].transpose(1, 0, 2)[:, None, None], values.shape)
+        k = np.broadcast_to(first + np.arange(len(s))[:, None, None, None, None], values.shape)
+        i, j, k, values = i.ravel(), j.ravel(), k.ravel(), values.ravel()
+        keep = values != 0.0
+        i, j, k, values = i[keep], j[keep], k[keep], values[keep]
+        return (np.append(k, k), np.append(i, j), np.append(j, i), np.append(values, values))
+
+    def curvature(self, u: Array, t: float,
+                  multipliers: Array) -> tuple[Array, Array, Array]:
+        k, i, j, values = self.second_entries(len(u))
+        return i, j, multipliers[k] * values
+
+    def quadratic(self, u: Array, t: float, v: Array) -> Array:
+        k, i, j, values = self.second_entries(len(u))
+        return np.bincount(k, values * v[i] * v[j], len(self.equations))
+
+    def split(self, multipliers: Array) -> tuple[Array, ...]:
+        """Forces (followers, 2) and moments (turned,) of followers, and those that hold nodes.
+
+        Parameters
+        ----------
+        multipliers
+            Of the equations, or what they are open by, shape (m,).
+
+        Returns
+        -------
+        tuple
+            Of shapes (followers, 2), (turned,), (held_x,), (held_y,) and (held_angle,).
+        """
+        n = len(self.followers)
+        sizes = [n, n, len(self.turned), len(self.held_x), len(self.held_y)]
+        x, y, *others = np.split(multipliers, np.cumsum(sizes))
+        return np.stack([x, y], axis=1), *others
+
+    def reaction(self, place: Any, u: Array, multipliers: Array) -> tuple[Array, float, dict]:
+        """What holds some nodes: force, moment about the first of them, and both by name.
+
+        Parameters
+        ----------
+        place
+            Nodes, see :meth:`~skfem_ancf.mesh.frame_graph.Net.nodes_at`.
+        u, multipliers
+            Displacement of the scene's coordinates, shape (N,), and multipliers, (m,).
+        """
+        out, nodes = np.zeros(self.held.shape), self.net.nodes_at(place)
+        ends = self.held_x, self.held_y, self.held_angle
+        for k, (at, part) in enumerate(zip(ends, self.split(multipliers)[2:])):
+            scale = np.abs(self.turns(u)[at]) if k == 2 else 1.0
+            out[self.nodes[at], k] = -part * scale
+        x, y, moment = out[nodes].T
+        r = self.net.points[:, nodes] + u[self.positions[self.leading(nodes)]].T
+        (a, b), held = r - r[:, :1], np.any(self.held[nodes], axis=0)
+        total = {name: float(np.sum(out[nodes, k])) for k, name in enumerate(HELD) if held[k]}
+        return np.array([x.sum(), y.sum()]), float(np.sum(moment + a * y - b * x)), total
+
+    def parts(self) -> Array:
+        """Of each chain the number of the rigid part it is in: lines that are joined rigidly."""
+        n = len(self.nodes) // 2
+        links = sparse.coo_array((np.ones(len(self.turned)),
+                                  (self.turned // 2, self.leader[self.turned] // 2)), (n, n))
+        return np.asarray(connected_components(links, directed=False)[1])
+
+    def held_motions(self, parts: Array, origin: Array, size: float,
+                     number: int) -> sparse.csr_array:
+        """What nodes and supports hold of the motions of rigid parts, one row each.
+
+        Parameters
+        ----------
+        parts
+            What :meth:`parts` returns, shape (ends / 2,).
+        origin, size
+            Of the motions, two translations and a rotation of each part: shape (2,), and a length.
+        number
+            Of parts and other bodies.
+
+        Returns
+        -------
+        scipy.sparse.csr_array
+            Shape (rows, 3 number).
+        """
+        part = np.repeat(parts, 2)
+        x, y = (self.net.points[:, self.nodes] - origin[:, None]) / size
+        one = np.ones(len(x))
+        motion = np.array([[one, 0 * one, -y], [0 * one, one, x], [0 * one, 0 * one, one]])
+        s = self.followers[part[self.followers] != part[self.leader[self.followers]]]
+        rows, at, row = [np.zeros((0, 3))], [s[:0]], [s[:0]]
+        count = 0
+        for k, ends, others in ((0, self.leader[s], s), (1, self.leader[s], s),
+                                (0, self.held_x, s[:0]), (1, self.held_y, s[:0]),
+                                (2, self.held_angle, s[:0])):
+            rows += [motion[k, :, ends], -motion[k, :, others]]
+            at += [part[ends], part[others]]
+            row += [count + np.arange(len(ends)), count + np.arange(len(others))]
+            count += len(ends)
+        columns = 3 * np.concatenate(at)[:, None] + np.arange(3)
+        return sparse.csr_array(
+            (np.concatenate(rows).ravel(), (np.repeat(np.concatenate(row), 3), columns.ravel())),
+            shape=(count, 3 * number))
+
+    def describe(self, parts: Array) -> list[str]:
+        """Which rigid parts are meant, for messages.
+
+        Parameters
+        ----------
+        parts
+            What :meth:`parts` returns, shape (ends / 2,).
+        """
+        _, first = np.unique(parts, return_index=True)
+        if len(first) == 1:
+            return [""]
+        return [f" of the part with line {self.lines[k]}" for k in first]
+
+    def __repr__(self) -> str:
+        return f"<Nodes of {len(self.leaders)} nodes>"
+
+
+def chain_ends(beam: Beam) -> Array:
+    """The first and the last node of each chain of a beam's mesh, shape (chains, 2)."""
+    left, right = beam.mesh.t
+    return np.stack([np.setdiff1d(left, right), np.setdiff1d(right, left)], axis=1)
+
+
+def _directions(beam: Beam, nodes: Array) -> tuple[Any, Array]:
+    """Coordinates (2, nodes, n) and weights (nodes, n) of the directions of sections."""
+    if beam.mesh.heights is None:
+        dofs, c = beam.section_direction(int(nodes[0]))
+        shift = beam.nd * (nodes - nodes[0])
+        return dofs[:, None] + shift[:, None], np.tile(c, (len(nodes), 1))
+    found = [beam.section_direction(int(node)) for node in nodes]
+    return np.stack([dofs for dofs, _ in found], axis=1), np.array([c for _, c in found])

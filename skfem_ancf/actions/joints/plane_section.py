@@ -1,0 +1,55 @@
+"""An end section keeps its direction as a plane, and may change its thickness."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...core.errors import require_label, teaching
+from .base import Joint
+
+if TYPE_CHECKING:
+    from ...beam.layout import Layout
+    from ...core.types import Array, Place
+    from ...beam.layout import WhichBeam
+
+
+@teaching
+class PlaneSection(Joint):
+    """t . r_Y = 0 at every section point: no section slope leaves the stress-free plane.
+
+    For a cable, n . r_X = 0. On a beam along a coordinate axis it only fixes coordinates.
+
+    Parameters
+    ----------
+    at
+        The end section, "left" or "right".
+    beam
+        The beam, by Beam, name or number; None where there is only one.
+    name
+        What messages call the joint.
+    """
+
+    def __init__(self, at: Place, beam: WhichBeam = None, name: str | None = None) -> None:
+        self.at, self.beam, self.name = at, beam, require_label("name", name)
+
+    def bind(self, layout: Layout) -> None:
+        beam = layout.beam(self.beam)
+        node = beam.section_node(self.at)
+        t = beam.mesh.p_X[:, node]
+        direction, held = beam.kinematics.plane(beam, t)
+        self.direction = np.array([0.0 if abs(x) < 1e-14 else x for x in direction.tolist()])
+        first = layout.offset(beam) + node * beam.nd
+        self.equations = tuple(f"moment on {beam.element.dofnames[k]}" for k in held)
+        parts = [c for c in (0, 1) if self.direction[c]]
+        dofs = np.array([[first + 2 * k + c for c in parts] for k in held])
+        self.found = (np.array([row for row in range(len(held)) for _ in parts]), dofs.ravel(),
+                      np.array([self.direction[c] for c in parts] * len(held)))
+        self.dofs, self.along = dofs, self.direction[parts]
+
+    def value(self, u: Array, t: float) -> Array:
+        return u.take(self.dofs).dot(self.along)
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return self.found

@@ -1,0 +1,188 @@
+"""A point or a section follows a given motion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy
+
+from ...core.errors import (ask_array, ask_number, require_finite_scalar, require_function,
+                            require_label, teaching)
+from ...beam.rigid import on_body
+from ...core.sampling import Sampled
+from .base import Aligned, Joint, angle_to, both_of, gradients, point, rotation, section
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
+
+    from ...beam.layout import Layout
+    from ...core.types import Array
+    from ...beam.layout import WhichMember
+
+#: Pieces of an integral over time, at most.
+PIECES = 500
+
+
+@teaching
+class PrescribedPosition(Joint):
+    """r = r(t) for a material point. At a node of the axis it only fixes coordinates.
+
+    Parameters
+    ----------
+    at
+        The material point: its place (x, y) in the stress-free body, or the name of an end; of a
+        RigidBody, which may stand here too, its centre of mass if no point is given.
+    r
+        The motion: a function of time that returns the position (2,).
+    beam
+        The beam, by Beam, name or number; None where there is only one.
+    name
+        What messages call the joint.
+    """
+
+    equations = ("force along x", "force along y")
+    moving = True
+
+    def __init__(self, at: Any = None, r: Callable[[float], ArrayLike] | None = None,
+                 beam: WhichMember = None, name: str | None = None) -> None:
+        self.motion = require_function("r", r, "of time that returns a position (2,)")
+        self.at, self.beam = on_body(at, beam)
+        self.name = require_label("name", name)
+
+    def bind(self, layout: Layout) -> None:
+        self.r, self._motion = point(layout, self.beam, self.at), Sampled(self.motion, "r", (2,))
+        self.found = gradients(*([(self.r, e)] for e in np.eye(2)))
+
+    def value(self, u: Array, t: float) -> Array:
+        return self.r(u) - ask_array("r(t={:g})", (2,), self.motion, t)
+
+    def offset(self, times: Array, N: int) -> Array:
+        return self.r.start - self._motion(times)
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return self.found
+
+
+@teaching
+class PrescribedAngle(Joint):
+    """The direction of a section or a rigid body has turned by angle(t): e(t) x d = 0.
+
+    Parameters
+    ----------
+    at
+        The section, as "left" or "right" or a point through which it goes; a RigidBody. Not asked
+        for where ``beam`` is a RigidBody.
+    angle
+        The angle in radians as a function of time, from the stress-free state, counterclockwise.
+    beam
+        The beam, by Beam, name or number; None where there is only one. Or a RigidBody.
+    name
+        What messages call the joint.
+    """
+
+    equations = ("moment",)
+    constant = False
+    moving = True
+
+    def __init__(self, at: Any = None, angle: Callable[[float], float] | None = None,
+                 beam: WhichMember = None, name: str | None = None) -> None:
+        self.angle = require_function("angle", angle, "of time that returns radians")
+        self.at, self.beam = on_body(at, beam)
+        self.name = require_label("name", name)
+
+    def bind(self, layout: Layout) -> None:
+        _, self.d = section(layout, self.beam, self.at)
+        self.start, self._angles = np.arctan2(*self.d.start[::-1]), Sampled(self.angle, "angle", ())
+        n = self.d.dofs.shape[1]
+        of = self._of_normal = np.zeros((2, 1 + 2 * n))  # offset and slope, see driven
+        of[:, 0], (of[0, 1:1 + n], of[1, 1 + n:]) = self.d.start, self.d.weights
+
+    def _angle(self, t: float) -> float:
+        return ask_number("angle(t={:g})", self.angle, t)
+
+    def value(self, u: Array, t: float) -> Array:
+        a, d = self.start + self._angle(t), self.d(u)
+        return np.array([np.cos(a) * d[1] - np.sin(a) * d[0]])
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        a = self.start + self._angle(t)
+        return gradients([(self.d, (-np.sin(a), np.cos(a)))])
+
+    def driven(self, times: Array, N: int) -> Array:
+        a = self.start + self._angles(times)
+        normals = np.empty((len(a), 2))
+        normals[:, 0], normals[:, 1] = -np.sin(a), np.cos(a)
+        return normals @ self._of_normal
+
+    def offset(self, times: Array, N: int) -> Array:
+        return self.driven(times, N)[:, :1]
+
+    def slope(self, times: Array, N: int) -> tuple[Array, Array]:
+        return self.d.dofs.ravel(), self.driven(times, N)[:, None, 1:]
+
+
+class Turned:
+    """The integral of an angular velocity from the time 0, as a function of time.
+
+    Parameters
+    ----------
+    speed
+        The angular velocity: a number, or a function of time.
+    """
+
+    def __init__(self, speed: float | Callable[[float], float]) -> None:
+        self.speed = require_function("speed", speed, "of time that returns radians per time") if (
+            callable(speed)) else require_finite_scalar("speed", speed)
+
+    def __call__(self, t: float) -> float:
+        if not callable(self.speed):
+            return self.speed * t
+        return float(scipy.integrate.quad(
+            lambda s: ask_number("speed(t={:g})", self.speed, s), 0.0, t,
+            epsabs=1e-13, epsrel=1e-13, limit=PIECES)[0])
+
+
+@teaching
+class PrescribedTurn(Joint):
+    """The angle between two sections or rigid bodies grows by angle(t): d x (R(t) e) = 0.
+
+    Parameters
+    ----------
+    at, other
+        Each (beam, place) with a Beam, a RigidBody, a name or a number, and a place as for
+        :class:`PrescribedAngle`. What turns, and from what its angle is measured.
+    angle
+        The angle in radians as a function of time, from the stress-free state, counterclockwise.
+    name
+        What messages call the joint.
+    """
+
+    equations = ("moment",)
+    constant = tabled = False
+    moving = True
+
+    def __init__(self, at: Any, other: Any, angle: Callable[[float], float],
+                 name: str | None = None) -> None:
+        self.angle = require_function("angle", angle, "of time that returns radians")
+        self.at, self.other = both_of("at", at), both_of("other", other)
+        self.name = require_label("name", name)
+
+    def bind(self, layout: Layout) -> None:
+        (_, self.d), (_, self.e) = (section(layout, *place) for place in (self.at, self.other))
+        self.start = angle_to(self.d.start, self.e.start)
+
+    def _turned(self, t: float) -> Aligned:
+        return Aligned(self.d, self.e, rotation(
+            self.start + ask_number("angle(t={:g})", self.angle, t)))
+
+    def value(self, u: Array, t: float) -> Array:
+        return np.array([self._turned(t).value(u)])
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return gradients(self._turned(t).terms(u))
+
+    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
+        return self._turned(t).second(multipliers[0])

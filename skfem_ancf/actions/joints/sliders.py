@@ -1,0 +1,348 @@
+"""A point slides along the axis of a beam, or along a straight line of a rigid body."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from skfem.helpers import dot
+
+from ...core.errors import InputError, require_finite, require_flag, require_label, shown, teaching
+from ...beam.layout import select_beam
+from ...mesh.mapping import cross
+from .axis import Axis
+from .base import (GROUND, Aligned, Joint, Vector, angle_to, gradients, named_place, point,
+                   rotation, section)
+from .spans import Family, Product, Span
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from ...beam.layout import Layout
+    from ...core.types import Array
+    from ...beam.layout import WhichBeam, WhichMember
+
+#: How far beyond an end of a beam a sleeve may be, in elements.
+BEYOND = 1e-6
+
+
+def _pairs(A: Array, B: Array) -> Array:
+    """a_i x b_j of the columns of two matrices, made symmetric."""
+    M = np.outer(A[0], B[1]) - np.outer(A[1], B[0])
+    return M + M.T
+
+
+def _dots(A: Array, B: Array) -> Array:
+    """a_i . b_j of the columns of two matrices, made symmetric."""
+    M = A.T @ B
+    return M + M.T
+
+
+@teaching
+class Sleeve(Joint):
+    """A material point slides along the axis of a beam.
+
+    With the point p and the point c(s) of the axis that is nearest to it, ``c'(s) . (p - c(s)) =
+    0``, the equation is ``c'(s) x (p - c(s)) = 0``, c' the derivative by the length of the
+    stress-free axis. So s is no coordinate, and the multiplier is the force normal to the axis over
+    its stretch. With ``angle`` the direction of the point's section keeps its angle with c'.
+
+    Parameters
+    ----------
+    at
+        The point: (beam, (x, y)) with a Beam, a RigidBody, a name or a number, or
+        ("ground", (x, y)); a RigidBody for its centre of mass.
+    on
+        The beam along which it slides, its name or its number.
+    angle
+        Keep the angle: a sleeve that carries a moment.
+    name
+        What messages call the joint.
+
+    Raises
+    ------
+    InputError
+        If the point is not on the axis in the stress-free state.
+
+    References
+    ----------
+    Hong, Ren: "Modeling of sliding joint on one-dimensional flexible medium", Multibody System
+    Dynamics 26 (2011), who have s as a coordinate.
+    """
+
+    constant = tabled = False
+    #: of the last two displacements: the parameter, and derivatives
+    _known: list[dict[str, Any]]
+
+    def __init__(self, at: Any, on: WhichBeam, angle: bool = False,
+                 name: str | None = None) -> None:
+        self.at, self.on, self.angle = at, on, require_flag("angle", angle)
+        self.name = require_label("name", name)
+        self.equations = ("force normal to the axis",) + ("moment",) * self.angle
+
+    def bind(self, layout: Layout) -> None:
+        which, at = named_place(layout, self.at)
+        beam = select_beam(layout.beams, self.on)
+        if which != GROUND and layout.beam(which) is beam:
+            raise InputError(f"{self!r}: a point of {beam!r} cannot slide along the beam itself")
+        self.axis = Axis(beam, layout.offset(beam))
+        zero = np.zeros(layout.N)
+        self._known = []
+        if self.angle:
+            self.p, self.d = section(layout, which, at)
+        else:
+            self.p = self.d = point(layout, which, at)
+        s = self.axis.nearest(zero, self.p.start)
+        gap = np.hypot(*(self.p.start - self.axis.at(zero, s)[0]))
+        if gap > 1e-6 * beam.size or self._outside(s):
+            raise InputError(f"{self!r}: the point ({self.p.start[0]:.6g}, {self.p.start[1]:.6g}) "
+                             f"is {gap:.6g} off the axis of {beam!r}: name one that is on it")
+        tangent = self.axis.at(zero, s)[1]
+        self.Q = rotation(angle_to(self.d.start, tangent))
+
+    def __repr__(self) -> str:
+        return f"<Sleeve {f'{self.name} ' if self.name else ''}at {shown(self.at)}>"
+
+    def _outside(self, s: float) -> bool:
+        return not -BEYOND <= s <= self.axis.beam.mesh.nelements + BEYOND
+
+    def distance(self, u: Array) -> float:
+        """Where the point is: the length of the stress-free axis from its left end.
+
+        Parameters
+        ----------
+        u
+            Displacement of the scene's coordinates, shape (N,).
+        """
+        return self.axis.length(self._parameter(np.asarray(u)))
+
+    def lost(self, u: Array) -> str:
+        s = self._parameter(u)
+        if not self._outside(s):
+            return ""
+        end = "left" if s < 0 else "right"
+        beam = self.axis.beam
+        return (f"{self!r} has left the beam {beam.name or ''!r} at its {end} end: "
+                "stop before, with until=, hold it by a spring or a support, or lengthen the beam")
+
+    def _at(self, u: Array) -> dict[str, Any]:
+        """What is known of a displacement, which comes to the front."""
+        for k, known in enumerate(self._known):
+            if np.array_equal(known["u"], u):
+                self._known.insert(0, self._known.pop(k))
+                return known
+        self._known[1:] = self._known[:1]
+        self._known[:1] = [{"u": u.copy(), "s": self.axis.nearest(u, self.p(u))}]
+        return self._known[0]
+
+    def _parameter(self, u: Array) -> float:
+        return float(self._at(u)["s"])
+
+    def _terms(self, u: Array) -> tuple[Any, ...]:
+        """Coordinates, position and derivatives of the axis, and what depends on coordinates."""
+        s = self._parameter(u)
+        dofs, weights = self.axis.weights(s)
+        e = self.axis.element(s)
+        # by the length of the stress-free axis
+        weights = weights / self.axis.beam.mesh.lengths[e] ** np.arange(4)[:, None]
+        c = self.axis.at(u, s) / self.axis.beam.mesh.lengths[e] ** np.arange(4)[:, None]
+        columns = np.concatenate([self.p.dofs.ravel(), self.d.dofs.ravel(), dofs.ravel()])
+        P, D, C = (np.zeros((2, len(columns))) for _ in range(3))
+        n, m = self.p.dofs.shape[1], self.d.dofs.shape[1]
+        at, parts = 0, ((P, self.p.weights, n), (D, self.d.weights, m))
+        for matrix, rows, size in parts:
+            for k in range(2):
+                matrix[k, at:at + size] = rows[k]
+                at += size
+        nb, Cs = weights.shape[1], []
+        for row in weights:
+            C = np.zeros((2, len(columns)))
+            C[0, at:at + nb] = C[1, at + nb:] = row
+            Cs.append(C)
+        return columns, c, self.p(u) - c[0], P - Cs[0], Cs, D
+
+    def value(self, u: Array, t: float) -> Array:
+        s = self._parameter(u)
+        c, d = self.axis.at(u, s)[:2]
+        d = d / self.axis.beam.mesh.lengths[self.axis.element(s)]
+        out = [cross(d, self.p(u) - c)]
+        if self.angle:
+            out.append(cross(self.d(u), self.Q @ d))
+        return np.array(out)
+
+    def _slopes(self, u: Array) -> tuple[Any, ...]:
+        """The derivatives of the equations and of s, and what they are made of."""
+        known = self._at(u)
+        if "slopes" not in known:
+            known["slopes"] = self._differentiate(u)
+        return known["slopes"]
+
+    def _differentiate(self, u: Array) -> tuple[Any, ...]:
+        columns, c, e, E, C, D = self._terms(u)
+        Gs = c[2] @ e - c[1] @ c[1]
+        s_y = -(c[1] @ E + e @ C[1]) / Gs
+        first = [(cross(c[2], e), cross(c[1], E) - cross(e, C[1]))]
+        if self.angle:
+            d, Q = self.d(u), self.Q
+            first.append((cross(d, Q @ c[2]), cross(d, Q @ C[1]) - cross(Q @ c[1], D)))
+        return columns, c, e, E, C, D, Gs, s_y, first
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        columns, *_, s_y, first = self._slopes(u)
+        rows = [slope + by_s * s_y for by_s, slope in first]
+        k = len(rows)
+        return (np.repeat(np.arange(k), len(columns)), np.tile(columns, k), np.concatenate(rows))
+
+    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
+        columns, c, e, E, C, D, Gs, s_y, first = self._slopes(u)
+
+        def mixed(row: Array) -> Array:
+            M = np.outer(row, s_y)
+            return M + M.T
+
+        # of c'(s) . (p - c(s)) = 0
+        s_yy = -(_dots(C[1], E) + mixed(c[2] @ E + e @ C[2] - 2.0 * c[1] @ C[1])
+                 + (c[3] @ e - 3.0 * c[1] @ c[2]) * np.outer(s_y, s_y)) / Gs
+        H = multipliers[0] * (
+            _pairs(C[1], E) + mixed(cross(c[2], E) - cross(e, C[2]))
+            + (cross(c[3], e) - cross(c[2], c[1])) * np.outer(s_y, s_y) + first[0][0] * s_yy)
+        if self.angle:
+            d, Q = self.d(u), self.Q
+            H = H + multipliers[1] * (
+                _pairs(D, Q @ C[1]) + mixed(cross(d, Q @ C[2]) - cross(Q @ c[2], D))
+                + cross(d, Q @ c[3]) * np.outer(s_y, s_y) + first[1][0] * s_yy)
+        n = len(columns)
+        return np.repeat(columns, n), np.tile(columns, n), H.ravel()
+
+    # between two displacements
+
+    def _span(self, u0: Array, u1: Array) -> Span:
+        """The :class:`~skfem_ancf.actions.joints.spans.Span` from one displacement to another."""
+        known = self._at(u1)
+        if "span" not in known or not np.array_equal(known["span"][0], u0):
+            known["span"] = u0.copy(), self._new_span((u0, u1))
+        return known["span"][1]
+
+    def _new_span(self, ends: tuple[Array, Array]) -> Span:
+        s = [self._parameter(u) for u in ends]
+        dofs, weights, quotients = self.axis.between(*s)
+        columns = np.concatenate([self.p.dofs.ravel(), self.d.dofs.ravel(), dofs.ravel()])
+        n, first = len(columns), 0
+        parts = []
+        for width in (self.p.dofs.shape[1], self.d.dofs.shape[1], dofs.shape[1]):
+            parts.append(first + np.arange(2 * width).reshape(2, width))
+            first += 2 * width
+
+        def rows(part: Array, of: Array) -> Array:
+            out = np.zeros((*of.shape[:-2], 2, n))
+            for k in range(2):
+                out[..., k, part[k]] = of[..., k % of.shape[-2], :]
+            return out
+
+        def held(part: Array, vector: Vector) -> Family:
+            at = np.array([vector(u) for u in ends])
+            matrix = rows(part, vector.weights)
+            return Family(np.array([matrix, matrix]), np.array([at, at]), 0.0 * matrix, 0.0 * at)
+
+        def along(order: int) -> Family:
+            places, w, q = [self.axis.places(u, dofs).T for u in ends], weights, quotients[order]
+            return Family(rows(parts[2], w[:, order, None]),
+                          np.array([[w[k, order] @ x for x in places] for k in range(2)]),
+                          rows(parts[2], q[None]), np.array([q @ x for x in places]))
+
+        c = along(1)
+        gap = held(parts[0], self.p).minus(along(0))
+        equations = [Product(cross, c, gap)]
+        if self.angle:
+            equations.append(Product(cross, held(parts[1], self.d), c.turned(self.Q)))
+        shares = [[by_s / slopes[6] for by_s, _ in slopes[8]]
+                  for slopes in (self._slopes(u) for u in ends)]
+        return Span(columns, (ends[1] - ends[0])[columns], s[1] - s[0], Product(dot, c, gap),
+                    equations, np.array(shares).T)
+
+    def mean_entries(self, u0: Array, u1: Array, t: float) -> tuple[Array, Array, Array]:
+        span = self._span(u0, u1)
+        values, k = span.rows(), len(self.equations)
+        return (np.repeat(np.arange(k), len(span.columns)), np.tile(span.columns, k),
+                values.ravel())
+
+    def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
+                     multipliers: Array) -> Array:
+        span = self._span(u0, u1)
+        at = span.columns
+        return np.bincount(at, span.force(multipliers, v0[at], v1[at]), len(u0))
+
+
+@teaching
+class Slot(Joint):
+    """A material point slides along a straight line of a rigid body, or of the ground.
+
+    ``e x (p - b) = 0``, with a point b of the body and a direction e that turns with it.
+
+    Parameters
+    ----------
+    at
+        The point: (beam, (x, y)) with a Beam, a RigidBody, a name or a number; a RigidBody for its
+        centre of mass.
+    on
+        The body, its name or its number, or "ground"; a Beam for a line that is carried by the
+        section at ``through``.
+    direction
+        Direction of the line in the state of the start, shape (2,).
+    through
+        A point of the line there, shape (2,); the material point by default.
+    angle
+        Keep the angle between the point's section and the line: a moment is carried.
+    name
+        What messages call the joint.
+    """
+
+    constant = False
+
+    def __init__(self, at: Any, on: WhichMember, direction: ArrayLike,
+                 through: ArrayLike | None = None, angle: bool = False,
+                 name: str | None = None) -> None:
+        d = require_finite("direction", direction, (2,))
+        if not np.any(d):
+            raise InputError("the direction of the line must not be zero")
+        self.direction = d / np.hypot(*d)
+        self.through = None if through is None else require_finite("through", through, (2,))
+        self.at, self.on, self.angle = at, on, require_flag("angle", angle)
+        self.name = require_label("name", name)
+        self.equations = ("force normal to the line",) + ("moment",) * self.angle
+
+    def __repr__(self) -> str:
+        return f"<Slot {f'{self.name} ' if self.name else ''}at {shown(self.at)}>"
+
+    def bind(self, layout: Layout) -> None:
+        which, at = named_place(layout, self.at)
+        self.p, d = section(layout, which, at) if self.angle else (
+            point(layout, which, at), None)
+        through = self.p.start if self.through is None else self.through
+        b, self.e = section(layout, self.on, tuple(map(float, through)))
+        self.constant = not self.e.dofs.size
+        self.w = Vector(self.p.start - b.start, np.hstack([self.p.dofs, b.dofs]),
+                        np.hstack([self.p.weights, -b.weights]))
+        if not self.w.dofs.size:
+            raise InputError(f"{self!r}: the point and the line are both of the ground")
+        if which == self.on or (which != GROUND and self.on != GROUND
+                                and layout.beam(which) is layout.beam(self.on)):
+            raise InputError(f"{self!r}: a point cannot slide along a line of its own beam or body")
+        gap = cross(self.direction, self.w.start)
+        size = max(layout.beam(k).size for k in (which, self.on) if k != GROUND)
+        if abs(gap) > 1e-6 * size:
+            raise InputError(f"{self!r}: the point ({self.p.start[0]:.6g}, {self.p.start[1]:.6g}) "
+                             f"is {abs(gap):.6g} off the line: give another through=")
+        kept = [(self.w, self.direction)] if d is None else [(self.w, self.direction), (d, d.start)]
+        self.pairs = [Aligned(vector, self.e, rotation(angle_to(start, self.e.start)))
+                      for vector, start in kept]
+
+    def value(self, u: Array, t: float) -> Array:
+        return np.array([turned.value(u) for turned in self.pairs])
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return gradients(*(turned.terms(u) for turned in self.pairs))
+
+    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
+        i, j, v = zip(*(turned.second(m) for turned, m in zip(self.pairs, multipliers)))
+        return np.concatenate(i), np.concatenate(j), np.concatenate(v)

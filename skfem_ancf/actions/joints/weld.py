@@ -1,0 +1,90 @@
+"""Sections of two beams or more are welded at the angles they have in the stress-free state."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...core.errors import InputError, require_flag, require_label, teaching
+from .base import (Aligned, Joint, angle_to, each, equations_of, gradients, is_ground, rotation,
+                   section, several)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ...beam.layout import Layout
+    from ...core.types import Array
+    from .base import Vector
+
+
+@teaching
+class Weld(Joint):
+    """The points coincide, and the directions of the sections through them keep their angles.
+
+    The direction of a section is the best straight line through it, so it may still warp and change
+    its thickness; that of a cable is its tangent.
+
+    Parameters
+    ----------
+    beams
+        Two or more, each a Beam or a RigidBody, its name or its number, or "ground".
+    at
+        The section of each beam, as ``("right", "left")``, or a material point (x, y), inside of an
+        element too; or one place for all, as the point ``(1, 0)`` that they share.
+    name
+        What messages call the joint.
+    apart
+        Allow that the points are apart in the stress-free state: the weld draws them together.
+
+    Raises
+    ------
+    InputError
+        If the points are apart.
+    """
+
+    constant = False
+
+    def __init__(self, beams: Sequence[Any], at: Any, name: str | None = None,
+                 apart: bool = False) -> None:
+        self.beams, self.name = several(beams), require_label("name", name)
+        self.apart = require_flag("apart", apart)
+        self.at = each(at, "the section of each beam", len(self.beams))
+        self.equations = equations_of(("force along x", "force along y", "moment"),
+                                      len(self.beams))
+
+    def bind(self, layout: Layout) -> None:
+        (self.a, d), *others = (
+            section(layout, beam, at) for beam, at in zip(self.beams, self.at))
+        self.pairs = []
+        for b, e in others:
+            self._require_together(layout, b)
+            self.pairs.append((b, Aligned(d, e, rotation(angle_to(d.start, e.start)))))
+
+    def _require_together(self, layout: Layout, b: Vector) -> None:
+        gap = b.start - self.a.start
+        beams = [layout.beam(beam) for beam in self.beams if not is_ground(beam)]
+        if not self.apart and np.hypot(*gap) > 1e-6 * min(beam.size for beam in beams):
+            centre = next((f": of {beam!r} alone it is the centre of mass that is meant, name "
+                           "the point, as (body, (x, y)); or" for beam, at in
+                           zip(self.beams, self.at) if at is None), ":")
+            raise InputError(
+                f"the sections to weld are {np.hypot(*gap):.6g} apart, one at "
+                f"({self.a.start[0]:.6g}, {self.a.start[1]:.6g}), the other at "
+                f"({b.start[0]:.6g}, {b.start[1]:.6g}){centre} name sections that meet, move a "
+                f"mesh by mesh.translated(({0 - gap[0]:.6g}, {0 - gap[1]:.6g})), or weld with "
+                "apart=True to draw them together")
+
+    def value(self, u: Array, t: float) -> Array:
+        a, out = self.a(u), []
+        for b, turned in self.pairs:
+            out += [*(a - b(u)), turned.value(u)]
+        return np.array(out)
+
+    def entries(self, u: Array, t: float) -> tuple[Array, Array, Array]:
+        return gradients(*(terms for b, turned in self.pairs for terms in (
+            *([(self.a, n), (b, -n)] for n in np.eye(2)), turned.terms(u))))
+
+    def curvature(self, u: Array, t: float, multipliers: Array) -> tuple[Array, Array, Array]:
+        i, j, v = zip(*(turned.second(m) for (_, turned), m in zip(self.pairs, multipliers[2::3])))
+        return np.concatenate(i), np.concatenate(j), np.concatenate(v)

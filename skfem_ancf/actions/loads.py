@@ -1,0 +1,759 @@
+"""Loads: their force on the coordinates of a beam, its derivative, and its potential.
+
+A :class:`~skfem_ancf.Scene` keeps loads as they were given, and binds them to its beams: once, and
+again for the same scene on other meshes.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from functools import partial
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from scipy import sparse
+from skfem.assembly import FacetBasis, LinearForm, asm
+from skfem.assembly.form.form import FormExtraParams
+from skfem.element import DiscreteField
+
+from ..beam.beam import Beam
+from ..core.errors import (AncfError, CallbackError, InputError, ModelWarning, ask_field,
+                           ask_number, require_finite, require_function, require_slope, shown,
+                           warnings_as_errors)
+from ..core.frozen import Sealable, read_only
+from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
+from ..core.kept import cached_property
+from ..core.origin import ours
+from ..core.pickling import picklable_form
+from ..mesh.places import facets_of
+from ..beam.rigid import RigidBody
+from ..beam.distribution import BODY, Sampled, Spread, facets_along, on_facets, stations_of_vector
+from ..beam.surfaces import add_nodal, surfaces_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from ..core.types import Array, Place, TimeFunction
+    from ..beam.layout import WhichBeam
+
+
+#: A traction on a cable is warned of where the moment by its lever across is more than this part
+#: of that by the length, and than the other part of force times height, which is round-off.
+LEVER, ROUND_OFF = 0.01, 1e-12
+
+
+class Amplitude:
+    """A function of time, asked with care: what it raises or returns is said."""
+
+    def __init__(self, function: Callable[[float], float]) -> None:
+        self.function = require_function("amplitude", function, "of time that returns a number")
+
+    def __call__(self, t):
+        return self.function(t) if np.ndim(t) else ask_number("amplitude(t={:g})", self.function, t)
+
+
+class Load(Sealable):
+    """Base class: a force on the coordinates of one beam as a function of their displacement.
+
+    A load of your own is a subclass, given to a scene by :meth:`skfem_ancf.Scene.add`. It defines
+
+    * :meth:`force`, and :meth:`stiffness` if the force depends on the displacement: then it sets
+      ``constant = False``,
+    * :meth:`potential`, if it has one and energies are asked for; else, and if its stiffness is
+      not symmetric, it sets ``symmetric = False``,
+    * :meth:`bind`, if it computes something of the beam: what it needs to act on another mesh,
+      as ``solve_static(adapt=...)`` wants.
+
+    Parameters
+    ----------
+    beam
+        The beam it acts on, its name or its number; None where the scene has only one.
+    amplitude
+        A function of time by which the force is multiplied in a motion, or None.
+
+    Attributes
+    ----------
+    beam
+        The beam it acts on: a :class:`~skfem_ancf.Beam` once the load is bound.
+    constant : bool
+        The force does not depend on the displacement.
+    symmetric : bool
+        The derivative of the force is symmetric: the load has a potential.
+    linear : bool
+        The force is linear in the displacement, but for a constant: it is assembled once.
+    for_bodies : bool
+        It may act on a :class:`~skfem_ancf.RigidBody` too.
+
+    Examples
+    --------
+    Springs below a beam, so many newton a metre at each node:
+
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+    >>> from skfem_ancf.actions.loads import Load
+    >>> class Springs(Load):
+    ...     constant = False
+    ...     def __init__(self, k, beam=None):
+    ...         super().__init__(beam)
+    ...         self.k = k
+    ...     def bind(self, beam):
+    ...         bound = super().bind(beam)
+    ...         bound.dofs = np.arange(1, beam.N, beam.nd)  # r^2 of each node
+    ...         return bound
+    ...     def force(self, u):
+    ...         out = np.zeros(self.beam.N)
+    ...         out[self.dofs] = -self.k * u[self.dofs]
+    ...         return out
+    ...     def stiffness(self, u):
+    ...         return self.dofs, self.dofs, np.full(len(self.dofs), -self.k)
+    ...     def potential(self, u):
+    ...         return 0.5 * self.k * float(u[self.dofs] @ u[self.dofs])
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.01), ElementBeamANCF(2),
+    ...             StVenantKirchhoff(2e8, 0.3, 7800), width=0.01)
+    >>> scene = Scene(beam).clamp("left").gravity((0, -9.81)).add(Springs(2.0))
+    >>> scene.solve_static().converged
+    True
+    """
+
+    constant = True
+    symmetric = True
+    beam: Any
+    linear = False
+    turning = False
+    #: The factor in statics: 1 but for some loads of the package.
+    at_rest = 1.0
+    #: Its derivative belongs to a stress that it causes, which the first tangent does not have yet.
+    prestress = False
+    #: Of a stress-free strain: for each pack of the beam what is given for it, an array
+    #: (components, points, elements), see :meth:`~skfem_ancf.beam.kernels.base.Chain.pushed_packs`.
+    pushes: Sequence[Array] = ()
+    for_bodies = False
+
+    def __init__(self, beam: WhichBeam = None, amplitude: TimeFunction = None) -> None:
+        self.beam, self.amplitude = beam, amplitude
+
+    def bind(self, beam: Beam) -> Load:
+        """The load on a beam; the scene seals it, so that its attributes do not change then.
+
+        By default a copy with :attr:`beam` set. Override it where something is computed from the
+        beam; leave ``self`` as it is, which is bound to other beams later.
+
+        Parameters
+        ----------
+        beam
+            A :class:`~skfem_ancf.Beam`.
+
+        Returns
+        -------
+        Load
+        """
+        bound = self._unsealed()
+        bound.beam = beam
+        return bound
+
+    @property
+    def amplitude(self) -> Amplitude | None:
+        return getattr(self, "_amplitude", None)
+
+    @amplitude.setter
+    def amplitude(self, function):
+        self._amplitude = (function if function is None or isinstance(function, Amplitude) else
+                           Amplitude(function))
+
+    def factor(self, t: float | None) -> float:
+        """The amplitude at time ``t``; 1 without one, or in statics, where ``t`` is None."""
+        return self.at_rest if t is None else 1.0 if self.amplitude is None else self.amplitude(t)
+
+    def acting(self, t: float | None) -> tuple[float, Load]:
+        """A factor, and the load that it is on, at time ``t``; None in statics."""
+        return self.factor(t), self
+
+    def mean_force(self, u0: Array, u1: Array) -> Array:
+        """A mean of the force between two displacements whose work is exact if it can be.
+
+        Parameters
+        ----------
+        u0, u1
+            Displacements of the beam's coordinates, shape (N,).
+
+        Returns
+        -------
+        ndarray
+            Shape (N,).
+        """
+        return self.force(0.5 * (u0 + u1))
+
+    def force(self, u: Array) -> Array:
+        """Force at the displacement ``u`` of the beam's coordinates, shape (beam.N,)."""
+        raise NotImplementedError
+
+    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
+        """Derivative of the force: rows, columns and values.
+
+        Rows and columns are coordinates of one node or of neighbouring nodes.
+        """
+        raise NotImplementedError
+
+    def potential(self, u: Array) -> float | None:
+        """The potential, minus the work done from the stress-free state; None if there is none."""
+        return None
+
+    def spread(self, u: Array) -> Spread | None:
+        """How the force at the displacement ``u`` is spread over the body, or None.
+
+        Recovered fields need to know. By default it is taken to act on the nodes, or the point
+        inside of an element, whose coordinates it acts on, and not known if they are neighbours.
+
+        Returns
+        -------
+        skfem_ancf.beam.distribution.Spread or None
+        """
+        stations = stations_of_vector(self.beam, self.force(u))
+        return None if stations is None else Spread(stations=stations)
+
+    def __repr__(self):
+        return f"<{type(self).__name__} on {self.beam!r}>"
+
+
+def bind_load(load: Load, beam: Beam | RigidBody) -> Load:
+    """A load on a beam, tried there: what it returns fits the beam.
+
+    Parameters
+    ----------
+    load
+        A :class:`Load`, as it was given.
+    beam
+        The :class:`~skfem_ancf.Beam` or :class:`~skfem_ancf.RigidBody` it acts on.
+
+    Returns
+    -------
+    Load
+        Sealed.
+
+    Raises
+    ------
+    InputError
+        If the load does not keep to the interface of :class:`Load`.
+    """
+    if isinstance(beam, RigidBody) and not load.for_bodies:
+        raise InputError(f"{type(load).__name__} acts on beams and not on {beam!r}: a rigid body "
+                         "takes scene.gravity, point_force, follower_force, moment, springs and "
+                         "joints")
+    bound = load.bind(cast("Beam", beam))
+    if type(bound) in (DeadLoad, Pressure, EndMoment):
+        bound._seal()
+        return bound
+    if not isinstance(bound, Load) or bound.beam is not beam:
+        raise InputError(f"{load!r}.bind(beam) must return a Load on that beam, got {shown(bound)}")
+    zero = np.zeros(beam.N)
+    try:
+        require_finite("its force", bound.force(zero), (beam.N,))
+        bound._seal()
+        if bound.constant:
+            if not ours(bound):
+                _require_constant(bound)
+            return bound
+        i, j, v = bound.stiffness(zero)
+    except AncfError as error:
+        raise InputError(f"{load!r} is no load of this beam: {error}. Meshes change, under adapt= "
+                         "and by refinement: what has the size of one is made in bind(beam) or "
+                         "force(u), of places along self.beam") from None
+    except Exception as error:  # it is the user's: it may raise anything
+        raise InputError(f"{load!r} fails in the stress-free state: {type(error).__name__}: "
+                         f"{error}; a load defines force(u) of shape (beam.N,), and stiffness(u) "
+                         "unless it is constant") from error
+    require_entries(f"the stiffness of {load!r}", i, j, v, beam.N)
+    far = np.abs(np.asarray(i) // beam.nd - np.asarray(j) // beam.nd)
+    if np.any(far > 1):
+        raise InputError(f"the stiffness of {load!r} couples nodes that are {np.max(far)} apart: "
+                         "only neighbours of the chain may be coupled, as they are in its elements")
+    if not ours(bound):
+        beside(partial(_require_derivatives, bound), bound.beam.sizes)
+    return bound
+
+
+def beside(check: Callable[[Array, Array], None], sizes: Array) -> None:
+    """Call a check of derivatives at displacements at which nothing is zero by chance.
+
+    At one of two it may fail: there may be a kink.
+
+    Parameters
+    ----------
+    check
+        A function of a displacement and of a step that is small to it; raises InputError.
+    sizes
+        What coordinates change by where things move by their size, shape (N,).
+    """
+    angles = np.arange(len(sizes))
+    try:
+        check(1e-4 * sizes * np.cos(angles), 1e-6 * sizes * np.sin(angles + 1.0))
+    except InputError:
+        check(1e-4 * sizes * np.cos(angles + 2.0), 1e-6 * sizes * np.sin(angles + 3.0))
+
+
+def _require_constant(load):
+    force = load.force(np.zeros(load.beam.N))
+
+    def check(u, _):
+        if np.any(np.abs(load.force(u) - force) > 1e-12 * np.max(np.abs(force), initial=0.0)):
+            raise InputError("force(u) depends on the displacement: say so in its class, constant "
+                             "= False, and define stiffness(u)")
+
+    beside(check, load.beam.sizes)
+
+
+def _require_derivatives(load, u, d):
+    """Raise InputError unless stiffness and potential of a load of the user's fit its force."""
+    try:
+        force, *forces = (load.force(u + s * d) for s in (0.0, -1.0, 1.0))
+        potentials = [load.potential(u + s * d) for s in (0.0, -1.0, 1.0)]
+        i, j, v = load.stiffness(u)
+    except Exception:  # it may be one of the stress-free state alone
+        return
+    K, noise = sparse.coo_array((v, (i, j)), shape=(len(u), len(u))), 1e-13 * np.abs(force).max()
+    require_slope(f"stiffness(u) of {load!r}", "force(u)", forces[1] - forces[0], 2.0 * (K @ d),
+                  noise)
+    if load.symmetric:
+        require_slope(f"stiffness(u) of {load!r}, transposed,", "force(u)", forces[1] - forces[0],
+                      2.0 * (K.T @ d), noise,
+                      "; a load without a potential says so in its class: symmetric = False")
+    if potentials[0] is not None:
+        require_slope(f"minus force(u) of {load!r}", "potential(u)",
+                      np.array([potentials[2] - potentials[1]]), np.array([-2.0 * (force @ d)]),
+                      1e-13 * abs(potentials[0]))
+
+
+def require_entries(what: str, i: ArrayLike, j: ArrayLike, v: ArrayLike, n: int) -> None:
+    """Raise InputError unless rows, columns and values are entries of an n x n matrix.
+
+    Parameters
+    ----------
+    what
+        What messages call the matrix.
+    i, j, v
+        Rows, columns and values, shapes (k,).
+    n
+        Number of rows and columns of the matrix.
+    """
+    i, j = np.asarray(i), np.asarray(j)
+    v = require_finite(what, v, (None,))
+    if i.dtype.kind not in "iu" or j.dtype.kind not in "iu" or not i.shape == j.shape == v.shape:
+        raise InputError(f"{what} must be rows, columns and values of one length, got shapes "
+                         f"{i.shape}, {j.shape}, {v.shape}")
+    if len(i) and not (0 <= min(i.min(), j.min()) and max(i.max(), j.max()) < n):
+        raise InputError(f"{what} has entries in rows and columns {min(i.min(), j.min())} to "
+                         f"{max(i.max(), j.max())}: there are 0 to {n - 1}")
+
+
+class Weight(Load):
+    """The weight of a beam under an acceleration g (2,).
+
+    Parameters
+    ----------
+    g
+        Acceleration, shape (2,).
+    beam, amplitude
+        As for :class:`Load`.
+    """
+
+    for_bodies = True
+
+    def __init__(self, g: ArrayLike, beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, amplitude)
+        self.g = require_finite("g", g, (2,))
+
+    def bind(self, beam: Beam | RigidBody) -> Load:
+        spread = None if isinstance(beam, RigidBody) else Spread(gravity=self.g)
+        return DeadLoad(beam, beam.weight(self.g), self.amplitude, spread)
+
+
+class PointForce(Load):
+    """A dead force (2,) on the material point ``at``.
+
+    Parameters
+    ----------
+    force
+        The force, shape (2,).
+    at
+        The material point: its place (x, y) in the stress-free body.
+    beam, amplitude
+        As for :class:`Load`.
+    """
+
+    for_bodies = True
+
+    def __init__(self, force: ArrayLike, at: ArrayLike, beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, amplitude)
+        self.total, self.at = require_finite("force", force, (2,)), at
+
+    def bind(self, beam: Beam | RigidBody) -> Load:
+        vector = np.zeros(beam.N)
+        if isinstance(beam, RigidBody):
+            dofs, weights = beam.probe(self.at)
+            np.add.at(vector, dofs, self.total[:, None] * weights)
+            return DeadLoad(beam, vector, self.amplitude)
+        e, X = beam.locate(self.at)
+        first = beam.first_of_node(e, *X.tolist())
+        if first < 0:
+            dofs, weights = beam.probe_at(self.at, e, X)
+            vector[dofs] = self.total[:, None] * weights  # those of an element, each once
+        else:
+            vector[first:first + 2] = self.total
+        return DeadLoad(beam, vector, self.amplitude, Spread(stations=(e + float(X[0]),)))
+
+
+class Traction(Load):
+    """A dead traction on a surface. The surface of a cable is its axis, without the lever across.
+
+    Parameters
+    ----------
+    boundary
+        A place, see :func:`skfem_ancf.mesh.places.facets_of`.
+    t
+        Force per area of the stress-free body, shape (2,), or a function of the points x (2, ...)
+        that returns (2, ...).
+    beam, amplitude
+        As for :class:`Load`.
+    """
+
+    def __init__(self, boundary: Place, t: ArrayLike | Callable[[Array], Array],
+                 beam: WhichBeam = None, amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, amplitude)
+        self.boundary, self.t = boundary, t if callable(t) else require_finite("t", t, (2,))
+
+    def bind(self, beam: Beam) -> Load:
+        t, vector, mapping = self.t, np.zeros(beam.N), beam.mesh.mapping()
+        found = surfaces_of(beam, self.boundary, 7 if callable(t) else beam.facet_points)
+        forces: list[Array] = []
+        for one in found:
+            density = ask_field("t(x)", t, mapping.F(one.X, one.elements)) if callable(t) else (
+                t[:, None, None])
+            functions = beam.element.values(mapping, one.X, one.elements)
+            forces.append(density * one.areas)
+            add_nodal(beam, one.elements, np.einsum("iep,cep->eic", functions, forces[-1]), vector)
+        if not beam.has_sections:
+            _warn_of_lever(beam, found, forces)
+        return DeadLoad(beam, vector, self.amplitude, on_facets(
+            beam.mesh, np.concatenate([one.facets for one in found]), traction=t))
+
+
+def _warn_of_lever(beam, surfaces, forces):
+    """Give a ModelWarning if forces on a cable, (2, nf, np) each, would turn it by their lever."""
+    mapping, length = beam.mesh.mapping(), np.sum(beam.mesh.lengths)
+    lost, kept, size = {}, 0.0, 0.0
+    for one, force in zip(surfaces, forces):
+        along, across = np.einsum("ikep,iep->kep", mapping.frame(one.X, one.elements), force)
+        moment = np.sum(along * mapping.offset(one.X, one.elements), axis=1)
+        lost[one.side] = lost.get(one.side, 0.0) + moment  # of the slabs of an end together
+        kept += length * np.sum(np.abs(across))
+        size += beam.mesh.height * np.sum(np.hypot(along, across))
+    left_out = sum(np.sum(np.abs(moment)) for moment in lost.values())
+    if left_out > LEVER * kept + ROUND_OFF * size:
+        warnings.warn(
+            f"a traction on {beam!r} acts on its axis: it leaves out a moment of {left_out:.3g} by "
+            "the distance of the face. Use an element with sections, as ElementBeamANCF(2), or "
+            "give an end its moment by scene.moment", ModelWarning, stacklevel=2)
+
+
+class FormLoad(Load):
+    """A scikit-fem ``LinearForm`` as a dead load, on the body or on a place of its boundary.
+
+    Parameters
+    ----------
+    form
+        A ``LinearForm`` of scikit-fem, which knows ``w.x``, ``w.h`` and, on a boundary, ``w.n``.
+    boundary
+        A place, see :func:`skfem_ancf.mesh.places.facets_of`; None for the body.
+    beam, amplitude
+        As for :class:`Load`.
+    """
+
+    def __getstate__(self):
+        return {**vars(self), "form": picklable_form(self.form)}
+
+    def __setstate__(self, state):
+        vars(self).update(state, form=state["form"].form)
+
+    def __init__(self, form: LinearForm, boundary: Place | None = None, beam: WhichBeam = None,
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, amplitude)
+        if not isinstance(form, LinearForm):
+            raise InputError(f"a load is a scikit-fem LinearForm, got {shown(form)}; what is no "
+                             "form is a subclass of skfem_ancf.actions.loads.Load, for scene.add")
+        self.form, self.boundary = form, boundary
+
+    def bind(self, beam: Beam) -> Load:
+        basis = (beam.exact_basis() if self.boundary is None else
+                 beam.facet_basis(self.boundary))
+        vector = _assembled(self.form, basis)
+        return DeadLoad(beam, vector, self.amplitude, _density(self.form, basis, beam, vector))
+
+
+def _density(form, basis, beam, vector):
+    """How the force of a form is spread, from its values for constant test functions.
+
+    None if these do not give its vector again: then it acts on derivatives.
+    """
+    parameters = FormExtraParams(basis.default_parameters())
+    shape = basis.dx.shape
+    try:
+        with warnings_as_errors():
+            f = np.array([np.broadcast_to(form.form(_constant(i, shape), parameters), shape)
+                          for i in range(2)])
+    except Exception:  # the form is the user's: it may ask for what a constant has not
+        return None
+    again = asm(LinearForm(lambda v, w: f[0] * v[0] + f[1] * v[1]), basis)
+    if np.max(np.abs(again - vector)) > 1e-10 * np.max(np.abs(vector)):
+        return None
+    if isinstance(basis, FacetBasis):
+        groups, stations = facets_along(beam.mesh, basis)
+        per_xi = f * basis.dx / basis.W
+        return Spread(stations=stations, sampled=tuple(
+            Sampled(g.where, g.elements, g.xi, per_xi[:, g.chosen]) for g in groups))
+    if not beam.across.plain:
+        return None
+    xi, eta = (np.unique(np.round(x, 14)) for x in basis.X)
+    values = (f / beam.across.slabs[0].width).reshape(*f.shape[:2], len(xi), len(eta))
+    return Spread(sampled=(Sampled(BODY, np.arange(shape[0]), xi, values, eta),))
+
+
+def _constant(i, shape):
+    """A test function that is the unit vector i."""
+    value = np.zeros((2, *shape))
+    value[i] = 1.0
+    return DiscreteField(value=value, grad=np.zeros((2, 2, *shape)))
+
+
+def _assembled(form, basis):
+    """The vector of a form of the caller's."""
+    complex_to_real = getattr(np, "exceptions", np).ComplexWarning
+    try:
+        with warnings_as_errors(complex_to_real):
+            return asm(form, basis)
+    except (KeyError, AttributeError) as error:
+        name = re.search("'([^']*)' not found in 'w'|^'([^']*)'$", str(error))
+        if name is None:
+            raise CallbackError(f"the form of a load, form(v, w), raised {type(error).__name__}: "
+                                f"{error}") from error
+        raise CallbackError(
+            f"the form of a load uses w.{name[1] or name[2]}, which there is not: it is assembled "
+            "once, on the stress-free body, and knows w.x, w.h and, on a boundary, w.n. A load "
+            "that follows the deformation is scene.pressure, scene.moment or a Load of your own"
+        ) from error
+    except AncfError:
+        raise
+    except Exception as error:  # it is the user's: it may raise anything
+        raise CallbackError(f"the form of a load, form(v, w), fails: {type(error).__name__}: "
+                            f"{error}; it must return a real number at each point, as v[1]"
+                            ) from error
+
+
+class DeadLoad(Load):
+    """A force that keeps its direction and size.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    vector
+        Force on its coordinates, shape (N,).
+    amplitude
+        As for :class:`Load`.
+    spread
+        How it is spread over the body, a :class:`~skfem_ancf.beam.distribution.Spread`; None to
+        find out.
+    """
+
+    for_bodies = True
+
+    def __init__(self, beam: Beam | RigidBody, vector: ArrayLike, amplitude: TimeFunction = None,
+                 spread: Spread | None = None) -> None:
+        super().__init__(_the_beam(beam, self.for_bodies), amplitude)
+        self.vector = read_only(require_finite("the load", vector, (beam.N,)))
+        self._spread = spread
+
+    def spread(self, u: Array) -> Spread | None:
+        if self._spread is None:
+            self._spread = super().spread(u)
+        return self._spread
+
+    def bind(self, beam: Beam) -> Load:
+        if beam is not self.beam:
+            raise InputError("a DeadLoad is a vector of the coordinates of one mesh and cannot be "
+                             "put on another: use scene.load(form) or a Load with bind(beam)")
+        return self
+
+    def force(self, u: Array) -> Array:
+        return self.vector
+
+    def potential(self, u: Array) -> float:
+        return -float(self.vector @ u)
+
+
+class Pressure(Load):
+    """A pressure that stays normal to the deformed surface: linear in the position in the plane.
+
+    The surface of a cable is its axis, wherever across the section the place is.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    boundary
+        A place, see :func:`skfem_ancf.mesh.places.facets_of`.
+    p
+        Force per deformed area; positive pushes.
+    amplitude
+        As for :class:`Load`.
+    """
+
+    constant = False
+    symmetric = False
+    linear = True
+
+    def __init__(self, beam: Beam, boundary: Place, p: float,
+                 amplitude: TimeFunction = None) -> None:
+        super().__init__(_the_beam(beam), amplitude)
+        self.boundary, self.p = boundary, p
+        facets = np.asarray(facets_of(beam.mesh, boundary))
+        if not beam.has_sections and np.any(facets < beam.mesh.p.shape[1]):
+            raise InputError(
+                f"a pressure at {boundary!r} of a cable would do nothing: its points across the "
+                "section are no coordinates. Use an element with sections, as ElementBeamANCF(2), "
+                "or for a force of constant direction scene.traction or scene.point_force")
+        self._rows = _follower(beam, facets, p)
+        self.matrix = self._rows.tocoo()
+        self._spread = on_facets(beam.mesh, facets, pressure=p)
+
+    def spread(self, u: Array) -> Spread | None:
+        return self._spread
+
+    def bind(self, beam: Beam) -> Load:
+        return self if beam is self.beam else Pressure(beam, self.boundary, self.p, self.amplitude)
+
+    def force(self, u: Array) -> Array:
+        return self._rows @ (self.beam.q0_local + u)
+
+    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
+        return self.matrix.row, self.matrix.col, self.matrix.data
+
+
+def _follower(beam, facets, p):
+    """The force of a pressure over the position, ``-n da`` being its derivative, turned; sparse."""
+    mesh, nd, row, column, value = beam.mesh, beam.nd, [], [], []
+    for one in surfaces_of(beam, facets, beam.facet_points):
+        functions, grad = beam.element.functions(mesh.mapping(), one.X, one.elements)
+        slopes = grad[:, 0] * one.along[0] + grad[:, 1] * one.along[1]
+        both = p * np.einsum("iep,jep,ep->eij", functions, slopes, one.weights)
+        dofs = (mesh.t[:, one.elements].T[:, :, None] * nd + np.arange(0, nd, 2)).reshape(
+            len(one.elements), -1)
+        i, j = (x.ravel() for x in np.broadcast_arrays(dofs[:, :, None], dofs[:, None]))
+        row += [i, i + 1]
+        column += [j + 1, j]
+        value += [-both.ravel(), both.ravel()]
+    row, column, value = map(np.concatenate, (row, column, value))
+    return sparse.coo_array((value, (row, column)), shape=(beam.N, beam.N)).tocsr()
+
+
+class EndMoment(Load):
+    """A moment M on a section: M times the angle of the section is its potential, negated.
+
+    The section's direction is ``d = 12 / h^3 int Y r dY``, the best fit of a straight line to the
+    deformed face, and its angle that of ``d``. The force is a traction linear in Y and normal
+    to ``d``; it turns with the section.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam` or a :class:`~skfem_ancf.RigidBody`.
+    boundary
+        A place that is one section, see :func:`skfem_ancf.mesh.places.facets_of`; or the number of
+        a node. None, or a point, of a rigid body.
+    M
+        The moment, counterclockwise.
+    amplitude
+        As for :class:`Load`.
+    couple
+        Any object that two moments have in common of which one is the opposite of the other: they
+        keep the angular momentum. None for a moment from the ground.
+    """
+
+    constant = False
+    turning = True
+    for_bodies = True
+
+    def __init__(self, beam: Beam | RigidBody, boundary: Place | int | None, M: float,
+                 amplitude: TimeFunction = None, couple: Any = None) -> None:
+        super().__init__(_the_beam(beam, self.for_bodies), amplitude)
+        self.M, self.boundary, self.couple = M, boundary, couple
+        if isinstance(boundary, (int, np.integer)):
+            self.boundary = np.array([boundary])
+        self.node = beam.section_node(cast("Place", self.boundary))
+        self.dofs, self.c = beam.section_direction(self.node)
+
+    def bind(self, beam: Beam) -> Load:
+        if beam is self.beam:
+            return self
+        return EndMoment(beam, self.boundary, self.M, self.amplitude, self.couple)
+
+    def direction(self, u: Array) -> Array:
+        """The section's direction d, shape (2,)."""
+        return (self.beam.q0_local[self.dofs] + u[self.dofs]) @ self.c
+
+    def angle(self, u: Array) -> float:
+        """The angle by which the section has turned, in radians.
+
+        Whole turns are counted along the beam, from the section at its other end, whose own angle
+        is taken in (-pi, pi].
+        """
+        nd = self.beam.nd
+        rows = self.dofs - self.node * nd + nd * np.arange(self.beam.N // nd)[:, None, None]
+        start = self.beam.q0_local[rows] @ self.c
+        now = start + u[rows] @ self.c
+        turn = (now @ [1.0, 1.0j]) / (start @ [1.0, 1.0j])
+        if self.node == 0:
+            turn = turn[::-1]
+        return float(np.angle(turn[0]) + np.sum(np.angle(turn[1:] / turn[:-1])))
+
+    @cached_property
+    def _pack(self):
+        start = self.direction(np.zeros(self.beam.N))
+        return MomentPack(self.dofs[None], self.c[None], start[None], np.array([float(self.M)]),
+                          np.array([-1]))
+
+    def force(self, u: Array) -> Array:
+        out = np.zeros(self.beam.N, dtype=u.dtype)
+        add_moments(self._pack, np.ones(1), u, out)
+        return out
+
+    def stiffness(self, u: Array) -> tuple[Array, Array, Array]:
+        n = self.c.size
+        own = np.arange(2 * n).reshape(n, 2).T  # as if there were no other coordinates
+        lower = np.zeros(2 * n * 2 * n)
+        at = u[self.dofs.T].ravel()
+        add_moment_stiffness(self._pack._replace(dofs=own[None]), np.ones(1), at, lower, 2 * n)
+        i, j = np.tril_indices(2 * n)
+        values = -lower[j * 2 * n + i - j]
+        rows, cols = self.dofs.T.ravel()[i], self.dofs.T.ravel()[j]
+        off = i != j
+        return (np.append(rows, cols[off]), np.append(cols, rows[off]),
+                np.append(values, values[off]))
+
+    def mean_force(self, u0: Array, u1: Array) -> Array:
+        out = np.zeros(self.beam.N)
+        add_mean_moments(self._pack, np.ones(1), u0, u1, out)
+        return out
+
+    def potential(self, u: Array) -> float:
+        return -self.M * self.angle(u)
+
+
+def _the_beam(beam, bodies=False):
+    if not isinstance(beam, Beam) and not (bodies and isinstance(beam, RigidBody)):
+        raise InputError(f"this load acts on a Beam, got {shown(beam)}")
+    return beam

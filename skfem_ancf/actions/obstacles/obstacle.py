@@ -1,0 +1,363 @@
+"""What a scene may touch: a shape, where it is, and how it resists."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...beam.layout import select_beam
+from ...core.errors import (InputError, MeshError, ModelWarning, ask_array, require_function,
+                            require_integer, require_not_negative, require_option, require_positive,
+                            shown, teaching)
+from ..forces.base import ForceElement, Link, Part
+from ..forces.contacts import Contacts, Group
+from ..forces.poses import carried, taken_back
+from ...beam.kernels.section import beam_gradients
+from ...core.quadrature import gauss_lobatto
+from .shapes import Shape
+
+if TYPE_CHECKING:
+    from ...beam.layout import Layout
+    from ...core.types import Array
+    from ...beam.layout import WhichBeam
+
+METHODS = ("penalty", "augmented")
+#: What an obstacle may be told; the last two may be left to it.
+KNOWN = ("friction", "stiffness", "beam", "method", "position", "angle", "damping", "points",
+         "width", "tolerance")
+#: The least length over which a strip that is pressed in one point sinks in, relative to its
+#: extent: shorter ones no mesh resolves, and Newton's method loses its way among single points.
+SPREAD = 1.0 / 200.0
+#: Width of the transition from no pressure to one in proportion to the penetration, relative to
+#: the height.
+WIDTH = 1e-3
+#: How deep a body may be cut at the start, relative to its height: meshes of curves are not exact.
+CUT = 1e-2
+#: Penetration that is left by the augmented Lagrangian, relative to the height.
+TOLERANCE = 1e-5
+#: What the augmented Lagrangian adds to the stiffness in a step in time, relative to the mass of
+#: the body beside the surface over the square of the step.
+HARDER = 100.0
+#: How deep the way of a point from one instant to the next may cut an obstacle unseen, relative to
+#: the height or to half of the obstacle's thickness.
+THROUGH = 0.1
+#: Relative step in time for the velocity of an obstacle.
+STEP = 1e-6
+#: Points across an end.
+ACROSS = 3
+#: How deep a circle may sink in between two points of a straight surface, relative to the height;
+#: and points along an element at most.
+SINK, MOST = 1e-2, 200
+
+
+@teaching
+class Obstacle(ForceElement):
+    """An obstacle for the surface of beams: bottom, top and both ends.
+
+    Each point of a rule on the surface is pressed out of the shape with ``stiffness`` times the
+    depth to which it is in it, per area of the stress-free surface; see
+    :mod:`skfem_ancf.actions.forces.contact_texts`. Of a cable the surface is its axis, moved by
+    half of the height along the normal.
+
+    Parameters
+    ----------
+    shape
+        A :class:`~skfem_ancf.actions.obstacles.Circle`,
+        :class:`~skfem_ancf.actions.obstacles.Line`, :class:`~skfem_ancf.actions.obstacles.Polygon`
+        or :class:`~skfem_ancf.actions.obstacles.SignedDistance`.
+    friction
+        Coulomb's coefficient, zero or positive.
+    stiffness
+        Pressure per penetration, positive; by default ``E / height`` of each beam, that of half of
+        its own thickness or so, but of strips thinner than a hundredth of their extent L no more
+        than ``E height^3 / (12 (L / 200)^4)``, so that they bend over lengths that meshes resolve.
+        A static solution hardens that, up to ``E / height``, where bodies are pressed deep.
+    beam
+        The beam, its name or its number; all of the scene by default.
+    method
+        "penalty", or "augmented": each load step, or step in time, is solved again with the
+        pressures that it has found, until the penetration at its end is less than ``tolerance``.
+    position
+        A function of time that returns the displacement (x, y) of the shape from where it was
+        given; in statics time is the load factor.
+    angle
+        A function of time that returns the angle by which it has turned, counterclockwise, about
+        its ``pivot``: center, point or mean of the corners.
+    damping
+        In a motion the pressure grows by so much of itself per velocity of approach, zero or
+        positive (time per length), as of Hunt and Crossley; it never pulls.
+    points
+        Points along each element on bottom and top, at least 2, of a Gauss-Lobatto rule. By
+        default two more than the degree of the element's axis, and so many such rules one after
+        the other that a shape of a small radius cannot sink in between two points by more than a
+        hundredth of the height.
+    **options
+        ``width``: of the transition from no pressure to one in proportion to the penetration, a
+        length, by default a thousandth of the height. ``tolerance``: the penetration that
+        "augmented" leaves, a length, by default 1e-5 of the height.
+
+    References
+    ----------
+    Wriggers: "Computational Contact Mechanics", Springer 2006; Laursen, Chawla: "Design of energy
+    conserving algorithms for frictionless dynamic contact problems", International Journal for
+    Numerical Methods in Engineering 40 (1997); Hunt, Crossley: "Coefficient of restitution
+    interpreted as damping in vibroimpact", Journal of Applied Mechanics 42 (1975).
+    """
+
+    distributed = True
+
+    def __init__(self, shape: Shape, friction: float = 0.0, stiffness: float | None = None,
+                 beam: WhichBeam = None, method: str = "penalty", position: Any = None,
+                 angle: Any = None, damping: float = 0.0, points: int | None = None,
+                 **options: float | None) -> None:
+        if not isinstance(shape, Shape):
+            raise InputError("an obstacle is a Circle, Line, Polygon or SignedDistance of "
+                             f"skfem_ancf.actions.obstacles, got {shown(shape)}")
+        self.shape, self.beam = shape, beam
+        self.friction = require_not_negative("friction", friction, False)
+        self.damping = require_not_negative("damping", damping)
+        self.penalty = None if stiffness is None else require_positive("stiffness", stiffness)
+        self.method = require_option("method", method, METHODS)
+        self.points = None if points is None else require_integer("points", points, 2, 64)
+        self.position, self.angle = position, angle
+        for name, function in (("position", position), ("angle", angle)):
+            if function is not None:
+                require_function(name, function, "of time")
+        self.options = _options(options)
+        self.symmetric = self.friction == 0.0
+        self.tolerance = 0.0
+
+    @property
+    def moves(self) -> bool:
+        """True if its place depends on time."""
+        return self.position is not None or self.angle is not None
+
+    def pose(self, t: float, rates: bool = True) -> Array:
+        """Where it is: displacement, cosine and sine, pivot, velocities, when; shape (10,).
+
+        Parameters
+        ----------
+        t
+            The time.
+        rates
+            With its velocities, else zero.
+        """
+        out = np.array([0.0, 0.0, 1.0, 0.0, *self.shape.pivot, 0.0, 0.0, 0.0, t])
+        if self.moves:
+            now, h = self._at(t), STEP * max(1.0, abs(t))
+            out[:2], out[2:4] = now[:2], (np.cos(now[2]), np.sin(now[2]))
+            if rates:
+                out[6:9] = (self._at(t + h) - self._at(t - h)) / (2.0 * h)
+        return out
+
+    def _at(self, t):
+        place = np.zeros(2) if self.position is None else ask_array(
+            "position(t={:g})", (2,), self.position, t)
+        turn = 0.0 if self.angle is None else ask_array("angle(t={:g})", (), self.angle, t)
+        return np.append(place, turn)
+
+    def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
+        """Its surface at a time as straight pieces.
+
+        Parameters
+        ----------
+        box
+            Lower left and upper right of what is to be seen, one a column, shape (2, 2).
+        t
+            Time; in statics the load factor.
+
+        Returns
+        -------
+        points, pieces
+            Shape (2, n), and the numbers of both ends of each, (m, 2).
+        """
+        if not self.moves:
+            return self.shape.outline(box, t)
+        pose = self.pose(t)
+        corners = taken_back(pose, np.array(
+            [[box[0, i], box[1, j]] for i in (0, 1) for j in (0, 1)]).T)
+        points, pieces = self.shape.outline(
+            np.array([corners.min(axis=1), corners.max(axis=1)]).T, t)
+        return carried(pose, points), pieces
+
+    def bind(self, layout: Layout) -> list[Link]:
+        if not layout.beams:
+            raise InputError("an obstacle is touched by surfaces of beams, the scene has rigid "
+                             "bodies alone: hold them by one-sided springs, or add a beam")
+        beams = layout.beams if self.beam is None else [select_beam(layout.beams, self.beam)]
+        height = min(beam.mesh.height for beam in beams)
+        self.tolerance = self.options["tolerance"] or TOLERANCE * height
+        groups = []
+        for beam in beams:
+            groups += self._groups_of(beam, layout.offset(beam))
+        places = np.concatenate([group.starts[:2] for group in groups], axis=1)
+        self.shape = self.shape.fitted(places, height)
+        self.groups = tuple(groups)
+        contacts = Contacts([self])
+        for (_, group), x, found in contacts.look(np.zeros(layout.N), 0.0):
+            deepest = int(np.argmin(found[0]))
+            place = x[:, deepest] + contacts.origin
+            if not found[0, deepest] >= -CUT * height:
+                raise InputError(
+                    f"{self!r} cuts the body at the start: the point "
+                    f"{shown(place.tolist())} of its surface is {-found[0, deepest]:.4g} "
+                    "deep in it. Move the obstacle, or the body to where it is")
+        self._require_outside(beams)
+        return [Link(np.zeros(2))]
+
+    def _require_outside(self, beams):
+        """Raise InputError if the surface of a shape is inside of a beam."""
+        landmarks = carried(self.pose(0.0), self.shape.landmarks()).T
+        for beam in beams:
+            for at in landmarks:
+                try:
+                    Y = beam.locate(at)[1][1]
+                except MeshError:
+                    continue
+                if min(Y, 1.0 - Y) > CUT:
+                    raise InputError(f"{self!r} cuts the body at the start: its point "
+                                     f"{shown(at.tolist())} is inside of {beam!r}")
+
+    def parts(self) -> list[Part]:
+        return []
+
+    # points of the surface
+
+    def _groups_of(self, beam, first):
+        """The group of bottom, top and both ends, which count as an element each."""
+        xi, along = self._along(beam)
+        sides = np.array([np.tile(xi, 2), np.repeat([0.0, 1.0], len(xi))]), np.tile(along, 2)
+        m, last = 2 * len(xi), beam.mesh.nelements - 1
+        eta, across = _lobatto(ACROSS)  # as many points as an element has: some are shared
+        which = np.arange(m) % ACROSS
+        eta, across = eta[which], across[which] / np.bincount(which)[which]
+        ends = [(np.array([np.full(m, end), eta]), across, np.array([e]))
+                for end, e in ((0.0, 0), (1.0, last))]
+        return [_joined([self._group(beam, first, *sides, None)] + [
+            self._group(beam, first, *end) for end in ends])]
+
+    def _along(self, beam):
+        """Points and weights along the elements of a beam."""
+        rule = _lobatto(self.points or beam.element.axis_degree + 2)
+        bend, longest = self.shape.bend, float(beam.mesh.lengths.max())
+        apart = longest * float(np.max(np.diff(rule[0])))
+        if self.points is None and bend > 0.0:
+            wanted = np.ceil(apart / np.sqrt(8.0 * SINK * bend * beam.mesh.height))
+            pieces = int(np.clip(wanted, 1, MOST // len(rule[0])))
+            rule, apart = _repeated(*rule, pieces), apart / pieces
+        if apart > 2.0 * bend > 0.0:
+            warnings.warn(
+                f"{self!r} has a radius of {bend:.4g}, and the points of {beam!r} that touch it "
+                f"are {apart:.4g} apart: it passes between them unseen. Use shorter elements where "
+                "it is, or a larger points=", ModelWarning, stacklevel=2)
+        return rule
+
+    def _group(self, beam, first, X, w, tind):
+        mesh, mapping = beam.mesh, beam.mesh.mapping()
+        elements = np.arange(mesh.nelements) if tind is None else tind
+        h, n, m = mesh.height, len(elements), X.shape[1]
+        offsets, slopes = np.zeros((n, m)), None
+        at, starts = X, np.zeros((4, n, m))
+        if not beam.has_sections:
+            offsets[:] = mapping.offset(X, elements)
+            at = np.array([X[0], np.full(m, 0.5)])
+            G, frame = beam_gradients(mesh, beam.element, at, elements)
+            slopes = np.moveaxis(G[0], -1, 0).reshape(-1, n * m)
+            starts[2:] = np.moveaxis(frame[0], -1, 0)
+        starts[:2] = mapping.F(at, elements)
+        weights = beam.element.functions(mapping, at, elements)[0]
+        if tind is None:  # lengths of both sides, by xi, and their widths
+            half, length = m // 2, np.hypot(*mapping.DF(at, elements)[:, 0])
+            width = [np.broadcast_to(_face(beam.across, side, part, elements), (n, half))
+                     for side, part in ((0, X[:, :half]), (1, X[:, half:]))]
+            areas = w * length * np.concatenate(width, axis=1)
+        else:
+            areas = w * mapping.height(X[0], elements)[0] * beam.across.outline(X, elements)
+        areas = np.broadcast_to(areas, (n, m))
+        nodes = first + mesh.t[0, elements] * beam.nd
+        middle = starts[:2].mean(axis=2, keepdims=True)
+        radius = float((np.hypot(*(starts[:2] - middle)) + np.abs(offsets)).max())
+        E, density = _stiffest(beam.across, elements)
+        k, augmented = self.penalty or _default(E, mesh), self.method == "augmented"
+        firmest = 1.0 if self.penalty or augmented else max(1.0, E / (h * k))
+        numbers = np.array([k, self.options["width"] or WIDTH * h, self.friction, k, self.damping,
+                            HARDER * density * h * augmented, radius,
+                            -1.0 if self.shape.hollow else 1.0, self.tolerance * augmented])
+        return Group(np.repeat(nodes, m), weights.reshape(-1, n * m), slopes, areas.ravel(),
+                     offsets.ravel(), starts.reshape(4, -1), n, m,
+                     _deepest(self.shape, h), h, numbers, firmest)
+
+    def __repr__(self) -> str:
+        return f"<Obstacle {self.shape!r}>"
+
+
+def _joined(groups):
+    """Some groups of one beam as one."""
+    first = groups[0]
+    arrays = {name: np.concatenate([getattr(group, name) for group in groups], axis=-1)
+              for name in ("first", "weights", "areas", "offsets", "starts")}
+    slopes = None if first.slopes is None else np.concatenate(
+        [group.slopes for group in groups], axis=-1)
+    numbers = np.max([group.numbers for group in groups], axis=0)  # but for the radius the same
+    return first._replace(**arrays, slopes=slopes, numbers=numbers,
+                          elements=sum(group.elements for group in groups))
+
+
+def _deepest(shape, h):
+    """How deep a way may cut a shape; infinite of one that has no other side."""
+    return np.inf if shape.inner == np.inf else THROUGH * min(h, shape.inner)
+
+
+def _default(E, mesh):
+    """The stiffness of a strip's own thickness, or less: that over which it bends far enough."""
+    h, extent = mesh.height, float(np.hypot(*np.ptp(mesh.p, axis=1)))
+    return E / h * min(1.0, h**4 / (12.0 * (SPREAD * extent)**4))
+
+
+def _stiffest(across, elements):
+    """The largest modulus and the largest density of the layers, in the middles of elements."""
+    E, density = [], []
+    for slab in across.slabs:
+        X = np.array([[0.5], slab.measure.gauss(1)[0]])
+        E.append(np.max(slab.material.E * across.grade(slab, X, elements)))
+        density.append(0.0 if slab.density is None else np.max(across.density(slab, X, elements)))
+    return float(max(E)), float(max(density))
+
+
+def _face(across, side, X, elements):
+    """The width of bottom or top; of a section without any, as a circle, the largest."""
+    slab = across.slabs[-side]
+    if slab.face is not None and slab.face[side] == 0.0:
+        return across.outline(X, elements)
+    return across.face(side, X, elements)
+
+
+def _lobatto(n):
+    """Points and weights on [0, 1]."""
+    x = gauss_lobatto(n)
+    P = np.polynomial.legendre.Legendre.basis(n - 1)(x)
+    return 0.5 * (x + 1.0), 1.0 / (n * (n - 1) * P**2)
+
+
+def _repeated(x, w, pieces):
+    """A rule with points at both ends on each of equal pieces of [0, 1]."""
+    points = np.add.outer(np.arange(pieces), x)[:, :-1].ravel() / pieces
+    weights = np.tile(w[:-1], pieces) / pieces
+    weights[len(w) - 1::len(w) - 1] += w[-1] / pieces  # two meet
+    return np.append(points, 1.0), np.append(weights, w[-1] / pieces)
+
+
+def _options(options):
+    if "slip_speed" in options:
+        warnings.warn("slip_speed= has no effect any more, leave it out: in a motion points stick "
+                      "as they do in statics", DeprecationWarning, stacklevel=4)
+        options = {name: x for name, x in options.items() if name != "slip_speed"}
+    for name in options:
+        require_option("option of an obstacle", name, KNOWN)
+    return {name: None if options.get(name) is None else require_positive(name, options[name])
+            for name in KNOWN[-2:]}
+
+
+__all__ = ["Obstacle"]

@@ -1,0 +1,96 @@
+"""Outlines of shapes as straight pieces, for pictures and files."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ...core.types import Array
+
+#: Cells of a grid along each side, in which a surface is looked for.
+CELLS = 160
+
+
+def circle(center: Array, radius: float, n: int) -> tuple[Array, Array]:
+    """Points of a circle and its pieces.
+
+    Parameters
+    ----------
+    center, radius
+        Of the circle; shape (2,).
+    n
+        Number of points.
+
+    Returns
+    -------
+    points, pieces
+        Shapes (2, n) and (n, 2).
+    """
+    angle, k = 2.0 * np.pi * np.arange(n) / n, np.arange(n)
+    points = center[:, None] + radius * np.array([np.cos(angle), np.sin(angle)])
+    return points, np.column_stack([k, np.roll(k, -1)])
+
+
+def clipped(point: Array, normal: Array, box: Array) -> tuple[Array, Array]:
+    """A line as one piece, as long as it is beside a box.
+
+    Parameters
+    ----------
+    point, normal
+        Of the line, shape (2,).
+    box
+        Lower left and upper right, one a column, shape (2, 2).
+
+    Returns
+    -------
+    points, pieces
+        Shapes (2, 2) and (1, 2).
+    """
+    along = np.array([normal[1], -normal[0]])
+    middle, half = box.mean(axis=1), 0.5 * np.hypot(*(box[:, 1] - box[:, 0]))
+    foot = point + ((middle - point) @ along) * along
+    return np.array([foot - half * along, foot + half * along]).T, np.array([[0, 1]])
+
+
+def contour(distance: Callable[[Array], Array], box: Array) -> tuple[Array, Array]:
+    """Where a distance is zero, by marching triangles on a grid.
+
+    Parameters
+    ----------
+    distance
+        Takes points (2, n), returns (n,).
+    box
+        Lower left and upper right of the grid, one a column, shape (2, 2).
+
+    Returns
+    -------
+    points, pieces
+        Shapes (2, 2 m) and (m, 2).
+    """
+    x, y = (np.linspace(low, high, CELLS + 1) for low, high in box)
+    points = np.array(np.meshgrid(x, y)).reshape(2, -1)
+    values = distance(points)
+    corner = (np.arange(CELLS)[:, None] * (CELLS + 1) + np.arange(CELLS)).ravel()
+    below, above = (np.stack([corner, corner + a, corner + CELLS + 2], axis=1)
+                    for a in (1, CELLS + 1))
+    triangles = np.concatenate([below, above])
+    inside = values[triangles] < 0.0
+    cut = triangles[np.any(inside, axis=1) & ~np.all(inside, axis=1)]
+    # the corner that is alone on its side, and the two others
+    inside = values[cut] < 0.0
+    alone = np.argmax(inside == (inside.sum(axis=1) == 1)[:, None], axis=1)
+    rows = np.arange(len(cut))
+    one = cut[rows, alone]
+    ends = []
+    for k in (1, 2):
+        other = cut[rows, (alone + k) % 3]
+        share = values[one] / (values[one] - values[other])
+        ends.append(points[:, one] + share * (points[:, other] - points[:, one]))
+    return np.concatenate(ends, axis=1), np.column_stack([rows, rows + len(rows)])
+
+
+__all__ = ["circle", "clipped", "contour"]

@@ -1,0 +1,484 @@
+"""Shapes of obstacles: what is solid, by its signed distance."""
+
+from __future__ import annotations
+
+import inspect
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...core.errors import (CallbackError, InputError, ask, require_finite, require_flag,
+                            require_function, require_not_negative, require_positive, shown,
+                            teaching, warnings_as_errors)
+from ..forces.contact_texts import OUTLINE, OWN, outline
+from ...core.frozen import Sealable
+from .outlines import circle, clipped, contour
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
+
+    from ...core.types import Array
+
+#: Relative step of differences of a distance function, and of its gradient.
+STEP, COARSE = 1e-6, 1e-4
+#: By how much a distance may grow more than what it is the distance of.
+STEEP = 0.05
+#: An edge without end, in its lengths.
+FAR = 1e300
+#: A thickness that is not known.
+UNKNOWN = 1e300
+_COMPLEX = getattr(np, "exceptions", np).ComplexWarning
+
+
+class Shape(Sealable):
+    """What is solid. Its surface has no thickness, and its inside no end.
+
+    Attributes
+    ----------
+    kind
+        Its number in :mod:`skfem_ancf.actions.forces.contact_texts`.
+    numbers
+        What the texts take, shape (n,).
+    pivot
+        The point about which it turns, where its angle depends on time; shape (2,).
+    hollow
+        It is solid outside and not inside.
+    bend
+        The smallest radius of its surface; infinite where it is straight or that is not known, zero
+        for sharp corners.
+    inner
+        How deep a point may be in it before it is closer to another side: half of its least
+        thickness; infinite if there is no other side, large if that is not known.
+    """
+
+    kind = OWN
+    bend = inner = np.inf
+    numbers: Any = np.zeros(0)
+    pivot: Any = np.zeros(2)
+    hollow = False
+
+    def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
+        """The distance of points from the surface, negative in what is solid.
+
+        Parameters
+        ----------
+        x
+            Points, shape (2, ...).
+        t
+            Time, for a shape of functions of it.
+
+        Returns
+        -------
+        ndarray
+            Shape (...).
+        """
+        raise NotImplementedError
+
+    def landmarks(self) -> Array:
+        """Points of its surface, no beam may be about them at the start; shape (2, n)."""
+        return np.zeros((2, 0))
+
+    def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
+        """Its surface as straight pieces.
+
+        Parameters
+        ----------
+        box
+            Lower left and upper right of what is to be seen, shape (2, 2), one a column.
+        t
+            Time, for a shape of functions of it.
+
+        Returns
+        -------
+        points, pieces
+            Shape (2, n), and the numbers of both ends of each, (m, 2).
+        """
+        raise NotImplementedError
+
+    def fitted(self, x: Array, scale: float) -> Shape:
+        """The shape for a body: functions of the caller's are tried there.
+
+        Parameters
+        ----------
+        x
+            Points of the body, shape (2, n).
+        scale
+            A length of the body.
+
+        Raises
+        ------
+        CallbackError
+            If a function is not what a shape needs.
+        """
+        return self
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}>"
+
+
+@teaching
+class Line(Shape):
+    """A straight wall without end.
+
+    Parameters
+    ----------
+    point
+        A point of its surface, shape (2,).
+    normal
+        The direction out of what is solid, of any length, shape (2,).
+
+    Examples
+    --------
+    >>> from skfem_ancf.actions.obstacles import Line
+    >>> floor = Line((0, -1), normal=(0, 1))
+    >>> float(floor.distance((3.0, 0.5)))
+    1.5
+    """
+
+    kind = OUTLINE
+
+    def __init__(self, point: ArrayLike, normal: ArrayLike = (0.0, 1.0)) -> None:
+        self.point = require_finite("point", point, (2,))
+        self.normal = require_finite("normal", normal, (2,))
+        size = np.hypot(*self.normal)
+        if not size > 0.0:
+            raise InputError(f"normal must have a direction, got {shown(normal)}")
+        self._unit, self.pivot = self.normal / size, self.point
+        p, q = self._unit
+        self.numbers = np.array([0.0, -FAR, FAR, *self.point, -q, p, 1.0])
+
+    def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
+        x = np.asarray(x, dtype=float)
+        return self._unit[0] * (x[0] - self.point[0]) + self._unit[1] * (x[1] - self.point[1])
+
+    def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
+        return clipped(self.point, self._unit, box)
+
+    def __repr__(self) -> str:
+        return f"<Line at {_pair(self.point)}, normal {_pair(self.normal)}>"
+
+
+@teaching
+class Circle(Shape):
+    """A disc, or the hole of a ring.
+
+    Parameters
+    ----------
+    center
+        Shape (2,).
+    radius
+        Positive.
+    hollow
+        It is solid outside and not inside.
+
+    Examples
+    --------
+    >>> from skfem_ancf.actions.obstacles import Circle
+    >>> float(Circle((0, 0), 1.0).distance((0.0, 3.0)))
+    2.0
+    """
+
+    kind = OUTLINE
+
+    def __init__(self, center: ArrayLike, radius: float, hollow: bool = False) -> None:
+        self.center = require_finite("center", center, (2,))
+        self.radius = require_positive("radius", radius)
+        self.hollow = require_flag("hollow", hollow)
+        self.pivot = self.center
+        self.numbers = np.array([self.radius, 0.0, 1.0, *self.center, 0.0, 0.0, 1.0])
+        self.bend = self.radius
+        self.inner = np.inf if self.hollow else self.radius
+
+    def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
+        x = np.asarray(x, dtype=float)
+        gap = np.hypot(x[0] - self.center[0], x[1] - self.center[1]) - self.radius
+        return -gap if self.hollow else gap
+
+    def landmarks(self) -> Array:
+        points, _ = circle(self.center, self.radius, 8)
+        return points if self.hollow else np.column_stack([self.center, points])
+
+    def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
+        return circle(self.center, self.radius, 96)
+
+    def __repr__(self) -> str:
+        return f"<Circle about {_pair(self.center)}, radius {self.radius:g}>"
+
+
+@teaching
+class Polygon(Shape):
+    """What is inside of a closed polygon, or outside of it.
+
+    Parameters
+    ----------
+    points
+        Its corners in order, either way round: at least three, as a list of pairs or an array of
+        shape (n, 2). No two sides may meet but at a corner.
+    radius
+        The polygon is grown by so much, and its corners rounded. A beam that slides over a corner
+        wants one: where the corner is sharp the direction of its pressure jumps.
+    hollow
+        It is solid outside and not inside; the radius then makes the hole larger.
+
+    Examples
+    --------
+    >>> from skfem_ancf.actions.obstacles import Polygon
+    >>> box = Polygon([(0, 0), (1, 0), (1, 1), (0, 1)])
+    >>> box.distance([[0.5, 2.0], [0.75, 0.5]]).tolist()
+    [-0.25, 1.0]
+    """
+
+    kind = OUTLINE
+
+    def __init__(self, points: ArrayLike, radius: float = 0.0, hollow: bool = False) -> None:
+        try:
+            corners = np.array(points, dtype=float)
+        except (TypeError, ValueError):
+            corners = np.zeros(0)
+        if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3:
+            raise InputError("points must be three corners or more, each (x, y), as "
+                             f"[(0, 0), (1, 0), (0, 1)], got {shown(points)}")
+        corners = require_finite("points", corners)
+        self.bend = self.radius = require_not_negative("radius", radius, False)
+        self.hollow = require_flag("hollow", hollow)
+        _require_simple(corners)
+        after = np.roll(corners, -1, axis=0)
+        if np.sum(corners[:, 0] * after[:, 1] - corners[:, 1] * after[:, 0]) < 0.0:
+            corners = corners[::-1].copy()
+        self.points, self.pivot = corners, corners.mean(axis=0)
+        edges = np.roll(corners, -1, axis=0) - corners
+        before = np.roll(edges, 1, axis=0)
+        turn = before[:, 0] * edges[:, 1] - before[:, 1] * edges[:, 0]
+        sides = np.where(turn >= 0.0, 1.0, -1.0)
+        self.numbers = np.append([self.radius, 0.0, 1.0], np.column_stack([corners, edges, sides]))
+        side = -1.0 if self.hollow else 1.0
+        inner = _thin(corners, edges, side) + side * self.radius
+        self.inner = inner if inner > 0.0 else np.inf
+
+    def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
+        x = np.asarray(x, dtype=float)
+        out = np.zeros((6, int(np.prod(x.shape[1:]))))
+        outline(self.numbers, False, x.reshape(2, -1), out)
+        gap = out[0].reshape(x.shape[1:])
+        return -gap if self.hollow else gap
+
+    def landmarks(self) -> Array:
+        return self.points.T
+
+    def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
+        if self.radius > 0.0:  # with arcs at its corners
+            grown = self.radius + 0.02 * float(np.ptp(self.points, axis=0).max())
+            own = np.array([self.points.min(axis=0) - grown, self.points.max(axis=0) + grown]).T
+            return contour(self.distance, own)
+        n = np.arange(len(self.points))
+        return self.points.T, np.column_stack([n, np.roll(n, -1)])
+
+    def __repr__(self) -> str:
+        return f"<Polygon of {len(self.points)} corners>"
+
+
+def _pair(x):
+    return f"({x[0]:g}, {x[1]:g})"
+
+
+def _thin(corners, edges, side):
+    """Half of the least way from the middle of an edge through what is solid to another edge."""
+    middle, normal = corners + 0.5 * edges, side * np.array([-edges[:, 1], edges[:, 0]]).T
+    apart = corners[None] - middle[:, None]  # corner_j + b edge_j = middle_i + a normal_i
+    det = _cross(normal[:, None], edges[None])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        a, b = _cross(apart, edges[None]) / det, _cross(apart, normal[:, None]) / det
+    met = (a > 1e-9) & (b >= 0.0) & (b <= 1.0)
+    return 0.5 * float(np.min(np.where(met, a * np.hypot(*normal.T)[:, None], np.inf)))
+
+
+def _cross(a, b):
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def _require_simple(points):
+    """Raise InputError for corners that repeat, and sides that cross."""
+    n = len(points)
+    sides = np.roll(points, -1, axis=0) - points
+    short, = np.nonzero(np.hypot(*sides.T) <= 1e-12 * np.abs(points).max())
+    if len(short):
+        raise InputError(f"the corner {short[0]} of the polygon, {_pair(points[short[0]])}, and "
+                         "the next are one place: leave one of them out")
+
+    def turn(a, b, c):
+        return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+    for i in range(n):
+        for j in range(i + 1, n):
+            a, b, c, d = points[i], points[(i + 1) % n], points[j], points[(j + 1) % n]
+            beside = j == i + 1 or (i == 0 and j == n - 1)
+            crosses = (turn(a, b, c) * turn(a, b, d) < 0 and turn(c, d, a) * turn(c, d, b) < 0)
+            if beside:  # they may fold back on each other
+                shared, p, q = (b, a, d) if j == i + 1 else (a, b, c)
+                crosses = turn(shared, p, q) == 0.0 and (p - shared) @ (q - shared) > 0.0
+            if crosses:
+                raise InputError(f"the sides {i} and {j} of the polygon, from {_pair(a)} to "
+                                 f"{_pair(b)} and from {_pair(c)} to {_pair(d)}, cross: give its "
+                                 "corners in order, round what is solid")
+
+
+@teaching
+class SignedDistance(Shape):
+    """A shape by the signed distance of points from its surface.
+
+    Parameters
+    ----------
+    f
+        ``f(x, y)`` or ``f(x, y, t)`` of arrays x and y: the distances, negative in what is solid,
+        of their shape. It has to be a distance where bodies are, no other function with the same
+        zeros: one that grows by more than the way may be missed by the search, and penalties are
+        of its values.
+    gradient
+        ``gradient(x, y)`` or with t: its derivatives, shape (2, ...). By default complex steps,
+        where f takes complex numbers, else differences.
+    hessian
+        ``hessian(x, y)`` or with t: its second derivatives xx, xy and yy, shape (3, ...). By
+        default differences of the gradient.
+    pivot
+        The point about which it turns, where its angle depends on time; shape (2,).
+
+    Notes
+    -----
+    It is called in Python: a scene with one runs in NumPy.
+
+    Examples
+    --------
+    A floor with waves:
+
+    >>> import numpy as np
+    >>> from skfem_ancf.actions.obstacles import SignedDistance
+    >>> waves = SignedDistance(lambda x, y: (y - 0.01 * np.sin(5 * x)) / 1.01)
+    >>> float(waves.distance((0.0, 1.01)))
+    1.0
+    """
+
+    kind = OWN
+    inner = UNKNOWN
+
+    def __init__(self, f: Callable[..., Any], gradient: Callable[..., Any] | None = None,
+                 hessian: Callable[..., Any] | None = None, pivot: ArrayLike = (0.0, 0.0)) -> None:
+        self.f = require_function("f", f, "of x and y that returns distances")
+        self.gradient, self.hessian = gradient, hessian
+        for name, function in (("gradient", gradient), ("hessian", hessian)):
+            if function is not None:
+                require_function(name, function, "of x and y that returns derivatives")
+        self.pivot = require_finite("pivot", pivot, (2,))
+        self._timed = {name: _takes_time(g) for name, g in (
+            ("f", f), ("gradient", gradient), ("hessian", hessian))}
+        self._by_steps, self._scale = False, 1.0
+
+    def _asked(self, name, x, t, rows=()):
+        """What one of the functions returns, in the shape that it has to have."""
+        more = (t,) if self._timed[name] else ()
+        value = ask(f"{name} of a SignedDistance", getattr(self, name), x[0], x[1], *more)
+        value = np.asarray(value)
+        if name == "f" and value.ndim == 0 and x[0].ndim == 0:
+            pass
+        elif value.shape != (*rows, *x.shape[1:]):
+            raise CallbackError(
+                f"{name}(x, y) of a SignedDistance must return the shape {(*rows, *x.shape[1:])} "
+                f"for x and y of the shape {x.shape[1:]}, got {value.shape}: write it for arrays, "
+                "as np.hypot(x, y) - 1.0")
+        if value.dtype.kind not in "fiuc" or not np.all(np.isfinite(value)):
+            raise CallbackError(f"{name}(x, y) of a SignedDistance must be finite numbers, got "
+                                f"{shown(value)}")
+        return value
+
+    def distance(self, x: ArrayLike, t: float = 0.0) -> Array:
+        return np.asarray(self._asked("f", np.asarray(x, dtype=float), t), dtype=float)
+
+    def _slope(self, x, t):
+        """Its gradient at points, shape (2, n)."""
+        if self.gradient is not None:
+            return self._asked("gradient", x, t, (2,))
+        units = np.eye(2)[:, :, None]
+        if self._by_steps:
+            return np.array([np.imag(self._asked("f", x + 1e-30j * e, t)) / 1e-30 for e in units])
+        return self._differences(x, t)
+
+    def _differences(self, x, t):
+        step = STEP * self._scale
+        return np.array([(self._asked("f", x + step * e, t) - self._asked("f", x - step * e, t))
+                         / (2.0 * step) for e in np.eye(2)[:, :, None]])
+
+    def derivatives(self, x: Array, t: float) -> Array:
+        """Distance, gradient and second derivatives xx, xy, yy.
+
+        Parameters
+        ----------
+        x
+            Points, shape (2, n).
+        t
+            Time.
+
+        Returns
+        -------
+        ndarray
+            Shape (6, n).
+        """
+        out = np.empty((6, x.shape[1]))
+        out[0], out[1:3] = self._asked("f", x, t), self._slope(x, t)
+        if self.hessian is not None:
+            out[3:] = self._asked("hessian", x, t, (3,))
+        elif x.shape[1]:
+            step = COARSE * self._scale
+            by_x, by_y = ((self._slope(x + step * e, t) - self._slope(x - step * e, t))
+                          / (2.0 * step) for e in np.eye(2)[:, :, None])
+            out[3:] = by_x[0], 0.5 * (by_x[1] + by_y[0]), by_y[1]
+        return out
+
+    def fitted(self, x: Array, scale: float) -> SignedDistance:
+        made = self._unsealed()
+        made._scale, made._by_steps = scale, False
+        rough = made._differences(x, 0.0)
+        steep = np.hypot(*rough)
+        worst = int(np.argmax(steep))
+        if steep[worst] > 1.0 + STEEP:
+            raise CallbackError(
+                f"f(x, y) of a SignedDistance must be a distance, whose slope is 1: at "
+                f"{shown(x[:, worst].tolist())} it is {steep[worst]:.4g}. Divide it by its slope, "
+                "or by a bound of it")
+        if made.gradient is None:
+            made._by_steps = made._takes_complex(x, rough)
+        elif not np.allclose(made._slope(x, 0.0), rough, rtol=0.0, atol=1e-3):
+            raise CallbackError("gradient(x, y) of a SignedDistance is not that of f: they differ "
+                                f"by {np.abs(made._slope(x, 0.0) - rough).max():.3g}")
+        made.derivatives(x, 0.0)
+        return made
+
+    def _takes_complex(self, x, rough):
+        """True if complex steps give the gradient that differences give."""
+        self._by_steps = True
+        try:
+            with warnings_as_errors(_COMPLEX):
+                return bool(np.allclose(self._slope(x, 0.0), rough, rtol=0.0, atol=1e-4))
+        except (CallbackError, TypeError, ValueError, _COMPLEX):
+            return False
+
+    def outline(self, box: Array, t: float = 0.0) -> tuple[Array, Array]:
+        return contour(lambda x: self.distance(x, t), box)
+
+    def __repr__(self) -> str:
+        return f"<SignedDistance {getattr(self.f, '__name__', 'function')}>"
+
+
+def _takes_time(function):
+    """True if a function takes a third argument without a default."""
+    if function is None:
+        return False
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        return False
+    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    return len([p for p in parameters if p.kind in kinds and p.default is p.empty]) > 2
+
+
+__all__ = ["Circle", "Line", "Polygon", "Shape", "SignedDistance"]

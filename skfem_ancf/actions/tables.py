@@ -1,0 +1,265 @@
+"""Joints and loads of a scene as tables, and what they do, as texts.
+
+Joints are ``Phi = c + g . u + u . H u / 2``; c and g may depend on time.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.band import clear, copy, mirror
+from ..beam.strain_energy import FlatBody, evaluate_body
+from ..beam.kernels.base import GIVEN, MEAN, TANGENT
+from ..beam.kernels.moments import MomentPack, add_mean_moments, add_moment_stiffness, add_moments
+from ..core.callbacks import own_force, own_joints, own_load_stiffness, own_mean_force
+from ..core.source import F1, F2, I1, lanes, primitive, source
+
+
+class JointTables(NamedTuple):
+    """The joints of a scene.
+
+    Attributes
+    ----------
+    hk, hi, hj, hv
+        H by equation, row, column and value, both halves.
+    gk, gi
+        Equation and column of each entry of g.
+    sizes
+        What each equation is open by in a displacement of the scene's size.
+    own
+        Handle of what has joints that are not quadratic, see :mod:`skfem_ancf.core.callbacks`; 0
+        for none.
+    """
+
+    hk: I1
+    hi: I1
+    hj: I1
+    hv: F1
+    gk: I1
+    gi: I1
+    sizes: F1
+    own: int
+
+
+class LoadTables(NamedTuple):
+    """The loads of a scene; each row of factors has those of all kinds, one behind the other.
+
+    Attributes
+    ----------
+    vectors
+        Forces of constant direction, shape (k, N).
+    moments
+        A :class:`~skfem_ancf.beam.kernels.moments.MomentPack`.
+    rows, columns, values, which
+        Forces linear in the displacement, as entries and the number of the factor.
+    pushed, pushes
+        Beams with stress-free strains, a :class:`~skfem_ancf.beam.strain_energy.Body` without
+        stiffness of its own, and for each such load the stresses of a cable that are lost to it, or
+        the strain, at the points of integration, shape (k, n); see
+        :meth:`~skfem_ancf.beam.kernels.base.Chain.pushed_packs`.
+    own
+        Handle of what has loads of other kinds; 0 for none.
+    """
+
+    vectors: F2
+    moments: MomentPack
+    rows: I1
+    columns: I1
+    values: F1
+    which: I1
+    pushed: FlatBody
+    pushes: F2
+    own: int
+
+
+@primitive("scatter")
+def add_each(out, at, x):
+    """out[at] += x, however often a place occurs."""
+    np.add.at(out, at, x)
+
+
+@primitive("scatter")
+def add_products(out, at, v, x, i):
+    """out[at] += v x[i], however often a place occurs."""
+    np.add.at(out, at, v * x[i])
+
+
+@primitive("scatter")
+def add_triples(out, at, v, x, i, y, j):
+    """out[at] += v x[i] y[j]."""
+    np.add.at(out, at, v * x[i] * y[j])
+
+
+@primitive("scatter")
+def add_entries(J, k, i, v):
+    """J[k, i] += v."""
+    np.add.at(J, (k, i), v)
+
+
+@primitive("scatter")
+def add_weighted_entries(J, k, i, v, x, j):
+    """J[k, i] += v x[j]."""
+    np.add.at(J, (k, i), v * x[j])
+
+
+@primitive("scatter")
+def subtract_from_band(A, i, j, v, x, k):
+    """A[i, j] -= v x[k], of a band matrix; of the lower half alone where that is all there is."""
+    there = np.nonzero((i >= j) | (A.top > 0))[0]
+    np.add.at(A.flat, (j * A.ld + A.top + i - j)[there], (-v * x[k])[there])
+
+
+# joints
+
+
+@source
+def constraint(joints, c, g, t, u, phi):
+    """Phi at u."""
+    if joints.own > 0:
+        copy(c, phi)
+        own_joints(joints.own, np.int64(0), t, u, u, phi)
+        return
+    clear(phi)
+    add_triples(phi, joints.hk, joints.hv, u, joints.hi, u, joints.hj)
+    for k in lanes(phi.size):
+        phi[k] = c[k] + 0.5 * phi[k]
+    add_products(phi, joints.gk, g, u, joints.gi)
+
+
+@source
+def add_constraint_rate(joints, g, t, u, v, out):
+    """out += J(u) v."""
+    if joints.own > 0:
+        own_joints(joints.own, np.int64(1), t, u, v, out)
+        return
+    add_products(out, joints.gk, g, v, joints.gi)
+    add_triples(out, joints.hk, joints.hv, v, joints.hi, u, joints.hj)
+
+
+@source
+def add_joint_force(joints, g, t, u, multipliers, out):
+    """out += J(u)^T multipliers."""
+    if joints.own > 0:
+        own_joints(joints.own, np.int64(2), t, u, multipliers, out)
+        return
+    add_products(out, joints.gi, g, multipliers, joints.gk)
+    add_triples(out, joints.hi, joints.hv, multipliers, joints.hk, u, joints.hj)
+
+
+@source
+def add_curvature_force(joints, multipliers, v, out):
+    """out += (sum over k of multipliers[k] H_k) v, of joints that are tables."""
+    add_triples(out, joints.hi, joints.hv, multipliers, joints.hk, v, joints.hj)
+
+
+@source
+def joint_directions(joints, g, t, u, J):
+    """J(u), dense, shape (m, N)."""
+    flat = J.reshape(J.size)
+    clear(flat)
+    if joints.own > 0:
+        own_joints(joints.own, np.int64(3), t, u, u, flat)
+        return
+    add_entries(J, joints.gk, joints.gi, g)
+    add_weighted_entries(J, joints.hk, joints.hi, joints.hv, u, joints.hj)
+
+
+# loads
+
+
+@source
+def _dead_force(loads, factors, out):
+    """The forces of constant direction."""
+    clear(out)
+    for k in range(loads.vectors.shape[0]):
+        c, vector = factors[k], loads.vectors[k]
+        for i in lanes(out.size):
+            out[i] += c * vector[i]
+
+
+@source
+def _of_moments(loads, factors):
+    """The factors of the moments, a view."""
+    n = loads.vectors.shape[0]
+    return factors[n:n + loads.moments.M.size]
+
+
+@source
+def push(loads, what, factors, u, v, out, flat, ld):
+    """What stress-free strains change: internal forces become less, and their tangent.
+
+    Parameters
+    ----------
+    loads
+        :class:`LoadTables`.
+    what
+        GIVEN: the force at u. MEAN: that whose work from u to v is theirs. TANGENT: the derivative
+        at u.
+    factors
+        Of the loads, those of stress-free strains last.
+    u, v, out
+        Displacements, and the external force, which is added to, shape (N,); of none for a tangent.
+    flat, ld
+        The tangent, which is added to, as :func:`~skfem_ancf.beam.strain_energy.evaluate_body`
+        takes it.
+    """
+    given, f = np.empty(loads.pushes.shape[1]), np.empty(u.size)
+    clear(given)
+    clear(f)
+    first = factors.size - loads.pushes.shape[0]
+    for k in range(loads.pushes.shape[0]):
+        c, one = factors[first + k], loads.pushes[k]
+        for i in lanes(given.size):
+            given[i] -= c * one[i]
+    evaluate_body(loads.pushed, what, u, v, f, given, np.int64(1), given[:0], flat, ld)
+    for i in lanes(out.size):
+        out[i] -= f[i]
+
+
+@source
+def external_force(loads, factors, t, scale, u, out):
+    """The force of all loads; ``scale`` is on those of one's own, the others have factors."""
+    _dead_force(loads, factors, out)
+    add_moments(loads.moments, _of_moments(loads, factors), u, out)
+    if loads.rows.size > 0:
+        add_triples(out, loads.rows, loads.values, factors, loads.which, u, loads.columns)
+    if loads.pushes.shape[0] > 0:
+        push(loads, np.int64(GIVEN), factors, u, u, out, out[:0], np.int64(0))
+    if loads.own > 0:
+        own_force(loads.own, t, scale, u, out)
+
+
+@source
+def mean_external_force(loads, factors, t, u0, u1, out):
+    """The mean force of all loads from u0 to u1: its work is what their potentials lose.
+
+    From u to u it is the force at u.
+    """
+    _dead_force(loads, factors, out)
+    add_mean_moments(loads.moments, _of_moments(loads, factors), u0, u1, out)
+    if loads.rows.size > 0:
+        middle = np.empty(out.size)
+        for i in lanes(out.size):
+            middle[i] = 0.5 * (u0[i] + u1[i])
+        add_triples(out, loads.rows, loads.values, factors, loads.which, middle, loads.columns)
+    if loads.pushes.shape[0] > 0:
+        push(loads, np.int64(MEAN), factors, u0, u1, out, out[:0], np.int64(0))
+    if loads.own > 0:
+        own_mean_force(loads.own, t, u0, u1, out)
+
+
+@source
+def add_load_stiffness(loads, factors, t, scale, u, A):
+    """Subtract the derivative of :func:`external_force` from a band matrix.
+
+    Of the matrix the lower half is given; what is symmetric comes first, then the upper half.
+    """
+    lower = A.flat[A.top:]
+    add_moment_stiffness(loads.moments, _of_moments(loads, factors), u, lower, A.ld)
+    if loads.pushes.shape[0] > 0:
+        push(loads, np.int64(TANGENT), factors, u, u, u[:0], lower, A.ld)
+    mirror(A)
+    if loads.rows.size > 0:
+        subtract_from_band(A, loads.rows, loads.columns, loads.values, factors, loads.which)
+    if loads.own > 0:
+        own_load_stiffness(loads.own, t, scale, u, A.flat)

@@ -1,0 +1,275 @@
+"""Where forces act on a beam: spread over its body and faces, or on sections and points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..core.quadrature import lagrange
+from ..sections.jumps import jumps
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
+
+    from .beam import Beam
+    from ..elements.base import ElementBeam
+    from ..mesh.mesh_beam import MeshBeam
+    from ..core.types import Array
+
+#: Places nearer than this part of an element to a node are at the node.
+SNAP = 1e-5
+
+#: A function of ``r`` that differs from 0 or 1 by less is that at a node, where it is flat.
+FLAT = 1e-11
+
+
+#: Where a :class:`Sampled` density acts; the first two are also numbers of faces.
+BOTTOM, TOP, AXIS, BODY = range(4)
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """A density of force, by its values at points of elements: a polynomial between them.
+
+    Attributes
+    ----------
+    where
+        BOTTOM or TOP, a face; AXIS; or BODY.
+    elements
+        Those on which it acts, numbers (n,).
+    xi, eta
+        Points along an element and, of a body, across it; shapes (p,) and (q,).
+    values
+        Force per xi, shape (2, ..., n, p); of a body per volume, shape (2, ..., n, p, q).
+    """
+
+    where: int
+    elements: Array
+    xi: Array
+    values: Array
+    eta: Array | None = None
+
+    def times(self, factor: Any) -> Sampled:
+        """The density times a number, or each of several, shape (...)."""
+        return replace(self, values=np.moveaxis(np.multiply.outer(factor, self.values),
+                                                np.ndim(factor), 0))
+
+    def at(self, e: Array, xi: Array, eta: Array, nelements: int) -> Array:
+        """The density on sections.
+
+        Parameters
+        ----------
+        e, xi
+            Sections, shapes (n,).
+        eta
+            Points across them, shape (n, k).
+        nelements
+            How many elements there are.
+
+        Returns
+        -------
+        ndarray
+            Shape (2, ..., n, k); of a face or the axis k = 1.
+        """
+        row = np.full(nelements, -1)
+        row[self.elements] = np.arange(len(self.elements))
+        along = lagrange(self.xi, xi) * (row[e] >= 0)[:, None]
+        if self.eta is None:
+            return np.einsum("...np,np->...n", self.values[..., row[e], :], along)[..., None]
+        here = np.einsum("...npq,np->...nq", self.values[..., row[e], :, :], along)
+        if np.all(eta == eta[:1]):
+            return here @ lagrange(self.eta, eta[0]).T
+        across = lagrange(self.eta, eta.ravel()).reshape(eta.shape + (-1,))
+        return np.einsum("...nq,nkq->...nk", here, across)
+
+    def changes(self, nelements: int) -> Array:
+        """Stations between elements on which it acts and those on which it does not."""
+        on = np.isin(np.arange(nelements), self.elements)
+        return np.nonzero(on[1:] != on[:-1])[0] + 1.0
+
+    def jumps(self, nelements: int) -> Array:
+        """Stations at which it is another one on both sides, by a tenth of its largest value.
+
+        Less is from element to element what polynomials miss of a smooth density.
+
+        Parameters
+        ----------
+        nelements
+            How many elements there are.
+        """
+        eta = np.array([0.0]) if self.eta is None else self.eta
+        return jumps(lambda X, e: self.at(e, X[0, :, 0], X[1], nelements), nelements, eta,
+                     0.1 * float(np.max(np.abs(self.values), initial=0.0)))
+
+
+class Facets(NamedTuple):
+    """Facets of one kind: where they are, as for :class:`Sampled`.
+
+    Attributes
+    ----------
+    where
+        BOTTOM, TOP or AXIS.
+    chosen
+        Which of the facets they are, numbers (n,).
+    elements
+        Their elements, (n,).
+    xi
+        Points along each, (p,).
+    """
+
+    where: int
+    chosen: Array
+    elements: Array
+    xi: Array
+
+
+def facets_along(mesh: MeshBeam, basis: Any) -> tuple[list[Facets], tuple[float, ...]]:
+    """The facets of a FacetBasis along a beam, and the stations of those across it.
+
+    Parameters
+    ----------
+    mesh
+        A :class:`~skfem_ancf.MeshBeam`.
+    basis
+        Its FacetBasis.
+    """
+    n, ne, find = mesh.p.shape[1], mesh.nelements, np.asarray(basis.find)
+    found = []
+    for side in (BOTTOM, TOP):
+        chosen = np.nonzero((find >= n + side * ne) & (find < n + (side + 1) * ne))[0]
+        if len(chosen):
+            found.append(Facets(side, chosen, find[chosen] - n - side * ne,
+                                np.asarray(basis.X[0]).ravel()))
+    return found, tuple(station_of_node(mesh, int(k)) for k in find[find < n])
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How a load is spread over a beam.
+
+    Attributes
+    ----------
+    body
+        Force per volume of the stress-free body, shape (2,), or None.
+    gravity
+        Force per mass, shape (2,), or None.
+    faces
+        For the bottom and the top the elements whose faces are loaded, two arrays (nelements,) of
+        truth values, or None.
+    traction
+        Force per stress-free area of the faces, (2,), or a function of the points x (2, ...).
+    pressure
+        Force per deformed area, normal to the faces, or None.
+    stations
+        Where it acts on a section or a point: element + xi.
+    sampled
+        Densities that are known at points.
+    eigen
+        A stress-free strain in place of a force: an
+        :class:`~skfem_ancf.actions.eigenstrain.EigenStrain`, or None.
+    """
+
+    body: Array | None = None
+    gravity: Array | None = None
+    faces: tuple[Array, ...] | None = None
+    traction: Array | Callable[[Array], Array] | None = None
+    pressure: float | None = None
+    stations: tuple[float, ...] = ()
+    sampled: tuple[Sampled, ...] = ()
+    eigen: Any = None
+
+    @property
+    def acts_at_stations(self) -> bool:
+        """True if it is nowhere spread."""
+        return not self.sampled and all(
+            x is None for x in (self.faces, self.body, self.gravity, self.eigen))
+
+
+def on_facets(mesh: MeshBeam, facets: ArrayLike, **how: Any) -> Spread:
+    """The Spread of a load on facets: faces of elements, or sections.
+
+    Parameters
+    ----------
+    mesh
+        A :class:`~skfem_ancf.MeshBeam`.
+    facets
+        Numbers of facets, shape (n,).
+    **how
+        ``traction`` or ``pressure`` of the :class:`Spread`.
+    """
+    n, ne = mesh.p.shape[1], mesh.nelements
+    on = np.zeros(n + 2 * ne, dtype=bool)
+    on[np.asarray(facets)] = True
+    stations = tuple(station_of_node(mesh, k) for k in on[:n].nonzero()[0].tolist())
+    return Spread(faces=(on[n:n + ne], on[n + ne:]), stations=stations, **how)
+
+
+def station_of_node(mesh: MeshBeam, node: int) -> float:
+    """A node as element + xi.
+
+    Parameters
+    ----------
+    mesh
+        A :class:`~skfem_ancf.MeshBeam`.
+    node
+        Number of the node.
+
+    Returns
+    -------
+    float
+        Of the element on its left, if there is one, the end; else of that on its right the start.
+    """
+    right = np.nonzero(mesh.t[1] == node)[0]
+    return float(right[0]) + 1.0 if len(right) else float(np.nonzero(mesh.t[0] == node)[0][0])
+
+
+def stations_of_vector(beam: Beam, vector: ArrayLike) -> tuple[float, ...] | None:
+    """Where a force on few coordinates acts: element + xi; None if it is spread.
+
+    A force on a point inside an element acts on the coordinates ``r`` of its two nodes as the
+    Hermite functions of xi say, whose values are found again.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    vector
+        A force on its coordinates, shape (N,).
+
+    Returns
+    -------
+    tuple of float, or None
+        Element + xi of each place; None if the force is spread over neighbouring nodes.
+    """
+    rows = np.asarray(vector).reshape(-1, beam.nd)
+    loaded = np.nonzero(np.any(rows != 0, axis=1))[0]
+    if len(loaded) == 2 and np.any(beam.mesh.t[0] == loaded[0]) and loaded[1] == loaded[0] + 1:
+        a, b = rows[loaded, :2]
+        total = a + b
+        if total @ total > 0:
+            value = float(b @ total / (total @ total))
+            xi = _where(beam.element, value)
+            if xi is not None:
+                return (float(np.nonzero(beam.mesh.t[0] == loaded[0])[0][0]) + xi,)
+    if np.any(np.diff(loaded) == 1):
+        return None
+    return tuple(station_of_node(beam.mesh, int(k)) for k in loaded)
+
+
+def _where(element: ElementBeam, value: float) -> float | None:
+    """Where the function of ``r`` at the right node has a value; it rises from 0 to 1."""
+    low, high = 0.0, 1.0
+    if not -FLAT <= value <= 1.0 + FLAT:
+        return None
+    if min(value, 1.0 - value) < FLAT:
+        return float(round(value))
+    for _ in range(60):
+        xi = 0.5 * (low + high)
+        X = np.array([[xi], [0.5]])
+        low, high = ((xi, high) if element.local(X, 1.0, element.nodal_dofs)[0][0] < value
+                     else (low, xi))
+    return 0.5 * (low + high)

@@ -1,0 +1,173 @@
+"""The mass of a beam: local functions and masses at points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..core.linalg import BandMatrix
+from ..mesh.mapping import cross
+from ..core.quadrature import gauss, product_rule
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .interior import Interior
+    from ..core.types import Array
+
+#: Points along an element more, where the height is a cubic or something varies.
+MORE = 4
+
+#: Turns a vector by 90 degrees.
+TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
+
+
+class Inertia(NamedTuple):
+    """Masses at points of the elements, of one where all are equal.
+
+    A cable may have more than the mass of its axis: its points off it move with ``v + Y v_X``, the
+    latter turned by 90 degrees, as long as the axis hardly stretches.
+
+    Attributes
+    ----------
+    functions
+        Local functions at points, shape (nb, nelements, npoints).
+    mass
+        Mass of the points, shape (nelements, npoints).
+    slopes
+        Derivatives of the functions along the axis, of the same shape, or None.
+    moments
+        Masses times Y and Y^2, shape (2, nelements, npoints), or None.
+    """
+
+    functions: Array
+    mass: Array
+    slopes: Array | None = None
+    moments: Any = None
+
+    def matrices(self, elements: Any) -> Array:
+        """Mass matrices, shape (n, 2 nb, 2 nb).
+
+        Parameters
+        ----------
+        elements
+            A slice.
+        """
+        N, m = self.functions[:, elements], self.mass[elements]
+        size = 2 * len(N)
+
+        def product(A, B, weights, turn):
+            scalar = (A * weights).transpose(1, 0, 2) @ B.transpose(1, 2, 0)
+            return (scalar[:, :, None, :, None] * turn[:, None]).reshape(-1, size, size)
+
+        out = product(N, N, m, np.eye(2))
+        if self.slopes is not None:
+            S, (first, second) = self.slopes[:, elements], self.moments[:, elements]
+            coupling = product(N, S, first, TURN)
+            out = out + product(S, S, second, np.eye(2)) + coupling + coupling.transpose(0, 2, 1)
+        return out
+
+    def weights(self, g: Array) -> Array:
+        """Forces of an acceleration, shape (nelements, nb, 2).
+
+        Parameters
+        ----------
+        g
+            Acceleration, shape (2,).
+        """
+        out = np.einsum("iep,ep->ei", self.functions, self.mass)[:, :, None] * g
+        if self.slopes is not None:
+            out = out + np.einsum("iep,ep->ei", self.slopes, self.moments[0])[:, :, None] * (
+                g @ TURN)
+        return out
+
+
+def points_along(beam: Interior) -> int:
+    """Gauss points along an element for products of two coordinates.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    """
+    more = (0 if beam.mesh.is_straight else 1) + (0 if beam.across.constant else MORE)
+    return beam.element.axis_degree + 1 + more
+
+
+def of_sections(beam: Interior) -> Inertia:
+    """The Inertia of a beam with sections.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    """
+    across, axis = beam.across, gauss(points_along(beam))
+    tind = np.array([0]) if across.uniform else None
+    parts = []
+    for slab, rule in across.rules(beam.element.order + 1, inertia=True):
+        X, W = product_rule(axis, rule)
+        parts.append((beam.element.values(beam.mesh.mapping(), X, tind),
+                      across.volume(slab, X, W, tind, times="density")))
+    return Inertia(*(np.concatenate(part, axis=-1) for part in zip(*parts)))
+
+
+def of_cable(beam: Interior) -> Inertia:
+    """The Inertia of a cable; without that of turning if its section is a plain rectangle.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    """
+    across, mapping = beam.across, beam.mesh.mapping()
+    xi, w = gauss(points_along(beam))
+    tind = np.array([0]) if across.uniform else None
+    X = np.array([xi, 0.5 + 0.0 * xi])
+    N, d_xi = beam.element.along(mapping, X, tind)
+    if across.simple and across.uniform:
+        return Inertia(N, across.moments(xi[:1], tind, "mass")[0] * (w * beam.mesh.lengths[0]))
+    eta = np.array([0.5] if across.simple else [0.5, 0.0, 1.0])
+    J = mapping.DF(np.array([np.tile(xi, len(eta)), np.repeat(eta, len(xi))]), tind)
+    # the length of the axis: directors that are interpolated between nodes are shorter than one
+    speed = np.hypot(*J[:, 0, ..., :len(xi)])
+    mass, first, second = across.moments(xi, tind, "mass") * w * speed
+    if across.simple:
+        return Inertia(N, mass)
+    # the volume of a curve is that of its axis times 1 - Y / R
+    middle, bottom, top = np.split(cross(J[:, 0], J[:, 1]), 3, axis=-1)
+    bend = (bottom - top) / (middle * mapping.height(xi, tind)[0])
+    return Inertia(N, mass - bend * first, d_xi / speed, np.array([first - bend * second, second]))
+
+
+def projected(beam: Interior, field: Callable[[Array], Array]) -> Array:
+    """Rates of the coordinates whose velocity is nearest to a field, in the mean over the body.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    field
+        Takes points of the stress-free body, shape (2, nelements, npoints), and returns its
+        components there.
+
+    Returns
+    -------
+    ndarray
+        Shape (N,).
+    """
+    X, W = beam.exact_rule()
+    mesh, mapping, element, nd = beam.mesh, beam.mesh.mapping(), beam.element, beam.nd
+    N = element.values(mapping, X).transpose(1, 0, 2)
+    weighted, back = N * (mapping.detDF(X) * W)[:, None], N.transpose(0, 2, 1)
+    gram = BandMatrix(beam.N // 2, nd - 1)  # of one component
+    gram.add_elements(weighted @ back, 0, nd // 2, mesh.t[0])
+    rest, v = field(mapping.F(X)).transpose(1, 2, 0), np.zeros((beam.N // 2, 2))
+    for _ in range(2):  # elements of high degree have ill-conditioned masses
+        parts = weighted @ rest
+        dv = gram.solve(beam.kernel.scatter(parts).reshape(-1, 2))
+        left, right = dv.reshape(-1, nd)[mesh.t]
+        of_elements = np.concatenate([left, right], axis=1).reshape(parts.shape)
+        rest, v = rest - back @ of_elements, v + dv
+    return v.ravel()

@@ -1,0 +1,197 @@
+"""Laws in kernels: Hooke's, those with texts, and any other by calls of its methods."""
+
+import weakref
+from itertools import count
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...materials import LinearLaw, TextMaterial
+from ...materials.base import ShearCorrected
+from ...materials.followed import NotFollowed, follow
+from ...core.source import F1, F2, lanes, primitive, room, source
+from .base import packed
+
+#: Kinds of laws: constant moduli, a law with texts, and any other.
+LINEAR, TEXT, OWN = 0, 1, 2
+
+#: By handle, as long as a kernel has them: compiled code holds no Python objects.
+_LAWS: dict[int, Any] = {}
+#: What has come of following those in Python.
+_FOLLOWED: dict[int, Any] = {}
+_handles = count(1)
+
+
+class LawTables(NamedTuple):
+    """A law as compiled code takes it; :func:`law_tables` makes it.
+
+    Attributes
+    ----------
+    kind, handle
+        One of :data:`LINEAR`, :data:`TEXT`, :data:`OWN`, and what finds the law of the latter two.
+    address
+        That of the compiled text; 0 for the plain one.
+    D
+        Moduli, those without strain where they depend on it, shape (3, 3).
+    constants
+        Of a law with texts.
+    scale
+        Factors on the strain, and on the stress: that of shear is sqrt(k_s). Shape (3,).
+    """
+
+    kind: int
+    handle: int
+    address: int
+    D: F2
+    constants: F1
+    scale: F1
+
+
+@primitive("primitives")
+def own_evaluate(handle, strain, out):
+    """Stress (3, n, elements), moduli (9, ...) or energy (1, ...) of a law in Python."""
+    law = _LAWS[handle]
+    found = {1: law.energy, 3: law.stress, 9: law.moduli}[len(out)](strain)
+    out[...] = np.reshape(found, out.shape)
+
+
+@primitive("laws")
+def run_text(law, strain, out):
+    """Energy, stress or moduli of a law with a text; compiled, by its address."""
+    _LAWS[law.handle].text(law.constants, strain, out)
+
+
+def with_text(law: LawTables) -> LawTables:
+    """The tables of a law with a text, if it can be made of one in Python.
+
+    Raises
+    ------
+    NotFollowed
+        If it cannot.
+    """
+    if law.kind != OWN:
+        return law
+    if law.handle not in _FOLLOWED:
+        try:
+            _FOLLOWED[law.handle] = follow(_LAWS[law.handle])
+        except NotFollowed as error:
+            _FOLLOWED[law.handle] = error
+    found = _FOLLOWED[law.handle]
+    if isinstance(found, NotFollowed):
+        raise found
+    return law._replace(kind=TEXT, constants=packed(found.constants))
+
+
+def text_of(law: LawTables) -> Any:
+    """The text of a law, None for one without."""
+    if law.kind != TEXT:
+        return None
+    return _FOLLOWED[law.handle].text if law.handle in _FOLLOWED else _LAWS[law.handle].text
+
+
+@source
+def law_evaluate(law, strain, out):
+    """Second Piola-Kirchhoff stress, moduli or energy per volume.
+
+    Parameters
+    ----------
+    law
+        LawTables.
+    strain
+        (eps_xx, eps_yy, 2 eps_xy), shape (3, n, elements).
+    out
+        The stress, if of shape (3, n, elements), the moduli (9, ...), (c, d) at 3 c + d, or the
+        energy (1, ...).
+    """
+    n, size = strain.shape[1], strain.shape[2]
+    if law.kind == LINEAR:
+        for c in range(3):
+            x, y, z = law.D[c, 0], law.D[c, 1], law.D[c, 2]
+            for p in lanes(n):
+                for e in lanes(size):
+                    S = x * strain[0, p, e] + y * strain[1, p, e] + z * strain[2, p, e]
+                    if len(out) == 3:
+                        out[c, p, e] = S
+                    elif len(out) == 9:
+                        out[3 * c, p, e], out[3 * c + 1, p, e], out[3 * c + 2, p, e] = x, y, z
+                    else:
+                        W = 0.5 * strain[c, p, e] * S
+                        out[0, p, e] = W + (out[0, p, e] if c else 0.0)
+        return
+    x = room(strain.shape, strain)
+    for c in range(3):  # the strain of the law: with its shear corrected
+        y = law.scale[c]
+        for p in lanes(n):
+            for e in lanes(size):
+                x[c, p, e] = y * strain[c, p, e]
+    if law.kind == TEXT:
+        run_text(law, x, out)
+    else:
+        own_evaluate(law.handle, x, out)
+    for k in range(len(out)):
+        y = 1.0 if len(out) == 1 else law.scale[k // (len(out) // 3)]
+        y *= law.scale[k % 3] if len(out) == 9 else 1.0
+        for p in lanes(n):
+            for e in lanes(size):
+                out[k, p, e] *= y
+
+
+@source
+def conserve(law, middle, change, S):
+    """Make the stress's product with the change of the strain that of the law's energy.
+
+    The discrete gradient of Gonzalez (2000).
+
+    Parameters
+    ----------
+    law
+        LawTables.
+    middle, change
+        Mean of both strains and their difference, shape (3, n, elements).
+    S
+        The stress of the mean; changed.
+    """
+    n, size = S.shape[1], S.shape[2]
+    x, W = room((3, 2 * n, size), S), room((1, 2 * n, size), S)
+    before, after, old, new = x[:, :n], x[:, n:], W[0, :n], W[0, n:]
+    for c in range(3):
+        for p in lanes(n):
+            for e in lanes(size):
+                before[c, p, e] = middle[c, p, e] - 0.5 * change[c, p, e]
+                after[c, p, e] = middle[c, p, e] + 0.5 * change[c, p, e]
+    law_evaluate(law, x, W)
+    for p in lanes(n):
+        for e in lanes(size):
+            a, b, c = change[0, p, e], change[1, p, e], change[2, p, e]
+            square = a * a + b * b + c * c
+            missing = (new[p, e] - old[p, e]
+                       - (S[0, p, e] * a + S[1, p, e] * b + S[2, p, e] * c))
+            share = missing * (square > 1e-24) / np.maximum(square, 1e-24)
+            S[0, p, e] += share * a
+            S[1, p, e] += share * b
+            S[2, p, e] += share * c
+
+
+def law_tables(law: Any, owner: Any) -> LawTables:
+    """The LawTables of a law; one in Python is kept as long as its ``owner`` lives.
+
+    Parameters
+    ----------
+    law
+        Of a material: an object with ``energy``, ``stress`` and ``moduli``.
+    owner
+        What asks it.
+    """
+    one = np.ones(3)
+    if isinstance(law, LinearLaw):
+        return LawTables(LINEAR, 0, 0, packed(law.D), np.zeros(3), one)
+    base, scale = (law.base, law.scale) if type(law) is ShearCorrected else (law, one)
+    handle, kind, constants = next(_handles), OWN, np.zeros(3)
+    if isinstance(base, TextMaterial) and base.has_text:
+        kind, constants = TEXT, packed(base.constants)
+    _LAWS[handle] = base
+    for known in (_LAWS, _FOLLOWED):
+        weakref.finalize(owner, known.pop, handle, None)
+    with np.errstate(all="ignore"):
+        D = np.reshape(law.moduli(np.zeros((3, 1, 1))), (3, 3))
+    return LawTables(kind, handle, 0, packed(D), constants, packed(scale))

@@ -1,0 +1,372 @@
+"""A planar rigid body, by coordinates in which its points are linear and its mass is constant."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..core.errors import (InputError, NameUnknown, require_finite, require_finite_scalar,
+                           require_label, require_names, require_positive, shown, teaching)
+from ..core.frozen import Frozen, read_only
+from ..mesh.places import as_point
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from ..core.types import Array
+
+#: Components of the coordinates: the position of the centre of mass, and the director.
+NAMES = ("r^1", "r^2", "d^1", "d^2")
+
+
+@teaching
+class RigidBody(Frozen):
+    """A rigid body in the plane. It does not change; :meth:`replace` returns a changed copy.
+
+    Its coordinates are the position r of the centre of mass and a unit vector d that turns with it.
+    The point that has the coordinates (a, b) in its own frame is at ``r + a d + b d'``, d' the
+    vector d turned by a right angle, and the kinetic energy is ``mass r.^2 / 2 + inertia d.^2 / 2``
+    with the rates r. and d.: so points are linear in the coordinates, the mass matrix is constant,
+    and ``d . d = 1`` is the only condition, held by a multiplier.
+
+    A material point is named by its place (x, y) in the state of the start, as of a beam. One may
+    lie outside of the outline.
+
+    Parameters
+    ----------
+    mass
+        The mass, positive.
+    inertia
+        Moment of inertia about the centre of mass, positive.
+    position
+        Place of the centre of mass at the start, shape (2,).
+    angle
+        Angle of its own frame at the start, in radians, counterclockwise.
+    name
+        What messages call the body.
+    outline
+        Corners of a polygon in its own frame, from the centre of mass: a list of points, or an
+        array of shape (n, 2), or (2, n) as the attribute has it. For pictures and files, and to
+        find which body a point is in. By default the square whose plate of constant thickness has
+        this mass and inertia.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, or mass or inertia are not positive.
+
+    References
+    ----------
+    Garcia de Jalon, Bayo: "Kinematic and dynamic simulation of multibody systems", Springer (1994),
+    chapter 2: natural coordinates.
+
+    Examples
+    --------
+    A heavy body on the end of a light cantilever, of frequency sqrt(3 E I / (m L^3)):
+
+    >>> import numpy as np
+    >>> from skfem_ancf import (Beam, ElementBeamCable, MeshBeam, RigidBody, Scene,
+    ...                         StVenantKirchhoff)
+    >>> beam = Beam(MeshBeam.init_line([0, 0.5, 1], 0.01), ElementBeamCable(5),
+    ...             StVenantKirchhoff(12e9, 0.3, 1e-3), width=0.01)
+    >>> body = RigidBody(mass=2.0, inertia=1e-6, position=(1, 0), name="bob")
+    >>> scene = Scene(beam, body).clamp("left")
+    >>> weld = scene.joint("weld", beams=(beam, body), at=(1, 0))
+    >>> bool(abs(scene.modes(1).frequencies[0] / np.sqrt(3 * 10.0 / 2.0) - 1) < 1e-4)
+    True
+    """
+
+    N = nd = 4
+
+    def __init__(self, mass: float, inertia: float, position: ArrayLike = (0.0, 0.0),
+                 angle: float = 0.0, name: str | None = None,
+                 outline: ArrayLike | None = None) -> None:
+        self.mass, self.inertia = require_positive("mass", mass), require_positive("inertia",
+                                                                                  inertia)
+        self.position = require_finite("position", position, (2,))
+        self.angle = require_finite_scalar("angle", angle)
+        self.name = require_label("name", name)
+        self.outline = _square(self.mass, self.inertia) if outline is None else _polygon(outline)
+        c, s = np.cos(self.angle), np.sin(self.angle)
+        self.q0 = np.array([*self.position, c, s])
+        self._frame = read_only(np.array([[c, -s], [s, c]]))
+
+    def __repr__(self):
+        who = "" if self.name is None else f"{self.name} "
+        return (f"<RigidBody {who}of mass {self.mass:g} and inertia {self.inertia:g} at "
+                f"({self.position[0]:g}, {self.position[1]:g})>")
+
+    def replace(self, **changes: Any) -> RigidBody:
+        """The same body with some arguments of its constructor changed.
+
+        Parameters
+        ----------
+        **changes
+            Arguments of :class:`RigidBody`, as ``mass=2.0``.
+
+        Raises
+        ------
+        NameUnknown
+            If an argument is not known.
+        """
+        known = ("mass", "inertia", "position", "angle", "name", "outline")
+        for name in changes:
+            if name not in known:
+                raise NameUnknown("argument of RigidBody", name, known)
+        return type(self)(**{**{name: getattr(self, name) for name in known}, **changes})
+
+    # what a scene asks of a beam, too
+
+    @property
+    def dofnames(self) -> list[str]:
+        """Names of the coordinates."""
+        return list(NAMES)
+
+    @property
+    def q0_local(self) -> Array:
+        """Coordinates at the start with the position measured from :attr:`origin`, shape (4,)."""
+        return np.append(np.zeros(2), self.q0[2:])
+
+    @property
+    def origin(self) -> Array:
+        """The centre of mass at the start, shape (2,)."""
+        return self.position
+
+    @property
+    def size(self) -> float:
+        """How far the outline reaches from the centre of mass."""
+        return float(np.max(np.hypot(*self.outline)))
+
+    @property
+    def sizes(self) -> Array:
+        """What the coordinates change by where it moves by its size and turns, shape (4,)."""
+        return np.array([self.size, self.size, 1.0, 1.0])
+
+    @property
+    def total_mass(self) -> float:
+        """The mass."""
+        return self.mass
+
+    def mass_entries(self) -> tuple[Array, Array, Array]:
+        """The mass matrix: rows, columns and values, shapes (4,)."""
+        k = np.arange(4)
+        return k, k, np.array([self.mass, self.mass, self.inertia, self.inertia])
+
+    def weight(self, g: ArrayLike) -> Array:
+        """The dead load of an acceleration ``g`` (2,), shape (4,)."""
+        return np.append(self.mass * require_finite("g", g, (2,)), np.zeros(2))
+
+    def velocity_of(self, field: Callable[[Array], Array]) -> Array:
+        """The rates of the coordinates in a field of velocities, shape (4,).
+
+        Parameters
+        ----------
+        field
+            A function of points x (2, n) of the start that returns velocities (2, n): it is asked
+            at the centre of mass and at the tip of the director.
+        """
+        v = field(self.position[:, None] + self.size * np.array([[0.0, 1.0], [0.0, 1.0]])
+                  * self.q0[2:, None])
+        n = np.array([-self.q0[3], self.q0[2]])
+        return np.append(v[:, 0], n * (n @ (v[:, 1] - v[:, 0])) / self.size)
+
+    def held_by_a_section(self, held: Sequence[int], sums: Sequence[Any] = ()) -> bool:
+        """False: of a body its motions are asked.
+
+        Parameters
+        ----------
+        held, sums
+            Numbers of coordinates, and sums of them.
+        """
+        return False
+
+    def rigid_motions(self, rows: Any = slice(None)) -> Array:
+        """Two translations and the rotation about :attr:`origin`: shape (4, 3).
+
+        Parameters
+        ----------
+        rows
+            Numbers of coordinates, shape (n,), for as many rows; all by default.
+        """
+        out = np.zeros((4, 3))
+        out[0, 0] = out[1, 1] = 1.0
+        out[2:, 2] = -self.q0[3], self.q0[2]
+        return out[rows]
+
+    def dofs(self, boundary: Any = None, names: str | Sequence[str] | None = None) -> Array:
+        """Numbers of coordinates by their names, shape (n,).
+
+        Parameters
+        ----------
+        boundary
+            None, or a point: a body is one place.
+        names
+            Of :attr:`dofnames`, or without component, as ``"r"``; None for all.
+
+        Raises
+        ------
+        NameUnknown
+            If a name is not known; the message lists the known ones.
+        """
+        self.section_node(boundary)
+        if names is None:
+            return np.arange(4)
+        names = require_names("coordinate", names, [*NAMES, "r", "d"])
+        return np.array([k for k, full in enumerate(NAMES)
+                         if full in names or full.rsplit("^", 1)[0] in names])
+
+    def nodes(self, boundary: Any = None) -> Array:
+        """The number 0, shape (1,): a body is one place.
+
+        Parameters
+        ----------
+        boundary
+            None, or one of its points.
+        """
+        return np.array([self.section_node(boundary)])
+
+    def section_node(self, boundary: Any) -> int:
+        """0: all of a body has one direction.
+
+        Parameters
+        ----------
+        boundary
+            None, or one of its points.
+        """
+        if boundary is not None and not isinstance(boundary, RigidBody):
+            self.place(boundary)
+        return 0
+
+    def section_direction(self, node: int) -> tuple[Array, Array]:
+        """Coordinates (2, 1) and weight (1,) of its director."""
+        return np.array([[2], [3]]), np.ones(1)
+
+    # points
+
+    def place(self, at: Any) -> Array:
+        """A point in the state of the start, shape (2,).
+
+        Parameters
+        ----------
+        at
+            Its place (x, y) at the start; None for the centre of mass.
+
+        Raises
+        ------
+        MeshError
+            If it is no point.
+        """
+        return self.position if at is None else as_point(at)
+
+    def local(self, x: ArrayLike) -> Array:
+        """Coordinates in its own frame of points of the start, from the centre: shape (2, ...).
+
+        Parameters
+        ----------
+        x
+            Places at the start, shape (2, ...).
+        """
+        x = require_finite("x", x)
+        if x.ndim < 1 or len(x) != 2:
+            raise InputError(f"x must have shape (2, ...), got {x.shape}")
+        return np.tensordot(self._frame.T, x - self.position.reshape((2,) + (1,) * (x.ndim - 1)), 1)
+
+    def probe(self, at: Any) -> tuple[Array, Array]:
+        """Coordinate numbers and weights of the position of a material point.
+
+        Parameters
+        ----------
+        at
+            Its place (x, y) at the start; None for the centre of mass.
+
+        Returns
+        -------
+        dofs, weights
+            Shape (2, 3) both: ``sum(q[dofs] * weights, axis=1)`` is the position.
+        """
+        a, b = self.local(self.place(at))
+        return np.array([[0, 2, 3], [1, 3, 2]]), np.array([[1.0, a, -b], [1.0, a, b]])
+
+    def contains(self, x: ArrayLike) -> Array:
+        """Whether points of the start are inside of the outline or on it, shape (n,).
+
+        Parameters
+        ----------
+        x
+            Places at the start, shape (2, n).
+        """
+        p = self.local(require_finite("x", x, (2, None))).T
+        corners = self.outline.T
+        inside, near = np.zeros(len(p), dtype=bool), np.zeros(len(p), dtype=bool)
+        for a, b in zip(corners, np.roll(corners, -1, axis=0)):
+            edge = b - a
+            along = np.clip(((p - a) @ edge) / max(edge @ edge, 1e-300), 0.0, 1.0)
+            near |= np.hypot(*(p - a - along[:, None] * edge).T) <= 1e-9 * self.size
+            between = (a[1] > p[:, 1]) != (b[1] > p[:, 1])
+            with np.errstate(divide="ignore", invalid="ignore"):
+                inside ^= between & (p[:, 0] < a[0] + (p[:, 1] - a[1]) * edge[0] / edge[1])
+        return inside | near
+
+    def outline_at(self, u: Array) -> Array:
+        """The corners of the outline at a displacement of the coordinates, shape (2, n).
+
+        Parameters
+        ----------
+        u
+            Shape (4,).
+        """
+        q = self.q0 + u
+        d = q[2:]
+        return q[:2, None] + np.array([[d[0], -d[1]], [d[1], d[0]]]) @ self.outline
+
+    def angle_at(self, u: Array) -> Array:
+        """The angle at displacements of the coordinates, no more than pi from :attr:`angle`.
+
+        Parameters
+        ----------
+        u
+            Shape (..., 4).
+        """
+        d = self._frame.T @ (self.q0[2:] + u[..., 2:])[..., None]
+        return self.angle + np.arctan2(d[..., 1, 0], d[..., 0, 0])
+
+    def angular_velocity(self, u: Array, v: Array) -> Array:
+        """The angular velocity, counterclockwise.
+
+        Parameters
+        ----------
+        u, v
+            Displacement of the coordinates and its rate, shapes (..., 4).
+        """
+        d = self.q0[2:] + u[..., 2:]
+        return d[..., 0] * v[..., 3] - d[..., 1] * v[..., 2]
+
+
+def on_body(place: Any, beam: Any) -> tuple[Any, Any]:
+    """A place and a beam; a RigidBody in place of a place is its centre of mass, or all of it.
+
+    Parameters
+    ----------
+    place, beam
+        As a method takes them.
+    """
+    return (None, place) if isinstance(place, RigidBody) else (place, beam)
+
+
+def _square(mass, inertia):
+    half = 0.5 * np.sqrt(6.0 * inertia / mass)
+    return half * np.array([[-1.0, 1.0, 1.0, -1.0], [-1.0, -1.0, 1.0, 1.0]])
+
+
+def _polygon(outline):
+    points = require_finite("outline", outline)
+    if points.ndim == 2 and points.shape[1] == 2:  # of three corners (2, n) has more columns
+        points = points.T
+    if points.ndim != 2 or len(points) != 2 or points.shape[1] < 3 or not np.any(points):
+        raise InputError("an outline is a polygon of three corners at least, from the centre of "
+                         "mass: a list of points, or an array of shape (n, 2), got "
+                         f"{shown(outline)}")
+    return points

@@ -1,0 +1,1 @@
+"""Foundations: errors, checks of arguments, quadrature, band matrices, progress."""

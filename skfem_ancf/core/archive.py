@@ -1,0 +1,170 @@
+"""Files of arrays by name, of which there is never half a one."""
+
+from __future__ import annotations
+
+import os
+import stat
+import zipfile
+import zlib
+from contextlib import contextmanager, suppress
+from io import BytesIO
+from secrets import token_hex
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .errors import MissingExtra
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+    from .types import ArrayLike
+
+#: Letters of a name that the one of a new file beside it has, at most: names may have 255.
+STEM = 100
+#: What reading a file raises that is damaged, or none of these.
+DAMAGED = (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, MemoryError,
+           RuntimeError, OverflowError, zipfile.BadZipFile, zlib.error)
+
+
+def find_h5py() -> Any:
+    """The package h5py; raises MissingExtra where it is not installed."""
+    try:
+        import h5py
+    except ImportError:
+        raise MissingExtra("h5py", "files") from None
+    return h5py
+
+
+@contextmanager
+def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
+    """A new file beside a path, which takes its place when all is written, or is removed.
+
+    Its name is one that nobody knows beforehand, no link is followed, and it may be read and
+    written by whom the file that it replaces may, or else a new file.
+
+    Parameters
+    ----------
+    path
+        Where it goes at the end. The new file has the same suffix.
+    durable
+        Wait until it is on the disk, before and after.
+
+    Yields
+    ------
+    pathlib.Path
+        The new file, empty.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; what was there stays.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from skfem_ancf.core.archive import replacing
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "note.txt"
+    ...     with replacing(path) as new:
+    ...         size = new.write_text("whole")
+    ...     path.read_text()
+    'whole'
+    """
+    new = new_file(path)
+    try:
+        yield new
+        put_in_place(new, path, durable)
+    except BaseException:
+        with suppress(OSError):
+            new.unlink()
+        raise
+
+
+def new_file(path: Path) -> Path:
+    """A new, empty file beside a path, see :func:`replacing`.
+
+    Parameters
+    ----------
+    path
+        What it is for.
+    """
+    new = path.with_name(f".{path.stem[:STEM]}.{token_hex(8)}.part{path.suffix}")
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0)
+    mode = _mode(path)
+    os.close(os.open(new, flags, 0o666 if mode is None else 0o600))
+    if mode is not None:
+        os.chmod(new, mode | 0o600)
+    return new
+
+
+def put_in_place(new: Path, path: Path, durable: bool = False) -> None:
+    """Let a complete file take the place of another, see :func:`replacing`.
+
+    Parameters
+    ----------
+    new
+        Of :func:`new_file`.
+    path, durable
+        As of :func:`replacing`.
+    """
+    mode = _mode(path)
+    if mode is not None:
+        os.chmod(new, mode)
+    if durable:
+        _sync(new)
+    os.replace(new, path)
+    if durable:
+        _sync(path.parent)
+
+
+def _mode(path):
+    """Who may read and write a file that is there; None where there is none, or no plain one."""
+    try:
+        found = os.lstat(path)
+    except OSError:
+        return None
+    return stat.S_IMODE(found.st_mode) if stat.S_ISREG(found.st_mode) else None
+
+
+def write(path: Path, arrays: Mapping[str, ArrayLike]) -> None:
+    """Write a file beside its place, and put it there when it is complete and on the disk.
+
+    Parameters
+    ----------
+    path
+        Its name: .h5, or else an archive of NumPy.
+    arrays
+        Arrays of any shapes by name, (...).
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; what was there stays.
+    """
+    with replacing(path, durable=True) as new, open(new, "wb") as file:
+        content = BytesIO()  # by way of memory: on a full disk neither can be closed
+        if path.suffix == ".h5":
+            with find_h5py().File(content, "w") as h5:
+                for name, array in arrays.items():
+                    h5.create_dataset(name, data=array)
+        else:
+            np.savez(content, **arrays)  # type: ignore[arg-type]
+        file.write(content.getbuffer())
+
+
+def _sync(path):
+    """Put a file, or the names in a folder, on the disk, where the system can."""
+    try:
+        handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    except OSError:  # of a folder, not on Windows; of a file that may not be written again
+        return
+    try:
+        os.fsync(handle)
+    except OSError:
+        if not path.is_dir():
+            raise
+    finally:
+        os.close(handle)

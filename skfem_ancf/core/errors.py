@@ -1,0 +1,776 @@
+"""The errors of the package: what was wrong, the value, and what to change.
+
+Every error derives from :class:`AncfError`; those about bad input are also
+``ValueError``, so existing ``except ValueError`` clauses keep working. The functions are the doors:
+what a caller gives passes one of them before anything is computed.
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import os
+import pickle
+import warnings
+from contextlib import contextmanager
+from functools import wraps
+from math import isfinite
+from pathlib import Path
+from threading import RLock
+from types import FunctionType
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from .types import Array
+
+Function = TypeVar("Function", bound="Callable[..., Any]")
+Class = TypeVar("Class", bound=type)
+
+#: The filters of warnings belong to all threads: one at a time sets and restores them.
+_FILTERS = RLock()
+
+#: Longest text of a value in a message.
+WIDTH = 80
+
+#: Numbers of an array up to which Python looks at them one by one, as that is faster.
+FEW = 32
+
+
+class AncfError(Exception):
+    """Base class of every error raised by :mod:`skfem_ancf`."""
+
+
+class InputError(AncfError, ValueError):
+    """An argument has a value that cannot describe a beam."""
+
+
+class MeshError(InputError):
+    """The mesh, its geometry or a point on it is not valid."""
+
+
+class NameUnknown(InputError):
+    """A boundary, coordinate, formulation or scheme name is not known.
+
+    The message lists the known ones and suggests the nearest.
+
+    Attributes
+    ----------
+    kind, name, known
+        What was named, the name given, and those that are known.
+    """
+
+    def __init__(self, kind: str, name: object, known: Iterable[Any]) -> None:
+        self.kind, self.name, self.known = kind, name, tuple(known)
+        near = nearest(name, self.known)
+        super().__init__(
+            f"unknown {kind} {shown(name)}; known: " + (", ".join(map(repr, self.known)) or "none")
+            + (f"; did you mean {near!r}?" if near is not None else ""))
+
+    def __reduce__(self):
+        return type(self), (self.kind, self.name, self.known)
+
+
+class CallError(InputError, TypeError):
+    """A call with unknown or missing arguments; the message lists those that there are."""
+
+
+class CallbackError(InputError):
+    """A function of the caller's raised an error, or returned what cannot be used."""
+
+
+class FileError(InputError, OSError):
+    """A file cannot be read or written, or holds something else."""
+
+    def __str__(self):
+        return str(self.args[0])
+
+
+class SupportError(AncfError):
+    """The supports leave a rigid motion free, or contradict each other."""
+
+
+class ImmutableError(AncfError, AttributeError):
+    """An attribute of an object that does not change was set."""
+
+
+class PickleError(AncfError, pickle.PicklingError):
+    """An object holds a function that pickle cannot take; the message says which."""
+
+
+class MissingExtra(AncfError, ImportError):
+    """An optional dependency is missing; the message names the extra.
+
+    Parameters
+    ----------
+    module
+        Name of the package that cannot be imported.
+    extra
+        Name of the extra of ``skfem-ancf`` that installs it.
+    """
+
+    def __init__(self, module: str, extra: str) -> None:
+        self.module, self.extra = module, extra
+        super().__init__(
+            f"this needs the package {module!r}, which is not installed: "
+            f'pip install "skfem-ancf[{extra}]", or pip install ".[{extra}]" in a clone of the '
+            "repository")
+
+    def __reduce__(self):
+        return type(self), (self.module, self.extra)
+
+
+class ConvergenceError(AncfError):
+    """An iteration did not converge.
+
+    Parameters
+    ----------
+    message
+        What did not converge, where, and what to change.
+    state
+        What had converged until then, or None.
+
+    Attributes
+    ----------
+    state
+        The last converged state, or None if there is none.
+    """
+
+    def __init__(self, message: str, state: Any = None) -> None:
+        super().__init__(message)
+        self.state = state
+
+
+class StabilityWarning(UserWarning):
+    """The equilibrium path has lost its stability on the way to what was found."""
+
+
+class ModelWarning(UserWarning):
+    """The solution is beyond what the law or the mesh is good for."""
+
+
+class AccuracyWarning(UserWarning):
+    """A result is not as exact as was asked for."""
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C during a solution: what was found until then is kept.
+
+    A KeyboardInterrupt, so that ``except Exception`` does not take it for an error, and a script
+    does not go on as if all were done.
+
+    Parameters
+    ----------
+    message
+        Where it was stopped.
+    state
+        What was found until then.
+
+    Attributes
+    ----------
+    state
+        The History or the Path up to there, or the last State that converged.
+    """
+
+    def __init__(self, message: str, state: Any = None) -> None:
+        super().__init__(message)
+        self.state = state
+
+
+class CheckpointError(AncfError):
+    """A checkpoint cannot be written, is damaged, or is of another scene."""
+
+
+class CheckpointWarning(UserWarning):
+    """A checkpoint, or the file of a sweep, could not be written; the run goes on, the last good
+    file stays.
+    """
+
+
+class CompilationWarning(UserWarning):
+    """Compiled code cannot be kept on disk: each process compiles anew."""
+
+
+class SweepWarning(UserWarning):
+    """Members of a sweep failed; the others are there."""
+
+
+# messages
+
+def shown(value: object) -> str:
+    """A value as a message shows it: its repr on one line, shortened."""
+    if isinstance(value, int) and value.bit_length() > 256:  # Python refuses to print the largest
+        return f"{'-' * (value < 0)}10**{int(0.30103 * (value.bit_length() - 1))} or more"
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # whatever it is, it has no repr
+        text = f"<{type(value).__name__}>"
+    return text if len(text) <= WIDTH else text[:WIDTH - 3] + "..."
+
+
+def nearest(name: object, known: Iterable[Any]) -> str | None:
+    """The known name that is most like one, or None.
+
+    Parameters
+    ----------
+    name
+        What was given; None is returned unless it is a text.
+    known
+        The names that there are.
+
+    Examples
+    --------
+    >>> from skfem_ancf.core.errors import nearest
+    >>> nearest("Newtn", ["mixed", "newton"])
+    'newton'
+    """
+    if not isinstance(name, str):
+        return None
+    names = {k.lower(): k for k in known if isinstance(k, str)}
+    found = difflib.get_close_matches(name.lower(), names, 1, 0.5)
+    return names[found[0]] if found else None
+
+
+# numbers
+
+def require_positive(name: str, value: object, unit: str = "") -> float:
+    """Return ``value`` as a float, or raise :class:`InputError` if it is not > 0.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        What was given.
+    unit
+        What it is measured in, for the message; none by default.
+    """
+    value = require_finite_scalar(name, value)
+    if value <= 0.0:
+        raise InputError(f"{name} must be positive{unit and f' ({unit})'}, got {value!r}")
+    return value
+
+
+#: By how much a derivative may be off, over the larger of it and the difference.
+SLOPE = 0.01
+
+
+def require_slope(what: str, of: str, change: Any, slope: Any, noise: float,
+                  else_: str = "") -> None:
+    """Raise :class:`InputError` unless a derivative is that of a function, nearly.
+
+    Parameters
+    ----------
+    what, of
+        What messages call the derivative, and the function.
+    change
+        By how much the function changes over a small step.
+    slope
+        The derivative times that step, an array of the same shape.
+    noise
+        Round-off of the change.
+    else_
+        What the message says in the end.
+    """
+    change, slope = np.ravel(change), np.ravel(slope)
+    off = np.abs(change - slope)
+    if np.max(off, initial=0.0) > SLOPE * np.max(np.abs([change, slope])) + noise:
+        k = np.argmax(off)
+        raise InputError(f"{what} is not the derivative of {of}: over a small step it says "
+                         f"{slope[k]:.6g} where that changes by {change[k]:.6g}{else_}")
+
+
+def require_not_negative(name: str, value: Any, energy: bool = True) -> float:
+    """A finite number that is zero or positive; raises InputError.
+
+    Parameters
+    ----------
+    name
+        What the message calls it.
+    value
+        What was given.
+    energy
+        It would feed energy in if it were negative.
+    """
+    number = require_finite_scalar(name, value)
+    if number < 0.0:
+        why = ": negative damping, mass or stiffness would feed energy in" if energy else ""
+        raise InputError(f"{name} must be zero or positive, got {number!r}{why}")
+    return number
+
+
+def require_finite_scalar(name: str, value: Any) -> float:
+    """Return ``value`` as a float, or raise :class:`InputError` if it is no finite real number.
+
+    True and False, texts and arrays of one number are none.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        What was given.
+    """
+    if type(value) is not float:
+        if not _is_real(value):
+            raise InputError(f"{name} must be a number, got {shown(value)}")
+        try:
+            value = float(value)
+        except OverflowError:
+            raise InputError(f"{name} is too large for a float: {shown(value)}") from None
+        except (TypeError, ValueError):
+            raise InputError(f"{name} must be a number, got {shown(value)}") from None
+    if not -np.inf < value < np.inf:
+        raise InputError(f"{name} must be finite, got {value!r}")
+    return value
+
+
+def _is_real(value):
+    dtype = getattr(value, "dtype", None)
+    return (hasattr(type(value), "__float__") and not isinstance(value, bool)
+            and getattr(dtype, "kind", "f") in "iuf" and getattr(value, "ndim", 0) == 0)
+
+
+def require_integer(name: str, value: object, low: int, high: int | None = None,
+                    why: str = "") -> int:
+    """Return ``value`` as an int from ``low`` to ``high``, or raise :class:`InputError`.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        What was given; True and False are no integers.
+    low, high
+        Bounds, both allowed; ``high`` is None where there is none.
+    why
+        Where the bound comes from, for the message.
+    """
+    if (isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < low
+            or (high is not None and value > high)):
+        wanted = f">= {low}" if high is None else f"from {low} to {high}"
+        raise InputError(f"{name} must be an integer {wanted}{why and f' ({why})'}, got "
+                         f"{shown(value)}")
+    return int(value)
+
+
+def require_index(name: str, value: object, n: int) -> int:
+    """Return ``value`` as an index into ``n`` things, counted from the end if it is negative.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        An integer from ``-n`` to ``n - 1``.
+    n
+        How many things there are.
+    """
+    return require_integer(name, value, -n, n - 1) % n
+
+
+def require_finite(name: str, array: Any, shape: Sequence[int | None] | None = None) -> Array:
+    """Return ``array`` as float64, or raise :class:`InputError`.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    array
+        What was given: anything that NumPy makes an array of real, finite numbers of.
+    shape
+        The shape it must have, with None for a free extent, as ``(2, None)``; None for any.
+    """
+    if not (type(array) is np.ndarray and array.dtype == np.float64):
+        array = _real_array(name, array)
+    if shape is not None and array.shape != shape and (
+        array.ndim != len(shape) or any(map(_differs, shape, array.shape))
+    ):
+        wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
+        raise InputError(f"{name} must have shape {wanted}, got {array.shape}")
+    if not (all(map(isfinite, array.ravel().tolist())) if array.size <= FEW else
+            np.isfinite(array).all()):
+        bad = array[~np.isfinite(array)][0]
+        raise InputError(f"{name} has a value that is NaN or infinite: {bad}")
+    return array
+
+
+def _differs(wanted, n):
+    return wanted is not None and wanted != n
+
+
+def _real_array(name, value):
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError, OverflowError):  # rows of different lengths, for one
+        raise InputError(f"{name} must be an array of numbers, got {shown(value)}") from None
+    if type(value) in (list, tuple) and array.dtype == np.float64:
+        return array
+    if array.dtype.kind == "c":
+        raise InputError(f"{name} must be real, got complex numbers: {shown(value)}")
+    if array.dtype.kind == "O" and all(map(_is_real, array.flat)):  # fractions, or large integers
+        try:
+            return array.astype(np.float64)
+        except OverflowError:
+            raise InputError(f"{name} has a value that is too large for a float: {shown(value)}"
+                             ) from None
+    if array.dtype.kind not in "iuf":
+        raise InputError(f"{name} must be an array of numbers, got {shown(value)}")
+    return array.astype(np.float64)
+
+
+# names and flags
+
+def require_option(kind: str, name: object, known: Iterable[str]) -> str:
+    """Return ``name`` if it is a text among the known, or raise :class:`NameUnknown`.
+
+    Parameters
+    ----------
+    kind
+        What is named, for the message.
+    name
+        What was given.
+    known
+        The names that there are.
+    """
+    if not isinstance(name, str) or name not in known:
+        raise NameUnknown(kind, name, known)
+    return name
+
+
+def require_text(name: str, value: Any) -> Any:
+    """A text, or None.
+
+    Parameters
+    ----------
+    name
+        Of the argument, for the message.
+    value
+        What was given.
+    """
+    if value is not None and not (isinstance(value, str) and _is_unicode(value)):
+        raise InputError(f"{name} must be a text, got {shown(value)}")
+    return value
+
+
+def _is_unicode(text):
+    """True if a text has no lone surrogates, which no file can hold."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def require_flag(name: str, value: object) -> bool:
+    """Return True or False, or raise :class:`InputError` if it is neither.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        What was given.
+    """
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name} must be True or False, got {shown(value)}")
+    return bool(value)
+
+
+def require_label(name: str, value: object) -> str | None:
+    """Return a text that is not empty, or None, or raise :class:`InputError`.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        What was given.
+    """
+    if value is not None and not (isinstance(value, str) and value and _is_unicode(value)):
+        raise InputError(f"{name} must be a text, or None for none, got {shown(value)}")
+    return value
+
+
+def require_like(name: str, value: Any, kind: str, *attributes: str) -> Any:
+    """Return ``value`` if it has what is asked of a kind of object, or raise InputError.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        What was given; a class has not what its objects have.
+    kind
+        What it should be, for the message.
+    *attributes
+        Names of the attributes that are asked for.
+    """
+    if isinstance(value, type) or not all(hasattr(value, a) for a in attributes):
+        raise InputError(f"{name} must be a {kind}, got {shown(value)}")
+    return value
+
+
+def require_names(kind: str, names: Any, known: Iterable[str]) -> tuple[str, ...]:
+    """Return one name or several as a tuple, or raise :class:`NameUnknown`.
+
+    Parameters
+    ----------
+    kind
+        What is named, for the message, in the singular.
+    names
+        A text, or a tuple, list, set or array (n,) of texts.
+    known
+        The names that there are.
+    """
+    if isinstance(names, str):
+        names = (names,)
+    if not isinstance(names, (tuple, list, set, frozenset, np.ndarray)) or (
+            getattr(names, "ndim", 1) != 1):
+        raise InputError(f"{kind}s are named by a text or a list of texts, got {shown(names)}")
+    return tuple(require_option(kind, name, known) for name in names)
+
+
+def require_options(what: str, options: dict[str, Any], known: Iterable[str],
+                    hint: str = "") -> dict[str, Any]:
+    """Return the options of a call, or raise :class:`CallError` if one is not known.
+
+    Parameters
+    ----------
+    what
+        What is called, for the message.
+    options
+        Its keywords.
+    known
+        The keywords that it takes.
+    hint
+        What else there is to say.
+    """
+    for name in options:
+        if name not in known:
+            near = nearest(name, known)
+            raise CallError(f"{what} has no option {name!r}; known: "
+                            + ", ".join(map(repr, known))
+                            + (f"; did you mean {near!r}?" if near is not None else "") + hint)
+    return options
+
+
+def require_path(name: str, value: Any, suffixes: Sequence[str] = ()) -> Path:
+    """Return a file name as a ``pathlib.Path``, or raise :class:`InputError`.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        A text that is not empty, or a ``pathlib.Path``.
+    suffixes
+        What it may end with, as ".vtu", in capitals too; anything if none are given.
+    """
+    if not isinstance(value, (str, os.PathLike)) or not os.fspath(value) or (
+            "\0" in str(os.fspath(value))):
+        raise InputError(f"{name} must be the path of a file, got {shown(value)}")
+    try:
+        path = Path(value)
+        os.fsencode(path)
+    except (TypeError, UnicodeEncodeError):  # the latter of lone surrogates
+        raise InputError(f"{name} must be the path of a file, got {shown(value)}") from None
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise InputError("the file name must end with "
+                         f"{'one of ' if len(suffixes) > 1 else ''}{', '.join(suffixes)}, got "
+                         f"{str(value)!r}")
+    return path
+
+
+# functions of the caller's
+
+def require_function(name: str, value: Any, returns: str) -> Callable[..., Any]:
+    """Return ``value`` if it can be called, or raise :class:`InputError`.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    value
+        What was given.
+    returns
+        What it is a function of and what it should return, as "of time that returns a number".
+    """
+    if not callable(value):
+        raise InputError(f"{name} must be a function {returns}, got {shown(value)}")
+    return value
+
+
+@contextmanager
+def warnings_as_errors(category: type[Warning] = Warning) -> Iterator[None]:
+    """Warnings of a kind are raised inside, in this thread while no other changes the filters."""
+    with _FILTERS, warnings.catch_warnings():
+        warnings.simplefilter("error", category)
+        yield
+
+
+def ask(what: str, function: Callable[..., Any], *args: Any) -> Any:
+    """Call a function of the caller's, and say what was asked if it raises.
+
+    Parameters
+    ----------
+    what
+        The call for the message, as ``"amplitude(t={:g})"``; formatted with the arguments.
+    function
+        Any function.
+    *args
+        Its arguments.
+
+    Raises
+    ------
+    CallbackError
+        From what the function raised; errors of the package pass.
+
+    Examples
+    --------
+    >>> from skfem_ancf.core.errors import ask
+    >>> ask("amplitude(t={:g})", lambda t: 1 / t, 0.0)
+    Traceback (most recent call last):
+    ...
+    skfem_ancf.core.errors.CallbackError: amplitude(t=0) raised ZeroDivisionError: float division by
+    zero
+    """
+    try:
+        return function(*args)
+    except AncfError:
+        raise
+    except Exception as error:
+        raise CallbackError(f"{what.format(*args)} raised {type(error).__name__}: {error}"
+                            ) from error
+
+
+def ask_number(what: str, function: Callable[..., Any], *args: Any) -> float:
+    """As :func:`ask`, for a function that returns a finite number.
+
+    Parameters
+    ----------
+    what, function, *args
+        As for :func:`ask`.
+    """
+    value = ask(what, function, *args)
+    if isinstance(value, float) and -np.inf < value < np.inf:
+        return float(value)
+    return _returned(require_finite_scalar, what, value, args)
+
+
+def ask_array(what: str, shape: Sequence[int | None] | None, function: Callable[..., Any],
+              *args: Any, number: bool = False) -> Array:
+    """As :func:`ask`, for a function that returns finite numbers of a shape.
+
+    Parameters
+    ----------
+    what, function, *args
+        As for :func:`ask`.
+    shape
+        The shape that its value must have, as for :func:`require_finite`.
+    number
+        A number will do: it is the value everywhere.
+    """
+    value = ask(what, function, *args)
+    if number and np.ndim(value) == 0:
+        value = np.broadcast_to(value, shape)  # type: ignore[arg-type]
+    return _returned(require_finite, what, value, args, shape)
+
+
+def ask_field(what: str, function: Callable[[Array], Any], x: Array) -> Array:
+    """The values of a vector field at points, asked; each of the two may be a constant.
+
+    Parameters
+    ----------
+    what
+        The call for the message, as ``"t(x)"``.
+    function
+        Takes the points x (2, ...), returns two values, each a number or of the shape (...).
+    x
+        Points, shape (2, ...).
+
+    Returns
+    -------
+    ndarray
+        Shape (2, ...).
+
+    Raises
+    ------
+    CallbackError
+        If the function fails, or its values have another shape or are not finite.
+    """
+    try:
+        value = ask(what, function, x)
+    except CallbackError as error:
+        raise CallbackError(f"{error}, for points x of shape {x.shape}") from error.__cause__
+    try:
+        rows = [np.broadcast_to(_returned(require_finite, what, row, ()), x.shape[1:])
+                for row in value]
+    except (TypeError, ValueError) as error:
+        if isinstance(error, AncfError):
+            raise
+        rows = []
+    if len(rows) != 2:
+        raise CallbackError(
+            f"{what} must return two components, as np.array([0 * x[0], x[0]]), each of the shape "
+            f"of x[0] or a number; for x of shape {x.shape} it returned "
+            f"{np.shape(value) if isinstance(value, np.ndarray) else shown(value)}")
+    return np.array(rows)
+
+
+def _returned(door, what, value, args, *more):
+    try:
+        return door(what.format(*args), value, *more)
+    except InputError as error:
+        hint = "; does the function return something?" if value is None else ""
+        raise CallbackError(str(error) + hint) from None
+
+
+# calls
+
+def taught(function: Function) -> Function:
+    """A function whose wrong calls raise :class:`CallError`, which lists its arguments."""
+    explain = _explain
+
+    def call(*args, **kwargs):
+        try:
+            return function(*args, **kwargs)
+        except TypeError as error:
+            if error.__traceback__.tb_next is None:  # it is the call that is wrong
+                explain(function, kwargs, error)
+            raise
+
+    # doctest finds functions by the globals of their module
+    call = FunctionType(call.__code__, function.__globals__, call.__name__, None,
+                        call.__closure__)
+    return cast("Function", wraps(function)(call))
+
+
+def teaching(cls: Class) -> Class:
+    """A class decorator: :func:`taught` for the constructor and the public methods of a class."""
+    for name, value in list(vars(cls).items()):
+        if name.startswith("_") and name != "__init__":
+            continue
+        if inspect.isfunction(value):
+            setattr(cls, name, taught(value))
+        elif isinstance(value, (classmethod, staticmethod)):
+            setattr(cls, name, type(value)(taught(value.__func__)))
+    return cls
+
+
+def _explain(function, kwargs, error):
+    parameters = [p for p in inspect.signature(function).parameters.values()
+                  if p.name not in ("self", "cls", "system")]
+    known = [p.name for p in parameters if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]
+    unknown = [name for name in kwargs if name not in known]
+    near = nearest(unknown[0], known) if unknown else None
+    message = str(error).replace("<lambda>", "function")
+    if near is not None:
+        message = message.split(". Did you mean")[0] + f"; did you mean {near!r}?"
+    else:
+        message += ";"
+    arguments = ", ".join(str(p.replace(annotation=p.empty)) for p in parameters)
+    raise CallError(f"{message} Arguments: {arguments or 'none'}") from None

@@ -1,0 +1,1 @@
+"""The equations of a scene, and how they are solved."""

@@ -1,0 +1,295 @@
+"""Where texts run: in plain NumPy, or compiled where that pays."""
+
+from __future__ import annotations
+
+import logging
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from . import compiled
+from .compiled.words import Kept
+from .tables import Tables
+from ..core.kept import cached_property, twin_of
+from ..beam.kernels.law import with_text
+from ..beam.kernels.section import SectionPack
+from ..materials.followed import NotFollowed
+from ..core.progress import announced_bar
+from ..core.switch import compiled_off, expected, wanted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+logger = logging.getLogger(__name__)
+
+#: Seconds that compiling takes, about: what texts have in common, what kernels have, the kernels,
+#: each if a scene has it, and each text; and loading what lies on disk.
+COMPILING = {"common": 3.0, "kernels": 0.8, "SectionPack": 2.3, "CablePack": 1.2,
+             "elements": 1.4, "contacts": 2.9, "equilibrium": 2.4, "steps": 5.9, "evaluate": 0.3}
+#: The same for texts that are compiled where they are used, not beforehand.
+WHERE_USED = {"collocate": 5.6}
+LOADING = 0.7
+SECONDS = {**COMPILING, **WHERE_USED}
+#: Seconds that NumPy takes for an iteration, about, and what each element adds to them.
+ITERATION, ELEMENT = 1e-3, 1.2e-5
+#: How many tasks of one size code that is kept on disk is assumed to serve.
+SERVES = 5
+
+
+class Choice(NamedTuple):
+    """Which way a text runs, "plain", "loaded" or "compiled", and why."""
+
+    way: str
+    reason: str
+
+
+_IS_LOADED = Choice("loaded", "compiled code is loaded")
+
+
+class Machine:
+    """Runs the texts of a system.
+
+    The size of the task decides, which is known before it starts: the iterations that are expected,
+    see :func:`~skfem_ancf.core.switch.expecting`, and the number of elements. What is compiled
+    already in this process is used at once. What lies on disk is loaded for a task for which NumPy
+    would take longer than loading takes. What has to be compiled first is compiled, and kept on
+    disk, for a task that pays for it in :data:`SERVES` runs.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.equations.system.System`.
+
+    Attributes
+    ----------
+    tables : Tables
+        The equations.
+    """
+
+    def __init__(self, system: Any) -> None:
+        self.tables = Tables(system)
+        self._plain: str | None = None
+        self._followed = False
+        self._rooms: dict[str, Any] = {}
+        self._kept = Kept()
+        if not all(beam.compiled for beam in system.beams):
+            self._plain = "compiled=False"
+        elif system.forces.contacts.own:
+            self._plain = "a distance of your own: SignedDistance"
+
+    @property
+    def _off(self):
+        if self._plain is not None:
+            return self._plain
+        return compiled.PROBLEMS[0] if compiled.PROBLEMS else compiled_off()
+
+    @cached_property
+    def linearised(self) -> Machine | None:
+        """What runs the texts for :attr:`Tables.linearised`; None if the laws are linear."""
+        tables = self.tables.linearised
+        if tables is None:
+            return None
+        return self.with_tables(tables)
+
+    def with_tables(self, tables: Tables) -> Machine:
+        """The same for other tables of the system, with its work arrays.
+
+        Parameters
+        ----------
+        tables
+            In place of its own.
+        """
+        machine = twin_of(self)
+        machine.tables, machine._kept = tables, self._kept.of(self._rooms.values())
+        vars(machine).pop("linearised", None)
+        return machine
+
+    def choose(self, name: str) -> Choice:
+        """The way of a text for the next call.
+
+        Parameters
+        ----------
+        name
+            A key of :data:`COMPILING`.
+        """
+        choice = self._chosen(name)
+        if choice.way != "plain" and not self._followed:
+            self._follow()
+        return choice if self._plain is None else Choice("plain", self._plain)
+
+    def _follow(self):
+        """Make texts of laws in Python."""
+        self._followed = True
+        try:
+            for pack in self.tables.plain.body.packs:
+                if isinstance(pack, SectionPack):
+                    with_text(pack.law)
+        except NotFollowed as error:
+            self._plain = (f"a law of your own cannot be compiled: {error}; see "
+                           "skfem_ancf.materials.TextMaterial")
+
+    def _chosen(self, name):
+        missing = self._missing(name)
+        if not missing and not compiled.PROBLEMS and self._plain is None and wanted() != "0":
+            return _IS_LOADED
+        if self._off is not None:
+            return Choice("plain", self._off)
+        if wanted() == "1":
+            return Choice("compiled", "SKFEM_ANCF_COMPILED=1")
+        if missing == ["evaluate"]:
+            return Choice("compiled", "what it calls is loaded")
+        work = self.seconds(expected())
+        if work < LOADING:
+            return Choice("plain", f"NumPy takes about {work:.2g} s for {_iterations()}, loading "
+                          f"compiled code {LOADING:g} s and more")
+        missing = [part for part in missing if not compiled.on_disk(part)]
+        if not missing:
+            return Choice("compiled", f"compiled code lies on disk, NumPy would take about "
+                          f"{work:.2g} s for {_iterations()}")
+        seconds, times = compiling(missing), SERVES if compiled.can_keep() else 1
+        if times * work >= seconds:
+            return Choice("compiled", f"compiling takes about {seconds:.2g} s once, NumPy would "
+                          f"take about {work:.2g} s for {_iterations()}")
+        return Choice("plain", f"NumPy takes about {work:.2g} s for {_iterations()}, compiling "
+                      f"would take about {seconds:.2g} s; python -m skfem_ancf.equations.compiled does it "
+                      "beforehand")
+
+    def _missing(self, name):
+        """What of a text and of what it calls this process has not loaded."""
+        missing = [part for part in self.tables.parts if part not in compiled.KNOWN]
+        return missing if name in compiled.LOADED else [*missing, name]
+
+    def seconds(self, iterations: float) -> float:
+        """How long NumPy takes for so many iterations, about.
+
+        Parameters
+        ----------
+        iterations
+            Their number.
+        """
+        beams = self.tables.system.beams
+        return iterations * (ITERATION + ELEMENT * sum(beam.mesh.nelements for beam in beams))
+
+    def room(self, make: Callable, *sizes: int) -> Any:
+        """Work arrays of a text, made once.
+
+        Parameters
+        ----------
+        make
+            A function of :class:`~skfem_ancf.equations.Equations` and the sizes.
+        *sizes
+            Numbers that the arrays depend on.
+        """
+        if make.__name__ not in self._rooms:
+            self._rooms[make.__name__] = make(self.tables.plain, *sizes)
+        return self._rooms[make.__name__]
+
+    def of(self, text: Callable) -> Callable:
+        """The function of a text for its equations, plain or compiled: it takes all but these.
+
+        Parameters
+        ----------
+        text
+            Its first argument takes the equations.
+        """
+        if self.choose(text.__name__).way == "plain":
+            return self._in_numpy(text)
+
+        def run(*args):
+            try:
+                function, equations = self._load(text, args)
+            except compiled.TextProblem as error:
+                self._plain = str(error)
+                logger.info(self._plain)
+                return self._in_numpy(text)(*args)
+            except Exception as error:  # of a Numba that is not as those that are known
+                compiled.PROBLEMS.append(
+                    f"Numba cannot be used: {error}" if isinstance(error, ImportError) else
+                    f"{text.__name__} cannot be compiled: {error!r}")
+                logger.warning("%s; it runs in NumPy", compiled.PROBLEMS[-1])
+                return self._in_numpy(text)(*args)
+            return function(equations, *map(self._kept, args))
+
+        return run
+
+    def _in_numpy(self, text):
+        def run(*args):
+            with np.errstate(all="ignore"):  # what overflows is seen in the residual
+                return text(self.tables.plain, *args)
+
+        return run
+
+    def _load(self, text, args):
+        """The compiled function and the equations that it takes; says so where that takes long."""
+        name = text.__name__
+        flat = vars(self.tables).get("flat")
+        if flat is None or name not in compiled.LOADED:
+            with announced(self._missing(name)) as update:
+                for part in self.tables.parts:
+                    compiled.address(part)
+                    update(part)
+                flat = self.tables.flat
+                if name not in compiled.LOADED:
+                    compiled.load(text, (flat, *args))
+                    update(name)
+        return compiled.LOADED[name], self._kept(flat)
+
+
+def compiling(names: Iterable[str]) -> float:
+    """Seconds that compiling takes, about.
+
+    Parameters
+    ----------
+    names
+        Keys of :data:`SECONDS`: texts and what they call.
+    """
+    return sum(SECONDS[name] for name in names)
+
+
+def _iterations():
+    n = expected()
+    return "one evaluation" if n <= 1 else f"{n:.3g} iterations"
+
+
+#: True while it is said that something is compiled.
+_announced = False
+
+
+@contextmanager
+def announced(names: Iterable[str]) -> Iterator[Callable[[str], None]]:
+    """Say on stderr what is compiled, about how long it takes, and how far it is.
+
+    Parameters
+    ----------
+    names
+        Keys of :data:`SECONDS`. Of those on disk nothing is said.
+
+    Yields
+    ------
+    function
+        Of the name of what is done.
+    """
+    global _announced
+    names = {name for name in names if not compiled.on_disk(name)}
+    if not names or _announced:
+        yield _nothing
+        return
+    said = (f"compiling once, about {compiling(names):.2g} s, kept in {compiled.folder()}"
+            if compiled.can_keep() else f"compiling, about {compiling(names):.2g} s")
+    logger.info("%s: %s", ", ".join(sorted(names)), said)
+    _announced = True
+    try:
+        with announced_bar(compiling(names), f"skfem_ancf: {said}") as bar:
+            def update(name):
+                if name in names:
+                    names.discard(name)
+                    bar.update(SECONDS[name])
+
+            yield update
+    finally:
+        _announced = False
+
+
+def _nothing(name):
+    """Nothing is said."""

@@ -1,0 +1,721 @@
+"""What holds a scene: fixed coordinates, and equations of joints with multipliers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy import sparse
+
+from ..core.errors import InputError, SupportError, shown
+from ..actions.joints.base import Joint, same_joint
+from ..actions.joints.nodes import Nodes, chain_ends
+from ..actions.joints.settlements import HELD
+from ..core.kept import cached_property
+from .signature import DENSE, first_dependent, null_space, row_sizes, unit_rows
+from ..beam.rigid import RigidBody
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from ..beam.beam import Beam
+    from ..core.types import Array
+
+#: Columns of a border above which sparse LU is faster.
+WIDE_BORDER = 96
+#: No rows, columns and values.
+_NO_ENTRIES = np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
+
+
+class Constraints:
+    """The supports and joints of a scene.
+
+    Joints that only fix coordinates are eliminated like supports; the others are equations
+    ``Phi(u, t) = 0`` with multipliers.
+
+    Parameters
+    ----------
+    members, slices
+        The beams and behind them the rigid bodies, in order, and the coordinates of each.
+    size
+        Length of all beams together.
+    fixed, values
+        Numbers of the fixed coordinates and their displacements at full load, shape (n,).
+    joints
+        Joints, already bound.
+    stiffness
+        A function that returns that of force elements in the stress-free state, sparse, (N, N);
+        None where there are none.
+
+    Attributes
+    ----------
+    all_joints, joints : list
+        The joints, and those with multipliers.
+    N, m : int
+        Number of coordinates and of multipliers.
+    fixed
+        Numbers of the coordinates that supports and joints fix, shape (n,).
+    given
+        Their displacements at full load, without what joints prescribe, shape (n,).
+    free, mask
+        For each coordinate whether it is free, as truth values and as 1 or 0; shape (N,).
+    """
+
+    def __init__(self, members: Sequence[Beam | RigidBody], slices: Sequence[slice], size: float,
+                 fixed: Array, values: Array, joints: Sequence[Joint],
+                 stiffness: Callable[[], Any] | None) -> None:
+        self.members, self.slices, self.size, self._stiffness = members, slices, size, stiffness
+        self.N = slices[-1].stop
+        self._supported = self._independent = False
+        self._eliminate(fixed, values, joints)
+
+    def _eliminate(self, fixed, values, joints):
+        """Sort joints that only fix coordinates to the supports, the others to the multipliers."""
+        self.free = np.ones(self.N, dtype=bool)
+        self.free[fixed] = False
+        self.fixed, self.given = np.array(fixed, np.int64), np.array(values, float)
+        self.all_joints, self.joints, self._held = list(joints), [], np.zeros(len(fixed))
+        self._fixing: list[Any] = []
+        self._moving: list[Any] = []
+        if joints:
+            self._eliminate_joints(joints)
+        self.mask = self.free.astype(float)
+        self.m = sum([len(joint.equations) for joint in self.joints])
+
+    def _eliminate_joints(self, joints):
+        zero, fixed, held, first = np.zeros(self.N), [self.fixed], [self._held], len(self.fixed)
+        for joint in joints:
+            found = _fixes(joint, zero) if joint.constant else None
+            if found is None:
+                self.joints.append(joint)
+                continue
+            dofs, factors = found
+            if not self.free.take(dofs).all():
+                clash = np.sort(dofs[~self.free[dofs]])
+                raise SupportError(
+                    f"{joint!r} prescribes {self.describe_dof(clash[0])}, which a support or "
+                    "another joint fixes already: remove one of them, as the second of two "
+                    "clamps at one place")
+            self._fixing.append((joint, first, factors))
+            self.free[dofs] = False
+            fixed.append(dofs)
+            held.append(0.0 * factors if joint.moving else -joint.value(zero, 0.0) / factors)
+            first += len(dofs)
+        if len(fixed) > 1:
+            self.fixed, self._held = np.concatenate(fixed), np.concatenate(held)
+            self.given = np.concatenate([self.given, np.zeros(first - len(self.given))])
+        self._moving = [item for item in self._fixing if item[0].moving]
+
+    def describe_dof(self, k: int) -> str:
+        """What coordinate number k is, in words."""
+        b = int(np.searchsorted([s.start for s in self.slices], k, side="right")) - 1
+        member, k = self.members[b], k - self.slices[b].start
+        node = "" if isinstance(member, RigidBody) else f" of node {k // member.nd}"
+        return f"{member.dofnames[k % member.nd]}{node}{self._who(b)}"
+
+    def _who(self, k):
+        """Which beam or body is number k, for messages."""
+        member = self.members[k]
+        if isinstance(member, RigidBody):
+            return f" of the rigid body {member.name or k}"
+        return "" if len(self.members) == 1 else f" of beam {member.name or k}"
+
+    # fixed coordinates
+
+    def values(self, load: float, t: float | None = None) -> Array:
+        """Displacements of the fixed coordinates at a load factor and a time.
+
+        Parameters
+        ----------
+        load
+            Factor on the prescribed displacements.
+        t
+            Time, for those that are functions of it; the load factor if None.
+
+        Returns
+        -------
+        ndarray
+            Shape (nfixed,).
+        """
+        values = load * self.given + self._held
+        for joint, first, factors in self._moving:
+            phi = joint.offset(np.array([load if t is None else t]), self.N)[0]
+            values[first:first + len(factors)] = -phi / factors
+        return values
+
+    def values_at(self, times: Array) -> Array:
+        """Displacements of the fixed coordinates at full load, at times (n,): (n, nfixed)."""
+        values = np.tile(self.given + self._held, (len(times), 1))
+        for joint, first, factors in self._moving:
+            values[:, first:first + len(factors)] = -joint.offset(times, self.N) / factors
+        return values
+
+    @cached_property
+    def moves(self) -> bool:
+        """True if a fixed coordinate has a displacement that is not zero, now or later."""
+        return bool(self._moving) or bool(np.any(self.given + self._held))
+
+    # equations of joints
+
+    @cached_property
+    def coordinate_sizes(self) -> Array:
+        """What coordinates change by where the scene moves by its size, shape (N,)."""
+        out = np.concatenate([member.sizes for member in self.members])
+        if len(self.members) > 1:
+            for member, s in zip(self.members, self.slices):
+                out[s].reshape(-1, member.nd)[:, :2] = self.size  # positions
+        return out
+
+    def equation_sizes(self, rows: Array, columns: Array, values: Array) -> Array:
+        """What equations are open by where one of their coordinates changes by its size.
+
+        Parameters
+        ----------
+        rows, columns, values
+            Entries of :meth:`full_jacobian`, shapes (k,).
+
+        Returns
+        -------
+        ndarray
+            Shape (m,): the size of the scene where there is no such coordinate.
+        """
+        out = np.zeros(self.m)
+        np.maximum.at(out, rows, np.abs(values) * self.coordinate_sizes[columns])
+        out[out == 0.0] = self.size
+        return out
+
+    def constraint(self, u: Array, t: float) -> Array:
+        """Phi of the joints with multipliers, shape (m,).
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the coordinates, shape (N,), and time.
+        """
+        if not self.joints:
+            return np.zeros(0)
+        return np.concatenate([joint.value(u, t) for joint in self.joints])
+
+    @property
+    def drives(self) -> bool:
+        """True if a joint with multipliers depends on time."""
+        return any(joint.moving for joint in self.joints)
+
+    def full_jacobian(self, u: Array, t: float) -> Array | sparse.csr_array:
+        """Derivative of :meth:`constraint` by all coordinates, shape (m, N).
+
+        Sparse where the multipliers are too many for a border.
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the coordinates, shape (N,), and time.
+        """
+        return (self._dense if self.bordered else self._sparse)(*self._entries(u, t))
+
+    def _dense(self, rows, columns, values):
+        """A matrix (m, N) by its entries."""
+        J = np.zeros((self.m, self.N))
+        np.add.at(J, (rows, columns), values)
+        return J
+
+    def _sparse(self, rows, columns, values):
+        """The same as a scipy.sparse array."""
+        return sparse.csr_array((values, (rows, columns)), shape=(self.m, self.N))
+
+    def sparse_jacobian(self, u: Array, t: float) -> sparse.csr_array:
+        """As :meth:`full_jacobian`, as a scipy.sparse array in CSR format.
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the coordinates, shape (N,), and time.
+        """
+        return self._sparse(*self._entries(u, t))
+
+    @cached_property
+    def slopes(self) -> tuple[Array, ...]:
+        """Rows, columns and values of :meth:`full_jacobian` in the stress-free state at the time 0.
+
+        As :meth:`~skfem_ancf.actions.joints.Joint.slope_entries` of the joints has them.
+        """
+        found = [joint.slope_entries(np.zeros(1), self.N) for joint in self.joints]
+        return self.in_order((rows, columns, values[0]) for rows, columns, values in found)
+
+    @cached_property
+    def _at_rest(self):
+        """The matrix of :attr:`slopes`, sparse where the coordinates are many."""
+        return (self._dense if self.bordered and self.N <= DENSE else self._sparse)(*self.slopes)
+
+    def _entries(self, u, t):
+        """Rows, columns and values of :meth:`full_jacobian`."""
+        return self.in_order(joint.entries(u, t) for joint in self.joints)
+
+    def in_order(self, entries: Iterable[tuple]) -> tuple[Array, ...]:
+        """Tables of the joints one behind the other, their rows those of all equations.
+
+        Parameters
+        ----------
+        entries
+            For each joint rows and other columns, arrays of one shape (k,).
+        """
+        first, parts = 0, []
+        for joint, (rows, *others) in zip(self.joints, entries):
+            parts.append((first + rows, *others))
+            first += len(joint.equations)
+        return _joined(parts or [_NO_ENTRIES])
+
+    def jacobian(self, u: Array, t: float) -> Array | sparse.csr_array:
+        """As :meth:`full_jacobian`, zero at fixed coordinates.
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the coordinates, shape (N,), and time.
+        """
+        if not self.bordered:
+            rows = self.sparse_jacobian(u, t)
+            rows.data *= self.mask[rows.indices]
+            return rows
+        J = self.full_jacobian(u, t)
+        J[:, self.fixed] = 0.0
+        return J
+
+    def quadratic(self, u: Array, t: float, v: Array) -> Array:
+        """The second derivative of :meth:`constraint` in the direction v, shape (m,).
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the coordinates, shape (N,), and time.
+        v
+            Direction, shape (N,).
+        """
+        return np.concatenate([np.zeros(0), *(joint.quadratic(u, t, v) for joint in self.joints)])
+
+    def curvature(self, u: Array, t: float, multipliers: Array) -> sparse.csr_matrix:
+        """sum_k multipliers[k] d^2 Phi_k / du^2 at free coordinates, sparse, shape (N, N).
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the coordinates, shape (N,), and time.
+        multipliers
+            Of the equations, shape (m,).
+        """
+        i, j, v = self.curvature_entries(u, t, multipliers)
+        return sparse.csr_matrix((v, (i, j)), shape=(self.N, self.N))
+
+    def curvature_entries(self, u: Array, t: float | None,
+                          multipliers: Array) -> tuple[Array, Array, Array]:
+        """Rows, columns and values of :meth:`curvature`.
+
+        Parameters
+        ----------
+        u, t
+            Displacement of the coordinates, shape (N,), and time.
+        multipliers
+            Of the equations, shape (m,).
+        """
+        i, j, v = self._curvature(u, t, multipliers)
+        return i, j, v * (self.free[i] & self.free[j])
+
+    def _curvature(self, u, t, multipliers):
+        parts = [joint.curvature(u, t, part)
+                 for joint, part in zip(self.joints, self.multipliers_of(multipliers))]
+        return _joined([part for part in parts if part is not None] or [_NO_ENTRIES])
+
+    def mean_jacobian(self, u0: Array, u1: Array, t: float) -> Array:
+        """Discrete gradients of :meth:`constraint` in a step, shape (m, N).
+
+        Parameters
+        ----------
+        u0, u1, t
+            Displacements at its ends, shape (N,), and the time in its middle.
+        """
+        return self._dense(*self.in_order(joint.mean_entries(u0, u1, t) for joint in self.joints))
+
+    def mean_turning(self, u0: Array, u1: Array, v0: Array, v1: Array, t: float,
+                     multipliers: Array) -> Array:
+        """What joints turn by in a step, see :meth:`~skfem_ancf.actions.joints.Joint.mean_turning`.
+
+        Parameters
+        ----------
+        u0, u1, v0, v1
+            Displacements and velocities at its ends, shape (N,).
+        t
+            Time in the middle of it.
+        multipliers
+            Of the equations, shape (m,).
+        """
+        parts = zip(self.joints, self.multipliers_of(multipliers))
+        return sum((joint.mean_turning(u0, u1, v0, v1, t, part) for joint, part in parts),
+                   np.zeros(self.N))
+
+    @cached_property
+    def _limited(self) -> list[Joint]:
+        """Joints that may be lost."""
+        return [joint for joint in self.joints if type(joint).lost is not Joint.lost]
+
+    def lost(self, u: Array) -> str:
+        """Which joint cannot hold in a converged state, and why; "" if all can.
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (N,).
+        """
+        return next(filter(None, (joint.lost(u) for joint in self._limited)), "")
+
+    def first_lost(self, rows: Array) -> tuple[int, str]:
+        """How many states one after the other joints can hold, and why not the next one.
+
+        Parameters
+        ----------
+        rows
+            Displacements of the coordinates, shape (n, N).
+        """
+        for k, u in enumerate(rows if self._limited else ()):
+            text = self.lost(u)
+            if text:
+                return k, text
+        return len(rows), ""
+
+    def multipliers_of(self, multipliers: Array) -> list[Array]:
+        """The multipliers joint by joint: a list in the order of :attr:`joints`."""
+        if not self.joints:
+            return []
+        ends = np.cumsum([len(joint.equations) for joint in self.joints])[:-1]
+        return np.split(multipliers, ends)
+
+    def joint_force(self, joint: Joint, multipliers: Array, reaction: Array) -> Array:
+        """What a joint does to its first beam, in the order of ``joint.equations``.
+
+        Parameters
+        ----------
+        joint
+            One of the scene's, as it was given.
+        multipliers
+            Of the equations, shape (m,).
+        reaction
+            Force of the supports on the coordinates, shape (N,).
+
+        Returns
+        -------
+        ndarray
+            A number for each equation.
+        """
+        for known, part in zip(self.joints, self.multipliers_of(multipliers)):
+            if same_joint(known, joint):
+                return -part
+        for known, first, factors in self._fixing:
+            if same_joint(known, joint):
+                return reaction[self.fixed[first:first + len(factors)]] / factors
+        raise SupportError(f"{shown(joint)} is not a joint of this scene")
+
+    def force_on(self, held: Array, multipliers: Array) -> tuple[Array, Array]:
+        """What joints do that hold these coordinates alone by equations that do not change.
+
+        They are as supports, which coordinates along the axes would be fixed for.
+
+        Parameters
+        ----------
+        held
+            Truth values of the coordinates, shape (N,).
+        multipliers
+            Of the equations, shape (m,).
+
+        Returns
+        -------
+        force, touched
+            The force on the coordinates, shape (N,), and which of them these joints hold.
+        """
+        force, touched, zero = np.zeros(self.N), np.zeros(self.N, dtype=bool), np.zeros(self.N)
+        for joint, part in zip(self.joints, self.multipliers_of(multipliers)):
+            if joint.constant:
+                rows, columns, values = joint.entries(zero, 0.0)
+                if held[columns].all():
+                    np.subtract.at(force, columns, values * part[rows])
+                    touched[columns] = True
+        return force, touched
+
+    # what is held
+
+    def require_motion(self) -> None:
+        """Raise InputError if something is given in proportion to the load of statics."""
+        if self.frame is not None and np.any(self.frame.settled.numbers):
+            node, k = np.argwhere(self.frame.settled.numbers)[0]
+            value = self.frame.settled.numbers[node, k]
+            raise InputError(
+                f"node {node} is displaced by {HELD[k]}={value:g}, which grows with the load of a "
+                "static solution: for a motion give a function of time, as "
+                f"frame.settle({node}, {HELD[k]}=lambda t: {value:g} * min(t, 1.0)); or lambda t: "
+                f"{value:g} if it stays as it was in the static state at the start")
+
+    def require_independent_joints(self) -> None:
+        """Raise SupportError if joints repeat or contradict each other or the supports."""
+        if self._independent or not self.joints or self.condensable:
+            return
+        self._independent = self._apart
+        if self._independent:
+            return
+        zero = np.zeros(self.N)
+        found = first_dependent(self._at_rest * self.coordinate_sizes, self.free,
+                                lambda: self.constraint(zero, 0.0))
+        self._independent = found is None  # nothing of it changes in the life of a system
+        if found is None:
+            return
+        k, gap = found
+        joint, equation = [(joint, name) for joint in self.joints for name in joint.equations][k]
+        size = self.equation_sizes(*self.slopes)[k]
+        kind = "repeats" if abs(gap) <= 1e-9 * size else "contradicts"
+        raise SupportError(f"{joint!r}, equation {equation!r}, {kind} what the supports and the "
+                           "joints before it hold already: remove one of them")
+
+    @property
+    def _apart(self):
+        """True if no coordinate of an equation of joints is held or in another one."""
+        rows, columns, values = self.slopes
+        return (len(set(columns.tolist())) == len(columns) and len(set(rows.tolist())) == self.m
+                and bool(self.free.take(columns).all()) and bool(values.all()))
+
+    @cached_property
+    def _standing(self) -> list[bool]:
+        """Of each beam and body, whether its own supports hold it."""
+        found = []
+        for beam, s in zip(self.members, self.slices):
+            held, = (~self.free[s]).nonzero()
+            if beam.held_by_a_section(held.tolist()):
+                found.append(True)
+                continue
+            found.append(self._holds(beam, held, ()))
+        return found
+
+    @cached_property
+    def stiff(self) -> tuple[Array, Array]:
+        """What holds the beams which their own supports leave free: directions, and coordinates.
+
+        Directions of joints that hold a beam are those of equations whose coordinates lie in the
+        band, and whose derivative is constant: the number of the equation, the first of the
+        coordinates and the one behind the last, shape (n, 3). Of each beam which these leave free
+        to move, the positions of two nodes far apart; all coordinates of rigid bodies, which have
+        no stiffness of their own, come last.
+        """
+        standing, rows = self._held_alone
+        return np.array(rows, np.int64).reshape(-1, 3), self._springs(standing)
+
+    @cached_property
+    def _held_alone(self):
+        """Whether each is held by its own supports and joints, and what of joints is needed."""
+        standing, found = self._standing.copy(), []
+        if all(standing) or not self.m:
+            return standing, found
+        constant = [joint.constant for joint in self.joints for _ in joint.equations]
+        sums: list[list[Any]] = [[] for _ in constant]
+        for b, *entry in zip(*(x.tolist() for x in self.slopes)):
+            sums[b].append(entry)
+        for k, (beam, s) in enumerate(zip(self.members, self.slices)):
+            if standing[k] or isinstance(beam, RigidBody):
+                continue
+            rows, own = [], []
+            for b, of in enumerate(sums):
+                at = [dof for dof, _ in of if constant[b]] or [-1]
+                first, last = min(at), max(at) + 1
+                if s.start <= first and last <= min(s.stop, first + 2 * beam.nd):
+                    rows.append((b, first, last))
+                    own.append([(dof - s.start, factor) for dof, factor in of])
+            held, = (~self.free[s]).nonzero()
+            standing[k] = bool(rows) and (beam.held_by_a_section(held.tolist(), own)
+                                          or self._holds(beam, held, own))
+            if standing[k]:
+                found += rows
+        return standing, found
+
+    def _holds(self, beam, held, sums):
+        """True if a beam is held by some coordinates and sums of others."""
+        if len(held) + len(sums) < 3:
+            return False
+        motions = beam.rigid_motions() / (1.0, 1.0, self.size)
+        sums = [np.array([v for _, v in of]) @ motions[[dof for dof, _ in of]] for of in sums]
+        return _has_full_rank(np.vstack([motions[held], *sums]))
+
+    def _springs(self, standing):
+        """The coordinates of :attr:`stiff`, of beams that do not stand."""
+        found: list[int] = []
+        for beam, s, stands in zip(self.members, self.slices, standing):
+            if isinstance(beam, RigidBody):
+                found += range(s.start, s.stop)
+                continue
+            if stands:
+                continue
+            p = beam.mesh.p
+            x, y = p - p[:, :1]
+            far = int((x * x + y * y).argmax())
+            found += [s.start + node * beam.nd + k for node in (0, far) for k in range(2)]
+        out = np.array(found, np.int64)
+        return out[self.free[out]]
+
+    @cached_property
+    def loose(self) -> int:
+        """How many of the last coordinates of :attr:`stiff` are of rigid bodies."""
+        return sum(int(np.sum(self.free[s])) for member, s in zip(self.members, self.slices)
+                   if isinstance(member, RigidBody))
+
+    @property
+    def bordered(self) -> bool:
+        """True if the multipliers are few enough for a border about the band matrix."""
+        most = self.m + 4 * len(self.members)  # springs are seldom worth asking for
+        return self.frame is None and (most <= WIDE_BORDER
+                                       or self.m + len(self.stiff[1]) <= WIDE_BORDER)
+
+    @cached_property
+    def frame(self) -> Nodes | None:
+        """The joint of the nodes of a frame, or None."""
+        return next((joint for joint in self.joints if isinstance(joint, Nodes)), None)
+
+    @property
+    def condensable(self) -> bool:
+        """True if nothing holds but the nodes of a frame."""
+        return self.frame is not None and len(self.joints) == 1 and not len(self.fixed)
+
+    def free_rigid_motions(self) -> list[str]:
+        """Descriptions of the rigid motions that nothing holds, one string each."""
+        if self.frame is None and all(self._held_alone[0]):
+            return []
+        motions, joints, parts_of_frame = self._motions()
+        parts = [motions[self.fixed], joints]
+        if self._stiffness is not None:
+            pushed = self._stiffness() @ motions
+            size = row_sizes(pushed) * self.coordinate_sizes
+            parts.append(pushed[size > 1e-9 * size.max(initial=0.0)])
+        small = isinstance(motions, np.ndarray)
+        held = np.concatenate(parts) if small else sparse.vstack(parts)
+        if small and len(self.members) == 1 and _has_full_rank(held):
+            return []
+        free = null_space(unit_rows(held))
+        bodies = self._bodies(parts_of_frame) if len(free) else []
+        return [_describe(v, bodies) for v in free]
+
+    def _bodies(self, parts):
+        """Who, origin and size of each of those that :meth:`_motions` are of."""
+        if self.frame is None:
+            return [(self._who(k), b.origin, b.size) for k, b in enumerate(self.members)]
+        return [(name, self.members[0].origin, self.size) for name in self.frame.describe(parts)]
+
+    def _motions(self):
+        """Rigid motions of the bodies, those that joints hold, and of a frame which are its parts.
+
+        Bodies are beams and rigid bodies, of a frame the parts whose lines are joined rigidly. The
+        columns of a body are two translations and the rotation, in units of its size; dense arrays
+        of few coordinates.
+        """
+        joints, sizes = self._at_rest, [member.size for member in self.members]
+        if self.frame is None and self.N <= DENSE:
+            dense = np.zeros((self.N, 3 * len(self.members)))
+            for k, (member, s) in enumerate(zip(self.members, self.slices)):
+                dense[s, 3 * k:3 * k + 3] = member.rigid_motions()
+                dense[s, 3 * k + 2] /= member.size
+            return dense, joints @ dense, None
+        values = np.concatenate([member.rigid_motions() for member in self.members])
+        numbers = [member.N for member in self.members]
+        of_body, number, parts = np.repeat(np.arange(len(numbers)), numbers), len(numbers), None
+        if self.frame is not None:
+            origin, size, parts = self.members[0].origin, self.size, self.frame.parts()
+            number = int(parts.max()) + 1
+            shift = np.repeat([member.origin - origin for member in self.members], numbers, axis=0)
+            values[:, 2] += shift[:, 0] * values[:, 1] - shift[:, 1] * values[:, 0]
+            of_body, first = np.zeros(self.N, dtype=int), 0
+            for beam, s in zip(self.members, self.slices):
+                ends = chain_ends(beam)
+                of = np.repeat(parts[first:first + len(ends)], ends[:, 1] - ends[:, 0] + 1)
+                of_body[s], first = np.repeat(of, beam.nd), first + len(ends)
+            sizes = [size] * len(self.members)
+        values[:, 2] /= np.repeat(sizes, numbers)
+        motions = sparse.csr_array((values.ravel(), (3 * of_body[:, None] + np.arange(3)).ravel(),
+                                    3 * np.arange(self.N + 1)), shape=(self.N, 3 * number))
+        if self.frame is None:
+            return motions, joints @ motions, None
+        held = self.frame.held_motions(parts, origin, size, number)
+        return motions, sparse.vstack([held, joints[len(self.frame.equations):] @ motions]), parts
+
+    def require_supports(self) -> None:
+        """Raise SupportError if a rigid motion is free, or joints are not independent."""
+        if self._supported:  # nothing of it changes in the life of a system
+            return
+        self.require_independent_joints()
+        free = self.free_rigid_motions()
+        if free:
+            raise SupportError(
+                "the supports leave rigid motions free: " + "; ".join(free)
+                + (", along which the springs have no stiffness before the load"
+                   if self._stiffness is not None else "")
+                + f". Add a support, for example {self._advice()}, or solve in time with "
+                "scene.integrate")
+        self._supported = True
+
+    def _advice(self):
+        """What would hold the scene, in words."""
+        if self.frame is not None:
+            points = self.frame.net.points
+            x = "({:.6g}, {:.6g})".format(*points[:, np.lexsort(points)[0]])
+            return (f"frame.clamp({x}), the name or number of a node in place of its point, or as "
+                    f"a roller frame.hold({x}, 'y')")
+        member = self.members[0]
+        if isinstance(member, RigidBody):
+            who = repr(0 if member.name is None else member.name)
+            x = "({:.6g}, {:.6g})".format(*member.position)
+            return (f"scene.clamp({x}, beam={who}) for all of a body, scene.pin({x}, beam={who}) "
+                    "for a point, or springs")
+        return ("scene.clamp('left'), scene.pin('right') or, as a roller, "
+                "scene.fix('right', 'r^2')")
+
+
+def _joined(parts):
+    """Rows, columns and values of several tables, one behind the other."""
+    return parts[0] if len(parts) == 1 else tuple(map(np.concatenate, zip(*parts)))
+
+
+def _describe(v, bodies):
+    """A rigid motion of bodies (who, origin, size) in words."""
+    parts = []
+    for k, (who, origin, size) in enumerate(bodies):
+        a, b, c = v[3 * k:3 * k + 3]
+        if max(abs(a), abs(b), abs(c)) < 1e-8:
+            continue
+        if abs(c) < 1e-8:
+            d = np.round(np.array([a, b]) / np.hypot(a, b), 8)
+            d = (d if d[np.argmax(np.abs(d))] > 0 else -d) + 0.0  # no -0
+            parts.append(f"translation along ({d[0]:.3g}, {d[1]:.3g}){who}")
+        else:
+            x = origin + np.array([-b, a]) * size / c
+            x = np.where(np.abs(x) < 1e-9 * size, 0.0, x)
+            parts.append(f"rotation about ({x[0]:.4g}, {x[1]:.4g}){who}")
+    return " with ".join(parts)
+
+
+def _has_full_rank(A):
+    """True if the smallest singular value of a matrix (n, 3) of unit rows is not zero.
+
+    Its square is the determinant of A^T A over the product of the other two eigenvalues, which is
+    at most a quarter of their sum's square.
+    """
+    A = unit_rows(A)
+    (a, b, c), (_, d, e), (_, _, f) = A.T.dot(A).tolist()
+    trace = a + d + f
+    if a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d) > 1e-10 * trace**3:
+        return True
+    return len(A) > 2 and bool(np.linalg.svd(A, compute_uv=False)[2] > 1e-9)
+
+
+def _fixes(joint, zero):
+    """Coordinates that the equations of a joint fix, and their factors; None if it does more."""
+    rows, dofs, factors = joint.entries(zero, 0.0)
+    if len(rows) != len(joint.equations) or not factors.all():
+        return None
+    inorder = list(range(len(rows)))
+    if rows.tolist() == inorder:
+        return dofs, factors
+    order = rows.argsort()
+    if rows[order].tolist() != inorder:
+        return None
+    return dofs[order], factors[order]

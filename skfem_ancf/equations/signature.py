@@ -1,0 +1,261 @@
+"""Rank, null spaces and inertia of sparse matrices."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.linalg
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+
+from ..core.linalg import SMALL, Inertia, beside_zero, dense
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from ..core.types import Array
+
+#: Rest of a row beside those before it, relative to the row, that is round-off.
+DEPENDENT = 1e-9
+#: Smallest over largest singular value of what is held that is round-off.
+FREE = 1e-9
+#: Entries of L, of a matrix of unit diagonal, from which its pivots are not trusted.
+LARGEST = 1e6
+#: Columns up to which singular values, and equations that depend on others, are found by dense
+#: matrices.
+DENSE = 300
+#: Vectors of a null space that are looked for where it is not dense, and iterations for them.
+MOST, ITERATIONS = 8, 6
+
+
+def first_dependent(J: Array | sparse.csr_array, free: Array,
+                    phi: Callable[[], Array]) -> tuple[int, float] | None:
+    """The first equation that those before it hold already, or None.
+
+    The rows of J fall apart into groups without a common coordinate. In each group QR
+    orthogonalises the rows in their order: what is left of a row is on the diagonal of R.
+
+    Parameters
+    ----------
+    J
+        Shape (m, N).
+    free
+        Truth values of the coordinates that supports leave free, shape (N,).
+    phi
+        Returns what each equation is open by, shape (m,).
+
+    Returns
+    -------
+    tuple or None
+        The number of the equation, and what it is open by where those before it are met.
+    """
+    size = np.sqrt((J * J).sum(axis=1))
+    first = None
+    for rows, _, A in groups(J * free):
+        if first is not None and rows[0] > first[0]:
+            continue
+        R = scipy.linalg.lapack.dgeqrf(A.T)[0] if A.size else A.T  # and below it, what is not asked
+        rest, k = np.zeros(len(rows)), min(R.shape)
+        rest[:k] = np.abs(R.diagonal())
+        small = rest <= DEPENDENT * size[rows]
+        k = int(small.argmax())
+        if small[k] and (first is None or rows[k] < first[0]):
+            gap = phi()[rows]
+            known = scipy.linalg.solve_triangular(R[:k, :k], gap[:k], trans="T")
+            first = int(rows[k]), float(gap[k] - R[:k, k] @ known)
+    return first
+
+
+def groups(J: Array | sparse.csr_array) -> Iterator[tuple[Array, Array, Array]]:
+    """The rows of a sparse matrix in groups without a common column; of a dense one all at once.
+
+    Yields
+    ------
+    rows, columns, A
+        Numbers of the rows, increasing, of the columns that are not zero in all of them, and the
+        dense matrix between both.
+    """
+    if isinstance(J, np.ndarray):
+        columns, = J.any(axis=0).nonzero()
+        if len(J):
+            yield np.arange(len(J)), columns, J[:, columns]
+        return
+    J = sparse.csr_array(J)
+    J.eliminate_zeros()
+    (m, n), entries = J.shape, J.tocoo()
+    links = sparse.coo_array((np.ones(J.nnz), (entries.row, m + entries.col)), (m + n, m + n))
+    number, group = connected_components(links, directed=False)
+    rows, row = _members(group[:m], number)
+    columns, column = _members(group[m:], number)
+    for g, some in enumerate(_members(group[entries.row], number)[0]):
+        if len(rows[g]):
+            A = np.zeros((len(rows[g]), len(columns[g])))
+            A[row[entries.row[some]], column[entries.col[some]]] = entries.data[some]
+            yield rows[g], columns[g], A
+
+
+def _members(group, number):
+    """The members of each group, and the place that each member has in its group."""
+    order, count = np.argsort(group, kind="stable"), np.bincount(group, minlength=number)
+    place, ends = np.empty(len(group), dtype=int), np.cumsum(count)
+    place[order] = np.arange(len(group)) - np.repeat(ends - count, count)
+    return [order[last - n:last] for n, last in zip(count, ends)], place
+
+
+def null_basis(J: Array | sparse.csr_array) -> Array | sparse.csr_array:
+    """A matrix whose columns span the null space of a J of full rank, sparse if J is.
+
+    In each of the :func:`groups` of its rows as many coordinates as there are rows are given by
+    the others: those that QR with pivots takes first.
+
+    Parameters
+    ----------
+    J
+        Shape (m, N).
+
+    Returns
+    -------
+    ndarray or scipy.sparse.csr_array
+        Shape (N, N - m): every other coordinate is an unknown of its own.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the rows depend on each other.
+    """
+    n, given = J.shape[1], []
+    for rows, columns, A in groups(J):
+        k = len(rows)
+        size = row_sizes(A)
+        R, order = scipy.linalg.qr(A / np.where(size > 0.0, size, 1.0)[:, None], mode="r",
+                                   pivoting=True, check_finite=False)
+        rest = np.abs(np.diag(R))
+        if k > A.shape[1] or rest[k - 1] <= DEPENDENT * rest[0]:
+            raise np.linalg.LinAlgError("the joints are not independent in this state")
+        C = -scipy.linalg.solve_triangular(R[:, :k], R[:, k:])
+        given.append((np.repeat(columns[order[:k]], C.shape[1]), np.tile(columns[order[k:]], k),
+                      C.ravel(), columns[order[:k]]))
+    none = np.zeros(0, dtype=int)
+    rows, columns, values, pivots = map(np.concatenate, zip((none, none, np.zeros(0), none),
+                                                            *given))
+    own = np.delete(np.arange(n), pivots)
+    number = np.empty(n, dtype=int)
+    number[own] = np.arange(len(own))
+    rows, columns = np.append(rows, own), np.append(number[columns], number[own])
+    values, shape = np.append(values, np.ones(len(own))), (n, len(own))
+    if not isinstance(J, np.ndarray):
+        return sparse.csr_array((values, (rows, columns)), shape=shape)
+    out = np.zeros(shape)
+    out[rows, columns] = values
+    return out
+
+
+def inertia_of(A: Array | sparse.csr_array) -> Inertia:
+    """The :class:`~skfem_ancf.core.linalg.Inertia` of a symmetric matrix.
+
+    Of a sparse one from the signs of the pivots of ``L D L^T``, by Sylvester's law.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If there are no factors with pivots on the diagonal.
+    """
+    size = np.abs(A.diagonal())
+    if not len(size):  # joints and supports leave nothing free
+        return Inertia(0, False)
+    size[size == 0.0] = np.max(size)
+    if isinstance(A, np.ndarray):
+        root = np.sqrt(size)
+        values = np.linalg.eigvalsh(A / (root[:, None] * root))
+        largest = max(1.0, values[-1])  # of its size is their round-off
+        return beside_zero(lambda shift: int(np.sum(values < -shift * largest)))
+    scale = sparse.diags(1.0 / np.sqrt(size))
+    A = scale @ A @ scale
+    try:
+        if np.all(_pivots(A) > SMALL):
+            return Inertia(0, False)
+    except np.linalg.LinAlgError:  # singular to the last bit, which a shift is not
+        pass
+    one = sparse.eye(len(size))
+    return beside_zero(lambda shift: int(np.sum(_pivots(A + shift * one) < 0.0)))
+
+
+def _pivots(A):
+    """The pivots of a symmetric matrix of unit diagonal; entries of L that grow are refused."""
+    for order in ("MMD_AT_PLUS_A", "COLAMD"):
+        try:
+            lu = splu(A.tocsc(), order, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        except RuntimeError:  # a pivot is zero
+            continue
+        if np.array_equal(lu.perm_r, lu.perm_c) and np.max(np.abs(lu.L.data)) < LARGEST:
+            return lu.U.diagonal()
+    raise np.linalg.LinAlgError("the matrix is singular")
+
+
+def determinant_sign(A: Array | sparse.csr_array) -> int:
+    """The sign of the determinant of a matrix: 1 or -1."""
+    if isinstance(A, np.ndarray):
+        return -1 if np.linalg.slogdet(A)[0] < 0.0 else 1
+    lu, one = splu(A.tocsc()), sparse.eye(A.shape[0], format="csr")
+    odd = np.sum(lu.U.diagonal() < 0.0)
+    for order in (lu.perm_r, lu.perm_c):  # a cycle of k is k - 1 exchanges
+        odd += len(order) - connected_components(one[order])[0]
+    return -1 if odd % 2 else 1
+
+
+def row_sizes(A: Array | sparse.csr_array) -> Array:
+    """The largest absolute value of each row of a matrix (m, n), shape (m,)."""
+    if isinstance(A, np.ndarray) or not A.nnz:
+        return np.zeros(A.shape[0]) if not A.size else np.abs(A).max(axis=1)
+    return np.asarray(abs(A).max(axis=1).toarray()).ravel()
+
+
+def unit_rows(A: Array | sparse.csr_array) -> Array | sparse.csr_array:
+    """The rows of a matrix scaled to a largest entry of 1, without those that are zero.
+
+    Rows for slopes have another unit than rows for positions.
+    """
+    size = row_sizes(A)
+    keep = size > 0.0
+    if not keep.all():
+        A, size = A[keep], size[keep]
+    return A / size[:, None] if isinstance(A, np.ndarray) else sparse.diags(1.0 / size) @ A
+
+
+def null_space(H: Array | sparse.csr_array) -> Array:
+    """Vectors that span the null space of a matrix, as rows; of a large one some.
+
+    Parameters
+    ----------
+    H
+        Shape (r, n), rows of about unit size; sparse where n is above :data:`DENSE`.
+
+    Returns
+    -------
+    ndarray
+        Shape (k, n); with more than :data:`DENSE` columns at most :data:`MOST`.
+    """
+    n = H.shape[1]
+    if not H.shape[0]:
+        return np.eye(n)[:n if n <= DENSE else MOST]
+    if n <= DENSE:
+        _, sigma, V = np.linalg.svd(np.linalg.qr(dense(H), mode="r"))
+        return V[int(np.sum(sigma > FREE * sigma[0])):]
+    # inverse iteration with H^T H + small^2, whose condition number is the square of this one's
+    small = 0.1 * FREE
+    lu = splu(sparse.bmat([[small * sparse.eye(H.shape[0]), H],
+                                  [H.T, -small * sparse.eye(n)]], format="csc"))
+    X = np.random.default_rng(0).standard_normal((n, MOST))
+    for _ in range(ITERATIONS):
+        X = np.linalg.qr(lu.solve(np.vstack([np.zeros((H.shape[0], MOST)), X]))[H.shape[0]:])[0]
+    _, sigma, V = np.linalg.svd(np.linalg.qr(H @ X, mode="r"))
+    largest = np.sqrt(sparse.linalg.norm(H, 1) * sparse.linalg.norm(H, np.inf))
+    X = X @ V[sigma <= FREE * largest].T
+    # as few beams in each vector as there may be
+    _, R, pivots = scipy.linalg.qr(X.T, mode="economic", pivoting=True)
+    k = len(R)
+    out = np.empty((k, n))
+    out[:, pivots] = scipy.linalg.solve_triangular(R[:, :k], R)
+    return out / np.linalg.norm(out, axis=1)[:, None]

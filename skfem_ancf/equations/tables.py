@@ -1,0 +1,513 @@
+"""The equations of a scene as tables that texts take."""
+
+from functools import cache
+from operator import is_
+from typing import TYPE_CHECKING, Any, NamedTuple
+from weakref import ref
+
+import numpy as np
+from scipy import sparse
+
+from . import compiled
+from ..core.band import Band
+from ..beam.strain_energy import (BEGIN, END_GRADIENTS, FlatBody, body_of, copies_of, stress_size,
+                                  viscous_body_of)
+from .border import Border
+from .compiled.words import Words, constant
+from ..actions.forces.system import NO_FORCES
+from ..actions.forces.texts import ForceTables
+from ..core.kept import cached_property, twin_of
+from ..beam.kernels.base import packed
+from ..beam.kernels.law import LINEAR, text_of, with_text
+from ..beam.kernels.moments import MomentPack
+from ..beam.kernels.section import SectionPack, linearised
+from ..core.origin import ours
+from ..core.callbacks import handle_of
+from ..core.sampling import Sampled
+from ..core.source import F1, I1, by_place
+from ..actions.tables import JointTables, LoadTables
+from ..core.types import Array
+
+if TYPE_CHECKING:
+    from ..actions.loads import Load
+
+#: Of a scene without them.
+_NO_INTS = np.zeros(0, np.int64)
+_NO_JOINTS = constant(JointTables(_NO_INTS, _NO_INTS, _NO_INTS, np.zeros(0), _NO_INTS, _NO_INTS,
+                                  np.zeros(0), 0))
+_NO_MOMENTS = constant(MomentPack(np.zeros((0, 2, 0), np.int64), np.zeros((0, 0)),
+                                  np.zeros((0, 2)), np.zeros(0), _NO_INTS))
+_NO_BODY = constant(FlatBody(_NO_INTS, np.zeros((0, END_GRADIENTS + 1), np.int64)))
+_NO_PUSHES = np.zeros((0, 0))
+_NO_ROWS = np.zeros((0, 3), np.int64)
+_NO_BORDER = constant(Border(_NO_INTS, 0, 0, _NO_INTS, _NO_INTS, _NO_INTS, _NO_INTS, 0, _NO_ROWS))
+constant(NO_FORCES)
+
+#: Times at which joints are tried, whether tables give them.
+TRIED = 0.0, 0.37
+
+
+@by_place
+class Equations(NamedTuple):
+    """A scene for texts.
+
+    Attributes
+    ----------
+    body
+        A :class:`~skfem_ancf.beam.strain_energy.Body`; a ``FlatBody`` for compiled code.
+    loads, joints, border
+        :class:`~skfem_ancf.actions.tables.LoadTables`,
+        :class:`~skfem_ancf.actions.tables.JointTables`,
+        :class:`~skfem_ancf.equations.border.Border`.
+    fixed, free
+        Fixed coordinates, and for each one 1 or 0.
+    K
+        The band for the tangent, work space.
+    forces
+        :class:`~skfem_ancf.actions.forces.texts.ForceTables`.
+    viscous
+        As ``body``, of what resists the rates of strains; the same where nothing does.
+    copies
+        As ``body``, of several times all coordinates, one behind the other; see
+        :meth:`Tables.copied`, the same where nobody has asked.
+    sizes
+        Those of the coordinates, see
+        :attr:`skfem_ancf.equations.constraints.Constraints.coordinate_sizes`.
+    """
+
+    body: Any
+    loads: LoadTables
+    joints: JointTables
+    fixed: I1
+    free: F1
+    K: Band
+    border: Border
+    viscous: Any
+    forces: ForceTables
+    copies: Any
+    sizes: F1
+
+
+class Tables:
+    """The tables of a system, and what of them depends on time.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.equations.system.System`.
+
+    Attributes
+    ----------
+    plain, flat : Equations
+        For the plain texts, and for compiled ones.
+    motion_varies, turns : bool
+        A joint moves with time; its derivative in the stress-free state does.
+    """
+
+    def __init__(self, system: Any) -> None:
+        # the system has the tables: without a circle both go when nobody asks for them any more
+        self._system = ref(system)
+        self._own_handle: int | None = None
+        self._words: list[Words] = []
+        self._words_of_loads: list[Words] = []
+        self._sort(system.loads)
+        self.motion_varies = any(joint.moving for joint in system.joints)
+        self.turns = any(joint.turning for joint in system.joints)
+        joints = self._joints()
+        body = body_of(system.beams, system.slices)
+        self.plain = Equations(body, self._load_tables(), joints,
+                               system.fixed, system.mask, system.K.band,
+                               self._border(joints),
+                               viscous_body_of(body, system.beams, system.retardation),
+                               self._forces(), body, system.constraints.coordinate_sizes)
+
+    @property
+    def system(self) -> Any:
+        """Whose they are."""
+        system = self._system()
+        assert system is not None
+        return system
+
+    def _sort(self, loads):
+        # of the constant kind, moments, linear ones, stress-free strains, others
+        self._loads: list[list[Any]] = [[], [], [], [], []]
+        for load in loads:
+            self._loads[_kind(load)].append(load)
+
+    @property
+    def asks(self) -> bool:
+        """True if texts ask the system in Python, by its handle."""
+        plain = self.plain
+        return bool(plain.loads.own or plain.joints.own or plain.forces.own)
+
+    @cached_property
+    def flat(self) -> Equations:
+        plain = self.plain
+        addresses = {part: compiled.address(part) for part in self.parts}
+        body = self._flat(_with_laws(plain.body, compiled.law), addresses)
+        same, alone, forces = plain.viscous is plain.body, plain.copies is plain.body, plain.forces
+        if "contacts" in addresses:
+            forces = forces._replace(
+                contacts=forces.contacts._replace(address=addresses["contacts"]))
+        if "elements" in addresses:
+            forces = forces._replace(address=addresses["elements"])
+        return plain._replace(
+            body=body, viscous=body if same else self._flat(plain.viscous, addresses),
+            copies=body if alone else self._flat(_with_laws(plain.copies, compiled.law), addresses),
+            forces=forces, loads=self._flat_loads())
+
+    @cached_property
+    def parts(self) -> list[str]:
+        """What of :data:`skfem_ancf.equations.compiled.ADDRESSES` the scene has."""
+        forces = self.plain.forces
+        return [*_parts(frozenset(map(type, self.plain.body.packs)), forces.number > 0,
+                        forces.contacts.number > 0)]
+
+    @cached_property
+    def linearised(self) -> "Tables | None":
+        """The same with laws of constant moduli, those without strain; None if all are such."""
+        body = self.plain.body
+        packs = [linearised(pack) if isinstance(pack, SectionPack) else pack
+                 for pack in body.packs]
+        if all(map(is_, packs, body.packs)):
+            return None
+        body = body._replace(packs=tuple(packs))
+        return self.with_equations(self.plain._replace(body=body, viscous=body, copies=body))
+
+    def copied(self, n: int) -> "Tables":
+        """The same with ``n`` copies of all coordinates, whose forces a text finds together.
+
+        Parameters
+        ----------
+        n
+            Their number.
+        """
+        return self.with_equations(self.plain._replace(
+            copies=copies_of(self.plain.body, n, self.system.N)))
+
+    def with_equations(self, plain: Equations) -> "Tables":
+        """The same with other numbers.
+
+        Parameters
+        ----------
+        plain
+            In place of those of the system.
+        """
+        tables = twin_of(self)
+        vars(tables).pop("flat", None)
+        tables._words, tables._words_of_loads, tables.plain = [], [], plain
+        return tables
+
+    def _flat(self, body, addresses):
+        """The FlatBody of a Body."""
+        found, words = _flat(body, addresses)
+        self._words += words  # it has their places only
+        return found
+
+    def _flat_loads(self):
+        """The loads for compiled texts."""
+        loads = self.plain.loads
+        if not len(loads.pushes):
+            return loads
+        pushed, self._words_of_loads = _flat(
+            _with_laws(loads.pushed, compiled.law), {
+                name: compiled.address(name) for name in {
+                    type(pack).__name__ for pack in loads.pushed.packs}})
+        return loads._replace(pushed=pushed)
+
+    def _forces(self):
+        s = self.system
+        return s.forces.tables(s.K._position, s.symmetric, self.handle if s.forces.own else 0)
+
+    @property
+    def handle(self) -> int:
+        """What texts know the system by."""
+        if self._own_handle is None:
+            self._own_handle = handle_of(self.system)
+        return self._own_handle
+
+    @property
+    def stresses(self) -> Array:
+        """Room for the stresses of all beams."""
+        return np.zeros(self._stress_size)
+
+    @cached_property
+    def _stress_size(self):
+        return stress_size(self.plain.body)
+
+    # loads
+
+    def _load_tables(self):
+        s = self.system
+        steady, turning, linear, pushing, others = self._loads
+        self._rows = [load for load in steady if load.amplitude is not None]
+        vectors = np.zeros((1 + len(self._rows) + len(linear), s.N))
+        vectors[0] = s.constant_force
+        for row, load in enumerate(self._rows, 1):
+            vectors[row, s.of(load)] += load.force(None)
+        pushed = self._pushed(pushing)
+        if not linear:
+            return LoadTables(vectors, self._moments(turning), _NO_INTS, _NO_INTS, np.zeros(0),
+                              _NO_INTS, *pushed, self.handle if others else 0)
+        entries, first = [[np.zeros(0)] * 4], len(vectors) + len(turning)
+        for k, load in enumerate(linear):
+            zero, at = np.zeros(load.beam.N), s.of(load)
+            vectors[1 + len(self._rows) + k, at] = load.force(zero)
+            i, j, v = load.stiffness(zero)
+            entries.append((at.start + i, at.start + j, v, np.full(len(v), first + k)))
+        i, j, v, k = (np.concatenate(column) for column in zip(*entries))
+        return LoadTables(vectors, self._moments(turning), *(x.astype(np.int64) for x in (i, j)),
+                          v.astype(float), k.astype(np.int64), *pushed,
+                          self.handle if others else 0)
+
+    def _pushed(self, loads):
+        """The beams with stress-free strains, and these, a row for each load."""
+        if not loads:
+            return _NO_BODY, _NO_PUSHES
+        of = {id(load.beam): load.beam for load in loads}
+        beams = list(of.values())
+        packs = [beam.kernel.pushed_packs() for beam in beams]
+        body = body_of(beams, [self.system.of(beam) for beam in beams], packs)
+        first = np.cumsum([0, *map(len, packs)])[:-1]
+        begins = dict(zip(of, body.table[first, BEGIN]))
+        rows = np.zeros((len(loads), stress_size(body)))
+        for row, load in zip(rows, loads):
+            begin, values = begins[id(load.beam)], np.concatenate([x.ravel() for x in load.pushes])
+            row[begin:begin + len(values)] = values
+        return body, rows
+
+    def _moments(self, turning):
+        if not turning:
+            return _NO_MOMENTS
+        n, most = len(turning), max((load.dofs.shape[1] for load in turning), default=0)
+        dofs, c = np.zeros((n, 2, most), dtype=np.int64), np.zeros((n, most))
+        start = np.zeros((n, 2))
+        for k, load in enumerate(turning):
+            size, first = load.dofs.shape[1], self.system.of(load).start
+            dofs[k] = first + load.dofs[:, :1]  # what is left over has no weight
+            dofs[k, :, :size], c[k, :size] = first + load.dofs, load.c
+            start[k] = load.direction(np.zeros(load.beam.N))
+        opposite = np.full(n, -1, dtype=np.int64)
+        for k, load in enumerate(turning):
+            for i in range(k if load.couple is not None else 0):
+                if turning[i].couple is load.couple:
+                    opposite[[i, k]] = k, i
+        return MomentPack(dofs, c, start, np.array([load.M for load in turning], dtype=float),
+                          opposite)
+
+    @property
+    def own_loads(self) -> list["Load"]:
+        """Loads that are no tables."""
+        return self._loads[-1]
+
+    @property
+    def _columns(self):
+        """The load of each factor; None for all that are constant."""
+        _, turning, linear, pushing, _ = self._loads
+        return [None, *self._rows, *linear, *turning, *linear, *pushing]
+
+    def factors(self, times: Array) -> Array:
+        """Factors of the loads, shape (n, k); of one row where none has an amplitude."""
+        varying, n = self._amplitudes
+        out = np.empty((len(times) if varying else 1, n))
+        out.fill(1.0)
+        for k, amplitude in varying:
+            out[:, k] = amplitude(times).reshape(len(times))
+        return out
+
+    @cached_property
+    def _amplitudes(self):
+        """Functions of factors that vary, with their numbers, and the number of all factors."""
+        columns = self._columns
+        return [(k, Sampled(load.amplitude, "amplitude")) for k, load in enumerate(columns)
+                if load is not None and load.amplitude is not None], len(columns)
+
+    @cached_property
+    def prestressed(self) -> bool:
+        """True if the first tangent has other factors of loads, see :meth:`static_factors`."""
+        return any(load.prestress for load in [*self._loads[2], *self._loads[3]])
+
+    def static_factors(self, scale: float, before: float | None = None) -> Array:
+        """Factors of the loads in statics, where an amplitude counts as one; shape (k,).
+
+        Parameters
+        ----------
+        scale
+            The load factor.
+        before
+            That of the state to start from, for the first tangent, of loads that prestress.
+        """
+        out = scale * self._at_rest
+        if before is None or not self.prestressed:
+            return out
+        last = [*self._loads[2], *self._loads[3]]
+        for k, load in enumerate(last, len(out) - len(last)):
+            if load.prestress:
+                out[k] = before * load.at_rest
+        return out
+
+    @cached_property
+    def _at_rest(self):
+        """Factors of the loads in statics at full load."""
+        return np.array([1.0 if load is None else load.at_rest for load in self._columns])
+
+    # joints
+
+    def _joints(self):
+        s = self.system
+        #: g at the time 0
+        self._slope = np.zeros((1, 0))
+        if not s.joints:
+            return _NO_JOINTS
+        k, i, j, v = s.constraints.in_order([joint.second_entries(s.N) for joint in s.joints])
+        gk, gi, g = s.constraints.slopes
+        k, i, j, gk, gi = (packed(x, np.int64) for x in (k, i, j, gk, gi))
+        self._slope = packed(g)[None]
+        tables = JointTables(k, i, j, packed(v), gk, gi,
+                             s.constraints.equation_sizes(gk, gi, g), 0)
+        tabled = (all(joint.tabled for joint in s.joints) if all(map(ours, s.joints))
+                  else self.are_joints(tables))
+        return tables if tabled else tables._replace(own=self.handle)
+
+    @property
+    def linear_joints(self) -> bool:
+        """True if the equations of joints are linear in the coordinates, the same at all times."""
+        joints = self.plain.joints
+        return not (len(joints.hk) or joints.own or self.motion_varies)
+
+    def are_joints(self, tables: JointTables) -> bool:
+        """True if the tables give Phi and its derivative: joints of others may not be quadratic.
+
+        Parameters
+        ----------
+        tables
+            Of the system's joints.
+        """
+        s = self.system
+        if not s.m:
+            return True
+        k, i, j, v, gk, gi, sizes, _ = tables
+        all_sizes = s.constraints.coordinate_sizes
+        for t, x in zip(TRIED, np.random.default_rng(0).standard_normal((2, s.N))):
+            u = 0.1 * all_sizes * x
+            c, g = self.offsets(np.array([t]))[0], self.slopes(np.array([t]))[0]
+            slope = sparse.csr_array((g, (gk, gi)), shape=(s.m, s.N))
+            J = slope + sparse.csr_array((v * u[j], (k, i)), shape=slope.shape)
+            phi, gap = c + 0.5 * (J + slope) @ u, J - s.sparse_jacobian(u, t)
+            if not (np.all(np.abs(phi - s.constraint(u, t)) <= 1e-9 * sizes)
+                    and (abs(gap) @ all_sizes <= 1e-9 * (abs(J) @ all_sizes)).all()):
+                return False
+        return True
+
+    def offsets(self, times: Array) -> Array:
+        """c of all joints at the times, shape (n, m)."""
+        s = self.system
+        if not s.joints:
+            return np.zeros((len(times), 0))
+        return _beside([joint.offset(times, s.N) for joint in s.joints])
+
+    def slopes(self, times: Array) -> Array:
+        """g of all joints at the times, shape (n, k); of one row where none turns."""
+        s = self.system
+        if not self.turns:
+            return self._slope
+        return _beside([joint.slope_entries(times, s.N)[2] for joint in s.joints])
+
+    def driven(self, times: Array) -> Array:
+        """c of all joints at the times and behind them g, shape (n, m + k).
+
+        Of joints whose derivatives do not depend on time c alone, shape (n, m).
+        """
+        s = self.system
+        if not self.turns:
+            return self.offsets(times)
+        found = [(joint.driven(times, s.N), len(joint.equations)) for joint in s.joints]
+        return found[0][0] if len(found) == 1 else np.hstack([
+            *[x[:, :m] for x, m in found], *[x[:, m:] for x, m in found]])
+
+    def at(self, t: float) -> tuple[Array, Array]:
+        """c and g of all joints at one time, shapes (m,) and (k,)."""
+        if not self.motion_varies and not self.plain.joints.own:
+            c, g = self.still
+            return c[0, 0], g[0, 0]
+        times, m = np.array([t]), self.system.m
+        found = self.driven(times)[0]
+        return found[:m], found[m:] if self.turns else self.slopes(times)[0]
+
+    @cached_property
+    def still(self) -> tuple[Array, Array]:
+        """c and g of joints that do not move with both rates, (1, 3, m) and (1, 4, k).
+
+        g twice: at the end of a step and where the joints act. What moves, and joints that are no
+        tables, have zeros.
+        """
+        s, joints, first = self.system, self.plain.joints, np.zeros(1)
+        c, g = np.zeros((1, 3, s.m)), np.zeros((1, 4, len(joints.gk)))
+        if s.m and not joints.own:
+            if not self.motion_varies:
+                c[:, 0] = self.offsets(first)
+            if not self.turns:
+                g[:, :2] = self.slopes(first)
+        return c, g
+
+    def _border(self, joints):
+        s, none = self.system, _NO_INTS
+        if not s.coupled:
+            return _NO_BORDER
+        if not s.joints or not s.bordered or joints.own or s.forces.far:
+            return Border(none, 0, 0, none, none, none, none, int(s.coupled), _NO_ROWS)
+        along, springs = s.constraints.stiff
+        i, j, ns = joints.hi, joints.hj, len(springs)
+        if not len(i):
+            return Border(springs, ns, s.loose, none, none, none, none, 0, along)
+        outside = np.abs(i - j) > s.bandwidth
+        far = np.unique(np.append(i[outside], j[outside]))
+        picked = np.append(springs, far)
+        out, = np.nonzero(outside)
+        stored, = np.nonzero(~outside & ((i >= j) | (not s.symmetric)))
+        row, column = (ns + np.searchsorted(far, x[out]) for x in (i, j))
+        return Border(picked, ns, s.loose, s.K._position(i[stored], j[stored]), stored,
+                      row * len(picked) + column, out, 0, along)
+
+
+@cache
+def _parts(packs, elements, contacts):
+    """As :attr:`Tables.parts`, of classes of packs and whether there are elements and contacts."""
+    return ("common", *["kernels"] * bool(packs), *sorted(x.__name__ for x in packs),
+            *["elements"] * elements, *["contacts"] * contacts)
+
+
+def _beside(arrays):
+    """Arrays (n, ...) beside each other, as compiled code takes them."""
+    return packed(arrays[0] if len(arrays) == 1 else np.hstack(arrays))
+
+
+def _with_laws(body, address):
+    """A Body whose laws have the addresses of their texts."""
+
+    def addressed(pack):
+        law = with_text(pack.law)
+        text = text_of(law)
+        return pack._replace(law=law if text is None else law._replace(address=address(text)))
+
+    packs = tuple([
+        addressed(pack) if isinstance(pack, SectionPack) and pack.law.kind != LINEAR else pack
+        for pack in body.packs])
+    return body if all(map(is_, packs, body.packs)) else body._replace(packs=packs)
+
+
+def _kind(load):
+    """Number of the kind of table that a load goes to."""
+    if load.constant:
+        return 0
+    if load.turning:
+        return 1
+    if load.linear:
+        return 2
+    return 3 if load.pushes else 4
+
+
+def _flat(body, addresses):
+    """The FlatBody of a Body, and the words that it has the places of."""
+    words = [Words(pack._replace(address=addresses[type(pack).__name__])) for pack in body.packs]
+    return FlatBody(np.array([x.address for x in words], dtype=np.int64), body.table), words

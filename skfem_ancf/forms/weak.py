@@ -1,0 +1,538 @@
+"""The weak forms of a planar body: energy, internal force, tangent, mass, loads.
+
+Each factory returns a scikit-fem form for stock ``asm`` on a stock ``Basis`` of the position
+field, with the coordinates passed as ``r``:
+
+>>> import numpy as np
+>>> from skfem import Basis, ElementVector, asm
+>>> from skfem_ancf import (ElementBeamANCF, MeshBeam, StVenantKirchhoff, forms,
+...                         reference_coordinates)
+>>> basis = Basis(MeshBeam.init_line(np.linspace(0, 1, 3), height=0.1),
+...               ElementVector(ElementBeamANCF(2)))
+>>> steel = StVenantKirchhoff(E=2.1e11, nu=0.3)
+>>> q = reference_coordinates(basis)
+>>> K = asm(forms.tangent(steel, width=0.1), basis, r=q)
+>>> K.shape, bool(abs(asm(forms.internal_force(steel, width=0.1), basis, r=q)).max() < 1e-3)
+((24, 24), True)
+
+There are three kinds, which agree where they are the same integral:
+
+* :func:`textbook_energy`, :func:`textbook_internal_force`, :func:`textbook_tangent`: the
+  mathematics as it is written down, for scikit-fem's assembly of one pair of local functions
+  after the other. The others are tested against them.
+* :func:`energy`, :func:`internal_force`, :func:`tangent`: the same, contracted for all local
+  functions at once.
+* :func:`of`: what a Beam's own formulation makes of them, whatever it samples and stabilises: the
+  forms that :class:`~skfem_ancf.Scene` solves with.
+
+In all of them the strain is that of Green and Lagrange in the beam's frame, ``(F^T F - 1) / 2``
+with ``F = grad r``, and S the second Piola-Kirchhoff stress of the material's law.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+from skfem.assembly import BilinearForm, CellBasis, Form, Functional, LinearForm
+from skfem.assembly.form.form import FormExtraParams
+from skfem.element import DiscreteField
+from skfem.helpers import dot
+
+from ..core.errors import (InputError, ask_field, require_finite, require_like, require_positive,
+                           taught)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
+
+    from ..elements.base import ElementBeam
+    from ..materials.base import Material
+    from ..mesh.mesh_beam import MeshBeam
+    from ..core.types import Array
+
+
+# kinematics: grad[i, j] = d r_i / d X_j
+
+def deformation_gradient(r: Any, frame: Array) -> Array:
+    """F in the beam's frame: F[i, J] = d r_i / d X_j frame[j, J].
+
+    Parameters
+    ----------
+    r
+        The position field, with ``grad`` of shape (2, 2, ...).
+    frame
+        The beam's frame, shape (2, 2, ...).
+
+    Returns
+    -------
+    ndarray
+        Shape (2, 2, ...).
+    """
+    return np.einsum("ij...,jJ...->iJ...", r.grad, frame)
+
+
+def green_lagrange(F: Array) -> Array:
+    """(eps_xx, eps_yy, 2 eps_xy), shape (3, ...), of a deformation gradient (2, 2, ...)."""
+    return np.array([0.5 * (dot(F[:, 0], F[:, 0]) - 1.0), 0.5 * (dot(F[:, 1], F[:, 1]) - 1.0),
+                     dot(F[:, 0], F[:, 1])])
+
+
+def strain_variation(F: Array, dF: Array) -> Array:
+    """The variation of :func:`green_lagrange` at F in the direction dF; linear in both.
+
+    Parameters
+    ----------
+    F
+        Deformation gradient in the beam's frame, shape (2, 2, ...).
+    dF
+        Its variation, shape (2, 2, ...).
+
+    Returns
+    -------
+    ndarray
+        Shape (3, ...).
+    """
+    return np.array([dot(F[:, 0], dF[:, 0]), dot(F[:, 1], dF[:, 1]),
+                     dot(F[:, 0], dF[:, 1]) + dot(F[:, 1], dF[:, 0])])
+
+
+def _tensor(S):
+    return np.array([[S[0], S[2]], [S[2], S[1]]])
+
+
+def _voigt_to_tensor(D):
+    k = np.array([[0, 2], [2, 1]])
+    return D[k][:, :, k]
+
+
+def _law(material, k_s):
+    """The law of a material with its shear corrected."""
+    require_like("material", material, "Material", "law")
+    return material.law(require_positive("k_s", k_s))
+
+
+# the textbook's forms
+
+
+@taught
+def textbook_energy(material: Material, width: float = 1.0, k_s: float = 1.0) -> Functional:
+    """Strain energy ``U(r) = int W(eps) dV``, a ``Functional``.
+
+    Parameters
+    ----------
+    material
+        A :class:`~skfem_ancf.materials.Material`.
+    width
+        Width of the section, positive.
+    k_s
+        Factor on the shear modulus, positive, see
+        :meth:`~skfem_ancf.materials.base.Material.shear_factor`.
+    """
+    law, width = _law(material, k_s), require_positive("width", width)
+
+    @EnergyForm
+    def strain_energy(w):
+        return width * law.energy(green_lagrange(deformation_gradient(w.r, w.frame)))
+
+    return strain_energy
+
+
+@taught
+def textbook_internal_force(material: Material, width: float = 1.0, k_s: float = 1.0) -> LinearForm:
+    """The first variation ``delta U = int S : delta eps dV``, a ``LinearForm``.
+
+    Parameters
+    ----------
+    material, width, k_s
+        As for :func:`textbook_energy`.
+    """
+    law, width = _law(material, k_s), require_positive("width", width)
+
+    @BeamLinearForm
+    def force(v, w):
+        F, dF = (deformation_gradient(f, w.frame) for f in (w.r, v))
+        return width * dot(law.stress(green_lagrange(F)), strain_variation(F, dF))
+
+    return force
+
+
+@taught
+def textbook_tangent(material: Material, width: float = 1.0, k_s: float = 1.0) -> BilinearForm:
+    """The second, ``int delta eps : D : d eps + S : d delta eps dV``, a ``BilinearForm``.
+
+    Parameters
+    ----------
+    material, width, k_s
+        As for :func:`textbook_energy`.
+    """
+    law, width = _law(material, k_s), require_positive("width", width)
+
+    @BeamBilinearForm
+    def stiffness(u, v, w):
+        F, DF, dF = (deformation_gradient(f, w.frame) for f in (w.r, u, v))
+        eps, d, D = green_lagrange(F), strain_variation(F, dF), strain_variation(F, DF)
+        return width * (np.einsum("a...,ab...,b...->...", d, law.moduli(eps), D)
+                        + dot(law.stress(eps), strain_variation(dF, DF)))
+
+    return stiffness
+
+
+#: The three of them: ``textbook.energy``, ``textbook.internal_force``, ``textbook.tangent``.
+textbook = SimpleNamespace(energy=textbook_energy, internal_force=textbook_internal_force,
+                           tangent=textbook_tangent)
+
+
+# scikit-fem's forms with the beam's frame
+
+
+class _BeamFrame:
+    """A form whose ``w`` also holds the beam's frame, shape (2, 2, nelements, npoints)."""
+
+    @staticmethod
+    def _normalize_asm_kwargs(w, basis):
+        if hasattr(basis, "find"):
+            tind, points = basis.mapping.facet_points(basis.X, basis.find)
+        else:
+            tind, points = basis.tind, basis.X
+        frame = basis.mapping.frame(points, tind)
+        return {**Form._normalize_asm_kwargs(w, basis), "frame": frame}
+
+    def _parameters(self, basis, kwargs):
+        return FormExtraParams({**basis.default_parameters(),
+                                **self._normalize_asm_kwargs(kwargs, basis)})
+
+
+class EnergyForm(_BeamFrame, Functional):
+    """A functional, with the beam's frame as ``w.frame``."""
+
+
+class BeamLinearForm(_BeamFrame, LinearForm):
+    """A linear form, with the beam's frame as ``w.frame``."""
+
+
+class BeamBilinearForm(_BeamFrame, BilinearForm):
+    """A bilinear form, with the beam's frame as ``w.frame``."""
+
+
+class StressForm(BeamLinearForm):
+    """A linear form ``int P : grad v`` given by the first Piola-Kirchhoff stress P.
+
+    The decorated function takes ``w`` and returns P of shape (2, 2, nelements, npoints); the
+    fields in ``w`` are as for scikit-fem's ``LinearForm``, and ``w.frame`` is the beam's frame.
+    All local functions are contracted at once by a matrix product.
+    """
+
+    def _assemble(self, ubasis, vbasis=None, **kwargs):
+        P = self.form(self._parameters(ubasis, kwargs)) * ubasis.dx
+        nq, ne = ubasis.Nbfun, ubasis.nelems
+        B = _gradient_table(ubasis).reshape(ne, nq, -1)
+        P = np.moveaxis(P, (2, 3), (0, 1)).reshape(ne, -1, 1)
+        data = (B @ P)[..., 0].T
+        return np.array([ubasis.element_dofs.ravel()]), data.ravel(), (ubasis.N,), (nq,)
+
+
+class ModuliForm(BeamBilinearForm):
+    """A bilinear form ``int grad v : A : grad u`` given by the moduli A = dP / dF.
+
+    The decorated function takes ``w`` and returns A of shape (2, 2, 2, 2, nelements, npoints).
+    All pairs of local functions are contracted at once by matrix products.
+    """
+
+    def _assemble(self, ubasis, vbasis=None, **kwargs):
+        A = self.form(self._parameters(ubasis, kwargs)) * ubasis.dx
+        nq, ne = ubasis.Nbfun, ubasis.nelems
+        B = _gradient_table(ubasis).reshape(ne, nq, -1, 4)
+        A = np.moveaxis(A.reshape(4, 4, ne, -1), (2, 3), (0, 1))
+        AB = A @ B.transpose(0, 2, 3, 1)  # (ne, np, 4, nq)
+        K = B.reshape(ne, nq, -1) @ AB.reshape(ne, -1, nq)  # rows v, columns u
+        return _scattered(K, ubasis)
+
+
+def _gradient_table(basis):
+    """Gradients of all local functions, shape (ne, nq, np, 2, 2)."""
+    return np.ascontiguousarray(np.moveaxis(np.array([b[0].grad for b in basis.basis]),
+                                            (0, 3, 4, 1, 2), (1, 0, 2, 3, 4)))
+
+
+def _scattered(K, basis):
+    """Element matrices (ne, nq, nq), rows of v and columns of u, as scikit-fem's COO data."""
+    nq, dofs = basis.Nbfun, basis.element_dofs
+    rows, cols = np.tile(dofs, (nq, 1)), np.repeat(dofs, nq, axis=0)
+    return (np.array([rows.ravel(), cols.ravel()]), K.transpose(2, 1, 0).ravel(),
+            (basis.N, basis.N), (nq, nq))
+
+
+# the same for all local functions at once, and mass and loads
+
+#: :func:`textbook_energy`, whose assembly has no pairs of local functions.
+energy = textbook_energy
+
+
+@taught
+def internal_force(material: Material, width: float = 1.0, k_s: float = 1.0) -> LinearForm:
+    """Internal force ``int P : grad v dV``, P = F S; a batched ``LinearForm``.
+
+    Parameters
+    ----------
+    material, width, k_s
+        As for :func:`textbook_energy`.
+    """
+    law, width = _law(material, k_s), require_positive("width", width)
+
+    @StressForm
+    def force(w):
+        F = deformation_gradient(w.r, w.frame)
+        S = _tensor(law.stress(green_lagrange(F)))
+        return width * np.einsum("iJ...,JK...,jK...->ij...", F, S, w.frame)
+
+    return force
+
+
+@taught
+def tangent(material: Material, width: float = 1.0, k_s: float = 1.0) -> BilinearForm:
+    """Tangent ``int grad v : dP/dF : grad u dV``; a batched ``BilinearForm``.
+
+    Parameters
+    ----------
+    material, width, k_s
+        As for :func:`textbook_energy`.
+    """
+    law, width = _law(material, k_s), require_positive("width", width)
+
+    @ModuliForm
+    def stiffness(w):
+        F = deformation_gradient(w.r, w.frame)
+        eps = green_lagrange(F)
+        D, S = _voigt_to_tensor(law.moduli(eps)), _tensor(law.stress(eps))
+        A = np.einsum("iI...,IJKL...,kK...->iJkL...", F, D, F, optimize=True)
+        A = A + np.einsum("ik,JL...->iJkL...", np.eye(2), S)
+        return width * np.einsum("jJ...,iJkL...,lL...->ijkl...", w.frame, A, w.frame, optimize=True)
+
+    return stiffness
+
+
+@taught
+def mass(density: float, width: float = 1.0) -> BilinearForm:
+    """Mass ``int rho v . u dV``, a ``BilinearForm``: constant, whatever the motion.
+
+    Parameters
+    ----------
+    density
+        Mass per volume, positive.
+    width
+        Width of the section, positive.
+    """
+    density, width = require_positive("density", density), require_positive("width", width)
+
+    @BilinearForm
+    def inertia(u, v, _):
+        return width * density * dot(u, v)
+
+    return inertia
+
+
+@taught
+def gravity(density: float, g: ArrayLike, width: float = 1.0) -> LinearForm:
+    """Dead load ``int rho g . v dV``, a ``LinearForm``.
+
+    Parameters
+    ----------
+    density
+        Mass per volume, positive.
+    g
+        The acceleration, shape (2,).
+    width
+        Width of the section, positive.
+    """
+    density, width = require_positive("density", density), require_positive("width", width)
+    g = require_finite("g", g, (2,))
+
+    @LinearForm
+    def weight(v, _):
+        return width * density * (g[0] * v[0] + g[1] * v[1])
+
+    return weight
+
+
+def _widths(width):
+    """A positive width, or widths at the points of a basis."""
+    return require_finite("width", width, (None, None)) if isinstance(
+        width, np.ndarray) else require_positive("width", width)
+
+
+@taught
+def traction(t: ArrayLike | Callable[[Array], Array], width: float | Array = 1.0) -> LinearForm:
+    """Dead traction ``int t . v dA`` for a ``FacetBasis``, a ``LinearForm``.
+
+    Parameters
+    ----------
+    t
+        Force per area of the stress-free body, shape (2,), or a function of the points x (2, ...)
+        that returns (2, ...).
+    width
+        Width of the section, positive, or widths at the points of the basis, shape (nfacets,
+        npoints).
+    """
+    width = _widths(width)
+    if not callable(t):
+        t = require_finite("t", t, (2,))
+
+    @LinearForm
+    def surface_load(v, w):
+        value = ask_field("t(x)", t, np.asarray(w.x)) if callable(t) else t
+        return width * (value[0] * v[0] + value[1] * v[1])
+
+    return surface_load
+
+
+@taught
+def pressure(width: float | Array = 1.0) -> BilinearForm:
+    """Follower pressure of 1 as ``int -n . v da``, linear in the position: a ``BilinearForm``.
+
+    On the deformed facet ``n da`` is the derivative of the position along the facet, turned by
+    -90 degrees. The matrix times the coordinates is the force.
+
+    Parameters
+    ----------
+    width
+        Width of the section, positive, or widths at the points of the basis, shape (nfacets,
+        npoints).
+    """
+    width = _widths(width)
+
+    @BilinearForm
+    def follower(u, v, w):
+        # the facet's direction with the body on its left: n turned by +90 degrees
+        along = -w.n[1] * u.grad[:, 0] + w.n[0] * u.grad[:, 1]
+        return -width * (along[1] * v[0] - along[0] * v[1])
+
+    return follower
+
+
+# a beam's own forms
+
+
+class HasKernel(Protocol):
+    """What :func:`of` reads of a :class:`~skfem_ancf.Beam`.
+
+    Attributes
+    ----------
+    mesh, element
+        Those of the basis on which the forms are assembled.
+    N, q0
+        Number of degrees of freedom, and their values in the reference configuration, (N,).
+    kernel
+        Energies, forces and tangents of all elements.
+    """
+
+    mesh: MeshBeam
+    element: ElementBeam
+    q0: Array
+    kernel: Any
+
+    @property
+    def N(self) -> int: ...
+
+
+class BeamForms(NamedTuple):
+    """The forms of one beam; :func:`of` makes them."""
+
+    energy: Functional
+    internal_force: LinearForm
+    tangent: BilinearForm
+
+
+@taught
+def of(beam: HasKernel) -> BeamForms:
+    """The weak forms of a beam's own formulation, whatever it is.
+
+    They are ``U(r)``, ``delta U`` and ``delta^2 U`` of the strain energy that
+    :class:`~skfem_ancf.Scene` solves with, stabilisation included, for stock ``asm(form, basis,
+    r=q)``. The formulation has its own quadrature: that of the basis does not matter.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`. A ``Basis`` of ``ElementVector(element)`` on its mesh, or a
+        part of it, takes the forms.
+
+    Returns
+    -------
+    BeamForms
+        ``energy``, ``internal_force`` and ``tangent``: a ``Functional``, a ``LinearForm`` and a
+        ``BilinearForm``.
+
+    Raises
+    ------
+    InputError
+        When assembled, if the basis is not one of the beam, or ``r`` is not the vector of its
+        coordinates.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem import Basis, ElementVector, asm
+    >>> from skfem_ancf import (Beam, ElementBeamANCF, MeshBeam, StVenantKirchhoff, forms,
+    ...                         reference_coordinates)
+    >>> mesh, element = MeshBeam.init_line(np.linspace(0, 1, 3), height=0.1), ElementBeamANCF(2)
+    >>> own = forms.of(Beam(mesh, element, StVenantKirchhoff(E=2.1e11, nu=0.3), width=0.1))
+    >>> basis = Basis(mesh, ElementVector(element))
+    >>> asm(own.tangent, basis, r=reference_coordinates(basis)).shape
+    (24, 24)
+    """
+    require_like("beam", beam, "Beam", "facet_basis")
+    return BeamForms(_OwnEnergy(beam), _OwnForce(beam), _OwnTangent(beam))
+
+
+class _Own:
+    """A form whose element contributions come from the kernel of a beam."""
+
+    def __init__(self, beam):
+        super().__init__(self._named)
+        self.beam = beam
+
+    def _named(self, *_):
+        raise InputError("the form of a beam's own formulation is assembled as a whole: "
+                         "asm(form, basis, r=q)")
+
+    def _displacement(self, basis, r=None, idx=None, **other):
+        """Coordinates' displacement, and the elements of the basis; ``idx`` is scikit-fem's."""
+        mesh, element = self.beam.mesh, self.beam.element
+        other_element = getattr(basis.elem, "elem", None)
+        same = (isinstance(basis, CellBasis) and basis.N == self.beam.N
+                and type(other_element) is type(element)
+                and np.array_equal(other_element.doflocs, element.doflocs)
+                and np.array_equal(basis.mesh.p, mesh.p) and basis.mesh.height == mesh.height
+                and np.array_equal(basis.mesh.heights, mesh.heights))
+        if not same:
+            raise InputError(f"this is a form of {self.beam!r}: assemble it on "
+                             f"Basis(beam.mesh, ElementVector(beam.element)), not on {basis!r}")
+        if other or isinstance(r, DiscreteField) or np.shape(r) != (basis.N,):
+            raise InputError(f"pass the coordinates as r=q, a vector of {basis.N} numbers, and "
+                             f"nothing else; got r of shape {np.shape(r)}"
+                             + (f" and {sorted(other)}" if other else ""))
+        u = np.asarray(r, dtype=np.float64) - self.beam.q0
+        return u, slice(None) if basis.tind is None else basis.tind
+
+
+class _OwnEnergy(_Own, Functional):
+    def elemental(self, v, **kwargs):
+        u, tind = self._displacement(v, **kwargs)
+        return self.beam.kernel.energies(u)[tind]
+
+
+class _OwnForce(_Own, LinearForm):
+    def _assemble(self, ubasis, vbasis=None, **kwargs):
+        u, tind = self._displacement(ubasis, **kwargs)
+        data = self.beam.kernel.forces(u)[tind].reshape(-1, ubasis.Nbfun).T
+        dofs = ubasis.element_dofs
+        return np.array([dofs.ravel()]), data.ravel(), (ubasis.N,), (ubasis.Nbfun,)
+
+
+class _OwnTangent(_Own, BilinearForm):
+    def _assemble(self, ubasis, vbasis=None, **kwargs):
+        u, tind = self._displacement(ubasis, **kwargs)
+        return _scattered(self.beam.kernel.tangents(u)[tind], ubasis)

@@ -1,0 +1,8 @@
+"""Meshes of planar beams."""
+
+from .mesh_beam import MeshBeam, reach
+
+__all__ = [
+    "MeshBeam",
+    "reach",
+]

@@ -1,0 +1,311 @@
+"""The smooth axis of a curved beam: a function of a parameter, its derivative and arc length."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..core.errors import CallbackError, MeshError, ask_array, warnings_as_errors
+from ..core.quadrature import gauss
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..core.types import Array
+
+logger = logging.getLogger(__name__)
+
+#: Where differences are taken of a function, in steps.
+STENCIL = np.arange(-3, 4)
+#: Where curvatures are taken of an element, and beside a node for kinks, in parts of elements.
+FINE, ASIDE = np.arange(32) / 32.0, np.array([-1e-3, 1e-3, -2.5e-4, 2.5e-4])
+#: Where a derivative is tried, in parts of the curve.
+TRIED = np.linspace(0.0137, 0.991, 24)
+#: Angle of a kink of a curve that is refused; one of a fine polygon is smaller.
+KINK = 1e-2
+
+
+def _components(value, s):
+    """Two components at parameters s; one may be a constant."""
+    if isinstance(value, (tuple, list)) and len(value) == 2:
+        return [np.broadcast_to(v, s.shape) if np.ndim(v) == 0 else v for v in value]
+    return value
+
+
+def _on_curve(what, function, s):
+    """A function of parameters s (n,) that returns (2, n), asked."""
+    try:
+        return ask_array(what, (2, len(s)), lambda s: _components(function(s), s), s)
+    except CallbackError as error:
+        raise CallbackError(f"{error}; the function takes parameters of shape (n,) and returns "
+                            "positions of shape (2, n): a component that is constant is 0 * s + 1"
+                            ) from error.__cause__
+
+
+class Curve:
+    """A plane curve r(s) with its derivative.
+
+    Parameters
+    ----------
+    r, derivative
+        Functions of parameters (n,) that return (2, n).
+    ends
+        The parameters between which they are defined.
+    """
+
+    def __init__(self, r: Callable[[Array], Any], derivative: Callable[[Array], Any],
+                 ends: tuple[float, float]) -> None:
+        self.r, self.derivative, self.ends = r, derivative, ends
+
+    def __call__(self, s):
+        return _on_curve("r(s)", self.r, s)
+
+    def rate(self, s: Array) -> Array:
+        """The derivative at parameters ``s``, shape (2, n)."""
+        return _on_curve("the derivative of r", self.derivative, s)
+
+    def _moving(self, s):
+        """The derivative at parameters s, of a curve that has a tangent there."""
+        d = self.rate(s)
+        size = np.hypot(*d)
+        if len(s) and size.min() <= 1e-12 * size.max():
+            raise MeshError(f"the curve stands still at s = {s[np.argmin(size)]:.9g}: it has no "
+                            "tangent there")
+        return d
+
+    def nodes(self, s: Array) -> tuple[Array, Array]:
+        """Positions and unit tangents at parameters ``s``, both of shape (2, n)."""
+        d = self._moving(s)
+        return self(s), d / np.hypot(*d)
+
+    def turning(self, s: Array) -> Array:
+        """Derivative of the unit normal by the arc length at parameters ``s``, shape (2, n)."""
+        at, *rule = _stencil(s, *self.ends)
+        return _turning(*_each(self._moving, s, at), *rule)
+
+    def lengths(self, a: Array, b: Array) -> Array:
+        """Arc lengths from parameters ``a`` to ``b``, both of shape (n,).
+
+        Parameters
+        ----------
+        a, b
+            Parameters where the pieces begin and end, shapes (n,).
+        """
+        at, w = _gauss_points(a, b - a)
+        d, = _each(self.rate, at)
+        return np.hypot(*d) @ w * (b - a)
+
+    def elements(self, s: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """What a mesh asks of a curve, which is asked at all points at once.
+
+        Parameters
+        ----------
+        s
+            Parameters of the nodes, increasing, shape (n,).
+
+        Returns
+        -------
+        p, tangent, lengths, turning, bent
+            As :meth:`nodes`, :meth:`lengths` and :meth:`turning` return them, and the curvature of
+            each sixteenth of the elements, shape (16 n - 16,).
+
+        Raises
+        ------
+        MeshError
+            If the curve stands still, its derivative is not that of r between two nodes, or its
+            direction jumps at a node inside.
+        """
+        a, step = s[:-1], np.diff(s)
+        beside = s[1:-1] + ASIDE[:, None] * np.minimum(step[:-1], step[1:])
+        gauss, w = _gauss_points(a, step)
+        fine = np.append(a[:, None] + step[:, None] * FINE, s[-1])
+        near, *rule = _stencil(s, *self.ends)
+        p, p_beside = _each(self, s, beside)
+        here, d_near, d_gauss, d_fine = _each(self._moving, s, near, gauss, fine)
+        lengths = np.hypot(*d_gauss) @ w * step
+        gap = np.hypot(*(d_gauss @ w * step - np.diff(p))) / lengths
+        k = int(np.argmax(gap))
+        if not gap[k] <= 0.02:
+            raise MeshError(
+                f"r jumps, or its derivative does not fit, between s = {s[k]:.9g} and "
+                f"{s[k + 1]:.9g}: the derivative adds up to a point {gap[k] * lengths[k]:.6g} from "
+                "r")
+        if len(s) > 2:
+            _require_no_kink(s[1:-1], p[:, 1:-1], p_beside)
+        v = np.hypot(*d_fine)
+        pieces = (v[:-2:2] + 4.0 * v[1::2] + v[2::2]) * np.repeat(step / 96.0, 16)  # Simpson's rule
+        bent = np.abs(_angles(d_fine[:, :-2:2], d_fine[:, 2::2])) / pieces
+        return p.copy(), here / np.hypot(*here), lengths, _turning(here, d_near, *rule), bent
+
+    def moved(self, A: Array, shift: Array) -> Curve:
+        """The curve ``A r(s) + shift``.
+
+        Parameters
+        ----------
+        A, shift
+            Shapes (2, 2) and (2,).
+        """
+        return Curve(_Moved(self, A, shift), _Moved(self.rate, A, np.zeros(2)), self.ends)
+
+    def functions(self) -> list[tuple[str, Callable[[Array], Any]]]:
+        """Pairs of a description and a function, for those that the curve was given."""
+        r, rate = self.r, self.derivative
+        while isinstance(r, _Moved):
+            r, rate = r.function.r, r.function.derivative
+        items = [("the curve r(s) of the mesh", r)]
+        if not isinstance(rate, (_ComplexStep, _Differences)):
+            items.append(("the derivative dr of the curve of the mesh", rate))
+        return items
+
+
+class _Moved:
+    """``A f(s) + shift`` for a function f of parameters."""
+
+    def __init__(self, function, A, shift):
+        self.function, self.A, self.shift = function, A, shift
+
+    def __call__(self, s):
+        return self.A @ self.function(s) + self.shift[:, None]
+
+
+class _ComplexStep:
+    """The derivative of a function of parameters that takes complex ones."""
+
+    def __init__(self, r):
+        self.r = r
+
+    def __call__(self, s):
+        return np.imag(np.asarray(_components(self.r(s + 1e-30j), s))) / 1e-30
+
+
+class _Differences:
+    """The derivative of a function of parameters on [s0, s1] by differences."""
+
+    def __init__(self, r, s0, s1):
+        self.r, self.ends = r, (s0, s1)
+
+    def __call__(self, s):
+        return _differences(lambda s: _on_curve("r(s)", self.r, s), s, *self.ends)
+
+
+def derivative_of(r: Callable[[Array], Any], s0: float, s1: float) -> Callable[[Array], Array]:
+    """The derivative of ``r`` on [s0, s1]: complex step if exact, else sixth-order differences.
+
+    Parameters
+    ----------
+    r
+        Function of parameters (n,) that returns (2, n).
+    s0, s1
+        The ends of the parameters.
+    """
+    differences, complex_step = _Differences(r, s0, s1), _ComplexStep(r)
+    try:
+        probe = s0 + (s1 - s0) * TRIED
+        with warnings_as_errors():  # among them: the imaginary part is discarded
+            exact, near = complex_step(probe), differences(probe)
+        size = np.abs(near)
+        if exact.shape == near.shape and (
+                np.abs(exact - near) <= 1e-6 * (size + size.max())).all():
+            return complex_step
+    except Exception:  # r is the user's: whatever it raises, it has no complex step
+        logger.debug("the curve has no complex step; differences are used", exc_info=True)
+    return differences
+
+
+def _each(function, *parameters):
+    """What a function of parameters (n,) returns at those of arrays (...), asked once: (2, ...)."""
+    found = np.asarray(function(np.concatenate([s.ravel() for s in parameters])))
+    ends = [0, *itertools.accumulate(s.size for s in parameters)]
+    return [found[:, i:j].reshape(2, *s.shape)
+            for i, j, s in zip(ends, ends[1:], parameters)]
+
+
+def _angles(a, b):
+    """The angles from vectors to others, both (2, ...)."""
+    return np.arctan2(a[0] * b[1] - a[1] * b[0], np.sum(a * b, axis=0))
+
+
+def _differences(r, s, s0, s1):
+    """Derivative of a function on [s0, s1] by seven-point differences, of sixth order."""
+    at, weights, d = _stencil(s, s0, s1)
+    values, = _each(r, at)
+    return np.einsum("is,jis->js", weights, values) / d
+
+
+def _turning(d, near, weights, step):
+    """The turning of a curve by its derivative at parameters (n,), and about them (7, n)."""
+    x, y = np.einsum("is,jis->js", weights, near / np.hypot(*near)) / step
+    return np.array([-y, x]) / np.hypot(*d)
+
+
+def _stencil(s, s0, s1):
+    """For differences on [s0, s1] places and weights of values, both (7, n), and their distance."""
+    d = 1e-3 * (s1 - s0)
+    c = np.clip(s, s0 + 3 * d, s1 - 3 * d)  # the stencil stays inside
+    x = (s - c) / d
+    weights = np.zeros((len(STENCIL), len(x)))
+    for coefficients in _lagrange_derivatives().T:
+        weights = weights * x + coefficients[:, None]
+    return c + STENCIL[:, None] * d, weights, d
+
+
+def _gauss_points(a, step):
+    """Parameters (n, 12) of pieces that begin at a, and weights."""
+    x, w = gauss(12)
+    return a[:, None] + step[:, None] * x, w
+
+
+def _require_no_kink(s, p, beside):
+    """Raise MeshError if the direction of a curve jumps at a node inside.
+
+    The angle between chords to both sides of a node falls with their length where the curve is
+    smooth; at a kink it stays. Given are its points there (2, n), and beside them (2, 4, n).
+    """
+    chords = (beside - p[:, None]) * np.sign(ASIDE)[:, None]
+    wide, narrow = _angles(chords[:, 0], chords[:, 1]), _angles(chords[:, 2], chords[:, 3])
+    # far from the origin chords that short have the direction of round-off
+    chord = np.hypot(*chords[:, 2:]).min(axis=0)
+    seen = chord * KINK > 32.0 * np.finfo(float).eps * np.abs(p).max()
+    kink = np.where(seen & (np.abs(narrow) > 0.7 * np.abs(wide)), np.abs(narrow), 0.0)
+    k = int(np.argmax(kink))
+    if kink[k] > KINK:
+        raise MeshError(
+            f"the curve has a kink of {np.rad2deg(narrow[k]):.3g} degrees at s = {s[k]:.9g}: give "
+            "one beam for each smooth part, and weld them in a scene with "
+            'scene.joint("weld", ...)')
+
+
+@cache
+def _lagrange_derivatives():
+    """Of each Lagrange polynomial of the stencil the coefficients of its derivative, (7, 6)."""
+    out = []
+    for i, here in enumerate(STENCIL):
+        others = np.delete(STENCIL, i)
+        out.append(np.polyder(np.poly(others) / np.prod(here - others)))
+    return np.array(out)
+
+
+def check_curvature(bent: Array, s: Array, height: float | Array) -> None:
+    """Raise MeshError where the radius of curvature of the curve is below h/2.
+
+    Parameters
+    ----------
+    bent
+        The curvature of sixteenths of the elements, shape (16 n - 16,).
+    s
+        Parameters of the nodes, shape (n,).
+    height
+        Height of the section, or the largest between two nodes, shape (n - 1,).
+    """
+    height = np.broadcast_to(height, len(s) - 1).repeat(16)
+    k = int(np.argmax(bent * height))
+    if bent[k] * height[k] / 2 >= 1.0:
+        e, part = divmod(k, 16)
+        at = s[e] + (s[e + 1] - s[e]) * part / 16.0
+        raise MeshError(
+            f"the curve folds near s = {at:.6g}: its radius of curvature {1 / bent[k]:.6g} is "
+            f"below half the height {height[k] / 2:.6g}; use a smaller height or a gentler curve")

@@ -1,0 +1,586 @@
+"""Lines between points of the plane: what a frame is made of."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+import scipy
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from ..core.errors import (FileError, InputError, MeshError, ModelWarning, NameUnknown, ask,
+                           ask_field, require_finite, require_integer, require_label, require_names,
+                           require_not_negative, require_path, shown)
+from .members import Axes, MeshLines, heights_of_chains
+from .mesh_beam import MeshBeam
+from .places import is_point, points_of_rows
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from .curve import Curve
+    from ..core.types import Array
+
+#: How far from a node a point may be that names it, relative to the size of the net.
+NEAR = 1e-9
+#: How far apart points may be that are one node, if nothing else is given: relative to the size of
+#: the net, and to the longest line. Pairs apart by up to :data:`CLOSE` times that are warned of.
+MERGED, OF_LONGEST, CLOSE = 1e-5, 1e-3, 10.0
+PLACES = ("the name of nodes, the number of a node, a point as a tuple (x, y), a function of the "
+          "points x that returns truth values, or a list of these")
+
+
+class Net:
+    """Points, lines between them, and names for both.
+
+    Parameters
+    ----------
+    points
+        Pairs (x, y): a list, or an array of shape (n, 2).
+    lines
+        Pairs of numbers of the points that each line joins: a list, or an array of shape (m, 2).
+    groups
+        Numbers of lines by name.
+    nodes
+        Numbers of points by name.
+    curves
+        By the number of a line a function of parameters s (k,), from 0 to 1, that returns points
+        (2, k) of its axis.
+    tol
+        How far apart points may be that are one node; by default 1e-5 of the size of the net, and
+        1e-3 of its longest line at most.
+    beams
+        Names of the groups that are beams, which share no line; all of them by default.
+    lost
+        By name points that a mesh has in it and the net has not.
+
+    Attributes
+    ----------
+    points, lines
+        Shapes (2, n) and (2, m). Points that are one node have the same place, and lines join the
+        first of them.
+    given
+        Lines as they were given, shape (2, m).
+    kept
+        Numbers of the lines that have a length, shape (k,): they join different nodes.
+    same
+        The node that each point is, the first of the points there, shape (n,).
+    groups, nodes : dict
+        Numbers of lines and of points by name.
+    beams
+        Names of the groups that are beams.
+    curves : dict
+        Functions by number of line.
+    """
+
+    def __init__(self, points: Any, lines: Any, groups: Mapping[str, Any] | None = None,
+                 nodes: Mapping[str, Any] | None = None,
+                 curves: Mapping[int, Callable[[Array], Any]] | None = None,
+                 tol: float | None = None, beams: Sequence[str] | None = None,
+                 lost: Mapping[str, int] | None = None) -> None:
+        self.points = _pairs("points", points).astype(float)
+        self.lines = _numbers("lines", lines)
+        n, m = self.points.shape[1], self.lines.shape[1]
+        self.groups = _named("group", "lines", groups, m)
+        self.nodes = _named("name", "nodes", nodes, n)
+        self.curves = {require_integer("the number of a line in curves", k, 0, m - 1): curve
+                       for k, curve in mapping_of("curves", curves).items()}
+        self.given, self.lost = self.lines, dict(lost or {})
+        self._require_points()
+        self._merge(tol)
+        self._require_lines()
+        self.beams = tuple(self.groups) if beams is None else tuple(beams)
+        taken = np.zeros(m, dtype=int)
+        for name in self.beams:
+            some = self.groups[name]
+            if np.any(taken[some]):
+                k = some[np.argmax(taken[some])]
+                first = next(other for other in self.beams if k in self.groups[other])
+                raise InputError(f"line {k} is in the groups {first!r} and {name!r}: a group is a "
+                                 "beam of its own, so a line is in one at most; of the sets of a "
+                                 "mesh groups= names those that are beams")
+            taken[some] = 1
+            if not np.any(np.isin(some, self.kept)):
+                raise MeshError(f"all lines of the group {name!r} are shorter than tol = "
+                                f"{self.tol:.3g}, within which points are one node")
+
+    def _require_points(self):
+        """Lines join points that there are, and different ones."""
+        n, (a, b) = self.points.shape[1], self.lines
+        bad = np.flatnonzero((np.minimum(a, b) < 0) | (np.maximum(a, b) >= n))
+        if len(bad):
+            k = int(bad[0])
+            raise MeshError(f"line {k} joins the points {self.lines[:, k].tolist()}, which are "
+                            f"numbered 0 to {n - 1}")
+        for k in np.flatnonzero(a == b):
+            raise MeshError(f"line {k} has no length: it joins the point {a[k]} to itself")
+        alone = np.setdiff1d(np.arange(n), self.lines)
+        if len(alone):
+            raise MeshError(f"the point {alone[0]} at {_at(self.points[:, alone[0]])} is in no "
+                            "line: remove it, or join it to another point")
+
+    def _require_lines(self):
+        """No line is there twice."""
+        key = np.sort(self.lines[:, self.kept], axis=0)
+        _, first, which = np.unique(key, axis=1, return_index=True, return_inverse=True)
+        first = first[np.ravel(which)]
+        for i, j in zip(self.kept[first], self.kept):
+            if i != j and not {int(i), int(j)} & set(self.curves):
+                raise MeshError(f"lines {i} and {j} are the same: both join the points "
+                                f"{np.sort(self.lines[:, j]).tolist()}; remove one, or give one of "
+                                "them a curve")
+
+    def _merge(self, tol):
+        """Points that are not farther apart than a tolerance are one node."""
+        n, places = self.points.shape[1], self.points
+        length = np.hypot(*(places[:, self.lines[1]] - places[:, self.lines[0]]))
+        self.tol = require_not_negative("tol", tol, False) if tol is not None else float(min(
+            MERGED * self.size, OF_LONGEST * np.max(length)))
+        close = max(2.0 * self.tol, min(CLOSE * self.tol, OF_LONGEST * np.max(length)))
+        pairs, apart = self._near_pairs(max(close, NEAR * self.size))
+        one = (apart <= self.tol * (1.0 + 1e-9)) & (self.tol > 0.0)
+        for (i, j), d in zip(pairs[~one], apart[~one]):
+            if d <= NEAR * self.size:
+                raise MeshError(f"the points {i} and {j} are both at {_at(places[:, i])}: lines "
+                                "that end there would not be joined; let them end at one point, "
+                                "with hinges where they may turn, or give tol= to make them one")
+        joined = sparse.coo_array((np.ones(int(one.sum())), pairs[one].T), (n, n))
+        _, label = connected_components(joined, directed=False)
+        _, first = np.unique(label, return_index=True)
+        self.same = first[label]
+        self.points, self.lines = places[:, self.same], self.same[self.given]
+        self.kept = np.flatnonzero(self.lines[0] != self.lines[1])
+        self._curves_to_nodes(places)
+        if not len(self.kept):
+            raise MeshError(f"all lines are shorter than tol = {self.tol:.3g}, within which points "
+                            "are one node")
+        if tol is None:
+            _warn_of(pairs[one], apart[one], f"are one node, as they are not farther apart than "
+                     f"tol = {self.tol:.3g}: give tol= for another distance, tol=0 to keep them "
+                     "apart")
+        _warn_of(pairs[~one], apart[~one], "are different nodes, as they are farther apart than "
+                 f"tol = {self.tol:.3g}: give a larger tol= if they should be one")
+
+    def _near_pairs(self, distance):
+        """Pairs of points (k, 2) that are near each other, and how far they are apart, (k,)."""
+        tree = scipy.spatial.cKDTree(self.points.T)
+        pairs = tree.query_pairs(distance, output_type="ndarray").reshape(-1, 2)
+        pairs = pairs[np.lexsort(pairs.T[::-1])]
+        return pairs, np.hypot(*(self.points[:, pairs[:, 0]] - self.points[:, pairs[:, 1]]))
+
+    def _curves_to_nodes(self, places):
+        """Curves end at the nodes that their ends became."""
+        for k, curve in self.curves.items():
+            if k not in self.kept:
+                raise MeshError(f"the ends of line {k}, which has a curve, are not farther apart "
+                                f"than tol = {self.tol:.3g}, within which points are one node: "
+                                "give a smaller tol=")
+            shift = (self.points - places)[:, self.given[:, k]]
+            if np.any(shift):
+                self.curves[k] = _Moved(curve, shift)
+
+    @property
+    def size(self) -> float:
+        """Largest extent of the points."""
+        return float(np.max(np.ptp(self.points, axis=1)))
+
+    def nodes_at(self, place: Any) -> Array:
+        """Numbers of the nodes at a place, shape (k,), k >= 1.
+
+        Parameters
+        ----------
+        place
+            The name of nodes, or of lines for their ends, the number of a node, a point as a tuple
+            (x, y), a function of the points x (2, n) that returns n truth values, an array of
+            numbers, an array of points (k, 2), or a list of these.
+
+        Raises
+        ------
+        NameUnknown
+            If a name is not known.
+        MeshError
+            If there is no node at the place.
+        InputError
+            If it is no place.
+        """
+        return np.unique(self.same[self.points_at(place)])
+
+    def points_at(self, place: Any) -> Array:
+        """As :meth:`nodes_at`, of each node all points that are given there, or one.
+
+        Parameters
+        ----------
+        place
+            As there.
+        """
+        n, place = self.points.shape[1], points_of_rows(place)
+        if isinstance(place, str):
+            if place in self.lost:
+                raise MeshError(f"{place!r} holds the point {self.lost[place]} of the mesh, which "
+                                "is no end of a line: a frame is held and loaded at ends of lines")
+            if place in self.nodes:
+                return self.nodes[place]
+            if place in self.groups:
+                return np.unique(self.given[:, self.groups[place]])
+            raise NameUnknown("name of nodes", place, {**self.nodes, **self.groups})
+        if is_point(place) and not isinstance(place, list):
+            return self._node_near(place)
+        if isinstance(place, (int, np.integer)) and not isinstance(place, bool):
+            return np.array([require_integer("the number of a node", place, 0, n - 1)])
+        if callable(place):
+            chosen = np.asarray(ask("the function that names nodes, of x,", place, self.points))
+            if chosen.shape != (n,) or chosen.dtype != bool:
+                raise InputError("a function that names nodes takes points x of shape (2, n) and "
+                                 f"returns n truth values, as lambda x: x[1] == 0; for n = {n} it "
+                                 f"returned {chosen.dtype} of shape {chosen.shape}")
+            if not np.any(chosen):
+                raise MeshError(f"the function {place!r} selects none of the {n} nodes")
+            return np.flatnonzero(chosen)
+        if isinstance(place, (list, tuple, set, frozenset)) and len(place) or (
+                isinstance(place, np.ndarray) and place.ndim == 1 and len(place)):
+            return np.unique(np.concatenate([self.points_at(one) for one in place]))
+        raise InputError(f"a place of a frame is {PLACES}, got {shown(place)}")
+
+    def _node_near(self, place):
+        x = require_finite("the point", place, (2,))
+        off = np.hypot(*(self.points - x[:, None]))
+        k = int(np.argmin(off))
+        if off[k] > 1e3 * NEAR * self.size:
+            raise MeshError(f"no node of the frame is at {_at(x)}: the nearest is number {k} at "
+                            f"{_at(self.points[:, k])}")
+        return np.array([k])
+
+    def lines_of(self, given: Any) -> Array:
+        """Numbers of lines, shape (k,), from the name of a group, a number, or a list of these.
+
+        Parameters
+        ----------
+        given
+            As above.
+        """
+        if isinstance(given, str):
+            if given not in self.groups:
+                raise NameUnknown("group of lines", given, self.groups)
+            return self.groups[given]
+        if isinstance(given, (list, tuple, np.ndarray)):
+            return np.unique(np.concatenate([self.lines_of(one) for one in given]))
+        return np.array([require_integer("the number of a line", given, 0,
+                                         self.lines.shape[1] - 1)])
+
+    def mesh(self, lines: Array, elements: Array, height: Any) -> MeshBeam:
+        """A mesh with a chain of elements for each of some lines, in their order.
+
+        Parameters
+        ----------
+        lines
+            Their numbers, shape (k,).
+        elements
+            How many each of all lines is divided into, shape (m,).
+        height
+            Of the section: a number, a function of parameters s (n,) from 0 to 1 along each line
+            that returns heights (n,), or a list with one of these for each of the lines.
+        """
+        n = elements[lines]
+        first = np.concatenate([[0], np.cumsum(n + 1)])
+        line = np.repeat(np.arange(len(lines)), n + 1)
+        s = (np.arange(first[-1]) - first[line]) / n[line]
+        a, b = self.points[:, self.lines[:, lines]].transpose(1, 0, 2)
+        d, size = b - a, np.hypot(*(b - a))
+        p, tangent = a[:, line] + s * d[:, line], (d / size)[:, line]
+        turning = np.zeros(p.shape)
+        left = np.setdiff1d(np.arange(first[-1]), first[1:] - 1)
+        lengths = (size / n)[line[left]]
+        arcs: dict[int, Curve] = {}
+        for k in map(int, np.flatnonzero(np.isin(lines, list(self.curves)))):
+            nodes = np.arange(first[k], first[k + 1])
+            arc = self._arc(int(lines[k]), int(n[k]),
+                            height[k] if isinstance(height, list) else height)
+            p[:, nodes], tangent[:, nodes], turning[:, nodes] = arc.p, arc.p_X, arc.p_XY
+            lengths[np.searchsorted(left, nodes[:-1])] = arc.lengths
+            arcs[k] = cast("Curve", arc.curve)
+        s, t = 2 * line + s, np.array([left, left + 1])
+        largest, heights, taper = heights_of_chains(height, s, t, lines)
+        mesh = MeshLines(np.ascontiguousarray(p), t, height=largest, heights=heights, taper=taper,
+                         p_X=tangent, p_Y=np.array([0.0 - tangent[1], tangent[0]]),
+                         lengths=lengths, p_XY=turning, s=s,
+                         curve=cast("Curve", Axes(arcs, a, d)) if arcs else None)
+        mesh._boundaries = mesh._build_default_tags()
+        return mesh
+
+    def _arc(self, k, n, height):
+        curve, ends = self.curves[k], self.points[:, self.lines[:, k]]
+        found = ask_field(f"the curve of line {k} of s", lambda x: curve(x[0]),
+                          np.array([[0.0, 1.0]] * 2))
+        if np.max(np.abs(found - ends)) > 1e3 * NEAR * self.size:
+            raise MeshError(f"the curve of line {k} runs from {_at(found[:, 0])} to "
+                            f"{_at(found[:, 1])}, its points are at {_at(ends[:, 0])} and "
+                            f"{_at(ends[:, 1])}: a curve is a function of s from 0 to 1")
+        return MeshBeam.init_curve(curve, np.linspace(0.0, 1.0, n + 1), height)
+
+
+def mapping_of(name: str, given: Any) -> Mapping[Any, Any]:
+    """A dict that was given, or an empty one for None.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    given
+        What was given.
+    """
+    if given is not None and not isinstance(given, Mapping):
+        raise InputError(f"{name} must be a dict, got {shown(given)}")
+    return given or {}
+
+
+def _pairs(what, values):
+    """Pairs, each a row, as an array (2, n)."""
+    found = require_finite(what, list(values) if _is_iterable(values) else values)
+    if found.ndim != 2 or found.shape[1] != 2 or not len(found):
+        hint = "; give its transpose" if found.ndim == 2 and len(found) == 2 else ""
+        raise InputError(f"{what} are pairs, one at least: a list of pairs or an array of shape "
+                         f"(n, 2), got {shown(values)} of shape {found.shape}{hint}")
+    return found.T
+
+
+def _is_iterable(values):
+    return hasattr(values, "__iter__") and not isinstance(values, (np.ndarray, str, Mapping))
+
+
+def _numbers(what, values):
+    out = _pairs(what, values)
+    if np.any(out != np.floor(out)):
+        raise InputError(f"{what} are numbers of points, got {shown(values)}")
+    return out.astype(np.int64)
+
+
+def _named(kind, what, given, n):
+    """Numbers by name."""
+    out = {}
+    for name, numbers in mapping_of(f"{kind}s of {what}", given).items():
+        if require_label(f"a {kind} of {what}", name) is None:
+            raise InputError(f"a {kind} of {what} is a text, got None")
+        found = require_finite(f"the numbers of {what} of {name!r}", numbers)
+        if found.ndim != 1 or not len(found) or np.any(found != np.floor(found)):
+            raise InputError(f"{name!r} must hold numbers of {what}, got {shown(numbers)}")
+        found = np.unique(found).astype(np.int64)
+        if found[0] < 0 or found[-1] >= n:
+            raise MeshError(f"{name!r} holds the number {found[0] if found[0] < 0 else found[-1]}: "
+                            f"the {what} are numbered 0 to {n - 1}")
+        out[name] = found
+    return out
+
+
+def _at(x):
+    return f"({x[0]:.9g}, {x[1]:.9g})"
+
+
+def _warn_of(pairs, apart, what):
+    """Warn of pairs (k, 2) of points that are near each other."""
+    if len(pairs):
+        (i, j), d = pairs[0], apart[0]
+        more = "" if len(pairs) == 1 else f", {len(pairs) - 1} other pair(s) likewise"
+        warnings.warn(f"the points {i} and {j}, {d:.3g} apart{more}, {what}", ModelWarning,
+                      stacklevel=6)
+
+
+class _Moved:
+    """A curve whose ends are moved, and what is between them in proportion."""
+
+    def __init__(self, curve: Callable[[Array], Any], shift: Array) -> None:
+        self.curve, self.shift = curve, shift
+
+    def __call__(self, s: Array) -> Any:
+        x, y = self.curve(s)
+        (ax, bx), (ay, by) = self.shift
+        return x + (1.0 - s) * ax + s * bx, y + (1.0 - s) * ay + s * by
+
+
+#: Kinds of cells of meshio that are lines: the ends first, then what is between them in order.
+LINE = re.compile("line([0-9]*)")
+
+
+def net_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
+                    tol: float | None = None) -> Net:
+    """The lines of a mesh of meshio, each cell one, with its names.
+
+    Parameters
+    ----------
+    mesh
+        A ``meshio.Mesh``, or a file that meshio reads: Gmsh's ``.msh``, ``.vtu`` and others. Cells
+        "line" are straight, "line3", "line4", ... are polynomials through their points, "vertex"
+        gives names to nodes.
+    groups
+        Names of the sets of lines that are beams. By default those in ``named``, and those that
+        share no line with another set.
+    named
+        Names that are asked for elsewhere.
+    tol
+        As for :class:`Net`.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read.
+    MeshError
+        If it holds no lines, cells of other kinds, or points off the plane z = 0.
+    NameUnknown
+        If there is no set of a name.
+    """
+    import meshio
+
+    if isinstance(mesh, (str, Path)):
+        path = require_path("mesh", mesh)
+        try:
+            mesh = meshio.read(path)
+        except (Exception, SystemExit) as error:  # meshio ends the process where it knows no format
+            raise FileError(f"{path} cannot be read as a mesh: {error}") from None
+    if not isinstance(mesh, meshio.Mesh):
+        raise InputError(f"mesh must be a meshio.Mesh or the name of a file, got {shown(mesh)}")
+    if groups is not None and not isinstance(groups, (str, list, tuple, set, frozenset)):
+        raise InputError(f"groups are names of sets of lines, got {shown(groups)}")
+    points = require_finite("the points of the mesh", mesh.points)
+    kinds = {block.type for block in mesh.cells}
+    odd = sorted(kind for kind in kinds if kind != "vertex" and not LINE.fullmatch(kind))
+    if odd:
+        raise MeshError(f"the mesh has cells of the kinds {odd}, which are no lines: a frame is "
+                        "made of 'line', 'line3', 'line4', ..., and 'vertex' names nodes; leave "
+                        "the others out of the mesh")
+    blocks = {k: block for k, block in enumerate(mesh.cells) if LINE.fullmatch(block.type)}
+    cells = [_ends_first(points, cell) for block in blocks.values()
+             for cell in np.asarray(block.data, dtype=np.int64)]
+    if not cells:
+        raise MeshError(f"the mesh has no lines: its cells are {sorted(kinds) or 'none'}")
+    # the same cell may be there once for each set that it is in
+    number: dict[tuple[int, ...], int] = {}
+    cell_number = np.array([number.setdefault(min(cell, cell[1::-1] + cell[:1:-1]), len(number))
+                            for cell in map(tuple, map(np.ndarray.tolist, cells))])
+    lines = [cells[k] for k in np.unique(cell_number, return_index=True)[1]]
+    used, ends = np.unique([cell[:2] for cell in lines], return_inverse=True)
+    if points.shape[1] > 2:
+        inside = np.unique(np.concatenate(lines))
+        off = np.abs(points[inside, 2])
+        if np.max(off) > 1e-6 * np.max(np.ptp(points[inside, :2], axis=0)):
+            k = int(inside[np.argmax(off)])
+            raise MeshError(f"the point {k} of the mesh is at z = {points[k, 2]:.9g}: a frame lies "
+                            "in the plane z = 0")
+    curves = {k: _Polynomial(points[cell, :2].T) for k, cell in enumerate(lines) if len(cell) > 2}
+    first = dict(zip(blocks, np.cumsum([0] + [len(b.data) for b in blocks.values()])))
+    wanted = [*named, *([] if groups is None else [groups] if isinstance(groups, str) else groups)]
+    sets, nodes, lost = _names(mesh, {k: cell_number[first[k]:first[k] + len(block.data)]
+                                      for k, block in blocks.items()}, used, wanted)
+    if groups is not None:
+        chosen = require_names("set of lines in groups", groups, sets)
+        beams = tuple(name for name in sets if name in chosen)
+    else:
+        taken = np.bincount(np.concatenate([*map(np.unique, sets.values()), []]).astype(int),
+                            minlength=len(lines))
+        beams = tuple(name for name, some in sets.items()
+                      if name in named or np.all(taken[some] == 1))
+    return Net(points[used, :2], ends.reshape(-1, 2), sets, nodes, curves, tol, beams, lost)
+
+
+def _ends_first(points, cell):
+    """The points of a line: both ends, then what is between them.
+
+    So meshio has them of all formats but Abaqus, whose quadratic lines are end, middle, end: of
+    three points those farthest apart are the ends.
+    """
+    if len(cell) != 3:
+        return cell
+    a, b, c = points[cell]
+    if np.linalg.norm(c - a) > max(np.linalg.norm(b - a), np.linalg.norm(c - b)):
+        return cell[[0, 2, 1]]
+    if np.linalg.norm(c - b) > np.linalg.norm(b - a):
+        raise MeshError(f"the line through the points {cell.tolist()} of the mesh does not have "
+                        "its middle between its ends: the order is end, end, middle, or in files "
+                        "of Abaqus end, middle, end")
+    return cell
+
+
+def _names(mesh, blocks, used, wanted):
+    """Lines and nodes by name, from cell sets, point sets, and physical groups of Gmsh.
+
+    And by name a point that is no end of a line.
+    """
+    sets = {name: parts for name, parts in mesh.cell_sets.items()
+            if not name.startswith("gmsh:")} or _numbered(mesh, wanted)
+    groups, found = {}, dict[str, list[Any]]()
+    for name, parts in sets.items():
+        if len(parts) > len(mesh.cells):
+            raise MeshError(f"the cell set {name!r} has {len(parts)} parts, the mesh "
+                            f"{len(mesh.cells)} blocks of cells: it is a set of sets; name the "
+                            "cells themselves")
+        parts = {k: _entries(name, part, len(mesh.cells[k].data)) for k, part in enumerate(parts)
+                 if part is not None}
+        some = [blocks[k][part] for k, part in parts.items() if k in blocks and len(part)]
+        if some:
+            groups[name] = np.concatenate(some)
+        for k, part in parts.items():
+            if k not in blocks and len(part):
+                found.setdefault(name, []).append(np.ravel(mesh.cells[k].data)[part])
+    for name, part in mesh.point_sets.items():
+        part = _entries(name, part, len(mesh.points))
+        if len(part):
+            found[name] = [part]
+    nodes, lost = {}, {}
+    for name, parts in found.items():
+        at = np.concatenate(parts).astype(np.int64)
+        on = np.isin(at, used)
+        if np.any(on):
+            nodes[name] = np.searchsorted(used, at[on])
+        if not np.all(on):
+            lost[name] = int(at[~on][0])
+    return groups, nodes, lost
+
+
+def _entries(name, part, n):
+    """Numbers of a set of a mesh, (k,)."""
+    try:
+        out = np.ravel(np.asarray(part))
+    except ValueError:  # of sets
+        out = np.zeros(1, dtype=object)
+    if len(out) and (out.dtype.kind not in "iu" or out.min() < 0 or out.max() >= n):
+        raise MeshError(f"the set {name!r} of the mesh must hold numbers from 0 to {n - 1}, got "
+                        f"{shown(part)}")
+    return out.astype(np.int64)
+
+
+def _numbered(mesh, wanted):
+    """Cell sets that a file has as numbers: physical groups, or what meshio writes of names.
+
+    Into formats without names it writes data called "a-b", which are 0 in the set a, 1 in b. Other
+    programs have such names, too: they are sets where one of them is wanted.
+    """
+    sets = {}
+    names = {int(number): name for name, (number, _) in mesh.field_data.items()}
+    for key, parts in mesh.cell_data.items():
+        found = np.unique(np.concatenate([np.ravel(part) for part in parts]))
+        if key == "gmsh:physical":
+            known = {int(k): names.get(int(k), str(int(k))) for k in found if k}
+        elif set(wanted) & set(key.split("-")) and found.dtype.kind in "iu" and (
+                -1 <= found[0] and found[-1] < len(key.split("-"))):
+            known = dict(enumerate(key.split("-")))
+        else:
+            continue
+        for number, name in known.items():
+            sets[name] = [np.flatnonzero(np.ravel(part) == number) for part in parts]
+    return sets
+
+
+class _Polynomial:
+    """The polynomial through two ends, at s = 0 and 1, and points evenly between them."""
+
+    def __init__(self, points: Array) -> None:
+        self.points = points[:, [0, *range(2, points.shape[1]), 1]]
+
+    def __call__(self, s: Array) -> Array:
+        n = self.points.shape[1]
+        t, k = (n - 1) * np.asarray(s)[..., None], np.arange(n)
+        weights = [np.prod((t - k[k != i]) / (i - k[k != i]), axis=-1) for i in k]
+        return np.tensordot(self.points, weights, 1)

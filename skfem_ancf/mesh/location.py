@@ -1,0 +1,235 @@
+"""The elements that hold points of the stress-free body, many points at once."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy
+
+from ..core.errors import MeshError
+from ..core.kept import cached_property
+
+if TYPE_CHECKING:
+    from .chain import Chain
+    from ..core.types import Array
+
+#: Samples of each element in the tree of the finder, and candidates for a point that is in none of
+#: the elements next to its nearest sample.
+SAMPLES, CANDIDATES = 4, 6
+
+#: Squares of the plane of which a finder remembers what is near, at most.
+MOST = 2**20
+
+
+class Finder:
+    """Finds the elements of one mesh that hold points, many at once.
+
+    Parameters
+    ----------
+    mesh
+        A :class:`~skfem_ancf.MeshBeam`.
+    """
+
+    def __init__(self, mesh: Chain) -> None:
+        self.mesh = mesh
+        self.size = float(np.abs(mesh.p).max())
+        # points of an exact curve may lie a little outside its cubic elements
+        self.allowed = 1e-6 if mesh.is_straight else 1e-3
+        #: Where points begin, for squares of the plane, once there were more of them than squares.
+        self._of_squares: Array | None = None
+        self._line = self._straight_line()
+
+    @property
+    def mapping(self) -> Any:
+        """That of the mesh, which keeps it."""
+        return self.mesh.mapping()
+
+    @cached_property
+    def _cell(self):
+        return 0.5 * float(np.min(self.mesh.lengths))
+
+    @cached_property
+    def _before(self):
+        left, right = self.mesh.t
+        return np.where(np.append(False, right[:-1] == left[1:]),
+                        np.arange(self.mesh.nelements) - 1, -1)
+
+    @cached_property
+    def _after(self):
+        return np.append(np.where(self._before[1:] >= 0, np.arange(1, self.mesh.nelements), -1),
+                         -1)
+
+    def _straight_line(self):
+        """Start and direction of the one line of all elements, and their ends on it, or None."""
+        mesh = self.mesh
+        if not mesh.is_straight:
+            return None
+        if mesh.on_line:
+            return mesh.p[:, 0], mesh.p_X[:, 0], (mesh.s - mesh.s[0])[mesh.t]
+        start, d = mesh.p[:, mesh.t[0, 0]], mesh.p_X[:, mesh.t[0, 0]]
+        x, y = mesh.p - start[:, None]
+        along, off = d[0] * x + d[1] * y, d[0] * y - d[1] * x
+        noise = 16 * np.finfo(float).eps * (self.size + float(mesh.lengths.sum()))
+        ends = along[mesh.t]
+        order = ends.T.ravel()
+        if np.abs(off).max() > noise or (order[1:] - order[:-1] < -noise).any():
+            return None
+        return start, d, ends
+
+    def __call__(self, x: Array) -> tuple[Array, Array, Array]:
+        """Elements (n,), reference points (2, n), and how far outside of them points (2, n) are.
+
+        The last is zero for points of the body, and relative to the element; infinite for points
+        that are far away.
+        """
+        noise = 1e-9 + 8 * np.finfo(float).eps * (
+            self.size + np.max(np.abs(x), initial=0.0)) / self.mesh.height
+        with np.errstate(all="ignore"):
+            return self._find(x, noise)
+
+    def _find(self, x, noise):
+        e, X, outside = (self._near if self._line is None else self._on_line)(x, noise)
+        left = np.nonzero((outside > 0) & np.isfinite(outside))[0]
+        if len(left):
+            e[left], X[:, left], outside[left] = self._best(
+                x[:, left], self._candidates(x[:, left]), noise)
+            for i in left[outside[left] > self.allowed]:  # rare: neighbouring coils are nearer
+                all_of_them = np.arange(self.mesh.nelements)[None]
+                e[i], X[:, i], outside[i] = (part[..., 0] for part in self._best(
+                    x[:, i:i + 1], all_of_them, noise))
+        return e, np.clip(X, 0.0, 1.0), outside
+
+    @staticmethod
+    def _outside(X, noise):
+        out = np.maximum(*np.abs(X - 0.5)) - 0.5
+        out[out < noise] = 0.0
+        out[np.isnan(out)] = np.finfo(float).max
+        return out
+
+    def _on_line(self, x, noise):
+        (start, d, ends), mesh = self._line, self.mesh
+        x = x - start[:, None]
+        along = d @ x
+        e = np.searchsorted(ends[1] + noise * mesh.lengths, along)
+        e = np.minimum(e, mesh.nelements - 1)
+        before = np.maximum(e - 1, 0)  # in a gap: the nearer element
+        e = np.where(along - ends[1, before] < ends[0, e] - along, before, e)
+        xi = (along - ends[0, e]) / mesh.lengths[e]
+        height = self.mapping.height(np.clip(xi, 0.0, 1.0)[:, None], e)[0]
+        X = np.array([xi, (d[0] * x[1] - d[1] * x[0]) / np.ravel(height) + 0.5])
+        outside = self._outside(X, noise)
+        outside[outside > 1.0] = np.inf
+        return e, X, outside
+
+    def _nearest(self, x):
+        """Samples (n,) near points, and whether these are far from all.
+
+        Of many points the sample nearest to the middle of their square of the plane.
+        """
+        low, shape = self._squares
+        if self._of_squares is None and np.prod(shape) > min(x.shape[1], MOST):
+            distance, near = self._tree.query(x.T)
+            return near, distance > self._far
+        if self._of_squares is None:
+            middles = low[:, None, None] + self._cell * (0.5 + np.indices(shape.astype(int)))
+            distance, near = self._tree.query(middles.reshape(2, -1).T)
+            self._of_squares = np.where(distance > self._far + self._cell, -1, near).reshape(
+                middles.shape[1:])
+        place = (x - low[:, None]) / self._cell
+        inside = np.all((place >= 0.0) & (place < shape[:, None]), axis=0)
+        i, j = np.where(inside, place, 0.0).astype(int)
+        near = self._of_squares[i, j]
+        far = ~inside | (near < 0)
+        return np.where(far, 0, near), far
+
+    @cached_property
+    def _squares(self):
+        """The corner of those that hold the body, and how many there are each way."""
+        margin = self._far + self._cell
+        low, high = self._samples.min(axis=1) - margin, self._samples.max(axis=1) + margin
+        return low, np.ceil((high - low) / self._cell)
+
+    @cached_property
+    def _samples(self):
+        samples = np.array([(np.arange(SAMPLES) + 0.5) / SAMPLES, np.full(SAMPLES, 0.5)])
+        return self.mapping.F(samples).reshape(2, -1)
+
+    @cached_property
+    def _far(self):
+        """Points farther from all samples than this are in no element."""
+        return 0.75 * self.mesh.height + float(np.max(self.mesh.lengths))
+
+    @cached_property
+    def box(self) -> tuple[float, float, float, float]:
+        """What holds the body, and more: least and largest x, least and largest y."""
+        (x0, y0), (x1, y1) = (f(self._samples, axis=1).tolist() for f in (np.min, np.max))
+        return x0 - self._far, x1 + self._far, y0 - self._far, y1 + self._far
+
+    @cached_property
+    def _tree(self):
+        return scipy.spatial.cKDTree(self._samples.T)
+
+    def _candidates(self, x):
+        k = min(CANDIDATES, SAMPLES * self.mesh.nelements)
+        near = self._tree.query(x.T, k=k)[1].reshape(x.shape[1], k)
+        return np.sort(near // SAMPLES, axis=1)
+
+    def _near(self, x, noise):
+        """From the nearest sample, and to the neighbour where the point is beyond a node."""
+        near, far = self._nearest(x)
+        e = near // SAMPLES
+        X, outside = np.full(x.shape, 0.5), np.full(x.shape[1], np.inf)
+        todo = np.nonzero(~far)[0]
+        xi = (near % SAMPLES + 0.5) / SAMPLES
+        for _ in range(3):
+            X[:, todo] = self.mapping.invF(x[:, todo, None], e[todo], xi=xi[todo, None])[..., 0]
+            outside[todo] = self._outside(X[:, todo], noise)
+            # a point of the section between two elements is one of the left
+            other = np.where(X[0, todo] <= noise, self._before[e[todo]],
+                             np.where(X[0, todo] > 1.0 + noise, self._after[e[todo]], -1))
+            todo, other = todo[other >= 0], other[other >= 0]
+            if not len(todo):
+                break
+            e[todo], xi[todo] = other, 0.5
+        else:
+            X[:, todo] = self.mapping.invF(x[:, todo, None], tind=e[todo])[..., 0]
+            outside[todo] = self._outside(X[:, todo], noise)
+        return e, X, outside
+
+    def _best(self, x, candidates, noise):
+        """The best of the candidates (n, k) for each point."""
+        n, k = x.shape[1], candidates.shape[1]
+        candidates = np.broadcast_to(candidates, (n, k))
+        X = self.mapping.invF(np.repeat(x, k, axis=1)[:, :, None], tind=candidates.ravel())
+        X = X[..., 0].reshape(2, n, k)
+        outside = self._outside(X.reshape(2, -1), noise).reshape(n, k)
+        rows, which = np.arange(n), np.argmin(outside, axis=1)
+        return candidates[rows, which], X[:, rows, which], outside[rows, which]
+
+    @cached_property
+    def extent(self) -> str:
+        """Where the body is, in words."""
+        X = np.array(np.meshgrid(np.linspace(0, 1, 9), [0.0, 1.0])).reshape(2, -1)
+        x = self.mapping.F(X).reshape(2, -1)
+        low, high = x.min(axis=1), x.max(axis=1)
+        return (f"the body lies within x from {low[0]:.6g} to {high[0]:.6g} and y from "
+                f"{low[1]:.6g} to {high[1]:.6g}")
+
+    def refuse(self, x: Array, outside: Array) -> MeshError:
+        """The MeshError for points that are outside.
+
+        Parameters
+        ----------
+        x
+            All points, shape (2, n).
+        outside
+            How far outside each of them is, as the finder says, shape (n,).
+        """
+        bad, mesh = np.nonzero(outside > self.allowed)[0], self.mesh
+        x, more = x[:, bad[0]], f" ({len(bad)} of {len(outside)} points are)"
+        return MeshError(
+            f"the point ({x[0]:.9g}, {x[1]:.9g}) is outside the body"
+            f"{more if len(outside) > 1 else ''}: points are named by their place in the "
+            f"stress-free beam of height {mesh.height:.6g}, whose axis runs from "
+            f"{mesh.p[:, 0].tolist()} to {mesh.p[:, -1].tolist()}; {self.extent}")

@@ -1,0 +1,182 @@
+"""The mesh of the lines of a frame: chains of elements, each with a parameter from 0 to 1."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from ..core.errors import InputError, MeshError, shown
+from .mesh_beam import MeshBeam
+from .taper import heights_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from .curve import Curve
+    from ..core.types import Array
+
+
+def chain_of(s: Array) -> Array:
+    """Number of the chain of parameters that run from 2 k to 2 k + 1 along chain k.
+
+    Parameters
+    ----------
+    s
+        Parameters, shape (n,).
+    """
+    return np.floor(0.5 * s).astype(int)
+
+
+class MeshLines(MeshBeam):
+    """Chains of elements; ``s`` runs from 2 k to 2 k + 1 along chain k."""
+
+    kind = "lines"
+
+    @property
+    def parameters(self) -> Array:
+        """Parameter of each node on its own chain, from 0 to 1, shape (nvertices,)."""
+        s = cast("Array", self.s)
+        return s - 2.0 * chain_of(s)
+
+    def _heights_of(self, height):
+        return heights_of_chains(height, self.s, self.t)
+
+
+class Heights:
+    """The height of chains, for parameters from 2 k to 2 k + 1 on chain k.
+
+    Parameters
+    ----------
+    given
+        For each chain, or for all of them, a number or a function of parameters (n,) from 0 to 1
+        that returns heights (n,).
+    """
+
+    def __init__(self, given: Sequence[float | Callable[[Array], Any]]) -> None:
+        self.given = tuple(given)
+
+    def __repr__(self) -> str:
+        return ", ".join(map(shown, self.given))
+
+    def __call__(self, s: Array) -> Array:
+        chain, out = chain_of(s), np.empty(len(s))
+        own = s - 2.0 * chain
+        if len(self.given) == 1:
+            return _values(self.given[0], own)
+        for k in np.unique(chain).tolist():
+            here = chain == k
+            out[here] = _values(self.given[k], own[here])
+        return out
+
+
+def _values(height, s):
+    return height(s) if callable(height) else np.full(len(s), float(height))
+
+
+def heights_of_chains(height: Any, s: Array, t: Array, numbers: Any = None
+                      ) -> tuple[float, Array | None, Any]:
+    """Largest height, heights in the elements and their function, as :func:`~.taper.heights_of`.
+
+    Parameters
+    ----------
+    height
+        A positive number, a function of parameters (n,) from 0 to 1 that returns heights (n,), or
+        a list with one of these for each chain.
+    s, t
+        Parameters of the nodes, shape (nvertices,), from 2 k to 2 k + 1 on chain k; and nodes of
+        the elements, (2, nelements).
+    numbers
+        What messages call the chains, shape (nchains,); None for 0, 1, ...
+
+    Raises
+    ------
+    InputError, MeshError
+        As there.
+    """
+    chain = chain_of(s)
+    own = s - 2.0 * chain
+    if not isinstance(height, list):
+        largest, heights, _ = heights_of(height, own, t)
+        return largest, heights, None if heights is None else Heights([height])
+    if not any(map(callable, height)) and len(set(height)) == 1:
+        return heights_of(height[0], own, t)
+    most, heights, of = 0.0, np.empty((4, t.shape[1])), chain[t[0]]
+    for k, one in enumerate(height):
+        try:
+            largest, some, _ = heights_of(one, own, t[:, of == k])
+        except (InputError, MeshError) as error:
+            line = k if numbers is None else numbers[k]
+            raise type(error)(f"line {line}: {error}") from None
+        most, heights[:, of == k] = max(most, largest), largest if some is None else some
+    return most, heights, Heights(height)
+
+
+class Axes:
+    """The axes of the chains of a mesh, that of chain k for parameters from 2 k to 2 k + 1.
+
+    What a mesh asks of a :class:`~skfem_ancf.mesh.curve.Curve`.
+
+    Parameters
+    ----------
+    arcs
+        By the number of a chain its curve, for parameters from 0 to 1; others are straight.
+    start, way
+        Where each begins, and from there to its end, shapes (2, chains).
+    """
+
+    def __init__(self, arcs: Mapping[int, Curve], start: Array, way: Array) -> None:
+        self.arcs, self.start, self.way = dict(arcs), start, way
+
+    def _parts(self, s):
+        """Chain and parameter there of each of some parameters, and which are on which arc."""
+        chain = chain_of(s)
+        return chain, s - 2 * chain, [(arc, chain == k) for k, arc in self.arcs.items()
+                                      if np.any(chain == k)]
+
+    def nodes(self, s: Array) -> tuple[Array, Array]:
+        """Positions and unit tangents at parameters ``s``, both of shape (2, n)."""
+        chain, s, parts = self._parts(s)
+        way = self.way[:, chain]
+        p, tangent = self.start[:, chain] + s * way, way / np.hypot(*way)
+        for arc, here in parts:
+            p[:, here], tangent[:, here] = arc.nodes(s[here])
+        return p, tangent
+
+    def turning(self, s: Array) -> Array:
+        """Derivative of the unit normal by the arc length at parameters ``s``, shape (2, n)."""
+        _, s, parts = self._parts(s)
+        out = np.zeros((2, len(s)))
+        for arc, here in parts:
+            out[:, here] = arc.turning(s[here])
+        return out
+
+    def lengths(self, a: Array, b: Array) -> Array:
+        """Arc lengths from parameters ``a`` to ``b``, both of shape (n,).
+
+        Parameters
+        ----------
+        a, b
+            Parameters of the same chains, shapes (n,).
+        """
+        chain, x, parts = self._parts(a)
+        y = b - 2 * chain
+        out = (y - x) * np.hypot(*self.way[:, chain])
+        for arc, here in parts:
+            out[here] = arc.lengths(x[here], y[here])
+        return out
+
+    def moved(self, A: Array, shift: Array) -> Axes:
+        """The axes ``A r(s) + shift``.
+
+        Parameters
+        ----------
+        A, shift
+            Shapes (2, 2) and (2,).
+        """
+        return Axes({k: arc.moved(A, shift) for k, arc in self.arcs.items()},
+                    A @ self.start + shift[:, None], A @ self.way)
+
+    def functions(self) -> list[tuple[str, Callable[[Array], Any]]]:
+        """Pairs of a description and a function, for those that the curves were given."""
+        return [item for arc in self.arcs.values() for item in arc.functions()]

@@ -1,0 +1,1102 @@
+"""Meshes of planar beams: a chain of nodes on the axis, and the height of the section."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+from numpy import ndarray
+from skfem.element import Element
+from skfem.generic_utils import OrientedBoundary
+from skfem.mesh import Mesh2D, MeshQuad
+
+from ..core import archive
+from .curve import Curve, check_curvature, derivative_of
+from ..core.errors import (CallbackError, FileError, InputError, MeshError, NameUnknown, ask,
+                           require_finite, require_finite_scalar, require_function, require_integer,
+                           require_option, require_options, require_path, require_positive, shown,
+                           teaching)
+from .location import Finder
+from ..core.frozen import Frozen, ReadOnlyDict
+from ..core.kept import twin_of
+from .mapping import MappingBeam
+from ..core.origin import ours
+from ..core.pickling import require_picklable
+from .places import is_point, points_of_rows
+from .reference_cell import SECTIONS, ElementBeamP1
+from .refinement import halved
+from .taper import Scaled, heights_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from ..core.types import Array, StrPath
+
+EPS = float(np.finfo(float).eps)
+
+#: Elements of the largest mesh that :meth:`MeshBeam.refined` makes.
+MAX_ELEMENTS = 2**24
+
+#: Formats of several files, of which one names the others: these are written where they stay.
+IN_PARTS = (".xdmf", ".xmf", ".node", ".ele")
+
+#: Points of a picture or a file along and across an element.
+MAX_SUBDIVISION = 1000
+
+
+@teaching
+@dataclass(repr=False, eq=False)
+class MeshBeam(Frozen, Mesh2D):
+    """A planar beam in its stress-free state, divided into elements along its axis.
+
+    A mesh does not change; its methods return other meshes.
+
+    Use :meth:`init_line` or :meth:`init_curve`. The nodes are numbered along the axis, which
+    keeps matrices banded; the boundaries ``left`` and ``right`` are the end sections, ``top``
+    and ``bottom`` the surfaces at Y = +h/2 and -h/2.
+
+    Attributes
+    ----------
+    doflocs, p
+        Positions of the nodes, shape (2, nvertices).
+    t
+        Left and right node of each element, shape (2, nelements).
+    height
+        Height h of the section; of a tapered beam the largest.
+    heights
+        Of a tapered beam the heights at xi = 0, 1/3, 2/3 and 1 of each element, shape
+        (4, nelements), between which they are cubic; else None.
+    taper
+        The function of the axis' parameter that :meth:`refined` takes them from, or None.
+    p_X, p_Y
+        Derivative of the position along the axis and across the section at the nodes, shape
+        (2, nvertices): the unit tangent and the unit normal on a given curve.
+    lengths
+        Length of each element along the axis, shape (nelements,).
+    p_XY
+        Derivative of ``p_Y`` along the axis, shape (2, nvertices), or None if it is not known.
+    sections
+        "linear", "cubic", ...: how ``p_Y`` is interpolated between the nodes, see
+        :meth:`with_sections`.
+    s
+        Parameter of each node on the curve, or None.
+    curve
+        The function r(s) -> (2, n) that :meth:`refined` puts new nodes on, or None.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem_ancf import MeshBeam
+    >>> mesh = MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1)
+    >>> mesh.nelements, sorted(mesh.boundaries)
+    (4, ['bottom', 'left', 'right', 'top'])
+    >>> mesh.refined([3]).p[0].tolist()
+    [0.0, 0.25, 0.5, 0.75, 0.875, 1.0]
+    """
+
+    elem: type[Element] = ElementBeamP1
+    height: float = None  # type: ignore[assignment]
+    p_X: ndarray = None  # type: ignore[assignment]
+    p_Y: ndarray = None  # type: ignore[assignment]
+    lengths: ndarray = None  # type: ignore[assignment]
+    s: ndarray | None = None
+    curve: Curve | None = None
+    p_XY: ndarray | None = None
+    sections: str = "linear"
+    heights: ndarray | None = None
+    taper: Callable[[Array], ArrayLike] | None = None
+    #: What files call the class.
+    kind = "beam"
+
+    # construction
+
+    @classmethod
+    def init_line(cls, x: ArrayLike, height: float | Callable[[Array], ArrayLike],
+                  origin: ArrayLike = (0.0, 0.0), angle: float = 0.0) -> MeshBeam:
+        """A straight beam.
+
+        Parameters
+        ----------
+        x
+            Increasing positions of the nodes along the axis, shape (n,), n >= 2.
+        height
+            Height of the section: a number, or of a tapered beam a function of ``x`` (n,) that
+            returns heights (n,), with kinks at nodes only.
+        origin
+            The point, shape (2,), from which ``x`` is measured.
+        angle
+            Direction of the axis, in radians from the first coordinate axis, at most 2 pi in
+            size.
+
+        Raises
+        ------
+        MeshError
+            If an element has no length, the nodes are not increasing, or a height of a function
+            is not positive.
+        InputError
+            If ``height`` is not positive or a value is not finite.
+
+        Examples
+        --------
+        >>> mesh = MeshBeam.init_line([0, 1, 3], height=0.2)
+        >>> mesh.lengths.tolist()
+        [1.0, 2.0]
+        >>> MeshBeam.init_line([0, 1, 3], height=lambda x: 0.3 - 0.05 * x).heights[0].tolist()
+        [0.3, 0.25]
+        """
+        x = require_finite("x", x, (None,))
+        origin = require_finite("origin", origin, (2,))
+        angle = _radians(angle)
+        if len(x) < 2:
+            raise MeshError(f"a beam needs at least two nodes, got {len(x)}")
+        if not (x[1:] > x[:-1]).all():
+            k = int(np.argmin(np.diff(x)))
+            raise MeshError(
+                f"element {k} from x = {x[k]:.9g} to {x[k + 1]:.9g} has no positive length; the "
+                "nodes must increase along the axis")
+        e1 = np.array([np.cos(angle), np.sin(angle)])
+        p = origin[:, None] + e1[:, None] * x
+        t = _chain(len(x))
+        return cls._from_nodes(p, t, e1[:, None], x[1:] - x[:-1], heights_of(height, x, t),
+                               x.copy())
+
+    @classmethod
+    def init_curve(cls, r: Callable[[Array], ArrayLike], s: ArrayLike,
+                   height: float | Callable[[Array], ArrayLike],
+                   dr: Callable[[Array], ArrayLike] | None = None) -> MeshBeam:
+        """A beam that is curved in its stress-free state.
+
+        Parameters
+        ----------
+        r
+            The axis: a function of parameters, shape (n,), that returns positions (2, n).
+        s
+            Increasing parameters of the nodes, shape (n,), n >= 2. They need not be arc lengths.
+        height
+            Height of the section: a number, or a function of parameters ``s`` (n,) that returns
+            heights (n,), with kinks at nodes only.
+        dr
+            Optional derivative of ``r``. If None it is found by the complex step where ``r``
+            allows it, else by differences.
+
+        Raises
+        ------
+        MeshError
+            If the curve folds (radius of curvature below h/2), has a kink at a node, stands
+            still, jumps, or an element has no length.
+
+        Notes
+        -----
+        The axis of an element is the cubic through the end points with the unit tangents and
+        the arc length of the curve. :meth:`refined` puts new nodes on the curve.
+
+        Examples
+        --------
+        >>> arc = MeshBeam.init_curve(lambda s: np.array([np.cos(s), np.sin(s)]),
+        ...                           np.linspace(0, np.pi, 9), height=0.1)
+        >>> bool(abs(arc.lengths.sum() - np.pi) < 1e-12)
+        True
+        """
+        s = require_finite("s", s, (None,))
+        if len(s) < 2:
+            raise MeshError(f"a beam needs at least two nodes, got {len(s)}")
+        if not np.all(np.diff(s) > 0):
+            k = int(np.argmin(np.diff(s)))
+            raise MeshError(f"the parameters of the nodes must increase: s[{k}] = {s[k]:.9g}, "
+                            f"s[{k + 1}] = {s[k + 1]:.9g}")
+        what = "of parameters (n,) that returns positions (2, n)"
+        require_function("r", r, what)
+        if dr is None:
+            dr = derivative_of(r, s[0], s[-1])
+        curve = Curve(r, require_function("dr", dr, what), (s[0], s[-1]))
+        p, tangent, lengths, turning, bent = curve.elements(s)
+        t = _chain(len(s))
+        largest, heights, taper = heights_of(height, s, t)
+        check_curvature(bent, s, largest if heights is None else np.max(heights, axis=0))
+        return cls._from_nodes(p, t, tangent, lengths, (largest, heights, taper), s.copy(), curve,
+                               turning)
+
+    @classmethod
+    def _from_nodes(cls, p, t, tangent, lengths, heights, s, curve=None, turning=None):
+        """The mesh of one chain whose values are finite: __post_init__ asks for more than is open.
+
+        Without a curve the axis is straight, and ``lengths`` are those between the nodes.
+        """
+        frame, (height, heights, taper) = np.empty((2, *p.shape)), heights
+        frame[0], frame[1, 0], frame[1, 1] = tangent, 0.0 - tangent[1], tangent[0]
+        given = dict(doflocs=p, t=t, height=height, p_X=frame[0], p_Y=frame[1], lengths=lengths,
+                     s=s, curve=curve, p_XY=np.zeros(p.shape) if turning is None else turning,
+                     heights=heights, taper=taper)
+        if cls.__post_init__ is not MeshBeam.__post_init__:
+            mesh = cls(**given)
+            mesh._boundaries = mesh._build_default_tags()
+            return mesh
+        for array in (frame, *given.values()):
+            if isinstance(array, np.ndarray):
+                array.flags.writeable = False
+        mesh = object.__new__(cls)
+        vars(mesh).update(given, _sealed=True)
+        vars(mesh).update(_boundaries=ReadOnlyDict(mesh._build_default_tags()))
+        d, far = p[:, 1:] - p[:, :-1], np.abs(p).max()
+        mesh._require_length((np.hypot(d[0], d[1]) > 4 * EPS * far) & (lengths > 0.0))
+        if curve is None:
+            even, low, high = heights is None, lengths.min(), lengths.max()
+            vars(mesh).update(_is_straight=True, _on_one_line=even, _is_uniform=even and bool(
+                high - low <= 1e-13 * high + 8 * EPS * far))
+        if curve is not None or heights is not None:
+            require_finite("lengths", lengths)
+            mesh._mapping().check()
+        return mesh
+
+    @classmethod
+    def init_refdom(cls) -> MeshBeam:
+        return cls.init_line([0.0, 1.0], height=1.0, origin=(0.0, 0.5))
+
+    def __post_init__(self):
+        p = require_finite("the nodes", self.doflocs, (2, None))
+        t = require_finite("t", self.t)
+        if np.any(t != np.floor(t)) or np.any(np.abs(t) > 2**31 - 1):
+            raise MeshError(f"t must hold the numbers of nodes, got {shown(self.t)}")
+        shape = t.shape
+        if len(shape) != 2 or shape[0] != 2 or shape[1] == 0:
+            raise MeshError(
+                f"a MeshBeam has two nodes per element and at least one element, t has shape "
+                f"{shape}; for quads of its body use mesh.to_meshquad()")
+        super().__post_init__()
+        if self.height is None:  # what refinterp of a Basis asks for
+            raise MeshError(
+                "height must be a number, got None: build meshes of beams with MeshBeam.init_line "
+                "or init_curve. For a picture of a Basis take quad = mesh.to_meshquad() and "
+                "quad.plot(basis.probes(quad.p) @ y), not basis.plot or basis.refinterp")
+        self.height = require_positive("height", self.height)
+        if self.heights is not None:
+            self.heights = require_finite("heights", self.heights, (4, shape[1]))
+            if not np.all(self.heights > 0.0):
+                raise MeshError(f"heights must be positive, got {np.min(self.heights):.6g}")
+        t = self.t
+        if not (np.array_equal(t[1], t[0] + 1) and np.all(np.diff(t[0]) > 0)):
+            raise MeshError("the nodes of a MeshBeam are numbered along its axis: element k joins "
+                            "t[0, k] and t[0, k] + 1, and t[0] increases")
+        if (t[0, 0] or t[1, -1] != p.shape[1] - 1
+                or np.any(t[0, 1:] > t[1, :-1] + 1)):  # the elements leave nodes out
+            odd = np.setxor1d(t, np.arange(p.shape[1]))
+            raise MeshError(f"every node of a MeshBeam is part of an element: there are "
+                            f"{p.shape[1]} nodes, and node {odd[0]} is only in "
+                            f"{'t' if odd[0] in t else 'the nodes'}")
+        chord = np.hypot(*(p[:, t[1]] - p[:, t[0]]))
+        self._require_length(chord > 4 * np.finfo(float).eps * np.max(np.abs(p)))
+        if self.p_X is None:
+            self._straight()
+        self.p_X = require_finite("p_X", self.p_X, p.shape)
+        self.p_Y = require_finite("p_Y", self.p_Y, p.shape)
+        require_option("interpolation of the sections", self.sections, SECTIONS)
+        if self.p_XY is not None:
+            self.p_XY = require_finite("p_XY", self.p_XY, p.shape)
+        self.lengths = require_finite("lengths", self.lengths, (t.shape[1],))
+        self._require_length(self.lengths > 0)
+        self._check_sections()
+
+    def _check_sections(self):
+        if self.p_XY is None and self.sections != "linear":
+            raise MeshError("the mesh does not know how its sections turn (p_XY): build it with "
+                            "MeshBeam.init_line or MeshBeam.init_curve")
+        self._mapping().check()
+
+    def _require_length(self, has_length):
+        if not has_length.all():
+            k = int(np.argmin(has_length))
+            a, b = self.p[:, self.t[:, k]].T.tolist()
+            raise MeshError(f"element {k} has no length: its nodes are at {a} and {b}")
+
+    def _straight(self):
+        """Tangents, normals and lengths of nodes that lie on straight lines."""
+        p, t = self.doflocs, self.t
+        d = p[:, t[1]] - p[:, t[0]]
+        self.lengths = np.hypot(*d)
+        d = d / self.lengths
+        self.p_X = np.zeros(p.shape)
+        self.p_X[:, t[1]] = d
+        shared = np.intersect1d(t[0], t[1])
+        if np.any(np.abs(self.p_X[:, shared] - d[:, np.searchsorted(t[0], shared)]) > 1e-8):
+            raise MeshError("the nodes do not lie on a straight line: use MeshBeam.init_curve, or "
+                            "one beam for each straight part and a rigid joint between them")
+        self.p_X[:, t[0]] = d
+        self.p_Y = np.array([-self.p_X[1], self.p_X[0]])
+        self.p_XY = np.zeros(p.shape)
+
+    def with_sections(self, sections: str) -> MeshBeam:
+        """The mesh with section directors interpolated "linear", "cubic", ... along the axis.
+
+        The names are those of :data:`skfem_ancf.mesh.reference_cell.SECTIONS`: "quintic", "septic",
+        "of degree 9" ... "of degree 15" for directors and axis, which is cubic for the first two.
+        Elements with sections that vary linearly along X hold the stress-free state of a curved
+        beam exactly on a mesh with "linear", those with cubic sections on one with "cubic". A
+        ``Beam`` chooses for itself; it makes no difference for straight beams.
+        """
+        require_option("interpolation of the sections", sections, SECTIONS)
+        if sections == self.sections:
+            return self
+        mesh = twin_of(self)
+        vars(mesh).update(sections=sections)
+        vars(mesh).pop("_cached_mapping", None)
+        mesh._check_sections()
+        return mesh
+
+    def replace(self, **changes: Any) -> MeshBeam:
+        """The mesh with another ``height``, a number or a function, or without its ``curve``.
+
+        Positions, tangents and lengths depend on each other: for others use :meth:`init_line`,
+        :meth:`init_curve`, :meth:`refined`, :meth:`translated`, :meth:`rotated`, :meth:`scaled`.
+
+        Raises
+        ------
+        NameUnknown
+            If it is another attribute.
+
+        Examples
+        --------
+        >>> MeshBeam.init_line([0, 1], height=0.1).replace(height=0.2).height
+        0.2
+        """
+        for name in changes:
+            if name not in ("height", "curve"):
+                raise NameUnknown("attribute that may be replaced alone", name,
+                                  ("height", "curve"))
+        if "height" in changes:
+            names = ("height", "heights", "taper")
+            changes |= zip(names, self._heights_of(changes["height"]))
+        return replace(self, **changes)
+
+    def _heights_of(self, height):
+        return heights_of(height, self.parameters, self.t)
+
+    def node_height(self, node: int) -> float:
+        """The height of the section of a node.
+
+        Parameters
+        ----------
+        node
+            Its number.
+        """
+        if self.heights is None:
+            return self.height
+        end = int(node in self.t[1])
+        return float(self.heights[3 * end, np.nonzero(self.t[end] == node)[0][0]])
+
+    @property
+    def parameters(self) -> Array:
+        """Parameter of each node on the axis, shape (nvertices,): ``s``, or lengths from its start.
+        """
+        if self.s is not None:
+            return self.s
+        out = np.zeros(self.p.shape[1])
+        gaps = np.hypot(*np.diff(self.p))
+        gaps[self.t[0]] = self.lengths
+        out[1:] = np.cumsum(gaps)
+        return out
+
+    def __setattr__(self, name, value):
+        if name in ("_boundaries", "_subdomains") and value is not None:
+            value = ReadOnlyDict(value)
+        super().__setattr__(name, value)
+
+    def __getstate__(self):
+        if self.curve is not None:
+            require_picklable(self.curve.functions())
+        if self.taper is not None:
+            require_picklable([("the function height(x) of the mesh", self.taper)])
+        names = {field.name for field in fields(self)}
+        return {name: value for name, value in vars(self).items() if name in names}
+
+    # topology
+
+    def _mapping(self):
+        if not hasattr(self, "_cached_mapping"):
+            self._cached_mapping = MappingBeam(self)
+        return self._cached_mapping
+
+    def _init_facets(self):
+        """Sections first, one for each node, then the bottom and the top of each element."""
+        n, ne, t = self.doflocs.shape[1], self.t.shape[1], self.t
+        nodes = np.arange(n, dtype=np.int32)
+        bottom, top = n + np.arange(ne, dtype=np.int32), n + ne + np.arange(ne, dtype=np.int32)
+        self._facets = np.hstack([np.array([nodes, nodes]), t, t])
+        self._t2f = np.array([bottom, t[1], top, t[0]], dtype=np.int32)
+        f2t = np.full((2, n + 2 * ne), -1, dtype=np.int32)
+        elements = np.arange(ne, dtype=np.int32)
+        f2t[0, bottom] = f2t[0, top] = elements
+        f2t[1, t[0]] = elements
+        f2t[0, t[1]] = elements
+        starts = f2t[0] < 0
+        f2t[0, starts], f2t[1, starts] = f2t[1, starts], -1
+        self._f2t = f2t
+
+    @property
+    def f2t(self) -> Array:
+        if not hasattr(self, "_f2t"):
+            self._init_facets()
+        return self._f2t
+
+    def _build_default_tags(self):
+        ne, n = self.t.shape[1], self.doflocs.shape[1]
+        facets = np.arange(n + 2 * ne, dtype=np.int32)
+        facets.flags.writeable = False
+        # the first node is the left end, the last one the right
+        return {"left": facets[:1], "right": facets[n - 1:n], "bottom": facets[n:n + ne],
+                "top": facets[n + ne:]}
+
+    def normalize_facets(self, facets: Any) -> Array:
+        if isinstance(facets, str) and facets not in (self.boundaries or {}):
+            raise NameUnknown("boundary", facets, self.boundaries or {})
+        return super().normalize_facets(facets)
+
+    def normalize_elements(self, elements: Any) -> Array:
+        if isinstance(elements, str):
+            require_option("subdomain", elements, self.subdomains or {})
+            return np.asarray(super().normalize_elements(elements))
+        if callable(elements):
+            return self.elements_satisfying(elements)
+        given = elements
+        elements = list(elements) if isinstance(elements, (tuple, list, set)) else elements
+        if isinstance(elements, list) and any(isinstance(e, str) for e in elements):
+            return np.unique(np.concatenate([self.normalize_elements(e) for e in elements]))
+        try:
+            elements = np.atleast_1d(np.asarray(elements))
+        except (ValueError, TypeError):
+            elements = np.zeros(1, dtype=object)
+        if elements.dtype == bool and elements.shape == (self.nelements,):
+            elements = np.nonzero(elements)[0]
+        if not elements.size:
+            return np.zeros(0, dtype=np.int32)
+        if elements.dtype.kind not in "iu" or elements.ndim != 1:
+            raise MeshError("elements are given by their numbers, by the name of a subdomain, by a "
+                            f"function or a mask, got {shown(given)}")
+        bad = elements[(elements < 0) | (elements >= self.nelements)]
+        if len(bad):
+            raise MeshError(f"the elements are numbered 0 to {self.nelements - 1}, got {bad[0]}")
+        return elements
+
+    def facets_satisfying(self, test: Callable[[Array], Array], boundaries_only: bool = False,
+                          normal: ArrayLike | None = None) -> Array:
+        """The facets for whose middle a function is true.
+
+        Parameters
+        ----------
+        test
+            Takes points x (2, n), returns n truth values.
+        boundaries_only
+            No sections between two elements.
+        normal
+            Direction, shape (2,), of the side that the facets are given; None for no side.
+
+        Returns
+        -------
+        ndarray
+            Numbers of facets, shape (k,); an ``OrientedBoundary`` with ``normal``.
+        """
+        middle = np.array([[0.5]])
+        mapping = self._mapping()
+        facets = _satisfying(test, mapping.G(middle)[:, :, 0])
+        if boundaries_only:
+            facets = np.intersect1d(facets, self.boundary_facets())
+        if normal is None:
+            return facets
+        tind, points = mapping.facet_points(middle, facets)
+        normals = mapping.normals(points, tind, facets, self.t2f)[:, :, 0]
+        return OrientedBoundary(facets, 1 * (np.asarray(normal) @ normals < 0))
+
+    def elements_satisfying(self, test: Callable[[Array], Array]) -> Array:
+        middle = self._mapping().F(np.array([[0.5], [0.5]]))[:, :, 0]
+        return _satisfying(test, middle)
+
+    def params(self) -> Array:
+        """Length of each element."""
+        return self.lengths
+
+    def param(self) -> float:
+        """Length of the longest element."""
+        return float(np.max(self.lengths))
+
+    @property
+    def on_line(self) -> bool:
+        """True if it was made as one straight line, with ``s`` the lengths along it."""
+        return getattr(self, "_on_one_line", False)
+
+    @property
+    def is_straight(self) -> bool:
+        """True if every element is straight with sections normal to it."""
+        if not hasattr(self, "_is_straight"):
+            d = (self.p[:, self.t[1]] - self.p[:, self.t[0]]) / self.lengths
+            tol = 1e-12 + 8 * np.finfo(float).eps * np.max(np.abs(self.p)) / np.min(self.lengths)
+            self._is_straight = bool(
+                all(np.all(np.abs(self.p_X[:, t] - d) <= tol) for t in self.t)
+                and np.all(np.abs(self.p_Y - np.array([-self.p_X[1], self.p_X[0]])) <= tol))
+        return self._is_straight
+
+    @property
+    def is_uniform(self) -> bool:
+        """True if one table does for all elements: straight, of one length, height and direction.
+
+        The chains that they make are of one length, too.
+        """
+        if not hasattr(self, "_is_uniform"):
+            self._is_uniform = self.is_straight and self.heights is None and self._are_equal()
+        return self._is_uniform
+
+    def _are_equal(self):
+        """True if straight elements are of one length and direction, as their chains are."""
+        # the round-off of the nodes' positions is no difference in length
+        noise = 8 * EPS * np.max(np.abs(self.p))
+        return bool(np.ptp(self.lengths) <= 1e-13 * np.max(self.lengths) + noise
+                    and np.max(np.ptp(self.p_X, axis=1)) <= 1e-12 + noise / np.min(self.lengths)
+                    and np.ptp(self.chain_lengths) <= 1e-12 * np.max(self.chain_lengths))
+
+    @property
+    def is_chain(self) -> bool:
+        """True if each element begins where the one before it ends."""
+        return bool(self.t.shape[1] == self.doflocs.shape[1] - 1)
+
+    @property
+    def chain_lengths(self) -> Array:
+        """Length of the chain that each element is in, shape (nelements,)."""
+        if self.is_chain:
+            return np.full(self.t.shape[1], self.lengths.sum())
+        return np.bincount(self.chains, self.lengths)[self.chains]
+
+    @property
+    def chains(self) -> Array:
+        """Number of the chain that each element is in, shape (nelements,)."""
+        return np.cumsum(np.append(False, self.t[0, 1:] != self.t[1, :-1]))
+
+    def element_finder(self, mapping: Any = None) -> Callable[..., Array]:
+        """A function from points x, y to the elements that hold them.
+
+        The function raises :class:`MeshError` for points outside the body. ``mapping`` is
+        scikit-fem's argument: the mesh has its own.
+        """
+        find = Finder(self)
+
+        def finder(*x):
+            x = require_finite("the points", x, (2, None))
+            found, _, outside = find(x)
+            if np.any(outside > find.allowed):
+                raise find.refuse(x, outside)
+            return found.astype(np.int32)
+
+        return finder
+
+    # refinement
+
+    def _uniform(self):  # scikit-fem's finder of elements on surfaces calls it
+        return self._adaptive(np.arange(self.nelements))
+
+    def refined(self, times_or_ix: Any = 1) -> MeshBeam:
+        """A finer mesh: new nodes on the curve, numbered along the axis; names are kept.
+
+        Parameters
+        ----------
+        times_or_ix
+            The number of uniform refinements, or the elements to halve.
+        """
+        if isinstance(times_or_ix, (int, np.integer)) and not isinstance(times_or_ix, bool):
+            most = int(np.log2(MAX_ELEMENTS / self.nelements))
+            return super().refined(require_integer(
+                "the number of refinements", times_or_ix, 0, max(most, 0),
+                f"a mesh of {MAX_ELEMENTS} elements at most"))
+        return self._adaptive(times_or_ix)
+
+    def graded(self, at: Any = ("left",), size: float | None = None,
+               growth: float = 0.5) -> MeshBeam:
+        """A mesh that is finer near sections: for the boundary layers of supports and loads.
+
+        Elements are halved until those within one and a half heights of the sections are not
+        longer than ``size``, and those further off not longer than ``growth`` times their distance
+        from there.
+
+        Parameters
+        ----------
+        at
+            Sections: "left", "right", or points (x, y) of the axis; one, or a tuple or list of
+            several, or an array of points, shape (n, 2).
+        size
+            Length of the elements at the sections; a quarter of the height by default. See
+            docs/fields.md for the accuracy to expect.
+        growth
+            How fast the elements get longer, positive.
+
+        Returns
+        -------
+        MeshBeam
+            New nodes are on the curve, names are kept.
+
+        Raises
+        ------
+        InputError
+            If ``size`` or ``growth`` is not positive.
+        MeshError
+            If a section is not known, or a point is far from the beam.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from skfem_ancf import MeshBeam
+        >>> mesh = MeshBeam.init_line(np.linspace(0, 1, 5), height=0.1).graded("left")
+        >>> mesh.p[0].tolist()[:8], mesh.nelements
+        ([0.0, 0.015625, 0.03125, 0.046875, 0.0625, 0.078125, 0.09375, 0.109375], 23)
+        """
+        size = 0.25 * self.height if size is None else require_positive("size", size)
+        growth = require_positive("growth", growth)
+        if 3.0 * self.height / size > MAX_ELEMENTS:
+            raise InputError(f"size = {size:g} would make more than {MAX_ELEMENTS} elements of a "
+                             f"beam of height {self.height:g}: give a larger one")
+        at = points_of_rows(at)
+        if isinstance(at, str) or is_point(at) or not isinstance(at, (tuple, list, set, frozenset)):
+            at = [at]
+        if not at:
+            raise InputError("at names no section: give 'left', 'right', or a point of the axis")
+        places = np.array([self._section_point(place) for place in at])
+        mesh = self
+        while True:
+            X = np.array([np.linspace(0, 1, 5), np.full(5, 0.5)])
+            x = mesh._mapping().F(X)
+            far = np.min(np.hypot(*(x[..., None] - places.T[:, None, None])), axis=(1, 2))
+            allowed = np.maximum(size, growth * (far - 1.5 * self.height))
+            marked = np.nonzero(mesh.lengths > allowed * (1 + 1e-9))[0]
+            if len(marked) == 0:
+                return mesh
+            mesh = mesh.refined(marked)
+
+    def _section_point(self, place):
+        """The point of the axis that a place names, shape (2,)."""
+        if isinstance(place, str):
+            if place not in ("left", "right"):
+                raise NameUnknown("section", place, ("left", "right"))
+            return self.p[:, np.asarray(self.boundaries[place])[0]]
+        point = require_finite("at", place, (2,))
+        self.element_finder()(*point[:, None])
+        return point
+
+    def _adaptive(self, ix):
+        return halved(self, np.unique(self.normalize_elements(ix)))
+
+    def restrict(self, elements: Any, return_mapping: bool = False, skip_boundaries: bool = False,
+                 skip_subdomains: bool = False) -> Any:
+        """The mesh of some elements; a part cut off keeps the numbering along the axis.
+
+        Parameters
+        ----------
+        elements
+            Numbers of elements, shape (k,), a mask, the name of a subdomain, or a function of
+            the points.
+        return_mapping
+            Return the numbers of the nodes that are left, too.
+        skip_boundaries, skip_subdomains
+            Leave the names out.
+
+        Returns
+        -------
+        MeshBeam
+            With ``return_mapping`` a pair: the mesh, and nodes of shape (n,).
+        """
+        elements = np.unique(self.normalize_elements(elements))
+        if len(elements) == 0:
+            raise MeshError("a mesh needs at least one element: the given set is empty")
+        nodes = np.unique(self.t[:, elements])
+        renumber = np.full(self.p.shape[1], -1, dtype=np.int32)
+        renumber[nodes] = np.arange(len(nodes))
+        m = type(self)(self.p[:, nodes], renumber[self.t[:, elements]], height=self.height,
+                     p_X=self.p_X[:, nodes], p_Y=self.p_Y[:, nodes],
+                     lengths=self.lengths[elements], curve=self.curve, sections=self.sections,
+                     heights=None if self.heights is None else self.heights[:, elements],
+                     taper=self.taper,
+                     p_XY=None if self.p_XY is None else self.p_XY[:, nodes],
+                     s=None if self.s is None else self.s[nodes])
+        if self._subdomains is not None and not skip_subdomains:
+            m._subdomains = {name: np.nonzero(np.isin(elements, e))[0].astype(np.int32)
+                             for name, e in self._subdomains.items()}
+        if self._boundaries is not None and not skip_boundaries:
+            facets = np.full(self.nfacets, -1, dtype=np.int32)
+            facets[self.t2f[:, elements].ravel()] = m.t2f.ravel()
+            tags = {}
+            for name, f in self._boundaries.items():
+                keep = facets[np.asarray(f)] >= 0
+                new = facets[np.asarray(f)[keep]]
+                if getattr(f, "ori", None) is not None:  # a cut section has one side left
+                    new = OrientedBoundary(new, np.where(m.f2t[1, new] < 0, 0, f.ori[keep]))
+                tags[name] = new
+            m._boundaries = tags
+        return (m, nodes) if return_mapping else m
+
+    # rigid motion and scale
+
+    def _moved(self, rotation, shift, scale=1.0):
+        curve = None if self.curve is None else self.curve.moved(scale * rotation, shift)
+        return replace(self, doflocs=scale * rotation @ self.p + shift[:, None],
+                       p_X=rotation @ self.p_X, p_Y=rotation @ self.p_Y, curve=curve,
+                       p_XY=None if self.p_XY is None else rotation @ self.p_XY / scale,
+                       lengths=scale * self.lengths, height=scale * self.height,
+                       heights=None if self.heights is None else scale * self.heights,
+                       taper=None if self.taper is None else Scaled(self.taper, scale))
+
+    def translated(self, diffs: ArrayLike) -> MeshBeam:
+        """The mesh moved by a vector.
+
+        Parameters
+        ----------
+        diffs
+            The vector, shape (2,).
+        """
+        return self._moved(np.eye(2), require_finite("the shift", diffs, (2,)))
+
+    def rotated(self, angle: float, about: ArrayLike = (0.0, 0.0)) -> MeshBeam:
+        """The mesh turned about a point.
+
+        Parameters
+        ----------
+        angle
+            In radians, counterclockwise, at most 2 pi in size.
+        about
+            The point, shape (2,).
+
+        Returns
+        -------
+        MeshBeam
+        """
+        angle, about = _radians(angle), require_finite("about", about, (2,))
+        c, s = np.cos(angle), np.sin(angle)
+        Q = np.array([[c, -s], [s, c]])
+        return self._moved(Q, about - Q @ about)
+
+    def scaled(self, factors: ArrayLike) -> MeshBeam:
+        """The mesh, with its height, scaled.
+
+        Parameters
+        ----------
+        factors
+            One positive number, or several that are equal, shape (n,).
+        """
+        f = np.unique(require_finite("factors", factors))
+        if len(f) != 1 or f[0] <= 0:
+            raise MeshError(f"a beam is scaled by one positive factor in all directions, got "
+                            f"{factors!r}; sections would not stay normal otherwise")
+        return self._moved(np.eye(2), np.zeros(2), f[0])
+
+    def _refuse(self, what: str) -> NoReturn:
+        raise MeshError(
+            f"a MeshBeam cannot be {what}: it is one chain of nodes with sections. Put several "
+            "beams into one Scene and join them, or build the mesh with init_line or init_curve")
+
+    def mirrored(self, normal: Any, point: Any = None) -> MeshBeam:
+        self._refuse("mirrored")
+
+    def morphed(self, *args: Any) -> MeshBeam:
+        self._refuse("morphed")
+
+    def smoothed(self, fixed_nodes: Any = None) -> MeshBeam:
+        self._refuse("smoothed")
+
+    def __add__(self, other):
+        self._refuse("joined with +")
+
+    def __matmul__(self, other):
+        self._refuse("joined with @")
+
+    # pictures and files
+
+    def to_meshquad(self, nx: int = 8, ny: int = 4) -> MeshQuad:
+        """Quads of the stress-free body.
+
+        Parameters
+        ----------
+        nx, ny
+            Quads along and across each element.
+
+        Returns
+        -------
+        skfem.MeshQuad
+        """
+        nx, ny = (require_integer(name, n, 1, MAX_SUBDIVISION) for name, n in (("nx", nx),
+                                                                             ("ny", ny)))
+        quad = MeshQuad.init_tensor(np.linspace(0, 1, nx + 1), np.linspace(0, 1, ny + 1))
+        number = np.arange(quad.p.shape[1] * self.nelements).reshape(self.nelements, -1)
+        left, right = (np.nonzero(quad.p[0] == end)[0] for end in (0.0, 1.0))
+        joined = 1 + np.nonzero(self.t[1, :-1] == self.t[0, 1:])[0]
+        number[joined[:, None], left] = number[joined[:, None] - 1, right]
+        kept, number = np.unique(number, return_inverse=True)
+        t = number.reshape(self.nelements, -1)[:, quad.t[::-1]].transpose(1, 0, 2)
+        return MeshQuad(self._mapping().F(quad.p).reshape(2, -1)[:, kept], t.reshape(4, -1))
+
+    def draw(self, visuals: str = "matplotlib", **kwargs: Any) -> Any:
+        """Draw the outline of the elements.
+
+        Parameters
+        ----------
+        visuals
+            Name of the module of ``skfem.visuals``.
+        **kwargs
+            Those of :meth:`skfem.Mesh.draw`.
+        """
+        return self._outline().draw(visuals, **kwargs)
+
+    def _repr_svg_(self):
+        return self._outline()._repr_svg_()
+
+    def _outline(self):
+        return self.to_meshquad(1 if self.is_straight and self.heights is None else 8, 1)
+
+    def __repr__(self):
+        kind = "straight" if self.is_straight else "curved"
+        height = f"{self.height:.6g}" if self.heights is None else (
+            f"{np.min(self.heights):.6g} to {self.height:.6g}")
+        return (super().__repr__() + f"\n  Height, length: {height}, "
+                f"{self.lengths.sum():.6g} ({kind})")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but the functions ``curve`` and ``taper``, as lists."""
+        out = super().to_dict()
+        out["orientations"] = {k: v.ori.tolist() for k, v in (self.boundaries or {}).items()
+                               if getattr(v, "ori", None) is not None}
+        for name in ("p_X", "p_Y", "p_XY", "lengths", "s", "heights"):
+            value = getattr(self, name)
+            out[name] = None if value is None else value.T.tolist()
+        return {**out, "height": self.height, "sections": self.sections, "kind": self.kind}
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> MeshBeam:
+        """The mesh of what :meth:`to_dict` returned.
+
+        Raises
+        ------
+        MeshError
+            If it is something else.
+        """
+        wanted = {"p", "t", "height", "p_X", "p_Y", "lengths", "sections"}
+        if not isinstance(data, dict) or wanted - set(data):
+            raise MeshError("this is no dictionary of a beam"
+                            + (f": {sorted(wanted - set(data))} are missing" if isinstance(
+                                data, dict) else f", but {shown(data)}"))
+        try:
+            return cls._from_dict(data)
+        except MeshError:
+            raise
+        except Exception as error:  # whatever it holds, it is no mesh
+            raise MeshError(f"the dictionary holds no beam: {type(error).__name__}: {error}"
+                            ) from error
+
+    @classmethod
+    def _from_dict(cls, data):
+        data = {"boundaries": None, "subdomains": None, **data}
+        for name in ("p_X", "p_Y", "p_XY", "heights"):
+            if data.get(name) is not None:
+                data[name] = np.ascontiguousarray(np.array(data[name]).T)
+        for name in ("lengths", "s"):
+            if data.get(name) is not None:
+                data[name] = np.array(data[name])
+        orientations, of = data.pop("orientations", {}), cls._of_kind(data.pop("kind", cls.kind))
+        mesh = super(MeshBeam, of).from_dict(data)
+        if orientations:
+            tags = dict(mesh._boundaries)
+            for name, ori in orientations.items():
+                tags[name] = OrientedBoundary(tags[name], ori)
+            mesh._boundaries = tags
+        return mesh
+
+    def save_npz(self, filename: StrPath) -> None:
+        """Save all but the functions ``curve`` and ``taper``; read it with :meth:`load_npz`."""
+        path = require_path("filename", filename)
+        if path.suffix != ".npz":
+            path = path.with_name(f"{path.name}.npz")
+        tags = {f"b_{k}": v for k, v in (self.boundaries or {}).items()}
+        tags |= {f"o_{k}": v.ori for k, v in (self.boundaries or {}).items()
+                 if getattr(v, "ori", None) is not None}
+        tags |= {f"s_{k}": v for k, v in (self.subdomains or {}).items()}
+        s = {name: getattr(self, name) for name in ("s", "p_XY", "heights")
+             if getattr(self, name) is not None}
+        try:
+            archive.write(path, {
+                "doflocs": self.doflocs, "t": self.t, "height": self.height, "p_X": self.p_X,
+                "p_Y": self.p_Y, "lengths": self.lengths, "sections": self.sections,
+                "kind": self.kind, **s, **tags})
+        except OSError as error:
+            raise FileError(f"cannot write {str(path)!r}: {error}") from error
+
+    @classmethod
+    def load_npz(cls, filename: StrPath) -> MeshBeam:
+        """Load a mesh saved by :meth:`save_npz`; nothing in the file is executed.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be read.
+        MeshError
+            If it holds no beam.
+        """
+        path = require_path("filename", filename)
+        return _read(path, lambda: cls._load_npz(path))
+
+    @classmethod
+    def _load_npz(cls, filename):
+        with ExitStack() as stack:  # closes the file of one that is damaged
+            file = stack.enter_context(filename.open("rb"))
+            if file.read(4) not in (b"PK\x03\x04", b"PK\x05\x06"):
+                raise MeshError(f"{str(filename)!r} is no .npz file")
+            file.seek(0)
+            data = stack.enter_context(np.load(file, allow_pickle=False))
+            missing = {"doflocs", "t", "height", "p_X", "p_Y", "lengths",
+                       "sections"} - set(data.files)
+            if missing:
+                raise MeshError(f"{str(filename)!r} holds no beam: {sorted(missing)} are missing")
+            tags = {k[2:]: data[k] for k in data.files if k.startswith("b_")}
+            tags = {k: OrientedBoundary(v, data[f"o_{k}"]) if f"o_{k}" in data.files else v
+                    for k, v in tags.items()}
+            parts = {k[2:]: data[k] for k in data.files if k.startswith("s_")}
+            of = cls._of_kind(str(data["kind"]) if "kind" in data.files else cls.kind)
+            return of(data["doflocs"], data["t"], tags or None, parts or None,
+                      height=float(data["height"]), p_X=data["p_X"], p_Y=data["p_Y"],
+                      lengths=data["lengths"], sections=str(data["sections"]),
+                      **{name: data[name] for name in ("s", "p_XY", "heights")
+                         if name in data.files})
+
+    @classmethod
+    def _of_kind(cls, kind):
+        """The class of a mesh in a file: this one, or the one of the package that it was saved of.
+        """
+        known = {of.kind: of for of in (*MeshBeam.__subclasses__(), MeshBeam) if ours(of)}
+        if kind == cls.kind:
+            return cls
+        if kind not in known:
+            raise MeshError(f"a mesh of the kind {kind!r} is not known, only {sorted(known)}")
+        return known[kind]
+
+    def save(self, filename: StrPath, point_data: dict[str, Any] | None = None,
+             cell_data: dict[str, Any] | None = None, **kwargs: Any) -> None:
+        """Save the mesh: ``.npz`` or ``.json`` to load it again, else the body for a viewer.
+
+        Any other suffix that meshio knows writes the quads of :meth:`to_meshquad`.
+
+        Parameters
+        ----------
+        filename
+            Its suffix says the format.
+        point_data, cell_data, **kwargs
+            For a viewer: as for ``skfem.MeshQuad.save``.
+        """
+        import meshio
+
+        path = require_path("filename", filename)
+        if path.suffix in (".npz", ".json"):
+            require_options(f"save({path.name!r})", kwargs, ("filename",))
+        if path.suffix == ".npz":
+            self.save_npz(path)
+            return
+        try:
+            if not path.suffix:
+                raise FileError(f"the file name {str(path)!r} does not say the format: end it with "
+                                ".npz, .json, .vtu or what else meshio writes")
+            if path.suffix in IN_PARTS:
+                self.to_meshquad().save(filename, point_data, cell_data, **kwargs)
+                return
+            with archive.replacing(path) as new:
+                if path.suffix == ".json":
+                    new.write_text(json.dumps(self.to_dict()), encoding="utf-8")
+                else:
+                    self.to_meshquad().save(new, point_data, cell_data, **kwargs)
+        except FileError:
+            raise
+        except (OSError, meshio.ReadError, meshio.WriteError, SystemExit) as error:
+            raise FileError(f"cannot write {str(path)!r}: {error}") from error
+
+    @classmethod
+    def load(cls, filename: StrPath, out: Any = None, **kwargs: Any) -> MeshBeam:
+        """Load a mesh saved as ``.npz`` or ``.json``.
+
+        Parameters
+        ----------
+        filename
+            Of a file that :meth:`save` wrote.
+        out, **kwargs
+            Not used: they are there as for ``skfem.Mesh.load``.
+        """
+        path = require_path("filename", filename)
+        require_options("load", kwargs, ("filename",))
+        if path.suffix == ".npz":
+            return cls.load_npz(path)
+        if path.suffix == ".json":
+            return _read(path, lambda: cls.from_dict(json.loads(path.read_text(encoding="utf-8"))))
+        raise MeshError(f"cannot read a beam from {path.name!r}: only .npz and .json files keep "
+                        "the axis, the tangents and the height; save the mesh in one of them")
+
+
+def _read(path, read):
+    """What a function reads from a file, or an error that says what is wrong with it."""
+    try:
+        return read()
+    except MeshError as error:
+        name = repr(str(path))
+        raise MeshError(str(error) if name in str(error) else f"{name}: {error}") from error
+    except OSError as error:
+        raise FileError(f"cannot read {str(path)!r}: {error}") from error
+    except Exception as error:  # whatever is in the file
+        raise MeshError(f"{str(path)!r} holds no beam, or is damaged: {type(error).__name__}: "
+                        f"{error}") from error
+
+
+def reach(meshes: Sequence[MeshBeam]) -> float:
+    """What tolerances of places are relative to: how far bodies reach, or move.
+
+    The diagonal of the box round all nodes, but not less than the longest line, as one that is
+    curled may be drawn straight, and not more than all lines together, as some may lie far apart.
+    What is of forces and strains goes by lengths: there all lines add up.
+
+    Parameters
+    ----------
+    meshes
+        Those of the beams.
+
+    Examples
+    --------
+    >>> from skfem_ancf import Frame, StVenantKirchhoff
+    >>> from skfem_ancf.mesh import reach
+    >>> points, lines = [(0, 0), (3, 0), (3, 4), (0, 4)], [(0, 1), (1, 2), (2, 3), (3, 0)]
+    >>> steel = StVenantKirchhoff(E=2e11, nu=0.3)
+    >>> frame = Frame.from_lines(points, lines, height=0.1, width=0.1, material=steel)
+    >>> reach([beam.mesh for beam in frame.beams])
+    5.0
+    """
+    total = float(sum([np.add.reduce(mesh.lengths) for mesh in meshes]))
+    if len(meshes) == 1 and meshes[0].is_chain:
+        return total
+    longest = max([float(mesh.chain_lengths.max()) for mesh in meshes])
+    low = np.min([mesh.p.min(axis=1) for mesh in meshes], axis=0)
+    high = np.max([mesh.p.max(axis=1) for mesh in meshes], axis=0)
+    return min(total, max(longest, float(np.hypot(*(high - low)))))
+
+
+def _chain(n):
+    """The nodes of the elements of one chain of n nodes, (2, n - 1)."""
+    nodes = np.arange(n, dtype=np.int32)
+    return np.array([nodes[:-1], nodes[1:]])
+
+
+def _satisfying(test, x):
+    """The numbers of the points x (2, n) for which a function is true."""
+    require_function("the function of the points", test, "that returns True or False for each")
+    found = ask("the function of the points", test, x)
+    if np.shape(found) != x.shape[1:] or np.asarray(found).dtype != bool:
+        raise CallbackError("the function of the points x, shape (2, n), must return n times True "
+                            f"or False, got {shown(found)}")
+    return np.nonzero(found)[0].astype(np.int32)
+
+
+def _radians(angle):
+    """An angle as a float; raises InputError where it is likely to be in degrees."""
+    angle = require_finite_scalar("angle", angle)
+    if abs(angle) > 2.0 * np.pi * (1 + 1e-12):
+        raise InputError(f"an angle is given in radians, at most 2 pi in size, got {angle!r}: for "
+                         f"degrees write np.deg2rad({angle:g})")
+    return angle

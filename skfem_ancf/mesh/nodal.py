@@ -1,0 +1,73 @@
+"""Derivatives of a curved axis at its nodes, beyond those that a mesh keeps."""
+
+from __future__ import annotations
+
+from math import factorial, perm
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .chain import Chain
+    from ..core.types import Array
+
+
+def turned(d: Array) -> Array:
+    """Vectors (2, ...) turned by a right angle: the normal's derivatives from the tangent's.
+
+    Parameters
+    ----------
+    d
+        Shape (2, ...).
+    """
+    return np.array([-d[1], d[0]])
+
+
+def nodal_derivatives(mesh: Chain, most: int) -> list[Array]:
+    """Position of the stress-free axis at the nodes, and its derivatives by the arc length.
+
+    Position, tangent and curvature are those of the mesh. A node takes the others of the
+    polynomial of degree 8 that has these three at the node and at its two neighbours in the chain,
+    at an end at the next two (of degree 5 where a chain is one element): they are those of the
+    curve but for the error of that interpolation, of order 9 in the position. Those of a straight
+    mesh are zero.
+
+    Parameters
+    ----------
+    mesh
+        A mesh, with ``p_XY`` where ``most`` is 2 or more.
+    most
+        Number of the highest derivative.
+
+    Returns
+    -------
+    list of ndarray
+        Each of shape (2, nvertices), from the position on: most + 1 of them.
+    """
+    known = [mesh.p, mesh.p_X]
+    if most > 1 and mesh.p_XY is not None:
+        known.append(-turned(mesh.p_XY))
+    more = np.zeros((max(most - 2, 0), *mesh.p.shape))
+    if most > 2 and not mesh.is_straight:
+        _add_higher(mesh, np.array(known), more)
+    return [*known[:most + 1], *more]
+
+
+def _add_higher(mesh, known, out):
+    """Put derivatives from the third on, (n, 2, nvertices), from ``known`` ones (3, ...)."""
+    apart = mesh.t[0, 1:] != mesh.t[1, :-1]
+    at = np.cumsum(np.bincount(mesh.t[1], mesh.lengths, mesh.p.shape[1]))
+    for a, b in zip(mesh.t[0, np.append(True, apart)], mesh.t[1, np.append(apart, True)]):
+        few, nodes = min(3, b - a + 1), np.arange(a, b + 1)
+        n, near = 3 * few, np.clip(nodes - 1, a, b + 1 - few)[:, None] + np.arange(few)
+        x = at[near] - at[nodes, None]
+        size = np.max(np.abs(x), axis=1)
+        scale = size ** np.arange(n)[:, None]
+        # conditions: the derivatives 0, 1, 2 of the powers at each place
+        powers = np.array([[perm(k, d) * (x / size[:, None]) ** max(k - d, 0) for k in range(n)]
+                           for d in range(3)]).transpose(2, 3, 0, 1).reshape(-1, n, n)
+        values = known[:, :, near] * scale[:3, None, :, None]
+        values = values.transpose(2, 3, 0, 1).reshape(-1, n, 2)
+        found = np.linalg.solve(powers, values)
+        for k in range(3, min(2 + len(out), n - 1) + 1):
+            out[k - 3][:, nodes] = factorial(k) * found[:, k].T / scale[k]

@@ -1,0 +1,268 @@
+"""What names a place on a beam: a boundary, a point of the stress-free body, a function, facets."""
+
+from __future__ import annotations
+
+import numbers
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from ..core.errors import AncfError, InputError, MeshError, NameUnknown, require_finite, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike
+
+    from .chain import Chain
+    from ..core.types import Array, Place
+
+#: How far off a section a point may be that names it, relative to an element next to it.
+NEAR = 1e-6
+
+KINDS = ("the name of a boundary, a point (x, y) of the stress-free body, a function of the points "
+         "x that returns truth values, or numbers of facets as an array of integers")
+
+
+def is_point(place: object) -> bool:
+    """True for two numbers in a tuple or a list, or in an array of floats.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> is_point((1, 1)), is_point([0.5, 0]), is_point(np.array([0.5, 0.0]))
+    (True, True, True)
+    >>> is_point(np.array([1, 1])), is_point(("left", "right"))  # facets; two boundaries
+    (False, False)
+    """
+    if isinstance(place, np.ndarray):
+        return place.shape == (2,) and place.dtype.kind == "f"
+    return (isinstance(place, (tuple, list)) and len(place) == 2
+            and all(isinstance(x, numbers.Real) and not isinstance(x, (bool, np.bool_))
+                    for x in place))
+
+
+def points_of_rows(places: Any) -> Any:
+    """A list of points (x, y) for an array with one in each row, shape (n, 2); else what it is."""
+    if isinstance(places, np.ndarray) and places.ndim == 2 and places.shape[1] == 2:
+        return [tuple(point) for point in places.tolist()]
+    return places
+
+
+def is_place(place: object) -> bool:
+    """True for one place, False for a tuple of one place for each of several beams."""
+    return isinstance(place, (str, np.ndarray)) or callable(place) or is_point(place)
+
+
+def as_point(point: Any, mesh: Chain | None = None) -> Array:
+    """A material point as an array (2,); raises MeshError for anything else.
+
+    Parameters
+    ----------
+    point
+        Its place (x, y) in the stress-free body: a tuple, a list or an array (2,); or the name of
+        a boundary that is one section, as "right", for the axis there.
+    mesh
+        Of the body, without which no boundary can be named; or None.
+    """
+    if type(point) is tuple and len(point) == 2 and (
+            isinstance(point[0], float) and isinstance(point[1], float)
+            and abs(point[0]) + abs(point[1]) < np.inf):
+        return np.array(point, float)
+    if isinstance(point, (list, tuple)):
+        flat = len(point) == 2 and not any(
+            isinstance(x, (list, tuple)) or np.ndim(x) for x in point)
+    else:
+        flat = isinstance(point, np.ndarray) and point.shape == (2,)
+    if flat and not any(
+            isinstance(x, (str, bytes, bool, np.bool_)) for x in point):
+        return require_finite("a material point", point, (2,))
+    if isinstance(point, str) and mesh is not None and point in (mesh.boundaries or {}):
+        return mesh.p[:, node_of(mesh, point)]
+    raise MeshError("a material point has two coordinates (x, y), its place in the stress-free "
+                    f"body, or is the name of an end, as 'right', got {shown(point)}")
+
+
+def on_other_mesh(place: object) -> bool:
+    """True if a place means the same on another mesh: it holds no numbers of facets."""
+    if isinstance(place, np.ndarray):
+        return is_point(place)
+    if isinstance(place, (tuple, list, set, frozenset)) and not is_point(place):
+        return all(map(on_other_mesh, place))
+    return True
+
+
+def facets_of(mesh: Chain, place: Place) -> Array:
+    """The facets that a place means.
+
+    This is the one rule for every method that takes a place:
+
+    * a name is that of a boundary,
+    * two numbers in a tuple, a list or an array of floats are a point (x, y) of the stress-free
+      body: the section of a node on which it lies,
+    * a function takes points x, shape (2, n), and returns n truth values: the facets with their
+      middle there,
+    * an array of integers holds numbers of facets,
+    * another tuple, list or set holds places: all of them; an array (n, 2) holds n points.
+
+    Parameters
+    ----------
+    mesh
+        A :class:`~skfem_ancf.MeshBeam`.
+    place
+        As above.
+
+    Returns
+    -------
+    ndarray
+        Numbers of facets, shape (n,), n >= 1; a scikit-fem ``OrientedBoundary`` stays one.
+
+    Raises
+    ------
+    NameUnknown
+        If a name is not known.
+    MeshError
+        If there is no facet at the place; the message says what is near.
+    InputError
+        If it is no place.
+
+    Examples
+    --------
+    >>> from skfem_ancf import MeshBeam
+    >>> mesh = MeshBeam.init_line([0, 1, 2], height=0.1)
+    >>> facets_of(mesh, "right").tolist(), facets_of(mesh, (1, 0)).tolist()
+    ([2], [1])
+    """
+    place = points_of_rows(place)
+    if isinstance(place, str):
+        return _named(mesh, place)
+    if is_point(place):
+        return np.array([section_at(mesh, cast("ArrayLike", place))], dtype=np.int32)
+    if isinstance(place, np.ndarray):
+        return _numbered(mesh, place)
+    if callable(place):
+        return _satisfying(mesh, place)
+    if isinstance(place, (tuple, list, set, frozenset)) and len(place) and not all(
+            isinstance(p, numbers.Number) for p in place):
+        return np.unique(np.concatenate([np.asarray(facets_of(mesh, p)) for p in place]))
+    hint = ""
+    if isinstance(place, numbers.Integral) and not isinstance(place, bool):
+        hint = f"; for the facet of that number write np.array([{shown(place)}])"
+    elif isinstance(place, (tuple, list)) and len(place) and all(
+            isinstance(p, numbers.Integral) for p in place):
+        hint = f"; for facets of those numbers write np.array({shown(list(place))})"
+    raise InputError(f"a place is {KINDS}, got {shown(place)}{hint}")
+
+
+def node_of(mesh: Chain, place: Place) -> int:
+    """The node of a place that is one section.
+
+    Parameters
+    ----------
+    mesh
+        A :class:`~skfem_ancf.MeshBeam`.
+    place
+        As of :func:`facets_of`.
+
+    Raises
+    ------
+    MeshError
+        If it is none, or more than one.
+    """
+    facets = np.asarray(facets_of(mesh, place))
+    if len(facets) != 1 or facets[0] >= mesh.p.shape[1]:
+        raise MeshError(f"boundary {place!r} is not one section of the beam; sections are "
+                        "'left' and 'right', or the point of a node of the axis")
+    return int(facets[0])
+
+
+def section_at(mesh: Chain, point: ArrayLike) -> int:
+    """The node on whose section a point of the stress-free body lies.
+
+    Parameters
+    ----------
+    mesh
+        A :class:`~skfem_ancf.MeshBeam`.
+    point
+        Its place in the stress-free body, shape (2,); off the section by at most 1e-6 of
+        the shorter element next to it.
+
+    Raises
+    ------
+    MeshError
+        If there is none or more than one.
+    """
+    x = as_point(point, mesh)
+    d = x[:, None] - mesh.p
+    Y = np.sum(d * mesh.p_Y, axis=0) / np.sum(mesh.p_Y**2, axis=0)
+    Y = np.clip(Y, -0.5 * mesh.height, 0.5 * mesh.height)
+    off = np.hypot(*(d - Y * mesh.p_Y))
+    size = np.full(mesh.p.shape[1], np.inf)
+    for end in mesh.t:
+        size[end] = np.minimum(size[end], mesh.lengths)
+    noise = 8 * np.finfo(float).eps * (np.max(np.abs(mesh.p)) + np.max(np.abs(x)))
+    found = np.nonzero(off <= NEAR * size + noise)[0]
+    if len(found) == 1:
+        return int(found[0])
+    if len(found):
+        raise MeshError(f"the point {_pair(x)} is on the sections of the nodes {found.tolist()} at "
+                        "once: name one of them as a boundary, or by np.array([number])")
+    k = int(np.argmin(off))
+    raise MeshError(
+        f"the point {_pair(x)} is on no section between two elements: the nearest is that of node "
+        f"{k} with its axis at {_pair(mesh.p[:, k])}, {off[k]:.6g} away; give that point, or put a "
+        "node there")
+
+
+def _pair(x: Array) -> str:
+    x = np.where(np.abs(x) < 1e-15 * np.max(np.abs(x)), 0.0, x)
+    return f"({x[0]:.9g}, {x[1]:.9g})"
+
+
+def _names(mesh: Chain) -> str:
+    return ", ".join(repr(name) for name, facets in (mesh.boundaries or {}).items() if len(facets))
+
+
+def _named(mesh: Chain, name: str) -> Array:
+    if name not in (mesh.boundaries or {}):
+        raise NameUnknown("boundary", name, mesh.boundaries or {})
+    facets = mesh.boundaries[name]
+    if not len(facets):
+        raise MeshError(f"the boundary {name!r} is empty: it holds no facet of this mesh; others "
+                        f"are {_names(mesh)}")
+    return facets
+
+
+def _numbered(mesh: Chain, facets: Array) -> Array:
+    if facets.dtype.kind not in "iu" or facets.ndim != 1 or not len(facets):
+        raise InputError(f"facets are a one-dimensional array of integers that is not empty, got "
+                         f"{shown(facets)}; a place may also be {KINDS.rsplit(', or', 1)[0]}")
+    bad = facets[(facets < 0) | (facets >= mesh.nfacets)]
+    if len(bad):
+        n = mesh.p.shape[1]
+        raise MeshError(
+            f"the facets are numbered 0 to {mesh.nfacets - 1}, got {bad[0]}: 0 to {n - 1} are the "
+            f"sections of the nodes, then come the bottom and the top of the {mesh.nelements} "
+            "elements")
+    return facets
+
+
+def _satisfying(mesh: Chain, test: Callable[[Array], Any]) -> Array:
+    x = mesh.mapping().G(np.array([[0.5]]))[:, :, 0]
+    try:
+        chosen = np.asarray(test(x))
+    except AncfError:
+        raise
+    except Exception as error:  # the function is the user's: it may raise anything
+        raise InputError(f"the function {test!r} that names a place fails for points x of shape "
+                         f"{x.shape}: {type(error).__name__}: {error}") from error
+    if chosen.shape != x.shape[1:] or chosen.dtype != bool:
+        raise InputError(f"a function that names a place takes points x of shape (2, n) and "
+                         f"returns n truth values, as lambda x: x[0] > 1; for n = {x.shape[1]} it "
+                         f"returned {chosen.dtype} of shape {chosen.shape}")
+    if not np.any(chosen):
+        low, high = x.min(axis=1), x.max(axis=1)
+        raise MeshError(f"the function {test!r} selects none of the {len(chosen)} facets, whose "
+                        f"middles lie from {_pair(low)} to {_pair(high)}; boundaries with names "
+                        f"are {_names(mesh)}")
+    return np.nonzero(chosen)[0].astype(np.int32)

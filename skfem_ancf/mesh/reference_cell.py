@@ -1,0 +1,188 @@
+"""The reference cell of a beam and the two interpolations along its axis."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import comb, perm
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from skfem.element import ElementH1
+from skfem.refdom import Refdom, RefLine, RefQuad
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from ..core.types import Array
+
+
+#: How sections vary between the nodes that hold 1, 2, ... derivatives along X, the 0th included.
+SECTIONS = ("linear", "cubic", "quintic", "septic",
+            *(f"of degree {degree}" for degree in (9, 11, 13, 15)))
+
+#: Points at most at which functions are kept.
+KEPT_POINTS = 512
+
+
+def few(X: Any) -> bool:
+    """True if the functions at points are kept: few, and the same of all elements.
+
+    Parameters
+    ----------
+    X
+        Reference points, shape (2, n) for all elements, or (2, nelements, n).
+    """
+    return isinstance(X, np.ndarray) and X.ndim == 2 and X.shape[1] <= KEPT_POINTS
+
+
+class RefBeam(Refdom):
+    """Unit square (xi, eta) with two vertices, at the middle of its left and right side.
+
+    ``xi`` runs along the axis, ``eta`` across the section; the axis is ``eta = 1/2``.
+    The facets are bottom, right, top, left, as for scikit-fem's ``RefQuad``, whose
+    quadrature is used through the attribute ``refdom``. Bottom and top share their
+    two vertices, left and right have one vertex, written twice.
+    """
+
+    p = np.array([[0.0, 1.0], [0.5, 0.5]])
+    t = np.array([[0], [1]], dtype=np.int32)
+    normals = RefQuad.normals
+    facets = [[0, 1], [1, 1], [0, 1], [0, 0]]
+    refdom = RefQuad
+    brefdom = RefLine
+    nnodes = 2
+    nfacets = 4
+    name = "Beam"
+
+    @classmethod
+    def on_facet(cls, i: int, X: Array) -> Array:
+        """Which points lie on a facet.
+
+        Parameters
+        ----------
+        i
+            Number of the facet: bottom, right, top, left.
+        X
+            Reference points, shape (2, n).
+
+        Returns
+        -------
+        ndarray
+            Truth values, shape (n,).
+        """
+        return (np.abs(X[1]) < 1e-4, np.abs(X[0] - 1) < 1e-4,
+                np.abs(X[1] - 1) < 1e-4, np.abs(X[0]) < 1e-4)[i]
+
+
+class ElementBeamP1(ElementH1):
+    """Linear along the axis, constant across the section: for fields such as a temperature."""
+
+    nodal_dofs = 1
+    maxdeg = 1
+    dofnames = ["u"]
+    doflocs = np.array([[0.0, 0.5], [1.0, 0.5]])
+    refdom = RefBeam
+
+    def lbasis(self, X: Array, i: int) -> tuple[Array, Array]:
+        """A local function and its derivative.
+
+        Parameters
+        ----------
+        X
+            Reference points, shape (2, ...).
+        i
+            Number of the function: 0, of the left node, or 1.
+
+        Returns
+        -------
+        value, gradient
+            Shapes (...) and (2, ...).
+        """
+        if i not in (0, 1):
+            self._index_error()
+        slope = 2.0 * i - 1.0
+        return 1.0 - i + slope * X[0], np.array([slope + 0.0 * X[0], 0.0 * X[0]])
+
+
+def linear(xi: ArrayLike, derivative: int = 0) -> Array:
+    """The two linear functions of ``xi`` that are 1 at 0 and at 1; shape (2,) + xi.shape.
+
+    Parameters
+    ----------
+    xi
+        Points, of any shape (...).
+    derivative
+        Number of derivatives.
+    """
+    xi = np.asarray(xi)
+    one = np.ones_like(xi)
+    if derivative == 0:
+        return np.array([1.0 - xi, xi])
+    return np.array([-one, one]) if derivative == 1 else np.array([0.0 * one, 0.0 * one])
+
+
+def hermite(xi: ArrayLike, derivative: int = 0) -> Array:
+    """The cubic Hermite functions dual to f(0), f'(0), f(1), f'(1); shape (4,) + xi.shape.
+
+    Parameters
+    ----------
+    xi
+        Points, of any shape (...).
+    derivative
+        Number of derivatives, 0 to 2.
+    """
+    x = np.asarray(xi)
+    if derivative == 0:
+        return np.array([1.0 - x * x * (3.0 - 2.0 * x), x * (1.0 - x) ** 2,
+                         x * x * (3.0 - 2.0 * x), x * x * (x - 1.0)])
+    if derivative == 1:
+        return np.array([-6.0 * x * (1.0 - x), (1.0 - x) * (1.0 - 3.0 * x),
+                         6.0 * x * (1.0 - x), x * (3.0 * x - 2.0)])
+    if derivative == 2:
+        return np.array([12.0 * x - 6.0, 6.0 * x - 4.0, 6.0 - 12.0 * x, 6.0 * x - 2.0])
+    raise ValueError(f"derivative must be 0, 1 or 2, got {derivative!r}")
+
+
+@lru_cache
+def _hermite_coefficients(m: int, derivative: int) -> Array:
+    """Factors of ``x^i (1 - x)^(n - i)`` in a derivative of the Hermite functions, n = 2 m - 1.
+
+    Shape (2 m, n + 1 - derivative): Bernstein coefficients times binomials. The function whose
+    k-th derivative at 0 is 1 and whose others vanish has ``binom(i, k) (n - k)! / n!``, i < m; the
+    one at 1 is its mirror image. All are of one sign: nothing cancels, at no degree (Farouki and
+    Rajan, "On the numerical condition of polynomials in Bernstein form", Computer Aided Geometric
+    Design 4, 1987). The differences that derivatives are made of are taken of integers.
+    """
+    n = 2 * m - 1
+    left = [[comb(i, k) * perm(n, m) // perm(n, k) if i < m else 0 for i in range(n + 1)]
+            for k in range(m)]
+    rows = np.array(left + [[(-1) ** k * b for b in row[::-1]] for k, row in enumerate(left)],
+                    dtype=object)
+    rows = np.diff(rows, derivative, axis=1) * perm(n, derivative)
+    rows = rows * [comb(n - derivative, i) for i in range(rows.shape[1])]
+    return np.array(rows / perm(n, m), dtype=float)
+
+
+def hermite_basis(m: int, xi: ArrayLike, derivative: int = 0) -> Array:
+    """Functions of degree 2 m - 1 dual to the derivatives 0 ... m-1 at 0, then at 1.
+
+    Shape (2 m,) + xi.shape; m = 1 is :func:`linear`, m = 2 :func:`hermite`.
+
+    Parameters
+    ----------
+    m
+        Derivatives that are coordinates at each end, the 0th included.
+    xi
+        Points, of any shape (...).
+    derivative
+        Number of derivatives.
+    """
+    if m < 3 and derivative < 3:
+        return (linear if m == 1 else hermite)(xi, derivative)
+    x, degree = np.asarray(xi), 2 * m - 1 - derivative
+    if degree < 0:
+        return np.zeros((2 * m,) + x.shape)
+    k = np.arange(degree + 1)[:, None]
+    flat = x.reshape(1, -1) + 0.0
+    found = _hermite_coefficients(m, derivative) @ (flat**k * (1.0 - flat) ** (degree - k))
+    return found.reshape((2 * m,) + x.shape)

@@ -1,0 +1,112 @@
+"""Heights that vary along the axis: a cubic polynomial of xi in each element."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..core.errors import MeshError, ask_array, require_function, require_positive
+from ..core.quadrature import lagrange
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..core.types import Array
+
+#: Where the heights of an element are given, and between them, where a cubic has to fit.
+PLACES, BETWEEN = np.arange(4) / 3.0, (1.0 + 2.0 * np.arange(3)) / 6.0
+
+#: Largest relative error of the cubic there.
+FITS = 0.02
+
+
+class Scaled:
+    """A function of a parameter times a number.
+
+    Parameters
+    ----------
+    function, factor
+        Both.
+    """
+
+    def __init__(self, function: Callable[[Array], Any], factor: float) -> None:
+        self.function, self.factor = function, factor
+
+    def __call__(self, s: Array) -> Any:
+        return self.factor * np.asarray(self.function(s))
+
+
+def heights_of(height: Any, s: Array, t: Array) -> tuple[float, Array | None, Any]:
+    """Largest height, heights in the elements and their function, from what was given for them.
+
+    Parameters
+    ----------
+    height
+        A positive number, or a function of parameters (n,) of the axis that returns heights (n,).
+    s, t
+        Parameters of the nodes, shape (nvertices,), and nodes of the elements, (2, nelements).
+
+    Returns
+    -------
+    height, heights, function
+        The latter two None for a constant height; heights of shape (4, nelements).
+
+    Raises
+    ------
+    InputError
+        If a number is not positive.
+    MeshError
+        If a height of the function is not, or the function is no cubic in an element.
+    """
+    if not callable(height):
+        return require_positive("height", height), None, None
+    require_function("height", height, "of parameters (n,) that returns heights (n,)")
+    a, b = s[t]
+    at = a + np.append(PLACES, BETWEEN)[:, None] * (b - a)
+    found = ask_array("height(x)", (at.size,), height, at.ravel(), number=True)
+    found = found.reshape(at.shape)
+    if not np.all(found > 0.0):
+        k = np.unravel_index(np.argmin(found), found.shape)
+        raise MeshError(f"the height of a beam is positive, the function returns {found[k]:.6g} "
+                        f"at {at[k]:.6g}: end the mesh before it gets thin there")
+    heights, between = found[:4].copy(), found[4:]
+    gap = np.abs(lagrange(PLACES, BETWEEN) @ heights - between) / between
+    if np.max(gap) > FITS:
+        e = int(np.argmax(np.max(gap, axis=0)))
+        raise MeshError(
+            f"the height is no smooth function in element {e}, from {a[e]:.6g} to {b[e]:.6g}: a "
+            f"cubic polynomial misses it by {np.max(gap):.1%}. Put a node at a kink, weld two "
+            "beams where it jumps, or take more elements")
+    return float(np.max(heights)), heights, height
+
+
+@lru_cache(1)
+def _powers() -> Array:
+    return np.linalg.inv(np.vander(PLACES, increasing=True))
+
+
+def powers(heights: Array) -> Array:
+    """Coefficients of 1, xi, xi^2, xi^3 from heights; both of shape (4, nelements)."""
+    return _powers() @ heights
+
+
+def halved(heights: Array, marked: Array) -> Array:
+    """The heights of elements of which some are halved.
+
+    Parameters
+    ----------
+    heights, marked
+        Shape (4, nelements), and truth values (nelements,).
+
+    Returns
+    -------
+    ndarray
+        Shape (4, nelements + number marked), children in place of those that are marked.
+    """
+    parts = []
+    for one, two in zip(heights.T, marked):
+        starts = (0.0, 0.5) if two else (0.0,)
+        parts += [lagrange(PLACES, a + PLACES / len(starts)) @ one for a in starts]
+    return np.array(parts).T

@@ -1,0 +1,461 @@
+"""The table of fields: what can be drawn, written to files and asked for at points.
+
+One entry of :data:`FIELDS` says what a field is called, what it is computed from, its unit, whether
+it has a sign, and how many components it has. A field of your own is a function of
+:class:`Values`, or a :class:`Field` made with one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..core.errors import (CallbackError, InputError, NameUnknown, ask, require_finite_scalar,
+                           require_flag, require_integer, require_label, require_text, shown,
+                           teaching)
+from ..core.kept import cached_property, kept
+from ..beam.kernels.along import stretched
+from ..materials import LinearLaw
+from ..beam.interpolation import Part
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from ..beam.beam import Beam
+    from .recovered import Recovery
+    from ..core.types import Array
+
+COMPONENTS = ("xx", "yy", "xy")
+
+#: Grids of points that a beam keeps.
+GRIDS = 4
+
+
+@teaching
+@dataclass(frozen=True)
+class Field:
+    """A field on the body.
+
+    Attributes
+    ----------
+    name : str
+        As in files.
+    function : callable
+        From :class:`Values` to the field at their points, shape (n,), or (components, n).
+    title : str
+        What it is, for pictures; mathtext between dollars.
+    unit : str
+        As "force / area": the package knows no units, those of the input are meant.
+    signed : bool
+        Colours are symmetric about ``neutral``; else they start there.
+    components : int
+        1; 2 for a vector in global axes; 3 for a symmetric tensor (xx, yy, xy).
+    frame : str
+        Of vectors and tensors, and of components: "global" or "beam".
+    neutral : float
+        Its value in the stress-free body.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamANCF, MeshBeam, Scene, StVenantKirchhoff
+    >>> from skfem_ancf.recovery.fields import Field
+    >>> use = Field("utilisation", lambda v: v["von_mises"] / 1e3, "utilisation", signed=False)
+    >>> beam = Beam(MeshBeam.init_line(np.linspace(0, 1, 9), height=0.1), ElementBeamANCF(2),
+    ...             StVenantKirchhoff(E=1e6, nu=0.3), width=0.1)
+    >>> state = Scene(beam).clamp("left").point_force((0, -0.1), at=(1, 0)).solve_static()
+    >>> ax = state.plot(use)
+    >>> round(float(state.field(use, (0.5, 0.05))), 3)
+    0.3
+    """
+
+    name: str
+    function: Callable[[Values], Any]
+    title: str = ""
+    unit: str = ""
+    signed: bool = True
+    components: int = 1
+    frame: str = ""
+    neutral: float = 0.0
+
+    def __post_init__(self) -> None:
+        if require_label("the name of a field", self.name) is None:
+            raise InputError(f"the name of a field must be a text, got {shown(self.name)}")
+        if not callable(self.function):
+            raise InputError("the function of a field takes Values and returns an array, got "
+                             f"{shown(self.function)}")
+        require_integer("components", self.components, 1, 3)
+        for name in ("title", "unit", "frame"):
+            if require_text(name, getattr(self, name)) is None:
+                raise InputError(f"{name} must be a text, got None")
+        require_flag("signed", self.signed)
+        require_finite_scalar("neutral", self.neutral)
+
+    def label(self) -> str:
+        """Title and unit."""
+        return (self.title or self.name) + (f" ({self.unit})" if self.unit else "")
+
+    def of(self, values: Values) -> Array:
+        """The field at the points of Values, (n,) or (components, n)."""
+        own = FIELDS.get(self.name) is not self
+        out = ask("the function of a field", self.function, values) if own else (
+            self.function(values))
+        shape = (values.n,) if self.components == 1 else (self.components, values.n)
+        try:
+            out = np.asarray(out, dtype=float)
+        except (TypeError, ValueError):
+            raise CallbackError(f"the field {self.name!r} must be an array of numbers, got "
+                                f"{shown(out)}") from None
+        if out.shape not in (shape, ()) or (out.ndim == 0 and not np.isfinite(out)):
+            raise CallbackError(f"the field {self.name!r} must have shape {shape} at {values.n} "
+                                f"points, got {out if out.ndim == 0 else out.shape}")
+        return np.broadcast_to(out, shape)
+
+
+class Values(Mapping):
+    """Everything that is known at points of one beam, computed when it is asked for.
+
+    A mapping from the names of :data:`FIELDS` to arrays (n,), or (components, n).
+
+    Parameters
+    ----------
+    part
+        The :class:`~skfem_ancf.beam.interpolation.Part` with the points.
+    u
+        Displacement of the coordinates that the part is numbered by, shape (N,).
+    find
+        Returns the recovered field of the beam, or None; None for the field of the elements.
+    eigen
+        Returns the stress-free strain at points of a part, (3, n) or 0, or for a second argument
+        True what the stress of the elements is less by; None where there is none.
+
+    Attributes
+    ----------
+    beam
+        The beam.
+    n : int
+        Number of points.
+    strain
+        Green-Lagrange strain (eps_xx, eps_yy, 2 eps_xy) in the beam's frame, (3, n).
+    S
+        Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, (3, n).
+    F
+        Deformation gradient: derivatives along the axis and across it, in global axes, (2, 2, n).
+    frame
+        The beam's frame in the stress-free body, ``frame[:, 0]`` along the axis, (2, 2, n).
+    x
+        Stress-free positions, (2, n); ``values.u`` are their displacements.
+    """
+
+    def __init__(self, part: Part, u: Array,
+                 find: Callable[[], Recovery | None] | None = None,
+                 eigen: Callable[..., Any] | None = None) -> None:
+        self._part, self._u, self._find, self._eigen = part, u, find, eigen
+        self.beam, self.n = part.beam, len(part.e)
+        self._known: dict[str, Array] = {}
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self._known:
+            self._known[name] = find_field(name).of(self)
+        return self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(FIELDS)
+
+    def __len__(self) -> int:
+        return len(FIELDS)
+
+    @property
+    def x(self) -> Array:
+        return self._part.start
+
+    @cached_property
+    def u(self) -> Array:
+        return self._part.displacement(self._u)
+
+    @cached_property
+    def _recovery(self):
+        return None if self._find is None else self._find()
+
+    @property
+    def _own(self):
+        return self._u[self._part.coordinates], self._part.at, self._part.e
+
+    @cached_property
+    def strain(self) -> Array:
+        if self._recovery is not None:
+            return self._recovery.at(self._part, slice(0, 3))
+        return self._part.strain(self._u)
+
+    @cached_property
+    def S(self) -> Array:
+        if self._recovery is not None:
+            return self._recovery.at(self._part, slice(3, 6))
+        S = self._part.stress(self._u)
+        return S if self._eigen is None else S - self._eigen(self._part, True)
+
+    @cached_property
+    def elastic(self) -> Array:
+        """The strain less that without stress, (3, n)."""
+        return self.strain if self._eigen is None else self.strain - self._eigen(self._part)
+
+    def of_materials(self, ask: Callable[[Any], Array], graded: bool = False) -> Array:
+        """A field that the material at each point gives.
+
+        Parameters
+        ----------
+        ask
+            Returns the field (n,) of a material.
+        graded
+            It is proportional to the modulus.
+
+        Returns
+        -------
+        ndarray
+            Shape (n,).
+        """
+        across = self.beam.across
+        if across.plain:
+            return ask(self.beam.material)
+        found = [partial(ask, slab.material) for slab in across.slabs]
+        return across.of_slabs(self._part.at, np.zeros((self.n, 1)), [
+            partial(_column, one) for one in found], self._part.e, graded)[:, 0]
+
+    @cached_property
+    def F(self) -> Array:
+        if self._recovery is not None:
+            with np.errstate(invalid="ignore"):
+                return self._recovery.gradient(self.strain, self._recovery.at(
+                    self._part, slice(6, 7))[0])
+        H, frame = self.beam.gradients(*self._own)
+        return (H + frame)[..., 0]
+
+    @cached_property
+    def frame(self) -> Array:
+        return self.beam.mesh.mapping().frame(self._part.at, self._part.e)[..., 0]
+
+    @cached_property
+    def _volume(self):
+        """Change of volume; NaN where the material has no thickness left."""
+        F = self.F
+        with np.errstate(invalid="ignore"):
+            return (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) * self.of_materials(
+                lambda law: law.thickness_stretch(self.elastic))
+
+    @cached_property
+    def sigma(self) -> Array:
+        """Cauchy stress F S F^T / J (sigma_xx, sigma_yy, sigma_xy), global axes, (3, n)."""
+        F, S = self.F, self.S
+        with np.errstate(invalid="ignore", divide="ignore"):
+            A = np.array([[S[0], S[2]], [S[2], S[1]]])
+            sigma = np.einsum("iJn,JKn,jKn->ijn", F, A, F, optimize=True) / self._volume
+        return np.array([sigma[0, 0], sigma[1, 1], sigma[0, 1]])
+
+    @cached_property
+    def sigma_zz(self) -> Array:
+        """Cauchy stress normal to the plane, (n,): zero in plane stress."""
+        material = self.beam.material
+        if material.plane == "stress":
+            return np.zeros(self.n)
+        if not self.beam.has_sections:  # eps_zz = 0 and S_yy = 0
+            return self.of_materials(lambda law: law.nu * self.S[0]) / self._volume
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return self.of_materials(lambda law: law.stress_zz(self.elastic), True) / self._volume
+
+    @cached_property
+    def energy(self) -> Array:
+        """Strain energy per stress-free volume, (n,)."""
+        def of(material):
+            law = material.law()
+            if not self.beam.has_sections:
+                return self._energy_of_fibres()
+            if isinstance(law, LinearLaw):
+                return 0.5 * np.sum(self.elastic * self.S, axis=0)
+            return law.energy(self.elastic)
+
+        return self.of_materials(of)
+
+    def _energy_of_fibres(self):
+        """Of a cable: half of its nominal stress times the stretch that is elastic."""
+        stretch, longer = stretched(self.strain[0])
+        if self._eigen is not None:
+            longer = longer - (self._eigen(self._part) + 0.0 * self.strain)[0]
+        return 0.5 * (stretch * self.S[0] * longer + self.elastic[2] * self.S[2])
+
+    @cached_property
+    def principal(self) -> tuple[Array, Array]:
+        """Principal strains (2, n), the larger first, and the direction of that, (2, n)."""
+        eps = self.strain * np.array([[1.0], [1.0], [0.5]])
+        values, direction = _principal(eps)
+        return values, np.einsum("iJn,Jn->in", self.frame, direction)
+
+    @cached_property
+    def principal_stress(self) -> tuple[Array, Array]:
+        """Principal Cauchy stresses in the plane, (2, n), and the direction of the larger."""
+        return _principal(self.sigma)
+
+
+def _column(ask):
+    return ask()[:, None]
+
+
+def _principal(tensor):
+    """Eigenvalues (2, n) of (xx, yy, xy), the larger first, and its direction (2, n)."""
+    xx, yy, xy = tensor
+    middle, half = 0.5 * (xx + yy), 0.5 * (xx - yy)
+    radius, angle = np.hypot(half, xy), 0.5 * np.arctan2(xy, half)
+    return np.array([middle + radius, middle - radius]), np.array([np.cos(angle), np.sin(angle)])
+
+
+def _von_mises(v):
+    a, b, c = v.sigma
+    z = v.sigma_zz
+    return np.sqrt(0.5 * ((a - b)**2 + (b - z)**2 + (z - a)**2) + 3.0 * c * c)
+
+
+def _tresca(v):
+    high, low = v.principal_stress[0]
+    return np.maximum(high, v.sigma_zz) - np.minimum(low, v.sigma_zz)
+
+
+def _stretch(v):
+    with np.errstate(invalid="ignore"):
+        return np.sqrt(1.0 + 2.0 * v.strain[0])
+
+
+def _table():
+    area, one = "force / area", "1"
+    yield Field("displacement", lambda v: v.u, "displacement", "length", False, 2, "global")
+    for k, name in enumerate("xy"):
+        yield Field(f"u_{name}", lambda v, k=k: v.u[k], f"displacement $u_{name}$", "length", True,
+                    1, "global")
+    for k, c in enumerate(COMPONENTS):
+        factor = 0.5 if c == "xy" else 1.0
+        yield Field(f"eps_{c}", lambda v, k=k, f=factor: f * v.strain[k],
+                    rf"Green–Lagrange strain $\varepsilon_{{{c}}}$, beam frame", one, frame="beam")
+    for k, c in enumerate(COMPONENTS):
+        yield Field(f"S_{c}", lambda v, k=k: v.S[k],
+                    rf"second Piola–Kirchhoff stress $S_{{{c}}}$, beam frame", area, frame="beam")
+    for k, c in enumerate(COMPONENTS):
+        yield Field(f"sigma_{c}", lambda v, k=k: v.sigma[k],
+                    rf"Cauchy stress $\sigma_{{{c}}}$, global axes", area, frame="global")
+    yield Field("von_mises", _von_mises, "von Mises stress", area, False)
+    yield Field("tresca", _tresca, "Tresca stress", area, False)
+    for k in (0, 1):
+        yield Field(f"eps_{k + 1}", lambda v, k=k: v.principal[0][k],
+                    rf"principal strain $\varepsilon_{k + 1}$", one)
+    for k in (0, 1):
+        yield Field(f"sigma_{k + 1}", lambda v, k=k: v.principal_stress[0][k],
+                    rf"principal Cauchy stress $\sigma_{k + 1}$", area)
+    yield Field("energy", lambda v: v.energy, "strain energy density", "energy / volume", False)
+    yield Field("stretch", _stretch, "stretch along the axis", one, neutral=1.0)
+    yield Field("eps_1_direction", lambda v: v.principal[1],
+                "direction of the larger principal strain, stress-free body", one, False, 2,
+                "global")
+    yield Field("sigma_1_direction", lambda v: v.principal_stress[1],
+                "direction of the larger principal stress, deformed body", one, False, 2, "global")
+    yield Field("strain", lambda v: v.strain * np.array([[1.0], [1.0], [0.5]]),
+                "Green–Lagrange strain", one, True, 3, "beam")
+    yield Field("stress", lambda v: v.S, "second Piola–Kirchhoff stress", area, True, 3, "beam")
+    yield Field("cauchy_stress", lambda v: v.sigma, "Cauchy stress", area, True, 3, "global")
+
+
+#: All fields by their names.
+FIELDS = {field.name: field for field in _table()}
+
+#: Those that files hold where none are named.
+DEFAULT = ("displacement", *(f"{a}_{c}" for a in ("eps", "S", "sigma") for c in COMPONENTS))
+
+#: Those that a picture can show.
+DRAWN = tuple(name for name, f in FIELDS.items() if f.components == 1 or name == "displacement")
+
+
+def find_field(field: str | Field | Callable[[Values], Any], known: tuple[str, ...] | None = None,
+               ) -> Field:
+    """The Field meant by a name, a function or a Field.
+
+    Parameters
+    ----------
+    field
+        A name of :data:`FIELDS`, a function of :class:`Values`, or a :class:`Field`.
+    known
+        The names that are allowed; all by default.
+
+    Returns
+    -------
+    Field
+
+    Raises
+    ------
+    NameUnknown
+        If the name is not known; the message says the nearest.
+    """
+    if isinstance(field, Field):
+        return field
+    if isinstance(field, str):
+        known = tuple(FIELDS) if known is None else known
+        if field not in known:
+            if field in FIELDS:
+                raise InputError(f"the field {field!r} has {FIELDS[field].components} components, "
+                                 f"one is drawn: as {', '.join(map(repr, known[:4]))}")
+            raise NameUnknown("field", field, known)
+        return FIELDS[field]
+    if callable(field) and not isinstance(field, type):
+        name = getattr(field, "__name__", type(field).__name__).strip("<>")
+        return Field(name, field)
+    raise NameUnknown("field", field, tuple(FIELDS) if known is None else known)
+
+
+def find_fields(fields: Any) -> list[Field]:
+    """The Fields meant by one or several names, functions or Fields; None for the usual ones.
+
+    Raises
+    ------
+    InputError
+        If two have one name.
+    """
+    if fields is None:
+        fields = DEFAULT
+    if isinstance(fields, (str, Field)) or callable(fields):
+        fields = (fields,)
+    if not isinstance(fields, (list, tuple)):
+        raise InputError(f"fields must be a list of names or functions, got {shown(fields)}")
+    found = [find_field(field) for field in fields]
+    names = [field.name for field in found]
+    if len(set(names)) < len(names):
+        raise InputError(f"the fields must have different names, got {names}")
+    return found
+
+
+def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Values:
+    """Values at reference points of every element of a beam.
+
+    Parameters
+    ----------
+    state
+        A :class:`~skfem_ancf.results.State`, or anything with its ``u_of``.
+    beam
+        One of its beams.
+    X
+        Reference points (xi, eta) in [0, 1], shape (2, npoints) or (2, nelements, npoints).
+    recover
+        Recovered strain and stress, where the state has them.
+
+    Returns
+    -------
+    Values
+        Its points are (nelements, npoints), flattened.
+    """
+    ne = beam.mesh.nelements
+    part = kept(beam.grids, X.tobytes(), lambda: Part(
+        beam, 0, slice(0, beam.N), None, np.repeat(np.arange(ne), X.shape[-1]),
+        np.tile(X, ne) if X.ndim == 2 else X.reshape(2, -1)), GRIDS)
+    find = None
+    if recover and hasattr(state, "recovery"):
+        def find():
+            return state.recovery(beam)
+    return Values(part, state.u_of(beam), find, getattr(state, "eigen", None))

@@ -1,0 +1,250 @@
+"""Material points: where many of them are in the beams, and what their coordinates weigh there.
+
+A point is named by its place (x, y) in the stress-free body. One is a tuple, a list or an array of
+two numbers; many are an array of shape (2, n), as scikit-fem has them, or a list of points.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..beam.layout import select_beam, select_member
+from ..core.errors import InputError, MeshError, require_finite, shown
+from ..core.kept import cached_property
+from ..beam.interpolation import BodyPart, Part
+from ..mesh.places import as_point
+from ..beam.rigid import RigidBody
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..beam.beam import Beam
+    from ..mesh.mesh_beam import MeshBeam
+    from ..core.types import Array
+    from ..beam.layout import WhichMember
+
+
+def is_many(points: Any) -> bool:
+    """True for an array of two dimensions, and for a list or tuple of points."""
+    if isinstance(points, np.ndarray):
+        return points.ndim == 2
+    return isinstance(points, (list, tuple)) and len(points) > 0 and all(
+        isinstance(p, (list, tuple, np.ndarray)) for p in points)
+
+
+def as_points(points: Any, mesh: MeshBeam | None = None) -> Array:
+    """Many points as an array (2, n), or one as an array (2,).
+
+    Parameters
+    ----------
+    points
+        Two numbers for one point; for many a list of pairs, or an array (2, n), whose columns are
+        points: those of an array of shape (2, 2) too, as of scikit-fem's ``mesh.p``.
+    mesh
+        The mesh of the beam, for hints in messages.
+
+    Raises
+    ------
+    MeshError
+        If it is neither, with what was probably meant.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> as_points([(0, 0.5), (1, 0.5), (2, 0.5)]).shape, as_points(np.zeros((2, 5))).shape
+    ((2, 3), (2, 5))
+    """
+    if not is_many(points):
+        return as_point(points, mesh)
+    if isinstance(points, np.ndarray):
+        if len(points) == 2:
+            return require_finite("points", points)
+        hint = "; give its transpose, or a list" if points.shape[1] == 2 else ""
+        raise MeshError("an array of points has shape (2, n), the x in its first row and the y in "
+                        f"its second, got {points.shape}{hint}")
+    if any(np.shape(p) != (2,) for p in points if not _ragged(p)) or any(map(_ragged, points)):
+        hint = "; an array of shape (2, n) is one too" if len(points) == 2 else ""
+        raise MeshError(f"each material point of a list is a pair (x, y), got "
+                        f"{shown(points)}{hint}")
+    return np.array([as_point(p, mesh) for p in points]).T
+
+
+def _ragged(p):
+    return not isinstance(p, np.ndarray) and any(np.ndim(x) for x in p if not isinstance(x, str))
+
+
+class Located:
+    """Points of a scene.
+
+    Attributes
+    ----------
+    one : bool
+        They were given as a single point.
+    n : int
+        How many.
+    parts : list of Part and BodyPart
+        Those of each beam and body that has some.
+    """
+
+    def __init__(self, one: bool, n: int, parts: Sequence[Any]) -> None:
+        self.one, self.n, self.parts = one, n, parts
+
+    def gather(self, values: Sequence[Array]) -> Array:
+        """One array of those of the parts, (..., n) each; (...) for a single point."""
+        if len(self.parts) == 1 and self.parts[0].index is None:
+            out = values[0]
+        else:
+            out = np.empty(values[0].shape[:-1] + (self.n,))
+            for part, value in zip(self.parts, values):
+                out[..., part.index] = value
+        return out[..., 0] if self.one else out
+
+    def displacement(self, u: Array) -> Array:
+        """Displacements for coordinates ``u`` (..., N): (..., 2), or (..., 2, n) of many."""
+        return self.gather([part.displacement(u) for part in self.parts])
+
+    def velocity(self, u: Array, v: Array) -> Array:
+        """Velocities (..., 2), or (..., 2, n) of many points.
+
+        Parameters
+        ----------
+        u, v
+            Displacement of the coordinates of the scene and its rate, shapes (..., N).
+        """
+        return self.gather([part.velocity(u, v) for part in self.parts])
+
+    @cached_property
+    def start(self) -> Array:
+        """Positions in the stress-free body."""
+        return self.gather([part.start for part in self.parts])
+
+
+class Points:
+    """Finds the points of a scene.
+
+    Parameters
+    ----------
+    beams, slices
+        The beams, and the coordinates in the scene of them and of the bodies behind them.
+    bodies
+        Rigid bodies.
+    """
+
+    def __init__(self, beams: Sequence[Beam], slices: Sequence[slice],
+                 bodies: Sequence[RigidBody] = ()) -> None:
+        self.beams, self.slices, self.bodies = list(beams), slices, list(bodies)
+
+    def find(self, points: Any, beam: WhichMember = None) -> Located:
+        """Where points are.
+
+        Parameters
+        ----------
+        points
+            One point, shape (2,), or many, shape (2, n) or a list, see :func:`as_points`; a
+            RigidBody for its centre of mass; what was found before, which is returned.
+        beam
+            The beam or rigid body that they are in, its name or number; found for each if it is not
+            given.
+
+        Returns
+        -------
+        Located
+
+        Raises
+        ------
+        MeshError
+            If a point is in none of the beams.
+        """
+        if isinstance(points, Located):
+            return points
+        if isinstance(points, str):
+            beam = select_beam(self.beams, beam)
+            points = tuple(as_point(points, beam.mesh).tolist())
+        if self.bodies:
+            found = self._of_body(points, beam)
+            if found is not None:
+                return found
+        if isinstance(points, (int, float)):
+            as_points(points)  # x and y as two arguments: y is no beam
+        one = beam is not None or self._alone
+        return self._find(as_points(points, select_beam(self.beams, beam).mesh if one else None),
+                          beam)
+
+    @property
+    def _alone(self):
+        return len(self.beams) == 1 and not self.bodies
+
+    def _of_body(self, points, beam):
+        """Located of a body that is named; None if none is."""
+        if isinstance(points, RigidBody):
+            points, beam = points.position, points
+        elif beam is None and (self.beams or len(self.bodies) > 1):
+            return None
+        body = select_member(self.beams, self.bodies, beam)
+        if not isinstance(body, RigidBody):
+            return None
+        x = as_points(body.position if points is None else points)
+        start = np.reshape(x, (2, -1))
+        return Located(x.ndim == 1, start.shape[1],
+                       [BodyPart(body, self._coordinates(body), None, start)])
+
+    def _coordinates(self, body):
+        return self.slices[len(self.beams) + [b is body for b in self.bodies].index(True)]
+
+    def _find(self, x, beam):
+        one, x = x.ndim == 1, np.reshape(x, (2, -1))
+        if beam is not None or self._alone:
+            beam = select_beam(self.beams, beam)
+            e, X, outside = beam.finder(x)
+            if np.any(outside > beam.finder.allowed):
+                raise beam.finder.refuse(x, outside)
+            k = self.beams.index(beam)
+            return Located(one, len(e), [Part(beam, k, self.slices[k], None, e, X)])
+        left, parts = np.arange(x.shape[1]), list[Any]()
+        for k, candidate in enumerate(self.beams):
+            x0, x1, y0, y1 = candidate.finder.box
+            near = (x0 <= x[0, left]) & (x[0, left] <= x1) & (y0 <= x[1, left]) & (x[1, left] <= y1)
+            if x.size and not np.any(near):
+                continue
+            e, X, outside = candidate.finder(x[:, left[near]])
+            on = outside <= candidate.finder.allowed
+            if np.any(on) or not x.size:
+                near[near] = on
+                parts.append(Part(candidate, k, self.slices[k], left[near], e[on], X[:, on]))
+                left = left[~near]
+        for body in self.bodies:
+            on = body.contains(x[:, left])
+            if np.any(on):
+                parts.append(BodyPart(body, self._coordinates(body), left[on], x[:, left[on]]))
+                left = left[~on]
+        if len(left):
+            p = (float(c) for c in x[:, left[0]])
+            more = f" ({len(left)} of {x.shape[1]} points are)" if x.shape[1] > 1 else ""
+            where = "; ".join(
+                f"{k if b.name is None else repr(b.name)}: {b.finder.extent}"
+                for k, b in list(enumerate(self.beams))[:4])
+            raise MeshError(f"the point {shown(tuple(p))} is in none of the {len(self.beams)} "
+                            f"beams{more}; {where}")
+        if len(parts) == 1:
+            parts[0].index = None
+        return Located(one, x.shape[1], parts)
+
+
+
+def require_body(system: Any, which: WhichMember) -> RigidBody:
+    """The rigid body meant by itself, its name or its number; raises InputError of a beam.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.equations.system.System`.
+    which
+        The RigidBody, its name or its number.
+    """
+    body = None if which is None else select_member(system.beams, system.bodies, which)
+    if not isinstance(body, RigidBody):
+        raise InputError(f"this is asked of rigid bodies, got {shown(which)}; those of the scene "
+                         f"are {system.bodies}")
+    return body

@@ -1,0 +1,115 @@
+"""What enters the equations of a scene from outside: states and coordinates."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..core.errors import InputError, require_finite
+from .state import State
+
+if TYPE_CHECKING:
+    from ..beam.beam import Beam
+    from ..equations.system import System
+    from ..core.types import Array
+
+_GEOMETRY = ("p", "t", "p_X", "p_Y", "p_XY", "lengths", "heights")
+
+
+def difference(a: Beam, b: Beam) -> str | None:
+    """Why coordinates of one beam mean something else on another, in words; None if they do not.
+
+    Materials, widths and loads do not matter: a displacement is one of the body.
+
+    Parameters
+    ----------
+    a, b
+        Beams; the message calls the second that of the scene.
+    """
+    if a is b or (a.mesh is b.mesh and a.element is b.element):
+        return None
+    if repr(a.element) != repr(b.element) or not _same(a.element.doflocs, b.element.doflocs):
+        return f"its element is {a.element!r}, that of the scene {b.element!r}"
+    if a.mesh.nelements != b.mesh.nelements:
+        return f"its mesh has {a.mesh.nelements} elements, that of the scene {b.mesh.nelements}"
+    if a.mesh.height != b.mesh.height:
+        return f"its height is {a.mesh.height:.9g}, that of the scene {b.mesh.height:.9g}"
+    if a.mesh.sections != b.mesh.sections:
+        return f"its sections are {a.mesh.sections}, those of the scene {b.mesh.sections}"
+    for name in _GEOMETRY:
+        if not _same(getattr(a.mesh, name), getattr(b.mesh, name)):
+            what = "the nodes lie elsewhere" if name in ("p", "p_X", "lengths") else (
+                f"{name} of the mesh differs")
+            return f"{what} in the stress-free body"
+    return None
+
+
+def _same(a: Any, b: Any) -> bool:
+    return a is b or (a is not None and b is not None and np.array_equal(a, b))
+
+
+def displacement(system: System, state: State, name: str = "start") -> Array:
+    """The displacement of a State, for the equations of a scene: a new array, shape (N,).
+
+    Parameters
+    ----------
+    system
+        The :class:`~skfem_ancf.equations.system.System`.
+    state
+        A State of the same scene, or of one whose beams have equal meshes and elements.
+    name
+        What messages call it.
+
+    Raises
+    ------
+    InputError
+        If it is not a State, or one of another mesh, or not finite.
+    """
+    if not isinstance(state, State):
+        raise InputError(f"{name} is a State, as solve_static returns it, got "
+                         f"{type(state).__name__}; scene.state(u) makes one of coordinates "
+                         f"of shape ({system.N},)")
+    other = state.system
+    if other is not system:
+        if len(other.beams) != len(system.beams):
+            raise InputError(f"{name} is a state of {len(other.beams)} beams, the scene has "
+                             f"{len(system.beams)}")
+        for k, (a, b) in enumerate(zip(other.beams, system.beams)):
+            why = difference(a, b)
+            if why:
+                who = "" if len(system.beams) == 1 else f" of beam {b.name or k}"
+                raise InputError(
+                    f"{name} is a state of another mesh{who}: {why}. Its coordinates mean "
+                    "something else here; where they do not, scene.state(other.u) takes them over")
+    places = [[(tuple(b.position), b.angle) for b in s.bodies] for s in (other, system)]
+    if places[0] != places[1]:
+        raise InputError(f"{name} is a state of other rigid bodies: at (position, angle) "
+                         f"{places[0]} there, {places[1]} in the scene")
+    return np.array(require_finite(f"{name}.u", state.u, (system.N,)))
+
+
+def configuration(system: System, state: State) -> State:
+    """A State with its multipliers, as one of the equations of a scene.
+
+    Parameters
+    ----------
+    system
+        The :class:`~skfem_ancf.equations.system.System`.
+    state
+        A State, as for :func:`displacement`.
+
+    Raises
+    ------
+    InputError
+        As :func:`displacement`, and if the state has multipliers of other joints.
+    """
+    u = displacement(system, state, "state")
+    if state.system is system:
+        return state
+    kinds = [[(type(j), j.equations) for j in s.joints] for s in (state.system, system)]
+    if kinds[0] != kinds[1]:
+        raise InputError(f"state has multipliers of other joints: {list(state.system.joints)} "
+                         f"there, {list(system.joints)} in the scene; scene.state(u, multipliers) "
+                         "takes them as they are")
+    return state.replace(system=system, u=u)

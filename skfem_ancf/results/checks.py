@@ -1,0 +1,274 @@
+"""How far a state is from what the law and the mesh are good for."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from itertools import accumulate
+from math import sin, sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..core.errors import ModelWarning
+from ..core.kept import cached_property
+from ..materials import LinearLaw
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..beam.beam import Beam
+    from .state import State
+    from ..core.types import Array
+
+#: Stretch below which St. Venant-Kirchhoff resists less the more it is compressed: the force of a
+#: fibre, E (l^3 - l) / 2, has its smallest value there.
+COMPRESSED = 1.0 / sqrt(3.0)
+#: Angle, in radians, by which the axis may turn over one element, for a cubic axis and others.
+#: A cubic cable bent by an end moment is off by 1.7, 4.5, 9, 14 % of its length at 0.76, 0.93, 1.07
+#: and 1.18 rad, and beyond 1.2 rad nothing is left of the solution; one of degree 5 by 1.5e-5 at
+#: 1.6 rad, of degree 7 by 2.4e-8 at 2, of degree 9 by 5e-11 at 2.5.
+TURNING = {3: 1.0, 5: 1.6, 7: 2.0}
+TURNING_SMOOTH = 2.5
+TINY = 1e-300
+
+
+@dataclass(frozen=True)
+class Checks:
+    """Extreme values of a state.
+
+    Attributes
+    ----------
+    smallest_det
+        Smallest determinant of the deformation gradient at the integration points.
+    smallest_stretch, largest_stretch
+        Smallest and largest principal stretch at the integration points; of a cable those of its
+        outermost fibres.
+    turning
+        Largest angle in radians by which the axis turns over one element, from the stress-free
+        state.
+    findings : tuple of str
+        What is beyond the range of the law or of the mesh; empty where nothing is.
+    """
+
+    smallest_det: float
+    smallest_stretch: float
+    largest_stretch: float
+    turning: float
+    findings: tuple = ()
+
+    def __str__(self):
+        lines = [f"det F from {self.smallest_det:.4g}, stretch from {self.smallest_stretch:.4g} to "
+                 f"{self.largest_stretch:.4g}, turning {self.turning:.3g} rad an element"]
+        return "\n".join(lines + [f"beyond its range: {text}" for text in self.findings])
+
+
+def check(state: State) -> Checks:
+    """The :class:`Checks` of a state."""
+    values, found = [], []
+    for beam in state.beams:
+        u = state.u_of(beam)
+        ratio, stretches = beam.kinematics.deformation(beam, u)
+        values.append((np.min(ratio), np.min(stretches), np.max(stretches), turning(beam, u)))
+        found += _findings(beam, values[-1][1], values[-1][3])
+    det, low, high, turn = zip(*values or [(1.0, 1.0, 1.0, 0.0)])
+    return Checks(float(min(det)), float(min(low)), float(max(high)), float(max(turn)),
+                  tuple(found))
+
+
+class Screen:
+    """A look at the tangents of all nodes that tells whether a state may be out of range.
+
+    Parameters
+    ----------
+    beams
+        The beams of a scene.
+
+    Attributes
+    ----------
+    start
+        Tangents of the nodes in the stress-free state, complex.
+    slender
+        Height over length of each element.
+    """
+
+    def __init__(self, beams: Sequence[Beam]) -> None:
+        self._none = not beams
+        if self._none:
+            return
+        self._beams = beams
+        self.start = _joined([_complex(b.mesh.p_X.T) for b in beams])
+        self.slender = _joined([b.mesh.height / b.mesh.lengths for b in beams])
+
+    @cached_property
+    def _ends(self):
+        """Nodes at the begin and the end of each element, shape (2, elements)."""
+        node = accumulate([b.N // b.nd for b in self._beams], initial=0)
+        return _joined([n + b.mesh.t for n, b in zip(node, self._beams)])
+
+    @cached_property
+    def _places(self):
+        """Of these nodes the first two coordinates, the position, as a number of a complex one."""
+        first = accumulate([b.N // 2 for b in self._beams], initial=0)
+        return _joined([n + b.nd // 2 * b.mesh.t for n, b in zip(first, self._beams)])
+
+    @cached_property
+    def _turns(self):
+        """What tells of turns: places of tangents, these at rest, and of elements the tangents.
+
+        And how far the directions of these may be apart, and what makes a strain of that.
+        """
+        first = accumulate([b.N // 2 for b in self._beams], initial=1)
+        places = _joined([np.arange(n, n + b.N // 2, b.nd // 2)
+                          for n, b in zip(first, self._beams)])
+        limits = [turning_limit(b) for b in self._beams]
+        numbers = [b.mesh.nelements for b in self._beams]
+        limit, widest = np.array([limits, [2.0 * sin(0.5 * x) for x in limits]]).repeat(numbers, 1)
+        return places, self.start, *self._ends, widest, limit / widest * self.slender
+
+    @cached_property
+    def _folds(self):
+        """What tells of folds: places of end, begin and a tangent, each with both; at rest."""
+        (begin, end), rest = self._places, _joined([_complex(b.mesh.p.T) for b in self._beams])
+        (left, right), (first, last) = self._ends, rest[self._ends]
+        return (np.concatenate([end, end, begin, begin, 1 + begin, 1 + end]).reshape(3, -1),
+                np.concatenate([last, last, first, first, self.start[left], self.start[right]]
+                               ).reshape(3, -1))
+
+    def passes(self, u: Array) -> bool:
+        """False if a fibre may be compressed, or an element may turn, beyond the range.
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (N,).
+        """
+        if self._none:
+            return True
+        # how long tangents are over what they were, and how far they have turned: the largest
+        # curvature of an element is seldom more than twice its mean
+        places, rest, begin, end, widest, thick = self._turns
+        change = _paired(u)[places] / rest + 1.0
+        stretch = np.abs(change)
+        turn = change / (stretch + TINY)
+        apart = np.abs(turn[end] - turn[begin])
+        return bool((apart < widest).all()
+                    and stretch.min() > (apart * thick).max() + 1.1 * COMPRESSED)
+
+    def folded(self, u: Array) -> bool:
+        """True if the axis of an element turns back: its ends lie against a tangent of the axis.
+
+        An axis that does so turns by more than pi over the element, or has no length in it.
+
+        Parameters
+        ----------
+        u
+            Displacement of the coordinates, shape (N,).
+        """
+        if self._none:
+            return False
+        places, rest = self._folds
+        return bool(_along(*_paired(u)[places], *rest).min() < 0.0)
+
+
+def _along(end, begin, tangent, last, first, slope):
+    """How far an element reaches along a tangent of it, of changes and of what is at rest."""
+    return ((end + last - begin - first).conjugate() * (tangent + slope)).real
+
+
+def _complex(pairs):
+    """Vectors (..., 2) as complex numbers, (...)."""
+    return _paired(pairs)[..., 0]
+
+
+def _paired(x):
+    """Numbers (..., 2 n) as n complex ones."""
+    return np.ascontiguousarray(x).view(complex)
+
+
+def _joined(arrays):
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays, axis=-1)
+
+
+def warn_of(state: State) -> None:
+    """Give a :class:`~skfem_ancf.core.errors.ModelWarning` for each finding of ``solve_static``."""
+    for text in state.system.forces.contacts.sunk(state.u, state.load):
+        warnings.warn(text, ModelWarning, stacklevel=4)
+    if state.system.screen.passes(state.u):
+        return
+    for beam in state.beams:
+        u = state.u_of(beam)
+        for text in _findings(beam, shortest(beam, u), turning(beam, u)):
+            warnings.warn(f"{text} (state.checks has the numbers)", ModelWarning, stacklevel=4)
+
+
+def _findings(beam, stretch, turn):
+    who = "" if beam.name is None else f" of beam {beam.name!r}"
+    out = []
+    if stretch < COMPRESSED and beam.has_sections and _is_linear(beam):
+        out.append(f"a fibre{who} is compressed to {stretch:.3g} of its length; below "
+                   f"{COMPRESSED:.3g} St. Venant-Kirchhoff resists less and less: use NeoHookean, "
+                   "or a smaller load")
+    if not beam.has_sections and stretch <= 0.0:
+        out.append(f"the sections{who} overlap: the axis is bent to a radius below half the height")
+    limit = turning_limit(beam)
+    if turn > limit:
+        out.append(f"the mesh{who} is too coarse for the curvature found: the axis turns by "
+                   f"{turn:.3g} rad over one element, where {limit:g} is the limit: use more "
+                   "elements there, or solve_static(adapt=...); in a Frame, elements=")
+    return out
+
+
+def _is_linear(beam):
+    return all(isinstance(t.law, LinearLaw) for t in beam.kernel.tables)
+
+
+def turning(beam: Beam, u: Array) -> float:
+    """Largest angle by which the axis turns over an element, by its tangents at the nodes.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    u
+        Displacement of its coordinates, shape (N,).
+    """
+    turn = tangents(beam, u) / tangents(beam, 0.0)
+    left, right = beam.mesh.t
+    return float(np.max(np.abs(np.angle(turn[right] * turn[left].conj()))))
+
+
+def tangents(beam: Beam, u: Array | float) -> Array:
+    """The axis' derivative r_X at the nodes, as complex numbers.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    u
+        Displacement of its coordinates, shape (N,), or 0.
+
+    Returns
+    -------
+    ndarray
+        Shape (nvertices,), complex.
+    """
+    return (beam.q0_local + u).reshape(-1, beam.nd)[:, 2:4] @ [1.0, 1.0j]
+
+
+def turning_limit(beam: Beam) -> float:
+    """The angle by which the axis may turn over one element."""
+    return TURNING.get(beam.element.axis_degree, TURNING_SMOOTH)
+
+
+def shortest(beam: Beam, u: Array) -> float:
+    """Smallest stretch of the fibres along the axis at the integration points.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    u
+        Displacement of its coordinates, shape (N,).
+    """
+    return float(beam.kinematics.shortest(beam, u))

@@ -1,0 +1,177 @@
+"""An equilibrium path as a result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..core.errors import require_index, teaching
+from .state import State
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+    from ..solvers.continuation import Point
+    from ..solvers.critical import Critical
+    from ..equations.system import System
+    from ..core.types import Array
+    from ..beam.layout import WhichBeam
+
+
+@dataclass(repr=False)
+class CriticalPoint:
+    """A limit or bifurcation point of a path.
+
+    Attributes
+    ----------
+    kind : str
+        "limit", where the load turns, or "bifurcation", where another path crosses.
+    load
+        Load factor.
+    arc
+        Arc length along the path.
+    state : State
+        The equilibrium.
+    mode
+        The null vector of the tangent stiffness, shape (N,); at a limit point the direction of
+        the path.
+    change
+        By how many the number of negative eigenvalues changes there; None if it is not known.
+    critical : Critical
+        What the solver found, from which ``scene.continuation(branch=...)`` goes on.
+    """
+
+    kind: str
+    load: float
+    arc: float
+    state: State
+    mode: np.ndarray
+    change: int
+    critical: object
+
+    def __repr__(self):
+        return f"<{self.kind} point at load {self.load:.8g}, arc length {self.arc:.6g}>"
+
+
+@teaching
+class Path:
+    """The equilibria that a continuation found.
+
+    Parameters
+    ----------
+    system
+        The :class:`~skfem_ancf.equations.system.System`.
+    points, critical
+        What :func:`skfem_ancf.solvers.continuation.continuation` returned.
+
+    Attributes
+    ----------
+    load
+        Load factors, shape (n,).
+    u
+        Displacements of the coordinates, shape (n, N).
+    arc
+        Arc length along the path, shape (n,).
+    stable
+        Whether each equilibrium is stable; None where the loads have no potential.
+    negative
+        Number of negative eigenvalues of the tangent stiffness of each, or None.
+    error
+        Size of the last correction of each point in the energy norm, relative to the work done,
+        shape (n,): all of them are equilibria to this accuracy, however long the steps.
+    critical_points : list of CriticalPoint
+        Limit and bifurcation points in the order of the path, each solved for as a point of it.
+    """
+
+    def __init__(self, system: System, points: Sequence[Point],
+                 critical: Sequence[Critical] = ()) -> None:
+        self.system, self.points = system, points
+        self.load = np.array([p.load for p in points])
+        self.u = np.array([p.u for p in points])
+        self.arc = np.array([p.arc for p in points])
+        self.error = np.array([p.error for p in points])
+        self.negative = [p.negative for p in points]
+        self.stable = [p.stable for p in points]
+        self.iterations = sum(p.iterations for p in points)
+        self.critical_points = [
+            CriticalPoint(c.kind, c.load, c.arc, self._state(c, f"{c.kind} point"), c.mode,
+                          c.change, c) for c in critical]
+
+    def __len__(self):
+        return len(self.points)
+
+    def __repr__(self):
+        return (f"<Path of {len(self)} points, load {self.load.min():.6g} to "
+                f"{self.load.max():.6g}, {len(self.limit_points())} limit and "
+                f"{len(self.bifurcation_points())} bifurcation points, {self.iterations} "
+                f"iterations, relative error {self.error.max():.1g}>")
+
+    def _repr_html_(self):
+        from ..visuals.html import path_html
+
+        return path_html(self)
+
+    def _state(self, p, message, iterations=0):
+        return State(self.system, p.u, p.load, p.force, True, iterations, message, (),
+                     p.multipliers)
+
+    def state(self, k: int) -> State:
+        """Point ``k`` as a State."""
+        p = self.points[require_index("k", k, len(self.points))]
+        return self._state(p, f"point {k}", p.iterations)
+
+    def displacement(self, point: ArrayLike, beam: WhichBeam = None) -> Array:
+        """Displacement of material points along the path.
+
+        Parameters
+        ----------
+        point
+            Its place (x, y) in the stress-free body, or those of many: an array (2, m), or a list
+            of points.
+        beam
+            The beam, its name or its number; found if it is not given.
+
+        Returns
+        -------
+        ndarray
+            Shape (n, 2), or (n, 2, m) for many points.
+        """
+        return self.system.points.find(point, beam).displacement(self.u)
+
+    def limit_points(self) -> Array:
+        """Load factors at the turning points of the load, in the order of the path."""
+        return self._loads("limit")
+
+    def bifurcation_points(self) -> Array:
+        """Load factors where other paths cross this one, in its order.
+
+        :attr:`critical_points` has their states and modes; ``scene.continuation(branch=...)`` with
+        one of them follows the other path.
+        """
+        return self._loads("bifurcation")
+
+    def _loads(self, kind):
+        return np.array([c.load for c in self.critical_points if c.kind == kind])
+
+    def plot(self, point: ArrayLike, component: int = 1, beam: WhichBeam = None,
+             **options: Any) -> Any:
+        """Draw load against a displacement.
+
+        Parameters
+        ----------
+        point
+            A material point: its place (x, y) in the stress-free body.
+        component
+            0 or 1: of the displacement.
+        beam
+            The beam, its name or its number; found if it is not given.
+        **options
+            Those of :func:`skfem_ancf.visuals.matplotlib.plot_path`.
+        """
+        from ..visuals.matplotlib import plot_path
+
+        return plot_path(self, point, component, beam, **options)

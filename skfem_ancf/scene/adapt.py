@@ -1,0 +1,409 @@
+"""Elements where the error is, of a higher degree where the solution is smooth."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..elements.base import DEGREES
+from ..core.errors import (ConvergenceError, InputError, NameUnknown, require_integer,
+                           require_positive, taught)
+from ..actions.joints.nodes import chain_ends
+from ..core.quadrature import gauss
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from ..beam.beam import Beam
+    from ..results.state import State
+    from .scene import Scene
+    from ..core.types import Array
+
+logger = logging.getLogger(__name__)
+
+#: Part of the squared error whose elements are halved.
+BULK = 0.7
+
+#: By what a higher degree has to divide the error of a beam, for the solution to be called smooth.
+SMOOTH = 10.0
+
+#: What the error is measured in.
+GOALS = ("displacement", "strain")
+
+#: Largest number of elements that may be allowed.
+MAX_ELEMENTS = 10**7
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """What one round of an adaptive solution did to a beam.
+
+    Attributes
+    ----------
+    beam
+        Number of the beam in the scene.
+    kind
+        "degree" if the degree along the axis was raised, "split" if elements were halved.
+    degree, elements
+        Degree along the axis and number of elements after it.
+    error
+        The estimate of the beam's part of the error that led to it.
+    """
+
+    beam: int
+    kind: str
+    degree: int
+    elements: int
+    error: float
+
+
+@taught
+def solve_adaptive(scene: Scene, tol: float, max_elements: int = 20000, goal: str = "displacement",
+                   max_degree: int = DEGREES[-1], **options: Any) -> State:
+    """Solve with higher degrees or on finer meshes until the estimated error is small enough.
+
+    With the goal "displacement" each round solves twice. Beams of an element that has a higher
+    degree (:meth:`~skfem_ancf.elements.ElementBeam.raised`: cables and
+    :class:`~skfem_ancf.ElementBeamANCFHermite`) are compared with the same of the next degree, as
+    long as each degree divides their error by ten and more: there the solution is smooth. All
+    others are compared with the same whose elements are halved. The difference is the estimate: in
+    the displacement of the beams' ends relative to the size of the scene, and relative in the
+    strain energy. Once the mesh resolves the solution, a method of order p leaves the finer
+    solution an error of 1 / (2^p - 1) of it, a third or less, and a higher degree a tenth of it.
+    On a curve, of which elements have cubics, only halving brings their axes closer to it.
+    Smooth beams take the higher degree for the next round; of the others the elements are halved
+    that contribute most to the difference in the energy norm.
+
+    With the goal "strain" the estimate is the difference of the elements' strain and the recovered
+    one (:mod:`skfem_ancf.recovery`), in the L2 norm over the body relative to that of the strain,
+    and the elements that contribute most to it are halved. It estimates the error of the elements'
+    strain; that of the recovered strain, which is what State.strain returns, is smaller.
+
+    Parameters
+    ----------
+    scene
+        A scene whose supports and loads were given by names, points and functions, so that they
+        can be put on another mesh.
+    tol
+        Tolerance of both estimates.
+    max_elements
+        Largest number of elements of the finer mesh.
+    goal
+        "displacement" or "strain".
+    max_degree
+        Largest degree along the axis; that of the elements, or less, to halve elements alone.
+    **options
+        Those of :func:`~skfem_ancf.solvers.newton.solve_static`.
+
+    Returns
+    -------
+    State
+        The finer one of the last round, with ``error_estimate``, a dictionary with
+        "displacement" and "energy", or "strain", ``scene``, the scene on that mesh, and
+        ``refinements``, a tuple of :class:`Refinement` that says what was done.
+
+    Raises
+    ------
+    NameUnknown
+        If the goal is not known.
+    InputError
+        If the goal is "strain" and a beam's strain cannot be recovered.
+    ConvergenceError
+        If ``max_elements`` do not suffice; its ``state`` is the last State.
+
+    References
+    ----------
+    Melenk, Wohlmuth: "On residual-based a posteriori error estimation in hp-FEM", Advances in
+    Computational Mathematics 15 (2001), for the choice by the reduction that was predicted.
+    """
+    tol = require_positive("adapt", tol)
+    max_elements = require_integer("max_elements", max_elements, 1, MAX_ELEMENTS)
+    max_degree = require_integer("max_degree", max_degree, 1, DEGREES[-1])
+    if goal not in GOALS:
+        raise NameUnknown("goal", goal, GOALS)
+    if goal == "strain":
+        return _solve_for_strain(scene, tol, max_elements, **options)
+    rounds = _Rounds(scene, tol, max_degree)
+    while True:
+        # each mesh from the stress-free state: what a coarse mesh does not see as strain a finer
+        # one does, which makes its solution a poor start
+        coarse, state = rounds.scene, rounds.state or rounds.scene._solve(None, **options)
+        fine = rounds.finer()
+        better = fine._solve(None, **options)
+        estimate, errors = _compare(coarse, state, fine, better)
+        better = better.replace(error_estimate=estimate, scene=fine,
+                                refinements=rounds.done(errors, fine))
+        n = sum(b.mesh.nelements for b in fine.beams)
+        logger.info("%d elements, %d coordinates, estimated error %.3g", n, fine.N,
+                    max(estimate.values()))
+        if rounds.judge(errors) and max(estimate.values()) <= tol:
+            return better
+        if n >= max_elements:
+            raise _too_few(n, estimate, tol, better)
+        rounds.advance(state, fine, better, errors)
+
+
+class _Rounds:
+    """The beams of an adaptive solution: which have a higher degree next, and which are split.
+
+    Parameters
+    ----------
+    scene, tol, max_degree
+        As for :func:`solve_adaptive`.
+    """
+
+    def __init__(self, scene: Scene, tol: float, max_degree: int) -> None:
+        self.scene, self.tol, self._most = scene, tol, max_degree
+        self.state: State | None = None  # where a round has solved the scene of the next
+        self._rough: set[int] = set()
+        self._before: dict[int, float] = {}
+        self._refinements: tuple[Refinement, ...] = ()
+
+    def _raised(self, k):
+        """The element of a beam of the next degree; None if its elements are to be split."""
+        element = self.scene.beams[k].element
+        # of a curve elements have cubics, which a higher degree brings no closer to it
+        may = (k not in self._rough and element.axis_degree + 2 <= self._most
+               and self.scene.beams[k].mesh.curve is None)
+        return element.raised() if may else None
+
+    def _small(self, error):
+        return error <= 0.1 * self.tol
+
+    def finer(self) -> Scene:
+        """The scene to compare with."""
+        raised = [self._raised(k) for k in range(len(self.scene.beams))]
+        everywhere = [np.arange(b.mesh.nelements if e is None else 0)
+                      for b, e in zip(self.scene.beams, raised)]
+        return _with_elements(refine(self.scene, everywhere)[0], raised)
+
+    def done(self, errors: list[float], scene: Scene) -> tuple[Refinement, ...]:
+        """All that was done, with what leads to another scene from the one there is."""
+        return self._refinements + tuple(
+            Refinement(k, "split" if new.mesh.nelements > old.mesh.nelements else "degree",
+                       new.element.axis_degree, new.mesh.nelements, errors[k])
+            for k, (old, new) in enumerate(zip(self.scene.beams, scene.beams))
+            if new.nd > old.nd or new.mesh.nelements > old.mesh.nelements)
+
+    def judge(self, errors: list[float]) -> bool:
+        """Find where a higher degree gains little; False if that is not known yet, or news."""
+        sure = True
+        for k, error in enumerate(errors):
+            if self._raised(k) is None:
+                continue
+            before = self._before.get(k)
+            if before is None:
+                sure = False
+            elif (error * SMOOTH > before and not self._small(error)
+                  and error >= 0.5 * max(errors)):  # a small one may be another beam's
+                self._rough.add(k)
+                sure = sure and before <= self.tol
+        return sure
+
+    def advance(self, state: State, fine: Scene, better: State, errors: list[float]) -> None:
+        """Take the higher degrees that gain, and split the elements that matter in other beams."""
+        beams = self.scene.beams
+        split = [new.mesh.nelements > old.mesh.nelements for old, new in zip(beams, fine.beams)]
+        raised = [None if self._small(error) and k in self._before else self._raised(k)
+                  for k, error in enumerate(errors)]
+        self._before = {k: e for k, e in enumerate(errors) if self._raised(k) is not None}
+        if all(e is not None for e in raised):
+            scene, solved = fine, better
+        else:
+            marked = _mark(self.scene, state, fine, better, split)
+            some = any(e is not None for e in raised) or any(len(m) for m in marked)
+            scene, solved = self.scene, state
+            if some:
+                scene, solved = _with_elements(refine(self.scene, marked)[0], raised), None
+        self._refinements = self.done(errors, scene)
+        self.scene, self.state = scene, solved
+
+
+def _with_elements(scene, elements):
+    """The scene with beams of other elements, where they are given."""
+    if all(e is None for e in elements):
+        return scene
+    return scene.with_beams([b if e is None else b.replace(element=e)
+                             for b, e in zip(scene.beams, elements)])
+
+
+def _too_few(n, estimate, tol, state):
+    return ConvergenceError(
+        f"{n} elements leave an estimated error of {max(estimate.values()):.3g}, adapt = {tol:g} "
+        "is not reached: raise max_elements or use an element of higher order", state)
+
+
+def _solve_for_strain(scene, tol, max_elements, **options):
+    before = 0, np.inf
+    while True:
+        state = scene._solve(None, **options)
+        parts = [strain_error(state, b) for b in scene.beams]
+        errors, sizes = (np.concatenate(x) for x in zip(*parts))
+        size = sizes.sum()
+        estimate = {"strain": float(np.sqrt(errors.sum() / size)) if size else 0.0}
+        state = state.replace(error_estimate=estimate, scene=scene)
+        logger.info("%d elements, estimated error of the strain %.3g", len(errors),
+                    estimate["strain"])
+        if estimate["strain"] <= tol:
+            return state
+        stuck = False
+        if len(errors) >= 2 * before[0]:
+            stuck = estimate["strain"] > 0.95 * before[1]
+            before = len(errors), estimate["strain"]
+        if stuck:
+            raise ConvergenceError(
+                f"the estimated error of the strain stays at {before[1]:.3g} as elements are "
+                f"added; adapt = {tol:g} is not reached: the sections cannot show this field, use "
+                "an element of higher order", state)
+        if len(errors) >= max_elements:
+            raise _too_few(len(errors), estimate, tol, state)
+        scene, _ = refine(scene, _largest(errors, [len(e) for e, _ in parts]))
+
+
+def strain_error(state: State, beam: Beam) -> tuple[Array, ...]:
+    """Squared L2 norm of recovered minus elements' strain, and of the strain, by element.
+
+    Parameters
+    ----------
+    state
+        A State.
+    beam
+        One of its beams.
+
+    Returns
+    -------
+    error, size
+        Shapes (nelements,).
+
+    Raises
+    ------
+    InputError
+        If the strain of the beam cannot be recovered.
+    """
+    recovery = state.recovery(beam)
+    if recovery is None:
+        k = list(state.beams).index(beam)
+        raise InputError('the goal "strain" needs recovered fields, which this scene has not: '
+                         f"{list(state.recovered.values())[k]}")
+    weights = np.array([1.0, 1.0, 0.5])  # eps_xy twice, from its double
+    ne, (x, w) = beam.mesh.nelements, gauss(5)
+    out, e, xi = np.zeros((2, ne)), np.repeat(np.arange(ne), 5), np.tile(x, ne)
+    for slab in beam.across.slabs:
+        eta, v = beam.across.points(slab, e, xi, 2 * max(beam.element.order, 1) + 1)
+        X = np.array([xi[:, None] + 0.0 * eta, eta]).reshape(2, ne, -1)
+        dV = (v * np.tile(w, ne)[:, None]).reshape(ne, -1) * beam.mesh.mapping().detDF(X)
+        strain = recovery.fields(X)[0]
+        gap = strain - beam.strain(state.u_of(beam), X)
+        out += [np.einsum("k,kep,ep->e", weights, f * f, dV) for f in (gap, strain)]
+    return tuple(out)
+
+
+def refine(scene: Scene, marked: Sequence[ArrayLike]) -> tuple[Scene, Callable[[Array], Array]]:
+    """The scene with elements halved, and the map of displacements onto it.
+
+    Parameters
+    ----------
+    scene
+        A scene.
+    marked
+        For each beam the numbers of the elements to halve, shapes (k,).
+
+    Returns
+    -------
+    scene, prolong
+        ``prolong(u)`` is the displacement u (N,) in the coordinates of the new scene.
+    """
+    beams = [b.with_mesh(b.mesh.refined(np.asarray(m, dtype=int)))
+             for b, m in zip(scene.beams, marked)]
+
+    def prolong(u):
+        parts = np.split(u, np.cumsum([b.N for b in scene.beams]))  # the last of rigid bodies
+        return np.concatenate([*(_prolong(b, m, v) for b, m, v in zip(
+            scene.beams, marked, parts)), parts[-1]])
+
+    return scene.with_beams(beams), prolong
+
+
+def _prolong(old, marked, u):
+    """The same displacement on the mesh with the marked elements halved: the spaces are nested."""
+    nodes = u.reshape(-1, old.element.nodal_dofs, 2)
+    marked = np.unique(marked)
+    t = old.mesh.t[:, marked]
+    q = np.concatenate([nodes[t[0]], nodes[t[1]]], axis=1)
+    middle = np.einsum("eij,ejc->eic", _halving(old, marked), q)
+    return np.insert(nodes, t[1], middle, axis=0).ravel()
+
+
+def _collect(old, marked, force):
+    """A force on the mesh with the marked elements halved, on that before: the transposed.
+
+    Of each node, (n, nb, 2), and which nodes of the finer mesh are new.
+    """
+    nb, t = old.element.nodal_dofs, old.mesh.t[:, marked]
+    there = np.insert(np.zeros(old.mesh.p.shape[1], dtype=bool), t[1], True)
+    nodes = force.reshape(-1, nb, 2)
+    out = nodes[~there]
+    shares = np.einsum("eij,eic->ejc", _halving(old, marked), nodes[there])
+    np.add.at(out, t[0], shares[:, :nb])
+    np.add.at(out, t[1], shares[:, nb:])
+    return out, there
+
+
+def _halving(beam, marked):
+    """What makes of coordinates at both ends those in the middle of elements, (n, nb, 2 nb)."""
+    nb, slope = beam.element.nodal_dofs, np.array([f[1] for f in beam.element.functionals])
+    L = beam.mesh.lengths[marked][:, None, None]
+    return (beam.element.halving[nb:] * L ** np.tile(slope, 2)) / (0.5 * L) ** slope[:, None]
+
+
+def _compare(coarse, state, fine, better):
+    """The estimate, and for each beam what it has of the larger of its parts."""
+    total, changes, energies = better.strain_energy, [], []
+    for a, b in zip(coarse.beams, fine.beams):
+        u, v = state.u_of(a), better.u_of(b)
+        there, here = (np.append([0, -1], chain_ends(beam)) for beam in (a, b))
+        ends = v.reshape(-1, b.nd)[here, :2] - u.reshape(-1, a.nd)[there, :2]
+        changes.append(float(np.max(np.hypot(*np.transpose(ends)))) / coarse.system.size)
+        energies.append(float(b.kernel.energy(v) - a.kernel.energy(u)) / (total or 1.0))
+    estimate = {"displacement": max(changes, default=0.0),
+                "energy": abs(better.strain_energy - state.strain_energy) / (abs(total) or 1.0)}
+    return estimate, [max(c, abs(e)) for c, e in zip(changes, energies)]
+
+
+def _mark(coarse, state, fine, better, split):
+    """The elements of the coarse mesh that make up most of the difference in the energy norm.
+
+    Of beams that are not ``split`` none: their elements were not halved, but of a higher degree.
+    Where the loads of both meshes differ, as those that jump within an element, the work of that
+    on the difference counts too: it bends elements far from there.
+    """
+    before, after = coarse.system.external_force(state.u), fine.system.external_force(better.u)
+    errors = []
+    for a, b, s in zip(coarse.beams, fine.beams, split):
+        if not s:
+            errors.append(np.zeros(a.mesh.nelements))
+            continue
+        u, v, every = state.u_of(a), better.u_of(b), np.arange(a.mesh.nelements)
+        d = v - _prolong(a, every, u)
+        force, new = _collect(a, every, after[fine.system.of(b)])
+        gap = force - before[coarse.system.of(a)].reshape(force.shape)
+        work = np.abs(np.sum(gap * d.reshape(len(new), *gap.shape[1:])[~new], axis=(1, 2)))
+        d = b.kernel.gather(d).reshape(b.mesh.nelements, -1)
+        local = np.abs(np.einsum("ei,eij,ej->e", d, b.kernel.tangents(v), d))
+        errors.append(local.reshape(-1, 2).sum(axis=1) + 0.5 * work[a.mesh.t].sum(axis=0))
+    chosen = _largest(np.concatenate(errors), [len(e) for e in errors])
+    return [c if s else np.arange(0) for c, s in zip(chosen, split)]
+
+
+def _largest(errors, numbers):
+    """For each beam its elements among those that make up most of the squared error."""
+    order = np.argsort(-errors)
+    keep = order[:1 + int(np.searchsorted(np.cumsum(errors[order]), BULK * errors.sum()))]
+    chosen = np.zeros(len(errors), dtype=bool)
+    chosen[keep] = True
+    return [np.nonzero(c)[0] for c in np.split(chosen, np.cumsum(numbers)[:-1])]

@@ -1,0 +1,675 @@
+"""Frames: lines between nodes, rigid or hinged where they meet."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..actions.axial import LineLoad
+from ..beam.beam import Beam
+from ..results.arguments import displacement
+from ..elements import ElementBeamCable
+from ..core.errors import (InputError, require_finite, require_finite_scalar, require_function,
+                           require_integer, require_names, require_option, require_options,
+                           require_positive, shown, teaching)
+from ..actions.joints.base import bind_joint
+from ..actions.joints.nodes import Nodes, chain_ends
+from ..actions.joints.settlements import HELD
+from ..actions.loads import DeadLoad, EndMoment, Load
+from ..mesh.frame_graph import Net, mapping_of, net_from_meshio
+from .scene import Scene
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import ArrayLike
+
+    from ..results.state import State
+    from ..core.types import Array, TimeFunction
+    from ..beam.layout import WhichBeam
+
+#: What is given for all lines, or for those of a group.
+BEAM = "height", "material", "width", "section", "element", "formulation", "damping", "compiled"
+#: Elements of a line, at most.
+MOST = 2**16
+#: Name of the beam of lines that are in no group.
+REST = "lines"
+
+
+class NodeForce(DeadLoad):
+    """A dead force on each of some ends of a beam's lines.
+
+    Parameters
+    ----------
+    beam
+        The beam.
+    ends
+        Numbers of the ends, two for each line, shape (k,).
+    value
+        The force on each, shape (2,).
+    amplitude
+        As for :class:`~skfem_ancf.actions.loads.Load`.
+    """
+
+    def __init__(self, beam: Beam, ends: Array, value: Array,
+                 amplitude: TimeFunction = None) -> None:
+        vector = np.zeros(beam.N)
+        vector.reshape(-1, beam.nd)[chain_ends(beam).ravel()[ends], :2] = value
+        super().__init__(beam, vector, amplitude)
+        self.ends, self.value = ends, value
+
+    def bind(self, beam: Beam) -> Load:
+        return self if beam is self.beam else NodeForce(beam, self.ends, self.value,
+                                                        self.amplitude)
+
+
+class NodeMoment(EndMoment):
+    """A moment on a section at a node, whose angle is counted from -pi to pi.
+
+    Parameters
+    ----------
+    beam
+        The beam.
+    end
+        Number of the end, two for each line.
+    M
+        The moment, counterclockwise.
+    amplitude
+        As for :class:`~skfem_ancf.actions.loads.Load`.
+    """
+
+    def __init__(self, beam: Beam, end: int, M: float, amplitude: TimeFunction = None) -> None:
+        super().__init__(beam, int(chain_ends(beam).ravel()[end]), M, amplitude)
+        self.end, self.boundary = end, None  # which means the same on other meshes
+
+    def bind(self, beam: Beam) -> Load:
+        return self if beam is self.beam else NodeMoment(beam, self.end, self.M, self.amplitude)
+
+    def angle(self, u: Array) -> float:
+        start = self.beam.q0_local[self.dofs] @ self.c @ [1.0, 1.0j]
+        return float(np.angle(self.direction(u) @ [1.0, 1.0j] / start))
+
+
+@teaching
+class Frame(Scene):
+    """A :class:`Scene` of lines between nodes: use :meth:`from_lines` or :meth:`from_meshio`.
+
+    Lines that meet at a node share its position, and those that are not hinged there the rotation
+    of the section. Unknowns of the solution are these of the nodes: the coordinates of the lines
+    are condensed to them, so that cost and memory are those of a sparse matrix with three rows a
+    node, however many elements a line has. The lines of a group are one beam with the name of the
+    group: ``beam="columns"`` in loads, section forces and pictures. Supports, forces and moments
+    take nodes: a name, a number, a point (x, y), a function of the points, or a list of these.
+
+    Parameters
+    ----------
+    net
+        The lines, a :class:`~skfem_ancf.mesh.frame_graph.Net`.
+    beams
+        A Beam with a chain for each line of a group, group after group, and then for the others.
+    lines
+        Numbers of the lines in the order of the chains, shape (m,).
+    hinged
+        Whether the start and the end of each line are hinged, shape (2, m).
+
+    Examples
+    --------
+    >>> from skfem_ancf import Frame, StVenantKirchhoff
+    >>> steel = StVenantKirchhoff(E=2.1e11, nu=0.3, density=7850)
+    >>> frame = Frame.from_lines([(0, 0), (0, 3), (4, 3), (4, 0)], [(0, 1), (1, 2), (2, 3)],
+    ...                          nodes={"ground": [0, 3]}, material=steel, height=0.2, width=0.1)
+    >>> state = frame.clamp("ground").point_force((1e4, 0), at=(0, 3)).solve_static()
+    >>> state.converged, round(float(state.displacement((4, 3))[0]), 5)
+    (True, 0.00124)
+    """
+
+    def __init__(self, net: Net, beams: Sequence[Beam], lines: Array, hinged: Array) -> None:
+        super().__init__(*beams)
+        self.net, self._lines, self._hinged = net, lines, hinged
+        ends = net.lines[:, lines].T.ravel()
+        self._nodes = Nodes(ends, hinged[:, lines].T.ravel(),
+                            np.zeros((net.points.shape[1], 3), dtype=bool), net, lines)
+        self._join()
+
+    @classmethod
+    def from_lines(cls, points: Any, lines: Any, groups: Mapping[str, Any] | None = None,
+                   nodes: Mapping[str, Any] | None = None, hinges: Any = (),
+                   curves: Mapping[int, Callable[[Array], Any]] | None = None, elements: Any = 1,
+                   sections: Mapping[str, Mapping[str, Any]] | None = None,
+                   tol: float | None = None, **beam: Any) -> Frame:
+        """A frame of lines between points.
+
+        Parameters
+        ----------
+        points
+            Pairs (x, y): a list, or an array of shape (n, 2).
+        lines
+            Pairs of numbers of points: a list, or an array of shape (m, 2).
+        groups
+            Numbers of lines by name: each group is a beam of that name. A line is in one group at
+            most; those in none are the beam "lines".
+        nodes
+            Numbers of points by name, for supports and loads.
+        hinges
+            Where lines may turn: "all" for a truss; or a list of numbers and names of nodes, where
+            all lines are hinged, and of pairs (line, node), each by its number or its name; or an
+            array of such pairs, shape (k, 2).
+        curves
+            By the number of a line a function of parameters s (k,), from 0 to 1, that returns the
+            points (2, k) of its axis.
+        elements
+            How many elements a line is divided into, or for each line, shape (m,).
+        sections
+            Arguments of ``beam`` by group, where they differ: ``{"columns": {"height": 0.3}}``.
+        tol
+            Points not farther apart than this are one node, at the place of the first of them, and
+            a line between two of them is left out; numbers of points and lines stay. By default
+            1e-5 of the size of the frame, or 1e-3 of its longest line if that is less, and a
+            ModelWarning names such points. It also names points that are nearly as close, and stay
+            apart. With 0 all points are nodes of their own.
+        **beam
+            ``height``, and the arguments of :class:`~skfem_ancf.Beam`: ``material`` and ``width``
+            or ``section``, and where they differ from these ``element`` (``ElementBeamCable(5)``),
+            ``formulation``, ``damping``. The height is a number, or of tapered lines a function of
+            s (n,), which runs from 0 to 1 along each line from its first point to its second, that
+            returns heights (n,), with kinks at nodes of the elements; or a list with one of these
+            for each line, in ``sections`` for each line of the group. Functions of material
+            coordinates (x, y), as of a width or a modulus, take this s for x.
+
+        Returns
+        -------
+        Frame
+
+        Raises
+        ------
+        MeshError
+            If a line joins an unknown point, has no length, or is there twice; if a point is in
+            no line, or two are at one place with ``tol=0``.
+        InputError
+            If an argument is of the wrong kind.
+
+        Examples
+        --------
+        A portal with haunches, whose girder is of constant height in the middle:
+
+        >>> import numpy as np
+        >>> from skfem_ancf import Frame, StVenantKirchhoff
+        >>> hall = Frame.from_lines(
+        ...     [(0, 0), (0, 4), (10, 4), (10, 0)], [(0, 1), (1, 2), (3, 2)], elements=4,
+        ...     groups={"columns": [0, 2], "girder": [1]}, width=0.2, sections={
+        ...         "columns": {"height": lambda s: 0.3 + 0.3 * s},
+        ...         "girder": {"height": lambda s: 0.4 + 0.8 * np.maximum(abs(s - 0.5) - 0.25, 0)}},
+        ...     material=StVenantKirchhoff(E=2.1e11, nu=0.3))
+        >>> state = hall.clamp([0, 3]).line_load((0, -1e5), beam="girder").solve_static()
+        >>> round(float(hall.rotations(state)[1]), 5)
+        -0.00188
+
+        An arch:
+
+        >>> arch = Frame.from_lines([(-1, 0), (1, 0)], [(0, 1)], elements=8, height=0.01, width=0.1,
+        ...                         curves={0: lambda s: np.array([-np.cos(np.pi * s),
+        ...                                                        np.sin(np.pi * s)])},
+        ...                         material=StVenantKirchhoff(E=2e11, nu=0.3))
+        >>> round(float(arch.beams[0].mesh.lengths.sum()), 6)
+        3.141593
+        """
+        require_options("Frame.from_lines", beam, ("points", "lines", "groups", "nodes", "hinges",
+                                                   "curves", "elements", "sections", "tol", *BEAM))
+        return cls._made(Net(points, lines, groups, nodes, curves, tol), hinges, elements, sections,
+                         beam)
+
+    @classmethod
+    def from_meshio(cls, mesh: Any, hinges: Any = (), elements: Any = 1,
+                    sections: Mapping[str, Mapping[str, Any]] | None = None, groups: Any = None,
+                    tol: float | None = None, **beam: Any) -> Frame:
+        """A frame of the line cells of a mesh: of Gmsh's ``.msh``, ``.vtu``, and others.
+
+        Parameters
+        ----------
+        mesh
+            A ``meshio.Mesh``, or the name of a file. Each cell "line", or "line3", "line4", ...,
+            which are curved, is a line. Cell sets and physical groups are names: those of vertices,
+            and point sets, of nodes, those of lines of their ends, and in :meth:`line_load` of the
+            lines. Other kinds of cells are refused.
+        hinges, elements, sections, tol, **beam
+            As for :meth:`from_lines`.
+        groups
+            Names of the sets of lines that are beams, no line in two of them; other sets may
+            overlap. By default those that are named in ``sections``, and those that share no line
+            with another set. Names that meshio writes into files without sets, as numbers called
+            "column-girder", are read if one of them is named here or in ``sections``.
+
+        Returns
+        -------
+        Frame
+
+        Raises
+        ------
+        FileError
+            If the file cannot be read.
+        MeshError
+            If it holds no lines, or cells of other kinds, or as for :meth:`from_lines`.
+
+        Examples
+        --------
+        >>> import meshio
+        >>> from skfem_ancf import Frame, StVenantKirchhoff
+        >>> mesh = meshio.Mesh([[0, 0], [0, 1], [1, 1]], [("line", [[0, 1], [1, 2]])],
+        ...                    cell_sets={"column": [[0]], "girder": [[1]]})
+        >>> frame = Frame.from_meshio(mesh, material=StVenantKirchhoff(E=2e11, nu=0.3), height=0.1,
+        ...                           width=0.1)
+        >>> [beam.name for beam in frame.beams]
+        ['column', 'girder']
+        """
+        require_options("Frame.from_meshio", beam,
+                        ("mesh", "hinges", "elements", "sections", "groups", "tol", *BEAM))
+        named = list(mapping_of("sections", sections))
+        return cls._made(net_from_meshio(mesh, groups, named, tol), hinges, elements, sections,
+                         beam)
+
+    @classmethod
+    def _made(cls, net, hinges, elements, sections, options):
+        m = net.lines.shape[1]
+        elements = _elements(elements, m)
+        sections = mapping_of("sections", sections)
+        require_names("group of lines in sections", list(sections), [*net.beams, REST])
+        for name, given in sections.items():
+            require_options(f"the section of {name!r}", mapping_of(f"sections[{name!r}]", given),
+                            BEAM)
+        groups = {name: net.groups[name] for name in net.beams}
+        rest = np.setdiff1d(net.kept, np.concatenate([*groups.values(), [-1]]))
+        if len(rest):
+            if REST in groups:
+                raise InputError(f"lines {rest[:5].tolist()} are in no group and would be the beam "
+                                 f"{REST!r}, which is the name of a group: name it otherwise")
+            groups[REST] = rest
+        beams = []
+        for name, lines in groups.items():
+            given = {"element": ElementBeamCable(5), **options, **sections.get(name, {})}
+            if "height" not in given:
+                raise InputError("the lines need a height of their section: give height=, or one "
+                                 f"for each group in sections, as {{{name!r}: {{'height': 0.1}}}}")
+            numbers = lines if "height" in sections.get(name, {}) else np.arange(m)
+            height, lines = _heights(given.pop("height"), numbers), np.intersect1d(lines, net.kept)
+            groups[name] = lines
+            if isinstance(height, list):
+                height = [height[k] for k in np.searchsorted(numbers, lines)]
+            mesh = net.mesh(lines, elements, height)
+            beams.append(Beam(mesh, name=name, **given))
+        net.curves = {}  # the meshes have them
+        return cls(net, beams, np.concatenate(list(groups.values())), _hinged(net, hinges))
+
+    def _join(self):
+        """Bind the nodes anew."""
+        given = self._nodes._unsealed()
+        with self._lock:
+            bound = bind_joint(given, self)
+            given._seal()
+            self._joints = ((given, bound), *self._joints[1:])
+            self._system = None
+
+    def __repr__(self):
+        n, m = len(np.unique(self.net.same)), len(self._lines)
+        return f"<Frame of {m} line(s) between {n} nodes, {len(self.loads)} load(s)>"
+
+    @property
+    def _bound(self) -> Any:
+        """The joint of the nodes, bound."""
+        return self._joints[0][1]
+
+    @property
+    def points(self) -> Array:
+        """Places of the nodes, shape (2, n)."""
+        return self.net.points
+
+    def nodes(self, place: Any) -> Array:
+        """Numbers of the nodes at a place, shape (k,).
+
+        Parameters
+        ----------
+        place
+            The name of nodes, or of lines for their ends, the number of a node, a point as a tuple
+            (x, y), a function of the points x (2, n) that returns n truth values, an array of
+            numbers, an array of points (k, 2), or a list of these.
+        """
+        return self.net.nodes_at(place)
+
+    # supports
+
+    def hold(self, place: Any, *what: str) -> Frame:
+        """Hold nodes: their displacement along x, along y, or their rotation.
+
+        Parameters
+        ----------
+        place
+            Nodes, see :meth:`nodes`.
+        *what
+            Of "x", "y" and "angle".
+
+        Returns
+        -------
+        Frame
+            Itself.
+
+        Raises
+        ------
+        InputError
+            If the rotation is held of a node at which all lines are hinged.
+        """
+        return self._hold(place, require_names("what is held", list(what), HELD))
+
+    def _hold(self, place, names, settled=None):
+        """Hold nodes; they may be displaced."""
+        nodes, held, known = self.nodes(place), self._nodes.held.copy(), self._nodes
+        for name in names:
+            held[nodes, HELD.index(name)] = True
+        if "angle" in names:
+            self._require_rigid(nodes, "it has no rotation to hold, pin it")
+        self._nodes = Nodes(known.nodes, known.hinged, held, self.net, self._lines,
+                            known.settled if settled is None else settled)
+        self._join()
+        return self
+
+    def settle(self, place: Any, x: float | Callable[[float], float] | None = None,
+               y: float | Callable[[float], float] | None = None,
+               angle: float | Callable[[float], float] | None = None) -> Frame:
+        """Displace nodes along x or y, or turn them, by what is given; it is held, too.
+
+        Parameters
+        ----------
+        place
+            Nodes, see :meth:`nodes`.
+        x, y
+            By how much, from where the nodes are in the stress-free state: a number, which grows
+            with the load of a static solution; or a function of time, in statics of the load
+            factor, for motions as well.
+        angle
+            The rotation in radians, counterclockwise, of any size; in the same way.
+
+        Returns
+        -------
+        Frame
+            Itself.
+
+        Raises
+        ------
+        InputError
+            If nothing is given, or the rotation of a node at which all lines are hinged.
+
+        Examples
+        --------
+        A girder of E I = 1 between clamps, one of which sinks by w, is sheared by 12 E I w / L^3:
+
+        >>> from skfem_ancf import Frame, StVenantKirchhoff
+        >>> frame = Frame.from_lines([(0, 0), (1, 0)], [(0, 1)], height=0.01, width=0.01,
+        ...                          material=StVenantKirchhoff(12e8, 0.3))
+        >>> state = frame.clamp([0, 1]).settle(1, y=-1e-4).solve_static()
+        >>> round(float(state.reactions(0).force[1]), 6)
+        0.0012
+        """
+        given = {name: value for name, value in zip(HELD, (x, y, angle)) if value is not None}
+        if not given:
+            raise InputError("settle() displaces nodes: give x=, y= or angle=, a number or a "
+                             "function of time")
+        settled, nodes = self._nodes.settled, self.nodes(place)
+        for name, value in given.items():
+            settled = settled.given(nodes, HELD.index(name), require_function(
+                name, value, "of time that returns a number") if callable(value) else
+                require_finite_scalar(name, value))
+        return self._hold(place, list(given), settled)
+
+    def _require_rigid(self, nodes, advice):
+        loose = np.setdiff1d(nodes, self._nodes.nodes[~self._nodes.hinged])
+        if len(loose):
+            raise InputError(f"all lines are hinged at node {loose[0]}: {advice}")
+
+    def clamp(self, boundary: Any, beam: WhichBeam = None, thickness: str = "free") -> Frame:
+        """Hold nodes fast: their positions and, where a line is rigid there, their rotation.
+
+        That of the best straight line through a section, which may still warp and change its
+        thickness, as at the other nodes.
+
+        Parameters
+        ----------
+        boundary
+            Nodes, see :meth:`nodes`.
+        beam, thickness
+            Of a Scene; of a frame None and "free".
+
+        Returns
+        -------
+        Frame
+            Itself.
+        """
+        _no_beam(beam)
+        require_option("thickness at the nodes of a frame", thickness, ("free",))
+        return self.hold(boundary, *HELD)
+
+    def pin(self, boundary: Any, beam: WhichBeam = None) -> Frame:
+        """Fix the positions of nodes, which may turn.
+
+        Parameters
+        ----------
+        boundary
+            Nodes, see :meth:`nodes`.
+        beam
+            Of a Scene; of a frame None.
+
+        Returns
+        -------
+        Frame
+            Itself.
+        """
+        _no_beam(beam)
+        return self.hold(boundary, "x", "y")
+
+    # loads
+
+    def point_force(self, force: ArrayLike, at: Any, beam: WhichBeam = None,
+                    amplitude: TimeFunction = None) -> Frame:
+        """A dead force on each of some nodes, or on a material point of a beam.
+
+        Parameters
+        ----------
+        force
+            The force on each of them, shape (2,).
+        at
+            Nodes, see :meth:`nodes`; with ``beam`` a material point (x, y).
+        beam
+            The beam, its name or its number, for a point between nodes.
+        amplitude
+            A function of time by which the force is multiplied in a motion.
+
+        Returns
+        -------
+        Frame
+            Itself.
+        """
+        if beam is not None:
+            super().point_force(force, at, beam, amplitude)
+            return self
+        force = require_finite("force", force, (2,))
+        number, end = self._ends_at(at)
+        self._put(loads=[(int(k), NodeForce(self.beams[k], end[number == k], force, amplitude))
+                         for k in np.unique(number)])
+        return self
+
+    def moment(self, boundary: Any, M: float, beam: WhichBeam = None,
+               amplitude: TimeFunction = None) -> Frame:
+        """A moment on each of some nodes.
+
+        Parameters
+        ----------
+        boundary
+            Nodes, see :meth:`nodes`, at which a line is rigid.
+        M
+            The moment (force times length), counterclockwise.
+        beam
+            Of a Scene; of a frame None.
+        amplitude
+            A function of time by which the moment is multiplied in a motion.
+
+        Returns
+        -------
+        Frame
+            Itself.
+
+        Raises
+        ------
+        InputError
+            If all lines are hinged at one of the nodes.
+        """
+        _no_beam(beam)
+        M = require_finite_scalar("M", M)
+        self._require_rigid(self.nodes(boundary), "no line takes a moment there; leave one of them "
+                            "rigid, by pairs (line, node) in hinges")
+        loads = [(k, NodeMoment(self.beams[k], int(end), M, amplitude))
+                 for k, end in zip(*self._ends_at(boundary))]
+        self._put(loads=loads)
+        return self
+
+    def line_load(self, force: ArrayLike | Callable[[Array], Array], beam: WhichBeam = None,
+                  amplitude: TimeFunction = None) -> Frame:
+        """A dead force per length of the axis of lines.
+
+        Parameters
+        ----------
+        force
+            Force per length of the stress-free axis: constant, shape (2,), or a function of the
+            points x (2, ...) of the axis that returns (2, ...).
+        beam
+            The beam, its name or its number; or the name of a set of lines of the mesh.
+        amplitude
+            A function of time by which the force is multiplied in a motion.
+
+        Returns
+        -------
+        Frame
+            Itself.
+        """
+        known = [b.name for b in self.beams]
+        if not isinstance(beam, str) or beam in known or beam not in self.net.groups:
+            super().line_load(force, beam, amplitude)
+            return self
+        loads, chains = [], np.isin(self._lines, self.net.groups[beam])
+        for k, b in enumerate(self.beams):
+            some, chains = np.split(chains, [len(chain_ends(b))])
+            if np.any(some):
+                loads.append((k, LineLoad(force, None, amplitude, np.flatnonzero(some))))
+        self._put(loads=loads)
+        return self
+
+    def _ends_at(self, place):
+        """Of nodes the beams (k,) whose ends lead there, and numbers of these ends (k,)."""
+        ends = self._bound.leading(self.nodes(place))
+        first = np.cumsum([0] + [chain_ends(beam).size for beam in self.beams])
+        number = np.searchsorted(first, ends, side="right") - 1
+        return number, ends - first[number]
+
+    # results
+
+    def rotations(self, state: State) -> Array:
+        """Rotations of the nodes, from -pi to pi, shape (n,); NaN where all lines are hinged.
+
+        Parameters
+        ----------
+        state
+            A State of this frame.
+        """
+        joint, u = self._bound, displacement(self.system, state, "state")
+        out = np.full(self.points.shape[1], np.nan)
+        rigid = joint.leaders[~joint.hinged[joint.leaders]]
+        out[joint.nodes[rigid]] = np.angle(joint.turns(u)[rigid])
+        return out[self.net.same]
+
+    def with_beams(self, beams: Sequence[Beam]) -> Frame:
+        """The same frame with other beams, whose lines end where they did.
+
+        Parameters
+        ----------
+        beams
+            As many beams, in the same order: of other elements, materials or sections, or on
+            meshes with other nodes between the ends of the lines.
+
+        Returns
+        -------
+        Frame
+
+        Raises
+        ------
+        InputError
+            If lines end elsewhere, or as :meth:`Scene.with_beams <skfem_ancf.Scene.with_beams>`.
+        """
+        self._require_beams(beams)
+        for old, new in zip(self.beams, beams):
+            a, b = (beam.mesh.p[:, chain_ends(beam)] for beam in (old, new))
+            if a.shape != b.shape or np.max(np.abs(a - b)) > 1e-9 * self.net.size:
+                raise InputError(f"{new!r} must have a chain for each line of {old!r}, from the "
+                                 "same point to the same point: nodes between them may be others")
+        frame = type(self)(self.net, beams, self._lines, self._hinged)
+        known = self._nodes
+        frame._nodes = Nodes(known.nodes, known.hinged, known.held, self.net, self._lines,
+                             known.settled)
+        frame._join()
+        self._put_on(frame, [joint for joint, _ in self._joints[1:]])
+        return frame
+
+
+def _no_beam(beam):
+    if beam is not None:
+        raise InputError(f"a frame is held and loaded at nodes, got beam={shown(beam)}: name the "
+                         "nodes, by a name, a number, or a point (x, y)")
+
+
+def _elements(elements, m):
+    """How many elements each line has, (m,)."""
+    if isinstance(elements, (int, np.integer)) and not isinstance(elements, bool):
+        return np.full(m, require_integer("elements", elements, 1, MOST))
+    found = require_finite("elements", elements, (m,))
+    if np.any(found != np.floor(found)) or not np.all((found >= 1) & (found <= MOST)):
+        raise InputError(f"elements is an integer from 1 to {MOST}, or one for each line, got "
+                         f"{shown(elements)}")
+    return found.astype(np.int64)
+
+
+def _heights(height, lines):
+    """A number or a function; or a list of them, one for each of some lines."""
+    if callable(height):
+        return height
+    if not isinstance(height, (list, tuple)) and np.ndim(height) != 1:
+        return require_finite_scalar("height", height)
+    if len(height) != len(lines):
+        raise InputError(f"height has {len(height)} entries for {len(lines)} line(s): give a "
+                         "number, a function of s from 0 to 1 along each line, or a list with one "
+                         "of these for each line; one given in sections for each of the group")
+    return [one if callable(one) else require_positive(f"height of line {k}", one)
+            for k, one in zip(lines, height)]
+
+
+def _hinged(net, hinges):
+    """Whether the start and the end of each line are hinged, (2, m)."""
+    lines = net.given  # before ends became one node: what is hinged at one of them stays so
+    out = np.zeros(lines.shape, dtype=bool)
+    if isinstance(hinges, str) and hinges == "all":
+        return ~out
+    if isinstance(hinges, (str, int, np.integer)):
+        hinges = [hinges]
+    if not isinstance(hinges, (list, tuple, set, frozenset)) and not (
+            isinstance(hinges, np.ndarray) and hinges.ndim):
+        raise InputError('hinges are "all", or a list of nodes and of pairs (line, node), got '
+                         f"{shown(hinges)}")
+    for one in hinges:
+        if isinstance(one, (tuple, list, np.ndarray)) and len(one) == 2:
+            line, node = (int(net.lines_of(one[0])[0]), int(net.points_at(one[1])[0]))
+            at = lines[:, line] == node
+            if not np.any(at):
+                raise InputError(f"line {line} does not end at node {node}: it joins "
+                                 f"{lines[:, line].tolist()}")
+            if line not in net.kept:
+                raise InputError(f"line {line} cannot be hinged: its ends are one node, as they "
+                                 f"are not farther apart than tol = {net.tol:.3g}")
+            out[at, line] = True
+        else:
+            out |= np.isin(lines, net.points_at(one))
+    return out

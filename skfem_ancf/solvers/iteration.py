@@ -1,0 +1,350 @@
+"""The iteration to equilibrium: Newton's method, mixed or not, as a text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..core.band import (clear, copy, diagonal, dot, factorize, fix, largest, multiply, solve,
+                         weighted)
+from ..beam.strain_energy import body_carry, body_force, body_tangent
+from ..equations.border import (Factors, add_curvature, factorize_bordered, mean_stiffness,
+                                new_factors, solve_bordered)
+from ..actions.forces.texts import (add_elastic_force, add_element_tangent, contact_along,
+                                    contact_work)
+from ..core.callbacks import own_solve
+from ..core.source import F1, borrowed, by_place, lanes, source
+from ..actions.tables import (add_constraint_rate, add_joint_force, add_load_stiffness, constraint,
+                              external_force, joint_directions)
+
+if TYPE_CHECKING:
+    from ..equations.tables import Equations
+
+#: Stiffness that a coordinate is taken to have in norms at least, over the mean of all, each times
+#: the square of its size: that of a rigid body has none of its own.
+SMALLEST = 1e-14
+#: How an iteration ends.
+CONVERGED, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
+#: Corrections at least, where the residual at the start is not round-off.
+LEAST = 2
+#: What joints may be open by, over the sizes of their equations.
+CLOSED = 1e-12
+#: Work of the third correction, as a root over that of all forces, of an iteration that is astray.
+ASTRAY = 0.9
+
+
+class Target(NamedTuple):
+    """The equilibrium asked for.
+
+    Attributes
+    ----------
+    factors, before, scale
+        Of the tables of loads, the same for the first tangent, and of loads of one's own.
+    at, c, g
+        Time of the joints, and their tables at it.
+    gap
+        The force that may be missing, shape (N,).
+    prescribed
+        By how much the fixed coordinates have to change.
+    """
+
+    factors: F1
+    before: F1
+    scale: float
+    at: float
+    c: F1
+    g: F1
+    gap: F1
+    prescribed: F1
+
+
+class Rules(NamedTuple):
+    """When it has converged.
+
+    Attributes
+    ----------
+    mixed
+        1 if the geometric part takes carried stresses.
+    iterations
+        At most.
+    tol, floor, force_floor
+        Tolerance of a correction, and round-off of its work and of the residual.
+    inaccurate
+        What a border's solution may be wrong by, relative.
+    solver
+        Handle of what solves the linear systems, see :mod:`skfem_ancf.core.callbacks`; 0 for the
+        band.
+    wary
+        1 if it ends where the first corrections do not get smaller.
+    """
+
+    mixed: int
+    iterations: int
+    tol: float
+    floor: float
+    force_floor: float
+    inaccurate: float
+    solver: int
+    wary: int
+
+
+class Unknowns(NamedTuple):
+    """What is found: displacement, multipliers, internal force, stresses and those carried."""
+
+    u: F1
+    multipliers: F1
+    force: F1
+    stresses: F1
+    carried: F1
+
+
+@by_place
+class Work(NamedTuple):
+    """Work arrays: residual, correction, displacement before it, 1 / diagonal, loads, joints'
+    opening and correction.
+    """
+
+    R: F1
+    du: F1
+    before: F1
+    scale: F1
+    load: F1
+    push: F1
+    phi: F1
+    dm: F1
+    factors: Factors
+
+
+def room_for_iterations(e: Equations, m: int) -> Work:
+    """The :class:`Work` of a scene.
+
+    Parameters
+    ----------
+    e
+        :class:`~skfem_ancf.equations.Equations`.
+    m
+        Number of multipliers.
+    """
+    N = e.free.size
+    R, du, before, scale, load, push = np.empty((6, N))
+    return Work(R, du, before, scale, load, push, np.zeros(m), np.zeros(m),
+                new_factors(e.border, e.K, m, N))
+
+
+@source
+def equilibrium(e, target, rules, x, w, record):
+    """Iterate to equilibrium from x, in place.
+
+    Parameters
+    ----------
+    e
+        :class:`~skfem_ancf.equations.Equations`.
+    target, rules, x, w
+        As above.
+    record
+        Takes the residuals of each iteration, shape (iterations + 1, 2).
+
+    Returns
+    -------
+    status, number
+        How it ends, and the number of linear systems solved.
+    """
+    target, x = borrowed(target), borrowed(x)
+    N, m = x.u.size, x.multipliers.size
+    clear(w.dm)
+    work = before = reference = np.inf
+    quiet, moving = False, dot(target.prescribed, target.prescribed) > 0.0
+    for k in range(rules.iterations + 1):
+        # after the last correction only the residual is wanted, not the tangent
+        part = min(1.0, work / before) if k > 1 else 1.0
+        last = (k >= LEAST or (k > 0 and quiet)) and settled(work * part, reference, rules)
+        if last:
+            body_force(e.body, x.u, x.force)
+            add_elastic_force(e.forces, target.at, 0.0, x.u, x.u, x.force)
+        else:
+            _tangent(e, target, rules, x, w, k)
+        opening = _residual(e, target, x, w)
+        rho = np.sqrt(weighted(w.R, w.R, w.scale))
+        size = np.sqrt(max(weighted(x.force, x.force, w.scale), weighted(w.load, w.load, w.scale)))
+        if not rho < 1e300:
+            return NOT_FINITE, k
+        record[k, 0] = rho / size if size > 0.0 else 0.0
+        if k == 0:
+            small = rho <= 1e-3 * rules.tol * size
+            # no more than round-off: of a slender beam that may be a load, the correction tells
+            quiet = rho <= rules.force_floor
+        else:
+            small = last and rho <= rules.tol * size + rules.force_floor
+        if small and not moving and opening <= CLOSED:
+            return CONVERGED, k
+        if k == rules.iterations:
+            break
+        if last:
+            _tangent(e, target, rules, x, w, k)
+        before, work = work, _correction(e, target, rules, x, w, moving)
+        if not (0.0 <= work < 1e300):
+            return SINGULAR, k
+        if e.forces.contacts.number > 0 and not moving:
+            _hold_back(e, target.at, x, w)
+        moving = False
+        copy(x.u, w.before)
+        for i in lanes(N):
+            x.u[i] += w.du[i]
+        for i in lanes(m):
+            x.multipliers[i] += w.dm[i]
+        reference = reference_work(x.force, w.load, x.u)
+        record[k, 1] = work / reference if reference > 0.0 else 0.0
+        if rules.wary > 0 and k == 2 and record[k, 1] > ASTRAY:
+            return NOT_CONVERGED, k + 1
+    return NOT_CONVERGED, rules.iterations
+
+
+@source
+def reference_work(force, load, u):
+    """The root of the work that corrections are compared with: that of the forces on the way."""
+    return np.sqrt(max(abs(dot(force, u)), abs(dot(load, u))))
+
+
+@source
+def settled(work, reference, rules):
+    """True if a correction's work, as a root, is as small as is asked, or round-off."""
+    return work <= rules.tol * reference + rules.floor
+
+
+@source
+def _tangent(e, target, rules, x, w, k):
+    """The internal force, the tangent, and 1 / its diagonal."""
+    mixed = rules.mixed > 0 and k > 0
+    if mixed:
+        body_carry(e.body, w.before, w.du, x.stresses, x.carried)
+    body_tangent(e.body, x.u, x.force, x.carried, mixed, x.stresses, e.K)
+    add_elastic_force(e.forces, target.at, 0.0, x.u, x.u, x.force)
+    factors, t = (target.factors, np.nan) if k > 0 else (target.before, np.inf)
+    add_load_stiffness(e.loads, factors, t, target.scale, x.u, e.K)
+    add_element_tangent(e.forces, target.at, x.u, e.K)
+    diagonal(e.K, w.scale)
+    for i in lanes(x.u.size):
+        w.scale[i] = np.abs(w.scale[i])
+    least = SMALLEST * mean_stiffness(w.scale, e.sizes)
+    for i in lanes(x.u.size):
+        w.scale[i] = 1.0 / (w.scale[i] + least / (e.sizes[i] * e.sizes[i]))
+
+
+@source
+def _residual(e, target, x, w):
+    """The residual at free coordinates; returns how far joints are open, over their sizes."""
+    external_force(e.loads, target.factors, np.nan, target.scale, x.u, w.load)
+    clear(w.push)
+    opening = 0.0
+    if w.phi.size > 0:
+        constraint(e.joints, target.c, target.g, target.at, x.u, w.phi)
+        add_joint_force(e.joints, target.g, target.at, x.u, x.multipliers, w.push)
+        for k in lanes(w.phi.size):
+            w.dm[k] = w.phi[k] / e.joints.sizes[k]
+        opening = largest(w.dm)
+    for i in lanes(x.u.size):
+        w.R[i] = (w.load[i] - x.force[i] - target.gap[i] - w.push[i]) * e.free[i]
+    return opening
+
+
+@source
+def _correction(e, target, rules, x, w, moving):
+    """The correction into w; returns the root of its work, negative if there is none."""
+    N, m = x.u.size, w.phi.size
+    clear(w.push)
+    if moving:  # R = R - K du of the fixed coordinates
+        for k in lanes(e.fixed.size):
+            w.push[e.fixed[k]] = target.prescribed[k]
+        multiply(e.K, w.push, w.du)
+        for i in lanes(N):
+            w.R[i] = (w.R[i] - w.du[i]) * e.free[i]
+        if m > 0:
+            add_constraint_rate(e.joints, target.g, target.at, x.u, w.push, w.phi)
+    for k in lanes(m):
+        w.phi[k] = -w.phi[k]
+    fix(e.K, e.fixed)
+    if not _solved(e, target, rules, x, w):
+        return -1.0
+    work = np.sqrt(abs(dot(w.R, w.du)) + abs(dot(w.phi, w.dm)))
+    for i in lanes(N):
+        w.du[i] += w.push[i]
+    return work
+
+
+#: Part of the work that a correction leaves along its direction, up to which it is taken; of the
+#: work tried, and how often; parts of a correction that are looked at for obstacles on the way.
+LEFT, TRIES, PARTS = 0.5, 12, 16
+
+
+@source
+def _hold_back(e, t, x, w):
+    """Shorten a correction that runs into obstacles.
+
+    Of the equations linearised without contact, and contact as it is, what is left along the
+    correction has to be small, see Crisfield (1991), 9.2: without that points come and go.
+    """
+    N, work, two = x.u.size, dot(w.R, w.du), np.empty(2)
+    there, room = np.empty(N), np.zeros(N)
+    contact_along(e.forces, t, x.u, w.du, two)
+    if not work > 0.0:
+        return
+    parts = int(min(max(np.ceil(two[1]), 1.0), PARTS))
+    before, low, high = contact_work(e.forces, t, x.u, w.du, room), 0.0, 1.0
+    left, left_low = work, work
+    for k in range(parts):
+        high = (k + 1.0) / parts
+        left = _left(e, t, x, w, high, work, two[0], before, there, room)
+        if left < -LEFT * work:
+            break
+        low, left_low = high, left
+    if left >= -LEFT * work:
+        return
+    s = high
+    for k in range(TRIES):
+        s = 0.5 * (low + high) if left_low <= 0.0 or k > 2 else max(
+            low + 0.1 * (high - low), low + (high - low) * left_low / (left_low - left))
+        now = _left(e, t, x, w, s, work, two[0], before, there, room)
+        if abs(now) <= LEFT * work:
+            break
+        if now > 0.0:
+            low, left_low = s, now
+        else:
+            high, left = s, now
+    for i in lanes(N):
+        w.du[i] *= s
+    for k in lanes(w.dm.size):
+        w.dm[k] *= s
+
+
+@source
+def _left(e, t, x, w, s, work, along, before, there, room):
+    """What is left along the correction at a part s of it."""
+    for i in lanes(there.size):
+        there[i] = x.u[i] + s * w.du[i]
+    now = contact_work(e.forces, t, there, w.du, room)
+    return (1.0 - s) * work - (now - before - s * along)
+
+
+@source
+def _solved(e, target, rules, x, w):
+    """Solve for the correction; False if the matrix is singular."""
+    if rules.solver > 0:
+        return own_solve(rules.solver, target.at, x.u, x.multipliers, w.R, w.phi, w.du, w.dm)
+    if w.phi.size == 0:
+        copy(w.R, w.du)
+        if not factorize(e.K):
+            return False
+        solve(e.K, w.du)
+        return True
+    f = w.factors
+    joint_directions(e.joints, target.g, target.at, x.u, f.J)
+    for k in range(w.phi.size):
+        row = f.J[k]
+        for i in lanes(row.size):
+            row[i] *= e.free[i]
+    add_curvature(e.joints, e.border, x.multipliers, e.free, e.sizes, e.K, f)
+    if not factorize_bordered(f, e.border, e.free):
+        return False
+    error = solve_bordered(f, e.border, w.R, w.phi, w.du, w.dm)
+    return 0.0 <= error <= rules.inaccurate

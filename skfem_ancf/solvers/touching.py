@@ -1,0 +1,227 @@
+"""Equilibria in contact: from a start that holds what lies on an obstacle, and hard enough.
+
+A belt that just does not touch its pulley has no stiffness across: the first correction throws it
+far off, and what shortens it brings back single points. So bodies that lie beside an obstacle at
+the begin of a load step are first held there, pulled as well as pushed, as a belt is by a groove;
+then let go, on an obstacle so soft that the pressure found presses all points in; then there is
+friction, and last the obstacle is hardened step by step. Each is close to the next. It begins as a
+primal-dual active set method does (Hintermueller, Ito, Kunisch 2003) to which all that lies near
+is active.
+
+An obstacle of the default stiffness is hardened until the body lies on it, and not in it: what the
+penetration stores is by how much the whole is too compliant.
+"""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..actions.forces.contact_texts import ANCHORED, HOLDS, REACHES, hardened
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from ..actions.forces.contacts import Contacts
+    from ..core.types import Array
+
+#: How near a point lies that is held at first, and how far it is held, relative to the height.
+NEAR, FAR = 0.5, 1e3
+#: Part of the surface that lies near where points are held.
+PART = 0.03
+#: The mean penetration of what is let go, relative to the height.
+LET_GO = 0.1
+#: Penetration, relative to the height, and energy of it, relative to all other, up to which an
+#: obstacle is hard enough: what is deeper than the first, or than the second and stores more.
+DEEP, SEEN, STORED = 0.1, 0.02, 1e-3
+#: What is not asked for, relative to the height: what lies flat stores nothing else.
+LEAST = 1e-3
+#: What the harder one is to leave of each.
+LEFT = 0.5
+#: By how much obstacles are made harder at once.
+RUNG = 30.0
+#: Times that they are found too soft in a load step at most, and that what is done at once is less.
+TIMES, HALVED = 4, 2
+
+
+def lies_near(contacts: Contacts, u: Array, t: float) -> list[Array] | None:
+    """Points of each group that lie on an obstacle, or near it; None if they are few, or press.
+
+    Parameters
+    ----------
+    contacts
+        The obstacles of a scene.
+    u, t
+        Displacement, shape (N,), and time.
+    """
+    flags, most, pressed = [], 0.0, 0.0
+    for (_, group), _, found in contacts.look(u, t, False):
+        flags.append(found[0] < NEAR * group.height)
+        whole = group.areas.sum()
+        most = max(most, group.areas[flags[-1]].sum() / whole)
+        pressed = max(pressed, group.areas[found[0] < 0.0].sum() / whole)
+    return flags if most > PART and most > 2.0 * pressed else None
+
+
+@contextmanager
+def held(contacts: Contacts, flags: list[Array]) -> Iterator[None]:
+    """For the time of it points are held by obstacles, and there is no friction.
+
+    Parameters
+    ----------
+    contacts
+        The obstacles of a scene.
+    flags
+        Points of each group, shape (n,).
+    """
+    memory = contacts.tables.memory
+    before = memory.copy()
+    try:
+        memory[ANCHORED], memory[HOLDS] = 0.0, 1.0
+        for k, ((_, group), flag) in enumerate(zip(contacts.groups, flags)):
+            far = FAR * group.height * hardened(contacts.tables, contacts.header(k))
+            contacts.reach(k)[0], memory[REACHES + k] = far * flag, far
+        yield
+    finally:
+        memory[:] = before
+
+
+def soft(contacts: Contacts, u: Array, t: float) -> Array:
+    """The firmness with which the mean pressure presses all points in, shape (groups,).
+
+    Parameters
+    ----------
+    contacts
+        The obstacles of a scene.
+    u, t
+        Displacement, shape (N,), and time of a body that they hold.
+    """
+    out = contacts.firmness.copy()
+    for k, ((_, group), _, found) in enumerate(contacts.look(u, t, False)):
+        deep = np.maximum(-found[0], 0.0)
+        if np.any(deep):
+            mean = group.areas @ deep / group.areas[deep > 0.0].sum()
+            out[k] = min(group.firmest, (1.0 + out[k]) * mean / (LET_GO * group.height)) - 1.0
+    return out
+
+
+def firm(contacts: Contacts, u: Array, t: float, energy: float) -> Array:
+    """The firmness that leaves the body on the obstacles, shape (groups,); not less than it is.
+
+    Parameters
+    ----------
+    contacts
+        The obstacles of a scene.
+    u, t
+        Displacement, shape (N,), and time.
+    energy
+        Strain energy, with that of the penetration.
+    """
+    now, stored = contacts.firmness, contacts.potential(u, t)
+    out, share = np.maximum(now, 0.0), stored / max(energy - stored, 1e-300)
+    for k, ((_, group), _, found) in enumerate(contacts.look(u, t, False)):
+        part = (1.0 + now[k]) / (1.0 + out[k])  # what this pressure leaves if it is not harder
+        deep, stores = -part * float(found[0].min()) / group.height, part * share
+        if deep > DEEP or (deep > SEEN and stores > STORED):
+            more = max(deep / SEEN, min(stores / STORED, deep / LEAST)) / LEFT
+            out[k] = max(1.0, min(group.firmest, (1.0 + out[k]) * more)) - 1.0
+    return out
+
+
+def found_touching(contacts: Contacts, start: tuple[Array, float], t: float,
+                   solve: Callable[..., Any], energy: Callable[[Array], float],
+                   failed: type[Exception]) -> Any:
+    """An equilibrium in contact.
+
+    Parameters
+    ----------
+    contacts
+        The obstacles of a scene, with the memory of the begin of the load step; with that of its
+        end if they had to be harder.
+    start
+        Displacement at the begin of the load step, shape (N,), and its time.
+    t
+        The time at the end.
+    solve
+        Function of what has been found, or None for the begin, and of whether a start is wanted
+        only; it returns what it finds, the displacement first.
+    energy
+        Strain energy of a displacement at the end.
+    failed
+        The exception of ``solve``.
+    """
+    flags, before = lies_near(contacts, *start), contacts.tables.memory.copy()
+    climb = _Climb(contacts, start, t, solve, energy, failed)
+    if flags is not None:
+        try:
+            return climb.up(_let_go(climb, flags))
+        except failed:
+            contacts.tables.memory[:] = before
+    return climb.up(_directly(climb))
+
+
+def _let_go(climb, flags):
+    """What is found from bodies that are held, on obstacles that are soft."""
+    contacts = climb.contacts
+    with held(contacts, flags):
+        found = climb.solve(None, True)
+    contacts.harden(soft(contacts, found[0], climb.t), *climb.start)
+    if contacts.anchored:
+        with contacts.eased():  # no friction
+            found = climb.solve(found, True)
+    return climb.solve(found, True)
+
+
+def _directly(climb):
+    """What is found without more ado; where that fails, from obstacles that are eased."""
+    try:
+        return climb.solve(None, False)
+    except climb.failed:
+        with climb.contacts.eased():
+            found = climb.solve(None, True)
+        return climb.solve(found, False)
+
+
+class _Climb:
+    """From obstacles that are soft to those that are hard enough; see :func:`found_touching`."""
+
+    def __init__(self, contacts, start, t, solve, energy, failed):
+        self.contacts, self.start, self.t = contacts, start, t
+        self.solve, self.energy, self.failed = solve, energy, failed
+
+    def up(self, found):
+        """What is found there, or on the way to it, where that ends."""
+        contacts = self.contacts
+        for _ in range(TIMES):
+            wanted = firm(contacts, found[0], self.t, self.energy(found[0]))
+            if np.all(wanted == contacts.firmness):
+                break
+            found, done = self._to(wanted, found)
+            if not done:
+                break
+        return found
+
+    def _to(self, wanted, found):
+        """What is found there, or last on the way, and whether it is there."""
+        contacts, rung, fails = self.contacts, RUNG, 0
+        memory = contacts.tables.memory
+        while True:
+            before, now = memory.copy(), 1.0 + contacts.firmness
+            more = np.clip((1.0 + wanted) / now, 1.0 / rung, rung)
+            last = np.allclose(more * now, 1.0 + wanted, rtol=1e-9)
+            contacts.harden(wanted if last else more * now - 1.0, *self.start)
+            try:
+                found = self.solve(found, not last)
+            except self.failed:
+                memory[:] = before
+                rung, fails = np.sqrt(rung), fails + 1
+                if fails > HALVED:
+                    return found, False
+                continue
+            if last:
+                return found, True
+
+
+__all__ = ["firm", "found_touching", "held", "lies_near", "soft"]

@@ -1,0 +1,7 @@
+"""Many scenes, solved side by side."""
+
+from .sweep import sweep
+
+__all__ = [
+    "sweep",
+]

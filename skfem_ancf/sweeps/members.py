@@ -1,0 +1,272 @@
+"""What a sweep has found: arrays over its members, and their file."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..core.archive import DAMAGED, write
+from ..core.errors import (FileError, InputError, MissingExtra, NameUnknown, require_path, shown,
+                           teaching)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..core.types import Array, StrPath
+
+_FORMAT = 1
+#: Arrays of a file beside those of parameters and values.
+_OWN = ("format", "done", "failed", "errors")
+
+
+class Failure(NamedTuple):
+    """A member of a sweep that could not be built, solved or measured.
+
+    Attributes
+    ----------
+    member : int
+        Its place in the order of the parameters.
+    parameters : dict
+        From name to value.
+    error : str
+        The class and message of what was raised.
+    """
+
+    member: int
+    parameters: dict[str, Any]
+    error: str
+
+
+@teaching
+class Sweep:
+    """What :func:`skfem_ancf.sweep` has found, in the order of the parameters.
+
+    ``sweep[name]`` is the array of a name, of what was measured or of a parameter.
+
+    Parameters
+    ----------
+    parameters
+        From name to array of shape (n, ...), one row for each member.
+    found
+        For each member a dict of arrays, the text of an error, or None where it is not done.
+
+    Attributes
+    ----------
+    parameters : dict
+        As above.
+    values : dict
+        From name to an array (n, ...) of what was measured, nan where a member failed or is not
+        done. What has no name of its own is called "value".
+    status : ndarray
+        Shape (n,): "done", "failed" or "open".
+    failures : list of Failure
+        Those that failed; a member whose values have other names or shapes than those of the first
+        that is done has failed too.
+
+    Examples
+    --------
+    >>> from skfem_ancf import sweep
+    >>> result = sweep(lambda x: x, {"x": [1.0, 2.0]}, lambda x: {"square": x**2})
+    >>> result["square"], result["x"]
+    (array([1., 4.]), array([1., 2.]))
+    >>> len(result), result.failures
+    (2, [])
+    """
+
+    def __init__(self, parameters: dict[str, Array],
+                 found: Sequence[dict[str, Array] | str | None]) -> None:
+        self.parameters = parameters
+        self.status = np.full(len(found), "open", dtype="<U6")
+        found = _alike(found)
+        self._errors = {k: one for k, one in enumerate(found) if isinstance(one, str)}
+        done = [k for k, one in enumerate(found) if isinstance(one, dict)]
+        self.status[list(self._errors)], self.status[done] = "failed", "done"
+        self.values = _arrays(found, done)
+
+    @property
+    def failures(self) -> list[Failure]:
+        """Those that failed, with their parameters and errors."""
+        return [Failure(k, {name: _plain(column[k]) for name, column in self.parameters.items()},
+                        error) for k, error in self._errors.items()]
+
+    def __len__(self) -> int:
+        return len(self.status)
+
+    def __getitem__(self, name: str) -> Array:
+        known = {**self.parameters, **self.values}
+        if not isinstance(name, str) or name not in known:
+            raise NameUnknown("array", name, known)
+        return known[name]
+
+    def __repr__(self) -> str:
+        counts = [f"{np.sum(self.status == word)} {word}" for word in ("done", "failed", "open")]
+        return (f"<Sweep of {', '.join(self.parameters)}: {', '.join(counts)}; "
+                f"values: {', '.join(self.values) or 'none'}>")
+
+    def to_xarray(self) -> Any:
+        """An ``xarray.Dataset``: values along "member", with the parameters as coordinates.
+
+        The coordinate "status" is :attr:`status`, unless a parameter or a value has that name.
+
+        Raises
+        ------
+        MissingExtra
+            If xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise MissingExtra("xarray", "arrays") from None
+        status = {} if "status" in self.values else {"status": self.status}
+        return xarray.Dataset(
+            {name: _labelled(name, values) for name, values in self.values.items()},
+            {name: _labelled(name, values)
+             for name, values in {**status, **self.parameters}.items()})
+
+    def save(self, path: StrPath) -> None:
+        """Write a file that ``numpy.load`` reads too; one that is there is replaced at once.
+
+        Its arrays are ``parameters/NAME``, ``values/NAME``, ``done`` (n,), and of those that
+        failed ``failed`` (k,), their places, and ``errors`` (k,).
+
+        Parameters
+        ----------
+        path
+            Name of the file, which ends with .npz.
+
+        Raises
+        ------
+        InputError
+            If parameters are neither numbers nor texts.
+        FileError
+            If it cannot be written.
+        """
+        path = require_path("path", path, (".npz",))
+        require_plain(self.parameters)
+        failures = self.failures
+        arrays = {"format": np.array(_FORMAT), "done": self.status == "done",
+                  "failed": np.array([f.member for f in failures], dtype=int),
+                  "errors": np.array([f.error for f in failures], dtype=str)}
+        for folder, columns in (("parameters", self.parameters), ("values", self.values)):
+            arrays.update((f"{folder}/{name}", column) for name, column in columns.items())
+        try:
+            write(path, arrays)
+        except OSError as error:
+            raise FileError(f"{path} cannot be written: {error}") from error
+
+    @classmethod
+    def load(cls, path: StrPath) -> Sweep:
+        """The sweep that a file holds.
+
+        Parameters
+        ----------
+        path
+            Name of the file.
+
+        Raises
+        ------
+        FileError
+            If it cannot be read, or holds something else.
+        """
+        path = require_path("path", path, (".npz",))
+        try:
+            with open(path, "rb") as content, np.load(content, allow_pickle=False) as file:
+                if int(file["format"]) != _FORMAT:
+                    raise ValueError("it is of another version")
+                columns: dict[str, dict[str, Array]] = {"parameters": {}, "values": {}}
+                for key in file.files:
+                    if key not in _OWN:
+                        folder, _, name = key.partition("/")
+                        columns[folder][name] = file[key]
+                done, errors = file["done"], dict(zip(file["failed"].tolist(), file["errors"]))
+                if {len(x) for part in columns.values() for x in part.values()} - {len(done)}:
+                    raise ValueError("its arrays are not of equal length")
+                if not columns["parameters"] or done.any() and not columns["values"]:
+                    raise ValueError("arrays are missing")
+        except DAMAGED as error:
+            raise FileError(f"{path} cannot be read as a sweep: {error}") from error
+        return cls(columns["parameters"], [
+            {name: column[k] for name, column in columns["values"].items()} if done[k]
+            else str(errors[k]) if k in errors else None for k in range(len(done))])
+
+
+def _plain(x):
+    """A number of NumPy as one of Python, which is shown as it is written."""
+    return x.item() if isinstance(x, np.generic) else x
+
+
+def column_of(values: Sequence[Any]) -> Array:
+    """An array (n, ...) of n values: of numbers, texts or truth values, else of objects.
+
+    Examples
+    --------
+    >>> from skfem_ancf.sweeps.members import column_of
+    >>> column_of([1, 2.5]), column_of([None, (1, 2)]).dtype, column_of([True, 2.5]).dtype
+    (array([1. , 2.5]), dtype('O'), dtype('O'))
+    """
+    try:
+        column = np.array(values)
+        types = {type(x) for x in values}
+        counts = (sum(issubclass(x, kinds) for x in types) for kinds in (str, (bool, np.bool_)))
+        if column.dtype.kind in "biufcU" and all(n in (0, len(types)) for n in counts):
+            return column
+    except (TypeError, ValueError):  # rows of different lengths, for one
+        pass
+    column = np.empty(len(values), dtype=object)
+    column[:] = list(values)
+    return column
+
+
+def require_plain(columns: dict[str, Array]) -> None:
+    """Raise InputError if a parameter is neither numbers nor texts.
+
+    Parameters
+    ----------
+    columns
+        From name to array of shape (n, ...).
+    """
+    for name, column in columns.items():
+        if column.dtype.kind == "O":
+            raise InputError(f"a file takes parameters that are numbers or texts; {name!r} has "
+                             f"{shown(column[0])}: give names or numbers, and let build look up "
+                             "what they mean")
+
+
+def _alike(found):
+    """The same list; members unlike the first that is done are errors."""
+    first = next((one for one in found if isinstance(one, dict)), {})
+    shapes = {name: value.shape for name, value in first.items()}
+    out = []
+    for one in found:
+        if isinstance(one, dict) and not _fits(one, shapes):
+            one = (f"CallbackError: measure returned {_listed(one)}, of the first member "
+                   f"{_listed(first)}: names and shapes must be those of all members")
+        out.append(one)
+    return out
+
+
+def _fits(values, shapes):
+    if len(values) != len(shapes):
+        return False
+    for name, shape in shapes.items():
+        if name not in values or values[name].shape != shape:
+            return False
+    return True
+
+
+def _listed(values):
+    return ", ".join(f"{name!r} of shape {value.shape}" for name, value in values.items())
+
+
+def _arrays(found, done):
+    arrays = {}
+    for name in found[done[0]] if done else ():
+        rows = np.array([found[k][name] for k in done])
+        arrays[name] = np.full((len(found), *rows.shape[1:]), np.nan, dtype=rows.dtype)
+        arrays[name][done] = rows
+    return arrays
+
+
+def _labelled(name, values):
+    return ("member", *(f"{name}_{axis}" for axis in range(values.ndim - 1))), values

@@ -1,0 +1,305 @@
+"""Sweeps: one scene after another from a table of parameters, wherever there are processors."""
+
+from __future__ import annotations
+
+import inspect
+import time
+import warnings
+from collections.abc import Mapping
+from contextlib import closing
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..core.errors import (CallbackError, CallError, CheckpointWarning, FileError, InputError,
+                           Interrupted, NameUnknown, SweepWarning, require_function,
+                           require_integer, require_path, shown, taught)
+from .members import Sweep, column_of, require_plain
+from ..core.progress import progress_bar
+from .probes import Probes, measured
+from ..core.switch import expecting
+from .workers import Task, here, in_processes, in_threads, on_cluster
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from ..core.types import Array, ArrayLike, StrPath
+
+#: Seconds between two files, and how many times longer than writing one they are at least.
+_SECONDS, _RARER = 2.0, 20.0
+
+
+@taught
+def sweep(build: Callable[..., Any],
+          parameters: Mapping[str, ArrayLike] | Sequence[Mapping[str, Any]],
+          measure: Callable[[Any], Any] | tuple[Any, ...] | dict[str, Any],
+          workers: int | None = None, client: Any = None,
+          path: StrPath | None = None, progress: bool | None = None) -> Sweep:
+    """Build, solve and measure a scene for each of many sets of parameters.
+
+    Each member is ``measure(build(**its parameters))``: ``build`` describes, ``measure`` solves and
+    reads. Results do not depend on where members are computed, nor on their order. A member that
+    fails is nan, and is listed with its parameters in ``failures``; the others go on.
+
+    Parameters
+    ----------
+    build
+        From the parameters, by keyword, to a :class:`Scene`, or whatever ``measure`` takes.
+    parameters
+        From name to an array of shape (n, ...), one row for each member; a table of pandas; or a
+        list of n dicts.
+    measure
+        From the scene to a number, an array of numbers, or a dict of them by name; of equal names
+        and shapes for all members. Or what to read of the scene's ``solve_static()``: a pair
+        (what, at) or a triple (what, at, beam) of "displacement" or "position", a point (x, y),
+        points (2, n) or the name of an end, and a beam; or a dict by name of such and of functions
+        of the State. With these, members are solved in this process in as many threads as there
+        are processors: compiled code runs side by side. Members are built one after the other.
+    workers
+        How many processes; None: in this one. Processes import ``build`` and ``measure``, which
+        are to be defined by ``def`` at the top of a module; a script calls under
+        ``if __name__ == "__main__":``. Libraries of linear algebra have one thread in each.
+    client
+        A ``dask.distributed.Client``, in place of ``workers``.
+    path
+        A file (.npz) that is written as results come. If it is there, the sweep goes on: what is
+        done is taken from it, what failed is tried again. Parameters are compared with those of
+        the file; whether the functions are the same nobody can know.
+    progress
+        Show a bar: True, False, or None: on a terminal, after a second, if tqdm is installed.
+
+    Returns
+    -------
+    Sweep
+        Arrays by name, in the order of the parameters.
+
+    Raises
+    ------
+    InputError
+        If arguments do not fit; NameUnknown and CallError, if ``build`` takes other parameters.
+    FileError
+        If the file is of another sweep, or cannot be written.
+    PickleError
+        If functions cannot be sent to other processes.
+    CallbackError
+        If all members fail.
+    Interrupted
+        By Ctrl-C; its ``state`` is the Sweep so far, and the file holds it too.
+
+    Warns
+    -----
+    SweepWarning
+        If members fail.
+    CheckpointWarning
+        If the file cannot be written any more: the results are in what is returned.
+
+    Examples
+    --------
+    A cantilever is bent by a force: four moduli.
+
+    >>> import numpy as np
+    >>> from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff, sweep
+    >>> mesh = MeshBeam.init_line(np.linspace(0, 1, 3), height=0.01)
+    >>> def build(E):
+    ...     beam = Beam(mesh, ElementBeamCable(5), StVenantKirchhoff(E=E, nu=0.3), width=0.01)
+    ...     return Scene(beam).clamp("left").point_force((0, -0.01), at=(1, 0))
+    >>> def tip(scene):
+    ...     return scene.solve_static().displacement((1, 0))[1]
+    >>> result = sweep(build, {"E": [1e9, 2e9, 4e9, 8e9]}, tip)
+    >>> EI = result["E"] * 0.01**4 / 12
+    >>> bool(np.allclose(result["value"], -0.01 / (3 * EI), rtol=1e-4))
+    True
+
+    The same, by saying what is read:
+
+    >>> again = sweep(build, {"E": [1e9, 2e9, 4e9, 8e9]}, ("displacement", (1, 0)))
+    >>> bool(np.allclose(again["value"][:, 1], result["value"], rtol=1e-9))
+    True
+    """
+    require_function("build", build, "of the parameters that returns a scene")
+    measure = measured(measure)
+    if workers is not None and client is not None:
+        raise InputError("workers and client say both where to compute: give one of them")
+    if workers is not None:
+        workers = require_integer("workers", workers, 1)
+    members = _members(parameters)
+    _require_signature(build, members[0])
+    columns = {name: column_of(members.rows(name)) for name in members[0]}
+    record = _Record(columns, None if path is None else require_path("path", path, (".npz",)))
+    task, places = Task(build, measure), record.places
+    source = _source(task, members, places, workers, client)
+    try:
+        with (progress_bar(progress, len(members), "members") as bar, closing(source),
+              expecting(len(places))):
+            bar.update(len(members) - len(places))
+            for chunk, found in source:
+                record.add(chunk, found)
+                bar.update(len(chunk))
+    except KeyboardInterrupt:
+        raise Interrupted(record.stopped(), record.kept()) from None
+    except BaseException:
+        record.kept()
+        raise
+    return _judged(record.kept())
+
+
+def _source(task, members, places, workers, client):
+    """Chunks of members and what was found of them, as they come."""
+    if client is not None:
+        return on_cluster(task, members, places, client)
+    if workers is not None:
+        return in_processes(task, members, places, workers)
+    if isinstance(task.measure, Probes):
+        return in_threads(task, members, places)
+    return here(task, members, places)
+
+
+class _Record:
+    """What is found, and its file, written now and then."""
+
+    def __init__(self, columns: dict[str, Array], path: Path | None) -> None:
+        self.columns, self.path = columns, path
+        self.found: list[dict[str, Array] | str | None] = [None] * len(next(iter(columns.values())))
+        self.next = time.monotonic() + _SECONDS
+        if path is not None:
+            require_plain(columns)
+            if path.exists():
+                self.found = _done(path, columns)
+        self.places = [k for k, one in enumerate(self.found) if one is None]
+        if path is not None and self.places:
+            self.result().save(path)  # it can be written
+
+    def add(self, places, found):
+        """Take what was found of members; write, if it is time to."""
+        for k, one in zip(places, found):
+            self.found[k] = one
+        if self.path is not None and time.monotonic() >= self.next:
+            begun = time.monotonic()
+            self.kept()
+            now = time.monotonic()
+            self.next = now + max(_SECONDS, _RARER * (now - begun))
+
+    def result(self):
+        """The Sweep so far."""
+        return Sweep(self.columns, self.found)
+
+    def kept(self):
+        """The Sweep so far, in its file too; a warning where that cannot be written any more."""
+        result = self.result()
+        if self.path is not None:
+            try:
+                result.save(self.path)
+            except FileError as error:
+                warnings.warn(f"the results are not in the file, the sweep goes on: {error}",
+                              CheckpointWarning, stacklevel=5)
+        return result
+
+    def stopped(self):
+        """Where it was interrupted."""
+        done = sum(isinstance(one, dict) for one in self.found)
+        return (f"interrupted with {done} of {len(self.found)} members done; " + (
+            "they are in the state of this exception; with path= the next call would go on"
+            if self.path is None else f"call again with {str(self.path)!r} to go on"))
+
+
+class _Members:
+    """Dicts of parameters, made when they are asked for: a sequence."""
+
+    def __init__(self, rows):
+        self._rows = rows
+
+    def rows(self, name):
+        """The values of a name, a list."""
+        return self._rows[name]
+
+    def __len__(self):
+        return len(next(iter(self._rows.values()), ()))
+
+    def __getitem__(self, k):
+        return {name: rows[k] for name, rows in self._rows.items()}
+
+
+def _members(parameters):
+    """Members, at least one, of equal names, at least one."""
+    if isinstance(parameters, Mapping) or hasattr(parameters, "columns"):  # of pandas
+        columns = {name: _rows(name, values) for name, values in parameters.items()}
+        lengths = {name: len(rows) for name, rows in columns.items()}
+        if len(set(lengths.values())) > 1:
+            raise InputError(f"the parameters must have equal lengths, got {lengths}; for all "
+                             "combinations hand a list of dicts, made by itertools.product")
+    else:
+        if isinstance(parameters, str) or not hasattr(parameters, "__iter__"):
+            raise InputError("parameters must be a dict of arrays or a list of dicts, got "
+                             f"{shown(parameters)}")
+        members = list(parameters)
+        for k, member in enumerate(members):
+            if not isinstance(member, Mapping) or set(member) != set(members[0]):
+                raise InputError("parameters must be a dict of arrays, or a list of dicts with "
+                                 f"equal names; the first has {shown(members[0])}, number {k} is "
+                                 f"{shown(member)}")
+        columns = {name: [member[name] for member in members]
+                   for name in (members[0] if members else ())}
+    found = _Members(columns)
+    if not len(found):
+        raise InputError(f"there are no members in the parameters {shown(parameters)}")
+    return found
+
+
+def _rows(name, values):
+    values = getattr(values, "values", values)  # of pandas and xarray
+    if isinstance(values, str) or np.ndim(values) == 0 and not hasattr(values, "__len__"):
+        raise InputError(f"the parameter {name!r} must have one value for each member, got "
+                         f"{shown(values)}; what is the same for all belongs into build")
+    return list(values)
+
+
+def _require_signature(build, member):
+    try:
+        known = inspect.signature(build).parameters
+    except (TypeError, ValueError):  # of some functions written in C
+        return
+    if not any(p.kind is p.VAR_KEYWORD for p in known.values()):
+        for name in member:
+            if name not in known:
+                raise NameUnknown("parameter of build", name, known)
+    missing = [name for name, p in known.items() if p.default is p.empty and name not in member
+               and p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]
+    if missing:
+        raise CallError(f"build needs {', '.join(map(repr, missing))}, not among the parameters "
+                        f"{', '.join(map(repr, member))}")
+
+
+def _done(path, columns):
+    """What a file of an interrupted sweep of the same parameters has."""
+    before = Sweep.load(path)
+    if list(before.parameters) != list(columns):
+        differ = f"{list(before.parameters)} there, {list(columns)} here"
+    elif len(before) != len(next(iter(columns.values()))):
+        differ = f"{len(before)} members there, {len(next(iter(columns.values())))} here"
+    else:
+        differ = next((f"{name!r} of member {k} is {shown(there[k])} there, {shown(now[k])} here"
+                       for name, now in columns.items() for there in [before.parameters[name]]
+                       for k in range(len(now)) if not _same(there[k], now[k])), "")
+    if differ:
+        raise FileError(f"{path} is of a sweep with other parameters: {differ}; give another path, "
+                        "or delete the file")
+    return [{name: x[k] for name, x in before.values.items()} if status == "done" else None
+            for k, status in enumerate(before.status)]
+
+
+def _same(a, b):
+    floats = {np.asarray(a).dtype.kind, np.asarray(b).dtype.kind} == {"f"}
+    return np.array_equal(a, b, equal_nan=floats)
+
+
+def _judged(result):
+    """The result, with a warning of failures."""
+    failures = result.failures
+    if failures:
+        text = (f"{len(failures)} of {len(result)} members failed, the first with "
+                f"{failures[0].parameters}: {failures[0].error}")
+        if len(failures) == len(result):
+            raise CallbackError(text)
+        warnings.warn(f"{text}; all are in .failures", SweepWarning, stacklevel=4)
+    return result
