@@ -1,4 +1,4 @@
-"""Functions of a size to be read at once."""
+"""Rooms: folders whose imports go one way, and functions of a size to be read at once."""
 
 import ast
 from pathlib import Path
@@ -12,14 +12,15 @@ PACKAGE = Path(skfem_ancf.__file__).parent
 MOST_LINES, MOST_ARGUMENTS = 80, 10
 #: Functions that are larger, and why.
 LARGER = {
-    "beam.py::Beam.__init__": "options of a user, each with a default, by keyword",
-    "evaluation.py::evaluate": "one function for all that is asked, so that it is compiled once",
-    "compiled/blocks.py::block": "a function of C: arrays are addresses and sizes",
-    "compiled/contacts.py::contacts": "a function of C: arrays are addresses and sizes",
-    "compiled/elements.py::elements": "a function of C: arrays are addresses and sizes",
+    "beam/beam.py::Beam.__init__": "options of a user, each with a default, by keyword",
+    "equations/evaluation.py::evaluate":
+        "one function for all that is asked, so that it is compiled once",
+    "equations/compiled/blocks.py::block": "a function of C: arrays are addresses and sizes",
+    "equations/compiled/contacts.py::contacts": "a function of C: arrays are addresses and sizes",
+    "equations/compiled/elements.py::elements": "a function of C: arrays are addresses and sizes",
     "dynamics/integrate.py::integrate": "options of a user, each with a default, by keyword",
-    "results.py::State.__init__": "a record: what a solution is, and where it has it from",
-    "statics/continuation.py::continuation": "options of a user, each with a default, by keyword",
+    "results/state.py::State.__init__": "a record: what a solution is, and where it has it from",
+    "solvers/continuation.py::continuation": "options of a user, each with a default, by keyword",
     "visuals/animation.py::animate": "options of a user, each with a default, by keyword",
     "visuals/matplotlib.py::plot_state": "options of a user, each with a default, by keyword",
     "visuals/pyvista.py::view": "options of a user, each with a default, by keyword",
@@ -77,3 +78,73 @@ def test_reasons_are_given_for_functions_that_are_larger():
 def test_sizes_are_counted_as_said(source, size):
     function = ast.parse(source).body[0]
     assert (lines(function), arguments(function)) == size
+
+
+# the order of the folders
+
+#: From the ground up; a folder imports from those below it, and from no other on its own floor.
+FLOORS = [["core"], ["mesh"], ["elements", "materials"], ["sections", "formulations", "forms"],
+          ["beam"], ["actions"], ["equations", "recovery"], ["results", "io"],
+          ["solvers", "dynamics", "visuals"], ["scene"], ["sweeps"]]
+FLOOR = {folder: height for height, folders in enumerate(FLOORS) for folder in folders}
+#: Imports that go up, or aside, and are to go.
+UPWARD = {
+    ("equations", "dynamics"), ("equations", "recovery"), ("equations", "results"),
+    ("equations", "solvers"), ("results", "io"), ("results", "solvers"), ("results", "visuals"),
+    ("dynamics", "solvers"), ("dynamics", "visuals"),
+}
+
+
+def module_names():
+    """Every module of the package by its name."""
+    names = {}
+    for path in PACKAGE.rglob("*.py"):
+        parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+        names[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return names
+
+
+def imports(name, path, names):
+    """Modules that a module imports: at the top, inside functions and for annotations alike."""
+    here = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = here[:len(here) - node.level + 1] if node.level else []
+            base = ".".join([*base, *([node.module] if node.module else [])])
+            found = [f"{base}.{alias.name}" if f"{base}.{alias.name}" in names else base
+                     for alias in node.names]
+        else:
+            continue
+        yield from (target for target in found if target in names and target not in (
+            name, "skfem_ancf"))
+
+
+def graph():
+    names = module_names()
+    return {name: set(imports(name, path, names)) for name, path in names.items()}
+
+
+def folder_of(name):
+    return name.split(".")[1]
+
+
+def test_every_module_lies_in_a_room_of_the_plan():
+    assert {folder_of(name) for name in module_names() if name != "skfem_ancf"} == set(FLOOR)
+
+
+def test_imports_go_down():
+    found = {(folder_of(a), folder_of(b)): f"{a} -> {b}"
+             for a, targets in graph().items() if a != "skfem_ancf" for b in targets
+             if folder_of(a) != folder_of(b) and FLOOR[folder_of(b)] >= FLOOR[folder_of(a)]}
+    assert {pair: text for pair, text in found.items() if pair not in UPWARD} == {}
+    assert set(found) == UPWARD, "an exception is no longer needed"
+
+
+def test_an_import_is_found_wherever_it_stands(tmp_path):
+    path = tmp_path / "a.py"
+    path.write_text("import p.b\nfrom . import c\ndef f():\n    from .d import x\n"
+                    "if TYPE_CHECKING:\n    from ..p.e import Y\n")
+    names = dict.fromkeys(["p", "p.b", "p.c", "p.d", "p.e"])
+    assert set(imports("p.a", path, names)) == {"p.b", "p.c", "p.d", "p.e"}

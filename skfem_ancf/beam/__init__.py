@@ -1,8 +1,6 @@
 """Beams and rigid bodies: their strain energy and inertia."""
 
 from .beam import Beam, reference_coordinates
+from .rigid import RigidBody
 
-__all__ = [
-    "Beam",
-    "reference_coordinates",
-]
+__all__ = ["Beam", "RigidBody", "reference_coordinates"]

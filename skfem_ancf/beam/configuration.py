@@ -80,7 +80,7 @@ class Configuration(Protocol):
     def resultants(self) -> Callable[..., Any]: ...
 
 
-class Motion(Protocol):
+class Instants(Protocol):
     """Configurations over time; a :class:`~skfem_ancf.dynamics.History` is one.
 
     Attributes

@@ -152,8 +152,8 @@ class Machine:
             return Choice("compiled", f"compiling takes about {seconds:.2g} s once, NumPy would "
                           f"take about {work:.2g} s for {_iterations()}")
         return Choice("plain", f"NumPy takes about {work:.2g} s for {_iterations()}, compiling "
-                      f"would take about {seconds:.2g} s; python -m skfem_ancf.equations.compiled does it "
-                      "beforehand")
+                      f"would take about {seconds:.2g} s; python -m "
+                      "skfem_ancf.equations.compiled does it beforehand")
 
     def _missing(self, name):
         """What of a text and of what it calls this process has not loaded."""

@@ -1,34 +1,4 @@
-"""The weak forms of a planar body: energy, internal force, tangent, mass, loads.
-
-Each factory returns a scikit-fem form for stock ``asm`` on a stock ``Basis`` of the position
-field, with the coordinates passed as ``r``:
-
->>> import numpy as np
->>> from skfem import Basis, ElementVector, asm
->>> from skfem_ancf import (ElementBeamANCF, MeshBeam, StVenantKirchhoff, forms,
-...                         reference_coordinates)
->>> basis = Basis(MeshBeam.init_line(np.linspace(0, 1, 3), height=0.1),
-...               ElementVector(ElementBeamANCF(2)))
->>> steel = StVenantKirchhoff(E=2.1e11, nu=0.3)
->>> q = reference_coordinates(basis)
->>> K = asm(forms.tangent(steel, width=0.1), basis, r=q)
->>> K.shape, bool(abs(asm(forms.internal_force(steel, width=0.1), basis, r=q)).max() < 1e-3)
-((24, 24), True)
-
-There are three kinds, which agree where they are the same integral:
-
-* :func:`textbook_energy`, :func:`textbook_internal_force`, :func:`textbook_tangent`: the
-  mathematics as it is written down, for scikit-fem's assembly of one pair of local functions
-  after the other. The others are tested against them.
-* :func:`energy`, :func:`internal_force`, :func:`tangent`: the same, contracted for all local
-  functions at once.
-* :func:`of`: what a Beam's own formulation makes of them, whatever it samples and stabilises: the
-  forms that :class:`~skfem_ancf.Scene` solves with.
-
-In all of them the strain is that of Green and Lagrange in the beam's frame, ``(F^T F - 1) / 2``
-with ``F = grad r``, and S the second Piola-Kirchhoff stress of the material's law.
-"""
-
+"""The weak forms of a planar body, see :mod:`skfem_ancf.forms`."""
 from __future__ import annotations
 
 from types import SimpleNamespace

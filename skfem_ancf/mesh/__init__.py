@@ -1,8 +1,5 @@
 """Meshes of planar beams."""
 
-from .mesh_beam import MeshBeam, reach
+from .mesh_beam import MeshBeam
 
-__all__ = [
-    "MeshBeam",
-    "reach",
-]
+__all__ = ["MeshBeam"]

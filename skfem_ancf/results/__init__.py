@@ -2,7 +2,4 @@
 
 from .state import Reaction, State
 
-__all__ = [
-    "Reaction",
-    "State",
-]
+__all__ = ["Reaction", "State"]

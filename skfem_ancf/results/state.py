@@ -405,8 +405,8 @@ class State(Frozen):
             Shape (3, n), or 0.
         """
         if not isinstance(part, Part):
-            raise InputError("part must be points of a beam, a skfem_ancf.beam.interpolation.Part, got "
-                             f"{shown(part)}")
+            raise InputError("part must be points of a beam, a "
+                             f"skfem_ancf.beam.interpolation.Part, got {shown(part)}")
         u, stress = self.u_of(part.beam), require_flag("stress", stress)
         return sum((load.stress_at(u, part.at, part.e, factor) if stress else
                     factor * load.strain_at(part.at, part.e))[..., 0]

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from ..beam.configuration import Motion
+    from ..beam.configuration import Instants
     from ..core.types import Array, StrPath
 
 SUFFIXES = (".gif", ".mp4")
@@ -35,7 +35,7 @@ LARGEST = 4096
 
 
 @taught
-def animate(history: Motion, filename: StrPath, field: Any = "eps_yy", *,
+def animate(history: Instants, filename: StrPath, field: Any = "eps_yy", *,
             frames: int | None = None, fps: float | None = None, backend: str | None = None,
             thickness: Any = "auto", undeformed: bool = True, cmap: Any = None,
             limits: Any = None, unit: str | None = None, subdivide: tuple[int, int] = (8, 4),

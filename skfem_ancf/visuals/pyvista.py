@@ -18,7 +18,7 @@ from .matplotlib import colormap
 from .scenery import RIGID, WALL, Scenery, outline_points
 
 if TYPE_CHECKING:
-    from ..beam.configuration import Configuration, Motion
+    from ..beam.configuration import Configuration, Instants
     from ..core.types import StrPath
 
 #: VTK's numbers of the cells.
@@ -154,7 +154,7 @@ class Series:
         The instant that the mesh shows.
     """
 
-    def __init__(self, history: Motion, **options: Any) -> None:
+    def __init__(self, history: Instants, **options: Any) -> None:
         options = require_options("to_pyvista", options, (
             "fields", "subdivide", "lagrange", "undeformed", "recover"))
         self._history, self.t, self.k = history, history.t, 0

@@ -75,7 +75,13 @@ class Law:
         return (b - a) * self.mean(a, b)
 
     def mean(self, a: float, b: float) -> float:
-        """The mean force from a to b, whose product with b - a is :meth:`work`."""
+        """The mean force from a to b, whose product with b - a is :meth:`work`.
+
+        Parameters
+        ----------
+        a, b
+            Elongations, or angles, at the start and the end of a step.
+        """
         if a == b:
             return self(a)
         x, w = gauss(POINTS)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 if TYPE_CHECKING:
     from ..loads import EndMoment
-    from ...equations.system import System
     from ...core.types import Array
 
 
@@ -31,7 +30,7 @@ class Turns:
         Of all angles.
     """
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: Any) -> None:
         self._system = system
         self._loads = [cast("EndMoment", load) for load in system.loads if load.turning]
         self.moments, self.number = len(self._loads), len(self._loads) + len(system.bodies)
