@@ -122,14 +122,14 @@ def test_stress_of_a_bent_beam_without_coupling_off_the_axis(name):
 
 @pytest.mark.filterwarnings("ignore:the mesh is too coarse")  # 4 elements
 def test_cubic_cables_are_held_firmly_enough():
-    """A tenth of the stabilisation: 16 iterations, and 4 elements at a wrong equilibrium."""
-    for n, error in ((4, 0.05), (8, 0.01), (16, 1e-3)):
+    """A hundredth of the third point's weight: wrong equilibria, or none that is found."""
+    for n, error in ((4, 0.02), (8, 0.003), (16, 5e-4)):
         for h in (1e-2, 1e-4):
             beam = Beam(line(n, h), ElementBeamCable(),
                         StVenantKirchhoff(2e8 * (0.01 / h)**3, 0.3, 78 / h), 0.01)
             state = Scene(beam).clamp("left").gravity((0, -9.81)).solve_static()
             assert abs(state.displacement((1, 0))[1] + 0.9032) < error
-            assert state.iterations <= (12 if n == 4 else 10)
+            assert state.iterations <= (20 if n == 4 else 10)
 
 
 @pytest.mark.parametrize("degree", [3, 5, 7])

@@ -12,7 +12,8 @@ from skfem import (Basis, BilinearForm, ElementQuad2, ElementVector, FacetBasis,
 from skfem.helpers import sym_grad
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, InputError,
-                        MeshBeam, NameUnknown, NeoHookean, Scene, Section, StVenantKirchhoff)
+                        MeshBeam, ModelWarning, NameUnknown, NeoHookean, Scene, Section,
+                        StVenantKirchhoff)
 from skfem_ancf.core.errors import CallError
 from skfem_ancf.materials.base import hooke
 from skfem_ancf.actions.obstacles import Line
@@ -373,6 +374,17 @@ def test_sections_by_their_numbers(element):
     assert tip == pytest.approx(1e-3 * (1 / (3 * EI) + sheared), rel=1e-4)
     spin = np.stack([-beam.q0.reshape(-1, 2)[:, 1], beam.q0.reshape(-1, 2)[:, 0]], 1).ravel()
     assert spin @ (beam.mass() @ spin) == pytest.approx(3.0 / 3 + 0.01, rel=1e-12)
+
+
+def test_a_cable_says_that_it_does_not_shear():
+    """GA of 3 EI / L^2 doubles the deflection of a cantilever, 1e4 times as much does not."""
+    mesh, EI = line(4, h=0.02), 40.0
+    with pytest.warns(ModelWarning, match="no shear deformation and ignores GA=120 .* 100.0%"):
+        Beam(mesh, ElementBeamCable(5), section=Section.numbers(EA=1e6, EI=EI, GA=3 * EI))
+    soft = Section.numbers(EA=1e6, EI=EI, GA=3 * EI)
+    Beam(mesh, ElementBeamANCFCubic(2), section=soft)
+    for GA in (None, 3e4 * EI):
+        Beam(mesh, ElementBeamCable(5), section=Section.numbers(EA=1e6, EI=EI, GA=GA))
 
 
 def test_modes_of_a_tube_and_of_a_bimetal_strip():

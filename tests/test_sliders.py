@@ -9,21 +9,21 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 from skfem_ancf import (Beam, ConvergenceError, ElementBeamANCF, ElementBeamANCFCubic,
-                        ElementBeamANCFHermite, ElementBeamCable, InputError, MeshBeam, RigidBody,
-                        Scene, StVenantKirchhoff)
+                        ElementBeamANCFHermite, ElementBeamCable, InputError, KelvinVoigt, MeshBeam,
+                        RigidBody, Scene, StVenantKirchhoff)
 
 G = 9.81
 E, H = 1e9, 0.01
 EI, EA = E * H**4 / 12, E * H * H
 
 
-def line(a, b, n, element=None, name=None, E=E, h=H, density=100.0, grading=1.0):
+def line(a, b, n, element=None, name=None, E=E, h=H, density=100.0, grading=1.0, damping=None):
     """A straight beam from a to b."""
     a, d = np.array(a, dtype=float), np.subtract(b, a)
     mesh = MeshBeam.init_line(np.hypot(*d) * np.linspace(0, 1, n + 1)**grading, h, origin=a,
                               angle=np.arctan2(d[1], d[0]))
     return Beam(mesh, element or ElementBeamCable(), StVenantKirchhoff(E, 0.0, density), width=h,
-                name=name)
+                name=name, damping=damping)
 
 
 # derivatives
@@ -70,9 +70,9 @@ def test_a_mass_on_an_inclined_plane(scheme, angle):
     assert np.ptp(history.total_energy) < 1e-6
 
 
-def thrown(element, angle=True):
+def thrown(element, angle=True, **options):
     """A body slides along a beam that bends under it and vibrates."""
-    beam = line((0, 0), (2, 0), 6, element, E=3e7, h=0.05, name="rail")
+    beam = line((0, 0), (2, 0), 6, element, E=3e7, h=0.05, name="rail", **options)
     body = RigidBody(1.0, 0.01, (0.3, 0))
     scene = Scene(beam, body).pin("left").pin("right").gravity((0, -G))
     scene.initial_velocity(to_the_right, beam=body)
@@ -100,7 +100,8 @@ def test_order_of_a_body_that_slides_on_a_beam():
     """Second, towards what another scheme says."""
     ends = []
     for dt in (16e-3, 8e-3, 4e-3):
-        scene, _, slider = thrown(ElementBeamCable(), False)
+        # damped: fast vibrations do not follow the order of steps as long as these
+        scene, _, slider = thrown(ElementBeamCable(), False, damping=KelvinVoigt(0.01))
         ends.append(slider.distance(scene.integrate(0.4, dt).u[-1]))
     assert_allclose((ends[0] - ends[1]) / (ends[1] - ends[2]), 4.0, rtol=0.1)
     limit = ends[2] + (ends[2] - ends[1]) / 3

@@ -194,6 +194,7 @@ class Beam(Frozen):
         """Set what depends on section and material, of which ``given`` is the beam's own."""
         for slab in across.slabs:
             self.kinematics.require_law(slab.material)
+        self.kinematics.warn_of_section(section, self.mesh)
         vars(self).update(section=section, material=material, _given=given, across=across,
                           width=getattr(section, "width", None))
 

@@ -5,6 +5,7 @@ An element names its kind, ``element.kinematics``; what depends on it is asked h
 
 from __future__ import annotations
 
+import warnings
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ import numpy as np
 from .inertia import of_cable, of_sections
 from .kernels import CableKernel, Kernel
 from .kernels.along import CableSections, stretched
-from ..core.errors import InputError
+from ..core.errors import InputError, ModelWarning
 from ..formulations.ecm import AXIS
 from ..core.quadrature import gauss
 
@@ -22,7 +23,12 @@ if TYPE_CHECKING:
     from ..elements.base import ElementBeam
     from .inertia import Inertia
     from ..materials.base import Material
+    from ..mesh.mesh_beam import MeshBeam
     from ..core.types import Array, Rule
+
+
+#: Part of the deflection of a cantilever, by a force at its end, that is not left out silently.
+SHEARED = 1e-3
 
 
 class Sections:
@@ -42,6 +48,16 @@ class Sections:
     @staticmethod
     def require_law(material: Material) -> None:
         """Any law will do."""
+
+    @staticmethod
+    def warn_of_section(section: Any, mesh: MeshBeam) -> None:
+        """Nothing of a section is ignored.
+
+        Parameters
+        ----------
+        section, mesh
+            Those of a beam.
+        """
 
     @staticmethod
     def section_rule(element: ElementBeam) -> Rule:
@@ -245,6 +261,20 @@ class Cable(Sections):
                 "a cable has Hooke's law of E and nu along its axis and bends with E I: it cannot "
                 f"have the law of {material!r}. Use StVenantKirchhoff, or an element with "
                 "sections, as ElementBeamANCFCubic(2)")
+
+    @staticmethod
+    def warn_of_section(section: Any, mesh: MeshBeam) -> None:
+        """A ModelWarning where a given stiffness against shear would be felt."""
+        GA = getattr(section, "GA", None)
+        if GA is None:
+            return
+        share = 3.0 * section.EI / (GA * float(np.min(mesh.chain_lengths))**2)
+        if share > SHEARED:
+            warnings.warn(
+                f"a cable has no shear deformation and ignores GA={GA:g} of {section!r}, which "
+                f"would add {share:.1%} to the deflection of a cantilever of its length: use an "
+                "element with sections, as ElementBeamANCFCubic(2), or leave GA out", ModelWarning,
+                stacklevel=5)
 
     @staticmethod
     def section_rule(element: ElementBeam) -> Rule:

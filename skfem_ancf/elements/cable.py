@@ -13,7 +13,7 @@ from ..core.kept import cached_property
 from ..core.quadrature import gauss
 from ..mesh.reference_cell import SECTIONS, hermite_basis
 from .base import DEGREES, ElementBeam, SectionFunctions, require_degree
-from .sampling import Held, Sampling, missed
+from .sampling import Held, Sampling
 
 if TYPE_CHECKING:
     from ..core.types import Array
@@ -123,9 +123,9 @@ class ElementBeamCable(ElementBeam):
 
     @cached_property
     def held(self) -> tuple[Held, ...]:
-        # the mode that a higher degree misses in one element is held where two meet
-        return () if self.axis_degree > 3 else tuple(
-            Held(w, 300.0, "beam") for w in missed(2, self.sampling.points))
+        # the mode that a higher degree misses in one element is held where two meet, and that of
+        # the cubic axis by a third point
+        return ()
 
 
 @lru_cache(64)

@@ -40,9 +40,10 @@ class Assumed(Formulation):
     a cubic axis, and likewise for each pair ``r_Yk``, ``r_XYk`` of cubic sections. Where the
     stress-free state is curved, c less ``beta (r_2 - r_1) / L``, with the complex number beta that
     makes it vanish there, is held; it turns with the beam, so the term is objective, quadratic,
-    and its matrix constant. For linear sections k = E I / L^2; for cubic ones k = 10 E I / l^2 (the
-    cubic cable: 300 E I / l^2) for the axis, l the length of the beam, and E I / N for each
-    section coordinate, which keeps their higher order.
+    and its matrix constant. For linear sections k = E I / L^2; for cubic ones k = 10 E I / l^2 for
+    the axis, l the length of the beam, and E I / N for each section coordinate, which keeps their
+    higher order. A cubic cable has a third point of integration instead, whose weight
+    ``alpha * 1200 E I / (E A l^2)`` is small, and at most 4/9, that of three Gauss points.
 
     Linear sections of order 2 and more in plane strain: eps_yy is continuous from element to
     element, the curvature is not, so their sum cannot vanish at two points of each. The volumetric
@@ -58,7 +59,7 @@ class Assumed(Formulation):
     Parameters
     ----------
     alpha
-        Factor on the stabilisation.
+        Factor on the stabilisation, of cubic cables on the weight of the third point.
     """
 
     name = "assumed"

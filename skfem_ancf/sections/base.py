@@ -175,7 +175,8 @@ class Section(Frozen):
         EA, EI
             Stiffnesses against extension and bending.
         GA
-            Against shear, its factor included; None for that of a rectangle, 5/12 EA.
+            Against shear, its factor included; None for that of a rectangle, 5/12 EA. A cable does
+            not shear: a ModelWarning says where that is felt.
         rhoA, rhoI
             Mass per length, and its moment of inertia; None for rhoI is rhoA EI / EA.
         width

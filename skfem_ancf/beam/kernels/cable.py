@@ -3,8 +3,8 @@
 ``U = 1/2 int E A eps^2 - 2 E S eps k + E I k^2 ds`` with ``eps = |r'| - 1``, the change ``k`` of
 the material curvature ``kappa = r' x r'' / |r'|^2``, the rate at which the tangent turns along the
 stress-free axis, and the first moment S of the section about it. Both are sampled at 2 m - 2 Gauss
-points of an axis of degree 2 m - 1; for the cubic axis the mode of equal slopes that this leaves is
-stabilised.
+points of an axis of degree 2 m - 1. Those of the cubic axis miss a mode, equal slopes along the
+axis at both nodes: it has a third point in the middle, whose weight falls with the slenderness.
 
 Rows of the table are those of d/dX, then of d^2/dX^2, at the points: ``a = r'``, ``b = r''``.
 """
@@ -380,6 +380,25 @@ def cable_energy(pack: CablePack, u: Array, out: Array) -> None:
     add_held_energy(pack, u, out)
 
 
+#: Stiffness against the mode that two points of a cubic axis miss, in EI over the square of the
+#: length of the beam: the third point has a quarter of it.
+MIDDLE = 1200.0
+
+
+def softened(weight: float) -> tuple[Array, Array]:
+    """Three points on [0, 1], exact for cubics: two Gauss points and one of a weight between them.
+
+    Parameters
+    ----------
+    weight
+        That of the middle; of 4/9 and more it is the rule of three Gauss points.
+    """
+    weight = min(weight, 4.0 / 9.0)
+    x = 0.5 / np.sqrt(3.0 * (1.0 - weight))
+    outer = 0.5 * (1.0 - weight)
+    return np.array([0.5 - x, 0.5, 0.5 + x]), np.array([outer, weight, outer])
+
+
 CABLES = Texts(2, cable_evaluate, cable_energy)
 
 
@@ -394,6 +413,14 @@ def _pairs(n):
 def _powers(m):
     """Of the length that the functions of m coordinates a node take; shape (2 m,)."""
     return read_only(np.tile(np.arange(float(m)), 2))
+
+
+def _square(across):
+    """E I about the centroid over E A, where it is largest."""
+    if across.simple:
+        return across.mesh.height**2 / 12.0
+    EA, ES, EI = across.moments(np.array([0.5]), None, "E")[:, :, 0]
+    return float(np.max((EI - ES**2 / EA) / EA))
 
 
 def _has_alone(t):
@@ -441,18 +468,23 @@ class CableKernel(Chain):
         super().__init__(mesh, element)
         self.constant = across.stabilisation(formulation)
         n = formulation.points_along(element, across.slabs[0].material)
-        if self.constant is None and _has_alone(mesh.t):
-            n = max(n, element.axis_degree)  # no neighbour holds a mode that fewer points miss
-        self.points_number = n
+        if n == 2:
+            alpha, length = getattr(formulation, "alpha", 1.0), float(mesh.chain_lengths.min())
+            self.rule = softened(alpha * MIDDLE * _square(across) / length**2)
+        else:
+            if self.constant is None and _has_alone(mesh.t):
+                n = max(n, element.axis_degree)  # no neighbour holds a mode that fewer points miss
+            self.rule = gauss(n)
+        self.points_number = len(self.rule[0])
         longest = mesh.lengths.max()
         self.shared = mesh.is_uniform or longest - mesh.lengths.min() <= 1e-13 * longest
-        self._across, self.points = across, gauss(n)[0]
-        self.packs = [self._pack(mesh, element, n)]
+        self._across, self.points = across, self.rule[0]
+        self.packs = [self._pack(mesh, element, self.points_number)]
 
     @property
     def volume(self) -> float:
         """Volume of the body."""
-        w, area = gauss(self.points_number)[1], self._across.moments(self.points, what="area")[0]
+        w, area = self.rule[1], self._across.moments(self.points, what="area")[0]
         return float(area @ w @ self._across.mesh.lengths)
 
     @property
@@ -479,14 +511,14 @@ class CableKernel(Chain):
         """The tables of the reference element times powers of the lengths, of one or of each."""
         ne, nb = mesh.nelements, self.nd
         L = (mesh.lengths[:1] if self.shared else mesh.lengths)[:, None]
-        unit, pairs = element.derivatives_at_gauss_points(n), _pairs(n)
+        unit, pairs = self._derivatives(element, n), _pairs(n)
         columns, rows = L ** _powers(nb // 2), np.empty((len(L), 2 * n))
         rows[:, :n], rows[:, n:] = 1.0 / L, 1.0 / L**2
         table = unit * (rows[:, :, None] * columns[:, None])
         frame, length0, kappa0 = self._stress_free(mesh, element, n, table)
         stiffness, where = self._stiffness(), np.arange(ne)
         weights = np.empty(stiffness.shape[1:])
-        weights[:] = gauss(n)[1][:, None] * L.T
+        weights[:] = self.rule[1][:, None] * L.T
         constant = np.zeros((0, 2 * nb, 2 * nb)) if self.constant is None else packed(self.constant)
         return CablePack(
             table, np.ascontiguousarray(table[:int(self.shared)].transpose(0, 2, 1)), frame,
@@ -494,6 +526,12 @@ class CableKernel(Chain):
             stiffness, constant, mesh.t[0].astype(np.int64) * nb, np.arange(2 * nb),
             scaled_pair_tables(unit, rows[0], columns[0], pairs, constant, ne) if self.shared else
             pair_tables(table, pairs, constant, ne))
+
+    def _derivatives(self, element, n):
+        """The first and second derivatives of the axis' functions at the points, (2 n, nb)."""
+        if n == 3 and self.rule[1][1] < 4.0 / 9.0:
+            return np.concatenate([element.axis(self.points, d).T for d in (1, 2)])
+        return element.derivatives_at_gauss_points(n)
 
     def _stiffness(self):
         """EA, EI and - ES at the points, (3, points, 1 or elements)."""
