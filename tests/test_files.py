@@ -1,13 +1,20 @@
 """Files of the package: written whole and in nobody's way, and looked at before they are loaded."""
 
+import json
 import os
 import stat
+import warnings
+import zipfile
 
 import numpy as np
 import pytest
 
 from skfem_ancf import Beam, ElementBeamCable, MeshBeam, Scene, StVenantKirchhoff, sweep
+from skfem_ancf.core import archive
+from skfem_ancf.dynamics import checkpoint
+from skfem_ancf.core.errors import AncfError, CheckpointError, FileError
 from skfem_ancf.io import PvdWriter
+from skfem_ancf.sweeps.members import Sweep
 
 posix = pytest.mark.skipif(os.name != "posix", reason="modes and links of files are those of POSIX")
 
@@ -108,3 +115,229 @@ def test_what_was_there_stays_where_writing_fails(writer, monkeypatch, tmp_path)
     with pytest.raises(Exception, match="cannot be written|cannot write"):
         write()
     assert path.read_bytes() == before and set(tmp_path.iterdir()) == names
+
+
+# what is read
+
+
+def _stopped(path, **options):
+    """A file of a motion that has stopped in the middle."""
+    whole = dict(dt=0.01, every=3, scheme="generalized-alpha") | options
+    write, copies = checkpoint._write, []
+
+    def kept(target, arrays):
+        write(target, arrays)
+        copies.append(path.read_bytes())
+
+    checkpoint._write = kept
+    try:
+        scene().integrate(0.1, checkpoint=path, **whole)
+    finally:
+        checkpoint._write = write
+    path.write_bytes(copies[1])
+    return path
+
+
+def _again(path, change):
+    """Change a checkpoint's arrays and text in place, and make its checksum again."""
+    arrays = archive.read(path)
+    del arrays["checksum"]
+    text = json.loads(bytes(arrays.pop("text")).decode())
+    change(arrays, text)
+    arrays["text"] = np.frombuffer(json.dumps(text, sort_keys=True).encode(), np.uint8)
+    archive.write(path, {**arrays, "checksum": checkpoint._checksum(arrays)})
+
+
+READERS = {
+    "run.npz": lambda path: scene().resume(path),
+    "run.h5": lambda path: scene().resume(path),
+    "sweep.npz": Sweep.load,
+    "mesh.npz": MeshBeam.load,
+}
+
+
+@pytest.fixture(params=READERS)
+def reader(request, tmp_path):
+    """A function that reads a file, and the path of one that is good."""
+    if request.param == "run.h5":
+        pytest.importorskip("h5py")
+    path = tmp_path / request.param
+    if request.param.startswith("run"):
+        _stopped(path)
+    else:
+        WRITERS[request.param](path)
+    return READERS[request.param], path
+
+
+GIGABYTES = 4 * 2**30
+
+
+def test_sizes_are_looked_at_before_anything_is_loaded(reader):
+    """Files that are much larger in memory, or say so."""
+    read, path = reader
+    arrays = archive.read(path)
+    name = max(arrays, key=lambda name: arrays[name].nbytes)
+    if path.suffix == ".h5":
+        import h5py
+
+        for options in ({"shape": GIGABYTES // 8}, {"shape": GIGABYTES // 8, "chunks": (2**20,)},
+                        {"data": np.zeros(2**20), "compression": "gzip"}):
+            with h5py.File(path, "w") as h5:
+                for other, x in arrays.items():
+                    if other == name:
+                        h5.create_dataset(name, dtype="f8", **options)
+                    else:
+                        h5.create_dataset(other, data=x)
+            with pytest.raises(AncfError, match=r"bytes are there|not stored in one piece"):
+                read(path)
+        return
+    np.savez_compressed(path, **{**arrays, name: np.zeros(2**22)})
+    with pytest.raises(AncfError, match="compressed"):
+        read(path)
+    for size in (2**29, 10**17):  # said in the head of one array
+        head = f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({size},), }}"
+        npy = b"\x93NUMPY\x01\x00v\x00" + head.ljust(117).encode() + b"\n" + bytes(800)
+        with zipfile.ZipFile(path, "w") as members:
+            members.writestr(f"{name}.npy", npy)
+        with pytest.raises(AncfError, match="bytes are there"):
+            read(path)
+
+
+def test_objects_links_and_names_that_are_there_twice_are_refused(reader):
+    read, path = reader
+    arrays = archive.read(path)
+    if path.suffix == ".h5":
+        import h5py
+
+        with h5py.File(path, "a") as h5:
+            h5["more"] = h5py.SoftLink("/text")
+        with pytest.raises(AncfError, match="link"):
+            read(path)
+        return
+    np.savez(path, **{**arrays, "more": np.array([{}], dtype=object)})
+    with pytest.raises(AncfError, match="neither numbers nor texts"):
+        read(path)
+    np.savez(path, **arrays)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # which zipfile gives
+        with zipfile.ZipFile(path, "a") as members:
+            members.writestr(members.namelist()[0], b"")
+    with pytest.raises(AncfError, match="no array of its own"):
+        read(path)
+
+
+def test_damaged_files_end_in_the_errors_of_the_package(reader):
+    """Bytes changed and ends cut off, at random places."""
+    read, path = reader
+    content, rng = path.read_bytes(), np.random.default_rng(1)
+    for k in range(60):
+        damaged = bytearray(content)
+        for at in rng.integers(len(content), size=1 + k % 4):
+            damaged[at] = rng.integers(256)
+        path.write_bytes(damaged[:rng.integers(len(content))] if k % 5 == 0 else damaged)
+        try:
+            read(path)
+        except AncfError as error:
+            assert str(path) in str(error)
+
+
+TEXTS = {
+    "a time that is never reached": (("task", "t_end"), 1e300),
+    "a time that is no number": (("task", "t_end"), float("nan")),
+    "a start that is infinite": (("task", "t_start"), float("-inf")),
+    "an end before the start": (("task", "t_end"), -1.0),
+    "a step of zero": (("task", "dt"), 0.0), "a step that is negative": (("task", "dt"), -0.01),
+    "a step that is tiny": (("task", "dt"), 1e-14), "a step as text": (("task", "dt"), "0.01"),
+    "breakpoints that are none": (("task", "breakpoints"), ["x"]), "no task": (("task",), None),
+    "a task with more": (("task", "more"), 1), "a tolerance": (("task", "tol"), 5.0),
+    "a relative one": (("task", "rtol"), 1e-300), "a list in place of a scheme": (("scheme",), []),
+    "a scheme that is not known": (("scheme", "name"), "x"),
+    "a scheme whose name is a list": (("scheme", "name"), []),
+    "numbers that are none of it": (("scheme", "values"), {"alpha_f": 7.0}),
+    "other numbers of it": (("scheme", "values", "beta"), 0.9), "a scene": (("scene",), [1]),
+    "no file in a long time": (("every",), 0), "a truth value": (("every",), True),
+    "another time": (("t",), 0.0), "neither done nor not": (("done",), 1),
+    "a format": (("format",), [7]),
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_odd_texts_with_a_right_checksum(name, tmp_path):
+    (*folders, last), value = TEXTS[name]
+
+    def change(arrays, text):
+        for folder in folders:
+            text = text[folder]
+        text[last] = value
+
+    path = _stopped(tmp_path / "run.npz")
+    _again(path, change)
+    with pytest.raises(CheckpointError, match="run.npz|no scheme|scheme of your own"):
+        scene().resume(path)
+
+
+ARRAYS = {
+    "a displacement that is no number": ("now.u", lambda x: np.full_like(x, np.nan)),
+    "one that is infinite": ("history.v", lambda x: np.full_like(x, np.inf)),
+    "another shape": ("now.v", lambda x: x[:-1]), "an axis more": ("now.u", lambda x: x[None]),
+    "integers": ("now.u", lambda x: x.astype(int)), "texts": ("now.u", lambda x: x.astype(str)),
+    "complex numbers": ("history.u", lambda x: x.astype(complex)),
+    "a number": ("history.u", lambda x: np.array(1.0)),
+    "fewer instants": ("history.u", lambda x: x[:-1]),
+    "instants in another order": ("history.t", lambda x: x[::-1].copy()),
+    "counts that are negative": ("run.counts", lambda x: x - 10),
+    "counts of another motion": ("run.counts", lambda x: x + 1000),
+    "counts as floats": ("run.counts", lambda x: x.astype(float)),
+    "a state that is none": ("run.state", lambda x: np.full_like(x, 99.0)),
+    "factors of another size": ("run.A", lambda x: x[:-1]),
+    "factors in one number": ("run.A", lambda x: x[:1]),
+    "a size of steps": ("run.size", lambda x: np.array(-1.0)),
+    "times to store": ("t_eval", lambda x: np.array([np.nan])),
+    "none": ("now.acceleration", lambda x: None), "no history": ("history.t", lambda x: None),
+}
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_odd_arrays_with_a_right_checksum(name, tmp_path):
+    which, changed = ARRAYS[name]
+
+    def change(arrays, text):
+        new = changed(arrays.pop(which, None))
+        if new is not None:
+            arrays[which] = new
+
+    path = _stopped(tmp_path / "run.npz")
+    _again(path, change)
+    with pytest.raises(CheckpointError, match="run.npz"):
+        scene().resume(path)
+
+
+@pytest.mark.parametrize("scheme", ["radau", "energy-momentum"])
+def test_what_schemes_remember_is_looked_at(scheme, tmp_path):
+    for which in ("stages", "start") if scheme == "radau" else ("u",):
+        def change(arrays, text, which=which):
+            for name in list(arrays):
+                if name == "now.u" and which == "u" or name.endswith(f"0.{which}"):
+                    arrays[name] = arrays[name][..., :-1]
+
+        path = tmp_path / "run.npz"
+        path.unlink(missing_ok=True)
+        _again(_stopped(path, scheme=scheme), change)
+        with pytest.raises(CheckpointError, match="must be of the shape"):
+            scene().resume(path)
+
+
+@pytest.mark.parametrize("name, new", [
+    ("done", np.array([1.0, 1.0])), ("done", np.array([True])), ("failed", np.array([7])),
+    ("failed", np.array([0])), ("errors", np.array([1.0])), ("format", np.array("1")),
+    ("values/value", np.array(["a", "b"])), ("values/value", np.array(1.0)),
+    ("parameters/x", np.array([1.0])), ("other/x", np.array([1.0, 2.0])), ("done", None),
+])
+def test_odd_sweeps(name, new, tmp_path):
+    path = tmp_path / "sweep.npz"
+    WRITERS[path.name](path)
+    arrays = archive.read(path)
+    arrays[name] = new
+    archive.write(path, {k: x for k, x in arrays.items() if x is not None})
+    with pytest.raises(FileError, match="cannot be read as a sweep"):
+        Sweep.load(path)

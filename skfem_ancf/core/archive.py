@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import stat
 import zipfile
-import zlib
 from contextlib import contextmanager, suppress
 from io import BytesIO
+from math import prod
 from secrets import token_hex
 from typing import TYPE_CHECKING, Any
 
@@ -19,13 +19,16 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
 
-    from .types import ArrayLike
+    from .types import Array, ArrayLike
 
 #: Letters of a name that the one of a new file beside it has, at most: names may have 255.
 STEM = 100
-#: What reading a file raises that is damaged, or none of these.
-DAMAGED = (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, MemoryError,
-           RuntimeError, OverflowError, zipfile.BadZipFile, zlib.error)
+#: Kinds of numbers and texts in files, by the letters of NumPy.
+KINDS = "biufcUS"
+
+
+class Unreadable(ValueError):
+    """A file is none of arrays of numbers and texts as :func:`write` writes them, or is damaged."""
 
 
 def find_h5py() -> Any:
@@ -35,6 +38,92 @@ def find_h5py() -> Any:
     except ImportError:
         raise MissingExtra("h5py", "files") from None
     return h5py
+
+
+def read(path: Path) -> dict[str, Array]:
+    """The arrays of a file by name, those of :func:`write`.
+
+    What a file says of their sizes is compared with its own before anything is loaded, so that
+    reading takes no more memory than the file and a copy of it. Nothing in it is executed.
+
+    Parameters
+    ----------
+    path
+        Its name: .h5, or else an archive of NumPy.
+
+    Raises
+    ------
+    OSError
+        If it cannot be opened.
+    Unreadable
+        If it is something else, compressed, or damaged.
+    """
+    with open(path, "rb") as file:
+        size = os.fstat(file.fileno()).st_size
+        try:
+            return _read_h5(file, size) if path.suffix == ".h5" else _read_npz(file, size)
+        except MissingExtra:
+            raise
+        except Exception as error:  # whatever is in it
+            raise Unreadable(f"{type(error).__name__}: {error}") from None
+
+
+def _read_npz(file, size):
+    arrays = {}
+    with zipfile.ZipFile(file) as members:
+        infos = members.infolist()
+        if any(x.compress_type != zipfile.ZIP_STORED or x.file_size != x.compress_size
+               for x in infos):
+            raise Unreadable("its arrays are compressed, which no file of this package is")
+        if sum(x.file_size for x in infos) > size:
+            raise Unreadable("its arrays are said to be larger than the file")
+        for info in infos:
+            name, _, suffix = info.filename.rpartition(".")
+            if suffix != "npy" or name in arrays:
+                raise Unreadable(f"it has a member {info.filename!r} that is no array of its own")
+            with members.open(info) as content:
+                arrays[name] = _read_npy(name, content, info.file_size)
+    return arrays
+
+
+def _read_npy(name, content, size):
+    version = np.lib.format.read_magic(content)
+    if version not in ((1, 0), (2, 0)):
+        raise Unreadable(f"the array {name!r} is of the version {version} of files of NumPy")
+    shape, fortran, dtype = (np.lib.format.read_array_header_1_0 if version == (1, 0) else
+                             np.lib.format.read_array_header_2_0)(content)
+    _require(name, shape, dtype, size - content.tell())
+    flat = np.frombuffer(content.read(), dtype=dtype).copy()
+    return flat.reshape(shape, order="F" if fortran else "C")
+
+
+def _read_h5(file, size):
+    h5py, arrays = find_h5py(), {}
+    with h5py.File(file, "r") as h5:
+        for name in h5:
+            if not isinstance(h5.get(name, getlink=True), h5py.HardLink):
+                raise Unreadable(f"{name!r} is a link")
+            found = h5[name]
+            if not isinstance(found, h5py.Dataset) or found.shape is None:
+                raise Unreadable(f"{name!r} is no array")
+            if found.chunks is not None or found.is_virtual or found.external:
+                raise Unreadable(f"the array {name!r} is not stored in one piece")
+            _require(name, found.shape, found.dtype, found.id.get_storage_size())
+            size -= found.nbytes
+            if size < 0:
+                raise Unreadable("its arrays are said to be larger than the file")
+            arrays[name] = np.asarray(found[()])
+    return arrays
+
+
+def _require(name, shape, dtype, size):
+    """Raise Unreadable if an array is none of numbers or texts, or not as large as what there is.
+    """
+    if dtype.kind not in KINDS or dtype.names or dtype.subdtype or not dtype.itemsize:
+        raise Unreadable(f"the array {name!r} is of {dtype}, neither numbers nor texts")
+    if any(n < 0 for n in shape) or prod(shape) * dtype.itemsize != size:
+        raise Unreadable(f"the array {name!r} is said to have the shape {shape} of {dtype}, but "
+                         f"{size} bytes are there")
 
 
 @contextmanager

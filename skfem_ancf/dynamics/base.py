@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from ..core.errors import CheckpointError
 
 if TYPE_CHECKING:
     from ..equations.system import System
@@ -89,6 +91,38 @@ def kept(y: Motion, contacts: Array | None, **others: Array) -> dict[str, Array]
     """
     contacts = contacts_of(y) if contacts is None else contacts
     return ({"contacts": contacts} if contacts is not None else {}) | others or None
+
+
+def recalled(memory: dict[str, Any], name: str, shape: tuple[int, ...], kind: str = "f",
+             finite: bool = True) -> Array:
+    """An array of what a motion goes on with, of the shape that it has to have.
+
+    Parameters
+    ----------
+    memory
+        Arrays of any shapes (...,) by name.
+    name
+        Which.
+    shape
+        Its shape.
+    kind
+        "f" for floats, "i" for integers, "c" for complex numbers.
+    finite
+        Its numbers have to be finite.
+
+    Raises
+    ------
+    CheckpointError
+        If it is another, as of a file that was not written by this package.
+    """
+    found = memory.get(name)
+    array = np.asarray(found)
+    if found is None or array.shape != shape or array.dtype.kind != kind:
+        raise CheckpointError(f"{name!r} must be of the shape {shape} and kind {kind!r}, got " + (
+            "none" if found is None else f"{array.shape} and {array.dtype.kind!r}"))
+    if finite and not np.isfinite(array).all():
+        raise CheckpointError(f"{name!r} has numbers that are not finite")
+    return array
 
 
 class Memories(Sequence):

@@ -7,20 +7,24 @@ import json
 import logging
 import time
 import warnings
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.archive import DAMAGED, find_h5py
+from ..core import archive
+from ..core.archive import find_h5py
 from ..core.archive import write as _write
 from ..core.errors import (CheckpointError, CheckpointWarning, InputError, require_integer,
                            require_path, shown)
 from ..actions.forces.system import Forces
-from .base import Motion
-from .run import Run, Task
+from .base import Motion, recalled
+from .gauss import Gauss
+from .generalized_alpha import HHT, GeneralizedAlpha, Newmark
+from .run import MAX_STEPS, Run, Task, task_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from ..results.state import State
     from ..equations.system import System
@@ -205,9 +209,27 @@ def _scheme_of(text, given):
     if text["values"] is None or text["name"] not in SCHEMES:
         raise CheckpointError(f"the run was made by a scheme of your own, {text['name']!r}: give "
                               "it, resume(path, scheme=...)")
-    scheme = object.__new__(SCHEMES[text["name"]])
-    vars(scheme).update(text["values"])
+    try:
+        scheme = _MADE.get(text["name"], lambda values: SCHEMES[text["name"]]())(text["values"])
+        known = vars(scheme)
+        same = known.keys() == text["values"].keys() and all(
+            abs(known[name] - value) <= 1e-12 for name, value in text["values"].items())
+    except (KeyError, InputError):
+        same = False
+    if not same:
+        raise CheckpointError(f"there is no scheme {text}")
+    known.update({name: type(known[name])(value) for name, value in text["values"].items()})
     return scheme
+
+
+#: How a scheme with parameters is made of its numbers.
+_MADE: dict[str, Callable[[dict[str, Any]], Scheme]] = {
+    "generalized-alpha": lambda values: GeneralizedAlpha(
+        min(1.0, values["alpha_f"] / (1.0 - values["alpha_f"]))),
+    "hht": lambda values: HHT(values["alpha_f"]),
+    "newmark": lambda values: Newmark(values["beta"], values["gamma"]),
+    "gauss": lambda values: Gauss(values["number"]),
+}
 
 
 # files
@@ -218,39 +240,62 @@ def _checksum(arrays):
         part for name in sorted(arrays) for part in (name, arrays[name])))), dtype=np.uint8)
 
 
-def _load(path):
-    if path.suffix == ".h5":
-        with find_h5py().File(path, "r") as h5:
-            return {name: np.asarray(h5[name][()]) for name in h5}
-    with open(path, "rb") as file, np.load(file, allow_pickle=False) as npz:
-        return {name: npz[name] for name in npz.files}
-
-
 def read(path: StrPath) -> tuple[dict[str, Array], dict[str, Any]]:
     """The arrays of a checkpoint by name, and its text; raises CheckpointError."""
     path = require_path("checkpoint", _path(path))
     if not path.exists():
         raise CheckpointError(f"there is no file {str(path)!r}")
     try:
-        arrays = _load(path)
-    except DAMAGED as error:
+        arrays = archive.read(path)
+    except (OSError, archive.Unreadable) as error:
         raise CheckpointError(f"{str(path)!r} cannot be read, it is no checkpoint or damaged: "
-                              f"{type(error).__name__}: {error}") from None
+                              f"{error}") from None
     checksum = arrays.pop("checksum", None)
     try:
-        text = json.loads(bytes(arrays.pop("text")).decode())
+        text = json.loads(bytes(arrays.pop("text")).decode(), parse_constant=float)
         is_one = isinstance(text, dict) and text.get("what") == _MAGIC
-    except (KeyError, ValueError, TypeError):
+    except (KeyError, ValueError, TypeError, RecursionError):
         is_one = False
     if not is_one:
         raise CheckpointError(f"{str(path)!r} is no checkpoint of a motion")
-    if text["format"] != FORMAT:
-        raise CheckpointError(f"{str(path)!r} has the format {text['format']!r}, this version "
-                              f"reads {FORMAT}")
+    if text.get("format") != FORMAT:
+        raise CheckpointError(f"{str(path)!r} has the format {shown(text.get('format'))}, this "
+                              f"version reads {FORMAT}")
     found = _checksum({**arrays, "text": _bytes(text)})
     if checksum is None or not np.array_equal(checksum, found):
         raise CheckpointError(f"{str(path)!r} is damaged: its checksum is not that of its content")
+    wrong = _wrong(text)
+    if wrong:
+        raise CheckpointError(f"{str(path)!r} does not say what a run needs: {wrong}")
     return arrays, text
+
+
+def _is_number(x):
+    return type(x) in (int, float) and abs(x) < np.inf
+
+
+def _wrong(text):
+    """What of the text of a file is of another kind than it is written, or empty."""
+    task, scheme = text.get("task"), text.get("scheme")
+    if not isinstance(task, dict) or not isinstance(scheme, dict):
+        return "task, scheme"
+    scene, values, every = text.get("scene"), scheme.get("values"), text.get("every")
+    right = {
+        "every": every is None or type(every) is int and 1 <= every <= MAX_STEPS,
+        "scheme": (scheme.keys() == {"name", "values"} and type(scheme["name"]) is str
+                   and (values is None or isinstance(values, dict)
+                        and all(map(_is_number, values.values())))),
+        "scene": isinstance(scene, dict) and all(type(x) is str for x in scene.values()),
+        "task": (task.keys() == _TASK and isinstance(task["breakpoints"], list)
+                 and all(map(_is_number, task["breakpoints"]))
+                 and all(_is_number(task[name]) for name in ("t_start", "t_end", "rtol"))
+                 and all(task[name] is None or _is_number(task[name]) for name in ("dt", "tol"))),
+        "t": _is_number(text.get("t")), "done": type(text.get("done")) is bool}
+    return ", ".join(name for name, there in right.items() if not there)
+
+
+#: What of a Task is in the text.
+_TASK = {field.name for field in fields(Task)} - {"t_eval"}
 
 
 def _bytes(text):
@@ -369,8 +414,9 @@ def _compare(system, text, arrays, path):
         for name, values in functions(system, task["t_start"], task["t_end"]).items():
             known = arrays.get(f"function.{name}")
             size = np.abs(values).max(initial=0.0)
-            if known is None or known.shape != values.shape or not np.allclose(
-                    values, known, rtol=0, atol=1e-12 * size, equal_nan=True):
+            if known is None or known.shape != values.shape or known.dtype.kind not in "biuf" or (
+                    not np.allclose(
+                        values, known, rtol=0, atol=1e-12 * size, equal_nan=True)):
                 other.append(name)
     if other:
         raise CheckpointError(f"{str(path)!r} is of another scene, it differs in: "
@@ -398,33 +444,50 @@ def resume(system: System, path: StrPath, scheme: str | Scheme | type[Scheme] | 
         If the file cannot be read, is damaged, or of another scene.
     """
     arrays, text = read(path)
-    _compare(system, text, arrays, path)
-    task = Task(**{**text["task"], "t_eval": arrays.get("t_eval"),
-                   "breakpoints": tuple(text["task"]["breakpoints"])})
-    run = Run(system, _scheme_of(text["scheme"], scheme), task, sensors)
-    run.recorder.recall({k[7:]: v for k, v in arrays.items() if k.startswith("sensor.")}
-                        if sensors or "sensor.t" in arrays else {"t": np.zeros(0)})
     try:
-        _restore(run, arrays)
-    except (KeyError, ValueError, TypeError, IndexError) as error:
+        said = text["task"]
+        task = task_of(**{**said, "dt": "auto" if said["dt"] is None else said["dt"]},
+                       t_eval=arrays.get("t_eval"))
+    except InputError as error:
+        raise CheckpointError(f"{str(path)!r} does not hold what a run needs: {error}") from None
+    _compare(system, text, arrays, path)
+    made = _scheme_of(text["scheme"], scheme)
+    try:
+        run = Run(system, made, task, sensors)
+        run.recorder.recall({k[7:]: v for k, v in arrays.items() if k.startswith("sensor.")}
+                            if sensors or "sensor.t" in arrays else {"t": np.zeros(0)})
+        _restore(run, arrays, text)
+    except (InputError, KeyError, ValueError, TypeError, IndexError) as error:
         raise CheckpointError(f"{str(path)!r} does not hold what a run needs: "
                               f"{type(error).__name__}: {error}") from None
+    except CheckpointError as error:
+        raise CheckpointError(f"{str(path)!r} does not hold what a run needs: {error}") from None
     return run, Checkpoint(path, text["every"], run)
 
 
-def _restore(run, arrays):
-    columns = {name: arrays[f"history.{name}"] for name in run.history.COLUMNS}
-    shapes = {name: x.shape for name, x in run.history.columns().items()}
-    for name, shape in shapes.items():
-        if columns[name].shape[1:] != shape[1:] or arrays[f"now.{name}"].shape != shape[1:]:
-            raise ValueError(f"{name} has the shape {columns[name].shape}")
-    memories = [{} for _ in range(len(columns["t"]) + 1)]
+def _restore(run, arrays, text):
+    columns = {}
+    n = len(np.atleast_1d(arrays.get("history.t", ())))
+    for name, x in run.history.columns().items():
+        columns[name] = recalled(arrays, f"history.{name}", (n, *x.shape[1:]))
+        recalled(arrays, f"now.{name}", x.shape[1:])
+    memories = [{} for _ in range(n + 1)]
     for name, value in arrays.items():
         if name.startswith("memory."):
             _, k, key = name.split(".", 2)
-            memories[int(k)][key] = value
+            memories[range(n + 1)[int(k)]][key] = value
+    contacts = run.system.forces.contacts
+    for memory in memories:
+        if "contacts" in memory:
+            recalled(memory, "contacts", (contacts.tables.memory.size,))
     now, *stored = [memory or None for memory in memories]
     run.history.restore(columns, stored)
     t, *rest, before, dissipated, turns = (arrays[f"now.{name}"] for name in run.history.COLUMNS)
+    times = columns["t"]
+    if (np.diff(times) <= 0.0).any() or n and not run.task.t_start <= times[0] <= times[-1] <= t:
+        raise CheckpointError("the times of its instants do not increase up to its own")
+    if float(t) != text["t"]:
+        raise CheckpointError(f"its times are {float(t)} and {text['t']}")
     run.recall(Motion(float(t), *rest, float(before), now, float(dissipated), turns),
                {k[4:]: v for k, v in arrays.items() if k.startswith("run.")})
+    run.recorder.require_alike(run.y)

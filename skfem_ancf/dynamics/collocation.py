@@ -11,7 +11,7 @@ from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 from ..core.band import factorize, fix, solve
 from ..beam.strain_energy import gradients_size
 from ..core.errors import InputError
-from .base import Memories, Motion, Scheme, Steps, contacts_of
+from .base import Memories, Motion, Scheme, Steps, contacts_of, recalled
 from .differences import derivative, difference_row, grown
 from .integrator import StepFailed
 from .rates import JointMotions
@@ -212,7 +212,8 @@ class Collocation(Scheme):
         if not y.memory or "stages" not in y.memory:
             np.multiply(integrator.asked[2], y.acceleration, out=w.guess)
         else:
-            w.U[:], w.before[:], w.first[:] = (y.memory[k] for k in ("stages", "start", "forces"))
+            for name, room in (("stages", w.U), ("start", w.before), ("forces", w.first)):
+                room[:] = recalled(y.memory, name, room.shape)
             ahead = method.ahead if dt == y.before else table.ahead(dt / y.before)
             given = given._replace(begun=1, ahead=ahead)
         rows, stages = np.empty((n + 1, 3, s.N)), np.empty((n, len(method.points), s.N))
@@ -244,7 +245,7 @@ class Collocation(Scheme):
             {"J": w.J, "Y": w.Y, "S": w.S, "Q": w.Q} if len(w.J) else {})
         for name, room in factors.items():
             if name in kept and kept[name] is not room:  # of a motion that goes on
-                room[...] = kept[name]
+                room[...] = recalled(kept, name, room.shape, room.dtype.kind, finite=False)
             kept[name] = room
         return w
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core.errors import (AccuracyWarning, AncfError, ConvergenceError, InputError, Interrupted,
-                           ModelWarning, require_finite, require_finite_scalar, require_flag,
-                           require_function, require_positive, shown, taught)
+                           ModelWarning, require_finite_scalar, require_flag, require_function,
+                           require_positive, shown, taught)
 from ..core.progress import progress_bar
 from ..core.switch import expecting
 from .checkpoint import Checkpoint, same_problem
@@ -17,7 +17,7 @@ from .base import contacts_of, in_steps, same_scheme
 from .budget import ENOUGH
 from .companion import Companion
 from .integrator import Integrator, StepFailed
-from .run import Run, Task
+from .run import MAX_STEPS, Run, task_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -31,18 +31,15 @@ if TYPE_CHECKING:
     from .history import History
     from .sensors import Sensor
 
-MAX_STEPS = 10**9
 #: Steps after which a motion is looked at whether its body is turned inside out.
 LOOKED = 16
 #: Gigabytes of the joints' matrices, at most.
 LARGEST = 2.0
-MIN_RTOL = 1e-12
 #: Coordinates up to which the error of a motion is checked unasked: it is twice as long, or a
 #: little more, and in larger scenes that is a wait.
 CHECKED = 1000
 #: How often a motion is taken at most.
 PASSES = 3
-EPS = np.finfo(float).eps
 
 
 @taught
@@ -137,7 +134,7 @@ def integrate(system: System, t_end: float, dt: float | str, scheme: Scheme, u: 
         t_start = 0.0 if motion is None else motion.t
     if not isinstance(breakpoints, tuple):
         breakpoints = np.atleast_1d(breakpoints)
-    task = _task(t_start, t_end, dt, t_eval, tol, rtol, [
+    task = task_of(t_start, t_end, dt, t_eval, tol, rtol, [
         *breakpoints, *_samples(system, t_start, t_end)])
     if not (in_steps(scheme) and system.by_nodes):
         _require_room(system)
@@ -245,48 +242,6 @@ def _require_room(system):
             "in 'energy-momentum' and 'generalized-alpha', if it is held at nodes, without other "
             "joints, springs between points far apart and modal damping; else take fewer or longer "
             "beams, or the frequencies and shapes of scene.modes(k)")
-
-
-def _task(t_start, t_end, dt, t_eval, tol, rtol, breakpoints):
-    """The arguments, checked."""
-    t_start = require_finite_scalar("t_start", t_start)
-    t_end = require_finite_scalar("t_end", t_end)
-    span = require_positive("t_end - t_start", t_end - t_start)
-    auto = isinstance(dt, str)
-    if auto and dt != "auto":
-        raise InputError(f'dt must be a positive number or "auto", got {dt!r}')
-    dt = None if auto else min(require_positive("dt", dt), span)
-    _require_step(t_start, t_end, 1e-4 * span if auto else dt)
-    if t_eval is not None:
-        t_eval = require_finite("t_eval", t_eval, (None,))
-        if (not len(t_eval) or len(t_eval) > 1 and (t_eval[1:] <= t_eval[:-1]).any()
-                or t_eval[0] < t_start
-                or t_eval[-1] > t_end * (1 + 1e-12)):
-            raise InputError(f"t_eval must increase within [{t_start}, {t_end}], got "
-                             f"{shown(t_eval)}")
-    tol = None if tol is None else require_positive("tol", tol)
-    rtol = require_positive("rtol", rtol)
-    if rtol < MIN_RTOL:
-        raise InputError(f"rtol must be at least {MIN_RTOL:g}, got {rtol!r}")
-    inside = []
-    if len(breakpoints):
-        breaks = np.unique(require_finite("breakpoints", breakpoints, (None,)))
-        inside = breaks[(breaks > t_start + 1e-9 * span) & (breaks < t_end - 1e-9 * span)].tolist()
-    return Task(t_start, t_end, dt, tol, rtol, t_eval, tuple(inside))
-
-
-def _require_step(t_start, t_end, step):
-    """Raise InputError where the times of the steps cannot be told apart, or never end."""
-    if step < 1e-100 or t_end > 1e100:  # their squares are in the equations
-        raise InputError(f"times must lie between 1e-100 and 1e100, got dt = {step!r}, t_end = "
-                         f"{t_end!r}")
-    if step <= 8 * EPS * max(abs(t_start), abs(t_end)):
-        raise InputError(f"dt = {step!r} is below the round-off of the times {t_start!r} to "
-                         f"{t_end!r}")
-    steps = (t_end - t_start) / step
-    if steps > MAX_STEPS:
-        raise InputError(f"dt = {step!r} takes {steps:.3g} steps to t_end = {t_end!r}: more than "
-                         f"{MAX_STEPS:.0e} are not taken")
 
 
 def _goes_on(system, scheme, start, t):

@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..equations.step_condensation import Eliminated, EliminatedMass
-from ..core.errors import AncfError, InputError, SupportError, require_positive, shown
+from ..core.errors import (AncfError, CheckpointError, InputError, SupportError, require_positive,
+                           shown)
 from ..core.kept import cached_property, twin_of
 from ..core.linalg import halves
 from ..core.callbacks import handle_of
-from .base import Memories, Motion, Steps, contacts_of, in_steps, kept, same_scheme
+from .base import Memories, Motion, Steps, contacts_of, in_steps, kept, recalled, same_scheme
 from .course import Courses
 from .rates import rates
 from .dampers import Dampers, Rows, solve_rows
 from .joined import Joined
 from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, READY, STATE,
-                    Matrices, Rule, factors, mass_factor, room_for_steps, steps)
+                    SYMMETRIC, TURNED, Matrices, Rule, factors, mass_factor, room_for_steps, steps)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -488,21 +489,29 @@ class Integrator:
 
     def recall(self, memory: dict[str, Any]) -> None:
         """Go on with what :meth:`remember` gave."""
-        self._state[:], self._dt = memory["state"], float(memory["dt"])
-        self.substeps = int(memory["substeps"])
+        self._state[:] = recalled(memory, "state", (STATE,))
+        if not (np.isfinite(self._state).all() and self._state[READY] in (0.0, SYMMETRIC, TURNED)
+                and self._state[FAILURE] in range(len(FAILURES))):
+            raise CheckpointError(f"the state of the steps is {self._state}")
+        self._dt = float(recalled(memory, "dt", (), finite=False))
+        self.substeps = int(recalled(memory, "substeps", (), "i"))
         self.kept = {name[5:]: np.array(array) for name, array in memory.items()
                      if name.startswith("kept ")}
         for name, array in self._factors().items():
-            array[...] = memory[name]
+            array[...] = recalled(memory, name, array.shape, array.dtype.kind, finite=False)
+            if name == "pivots" and array.size and not 0 <= array.min() <= array.max() < array.size:
+                raise CheckpointError("the exchanges of rows are none")
         if self._nodes:
             self._recall_nodes(memory)
 
     def _recall_nodes(self, memory):
         steps, mass = self._nodes
+        s = self.system
         if self.ready:
-            steps.factorize(memory["at"], memory["multipliers at"])
-        if len(memory["mass at"]):
-            mass.factorize(memory["mass at"])
+            steps.factorize(recalled(memory, "at", (s.N,)),
+                            recalled(memory, "multipliers at", (s.m,)))
+        if np.shape(memory.get("mass at")) != (0,):
+            mass.factorize(recalled(memory, "mass at", (s.N,)))
 
     def _factors(self):
         """The arrays of the factors of steps, by name; none where there are no such factors."""

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
-from ..core.errors import AncfError, ask_number
-from .base import Motion, Scheme, contacts_of
+from ..core.errors import (AncfError, CheckpointError, InputError, ask_number, require_finite,
+                           require_finite_scalar, require_positive, shown)
+from .base import Motion, Scheme, contacts_of, recalled
 from .budget import Budget
 from .companion import Companion
 from .history import History
@@ -27,6 +28,11 @@ if TYPE_CHECKING:
     from ..core.types import Array
     from .sensors import Sensor
 
+#: Steps of a motion, at most.
+MAX_STEPS = 10**9
+#: The smallest tolerance of automatic steps.
+MIN_RTOL = 1e-12
+EPS = np.finfo(float).eps
 #: Part of a step by which one may end before an instant that is looked for there.
 NEARLY = 1e-6
 #: Part of a step up to which an instant is interpolated: a step that short is all round-off.
@@ -72,6 +78,54 @@ class Task:
     def span(self) -> float:
         """Length of the motion in time."""
         return self.t_end - self.t_start
+
+
+def task_of(t_start, t_end, dt, t_eval, tol, rtol, breakpoints):
+    """What is asked for, checked: arguments of :func:`~skfem_ancf.dynamics.integrate.integrate`.
+
+    Raises
+    ------
+    InputError
+        If they do not fit.
+    """
+    t_start = require_finite_scalar("t_start", t_start)
+    t_end = require_finite_scalar("t_end", t_end)
+    span = require_positive("t_end - t_start", t_end - t_start)
+    auto = isinstance(dt, str)
+    if auto and dt != "auto":
+        raise InputError(f'dt must be a positive number or "auto", got {dt!r}')
+    dt = None if auto else min(require_positive("dt", dt), span)
+    _require_step(t_start, t_end, 1e-4 * span if auto else dt)
+    if t_eval is not None:
+        t_eval = require_finite("t_eval", t_eval, (None,))
+        if (not len(t_eval) or len(t_eval) > 1 and (t_eval[1:] <= t_eval[:-1]).any()
+                or t_eval[0] < t_start
+                or t_eval[-1] > t_end * (1 + 1e-12)):
+            raise InputError(f"t_eval must increase within [{t_start}, {t_end}], got "
+                             f"{shown(t_eval)}")
+    tol = None if tol is None else require_positive("tol", tol)
+    rtol = require_positive("rtol", rtol)
+    if rtol < MIN_RTOL:
+        raise InputError(f"rtol must be at least {MIN_RTOL:g}, got {rtol!r}")
+    inside = []
+    if len(breakpoints):
+        breaks = np.unique(require_finite("breakpoints", breakpoints, (None,)))
+        inside = breaks[(breaks > t_start + 1e-9 * span) & (breaks < t_end - 1e-9 * span)].tolist()
+    return Task(t_start, t_end, dt, tol, rtol, t_eval, tuple(inside))
+
+
+def _require_step(t_start, t_end, step):
+    """Raise InputError where the times of the steps cannot be told apart, or never end."""
+    if step < 1e-100 or t_end > 1e100:  # their squares are in the equations
+        raise InputError(f"times must lie between 1e-100 and 1e100, got dt = {step!r}, t_end = "
+                         f"{t_end!r}")
+    if step <= 8 * EPS * max(abs(t_start), abs(t_end)):
+        raise InputError(f"dt = {step!r} is below the round-off of the times {t_start!r} to "
+                         f"{t_end!r}")
+    steps = (t_end - t_start) / step
+    if steps > MAX_STEPS:
+        raise InputError(f"dt = {step!r} takes {steps:.3g} steps to t_end = {t_end!r}: more than "
+                         f"{MAX_STEPS:.0e} are not taken")
 
 
 class Run:
@@ -466,9 +520,17 @@ class Run:
             self.sizes.recall(memory)
         for k, control in enumerate(self.system.forces.sampled):
             control.hold(memory[f"held {k}"])
-        self.segment, self.n, self._next, self.steps, self.rejected = map(int, memory["counts"])
-        self.size = float(memory["size"])
+        counts = recalled(memory, "counts", (5,), "i").tolist()
+        self.segment, self.n, self._next, self.steps, self.rejected = counts
+        self.size = float(recalled(memory, "size", ()))
+        wanted = self.task.t_eval
+        if min(counts) < 0 or self.segment > len(self._times) - 2 or self._next > (
+                1 if wanted is None else len(wanted)) or not self.size > 0.0:
+            raise CheckpointError(f"the counts of steps are {counts}, their size {self.size}")
         self._limit()
+        if not self._begun <= y.t <= self._end or self.sizes is None and (
+                self.n > self._count or abs(self._time(self.n) - y.t) > 1e-9 * self.size):
+            raise CheckpointError(f"the time {y.t} is not that of the step {self.n}")
 
 
 def _same(y):

@@ -12,6 +12,7 @@ from ..core.errors import (CheckpointError, InputError, NameUnknown, ask_array, 
 from ..recovery.fields import FIELDS, find_field
 from ..core.frozen import Frozen
 from ..actions.joints.base import Joint
+from .base import recalled
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -189,7 +190,7 @@ class Recorder:
 
     def __init__(self, sensors: Sequence[tuple[str, Sensor]], system: System,
                  states_of: Callable[[Sequence[Motion]], Iterable[State]]) -> None:
-        self.sensors, self._states_of = list(sensors), states_of
+        self.sensors, self._system, self._states_of = list(sensors), system, states_of
         self._located: list[Any] = [locate(sensor, system) for _, sensor in self.sensors]
         self._t: list[Array] = []
         self._read: list[list[Array]] = [[] for _ in self.sensors]
@@ -229,5 +230,19 @@ class Recorder:
         if len(arrays) != len(self.sensors) + 1:
             raise CheckpointError(f"the run had {max(len(arrays) - 1, 0)} sensors, the scene has "
                                   f"{len(self.sensors)}: {[name for name, _ in self.sensors]}")
-        self._t = [arrays["t"]]
+        self._t = [recalled(arrays, "t", (len(np.atleast_1d(arrays["t"])),))]
         self._read = [[arrays[str(k)]] for k in range(len(self.sensors))]
+
+    def require_alike(self, y: Motion) -> None:
+        """Raise CheckpointError if what was recalled is not of the shape of what is read.
+
+        Parameters
+        ----------
+        y
+            An instant.
+        """
+        now = Recorder(self.sensors, self._system, self._states_of)
+        now.record([y])
+        for found, (one,) in zip(self._read, now._read):
+            recalled({"sensor": found[0]}, "sensor", (len(self._t[0]), *one.shape[1:]),
+                     one.dtype.kind, finite=False)

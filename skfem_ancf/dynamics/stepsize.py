@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.sampling import sample
+from .base import recalled
 
 if TYPE_CHECKING:
     from ..equations.system import System
@@ -195,4 +196,4 @@ class StepSize:
 
     def recall(self, memory: dict[str, Any]) -> None:
         """Go on with what :meth:`remember` gave."""
-        self._averages = memory["averages"]
+        self._averages = recalled(memory, "averages", self._averages.shape)

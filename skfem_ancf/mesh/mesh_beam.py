@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from contextlib import ExitStack
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -941,26 +940,19 @@ class MeshBeam(Frozen, Mesh2D):
 
     @classmethod
     def _load_npz(cls, filename):
-        with ExitStack() as stack:  # closes the file of one that is damaged
-            file = stack.enter_context(filename.open("rb"))
-            if file.read(4) not in (b"PK\x03\x04", b"PK\x05\x06"):
-                raise MeshError(f"{str(filename)!r} is no .npz file")
-            file.seek(0)
-            data = stack.enter_context(np.load(file, allow_pickle=False))
-            missing = {"doflocs", "t", "height", "p_X", "p_Y", "lengths",
-                       "sections"} - set(data.files)
-            if missing:
-                raise MeshError(f"{str(filename)!r} holds no beam: {sorted(missing)} are missing")
-            tags = {k[2:]: data[k] for k in data.files if k.startswith("b_")}
-            tags = {k: OrientedBoundary(v, data[f"o_{k}"]) if f"o_{k}" in data.files else v
-                    for k, v in tags.items()}
-            parts = {k[2:]: data[k] for k in data.files if k.startswith("s_")}
-            of = cls._of_kind(str(data["kind"]) if "kind" in data.files else cls.kind)
-            return of(data["doflocs"], data["t"], tags or None, parts or None,
-                      height=float(data["height"]), p_X=data["p_X"], p_Y=data["p_Y"],
-                      lengths=data["lengths"], sections=str(data["sections"]),
-                      **{name: data[name] for name in ("s", "p_XY", "heights")
-                         if name in data.files})
+        data = archive.read(filename)
+        missing = {"doflocs", "t", "height", "p_X", "p_Y", "lengths", "sections"} - data.keys()
+        if missing:
+            raise MeshError(f"{str(filename)!r} holds no beam: {sorted(missing)} are missing")
+        tags = {k[2:]: v for k, v in data.items() if k.startswith("b_")}
+        tags = {k: OrientedBoundary(v, data[f"o_{k}"]) if f"o_{k}" in data else v
+                for k, v in tags.items()}
+        parts = {k[2:]: v for k, v in data.items() if k.startswith("s_")}
+        of = cls._of_kind(str(data["kind"]) if "kind" in data else cls.kind)
+        return of(data["doflocs"], data["t"], tags or None, parts or None,
+                  height=float(data["height"]), p_X=data["p_X"], p_Y=data["p_Y"],
+                  lengths=data["lengths"], sections=str(data["sections"]),
+                  **{name: data[name] for name in ("s", "p_XY", "heights") if name in data})
 
     @classmethod
     def _of_kind(cls, kind):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..core.archive import DAMAGED, write
+from ..core.archive import Unreadable, read, write
 from ..core.errors import (FileError, InputError, MissingExtra, NameUnknown, require_path, shown,
                            teaching)
 
@@ -171,24 +171,43 @@ class Sweep:
         """
         path = require_path("path", path, (".npz",))
         try:
-            with open(path, "rb") as content, np.load(content, allow_pickle=False) as file:
-                if int(file["format"]) != _FORMAT:
-                    raise ValueError("it is of another version")
-                columns: dict[str, dict[str, Array]] = {"parameters": {}, "values": {}}
-                for key in file.files:
-                    if key not in _OWN:
-                        folder, _, name = key.partition("/")
-                        columns[folder][name] = file[key]
-                done, errors = file["done"], dict(zip(file["failed"].tolist(), file["errors"]))
-                if {len(x) for part in columns.values() for x in part.values()} - {len(done)}:
-                    raise ValueError("its arrays are not of equal length")
-                if not columns["parameters"] or done.any() and not columns["values"]:
-                    raise ValueError("arrays are missing")
-        except DAMAGED as error:
+            arrays = read(path)
+            columns: dict[str, dict[str, Array]] = {"parameters": {}, "values": {}}
+            for key, x in arrays.items():
+                folder, _, name = key.partition("/")
+                if key in _OWN:
+                    continue
+                if folder not in columns or x.dtype.kind == "S":
+                    raise Unreadable(f"the array {key!r} belongs to none")
+                columns[folder][name] = x
+            done, errors = _states(arrays)
+            if any(x.shape[:1] != done.shape for part in columns.values() for x in part.values()):
+                raise Unreadable("its arrays are not of equal length")
+            if not columns["parameters"] or done.any() and not columns["values"]:
+                raise Unreadable("arrays are missing")
+            if any(x.dtype.kind not in "fc" for x in columns["values"].values()):
+                raise Unreadable("its values are no floats")
+        except (OSError, Unreadable) as error:
             raise FileError(f"{path} cannot be read as a sweep: {error}") from error
         return cls(columns["parameters"], [
             {name: column[k] for name, column in columns["values"].items()} if done[k]
             else str(errors[k]) if k in errors else None for k in range(len(done))])
+
+
+def _states(arrays):
+    """Which members are done (n,), and errors by the number of a member."""
+    missing = [name for name in _OWN if name not in arrays]
+    if missing:
+        raise Unreadable(f"{missing} are missing")
+    form, done, failed, errors = (arrays[name] for name in _OWN)
+    if form.shape or form.dtype.kind not in "iu" or form != _FORMAT:
+        raise Unreadable("it is of another version")
+    if (done.dtype.kind != "b" or failed.dtype.kind not in "iu" or errors.dtype.kind != "U"
+            or done.ndim != 1 or failed.ndim != 1 or failed.shape != errors.shape
+            or len(set(failed.tolist())) < len(failed)
+            or any(not 0 <= k < len(done) or done[k] for k in failed.tolist())):
+        raise Unreadable("what it says of its members does not fit")
+    return done, dict(zip(failed.tolist(), errors))
 
 
 def _plain(x):
