@@ -4,6 +4,7 @@
 # make test-least   the tests, with the least versions that pyproject.toml promises
 # make paper   the paper's tables; bench: timings; stress: large and hard cases
 # make fuzz    2000 random scenes; mutants: changes of the text that the tests should see
+# make margins  the tests, with how far their comparisons are from round-off, out/margins.txt
 # make coverage  the tests, with the lines and branches that they run
 # make lint    ruff and mypy, of the versions that pyproject.toml names
 # make docs    the pages of docs/, the gallery and the reference, out/docs/index.html
@@ -21,7 +22,7 @@ PIP := $(PY) -m pip install --quiet --disable-pip-version-check
 export OPENBLAS_NUM_THREADS ?= 1
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test test-settings test-least lint paper bench stress fuzz mutants coverage docs pictures dist clean
+.PHONY: demo test test-settings test-least lint paper bench stress fuzz mutants margins coverage docs pictures dist clean
 
 demo: $(VENV)/demo.stamp
 	$(PY) demos/cantilever.py
@@ -51,6 +52,10 @@ test-settings: $(VENV)/test.stamp $(LEAST)/stamp
 	  $(PY) -m skfem_ancf.equations.compiled && $(PY) -m pytest -n 2 $(ARGS) $(GENERIC:%=tests/test_%.py)
 	OPENBLAS_CORETYPE=Haswell SKFEM_ANCF_COMPILED=0 \
 	  $(LEAST)/bin/python -m pytest -n 2 $(ARGS) tests $(ONCE:%=--ignore=tests/test_%.py)
+
+margins: $(VENV)/test.stamp
+	mkdir -p out
+	$(PY) -m pytest $(ARGS) tests --margins out/margins.txt
 
 test-least: $(LEAST)/stamp
 	$(LEAST)/bin/python -m skfem_ancf.equations.compiled

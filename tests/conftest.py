@@ -8,9 +8,22 @@ os.environ.setdefault("SKFEM_ANCF_COMPILED", "1")
 import numpy as np
 import pytest
 
+import margins
+
 from skfem_ancf import MeshBeam
 from skfem_ancf.elements import ELEMENTS
 from skfem_ancf.core.switch import compiled_off
+
+
+def pytest_addoption(parser):
+    parser.addoption("--margins", metavar="FILE",
+                     help="list comparisons near round-off that are close to their bound")
+
+
+def pytest_configure(config):
+    if config.getoption("margins"):
+        margins.install()
+        config.pluginmanager.register(margins)
 
 
 def quarter_arc(n=3, height=0.3, radius=1.0):

@@ -118,7 +118,8 @@ def test_points_are_measured_with_their_difference(capsys):
     cables = sum("cable" in name for name in points.ELEMENTS)
     each = 3 * len(points.ELEMENTS) - cables
     assert len(rows) == 2 * each * len(points.MESHES) and "difference" in head
-    assert all(float(row.rstrip("* ").split()[-1]) < 1e-13 for row in rows)
+    # of sums of some hundred products: 1e-13 on some processors
+    assert all(float(row.rstrip("* ").split()[-1]) < 1e-11 for row in rows)
 
 
 def test_the_page_is_made_of_a_run(tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from contextlib import contextmanager
+from threading import RLock
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -225,7 +226,7 @@ class Machine:
         name = text.__name__
         flat = vars(self.tables).get("flat")
         if flat is None or name not in compiled.LOADED:
-            with announced(self._missing(name)) as update:
+            with _LOCK, announced(self._missing(name)) as update:
                 for part in self.tables.parts:
                     compiled.address(part)
                     update(part)
@@ -252,6 +253,8 @@ def _iterations():
     return "one evaluation" if n <= 1 else f"{n:.3g} iterations"
 
 
+#: One thread at a time compiles.
+_LOCK = RLock()
 #: True while it is said that something is compiled.
 _announced = False
 
