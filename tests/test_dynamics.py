@@ -719,7 +719,7 @@ def test_instants_beside_the_ends_of_steps(scheme, monkeypatch):
         some = scene.integrate(0.3, 0.01, scheme=scheme, t_eval=t)
         n = [2, 15, 30][:len(t)]
         assert some.t.tolist() == t.tolist() and some.steps == 30
-        near = 1e-13 + 0.01 * abs(shift) * np.abs(every.v).max()
+        near = 1e-13 + 0.1 * abs(shift) * np.abs(every.v).max()
         assert_allclose(some.u, every.u[n] + shift * every.v[n], rtol=0, atol=near)
         assert shift or made == [0.0, *t]
 
