@@ -45,6 +45,9 @@ BAD = {
     "[10**400, 0]": [10**400, 0], "[nan, 0]": [float("nan"), 0.0], "[1j, 0]": [1j, 0.0],
     "[None, None]": [None, None], "[True, False]": [True, False],
     "zeros(2, 2, 2)": np.zeros((2, 2, 2)), "object array": np.array([object(), object()]),
+    "masked": np.ma.array([0.5, 0.0], mask=[False, True]), "masked integers": np.ma.array(
+        [0, 1], mask=[False, True]),
+    "list of masked": [(0.0, 0.0), np.ma.array([1.0, 0.0], mask=[False, True])],
     "array of nan": np.full(3, np.nan), "float class": float,
     "returns text": lambda *args, **kwargs: "text",
     "returns None": lambda *args, **kwargs: None,
@@ -108,7 +111,7 @@ WORDS = {
     "t_end": "times", "adapt": "max_elements", "function": "function|the field 'f'",
     "side": "place|facet|boundary|point", "between": "point of a spring|beam",
     "other": "beam|place",
-    "first": "point|beam", "second": "point|beam", "body": "rigid bod|beam", "beams": "[Bb]eam",
+    "first": "point|beam|places", "second": "point|beam|places", "body": "rigid bod|beam", "beams": "[Bb]eam",
     "on": "beam|direction|point", "torque": "torque|amplitude",
 }
 

@@ -402,7 +402,23 @@ def _differs(wanted, n):
     return wanted is not None and wanted != n
 
 
+def is_masked(value: object) -> bool:
+    """True of an array with masked values, and of a list or dict that holds one."""
+    if isinstance(value, np.ma.MaskedArray):
+        return bool(np.ma.is_masked(value))
+    if isinstance(value, dict):
+        value = tuple(value.values())
+    return isinstance(value, (list, tuple)) and any(map(is_masked, value))
+
+
+def _refuse_masked(name):
+    raise InputError(f"{name} has masked values, whose numbers mean nothing: leave them out, as by "
+                     "numpy.ma.compressed, or fill them, as by numpy.ma.filled")
+
+
 def _real_array(name, value):
+    if is_masked(value):
+        _refuse_masked(name)
     try:
         array = np.asarray(value)
     except (TypeError, ValueError, OverflowError):  # rows of different lengths, for one
@@ -732,10 +748,15 @@ def _returned(door, what, value, args, *more):
 # calls
 
 def taught(function: Function) -> Function:
-    """A function whose wrong calls raise :class:`CallError`, which lists its arguments."""
-    explain = _explain
+    """A function whose wrong calls raise :class:`CallError`, which lists its arguments.
+
+    Arguments with masked values are refused.
+    """
+    explain, masked, refuse = _explain, is_masked, _refuse_masked_argument
 
     def call(*args, **kwargs):
+        if masked(args) or masked(kwargs):
+            refuse(function, args, kwargs)
         try:
             return function(*args, **kwargs)
         except TypeError as error:
@@ -759,6 +780,16 @@ def teaching(cls: Class) -> Class:
         elif isinstance(value, (classmethod, staticmethod)):
             setattr(cls, name, type(value)(taught(value.__func__)))
     return cls
+
+
+def _refuse_masked_argument(function, args, kwargs):
+    try:
+        given = inspect.signature(function).bind(*args, **kwargs).arguments
+    except TypeError:  # which the call itself will say
+        return
+    for name, value in (*kwargs.items(), *given.items()):
+        if is_masked(value):
+            _refuse_masked(name)
 
 
 def _explain(function, kwargs, error):

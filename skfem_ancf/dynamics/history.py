@@ -63,9 +63,10 @@ class History:
     multipliers
         Of the joints, shape (nt, m).
     dissipated
-        The work of damping since the start, shape (nt,): that of its force with the
-        energy-momentum scheme, that of the mean of its forces at both ends of each step with
-        generalized-alpha, by the scheme's own rule with others.
+        The work of damping since the start, shape (nt,), which does not fall: in each step that at
+        its mean velocity and middle place with the energy-momentum scheme, for which it is exact,
+        and with generalized-alpha; by the scheme's own rule with others. What a scheme itself
+        damps is not in it.
     sensors
         What the sensors of the scene have read at every step, by name: a
         :class:`~skfem_ancf.dynamics.sensors.Readings` with its times ``t``.

@@ -322,10 +322,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
     course, state = borrowed(course), borrowed(state)
     m, y, u = w.m.l.size, w.y, w.x.u
     joined, damped = m > 0, matrices.dampers.active > 0
-    contacts, taken, before, stale = e.forces.contacts, np.empty(1), np.empty(u.size), joined
-    if damped and rule.conserving == 0:
-        damping_force(e, matrices.dampers, matrices.M, course.times[0, 0] - course.dt, y[0], y[1],
-                      before, w.x.room)
+    contacts, taken, stale = e.forces.contacts, np.empty(1), joined
     for n in range(rows.shape[0]):
         s = _step(e.joints, rule, course, n)
         rough, wanted = _begin(e.free, matrices.M, rule, s, w, state)
@@ -379,7 +376,7 @@ def steps(e, matrices, rule, course, state, w, memories, rows, multiplier_rows, 
         if told == FAILED:
             return n
         if damped:
-            _add_work(e, matrices, rule, s, w, state, before)
+            _add_work(e, matrices, rule, s, w, state)
         if contacts.lasting > 0:
             _settle(e.forces, rule, s, w, taken)
             state[DISSIPATED] += taken[0]
@@ -815,24 +812,20 @@ def _resist(e, matrices, s, w, state):
 
 
 @source
-def _add_work(e, matrices, rule, s, w, state, before):
-    """Add what damping has taken in the step.
+def _add_work(e, matrices, rule, s, w, state):
+    """Add what damping takes in the middle of the step, at its mean velocity.
 
-    In the conserving scheme that is the work of its force, else of the mean of the force
-    ``before``, which becomes that of the next step, and that at the end.
+    In the conserving scheme that is the work of its force. In others velocities at the ends of
+    steps may be those of vibrations that the steps do not resolve: the mean force of both ends may
+    have a negative work.
     """
-    u, u0, d, pace = w.x.u, w.y[0], w.x.damping, w.x.pace
+    u, u0, d, pace, middle = w.x.u, w.y[0], w.x.damping, w.x.pace, w.x.middle
     for i in lanes(u.size):
         pace[i] = (u[i] - u0[i]) / s.dt
-    if rule.conserving > 0:
-        _middle(rule, w)
-        damping_force(e, matrices.dampers, matrices.M, s.acting, w.x.middle, pace, d, w.x.room)
-        work = dot(d, pace)
-    else:
-        damping_force(e, matrices.dampers, matrices.M, s.t, u, w.x.v, d, w.x.room)
-        work = 0.5 * (dot(d, pace) + dot(before, pace))
-        copy(d, before)
-    state[DISSIPATED] += s.dt * work
+        middle[i] = 0.5 * (u[i] + u0[i])
+    t = s.acting if rule.conserving > 0 else s.t - 0.5 * s.dt
+    damping_force(e, matrices.dampers, matrices.M, t, middle, pace, d, w.x.room)
+    state[DISSIPATED] += s.dt * dot(d, pace)
 
 
 @source

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..core.errors import AncfError, InputError, MeshError, NameUnknown, require_finite, shown
+from ..core.errors import (AncfError, InputError, MeshError, NameUnknown, is_masked, require_finite,
+                           shown)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -133,6 +134,8 @@ def facets_of(mesh: Chain, place: Place) -> Array:
     >>> facets_of(mesh, "right").tolist(), facets_of(mesh, (1, 0)).tolist()
     ([2], [1])
     """
+    if is_masked(place):  # one that a function gave
+        raise InputError(f"a place has masked values: {shown(place)}; name what is there")
     place = points_of_rows(place)
     if isinstance(place, str):
         return _named(mesh, place)
@@ -250,13 +253,14 @@ def _numbered(mesh: Chain, facets: Array) -> Array:
 def _satisfying(mesh: Chain, test: Callable[[Array], Any]) -> Array:
     x = mesh.mapping().G(np.array([[0.5]]))[:, :, 0]
     try:
-        chosen = np.asarray(test(x))
+        found = test(x)
+        chosen = np.asarray(found)
     except AncfError:
         raise
     except Exception as error:  # the function is the user's: it may raise anything
         raise InputError(f"the function {test!r} that names a place fails for points x of shape "
                          f"{x.shape}: {type(error).__name__}: {error}") from error
-    if chosen.shape != x.shape[1:] or chosen.dtype != bool:
+    if is_masked(found) or chosen.shape != x.shape[1:] or chosen.dtype != bool:
         raise InputError(f"a function that names a place takes points x of shape (2, n) and "
                          f"returns n truth values, as lambda x: x[0] > 1; for n = {x.shape[1]} it "
                          f"returned {chosen.dtype} of shape {chosen.shape}")
