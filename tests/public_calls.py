@@ -111,7 +111,8 @@ WORDS = {
     "t_end": "times", "adapt": "max_elements", "function": "function|the field 'f'",
     "side": "place|facet|boundary|point", "between": "point of a spring|beam",
     "other": "beam|place",
-    "first": "point|beam|places", "second": "point|beam|places", "body": "rigid bod|beam", "beams": "[Bb]eam",
+    "first": "point|beam|places", "second": "point|beam|places", "body": "rigid bod|beam",
+    "beams": "[Bb]eam",
     "on": "beam|direction|point", "torque": "torque|amplitude",
 }
 

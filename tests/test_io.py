@@ -124,6 +124,14 @@ def test_no_thickness_left_is_nan_without_a_warning():
     assert np.all(np.isnan(data["sigma_xx"])) and np.all(np.isfinite(data["S_xx"]))
 
 
+@pytest.mark.parametrize("degree", [3, 5])
+def test_no_width_left_of_a_cable_is_nan_without_a_warning(degree):
+    beam = Beam(MeshBeam.init_line([0, 0.5, 1], height=0.1), ElementBeamCable(degree),
+                StVenantKirchhoff(E=1.0, nu=0.4), 0.1)
+    data = body_fields(Scene(beam).state(beam.q0_local)).point_data  # of twice the length
+    assert np.all(np.isnan(data["sigma_xx"])) and np.all(np.isfinite(data["S_xx"]))
+
+
 # Lagrange cells
 
 def test_order_of_the_points_in_a_lagrange_cell_of_degree_3():

@@ -311,8 +311,10 @@ class Cable(Sections):
         tangent, _, eps, kappa, kappa0 = cls._section(beam, u, X, tind)
         Y, normal = beam.mesh.mapping().offset(X, tind), np.array([-tangent[1], tangent[0]])
         strain = cls._strain_of(beam, Y, beam.across.which(X, tind), eps, kappa, kappa0)
-        F = np.stack([(1.0 + (eps - Y * kappa) / (1.0 - Y * kappa0)) * tangent,
-                      np.sqrt(1.0 + 2.0 * strain[1]) * normal], axis=1)
+        with np.errstate(invalid="ignore"):  # where the strain leaves no width
+            across = np.sqrt(1.0 + 2.0 * strain[1])
+        F = np.stack([(1.0 + (eps - Y * kappa) / (1.0 - Y * kappa0)) * tangent, across * normal],
+                     axis=1)
         return F - frame, frame
 
     @classmethod
