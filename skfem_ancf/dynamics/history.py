@@ -285,12 +285,12 @@ class History:
 
     # at material points
 
-    def displacement(self, point: Any, beam: WhichMember = None) -> Array:
+    def displacement(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
         """Displacement of material points at all instants.
 
         Parameters
         ----------
-        point, beam
+        point, beam, line
             One point, shape (2,), or many, as for :meth:`State.displacement
             <skfem_ancf.results.State.displacement>`.
 
@@ -299,9 +299,9 @@ class History:
         ndarray
             Shape (nt, 2), or (nt, 2, n) for many points.
         """
-        return self.system.points.find(point, beam).displacement(self.u)
+        return self.system.points.find(point, beam, line).displacement(self.u)
 
-    def position(self, point: Any, beam: WhichMember = None) -> Array:
+    def position(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
         """Position of material points at all instants, (nt, 2) or (nt, 2, n).
 
         Parameters
@@ -310,11 +310,13 @@ class History:
             One point, shape (2,), or many, as for :meth:`displacement`.
         beam
             The beam, its name or its number; found if it is not given.
+        line
+            As for :meth:`displacement`.
         """
-        at = self.system.points.find(point, beam)
+        at = self.system.points.find(point, beam, line)
         return at.start + at.displacement(self.u)
 
-    def velocity(self, point: Any, beam: WhichMember = None) -> Array:
+    def velocity(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
         """Velocity of material points at all instants, (nt, 2) or (nt, 2, n).
 
         Parameters
@@ -323,8 +325,10 @@ class History:
             One point, shape (2,), or many, as for :meth:`displacement`.
         beam
             The beam, its name or its number; found if it is not given.
+        line
+            As for :meth:`displacement`.
         """
-        return self.system.points.find(point, beam).velocity(self.u, self.v)
+        return self.system.points.find(point, beam, line).velocity(self.u, self.v)
 
     def angle(self, body: WhichMember) -> Array:
         """The angle of a rigid body at all instants, in radians, shape (nt,); turns are counted.
@@ -350,7 +354,8 @@ class History:
         s = self.system.of(found)
         return found.angular_velocity(self.u[:, s], self.v[:, s])
 
-    def strain(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True) -> Array:
+    def strain(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True,
+               line: int | None = None) -> Array:
         """Strain (eps_xx, eps_yy, eps_xy) at all instants, (nt, 3) or (nt, 3, n).
 
         Parameters are those of :meth:`State.strain <skfem_ancf.results.State.strain>`.
@@ -361,13 +366,14 @@ class History:
             One point, shape (2,), or many, as for :meth:`displacement`.
         beam
             The beam, its name or its number; found if it is not given.
-        recover
+        recover, line
             As for :meth:`State.strain <skfem_ancf.results.State.strain>`.
         """
-        at = self.system.points.find(point, beam)
+        at = self.system.points.find(point, beam, line, ask=True)
         return np.array([state.strain(at, recover=recover) for state in self])
 
-    def stress(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True) -> Array:
+    def stress(self, point: ArrayLike, beam: WhichBeam = None, recover: bool = True,
+               line: int | None = None) -> Array:
         """Second Piola-Kirchhoff stress at all instants, (nt, 3) or (nt, 3, n).
 
         Parameters are those of :meth:`State.strain <skfem_ancf.results.State.strain>`.
@@ -378,19 +384,19 @@ class History:
             One point, shape (2,), or many, as for :meth:`displacement`.
         beam
             The beam, its name or its number; found if it is not given.
-        recover
+        recover, line
             As for :meth:`State.strain <skfem_ancf.results.State.strain>`.
         """
-        at = self.system.points.find(point, beam)
+        at = self.system.points.find(point, beam, line, ask=True)
         return np.array([state.stress(at, recover=recover) for state in self])
 
     def field(self, field: Any, point: ArrayLike, beam: WhichBeam = None,
-              recover: bool = True) -> Array:
+              recover: bool = True, line: int | None = None) -> Array:
         """Any field at all instants.
 
         Parameters
         ----------
-        field, beam, recover
+        field, beam, recover, line
             Those of :meth:`State.field <skfem_ancf.results.State.field>`.
         point
             One point, shape (2,), or many, shape (2, n) or a list.
@@ -400,17 +406,18 @@ class History:
         ndarray
             Shape (nt, ...).
         """
-        at = self.system.points.find(point, beam)
+        at = self.system.points.find(point, beam, line, ask=True)
         return np.array([state.field(field, at, recover=recover) for state in self])
 
-    def resultants(self, at: ArrayLike, beam: WhichBeam = None, recover: bool = True) -> Resultants:
+    def resultants(self, at: ArrayLike, beam: WhichBeam = None, recover: bool = True,
+                   line: int | None = None) -> Resultants:
         """Section forces and strains of the axis at all instants.
 
         Parameters
         ----------
         at
             Points through which the sections go: one, shape (2,), or many, shape (2, n) or a list.
-        beam, recover
+        beam, recover, line
             Those of :meth:`State.resultants <skfem_ancf.results.State.resultants>`.
 
         Returns
@@ -418,7 +425,7 @@ class History:
         Resultants
             Its arrays begin with the axis of the instants, (nt,) or (nt, n).
         """
-        found = self.system.points.find(at, beam)
+        found = self.system.points.find(at, beam, line, ask=True)
         return over_time([state.resultants(found, recover=recover) for state in self])
 
     def joint_force(self, joint: Joint) -> Array:

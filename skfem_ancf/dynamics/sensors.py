@@ -49,12 +49,14 @@ class Sensor(Frozen):
     recover
         Recovered fields and section forces, which takes about a millisecond a step and beam; by
         default those of the elements.
+    line
+        The number of the line, of a frame; found if it is not given.
     """
 
     def __init__(self, what: str | Callable[[State], Any], at: Any = None, beam: WhichBeam = None,
-                 recover: bool = False) -> None:
+                 recover: bool = False, line: int | None = None) -> None:
         self.recover = require_flag("recover", recover)
-        self.what, self.at, self.beam = what, at, beam
+        self.what, self.at, self.beam, self.line = what, at, beam, line
         if callable(what) and not isinstance(what, type):
             if at is not None:
                 raise InputError("a sensor that is a function of the State has no place: leave "
@@ -136,7 +138,7 @@ def locate(sensor: Sensor, system: System) -> Located | None:
     """
     if callable(sensor.what) or sensor.what == "joint_force":
         return None
-    found = system.points.find(sensor.at, sensor.beam)
+    found = system.points.find(sensor.at, sensor.beam, sensor.line, sensor.what not in MOVING)
     if sensor.what in SECTION and len(found.parts) != 1:
         raise InputError("the points of a sensor of sections must be in one beam: make one for "
                          "each")

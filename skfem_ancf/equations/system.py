@@ -172,7 +172,8 @@ class System:
     @cached_property
     def points(self) -> Points:
         """What finds material points, a :class:`~skfem_ancf.recovery.points.Points`."""
-        return Points(self.beams, self.slices, self.bodies)
+        frame = self.constraints.frame
+        return Points(self.beams, self.slices, self.bodies, None if frame is None else frame.lines)
 
     def __getstate__(self):
         """What it was made of: work arrays and factors are made again."""

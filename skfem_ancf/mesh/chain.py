@@ -24,6 +24,8 @@ class Chain(Protocol):
         The largest height of a section, and the heights at the nodes or of the elements.
     lengths
         Lengths of the elements, shape (nelements,).
+    is_chain, chains
+        Whether each element begins where the one before ends; the chain that each is in.
     curve, taper, sections
         What the mesh was made from: a curve, heights that vary, planes of the sections.
     """
@@ -67,6 +69,12 @@ class Chain(Protocol):
 
     @property
     def is_straight(self) -> Any: ...
+
+    @property
+    def is_chain(self) -> bool: ...
+
+    @property
+    def chains(self) -> Array: ...
 
     @property
     def nelements(self) -> int: ...

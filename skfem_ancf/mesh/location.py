@@ -81,12 +81,96 @@ class Finder:
         """Elements (n,), reference points (2, n), and how far outside of them points (2, n) are.
 
         The last is zero for points of the body, and relative to the element; infinite for points
-        that are far away.
+        that are far away. Of several chains that hold a point it is the one whose axis is nearest.
+        """
+        e, X, outside, _ = self.find(x)
+        return e, X, outside
+
+    def find(self, x: Array, chain: int | None = None) -> tuple[Array, Array, Array, Array]:
+        """As a call; and of each point whether the axes of several chains are nearest, (n,).
+
+        Parameters
+        ----------
+        x
+            Points, shape (2, n).
+        chain
+            The chain of elements in which they are looked for; None for all.
         """
         noise = 1e-9 + 8 * np.finfo(float).eps * (
             self.size + np.max(np.abs(x), initial=0.0)) / self.mesh.height
+        tied = np.zeros(x.shape[1], dtype=bool)
         with np.errstate(all="ignore"):
-            return self._find(x, noise)
+            if chain is not None:
+                some = np.flatnonzero(self.mesh.chains == chain)[None]
+                e, X, outside = self._best(x, some, noise)
+                return e, np.clip(X, 0.0, 1.0), outside, tied
+            e, X, outside = self._find(x, noise)
+            if not self.mesh.is_chain and x.size:
+                self._nearest_axis(x, noise, e, X, outside, tied)
+        return e, X, outside, tied
+
+    def from_axis(self, e: Array, X: Array) -> Array:
+        """How far points of elements are from the axis, shape (n,).
+
+        Parameters
+        ----------
+        e, X
+            Elements (n,) and reference points (2, n).
+        """
+        height = np.ravel(self.mapping.height(X[0][:, None], e)[0])
+        return np.abs(X[1] - 0.5) * height
+
+    @property
+    def alike(self) -> float:
+        """Distances from axes that differ by less are the same."""
+        return 1e-8 * self.mesh.height
+
+    def chains_at(self, x: Array) -> list[int]:
+        """Chains of elements whose axes are nearest to a point (2, 1) among those that hold it."""
+        found = {}
+        for chain in range(int(self.mesh.chains[-1]) + 1):
+            e, X, outside, _ = self.find(x, chain)
+            if outside[0] == 0.0:
+                found[chain] = float(self.from_axis(e, X)[0])
+        return [k for k, off in found.items() if off <= min(found.values()) + self.alike]
+
+    def _nearest_axis(self, x, noise, e, X, outside, tied):
+        """Of all elements that hold points those with the nearest axis, put into e, X, ..."""
+        k, some = self._around(x)
+        Y = self.mapping.invF(x[:, k, None], tind=some)[..., 0]
+        held = self._outside(Y, noise) == 0.0
+        k, some, Y = k[held], some[held], np.clip(Y[:, held], 0.0, 1.0)
+        off, least = self.from_axis(some, Y), np.full(x.shape[1], np.inf)
+        np.minimum.at(least, k, off)
+        near = off <= least[k] + self.alike
+        k, some, Y = k[near], some[near], Y[:, near]
+        order = np.lexsort((some, k))
+        at, first = np.unique(k[order], return_index=True)
+        first = order[first]
+        e[at], X[:, at], outside[at] = some[first], Y[:, first], 0.0
+        chains = self.mesh.chains
+        np.logical_or.at(tied, k, chains[some] != chains[e[k]])
+
+    def _around(self, x):
+        """Pairs of points and elements that may hold them: numbers (m,) of both."""
+        points, elements = [], []
+        for some, tree, radius in self._circles:
+            near = tree.query_ball_point(x.T, radius)
+            points.append(np.repeat(np.arange(x.shape[1]), [len(each) for each in near]))
+            elements.append(some[np.concatenate([*near, []]).astype(int)])
+        return np.concatenate(points), np.concatenate(elements)
+
+    @cached_property
+    def _circles(self):
+        """Elements of about one size with a tree of their middles, and circles that hold them."""
+        middle = self.mapping.F(np.array([[0.5], [0.5]])).reshape(2, -1)
+        radius = 0.51 * (self.mesh.lengths + self.mesh.height)
+        level = np.floor(np.log2(radius)).astype(int)
+        out = []
+        for k in np.unique(level):
+            some = np.flatnonzero(level == k)
+            out.append((some, scipy.spatial.cKDTree(middle[:, some].T), float(radius[some].max())))
+        return out
 
     def _find(self, x, noise):
         e, X, outside = (self._near if self._line is None else self._on_line)(x, noise)
@@ -216,7 +300,7 @@ class Finder:
         return (f"the body lies within x from {low[0]:.6g} to {high[0]:.6g} and y from "
                 f"{low[1]:.6g} to {high[1]:.6g}")
 
-    def refuse(self, x: Array, outside: Array) -> MeshError:
+    def refuse(self, x: Array, outside: Array, chain: int | None = None) -> MeshError:
         """The MeshError for points that are outside.
 
         Parameters
@@ -225,11 +309,14 @@ class Finder:
             All points, shape (2, n).
         outside
             How far outside each of them is, as the finder says, shape (n,).
+        chain
+            The chain of elements in which they were looked for; None for all.
         """
         bad, mesh = np.nonzero(outside > self.allowed)[0], self.mesh
         x, more = x[:, bad[0]], f" ({len(bad)} of {len(outside)} points are)"
         return MeshError(
-            f"the point ({x[0]:.9g}, {x[1]:.9g}) is outside the body"
+            f"the point ({x[0]:.9g}, {x[1]:.9g}) is outside "
+            f"{'the body' if chain is None else 'the line that was named'}"
             f"{more if len(outside) > 1 else ''}: points are named by their place in the "
             f"stress-free beam of height {mesh.height:.6g}, whose axis runs from "
             f"{mesh.p[:, 0].tolist()} to {mesh.p[:, -1].tolist()}; {self.extent}")

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.errors import (AncfError, InputError, MeshError, NameUnknown, is_masked, require_finite,
                            shown)
+from .location import Finder
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -205,6 +206,10 @@ def section_at(mesh: Chain, point: ArrayLike) -> int:
         size[end] = np.minimum(size[end], mesh.lengths)
     noise = 8 * np.finfo(float).eps * (np.max(np.abs(mesh.p)) + np.max(np.abs(x)))
     found = np.nonzero(off <= NEAR * size + noise)[0]
+    if len(found) and not mesh.is_chain:  # not the section of a line whose axis is farther away
+        finder = Finder(mesh)
+        e, X, _ = finder(x[:, None])
+        found = found[np.abs(Y[found]) <= finder.from_axis(e, X)[0] + finder.alike]
     if len(found) == 1:
         return int(found[0])
     if len(found):

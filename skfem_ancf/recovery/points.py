@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..beam.layout import select_beam, select_member
-from ..core.errors import InputError, MeshError, require_finite, shown
+from ..core.errors import InputError, MeshError, require_finite, require_integer, shown
 from ..core.kept import cached_property
 from ..beam.interpolation import BodyPart, Part
 from ..mesh.places import as_point
@@ -130,14 +130,18 @@ class Points:
         The beams, and the coordinates in the scene of them and of the bodies behind them.
     bodies
         Rigid bodies.
+    lines
+        Of a frame the number of the line of each chain of elements, beam after beam, (chains,).
     """
 
     def __init__(self, beams: Sequence[Beam], slices: Sequence[slice],
-                 bodies: Sequence[RigidBody] = ()) -> None:
+                 bodies: Sequence[RigidBody] = (), lines: Array | None = None) -> None:
         self.beams, self.slices, self.bodies = list(beams), slices, list(bodies)
+        self._lines = lines
 
-    def find(self, points: Any, beam: WhichMember = None) -> Located:
-        """Where points are.
+    def find(self, points: Any, beam: WhichMember = None, line: int | None = None,
+             ask: bool = False) -> Located:
+        """Where points are: of several beams and lines in the one whose axis is nearest.
 
         Parameters
         ----------
@@ -147,6 +151,11 @@ class Points:
         beam
             The beam or rigid body that they are in, its name or number; found for each if it is not
             given.
+        line
+            The number of the line of a frame that they are in; of another scene that of the chain
+            of elements of the beam.
+        ask
+            Raise InputError where several axes are nearest, as at a node; if False it is the first.
 
         Returns
         -------
@@ -159,6 +168,9 @@ class Points:
         """
         if isinstance(points, Located):
             return points
+        chain = None
+        if line is not None:
+            beam, chain = self.chain_of(line, beam)
         if isinstance(points, str):
             beam = select_beam(self.beams, beam)
             points = tuple(as_point(points, beam.mesh).tolist())
@@ -170,7 +182,53 @@ class Points:
             as_points(points)  # x and y as two arguments: y is no beam
         one = beam is not None or self._alone
         return self._find(as_points(points, select_beam(self.beams, beam).mesh if one else None),
-                          beam)
+                          beam, chain, ask)
+
+    @cached_property
+    def _chains(self):
+        """How many chains of elements the beams before each have, and all, (beams + 1,)."""
+        return np.cumsum([0] + [int(b.mesh.chains[-1]) + 1 for b in self.beams])
+
+    def chain_of(self, line: int, beam: WhichMember = None) -> tuple[Beam, int]:
+        """The beam of a line, and its number among the chains of elements of that beam.
+
+        Parameters
+        ----------
+        line, beam
+            As for :meth:`find`.
+        """
+        if self._lines is None:
+            b = select_beam(self.beams, beam)
+            return b, require_integer("line", line, 0, int(b.mesh.chains[-1]))
+        number = require_integer("line", line, 0)
+        at = np.flatnonzero(self._lines == number)
+        if not len(at):
+            raise InputError(f"the frame has no line {number}: its lines are numbered 0 to "
+                             f"{np.max(self._lines)}, without those whose ends are one node")
+        k = int(np.searchsorted(self._chains, at[0], side="right")) - 1
+        if beam is not None and select_beam(self.beams, beam) is not self.beams[k]:
+            raise InputError(f"line {number} is in the beam {self.beams[k].name!r}, not in "
+                             f"{shown(beam)}")
+        return self.beams[k], int(at[0] - self._chains[k])
+
+    def _ask(self, x, beams):
+        """Raise InputError: the axes of several lines are nearest to a point, shape (2, 1)."""
+        found, least = [], np.inf
+        for b in beams:
+            for chain in b.finder.chains_at(x):
+                e, X, *_ = b.finder.find(x, chain)
+                off = float(b.finder.from_axis(e, X)[0])
+                found.append((off, b, chain))
+                least = min(least, off)
+        found = [(b, chain) for off, b, chain in found if off <= least + b.finder.alike]
+        where = f"the point {shown(tuple(map(float, x[:, 0])))} is as near to the axes of "
+        if self._lines is None and len({id(b) for b, _ in found}) > 1:
+            names = [k if b.name is None else b.name
+                     for k, b in enumerate(self.beams) if any(b is other for other, _ in found)]
+            raise InputError(f"{where}the beams {names}: say which, as beam={names[0]!r}")
+        numbers = sorted(chain if self._lines is None else int(
+            self._lines[self._chains[self.beams.index(b)] + chain]) for b, chain in found)
+        raise InputError(f"{where}lines {numbers}: say which, as line={numbers[0]}")
 
     @property
     def _alone(self):
@@ -193,27 +251,43 @@ class Points:
     def _coordinates(self, body):
         return self.slices[len(self.beams) + [b is body for b in self.bodies].index(True)]
 
-    def _find(self, x, beam):
+    def _find(self, x, beam, chain, ask):
         one, x = x.ndim == 1, np.reshape(x, (2, -1))
         if beam is not None or self._alone:
             beam = select_beam(self.beams, beam)
-            e, X, outside = beam.finder(x)
+            e, X, outside, tied = beam.finder.find(x, chain)
             if np.any(outside > beam.finder.allowed):
-                raise beam.finder.refuse(x, outside)
+                raise beam.finder.refuse(x, outside, chain)
+            if ask and np.any(tied):
+                self._ask(x[:, [np.argmax(tied)]], [beam])
             k = self.beams.index(beam)
             return Located(one, len(e), [Part(beam, k, self.slices[k], None, e, X)])
-        left, parts = np.arange(x.shape[1]), list[Any]()
+        which, least = np.full(x.shape[1], -1), np.full(x.shape[1], np.inf)
+        elements, cells = np.zeros(x.shape[1], dtype=int), np.zeros(x.shape)
+        several, parts = np.zeros(x.shape[1], dtype=bool), list[Any]()
         for k, candidate in enumerate(self.beams):
-            x0, x1, y0, y1 = candidate.finder.box
-            near = (x0 <= x[0, left]) & (x[0, left] <= x1) & (y0 <= x[1, left]) & (x[1, left] <= y1)
-            if x.size and not np.any(near):
+            finder = candidate.finder
+            x0, x1, y0, y1 = finder.box
+            near = np.flatnonzero((x0 <= x[0]) & (x[0] <= x1) & (y0 <= x[1]) & (x[1] <= y1))
+            if not len(near):
                 continue
-            e, X, outside = candidate.finder(x[:, left[near]])
-            on = outside <= candidate.finder.allowed
-            if np.any(on) or not x.size:
-                near[near] = on
-                parts.append(Part(candidate, k, self.slices[k], left[near], e[on], X[:, on]))
-                left = left[~near]
+            e, X, outside, tied = finder.find(x[:, near])
+            on = outside <= finder.allowed
+            near, e, X, tied = near[on], e[on], X[:, on], tied[on]
+            off, before = finder.from_axis(e, X), least[near]
+            nearer, farther = off < before - finder.alike, off > before + finder.alike
+            several[near] = np.where(nearer, tied, several[near] | ~farther)
+            near, e, X, off = near[nearer], e[nearer], X[:, nearer], off[nearer]
+            which[near], least[near], elements[near], cells[:, near] = k, off, e, X
+        if ask and np.any(several):
+            self._ask(x[:, [np.argmax(several)]], self.beams)
+        for k in np.unique(which[which >= 0]):
+            at = np.flatnonzero(which == k)
+            parts.append(Part(self.beams[k], int(k), self.slices[k], at, elements[at],
+                              cells[:, at]))
+        if not x.size:
+            parts.append(Part(self.beams[0], 0, self.slices[0], which, elements, cells))
+        left = np.flatnonzero(which < 0)
         for body in self.bodies:
             on = body.contains(x[:, left])
             if np.any(on):

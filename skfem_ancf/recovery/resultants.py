@@ -106,7 +106,7 @@ def over_time(instants: list[Resultants]) -> Resultants:
 
 
 def resultants(state: Configuration, number: int, part: Part | None = None,
-               recover: bool = True) -> Resultants:
+               recover: bool = True, chain: int | None = None) -> Resultants:
     """The Resultants of a beam.
 
     Parameters
@@ -119,6 +119,8 @@ def resultants(state: Configuration, number: int, part: Part | None = None,
         Points through which the sections go; None for all elements.
     recover
         From equilibrium, where it can be had; False for the stress of the elements.
+    chain
+        The chain of elements that all sections are of, if there are no points; None for all.
 
     Returns
     -------
@@ -128,6 +130,9 @@ def resultants(state: Configuration, number: int, part: Part | None = None,
     recovery = state.balance(beam) if recover else None
     if part is None:
         e, xi, after = _everywhere(beam, None if recovery is None else recovery.forces.cuts)
+        if chain is not None:
+            on = beam.mesh.chains[e] == chain
+            e, xi, after = e[on], xi[on], after[on]
     else:
         e, xi, after = part.e, part.X[0], np.zeros(len(part.e), dtype=bool)
     lengths = _arc(beam, e, xi)

@@ -274,7 +274,7 @@ class State(Frozen):
 
     # at material points
 
-    def displacement(self, point: Any, beam: WhichMember = None) -> Array:
+    def displacement(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
         """Displacement of material points.
 
         Parameters
@@ -284,6 +284,10 @@ class State(Frozen):
             points, or an array (2, n) whose columns are points; a RigidBody for its centre of mass.
         beam
             The beam or rigid body, its name or its number; found for each point if it is not given.
+        line
+            The number of the line, of a frame; found for each point if it is not given. A point
+            that is in several lines or beams is one of that whose axis is nearest, here as in all
+            loads and readings; of the first of them if several are as near, as at a node.
 
         Returns
         -------
@@ -295,9 +299,9 @@ class State(Frozen):
         MeshError
             If a point is outside the body.
         """
-        return self.system.points.find(point, beam).displacement(self.u)
+        return self.system.points.find(point, beam, line).displacement(self.u)
 
-    def position(self, point: Any, beam: WhichMember = None) -> Array:
+    def position(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
         """Position of material points, (2,) or (2, n); parameters are those of
         :meth:`displacement`.
 
@@ -307,11 +311,13 @@ class State(Frozen):
             One point, shape (2,), or many, as for :meth:`displacement`.
         beam
             The beam, its name or its number; found if it is not given.
+        line
+            As for :meth:`displacement`.
         """
-        at = self.system.points.find(point, beam)
+        at = self.system.points.find(point, beam, line)
         return at.start + at.displacement(self.u)
 
-    def velocity(self, point: Any, beam: WhichMember = None) -> Array:
+    def velocity(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
         """Velocity of material points, (2,) or (2, n); zero where there is no motion.
 
         Parameters are those of :meth:`displacement`.
@@ -322,10 +328,13 @@ class State(Frozen):
             One point, shape (2,), or many, as for :meth:`displacement`.
         beam
             The beam, its name or its number; found if it is not given.
+        line
+            As for :meth:`displacement`.
         """
-        return self.system.points.find(point, beam).velocity(self.u, self.v)
+        return self.system.points.find(point, beam, line).velocity(self.u, self.v)
 
-    def strain(self, point: Any, beam: WhichBeam = None, recover: bool = True) -> Array:
+    def strain(self, point: Any, beam: WhichBeam = None, recover: bool = True,
+               line: int | None = None) -> Array:
         """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, (3,) or (3, n).
 
         Parameters
@@ -335,27 +344,37 @@ class State(Frozen):
         recover
             The recovered field, see :mod:`skfem_ancf.recovery`, where there is one
             (:attr:`recovered`); False for the strain of the element at the point.
+        line
+            The number of the line, of a frame; found for each point if it is not given.
+
+        Raises
+        ------
+        InputError
+            If several lines or beams are as near to a point, as at a node: their strains differ.
         """
-        at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
+        at = self.system.points.find(point, beam, line, ask=True)
+        recover = require_flag("recover", recover)
         values = at.gather([self._strain(part, recover) for part in at.parts])
         values[2] *= 0.5
         return values
 
-    def stress(self, point: Any, beam: WhichBeam = None, recover: bool = True) -> Array:
+    def stress(self, point: Any, beam: WhichBeam = None, recover: bool = True,
+               line: int | None = None) -> Array:
         """Second Piola-Kirchhoff stress (S_xx, S_yy, S_xy) in the beam's frame, (3,) or (3, n).
 
         Parameters are those of :meth:`strain`.
 
         Parameters
         ----------
-        point, beam, recover
+        point, beam, recover, line
             As for :meth:`strain`: one point, shape (2,), or many.
         """
-        at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
+        at = self.system.points.find(point, beam, line, ask=True)
+        recover = require_flag("recover", recover)
         return at.gather([self._stress(part, recover) for part in at.parts])
 
     def field(self, field: Any, point: Any, beam: WhichBeam = None,
-              recover: bool = True) -> Array:
+              recover: bool = True, line: int | None = None) -> Array:
         """Any field at material points.
 
         Parameters
@@ -365,7 +384,7 @@ class State(Frozen):
             Field of your own, see :mod:`skfem_ancf.recovery.fields`.
         point
             One point, shape (2,), or many, shape (2, n) or a list.
-        beam, recover
+        beam, recover, line
             As for :meth:`strain`.
 
         Returns
@@ -383,7 +402,8 @@ class State(Frozen):
         >>> float(state.field("von_mises", (0.5, 0.05)).round(-1))
         300.0
         """
-        at, recover = self.system.points.find(point, beam), require_flag("recover", recover)
+        at = self.system.points.find(point, beam, line, ask=True)
+        recover = require_flag("recover", recover)
         field = find_field(field)
         return at.gather([field.of(Values(part, self.u, partial(
             self._recovery_of, part.number) if recover else None, self.eigen))
@@ -493,7 +513,7 @@ class State(Frozen):
         return actions(self)
 
     def resultants(self, at: Any = None, beam: WhichBeam = None,
-                   recover: bool = True) -> Resultants:
+                   recover: bool = True, line: int | None = None) -> Resultants:
         """Normal force, shear force and bending moment along a beam, with the strains of its axis.
 
         Parameters
@@ -506,12 +526,20 @@ class State(Frozen):
         recover
             From the equilibrium of the body, exact up to the iteration of the solution, where it
             can be had (:attr:`recovered`); False for the stress of the elements, integrated.
+        line
+            The number of the line, of a frame; found from ``at`` if it is not given: a section is
+            one of the line whose axis is nearest to the point. Without ``at`` all sections of it.
 
         Returns
         -------
         Resultants
             With ``s``, ``N``, ``Q``, ``M``, ``curvature``, ``stretch``, ``shear``, ``angle`` and
             ``force``, see :class:`~skfem_ancf.recovery.resultants.Resultants` for their signs.
+
+        Raises
+        ------
+        InputError
+            If several lines or beams are as near to a point, as at a node: each has its own.
 
         Examples
         --------
@@ -526,8 +554,12 @@ class State(Frozen):
         """
         recover = require_flag("recover", recover)
         if at is None:
-            return resultants(self, self.beams.index(select_beam(self.beams, beam)), None, recover)
-        found = self.system.points.find(at, beam)
+            chain = None
+            if line is not None:
+                beam, chain = self.system.points.chain_of(line, beam)
+            number = self.beams.index(select_beam(self.beams, beam))
+            return resultants(self, number, None, recover, chain)
+        found = self.system.points.find(at, beam, line, ask=True)
         if len(found.parts) != 1:
             raise InputError("the points are in several beams: ask for the resultants of each, "
                              "with beam=")

@@ -33,7 +33,7 @@ from ..core.errors import (ConvergenceError, InputError, Interrupted, StabilityW
                            require_finite, require_finite_scalar, require_label, require_option,
                            require_options, require_positive, shown, taught, teaching)
 from ..actions.joints import Joint, bind_joint, get_joint
-from ..actions.joints.base import both_of, is_ground, members_at, named_place
+from ..actions.joints.base import both_of, is_ground, members_at, named_place, nearest_of
 from ..actions.joints.prescribed import Turned
 from ..actions.loads import (EndMoment, FormLoad, Load, PointForce, Pressure, Traction, Weight,
                              bind_load)
@@ -240,9 +240,9 @@ class Scene:
         return self._places[id(select_member(self._beams, self._bodies, beam))][0]
 
     def _number_at(self, at, beam):
-        """As :meth:`_number`; if no beam is named, that of the only one that has the point."""
+        """As :meth:`_number`; if no beam is named, that of the one that has the point."""
         if beam is None and at is not None and len(self.members) > 1:
-            found = members_at(self, at)
+            found = nearest_of(self, at, members_at(self, at))
             if len(found) == 1:
                 return found[0]
         return self._number(beam)
@@ -1699,7 +1699,7 @@ class Scene:
                          sensors=self._checked_sensors(), **options)
 
     def sensor(self, name: str, what: str | Callable[[State], Any], at: Any = None,
-               beam: WhichBeam = None, recover: bool = False) -> Scene:
+               beam: WhichBeam = None, recover: bool = False, line: int | None = None) -> Scene:
         """Write something down at every step of motions: ``history.sensors[name]``.
 
         States may then be stored sparsely, by ``integrate(..., t_eval=...)``.
@@ -1720,6 +1720,8 @@ class Scene:
         recover
             Recovered fields and section forces, a millisecond a step and beam; by default those of
             the elements.
+        line
+            The number of the line, of a frame; found if it is not given.
 
         Returns
         -------
@@ -1746,7 +1748,7 @@ class Scene:
         """
         if require_label("name", name) is None:
             raise InputError("the name of a sensor must be a text, got None")
-        sensor = Sensor(what, at, beam, recover)
+        sensor = Sensor(what, at, beam, recover, line)
         with self._lock:
             locate(sensor, self.system)
             self._sensors = {**self._sensors, name: sensor}

@@ -596,6 +596,24 @@ def members_at(layout: Layout, at: ArrayLike) -> list[int]:
     return found
 
 
+def nearest_of(layout: Layout, at: ArrayLike, found: list[int]) -> list[int]:
+    """Of beams that have a point those whose axes are nearest to it; others if a body has it, too.
+
+    Parameters
+    ----------
+    layout, at
+        As for :func:`members_at`.
+    found
+        What that returned.
+    """
+    beams: list[Any] = [layout.members[k] for k in found]
+    if len(found) < 2 or isinstance(at, str) or any(isinstance(b, RigidBody) for b in beams):
+        return found
+    where = [(b, *b.locate(at)) for b in beams]
+    off = [float(b.finder.from_axis(np.array([e]), X[:, None])[0]) for b, e, X in where]
+    return [k for k, b, d in zip(found, beams, off) if d <= min(off) + b.finder.alike]
+
+
 def named_place(layout: Layout, place: Any, where_none_is: str | None = None) -> tuple[Any, Any]:
     """Which beam or body a place is of, and the place there.
 
@@ -632,6 +650,7 @@ def named_place(layout: Layout, place: Any, where_none_is: str | None = None) ->
     if not found:
         place = require_finite("a point of a spring or a joint", place, (2,))
         found = members_at(layout, place)
+    found = nearest_of(layout, place, found)
     if len(found) > 1:
         names = [layout.members[k].name or k for k in found]
         raise InputError(f"the point {shown(place)} is one of the beams {names}: say which, as "
