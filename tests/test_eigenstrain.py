@@ -7,6 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
+from skfem import (Basis, BilinearForm, ElementQuad2, ElementVector, LinearForm, MeshQuad, condense,
+                   solve)
+from skfem.helpers import sym_grad
 
 from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeamCable, Frame,
                         InputError, MeshBeam, NeoHookean, Scene, Section, StVenantKirchhoff, sweep)
@@ -393,3 +396,61 @@ def test_a_heated_cable_is_replaced_swept_pickled_and_gone_on_with(tmp_path):
     again = bar().temperature(lambda x, y, t: 20.0 * np.sin(900.0 * t) * x)
     assert np.array_equal(again.resume(tmp_path / "run.npz").u, whole.u)
     assert np.ptp(whole.displacement((1.0, 0.0))[:, 0]) > 1e-4
+
+
+# layers of different nu, and temperatures of a high degree across
+
+
+def plane_bow(L, h, layers, T):
+    """Axis of a free strip heated by T(y), plane stress, Q2 elements: v at 0, L/4, ..., L."""
+    y = np.unique(np.concatenate([np.linspace(a, b, 5) for a, b, _ in layers]))
+    mesh = MeshQuad.init_tensor(np.linspace(0.0, L, 61), y)
+    basis = Basis(mesh, ElementVector(ElementQuad2()), intorder=6)
+    K, f = 0.0, 0.0
+    for a, b, law in layers:
+        middle = mesh.p[1, mesh.t].mean(axis=0)
+        part = Basis(mesh, basis.elem, intorder=6,
+                     elements=np.nonzero((middle > a) & (middle < b))[0])
+        c, nu, alpha = law.E / (1 - law.nu**2), law.nu, law.thermal_expansion
+
+        def form(u, v, w, c=c, nu=nu):
+            e, d = sym_grad(u), sym_grad(v)
+            return c * (e[0, 0] * d[0, 0] + e[1, 1] * d[1, 1] + nu * (
+                e[0, 0] * d[1, 1] + e[1, 1] * d[0, 0]) + 2 * (1 - nu) * e[0, 1] * d[0, 1])
+
+        def heat(v, w, c=c, nu=nu, alpha=alpha):
+            d = sym_grad(v)
+            return c * (1 + nu) * alpha * T(w.x[0], w.x[1]) * (d[0, 0] + d[1, 1])
+
+        K, f = K + BilinearForm(form).assemble(part), f + LinearForm(heat).assemble(part)
+    left = basis.get_dofs(lambda x: (np.abs(x[0]) < 1e-9) & (np.abs(x[1]) < 1e-9)).all()
+    right = basis.get_dofs(lambda x: (np.abs(x[0] - L) < 1e-9) & (np.abs(x[1]) < 1e-9)).all("u^2")
+    u = solve(*condense(K, f, D=np.concatenate([left, right])))
+    x = np.array([np.linspace(0.0, L, 5), np.zeros(5)])
+    return (basis.probes(x) @ u).reshape(2, -1)[1]
+
+
+@pytest.mark.parametrize("element, at_ends", [
+    (ElementBeamANCF(2), 2.5e-2), (ElementBeamANCF(3), 2.5e-2), (ElementBeamANCF(6), 4e-3),
+    (ElementBeamANCFCubic(3), 2.5e-2)], ids=repr)
+def test_layers_of_different_nu_bend_as_the_plane_body(element, at_ends):
+    """Under a temperature that is quadratic across: in the middle, and with what the ends do."""
+    laws = [StVenantKirchhoff(2e8, 0.1, thermal_expansion=1e-5),
+            StVenantKirchhoff(1e8, 0.45, thermal_expansion=1.5e-5)]
+    L, h = 1.0, 0.1
+
+    def T(x, y):
+        return 4e3 * y**2
+
+    beam = Beam(MeshBeam.init_line(np.linspace(0.0, L, 33), h), element,
+                section=Section.layers((0.05, laws[0]), (0.05, laws[1]), width=0.02))
+    state = Scene(beam).pin("left").fix("right", "r^2").temperature(T).solve_static()
+    own = state.displacement(np.array([np.linspace(0.0, L, 5), np.zeros(5)]))[1]
+    plane = plane_bow(L, h, [(-0.05, 0.0, laws[0]), (0.0, 0.05, laws[1])], T)
+    (inner, outer), (exact, whole) = ((v[1] - 2 * v[2] + v[3], v[0] - 2 * v[2] + v[4])
+                                      for v in (own, plane))
+    assert inner == pytest.approx(exact, rel=1e-3)
+    assert outer == pytest.approx(whole, rel=at_ends)
+    S = state.stress((0.5, 0.03), recover=False)
+    assert abs(S[1]) < 2e-3 * abs(S[0])  # no stress across is left
+    assert S[0] == pytest.approx(state.stress((0.5, 0.03))[0], rel=1e-3)

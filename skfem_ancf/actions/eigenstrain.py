@@ -16,7 +16,7 @@ from scipy import sparse
 
 from ..core.errors import InputError, ask_array, require_finite_scalar, require_function, shown
 from ..formulations import COMPONENTS
-from .nonlinear_eigenstrain import energy_lost, sampled
+from .nonlinear_eigenstrain import energy_lost, sampled, unmatched
 from ..beam.kernels.along import stretched
 from ..beam.kernels.base import GIVEN, MEAN, apart, no_stresses, nowhere
 from ..beam.kernels.law import LINEAR
@@ -227,6 +227,9 @@ class EigenStrain(Load):
         if not beam.has_sections:
             stretch, _ = stretched(beam.strain(u, X, e)[0])
             return self.nominal_at(X, e, factor) / stretch
+        which = np.broadcast_to(beam.across.which(X, e), E0.shape[1:])
+        for k, slab in enumerate(beam.across.slabs):  # what acts on the elements
+            E0[1] -= np.where(which == k, unmatched(beam, self, slab, X, e), 0.0)
         E = beam.strain(u, X, e) if self.grows else 0.0 * E0
         laws = [layer.material.law(layer.material.shear_factor(layer.element)).stress
                 for layer in beam.layers]
