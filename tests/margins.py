@@ -39,17 +39,20 @@ def note(place, kind, value, bound, relative):
         found[place, kind] = float(margin), float(relative), float(value)
 
 
-def place_of_caller():
-    """File and line of the test that compares, or None for others."""
-    frame = sys._getframe(2)
+def place_of(frame, place=None):
+    """File and line of the test that compares, and of what it calls to do so; None for others."""
     while frame is not None:
         path = Path(frame.f_code.co_filename)
-        if path.parent == HERE and path.name != "margins.py":
-            return f"{path.name}:{frame.f_lineno}"
         if path.is_relative_to(HERE.parent / "skfem_ancf"):
-            return None
+            return place
+        if path.parent == HERE and path.name != "margins.py":
+            here = f"{path.name}:{frame.f_lineno}"
+            if place is None:
+                place = here
+            if frame.f_code.co_name.startswith("test_"):
+                return place if place == here else f"{place} of {here}"
         frame = frame.f_back
-    return None
+    return place
 
 
 def note_close(place, kind, actual, desired, rtol, atol):
@@ -73,7 +76,7 @@ def measured(function, rtol, atol):
     """A function of NumPy that notes what it compares."""
     @functools.wraps(function)
     def compare(actual, desired, *args, **options):
-        place = place_of_caller()
+        place = place_of(sys._getframe(1))
         if place is not None:
             given = dict(zip(("rtol", "atol"), args)) | options
             note_close(place, function.__name__, actual, desired, given.get("rtol", rtol),
@@ -85,7 +88,7 @@ def measured(function, rtol, atol):
 
 def compare(values, kinds, place, small):
     """What ``a < b <= c`` of an assert is, noted; ``small`` is the least of its tiny numbers."""
-    result = True
+    result, place = True, place_of(sys._getframe(1), place)
     for a, kind, b in zip(values, kinds, values[1:]):
         result = result and getattr(operator, kind)(a, b)
         low, high = (a, b) if kind in ("lt", "le") else (b, a)
@@ -101,6 +104,16 @@ def compare(values, kinds, place, small):
     return result
 
 
+def tiny(node):
+    """Numbers below :data:`ROUND_OFF` in an expression, but not those added to something."""
+    if isinstance(node, ast.Constant):
+        x = node.value
+        return [x] if isinstance(x, float) and 0.0 < x < ROUND_OFF else []
+    added = isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Add, ast.Sub))
+    return [x for part in ast.iter_child_nodes(node) for x in tiny(part)
+            if not (added and isinstance(part, ast.Constant))]
+
+
 class Transformer(ast.NodeTransformer):
     """Puts :func:`compare` in place of comparisons."""
 
@@ -111,9 +124,8 @@ class Transformer(ast.NodeTransformer):
         self.generic_visit(node)
         if not all(type(kind) in COMPARED for kind in node.ops):
             return node
-        numbers = [x.value for part in [node.left, *node.comparators] for x in ast.walk(part)
-                   if isinstance(x, ast.Constant) and isinstance(x.value, float) and x.value > 0.0]
-        small = min([x for x in numbers if x < ROUND_OFF], default=None)
+        numbers = [x for part in [node.left, *node.comparators] for x in tiny(part)]
+        small = min(numbers, default=None)
         kinds = tuple(COMPARED[type(kind)].__name__ for kind in node.ops)
         call = ast.Call(ast.Name(NAME, ast.Load()), [
             ast.List([node.left, *node.comparators], ast.Load()),
@@ -148,7 +160,7 @@ def install():
     equal = ApproxScalar.__eq__
 
     def approx_equal(self, actual):
-        place = place_of_caller()
+        place = place_of(sys._getframe(1))
         if place is not None:
             try:
                 gap, size = abs(actual - self.expected), abs(self.expected)

@@ -41,14 +41,14 @@ def test_shear_factor_of_a_rectangle():
 @pytest.mark.parametrize(
     "model, plane, tip, tol",
     [  # independent code
-        ("elastica", "stress", (-0.7409917574, -0.9031316830831), 6e-11),
-        ("elastica", "strain", (-0.7244805807, -0.8974327927637), 6e-11),
-        ("extensible", "stress", (-0.7409795738, -0.9032869463686), 6e-11),
-        ("extensible", "strain", (-0.7244692457, -0.8975726079360), 6e-11),
-        ("reissner", "stress", (-0.7410168535, -0.9033972258502), 6e-11),
-        ("reissner", "strain", (-0.7245073589, -0.8976878470927), 6e-11),
-        ("svk", "stress", (-0.7411086333, -0.903311513), 6e-10),
-        ("svk", "strain", (-0.7245923453, -0.897596109), 6e-10),
+        ("elastica", "stress", (-0.7409917574, -0.9031316830831), 6e-10),
+        ("elastica", "strain", (-0.7244805807, -0.8974327927637), 6e-10),
+        ("extensible", "stress", (-0.7409795738, -0.9032869463686), 6e-10),
+        ("extensible", "strain", (-0.7244692457, -0.8975726079360), 6e-10),
+        ("reissner", "stress", (-0.7410168535, -0.9033972258502), 6e-10),
+        ("reissner", "strain", (-0.7245073589, -0.8976878470927), 6e-10),
+        ("svk", "stress", (-0.7411086333, -0.903311513), 6e-9),
+        ("svk", "strain", (-0.7245923453, -0.897596109), 6e-9),
     ],
 )
 def test_gravity_cantilever(model, plane, tip, tol):
@@ -91,7 +91,7 @@ def test_scaling_the_gravity_cantilever():
 def test_elastica_under_a_tip_load():
     u, w = exact.elastica_tip_load(10.0)
     close(w, 0.8106090248803, 1e-13)  # independent code
-    close(u, 0.55499559775, 6e-12)  # independent code
+    close(u, 0.55499559775, 6e-11)  # independent code
     u, w = exact.elastica_tip_load(1e-4)
     assert w == pytest.approx(1e-4 / 3, rel=1e-7)
     assert u == pytest.approx(1e-8 / 15, rel=1e-5)
@@ -105,26 +105,26 @@ def test_elliptic_integrals_agree_with_shooting(alpha, tol):
 
 def test_elastica_of_the_slender_cantilever():
     alpha = 10.0 / (2e11 * exact.inertia(0.01, 0.01))
-    close(exact.elastica_tip_load(alpha)[1], 0.019991777751, 6e-13)  # independent code
+    close(exact.elastica_tip_load(alpha)[1], 0.019991777751, 6e-12)  # independent code
 
 
 def test_cubic_cable_under_a_tip_load():
     EI = 2.07e11 * exact.inertia(0.1, 0.1)
     tip = exact.elastica_extensible_tip(3 * EI / 2.0**2, 2.07e11 * 0.01, EI, 2.0)
-    close(tip, [-0.508537304326, -1.207239854550], 1e-12)  # independent code
+    close(tip, [-0.508537304326, -1.207239854550], 1e-11)  # independent code
 
 
 def test_rollup_of_a_continuum():
     b = h = 0.01
     M = 2 * np.pi * 2e8 * exact.inertia(b, h)
     turns = exact.rollup_end_angle(M, 2e8, b, h, 1.0) / (2 * np.pi)
-    close(turns, 1.0011885806, 6e-11)  # independent code
+    close(turns, 1.0011885806, 6e-10)  # independent code
     kappa, stretch = exact.rollup_curvature(M, 2e8, b, h)
     # the stress resultants of S = E ((stretch - Y kappa)^2 - 1)/2, integrated exactly
     Y, weight = legendre.leggauss(4)
     a = stretch - Y * h / 2 * kappa
     traction = 2e8 * (a * a - 1) / 2 * a * weight * b * h / 2
-    close(traction.sum() / (2e8 * b * h), 0.0, 1e-16)
+    close(traction.sum() / (2e8 * b * h), 0.0, 1e-15)
     assert -(traction * Y * h / 2).sum() == pytest.approx(M, rel=1e-12)
     thin = exact.rollup_end_angle(M * 1e-9, 2e8, b, h * 1e-3, 1.0) / (2 * np.pi)
     close(thin - 1, 1.1844e-9, 1e-12)  # 0.3 (2 pi h/L)^2
@@ -144,7 +144,7 @@ def test_rollup_of_a_continuum():
     ],
 )
 def test_limit_loads_of_lees_frame(section, highest, lowest):
-    close(exact.lee_frame_limits(**section), (highest, lowest), 6e-10)
+    close(exact.lee_frame_limits(**section), (highest, lowest), 6e-9)
 
 
 def test_path_of_lees_frame():
@@ -166,7 +166,7 @@ def test_lees_frame_at_rest():
 
 
 def test_limit_load_of_the_clamped_hinged_arch():
-    close(exact.clamped_hinged_arch_limit(), 8.973089970, 6e-10)  # independent code
+    close(exact.clamped_hinged_arch_limit(), 8.973089970, 6e-9)  # independent code
     _, uy, load = exact.clamped_hinged_arch(19)
     assert uy.shape == (19,) and 8.9 < load.max() < 8.9731
     assert np.all(np.diff(uy) < 0)
@@ -219,7 +219,7 @@ def test_euler_buckling_of_the_fixed_pinned_column():
 
 
 def test_self_buckling():
-    close(exact.greenhill_load(1.0, 1.0, 1.0), 7.837347438943, 1e-12)  # independent code
+    close(exact.greenhill_load(1.0, 1.0, 1.0), 7.837347438943, 1e-11)  # independent code
     assert exact.greenhill_load(6.0, 5.0, 2.0) == pytest.approx(7.837347438943 * 30 / 8)
 
 
@@ -287,7 +287,7 @@ def test_euler_bernoulli_frequencies():
     x = np.sqrt(exact.euler_bernoulli_frequencies(**unit, n=2, ends="free-free"))
     close(x, [4.730040744862704, 7.853204624095838], 1e-13)  # tables
     x = np.sqrt(exact.euler_bernoulli_frequencies(**unit, n=400, ends="fixed-free"))
-    close(x[-1], 399.5 * np.pi, 1e-12)
+    close(x[-1], 399.5 * np.pi, 1e-11)
 
 
 # Rigid motion

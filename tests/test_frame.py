@@ -492,7 +492,7 @@ def test_what_else_acts_in_a_motion_by_elimination(change, monkeypatch):
     if change == "auto":
         assert abs(len(ours.t) / len(dense.t) - 1.0) < 0.1
     assert_allclose(ours.u[-1], dense.u[-1], rtol=0,
-                    atol=(1e-3 if change == "auto" else 1e-10) * np.abs(dense.u).max())
+                    atol=(1e-3 if change == "auto" else 1e-9) * np.abs(dense.u).max())
     assert np.ptp(ours.total_energy + ours.dissipated) < 1e-9 * dense.kinetic_energy.max() or (
         change == "pressure")
 
@@ -789,7 +789,7 @@ def test_refined_tapers_have_the_heights_of_their_functions():
     at = np.linspace(0, 1, 8, endpoint=False) + np.arange(4)[:, None] / 24
     assert_allclose(mesh.heights[:, :8], height(at), rtol=1e-15)
     assert_allclose(mesh.heights[:, 8:16], 0.02)
-    assert_allclose(mesh.heights[:, 16:], slim(at), rtol=1e-15)
+    assert_allclose(mesh.heights[:, 16:], slim(at), rtol=1e-14)
     mesh = mesh.replace(height=lambda s: 2 * slim(s))
     assert_allclose(mesh.heights, np.tile(2 * slim(at), 3), rtol=1e-15)
     assert frame.clamp([0, 3]).point_force((10.0, 0.0), at=1).solve_static(adapt=1e-6).converged

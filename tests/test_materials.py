@@ -180,7 +180,7 @@ def test_shear_factor(name):
 
 def test_shear_correction_scales_the_shear_modulus_only(law):
     D, Dk = law.moduli(np.zeros(3)), law.law(0.6).moduli(np.zeros(3))
-    assert_allclose(Dk, D * np.where(np.arange(9).reshape(3, 3) == 8, 0.6, 1.0), rtol=1e-15)
+    assert_allclose(Dk, D * np.where(np.arange(9).reshape(3, 3) == 8, 0.6, 1.0), rtol=1e-14)
     k = ShearCorrected(law, 0.6)  # the general wrapper and a law's own agree
     assert_allclose(k.stress(STRAINS), law.law(0.6).stress(STRAINS), rtol=1e-14, atol=1e-3)
 
@@ -489,7 +489,7 @@ def test_scenes_of_laws_in_python_run_compiled(cls, element, needs_compiled):
         assert (scene.plan()["compiled loop"].status == "computed") is flag
         assert state.iterations > 2
     for mine, other in zip(*found):
-        assert_allclose(mine, other, rtol=0, atol=1e-10 * np.abs(other).max())
+        assert_allclose(mine, other, rtol=0, atol=1e-9 * np.abs(other).max())
 
 
 def test_the_plan_says_why_a_law_runs_in_numpy(needs_compiled):
