@@ -19,8 +19,8 @@ import pytest
 
 #: Relative bounds below which a comparison is one with round-off, and the margin that it must have.
 ROUND_OFF, MARGIN = 1e-9, 10.0
-#: Margin below which ``not np.allclose`` says that things differ.
-APART = 0.1
+#: Below this margin a comparison says no: in ``not np.allclose``, or before an ``or``.
+APART = 1.0
 
 HERE = Path(__file__).parent
 COMPARED = {ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge}
@@ -35,7 +35,7 @@ def note(place, kind, value, bound, relative):
     if not (np.isfinite(value) and 0.0 < bound < np.inf):
         return
     margin = bound / value if value > 0.0 else np.inf
-    if APART < margin < found.get((place, kind), (np.inf,))[0]:
+    if APART <= margin < found.get((place, kind), (np.inf,))[0]:
         found[place, kind] = float(margin), float(relative), float(value)
 
 

@@ -131,7 +131,7 @@ def test_balance_to_round_off_and_to_the_order_of_others(element, name):
     scene = SCENES[name](weighing(element))
     history = scene.integrate(0.1, 2e-3)
     assert np.ptp(history.total_energy + history.dissipated) < 1e-11
-    assert np.all(np.diff(history.dissipated) >= -1e-15)
+    assert np.all(np.diff(history.dissipated) >= -1e-14)
     other = scene.integrate(0.1, 1e-3, scheme="generalized-alpha")
     assert np.ptp(other.total_energy + other.dissipated) < 3e-4
     assert_allclose(other.displacement((1, 0))[-1], history.displacement((1, 0))[-1], rtol=0,
@@ -145,8 +145,8 @@ def test_two_beams_on_a_spring_keep_their_momenta():
     history = scene.integrate(0.3, 2e-3)
     assert scene.system.forces.far and history.dissipated[-1] > 1e-3
     assert np.ptp(history.total_energy + history.dissipated) < 1e-12
-    assert np.abs(history.momentum - history.momentum[0]).max() < 1e-13
-    assert np.ptp(history.angular_momentum) < 1e-13
+    assert np.abs(history.momentum - history.momentum[0]).max() < 1e-12
+    assert np.ptp(history.angular_momentum) < 1e-12
 
 
 def spinning_pair(kinds, rates=(20.0, 14.0)):
