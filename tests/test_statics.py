@@ -544,10 +544,12 @@ def test_nothing_to_do():
 def test_free_rigid_motions_are_named(support, free):
     mesh = MeshBeam.init_line([2.0, 2.4, 3.0], 0.1)
     scene = Scene(Beam(mesh, ElementBeamANCF(2), StVenantKirchhoff(2e8, 0.3, 7800), 0.1))
-    support(scene.gravity(GRAVITY))
+    support(scene)
     for words in free:
         with pytest.raises(SupportError, match=words):
             scene.solve_static()
+    with pytest.raises(SupportError, match=free[0]):
+        scene.gravity(GRAVITY).solve_linear()
 
 
 @pytest.mark.parametrize("support", [

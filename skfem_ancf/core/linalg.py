@@ -168,6 +168,11 @@ class BandMatrix:
         """A copy of the diagonal."""
         return self._flat[self._diagonal::self._ld].copy()
 
+    def add_diagonal(self, values: Array) -> None:
+        """Add values (n,) to the diagonal."""
+        self._flat[self._diagonal::self._ld] += values
+        self._factor = None
+
     def multiply(self, v: Array) -> Array:
         """The matrix times a vector (n,)."""
         if self.symmetric:

@@ -12,7 +12,7 @@ from ..actions.joints.base import Joint, same_joint
 from ..actions.joints.nodes import Nodes, chain_ends
 from ..actions.joints.settlements import HELD
 from ..core.kept import cached_property
-from .signature import DENSE, first_dependent, null_space, row_sizes, unit_rows
+from .signature import DENSE, FREE, first_dependent, null_space, row_sizes, unit_rows
 from ..beam.rigid import RigidBody
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Constraints:
                  stiffness: Callable[[], Any] | None) -> None:
         self.members, self.slices, self.size, self._stiffness = members, slices, size, stiffness
         self.N = slices[-1].stop
-        self._supported = self._independent = False
+        self._independent = False
         self._eliminate(fixed, values, joints)
 
     def _eliminate(self, fixed, values, joints):
@@ -640,18 +640,31 @@ class Constraints:
 
     def require_supports(self) -> None:
         """Raise SupportError if a rigid motion is free, or joints are not independent."""
-        if self._supported:  # nothing of it changes in the life of a system
-            return
         self.require_independent_joints()
+        if self.missing_supports:
+            raise SupportError(self.missing_supports)
+
+    @cached_property
+    def missing_supports(self) -> str:
+        """The rigid motions that are free, and what would hold them, in words; or empty."""
         free = self.free_rigid_motions()
-        if free:
-            raise SupportError(
-                "the supports leave rigid motions free: " + "; ".join(free)
+        if not free:
+            return ""
+        return ("the supports leave rigid motions free: " + "; ".join(free)
                 + (", along which the springs have no stiffness before the load"
                    if self._stiffness is not None else "")
                 + f". Add a support, for example {self._advice()}, or solve in time with "
                 "scene.integrate")
-        self._supported = True
+
+    @cached_property
+    def adrift(self) -> bool:
+        """True if nothing holds a translation of the whole scene, so that no load can either."""
+        if self._stiffness is not None or not self.missing_supports:
+            return False
+        whole = np.concatenate([member.rigid_motions()[:, :2] for member in self.members])
+        held = np.concatenate([whole[self.fixed], self._at_rest @ whole])
+        sigma = np.linalg.svd(held, compute_uv=False)
+        return len(sigma) < 2 or sigma[1] <= FREE * sigma[0]
 
     def _advice(self):
         """What would hold the scene, in words."""

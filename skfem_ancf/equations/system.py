@@ -156,6 +156,7 @@ class System:
     bordered: Any = _OfConstraints()
     free_rigid_motions: Any = _OfConstraints()
     require_independent_joints: Any = _OfConstraints()
+    missing_supports: Any = _OfConstraints()
     require_supports: Any = _OfConstraints()
 
     def _directors(self, fixed):

@@ -29,9 +29,10 @@ from ..core.kept import cached_property
 from ..actions.obstacles import Obstacle
 from ..actions.forces import (Control, Drag, ForceElement, Foundation, PointMass, Spring,
                               TorsionalSpring, bind_force)
-from ..core.errors import (ConvergenceError, InputError, Interrupted, StabilityWarning, ask_field,
-                           require_finite, require_finite_scalar, require_label, require_option,
-                           require_options, require_positive, shown, taught, teaching)
+from ..core.errors import (ConvergenceError, InputError, Interrupted, StabilityWarning,
+                           SupportError, ask_field, require_finite, require_finite_scalar,
+                           require_label, require_option, require_options, require_positive, shown,
+                           taught, teaching)
 from ..actions.joints import Joint, bind_joint, get_joint
 from ..actions.joints.base import both_of, is_ground, members_at, named_place, nearest_of
 from ..actions.joints.prescribed import Turned
@@ -1552,11 +1553,19 @@ class Scene:
                         "; first_step=0.1 begins with a tenth of the load; with adapt= those of "
                         "statics.adapt.solve_adaptive too")
         system = self.system
-        system.require_supports()
+        system.require_independent_joints()
+        if system.constraints.adrift:
+            system.require_supports()
         try:
             result = newton.solve_static(system, u, memory=memory, **options)
-        except (ConvergenceError, Interrupted) as error:
-            raise type(error)(str(error), self._state(error.state)) from None
+        except Interrupted as error:
+            raise Interrupted(str(error), self._state(error.state)) from None
+        except ConvergenceError as error:
+            if system.missing_supports:
+                raise SupportError(f"{system.missing_supports}. No stable equilibrium was found in "
+                                   "which the loads hold what is free") from error
+            state = self._state(error.state)
+            raise ConvergenceError(_with_findings(str(error), state), state) from None
         return self._state(result)
 
     @_alone
@@ -1870,6 +1879,14 @@ class Scene:
         return State(self.system, result.u, result.load, result.force, result.converged,
                      result.iterations, result.message, result.steps, result.multipliers,
                      doubt=result.doubt, memory=result.memory)
+
+
+def _with_findings(message, state):
+    """A message, and what the last state that converged is beyond."""
+    found = state.checks.findings
+    if not found:
+        return message
+    return f"{message}. At the load level {state.load:.6g} already " + "; ".join(found)
 
 
 def _branch(point, system):

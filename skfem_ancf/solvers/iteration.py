@@ -32,6 +32,11 @@ LEAST = 2
 CLOSED = 1e-12
 #: Work of the third correction, as a root over that of all forces, of an iteration that is astray.
 ASTRAY = 0.9
+#: The same of the second, of a scene so soft that the first was far too large; and of one after
+#: the eighth, of an iteration that is not seen to converge.
+SOFT, LATE, LARGE = 10.0, 8, 3.0
+#: What ends an iteration early: the third correction, or the second and those after the eighth.
+FIRST, WATCHED = 1, 2
 
 
 class Target(NamedTuple):
@@ -76,7 +81,8 @@ class Rules(NamedTuple):
         Handle of what solves the linear systems, see :mod:`skfem_ancf.core.callbacks`; 0 for the
         band.
     wary
-        1 if it ends where the first corrections do not get smaller.
+        When it ends because corrections do not get smaller: 0 never, :data:`FIRST` or
+        :data:`WATCHED`.
     """
 
     mixed: int
@@ -195,9 +201,17 @@ def equilibrium(e, target, rules, x, w, record):
             x.multipliers[i] += w.dm[i]
         reference = reference_work(x.force, w.load, x.u)
         record[k, 1] = work / reference if reference > 0.0 else 0.0
-        if rules.wary > 0 and k == 2 and record[k, 1] > ASTRAY:
+        if rules.wary > 0 and _astray(rules.wary, k, record[k, 1]):
             return NOT_CONVERGED, k + 1
     return NOT_CONVERGED, rules.iterations
+
+
+@source
+def _astray(wary, k, work):
+    """True if correction k says that an iteration will not converge."""
+    if wary == FIRST:
+        return k == 2 and work > ASTRAY
+    return (k == 1 and work > SOFT) or (k >= LATE and work > LARGE)
 
 
 @source

@@ -11,7 +11,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..core.band import fix
 from ..actions.forces.turns import Turns
-from ..core.linalg import NO_FACTORS
+from ..core.linalg import NO_FACTORS, Inertia
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -36,6 +36,10 @@ SOFTER = 8.0
 CUTS = 3
 #: Iterations of a descent.
 DESCENT = 200
+#: Largest radius of a descent, and displacement over the size of the scene from which it is lost.
+LARGEST, ASTRAY = 0.5, 20.0
+#: Stiffness that holds what supports leave free, over that of the loads.
+HELD = 1e-6
 #: Largest difference of a tangent from its transpose, relative, that is round-off.
 ROUND_OFF = 1e-10
 
@@ -161,6 +165,31 @@ def holds(system: System, u: Array, load: float, multipliers: Array, t: float | 
     return verdict(system, u, load, multipliers, t).stability != "unstable"
 
 
+def is_held(system: System, u: Array, multipliers: Array) -> bool:
+    """True if loads or obstacles hold an equilibrium of a scene whose supports leave it free.
+
+    Its tangent has to be positive definite, and not by round-off alone.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.system.System`.
+    u, multipliers
+        The equilibrium at full load, shapes (N,) and (m,).
+    """
+    force, _ = system.assemble(u)
+    fix(system.K.band, system.fixed)
+    loads = np.maximum(np.abs(force), np.abs(system.external_force(u)))
+    weights = position_weights(system) * system.mask
+    least = HELD * np.max(loads * weights) / (system.size * max(1.0, np.sum(weights)))
+    system.K.add_diagonal(-least * weights)
+    try:
+        system.factorize(u, 1.0, multipliers)
+        return system.inertia() == Inertia(0, False)
+    except NO_FACTORS:
+        return False
+
+
 def weak_at_rest(system: System) -> str:
     """Why a scene gives way without any load, if its strain energy is to blame; else empty.
 
@@ -186,7 +215,7 @@ def weak_at_rest(system: System) -> str:
             "'continuum' have a positive one; so has a smaller nu or order")
 
 
-def heads_on(system: System, result: Any, u: Array, load: float, origin: tuple[Any, Any]) -> bool:
+def heads_on(system: System, result: Any, u: Array, load: float) -> bool:
     """True if the scene moves from the last equilibrium to ``u`` as the load drives it there.
 
     Close to a bifurcation an iteration may jump to the other side. The nodes' displacements are
@@ -202,10 +231,8 @@ def heads_on(system: System, result: Any, u: Array, load: float, origin: tuple[A
         Displacement of the next one, shape (N,).
     load
         Its load factor.
-    origin
-        Displacement that the solution began with and its multipliers, or None for these.
     """
-    if origin[1] is not None or result.load == 0.0 or system.forces.contacts.moving:
+    if system.forces.contacts.moving:
         return True  # the tangent does not know where obstacles go
     du = np.zeros(system.N)
     du[system.fixed] = system.values(load) - result.u[system.fixed]
@@ -250,18 +277,22 @@ def gives_way(system: System, result: Any, load: float) -> bool:
 
 
 class Descent:
-    """Corrections of Newton's method that lead to a minimum of the potential.
+    """Corrections of bounded size that lead to a minimum of the potential.
 
-    The part of a correction along a direction of negative curvature is turned round, and the
-    whole is kept within a stride: eigenvector following, as in Cerjan and Miller, Journal of
-    Chemical Physics 75 (1981).
+    The tangent is made stiffer by a multiple of the identity, of coordinates over their sizes,
+    until it is positive definite and the correction no larger than a radius: a trust region by
+    Levenberg and Marquardt, see Conn, Gould, Toint: Trust-Region Methods (2000), 7.3. So it leads
+    down where directions give way, and where a rigid motion is free. Close to a minimum nothing is
+    added, and the correction is Newton's.
 
     Parameters
     ----------
     system
         A :class:`~skfem_ancf.equations.system.System`.
     stride
-        Largest displacement of a node in one correction, relative to the scene's size.
+        The radius at first: largest change of a coordinate in one correction over its size, which
+        is that of the scene for positions and about 1 for rotations. It is halved where corrections
+        turn back, and grows to five times that where they go on.
 
     Attributes
     ----------
@@ -270,37 +301,15 @@ class Descent:
     """
 
     def __init__(self, system: System, stride: float = STRIDES[0]) -> None:
-        self.system, self.stride = system, stride
-        self.turned = False
+        self.system, self.turned = system, False
         self._weights = position_weights(system)
-
-    def correct(self, free: Array, du: Array, dm: Array) -> tuple[Array, Array]:
-        """The correction of a residual, turned and shortened.
-
-        Parameters
-        ----------
-        free
-            Residual at the free coordinates, shape (N,).
-        du, dm
-            Newton's correction of displacement (N,) and multipliers (m,).
-
-        Returns
-        -------
-        du, dm
-            Shapes (N,) and (m,).
-        """
-        system = self.system
-        negative = system.inertia().negative
-        for v, curvature in self.directions(negative):
-            self.turned = True
-            du = du - 2.0 * (v @ free / curvature) * v
-        largest = np.max(np.hypot(*du[self._weights > 0].reshape(-1, 2).T))
-        scale = min(1.0, self.stride * system.size / largest) if largest > 0 else 1.0
-        return scale * du, scale * dm
+        self._sizes = system.constraints.coordinate_sizes
+        self._radius, self._largest = stride, min(5.0 * stride, LARGEST)
+        self._shift, self._before = 0.0, np.zeros(system.N)
 
     def solve_own(self, t: float, u: Array, multipliers: Array, R: Array, phi: Array, du: Array,
                   dm: Array) -> bool:
-        """Solve for a correction, as :meth:`correct` changes it; False if there is none.
+        """Solve for a correction; False if there is none.
 
         Parameters
         ----------
@@ -308,13 +317,62 @@ class Descent:
             As for :meth:`System.solve_own <skfem_ancf.equations.system.System.solve_own>`, shapes
             (N,) and (m,).
         """
-        if not self.system.solve_own(t, u, multipliers, R, phi, du, dm):
+        if np.max(np.abs(u / self._sizes)) > ASTRAY:
             return False
-        try:
-            du[:], dm[:] = self.correct(R, du, dm)
-        except NO_FACTORS:
+        found = self._bounded(lambda: self.system.factorize(u, t, multipliers), R, phi)
+        if found is None:
             return False
+        du[:], dm[:] = found
+        now, before = du / self._sizes, self._before
+        along = now @ before / (np.sqrt(now @ now * (before @ before)) or 1.0)
+        if along < -0.2:
+            self._radius *= 0.5
+        elif along > 0.3:
+            self._radius = min(1.5 * self._radius, self._largest)
+        self._before = now
         return True
+
+    def _bounded(self, factorize, R, phi):
+        """The correction with the least stiffness added that will do, to a factor of ten or so."""
+        band, system = self.system.K.band, self.system
+        fix(band, system.fixed)
+        tangent = band.flat.copy()
+        scale = max(np.mean(np.abs(system.K.diagonal()) * self._sizes**2 * system.mask),
+                    np.max(np.abs(R * self._sizes)))
+
+        def correction(shift):
+            band.flat[:] = tangent
+            if shift > 0.0:
+                system.K.add_diagonal(shift * system.mask / self._sizes**2)
+            try:
+                factorize()
+                du, dm = system.solve(R, phi)
+                # where friction slips there is no potential: what does work will do
+                down = system.inertia().negative == 0 if system.symmetric else R @ du >= 0.0
+            except NO_FACTORS:
+                return None
+            self.turned = self.turned or (shift == 0.0 and not down)
+            return (du, dm) if down and np.max(np.abs(du / self._sizes)) <= self._radius else None
+
+        least = 1e-14 * scale
+        found, shift = correction(0.0), max(self._shift, 100.0 * least)
+        if found is not None:
+            self._shift = 0.0
+            return found
+        found = correction(shift)
+        if found is None:  # more
+            while found is None and shift < 1e6 * scale:
+                shift *= 10.0
+                found = correction(shift)
+            self._shift = shift
+            return found
+        while shift > 10.0 * least:  # less
+            less = correction(0.1 * shift)
+            if less is None:
+                break
+            found, shift = less, 0.1 * shift
+        self._shift = shift
+        return found
 
     def product(self, a: Array, b: Array) -> float:
         """The sum over the nodes of ``a . b``, of displacements of the coordinates.
@@ -364,7 +422,7 @@ class Descent:
 
 
 def way_down(system: System, result: Any, load: float, full: float, at: float,
-             origin: tuple[Any, Any], iterate: Callable[..., Any],
+             proportional: bool, iterate: Callable[..., Any],
              failed: type[Exception]) -> tuple[Any, bool]:
     """What :func:`descend` finds, or None, and whether it met an unstable tangent.
 
@@ -374,10 +432,12 @@ def way_down(system: System, result: Any, load: float, full: float, at: float,
     ----------
     system, result
         As for :func:`descend`.
-    load, origin
+    load
         As for :func:`heads_on`.
     full, at
         Load factor and time for :func:`descend`.
+    proportional
+        Loads and supports grow together, so that :func:`heads_on` can tell.
     iterate, failed
         As for :func:`descend`.
     """
@@ -389,7 +449,7 @@ def way_down(system: System, result: Any, load: float, full: float, at: float,
         except (failed, *NO_FACTORS) as failure:
             logger.info("no descent at load %.6g: %s", load, failure)
             continue
-        if heads_on(system, result, found[0], load, origin):
+        if not proportional or result.load == 0.0 or heads_on(system, result, found[0], load):
             return found, descent.turned
         first = (found, descent.turned) if first[0] is None else first
     return first
