@@ -563,6 +563,7 @@ class Search:
         if step < self.rules.first_step:  # a strategy has tried what the step was cut from
             result.rejected, cuts = 1, int(self._unstable)
         options = self._options(route, rules.method, watched=rules.few)
+        few = FEW * (3 if system.forces.contacts.obstacles else 1)  # contact takes its time
         with progress_bar(self.progress, total=1.0, desc="load") as bar:
             while result.load < 1.0:
                 load = min(1.0, result.load + step)
@@ -578,7 +579,7 @@ class Search:
                     logger.info("load %.6g failed (%s), step cut", load, failure)
                     step = 0.25 * (load - result.load)
                     found = None
-                    many = rules.few and spent + record.iterations >= FEW
+                    many = rules.few and spent + record.iterations >= few
                     if stable and (cuts > stability.CUTS or step < rules.min_step or many):
                         found = _rescue(system, result, load, options, record, failure)
                     spent += record.iterations
@@ -601,7 +602,7 @@ class Search:
                 logger.info("load %.6g converged in %d iterations", load, record.iterations)
                 if record.iterations <= max(8, rules.max_iterations // 3):
                     step *= 2.0
-                if rules.few and spent >= FEW and result.load < 1.0 and not result.doubt:
+                if rules.few and spent >= few and result.load < 1.0 and not result.doubt:
                     raise _Failed(f"the full load was not reached in {spent} iterations")
         return result
 

@@ -38,6 +38,8 @@ CUTS = 3
 DESCENT = 200
 #: Largest radius of a descent, and displacement over the size of the scene from which it is lost.
 LARGEST, ASTRAY = 0.5, 20.0
+#: How often a correction of a descent is halved that leads through an obstacle.
+HALVED = 8
 #: Stiffness that holds what supports leave free, over that of the loads.
 HELD = 1e-6
 #: Largest difference of a tangent from its transpose, relative, that is round-off.
@@ -322,7 +324,7 @@ class Descent:
         found = self._bounded(lambda: self.system.factorize(u, t, multipliers), R, phi)
         if found is None:
             return False
-        du[:], dm[:] = found
+        du[:], dm[:] = self._held_back(t, u, *found)
         now, before = du / self._sizes, self._before
         along = now @ before / (np.sqrt(now @ now * (before @ before)) or 1.0)
         if along < -0.2:
@@ -331,6 +333,14 @@ class Descent:
             self._radius = min(1.5 * self._radius, self._largest)
         self._before = now
         return True
+
+    def _held_back(self, t, u, du, dm):
+        """A correction, shortened until nothing passes through an obstacle."""
+        for _ in range(HALVED):
+            if self.system.forces.contacts.passed((u, t), (u + du, t)) is None:
+                break
+            du, dm = 0.5 * du, 0.5 * dm
+        return du, dm
 
     def _bounded(self, factorize, R, phi):
         """The correction with the least stiffness added that will do, to a factor of ten or so."""
