@@ -9,6 +9,7 @@ the points of integration, E0 sampled and interpolated there as the formulation 
 from __future__ import annotations
 
 import inspect
+from functools import partial
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -20,6 +21,8 @@ from .nonlinear_eigenstrain import energy_lost, sampled, unmatched
 from ..beam.kernels.along import stretched
 from ..beam.kernels.base import GIVEN, MEAN, apart, no_stresses, nowhere
 from ..beam.kernels.law import LINEAR
+from ..beam.kernels.section import linearised
+from ..core.linear import first_order, step, stress_of
 from .loads import Load
 from ..beam.distribution import Spread
 
@@ -148,13 +151,23 @@ class EigenStrain(Load):
         u = np.ascontiguousarray(u_e).ravel()
         return self._pushed(GIVEN, u, u, factor, self._apart()).reshape(u_e.shape)
 
+    def small_forces(self, factor: float = 1.0) -> Array:
+        """As :meth:`element_forces` without displacement, linear in the strain."""
+        if not self.grows:
+            return self.element_forces(np.zeros(self.beam.N), factor)
+        kernel = self.beam.kernel
+        u = np.zeros(kernel.gather(np.zeros(self.beam.N)).shape, dtype=complex)
+        packs = [linearised(pack) for pack in self._apart()]
+        return first_order(self._pushed(GIVEN, u.ravel(), u.ravel(), step(0.0, factor), packs)
+                           ).reshape(u.shape)
+
     def _apart(self):
         """The packs of :attr:`pushes`, each element with coordinates of its own."""
         return [apart(pack, slice(None)) for pack in self.beam.kernel.pushed_packs()]
 
     def _pushed(self, what, u, v, factor, packs):
         """The force, or the mean force, of :attr:`pushes` times a factor."""
-        out = np.zeros(u.size)
+        out = np.zeros_like(u)
         for pack, given in zip(packs, self.pushes):
             self.beam.kernel.texts.evaluate(pack, what, u, v, out, -factor * given,
                                             no_stresses(pack), nowhere(out))
@@ -225,16 +238,16 @@ class EigenStrain(Load):
         """
         beam, E0 = self.beam, self.strain_at(X, e)
         if not beam.has_sections:
-            stretch, _ = stretched(beam.strain(u, X, e)[0])
+            stretch, _ = stretched(beam.kinematics.strain(beam, u, X, e)[0])
             return self.nominal_at(X, e, factor) / stretch
         which = np.broadcast_to(beam.across.which(X, e), E0.shape[1:])
         for k, slab in enumerate(beam.across.slabs):  # what acts on the elements
             E0[1] -= np.where(which == k, unmatched(beam, self, slab, X, e), 0.0)
-        E = beam.strain(u, X, e) if self.grows else 0.0 * E0
-        laws = [layer.material.law(layer.material.shear_factor(layer.element)).stress
+        E = beam.kinematics.strain(beam, u, X, e) if self.grows else 0.0 * factor * E0
+        laws = [partial(stress_of, layer.material.law(layer.material.shear_factor(layer.element)))
                 for layer in beam.layers]
         return beam.across.of_slabs(
-            X, E0, [lambda law=law: law(E) - law(E - factor * E0) for law in laws], e)
+            X, E, [lambda law=law: law(E) - law(E - factor * E0) for law in laws], e)
 
     def nominal_at(self, X: Array, e: Array, factor: float = 1.0) -> Array:
         """What the nominal stress of a cable, force per stress-free area, is less by, (3, n, m).

@@ -31,6 +31,15 @@ class Configuration(Protocol):
         Time, None in statics.
     acceleration
         Of the degrees of freedom, shape (N,), None in statics.
+    base
+        The configuration about which this one is linearised, or None.
+    places
+        The displacement (N,) as fields are evaluated at it: of a linear solution a
+        :func:`~skfem_ancf.core.linear.step` from the base.
+    from_rest
+        True of a linear solution about the reference configuration without load.
+    unit
+        What factors of loads are times: of one from rest a step, else 1.
     actions
         Times and factors at which distributed loads act, see :mod:`skfem_ancf.recovery`.
     balance, resultants
@@ -59,6 +68,18 @@ class Configuration(Protocol):
     def acceleration(self) -> Array | None: ...
 
     @property
+    def base(self) -> Any: ...
+
+    @property
+    def places(self) -> Array: ...
+
+    @property
+    def from_rest(self) -> bool: ...
+
+    @property
+    def unit(self) -> Any: ...
+
+    @property
     def actions(self) -> Any: ...
 
     @property
@@ -69,6 +90,9 @@ class Configuration(Protocol):
 
     def u_of(self, beam: Any) -> Array:
         """Displacement of the degrees of freedom of one beam or rigid body."""
+
+    def places_of(self, beam: Any) -> Array:
+        """Those of :attr:`places` of one beam or rigid body."""
 
     def contact_memory(self) -> Any:
         """A context in which the obstacles have the memory of this configuration."""

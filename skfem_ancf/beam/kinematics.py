@@ -15,6 +15,7 @@ from .inertia import of_cable, of_sections
 from .kernels import CableKernel, Kernel
 from .kernels.along import CableSections, stretched
 from ..core.errors import InputError, ModelWarning
+from ..core.linear import first_order
 from ..formulations.ecm import AXIS
 from ..core.quadrature import gauss
 
@@ -228,17 +229,20 @@ class Sections:
         beam
             A :class:`~skfem_ancf.Beam`.
         u
-            Displacement of the coordinates, shape (N,).
+            Displacement of the coordinates, shape (N,). Of a
+            :func:`~skfem_ancf.core.linear.step` they are linear.
         """
         det, stretches = [], []
         for term in beam.terms:
-            H, frame = beam.gradients(u, term.quadrature[0])
+            H, frame = Sections.gradients(beam, u, term.quadrature[0], None)
             F = H + frame
-            C = np.einsum("ikep,ijep->kjep", F, F)
+            C = first_order(np.einsum("ikep,ijep->kjep", F, F))
             middle, half = 0.5 * (C[0, 0] + C[1, 1]), 0.5 * (C[0, 0] - C[1, 1])
             root = np.hypot(half, C[0, 1])
-            stretches.append(np.sqrt(np.maximum([middle - root, middle + root], 0.0)).ravel())
-            det.append((F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]).ravel())
+            square = np.array([middle - root, middle + root]).ravel()
+            stretches.append(0.5 + 0.5 * square if np.iscomplexobj(F) else
+                             np.sqrt(np.maximum(square, 0.0)))
+            det.append(first_order(F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]).ravel())
         return np.concatenate(det), np.concatenate(stretches)
 
 
@@ -362,6 +366,8 @@ class Cable(Sections):
     def deformation(beam: Interior, u: Array) -> tuple[Array, Array]:
         along = beam.kernel.outer_stretches(u)
         ratio = beam.across.slabs[0].material.lateral_ratio
+        if np.iscomplexobj(u):
+            return along + ratio * (1.0 - along), along
         across = np.sqrt(np.maximum(1.0 - ratio * (along * along - 1.0), 0.0))  # S_yy = 0
         return along * across, along
 

@@ -9,6 +9,7 @@ import numpy as np
 from ..core.errors import (InputError, NameUnknown, require_finite, require_finite_scalar,
                            require_label, require_names, require_positive, shown, teaching)
 from ..core.frozen import Frozen, read_only
+from ..core.linear import angle_of
 from ..mesh.places import as_point
 
 if TYPE_CHECKING:
@@ -331,7 +332,7 @@ class RigidBody(Frozen):
             Shape (..., 4).
         """
         d = self._frame.T @ (self.q0[2:] + u[..., 2:])[..., None]
-        return self.angle + np.arctan2(d[..., 1, 0], d[..., 0, 0])
+        return self.angle + angle_of(d[..., 0, 0], d[..., 1, 0])
 
     def angular_velocity(self, u: Array, v: Array) -> Array:
         """The angular velocity, counterclockwise.

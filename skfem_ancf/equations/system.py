@@ -26,6 +26,7 @@ from ..actions.forces.system import Forces
 from ..actions.forces.texts import add_resisting_force
 from ..actions.joints.director import UnitDirector
 from ..core.kept import cached_property
+from ..core.origin import ours
 from ..core.linalg import INACCURATE, NO_FACTORS, BandMatrix, Inertia, dense
 from .backend import Machine
 from ..mesh.mesh_beam import reach
@@ -249,6 +250,73 @@ class System:
         """That of beams that are not displaced: of laws of one's own alone it may not be zero."""
         return np.zeros(self.N) if self._linear else self._evaluate(FORCE, np.zeros(self.N))
 
+    def linear_force(self, base: Array, d: Array, load: float = 1.0) -> Array:
+        """As :meth:`internal_force` in statics, linearised.
+
+        Parameters
+        ----------
+        base, d
+            A displacement about which it is, and what is added to it, shape (N,).
+        load
+            The load factor.
+        """
+        return self.internal_force(base, None, load) + self._stiffness_times(base, d, load)
+
+    def _stiffness_times(self, base, d, load):
+        """The tangent of the internal force times a vector; sums of strains, where it can be."""
+        out, at_rest = np.zeros(self.N), not base.any()
+        if not d.any():
+            return out
+        for beam, s in zip(self.beams, self.slices):
+            k = beam.kernel
+            out[s] = k.scatter(k.small_forces(d[s]) if at_rest else _times_elements(
+                k.tangents(base[s]), k.gather(d[s])))
+        if self.forces.elements:
+            i, j, v = self.forces.entries(self.machine.tables.plain.forces, load, base, 0.0 * base,
+                                          0.0)
+            np.add.at(out, i, v * d[j])
+        return out
+
+    def linear_energy(self, base: Array, d: Array, load: float = 1.0) -> float:
+        """The strain energy, and the potential of force elements, to second order.
+
+        Parameters
+        ----------
+        base, d, load
+            As for :meth:`linear_force`, shape (N,).
+        """
+        if base.any() or self.forces.elements:
+            second = 0.5 * d @ self._stiffness_times(base, d, load)
+        else:
+            second = sum(b.kernel.small_energy(d[s]) for b, s in zip(self.beams, self.slices))
+        return float(self.strain_energy(base, load) + second
+                     + self.internal_force(base, None, load) @ d)
+
+    def linear_external_force(self, base: Array, d: Array) -> Array:
+        """The force of all loads in statics at full size, linearised as it is solved with.
+
+        That loads of the package follow the body is of second order in small displacements from
+        the stress-free state. The force of a load of the user's may depend on these otherwise, as
+        that of a spring.
+
+        Parameters
+        ----------
+        base, d
+            As for :meth:`linear_force`, shape (N,).
+        """
+        out = np.array(self.external_force(base))
+        strains: list[Any] = [] if base.any() else [one for one in self.loads if one.pushes]
+        for one in strains:  # of laws that are not linear
+            s = self.of(one)
+            out[s] += one.beam.kernel.scatter(one.small_forces(one.at_rest)) - (
+                one.acting(None)[1].force(base[s]))
+        for one in self._varying:
+            if not one.constant and (base.any() or not ours(one)):
+                s, (factor, acting) = self.of(one), one.acting(None)
+                i, j, v = acting.stiffness(base[s])
+                np.add.at(out[s], i, factor * np.asarray(v) * d[s][j])
+        return out
+
     def mean_internal_force(self, u0: Array, u1: Array, t: float | None = None) -> Array:
         """The internal force whose work from u0 to u1 is the change of the strain energy.
 
@@ -314,6 +382,16 @@ class System:
         if self.forces.sampled:
             self.forces.sample(self.machine.tables.plain.forces, u, v, t, first)
 
+    def small_part_forces(self, base: Array, d: Array, load: float = 1.0) -> Array:
+        """As :meth:`part_forces` in statics, linearised; shape (2, parts).
+
+        Parameters
+        ----------
+        base, d, load
+            As for :meth:`linear_force`, shape (N,).
+        """
+        return self.forces.small_part_forces(self.machine.tables.plain.forces, load, base, d)
+
     def part_forces(self, u: Array, v: Array) -> Array:
         """What resists on the points of force elements that are no own ones, shape (2, parts).
 
@@ -344,7 +422,7 @@ class System:
         tables = self.machine.tables
         u, v = np.array(u, dtype=float), np.array(u if v is None else v, dtype=float)
         first = what == TANGENT and t is None and not geometric
-        factors = tables.static_factors(load, 0.0 if first else None)
+        factors = tables.linear_factors(load) if first else tables.static_factors(load)
         time = np.inf if first else np.nan if t is None else float(t)
         if what == TANGENT and t is not None and self._varying:
             factors = load * tables.factors(np.array([t]))[0]
@@ -557,14 +635,14 @@ class System:
         Parameters
         ----------
         t, scale, u
-            As there; u of shape (N,). An infinite time is that of the first tangent in statics,
-            when no load has prestressed the body yet.
+            As there; u of shape (N,). An infinite time is that of the first tangent in statics, and
+            of linear theory: the stiffness of the package's own loads is of second order there.
         flat
             The numbers of the matrix, shape (n,).
         """
         for load in self.machine.tables.own_loads:
             s = self.of(load)
-            if np.isinf(t) and load.prestress:
+            if np.isinf(t) and ours(load):
                 continue
             factor, acting = load.acting(t if np.isfinite(t) else None)
             i, j, v = acting.stiffness(u[s])
@@ -734,7 +812,8 @@ class System:
         carried
             Stresses (n,) for the geometric part, as :meth:`stress_step` returns them.
         geometric
-            Include the geometric part.
+            Include the geometric part, and the stiffness of loads that follow the body. Both grow
+            with the load: linear theory has none of them.
         t
             Time, for loads with an amplitude.
 
@@ -974,6 +1053,11 @@ class System:
         if self.bordered:
             x[self.N:] += self._factors.factors.stiffness * phi
         return x[:self.N], x[self.N:]
+
+
+def _times_elements(K, u_e):
+    """Products of element matrices (ne, 2 nb, 2 nb) and vectors (ne, nb, 2)."""
+    return np.einsum("eij,ej->ei", K, u_e.reshape(len(K), -1)).reshape(u_e.shape)
 
 
 def _extent(bodies):

@@ -346,6 +346,19 @@ class Tables:
                 out[k] = before * load.at_rest
         return out
 
+    def linear_factors(self, scale: float) -> Array:
+        """As :meth:`static_factors` for the stiffness of loads in linear theory: of the user's own.
+
+        That the package's loads follow the body is of second order there.
+
+        Parameters
+        ----------
+        scale
+            The load factor.
+        """
+        own = [load is not None and not ours(load) for load in self._columns]
+        return np.where(own, self.static_factors(scale), 0.0)
+
     @cached_property
     def _at_rest(self):
         """Factors of the loads in statics at full load."""

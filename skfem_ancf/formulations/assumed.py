@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..core.linear import stress_of
 from ..core.errors import InputError, require_finite_scalar, require_like, taught
 from ..materials import LinearLaw
 from ..core.quadrature import gauss
@@ -114,10 +115,10 @@ class Assumed(Formulation):
 
     def stress_of(self, beam: Integrated, strain: Callable[..., Array]) -> Array:
         first, *others = beam.terms
-        total = first.law.stress(strain(first))
+        total = stress_of(first.law, strain(first))
         for term in others:  # of the middle of the element, or of the section's mean
             xi, mean = term.axis[0], term.section_samples
-            total = total + term.law.stress(strain(
+            total = total + stress_of(term.law, strain(
                 term, None if len(xi) > 1 else xi[0], None if mean is None else (
                     mean[0], mean[1][0])))
         return total

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from ..core.linear import stress_of
 from ..core.errors import require_like
 from ..core.frozen import Content, Frozen, read_only
 from ..core.kept import cached_property
@@ -216,7 +217,7 @@ class Formulation(Frozen):
         ndarray
             Shape (3, ...).
         """
-        return beam.law.stress(strain(beam.terms[0]))
+        return stress_of(beam.law, strain(beam.terms[0]))
 
     @staticmethod
     def full_rules(element: ElementBeam) -> tuple[Rule, Rule]:

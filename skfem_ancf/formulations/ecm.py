@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..core.linear import stress_of
 from ..core.errors import InputError, require_like
 from ..materials import LinearLaw
 from .base import Formulation, Integrated, Term
@@ -75,7 +76,7 @@ class EnhancedContinuum(Formulation):
 
     def stress_of(self, beam: Integrated, strain: Callable[..., Array]) -> Array:
         first, *coupling = beam.terms
-        out = first.law.stress(strain(first))
+        out = stress_of(first.law, strain(first))
         if coupling:
-            out = out + coupling[0].law.stress(strain(first, None, AXIS))
+            out = out + stress_of(coupling[0].law, strain(first, None, AXIS))
         return out

@@ -18,6 +18,7 @@ from ..core.errors import (CallbackError, InputError, NameUnknown, ask, require_
                            require_flag, require_integer, require_label, require_text, shown,
                            teaching)
 from ..core.kept import cached_property, kept
+from ..core.linear import first_order, step
 from ..beam.kernels.along import stretched
 from ..materials import LinearLaw
 from ..beam.interpolation import Part
@@ -126,7 +127,8 @@ class Values(Mapping):
     part
         The :class:`~skfem_ancf.beam.interpolation.Part` with the points.
     u
-        Displacement of the coordinates that the part is numbered by, shape (N,).
+        Displacement of the coordinates that the part is numbered by, shape (N,); of a linear
+        solution the :func:`~skfem_ancf.core.linear.step` from its base.
     find
         Returns the recovered field of the beam, or None; None for the field of the elements.
     eigen
@@ -149,6 +151,9 @@ class Values(Mapping):
         The beam's frame in the stress-free body, ``frame[:, 0]`` along the axis, (2, 2, n).
     x
         Stress-free positions, (2, n); ``values.u`` are their displacements.
+
+    Of a linear solution strain and S are linear, F is one and the displacement gradient of the
+    elements, and Cauchy stress is S in global axes.
     """
 
     def __init__(self, part: Part, u: Array,
@@ -156,6 +161,8 @@ class Values(Mapping):
                  eigen: Callable[..., Any] | None = None) -> None:
         self._part, self._u, self._find, self._eigen = part, u, find, eigen
         self.beam, self.n = part.beam, len(part.e)
+        #: It is linear about the stress-free state.
+        self._small = np.iscomplexobj(u) and not u.real.any()
         self._known: dict[str, Array] = {}
 
     def __getitem__(self, name: str) -> Array:
@@ -175,7 +182,7 @@ class Values(Mapping):
 
     @cached_property
     def u(self) -> Array:
-        return self._part.displacement(self._u)
+        return first_order(self._part.displacement(self._u))
 
     @cached_property
     def _recovery(self):
@@ -189,12 +196,17 @@ class Values(Mapping):
     def strain(self) -> Array:
         if self._recovery is not None:
             return self._recovery.at(self._part, slice(0, 3))
-        return self._part.strain(self._u)
+        return first_order(self._part.strain(self._u))
 
     @cached_property
     def S(self) -> Array:
         if self._recovery is not None:
             return self._recovery.at(self._part, slice(3, 6))
+        return first_order(self._stress)
+
+    @property
+    def _stress(self):
+        """That of the elements."""
         S = self._part.stress(self._u)
         return S if self._eigen is None else S - self._eigen(self._part, True)
 
@@ -222,16 +234,21 @@ class Values(Mapping):
         if across.plain:
             return ask(self.beam.material)
         found = [partial(ask, slab.material) for slab in across.slabs]
-        return across.of_slabs(self._part.at, np.zeros((self.n, 1)), [
+        return across.of_slabs(self._part.at, np.zeros((self.n, 1), self._u.dtype), [
             partial(_column, one) for one in found], self._part.e, graded)[:, 0]
 
     @cached_property
     def F(self) -> Array:
-        if self._recovery is not None:
+        if self._recovery is not None and not self._small:
             with np.errstate(invalid="ignore"):
                 return self._recovery.gradient(self.strain, self._recovery.at(
                     self._part, slice(6, 7))[0])
-        H, frame = self.beam.gradients(*self._own)
+        return first_order(self._gradient)
+
+    @property
+    def _gradient(self):
+        """That of the elements."""
+        H, frame = self.beam.kinematics.gradients(self.beam, *self._own)
         return (H + frame)[..., 0]
 
     @cached_property
@@ -241,19 +258,24 @@ class Values(Mapping):
     @cached_property
     def _volume(self):
         """Change of volume; NaN where the material has no thickness left."""
-        F = self.F
+        return 1.0 if self._small else first_order(self._volume_of(self.F, self.elastic))
+
+    def _volume_of(self, F, elastic):
         with np.errstate(invalid="ignore"):
             return (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) * self.of_materials(
-                lambda law: law.thickness_stretch(self.elastic))
+                lambda law: law.thickness_stretch(elastic))
 
     @cached_property
     def sigma(self) -> Array:
         """Cauchy stress F S F^T / J (sigma_xx, sigma_yy, sigma_xy), global axes, (3, n)."""
-        F, S = self.F, self.S
+        F, S, volume = (self.frame if self._small else self.F), self.S, self._volume
+        if np.iscomplexobj(self._u) and not self._small:
+            F, S, strain = self._gradient, self._stress, self._part.strain(self._u)
+            volume = self._volume_of(F, strain + (self.elastic - self.strain))
         with np.errstate(invalid="ignore", divide="ignore"):
             A = np.array([[S[0], S[2]], [S[2], S[1]]])
-            sigma = np.einsum("iJn,JKn,jKn->ijn", F, A, F, optimize=True) / self._volume
-        return np.array([sigma[0, 0], sigma[1, 1], sigma[0, 1]])
+            sigma = np.einsum("iJn,JKn,jKn->ijn", F, A, F, optimize=True) / volume
+        return first_order(np.array([sigma[0, 0], sigma[1, 1], sigma[0, 1]]))
 
     @cached_property
     def sigma_zz(self) -> Array:
@@ -264,16 +286,18 @@ class Values(Mapping):
         if not self.beam.has_sections:  # eps_zz = 0 and S_yy = 0
             return self.of_materials(lambda law: law.nu * self.S[0]) / self._volume
         with np.errstate(invalid="ignore", divide="ignore"):
-            return self.of_materials(lambda law: law.stress_zz(self.elastic), True) / self._volume
+            strain = step(0.0, self.elastic) if self._small else self.elastic
+            return first_order(self.of_materials(
+                lambda law: law.stress_zz(strain), True)) / self._volume
 
     @cached_property
     def energy(self) -> Array:
         """Strain energy per stress-free volume, (n,)."""
         def of(material):
             law = material.law()
-            if not self.beam.has_sections:
+            if not self.beam.has_sections and not self._small:
                 return self._energy_of_fibres()
-            if isinstance(law, LinearLaw):
+            if self._small or isinstance(law, LinearLaw):
                 return 0.5 * np.sum(self.elastic * self.S, axis=0)
             return law.energy(self.elastic)
 
@@ -323,6 +347,8 @@ def _tresca(v):
 
 
 def _stretch(v):
+    if v._small:
+        return 1.0 + v.strain[0]
     with np.errstate(invalid="ignore"):
         return np.sqrt(1.0 + 2.0 * v.strain[0])
 
@@ -458,4 +484,5 @@ def values_on_grid(state: Any, beam: Beam, X: Array, recover: bool = True) -> Va
     if recover and hasattr(state, "recovery"):
         def find():
             return state.recovery(beam)
-    return Values(part, state.u_of(beam), find, getattr(state, "eigen", None))
+    return Values(part, getattr(state, "places_of", state.u_of)(beam), find,
+                  getattr(state, "eigen", None))

@@ -33,6 +33,7 @@ from scipy import sparse
 
 from ..formulations.ecm import EnhancedContinuum
 from ..core.kept import cached_property, kept
+from ..core.linear import first_order
 from ..materials import LinearLaw
 from .intervals import Moved, Panels
 from .segments import Piece, largest, refuse
@@ -85,7 +86,7 @@ def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[i
         If there is no such strain.
     """
     k, field = list(unknown), (0, -2, -1)
-    strain = np.array(strain, dtype=float)
+    strain = np.array(strain, dtype=np.result_type(strain, stress, float))
     if isinstance(law, LinearLaw):
         gap = (stress - law.stress(strain))[k[0]:k[-1] + 1]
         strain[k[0]:k[-1] + 1] += law.compliance(tuple(unknown)).dot(
@@ -107,6 +108,11 @@ def strain_of_stress(law: Law, stress: Array, strain: Array, unknown: Sequence[i
             change = np.linalg.solve(D, np.moveaxis(gap, 0, -1)[..., None])[..., 0]
             strain[k] += left[..., None, None] * np.moveaxis(change, -1, 0)
     raise NotRecovered("no strain has the stress of the section under this law", left)
+
+
+def _small(law):
+    """The law of small strains."""
+    return law if isinstance(law, LinearLaw) else LinearLaw(law.moduli(np.zeros(3)))
 
 
 def _axial(law, strain):
@@ -160,8 +166,9 @@ class Recovery:
         self.panels = kept(beam.tables, "across", lambda: Panels(slabs, beam.element.order))
         #: Where the points of :attr:`panels` are, of those that move where the section is highest.
         self.eta = self.panels.eta
-        self.laws = [(columns, slab.material.law(slab.shear))
-                     for slab, columns in zip(slabs, self.panels.slabs)]
+        self.laws = [(columns, _small(law) if forces.small else law)
+                     for slab, columns in zip(slabs, self.panels.slabs)
+                     for law in (slab.material.law(slab.shear),)]
         self.lengths, self._inside = kept(beam.tables, "arc", self._arc_tables)
         self.geometry = kept(beam.tables, "geometry", lambda: _geometry(beam))
         self.has_stress = (len(slabs) == 1 and slabs[0].face is None
@@ -177,7 +184,7 @@ class Recovery:
             raise NotRecovered("the fields do not settle: the last of their rounds changes the "
                                f"strain by {np.max(change):.0%} of its largest value",
                                change > UNSETTLED)
-        self._tables = [p.table(np.concatenate([p.strain, p.stress, p.angle[None]]))
+        self._tables = [p.table(first_order(np.concatenate([p.strain, p.stress, p.angle[None]])))
                         for p in self.pieces]
         self._cuts = forces.cuts.tolist()
 
@@ -290,8 +297,10 @@ class Recovery:
         """Places along an element, (p,), and its own stress there, (3, ..., ne, p, m)."""
         beam, x = self.beam, self.beam.element.sampling.places("xx")
         X = np.array([np.repeat(x, len(self.eta)), np.tile(self.eta, len(x))])
-        stress = beam.stress(self._u, X) if self._u.ndim == 1 else np.stack(
-            [beam.stress(u, X) for u in self._u], axis=1)
+        of = beam.kinematics
+        own = [of.stress(beam, of.strain(beam, u, X, None), u, X, None)
+               for u in np.atleast_2d(self._u)]
+        stress = own[0] if self._u.ndim == 1 else np.stack(own, axis=1)
         for factor, eigen in self.forces.eigen:
             e = np.arange(beam.mesh.nelements)
             stress = stress - (eigen.stress_at(self._u, X, e, factor) if self._u.ndim == 1 else
@@ -400,7 +409,8 @@ def actions(state: Configuration) -> list[list[float]]:
     held = np.zeros(system.N)
     held[system.fixed] = 1.0
     acting = system.forces.acting_rows()
-    J = sparse.vstack([system.sparse_jacobian(state.u, t), acting]).tocsc() if (
+    u = state.u if state.base is None else state.base.u
+    J = sparse.vstack([system.sparse_jacobian(u, t), acting]).tocsc() if (
         system.m or len(acting)) else None
     out: list[list[float]] = []
     for beam, s in zip(system.beams, system.slices):
@@ -438,7 +448,10 @@ def distributed(states: Sequence[Configuration], beam: Beam) -> tuple[list[Sampl
     elements = [e for e in system.forces.elements if e.distributed]
     if not elements:
         return sampled, stations
-    force = -np.array([system.part_forces(state.u, state.v) for state in states])
+    force = -np.array([
+        system.part_forces(state.u, state.v) if state.base is None else state.unit
+        * system.small_part_forces(state.base.u, state.u - state.base.u, state.load)
+        for state in states])
     for element in elements:
         if element.along is None:
             raise NotRecovered(f"how {element!r} acts along the beam is not known to it")
@@ -474,8 +487,8 @@ def recover(states: Sequence[Configuration], number: int) -> list[Recovery | Not
     loads: list[Any] = []
     alike: dict[Any, list[int]] = {}
     for k, state in enumerate(states):
-        u = state.u_of(number)
-        loads.append([(state.load * load.factor(state.t), load.spread(u))
+        u = (state if state.base is None else state.base).u_of(number)
+        loads.append([(state.unit * state.load * load.factor(state.t), load.spread(u))
                       for load in state.system.loads if load.beam is state.beams[number]])
         # what acts at other places cuts the beam into other pieces
         case: list[Any] = [tuple(state.actions[number])]
@@ -494,12 +507,16 @@ def _recover_alike(states, number, loads):
     """As :func:`recover`, of states whose loads act at the same places."""
     first, system = states[0], states[0].system
     beam, s = first.beams[number], system.of(first.beams[number])
+    if first.base is not None and not first.from_rest:
+        return len(states) * [NotRecovered(
+            "it is linearised about a state that is not free of load, a mode of it: its strain "
+            "and stress are those of the elements")]
     try:
         together = [(np.array([of[k][0] for of in loads]), spread)
                     for k, (_, spread) in enumerate(loads[0])]
-        u = np.array([state.u[s] for state in states])
+        u = np.array([state.places[s] for state in states])
         sampled, stations = distributed(states, beam)
-        acceleration = None if first.acceleration is None else np.array(
+        acceleration = None if first.acceleration is None else first.unit * np.array(
             [(state.acceleration + system.damping_acceleration(state.v))[s] for state in states])
         time = system.retardation[number]
         viscous = None if first.t is None or time == 0.0 else np.array(

@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 
 from ..beam.kernels.along import CableSections
+from ..core.linear import angle_of, first_order, unwrapped
 from ..core.quadrature import gauss
 from ..mesh.mapping import cross
 from .section_forces import Sections
@@ -141,7 +142,8 @@ def resultants(state: Configuration, number: int, part: Part | None = None,
               _recovered(recovery, e, xi, after))
     if recovery is not None and not beam.has_sections:
         values.update(_strains_of_cable(state, beam, e, xi, values["N"], values["M"]))
-    return Resultants(lengths, x, **values, recovered=recovery is not None)
+    return Resultants(lengths, x, **{name: first_order(value) for name, value in values.items()},
+                      recovered=recovery is not None)
 
 
 def _everywhere(beam, cuts):
@@ -189,7 +191,7 @@ def _recovered(recovery, e, xi, after):
                      np.searchsorted(cuts, place, side="right")) - 1
     piece = np.clip(piece, 0, len(cuts) - 2)
     R, M = forces.at(e, xi, side)
-    out = np.empty((4, len(e)))
+    out = np.empty((4, len(e)), R.dtype)
     s = recovery.arc(e, xi)
     for k in np.unique(piece):
         on = piece == k
@@ -213,8 +215,9 @@ def _axis(piece):
     across = piece.angle + np.arccos(np.clip(eps[2] / (stretch * lam_y), -1.0, 1.0))
     r_Y = lam_y * _directions(across)[0]
     d = piece.across(piece.from_axis(r_Y) * piece.Y)
-    normal = np.unwrap(np.arctan2(d[1], d[0])) - 0.5 * np.pi
-    shear = (phi - normal + np.pi) % (2.0 * np.pi) - np.pi
+    normal = unwrapped(angle_of(*d)) - 0.5 * np.pi
+    shear = phi - normal
+    shear = shear - 2.0 * np.pi * np.round(shear.real / (2.0 * np.pi))
     # not the derivative of the angle, which is fitted to that of the elements
     start = (piece.g[:, 0] - piece.g[:, -1]) / (piece.Y[..., -1] - piece.Y[..., 0])
     curvature = piece.rate - start - piece.d_ds(shear[:, None])[:, 0]
@@ -226,18 +229,17 @@ def _own(state, beam, e, xi):
     """From the stress of the elements, integrated across the section."""
     if not beam.has_sections:
         return _own_of_cable(state, beam, e, xi)
-    u, mapping = state.u_of(beam), beam.mesh.mapping()
+    u, mapping = state.places_of(beam), beam.mesh.mapping()
     X, area = _across(beam, e, xi)
-    S = beam.stress(u, X, e)
-    for factor, load in state.eigenstrains(beam):
-        S = S - load.stress_at(u, X, e, factor)
-    H, frame = beam.gradients(u, X, e)
+    of = beam.kinematics
+    S = of.stress(beam, of.strain(beam, u, X, e), u, X, e) - state.eigen_stress(beam, X, e)
+    H, frame = of.gradients(beam, u, X, e)
     F = H + frame
     P = F[:, 0] * S[0] + F[:, 1] * S[2]
     axis = np.array([xi, 0.5 + 0.0 * xi])[:, :, None]
 
     def position(points):
-        return mapping.F(points, e) + beam.displacements(u, points, e)
+        return mapping.F(points, e) + of.displacements(beam, u, points, e)
 
     arm = position(X) - position(axis)
     R, M = np.sum(P * area, axis=-1), np.sum(cross(arm, P) * area, axis=-1)
@@ -271,7 +273,7 @@ def _own_of_cable(state, beam, e, xi):
 
 def _forces_of_cable(state, beam, e, xi):
     """Normal force and moment of a cable, and the strains of its axis."""
-    angle, stretch, shear, curvature = _cable_axis(beam, state.u_of(beam), e, xi)
+    angle, stretch, shear, curvature = _cable_axis(beam, state.places_of(beam), e, xi)
     EA, ES, EI = beam.across.moments(xi[:, None], e)[..., 0]
     N0, M0 = _stress_free_of_cable(state, beam, e, xi)
     N = EA * (stretch - 1.0) - ES * curvature - N0
@@ -289,9 +291,10 @@ def _strains_of_cable(state, beam, e, xi, N, M):
 
 def _stress_free_of_cable(state, beam, e, xi):
     """Normal force and moment that the stress-free strains of a cable would take."""
-    (X, area), out = _across(beam, e, xi), np.zeros((2, len(e)))
+    (X, area), unit = _across(beam, e, xi), state.unit
+    out = np.zeros((2, len(e)), type(unit))
     for factor, load in state.eigenstrains(beam):
-        S0 = load.nominal_at(X, e, factor)[0] * area
+        S0 = load.nominal_at(X, e, unit * factor)[0] * area
         out += np.sum(S0, axis=-1), -np.sum(S0 * beam.mesh.mapping().offset(X, e), axis=-1)
     return out
 
@@ -300,7 +303,7 @@ def _cable_axis(beam, u, e, xi):
     at = CableSections(beam, xi[:, None], e)
     tangent, (eps, kappa) = at(beam.kernel.gather(u, e))
     t = tangent[..., 0]
-    return np.arctan2(t[1], t[0]), 1.0 + eps[:, 0], 0.0 * xi, kappa[:, 0]
+    return angle_of(*t), 1.0 + eps[:, 0], 0.0 * xi, kappa[:, 0]
 
 
 class _Body:
@@ -321,7 +324,7 @@ def _axis_of_element(beam, u, e, xi):
         d, rate = (sections.field(q, slope) @ lever for slope in (False, True))
         r = axis.field(q, slope=True)[..., 0]
         turn = cross(d, rate) / np.sum(d * d, axis=0)
-        out.append((np.unwrap(np.arctan2(r[1], r[0])), np.hypot(*r),
-                    np.arctan2(cross(d, r), np.sum(d * r, axis=0)) + 0.5 * np.pi, turn))
+        out.append((unwrapped(angle_of(*r)), np.sqrt(np.sum(r * r, axis=0)),
+                    angle_of(np.sum(d * r, axis=0), cross(d, r)) + 0.5 * np.pi, turn))
     (_, speed, shear0, turn0), (angle, size, shear, turn) = out
     return angle, size / speed, shear - shear0, (turn - turn0) / speed

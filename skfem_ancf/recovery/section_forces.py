@@ -156,7 +156,7 @@ class Sections:
             turned = self._arm * np.array([values[1], -values[0]])
             parts = parts + np.einsum("bnk,i...nk->n...bi", self._functions[1], turned,
                                       optimize=True)
-        out = np.zeros((self.forces.beam.mesh.nelements,) + parts.shape[1:])
+        out = np.zeros((self.forces.beam.mesh.nelements,) + parts.shape[1:], parts.dtype)
         np.add.at(out, self.e, parts)
         return np.moveaxis(out, 0, -3)
 
@@ -195,7 +195,7 @@ class Sections:
         Shape (2, ..., n, k).
         """
         f = self.forces
-        out = np.zeros((2,) + f.states + self.shape)
+        out = np.zeros((2,) + f.states + self.shape, f.q.dtype)
         if any(s.where == side for s in f.sampled):
             out += self.sampled(side) / f.beam.across.face(side, self.X, self.e)
         for factor, load in f.faces:
@@ -231,7 +231,9 @@ class SectionForces:
         A :class:`~skfem_ancf.Beam`.
     u
         Displacement of its coordinates, shape (N,), or (states, N): then arrays have the axis of
-        the states before those of places.
+        the states before those of places. Of linear solutions a
+        :func:`~skfem_ancf.core.linear.step` from the stress-free state, as are the factors of
+        loads; then all that is found is one.
     loads
         Pairs of a factor and a :class:`~skfem_ancf.beam.distribution.Spread`, or None for a load
         whose spread is not known. The factor of several states has shape (states,).
@@ -263,7 +265,7 @@ class SectionForces:
         if any(load is None for _, load in loads):
             raise NotRecovered("a load is given by its force on the coordinates only: where it "
                                "acts across the section is not known")
-        self.states = u.shape[:-1]
+        self.states, self.small = u.shape[:-1], np.iscomplexobj(u)
         self.lifted = not (beam.has_sections or beam.across.simple)
         gather = beam.kernel.gather
         self.q = _each(gather, beam.q0_local + u)
@@ -315,15 +317,18 @@ class SectionForces:
             x.reshape(x.shape[:-1] + (ne, ALONG)) for x in (axis[..., 0], force, moment))
         w = np.tile(w, ne)
         load: Any = sum(at.spread(f * w[:, None]) for at, f in parts)
-        internal = _each(beam.kernel.forces, u)
+        internal = _each(beam.kernel.small_forces if self.small else beam.kernel.forces, u)
         if self.viscous is not None:
             internal = internal + self.viscous
         q = np.split(self.q, 2, axis=-2)
         #: Size of force times height and moment that stress-free strains have alone.
         self._pushed = np.zeros(self.states)
         for factor, eigen in self.eigen:
-            pushed = eigen.element_forces(u, factor) if u.ndim == 1 else np.array(
-                [eigen.element_forces(x, f) for x, f in zip(u, factor)])
+            if self.small:
+                pushed = np.multiply.outer(factor, eigen.small_forces())
+            else:
+                pushed = eigen.element_forces(u, factor) if u.ndim == 1 else np.array(
+                    [eigen.element_forces(x, f) for x, f in zip(u, factor)])
             internal = internal - pushed
             self._pushed = self._pushed + self._size(*_at_ends(q, pushed))
         # of the part of the beam on the right of a section on that on its left
@@ -338,7 +343,8 @@ class SectionForces:
     def _round_off(self):
         """What :meth:`_size` is of a beam without load: that of the strains times the stiffness."""
         beam = self.beam
-        strain = UNLOADED * np.max(np.abs(self.q[..., 0, :]), axis=(-2, -1)) / np.min(
+        places = self.q.imag if self.small else self.q
+        strain = UNLOADED * np.max(np.abs(places[..., 0, :]), axis=(-2, -1)) / np.min(
             beam.mesh.lengths)
         return strain * (beam.kernel.scale / beam.mesh.lengths.sum() * beam.mesh.height)
 
@@ -451,7 +457,8 @@ class SectionForces:
         """The section force is continuous, and zero at ends, where nothing acts at a node."""
         mesh = self.beam.mesh
         n = mesh.p.shape[1]
-        R, M = np.zeros(self.states + (n, 2)), np.zeros(self.states + (n,))
+        R = np.zeros(self.states + (n, 2), self.R.dtype)
+        M = np.zeros(self.states + (n,), self.M.dtype)
         R[..., mesh.t[1], :], M[..., mesh.t[1]] = self.R[1], self.M[1]
         R[..., mesh.t[0], :] -= self.R[0]
         M[..., mesh.t[0]] -= self.M[0]

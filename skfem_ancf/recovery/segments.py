@@ -10,6 +10,7 @@ import scipy
 from scipy.linalg import solve_banded
 
 from ..core.kept import cached_property, kept
+from ..core.linear import angle_of, unwrapped
 from ..mesh.mapping import cross
 from .section_forces import NotRecovered, Sections
 from ..sections.jumps import beside
@@ -153,7 +154,7 @@ class Piece:
         self.faces = [self._face(k) / speed for k in (0, 1)]
         self.bubble = self._jourawski()
         r = axis.field(self.forces.q, slope=True)
-        self.raw_angle = np.unwrap(np.arctan2(r[1, ..., 0], r[0, ..., 0]))
+        self.raw_angle = unwrapped(angle_of(r[0, ..., 0], r[1, ..., 0]))
         self.phi = self.raw_angle
         self._solve()
 
@@ -423,8 +424,9 @@ class Piece:
 
     def _solve(self):
         shape = self.forces.states + self.g.shape
-        self.alpha, self.eps, self.rate = np.zeros(shape), np.zeros((3,) + shape), self.phi
-        self.S, self.stretch = np.zeros((3,) + shape), np.ones(shape)
+        self.alpha, self.rate = np.zeros(shape, self.R.dtype), self.phi
+        self.eps, self.S = np.zeros((2, 3) + shape, self.R.dtype)
+        self.stretch = np.ones(shape, self.R.dtype)
         self.stress_given = False
         self._rounds()
         self._balance()

@@ -30,6 +30,8 @@ COMPRESSED = 1.0 / sqrt(3.0)
 #: 1.6 rad, of degree 7 by 2.4e-8 at 2, of degree 9 by 5e-11 at 2.5.
 TURNING = {3: 1.0, 5: 1.6, 7: 2.0}
 TURNING_SMOOTH = 2.5
+#: Angle, in radians, by which the axis may turn in linear theory: 1 % are left out then.
+SMALL = 0.1
 TINY = 1e-300
 
 
@@ -49,6 +51,8 @@ class Checks:
         state.
     findings : tuple of str
         What is beyond the range of the law or of the mesh; empty where nothing is.
+
+    Of a linear solution they are linear, and a finding says where it is beyond small displacements.
     """
 
     smallest_det: float
@@ -67,10 +71,12 @@ def check(state: State) -> Checks:
     """The :class:`Checks` of a state."""
     values, found = [], []
     for beam in state.beams:
-        u = state.u_of(beam)
-        ratio, stretches = beam.kinematics.deformation(beam, u)
-        values.append((np.min(ratio), np.min(stretches), np.max(stretches), turning(beam, u)))
-        found += _findings(beam, values[-1][1], values[-1][3])
+        u, base = state.u_of(beam), None if state.base is None else state.base.u_of(beam)
+        ratio, stretches = beam.kinematics.deformation(beam, state.places_of(beam))
+        values.append((np.min(ratio), np.min(stretches), np.max(stretches),
+                       turning(beam, u, base)))
+        found += (_findings(beam, values[-1][1], values[-1][3]) if base is None else
+                  _linear_findings(beam, u, base))
     det, low, high, turn = zip(*values or [(1.0, 1.0, 1.0, 0.0)])
     return Checks(float(min(det)), float(min(low)), float(max(high)), float(max(turn)),
                   tuple(found))
@@ -219,11 +225,19 @@ def _findings(beam, stretch, turn):
     return out
 
 
+def _linear_findings(beam, u, base):
+    turn = np.max(np.abs(_turns(beam, u, base) - _turns(beam, base)))
+    who = "" if beam.name is None else f" of beam {beam.name!r}"
+    return [] if turn <= SMALL else [
+        f"the axis{who} turns by {turn:.3g} rad, and what is linear leaves out what is of the "
+        f"order of the square of that; beyond {SMALL:g} rad use solve_static()"]
+
+
 def _is_linear(beam):
     return all(isinstance(t.law, LinearLaw) for t in beam.kernel.tables)
 
 
-def turning(beam: Beam, u: Array) -> float:
+def turning(beam: Beam, u: Array, base: Array | None = None) -> float:
     """Largest angle by which the axis turns over an element, by its tangents at the nodes.
 
     Parameters
@@ -232,10 +246,22 @@ def turning(beam: Beam, u: Array) -> float:
         A :class:`~skfem_ancf.Beam`.
     u
         Displacement of its coordinates, shape (N,).
+    base
+        That about which it is linearised, shape (N,), or None.
     """
-    turn = tangents(beam, u) / tangents(beam, 0.0)
     left, right = beam.mesh.t
+    if base is not None:
+        turns = _turns(beam, u, base)
+        return float(np.max(np.abs(turns[right] - turns[left])))
+    turn = tangents(beam, u) / tangents(beam, 0.0)
     return float(np.max(np.abs(np.angle(turn[right] * turn[left].conj()))))
+
+
+def _turns(beam, u, base=None):
+    """Angles by which the tangents of the nodes have turned; linear about a base."""
+    start = tangents(beam, u if base is None else base)
+    turns = np.angle(start / tangents(beam, 0.0))
+    return turns if base is None else turns + (tangents(beam, u) / start).imag
 
 
 def tangents(beam: Beam, u: Array | float) -> Array:

@@ -14,6 +14,7 @@ from ..actions.eigenstrain import EigenStrain
 from ..recovery.fields import Values, find_field
 from ..core.frozen import Frozen
 from ..core.kept import cached_property
+from ..core.linear import first_order, step
 from ..beam.interpolation import Part
 from ..recovery.points import require_body
 from ..recovery.recovered import actions, recover
@@ -89,6 +90,8 @@ class State(Frozen):
         What is known of its stability, or None: it is found when asked for.
     memory
         What load steps have left behind at obstacles, shape (n,), or None.
+    base
+        As in the attributes.
 
     Attributes
     ----------
@@ -101,9 +104,14 @@ class State(Frozen):
     t
         Time, in a motion; else None.
     acceleration
-        Of the coordinates, shape (N,), in a motion; else None.
+        Of the coordinates, shape (N,), in a motion and of a mode; else None.
     doubt : str
         Where and how the way to it left the path from the stress-free state; empty if it did not.
+    base : State or None
+        The state about which this one is linearised: of a linear solution that without load, of a
+        mode that which vibrates. All that is asked is of first order in the difference: strain,
+        stress, section forces, rotations, reactions; the strain energy of second order. None of a
+        state of large displacements.
     """
 
     system: System
@@ -119,6 +127,7 @@ class State(Frozen):
     doubt: str
     _force: Array | None
     _inertia: Array | float
+    base: State | None
     _motion: Any
     _origin: Any
     _verdict: Verdict | None
@@ -131,7 +140,7 @@ class State(Frozen):
                  t: float | None = None, inertia: Array | float = 0.0,
                  acceleration: Array | None = None, motion: Any = None, origin: Any = None,
                  verdict: Verdict | None = None, doubt: str = "",
-                 memory: Array | None = None) -> None:
+                 memory: Array | None = None, base: State | None = None) -> None:
         multipliers = np.zeros(system.m) if multipliers is None else multipliers
         for name, value, size in (("u", u, system.N), ("multipliers", multipliers, system.m)):
             if np.shape(value) != (size,):
@@ -142,8 +151,8 @@ class State(Frozen):
         vars(self).update(
             system=system, u=u, load=load, converged=converged, iterations=iterations,
             message=message, steps=tuple(steps), t=t, acceleration=acceleration,
-            multipliers=multipliers, doubt=doubt, _force=force, _inertia=inertia, _motion=motion,
-            _origin=origin, _verdict=verdict, _checks=None, _memory=memory)
+            multipliers=multipliers, doubt=doubt, base=base, _force=force, _inertia=inertia,
+            _motion=motion, _origin=origin, _verdict=verdict, _checks=None, _memory=memory)
 
     def replace(self, **changes: Any) -> State:
         """The same state with other attributes, as ``replace(message="guess")``.
@@ -163,7 +172,7 @@ class State(Frozen):
                 raise NameUnknown("attribute of State", name, known)
         other = object.__new__(type(self))
         vars(other).update(vars(self), **changes)
-        for name in ("_recoveries", "actions", "together"):
+        for name in ("_recoveries", "actions", "together", "places"):
             vars(other).pop(name, None)
         if {"u", "multipliers", "system", "load", "t"} & set(changes):
             vars(other).update(_verdict=None, _checks=None, _force=None)
@@ -178,7 +187,10 @@ class State(Frozen):
 
     def __str__(self):
         lines = [repr(self)[1:-1]]
-        if self.t is None:
+        if self.base is not None:
+            about = "a state under load" if self.base.u.any() else "the stress-free state"
+            lines.append(f"  linear, for small displacements from {about}: no verdict on stability")
+        elif self.t is None:
             lines.append(f"  equilibrium: {self.verdict}")
         if self.beams:
             lines += [f"  {line}" for line in str(self.checks).splitlines()]
@@ -191,11 +203,12 @@ class State(Frozen):
     @property
     def verdict(self) -> Verdict | None:
         """What the tangent says of an equilibrium: a
-        :class:`~skfem_ancf.solvers.stability.Verdict`; None for an instant of a motion.
+        :class:`~skfem_ancf.solvers.stability.Verdict`; None for an instant of a motion, and for a
+        linear solution: ``scene.buckling()`` tells up to which load that is stable.
         """
         from ..solvers.stability import verdict
 
-        if self._verdict is None and self.t is None:
+        if self._verdict is None and self.t is None and self.base is None:
             with self.contact_memory():
                 self._verdict = verdict(self.system, np.array(self.u), self.load, self.multipliers)
         return self._verdict
@@ -203,14 +216,14 @@ class State(Frozen):
     @property
     def stability(self) -> str | None:
         """"stable", "unstable" or "singular" (to round-off); "undecided" is possible with loads
-        that have no potential, see ``state.verdict.note``. None for an instant of a motion.
+        that have no potential, see ``state.verdict.note``. None where :attr:`verdict` is.
         """
         return None if self.verdict is None else self.verdict.stability
 
     @property
     def negative_pivots(self) -> int | None:
         """Number of directions that give way: negative eigenvalues of the tangent at the free
-        coordinates, on the tangent space of the joints. None for an instant of a motion.
+        coordinates, on the tangent space of the joints. None where :attr:`verdict` is.
         """
         return None if self.verdict is None else self.verdict.negative_pivots
 
@@ -235,6 +248,22 @@ class State(Frozen):
         """Absolute coordinates, beam after beam, shape (N,)."""
         return np.concatenate([b.q0 for b in self.system.members]) + self.u
 
+    @cached_property
+    def places(self) -> Array:
+        """Displacement of the coordinates as fields are asked at it, shape (N,): of a linear
+        solution the :func:`~skfem_ancf.core.linear.step` from its base.
+        """
+        return self.u if self.base is None else step(self.base.u, self.u)
+
+    def places_of(self, beam: WhichMember) -> Array:
+        """Those of :attr:`places` of one beam or rigid body."""
+        return self.places[self.system.of(select_member(self.beams, self.system.bodies, beam))]
+
+    @property
+    def from_rest(self) -> bool:
+        """True if it is linearised about the stress-free state without load."""
+        return self.base is not None and self.base.load == 0.0 and not self.base.u.any()
+
     @property
     def v(self) -> Array:
         """Velocity of the coordinates, shape (N,); zero where there is no motion."""
@@ -258,7 +287,7 @@ class State(Frozen):
             The RigidBody, its name or its number.
         """
         found = require_body(self.system, body)
-        return float(found.angle_at(self.u[self.system.of(found)]))
+        return float(first_order(found.angle_at(self.places[self.system.of(found)])))
 
     def angular_velocity(self, body: WhichMember) -> float:
         """The angular velocity of a rigid body, counterclockwise; zero where there is no motion.
@@ -299,7 +328,7 @@ class State(Frozen):
         MeshError
             If a point is outside the body.
         """
-        return self.system.points.find(point, beam, line).displacement(self.u)
+        return first_order(self.system.points.find(point, beam, line).displacement(self.places))
 
     def position(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
         """Position of material points, (2,) or (2, n); parameters are those of
@@ -315,7 +344,7 @@ class State(Frozen):
             As for :meth:`displacement`.
         """
         at = self.system.points.find(point, beam, line)
-        return at.start + at.displacement(self.u)
+        return at.start + first_order(at.displacement(self.places))
 
     def velocity(self, point: Any, beam: WhichMember = None, line: int | None = None) -> Array:
         """Velocity of material points, (2,) or (2, n); zero where there is no motion.
@@ -336,6 +365,8 @@ class State(Frozen):
     def strain(self, point: Any, beam: WhichBeam = None, recover: bool = True,
                line: int | None = None) -> Array:
         """Green-Lagrange strain (eps_xx, eps_yy, eps_xy) in the beam's frame, (3,) or (3, n).
+
+        Of a linear solution the linear strain.
 
         Parameters
         ----------
@@ -405,7 +436,7 @@ class State(Frozen):
         at = self.system.points.find(point, beam, line, ask=True)
         recover = require_flag("recover", recover)
         field = find_field(field)
-        return at.gather([field.of(Values(part, self.u, partial(
+        return at.gather([field.of(Values(part, self.places, partial(
             self._recovery_of, part.number) if recover else None, self.eigen))
             for part in at.parts])
 
@@ -427,10 +458,33 @@ class State(Frozen):
         if not isinstance(part, Part):
             raise InputError("part must be points of a beam, a "
                              f"skfem_ancf.beam.interpolation.Part, got {shown(part)}")
-        u, stress = self.u_of(part.beam), require_flag("stress", stress)
-        return sum((load.stress_at(u, part.at, part.e, factor) if stress else
-                    factor * load.strain_at(part.at, part.e))[..., 0]
+        if require_flag("stress", stress):
+            return first_order(self.eigen_stress(part.beam, part.at, part.e)[..., 0])
+        return sum(factor * load.strain_at(part.at, part.e)[..., 0]
                    for factor, load in self.eigenstrains(part.beam))
+
+    def eigen_stress(self, beam: Beam, X: Array, e: Array) -> Array:
+        """What the stress of the elements is less by for stress-free strains, (3, n, m).
+
+        Of a linear solution a :func:`~skfem_ancf.core.linear.step`.
+
+        Parameters
+        ----------
+        beam
+            One of the beams.
+        X, e
+            Reference points (2, n, m) and their elements (n,).
+        """
+        u, unit = self.places_of(beam), self.unit
+        return np.zeros((3, *X.shape[1:])) + sum(
+            load.stress_at(u, X, e, unit * factor) for factor, load in self.eigenstrains(beam))
+
+    @property
+    def unit(self) -> Any:
+        """What factors of loads are times: of a linear solution from rest a
+        :func:`~skfem_ancf.core.linear.step`, else 1.
+        """
+        return step(0.0, 1.0) if self.from_rest else 1.0
 
     def eigenstrains(self, beam: WhichBeam = None) -> list[tuple[float, EigenStrain]]:
         """Factors and loads of stress-free strains on a beam."""
@@ -440,11 +494,12 @@ class State(Frozen):
 
     def _strain(self, part, recover):
         r = self._recovery_of(part.number) if recover else None
-        return part.strain(self.u) if r is None else r.at(part, STRAIN)
+        return first_order(part.strain(self.places)) if r is None else r.at(part, STRAIN)
 
     def _stress(self, part, recover):
         r = self._recovery_of(part.number) if recover else None
-        return part.stress(self.u) - self.eigen(part, True) if r is None else r.at(part, STRESS)
+        return (first_order(part.stress(self.places)) - self.eigen(part, True) if r is None else
+                r.at(part, STRESS))
 
     # recovered fields
 
@@ -600,6 +655,8 @@ class State(Frozen):
         and their potential is what W(E - E0), the field "energy", has less.
         """
         with self.contact_memory():
+            if self.base is not None:
+                return self.system.linear_energy(self.base.u, self.u - self.base.u, self.load)
             return self.system.strain_energy(self.u, self.load if self.t is None else self.t)
 
     @property
@@ -607,7 +664,9 @@ class State(Frozen):
         """Internal force on all coordinates, shape (N,)."""
         if self._force is None:
             with self.contact_memory():
-                self._force = self.system.internal_force(self.u, self.t, self.load)
+                self._force = (
+                    self.system.internal_force(self.u, self.t, self.load) if self.base is None else
+                    self.system.linear_force(self.base.u, self.u - self.base.u, self.load))
         return self._force
 
     def reactions(self, boundary: Place | None, beam: WhichMember = None) -> Reaction:
@@ -636,7 +695,7 @@ class State(Frozen):
         frame = self.system.constraints.frame
         if frame is not None and beam is None:
             multipliers = self.multipliers[:len(frame.equations)]
-            return Reaction(*frame.reaction(boundary, self.u, multipliers))
+            return Reaction(*frame.reaction(boundary, self._acted, multipliers))
         member: Any = select_member(self.beams, self.system.bodies, beam)
         s = self.system.of(member)
         nodes, there = member.nodes(boundary), np.zeros(self.system.N, dtype=bool)
@@ -644,7 +703,7 @@ class State(Frozen):
         force, touched = self.system.constraints.force_on(there, self.multipliers)
         total = np.where(self.system.free, 0.0, self._support_force()) + force
         forces = total[s].reshape(-1, member.nd // 2, 2)[nodes]
-        q = (member.q0_local + self.u[s]).reshape(-1, member.nd // 2, 2)[nodes]
+        q = (member.q0_local + self._acted[s]).reshape(-1, member.nd // 2, 2)[nodes]
         arm = q.copy()
         arm[:, 0] -= q[0, 0]
         moment = np.sum(arm[..., 0] * forces[..., 1] - arm[..., 1] * forces[..., 0])
@@ -659,12 +718,19 @@ class State(Frozen):
 
     def _support_force(self):
         """What supports do to the coordinates, (N,): all other forces and inertia, negated."""
-        total = (self.internal_force - self.load * self.system.external_force(self.u, self.t)
-                 + self._inertia)
+        system = self.system
+        loads = system.external_force(self.u, self.t) if self.base is None else (
+            system.linear_external_force(self.base.u, self.u - self.base.u))
+        total = self.internal_force - self.load * loads + self._inertia
         t = self.load if self.t is None else self.t
-        if self.system.joints:
-            total = total + self.multipliers @ self.system.full_jacobian(self.u, t)
+        if system.joints:
+            total = total + self.multipliers @ system.full_jacobian(self._acted, t)
         return total
+
+    @property
+    def _acted(self):
+        """Where forces act, as a displacement (N,): in linear theory where the base is."""
+        return self.u if self.base is None else self.base.u
 
     def joint_force(self, joint: Joint) -> Array:
         """What a joint does to its first beam, in the order of ``joint.equations``; (m,)."""

@@ -572,6 +572,8 @@ class Frame(Scene):
     def rotations(self, state: State) -> Array:
         """Rotations of the nodes, from -pi to pi, shape (n,); NaN where all lines are hinged.
 
+        Of a linear solution those of small displacements.
+
         Parameters
         ----------
         state
@@ -580,7 +582,11 @@ class Frame(Scene):
         joint, u = self._bound, displacement(self.system, state, "state")
         out = np.full(self.points.shape[1], np.nan)
         rigid = joint.leaders[~joint.hinged[joint.leaders]]
-        out[joint.nodes[rigid]] = np.angle(joint.turns(u)[rigid])
+        if state.base is None:
+            out[joint.nodes[rigid]] = np.angle(joint.turns(u)[rigid])
+        else:
+            turns, start = joint.turns(u)[rigid], joint.turns(state.base.u)[rigid]
+            out[joint.nodes[rigid]] = np.angle(start) + (turns / start).imag
         return out[self.net.same]
 
     def with_beams(self, beams: Sequence[Beam]) -> Frame:

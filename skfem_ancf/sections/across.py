@@ -213,7 +213,7 @@ class Across(Frozen):
             graded = graded and self.slabs[0].grade is not None
             return values[0]() * self.grade(self.slabs[0], X, tind) if graded else values[0]()
         which = np.broadcast_to(self.which(X, tind), like.shape[-2:])
-        out = np.empty(like.shape)
+        out = np.empty(like.shape, like.dtype)
         for k, (slab, value) in enumerate(zip(self.slabs, values)):
             on = which == k
             if np.any(on):

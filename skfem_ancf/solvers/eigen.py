@@ -111,6 +111,10 @@ class Modes:
     def mode(self, i: int, amplitude: float) -> State:
         """The state displaced along a shape, to plot or save; along the real part of a complex one.
 
+        It is linearised about :attr:`state`: strain, stress and section forces differ from those
+        there in proportion to the amplitude, and with the inertia of the vibration they are in
+        equilibrium. About the stress-free state its strain energy is ``(omega amplitude)^2 / 2``.
+
         Parameters
         ----------
         i
@@ -120,8 +124,11 @@ class Modes:
         """
         i = require_index("i", i, len(self.shapes))
         amplitude = require_finite_scalar("amplitude", amplitude)
-        return State(self.state.system, self.state.u + amplitude * self.shapes[i].real,
-                     load=self.state.load, message=f"mode {i}")
+        system, d = self.state.system, amplitude * self.shapes[i].real
+        acceleration = -self.eigenvalues[i].real * d
+        return State(system, self.state.u + d, acceleration=acceleration,
+                     inertia=system.mass.multiply(acceleration), load=self.state.load,
+                     message=f"mode {i}", multipliers=self.state.multipliers, base=self.state)
 
 
 @dataclass(repr=False)

@@ -9,6 +9,7 @@ import numpy as np
 from ..core.errors import InputError, require_finite_scalar, require_flag, require_positive, shown
 from ..recovery.fields import DRAWN, Field, find_field, values_on_grid
 from ..io.vtu import in_space, layout, subdivision
+from ..core.linear import first_order
 from ..core.kept import cached_property
 from ..actions.obstacles.pictures import around, obstacles_of, outlines
 
@@ -38,7 +39,9 @@ class _Body:
         ends = np.array([np.linspace(0, 1, m + 1), np.full(m + 1, 0.5)])
         flat = self.shape[:2] + (-1,)
         x, axis = values.x.reshape(flat), beam.mesh.mapping().F(ends)
-        u, axis_u = values.u.reshape(flat), beam.displacements(state.u_of(beam), ends)
+        u = values.u.reshape(flat)
+        axis_u = first_order(beam.kinematics.displacements(
+            beam, state.places_of(beam), ends, None))
         self.reference, self.deformed = (x, axis), (x + u, axis + axis_u)
         self.values = field.of(values)
         if field.components > 1:

@@ -274,6 +274,24 @@ class Forces:
         n = len(self.parts)
         return (out + resisting)[:2 * n].reshape(2, n)
 
+    def small_part_forces(self, tables: ForceTables, t: float, base: Array, d: Array) -> Array:
+        """As :meth:`part_forces` of elements on single points at rest, linearised.
+
+        Parameters
+        ----------
+        tables
+            Those of :meth:`tables`.
+        t
+            Time.
+        base, d
+            A displacement of the coordinates, and what is added to it, shape (N,).
+        """
+        n, w = len(self.parts), np.empty(self.rows)
+        vectors_of(tables, d, 0.0, w)
+        D = self.stiffness(tables, t, base, 0.0 * base, 0.0)[:16 * n].reshape(4, 4, n)
+        return self.part_forces(tables, base, 0.0 * base) + np.einsum(
+            "ijk,jk->ik", D[:2, :2], w[:2 * n].reshape(2, n))
+
     def turns(self, u: Array) -> Array:
         """The angles of springs of sections, in (-pi, pi] about those without moment.
 

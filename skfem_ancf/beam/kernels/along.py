@@ -83,8 +83,10 @@ class CableSections:
             Displacements of the coordinates of the elements, shape (ne, nb, 2).
         """
         d, (n, ne) = (self._slopes @ from_first_node(u_e)).transpose(1, 2, 0), self._shape
-        r, strain = np.empty(d.shape), np.empty((2, n, ne))
-        length, kappa = np.empty((2, n, ne))
+        r, strain = np.empty_like(d), np.empty((2, n, ne), d.dtype)
+        length, kappa = np.empty((2, n, ne), d.dtype)
         cable_strain(self._pack, 0, d, r, length, kappa, strain)
+        if np.iscomplexobj(strain) and not u_e.real.any():
+            strain.real = 0.0  # not round-off, where the axis is curved
         tangent = (r[:n] / length[:, None]).transpose(1, 2, 0)
         return tangent, strain.swapaxes(1, 2)

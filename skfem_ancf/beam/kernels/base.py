@@ -17,6 +17,7 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.frozen import Content
+from ...core.linear import first_order, step
 from ...core.source import F1, F2, F3, I1, I2, column, lanes, primitive, room, shaped, source
 from ...core.types import Array
 
@@ -854,6 +855,34 @@ class Chain:
         for pack in self.apart():
             self.texts.force(pack, u_e.ravel(), out)
         return out.reshape(u_e.shape)
+
+    def small_forces(self, u: Array) -> Array:
+        """Element forces (ne, nb, 2) of a small displacement (N,): linear in it.
+
+        Of a :func:`~skfem_ancf.core.linear.step` from the stress-free state they are one, too.
+
+        Parameters
+        ----------
+        u
+            Displacement, shape (N,).
+        """
+        z = self.gather(self.checked(u if np.iscomplexobj(u) else step(0.0, u)))
+        out = np.zeros(z.size, dtype=complex)
+        for pack in self.small_packs():
+            self.texts.force(apart(pack, slice(None)), z.ravel(), out)
+        out = 1j * out.imag.reshape(z.shape)  # without round-off of curved elements at rest
+        return out if np.iscomplexobj(u) else first_order(out)
+
+    def small_energy(self, u: Array) -> float:
+        """The quadratic part of the strain energy of a displacement (N,): that of small ones."""
+        u_e = self.gather(u)
+        u_e[:, self.nd // 2] -= u_e[:, 0]  # seen from the first node: less round-off
+        u_e[:, 0] = 0.0
+        return 0.5 * float(np.sum(u_e * self.small_forces(u)))
+
+    def small_packs(self) -> list[Any]:
+        """The :attr:`packs` with constant moduli, those of no strain."""
+        return self.packs
 
     def tangents(self, u: Array, geometric: bool = True) -> Array:
         """Element tangents (ne, 2 nb, 2 nb) of a coordinate displacement (N,).

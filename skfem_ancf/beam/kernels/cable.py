@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...core.frozen import read_only
+from ...core.linear import first_order
 from ...core.quadrature import gauss
 from ...core.source import F2, F3, I1, lanes, primitive, room, shaped, source
 from ...core.types import Array
@@ -502,7 +503,7 @@ class CableKernel(Chain):
         u
             Displacement of the coordinates, shape (N,).
         """
-        pack, (eps, kappa) = self.packs[0], self.strain(self.gather(u))
+        pack, (eps, kappa) = self.packs[0], first_order(self.strain(self.gather(u)))
         Y = 0.5 * np.transpose(self._across.mesh.mapping().height(self.points)[0])
         kappa0 = pack.kappa0[:, pack.frame_place]
         return np.array([1.0 + (eps - y * kappa) / (1.0 - y * kappa0) for y in (-Y, Y)])
@@ -572,7 +573,7 @@ class CableKernel(Chain):
             A slice of the elements.
         """
         pack, = self.apart(elements)
-        out = np.empty((2, self.points_number, len(u_e)))
+        out = np.empty((2, self.points_number, len(u_e)), u_e.dtype)
         CABLES.stress(_unit(pack), u_e.ravel(), out)
         return out
 

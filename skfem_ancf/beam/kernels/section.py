@@ -919,6 +919,9 @@ class Kernel(Chain):
             self._across, t.slab, replace(t.term, law=LinearLaw(time * t.law.moduli(np.zeros(3)))),
             none, self).pack for t in self.tables]
 
+    def small_packs(self) -> list[SectionPack]:
+        return [linearised(pack) for pack in self.packs]
+
     def pushed_packs(self) -> list[SectionPack]:
         return [pack._replace(
             grows=1, constant=pack.constant[:0],
