@@ -681,6 +681,13 @@ for _name in ("strain", "stress"):
     call(f"state.{_name}, recover",
          lambda _name=_name, **k: getattr(state(), _name)((1.0, 0.0), **k),
          dict(recover=False), recover="flag")
+for _name in ("displacement", "position", "velocity", "strain", "stress", "resultants"):
+    _at = "at" if _name == "resultants" else "point"
+    call(f"state.{_name}, line", lambda _name=_name, **k: getattr(
+        frame().clamp(0).state(), _name)(**k), {_at: (0.0, 0.5), "line": 0},
+         **{_at: f"vector{'?' * (_at == 'at')}"}, line="nodes?")
+call("frame.sensor, line", lambda **k: frame().clamp(0).sensor("s", "N", **k),
+     dict(at=(0.0, 0.5), line=0), at="vector", line="nodes?")
 call("state.recovery", lambda **k: state().recovery(**k), dict(beam=0), beam="beam?")
 for _name in ("balance", "eigenstrains"):
     call(f"state.{_name}", lambda _name=_name, **k: getattr(state(), _name)(**k), dict(beam=0),

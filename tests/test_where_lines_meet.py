@@ -103,6 +103,14 @@ def test_the_node_is_read_from_each_line(case):
                     history.state(-1).resultants((0, 4), line=0, recover=False).N, rtol=1e-9)
 
 
+def test_no_points_are_none_of_them(case):
+    _, state = case
+    none = np.zeros((2, 0))
+    assert state.displacement(none).shape == (2, 0) and state.strain(none).shape == (3, 0)
+    with pytest.raises(MeshError, match="outside the body|in none of the"):
+        state.displacement([(0, 1), (0.3, 3.7)])
+
+
 def test_lines_that_are_not_there_are_refused(case):
     frame, state = case
     with pytest.raises(InputError, match="the frame has no line 3: its lines are numbered 0 to 2"):

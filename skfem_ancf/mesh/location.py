@@ -104,9 +104,14 @@ class Finder:
                 some = np.flatnonzero(self.mesh.chains == chain)[None]
                 e, X, outside = self._best(x, some, noise)
                 return e, np.clip(X, 0.0, 1.0), outside, tied
-            e, X, outside = self._find(x, noise)
-            if not self.mesh.is_chain and x.size:
-                self._nearest_axis(x, noise, e, X, outside, tied)
+            if self.mesh.is_chain:
+                return *self._find(x, noise), tied
+            e, X, outside = np.zeros(x.shape[1], dtype=int), np.zeros(x.shape), np.full(
+                x.shape[1], np.inf)
+            self._nearest_axis(x, noise, e, X, outside, tied)
+            left = np.flatnonzero(outside)
+            if len(left):
+                e[left], X[:, left], outside[left] = self._find(x[:, left], noise)
         return e, X, outside, tied
 
     def from_axis(self, e: Array, X: Array) -> Array:
@@ -155,8 +160,9 @@ class Finder:
         """Pairs of points and elements that may hold them: numbers (m,) of both."""
         points, elements = [], []
         for some, tree, radius in self._circles:
-            near = tree.query_ball_point(x.T, radius)
-            points.append(np.repeat(np.arange(x.shape[1]), [len(each) for each in near]))
+            near = tree.query_ball_point(x.T, radius, return_sorted=False)
+            many = np.fromiter(map(len, near), dtype=int, count=len(near))
+            points.append(np.repeat(np.arange(x.shape[1]), many))
             elements.append(some[np.concatenate([*near, []]).astype(int)])
         return np.concatenate(points), np.concatenate(elements)
 
