@@ -109,6 +109,25 @@ def test_sets_of_abaqus_may_overlap(tmp_path):
         Frame.from_meshio(path, groups=["rigth"], **OPTIONS)
 
 
+@pytest.mark.parametrize("text, message", [
+    ("*ELEMENT, TYPE=B31\n1, 1,2\n2, 2,3\n*ELEMENT, TYPE=B31, ELSET=b\n3, 3,4\n4, 4,5",
+     "a block has none before one that has"),
+    ("*Element, type=B31, elset=b\n1, 1,2\n2, 2,3\n*Element, type=B31, elset=b\n3, 3,4\n4, 4,5",
+     "'b' is there twice"),
+    ("*ELEMENT, TYPE=B31, ELSET=a\n1, 1,2\n2, 2,3\n3, 3,4\n4, 4,5\n*ELSET, ELSET=a\n1",
+     "'a' is there twice"),
+    ("*ELEMENT, TYPE=B31\n1, 1,2\n2, 2,3\n3, 3,4\n4, 4,5\n*ELSET, ELSET=a\n1\n*ELSET, ELSET=a\n2",
+     "'a' is there twice"),
+    ("*ELEMENT, TYPE=B31, ELSET=a\n1, 1,2\n2, 2,3\n*ELEMENT, TYPE=B31, ELSET=c\n3, 3,4\n4, 4,5\n"
+     "*ELSET, ELSET=b\nc,\na", "set 'b' holds names of sets")])
+def test_sets_of_abaqus_that_meshio_takes_for_others_are_refused(tmp_path, text, message):
+    """Sets in which it has other elements than the file."""
+    with pytest.raises(MeshError, match=message):
+        Frame.from_meshio(abaqus(tmp_path / "arc.inp", text), **OPTIONS)
+    plain = text.replace(", ELSET=b\n3", "\n3").replace(", elset=b", "").split("*ELSET")[0]
+    assert length(Frame.from_meshio(abaqus(tmp_path / "plain.inp", plain), **OPTIONS)) > 1.5
+
+
 GMSH = """$MeshFormat
 4.1 0 8
 $EndMeshFormat

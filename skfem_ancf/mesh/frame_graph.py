@@ -440,6 +440,8 @@ def net_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
             mesh = meshio.read(path)
         except (Exception, SystemExit) as error:  # meshio ends the process where it knows no format
             raise FileError(f"{path} cannot be read as a mesh: {error}") from None
+        if path.suffix.lower() == ".inp":
+            _require_sets_of_abaqus(path)
     if not isinstance(mesh, meshio.Mesh):
         raise InputError(f"mesh must be a meshio.Mesh or the name of a file, got {shown(mesh)}")
     if groups is not None and not isinstance(groups, (str, list, tuple, set, frozenset)):
@@ -483,6 +485,34 @@ def net_from_meshio(mesh: Any, groups: Any = None, named: Sequence[str] = (),
         beams = tuple(name for name, some in sets.items()
                       if name in named or np.all(taken[some] == 1))
     return Net(points[used, :2], ends.reshape(-1, 2), sets, nodes, curves, tol, beams, lost)
+
+
+def _require_sets_of_abaqus(path):
+    """Raise MeshError for element sets of a file of Abaqus that meshio 5 takes for others.
+
+    It counts the names at ``*ELEMENT`` as if each block had one of its own, and keeps one block of
+    a name; sets of sets it takes for blocks in their order.
+    """
+    blocks, sets, keyword = [], [], ""
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+        if line.startswith("*"):
+            keyword = line.partition(",")[0].strip().upper()
+            found = re.search(r"ELSET\s*=\s*([^,]*)", line, re.IGNORECASE)
+            name = found.group(1).strip() if found else ""
+            if keyword == "*ELEMENT":
+                blocks.append(name)
+            elif keyword == "*ELSET":
+                sets.append(name)
+        elif keyword == "*ELSET" and re.match(r"\s*[A-Za-z_]", line):
+            raise MeshError(f"{path}: the element set {sets[-1]!r} holds names of sets, which are "
+                            "not read: list the numbers of its elements")
+    named = [name for name in blocks if name]
+    again = sorted({name for name in named + sets if (named + sets).count(name) > 1})
+    if again or blocks[:len(named)] != named:
+        what = f"{again[0]!r} is there twice" if again else "a block has none before one that has"
+        raise MeshError(f"{path}: element sets are read if each has one place, at *ELSET or at an "
+                        f"*ELEMENT, ELSET=... before which others have names, too: {what}; write "
+                        "*ELSET with the numbers of all its elements")
 
 
 def _ends_first(points, cell):
