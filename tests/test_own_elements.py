@@ -159,10 +159,10 @@ def test_three_zero_modes(name, plane):
             h = 1.0 / slenderness
             law = StVenantKirchhoff(2e8 * (0.01 / h) ** 3, 0.3, plane=plane)
             w = eigenvalues(Beam(line(n, h), OWN[name](), law, WIDTH))
-            assert np.max(np.abs(w[:3])) < 1e-14
+            assert np.max(np.abs(w[:3])) < 1e-13
             assert w[3] > 2e-2 / slenderness**2
     loose = Beam(line(1, 0.1), OWN[name](), law, WIDTH, formulation=Assumed(alpha=0.0))
-    assert np.sum(eigenvalues(loose) < 1e-12) > 3
+    assert np.sum(eigenvalues(loose) < 1e-11) > 3
 
 
 @pytest.mark.parametrize("law", [StVenantKirchhoff, NeoHookean])

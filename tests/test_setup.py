@@ -181,7 +181,7 @@ def test_a_line_is_the_mesh_that_its_nodes_make(x, origin, angle):
     anew = MeshBeam(mesh.p, mesh.t, height=0.1)
     for name in ("p", "t", "p_X", "p_Y", "p_XY", "lengths"):
         a, b = getattr(mesh, name), getattr(anew, name)
-        assert a.dtype == b.dtype and np.allclose(a, b, rtol=0, atol=1e-12) and (
+        assert a.dtype == b.dtype and np.allclose(a, b, rtol=0, atol=1e-11) and (
             not a.flags.writeable)
     assert mesh.is_straight and anew.is_straight and mesh.is_uniform == anew.is_uniform
     assert np.allclose(mesh.parameters, x)
