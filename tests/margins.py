@@ -105,13 +105,13 @@ def compare(values, kinds, place, small):
 
 
 def tiny(node):
-    """Numbers below :data:`ROUND_OFF` in an expression, but not those added to something."""
+    """Numbers below :data:`ROUND_OFF` in an expression, but none added to something, nor ``tol=``."""
     if isinstance(node, ast.Constant):
         x = node.value
         return [x] if isinstance(x, float) and 0.0 < x < ROUND_OFF else []
     added = isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Add, ast.Sub))
     return [x for part in ast.iter_child_nodes(node) for x in tiny(part)
-            if not (added and isinstance(part, ast.Constant))]
+            if not (isinstance(part, ast.keyword) or added and isinstance(part, ast.Constant))]
 
 
 class Transformer(ast.NodeTransformer):
