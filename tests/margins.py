@@ -105,7 +105,7 @@ def compare(values, kinds, place, small):
 
 
 def tiny(node):
-    """Numbers below :data:`ROUND_OFF` in an expression, but none added to something, nor ``tol=``."""
+    """Numbers below :data:`ROUND_OFF` in an expression, none added to something, nor ``tol=``."""
     if isinstance(node, ast.Constant):
         x = node.value
         return [x] if isinstance(x, float) and 0.0 < x < ROUND_OFF else []
