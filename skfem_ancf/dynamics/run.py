@@ -346,6 +346,8 @@ class Run:
         except AncfError:  # of a function of the caller's: go on as far as it goes
             self._in_blocks = False
             return None
+        if not taken:  # not one of them, or a scheme of one's own says so
+            return None
         if self.n + len(taken) == self._count:
             taken.end = self._end
         taken.turns = self._turns.follow(self.y.turns, taken.rows[:len(taken), 0])
