@@ -93,7 +93,7 @@ def test_balance_to_round_off_with_all_kinds_at_once(body, element):
     scene.damping(mass=0.5, stiffness=1e-3, modal=[0.1, 0.05]).drag(10.0, 1.2, 0.1)
     history = scene.integrate(0.03, 2e-3)
     assert np.all(np.diff(history.dissipated) >= 0.0) and history.dissipated[-1] > 1e-4
-    assert np.ptp(history.total_energy + history.dissipated) < 1e-12 * history.kinetic_energy.max()
+    assert np.ptp(history.total_energy + history.dissipated) < 1e-11 * history.kinetic_energy.max()
     assert history.state(-1).recovered == {0: ""}
 
 

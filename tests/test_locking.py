@@ -296,7 +296,7 @@ def test_a_free_beam_has_three_zero_modes(name, shape):
                 h = 1.0 / slenderness
                 w = scaled_eigenvalues(Beam(shape(n, h), element, soft(h, plane), WIDTH,
                                             formulation="assumed"))
-                assert np.max(np.abs(w[:3])) < 1e-14
+                assert np.max(np.abs(w[:3])) < 1e-13
                 assert w[3] > 2e-2 / slenderness**2  # bending against stretching
 
 
@@ -318,7 +318,7 @@ def test_three_zero_modes_at_any_poisson_ratio(body, nu):
         for h in (0.5, 0.1, 1e-3):
             beam = Beam(BODIES[body](h), ElementBeamANCF(order), soft(h, "strain", nu=nu), WIDTH)
             w = scaled_eigenvalues(beam)
-            assert np.max(np.abs(w[:3])) < min(1e-11, 1e-2 * w[3])
+            assert np.max(np.abs(w[:3])) < min(1e-10, 1e-2 * w[3])
             for u in 1e-2 * h * rng.standard_normal((20, beam.N)):
                 assert beam.kernel.energy(u) > 0
 
