@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import exact
-from skfem_ancf import (Beam, ElementBeamANCFCubic, ElementBeamCable, InputError, MeshBeam, Scene,
-                        Section, StVenantKirchhoff)
+from scipy.optimize import fsolve
+from skfem_ancf import (Beam, ElementBeamANCFCubic, ElementBeamCable, InputError, MeshBeam,
+                        ModelWarning, Scene, Section, StVenantKirchhoff)
 from skfem_ancf.beam.kernels.along import CableSections
 
 DEGREES = (3, 5, 7, 9, 13)
@@ -478,3 +479,62 @@ def test_high_degrees_lose_no_digits_of_positions_and_strains(degree, height):
     for ask, digits in ((lambda s: s.displacement(x), 1e-12), (lambda s: s.strain(x)[0], 1e-10)):
         a, b = ask(one), ask(other)
         assert np.max(np.abs(a - b)) < digits * np.max(np.abs(a))
+
+
+# ropes with a force at a point
+
+
+def wire(x, element, h=1e-4, EA=1e3, **options):
+    return Beam(MeshBeam.init_line(x, h, **options), element,
+                StVenantKirchhoff(EA / (h * 1e-3), 0.0), 1e-3)
+
+
+def rope(element, n, at):
+    """Pinned at both ends, which have come closer by a tenth, and pulled down at a point."""
+    scene = Scene(wire(np.linspace(0.0, 1.0, n + 1), element)).pin("left").fix("right", "r^2").fix(
+        "right", "r^1", displacement=-0.1)
+    return scene.line_load((0.0, -1e-3)).point_force((0.0, -2.0), at=(at, 0.0))
+
+
+def sag(at, EA=1e3, force=2.0, length=1.0, span=0.9):
+    """Of the point of a rope of two straight parts."""
+    def balance(z):
+        (x, y), parts = z, []
+        for dx, l0 in ((x, at), (span - x, length - at)):
+            long = np.hypot(dx, y)
+            parts.append(EA * (long / l0 - 1.0) / long)
+        return [parts[0] * x - parts[1] * (span - x), (parts[0] + parts[1]) * y - force]
+
+    return fsolve(balance, [at * span, 0.2])[1]
+
+
+@pytest.mark.parametrize("degree, n, at", [(5, 20, 0.5), (5, 60, 0.5), (7, 20, 0.5), (5, 20, 0.341),
+                                           (3, 20, 0.341)])
+def test_a_force_inside_a_rope_that_its_elements_cannot_follow_is_said(degree, n, at):
+    scene = rope(ElementBeamCable(degree), n, at)
+    with pytest.warns(ModelWarning, match="bends its axis by 0.* rad within"):
+        state = scene.solve_static(method="newton")
+    off = -state.displacement((at, 0.0))[1] / sag(at) - 1
+    assert 1e-3 < abs(off) < 0.2
+
+
+def test_what_is_said_of_a_kink_helps():
+    """A hinge at the point, or a cubic cable with a node there: no warning, and right."""
+    state = rope(ElementBeamCable(3), 20, 0.5).solve_static(method="newton")
+    assert -state.displacement((0.5, 0.0))[1] == pytest.approx(sag(0.5), rel=5e-4)
+    at, x = 0.341, np.linspace(0.0, 1.0, 7)
+    place = np.array([0.45 + (at**2 - (1 - at)**2) / 1.8, 0.0])  # of two straight parts
+    place[1] = -np.sqrt(at**2 - place[0]**2)
+    parts = [wire(at * x, ElementBeamCable(5), angle=np.arctan2(place[1], place[0])),
+             wire((1 - at) * x, ElementBeamCable(5), origin=tuple(place),
+                  angle=np.arctan2(-place[1], 0.9 - place[0]))]
+    scene = Scene(*parts).pin("left", beam=0).pin("right", beam=1)
+    scene.hinge(place)
+    state = scene.point_force((0.0, -2.0), at=place, beam=0).solve_static(method="newton")
+    assert -state.position(place, 0)[1] == pytest.approx(sag(at), rel=5e-4)
+
+
+def test_no_kink_is_said_of_what_bends():
+    """Of a beam whose bending reaches over its elements."""
+    beam = Beam(line(8, 0.1), ElementBeamCable(5), StVenantKirchhoff(1e6, 0.0), 0.1)
+    Scene(beam).clamp("left").clamp("right").point_force((0, -100.0), at=(0.5, 0)).solve_static()

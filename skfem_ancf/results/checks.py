@@ -5,13 +5,14 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 from itertools import accumulate
-from math import sin, sqrt
+from math import atan, sin, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..core.errors import ModelWarning
 from ..core.kept import cached_property
+from ..beam.distribution import SNAP
 from ..materials import LinearLaw
 
 if TYPE_CHECKING:
@@ -33,6 +34,9 @@ TURNING_SMOOTH = 2.5
 #: Angle, in radians, by which the axis may turn in linear theory: 1 % are left out then.
 SMALL = 0.1
 TINY = 1e-300
+#: Sideways force at a point over the normal force from which it is looked at, and how long the
+#: part is over which bending spreads the kink, relative to an element that follows it.
+KINKED, FOLLOWED = 0.05, 0.3
 
 
 @dataclass(frozen=True)
@@ -200,12 +204,62 @@ def warn_of(state: State) -> None:
     """Give a :class:`~skfem_ancf.core.errors.ModelWarning` for each finding of ``solve_static``."""
     for text in state.system.forces.contacts.sunk(state.u, state.load):
         warnings.warn(text, ModelWarning, stacklevel=4)
+    for text in _kinks(state):
+        warnings.warn(text, ModelWarning, stacklevel=4)
     if state.system.screen.passes(state.u):
         return
     for beam in state.beams:
         u = state.u_of(beam)
         for text in _findings(beam, shortest(beam, u), turning(beam, u)):
             warnings.warn(f"{text} (state.checks has the numbers)", ModelWarning, stacklevel=4)
+
+
+def _kinks(state):
+    """What to say of forces at points that bend a rope more sharply than its elements can."""
+    for load in state.system.loads:
+        if not hasattr(load.beam, "mesh"):
+            continue  # a rigid body
+        spread, vector = getattr(load, "_spread", None), getattr(load, "vector", None)
+        if vector is None or spread is None or len(spread.stations) != 1:
+            continue
+        beam, station = load.beam, spread.stations[0]
+        force = state.load * load.factor(state.t) * vector.reshape(-1, beam.nd // 2, 2)[:, 0].sum(0)
+        at_node = abs(station - round(station)) < SNAP
+        if not np.any(force) or (at_node and beam.element.axis_degree == 3):
+            continue  # a cubic axis has no curvature in common at a node
+        t, k = beam.mesh.t, round(station)
+        if at_node and (not 0 < k < t.shape[1] or t[1, k - 1] != t[0, k]):
+            continue  # an end
+        sides = [k - 1, k] if at_node else [int(station)] * 2
+        found = _kink(beam, state.u_of(beam), force, sides)
+        if found is not None:
+            angle, reach, length = found
+            who = "of a beam" if beam.name is None else f"of beam {beam.name!r}"
+            yield (f"a force at a point inside {who} bends its axis by {angle:.2g} rad within "
+                   f"sqrt(EI / N) = {reach:.2g}, and elements there are {length:.2g} long: their "
+                   "axis is smooth, so that the deflection is off by up to some per cent, and "
+                   "converges slowly. Let the beam end at the point and join another to it by "
+                   "scene.hinge, or use ElementBeamCable(3) with a node there, or elements as "
+                   "short as that")
+
+
+def _kink(beam, u, force, sides):
+    """Angle of the kink under a force on the elements at both sides, the length over which bending
+    rounds it off, and that of the elements; None where they follow.
+    """
+    t = beam.mesh.t
+    r = (beam.mesh.p.T + u.reshape(-1, beam.nd // 2, 2)[:, 0])[t[:, sides]]
+    chord = (r[1] - r[0]) / np.hypot(*(r[1] - r[0]).T)[:, None]
+    left, right = np.split(beam.kernel.forces(u)[sides], 2, axis=1)
+    N = min(-left[0, 0] @ chord[0], right[1, 0] @ chord[1])
+    along = chord[0] + chord[1]
+    side = abs(along[0] * force[1] - along[1] * force[0]) / np.hypot(*along)
+    if N <= 0.0 or side < KINKED * N:
+        return None
+    EI = beam.across.bending
+    reach = sqrt(float(EI[min(max(sides), len(EI) - 1)]) / N)
+    length = float(np.max(beam.mesh.lengths[sides]))
+    return (2.0 * atan(0.5 * side / N), reach, length) if reach < FOLLOWED * length else None
 
 
 def _findings(beam, stretch, turn):
