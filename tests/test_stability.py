@@ -395,8 +395,8 @@ def test_fibres_compressed_beyond_the_law_are_said():
 
 
 def test_a_mesh_too_coarse_for_the_curvature_is_said():
-    """A cable bent to a circular arc of 4 rad by an end moment, against the circle."""
-    h, angle = 0.01, 4.0
+    """A cable bent to a circular arc of 4.3 rad by an end moment, against the circle."""
+    h, angle = 0.01, 4.3
     tip = np.array([np.sin(angle), 1.0 - np.cos(angle)]) / angle
     errors = {}
     for n in (4, 12):
@@ -406,7 +406,7 @@ def test_a_mesh_too_coarse_for_the_curvature_is_said():
         errors[n] = np.linalg.norm(state.position((1, 0)) - tip)
         assert (ModelWarning in warned) == (n == 4)
         assert any("too coarse" in text for text in state.checks.findings) == (n == 4)
-    assert 0.05 < errors[4] < 0.15 and errors[12] < 2e-3
+    assert 5e-3 < errors[4] < 0.15 and errors[12] < 2e-3
 
 
 def test_energy_that_is_not_positive_is_said_at_once():

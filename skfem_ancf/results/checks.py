@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 #: fibre, E (l^3 - l) / 2, has its smallest value there.
 COMPRESSED = 1.0 / sqrt(3.0)
 #: Angle, in radians, by which the axis may turn over one element, for a cubic axis and others.
-#: A cubic cable bent by an end moment is off by 1.7, 4.5, 9, 14 % of its length at 0.76, 0.93, 1.07
-#: and 1.18 rad, and beyond 1.2 rad nothing is left of the solution; one of degree 5 by 1.5e-5 at
-#: 1.6 rad, of degree 7 by 2.4e-8 at 2, of degree 9 by 5e-11 at 2.5.
+#: A cubic cable bent by an end moment is off by 0.3, 0.7, 1.0, 1.5 % of its length at 0.75, 0.93,
+#: 1.0 and 1.18 rad; one of degree 5 by 1.5e-5 at 1.6 rad, of degree 7 by 2.4e-8 at 2, of degree 9
+#: by 5e-11 at 2.5.
 TURNING = {3: 1.0, 5: 1.6, 7: 2.0}
 TURNING_SMOOTH = 2.5
 #: Angle, in radians, by which the axis may turn in linear theory: 1 % are left out then.
