@@ -191,7 +191,7 @@ def test_the_elements_own():
     assert_allclose(own.Q, right.Q, atol=0.01 * np.abs(right.Q).max())
     assert_allclose(own.force, np.array([np.cos(own.angle) * own.N - np.sin(own.angle) * own.Q,
                                          np.sin(own.angle) * own.N + np.cos(own.angle) * own.Q]))
-    mode = cable.modes(1).mode(0, 0.01)  # no equilibrium
+    mode = cable.modes(1, state).mode(0, 0.01)  # about a state under load
     assert not mode.resultants().recovered and np.all(np.isfinite(mode.resultants().M))
 
 
