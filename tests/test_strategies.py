@@ -1,5 +1,8 @@
 """The default of statics: what it tries, and scenes that only loads hold, against closed forms."""
 
+import importlib.util
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -210,6 +213,25 @@ def test_a_frame_that_hangs_on_a_hinge():
     centre = lengths @ np.array(middles) / lengths.sum()
     assert state.stability == "stable"
     assert abs(centre[0]) < 1e-3 and centre[1] < -0.3
+
+
+# random scenes
+
+
+CAMPAIGN = Path(__file__).parents[1] / "benchmarks" / "strategies.py"
+
+
+@pytest.mark.skipif(not CAMPAIGN.exists(), reason="benchmarks/ is not in the distribution")
+@pytest.mark.parametrize("kind", ["rope", "cable", "guyed_rod", "arch", "frame", "cantilever",
+                                  "column", "chain"])
+def test_the_default_does_not_lose_to_explicit_methods(kind):
+    """A few of the scenes of benchmarks/strategies.py, which draws hundreds."""
+    spec = importlib.util.spec_from_file_location("strategies_campaign", CAMPAIGN)
+    campaign = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(campaign)
+    explicit = {name: campaign.EXPLICIT[name] for name in ("mixed", "newton")}
+    for number in range(4):
+        assert campaign.lost(campaign.draw(kind, number), explicit)[0] == []
 
 
 # errors

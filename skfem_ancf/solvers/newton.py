@@ -296,10 +296,13 @@ class Search:
 
     Parameters
     ----------
-    system, u, memory
-        The equations, the displacement to start from, or None, and what is left behind there.
+    system
+        A :class:`~skfem_ancf.equations.system.System`.
+    u, memory
+        The displacement to start from, shape (N,), and what is left behind there at obstacles,
+        (n,); or None.
     steps
-        Rules of the load steps.
+        Rules of the load steps, :class:`Steps`.
     stable, progress
         As for :func:`solve_static`.
 
@@ -445,7 +448,13 @@ class Search:
 
     def one_step(self, method: str, route: Route | None = None,
                  start: StaticResult | None = None) -> StaticResult:
-        """As :meth:`load_steps`, at once or not at all."""
+        """As :meth:`load_steps`, at once or not at all.
+
+        Parameters
+        ----------
+        method, route, start
+            As there.
+        """
         route = route or self.route
         options = self._options(route, method, watched=True)
         result, record = start or self._beginning(route), LoadStep(1.0, 0)
