@@ -24,7 +24,7 @@ from skfem_ancf.actions.joints import Joint, PrescribedAngle, Weld
 from skfem_ancf.core.quadrature import gauss, tensor
 from skfem_ancf.beam.distribution import BODY, Sampled
 from skfem_ancf.solvers import newton
-from skfem_ancf.solvers.continuation import Tracer
+from skfem_ancf.solvers.tracing import Tracer
 from skfem_ancf.mesh.taper import PLACES, halved
 
 STEEL = StVenantKirchhoff(1e6, 0.3, 1.0)

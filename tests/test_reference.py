@@ -14,7 +14,7 @@ FOLDERS = ["actions.forces", "actions.joints", "actions.obstacles", "beam", "dyn
            "formulations", "io", "materials", "mesh", "results", "scene", "sections", "solvers",
            "sweeps"]
 #: Returned by public methods, and machinery all the same.
-MACHINERY = {"BandMatrix", "Finder", "Inertia", "Points", "Recovery", "Screen", "System", "Spread",
+MACHINERY = {"BandMatrix", "Finder", "Inertia", "Points", "Recovery", "System", "Spread",
              "ElementStrain", "Law", "Amplitude", "BodyFields", "Link", "Part",
              "Held", "Sampling", "Rule", "Series", "Point", "Critical", "Vector"}
 

@@ -12,7 +12,6 @@ from ..core.kept import cached_property
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from .beam import Beam
     from .rigid import RigidBody
     from ..core.types import Array
 
@@ -45,7 +44,7 @@ class Part:
     e: Array
     X: Array
 
-    def __init__(self, beam: Beam, number: int, coordinates: slice, index: Array | None,
+    def __init__(self, beam: Any, number: int, coordinates: slice, index: Array | None,
                  e: Array, X: Array) -> None:
         self.beam, self.number, self.coordinates, self.index = beam, number, coordinates, index
         self.n, self.e, self.X = len(e), e, X

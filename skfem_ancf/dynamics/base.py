@@ -13,7 +13,6 @@ from ..core.errors import CheckpointError
 if TYPE_CHECKING:
     from ..equations.system import System
     from ..core.types import Array
-    from .integrator import Integrator
 
 #: Part of a step up to which an acceleration is interpolated, where it is a difference.
 NEAR = 0.1
@@ -258,7 +257,7 @@ class Scheme:
     filtered = 1
     safety = 1.0
 
-    def step(self, integrator: Integrator, y: Motion, dt: float) -> Motion:
+    def step(self, integrator: Any, y: Motion, dt: float) -> Motion:
         """Where the motion is one step later.
 
         A scheme that overrides it is asked for each step, others are taken in blocks. What it
@@ -295,7 +294,7 @@ class Scheme:
         """
         return type(self).step is Scheme.step
 
-    def run(self, integrator: Integrator, y: Motion, dt: float, n: int,
+    def run(self, integrator: Any, y: Motion, dt: float, n: int,
             start: float | None = None, first: int = 0,
             block: tuple[int, int] | None = None) -> Steps:
         """Up to n steps: as :meth:`skfem_ancf.dynamics.integrator.Integrator.run`.
@@ -347,7 +346,7 @@ class Scheme:
         """
         return NEAR
 
-    def lasting(self, integrator: Integrator, du: Array, time: float) -> Array:
+    def lasting(self, integrator: Any, du: Array, time: float) -> Array:
         """The mean of what is left of a change of the displacement while it is damped.
 
         Parameters
@@ -361,7 +360,7 @@ class Scheme:
         """
         return du
 
-    def resolved(self, integrator: Integrator, du: Array) -> Array:
+    def resolved(self, integrator: Any, du: Array) -> Array:
         """What of a change of the displacement a step resolves, by its matrix as a filter.
 
         Parameters

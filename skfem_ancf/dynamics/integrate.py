@@ -12,6 +12,7 @@ from ..core.errors import (AccuracyWarning, AncfError, ConvergenceError, InputEr
                            require_positive, shown, taught)
 from ..core.progress import progress_bar
 from ..core.switch import expecting
+from ..results.checks import folded
 from .checkpoint import Checkpoint, same_problem
 from .base import contacts_of, in_steps, same_scheme
 from .budget import ENOUGH
@@ -334,7 +335,8 @@ class _Body:
         run = self.run
         if self.t is None and (run.steps >= self.next or run.done):
             self.next = run.steps + LOOKED
-            if run.system.inverted(run.y.u) or run.system.screen.folded(run.y.u):
+            if run.system.inverted(run.y.u) or any(
+                    folded(beam, run.y.u[run.system.of(beam)]) for beam in run.system.beams):
                 self.t = run.y.t
 
     def warn(self):

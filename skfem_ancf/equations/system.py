@@ -15,7 +15,6 @@ from scipy.sparse.linalg import splu
 from ..solvers import eigen
 from ..core.band import factorize, fix
 from .bordered import BorderedMatrix, gives_way
-from ..results.checks import Screen
 from .condensation import Condensed
 from .constraints import Constraints
 from ..materials.damping import UNDAMPED, Damping
@@ -40,7 +39,6 @@ if TYPE_CHECKING:
 
     from ..beam.beam import Beam
     from .border import Factors
-    from ..dynamics.integrator import Integrator
     from ..actions.forces.base import ForceElement
     from ..actions.joints.base import Joint
     from ..actions.loads import EndMoment, Load
@@ -703,11 +701,6 @@ class System:
             return False
         return True
 
-    @cached_property
-    def screen(self) -> Screen:
-        """What tells whether a state may be out of the range of laws and meshes."""
-        return Screen(self.beams)
-
     # mass
 
     @cached_property
@@ -780,7 +773,7 @@ class System:
     # tangent
 
     @cached_property
-    def integrators(self) -> list[Integrator]:
+    def integrators(self) -> list[Any]:
         """Those of motions that have ended, whose work arrays the next one takes."""
         return []
 

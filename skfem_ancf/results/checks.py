@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from itertools import accumulate
-from math import atan, sin, sqrt
+from math import atan, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..core.errors import ModelWarning
-from ..core.kept import cached_property
 from ..beam.distribution import SNAP
 from ..materials import LinearLaw
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
 
     from ..beam.beam import Beam
-    from .state import State
+    from ..beam.configuration import Configuration
     from ..core.types import Array
 
 #: Stretch below which St. Venant-Kirchhoff resists less the more it is compressed: the force of a
@@ -71,7 +68,7 @@ class Checks:
         return "\n".join(lines + [f"beyond its range: {text}" for text in self.findings])
 
 
-def check(state: State) -> Checks:
+def check(state: Configuration) -> Checks:
     """The :class:`Checks` of a state."""
     values, found = [], []
     for beam in state.beams:
@@ -86,128 +83,12 @@ def check(state: State) -> Checks:
                   tuple(found))
 
 
-class Screen:
-    """A look at the tangents of all nodes that tells whether a state may be out of range.
-
-    Parameters
-    ----------
-    beams
-        The beams of a scene.
-
-    Attributes
-    ----------
-    start
-        Tangents of the nodes in the stress-free state, complex.
-    slender
-        Height over length of each element.
-    """
-
-    def __init__(self, beams: Sequence[Beam]) -> None:
-        self._none = not beams
-        if self._none:
-            return
-        self._beams = beams
-        self.start = _joined([_complex(b.mesh.p_X.T) for b in beams])
-        self.slender = _joined([b.mesh.height / b.mesh.lengths for b in beams])
-
-    @cached_property
-    def _ends(self):
-        """Nodes at the begin and the end of each element, shape (2, elements)."""
-        node = accumulate([b.N // b.nd for b in self._beams], initial=0)
-        return _joined([n + b.mesh.t for n, b in zip(node, self._beams)])
-
-    @cached_property
-    def _places(self):
-        """Of these nodes the first two coordinates, the position, as a number of a complex one."""
-        first = accumulate([b.N // 2 for b in self._beams], initial=0)
-        return _joined([n + b.nd // 2 * b.mesh.t for n, b in zip(first, self._beams)])
-
-    @cached_property
-    def _turns(self):
-        """What tells of turns: places of tangents, these at rest, and of elements the tangents.
-
-        And how far the directions of these may be apart, and what makes a strain of that.
-        """
-        first = accumulate([b.N // 2 for b in self._beams], initial=1)
-        places = _joined([np.arange(n, n + b.N // 2, b.nd // 2)
-                          for n, b in zip(first, self._beams)])
-        limits = [turning_limit(b) for b in self._beams]
-        numbers = [b.mesh.nelements for b in self._beams]
-        limit, widest = np.array([limits, [2.0 * sin(0.5 * x) for x in limits]]).repeat(numbers, 1)
-        return places, self.start, *self._ends, widest, limit / widest * self.slender
-
-    @cached_property
-    def _folds(self):
-        """What tells of folds: places of end, begin and a tangent, each with both; at rest."""
-        (begin, end), rest = self._places, _joined([_complex(b.mesh.p.T) for b in self._beams])
-        (left, right), (first, last) = self._ends, rest[self._ends]
-        return (np.concatenate([end, end, begin, begin, 1 + begin, 1 + end]).reshape(3, -1),
-                np.concatenate([last, last, first, first, self.start[left], self.start[right]]
-                               ).reshape(3, -1))
-
-    def passes(self, u: Array) -> bool:
-        """False if a fibre may be compressed, or an element may turn, beyond the range.
-
-        Parameters
-        ----------
-        u
-            Displacement of the coordinates, shape (N,).
-        """
-        if self._none:
-            return True
-        # how long tangents are over what they were, and how far they have turned: the largest
-        # curvature of an element is seldom more than twice its mean
-        places, rest, begin, end, widest, thick = self._turns
-        change = _paired(u)[places] / rest + 1.0
-        stretch = np.abs(change)
-        turn = change / (stretch + TINY)
-        apart = np.abs(turn[end] - turn[begin])
-        return bool((apart < widest).all()
-                    and stretch.min() > (apart * thick).max() + 1.1 * COMPRESSED)
-
-    def folded(self, u: Array) -> bool:
-        """True if the axis of an element turns back: its ends lie against a tangent of the axis.
-
-        An axis that does so turns by more than pi over the element, or has no length in it.
-
-        Parameters
-        ----------
-        u
-            Displacement of the coordinates, shape (N,).
-        """
-        if self._none:
-            return False
-        places, rest = self._folds
-        return bool(_along(*_paired(u)[places], *rest).min() < 0.0)
-
-
-def _along(end, begin, tangent, last, first, slope):
-    """How far an element reaches along a tangent of it, of changes and of what is at rest."""
-    return ((end + last - begin - first).conjugate() * (tangent + slope)).real
-
-
-def _complex(pairs):
-    """Vectors (..., 2) as complex numbers, (...)."""
-    return _paired(pairs)[..., 0]
-
-
-def _paired(x):
-    """Numbers (..., 2 n) as n complex ones."""
-    return np.ascontiguousarray(x).view(complex)
-
-
-def _joined(arrays):
-    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays, axis=-1)
-
-
-def warn_of(state: State) -> None:
+def warn_of(state: Configuration) -> None:
     """Give a :class:`~skfem_ancf.core.errors.ModelWarning` for each finding of ``solve_static``."""
     for text in state.system.forces.contacts.sunk(state.u, state.load):
         warnings.warn(text, ModelWarning, stacklevel=4)
     for text in _kinks(state):
         warnings.warn(text, ModelWarning, stacklevel=4)
-    if state.system.screen.passes(state.u):
-        return
     for beam in state.beams:
         u = state.u_of(beam)
         for text in _findings(beam, shortest(beam, u), turning(beam, u)):
@@ -334,6 +215,25 @@ def tangents(beam: Beam, u: Array | float) -> Array:
         Shape (nvertices,), complex.
     """
     return (beam.q0_local + u).reshape(-1, beam.nd)[:, 2:4] @ [1.0, 1.0j]
+
+
+def folded(beam: Beam, u: Array) -> bool:
+    """True if the axis of an element turns back: its ends lie against a tangent of the axis.
+
+    An axis that does so turns by more than pi over the element, or has no length in it.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    u
+        Displacement of its degrees of freedom, shape (N,).
+    """
+    nodes = u.reshape(-1, beam.nd)[:, :4].T
+    x, tangent = beam.mesh.p + nodes[:2], beam.mesh.p_X + nodes[2:]
+    left, right = beam.mesh.t
+    chord = x[:, right] - x[:, left]
+    return bool(min(np.min(np.sum(chord * tangent[:, end], axis=0)) for end in (left, right)) < 0.0)
 
 
 def turning_limit(beam: Beam) -> float:

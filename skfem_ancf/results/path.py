@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from ..solvers.continuation import Point
-    from ..solvers.critical import Critical
     from ..equations.system import System
     from ..core.types import Array
     from ..beam.layout import WhichBeam
@@ -41,7 +39,7 @@ class CriticalPoint:
         the path.
     change
         By how many the number of negative eigenvalues changes there; None if it is not known.
-    critical : Critical
+    critical
         What the solver found, from which ``scene.continuation(branch=...)`` goes on.
     """
 
@@ -87,8 +85,8 @@ class Path:
         Limit and bifurcation points in the order of the path, each solved for as a point of it.
     """
 
-    def __init__(self, system: System, points: Sequence[Point],
-                 critical: Sequence[Critical] = ()) -> None:
+    def __init__(self, system: System, points: Sequence[Any],
+                 critical: Sequence[Any] = ()) -> None:
         self.system, self.points = system, points
         self.load = np.array([p.load for p in points])
         self.u = np.array([p.u for p in points])

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
     from ..beam.beam import Beam
     from ..results.state import State
-    from .scene import Scene
     from ..core.types import Array
 
 logger = logging.getLogger(__name__)
@@ -63,7 +62,7 @@ class Refinement:
 
 
 @taught
-def solve_adaptive(scene: Scene, tol: float, max_elements: int = 20000, goal: str = "displacement",
+def solve_adaptive(scene: Any, tol: float, max_elements: int = 20000, goal: str = "displacement",
                    max_degree: int = DEGREES[-1], **options: Any) -> State:
     """Solve with higher degrees or on finer meshes until the estimated error is small enough.
 
@@ -157,7 +156,7 @@ class _Rounds:
         As for :func:`solve_adaptive`.
     """
 
-    def __init__(self, scene: Scene, tol: float, max_degree: int) -> None:
+    def __init__(self, scene: Any, tol: float, max_degree: int) -> None:
         self.scene, self.tol, self._most = scene, tol, max_degree
         self.state: State | None = None  # where a round has solved the scene of the next
         self._rough: set[int] = set()
@@ -175,14 +174,14 @@ class _Rounds:
     def _small(self, error):
         return error <= 0.1 * self.tol
 
-    def finer(self) -> Scene:
+    def finer(self) -> Any:
         """The scene to compare with."""
         raised = [self._raised(k) for k in range(len(self.scene.beams))]
         everywhere = [np.arange(b.mesh.nelements if e is None else 0)
                       for b, e in zip(self.scene.beams, raised)]
         return _with_elements(refine(self.scene, everywhere)[0], raised)
 
-    def done(self, errors: list[float], scene: Scene) -> tuple[Refinement, ...]:
+    def done(self, errors: list[float], scene: Any) -> tuple[Refinement, ...]:
         """All that was done, with what leads to another scene from the one there is."""
         return self._refinements + tuple(
             Refinement(k, "split" if new.mesh.nelements > old.mesh.nelements else "degree",
@@ -205,7 +204,7 @@ class _Rounds:
                 sure = sure and before <= self.tol
         return sure
 
-    def advance(self, state: State, fine: Scene, better: State, errors: list[float]) -> None:
+    def advance(self, state: State, fine: Any, better: State, errors: list[float]) -> None:
         """Take the higher degrees that gain, and split the elements that matter in other beams."""
         beams = self.scene.beams
         split = [new.mesh.nelements > old.mesh.nelements for old, new in zip(beams, fine.beams)]
@@ -303,7 +302,7 @@ def strain_error(state: State, beam: Beam) -> tuple[Array, ...]:
     return tuple(out)
 
 
-def refine(scene: Scene, marked: Sequence[ArrayLike]) -> tuple[Scene, Callable[[Array], Array]]:
+def refine(scene: Any, marked: Sequence[ArrayLike]) -> tuple[Any, Callable[[Array], Array]]:
     """The scene with elements halved, and the map of displacements onto it.
 
     Parameters

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..core.errors import (CallbackError, ConvergenceError, InputError, Interrupted, ask,
                            require_function, require_integer, require_positive, shown, taught)
-from ..core.linalg import NO_FACTORS
 from ..core.progress import progress_bar
 from ..core.switch import expecting
 from .critical import find_critical
-from .iteration import CLOSED, reference_work, settled
-from .newton import rules_of
-from .stability import position_weights
+from .tracing import Failed, Point, Tracer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ..equations.system import System
-    from ..core.types import Array
     from .critical import Critical
 
 logger = logging.getLogger(__name__)
@@ -33,226 +29,6 @@ MAX_STEPS = 10**6
 TURN = 0.03
 #: Shortest step that is tried, relative to ds.
 SHORTEST = 1e-6
-#: Motion of the nodes below which the load counts in the arc length, over what it could stretch.
-STILL = 1e-3
-
-
-class Failed(Exception):
-    """A step did not converge."""
-
-
-class Point:
-    """One equilibrium of a path.
-
-    Parameters
-    ----------
-    u, multipliers, load, force
-        Displacement (N,), multipliers (m,), load factor and internal force (N,).
-    arc
-        Arc length from the start of the path.
-    error
-        Size of the last correction in the energy norm, relative to the work done.
-    iterations
-        Linear systems solved.
-
-    Attributes
-    ----------
-    rate
-        Of the load with the arc length; zero at a limit point.
-    tangent
-        Of the displacement with the arc length, (N,).
-    negative
-        Number of negative eigenvalues of the tangent stiffness on the tangent space of the
-        constraints; None where the loads have no potential.
-    stable
-        Whether ``negative`` is zero; None where it is not known.
-    """
-
-    def __init__(self, u: Array, multipliers: Array, load: float, force: Array, arc: float,
-                 error: float, iterations: int) -> None:
-        self.u, self.multipliers, self.load, self.force = u, multipliers, load, force
-        self.arc, self.error, self.iterations = arc, error, iterations
-        self.rate: Any = np.nan
-        self.tangent: Any = None
-        self.multiplier_rate: Any = None
-        self.negative: Any = None
-
-    @property
-    def stable(self) -> bool | None:
-        return None if self.negative is None else self.negative == 0
-
-
-class Tracer:
-    """Corrector and tangent of the equilibrium path of a system.
-
-    Parameters
-    ----------
-    system
-        A :class:`~skfem_ancf.equations.system.System`.
-    tol, max_iterations
-        As for :func:`continuation`.
-    """
-
-    def __init__(self, system: System, tol: float, max_iterations: int) -> None:
-        self.system, self.rules = system, rules_of(system, "mixed", tol, max_iterations)
-        weights = position_weights(system)
-        self.weights = weights / (0.5 * weights.sum() * system.size**2)
-        self.unit = system.values(1.0) - system.values(0.0)
-        #: what a unit of load counts in the arc length, where it hardly moves the nodes
-        self.of_load: float = 0.0
-
-    def norm(self, v: Array) -> float:
-        """The norm of the nodes' mean displacement over the size of the scene."""
-        return np.sqrt(v @ (self.weights * v))
-
-    def stress_free(self) -> Point:
-        """The stress-free state as a point."""
-        zero = np.zeros(self.system.N)
-        return Point(zero, np.zeros(self.system.m), 0.0, zero, 0.0, 0.0, 0)
-
-    def begin(self, point: Point) -> Point:
-        """Find the tangent at the stress-free state, and what the load counts in the arc length.
-
-        Heat between walls moves no node: there the arc length has the load in it, times the strain
-        that its forces could cause.
-
-        Parameters
-        ----------
-        point
-            It is changed, and returned.
-        """
-        system = self.system
-        forces = float(np.abs(system.external_force(point.u)) @ system.constraints.coordinate_sizes)
-        self.of_load = forces / system.energy_of_strains if forces > 0 else 0.0
-        self.set_tangent(point)
-        motion = self.norm(point.tangent)
-        if motion > STILL * self.of_load * point.rate:
-            self.of_load = 0.0
-            point.rate, point.tangent = point.rate / motion, point.tangent / motion
-            point.multiplier_rate = point.multiplier_rate / motion
-        return point
-
-    def _drive(self, external, u, load):
-        """What a unit of load adds to the residual and to the constraints."""
-        system, phi = self.system, np.zeros(self.system.m)
-        if system.drives:
-            h = 1e-6 * max(1.0, abs(load))
-            phi = (system.constraint(u, load + h) - system.constraint(u, load - h)) / (2.0 * h)
-        if np.any(self.unit):
-            du0 = np.zeros(system.N)
-            du0[system.fixed] = self.unit
-            external = external - system.multiply(du0)
-            if system.joints:
-                phi = phi + system.full_jacobian(u, load) @ du0
-        return external, -phi
-
-    def factorize(self, point: Point) -> tuple[Array, Array]:
-        """Factorise the tangent stiffness of a point and count its negative eigenvalues."""
-        system = self.system
-        system.assemble(point.u, point.load)
-        drive = self._drive(system.external_force(point.u), point.u, point.load)
-        try:
-            system.factorize(point.u, point.load, point.multipliers)
-            if system.symmetric:
-                point.negative = system.inertia().negative
-        except NO_FACTORS:
-            raise Failed("the tangent is singular") from None
-        return drive
-
-    def set_tangent(self, point: Point, after: Point | None = None) -> Point:
-        """Find the tangent of the path at a point.
-
-        Parameters
-        ----------
-        point
-            It is changed, and returned.
-        after
-            The point before, from which the tangent points on; None for that of a growing load.
-        """
-        drive, phi = self.factorize(point)
-        dF, mF = self.system.solve(drive, phi)
-        dF[self.system.fixed] += self.unit
-        size = np.hypot(self.norm(dF), self.of_load)
-        if not size > 0 or not np.isfinite(size):
-            raise Failed("the loads move nothing" if size == 0 else "the tangent is singular")
-        if after is not None and (self.weights * dF) @ (point.u - after.u) + self.of_load**2 * (
-                point.load - after.load) < 0:
-            size = -size
-        point.rate, point.tangent, point.multiplier_rate = 1.0 / size, dF / size, mF / size
-        return point
-
-    def advance(self, start: Point, ds: float) -> Point:
-        """The next point of the path.
-
-        Parameters
-        ----------
-        start
-            A point with its tangent.
-        ds
-            The distance along the tangent.
-        """
-        first = ds * start.tangent, ds * start.multiplier_rate, ds * start.rate
-        plane, normal = self.weights * start.tangent, self.of_load**2 * start.rate
-
-        def increment(step, dl, dR, dF):  # the plane at distance ds
-            return (ds - plane @ (step + dR) - normal * dl) / (plane @ dF + normal)
-
-        return self._correct(start, first, increment, ds)
-
-    def at_load(self, start: Point, load: float, guess: tuple[Array, Array]) -> Point:
-        """The point at a load near another one.
-
-        Parameters
-        ----------
-        start
-            The other point.
-        load
-            Load factor.
-        guess
-            Change of displacement (N,) and multipliers (m,) from there.
-        """
-        first = guess[0], guess[1], load - start.load
-        return self._correct(start, first, lambda step, dl, dR, dF: 0.0, np.inf)
-
-    def _correct(self, start, first, increment, ds):
-        """Iterate from ``start`` and a first increment of u, multipliers and load."""
-        system, weights = self.system, self.weights
-        u, m, load = start.u, start.multipliers, start.load
-        _, evaluations = system.assemble(u, load)
-        du, dm, dl = first
-        step, work, rules = np.zeros(system.N), np.inf, self.rules
-        for k in range(1, rules.iterations + 1):
-            carried = system.stress_step(evaluations, du)
-            u, m, load, step = u + du, m + dm, load + dl, step + du
-            with np.errstate(over="ignore", invalid="ignore"):
-                force, evaluations = system.assemble(u, load, carried)
-                external = system.external_force(u)
-            if not np.all(np.isfinite(force)):
-                raise Failed("the strain is not finite")
-            residual, phi = load * external - force, system.constraint(u, load)
-            if system.joints:
-                residual = residual - m @ system.jacobian(u, load)
-            closed = np.all(np.abs(phi) <= CLOSED * system.machine.tables.plain.joints.sizes)
-            reference = max(reference_work(force, load * external, u),
-                            np.sqrt(abs(external @ step * dl)))
-            if closed and settled(work, reference, rules):
-                return Point(u, m, load, force, start.arc + ds,
-                             work / reference if reference > 0 else 0.0, k)
-            drive, gap = self._drive(external, u, load)
-            try:
-                system.factorize(u, load, m)
-                dR, mR = system.solve(residual, -phi)
-                dF, mF = system.solve(drive, gap)
-            except NO_FACTORS:
-                raise Failed("the tangent is singular") from None
-            dF[system.fixed] += self.unit
-            dl = increment(step, load - start.load, dR, dF)
-            du, dm = dR + dl * dF, mR + dl * mF
-            if not np.all(np.isfinite(du)) or np.sqrt(du @ (weights * du)) > 10 * ds:
-                raise Failed("the iteration leaves the path")
-            work = np.sqrt(abs((residual * system.free) @ du) + abs(phi @ dm)
-                           + abs(dl * (external @ du)))
-        raise Failed(f"no convergence in {rules.iterations} iterations")
 
 
 @taught

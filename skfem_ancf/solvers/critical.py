@@ -9,7 +9,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from ..core.types import Array
-    from .continuation import Point, Tracer
+    from .tracing import Point, Tracer
 
 #: How often a step is halved to tell critical points from each other.
 DEPTH = 12
@@ -24,7 +24,7 @@ class Critical:
     kind : str
         "limit", where the load turns, or "bifurcation", where another path crosses.
     u, multipliers, load, force, arc, error
-        As for :class:`~skfem_ancf.solvers.continuation.Point`.
+        As for :class:`~skfem_ancf.solvers.tracing.Point`.
     mode, multiplier_mode
         The null vector, (N,) and (m,), of unit mean displacement over the size of the scene.
     negative
@@ -52,7 +52,7 @@ def find_critical(tracer: Tracer, p: Point, q: Point, tol: float) -> list[Critic
     Parameters
     ----------
     tracer
-        Their :class:`~skfem_ancf.solvers.continuation.Tracer`.
+        Their :class:`~skfem_ancf.solvers.tracing.Tracer`.
     p, q
         Points with their tangents.
     tol
@@ -136,7 +136,7 @@ def smallest(tracer: Tracer, point: Point, start: tuple[Array, Array] | None = N
     Parameters
     ----------
     tracer
-        The :class:`~skfem_ancf.solvers.continuation.Tracer`.
+        The :class:`~skfem_ancf.solvers.tracing.Tracer`.
     point
         Where the tangent stiffness is taken.
     start
