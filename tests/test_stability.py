@@ -16,7 +16,7 @@ from skfem_ancf.equations import constraints
 from skfem_ancf.core.linalg import dense
 from skfem_ancf.core.linalg import BandMatrix, Inertia
 from skfem_ancf.results.state import State
-from skfem_ancf.solvers.stability import Verdict
+from skfem_ancf.equations.stability import Verdict
 
 ELEMENTS = (ElementBeamANCF(2), ElementBeamCable(3), ElementBeamCable(5), ElementBeamANCFCubic(2))
 SUPPORTS = ("clamped", "pinned", "weld", "hinge", "slider")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..solvers.stability import position_weights
+from ..equations.stability import position_weights
 from .base import Motion, contacts_of
 from .integrator import Integrator, StepFailed
 

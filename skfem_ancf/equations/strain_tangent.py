@@ -24,7 +24,6 @@ from ..core.kept import twin_of
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-    from .system import System
     from ..core.types import Array
 
 #: Corrections of a solution; relative size of one that is the last, and of one that may be.
@@ -53,7 +52,7 @@ class StrainTangent:
         (m,).
     """
 
-    def __init__(self, system: System, u: Array, load: float, t: float | None,
+    def __init__(self, system: Any, u: Array, load: float, t: float | None,
                  multipliers: Array) -> None:
         self.system, self.free = system, np.nonzero(system.free)[0]
         self._at = u, load, t, load if t is None else t
@@ -286,7 +285,7 @@ def is_symmetric(S: csr_matrix, sizes: Array) -> bool:
     return not gap.nnz or bool(gap.max() <= 1e-12 * abs(S).max())
 
 
-def load_stiffness(system: System, u: Array, load: float, t: float | None = None) -> csr_matrix:
+def load_stiffness(system: Any, u: Array, load: float, t: float | None = None) -> csr_matrix:
     """Minus the derivative of the loads by the coordinates.
 
     Parameters

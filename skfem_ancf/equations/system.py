@@ -12,7 +12,6 @@ from scipy import sparse
 from scipy.linalg import lapack
 from scipy.sparse.linalg import splu
 
-from ..solvers import eigen
 from ..core.band import factorize, fix
 from .bordered import BorderedMatrix, gives_way
 from .condensation import Condensed
@@ -32,7 +31,6 @@ from ..mesh.mesh_beam import reach
 from ..core.pickling import functions_of, require_picklable
 from ..recovery.points import Points
 from .signature import determinant_sign, inertia_of, null_basis, row_sizes
-from ..results.state import State
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -91,15 +89,20 @@ class System:
         Force elements, already bound.
     bodies
         Rigid bodies, whose coordinates come behind those of the beams.
+    rest_modes
+        ``rest_modes(system, k)`` returns k angular frequencies above those of rigid motions about
+        the reference configuration, and their shapes (k, N); modal damping asks for them.
     """
 
     def __init__(self, beams: Sequence[Beam], loads: Sequence[Load], fixed: Array, values: Array,
                  joints: Sequence[Joint] = (), damping: Damping | None = None,
                  elements: Sequence[ForceElement] = (),
-                 bodies: Sequence[RigidBody] = ()) -> None:
+                 bodies: Sequence[RigidBody] = (),
+                 rest_modes: Callable[[System, int], tuple[Array, Array]] | None = None) -> None:
         self._given: tuple[Any, ...] = (
             tuple(beams), tuple(loads), fixed, values, tuple(joints), damping, tuple(elements),
-            tuple(bodies))
+            tuple(bodies), rest_modes)
+        self._rest_modes = rest_modes
         self.beams, self.bodies, self.loads = list(beams), list(bodies), list(loads)
         self.members: list[Beam | RigidBody] = [*beams, *bodies]
         offsets = list(accumulate((b.N for b in self.members), initial=0))
@@ -404,14 +407,11 @@ class System:
     def damped_modes(self) -> Array:
         """Rows (k, N): what resists v by damped modes is their product with that of rows and v."""
         ratios = self.damping.modal
-        if not ratios.any():
+        if not ratios.any() or self._rest_modes is None:
             return np.zeros((0, self.N))
-        rest = State(self, np.zeros(self.N), load=0.0)
-        rigid = len(self.free_rigid_motions())  # they have no ratio, and are not counted
-        modes = eigen.modes(self, rest, rigid + len(ratios))
-        weights = np.sqrt(2.0 * ratios * np.maximum(modes.frequencies[rigid:], 0.0))
-        rows = np.array([c * self.mass.multiply(shape)
-                         for c, shape in zip(weights, modes.shapes[rigid:])])
+        frequencies, shapes = self._rest_modes(self, len(ratios))
+        weights = np.sqrt(2.0 * ratios * np.maximum(frequencies, 0.0))
+        rows = np.array([c * self.mass.multiply(shape) for c, shape in zip(weights, shapes)])
         return np.ascontiguousarray(rows[weights > 0.0])
 
     def _evaluate(self, what, u, v=None, load=1.0, t=None, stresses=None, carried=None,

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from ..actions.obstacles.contact import Contact
     from ..recovery.recovered import Recovery
     from ..beam.rigid import RigidBody
-    from ..solvers.stability import Verdict
+    from ..equations.stability import Verdict
     from ..equations.system import System
     from ..core.types import Array, Place, StrPath
     from ..beam.layout import WhichBeam, WhichMember
@@ -203,10 +203,10 @@ class State(Frozen):
     @property
     def verdict(self) -> Verdict | None:
         """What the tangent says of an equilibrium: a
-        :class:`~skfem_ancf.solvers.stability.Verdict`; None for an instant of a motion, and for a
+        :class:`~skfem_ancf.equations.stability.Verdict`; None for an instant of a motion, and for a
         linear solution: ``scene.buckling()`` tells up to which load that is stable.
         """
-        from ..solvers.stability import verdict
+        from ..equations.stability import verdict
 
         if self._verdict is None and self.t is None and self.base is None:
             with self.contact_memory():

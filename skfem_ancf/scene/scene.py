@@ -1256,7 +1256,8 @@ class Scene:
                 loads = [bound for _, _, bound in self._loads] + self._weights()
                 self._system = System(self._beams, loads, fixed, values,
                                       [bound for _, bound in self._joints], self._damping,
-                                      [bound for _, bound in self._elements], self._bodies)
+                                      [bound for _, bound in self._elements], self._bodies,
+                                      eigen.rest_modes)
             return self._system
 
     def _weights(self):

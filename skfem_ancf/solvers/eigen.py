@@ -18,6 +18,7 @@ from ..results.state import State
 from ..equations.strain_tangent import Inverse, StrainTangent, is_symmetric
 
 if TYPE_CHECKING:
+    from ..core.types import Array
     from ..equations.system import System
 
 DENSE = 600  # free coordinates up to which the dense solver is used
@@ -214,6 +215,26 @@ def _modes(system, state, k):
         np.sign(values.real) * np.sqrt(np.abs(values.real)))
     _warn_of_turning(state, np.abs(values), ROUND_OFF**2 * _bending_eigenvalue(system))
     return Modes(frequencies, shapes, state, values.astype(complex))
+
+
+def rest_modes(system: System, k: int) -> tuple[Array, Array]:
+    """Angular frequencies and shapes about the reference configuration, rigid motions left out.
+
+    Parameters
+    ----------
+    system
+        A :class:`~skfem_ancf.equations.system.System`.
+    k
+        How many.
+
+    Returns
+    -------
+    frequencies, shapes
+        Shapes (k,) and (k, N).
+    """
+    rigid = len(system.free_rigid_motions())
+    found = modes(system, State(system, np.zeros(system.N), load=0.0), rigid + k)
+    return found.frequencies[rigid:], found.shapes[rigid:]
 
 
 def _warn_of_turning(state, values, rigid):

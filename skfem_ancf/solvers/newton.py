@@ -14,7 +14,7 @@ from ..core.linalg import INACCURATE, NO_FACTORS
 from ..core.callbacks import handle_of
 from ..core.progress import progress_bar
 from ..core.switch import expecting
-from . import stability
+from ..equations import stability
 from .iteration import (CONVERGED, FIRST, NOT_CONVERGED, NOT_FINITE, SINGULAR, WATCHED, Rules,
                         Target, Unknowns, equilibrium, room_for_iterations)
 from .strategies import HELD_BY_LOADS, STRATEGIES, Strategy
@@ -257,7 +257,7 @@ def solve_static(system: System, u: Array | None = None, method: str = "auto", t
     stable
         Take no unstable equilibrium: a step that lands on one is cut, and where the path itself
         loses its stability the solution goes on along the direction that gives way, see
-        :func:`~skfem_ancf.solvers.stability.descend`. False takes any.
+        :func:`~skfem_ancf.equations.stability.descend`. False takes any.
     memory
         What load steps had left behind at obstacles, at the displacement ``u``; shape (n,).
 

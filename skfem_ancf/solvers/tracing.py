@@ -9,7 +9,7 @@ import numpy as np
 from ..core.linalg import NO_FACTORS
 from .iteration import CLOSED, reference_work, settled
 from .newton import rules_of
-from .stability import position_weights
+from ..equations.stability import position_weights
 
 if TYPE_CHECKING:
     from ..core.types import Array

@@ -16,7 +16,6 @@ from ..core.linalg import NO_FACTORS, Inertia
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ..equations.system import System
     from ..core.types import Array
 
 logger = logging.getLogger(__name__)
@@ -78,7 +77,7 @@ FOLLOWS = "against divergence: the loads have no potential, and flutter is not s
 RUBS = "with friction as it is, sticking or slipping: it has no potential, and flutter is not seen"
 
 
-def verdict(system: System, u: Array, load: float, multipliers: Array,
+def verdict(system: Any, u: Array, load: float, multipliers: Array,
             t: float | None = None) -> Verdict:
     """The :class:`Verdict` on an equilibrium, from the tangent there.
 
@@ -104,7 +103,7 @@ def verdict(system: System, u: Array, load: float, multipliers: Array,
         return Verdict("singular", 0)
 
 
-def verdict_of_factors(system: System) -> Verdict:
+def verdict_of_factors(system: Any) -> Verdict:
     """As :func:`verdict`, from the tangent that has been factorised."""
     negative, singular = system.inertia()
     rubs = system.forces.contacts.anchored
@@ -125,7 +124,7 @@ def _is_symmetric(system):
     return skew <= ROUND_OFF * size
 
 
-def has_potential(system: System, u: Array, load: float) -> bool:
+def has_potential(system: Any, u: Array, load: float) -> bool:
     """True if the tangent is symmetric: the loads have a potential, or act like such.
 
     Parameters
@@ -144,7 +143,7 @@ def has_potential(system: System, u: Array, load: float) -> bool:
     return _is_symmetric(system)
 
 
-def holds(system: System, u: Array, load: float, multipliers: Array, t: float | None) -> bool:
+def holds(system: Any, u: Array, load: float, multipliers: Array, t: float | None) -> bool:
     """True unless the equilibrium that an iteration has just found is unstable.
 
     The factors of the last iterate mostly answer at little cost; what they do not affirm is asked
@@ -167,7 +166,7 @@ def holds(system: System, u: Array, load: float, multipliers: Array, t: float | 
     return verdict(system, u, load, multipliers, t).stability != "unstable"
 
 
-def is_held(system: System, u: Array, multipliers: Array) -> bool:
+def is_held(system: Any, u: Array, multipliers: Array) -> bool:
     """True if loads or obstacles hold an equilibrium of a scene whose supports leave it free.
 
     Its tangent has to be positive definite, and not by round-off alone.
@@ -192,7 +191,7 @@ def is_held(system: System, u: Array, multipliers: Array) -> bool:
         return False
 
 
-def weak_at_rest(system: System) -> str:
+def weak_at_rest(system: Any) -> str:
     """Why a scene gives way without any load, if its strain energy is to blame; else empty.
 
     A spring may push a scene out of rest, and a way leads down from there. Where a formulation
@@ -217,7 +216,7 @@ def weak_at_rest(system: System) -> str:
             "'continuum' have a positive one; so has a smaller nu or order")
 
 
-def heads_on(system: System, result: Any, u: Array, load: float) -> bool:
+def heads_on(system: Any, result: Any, u: Array, load: float) -> bool:
     """True if the scene moves from the last equilibrium to ``u`` as the load drives it there.
 
     Close to a bifurcation an iteration may jump to the other side. The nodes' displacements are
@@ -250,7 +249,7 @@ def heads_on(system: System, result: Any, u: Array, load: float) -> bool:
     return bool(du @ (position_weights(system) * (u - result.u)) >= 0.0)
 
 
-def gives_way(system: System, result: Any, load: float) -> bool:
+def gives_way(system: Any, result: Any, load: float) -> bool:
     """True if the last equilibrium is close to a limit point.
 
     There the nodes move much more under forces that the stress-free scene withstands.
@@ -302,7 +301,7 @@ class Descent:
         A direction of negative curvature was met.
     """
 
-    def __init__(self, system: System, stride: float = STRIDES[0]) -> None:
+    def __init__(self, system: Any, stride: float = STRIDES[0]) -> None:
         self.system, self.turned = system, False
         self._weights = position_weights(system)
         self._sizes = system.constraints.coordinate_sizes
@@ -431,7 +430,7 @@ class Descent:
         return inverse, values, Y
 
 
-def way_down(system: System, result: Any, load: float, full: float, at: float,
+def way_down(system: Any, result: Any, load: float, full: float, at: float,
              proportional: bool, iterate: Callable[..., Any],
              failed: type[Exception]) -> tuple[Any, bool]:
     """What :func:`descend` finds, or None, and whether it met an unstable tangent.
@@ -465,7 +464,7 @@ def way_down(system: System, result: Any, load: float, full: float, at: float,
     return first
 
 
-def descend(system: System, result: Any, load: float, t: float, iterate: Callable[..., Any],
+def descend(system: Any, result: Any, load: float, t: float, iterate: Callable[..., Any],
             descent: Descent, failed: type[Exception]) -> tuple[Array, Array, Array]:
     """A stable equilibrium at a load where the path from the last one has lost its stability.
 
@@ -519,7 +518,7 @@ def _side(system, descent, v, u, last, load):
     return 1.0 if v[np.argmax(np.abs(v) > 0.5 * np.max(np.abs(v)))] > 0 else -1.0
 
 
-def potential(system: System, u: Array, load: float, turned: Array | None = None) -> float:
+def potential(system: Any, u: Array, load: float, turned: Array | None = None) -> float:
     """The total potential: strain energy less the work of the loads.
 
     Parameters
@@ -536,7 +535,7 @@ def potential(system: System, u: Array, load: float, turned: Array | None = None
     return system.strain_energy(u, load) + load * system.load_potential(u, turned=turned)
 
 
-def position_weights(system: System) -> Array:
+def position_weights(system: Any) -> Array:
     """One at the positions of the nodes, zero at other coordinates, shape (N,)."""
     weights = np.zeros(system.N)
     for beam, s in zip(system.members, system.slices):
