@@ -10,7 +10,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         ElementBeamPatelShabana, InputError, MeshBeam, MeshError, NameUnknown,
                         Scene, StVenantKirchhoff)
 from skfem_ancf.mesh import location as finder
-from skfem_ancf.recovery.points import as_points
+from skfem_ancf.beam.points import as_points
 
 STEEL = StVenantKirchhoff(E=1e6, nu=0.3, density=10.0)
 LINE = MeshBeam.init_line([0, 0.3, 1.0], height=0.1)

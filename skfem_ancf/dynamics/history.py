@@ -11,7 +11,7 @@ import numpy as np
 from ..core.errors import InputError, require_finite, require_index, require_path, shown, teaching
 from ..actions.forces.turns import Turns
 from ..core.kept import cached_property
-from ..recovery.points import require_body
+from ..beam.points import require_body
 from ..recovery.resultants import over_time
 from ..results.state import Reaction, State
 from .base import Motion, contacts_of

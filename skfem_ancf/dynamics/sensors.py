@@ -17,7 +17,7 @@ from .base import recalled
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from ..recovery.points import Located
+    from ..beam.points import Located
     from ..results.state import State
     from ..equations.system import System
     from ..core.types import Array

@@ -29,7 +29,7 @@ from ..core.linalg import INACCURATE, NO_FACTORS, BandMatrix, Inertia, dense
 from .backend import Machine
 from ..mesh.mesh_beam import reach
 from ..core.pickling import functions_of, require_picklable
-from ..recovery.points import Points
+from ..beam.points import Points
 from .signature import determinant_sign, inertia_of, null_basis, row_sizes
 
 if TYPE_CHECKING:
@@ -174,7 +174,7 @@ class System:
 
     @cached_property
     def points(self) -> Points:
-        """What finds material points, a :class:`~skfem_ancf.recovery.points.Points`."""
+        """What finds material points, a :class:`~skfem_ancf.beam.points.Points`."""
         frame = self.constraints.frame
         return Points(self.beams, self.slices, self.bodies, None if frame is None else frame.lines)
 

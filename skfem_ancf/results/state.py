@@ -16,7 +16,7 @@ from ..core.frozen import Frozen
 from ..core.kept import cached_property
 from ..core.linear import first_order, step
 from ..beam.interpolation import Part
-from ..recovery.points import require_body
+from ..beam.points import require_body
 from ..recovery.recovered import actions, recover
 from ..recovery.resultants import Resultants, resultants
 from ..recovery.section_forces import NotRecovered

@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..beam.layout import select_beam, select_member
+from .layout import select_beam, select_member
 from ..core.errors import InputError, MeshError, require_finite, require_integer, shown
 from ..core.kept import cached_property
-from ..beam.interpolation import BodyPart, Part
+from .interpolation import BodyPart, Part
 from ..mesh.places import as_point
-from ..beam.rigid import RigidBody
+from .rigid import RigidBody
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..beam.beam import Beam
+    from .beam import Beam
     from ..mesh.mesh_beam import MeshBeam
     from ..core.types import Array
-    from ..beam.layout import WhichMember
+    from .layout import WhichMember
 
 
 def is_many(points: Any) -> bool:
