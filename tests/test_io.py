@@ -13,7 +13,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         StVenantKirchhoff)
 from skfem_ancf.io import PvdWriter, body_fields, save_vtu
 from skfem_ancf.io import vtu
-from skfem_ancf.io.vtu import grid, lagrange_cell, quads
+from skfem_ancf.recovery.grids import grid, lagrange_cell, quads
 from skfem_ancf.materials import Material
 from skfem_ancf.results.state import State
 

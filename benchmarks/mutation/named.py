@@ -151,7 +151,7 @@ NAMED = [
      "shift, small = 0.0,",
      "test_modes.py::test_free_beam_has_three_zero_modes"),
     ("files: the list written in place", "io/pvd.py",
-     "with replacing(self.path) as temporary:",
+     "with output_file(self.path) as temporary:",
      "for temporary in [self.path]:",
      "test_an_interrupted_series_keeps_its_list"),
     ("locate: all points on the axis", "finder.py",

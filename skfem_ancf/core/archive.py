@@ -8,18 +8,18 @@ import zipfile
 from contextlib import contextmanager, suppress
 from io import BytesIO
 from math import prod
+from pathlib import Path
 from secrets import token_hex
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import MissingExtra
+from .errors import FileError, MissingExtra
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
-    from pathlib import Path
 
-    from .types import Array, ArrayLike
+    from .types import Array, ArrayLike, StrPath
 
 #: Letters of a name that the one of a new file beside it has, at most: names may have 255.
 STEM = 100
@@ -170,6 +170,29 @@ def replacing(path: Path, durable: bool = False) -> Iterator[Path]:
         with suppress(OSError):
             new.unlink()
         raise
+
+
+@contextmanager
+def output_file(path: StrPath) -> Iterator[Path]:
+    """As :func:`replacing`, of any file: makes the folder, and raises FileError.
+
+    Parameters
+    ----------
+    path
+        Where the file goes.
+    """
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot make the folder {str(path.parent)!r}: {error}") from error
+    try:
+        with replacing(path) as new:
+            yield new
+    except FileError:
+        raise
+    except OSError as error:
+        raise FileError(f"cannot write {str(path)!r}: {error}") from error
 
 
 def new_file(path: Path) -> Path:

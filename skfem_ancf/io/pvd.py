@@ -9,7 +9,8 @@ from xml.sax.saxutils import quoteattr
 from ..core.errors import require_options, require_path, require_text, teaching
 from ..recovery.fields import find_fields
 from ..actions.obstacles.pictures import obstacles_of
-from .vtu import replacing, require_next, save_frame
+from ..core.archive import output_file
+from .vtu import require_next, save_frame
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -130,7 +131,7 @@ class PvdWriter:
         return frame
 
     def _list(self):
-        with replacing(self.path) as temporary:
+        with output_file(self.path) as temporary:
             temporary.write_text("\n".join(
                 ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">',
                  "<Collection>", *self._rows, "</Collection>", "</VTKFile>", ""]), encoding="utf-8")

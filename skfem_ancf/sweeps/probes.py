@@ -9,7 +9,6 @@ from ..core.errors import InputError, require_label, require_option, shown
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ..scene.scene import Scene
 
 #: What is read of material points by its name.
 WHAT = ("displacement", "position")
@@ -33,14 +32,14 @@ class Probes:
             _require_probe(name, probe)
         self._probes = named
 
-    def __call__(self, scene: Scene) -> dict[str, Any]:
+    def __call__(self, scene: Any) -> dict[str, Any]:
         """Values by name, of the scene's static equilibrium."""
         state = scene.solve_static()
         return {name: probe(state) if callable(probe) else getattr(state, probe[0])(*probe[1:])
                 for name, probe in self._probes.items()}
 
 
-def measured(measure: Any) -> Callable[[Scene], Any]:
+def measured(measure: Any) -> Callable[[Any], Any]:
     """The function of a scene that a measure is.
 
     Parameters

@@ -9,7 +9,7 @@ import numpy as np
 from ..core.errors import (FileError, InputError, MissingExtra, require_flag, require_integer,
                            require_like, require_option, require_path, require_positive,
                            require_text, taught)
-from ..io.vtu import replacing
+from ..core.archive import output_file
 from .matplotlib import colormap, figure_class, triangulation
 from .pyvista import dressed, lines_of, new_plotter, pixels
 from .scenery import GHOST, INK, MUTED, RIGID, WALL, Scenery
@@ -89,7 +89,7 @@ def animate(history: Instants, filename: StrPath, field: Any = "eps_yy", *,
                       recover)
     draw = _by_pyvista if backend == "pyvista" else _by_matplotlib
     images = draw(scenery, history.t[chosen], size, undeformed, cmap, unit)
-    with replacing(path) as temporary:
+    with output_file(path) as temporary:
         (_gif if path.suffix.lower() == ".gif" else _mp4)(
             temporary, images, fps, _colours(scenery, cmap))
     return path

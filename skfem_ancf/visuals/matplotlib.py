@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.errors import (InputError, MissingExtra, require_flag, require_integer, require_like,
                            require_option, require_path, require_positive, require_text, taught)
-from ..io.vtu import replacing
+from ..core.archive import output_file
 from ..actions.obstacles.pictures import AROUND, around, outlines
 from .scenery import GHOST, INK, MUTED, RIGID, WALL, Scenery, cells_of
 
@@ -296,7 +296,7 @@ def save(ax: Any, filename: Any, **options: Any) -> None:
         Those of matplotlib's ``savefig``.
     """
     if filename is not None:
-        with replacing(filename) as temporary:
+        with output_file(filename) as temporary:
             ax.figure.savefig(temporary, **options)
 
 

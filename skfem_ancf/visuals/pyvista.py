@@ -12,7 +12,8 @@ from ..core.errors import (InputError, MissingExtra, require_flag, require_index
                            require_like, require_options, require_path, require_text, shown, taught,
                            teaching)
 from ..recovery.fields import FIELDS, find_fields, values_on_grid
-from ..io.vtu import in_space, lagrange_cell, layout, replacing, subdivision
+from ..core.archive import output_file
+from ..recovery.grids import in_space, lagrange_cell, layout, subdivision
 from ..actions.obstacles.pictures import around, outlines
 from .matplotlib import colormap
 from .scenery import RIGID, WALL, Scenery, outline_points
@@ -352,7 +353,7 @@ def view(state: Configuration, field: Any = "eps_yy", plotter: Any = None, *,
         plotter = new_plotter(pv, off_screen if path is None else True, window_size)
     dressed(scenery, plotter, cmap, require_flag("undeformed", undeformed), unit)
     if path is not None:
-        with replacing(path) as temporary:
+        with output_file(path) as temporary:
             plotter.screenshot(str(temporary))
     return plotter
 

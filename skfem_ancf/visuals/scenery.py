@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.errors import InputError, require_finite_scalar, require_flag, require_positive, shown
 from ..recovery.fields import DRAWN, Field, find_field, values_on_grid
-from ..io.vtu import in_space, layout, subdivision
+from ..recovery.grids import in_space, layout, subdivision
 from ..core.linear import first_order
 from ..core.kept import cached_property
 from ..actions.obstacles.pictures import around, obstacles_of, outlines
