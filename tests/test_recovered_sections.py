@@ -11,7 +11,7 @@ from skfem_ancf import (Beam, ElementBeamANCF, ElementBeamANCFCubic, ElementBeam
                         NeoHookean, Scene, Section)
 from skfem_ancf.materials.damping import KelvinVoigt
 from skfem_ancf.recovery.intervals import Panels
-from skfem_ancf.sections.base import slab_of
+from skfem_ancf.sections.section import slab_of
 from skfem_ancf.sections.measure import Uniform
 
 T = Section.profile("T", width=0.06, web=0.01, flange=0.015)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..core.archive import output_file
-from ..core.errors import (InputError, require_finite_scalar, require_flag,
-                           require_like, require_option, require_path, taught)
+from ..core.errors import (InputError, require_finite_scalar, require_flag, require_like,
+                           require_option, require_path, taught)
 from ..recovery.fields import find_fields, values_on_grid
 from ..actions.obstacles.pictures import around, outlines
 from ..recovery.grids import in_space, lagrange_cell, layout, subdivision

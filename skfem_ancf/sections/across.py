@@ -14,7 +14,7 @@ from ..core.errors import InputError
 from ..core.frozen import Frozen
 from ..core.kept import cached_property
 from ..core.quadrature import gauss
-from .base import Rectangle
+from .section import Rectangle
 from .jumps import BEND, KINK, jumps
 from .measure import measure_of
 from .shear import shear_factor
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..materials import Material
     from ..mesh.mesh_beam import MeshBeam
     from ..core.types import Array, Rule
-    from .base import Section, Slab
+    from .section import Section, Slab
 
 #: Points across a slab for areas and moments.
 POINTS = 4
@@ -68,7 +68,7 @@ class Across(Frozen):
     Attributes
     ----------
     slabs
-        The parts of the section, a tuple of :class:`~skfem_ancf.sections.base.Slab`.
+        The parts of the section, a tuple of :class:`~skfem_ancf.sections.section.Slab`.
     plain, simple : bool
         A rectangle of one width and one material; and that on a mesh of one height.
     constant, uniform : bool

@@ -12,7 +12,7 @@ from ..core.quadrature import gauss, lagrange
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from .base import Slab
+    from .section import Slab
 
 #: Points in each piece of a section.
 POINTS = 24

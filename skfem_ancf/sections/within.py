@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ..core.errors import InputError
-from .base import asked
+from .section import asked
 
 if TYPE_CHECKING:
     from ..core.types import Array
-    from .base import Slab
+    from .section import Slab
 
 #: What messages call the functions of a slab.
 NAMES = {"width": "width", "grade": "E", "density": "density"}
