@@ -16,7 +16,7 @@ from .actions.obstacles import Circle, Line, Polygon, SignedDistance
 from .beam.rigid import RigidBody
 from .scene.scene import Scene
 from .sections import Section
-from .sweeps.sweep import sweep
+from .sweeps.parameter_sweep import sweep
 
 __version__ = "0.1.0"
 

@@ -140,16 +140,16 @@ def test_an_interrupted_sweep_goes_on(tmp_path):
 KILLED = """
 import os, signal
 import numpy as np
-import skfem_ancf.sweeps
+import skfem_ancf.sweeps.parameter_sweep as sweeps
 
-skfem_ancf.sweeps._SECONDS = skfem_ancf.sweeps._RARER = 0.0
+sweeps._SECONDS = sweeps._RARER = 0.0
 
 def measure(x):
     if x == 3.0:
         os.kill(os.getpid(), signal.SIGKILL)
     return x**0.5
 
-skfem_ancf.sweep(lambda x: x, {"x": np.arange(6.0)}, measure, path="roots.npz")
+sweeps.sweep(lambda x: x, {"x": np.arange(6.0)}, measure, path="roots.npz")
 """
 
 
@@ -202,8 +202,8 @@ def test_a_damaged_file_is_said(tmp_path):
 
 
 def test_the_file_is_written_as_results_come(tmp_path, monkeypatch):
-    monkeypatch.setattr("skfem_ancf.sweeps._SECONDS", 0.0)
-    monkeypatch.setattr("skfem_ancf.sweeps._RARER", 0.0)
+    monkeypatch.setattr("skfem_ancf.sweeps.parameter_sweep._SECONDS", 0.0)
+    monkeypatch.setattr("skfem_ancf.sweeps.parameter_sweep._RARER", 0.0)
     path, seen = tmp_path / "roots.npz", []
 
     def measure(x):
@@ -221,8 +221,8 @@ def test_a_file_that_cannot_be_written_loses_nothing(tmp_path, monkeypatch):
     with pytest.raises(FileError, match="cannot be written"):
         sweep(just, {"x": [1.0, 2.0]}, asked.append, path=tmp_path / "none" / "roots.npz")
     assert not asked
-    monkeypatch.setattr("skfem_ancf.sweeps._SECONDS", 0.0)
-    monkeypatch.setattr("skfem_ancf.sweeps._RARER", 0.0)
+    monkeypatch.setattr("skfem_ancf.sweeps.parameter_sweep._SECONDS", 0.0)
+    monkeypatch.setattr("skfem_ancf.sweeps.parameter_sweep._RARER", 0.0)
     folder = tmp_path / "some"
     folder.mkdir()
 

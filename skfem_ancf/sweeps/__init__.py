@@ -1,6 +1,6 @@
 """Many scenes, solved side by side."""
 
 from .members import Failure, Sweep
-from .sweep import sweep
+from .parameter_sweep import sweep
 
 __all__ = ["Failure", "Sweep", "sweep"]
