@@ -28,6 +28,8 @@ SPARE = 6
 LOST = 1e-13
 #: ``top`` of a matrix in two halves.
 HALVES = -1
+#: Rest of an equation of joints beside the others, of the square of its size, that is round-off.
+REPEATED = 1e-13
 
 
 @by_place
@@ -146,6 +148,43 @@ def dense_solve(A, b):
 
 
 @primitive("factors")
+def solve_dependent(S, b):
+    """Solve in place of b, a vector, equations of which some may repeat others.
+
+    S, shape (m, m), is scaled to a unit diagonal and eliminated with complete pivots up to those
+    that are round-off: what is left is held by the other equations, up to what b does not say. Of
+    all solutions b becomes the smallest in that scale. False if S is not finite or zero.
+    """
+    m, size = b.size, np.abs(np.diagonal(S)).copy()
+    size[size == 0.0] = 1.0
+    size = np.sqrt(size)
+    A, y, order, rank = S / (size[:, None] * size), b / size, np.arange(m), m
+    for j in range(m):
+        left = np.abs(A[j:, j:])
+        p, q = np.unravel_index(left.argmax(), left.shape)
+        pivot = left[p, q]
+        if not pivot < np.inf or j == 0 and pivot <= REPEATED:
+            return False
+        if pivot <= REPEATED:
+            rank = j
+            break
+        A[[j, j + p]], y[[j, j + p]] = A[[j + p, j]], y[[j + p, j]]
+        A[:, [j, j + q]], order[[j, j + q]] = A[:, [j + q, j]], order[[j + q, j]]
+        c = A[j + 1:, j] / A[j, j]
+        A[j + 1:, j:] -= np.outer(c, A[j, j:])
+        y[j + 1:] -= c * y[j]
+    x, free = np.zeros((m, m - rank + 1)), m - rank
+    x[:rank, free], x[:rank, :free], x[rank:, :free] = y[:rank], -A[:rank, rank:], np.eye(free)
+    x[:rank] = np.linalg.solve(np.triu(A[:rank, :rank]), x[:rank])
+    for k in range(free):  # away from what changes nothing
+        one = x[:, k] / np.sqrt(x[:, k] @ x[:, k])
+        x[:, k + 1:] -= np.outer(one, one @ x[:, k + 1:])
+    b[order] = x[:, free]
+    b /= size
+    return True
+
+
+@primitive("factors")
 def subtract_rows(J, x, out):
     """out -= J^T x."""
     out -= x @ J
@@ -173,13 +212,13 @@ def solve_joined(A, J, J1, free, anew, Y, S, b, x):
     Returns
     -------
     bool
-        False if S is singular.
+        False if S is not finite, or zero: equations that repeat others are met by these.
     """
     if anew:
         solve_many(A, J * free, Y)
     np.dot(J1, Y.T, out=S)
     b += J1 @ x
-    if not dense_solve(S, b):
+    if not solve_dependent(S, b):
         return False
     x -= b @ Y
     return True

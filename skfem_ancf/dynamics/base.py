@@ -124,6 +124,29 @@ def recalled(memory: dict[str, Any], name: str, shape: tuple[int, ...], kind: st
     return array
 
 
+def interpolate(a: Motion, b: Motion, t: float) -> Motion:
+    """The motion at t between two instants: cubic in the displacement, linear in accelerations.
+
+    Parameters
+    ----------
+    a, b
+        The instants.
+    t
+        The time.
+    """
+    h, s = b.t - a.t, (t - a.t) / (b.t - a.t)
+    du = b.u - a.u
+    u = (a.u + s * s * (3 - 2 * s) * du + h * s * (1 - s) ** 2 * a.v + h * s * s * (s - 1) * b.v)
+    v = (6 * s * (1 - s) / h * du + (1 - s) * (1 - 3 * s) * a.v + s * (3 * s - 2) * b.v)
+
+    def linear(x, y):
+        return (1 - s) * x + s * y
+
+    return Motion(t, u, v, linear(a.acceleration, b.acceleration), a.algorithmic,
+                  linear(a.multipliers, b.multipliers), a.force, a.before, a.memory,
+                  linear(a.dissipated, b.dissipated))
+
+
 class Memories(Sequence):
     """What is kept after each of some steps, made for those that are asked for.
 

@@ -14,10 +14,12 @@ from ..core.errors import (AncfError, CheckpointError, InputError, SupportError,
 from ..core.kept import cached_property, twin_of
 from ..core.linalg import halves
 from ..core.callbacks import handle_of
-from .base import Memories, Motion, Steps, contacts_of, in_steps, kept, recalled, same_scheme
+from .base import (Memories, Motion, Steps, contacts_of, in_steps, interpolate, kept, recalled,
+                   same_scheme)
 from .course import Courses
 from .rates import rates
 from .dampers import Dampers, Rows, solve_rows
+from .energy_momentum import EnergyMomentum
 from .joined import Joined
 from .steps import (BEFORE, COUNT, DISSIPATED, ENERGY, FACTORIZED, FAILURE, FAILURES, READY, STATE,
                     SYMMETRIC, TURNED, Matrices, Rule, factors, mass_factor, room_for_steps, steps)
@@ -32,6 +34,8 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 DEPTH = 6  # how often a step is halved
+#: Lengths of a step past a position in which joints depend on each other, over that to it.
+LEAPS = 1.5, 2.3, 3.7
 #: Steps of a block at most, and numbers that they may store.
 BLOCK, STORED = 256, 2_000_000
 #: Coordinates up to which work arrays are kept for the next motion: there making them takes longer
@@ -417,10 +421,40 @@ class Integrator:
             return self.attempt(y, dt, depth == 0)
         except StepFailed as failure:
             if depth == DEPTH:
+                past = self.leap(y, dt)
+                if past is not None:
+                    return interpolate(y, past, y.t + dt)
                 raise StepFailed(f"{failure}, nor with steps of {dt:.3g}") from None
             logger.info("step of %.3g at t = %.6g halved: %s", dt, y.t, failure)
         self.substeps += 1 if depth else 2
         return self.step(self.step(y, 0.5 * dt, depth + 1), 0.5 * dt, depth + 1)
+
+    def leap(self, y: Motion, dt: float) -> Motion | None:
+        """A longer step, past a position in which joints depend on each other, or None.
+
+        As where all bars of a linkage are in line: steps that end there do not converge, and
+        shorter ones end there too. Collocation takes one direction of each joint for a whole step,
+        and has none near there: it is a step of the energy-momentum scheme then.
+
+        Parameters
+        ----------
+        y, dt
+            Where the motion is, and the size of a step that has failed.
+        """
+        if not self.system.m or self.system.forces.contacts.obstacles:
+            return None
+        other = self if in_steps(self.scheme) else Integrator.lent(self.system, EnergyMomentum(),
+                                                                   None)
+        begin = y
+        if other is not self:
+            other.expect(self.energy)
+            other.limit = self.limit
+            begin = other.start(y.u, y.v, y.t, dt)
+            begin.dissipated = y.dissipated
+        for factor in LEAPS:
+            with suppress(StepFailed):
+                return other.attempt(begin, factor * dt)
+        return None
 
     def attempt(self, y: Motion, dt: float, again: bool = True) -> Motion:
         """One step; raises StepFailed.

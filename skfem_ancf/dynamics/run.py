@@ -12,11 +12,11 @@ import scipy
 
 from ..core.errors import (AncfError, CheckpointError, InputError, ask_number, require_finite,
                            require_finite_scalar, require_positive, shown)
-from .base import Motion, Scheme, contacts_of, recalled
+from .base import Motion, Scheme, contacts_of, interpolate, recalled
 from .budget import Budget
 from .companion import Companion
 from .history import History
-from .integrator import Integrator, StepFailed
+from .integrator import DEPTH, Integrator, StepFailed
 from .sensors import Recorder
 from .stepsize import StepSize
 
@@ -177,6 +177,7 @@ class Run:
         self.longest: int | None = None
         self.until: Callable[[State], float] | None = None
         self.event: float | None = None
+        self._stuck = 0
         self._value: float | None = None
         self.companion: Companion | None = None
         self.budget = Budget(task.t_start, task.span)
@@ -374,10 +375,14 @@ class Run:
         except StepFailed:
             if h < SHORTEST * self.task.span:
                 raise
-            self.size, kept = 0.5 * h, False
+            self.size, kept, self._stuck = 0.5 * h, False, self._stuck + 2
+            past = self.integrator.leap(y, h) if self._stuck >= 2 * DEPTH else None
+            if past is not None and past.t < self._end:
+                new, h, error, kept, self._stuck = past, past.t - y.t, 1.0, True, 0
         if not kept:
             self.rejected += 1
             return
+        self._stuck = max(0, self._stuck - 1)  # steps that fail between others that do not
         if h == left:
             new.t = self._end
         segment = self.segment
@@ -537,29 +542,6 @@ class Run:
 
 def _same(y):
     return y
-
-
-def interpolate(a: Motion, b: Motion, t: float) -> Motion:
-    """The motion at t between two instants: cubic in the displacement, linear in accelerations.
-
-    Parameters
-    ----------
-    a, b
-        The instants.
-    t
-        The time.
-    """
-    h, s = b.t - a.t, (t - a.t) / (b.t - a.t)
-    du = b.u - a.u
-    u = (a.u + s * s * (3 - 2 * s) * du + h * s * (1 - s) ** 2 * a.v + h * s * s * (s - 1) * b.v)
-    v = (6 * s * (1 - s) / h * du + (1 - s) * (1 - 3 * s) * a.v + s * (3 * s - 2) * b.v)
-
-    def linear(x, y):
-        return (1 - s) * x + s * y
-
-    return Motion(t, u, v, linear(a.acceleration, b.acceleration), a.algorithmic,
-                  linear(a.multipliers, b.multipliers), a.force, a.before, a.memory,
-                  linear(a.dissipated, b.dissipated))
 
 
 __all__ = ["Run", "StepFailed", "Task", "interpolate"]

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.band import (SPARE, Band, add_multiple, clear, copy, dense_solve, factorize,
+from ..core.band import (SPARE, Band, add_multiple, clear, copy, factorize,
                          factorize_complex, fix_stored, multiply, solve, solve_complex,
-                         solve_joined)
+                         solve_dependent, solve_joined)
 from ..beam.strain_energy import (add_force_by, add_viscous_stress, body_force, body_gradients,
                                   body_mean_stress, body_mixed, body_stress, body_tangent,
                                   body_tangent_by, carry_by)
@@ -584,7 +584,7 @@ def _join(method, s, w, k, r, q, x, y):
     if b > m:
         _stiffen(w.S, p / s.h, z / s.h, m, r)
     copy(_flat(w.Q[k]), _flat(q))
-    if not dense_solve(q, r):
+    if not solve_dependent(q, r):
         return False
     for a in range(b):
         re, im, f, g = w.Y[2 * k, a], w.Y[2 * k + 1, a], r[a], r[b + a]

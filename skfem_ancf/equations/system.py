@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from scipy import sparse
-from scipy.linalg import lapack
 from scipy.sparse.linalg import splu
 
-from ..core.band import factorize, fix
+from ..core.band import factorize, fix, solve_dependent
 from .bordered import BorderedMatrix, gives_way
 from .condensation import Condensed
 from .constraints import Constraints
@@ -759,13 +758,13 @@ class System:
             return lambda b, rate: (M.solve(b * free), _NONE)
         J = J * self.mask if isinstance(J, np.ndarray) else self.jacobian(u, t)
         Y = M.solve(J.T if isinstance(J, np.ndarray) else dense(J.T))
-        lu, pivots, info = lapack.dgetrf(J @ Y)
-        if info != 0:
-            raise np.linalg.LinAlgError("the joints are not independent in this state")
+        S = J @ Y
 
         def solve(b: Array, rate: Array) -> tuple[Array, Array]:
             x = M.solve(b * free)
-            multipliers = lapack.dgetrs(lu, pivots, J @ x - rate)[0]
+            multipliers = J @ x - rate
+            if not solve_dependent(S.copy(), multipliers):
+                raise np.linalg.LinAlgError("the joints hold nothing in this state")
             return x - Y @ multipliers, multipliers
 
         return solve

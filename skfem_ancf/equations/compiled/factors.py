@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...core.band import LOST, SPARE
+from ...core.band import LOST, REPEATED, SPARE
 from .twin import jit
 from .vectors import eliminate, products, scale, subtract, subtract_columns
 
@@ -267,6 +267,74 @@ def dense_solve(A, b):
 
 
 @jit
+def solve_dependent(S, b):
+    """Solve in place of b, a vector, equations of which some may repeat others."""
+    m = b.size
+    rank, size, order = m, np.empty(m), np.empty(m, np.int64)
+    for j in range(m):
+        size[j], order[j] = np.sqrt(abs(S[j, j])), j
+        if size[j] == 0.0:
+            size[j] = 1.0
+    for i in range(m):
+        b[i] /= size[i]
+        for j in range(m):
+            S[i, j] /= size[i] * size[j]
+    for j in range(m):
+        p, q, pivot = j, j, 0.0
+        for i in range(j, m):
+            for k in range(j, m):
+                if not abs(S[i, k]) < np.inf:
+                    return False
+                if abs(S[i, k]) > pivot:
+                    p, q, pivot = i, k, abs(S[i, k])
+        if pivot <= REPEATED:
+            if j == 0:
+                return False
+            rank = j
+            break
+        for k in range(m):
+            S[j, k], S[p, k] = S[p, k], S[j, k]
+        b[j], b[p] = b[p], b[j]
+        for i in range(m):
+            S[i, j], S[i, q] = S[i, q], S[i, j]
+        order[j], order[q] = order[q], order[j]
+        for i in range(j + 1, m):
+            c = S[i, j] / S[j, j]
+            if c != 0.0:
+                for k in range(j, m):
+                    S[i, k] -= c * S[j, k]
+                b[i] -= c * b[j]
+    free = m - rank
+    x = np.zeros((free + 1, m))
+    for k in range(free):
+        x[k, rank + k] = 1.0
+        for i in range(rank):
+            x[k, i] = -S[i, rank + k]
+    for i in range(rank):
+        x[free, i] = b[i]
+    for k in range(free + 1):
+        for i in range(rank - 1, -1, -1):
+            for j in range(i + 1, rank):
+                x[k, i] -= S[i, j] * x[k, j]
+            x[k, i] /= S[i, i]
+    for k in range(free):
+        square = 0.0
+        for i in range(m):
+            square += x[k, i] * x[k, i]
+        for l in range(k + 1, free + 1):
+            c = 0.0
+            for i in range(m):
+                c += x[k, i] * x[l, i]
+            for i in range(m):
+                x[l, i] -= c / square * x[k, i]
+    for i in range(m):
+        b[order[i]] = x[free, i]
+    for i in range(m):
+        b[i] /= size[i]
+    return True
+
+
+@jit
 def subtract_rows(J, x, out):
     """out -= J^T x."""
     for k in range(J.shape[0]):
@@ -290,7 +358,7 @@ def solve_joined(A, J, J1, free, anew, Y, S, b, x):
             S[k, l] = s
         for i in range(x.size):
             b[k] += J1[k, i] * x[i]
-    if not dense_solve(S, b):
+    if not solve_dependent(S, b):
         return False
     subtract_rows(Y, b, x)
     return True

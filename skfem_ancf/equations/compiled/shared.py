@@ -65,6 +65,7 @@ GROUPS = {
         Call(band.factorize, (Band,), bool),
         Call(band.solve, (Band, F1)),
         Call(band.dense_solve, (F2, F1), bool),
+        Call(band.solve_dependent, (F2, F1), bool),
         Call(band.fix, (Band, I1))),
     "kernels": (
         Call(base.load, (I1, I1, int, F1, F3)),
