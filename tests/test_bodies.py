@@ -915,3 +915,75 @@ def test_a_body_on_a_guide_is_as_stable_as_its_spring(stiffness, stability):
     state = scene.solve_static(stable=False)
     assert_allclose(state.displacement(body), [0, -1 / stiffness], atol=1e-9)
     assert state.stability == stability
+
+
+# linkages through positions in which all bars are in line
+
+def rod(a, b):
+    """A bar of the mass 1 between two points."""
+    a, b = np.array(a), np.array(b)
+    return RigidBody(1.0, np.sum((b - a)**2) / 12, position=tuple(0.5 * (a + b)))
+
+
+def parallelogram(angle):
+    """Crank, coupler and rocker of 1 m, and the base of 1 m."""
+    A = (np.cos(angle), np.sin(angle))
+    B = (1.0 + A[0], A[1])
+    crank, coupler, rocker = rod((0.0, 0.0), A), rod(A, B), rod((1.0, 0.0), B)
+    scene = Scene(crank, coupler, rocker).pin((0, 0), crank).pin((1, 0), rocker)
+    scene.hinge((crank, A), (coupler, A))
+    scene.hinge((coupler, B), (rocker, B))
+    return scene, crank, coupler, rocker
+
+
+def slider_crank(angle):
+    """Crank and rod of 1 m: they fold up where the crank is upright."""
+    A, B = (np.cos(angle), np.sin(angle)), (2.0 * np.cos(angle), 0.0)
+    crank, bar = rod((0.0, 0.0), A), rod(A, B)
+    scene = Scene(crank, bar).pin((0, 0), crank)
+    scene.hinge((crank, A), (bar, A))
+    scene.slider((bar, B), "ground", direction=(1, 0))
+    return scene, crank, bar, B
+
+
+#: Steps that end in the position, close to it, and well beside it.
+STEPS = {"at it": np.pi / 150, "near it": (1 + 1e-9) * np.pi / 150, "beside it": 0.02,
+         "automatic": "auto"}
+
+
+@pytest.mark.parametrize("dt", STEPS.values(), ids=STEPS)
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha", "radau", "auto"])
+@pytest.mark.parametrize("start", [np.pi / 3, np.pi / 2])
+def test_a_driven_parallelogram_passes_its_positions_in_line(start, scheme, dt):
+    scene, crank, coupler, rocker = parallelogram(start)
+    scene.motor(crank, speed=1.0)
+    history = scene.integrate(3.0, dt, scheme=scheme)
+    for body, rate in ((crank, 1.0), (coupler, 0.0), (rocker, 1.0)):
+        assert_allclose(history.angle(body), history.angle(body)[0] + rate * history.t, rtol=0,
+                        atol=1e-5)
+
+
+@pytest.mark.parametrize("dt", [np.pi / 150, 0.02, "auto"])
+@pytest.mark.parametrize("scheme", ["energy-momentum", "radau"])
+def test_a_spun_parallelogram_passes_its_positions_in_line(scheme, dt):
+    scene, crank, coupler, rocker = parallelogram(np.pi / 3)
+    v = np.array([-np.sin(np.pi / 3), np.cos(np.pi / 3)])
+    scene.initial_velocity(lambda x: np.array([-x[1], x[0]]), beam=crank)
+    scene.initial_velocity(lambda x: np.array([-x[1], x[0] - 1.0]), beam=rocker)
+    scene.initial_velocity(tuple(v), beam=coupler)
+    history = scene.integrate(3.0, dt, scheme=scheme)
+    turn = history.angle(rocker) - history.angle(rocker)[0]
+    assert_allclose(turn, history.t, rtol=0, atol=1e-3)
+    assert np.ptp(history.total_energy) < 1e-5 * history.total_energy[0]
+
+
+@pytest.mark.parametrize("dt", STEPS.values(), ids=STEPS)
+@pytest.mark.parametrize("scheme", ["energy-momentum", "generalized-alpha", "radau", "auto"])
+@pytest.mark.parametrize("start", [np.pi / 6, np.pi / 4])
+def test_a_slider_crank_passes_where_it_folds_up(start, scheme, dt):
+    scene, crank, bar, B = slider_crank(start)
+    scene.motor(crank, speed=1.0)
+    history = scene.integrate(2.0, dt, scheme=scheme)
+    x, y = history.position(B, bar).T
+    assert_allclose(x, 2.0 * np.cos(start + history.t), rtol=0, atol=1e-5)
+    assert_allclose(y, 0.0, rtol=0, atol=1e-9)

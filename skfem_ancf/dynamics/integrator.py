@@ -35,7 +35,7 @@ logger = logging.getLogger(__name__)
 
 DEPTH = 6  # how often a step is halved
 #: Lengths of a step past a position in which joints depend on each other, over that to it.
-LEAPS = 1.5, 2.3, 3.7
+LEAPS = 1.5, 2.3, 3.7, 6.1, 11.0, 23.0
 #: Steps of a block at most, and numbers that they may store.
 BLOCK, STORED = 256, 2_000_000
 #: Coordinates up to which work arrays are kept for the next motion: there making them takes longer
