@@ -326,6 +326,19 @@ def test_a_mode_has_the_stress_of_small_vibrations(element):
             -EI * np.pi**3 * size, rel=1e-2)
 
 
+def test_a_mode_of_a_frame_has_reactions_that_carry_its_inertia():
+    frame = Frame.from_lines([(0, 0), (0, 4), (2, 4)], [(0, 1), (1, 2)], height=0.1, width=0.1,
+                             material=STEEL, elements=4).clamp(0)
+    modes = frame.modes(2)
+    for k, a in ((0, 1e-3), (1, 1.0)):
+        mode = modes.mode(k, a)
+        held = mode.reactions(0)
+        total = frame.system.momentum(mode.acceleration)
+        assert_allclose(held.force, total, rtol=0, atol=1e-6 * np.max(np.abs(total)))
+        foot = mode.resultants((0, 1e-4))
+        assert abs(foot.M) == pytest.approx(abs(held.moment), rel=1e-3)
+
+
 def test_a_mode_about_a_loaded_state_adds_to_what_that_has():
     beam = straight(ElementBeamANCF(2), 10, 0.02)
     scene = Scene(beam).clamp("left").clamp("right").line_load((0, -2e4))

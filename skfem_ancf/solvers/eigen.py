@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, eigsh, spsolve
 
 from ..core.band import fix
 from ..core.errors import (ConvergenceError, InputError, ModelWarning, SupportError,
@@ -127,9 +127,22 @@ class Modes:
         amplitude = require_finite_scalar("amplitude", amplitude)
         system, d = self.state.system, amplitude * self.shapes[i].real
         acceleration = -self.eigenvalues[i].real * d
-        return State(system, self.state.u + d, acceleration=acceleration,
-                     inertia=system.mass.multiply(acceleration), load=self.state.load,
-                     message=f"mode {i}", multipliers=self.state.multipliers, base=self.state)
+        inertia = system.mass.multiply(acceleration)
+        return State(system, self.state.u + d, acceleration=acceleration, inertia=inertia,
+                     load=self.state.load, message=f"mode {i}", base=self.state,
+                     multipliers=self.state.multipliers + self._joint_forces(d, inertia))
+
+    def _joint_forces(self, d, inertia):
+        """What a displacement and its inertia change the multipliers of the joints by, (m,)."""
+        state, system = self.state, self.state.system
+        if not system.m:
+            return np.zeros(0)
+        u, load, t = np.array(state.u), state.load, state.load if state.t is None else state.t
+        rest = (system.linear_force(u, d, load) - system.internal_force(u, None, load) + inertia
+                - load * (system.linear_external_force(u, d) - system.external_force(u))
+                + system.curvature(u, t, state.multipliers) @ d)
+        J = system.sparse_jacobian(u, t)[:, system.free].tocsr()
+        return -spsolve((J @ J.T).tocsc(), J @ rest[system.free])
 
 
 @dataclass(repr=False)
