@@ -372,5 +372,24 @@ class Cable(Sections):
         return along * across, along
 
 
+def folded(beam: Any, u: Array) -> bool:
+    """True if the axis of an element turns back: its ends lie against a tangent of the axis.
+
+    An axis that does so turns by more than pi over the element, or has no length in it.
+
+    Parameters
+    ----------
+    beam
+        A :class:`~skfem_ancf.Beam`.
+    u
+        Displacement of its degrees of freedom, shape (N,).
+    """
+    nodes = u.reshape(-1, beam.nd)[:, :4].T
+    x, tangent = beam.mesh.p + nodes[:2], beam.mesh.p_X + nodes[2:]
+    left, right = beam.mesh.t
+    chord = x[:, right] - x[:, left]
+    return bool(min(np.min(np.sum(chord * tangent[:, end], axis=0)) for end in (left, right)) < 0.0)
+
+
 #: Classes by the name that elements give.
 KINEMATICS = {"sections": Sections, "cable": Cable}

@@ -12,7 +12,7 @@ from ..core.errors import (AccuracyWarning, AncfError, ConvergenceError, InputEr
                            require_positive, shown, taught)
 from ..core.progress import progress_bar
 from ..core.switch import expecting
-from ..results.checks import folded
+from ..beam.kinematics import folded
 from .checkpoint import Checkpoint, same_problem
 from .base import contacts_of, in_steps, same_scheme
 from .budget import ENOUGH

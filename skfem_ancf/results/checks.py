@@ -217,25 +217,6 @@ def tangents(beam: Beam, u: Array | float) -> Array:
     return (beam.q0_local + u).reshape(-1, beam.nd)[:, 2:4] @ [1.0, 1.0j]
 
 
-def folded(beam: Beam, u: Array) -> bool:
-    """True if the axis of an element turns back: its ends lie against a tangent of the axis.
-
-    An axis that does so turns by more than pi over the element, or has no length in it.
-
-    Parameters
-    ----------
-    beam
-        A :class:`~skfem_ancf.Beam`.
-    u
-        Displacement of its degrees of freedom, shape (N,).
-    """
-    nodes = u.reshape(-1, beam.nd)[:, :4].T
-    x, tangent = beam.mesh.p + nodes[:2], beam.mesh.p_X + nodes[2:]
-    left, right = beam.mesh.t
-    chord = x[:, right] - x[:, left]
-    return bool(min(np.min(np.sum(chord * tangent[:, end], axis=0)) for end in (left, right)) < 0.0)
-
-
 def turning_limit(beam: Beam) -> float:
     """The angle by which the axis may turn over one element."""
     return TURNING.get(beam.element.axis_degree, TURNING_SMOOTH)

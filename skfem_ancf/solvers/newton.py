@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..beam.kinematics import folded
 from ..core.errors import (ConvergenceError, InputError, Interrupted, require_finite, require_flag,
                            require_integer, require_option, require_positive, taught)
 from ..core.linalg import INACCURATE, NO_FACTORS
@@ -528,7 +529,8 @@ class Search:
         """Raise _Failed unless what is free is held, and no axis turns back within an element."""
         if self.held_by_loads and not stability.is_held(self.system, result.u, result.multipliers):
             raise _Failed("the loads do not hold what the supports leave free")
-        if self.rules.method == "auto" and self.system.screen.folded(result.u):
+        if self.rules.method == "auto" and any(
+                folded(b, result.u[self.system.of(b)]) for b in self.system.beams):
             self.other = self.other or result
             raise _Failed("the axis turns back within an element")
 
